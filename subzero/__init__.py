@@ -1,0 +1,1 @@
+"""Simulate, compare and understand a tethered underwater vehicle."""

@@ -1,0 +1,1 @@
+"""The rigid body in water."""
