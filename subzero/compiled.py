@@ -2,8 +2,9 @@
 
 The one thing that all packages share: a decorator, `compiled`, for functions on plain floats and arrays.
 Numba's on-disk cache notices an edit in the file of a function, but not in another file whose functions it
-inlined, so a cache directory is named by a digest of all our sources: any edit starts a new one. It lies in
-the user's cache directory (``SUBZERO_CACHE_DIR`` moves it), so a read-only installation works too.
+inlined. So the cache directory of a package is named by a digest of all compiled sources that the package can
+see (`SEES`): any edit of those starts a new one. It lies in the user's cache directory (``SUBZERO_CACHE_DIR``
+moves it), so a read-only installation works too.
 
 Setting ``NUMBA_DISABLE_JIT=1`` runs the same code interpreted.
 """
@@ -13,6 +14,7 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -20,35 +22,40 @@ import numba
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
-PACKAGES = ("subzero", "cable", "vehicle")
+SEES = {"cable": ("cable",), "vehicle": ("vehicle",)}
+"""Which packages' compiled functions a package can call; all others (subzero itself, tests) see everything."""
+
+ALL = ("cable", "subzero", "vehicle")
 
 
-def source_digest() -> str:
-    """Return twelve hexadecimal digits that change with any edit of a compiled package."""
+@cache
+def source_digest(packages: tuple[str, ...] = ALL) -> str:
+    """Return twelve hexadecimal digits that change with any edit of a compiled file of these packages."""
     root = Path(__file__).resolve().parent.parent
     digest = hashlib.sha256(numba.__version__.encode())
-    for path in sorted(path for package in PACKAGES for path in (root / package).rglob("*.py")):
-        digest.update(path.read_bytes())
+    for path in sorted(path for package in packages for path in (root / package).rglob("*.py")):
+        source = path.read_bytes()
+        if b"compiled" in source:
+            digest.update(source)
     return digest.hexdigest()[:12]
 
 
-def cache_directory() -> Path:
+@cache
+def cache_directory(package: str = "subzero") -> Path:
     """Return the directory that holds the machine code of these very sources."""
     base = os.environ.get("SUBZERO_CACHE_DIR") or Path(
         os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache", "subzero"
     )
-    return Path(base) / f"numba-{source_digest()}"
+    return Path(base) / f"{package}-{source_digest(SEES.get(package, ALL))}"
 
 
 def is_warm() -> bool:
-    """Say whether this version's kernels have been compiled before on this machine."""
-    return any(CACHE.rglob("*.nbc")) if CACHE.is_dir() else False
-
-
-CACHE = cache_directory()
-numba.config.CACHE_DIR = str(CACHE)
+    """Say whether the coupled loop of this very version has been compiled before on this machine."""
+    return cache_directory().is_dir()
 
 
 def compiled(function: Function) -> Function:
     """Compile a function of plain floats and arrays; strict IEEE arithmetic, so runs repeat to the last bit."""
+    package = function.__module__.partition(".")[0]
+    numba.config.CACHE_DIR = str(cache_directory(package if package in SEES else "subzero"))
     return numba.njit(cache=True, error_model="numpy")(function)
