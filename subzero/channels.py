@@ -1,0 +1,150 @@
+"""The one table of channels: every number that a run gives at every time, by name.
+
+A channel has one name everywhere: in the dataset (`surge_speed`), in a CSV file with its unit behind it
+(`surge_speed_m_s`), in a measured record, a figure, a report. Results carry the *display* unit of this table
+(degrees, rev/s), so what is read from a file is what is seen in a figure; ``scale`` leads there from SI.
+
+Signs: axes are north-east-down for the earth and forward-starboard-down for the body. Depth is positive
+down, heading runs clockwise from north and is continuous (no jump at 360 degrees), a positive rudder
+turns the heading clockwise, positive stern-planes raise the nose. Forces and moments of the cable are
+those *on the vehicle*, and moments are about the hull centre.
+
+To add a channel, add a row here and fill it in `subzero.simulation`; files, records and reports follow.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+DEGREE = 180.0 / math.pi
+REVOLUTION = 1.0
+
+UNITS: dict[str, tuple[str, float]] = {
+    "s": ("s", 1.0),
+    "m": ("m", 1.0),
+    "m/s": ("m_s", 1.0),
+    "degree": ("deg", DEGREE),
+    "degree/s": ("deg_s", DEGREE),
+    "rev/s": ("rps", REVOLUTION),
+    "V": ("V", 1.0),
+    "N": ("N", 1.0),
+    "N m": ("N_m", 1.0),
+    "J": ("J", 1.0),
+}
+"""Display unit → (suffix of the CSV column, display units per unit used inside: SI, but rev/s)."""
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Channel:
+    """One scalar that a run gives at every time.
+
+    Args:
+        name: name in datasets and in the API.
+        unit: display unit, in which results carry it.
+        symbol: symbol of the source, for the axis of a figure (matplotlib mathtext).
+        long_name: what it is, in words, with its sign where there are two.
+    """
+
+    name: str
+    unit: str
+    symbol: str
+    long_name: str
+
+    @property
+    def suffix(self) -> str:
+        """The unit as the end of a column name, such as ``m_s``."""
+        return UNITS[self.unit][0]
+
+    @property
+    def scale(self) -> float:
+        """Display units per inner unit: multiply a number of the simulation by this."""
+        return UNITS[self.unit][1]
+
+    @property
+    def column(self) -> str:
+        """Name of the CSV column, such as ``surge_speed_m_s``."""
+        return f"{self.name}_{self.suffix}"
+
+    @property
+    def attributes(self) -> dict[str, str]:
+        """What a variable of a dataset carries: units, long name, symbol."""
+        return {"units": self.unit, "long_name": self.long_name, "symbol": self.symbol}
+
+
+def _read(table: str) -> tuple[Channel, ...]:
+    """Turn the rows of a table, ``name | unit | symbol | long name``, into channels."""
+    rows = [line for line in table.strip().splitlines() if not line.startswith("#")]
+    cells = [[cell.strip() for cell in row.split("|")] for row in rows]
+    return tuple(
+        Channel(name=name, unit=unit, symbol=sym, long_name=words) for name, unit, sym, words in cells
+    )
+
+
+(TIME,) = _read("time | s | t | time since the start")
+
+CHANNELS: tuple[Channel, ...] = _read(r"""
+# where the vehicle is, and how it lies
+north                         | m        | x           | position, north
+east                          | m        | y           | position, east
+depth                         | m        | z           | depth of the hull centre, positive down
+roll                          | degree   | \phi        | roll angle, positive starboard side down
+pitch                         | degree   | \theta      | pitch angle, positive nose up
+heading                       | degree   | \psi        | heading, clockwise from north, continuous
+# how the hull centre moves, over ground, in body axes
+surge_speed                   | m/s      | u           | forward speed
+sway_speed                    | m/s      | v           | speed to starboard
+heave_speed                   | m/s      | w           | speed along the body's down axis
+roll_rate                     | degree/s | p           | roll rate
+pitch_rate                    | degree/s | q           | pitch rate, positive nose going up
+yaw_rate                      | degree/s | r           | yaw rate, positive to starboard
+speed_over_ground             | m/s      | U_g         | speed over ground, never negative
+# what the actuators do, and what they were told to do
+propeller_speed               | rev/s    | n           | propeller speed
+rudder_angle                  | degree   | \delta_r    | rudder angle, positive turns to starboard
+stern_plane_port_angle        | degree   | \delta_p    | port stern-plane, positive: nose up
+stern_plane_starboard_angle   | degree   | \delta_s    | starboard stern-plane, positive: nose up
+battery_voltage               | V        | U           | battery voltage
+propeller_command             | rev/s    | n_c         | propeller command
+rudder_command                | degree   | \delta_{rc} | rudder command, positive turns to starboard
+stern_plane_port_command      | degree   | \delta_{pc} | port stern-plane command, positive: nose up
+stern_plane_starboard_command | degree   | \delta_{sc} | starboard stern-plane command, likewise
+# the cable, and what it does to the vehicle
+cable_tension                 | N        | T(0)        | cable tension at the tow point
+drum_tension                  | N        | T(S)        | cable tension at the drum
+cable_length                  | m        | S           | length of cable in the water
+cable_force_forward           | N        | F_{cX}      | force of the cable on the vehicle, forward
+cable_force_starboard         | N        | F_{cY}      | force of the cable on the vehicle, to starboard
+cable_force_down              | N        | F_{cZ}      | force of the cable on the vehicle, body's down axis
+cable_moment_roll             | N m      | M_{cX}      | roll moment of the cable, positive to starboard
+cable_moment_pitch            | N m      | M_{cY}      | pitch moment of the cable, positive nose up
+cable_moment_yaw              | N m      | M_{cZ}      | yaw moment of the cable, positive to starboard
+tow_velocity_tangential       | m/s      | V_t         | tow point's speed along the cable (negative: out)
+tow_velocity_normal           | m/s      | V_n         | tow point's speed along the cable's normal
+tow_velocity_binormal         | m/s      | V_b         | tow point's speed along the cable's binormal
+# energy since the start
+energy_propeller_work         | J        | W_p         | work of the propeller on the hull
+energy_hull_loss              | J        | E_h         | energy lost in the water by hull and fins
+energy_cable_loss             | J        | E_c         | energy lost in the water by the cable
+energy_kinetic_change         | J        | \Delta E_k  | change of kinetic and potential energy
+energy_drum                   | J        | E_d         | energy left at the drum
+energy_added_mass_term        | J        | E_m         | energy by the cable's added-mass form
+energy_residual               | J        | E_r         | energy that the balance leaves unexplained
+""")
+
+BY_NAME: dict[str, Channel] = {channel.name: channel for channel in (TIME, *CHANNELS)}
+BY_COLUMN: dict[str, Channel] = {channel.column: channel for channel in (TIME, *CHANNELS)}
+
+
+def column_name(name: str) -> str:
+    """Return the CSV column of a channel: its name with its unit, ``surge_speed`` → ``surge_speed_m_s``.
+
+    Raises:
+        KeyError: if the table has no such channel.
+    """
+    return BY_NAME[name].column
+
+
+def channel_of_column(column: str) -> Channel | None:
+    """Return the channel that a CSV column holds, ``heading_deg`` → heading; None if there is none."""
+    return BY_COLUMN.get(column)
