@@ -1,0 +1,104 @@
+"""Solve a block tridiagonal system with 4×4 blocks, in time and memory proportional to the number of blocks.
+
+    L_j z_{j−1} + D_j z_j + U_j z_{j+1} = r_j,   j = 1 … N
+
+One block holds the four unknowns of a cable segment (tension and the position of its far node). Block Gauss
+elimination from the tow point to the drum, with partial pivoting inside a block. Elimination between blocks
+needs no pivoting: what is eliminated first is the part of the cable between the tow point and a held node, a
+well-posed problem by itself. The first column of every L_j is zero (a node knows its neighbour's position, not
+the tension beyond it), which saves a quarter of the work.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from subzero.compiled import compiled
+
+SIZE = 4
+
+
+@compiled
+def factor_block(D: np.ndarray, pivots: np.ndarray) -> bool:
+    """Factor a 4×4 block in place, P D = L U, rows exchanged for size; return False when it is singular."""
+    for k in range(SIZE):
+        best = k
+        for i in range(k + 1, SIZE):
+            if abs(D[i, k]) > abs(D[best, k]):
+                best = i
+        pivots[k] = best
+        if not abs(D[best, k]) > 0.0:
+            return False
+        if best != k:
+            for c in range(SIZE):
+                D[k, c], D[best, c] = D[best, c], D[k, c]
+        inverse = 1.0 / D[k, k]
+        for i in range(k + 1, SIZE):
+            D[i, k] *= inverse
+            for c in range(k + 1, SIZE):
+                D[i, c] -= D[i, k] * D[k, c]
+    return True
+
+
+@compiled
+def solve_block(D: np.ndarray, pivots: np.ndarray, b: np.ndarray) -> None:
+    """Overwrite the right-hand side b (4,) with the solution of the factored block."""
+    for k in range(SIZE):
+        p = pivots[k]
+        if p != k:
+            b[k], b[p] = b[p], b[k]
+        for i in range(k + 1, SIZE):
+            b[i] -= D[i, k] * b[k]
+    for k in range(SIZE - 1, -1, -1):
+        for c in range(k + 1, SIZE):
+            b[k] -= D[k, c] * b[c]
+        b[k] /= D[k, k]
+
+
+@compiled
+def factor(L: np.ndarray, D: np.ndarray, U: np.ndarray, pivots: np.ndarray, first: int, last: int) -> int:
+    """Factor blocks first … last in place; U_j becomes D_j⁻¹U_j, transposed.
+
+    Returns:
+        0 when done, else the index of the singular block.
+    """
+    for j in range(first, last + 1):
+        if j > first:
+            for row in range(SIZE):
+                for column in range(SIZE):
+                    total = 0.0
+                    for k in range(1, SIZE):
+                        total += L[j, row, k] * U[j - 1, column, k]
+                    D[j, row, column] -= total
+        if not factor_block(D[j], pivots[j]):
+            return j
+        if j < last:
+            _transpose(U[j])
+            for column in range(SIZE):
+                solve_block(D[j], pivots[j], U[j, column])
+    return 0
+
+
+@compiled
+def solve(
+    L: np.ndarray, D: np.ndarray, U: np.ndarray, pivots: np.ndarray, first: int, last: int, r: np.ndarray
+) -> None:
+    """Overwrite r (blocks, 4) with the solution, given what `factor` left."""
+    for j in range(first, last + 1):
+        if j > first:
+            for row in range(SIZE):
+                for k in range(1, SIZE):
+                    r[j, row] -= L[j, row, k] * r[j - 1, k]
+        solve_block(D[j], pivots[j], r[j])
+    for j in range(last - 1, first - 1, -1):
+        for column in range(SIZE):
+            for row in range(SIZE):
+                r[j, row] -= U[j, column, row] * r[j + 1, column]
+
+
+@compiled
+def _transpose(A: np.ndarray) -> None:
+    """Transpose a 4×4 block in place, so that columns are contiguous."""
+    for i in range(SIZE):
+        for k in range(i + 1, SIZE):
+            A[i, k], A[k, i] = A[k, i], A[i, k]

@@ -1,0 +1,148 @@
+"""What a cable and a drum are: values with units, and the plain numbers that compiled code takes.
+
+Symbols are those of Feng & Allen (2004), section 2.2; defaults are their Table 1 and section 4. The drum's
+moment of inertia I_d is not printed there: 0 makes the tension at a frictionless drum exactly zero.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from math import isfinite, sqrt
+from typing import NamedTuple
+
+GRAVITY = 9.81
+"""Gravitational acceleration g, as printed in section 2.2 of the source. [m/s²]"""
+
+
+class CableNumbers(NamedTuple):
+    """The cable as compiled code sees it: m, ρA, w_c, e and the two drag constants ½ρdπC_t and ½ρdC_n."""
+
+    mass: float
+    added_mass: float
+    weight: float
+    compliance: float
+    tangential_drag: float
+    normal_drag: float
+
+
+class DrumNumbers(NamedTuple):
+    """The drum as compiled code sees it, at the cable: I_d/R_d² [kg] and C_f/R_d [N]."""
+
+    inertia: float
+    friction: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class CableProperties:
+    """A thin flexible cable in water; every value per unit length of unstretched cable.
+
+    Attributes:
+        water_density: ρ. [kg/m³]
+        mass_per_length: m. [kg/m]
+        cross_section_area: A, of the unstretched cable. [m²]
+        diameter: d. [m]
+        tangential_drag_coefficient: C_t, on the wetted surface π d. [-]
+        normal_drag_coefficient: C_n, on the projected area d. [-]
+        compliance: e = 1/(E A); 0 is an inextensible cable. [1/N]
+
+    Raises:
+        ValueError: a value that is not a finite number, or not in its physical range.
+    """
+
+    water_density: float = 1000.0
+    mass_per_length: float = 0.0049
+    cross_section_area: float = 4.9e-6
+    diameter: float = 0.0025
+    tangential_drag_coefficient: float = 0.01
+    normal_drag_coefficient: float = 1.0
+    compliance: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be a cable."""
+        positive = ("water_density", "mass_per_length", "cross_section_area", "diameter")
+        _check_range(self, positive, minimum=0.0, inclusive=False)
+        drags = ("tangential_drag_coefficient", "normal_drag_coefficient", "compliance")
+        _check_range(self, drags, minimum=0.0, inclusive=True)
+
+    @property
+    def virtual_mass_per_length(self) -> float:
+        """m1 = m + ρA. [kg/m]."""
+        return self.mass_per_length + self.water_density * self.cross_section_area
+
+    @property
+    def weight_in_water(self) -> float:
+        """w_c = (m − ρA) g, positive for a cable that sinks. [N/m]."""
+        return (self.mass_per_length - self.water_density * self.cross_section_area) * GRAVITY
+
+    @property
+    def tangential_drag(self) -> float:
+        """½ρπdC_t, the drag per metre at 1 m/s along the cable: 0.03927 for Table 1. [N s²/m³]."""
+        pi = 3.141592653589793
+        return 0.5 * self.water_density * pi * self.diameter * self.tangential_drag_coefficient
+
+    @property
+    def normal_drag(self) -> float:
+        """½ρdC_n, the drag per metre at 1 m/s across the cable. [N s²/m³]."""
+        return 0.5 * self.water_density * self.diameter * self.normal_drag_coefficient
+
+    def critical_angle(self, speed: float) -> float:
+        """Angle to the flow φ of a long heavy cable towed at a steady speed: ½ρdC_nU² sin²φ = w_c cosφ. [rad]."""
+        from math import acos
+
+        ratio = abs(self.weight_in_water) / (2.0 * self.normal_drag * speed * speed)
+        return acos(sqrt(1.0 + ratio * ratio) - ratio)
+
+    def numbers(self) -> CableNumbers:
+        """Return the plain numbers that compiled code takes."""
+        return CableNumbers(
+            mass=float(self.mass_per_length),
+            added_mass=float(self.water_density * self.cross_section_area),
+            weight=float(self.weight_in_water),
+            compliance=float(self.compliance),
+            tangential_drag=float(self.tangential_drag),
+            normal_drag=float(self.normal_drag),
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class DrumProperties:
+    """The drum on the shore that the cable is pulled off, equation (11).
+
+    Attributes:
+        radius: R_d. [m]
+        inertia: I_d; acts like an extra towed mass I_d/R_d². [kg m²]
+        friction_torque: C_f, Coulomb friction between drum and pivot, while it turns; when the drum stands it
+            holds the cable up to the tension C_f/R_d. [N m]
+
+    Raises:
+        ValueError: a value that is not a finite number, or not in its physical range.
+    """
+
+    radius: float = 0.1
+    inertia: float = 0.0
+    friction_torque: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be a drum."""
+        _check_range(self, ("radius",), minimum=0.0, inclusive=False)
+        _check_range(self, ("inertia", "friction_torque"), minimum=0.0, inclusive=True)
+
+    def numbers(self) -> DrumNumbers:
+        """Return the plain numbers that compiled code takes."""
+        return DrumNumbers(
+            inertia=float(self.inertia / self.radius**2), friction=float(self.friction_torque / self.radius)
+        )
+
+
+def _check_range(
+    thing: CableProperties | DrumProperties, names: tuple[str, ...], *, minimum: float, inclusive: bool
+) -> None:
+    """Raise a ValueError that names the first field of `names` that is outside its range."""
+    known = {field.name for field in fields(thing)}
+    for name in names:
+        value = getattr(thing, name)
+        fine = isfinite(value) and (value >= minimum if inclusive else value > minimum)
+        if name in known and not fine:
+            allowed = f"{'at least' if inclusive else 'more than'} {minimum:g}"
+            message = f"{type(thing).__name__}: {name} is {value!r}; it must be a finite number, {allowed}."
+            raise ValueError(message)
