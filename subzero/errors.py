@@ -1,0 +1,39 @@
+"""What a user can do wrong, told in one clean message (exit code 2 on the command line).
+
+A message has three parts: *what* was found (file, line or name, value), *why* it cannot be, and *what to do*.
+Only the command line catches `UserError`; anything else that is raised is a bug of ours and keeps its
+traceback. Problems inside scenario files are `scenarios.ScenarioError`, which the command line treats alike.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+SHOWN_PROBLEMS = 12
+"""So many problems of one file are spelt out: enough to repair it, few enough to read on one screen."""
+
+
+class UserError(Exception):
+    """Something in the request or in a file of the user cannot be used; the message says what to do."""
+
+
+def nearest(word: str, allowed: Iterable[str], count: int = 1) -> list[str]:
+    """Return the allowed words most like `word` (case does not matter), best first; none if none is near."""
+    by_lower = {candidate.lower(): candidate for candidate in allowed}
+    close = difflib.get_close_matches(word.lower(), by_lower, n=count, cutoff=0.5)
+    return [by_lower[match] for match in close]
+
+
+def suggestion(word: str, allowed: Iterable[str]) -> str:
+    """Return `` Did you mean 'x'?`` with the nearest allowed word, or nothing if none is near."""
+    close = nearest(word, allowed)
+    return f" Did you mean '{close[0]}'?" if close else ""
+
+
+def listed(title: str, problems: list[str]) -> str:
+    """Return one message that lists all problems of a file, each on its own line."""
+    shown = problems[:SHOWN_PROBLEMS]
+    rest = len(problems) - len(shown)
+    lines = [title, *(f"  {problem}" for problem in shown)]
+    return "\n".join([*lines, f"  ... and {rest} more."] if rest else lines)
