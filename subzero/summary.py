@@ -1,0 +1,80 @@
+"""A run in a few numbers: what one reads first, each with its unit in its name.
+
+Plain numbers, texts and mappings only, so a summary can be printed, stored as JSON and compared. A number
+that does not exist (the heading of a run without samples, the balance of a prescribed run) is None.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+ENERGY_PARTS = ("hull_loss", "cable_loss", "kinetic_change", "drum", "added_mass_term", "residual")
+"""Where the work of the propeller goes; their sum is ``energy_propeller_work``."""
+
+FORCE = ("cable_force_forward", "cable_force_starboard", "cable_force_down")
+MOMENT = ("cable_moment_roll", "cable_moment_pitch", "cable_moment_yaw")
+
+
+def summarise(run: xr.Dataset) -> dict[str, Any]:
+    """Return the numbers of one run that one reads first; keys carry their units."""
+    time, speed = run["time"].values, run["surge_speed"].values
+    force, moment = magnitude(run, FORCE), magnitude(run, MOMENT)
+    peak, pull, twist = (int(np.argmax(values)) for values in (speed, force, moment))
+    return {
+        "outcome": run.attrs["outcome"],
+        "outcome_message": run.attrs["outcome_message"],
+        "time_at_end_s": number(time[-1]),
+        "peak_speed_m_s": number(speed[peak]),
+        "time_of_peak_speed_s": number(time[peak]),
+        "speed_at_end_m_s": number(speed[-1]),
+        "heading_at_end_deg": at_end(run, "heading"),
+        "depth_at_end_m": at_end(run, "depth"),
+        "path_length_m": number(path_length(run)),
+        "cable_length_at_end_m": at_end(run, "cable_length"),
+        "largest_cable_force_N": number(force[pull]),
+        "time_of_largest_cable_force_s": number(time[pull]),
+        "largest_cable_moment_N_m": number(moment[twist]),
+        "time_of_largest_cable_moment_s": number(time[twist]),
+        "energy": energy_balance(run),
+    }
+
+
+def energy_balance(run: xr.Dataset) -> dict[str, float | None] | None:
+    """Return where the propeller's work went by the end, in joules, and the unexplained share of it.
+
+    None for a prescribed run, whose vehicle is moved by no propeller.
+    """
+    work = at_end(run, "energy_propeller_work")
+    if run.attrs["prescribed"] or work is None:
+        return None
+    parts = {f"{part}_J": at_end(run, f"energy_{part}") for part in ENERGY_PARTS}
+    residual = parts["residual_J"]
+    closure = abs(residual / work) if work and residual is not None else None
+    return {"propeller_work_J": work, **parts, "unexplained_share": closure}
+
+
+def path_length(run: xr.Dataset) -> float:
+    """Return the length of the track of the hull centre, as a polygon through the samples. [m]"""
+    track = np.array([run[name].values for name in ("north", "east", "depth")])
+    return float(np.sum(np.linalg.norm(np.diff(track, axis=1), axis=0)))
+
+
+def magnitude(run: xr.Dataset, names: tuple[str, ...]) -> np.ndarray:
+    """Return the length of a vector that is stored as three channels; gaps count as zero."""
+    return np.linalg.norm(np.nan_to_num([run[name].values for name in names]), axis=0)
+
+
+def at_end(run: xr.Dataset, name: str) -> float | None:
+    """Return the last value of a channel, None if it does not exist."""
+    return number(run[name].values[-1])
+
+
+def number(value: Any) -> float | None:
+    """Return a plain float that JSON can hold: None for what is not finite."""
+    return float(value) if math.isfinite(value) else None
