@@ -2,11 +2,13 @@
 
     L_j z_{j−1} + D_j z_j + U_j z_{j+1} = r_j,   j = 1 … N
 
-One block holds the four unknowns of a cable segment (tension and the position of its far node). Block Gauss
-elimination from the tow point to the drum, with partial pivoting inside a block. Elimination between blocks
-needs no pivoting: what is eliminated first is the part of the cable between the tow point and a held node, a
-well-posed problem by itself. The first column of every L_j is zero (a node knows its neighbour's position, not
-the tension beyond it), which saves a quarter of the work.
+One block holds the four unknowns of a cable segment: its tension and the position of its far node. Block Gauss
+elimination runs from the drum to the tow point, with partial pivoting inside a block; between blocks none is needed,
+because what is eliminated first is the piece of cable between the drum and a held node, a well-posed problem by
+itself. The first column of every L_j is zero (a node knows its neighbour's position, not the tension beyond it).
+
+The elimination ends at the tow point, so W_1 = D_1⁻¹ L_1 tells how the first block answers to a displacement of
+the tow point, all cable behind it included: the coupling to a vehicle gets that derivative for nothing.
 """
 
 from __future__ import annotations
@@ -20,7 +22,10 @@ SIZE = 4
 
 @compiled
 def factor_block(D: np.ndarray, pivots: np.ndarray) -> bool:
-    """Factor a 4×4 block in place, P D = L U, rows exchanged for size; return False when it is singular."""
+    """Factor a 4×4 block in place by rows exchanged for size; return False when it is singular.
+
+    Multipliers stay in the row they were made in, so `solve_block` exchanges and eliminates in the same order.
+    """
     for k in range(SIZE):
         best = k
         for i in range(k + 1, SIZE):
@@ -30,7 +35,7 @@ def factor_block(D: np.ndarray, pivots: np.ndarray) -> bool:
         if not abs(D[best, k]) > 0.0:
             return False
         if best != k:
-            for c in range(SIZE):
+            for c in range(k, SIZE):
                 D[k, c], D[best, c] = D[best, c], D[k, c]
         inverse = 1.0 / D[k, k]
         for i in range(k + 1, SIZE):
@@ -56,49 +61,48 @@ def solve_block(D: np.ndarray, pivots: np.ndarray, b: np.ndarray) -> None:
 
 
 @compiled
-def factor(L: np.ndarray, D: np.ndarray, U: np.ndarray, pivots: np.ndarray, first: int, last: int) -> int:
-    """Factor blocks first … last in place; U_j becomes D_j⁻¹U_j, transposed.
+def factor(L: np.ndarray, D: np.ndarray, U: np.ndarray, pivots: np.ndarray, last: int) -> int:
+    """Factor blocks 1 … last in place; L_j becomes W_j = D_j⁻¹ L_j, transposed so that columns are contiguous.
 
     Returns:
         0 when done, else the index of the singular block.
     """
-    for j in range(first, last + 1):
-        if j > first:
+    for j in range(last, 0, -1):
+        if j < last:
             for row in range(SIZE):
-                for column in range(SIZE):
+                for column in range(1, SIZE):
                     total = 0.0
-                    for k in range(1, SIZE):
-                        total += L[j, row, k] * U[j - 1, column, k]
+                    for k in range(SIZE):
+                        total += U[j, row, k] * L[j + 1, column, k]
                     D[j, row, column] -= total
         if not factor_block(D[j], pivots[j]):
             return j
-        if j < last:
-            _transpose(U[j])
-            for column in range(SIZE):
-                solve_block(D[j], pivots[j], U[j, column])
+        _transpose(L[j])
+        for column in range(1, SIZE):
+            solve_block(D[j], pivots[j], L[j, column])
     return 0
 
 
 @compiled
 def solve(
-    L: np.ndarray, D: np.ndarray, U: np.ndarray, pivots: np.ndarray, first: int, last: int, r: np.ndarray
+    L: np.ndarray, D: np.ndarray, U: np.ndarray, pivots: np.ndarray, last: int, r: np.ndarray
 ) -> None:
     """Overwrite r (blocks, 4) with the solution, given what `factor` left."""
-    for j in range(first, last + 1):
-        if j > first:
+    for j in range(last, 0, -1):
+        if j < last:
             for row in range(SIZE):
-                for k in range(1, SIZE):
-                    r[j, row] -= L[j, row, k] * r[j - 1, k]
+                for k in range(SIZE):
+                    r[j, row] -= U[j, row, k] * r[j + 1, k]
         solve_block(D[j], pivots[j], r[j])
-    for j in range(last - 1, first - 1, -1):
-        for column in range(SIZE):
+    for j in range(2, last + 1):
+        for column in range(1, SIZE):
             for row in range(SIZE):
-                r[j, row] -= U[j, column, row] * r[j + 1, column]
+                r[j, row] -= L[j, column, row] * r[j - 1, column]
 
 
 @compiled
 def _transpose(A: np.ndarray) -> None:
-    """Transpose a 4×4 block in place, so that columns are contiguous."""
+    """Transpose a 4×4 block in place."""
     for i in range(SIZE):
         for k in range(i + 1, SIZE):
             A[i, k], A[k, i] = A[k, i], A[i, k]

@@ -6,15 +6,17 @@ The paper's text layer lost its signs, so the matrices are derived again from th
     V'     = d/dt[(1 + ε) t]                                        the cable hangs together
 
 with ε = e T and the local frame W(α, β) = [t n b] of (4); ``tests/exact/test_equation7.py`` repeats the
-derivation with SymPy and compares every entry. Rows: t-momentum, t-, n-, b-compatibility, b-momentum, n-momentum.
+derivation with SymPy and compares every entry. Rows: t-momentum, t-, n-, b-compatibility, b-momentum,
+n-momentum.
 
-The current J is steady and uniform, given in earth axes; its local components turn with the frame, so the J̇ of
-the printed q is linear in α̇ and β̇, and stands in N here.
+The current J is steady and uniform, given in earth axes; its local components turn with the frame, so the
+J̇ of the printed q is linear in α̇ and β̇, and stands in N here.
 
-**Departs from source:** the printed N carries −e p/(1 + ε) in the column of Ṫ, p being the momentum of a row.
-Such terms come out only if the mass of a *stretched* metre is held fixed, and they break Galilean invariance: a
-rigid drift of cable and water would change the tension. ``stretch_momentum`` = 1 keeps them as printed, 0 leaves
-them out (mass belongs to the unstretched metre); both are the same for Table 1, where e = 0.
+**Departs from source:** the printed N carries −e p/(1 + ε) in the column of Ṫ, p being the momentum of a
+row. Such terms come out only if the mass of a *stretched* metre is held fixed, and they break Galilean
+invariance: a rigid drift of cable and water would change the tension. ``stretch_momentum`` = 1 keeps them
+as printed, 0 leaves them out (mass belongs to the unstretched metre); both are the same for Table 1, where
+e = 0.
 
 Leaves out: bending stiffness, shear in the current, boundary conditions. The slopes ∂(M x)/∂y … are in
 `cable.equation7_slopes`.

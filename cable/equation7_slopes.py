@@ -1,8 +1,9 @@
-"""How M, N and q of equation (7) change with y: what Newton's method needs beside the matrices themselves.
+"""How M, N and q of equation (7) change with y: what Newton's method needs beside the matrices
+themselves.
 
-For a fixed vector x the functions fill ∂(M(y) x)/∂y and ∂(N(y) x)/∂y, shape (6, 6), row = equation, column =
-unknown, and ∂q/∂y. Only entries that can differ from zero are set, so the caller hands in arrays that were zero
-once. Checked against differences in ``tests/exact/test_equation7.py``.
+For a fixed vector x the functions fill ∂(M(y) x)/∂y and ∂(N(y) x)/∂y, shape (6, 6), row = equation,
+column = unknown, and ∂q/∂y. Only entries that can differ from zero are set, so the caller hands in
+arrays that were zero once. Checked against differences in ``tests/exact/test_equation7.py``.
 
 The current's local components follow the frame: ∂Jt/∂α = −Jb cosβ, ∂Jn/∂α = Jb sinβ,
 ∂Jb/∂α = Jt cosβ − Jn sinβ, ∂Jt/∂β = Jn, ∂Jn/∂β = −Jt, ∂Jb/∂β = 0.

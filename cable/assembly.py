@@ -1,0 +1,235 @@
+"""The equations of one step, and their analytic Jacobian, segment by segment.
+
+Unknowns of block j: the tension T_j of segment j and the position x_j of its far node; of the last block: T_N and the
+length ℓ_N of the growing segment (its far node sits at the drum). With f_j = T_j t_j and the segment's total load
+Q_j = ∫(∂p/∂t + D − w_c k) ds, shared half and half by its two ends, the equations are
+
+    balance of node j:      f_j − f_{j+1} + ½(Q_j + Q_{j+1}) = 0          (momentum of equation (7))
+    length of segment j:    φ(T_j, 1 + eT_j − |x_j − x_{j−1}|/ℓ_j) = 0    (compatibility of (7), `cable.slack`)
+    drum:                   T_N + ½ t_N·Q_N = (I_d/R_d² dU/dt + C_f/R_d)  (11), U = dS/dt; or U = 0 while it stands
+
+Nodes are where the velocity lives and segments where the tension lives, so neither can alternate from node to node.
+The force on the vehicle (12) is f_1 − ½Q_1. The last segment ends at a fixed place where new material enters:
+
+    Q_N = d/dt(ℓ_N p_N) − U p(S) + ℓ_N (D − w_c k),   velocity at the drum −U d_N/ℓ_N.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from subzero.compiled import compiled
+
+from .element import Load, chord_length, evaluate_load
+from .line import BEFORE, NEW, NOW, Line
+from .properties import CableNumbers, DrumNumbers
+from .slack import slack_law
+
+
+@compiled
+def node_velocities(line: Line, a0: float, a1: float, a2: float) -> None:
+    """Fill the velocities of all nodes and the pay-out rate at level NEW by backward differences."""
+    x, N = line.position, line.count[0]
+    for j in range(N):
+        for i in range(3):
+            line.velocity[NEW, j, i] = a0 * x[NEW, j, i] + a1 * x[NOW, j, i] + a2 * x[BEFORE, j, i]
+    last = line.last_length
+    line.payout[NEW] = a0 * last[NEW] + a1 * last[NOW] + a2 * last[BEFORE]
+    if line.stuck[0]:
+        line.payout[NEW] = 0.0
+    for i in range(3):
+        chord = x[NEW, N, i] - x[NEW, N - 1, i]
+        line.velocity[NEW, N, i] = -line.payout[NEW] * chord / last[NEW]
+
+
+@compiled
+def assemble(
+    line: Line,
+    a0: float,
+    a1: float,
+    a2: float,
+    J: np.ndarray,
+    c: CableNumbers,
+    drum: DrumNumbers,
+    work: Load,
+) -> None:
+    """Fill the residual and the block tridiagonal Jacobian at the present guess of level NEW."""
+    node_velocities(line, a0, a1, a2)
+    N = line.count[0]
+    line.lower[1 : N + 1] = 0.0
+    line.diagonal[1 : N + 1] = 0.0
+    line.upper[1 : N + 1] = 0.0
+    line.rhs[1 : N + 1] = 0.0
+    by_near, by_far = np.empty((3, 3)), np.empty((3, 4))
+    for j in range(1, N + 1):
+        length = line.last_length[NEW] if j == N else line.length[j]
+        V = 0.5 * (line.velocity[NEW, j - 1] + line.velocity[NEW, j])
+        d = line.position[NEW, j] - line.position[NEW, j - 1]
+        T = line.tension[NEW, j]
+        evaluate_load(V, J, d, length, T, a0, c, work)
+        for i in range(3):
+            line.momentum[NEW, j, i] = length * work.momentum[i]
+            history = a1 * line.momentum[NOW, j, i] + a2 * line.momentum[BEFORE, j, i]
+            line.load[j, i] = length * work.q[i] + history
+        if j < N:
+            _differentiate_segment(length, a0, T, c, work, by_near, by_far)
+        else:
+            _add_influx(line, d, length, a0, T, J, c, work, by_near, by_far)
+        _scatter_balance(line, j, T, d, length, work, by_near, by_far)
+        _scatter_length(line, j, T, d, length, c)
+    _drum_row(line, a0, a1, a2, drum, work, by_near, by_far)
+
+
+@compiled
+def _differentiate_segment(
+    length: float, a0: float, T: float, c: CableNumbers, work: Load, by_near: np.ndarray, by_far: np.ndarray
+) -> None:
+    """Fill ∂Q/∂x of the near node (3, 3), and ∂Q/∂(T, x) of the far node (3, 4)."""
+    stretch = 0.5 * c.compliance / (1.0 + c.compliance * T)
+    for i in range(3):
+        by_far[i, 0] = length * stretch * work.drag[i]
+        for k in range(3):
+            mean = 0.5 * a0 * work.q_V[i, k]
+            by_near[i, k] = length * (mean - work.q_d[i, k])
+            by_far[i, 1 + k] = length * (mean + work.q_d[i, k])
+
+
+@compiled
+def _add_influx(
+    line: Line,
+    d: np.ndarray,
+    length: float,
+    a0: float,
+    T: float,
+    J: np.ndarray,
+    c: CableNumbers,
+    work: Load,
+    by_near: np.ndarray,
+    by_far: np.ndarray,
+) -> None:
+    """Complete Q of the last segment by the momentum that enters at the drum; fill ∂Q/∂x_{N−1} and ∂Q/∂(T, ℓ)."""
+    N, U, t = line.count[0], line.payout[NEW], work.tangent
+    r = chord_length(d, length)
+    Jt = J[0] * t[0] + J[1] * t[1] + J[2] * t[2]
+    dU = 0.0 if line.stuck[0] else a0
+    stretch = 0.5 * c.compliance / (1.0 + c.compliance * T)
+    for i in range(3):
+        entering = c.mass * line.velocity[NEW, N, i] - c.added_mass * (J[i] - Jt * t[i])
+        line.load[N, i] -= U * entering
+        by_far[i, 0] = length * stretch * work.drag[i]
+        by_far[i, 1] = work.q[i] - dU * entering - U * c.mass * (U / length - dU) * d[i] / length
+        by_far[i, 2] = 0.0
+        by_far[i, 3] = 0.0
+        for k in range(3):
+            P = (1.0 if i == k else 0.0) - t[i] * t[k]
+            across_k = J[k] - Jt * t[k]
+            by_far[i, 1] += 0.5 * work.q_V[i, k] * (U / length - dU) * d[k]
+            by_near[i, k] = length * (0.5 * (a0 + U / length) * work.q_V[i, k] - work.q_d[i, k])
+            by_near[i, k] += U * c.added_mass * (Jt * P + t[i] * across_k) / r
+        by_near[i, i] -= U * c.mass * U / length
+
+
+@compiled
+def _scatter_balance(
+    line: Line,
+    j: int,
+    T: float,
+    d: np.ndarray,
+    length: float,
+    work: Load,
+    by_near: np.ndarray,
+    by_far: np.ndarray,
+) -> None:
+    """Add segment j to the balances of its two nodes: f + ½Q to the far one, −f + ½Q to the near one."""
+    N, t = line.count[0], work.tangent
+    stiffness = T / chord_length(d, length)
+    D, L, U, r = line.diagonal, line.lower, line.upper, line.rhs
+    for i in range(3):
+        f, half = T * t[i], 0.5 * line.load[j, i]
+        if j < N:
+            r[j, 1 + i] += f + half
+            D[j, 1 + i, 0] += t[i]
+        if j > 1:
+            r[j - 1, 1 + i] += half - f
+            U[j - 1, 1 + i, 0] -= t[i]
+        else:
+            line.tow_force[i] = f - half
+            line.tow_by_block[i, 0] = t[i]
+        for k in range(4):
+            far = 0.5 * by_far[i, k]
+            pull = stiffness * ((1.0 if i == k - 1 else 0.0) - t[i] * t[k - 1]) if j < N and k > 0 else 0.0
+            if j < N:
+                D[j, 1 + i, k] += far + pull
+            if j > 1:
+                U[j - 1, 1 + i, k] += far - pull
+            else:
+                line.tow_by_block[i, k] = (t[i] if k == 0 else 0.0) + pull - far
+        for k in range(3):
+            near = 0.5 * by_near[i, k]
+            pull = stiffness * ((1.0 if i == k else 0.0) - t[i] * t[k])
+            if j < N:
+                L[j, 1 + i, 1 + k] += near - pull
+            if j > 1:
+                D[j - 1, 1 + i, 1 + k] += near + pull
+            else:
+                line.tow_by_tow[i, k] = -pull - near
+
+
+@compiled
+def _scatter_length(line: Line, j: int, T: float, d: np.ndarray, length: float, c: CableNumbers) -> None:
+    """Write the length equation of segment j, the first row of its block."""
+    r = chord_length(d, length)
+    phi, by_T, by_strain = slack_law(T, 1.0 + c.compliance * T - r / length)
+    line.rhs[j, 0] = phi
+    line.diagonal[j, 0, 0] = by_T + by_strain * c.compliance
+    for i in range(3):
+        slope = by_strain * d[i] / (r * length)
+        line.lower[j, 0, 1 + i] = slope
+        if j < line.count[0]:
+            line.diagonal[j, 0, 1 + i] = -slope
+    if j == line.count[0]:
+        line.diagonal[j, 0, 1] = by_strain * r / (length * length)
+
+
+@compiled
+def _drum_row(
+    line: Line,
+    a0: float,
+    a1: float,
+    a2: float,
+    drum: DrumNumbers,
+    work: Load,
+    by_near: np.ndarray,
+    by_far: np.ndarray,
+) -> None:
+    """Write the drum's equation (11), the second row of the last block; `work` still holds the last segment."""
+    N, t = line.count[0], work.tangent
+    D, L, r = line.diagonal[line.count[0]], line.lower[line.count[0]], line.rhs[line.count[0]]
+    D[2, 2] = 1.0
+    D[3, 3] = 1.0
+    if line.stuck[0]:
+        r[1] = line.last_length[NEW] - line.last_length[NOW]
+        D[1, 1] = 1.0
+        return
+    U = line.payout
+    r[1] = drum_tension(line, t) - drum.friction - drum.inertia * (a0 * U[NEW] + a1 * U[NOW] + a2 * U[BEFORE])
+    D[1, 0] = 1.0
+    D[1, 1] = -drum.inertia * a0 * a0
+    chord = line.position[NEW, N] - line.position[NEW, N - 1]
+    size = chord_length(chord, line.last_length[NEW])
+    Qt = line.load[N, 0] * t[0] + line.load[N, 1] * t[1] + line.load[N, 2] * t[2]
+    for i in range(3):
+        D[1, 0] += 0.5 * t[i] * by_far[i, 0]
+        D[1, 1] += 0.5 * t[i] * by_far[i, 1]
+        for k in range(3):
+            L[1, 1 + k] += 0.5 * t[i] * by_near[i, k]
+    for k in range(3):
+        L[1, 1 + k] -= 0.5 * (line.load[N, k] - Qt * t[k]) / size
+
+
+@compiled
+def drum_tension(line: Line, t: np.ndarray) -> float:
+    """Return the tension at the drum, T(S) = T_N + ½ t_N·Q_N at level NEW. [N]."""
+    N = line.count[0]
+    half = 0.5 * (line.load[N, 0] * t[0] + line.load[N, 1] * t[1] + line.load[N, 2] * t[2])
+    return line.tension[NEW, N] + half

@@ -1,0 +1,146 @@
+"""The cable in the water as arrays: nodes from the tow point (0) to the drum (count), at three levels of time.
+
+Nodes 0 … count−1 are material points; the last node sits at the drum, and the last segment grows while cable is
+paid out (a moving end). Positions are relative to the drum, in earth axes (north, east, down).
+
+Levels: `NEW` is being solved for, `NOW` is the last accepted time, `BEFORE` the one before. A step is tried on level
+NEW as often as needed and becomes real only by `accept`.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+from typing import NamedTuple
+
+import numpy as np
+
+from subzero.compiled import compiled
+
+from .element import evaluate_momentum
+from .properties import CableNumbers
+
+NEW, NOW, BEFORE = 0, 1, 2
+
+SPLIT_AT = 1.5
+"""The last segment is split when it has grown to this many segment lengths."""
+
+
+class Line(NamedTuple):
+    """The state of a cable; segment j lies between nodes j−1 and j, so index 0 of segment arrays is unused.
+
+    Attributes:
+        position: node positions (3 levels, nodes, 3). [m]
+        velocity: velocities of the material at the nodes (3 levels, nodes, 3). [m/s]
+        momentum: momentum ∫p ds of the segments (3 levels, nodes, 3). [kg m/s]
+        tension: tension of the segments (2 levels, nodes). [N]
+        length: unstretched lengths of the segments (nodes,); of the last one, see `last_length`. [m]
+        last_length: length of the last, growing segment (3 levels,). [m]
+        payout: rate dS/dt at which cable enters the water (3 levels,). [m/s]
+        load: ∫(∂p/∂t + D − w_c k) ds of the segments at level NEW (nodes, 3). [N]
+        count: number of segments, in a one-element array.
+        stuck: 1 while the drum stands and holds the cable, in a one-element array.
+        previous_step: t_now − t_before, 0 after a start, in a one-element array. [s]
+        tow_force: force on the vehicle at level NEW (3,). [N]
+        tow_by_tow, tow_by_block: derivatives of the tow force by the tow point's position (3, 3) and by the
+            unknowns of the first block (3, 4).
+        lower, diagonal, upper, pivots, rhs: work space of the block tridiagonal system.
+    """
+
+    position: np.ndarray
+    velocity: np.ndarray
+    momentum: np.ndarray
+    tension: np.ndarray
+    length: np.ndarray
+    last_length: np.ndarray
+    payout: np.ndarray
+    load: np.ndarray
+    count: np.ndarray
+    stuck: np.ndarray
+    previous_step: np.ndarray
+    tow_force: np.ndarray
+    tow_by_tow: np.ndarray
+    tow_by_block: np.ndarray
+    lower: np.ndarray
+    diagonal: np.ndarray
+    upper: np.ndarray
+    pivots: np.ndarray
+    rhs: np.ndarray
+
+
+@compiled
+def new_line(capacity: int) -> Line:
+    """Return an empty line with room for `capacity` segments."""
+    n = capacity + 1
+    return Line(
+        np.zeros((3, n, 3)),
+        np.zeros((3, n, 3)),
+        np.zeros((3, n, 3)),
+        np.zeros((2, n)),
+        np.zeros(n),
+        np.zeros(3),
+        np.zeros(3),
+        np.zeros((n, 3)),
+        np.zeros(1, np.int64),
+        np.zeros(1, np.int64),
+        np.zeros(1),
+        np.zeros(3),
+        np.zeros((3, 3)),
+        np.zeros((3, 4)),
+        np.zeros((n, 4, 4)),
+        np.zeros((n, 4, 4)),
+        np.zeros((n, 4, 4)),
+        np.zeros((n, 4), np.int64),
+        np.zeros((n, 4)),
+    )
+
+
+@compiled
+def lay_straight(
+    line: Line, wet_length: float, direction: np.ndarray, speed: float, segment_length: float, c: CableNumbers
+) -> None:
+    """Lay a straight cable from the drum along `direction` (unit vector, earth axes), moving at `speed` along it.
+
+    The cable is as long as `wet_length` says; its tension is the one of a steady straight pull with no tension at
+    the drum, so a run can start at speed without a jolt. Needs 0 < wet_length and room for the segments.
+    """
+    count = max(1, int(np.floor(wet_length / segment_length + 0.5)))
+    line.count[0] = count
+    line.stuck[0] = 0
+    line.previous_step[0] = 0.0
+    last = wet_length - (count - 1) * segment_length
+    for level in range(3):
+        line.last_length[level] = last
+        line.payout[level] = speed
+        for j in range(count + 1):
+            along = wet_length - j * segment_length if j < count else 0.0
+            for i in range(3):
+                line.position[level, j, i] = along * direction[i]
+                line.velocity[level, j, i] = speed * direction[i]
+    for j in range(1, count + 1):
+        line.length[j] = segment_length if j < count else last
+        middle = wet_length - (j - 0.5) * segment_length if j < count else 0.5 * last
+        line.tension[:, j] = c.tangential_drag * speed * abs(speed) * middle
+
+
+@compiled
+def set_momenta(line: Line, J: np.ndarray, c: CableNumbers) -> None:
+    """Fill the segments' momenta at levels NOW and BEFORE from positions and velocities in water that moves at J."""
+    for level in (NOW, BEFORE):
+        for j in range(1, line.count[0] + 1):
+            segment_momentum(line, level, j, segment_length_at(line, level, j), J, c)
+
+
+@compiled
+def segment_length_at(line: Line, level: int, j: int) -> float:
+    """Return the unstretched length of segment j at a level of time. [m]."""
+    return line.last_length[level] if j == line.count[0] else line.length[j]
+
+
+@compiled
+def segment_momentum(line: Line, level: int, j: int, length: float, J: np.ndarray, c: CableNumbers) -> None:
+    """Fill ∫p ds of segment j at a level; the tangent is the one of level NOW, where the segment has a length."""
+    chord = line.position[NOW, j] - line.position[NOW, j - 1]
+    r = sqrt(chord[0] * chord[0] + chord[1] * chord[1] + chord[2] * chord[2])
+    V = 0.5 * (line.velocity[level, j - 1] + line.velocity[level, j])
+    evaluate_momentum(V, J, chord / max(r, 1e-300), c, line.momentum[level, j])
+    line.momentum[level, j] *= length

@@ -1,0 +1,122 @@
+"""Newton's method on the equations of one step: damped, bounded in iterations, and always with an outcome."""
+
+from __future__ import annotations
+
+from math import isfinite, sqrt
+from typing import NamedTuple
+
+import numpy as np
+
+from subzero.compiled import compiled
+
+from .assembly import assemble
+from .blocks import factor, solve
+from .element import Load
+from .line import NEW, Line
+from .properties import CableNumbers, DrumNumbers
+
+MAX_ITERATIONS = 40
+MAX_HALVINGS = 8
+RELATIVE_TOLERANCE = 1e-9
+"""Balances hold to this fraction of the largest tension in the cable."""
+ABSOLUTE_TOLERANCE = 1e-13
+"""Balances of a cable without tension hold to this. [N]"""
+LENGTH_TOLERANCE = 1e-9
+"""The length equation, in units of `slack.STRAIN_SCALE`: a strain of 1e-12."""
+SMALLEST_SEGMENT = 1e-9
+"""The growing segment never gets shorter than this while iterating. [m]"""
+
+
+class Solved(NamedTuple):
+    """How the iteration ended: `worst_equation` is 0 length, 1 … 3 balance north, east, down, in block `worst_node`."""
+
+    converged: bool
+    iterations: int
+    residual: float
+    worst_node: int
+    worst_equation: int
+
+
+@compiled
+def solve_step(
+    line: Line,
+    a0: float,
+    a1: float,
+    a2: float,
+    J: np.ndarray,
+    c: CableNumbers,
+    drum: DrumNumbers,
+    work: Load,
+) -> Solved:
+    """Solve the equations of `assembly` for level NEW, from the guess that stands there."""
+    N = line.count[0]
+    saved_x = np.empty((N + 1, 3))
+    saved_T = np.empty(N + 1)
+    assemble(line, a0, a1, a2, J, c, drum, work)
+    size, node, equation = _residual(line)
+    merit = _merit(line)
+    for iteration in range(MAX_ITERATIONS):
+        if size <= 1.0:
+            return Solved(True, iteration, size, node, equation)
+        if factor(line.lower, line.diagonal, line.upper, line.pivots, N) > 0:
+            break
+        solve(line.lower, line.diagonal, line.upper, line.pivots, N, line.rhs)
+        saved_x[:] = line.position[NEW, : N + 1]
+        saved_T[:] = line.tension[NEW, : N + 1]
+        saved_length = line.last_length[NEW]
+        step = line.rhs[: N + 1].copy()
+        fraction = 1.0
+        for _ in range(MAX_HALVINGS):
+            _update(line, saved_x, saved_T, saved_length, step, fraction)
+            assemble(line, a0, a1, a2, J, c, drum, work)
+            new_merit = _merit(line)
+            if isfinite(new_merit) and new_merit <= merit * (1.0 - 0.1 * fraction) + 1e-30:
+                break
+            fraction *= 0.5
+        merit = new_merit
+        size, node, equation = _residual(line)
+        if not isfinite(merit):
+            break
+    return Solved(size <= 1.0, MAX_ITERATIONS, size, node, equation)
+
+
+@compiled
+def _update(
+    line: Line, x: np.ndarray, T: np.ndarray, last_length: float, step: np.ndarray, fraction: float
+) -> None:
+    """Write guess minus `fraction` of the Newton step to level NEW."""
+    N = line.count[0]
+    for j in range(1, N + 1):
+        line.tension[NEW, j] = T[j] - fraction * step[j, 0]
+        if j < N:
+            for i in range(3):
+                line.position[NEW, j, i] = x[j, i] - fraction * step[j, 1 + i]
+    line.last_length[NEW] = max(last_length - fraction * step[N, 1], 0.1 * last_length, SMALLEST_SEGMENT)
+
+
+@compiled
+def _residual(line: Line) -> tuple[float, int, int]:
+    """Return the largest residual as a multiple of its tolerance, and where it stands."""
+    N = line.count[0]
+    tension = 0.0
+    for j in range(1, N + 1):
+        tension = max(tension, abs(line.tension[NEW, j]))
+    allowed = RELATIVE_TOLERANCE * tension + ABSOLUTE_TOLERANCE
+    worst, node, equation = 0.0, 0, 0
+    for j in range(1, N + 1):
+        for i in range(4):
+            size = abs(line.rhs[j, i]) / (LENGTH_TOLERANCE if i == 0 else allowed)
+            if not size <= worst:
+                worst, node, equation = size, j, i
+    return worst, node, equation
+
+
+@compiled
+def _merit(line: Line) -> float:
+    """Return the root of the sum of squares of all residuals, lengths in `STRAIN_SCALE`, balances in millinewtons."""
+    total = 0.0
+    for j in range(1, line.count[0] + 1):
+        total += line.rhs[j, 0] ** 2
+        for i in range(1, 4):
+            total += (1e3 * line.rhs[j, i]) ** 2
+    return sqrt(total)

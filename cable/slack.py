@@ -1,0 +1,37 @@
+"""The law between tension and strain: inextensible or elastic when taut, and never a push.
+
+A thin cable cannot be compressed: it buckles, and its chord gets shorter. With the shortening
+σ = 1 + eT − |d|/ℓ of a segment, slackness is the alternative
+
+    T ≥ 0,   σ ≥ 0,   T σ = 0
+
+which is smoothed to T σ = T₀ (`SMOOTHING`, 1e-10 N) and written as one equation that Newton's method likes,
+the Fischer-Burmeister function φ(a, b) = a + b − √(a² + b² + 2μ) = 0 with a = T/T_r and b = σ/σ_r.
+
+Departs from source: the paper takes the cable as taut everywhere (its equations are singular at T = 0). The cost of
+the smoothing is a strain of T₀/T: 1e-9 at a tenth of a newton. What happens inside a slack bight (folding, contact,
+bending) is not modelled: without bending stiffness its shape below one segment length is ill-posed, and only its
+ends, its drag and its inertia mean anything.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+
+from subzero.compiled import compiled
+
+TENSION_SCALE = 1e-3
+"""T_r [N] and σ_r [-]: where the corner between taut and slack is seen at the same size in both."""
+STRAIN_SCALE = 1e-3
+SMOOTHING = 1e-10
+"""T₀ = T σ of the smoothed law. [N]"""
+
+
+@compiled
+def slack_law(T: float, strain_deficit: float) -> tuple[float, float, float]:
+    """Return φ and its derivatives by the tension T [N] and the shortening σ [-]."""
+    a, b = T / TENSION_SCALE, strain_deficit / STRAIN_SCALE
+    s = sqrt(a * a + b * b + 2.0 * SMOOTHING / (TENSION_SCALE * STRAIN_SCALE))
+    # a + b − s, without cancellation when one of the two is large
+    phi = 2.0 * (a * b - SMOOTHING / (TENSION_SCALE * STRAIN_SCALE)) / (a + b + s) if a + b > 0.0 else a + b - s
+    return phi, (1.0 - a / s) / TENSION_SCALE, (1.0 - b / s) / STRAIN_SCALE

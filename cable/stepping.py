@@ -1,0 +1,121 @@
+"""Advance the cable by one step: try it, and when all agree, accept it.
+
+`try_step` solves for a new tow-point position without forgetting where the cable was, so a vehicle and its cable
+can ask "what if" until they agree. `accept` makes the new level the present one and, when the growing segment has
+become long, splits it.
+
+The drum either turns, equation (11), or stands and holds the cable (it cannot take cable up, and friction may hold
+it): `try_step` solves with the state that the drum had and changes it when the answer contradicts it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from subzero.compiled import compiled
+
+from .assembly import drum_tension
+from .differences import backward_weights
+from .element import Load
+from .line import BEFORE, NEW, NOW, SPLIT_AT, Line, segment_length_at, segment_momentum
+from .newton import Solved, solve_step
+from .properties import CableNumbers, DrumNumbers
+
+HELD = 1e-12
+"""A standing frictionless drum starts to turn above this tension. [N]"""
+
+
+@compiled
+def try_step(
+    line: Line,
+    step: float,
+    tow: np.ndarray,
+    J: np.ndarray,
+    c: CableNumbers,
+    drum: DrumNumbers,
+    work: Load,
+) -> Solved:
+    """Solve for the cable `step` later, with the tow point at `tow` (relative to the drum), on level NEW.
+
+    Args:
+        line: the cable; levels NOW and BEFORE stay untouched.
+        step: Δt. [s]
+        tow: position of the tow point at the new time, earth axes (3,). [m]
+        J: velocity of the water (3,). [m/s]
+        c: cable.
+        drum: drum.
+        work: work space.
+    """
+    a0, a1, a2 = backward_weights(step, line.previous_step[0])
+    _predict(line, step, tow)
+    solved = solve_step(line, a0, a1, a2, J, c, drum, work)
+    was_stuck = line.stuck[0]
+    if solved.converged and _contradicts(line, drum, work):
+        line.stuck[0] = 1 - was_stuck
+        _predict(line, step, tow)
+        solved = solve_step(line, a0, a1, a2, J, c, drum, work)
+    return solved
+
+
+@compiled
+def _predict(line: Line, step: float, tow: np.ndarray) -> None:
+    """Guess level NEW: everything goes on as it moves, tensions stay."""
+    N = line.count[0]
+    for j in range(N + 1):
+        line.tension[NEW, j] = line.tension[NOW, j]
+        for i in range(3):
+            moved = line.position[NOW, j, i] + step * line.velocity[NOW, j, i]
+            line.position[NEW, j, i] = moved if j < N else line.position[NOW, j, i]
+    line.position[NEW, 0] = tow
+    growth = 0.0 if line.stuck[0] else step * line.payout[NOW]
+    line.last_length[NEW] = max(line.last_length[NOW] + growth, 0.5 * line.last_length[NOW])
+
+
+@compiled
+def _contradicts(line: Line, drum: DrumNumbers, work: Load) -> bool:
+    """Say whether the drum turns backwards, or stands though the cable pulls harder than friction holds."""
+    if line.stuck[0]:
+        return drum_tension(line, work.tangent) > drum.friction * (1.0 + 1e-9) + HELD
+    return line.payout[NEW] < 0.0
+
+
+@compiled
+def accept(
+    line: Line, step: float, J: np.ndarray, c: CableNumbers, segment_length: float
+) -> None:
+    """Make level NEW the present one, and split the last segment while it is too long."""
+    N = line.count[0]
+    for level in (BEFORE, NOW):
+        line.position[level, : N + 1] = line.position[level - 1, : N + 1]
+        line.velocity[level, : N + 1] = line.velocity[level - 1, : N + 1]
+        line.momentum[level, : N + 1] = line.momentum[level - 1, : N + 1]
+        line.last_length[level] = line.last_length[level - 1]
+        line.payout[level] = line.payout[level - 1]
+    line.tension[NOW, : N + 1] = line.tension[NEW, : N + 1]
+    line.previous_step[0] = step
+    while line.last_length[NOW] > SPLIT_AT * segment_length and line.count[0] < line.length.size - 1:
+        _split_last(line, segment_length, J, c)
+
+
+@compiled
+def _split_last(line: Line, segment_length: float, J: np.ndarray, c: CableNumbers) -> None:
+    """Insert a node `segment_length` from the start of the last segment, on its chord, at levels NOW and BEFORE.
+
+    The new node is a material point. At level BEFORE it may still have been on the drum: then it is put where the
+    straight continuation of the chord would have had it, so that its backward differences stay smooth.
+    """
+    N = line.count[0]
+    for level in (NOW, BEFORE):
+        fraction = segment_length / line.last_length[level]
+        for quantity in (line.position, line.velocity):
+            for i in range(3):
+                near, end = quantity[level, N - 1, i], quantity[level, N, i]
+                quantity[level, N + 1, i] = end
+                quantity[level, N, i] = near + fraction * (end - near)
+        line.last_length[level] -= segment_length
+    line.length[N] = segment_length
+    line.tension[NOW, N + 1] = line.tension[NOW, N]
+    line.count[0] = N + 1
+    for level in (NOW, BEFORE):
+        for j in (N, N + 1):
+            segment_momentum(line, level, j, segment_length_at(line, level, j), J, c)
