@@ -1,0 +1,102 @@
+"""Servos: from a command to the angle of a fin.
+
+    target = clip(dead zone(command) + offset, ± deflection limit)
+    δ'     = clip((target − δ)/lag, ± rate limit)
+    fin    = δ, dragged behind by half the backlash of the linkage
+
+Each stage has a neutral value that switches it off exactly: dead band 0, offset 0, lag 0 with an infinite
+rate limit (the fin then *is* at its target and the state merely follows), rate and deflection limit infinite,
+backlash 0. With a finite rate limit a servo still has to stop somewhere: lags shorter than `QUICKEST` count
+as `QUICKEST`.
+
+Backlash is a play between servo and fin: the linkage stays where it is until the servo has taken up the slack.
+Inside a step the fin is the linkage clipped into the play around the servo; `settle` moves the linkage at the end
+of each step. For a servo that turns one way during a step this is the exact play operator.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import astuple, dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from subzero.compiled import compiled
+from vehicle.parameters import parameter
+from vehicle.state import LINKAGE, SERVO
+
+QUICKEST = 0.01
+"""Shortest lag of a state [s]: an explicit Runge-Kutta step of 0.02 s is stable down to a lag of 0.0072 s."""
+
+
+class ServoNumbers(NamedTuple):
+    """The parameters of one servo, as the compiled functions take them."""
+
+    dead_band: float
+    offset: float
+    lag: float
+    rate_limit: float
+    deflection_limit: float
+    half_backlash: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Servo:
+    """One servo with its linkage."""
+
+    dead_band: float = parameter("half-width of commands that do nothing", "rad", low=0.0)
+    offset: float = parameter("fin angle at zero command", "rad")
+    lag: float = parameter("time constant", "s", low=0.0)
+    rate_limit: float = parameter("fastest turn of the servo", "rad/s", above=0.0)
+    deflection_limit: float = parameter("largest angle either way", "rad", low=0.0)
+    half_backlash: float = parameter("half the play of the linkage", "rad", low=0.0)
+
+    def numbers(self) -> ServoNumbers:
+        """Return what the compiled servo needs."""
+        return ServoNumbers(*astuple(self))
+
+
+@compiled
+def servo_target(command: float, servo: ServoNumbers) -> float:
+    """Return the angle that a commanded angle leads to in the end [rad]."""
+    moved = max(0.0, command - servo.dead_band) + min(0.0, command + servo.dead_band)
+    return max(-servo.deflection_limit, min(servo.deflection_limit, moved + servo.offset))
+
+
+@compiled
+def servo_rate(angle: float, command: float, servo: ServoNumbers) -> float:
+    """Return how fast a servo at `angle` turns under a commanded angle [rad/s]."""
+    rate = (servo_target(command, servo) - angle) / max(servo.lag, QUICKEST)
+    return max(-servo.rate_limit, min(servo.rate_limit, rate))
+
+
+@compiled
+def servo_angle(angle: float, command: float, servo: ServoNumbers) -> float:
+    """Return where the servo is [rad]: at its state, or at its target if it has neither lag nor rate limit."""
+    if servo.lag == 0.0 and math.isinf(servo.rate_limit):
+        return servo_target(command, servo)
+    return angle
+
+
+@compiled
+def fin_angle(
+    state: np.ndarray,
+    command: np.ndarray,
+    which: int,
+    servos: tuple[ServoNumbers, ServoNumbers, ServoNumbers],
+) -> float:
+    """Return the angle of a fin in the water [rad]: 0 rudder, 1 port plane, 2 starboard plane."""
+    servo = servos[which]
+    angle = servo_angle(state[SERVO + which], command[1 + which], servo)
+    play = servo.half_backlash
+    return max(angle - play, min(angle + play, state[LINKAGE + which]))
+
+
+@compiled
+def settle(
+    state: np.ndarray, command: np.ndarray, servos: tuple[ServoNumbers, ServoNumbers, ServoNumbers]
+) -> None:
+    """Move the linkages of a state to where their servos have taken them, at the end of a step."""
+    for which in range(3):
+        state[LINKAGE + which] = fin_angle(state, command, which, servos)

@@ -1,0 +1,131 @@
+"""The equations of motion: the rate of the whole state, and its breakdown into named forces.
+
+    η' = J(η) ν,    M ν' = Σ terms,    servos, motor and battery as in `actuators` and `motor`
+
+The state is that of `vehicle.state`; the command is (propeller [rev/s], rudder, port plane, starboard plane [rad]);
+`current_n` (3,) is the velocity of the water in earth axes, steady and uniform around the vehicle; `wrench_b` (6,)
+is what pulls from outside, about the hull centre in body axes.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from subzero.compiled import compiled
+from vehicle.actuators import fin_angle, servo_rate, settle
+from vehicle.kinematics import motion, normalise, rotation
+from vehicle.motor import battery_current, shaft_rate, shaft_target, voltage
+from vehicle.state import CHARGE, LINKAGE, SERVO, SHAFT
+from vehicle.terms import TERM_COUNT, fill_terms
+
+
+@compiled
+def relative_velocity(state: np.ndarray, R: np.ndarray, current_n: np.ndarray, nu_r: np.ndarray) -> None:
+    """Fill nu_r (6,) with the velocity through the water in body axes [m/s, rad/s]; R is R_nb."""
+    for i in range(3):
+        flow = R[0, i] * current_n[0] + R[1, i] * current_n[1] + R[2, i] * current_n[2]
+        nu_r[i] = state[7 + i] - flow
+        nu_r[3 + i] = state[10 + i]
+
+
+@compiled
+def surge_through_water(state: np.ndarray, current_n: np.ndarray) -> float:
+    """Return u_r, the forward speed through the water [m/s]."""
+    R = np.empty((3, 3))
+    rotation(state[3:7], R)
+    return state[7] - (R[0, 0] * current_n[0] + R[1, 0] * current_n[1] + R[2, 0] * current_n[2])
+
+
+@compiled
+def shaft_goal(state, command, u, numbers):
+    """Return the shaft speed the motor is heading for [rev/s] at surge speed u through the water [m/s]."""
+    current = battery_current(state[SHAFT], u, numbers.motor, numbers.propeller)
+    return shaft_target(command[0], voltage(state[CHARGE], current, numbers.motor), numbers.motor)
+
+
+@compiled
+def shaft_speed(state, command, u, numbers):
+    """Return the shaft speed [rev/s]: the state's, or the goal itself if the motor has no lag."""
+    if numbers.motor.lag == 0.0:
+        return shaft_goal(state, command, u, numbers)
+    return state[SHAFT]
+
+
+@compiled
+def evaluate(state, command, current_n, wrench_b, numbers, R, nu_r, out):
+    """Fill R_nb (3, 3), nu_r (6,) and all terms (terms, 6) of a state."""
+    rotation(state[3:7], R)
+    relative_velocity(state, R, current_n, nu_r)
+    rudder = fin_angle(state, command, 0, numbers.servos)
+    port = fin_angle(state, command, 1, numbers.servos)
+    starboard = fin_angle(state, command, 2, numbers.servos)
+    n = shaft_speed(state, command, nu_r[0], numbers)
+    fill_terms(state[7:13], nu_r, R, n, (rudder, port, starboard), wrench_b, numbers, out)
+
+
+@compiled
+def actuators(state, command, u, numbers, out):
+    """Fill the rates of shaft, servos, charge and linkages; u is the surge speed through the water [m/s]."""
+    out[SHAFT] = shaft_rate(state[SHAFT], shaft_goal(state, command, u, numbers), numbers.motor)
+    for i in range(3):
+        out[SERVO + i] = servo_rate(state[SERVO + i], command[1 + i], numbers.servos[i])
+        out[LINKAGE + i] = 0.0
+    out[CHARGE] = battery_current(state[SHAFT], u, numbers.motor, numbers.propeller)
+
+
+@compiled
+def derivative(state, command, current_n, wrench_b, numbers, out):
+    """Fill out (STATE_SIZE,) with the rate of the state.
+
+    Args:
+        state: as in `vehicle.STATE`.
+        command: propeller [rev/s], rudder, port plane, starboard plane [rad].
+        current_n: velocity of the water, earth axes. [m/s]
+        wrench_b: external force and moment about the hull centre, body axes. [N, N m]
+        numbers: `Vehicle.numbers()`.
+        out: the rates.
+    """
+    R, nu_r, terms = np.empty((3, 3)), np.empty(6), np.empty((TERM_COUNT, 6))
+    evaluate(state, command, current_n, wrench_b, numbers, R, nu_r, terms)
+    motion(state, R, out)
+    for j in range(6):
+        total = 0.0
+        for i in range(TERM_COUNT):
+            total += terms[i, j]
+        terms[0, j] = total
+    for i in range(6):
+        rate = 0.0
+        for j in range(6):
+            rate += numbers.inverse_mass[i, j] * terms[0, j]
+        out[7 + i] = rate
+    actuators(state, command, nu_r[0], numbers, out)
+
+
+@compiled
+def breakdown(state, command, current_n, wrench_b, numbers, out):
+    """Fill out (len(BREAKDOWN), 6) with every named term; their sum is M ν' [N, N m]. Arguments: `derivative`."""
+    evaluate(state, command, current_n, wrench_b, numbers, np.empty((3, 3)), np.empty(6), out)
+
+
+@compiled
+def finish_step(state, command, numbers):
+    """Tidy a state after a step: quaternion to length one, linkages behind their servos."""
+    normalise(state)
+    settle(state, command, numbers.servos)
+
+
+@compiled
+def deflections(state, command, numbers):
+    """Return the angles of rudder, port and starboard plane in the water [rad], after backlash."""
+    rudder = fin_angle(state, command, 0, numbers.servos)
+    port = fin_angle(state, command, 1, numbers.servos)
+    return rudder, port, fin_angle(state, command, 2, numbers.servos)
+
+
+@compiled
+def battery_voltage(state, command, current_n, numbers):
+    """Return the battery voltage under load [V]."""
+    u = surge_through_water(state, current_n)
+    n = shaft_speed(state, command, u, numbers)
+    current = battery_current(n, u, numbers.motor, numbers.propeller)
+    return voltage(state[CHARGE], current, numbers.motor)

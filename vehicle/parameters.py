@@ -1,0 +1,106 @@
+"""What a parameter of the vehicle is, and how a set of them is checked.
+
+Every number of a vehicle is a field of a frozen dataclass, made by `parameter`: it carries its meaning, its unit
+and its hard limits (outside of which the equations make no sense; plausible ranges and provenance live with the
+values, in the vehicle's file). `read_section` turns a plain mapping into such a dataclass and collects what is
+wrong instead of stopping at the first mistake.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from difflib import get_close_matches
+from typing import Any
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Problem:
+    """One thing wrong with the numbers of a vehicle: which key, what was found, why not, what is allowed."""
+
+    key: str
+    found: str
+    why: str
+    allowed: str
+
+    def __str__(self) -> str:
+        return f"{self.key}: found {self.found}; {self.why}. Allowed: {self.allowed}."
+
+
+class VehicleError(ValueError):
+    """The numbers given do not make a vehicle; `problems` lists everything that is wrong with them."""
+
+    def __init__(self, problems: tuple[Problem, ...]) -> None:
+        self.problems = problems
+        super().__init__("\n".join(str(problem) for problem in problems))
+
+
+def parameter(
+    meaning: str, unit: str, *, low: float = -math.inf, high: float = math.inf, above: float | None = None
+) -> Any:
+    """Declare a field with its meaning, unit and hard limits; `above` is a lower limit itself excluded."""
+    limits = {"low": low if above is None else above, "high": high, "strict": above is not None}
+    return dataclasses.field(metadata={"meaning": meaning, "unit": unit, **limits})
+
+
+def allowed_values(field: dataclasses.Field[Any]) -> str:
+    """Say in words which values a field may take, with the unit."""
+    low, high, unit = field.metadata["low"], field.metadata["high"], field.metadata["unit"]
+    bounds = []
+    if low > -math.inf:
+        bounds.append(f"{'above' if field.metadata['strict'] else 'at least'} {low:g}")
+    if high < math.inf:
+        bounds.append(f"at most {high:g}")
+    return f"a number {' and '.join(bounds)} [{unit}]".replace("  ", " ")
+
+
+def check_value(key: str, value: object, field: dataclasses.Field[Any]) -> Problem | None:
+    """Return what is wrong with one value, or None."""
+    allowed, found = allowed_values(field), f"{value!r}"
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        return Problem(key=key, found=found, why="this is not a number", allowed=allowed)
+    low, high, strict = (field.metadata[name] for name in ("low", "high", "strict"))
+    if math.isnan(value):
+        return Problem(key=key, found=found, why="NaN is not a value", allowed=allowed)
+    if value < low or value > high or (strict and value == low):
+        why = f"{field.metadata['meaning']} cannot be that"
+        return Problem(key=key, found=found, why=why, allowed=allowed)
+    if math.isinf(value) and high < math.inf:
+        return Problem(key=key, found=found, why="an infinite value has no meaning here", allowed=allowed)
+    return None
+
+
+def nearest(name: str, valid: list[str]) -> str:
+    """Suggest the nearest valid name, or list them all."""
+    close = get_close_matches(name, valid, n=1, cutoff=0.5)
+    return f"did you mean '{close[0]}'" if close else "one of " + ", ".join(valid)
+
+
+def read_section(kind: type, section: str, values: object, problems: list[Problem]) -> Any:
+    """Make one section of a vehicle from a mapping; append to `problems`, and return None, if that fails."""
+    fields = {field.name: field for field in dataclasses.fields(kind)}
+    if not isinstance(values, Mapping):
+        allowed = "a table with " + ", ".join(fields)
+        problems.append(Problem(key=section, found=f"{values!r}", why="a table is needed", allowed=allowed))
+        return None
+    before = len(problems)
+    for name in values:
+        if name not in fields:
+            allowed = nearest(str(name), list(fields))
+            problems.append(
+                Problem(key=f"{section}.{name}", found="this key", why="no such parameter", allowed=allowed)
+            )
+    for name, field in fields.items():
+        problem = (
+            check_value(f"{section}.{name}", values[name], field)
+            if name in values
+            else Problem(
+                key=f"{section}.{name}", found="nothing", why="it is missing", allowed=allowed_values(field)
+            )
+        )
+        if problem:
+            problems.append(problem)
+    if len(problems) > before:
+        return None
+    return kind(**{name: float(values[name]) for name in fields})

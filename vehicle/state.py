@@ -1,0 +1,70 @@
+"""The state of the vehicle: one table of names, symbols, units and places in the array.
+
+Position and attitude are of the hull centre in earth axes (north, east, down); the velocities are those of
+the hull over ground in body axes (forward, starboard, down). The linkages hold the fins' positions inside
+their backlash; without backlash they only repeat the servo angles.
+
+If you add an entry, also look at `dynamics.derivative` and `initial_state`.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from vehicle.kinematics import quaternion_from_euler
+
+STATE_SIZE = 21
+POSITION, QUATERNION, VELOCITY = 0, 3, 7
+SHAFT, SERVO, CHARGE, LINKAGE = 13, 14, 17, 18
+
+
+class StateEntry(NamedTuple):
+    """One entry of the state: what it is called and where it lies."""
+
+    name: str
+    symbol: str
+    unit: str
+    slice: slice
+
+
+STATE = (
+    StateEntry("position (north, east, down)", "x, y, z", "m", slice(0, 3)),
+    StateEntry("attitude quaternion, body to earth", "q_w, q_x, q_y, q_z", "1", slice(3, 7)),
+    StateEntry("velocity (surge, sway, heave)", "u, v, w", "m/s", slice(7, 10)),
+    StateEntry("angular velocity (roll, pitch, yaw rate)", "p, q, r", "rad/s", slice(10, 13)),
+    StateEntry("propeller speed", "n", "rev/s", slice(13, 14)),
+    StateEntry("rudder servo angle", "δ_r", "rad", slice(14, 15)),
+    StateEntry("port stern-plane servo angle", "δ_sp", "rad", slice(15, 16)),
+    StateEntry("starboard stern-plane servo angle", "δ_ss", "rad", slice(16, 17)),
+    StateEntry("charge drawn from the battery", "q_e", "C", slice(17, 18)),
+    StateEntry("linkages (rudder, port, starboard)", "δ_l", "rad", slice(18, 21)),
+)
+
+
+def initial_state(
+    *,
+    north: float = 0.0,
+    east: float = 0.0,
+    depth: float = 0.0,
+    roll: float = 0.0,
+    pitch: float = 0.0,
+    heading: float = 0.0,
+    velocity: tuple[float, ...] = (0.0,) * 6,
+    propeller_speed: float = 0.0,
+) -> np.ndarray:
+    """Return a state with central fins and a full battery.
+
+    Args:
+        north, east, depth: position of the hull centre. [m]
+        roll, pitch, heading: Euler angles; nose up and starboard turns are positive. [rad]
+        velocity: u, v, w, p, q, r over ground in body axes. [m/s, rad/s]
+        propeller_speed: n. [rev/s]
+    """
+    state = np.zeros(STATE_SIZE)
+    state[0:3] = north, east, depth
+    state[3:7] = quaternion_from_euler(float(roll), float(pitch), float(heading))
+    state[7:13] = velocity
+    state[SHAFT] = propeller_speed
+    return state

@@ -1,0 +1,194 @@
+"""A vehicle as a value: sections of numbers, checked, and made ready for the compiled equations.
+
+A `Vehicle` is frozen and has no defaults: its numbers come from a file (`scenarios/vehicles`) through
+`from_mapping`. To try another number, make a new one with `dataclasses.replace`, or `with_parameter`.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from vehicle.actuators import Servo, ServoNumbers
+from vehicle.added_mass import AddedMass
+from vehicle.axial_drag import AxialDrag
+from vehicle.body_lift import BodyLift
+from vehicle.cross_flow import CrossFlowDrag
+from vehicle.damping import LinearDamping, QuadraticDamping
+from vehicle.fins import FinNumbers, Fins
+from vehicle.geometry import Hull
+from vehicle.motor import Battery, Motor, MotorNumbers, motor_numbers
+from vehicle.parameters import Problem, VehicleError, nearest, parameter, read_section
+from vehicle.propeller import Propeller, PropellerNumbers
+from vehicle.restoring import Buoyancy, RestoringNumbers
+from vehicle.rigid_body import RigidBody
+
+
+class VehicleNumbers(NamedTuple):
+    """Everything the compiled equations need, derived once from a Vehicle."""
+
+    mass_matrix: np.ndarray
+    inverse_mass: np.ndarray
+    rigid_body: np.ndarray
+    added_mass: np.ndarray
+    munk_excess: float
+    body_lift: np.ndarray
+    strips: np.ndarray
+    axial_drag: float
+    linear_damping: np.ndarray
+    quadratic_damping: np.ndarray
+    restoring: RestoringNumbers
+    propeller: PropellerNumbers
+    rudder: FinNumbers
+    stern_planes: FinNumbers
+    servos: tuple[ServoNumbers, ServoNumbers, ServoNumbers]
+    motor: MotorNumbers
+
+
+@dataclass(frozen=True, kw_only=True)
+class Water:
+    """The water and the gravity it lies in."""
+
+    density: float = parameter("density, rho", "kg/m3", above=0.0)
+    gravity: float = parameter("acceleration of gravity, g", "m/s2", low=0.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Vehicle:
+    """All numbers of a vehicle; each field is a section (a table of its file)."""
+
+    water: Water
+    hull: Hull
+    rigid_body: RigidBody
+    buoyancy: Buoyancy
+    added_mass: AddedMass
+    axial_drag: AxialDrag
+    body_lift: BodyLift
+    cross_flow_drag: CrossFlowDrag
+    linear_damping: LinearDamping
+    quadratic_damping: QuadraticDamping
+    propeller: Propeller
+    motor: Motor
+    battery: Battery
+    rudder: Fins
+    stern_planes: Fins
+    rudder_servo: Servo
+    stern_plane_port_servo: Servo
+    stern_plane_starboard_servo: Servo
+
+    def numbers(self) -> VehicleNumbers:
+        """Return what the compiled equations take."""
+        density = self.water.density
+        mass_matrix = self.rigid_body.matrix() + self.added_mass.matrix()
+        return VehicleNumbers(
+            mass_matrix=mass_matrix,
+            inverse_mass=np.linalg.inv(mass_matrix),
+            rigid_body=self.rigid_body.matrix(),
+            added_mass=self.added_mass.matrix(),
+            munk_excess=self.added_mass.munk_factor - 1.0,
+            body_lift=self.body_lift.numbers(),
+            strips=self.cross_flow_drag.numbers(self.hull, density),
+            axial_drag=self.axial_drag.numbers(self.hull.diameter, density),
+            linear_damping=self.linear_damping.numbers(),
+            quadratic_damping=self.quadratic_damping.numbers(),
+            restoring=self.buoyancy.numbers(self.rigid_body, self.water.gravity),
+            propeller=self.propeller.numbers(density),
+            rudder=self.rudder.numbers(density),
+            stern_planes=self.stern_planes.numbers(density),
+            servos=(
+                self.rudder_servo.numbers(),
+                self.stern_plane_port_servo.numbers(),
+                self.stern_plane_starboard_servo.numbers(),
+            ),
+            motor=motor_numbers(self.motor, self.battery),
+        )
+
+    def with_parameter(self, key: str, value: float) -> Vehicle:
+        """Return a new vehicle with one number changed, named "section.parameter"; raises VehicleError."""
+        section, _, name = key.partition(".")
+        mapping = {s: dict(values) for s, values in to_mapping(self).items()}
+        mapping.setdefault(section, {})[name] = value
+        return from_mapping(mapping)
+
+
+SECTIONS: dict[str, type] = {
+    "water": Water,
+    "hull": Hull,
+    "rigid_body": RigidBody,
+    "buoyancy": Buoyancy,
+    "added_mass": AddedMass,
+    "axial_drag": AxialDrag,
+    "body_lift": BodyLift,
+    "cross_flow_drag": CrossFlowDrag,
+    "linear_damping": LinearDamping,
+    "quadratic_damping": QuadraticDamping,
+    "propeller": Propeller,
+    "motor": Motor,
+    "battery": Battery,
+    "rudder": Fins,
+    "stern_planes": Fins,
+    "rudder_servo": Servo,
+    "stern_plane_port_servo": Servo,
+    "stern_plane_starboard_servo": Servo,
+}
+"""Every section of a vehicle and the dataclass that reads it."""
+
+
+def to_mapping(vehicle: Vehicle) -> dict[str, dict[str, float]]:
+    """Return the plain numbers of a vehicle, section by section, as `from_mapping` takes them."""
+    return {section: dataclasses.asdict(getattr(vehicle, section)) for section in SECTIONS}
+
+
+def from_mapping(mapping: Mapping[str, object]) -> Vehicle:
+    """Make a vehicle from plain numbers: section → key → value in SI units.
+
+    Raises:
+        VehicleError: with every problem found: unknown or missing keys, text for a number, values outside the
+            hard limits, a hull whose parts do not fit, an added mass that is no mass.
+    """
+    problems = [
+        Problem(
+            key=str(name), found="this table", why="no such section", allowed=nearest(name, list(SECTIONS))
+        )
+        for name in mapping
+        if name not in SECTIONS
+    ]
+    sections = {}
+    for name, kind in SECTIONS.items():
+        if name in mapping:
+            sections[name] = read_section(kind, name, mapping[name], problems)
+        else:
+            problems.append(
+                Problem(key=name, found="nothing", why="this table is missing", allowed=f"a table [{name}]")
+            )
+    if not problems:
+        problems += inconsistencies(sections["hull"], sections["added_mass"])
+    if problems:
+        raise VehicleError(tuple(problems))
+    return Vehicle(**sections)
+
+
+def inconsistencies(hull: Hull, added_mass: AddedMass) -> list[Problem]:
+    """Return what is wrong between numbers that are right by themselves."""
+    problems = []
+    if hull.nose_length + hull.tail_length > hull.length:
+        parts = f"nose {hull.nose_length:g} m and tail {hull.tail_length:g} m"
+        why = f"together they are longer than the hull, {hull.length:g} m"
+        problems.append(
+            Problem(key="hull.tail_length", found=parts, why=why, allowed="a sum up to the length")
+        )
+    for key, coupling, mass, inertia in (
+        ("sway_yaw", added_mass.sway_yaw, added_mass.sway, added_mass.yaw),
+        ("heave_pitch", added_mass.heave_pitch, added_mass.heave, added_mass.pitch),
+    ):
+        if coupling**2 > mass * inertia:
+            limit = (mass * inertia) ** 0.5
+            why = "the added mass would give negative kinetic energy"
+            problems.append(
+                Problem(key=f"added_mass.{key}", found=f"{coupling:g}", why=why, allowed=f"within ±{limit:g}")
+            )
+    return problems
