@@ -1,1 +1,99 @@
-"""Trials as data."""
+"""Trials as data: TOML that a person can copy and edit, read and checked into values.
+
+    >>> import scenarios
+    >>> "fig6" in scenarios.names()
+    True
+    >>> trial = scenarios.load("fig6")          # or the path of your own file
+    >>> trial.duration, trial.commands.values[0]
+    (30.0, array([27.,  0.,  0.,  0.]))
+
+To make your own trial, copy `path("fig6")`, which explains every key, edit it, and load it by its path.
+Vehicles and cables are files too (`vehicles/`, `cables/`), each number with its unit, plausible range and
+provenance. Commands can stand in a CSV file with the columns ``time_s, propeller_rps, rudder_deg,
+stern_plane_port_deg, stern_plane_starboard_deg``. A file that cannot be used raises one `ScenarioError` with
+all its problems.
+
+Signs, here and everywhere: depth is positive down, heading runs clockwise from north, a positive rudder turns
+the heading to starboard (it increases), positive stern-planes (both) pitch the nose up. Files speak of
+degrees and revolutions per second; a `Trial` of radians and revolutions per second.
+
+Stories: `trial` what a trial is; `quantities` the one table of numbers, units and limits; `schema` what a
+file may say; `files` opening and parsing; `csv_file`, `samples` columns over time; `parts`, `changes`
+vehicles and cables; `steps` what must fit; `reader` all together; `errors` what a problem is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from scenarios.errors import Problem, ScenarioError
+from scenarios.trial import SCHEMES, Commands, Motion, Start, Trial
+
+__all__ = [
+    "SCHEMES",
+    "Commands",
+    "Motion",
+    "Problem",
+    "ScenarioError",
+    "Start",
+    "Trial",
+    "describe",
+    "load",
+    "names",
+    "path",
+]
+
+VehicleCheck = Callable[[Mapping[str, Any]], Iterable[Any]]
+
+
+def load(
+    name_or_path: str | Path,
+    *,
+    commands_csv: str | Path | None = None,
+    check_vehicle: VehicleCheck | None = None,
+) -> Trial:
+    """Return a shipped or a user's scenario, checked.
+
+    Args:
+        name_or_path: a name of `names`, or the path of a TOML file.
+        commands_csv: a CSV file of commands that replaces those of the scenario.
+        check_vehicle: takes the numbers of the vehicle and gives what its own equations find wrong with them,
+            as objects with the attributes key, found, why, allowed. (This package knows no vehicle.)
+
+    Raises:
+        ScenarioError: with every problem of every file.
+    """
+    from scenarios.reader import load as read  # pydantic comes only with the first file
+
+    return read(name_or_path, commands_csv=commands_csv, check_vehicle=check_vehicle)
+
+
+def names() -> list[str]:
+    """Return the names of the scenarios we ship, in alphabetical order."""
+    from scenarios.files import shipped
+
+    return shipped("trials")
+
+
+def describe(name: str) -> str:
+    """Return what a scenario we ship is, in one line.
+
+    Raises:
+        ScenarioError: there is no such scenario.
+    """
+    from scenarios.files import find
+
+    return str(find(name).table["description"])
+
+
+def path(name: str) -> Path:
+    """Return where the file of a scenario we ship lies, to copy and edit it.
+
+    Raises:
+        ScenarioError: there is no such scenario.
+    """
+    from scenarios.files import find
+
+    return find(name).folder / f"{name}.toml"

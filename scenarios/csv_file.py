@@ -1,0 +1,117 @@
+"""Read columns of numbers from a CSV file, and say of every wrong cell where it stands.
+
+One header line with the columns of `scenarios.quantities`, in any order, then one row a sample. Empty lines
+and lines that start with ``#`` are remarks. Whether the times make sense is checked in `scenarios.samples`.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from pathlib import Path
+
+from scenarios.errors import Problem, ScenarioError, nearest_or_all, shown
+from scenarios.files import read_text
+from scenarios.quantities import SECTIONS, Quantity
+from scenarios.samples import Samples
+
+Row = tuple[int, list[str]]
+"""Line in the file, from 1, and the cells."""
+
+
+def read_csv(path: Path, name: str, section: str) -> tuple[Samples | None, list[Problem]]:
+    """Read the samples of a section from a CSV file.
+
+    Args:
+        path: the file.
+        name: the file as the user named it.
+        section: ``commands`` or ``motion``.
+
+    Returns:
+        the samples, None if there is a problem; and the problems.
+    """
+    quantities = {quantity.name: quantity for quantity in SECTIONS[section]}
+    try:
+        header, rows = _table(read_text(path, name), name)
+    except ScenarioError as error:
+        return None, list(error.problems)
+    problems = _header_problems(name, header, list(quantities)) or _shape_problems(name, header[1], rows)
+    if problems:
+        return None, problems
+    columns = {
+        column: [_number(name, quantities[column], line, cells[at], problems) for line, cells in rows]
+        for at, column in enumerate(header[1])
+    }
+    lines = [line for line, _ in rows]
+    problems.sort(key=lambda problem: problem.line or 0)
+    return (None if problems else Samples(file=name, key="time_s", columns=columns, lines=lines)), problems
+
+
+def _table(text: str, name: str) -> tuple[Row, list[Row]]:
+    """Return the header and the rows, without remarks."""
+    reader = csv.reader(io.StringIO(text, newline=""))
+    try:
+        rows = [(reader.line_num, [cell.strip() for cell in cells]) for cells in reader]
+    except csv.Error as error:
+        why = f"this is not a CSV file ({error})"
+        problem = Problem(file=name, line=reader.line_num, why=why, remedy="Save it as plain CSV.")
+        raise ScenarioError([problem]) from None
+    rows = [(line, cells) for line, cells in rows if any(cells) and not cells[0].startswith("#")]
+    if not rows:
+        remedy = "Write a header line and one row for each sample."
+        raise ScenarioError([Problem(file=name, why="the file is empty", remedy=remedy)])
+    return rows[0], rows[1:]
+
+
+def _header_problems(name: str, header: Row, allowed: list[str]) -> list[Problem]:
+    """Return the columns that are unknown, doubled or missing."""
+    line, columns = header
+    problems = []
+    for at, column in enumerate(columns):
+        if column not in allowed:
+            why, remedy = "there is no such column", nearest_or_all(column, allowed)
+        elif column in columns[:at]:
+            why, remedy = "this column stands twice", "Keep one of the two."
+        else:
+            continue
+        problems.append(
+            Problem(file=name, line=line, key="header", found=shown(column), why=why, remedy=remedy)
+        )
+    remedy = f"Needed: {', '.join(allowed)}."
+    missing = [column for column in allowed if column not in columns]
+    why = "this column is missing"
+    return problems + [Problem(file=name, line=line, key=key, why=why, remedy=remedy) for key in missing]
+
+
+def _shape_problems(name: str, columns: list[str], rows: list[Row]) -> list[Problem]:
+    """Return the rows that have more or fewer cells than the header, or that there are no rows."""
+    if not rows:
+        return [Problem(file=name, why="there are no rows below the header", remedy="Add one a sample.")]
+    count = len(columns)
+    return [
+        Problem(
+            file=name, line=line, found=f"{len(cells)} cells",
+            why=f"the header has {count} columns", remedy="Give every column one cell.",
+        )
+        for line, cells in rows
+        if len(cells) != count
+    ]  # fmt: skip
+
+
+def _number(name: str, quantity: Quantity, line: int, cell: str, problems: list[Problem]) -> float:
+    """Return the number in a cell; if it cannot be used, add the problem."""
+    try:
+        value = float(cell)
+    except ValueError:
+        value, why = math.nan, "this is not a number" if cell else "this cell is empty"
+    else:
+        why = "" if math.isfinite(value) else "this is not a finite number"
+        if math.isfinite(value) and not quantity.low <= value <= quantity.high:
+            why = "this is outside its limits"
+    if why:
+        found = shown(cell) if cell else ""
+        problems.append(
+            Problem(file=name, line=line, key=quantity.name, found=found, why=why, remedy=quantity.allowed)
+        )
+    return value

@@ -1,0 +1,83 @@
+"""What is wrong with a file, said so that it can be repaired: all problems at once, each with its place.
+
+A problem has three parts: *what* was found and where, *why* it cannot be, and *what to do*.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+SHOWN_PROBLEMS = 12
+"""So many problems are spelt out in a message: enough to repair a file, few enough to read on one screen."""
+
+SHOWN_CHARACTERS = 60
+"""Longer values are cut, so that a message stays readable whatever is in the file."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Problem:
+    """One thing in one file that cannot be used.
+
+    Attributes:
+        file: the file as the user named it, or the name of a scenario.
+        line: line in the file, from 1; None where the whole file is meant.
+        key: key or column, such as ``run.hull_step_s``; empty where none is meant.
+        found: the value found, as text; empty where something is missing.
+        why: why it cannot be.
+        remedy: what is allowed, or the nearest valid name.
+    """
+
+    file: str
+    line: int | None = None
+    key: str = ""
+    found: str = ""
+    why: str
+    remedy: str = ""
+
+    def __str__(self) -> str:
+        """Return ``file, line 3, key: found x, but ... Allowed: ...``."""
+        line = f"line {self.line}" if self.line else ""
+        place = ", ".join(part for part in (self.file, line, self.key) if part)
+        said = f"found {self.found}, but {self.why}" if self.found else self.why
+        return f"{place}: {said}. {self.remedy}".rstrip()
+
+
+class ScenarioError(Exception):
+    """A scenario, or a file it needs, cannot be used; carries every problem, and its text says them.
+
+    Attributes:
+        problems: all that is wrong, in the order of the files.
+    """
+
+    def __init__(self, problems: Iterable[Problem]) -> None:
+        """Keep the problems; there must be at least one."""
+        self.problems = tuple(problems)
+        super().__init__(self.problems)
+
+    def __str__(self) -> str:
+        """Return a headline and the problems, one a line."""
+        count = len(self.problems)
+        rest = count - SHOWN_PROBLEMS
+        headline = f"The scenario cannot be used ({count} problem{'s' if count > 1 else ''}):"
+        lines = [headline, *(f"  {problem}" for problem in self.problems[:SHOWN_PROBLEMS])]
+        return "\n".join([*lines, f"  ... and {rest} more."] if rest > 0 else lines)
+
+
+def shown(value: object) -> str:
+    """Return a value as it is shown in a message: `repr`, on one line, cut when long."""
+    try:
+        text = repr(value)
+    except ValueError:  # an integer of thousands of digits has no text
+        return "a number far too long"
+    return text if len(text) <= SHOWN_CHARACTERS else text[:SHOWN_CHARACTERS] + "..."
+
+
+def nearest_or_all(word: str, allowed: Iterable[str]) -> str:
+    """Return ``Did you mean 'x'?`` with the nearest allowed word; all allowed words if none is near."""
+    by_lower = {candidate.lower(): candidate for candidate in allowed}
+    close = difflib.get_close_matches(word.lower()[:SHOWN_CHARACTERS], by_lower, n=1, cutoff=0.6)
+    if close:
+        return f"Did you mean '{by_lower[close[0]]}'?"
+    return f"Allowed: {', '.join(by_lower.values())}."

@@ -1,0 +1,150 @@
+"""Find, open and parse the files of a scenario, and say where in them a key stands.
+
+Shipped files are named by a word (``fig6``), the user's by a path; a path that a file mentions is relative to
+the folder of that file.
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from scenarios.errors import Problem, ScenarioError, nearest_or_all, shown
+
+ROOT = Path(__file__).parent
+
+HEADER = re.compile(r"""\s*\[\s*([^\[\]]+?)\s*\]""")
+KEY = re.compile(r"""\s*("[^"]*"|'[^']*'|[\w.\-]+)\s*=""")
+AT = re.compile(r"\s*\(at (?:line (\d+), column (\d+)|end of document)\)$")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Source:
+    """A parsed TOML file that can say on which line a key stands.
+
+    Attributes:
+        name: the file as the user named it.
+        folder: folder that holds it, from which its own paths start.
+        text: what it says.
+        table: the same, parsed.
+        lines: dotted key → line, from 1.
+    """
+
+    name: str
+    folder: Path
+    text: str
+    table: dict[str, Any]
+    lines: dict[str, int] = field(repr=False)
+
+    def line(self, key: str) -> int | None:
+        """Return the line of a key such as ``commands.rudder_deg[3]``, or that of its section."""
+        key = key.partition("[")[0]
+        while key and key not in self.lines:
+            key = key.rpartition(".")[0]
+        return self.lines.get(key)
+
+    def problem(self, key: str, why: str, remedy: str = "", *, found: object = None) -> Problem:
+        """Return a problem of this file, with the line of its key."""
+        text = "" if found is None else shown(found)
+        return Problem(file=self.name, line=self.line(key), key=key, found=text, why=why, remedy=remedy)
+
+
+def shipped(kind: str) -> list[str]:
+    """Return the names of the shipped ``trials``, ``vehicles`` or ``cables``, in alphabetical order."""
+    return sorted(path.stem for path in (ROOT / kind).glob("*.toml"))
+
+
+def shipped_path(kind: str, name: str) -> Path:
+    """Return where a shipped file lies."""
+    return ROOT / kind / f"{name}.toml"
+
+
+def find(name_or_path: str | Path) -> Source:
+    """Return the trial file of a shipped scenario or of a path.
+
+    Raises:
+        ScenarioError: there is none, or it is not TOML.
+    """
+    named = str(name_or_path)
+    if named in shipped("trials"):
+        return read_toml(shipped_path("trials", named), named)
+    path = Path(named)
+    if path.suffix == ".toml" or len(path.parts) > 1 or path.exists():
+        return read_toml(path, named)
+    remedy = nearest_or_all(named, shipped("trials")) + " Or give the path of a TOML file."
+    raise ScenarioError([Problem(file=named, why="there is no such scenario", remedy=remedy)])
+
+
+def read_text(path: Path, name: str) -> str:
+    """Return the text of a file, whatever its line ends; `name` is what messages call it.
+
+    Raises:
+        ScenarioError: it is not there, is a folder, cannot be read, or is not text.
+    """
+    try:
+        return path.read_bytes().decode("utf-8-sig").replace("\r\n", "\n")
+    except FileNotFoundError:
+        why, remedy = "there is no such file", _neighbour(path)
+    except IsADirectoryError:
+        why, remedy = "this is a folder, not a file", "Name a file in it."
+    except UnicodeDecodeError:
+        why, remedy = "this is not a text file in UTF-8", "Save it as plain text, encoding UTF-8."
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        why, remedy = f"it cannot be read ({reason})", "Name a file that you may read."
+    raise ScenarioError([Problem(file=name, why=why, remedy=remedy)])
+
+
+def _neighbour(path: Path) -> str:
+    """Return a hint at a file in the same folder with nearly the same name."""
+    try:
+        names = [near.name for near in path.parent.iterdir() if near.suffix == path.suffix]
+    except OSError:
+        return "Its folder does not exist either: check the path."
+    hint = nearest_or_all(path.name, names)
+    return hint if hint.startswith("Did") else "Check the path."
+
+
+def read_toml(path: Path, name: str) -> Source:
+    """Read a TOML file.
+
+    Raises:
+        ScenarioError: it cannot be read, or is not TOML; with line and column.
+    """
+    text = read_text(path, name)
+    try:
+        table = tomllib.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise ScenarioError([_syntax_problem(name, text, str(error))]) from None
+    return Source(name=name, folder=path.parent, text=text, table=table, lines=_key_lines(text))
+
+
+def _syntax_problem(name: str, text: str, message: str) -> Problem:
+    """Return the problem that the TOML parser met, with the line it stands on."""
+    at = AT.search(message)
+    lines = text.split("\n")
+    line = int(at[1]) if at and at[1] else len(lines)
+    column = f", at column {at[2]}" if at and at[2] else ""
+    return Problem(
+        file=name,
+        line=line,
+        found=shown(lines[line - 1].strip()),
+        why=f"this is not valid TOML{column}: {AT.sub('', message)}",
+        remedy="Write one 'key = value' a line, text in double quotes, lists as [1, 2, 3].",
+    )
+
+
+def _key_lines(text: str) -> dict[str, int]:
+    """Return dotted key → line, from 1, of each key at the start of a line; good enough for a message."""
+    lines: dict[str, int] = {}
+    section = ""
+    for number, line in enumerate(text.split("\n"), start=1):
+        if header := HEADER.match(line):
+            section = header[1] + "."
+            lines.setdefault(header[1], number)
+        elif key := KEY.match(line):
+            lines.setdefault(section + key[1].strip("\"'"), number)
+    return lines

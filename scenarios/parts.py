@@ -1,0 +1,157 @@
+"""Vehicle and cable files: every number with its unit, its plausible range, and where it comes from.
+
+A number is an inline table ``{ value = 6.6, unit = "kg", range = [6.4, 7.5], source = "..." }``. The first
+file we ship of each kind is its *pattern*: a user's file must have the same sections, keys and units.
+``range`` says what is plausible and is for readers; ``limits`` in the pattern says what is possible, and is
+enforced.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from scenarios.errors import Problem, ScenarioError, nearest_or_all
+from scenarios.files import Source, read_toml, shipped, shipped_path
+
+PATTERNS = {"vehicle": ("vehicles", "subzero2"), "cable": ("cables", "table1")}
+"""Kind of part → the folder of its files, and the file that is the pattern."""
+
+LEAF_KEYS = ("value", "unit", "range", "limits", "source")
+
+ABOVE_ZERO = ("mass", "density", "diameter", "radius", "area", "inertia")
+"""Where the pattern gives no limits, a number whose name ends in one of these must be above zero."""
+
+Leaf = Mapping[str, Any]
+Leaves = dict[str, Leaf]
+"""Dotted key, such as ``hull.mass``, → its inline table."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Part:
+    """A vehicle, or a cable with its drum, as read.
+
+    Attributes:
+        source: its file; None if that could not be read.
+        values: dotted key → value, as far as they are good.
+    """
+
+    source: Source | None = None
+    values: Mapping[str, float] = field(default_factory=dict)
+
+
+def pattern(kind: str) -> Source:
+    """Return the pattern of a kind of part, ``vehicle`` or ``cable``."""
+    folder, name = PATTERNS[kind]
+    return read_toml(shipped_path(folder, name), name)
+
+
+def read_part(source: Source, kind: str, named: str) -> tuple[Part, list[Problem]]:
+    """Read the vehicle or the cable that a trial file names.
+
+    Args:
+        source: the trial file.
+        kind: ``vehicle`` or ``cable``.
+        named: name of a shipped file, or path from the trial file's folder, ending in ``.toml``.
+
+    Returns:
+        the part, as far as it is good; and the problems.
+    """
+    folder, _ = PATTERNS[kind]
+    if named.endswith(".toml"):
+        path = source.folder / named
+    elif named in shipped(folder):
+        path = shipped_path(folder, named)
+    else:
+        remedy = nearest_or_all(named, shipped(folder)) + " Or give the path of a file that ends in .toml."
+        return Part(), [source.problem(kind, f"we ship no such {kind}", remedy, found=named)]
+    try:
+        part = read_toml(path, named)
+        values, problems = _checked(part, pattern(kind))
+    except ScenarioError as error:
+        return Part(), list(error.problems)
+    return Part(source=part, values=values), problems
+
+
+def _checked(source: Source, model: Source) -> tuple[dict[str, float], list[Problem]]:
+    """Return the values of a file, held against its pattern."""
+    wanted, given = dict(leaves(model.table)), dict(leaves(source.table))
+    problems = [
+        source.problem(key, "this file has no such key", nearest_or_all(key, wanted))
+        for key in given
+        if key not in wanted
+    ]
+    values = {}
+    for key, leaf in wanted.items():
+        if key not in given:
+            why = "this key is missing"
+            problems.append(
+                source.problem(key, why, f'Add it as {{ value = ..., unit = "{leaf["unit"]}" }}.')
+            )
+        elif complaint := _complaint(given[key], leaf, key):
+            problems.append(source.problem(key, *complaint, found=given[key].get("value")))
+        else:
+            values[key] = float(given[key]["value"])
+    return values, problems
+
+
+def leaves(table: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Leaf]]:
+    """Walk through a file: every number with its dotted key; text and lists are for readers."""
+    for name, inside in table.items():
+        key = f"{above}{name}"
+        if isinstance(inside, Mapping) and "value" not in inside:
+            yield from leaves(inside, f"{key}.")
+        elif isinstance(inside, Mapping):
+            yield key, inside
+        elif not isinstance(inside, str | list):
+            yield key, {"value": inside}
+
+
+def _complaint(leaf: Leaf, model: Leaf, key: str) -> tuple[str, str] | None:
+    """Return why a number of a part cannot be used, and what to do; None if it can."""
+    unit = model["unit"]
+    unknown = [name for name in leaf if name not in LEAF_KEYS]
+    if unknown:
+        return f"'{unknown[0]}' says nothing here", nearest_or_all(unknown[0], LEAF_KEYS)
+    if leaf.get("unit") != unit:
+        return f"its unit is {leaf.get('unit', 'not given')!r}", f"Allowed: unit = '{unit}'."
+    return value_complaint(leaf["value"], model, key)
+
+
+def value_complaint(value: object, model: Leaf, key: str) -> tuple[str, str] | None:
+    """Return why a value cannot be used for a number of the pattern, and what to do; None if it can."""
+    low, high, allowed = _limits(model, key)
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return "this is not a number", allowed
+    if not abs(value) < math.inf:
+        return "this is not a finite number", allowed
+    if not low <= value <= high or (value == 0.0 and low == math.ulp(0.0)):
+        return "this cannot be", allowed
+    return None
+
+
+def _limits(model: Leaf, key: str) -> tuple[float, float, str]:
+    """Return the least and the greatest possible value, and a sentence for a message."""
+    low, high = -math.inf, math.inf
+    said = "any finite number"
+    if "limits" in model:
+        low, high = model["limits"]
+        said = f"{low:g} to {high:g}"
+    elif key.rpartition(".")[2].rpartition("_")[2] in ABOVE_ZERO:
+        low, said = math.ulp(0.0), "above 0"
+    plausible = f"; plausible is {model['range'][0]:g} to {model['range'][1]:g}" if "range" in model else ""
+    return low, high, f"Allowed: {said} {model['unit']}{plausible}."
+
+
+def nested(values: Mapping[str, float]) -> dict[str, Any]:
+    """Turn dotted keys into tables inside tables: ``{"hull.mass": 6.6}`` → ``{"hull": {"mass": 6.6}}``."""
+    tables: dict[str, Any] = {}
+    for key, value in values.items():
+        *sections, name = key.split(".")
+        table = tables
+        for section in sections:
+            table = table.setdefault(section, {})
+        table[name] = value
+    return tables

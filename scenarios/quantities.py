@@ -1,0 +1,98 @@
+"""The one table of numbers that a trial file may hold: name, unit, limits, default, meaning.
+
+The unit is part of the name, as in ``hull_step_s``. Limits are hard: a number outside is a slip of the pen or
+of the unit, and is refused. A quantity without a default must be given. The TOML reader, the CSV reader and
+every message read this table; to add a number, add a row here and use it in `scenarios.reader`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+INNER = {"degree": math.pi / 180.0}
+"""Inner units per unit of a file: radians inside; all other units are kept."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Quantity:
+    """One number: its name in files, its unit there, and what is allowed.
+
+    Attributes:
+        name: name of the key or of the column, with its unit.
+        unit: unit in files.
+        low: least allowed value, in that unit.
+        high: greatest allowed value, in that unit.
+        default: taken where the number is not given; None if it must be given.
+        meaning: in words, with its sign.
+    """
+
+    name: str
+    unit: str
+    low: float
+    high: float
+    default: float | None
+    meaning: str
+
+    @property
+    def scale(self) -> float:
+        """Inner units per unit of the file."""
+        return INNER.get(self.unit, 1.0)
+
+    @property
+    def allowed(self) -> str:
+        """What is allowed, as a sentence for a message."""
+        return f"Allowed: {self.low:g} to {self.high:g} {self.unit} ({self.meaning})."
+
+
+def _read(table: str) -> tuple[Quantity, ...]:
+    """Turn the rows of a table, ``name | unit | low | high | default | meaning``, into quantities."""
+    rows = [[cell.strip() for cell in line.split("|")] for line in table.strip().splitlines()]
+    return tuple(
+        Quantity(
+            name=name, unit=unit, low=float(low), high=float(high),
+            default=float(default) if default else None, meaning=meaning,
+        )
+        for name, unit, low, high, default, meaning in rows
+    )  # fmt: skip
+
+
+RUN = _read("""
+duration_s       | s | 0.001  | 86400 |      | how long the run lasts
+hull_step_s      | s | 0.0001 | 1     | 0.02 | time step of the vehicle
+cable_step_s     | s | 0.0001 | 10    | 0.1  | time step of the cable
+segment_length_m | m | 0.001  | 100   | 0.5  | length of a cable segment
+""")
+
+START = _read("""
+heading_deg     | degree | -36000 | 36000 | 0 | heading, clockwise from north
+pitch_deg       | degree | -89    | 89    | 0 | pitch, positive nose up
+roll_deg        | degree | -180   | 180   | 0 | roll, positive starboard side down
+depth_m         | m      | 0      | 11000 | 0 | depth of the hull centre, positive down
+surge_speed_m_s | m/s    | -20    | 20    | 0 | forward speed over ground
+wet_length_m    | m      | 0      | 10000 | 0 | cable already in the water, laid straight
+""")
+
+WATER = _read("""
+current_north_m_s | m/s | -5 | 5 | 0 | velocity of the water to the north
+current_east_m_s  | m/s | -5 | 5 | 0 | velocity of the water to the east
+current_down_m_s  | m/s | -5 | 5 | 0 | velocity of the water downwards
+""")
+
+COMMANDS = _read("""
+time_s                   | s      | 0    | 86400 |   | time since the start
+propeller_rps            | rev/s  | -200 | 200   |   | propeller speed, positive drives forward
+rudder_deg               | degree | -90  | 90    |   | rudder, positive turns to starboard
+stern_plane_port_deg     | degree | -90  | 90    |   | port stern-plane, positive raises the nose
+stern_plane_starboard_deg | degree | -90 | 90    |   | starboard stern-plane, positive raises the nose
+""")
+
+MOTION = _read("""
+time_s          | s      | 0      | 86400 |  | time since the start
+surge_speed_m_s | m/s    | -20    | 20    |  | forward speed
+pitch_deg       | degree | -89    | 89    |  | pitch, positive nose up
+heading_deg     | degree | -36000 | 36000 |  | heading, clockwise from north
+""")
+
+SECTIONS = {"run": RUN, "start": START, "water": WATER, "commands": COMMANDS, "motion": MOTION}
+"""Section of a trial file → the numbers it may hold; in the last two, each is a list of numbers."""

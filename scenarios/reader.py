@@ -1,0 +1,183 @@
+"""Read a scenario, the trial file and all files that it names, into one checked `Trial`.
+
+Problems are collected from all files and raised together; only a trial file that cannot be read at all stops
+sooner.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from math import radians
+from pathlib import Path
+from typing import Any, TypeVar
+
+from scenarios.changes import read_changes
+from scenarios.csv_file import read_csv
+from scenarios.errors import Problem, ScenarioError
+from scenarios.files import Source, find
+from scenarios.parts import Part, nested, read_part
+from scenarios.samples import Samples, check_times, commands, inline, motion
+from scenarios.schema import LISTS, check_page, check_section
+from scenarios.steps import check_steps
+from scenarios.trial import Motion, Start, Trial
+
+Found = TypeVar("Found")
+
+VehicleCheck = Callable[[Mapping[str, Any]], Iterable[Any]]
+"""Takes the numbers of a vehicle; gives complaints with the attributes key, found, why, allowed."""
+
+SAID_BY_MOTION = ("heading_deg", "pitch_deg", "roll_deg", "surge_speed_m_s")
+"""Keys of [start] that a prescribed motion leaves no room for; its roll is zero."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reading:
+    """A trial file while it is read: what it says, and what is wrong so far."""
+
+    source: Source
+    problems: list[Problem] = field(default_factory=list)
+
+    def keep(self, result: tuple[Found, list[Problem]]) -> Found:
+        """Note the problems of a result, and return the rest of it."""
+        self.problems.extend(result[1])
+        return result[0]
+
+    def note(self, key: str, why: str, remedy: str) -> None:
+        """Note one problem of the trial file."""
+        self.problems.append(self.source.problem(key, why, remedy))
+
+    def section(self, name: str) -> dict[str, Any]:
+        """Return a section, checked number by number; empty if there is a problem."""
+        return self.keep(check_section(self.source, name, self.source.table.get(name, {})))
+
+
+def load(
+    name_or_path: str | Path,
+    *,
+    commands_csv: str | Path | None = None,
+    check_vehicle: VehicleCheck | None = None,
+) -> Trial:
+    """Return a shipped or a user's scenario, checked.
+
+    Args:
+        name_or_path: a name of `names`, or the path of a TOML file.
+        commands_csv: a CSV file of commands that replaces those of the scenario.
+        check_vehicle: takes the numbers of the vehicle and gives what its own equations find wrong with them,
+            as objects with the attributes key, found, why, allowed. (This package knows no vehicle.)
+
+    Raises:
+        ScenarioError: with every problem of every file.
+    """
+    reading = Reading(source=find(name_or_path))
+    reading.problems.extend(check_page(reading.source))
+    run, start, water = (reading.section(name) for name in ("run", "start", "water"))
+    reading.problems.extend(check_steps(reading.source, run, start))
+    vehicle, cable = _parts(reading, check_vehicle)
+    samples = _instructions(reading, commands_csv, run.get("duration_s"))
+    if reading.problems:
+        raise ScenarioError(reading.problems)
+    prescribed = motion(samples["motion"]) if "motion" in samples else None
+    return Trial(
+        name=Path(name_or_path).stem,
+        description=reading.source.table["description"],
+        text=reading.source.text,
+        source=str(name_or_path),
+        duration=run["duration_s"],
+        hull_step=run["hull_step_s"],
+        cable_step=run["cable_step_s"],
+        segment_length=run["segment_length_m"],
+        scheme=run["scheme"],
+        start=_start(start, prescribed),
+        vehicle=vehicle,
+        cable=cable["cable"],
+        drum=cable["drum"],
+        current=(water["current_north_m_s"], water["current_east_m_s"], water["current_down_m_s"]),
+        commands=commands(samples["commands"]) if "commands" in samples else None,
+        motion=prescribed,
+    )
+
+
+def _parts(reading: Reading, check: VehicleCheck | None) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return the numbers of the vehicle, and those of cable and drum, with the changes of the trial."""
+    parts: dict[str, Part] = {}
+    for kind in ("vehicle", "cable"):
+        named = reading.source.table.get(kind)
+        known = isinstance(named, str)
+        parts[kind] = reading.keep(read_part(reading.source, kind, str(named))) if known else Part()
+    changes = reading.keep(read_changes(reading.source))
+    of_vehicle = {
+        key.removeprefix("vehicle."): value for key, value in changes.items() if key.startswith("vehicle.")
+    }
+    of_cable = {key: value for key, value in changes.items() if not key.startswith("vehicle.")}
+    vehicle = nested({**parts["vehicle"].values, **of_vehicle})
+    if check and parts["vehicle"].source and not reading.problems:
+        complaints = check(vehicle)
+        reading.problems.extend(
+            _complaint(reading, parts["vehicle"], of_vehicle, said) for said in complaints
+        )
+    return vehicle, nested({**parts["cable"].values, **of_cable})
+
+
+def _complaint(reading: Reading, part: Part, changed: Mapping[str, float], said: Any) -> Problem:
+    """Return a complaint of the vehicle as a problem of the file that holds the number."""
+    source, key = part.source or reading.source, said.key
+    if key in changed:
+        source, key = reading.source, f"changes.vehicle.{key}"
+    remedy = f"Allowed: {said.allowed}."
+    line = source.line(key)
+    return Problem(file=source.name, line=line, key=key, found=said.found, why=said.why, remedy=remedy)
+
+
+def _instructions(
+    reading: Reading, commands_csv: str | Path | None, duration: float | None
+) -> dict[str, Samples]:
+    """Return the commands or the motion: exactly one of the two."""
+    kinds = [kind for kind in LISTS if reading.source.table.get(kind) not in (None, {})]
+    if commands_csv is not None and "motion" in kinds:
+        why = "a prescribed motion takes no commands"
+        reading.note("motion", why, "Leave out the file of commands, or take a scenario with [commands].")
+    elif len(kinds) == 2:
+        reading.note("motion", "[commands] is given too", "Keep one of [commands] and [motion].")
+    elif not kinds and commands_csv is None:
+        why = "neither [commands] nor [motion] is given"
+        reading.note("", why, "Give one of the two; fig6 and fig5 show how.")
+    found = {
+        kind: _samples(reading, kind, commands_csv) for kind in kinds or ["commands"] * bool(commands_csv)
+    }
+    good = {kind: samples for kind, samples in found.items() if samples}
+    for samples in good.values():
+        reading.problems.extend(check_times(samples, duration))
+    return good
+
+
+def _samples(reading: Reading, kind: str, commands_csv: str | Path | None) -> Samples | None:
+    """Return the samples of a section, from the file that replaces it, from the file it names, or its own."""
+    if kind == "commands" and commands_csv is not None:
+        return reading.keep(read_csv(Path(commands_csv), str(commands_csv), kind))
+    values = reading.section(kind)
+    if not values:
+        return None
+    if "file" in values:
+        return reading.keep(read_csv(reading.source.folder / values["file"], values["file"], kind))
+    return reading.keep(inline(reading.source, kind, values))
+
+
+def _start(start: Mapping[str, float], prescribed: Motion | None) -> Start:
+    """Return the start; a prescribed motion starts where it says."""
+    if prescribed is not None:
+        return Start(
+            heading=float(prescribed.heading[0]),
+            pitch=float(prescribed.pitch[0]),
+            depth=start["depth_m"],
+            surge_speed=float(prescribed.surge_speed[0]),
+            wet_length=start["wet_length_m"],
+        )
+    return Start(
+        heading=radians(start["heading_deg"]),
+        pitch=radians(start["pitch_deg"]),
+        roll=radians(start["roll_deg"]),
+        depth=start["depth_m"],
+        surge_speed=start["surge_speed_m_s"],
+        wet_length=start["wet_length_m"],
+    )

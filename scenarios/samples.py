@@ -1,0 +1,125 @@
+"""Commands and prescribed motions: columns of numbers over time, inline in the trial file or in a CSV file.
+
+Inline lists are *switch points*: the last value holds to the end of the run. The rows of a CSV file are
+*samples of a log*: a row holds until the next, and the last for one sampling interval more, at most
+`LONGEST_HOLD`. A log that ends before the run does is refused, because what was commanded after it is not
+known.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from scenarios.errors import Problem, shown
+from scenarios.files import Source
+from scenarios.quantities import COMMANDS, MOTION, Quantity
+from scenarios.trial import Commands, Motion
+
+LONGEST_HOLD = 1.0
+"""The last row of a log is believed for no longer than this: a vehicle turns by tens of degrees in it. [s]"""
+
+NUMERICAL = 1e-9
+"""Times that differ by less than this are the same: decimal fractions are not exact in binary. [s]"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Samples:
+    """Columns of numbers as they stand in a file, each number checked by itself.
+
+    Attributes:
+        file: the file as the user named it.
+        key: what messages call the column of times.
+        columns: column → values, in the units of the file.
+        lines: the line of each sample in a CSV file; None in an inline list, where `key_line` is meant.
+        key_line: line of the list of times in a trial file.
+    """
+
+    file: str
+    key: str
+    columns: Mapping[str, Sequence[float]]
+    lines: Sequence[int] | None = None
+    key_line: int | None = None
+
+    @property
+    def time(self) -> Sequence[float]:
+        """The times of the samples. [s]"""
+        return self.columns["time_s"]
+
+    def problem(self, at: int, why: str, remedy: str) -> Problem:
+        """Return a problem with the time of sample `at`."""
+        line = self.lines[at] if self.lines else self.key_line
+        key = self.key if self.lines else f"{self.key}[{at}]"
+        return Problem(file=self.file, line=line, key=key, found=shown(self.time[at]), why=why, remedy=remedy)
+
+
+def inline(
+    source: Source, section: str, columns: Mapping[str, list[float]]
+) -> tuple[Samples | None, list[Problem]]:
+    """Return the lists of a section as samples, or the problem that they are not equally long."""
+    count = len(columns["time_s"])
+    problems = [
+        source.problem(
+            f"{section}.{name}",
+            f"time_s has {count}: every list needs one value for each time",
+            "Make the lists equally long.",
+            found=f"{len(values)} values",
+        )
+        for name, values in columns.items()
+        if len(values) != count
+    ]
+    key = f"{section}.time_s"
+    samples = Samples(file=source.name, key=key, columns=columns, key_line=source.line(key))
+    return (None if problems else samples), problems
+
+
+def check_times(samples: Samples, duration: float | None) -> list[Problem]:
+    """Return the problems of the times: they start at 0, increase, and a log lasts as long as the run.
+
+    Args:
+        samples: what was read.
+        duration: how long the run lasts; None if that is not known, because it is wrong itself. [s]
+    """
+    time = samples.time
+    problems = []
+    if time[0] != 0.0:
+        why = "what holds from 0 s until then is not said"
+        problems.append(samples.problem(0, why, "The first time must be 0."))
+    for at, (before, now) in enumerate(pairwise(time), start=1):
+        if not now > before:
+            why = f"the time before it is {before:g}"
+            problems.append(samples.problem(at, why, "Times must increase from sample to sample."))
+    if not problems and samples.lines and duration is not None:
+        problems += _check_end(samples, duration)
+    return problems
+
+
+def _check_end(samples: Samples, duration: float) -> list[Problem]:
+    """Return the problem that a log ends before the run does."""
+    last = samples.time[-1]
+    interval = last - samples.time[-2] if len(samples.time) > 1 else 0.0
+    if last + min(interval, LONGEST_HOLD) >= duration - NUMERICAL:
+        return []
+    why = f"the file ends early: the run lasts {duration:g} s"
+    remedy = f"Add rows up to {duration:g} s, or set duration_s to {last:g}."
+    return [samples.problem(len(samples.time) - 1, why, remedy)]
+
+
+def commands(samples: Samples) -> Commands:
+    """Return checked samples as commands: rev/s and radians."""
+    time, *values = (_inner(samples, quantity) for quantity in COMMANDS)
+    return Commands(time=time, values=np.ascontiguousarray(np.column_stack(values)))
+
+
+def motion(samples: Samples) -> Motion:
+    """Return checked samples as a prescribed motion: m/s and radians."""
+    time, surge_speed, pitch, heading = (_inner(samples, quantity) for quantity in MOTION)
+    return Motion(time=time, surge_speed=surge_speed, pitch=pitch, heading=heading)
+
+
+def _inner(samples: Samples, quantity: Quantity) -> np.ndarray:
+    """Return one column in inner units."""
+    return np.asarray(samples.columns[quantity.name], dtype=float) * quantity.scale

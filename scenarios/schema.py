@@ -1,0 +1,136 @@
+"""What a trial file may say: pydantic models made from the table of quantities; their complaints in our words.
+
+Only here is pydantic imported, and only when a file is read. Every section is checked by itself, so a mistake
+in one does not hide those in another. Checks that compare several values live in `scenarios.reader`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cache
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
+
+from scenarios.errors import Problem, nearest_or_all
+from scenarios.files import Source
+from scenarios.quantities import SECTIONS, Quantity
+from scenarios.trial import SCHEMES
+
+STRICT = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
+
+LISTS = ("commands", "motion")
+"""Sections whose numbers are lists: one value a sample."""
+
+
+class Page(BaseModel):
+    """A whole trial file; what the sections hold is checked by `check_section`."""
+
+    model_config = STRICT
+
+    description: str
+    vehicle: str
+    cable: str
+    run: dict[str, Any]
+    start: dict[str, Any] = {}
+    water: dict[str, Any] = {}
+    commands: dict[str, Any] = {}
+    motion: dict[str, Any] = {}
+    changes: dict[str, Any] = {}
+
+
+class FileReference(BaseModel):
+    """A section of samples that stand in a CSV file."""
+
+    model_config = STRICT
+
+    file: str
+
+
+@cache
+def section_model(name: str) -> type[BaseModel]:
+    """Return the model of one section, made from its rows in the table of quantities."""
+    fields: dict[str, Any] = {}
+    for quantity in SECTIONS[name]:
+        kind: Any = Annotated[float, Field(ge=quantity.low, le=quantity.high)]
+        if name in LISTS:
+            kind = Annotated[list[kind], Field(min_length=1)]
+        fields[quantity.name] = (kind, ... if quantity.default is None else quantity.default)
+    if name == "run":
+        fields["scheme"] = (Literal[SCHEMES], SCHEMES[0])
+    return create_model(name, __config__=STRICT, **fields)
+
+
+def check_page(source: Source) -> list[Problem]:
+    """Check the outermost keys of a trial file."""
+    _, problems = _validate(Page, source, "", source.table, {})
+    return problems
+
+
+def check_section(source: Source, name: str, raw: object) -> tuple[dict[str, Any], list[Problem]]:
+    """Check one section of a trial file.
+
+    Args:
+        source: the file, for the lines in messages.
+        name: one of `SECTIONS`.
+        raw: what the file says.
+
+    Returns:
+        its values, in the units of the file, empty if there is a problem; and the problems.
+    """
+    if not isinstance(raw, Mapping):
+        return {}, []  # `check_page` has said so
+    if name in LISTS and "file" in raw:
+        return _validate(FileReference, source, name, raw, {})
+    quantities = {quantity.name: quantity for quantity in SECTIONS[name]}
+    return _validate(section_model(name), source, name, raw, quantities)
+
+
+def _validate(
+    model: type[BaseModel],
+    source: Source,
+    section: str,
+    raw: Mapping[str, Any],
+    quantities: Mapping[str, Quantity],
+) -> tuple[dict[str, Any], list[Problem]]:
+    """Return the values of a section, or its problems."""
+    try:
+        return model.model_validate(raw).model_dump(), []
+    except ValidationError as error:
+        allowed = list(model.model_fields)
+        details = error.errors(include_url=False, include_context=False)
+        return {}, [_problem(source, section, detail, allowed, quantities) for detail in details]
+
+
+def _problem(
+    source: Source, section: str, detail: Any, allowed: list[str], quantities: Mapping[str, Quantity]
+) -> Problem:
+    """Put one complaint of pydantic into our words."""
+    name, *inside = detail["loc"]
+    key = (f"{section}." if section else "") + str(name) + "".join(f"[{at}]" for at in inside)
+    why, remedy = _explain(detail["type"], str(name), section, allowed, quantities)
+    found = None if detail["type"] == "missing" else detail["input"]
+    return source.problem(key, why, remedy, found=found)
+
+
+def _explain(
+    kind: str, name: str, section: str, allowed: list[str], quantities: Mapping[str, Quantity]
+) -> tuple[str, str]:
+    """Return why a value cannot be, and what to do."""
+    where = f"[{section}]" if section else "a trial file"
+    limits = quantities[name].allowed if name in quantities else ""
+    if kind == "extra_forbidden":
+        return f"{where} has no such key", nearest_or_all(name, allowed)
+    if kind == "literal_error":
+        return "this is not a scheme", f"Allowed: {', '.join(SCHEMES)}."
+    why = {
+        "missing": f"this key is missing in {where}",
+        "too_short": "the list is empty",
+        "list_type": "this is not a list of numbers",
+        "string_type": "this is not a text in quotes",
+        "dict_type": "this is not a section",
+        "finite_number": "this is not a finite number",
+        "greater_than_equal": "this is outside its limits",
+        "less_than_equal": "this is outside its limits",
+    }
+    return why.get(kind, "this is not a number"), limits
