@@ -1,15 +1,13 @@
-"""The six equations of one box between two nodes, and the conditions at both ends, with their exact
-slopes.
+"""The six equations of one box between two nodes, and the conditions at both ends, with exact slopes.
 
-With Δy = y_j − y_{j−1}, ȳ their mean, h the state from which a node's change is measured and a the rate
-(1/Δt):
+With Δy = y_j − y_{j−1}, ȳ their mean, h the state from which a node's change is measured, a the rate (1/Δt)
+and Σ over the two nodes:
 
-    w [M(ȳ) Δy − ΔS q(ȳ)] + K − ½ΔS a Σ N(z) (y − h) = 0,     z = φ y + (1 − φ) h,   sum over the two
-    nodes
+    w [M(ȳ) Δy − ΔS q(ȳ)] + K − ½ΔS a Σ N(z) (y − h) = 0,        z = φ y + (1 − φ) h
 
-is equation (22) of Feng and Allen (2004), multiplied by ΔS/2, for w = φ = ½, h = y(t_k) and K half of M
-Δy − ΔS q at t_k; fully implicit for w = φ = 1, K = 0; and a stage of any method ẏ = a (y − h) in the
-same way. Multiplied by ΔS, the equations stay harmless for a short box. A box whose right node is not a
+is equation (22) of Feng and Allen (2004), multiplied by ΔS/2, for w = φ = ½, h = y(t_k) and K half of
+M Δy − ΔS q at t_k; it is fully implicit for w = φ = 1, K = 0; and a stage of any method with ẏ = a (y − h)
+looks the same. Multiplied by ΔS, the equations stay harmless for a short box. A box whose right node is no
 material point but the moving end s = S(t), S = S_h − Vt/a (``rule.moves``), sees the change at fixed s:
 a (y − h) + Vt ∂y/∂s there.
 """
@@ -145,13 +143,7 @@ def fill_change(y: np.ndarray, history: np.ndarray, length: float, rule: BoxRule
 
 @compiled
 def add_time_part(
-    window: np.ndarray,
-    side: int,
-    y: np.ndarray,
-    length: float,
-    rule: BoxRule,
-    c: Equation7Numbers,
-    k: BoxScratch,
+    window: np.ndarray, side: int, length: float, rule: BoxRule, c: Equation7Numbers, k: BoxScratch
 ) -> None:
     """Subtract N(z) x of one node (side 0 or 6 of the window), x being ``k.change``, and its slopes."""
     time_matrix(k.mean, c, k.N)
@@ -174,7 +166,7 @@ def add_moving_end(
     rule: BoxRule,
     k: BoxScratch,
 ) -> None:
-    """Add what the moving end changes in the time part of one node: the length's and the end's own speed.
+    """Add what the moving end changes in the slopes of one node's time part.
 
     The node's x is ½[ΔS a (y − h) + Vt Δy] at the right node, ½ΔS a (y − h) at the left; ∂ΔS/∂Vt = −1/a.
     ``k.N`` is the node's; the residual has been seen to by `add_time_part`.
@@ -210,14 +202,14 @@ def box_rows(
         window[CARRIED + i, RIGHT] = -known[i]
     add_space_part(window, left, right, length, rule, c, k)
     fill_change(left, left_history, length, rule, k)
-    add_time_part(window, 0, left, length, rule, c, k)
+    add_time_part(window, 0, length, rule, c, k)
     if rule.moves:
         add_moving_end(window, left, right, left_history, 0, rule, k)
     fill_change(right, right_history, length, rule, k)
     if rule.moves:
         for i in range(SIZE):
             k.change[i] += 0.5 * right[1] * (right[i] - left[i])
-    add_time_part(window, SIZE, right, length, rule, c, k)
+    add_time_part(window, SIZE, length, rule, c, k)
     if rule.moves:
         add_moving_end(window, left, right, right_history, SIZE, rule, k)
 
@@ -238,7 +230,8 @@ def tow_rows(window: np.ndarray, y: np.ndarray, ends: Ends) -> None:
 
 @compiled
 def drum_rows(window: np.ndarray, y: np.ndarray, history: np.ndarray, rate: float, ends: Ends) -> None:
-    """Fill rows 3-5 for the last node: Vn = Vb = 0 (24)-(25) and the turning drum (26), divided by
-    R_d².""" window[3, 2], window[3, RIGHT] = 1.0, -y[2] window[4, 3], window[4, RIGHT] = 1.0, -y[3]
-    window[5, 0], window[5, 1] = 1.0, ends.inertia * rate window[5, RIGHT] = ends.friction - y[0] -
-    ends.inertia * rate * (y[1] - history[1])
+    """Fill rows 3-5 for the last node: Vn = Vb = 0 (24)-(25), and the turning drum (26) over R_d²."""
+    window[3, 2], window[3, RIGHT] = 1.0, -y[2]
+    window[4, 3], window[4, RIGHT] = 1.0, -y[3]
+    window[5, 0], window[5, 1] = 1.0, ends.inertia * rate
+    window[5, RIGHT] = ends.friction - y[0] - ends.inertia * rate * (y[1] - history[1])

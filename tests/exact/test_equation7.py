@@ -1,8 +1,9 @@
 """Equation (7) derived once more with SymPy, and its slopes against differences.
 
-Verifies: every entry of M, N and q, from the vector equations (T t)' = d/dt[m Vt t + m1 V⊥ − ρA J⊥] − wc k + drag
-and V' = d/dt[(1 + eT) t] in the frame W(α, β). Configuration: random states, heavy stretching cable, slanting
-current. Tolerance: rounding (1e-12 of the largest entry); differences: 1e-7, their own truncation and rounding.
+Verifies: every entry of M, N and q, from the vector equations (T t)' = d/dt[m Vt t + m1 V⊥ − ρA J⊥] −
+wc k + drag and V' = d/dt[(1 + eT) t] in the frame W(α, β). Configuration: random states, heavy
+stretching cable, slanting current. Tolerance: rounding (1e-12 of the largest entry); differences: 1e-7,
+their own truncation and rounding.
 """
 
 from functools import cache

@@ -1,0 +1,282 @@
+"""The numerical scheme of Feng and Allen (2004), equations (14)-(26), as printed: one new node a step.
+
+At t_k the cable has nodes 0 … k. A step
+
+1. lets ΔS = −Vt(S_k, t_k) Δt of cable into the water (18), as a new box with its node on the drum,
+2. prescribes the new node's state at t_k: [T, Vt, 0, 0, α, β − ΔS/R_d], the last node's with the tangent
+   turned back around the drum (reading ``drum``, as printed), or with the tangent continued (``tangent``),
+3. solves the box equations (22) with the conditions (23)-(26) for all nodes at t_{k+1}.
+
+Segment length and time step are one thing here, and the cost of a run grows with the square of its length.
+When the drum stands or is overrun (ΔS ≤ 0) the same nodes take the step and no node is added. While there is
+no cable in the water at all, the single node follows the tow point, (8)-(11).
+
+``implicit=True`` takes the same boxes fully implicit in time, which removes the staircase in the tension that
+the trapezoidal rule of (22) leaves; that is our comparison, not the paper's. What the scheme does, with
+numbers: ``docs/paper_scheme.md``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from cable.box_equations import BoxRule, Ends, known_part
+from cable.box_newton import (
+    CONVERGED,
+    FULL,
+    OUTCOMES,
+    ROW_NAMES,
+    BoxWorkspace,
+    NewtonReport,
+    box_workspace,
+    solve_boxes,
+)
+from cable.equation7 import Equation7Numbers, angles_of, equation7_numbers, tangent
+from cable.properties import CableProperties, DrumProperties
+from subzero.compiled import compiled
+
+READINGS = ("tangent", "drum")
+NOTHING = 1e-9
+"""Less cable than this [m] in a step is none: a thousandth of its diameter would be more."""
+
+
+@compiled
+def start_paper(w: BoxWorkspace, north: float, east: float, down: float, friction: float) -> None:
+    """Set the single node of a cable of no length: the tow point at the drum, conditions (8)-(11).
+
+    Args:
+        w: the workspace; node 0 is set, `count` becomes 1.
+        north: velocity of the tow point, earth axes. The cable leaves in the opposite direction. [m/s]
+        east: the same.
+        down: the same.
+        friction: C_f/R_d, the tension that turns the drum. [N]
+    """
+    alpha, beta = angles_of(-north, -east, -down)
+    w.count[0] = 1
+    w.y[0, 0] = friction
+    w.y[0, 1] = -math.sqrt(north * north + east * east + down * down)
+    w.y[0, 2] = 0.0
+    w.y[0, 3] = 0.0
+    w.y[0, 4] = alpha
+    w.y[0, 5] = beta
+
+
+@compiled
+def add_node(w: BoxWorkspace, length: float, turn: float) -> None:
+    """Add the new box (18) and the prescribed state of its node at t_k (the line below (21))."""
+    n = w.count[0]
+    for i in range(6):
+        w.y[n, i] = w.y[n - 1, i]
+    w.y[n, 2] = 0.0
+    w.y[n, 3] = 0.0
+    w.y[n, 5] -= turn
+    w.length[n] = length
+    w.count[0] = n + 1
+
+
+@compiled
+def keep_old_time(w: BoxWorkspace, weight: float, c: Equation7Numbers) -> None:
+    """Store y(t_k) and the old-time share of every box."""
+    for j in range(w.count[0]):
+        w.history[j] = w.y[j]
+    for j in range(1, w.count[0]):
+        known_part(w.y[j - 1], w.y[j], w.length[j], weight, c, w.scratch, w.known[j])
+
+
+@compiled
+def paper_step(
+    w: BoxWorkspace, step: float, ends: Ends, wound: float, implicit: bool, c: Equation7Numbers
+) -> NewtonReport:
+    """Take one step of the paper's scheme; on failure ``w`` holds the state before the step.
+
+    Args:
+        w: the workspace, started with `start_paper`. Node 0 is the tow point.
+        step: Δt. [s]
+        ends: velocity of the tow point at the *new* time in earth axes, and the drum.
+        wound: 1/R_d for the reading ``drum``, 0 for ``tangent``. [1/m]
+        implicit: fully implicit instead of (22).
+        c: constants of equation (7).
+
+    Returns:
+        The outcome; the force on the vehicle is T t of node 0, `node_force`.
+    """
+    before = w.count[0]
+    length = -w.y[before - 1, 1] * step
+    if length <= NOTHING and before == 1:
+        start_paper(w, ends.north, ends.east, ends.down, ends.friction)
+        return NewtonReport(CONVERGED, 0, 0.0, 0, 0)
+    if length > NOTHING:
+        if before == len(w.y):
+            return NewtonReport(FULL, 0, 0.0, before, 0)
+        add_node(w, length, wound * length)
+    weight = 1.0 if implicit else 0.5
+    keep_old_time(w, weight, c)
+    rule = BoxRule(weight, weight, 1.0 / step, False, 0.0, 0.0)
+    report = solve_boxes(w, rule, ends, c)
+    if report.outcome != CONVERGED:
+        w.y[: w.count[0]] = w.history[: w.count[0]]
+        w.count[0] = before
+    return report
+
+
+@compiled
+def node_force(w: BoxWorkspace, node: int) -> tuple[float, float, float]:
+    """Return T t of a node in earth axes; of node 0, the force on the vehicle (12). [N]."""
+    north, east, down = tangent(w.y[node, 4], w.y[node, 5])
+    T = w.y[node, 0]
+    return T * north, T * east, T * down
+
+
+@dataclass(frozen=True, kw_only=True)
+class PaperHistory:
+    """What a run of the paper's scheme leaves, one entry per time.
+
+    Attributes:
+        time: (n,) [s].
+        tow_force: force on the vehicle, earth axes. (n, 3) [N]
+        tow_tension: T at the vehicle. (n,) [N]
+        drum_tension: T at the drum. (n,) [N]
+        length: cable in the water. (n,) [m]
+        states: y = [T Vt Vn Vb α β] of every node, from the vehicle to the drum; (nodes, 6) per time.
+        positions: nodes relative to the drum, earth axes; (nodes, 3) per time. [m]
+        iterations: Newton iterations of the step that led to this time. (n,)
+        converged: whether the whole duration was run.
+        message: "completed", or when, where and why the run stopped, and what to try.
+    """
+
+    time: np.ndarray
+    tow_force: np.ndarray
+    tow_tension: np.ndarray
+    drum_tension: np.ndarray
+    length: np.ndarray
+    states: list[np.ndarray] = field(repr=False)
+    positions: list[np.ndarray] = field(repr=False)
+    iterations: np.ndarray
+    converged: bool
+    message: str
+
+
+def pull_out_paper(
+    tow_velocity: Callable[[float], Sequence[float]],
+    duration: float,
+    step: float,
+    cable: CableProperties | None = None,
+    drum: DrumProperties | None = None,
+    current: Sequence[float] | None = None,
+    *,
+    reading: str = "tangent",
+    implicit: bool = False,
+) -> PaperHistory:
+    """Pull cable off the drum along a given motion with the paper's scheme (14)-(26).
+
+    Args:
+        tow_velocity: velocity of the tow point, earth axes (north, east, down), at a time. [m/s]
+        duration: of the run. [s]
+        step: Δt; a segment is as long as the cable that leaves the drum in it. [s]
+        cable: the cable; Table 1 by default.
+        drum: the drum; Table 1 by default.
+        current: uniform steady velocity of the water, earth axes. [m/s]
+        reading: of the prescribed state of the new node: ``tangent`` or ``drum`` (as printed).
+        implicit: fully implicit in time instead of the trapezoidal rule (22).
+
+    Returns:
+        The history; a run that cannot go on is cut short and says so in `message`.
+
+    Raises:
+        ValueError: a reading that is not one of `READINGS`, or a step or duration that is not positive.
+    """
+    _check(step, duration, reading)
+    cable, drum = cable or CableProperties(), drum or DrumProperties()
+    north, east, down = (0.0, 0.0, 0.0) if current is None else (float(x) for x in current)
+    c = equation7_numbers(cable, (north, east, down))
+    wound = 1.0 / drum.radius if reading == "drum" else 0.0
+    turning = drum.numbers()
+    steps = max(1, round(duration / step))
+    w = box_workspace(steps + 2)
+    start_paper(w, *_velocity(tow_velocity, 0.0), turning.friction)
+    states, iterations, message = [w.y[:1].copy()], [0], "completed"
+    for k in range(1, steps + 1):
+        ends = Ends(*_velocity(tow_velocity, k * step), turning.inertia, turning.friction)
+        report = paper_step(w, step, ends, wound, implicit, c)
+        if report.outcome != CONVERGED:
+            message = explain(report, k * step, reading, implicit)
+            break
+        states.append(w.y[: w.count[0]].copy())
+        iterations.append(report.iterations)
+    return _history(states, w.length.copy(), step, c.e, np.array(iterations), message)
+
+
+def explain(report: NewtonReport, time: float, reading: str, implicit: bool) -> str:
+    """Say when, where and why a step failed, and what to try."""
+    remedy = "the default scheme (scheme='moving_end')"
+    if reading == "drum":
+        remedy = f"reading='tangent' or {remedy}"
+    elif not implicit:
+        remedy = f"a smaller step, or {remedy}"
+    return (
+        f"Stopped at {time:g} s: {OUTCOMES[report.outcome]}; worst at node {report.node}, "
+        f"{ROW_NAMES[report.row]}, scaled residual {report.residual:.2g} after {report.iterations} "
+        f"iterations. Try {remedy}."
+    )
+
+
+def positions_of(state: np.ndarray, length: np.ndarray, compliance: float = 0.0) -> np.ndarray:
+    """Return node positions relative to the drum, by integrating (1 + eT) t from the drum. (nodes, 3) [m].
+
+    Args:
+        state: y of the nodes, vehicle first. (nodes, 6)
+        length: of the box before each node; the first entry is not used. (nodes,) [m]
+        compliance: e. [1/N]
+    """
+    middle = 0.5 * (state[1:] + state[:-1])
+    alpha, beta = middle[:, 4], middle[:, 5]
+    t = np.stack([np.cos(alpha) * np.cos(beta), -np.sin(alpha) * np.cos(beta), -np.sin(beta)], axis=1)
+    pieces = t * (length[1 : len(state)] * (1.0 + compliance * middle[:, 0]))[:, None]
+    return np.concatenate([-np.cumsum(pieces[::-1], axis=0)[::-1], np.zeros((1, 3))])
+
+
+def _check(step: float, duration: float, reading: str) -> None:
+    """Refuse what cannot be run."""
+    for name, value in (("step", step), ("duration", duration)):
+        if not (math.isfinite(value) and value > 0.0):
+            raise ValueError(f"{name} is {value!r}; it must be a finite number of seconds, more than 0.")
+    if reading not in READINGS:
+        raise ValueError(f"reading is {reading!r}; it must be one of {', '.join(READINGS)}.")
+
+
+def _velocity(tow_velocity: Callable[[float], Sequence[float]], time: float) -> tuple[float, float, float]:
+    """Return the tow point's velocity as three floats, or refuse it."""
+    north, east, down = (float(x) for x in tow_velocity(time))
+    if not math.isfinite(north + east + down):
+        raise ValueError(f"tow_velocity({time:g}) is ({north}, {east}, {down}); it must be finite, in m/s.")
+    return north, east, down
+
+
+def _history(
+    states: list[np.ndarray],
+    length: np.ndarray,
+    step: float,
+    compliance: float,
+    iterations: np.ndarray,
+    message: str,
+) -> PaperHistory:
+    """Collect the arrays of a run."""
+    first = np.array([y[0] for y in states])
+    directions = np.array([tangent(y[4], y[5]) for y in first])
+    along = np.cumsum(length)
+    return PaperHistory(
+        time=step * np.arange(len(states)),
+        tow_force=first[:, :1] * directions,
+        tow_tension=first[:, 0],
+        drum_tension=np.array([y[-1, 0] for y in states]),
+        length=np.array([along[len(y) - 1] for y in states]),
+        states=states,
+        positions=[positions_of(y, length, compliance) for y in states],
+        iterations=iterations,
+        converged=message == "completed",
+        message=message,
+    )
