@@ -1,0 +1,54 @@
+"""Figures of runs and comparisons, fit to print: units on every axis, one style, the trial named on each.
+
+`draw` gives the figures that belong to some runs. A run that follows commands gets the four panels of
+Fig. 6 of Feng and Allen (2004), actuators and attitude, the cable's shape and tension, forces and energy.
+A prescribed run gets Fig. 4 if it is straight, with its exact solution, and Fig. 5 if it is not, besides
+the cable.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from .cable import shape
+from .forces import forces
+from .motion import attitude, figure_6
+from .prescribed import exact_tension, figure_4, figure_5, is_straight
+from .style import Runs
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from subzero.measured import Record
+
+__all__ = ["attitude", "draw", "exact_tension", "figure_4", "figure_5", "figure_6", "forces", "shape"]
+
+
+def draw(runs: Runs, record: Record | None = None) -> dict[str, Figure]:
+    """Return the figures of some runs of one trial, by the name of their file.
+
+    Args:
+        runs: ``{"tethered": ..., "untethered": ...}`` or one of the two.
+        record: what was measured, drawn as dots.
+    """
+    first = next(iter(runs.values()))
+    title = f"{first.attrs['scenario']}: {first.attrs['title']}"
+    return _prescribed(runs, title) if first.attrs["prescribed"] else _commanded(runs, record, title)
+
+
+def _commanded(runs: Runs, record: Record | None, title: str) -> dict[str, Figure]:
+    """Return the figures of a vehicle that follows commands."""
+    figures = {"fig6": figure_6(runs, record, title), "attitude": attitude(runs, record, title)}
+    if "tethered" in runs:
+        figures["cable"] = shape(runs["tethered"], title)
+    figures["forces"] = forces(runs.get("tethered", next(iter(runs.values()))), title)
+    return figures
+
+
+def _prescribed(runs: Runs, title: str) -> dict[str, Figure]:
+    """Return the figures of an idealised vehicle; without its cable there is nothing to see."""
+    if "tethered" not in runs:
+        return {}
+    run = runs["tethered"]
+    main = {"fig4": figure_4(run, title)} if is_straight(run) else {"fig5": figure_5(run, title)}
+    return {**main, "cable": shape(run, title)}

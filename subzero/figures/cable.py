@@ -1,0 +1,114 @@
+"""The cable: where it lies, how it pulls along its length, and what it does to the vehicle."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib import colormaps
+
+from . import style
+from .style import headline, label, legend, sheet
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+Colour = tuple[float, float, float, float]
+NORTH, EAST, DOWN = 0, 1, 2
+AXES = ("north of the drum", "east of the drum", "below the drum")
+CHANNEL = ("north", "east", "depth")
+TINY = 1e-9
+SHORTEST = 0.1
+"""A view shows at least this much, even if nothing has moved. [m]"""
+
+SHAPES = 5
+"""So many shapes tell how a cable grows, and can still be told apart."""
+
+
+def shape(run: xr.Dataset, title: str) -> Figure:
+    """Draw the cable at several times from above and from the side, and the tension along it."""
+    figure, panels = sheet(2, 2, title)
+    along = longest(run, NORTH, EAST)
+    views = ((panels[0], EAST, NORTH), (panels[1], along, DOWN))
+    times = style.spread(SHAPES, run.sizes["time"])
+    colours = [colormaps["viridis"](fraction) for fraction in np.linspace(0.0, 0.85, len(times))]
+    for at, colour in zip(times, colours, strict=True):
+        for axes, right, up in views:
+            _one_shape(run["cable_position"].values[at], axes, right, up, colour)
+        _one_tension(run, int(at), panels[2], colour)
+    for axes, right, up in views:
+        _track(run, axes, right, up)
+        label(axes, f"{AXES[right]} [m]", f"{AXES[up]} [m]")
+        in_scale(axes)
+    panels[1].invert_yaxis()
+    headline(panels[0], "The cable from above")
+    headline(panels[1], "The cable from the east" if along == NORTH else "The cable from the south")
+    headline(panels[2], "Tension along the cable")
+    label(panels[2], "distance from the vehicle $s$ [m]", "$T$ [N]")
+    legend(panels[2])
+    _pull(run, panels[3])
+    return figure
+
+
+def configurations(run: xr.Dataset, axes: Axes, times: list[float]) -> None:
+    """Draw Fig. 5 (b): the cable at some times, in the plane in which the vehicle goes."""
+    across = longest(run, DOWN, EAST)
+    now = run["time"].values
+    shown = [time for time in times if time <= now[-1] + TINY]
+    for time, colour in zip(shown, style.CYCLE, strict=False):
+        place = run["cable_position"].values[int(np.argmin(np.abs(now - time)))]
+        axes.plot(place[:, NORTH], place[:, across], color=colour, linewidth=1.3, label=f"{time:g} s")
+    label(axes, f"{AXES[NORTH]} [m]", f"{AXES[across]} [m]")
+    in_scale(axes)
+    axes.invert_yaxis()  # down is down; and from above, with north to the right, east is down
+
+
+def longest(run: xr.Dataset, *candidates: int) -> int:
+    """Return that one of some earth axes along which the vehicle goes farthest, the first if alike."""
+    reach = [float(np.ptp(run[CHANNEL[axis]].values)) for axis in candidates]
+    return candidates[int(np.argmax(reach))]
+
+
+def in_scale(axes: Axes) -> None:
+    """Show both directions in the same scale, by widening the one that has room to spare."""
+    (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
+    width, height = axes.get_window_extent().size
+    scale = max((right - left) / width, (top - bottom) / height, SHORTEST / width)
+    x, y = 0.5 * (left + right), 0.5 * (bottom + top)
+    axes.set_xlim(x - 0.5 * scale * width, x + 0.5 * scale * width)
+    axes.set_ylim(y - 0.5 * scale * height, y + 0.5 * scale * height)
+
+
+def _one_shape(place: np.ndarray, axes: Axes, right: int, up: int, colour: Colour) -> None:
+    """Draw the cable at one time in one view, with a dot where the vehicle is."""
+    axes.plot(place[:, right], place[:, up], color=colour, linewidth=1.3)
+    axes.plot(place[0, right], place[0, up], "o", color=colour, markersize=3.5)
+
+
+def _one_tension(run: xr.Dataset, at: int, axes: Axes, colour: Colour) -> None:
+    """Draw the tension along the cable at one time."""
+    pieces = np.linalg.norm(np.diff(run["cable_position"].values[at], axis=0), axis=1)
+    s = np.concatenate([[0.0], np.cumsum(pieces)])
+    words = f"{run['time'].values[at]:.3g} s"
+    axes.plot(s, run["cable_node_tension"].values[at], color=colour, linewidth=1.3, label=words)
+
+
+def _track(run: xr.Dataset, axes: Axes, right: int, up: int) -> None:
+    """Draw where the tow point went, and the drum, behind the shapes."""
+    tow = run["cable_position"].values[:, 0]
+    axes.plot(tow[:, right], tow[:, up], color=style.GREY, linewidth=0.9, linestyle=":", zorder=1.5)
+    axes.plot(0.0, 0.0, "s", color=style.INK, markersize=4.5)
+
+
+def _pull(run: xr.Dataset, axes: Axes) -> None:
+    """Draw the tension at both ends over time."""
+    time = run["time"].values
+    axes.plot(time, run["cable_tension"].values, color=style.BLUE, linewidth=1.5, label="$T(0)$, tow point")
+    axes.plot(time, run["drum_tension"].values, color=style.GREEN, linewidth=1.2, label="$T(S)$, drum")
+    headline(axes, "Tension at the ends")
+    label(axes, "time [s]", "$T$ [N]")
+    style.in_time(axes, {"": run})
+    style.calm(axes)
+    legend(axes, loc="upper left")

@@ -1,0 +1,105 @@
+"""Forces and moments on the vehicle, of the cable and of every named term; and the energy balance."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from subzero.channels import BY_NAME
+from subzero.summary import ENERGY_PARTS, FORCE, MOMENT
+
+from . import style
+from .style import CYCLE, headline, in_time, label, legend, sheet, time_label
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+TERMS_SHOWN = 6
+"""The largest terms are drawn each, the others as their sum: more lines cannot be told apart."""
+
+DASHES = ("-", (0, (5, 2)), (0, (1, 1)))
+COMPONENTS = {
+    "X": ("Forward force by term", "$X$ [N]"),
+    "Y": ("Force to starboard by term", "$Y$ [N]"),
+    "N": ("Yaw moment by term", "$N$ [N m]"),
+    "Z": ("Downward force by term", "$Z$ [N]"),
+    "M": ("Pitch moment by term", "$M$ [N m]"),
+}
+ENERGY_WORDS = {
+    "hull_loss": "lost by hull and fins",
+    "cable_loss": "lost by the cable",
+    "kinetic_change": "kinetic and potential",
+    "drum": "left at the drum",
+    "added_mass_term": "added-mass form",
+    "residual": "unexplained",
+}
+
+
+def cable_forces(run: xr.Dataset, force: Axes, moment: Axes) -> None:
+    """Draw Fig. 5 (e) and (f): the three forces and the three moments of the cable on the vehicle."""
+    for axes, names, unit in ((force, FORCE, "force [N]"), (moment, MOMENT, "moment [N m]")):
+        for name, colour, dash in zip(names, CYCLE, DASHES, strict=False):
+            symbol = f"${BY_NAME[name].symbol}$"
+            axes.plot(run["time"].values, run[name].values, color=colour, linestyle=dash, label=symbol)
+        label(axes, None, unit)
+        in_time(axes, {"": run})
+        style.calm(axes)
+        legend(axes, ncols=3)
+    headline(force, "Force of the cable on the vehicle")
+    headline(moment, "Moment of the cable on the vehicle")
+
+
+def forces(run: xr.Dataset, title: str) -> Figure:
+    """Draw what acts on the vehicle: the cable's force and moment, and every term in three components."""
+    figure, panels = sheet(3, 2, title)
+    cable_forces(run, panels[0], panels[1])
+    for axes, component in zip(panels[2:5], _busiest(run), strict=True):
+        _terms(run, component, axes)
+    energy(run, panels[5])
+    time_label(panels, 2)
+    return figure
+
+
+def energy(run: xr.Dataset, axes: Axes) -> None:
+    """Draw where the work of the propeller goes: the parts stacked, the work as a line over them."""
+    time = run["time"].values
+    parts = [(ENERGY_WORDS[part], np.nan_to_num(run[f"energy_{part}"].values)) for part in ENERGY_PARTS]
+    for (words, values), colour in zip(parts, CYCLE, strict=False):
+        axes.plot(time, values, color=colour, linewidth=1.2, label=words)
+    work = run["energy_propeller_work"].values
+    axes.plot(time, work, color=style.INK, linewidth=1.6, linestyle=DASHES[1], label="work of the propeller")
+    headline(axes, "Energy since the start")
+    label(axes, None, "energy [J]")
+    in_time(axes, {"": run})
+    style.calm(axes)
+    legend(axes, loc="upper left", fontsize=6.5)
+
+
+def _busiest(run: xr.Dataset) -> list[str]:
+    """Return the forward force and two more components: the plane in which the vehicle manoeuvres."""
+    table = np.abs(np.nan_to_num(run["force_breakdown"].values))
+    most = dict(zip(run["component"].values.tolist(), table.max(axis=(0, 1)), strict=True))
+    return ["X", "Y", "N"] if most["N"] >= most["M"] else ["X", "Z", "M"]
+
+
+def _terms(run: xr.Dataset, component: str, axes: Axes) -> None:
+    """Draw the largest terms of one component, and the sum of the others."""
+    table = np.nan_to_num(run["force_breakdown"].sel(component=component).values)
+    size = np.abs(table).max(axis=0)
+    order = [int(at) for at in np.argsort(-size, kind="stable") if size[at] > 1e-3 * size.max()]
+    names = [str(name).replace("_", " ") for name in run["term"].values]
+    for at, colour in zip(order[:TERMS_SHOWN], CYCLE, strict=False):
+        axes.plot(run["time"].values, table[:, at], color=colour, linewidth=1.2, label=names[at])
+    if len(order) > TERMS_SHOWN:
+        rest = table[:, order[TERMS_SHOWN:]].sum(axis=1)
+        axes.plot(run["time"].values, rest, color=style.GREY, linewidth=1.0, label="all others")
+    words, unit = COMPONENTS[component]
+    headline(axes, words)
+    label(axes, None, unit)
+    in_time(axes, {"": run})
+    style.calm(axes)
+    if order:
+        legend(axes, ncols=2, fontsize=6.5)

@@ -1,0 +1,79 @@
+"""How the vehicle moves: the four panels of Fig. 6, and what its actuators and its attitude do."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from . import style
+from .style import Runs, channel_panel, headline, label, legend, sheet, time_label
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from subzero.measured import Record
+
+SEEN = 1e-3
+"""Two angles that differ by less are one line. [degree]"""
+
+
+def figure_6(runs: Runs, record: Record | None, title: str) -> Figure:
+    """Draw Fig. 6 of Feng and Allen (2004): propeller command, forward speed, rudder command, heading."""
+    figure, panels = sheet(2, 2, title)
+    propeller, speed, rudder, heading = panels
+    first = next(iter(runs.values()))
+    _command(propeller, first, "propeller_command", "$n_c$ [rev/s]")
+    headline(propeller, "Propeller command")
+    channel_panel(speed, runs, "surge_speed", record)
+    headline(speed, "Forward speed")
+    legend(speed, loc="lower right")
+    _command(rudder, first, "rudder_command", r"$\delta_{rc}$ [degree]")
+    headline(rudder, "Rudder command, positive to starboard")
+    channel_panel(heading, runs, "heading", record)
+    headline(heading, "Heading, clockwise from north")
+    time_label(panels, 2)
+    return figure
+
+
+def attitude(runs: Runs, record: Record | None, title: str) -> Figure:
+    """Draw what the actuators do and how the hull answers: six panels."""
+    figure, panels = sheet(3, 2, title)
+    shown = {
+        "propeller_speed": "Propeller speed",
+        "depth": "Depth",
+        "rudder_angle": "Rudder angle, positive to starboard",
+        "roll": "Roll, positive starboard side down",
+        "stern_plane_port_angle": "Stern-planes, positive raises the nose",
+        "pitch": "Pitch, positive nose up",
+    }
+    for axes, (name, words) in zip(panels, shown.items(), strict=True):
+        channel_panel(axes, runs, name, record)
+        headline(axes, words)
+    _starboard_plane(runs, panels[4])
+    panels[1].invert_yaxis()
+    legend(panels[0], loc="lower right")
+    time_label(panels, 2)
+    return figure
+
+
+def _starboard_plane(runs: Runs, axes: Axes) -> None:
+    """Add the starboard plane, thin, if it does not do the same as the port plane."""
+    for which, run in runs.items():
+        port, starboard = (run[f"stern_plane_{side}_angle"].values for side in ("port", "starboard"))
+        if np.abs(port - starboard).max() > SEEN:
+            thin = {**style.LINES[which], "linewidth": 0.8}
+            axes.plot(run["time"].values, starboard, label=f"starboard, {which}", **thin)
+            legend(axes)
+    label(axes, None, r"$\delta_p$, $\delta_s$ [degree]")
+
+
+def _command(axes: Axes, run: xr.Dataset, name: str, unit: str) -> None:
+    """Draw a command as the steps it is, with zero in view."""
+    axes.step(run["time"].values, run[name].values, where="post", **style.COMMAND)
+    label(axes, None, unit)
+    style.in_time(axes, {"": run})
+    axes.update_datalim([(0.0, 0.0)])
+    axes.autoscale_view(scalex=False)
