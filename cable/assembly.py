@@ -56,35 +56,43 @@ def assemble(
     """Fill the residual and the block tridiagonal Jacobian at the present guess of level NEW."""
     node_velocities(line, a0, a1, a2)
     N = line.count[0]
-    line.lower[1 : N + 1] = 0.0
-    line.diagonal[1 : N + 1] = 0.0
-    line.upper[1 : N + 1] = 0.0
-    line.rhs[1 : N + 1] = 0.0
-    by_near, by_far = np.empty((3, 3)), np.empty((3, 4))
+    _clear(line)
     for j in range(1, N + 1):
         length = line.last_length[NEW] if j == N else line.length[j]
-        V = 0.5 * (line.velocity[NEW, j - 1] + line.velocity[NEW, j])
-        d = line.position[NEW, j] - line.position[NEW, j - 1]
         T = line.tension[NEW, j]
-        evaluate_load(V, J, d, length, T, a0, c, work)
+        for i in range(3):
+            work.velocity[i] = 0.5 * (line.velocity[NEW, j - 1, i] + line.velocity[NEW, j, i])
+            work.chord[i] = line.position[NEW, j, i] - line.position[NEW, j - 1, i]
+        evaluate_load(work.velocity, J, work.chord, length, T, a0, c, work)
         for i in range(3):
             line.momentum[NEW, j, i] = length * work.momentum[i]
             history = a1 * line.momentum[NOW, j, i] + a2 * line.momentum[BEFORE, j, i]
             line.load[j, i] = length * work.q[i] + history
         if j < N:
-            _differentiate_segment(length, a0, T, c, work, by_near, by_far)
+            _differentiate_segment(length, a0, T, c, work)
         else:
-            _add_influx(line, d, length, a0, T, J, c, work, by_near, by_far)
-        _scatter_balance(line, j, T, d, length, work, by_near, by_far)
-        _scatter_length(line, j, T, d, length, c)
-    _drum_row(line, a0, a1, a2, drum, work, by_near, by_far)
+            _add_influx(line, length, a0, T, J, c, work)
+        _scatter_balance(line, j, T, length, work)
+        _scatter_length(line, j, T, length, c, work.chord)
+    _drum_row(line, a0, a1, a2, drum, work)
 
 
 @compiled
-def _differentiate_segment(
-    length: float, a0: float, T: float, c: CableNumbers, work: Load, by_near: np.ndarray, by_far: np.ndarray
-) -> None:
+def _clear(line: Line) -> None:
+    """Set the system to zero."""
+    for j in range(1, line.count[0] + 1):
+        for i in range(4):
+            line.rhs[j, i] = 0.0
+            for k in range(4):
+                line.lower[j, i, k] = 0.0
+                line.diagonal[j, i, k] = 0.0
+                line.upper[j, i, k] = 0.0
+
+
+@compiled
+def _differentiate_segment(length: float, a0: float, T: float, c: CableNumbers, work: Load) -> None:
     """Fill ∂Q/∂x of the near node (3, 3), and ∂Q/∂(T, x) of the far node (3, 4)."""
+    by_near, by_far = work.by_near, work.by_far
     stretch = 0.5 * c.compliance / (1.0 + c.compliance * T)
     for i in range(3):
         by_far[i, 0] = length * stretch * work.drag[i]
@@ -96,19 +104,11 @@ def _differentiate_segment(
 
 @compiled
 def _add_influx(
-    line: Line,
-    d: np.ndarray,
-    length: float,
-    a0: float,
-    T: float,
-    J: np.ndarray,
-    c: CableNumbers,
-    work: Load,
-    by_near: np.ndarray,
-    by_far: np.ndarray,
+    line: Line, length: float, a0: float, T: float, J: np.ndarray, c: CableNumbers, work: Load
 ) -> None:
     """Complete Q of the last segment by the momentum that enters at the drum; fill ∂Q/∂x_{N−1} and ∂Q/∂(T, ℓ)."""
-    N, U, t = line.count[0], line.payout[NEW], work.tangent
+    N, U, t, d = line.count[0], line.payout[NEW], work.tangent, work.chord
+    by_near, by_far = work.by_near, work.by_far
     r = chord_length(d, length)
     Jt = J[0] * t[0] + J[1] * t[1] + J[2] * t[2]
     dU = 0.0 if line.stuck[0] else a0
@@ -130,19 +130,11 @@ def _add_influx(
 
 
 @compiled
-def _scatter_balance(
-    line: Line,
-    j: int,
-    T: float,
-    d: np.ndarray,
-    length: float,
-    work: Load,
-    by_near: np.ndarray,
-    by_far: np.ndarray,
-) -> None:
+def _scatter_balance(line: Line, j: int, T: float, length: float, work: Load) -> None:
     """Add segment j to the balances of its two nodes: f + ½Q to the far one, −f + ½Q to the near one."""
     N, t = line.count[0], work.tangent
-    stiffness = T / chord_length(d, length)
+    stiffness = T / chord_length(work.chord, length)
+    by_near, by_far = work.by_near, work.by_far
     D, L, U, r = line.diagonal, line.lower, line.upper, line.rhs
     for i in range(3):
         f, half = T * t[i], 0.5 * line.load[j, i]
@@ -176,7 +168,7 @@ def _scatter_balance(
 
 
 @compiled
-def _scatter_length(line: Line, j: int, T: float, d: np.ndarray, length: float, c: CableNumbers) -> None:
+def _scatter_length(line: Line, j: int, T: float, length: float, c: CableNumbers, d: np.ndarray) -> None:
     """Write the length equation of segment j, the first row of its block."""
     r = chord_length(d, length)
     phi, by_T, by_strain = slack_law(T, 1.0 + c.compliance * T - r / length)
@@ -192,16 +184,7 @@ def _scatter_length(line: Line, j: int, T: float, d: np.ndarray, length: float, 
 
 
 @compiled
-def _drum_row(
-    line: Line,
-    a0: float,
-    a1: float,
-    a2: float,
-    drum: DrumNumbers,
-    work: Load,
-    by_near: np.ndarray,
-    by_far: np.ndarray,
-) -> None:
+def _drum_row(line: Line, a0: float, a1: float, a2: float, drum: DrumNumbers, work: Load) -> None:
     """Write the drum's equation (11), the second row of the last block; `work` still holds the last segment."""
     N, t = line.count[0], work.tangent
     D, L, r = line.diagonal[line.count[0]], line.lower[line.count[0]], line.rhs[line.count[0]]
@@ -215,8 +198,8 @@ def _drum_row(
     r[1] = drum_tension(line, t) - drum.friction - drum.inertia * (a0 * U[NEW] + a1 * U[NOW] + a2 * U[BEFORE])
     D[1, 0] = 1.0
     D[1, 1] = -drum.inertia * a0 * a0
-    chord = line.position[NEW, N] - line.position[NEW, N - 1]
-    size = chord_length(chord, line.last_length[NEW])
+    by_near, by_far = work.by_near, work.by_far
+    size = chord_length(work.chord, line.last_length[NEW])
     Qt = line.load[N, 0] * t[0] + line.load[N, 1] * t[1] + line.load[N, 2] * t[2]
     for i in range(3):
         D[1, 0] += 0.5 * t[i] * by_far[i, 0]

@@ -29,7 +29,14 @@ SMALLEST_CHORD = 1e-6
 
 
 class Load(NamedTuple):
-    """Work space for one segment: tangent, momentum per length p, load q, and the derivatives of q and p."""
+    """Work space for one segment: what is known of it, its load q, and derivatives.
+
+    Attributes:
+        tangent, momentum, drag, q, across, velocity, chord: t, p, D, q, U_⊥, V and d (3,).
+        q_V, q_d: ∂q/∂V and ∂q/∂d (3, 3).
+        by_near, by_far: derivatives of the segment's total load Q by the position of its near node (3, 3) and by the
+            unknowns of its own block (3, 4), see `cable.assembly`.
+    """
 
     tangent: np.ndarray
     momentum: np.ndarray
@@ -38,14 +45,17 @@ class Load(NamedTuple):
     q_V: np.ndarray
     q_d: np.ndarray
     across: np.ndarray
+    velocity: np.ndarray
+    chord: np.ndarray
+    by_near: np.ndarray
+    by_far: np.ndarray
 
 
-@compiled
 def new_load() -> Load:
     """Return empty work space for one segment."""
-    return Load(
-        np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3), np.zeros((3, 3)), np.zeros((3, 3)), np.zeros(3)
-    )
+    vectors = {name: np.zeros(3) for name in Load._fields}
+    matrices = {"q_V": np.zeros((3, 3)), "q_d": np.zeros((3, 3))}
+    return Load(**vectors | matrices | {"by_near": np.zeros((3, 3)), "by_far": np.zeros((3, 4))})
 
 
 @compiled

@@ -9,14 +9,13 @@ NEW as often as needed and becomes real only by `accept`.
 
 from __future__ import annotations
 
-from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
 
 from subzero.compiled import compiled
 
-from .element import evaluate_momentum
+from .element import Load, chord_length, evaluate_momentum
 from .properties import CableNumbers
 
 NEW, NOW, BEFORE = 0, 1, 2
@@ -43,7 +42,7 @@ class Line(NamedTuple):
         tow_force: force on the vehicle at level NEW (3,). [N]
         tow_by_tow, tow_by_block: derivatives of the tow force by the tow point's position (3, 3) and by the
             unknowns of the first block (3, 4).
-        lower, diagonal, upper, pivots, rhs: work space of the block tridiagonal system.
+        lower, diagonal, upper, pivots, rhs, guess, newton_step: work space of Newton's method.
     """
 
     position: np.ndarray
@@ -65,32 +64,33 @@ class Line(NamedTuple):
     upper: np.ndarray
     pivots: np.ndarray
     rhs: np.ndarray
+    guess: np.ndarray
+    newton_step: np.ndarray
 
 
-@compiled
 def new_line(capacity: int) -> Line:
     """Return an empty line with room for `capacity` segments."""
     n = capacity + 1
+    per_node = {name: np.zeros((3, n, 3)) for name in ("position", "velocity", "momentum")}
+    blocks = {name: np.zeros((n, 4, 4)) for name in ("lower", "diagonal", "upper")}
     return Line(
-        np.zeros((3, n, 3)),
-        np.zeros((3, n, 3)),
-        np.zeros((3, n, 3)),
-        np.zeros((2, n)),
-        np.zeros(n),
-        np.zeros(3),
-        np.zeros(3),
-        np.zeros((n, 3)),
-        np.zeros(1, np.int64),
-        np.zeros(1, np.int64),
-        np.zeros(1),
-        np.zeros(3),
-        np.zeros((3, 3)),
-        np.zeros((3, 4)),
-        np.zeros((n, 4, 4)),
-        np.zeros((n, 4, 4)),
-        np.zeros((n, 4, 4)),
-        np.zeros((n, 4), np.int64),
-        np.zeros((n, 4)),
+        **per_node,
+        tension=np.zeros((2, n)),
+        length=np.zeros(n),
+        last_length=np.zeros(3),
+        payout=np.zeros(3),
+        load=np.zeros((n, 3)),
+        count=np.zeros(1, np.int64),
+        stuck=np.zeros(1, np.int64),
+        previous_step=np.zeros(1),
+        tow_force=np.zeros(3),
+        tow_by_tow=np.zeros((3, 3)),
+        tow_by_block=np.zeros((3, 4)),
+        **blocks,
+        pivots=np.zeros((n, 4), np.int64),
+        rhs=np.zeros((n, 4)),
+        guess=np.zeros((n, 4)),
+        newton_step=np.zeros((n, 4)),
     )
 
 
@@ -119,28 +119,30 @@ def lay_straight(
     for j in range(1, count + 1):
         line.length[j] = segment_length if j < count else last
         middle = wet_length - (j - 0.5) * segment_length if j < count else 0.5 * last
-        line.tension[:, j] = c.tangential_drag * speed * abs(speed) * middle
+        for level in range(2):
+            line.tension[level, j] = c.tangential_drag * speed * abs(speed) * middle
 
 
 @compiled
-def set_momenta(line: Line, J: np.ndarray, c: CableNumbers) -> None:
+def set_momenta(line: Line, J: np.ndarray, c: CableNumbers, work: Load) -> None:
     """Fill the segments' momenta at levels NOW and BEFORE from positions and velocities in water that moves at J."""
     for level in (NOW, BEFORE):
         for j in range(1, line.count[0] + 1):
-            segment_momentum(line, level, j, segment_length_at(line, level, j), J, c)
+            length = line.last_length[level] if j == line.count[0] else line.length[j]
+            segment_momentum(line, level, j, length, J, c, work)
 
 
 @compiled
-def segment_length_at(line: Line, level: int, j: int) -> float:
-    """Return the unstretched length of segment j at a level of time. [m]."""
-    return line.last_length[level] if j == line.count[0] else line.length[j]
-
-
-@compiled
-def segment_momentum(line: Line, level: int, j: int, length: float, J: np.ndarray, c: CableNumbers) -> None:
+def segment_momentum(
+    line: Line, level: int, j: int, length: float, J: np.ndarray, c: CableNumbers, work: Load
+) -> None:
     """Fill ∫p ds of segment j at a level; the tangent is the one of level NOW, where the segment has a length."""
-    chord = line.position[NOW, j] - line.position[NOW, j - 1]
-    r = sqrt(chord[0] * chord[0] + chord[1] * chord[1] + chord[2] * chord[2])
-    V = 0.5 * (line.velocity[level, j - 1] + line.velocity[level, j])
-    evaluate_momentum(V, J, chord / max(r, 1e-300), c, line.momentum[level, j])
-    line.momentum[level, j] *= length
+    for i in range(3):
+        work.chord[i] = line.position[NOW, j, i] - line.position[NOW, j - 1, i]
+        work.velocity[i] = 0.5 * (line.velocity[level, j - 1, i] + line.velocity[level, j, i])
+    r = chord_length(work.chord, length)
+    for i in range(3):
+        work.tangent[i] = work.chord[i] / r
+    evaluate_momentum(work.velocity, J, work.tangent, c, work.momentum)
+    for i in range(3):
+        line.momentum[level, j, i] = length * work.momentum[i]

@@ -50,8 +50,6 @@ def solve_step(
 ) -> Solved:
     """Solve the equations of `assembly` for level NEW, from the guess that stands there."""
     N = line.count[0]
-    saved_x = np.empty((N + 1, 3))
-    saved_T = np.empty(N + 1)
     assemble(line, a0, a1, a2, J, c, drum, work)
     size, node, equation = _residual(line)
     merit = _merit(line)
@@ -61,13 +59,10 @@ def solve_step(
         if factor(line.lower, line.diagonal, line.upper, line.pivots, N) > 0:
             break
         solve(line.lower, line.diagonal, line.upper, line.pivots, N, line.rhs)
-        saved_x[:] = line.position[NEW, : N + 1]
-        saved_T[:] = line.tension[NEW, : N + 1]
-        saved_length = line.last_length[NEW]
-        step = line.rhs[: N + 1].copy()
+        last_length = _save(line)
         fraction = 1.0
         for _ in range(MAX_HALVINGS):
-            _update(line, saved_x, saved_T, saved_length, step, fraction)
+            _update(line, last_length, fraction)
             assemble(line, a0, a1, a2, J, c, drum, work)
             new_merit = _merit(line)
             if isfinite(new_merit) and new_merit <= merit * (1.0 - 0.1 * fraction) + 1e-30:
@@ -81,16 +76,26 @@ def solve_step(
 
 
 @compiled
-def _update(
-    line: Line, x: np.ndarray, T: np.ndarray, last_length: float, step: np.ndarray, fraction: float
-) -> None:
+def _save(line: Line) -> float:
+    """Keep the guess and the Newton step; return the guess of the last segment's length. [m]."""
+    for j in range(1, line.count[0] + 1):
+        line.guess[j, 0] = line.tension[NEW, j]
+        for i in range(3):
+            line.guess[j, 1 + i] = line.position[NEW, j, i]
+        for i in range(4):
+            line.newton_step[j, i] = line.rhs[j, i]
+    return line.last_length[NEW]
+
+
+@compiled
+def _update(line: Line, last_length: float, fraction: float) -> None:
     """Write guess minus `fraction` of the Newton step to level NEW."""
-    N = line.count[0]
+    N, guess, step = line.count[0], line.guess, line.newton_step
     for j in range(1, N + 1):
-        line.tension[NEW, j] = T[j] - fraction * step[j, 0]
+        line.tension[NEW, j] = guess[j, 0] - fraction * step[j, 0]
         if j < N:
             for i in range(3):
-                line.position[NEW, j, i] = x[j, i] - fraction * step[j, 1 + i]
+                line.position[NEW, j, i] = guess[j, 1 + i] - fraction * step[j, 1 + i]
     line.last_length[NEW] = max(last_length - fraction * step[N, 1], 0.1 * last_length, SMALLEST_SEGMENT)
 
 

@@ -17,7 +17,7 @@ from subzero.compiled import compiled
 from .assembly import drum_tension
 from .differences import backward_weights
 from .element import Load
-from .line import BEFORE, NEW, NOW, SPLIT_AT, Line, segment_length_at, segment_momentum
+from .line import BEFORE, NEW, NOW, SPLIT_AT, Line, segment_momentum
 from .newton import Solved, solve_step
 from .properties import CableNumbers, DrumNumbers
 
@@ -66,7 +66,8 @@ def _predict(line: Line, step: float, tow: np.ndarray) -> None:
         for i in range(3):
             moved = line.position[NOW, j, i] + step * line.velocity[NOW, j, i]
             line.position[NEW, j, i] = moved if j < N else line.position[NOW, j, i]
-    line.position[NEW, 0] = tow
+    for i in range(3):
+        line.position[NEW, 0, i] = tow[i]
     growth = 0.0 if line.stuck[0] else step * line.payout[NOW]
     line.last_length[NEW] = max(line.last_length[NOW] + growth, 0.5 * line.last_length[NOW])
 
@@ -81,24 +82,27 @@ def _contradicts(line: Line, drum: DrumNumbers, work: Load) -> bool:
 
 @compiled
 def accept(
-    line: Line, step: float, J: np.ndarray, c: CableNumbers, segment_length: float
+    line: Line, step: float, J: np.ndarray, c: CableNumbers, segment_length: float, work: Load
 ) -> None:
     """Make level NEW the present one, and split the last segment while it is too long."""
     N = line.count[0]
     for level in (BEFORE, NOW):
-        line.position[level, : N + 1] = line.position[level - 1, : N + 1]
-        line.velocity[level, : N + 1] = line.velocity[level - 1, : N + 1]
-        line.momentum[level, : N + 1] = line.momentum[level - 1, : N + 1]
+        for j in range(N + 1):
+            for i in range(3):
+                line.position[level, j, i] = line.position[level - 1, j, i]
+                line.velocity[level, j, i] = line.velocity[level - 1, j, i]
+                line.momentum[level, j, i] = line.momentum[level - 1, j, i]
         line.last_length[level] = line.last_length[level - 1]
         line.payout[level] = line.payout[level - 1]
-    line.tension[NOW, : N + 1] = line.tension[NEW, : N + 1]
+    for j in range(N + 1):
+        line.tension[NOW, j] = line.tension[NEW, j]
     line.previous_step[0] = step
     while line.last_length[NOW] > SPLIT_AT * segment_length and line.count[0] < line.length.size - 1:
-        _split_last(line, segment_length, J, c)
+        _split_last(line, segment_length, J, c, work)
 
 
 @compiled
-def _split_last(line: Line, segment_length: float, J: np.ndarray, c: CableNumbers) -> None:
+def _split_last(line: Line, segment_length: float, J: np.ndarray, c: CableNumbers, work: Load) -> None:
     """Insert a node `segment_length` from the start of the last segment, on its chord, at levels NOW and BEFORE.
 
     The new node is a material point. At level BEFORE it may still have been on the drum: then it is put where the
@@ -107,15 +111,21 @@ def _split_last(line: Line, segment_length: float, J: np.ndarray, c: CableNumber
     N = line.count[0]
     for level in (NOW, BEFORE):
         fraction = segment_length / line.last_length[level]
-        for quantity in (line.position, line.velocity):
-            for i in range(3):
-                near, end = quantity[level, N - 1, i], quantity[level, N, i]
-                quantity[level, N + 1, i] = end
-                quantity[level, N, i] = near + fraction * (end - near)
+        _insert_between(line.position[level], N, fraction)
+        _insert_between(line.velocity[level], N, fraction)
         line.last_length[level] -= segment_length
     line.length[N] = segment_length
     line.tension[NOW, N + 1] = line.tension[NOW, N]
     line.count[0] = N + 1
     for level in (NOW, BEFORE):
-        for j in (N, N + 1):
-            segment_momentum(line, level, j, segment_length_at(line, level, j), J, c)
+        segment_momentum(line, level, N, segment_length, J, c, work)
+        segment_momentum(line, level, N + 1, line.last_length[level], J, c, work)
+
+
+@compiled
+def _insert_between(values: np.ndarray, last: int, fraction: float) -> None:
+    """Move the last row of `values` (nodes, 3) one down, and interpolate (or extrapolate) a new row before it."""
+    for i in range(3):
+        near, end = values[last - 1, i], values[last, i]
+        values[last + 1, i] = end
+        values[last, i] = near + fraction * (end - near)

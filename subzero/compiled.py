@@ -58,4 +58,4 @@ def compiled(function: Function) -> Function:
     """Compile a function of plain floats and arrays; strict IEEE arithmetic, so runs repeat to the last bit."""
     package = function.__module__.partition(".")[0]
     numba.config.CACHE_DIR = str(cache_directory(package if package in SEES else "subzero"))
-    return numba.njit(cache=True, error_model="numpy")(function)
+    return numba.njit(cache=True, error_model="numpy", no_cfunc_wrapper=True)(function)
