@@ -9,6 +9,7 @@ from __future__ import annotations
 import csv
 import io
 import math
+from collections.abc import Iterable
 from pathlib import Path
 
 from scenarios.errors import Problem, ScenarioError, nearest_or_all, shown
@@ -29,23 +30,41 @@ def read_csv(path: Path, name: str, section: str) -> tuple[Samples | None, list[
         section: ``commands`` or ``motion``.
 
     Returns:
-        the samples, None if there is a problem; and the problems.
+        the samples, None if there are no times to speak of; and the problems.
     """
-    quantities = {quantity.name: quantity for quantity in SECTIONS[section]}
     try:
         header, rows = _table(read_text(path, name), name)
     except ScenarioError as error:
         return None, list(error.problems)
-    problems = _header_problems(name, header, list(quantities)) or _shape_problems(name, header[1], rows)
-    if problems:
-        return None, problems
-    columns = {
-        column: [_number(name, quantities[column], line, cells[at], problems) for line, cells in rows]
-        for at, column in enumerate(header[1])
-    }
-    lines = [line for line, _ in rows]
+    columns, problems = _columns(name, header[1], rows, SECTIONS[section])
+    problems += _header_problems(name, header, [quantity.name for quantity in SECTIONS[section]])
+    problems += _shape_problems(name, header[1], rows)
     problems.sort(key=lambda problem: problem.line or 0)
-    return (None if problems else Samples(file=name, key="time_s", columns=columns, lines=lines)), problems
+    whole = _whole(header[1], rows)
+    time = columns.get("time_s", [])
+    if not time or any(math.isnan(at) for at in time):
+        return None, problems
+    return Samples(file=name, key="time_s", columns=columns, lines=[line for line, _ in whole]), problems
+
+
+def _whole(header: list[str], rows: list[Row]) -> list[Row]:
+    """Return the rows that have one cell for each column."""
+    return [row for row in rows if len(row[1]) == len(header)]
+
+
+def _columns(
+    name: str, header: list[str], rows: list[Row], quantities: Iterable[Quantity]
+) -> tuple[dict[str, list[float]], list[Problem]]:
+    """Return the columns we know, NaN where a cell cannot be used, and the problems of those cells."""
+    columns: dict[str, list[float]] = {}
+    problems: list[Problem] = []
+    for quantity in quantities:
+        if quantity.name in header:
+            at = header.index(quantity.name)
+            columns[quantity.name] = [
+                _number(name, quantity, line, cells[at], problems) for line, cells in _whole(header, rows)
+            ]
+    return columns, problems
 
 
 def _table(text: str, name: str) -> tuple[Row, list[Row]]:
@@ -100,18 +119,15 @@ def _shape_problems(name: str, columns: list[str], rows: list[Row]) -> list[Prob
 
 
 def _number(name: str, quantity: Quantity, line: int, cell: str, problems: list[Problem]) -> float:
-    """Return the number in a cell; if it cannot be used, add the problem."""
+    """Return the number in a cell; if it cannot be used, add the problem and return NaN."""
     try:
         value = float(cell)
     except ValueError:
         value, why = math.nan, "this is not a number" if cell else "this cell is empty"
     else:
-        why = "" if math.isfinite(value) else "this is not a finite number"
-        if math.isfinite(value) and not quantity.low <= value <= quantity.high:
-            why = "this is outside its limits"
-    if why:
-        found = shown(cell) if cell else ""
-        problems.append(
-            Problem(file=name, line=line, key=quantity.name, found=found, why=why, remedy=quantity.allowed)
-        )
-    return value
+        if quantity.low <= value <= quantity.high:
+            return value
+        why = "this is outside its limits" if math.isfinite(value) else "this is not a finite number"
+    found, remedy = shown(cell) if cell else "", quantity.allowed
+    problems.append(Problem(file=name, line=line, key=quantity.name, found=found, why=why, remedy=remedy))
+    return math.nan

@@ -9,8 +9,8 @@ import difflib
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-SHOWN_PROBLEMS = 12
-"""So many problems are spelt out in a message: enough to repair a file, few enough to read on one screen."""
+SHOWN_PROBLEMS = 40
+"""So many problems are spelt out in a message: enough to repair a file; more would only repeat themselves."""
 
 SHOWN_CHARACTERS = 60
 """Longer values are cut, so that a message stays readable whatever is in the file."""
@@ -74,10 +74,15 @@ def shown(value: object) -> str:
     return text if len(text) <= SHOWN_CHARACTERS else text[:SHOWN_CHARACTERS] + "..."
 
 
-def nearest_or_all(word: str, allowed: Iterable[str]) -> str:
-    """Return ``Did you mean 'x'?`` with the nearest allowed word; all allowed words if none is near."""
+def nearest(word: str, allowed: Iterable[str]) -> str | None:
+    """Return the allowed word most like `word`, whatever its case; None if none is near."""
     by_lower = {candidate.lower(): candidate for candidate in allowed}
     close = difflib.get_close_matches(word.lower()[:SHOWN_CHARACTERS], by_lower, n=1, cutoff=0.6)
-    if close:
-        return f"Did you mean '{by_lower[close[0]]}'?"
-    return f"Allowed: {', '.join(by_lower.values())}."
+    return by_lower[close[0]] if close else None
+
+
+def nearest_or_all(word: str, allowed: Iterable[str]) -> str:
+    """Return ``Did you mean 'x'?`` with the nearest allowed word; all allowed words if none is near."""
+    words = list(allowed)
+    close = nearest(word, words)
+    return f"Did you mean '{close}'?" if close else f"Allowed: {', '.join(words)}."

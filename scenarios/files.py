@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from scenarios.errors import Problem, ScenarioError, nearest_or_all, shown
+from scenarios.errors import Problem, ScenarioError, nearest, nearest_or_all, shown
 
 ROOT = Path(__file__).parent
 
@@ -72,10 +72,10 @@ def find(name_or_path: str | Path) -> Source:
     if named in shipped("trials"):
         return read_toml(shipped_path("trials", named), named)
     path = Path(named)
-    if path.suffix == ".toml" or len(path.parts) > 1 or path.exists():
+    if named and (path.suffix == ".toml" or len(path.parts) > 1 or path.exists()):
         return read_toml(path, named)
     remedy = nearest_or_all(named, shipped("trials")) + " Or give the path of a TOML file."
-    raise ScenarioError([Problem(file=named, why="there is no such scenario", remedy=remedy)])
+    raise ScenarioError([Problem(file=named or "''", why="there is no such scenario", remedy=remedy)])
 
 
 def read_text(path: Path, name: str) -> str:
@@ -101,11 +101,11 @@ def read_text(path: Path, name: str) -> str:
 def _neighbour(path: Path) -> str:
     """Return a hint at a file in the same folder with nearly the same name."""
     try:
-        names = [near.name for near in path.parent.iterdir() if near.suffix == path.suffix]
+        names = {near.stem: near.name for near in path.parent.iterdir() if near.suffix == path.suffix}
     except OSError:
         return "Its folder does not exist either: check the path."
-    hint = nearest_or_all(path.name, names)
-    return hint if hint.startswith("Did") else "Check the path."
+    close = nearest(path.stem, names)
+    return f"Did you mean '{names[close]}'?" if close else "Check the path."
 
 
 def read_toml(path: Path, name: str) -> Source:

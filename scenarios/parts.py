@@ -36,10 +36,12 @@ class Part:
     Attributes:
         source: its file; None if that could not be read.
         values: dotted key → value, as far as they are good.
+        complete: whether all of them are good.
     """
 
     source: Source | None = None
     values: Mapping[str, float] = field(default_factory=dict)
+    complete: bool = False
 
 
 def pattern(kind: str) -> Source:
@@ -72,7 +74,7 @@ def read_part(source: Source, kind: str, named: str) -> tuple[Part, list[Problem
         values, problems = _checked(part, pattern(kind))
     except ScenarioError as error:
         return Part(), list(error.problems)
-    return Part(source=part, values=values), problems
+    return Part(source=part, values=values, complete=not problems), problems
 
 
 def _checked(source: Source, model: Source) -> tuple[dict[str, float], list[Problem]]:
@@ -128,13 +130,13 @@ def value_complaint(value: object, model: Leaf, key: str) -> tuple[str, str] | N
     if not abs(value) < math.inf:
         return "this is not a finite number", allowed
     if not low <= value <= high or (value == 0.0 and low == math.ulp(0.0)):
-        return "this cannot be", allowed
+        return "this is outside its limits", allowed
     return None
 
 
 def _limits(model: Leaf, key: str) -> tuple[float, float, str]:
     """Return the least and the greatest possible value, and a sentence for a message."""
-    low, high = -math.inf, math.inf
+    low, high, unit = -math.inf, math.inf, "" if model["unit"] == "1" else f" {model['unit']}"
     said = "any finite number"
     if "limits" in model:
         low, high = model["limits"]
@@ -142,7 +144,7 @@ def _limits(model: Leaf, key: str) -> tuple[float, float, str]:
     elif key.rpartition(".")[2].rpartition("_")[2] in ABOVE_ZERO:
         low, said = math.ulp(0.0), "above 0"
     plausible = f"; plausible is {model['range'][0]:g} to {model['range'][1]:g}" if "range" in model else ""
-    return low, high, f"Allowed: {said} {model['unit']}{plausible}."
+    return low, high, f"Allowed: {said}{unit}{plausible}."
 
 
 def nested(values: Mapping[str, float]) -> dict[str, Any]:

@@ -76,7 +76,7 @@ def load(
     vehicle, cable = _parts(reading, check_vehicle)
     samples = _instructions(reading, commands_csv, run.get("duration_s"))
     if reading.problems:
-        raise ScenarioError(reading.problems)
+        raise ScenarioError(_in_order(reading.problems))
     prescribed = motion(samples["motion"]) if "motion" in samples else None
     return Trial(
         name=Path(name_or_path).stem,
@@ -98,25 +98,32 @@ def load(
     )
 
 
+def _in_order(problems: list[Problem]) -> list[Problem]:
+    """Sort problems by line within each file; files stay in the order in which they were read."""
+    files = list(dict.fromkeys(problem.file for problem in problems))
+    return sorted(problems, key=lambda problem: (files.index(problem.file), problem.line or 0))
+
+
+def _part(reading: Reading, kind: str) -> Part:
+    """Return the vehicle or the cable that the trial names, as far as it is good."""
+    named = reading.source.table.get(kind)
+    if not isinstance(named, str):
+        return Part()  # `check_page` has said so
+    return reading.keep(read_part(reading.source, kind, named))
+
+
 def _parts(reading: Reading, check: VehicleCheck | None) -> tuple[dict[str, Any], dict[str, Any]]:
     """Return the numbers of the vehicle, and those of cable and drum, with the changes of the trial."""
-    parts: dict[str, Part] = {}
-    for kind in ("vehicle", "cable"):
-        named = reading.source.table.get(kind)
-        known = isinstance(named, str)
-        parts[kind] = reading.keep(read_part(reading.source, kind, str(named))) if known else Part()
+    part, cable = (_part(reading, kind) for kind in ("vehicle", "cable"))
     changes = reading.keep(read_changes(reading.source))
     of_vehicle = {
         key.removeprefix("vehicle."): value for key, value in changes.items() if key.startswith("vehicle.")
     }
     of_cable = {key: value for key, value in changes.items() if not key.startswith("vehicle.")}
-    vehicle = nested({**parts["vehicle"].values, **of_vehicle})
-    if check and parts["vehicle"].source and not reading.problems:
-        complaints = check(vehicle)
-        reading.problems.extend(
-            _complaint(reading, parts["vehicle"], of_vehicle, said) for said in complaints
-        )
-    return vehicle, nested({**parts["cable"].values, **of_cable})
+    vehicle = nested({**part.values, **of_vehicle})
+    if check and part.complete:
+        reading.problems.extend(_complaint(reading, part, of_vehicle, said) for said in check(vehicle))
+    return vehicle, nested({**cable.values, **of_cable})
 
 
 def _complaint(reading: Reading, part: Part, changed: Mapping[str, float], said: Any) -> Problem:

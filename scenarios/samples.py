@@ -59,21 +59,18 @@ class Samples:
 def inline(
     source: Source, section: str, columns: Mapping[str, list[float]]
 ) -> tuple[Samples | None, list[Problem]]:
-    """Return the lists of a section as samples, or the problem that they are not equally long."""
+    """Return the lists of a section as samples, None if there are no times; and those of a wrong length."""
+    key = f"{section}.time_s"
+    if "time_s" not in columns:
+        return None, []
     count = len(columns["time_s"])
+    remedy = "Make the lists equally long: one value for each time."
     problems = [
-        source.problem(
-            f"{section}.{name}",
-            f"time_s has {count}: every list needs one value for each time",
-            "Make the lists equally long.",
-            found=f"{len(values)} values",
-        )
+        source.problem(f"{section}.{name}", f"{len(values)} values for {count} times", remedy)
         for name, values in columns.items()
         if len(values) != count
     ]
-    key = f"{section}.time_s"
-    samples = Samples(file=source.name, key=key, columns=columns, key_line=source.line(key))
-    return (None if problems else samples), problems
+    return Samples(file=source.name, key=key, columns=columns, key_line=source.line(key)), problems
 
 
 def check_times(samples: Samples, duration: float | None) -> list[Problem]:
@@ -104,7 +101,8 @@ def _check_end(samples: Samples, duration: float) -> list[Problem]:
     if last + min(interval, LONGEST_HOLD) >= duration - NUMERICAL:
         return []
     why = f"the file ends early: the run lasts {duration:g} s"
-    remedy = f"Add rows up to {duration:g} s, or set duration_s to {last:g}."
+    shorter = f", or set duration_s to {last:g}" if last > 0.0 else ""
+    remedy = f"Add rows up to {duration:g} s{shorter}."
     return [samples.problem(len(samples.time) - 1, why, remedy)]
 
 

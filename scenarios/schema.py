@@ -1,4 +1,4 @@
-"""What a trial file may say: pydantic models made from the table of quantities; their complaints in our words.
+"""What a trial file may say: pydantic models made from the table of quantities, which speak in our words.
 
 Only here is pydantic imported, and only when a file is read. Every section is checked by itself, so a mistake
 in one does not hide those in another. Checks that compare several values live in `scenarios.reader`.
@@ -76,7 +76,7 @@ def check_section(source: Source, name: str, raw: object) -> tuple[dict[str, Any
         raw: what the file says.
 
     Returns:
-        its values, in the units of the file, empty if there is a problem; and the problems.
+        its values, in the units of the file, as far as they are good; and the problems.
     """
     if not isinstance(raw, Mapping):
         return {}, []  # `check_page` has said so
@@ -93,13 +93,15 @@ def _validate(
     raw: Mapping[str, Any],
     quantities: Mapping[str, Quantity],
 ) -> tuple[dict[str, Any], list[Problem]]:
-    """Return the values of a section, or its problems."""
+    """Return the values of a section, without those that have a problem, and the problems."""
     try:
         return model.model_validate(raw).model_dump(), []
     except ValidationError as error:
         allowed = list(model.model_fields)
         details = error.errors(include_url=False, include_context=False)
-        return {}, [_problem(source, section, detail, allowed, quantities) for detail in details]
+        problems = [_problem(source, section, detail, allowed, quantities) for detail in details]
+        bad = {detail["loc"][0] for detail in details}
+        return {name: raw[name] for name in allowed if name in raw and name not in bad}, problems
 
 
 def _problem(

@@ -18,17 +18,26 @@ TOLERANCE = 1e-9
 
 
 def check_steps(source: Source, run: Mapping[str, float], start: Mapping[str, float]) -> list[Problem]:
-    """Return what does not fit in the sections [run] and [start], each checked by itself before."""
+    """Return what does not fit in [run] and [start], as far as their numbers are good by themselves.
+
+    Args:
+        source: the trial file, for the lines in messages.
+        run: numbers of the section [run], without those that are wrong.
+        start: numbers of the section [start], likewise.
+    """
+    numbers = {**run, **start}
+
+    def known(*names: str) -> bool:
+        return all(name in numbers for name in names)
+
     problems = []
-    if run:
-        problems += _whole(source, "cable_step_s", run["cable_step_s"], "hull_step_s", run["hull_step_s"])
-        problems += _whole(source, "duration_s", run["duration_s"], "cable_step_s", run["cable_step_s"])
-        problems += _not_endless(source, run["duration_s"], run["hull_step_s"])
-    if run and start and start["wet_length_m"] > MOST_SEGMENTS * run["segment_length_m"]:
-        why = f"the cable at the start would have more than {MOST_SEGMENTS} segments"
-        remedy = f"At least {start['wet_length_m'] / MOST_SEGMENTS:g} m."
-        key = "run.segment_length_m"
-        problems.append(source.problem(key, why, remedy, found=run["segment_length_m"]))
+    for name, step in (("cable_step_s", "hull_step_s"), ("duration_s", "cable_step_s")):
+        if known(name, step):
+            problems += _whole(source, name, numbers[name], step, numbers[step])
+    if known("duration_s", "hull_step_s"):
+        problems += _not_endless(source, numbers["duration_s"], numbers["hull_step_s"])
+    if known("wet_length_m", "segment_length_m"):
+        problems += _not_countless(source, numbers["wet_length_m"], numbers["segment_length_m"])
     return problems
 
 
@@ -38,9 +47,9 @@ def _whole(source: Source, name: str, value: float, step_name: str, step: float)
     if round(ratio) >= 1 and abs(ratio - round(ratio)) <= TOLERANCE * ratio:
         return []
     below, above = int(ratio) * step, (int(ratio) + 1) * step
-    nearest = f"{below:.6g} or {above:.6g}" if below > 0.0 else f"{above:.6g}"
+    near = f"{below:.9g} or {above:.9g}" if below > 0.0 else f"{above:.9g}"
     why = f"it must be a whole number of steps {step_name} = {step:g}"
-    return [source.problem(f"run.{name}", why, f"Nearest: {nearest}.", found=value)]
+    return [source.problem(f"run.{name}", why, f"Nearest: {near}.", found=value)]
 
 
 def _not_endless(source: Source, duration: float, step: float) -> list[Problem]:
@@ -49,3 +58,12 @@ def _not_endless(source: Source, duration: float, step: float) -> list[Problem]:
         return []
     why = f"a run of {duration:g} s would take {duration / step:.3g} steps, more than {MOST_STEPS:g}"
     return [source.problem("run.hull_step_s", why, f"At least {duration / MOST_STEPS:.3g} s.", found=step)]
+
+
+def _not_countless(source: Source, length: float, segment: float) -> list[Problem]:
+    """Return the problem that the cable in the water at the start has far too many segments."""
+    if length <= MOST_SEGMENTS * segment:
+        return []
+    why = f"a cable of {length:g} m at the start would have more than {MOST_SEGMENTS} segments"
+    key, remedy = "run.segment_length_m", f"At least {length / MOST_SEGMENTS:g} m."
+    return [source.problem(key, why, remedy, found=segment)]

@@ -1,7 +1,8 @@
 """What a trial is, as values: everything a run needs, checked, in SI units and radians.
 
-A `Trial` comes from `scenarios.load`. To change one, make a new one:
-``dataclasses.replace(trial, duration=60.0)``. Propeller speeds are in revolutions per second, the one unit here that is not SI.
+A `Trial` comes from `scenarios.load`. To change one, make a new one, as in
+``dataclasses.replace(trial, duration=60.0)``. Propeller speeds are in revolutions per second, the one
+unit here that is not SI.
 
 Signs: axes are north-east-down; depth is positive down; heading runs clockwise from north; a positive rudder
 turns the heading to starboard (it increases); positive stern-planes (both) pitch the nose up.
