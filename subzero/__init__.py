@@ -1,1 +1,49 @@
-"""Simulate, compare and understand a tethered underwater vehicle."""
+"""Simulate, compare and understand a tethered underwater vehicle.
+
+    >>> import subzero
+    >>> comparison = subzero.compare("fig6")            # with the cable and without
+    >>> comparison.tethered["surge_speed"]              # labelled arrays with units
+    >>> comparison.summary()["tethered"]["peak_speed_m_s"]
+
+Names come from their modules when they are first used, so that ``import subzero`` costs nothing:
+`simulate` and `compare` run a trial, `Comparison` holds two runs, `load_scenario` reads a trial,
+`read_record` a measured record, `draw` makes the figures, `CHANNELS` is the table of everything that a
+run gives.
+"""
+
+from importlib import import_module
+from typing import Any
+
+_HOME = {
+    "CHANNELS": ("subzero.channels", "CHANNELS"),
+    "Comparison": ("subzero.comparison", "Comparison"),
+    "Record": ("subzero.measured", "Record"),
+    "UserError": ("subzero.errors", "UserError"),
+    "compare": ("subzero.comparison", "compare"),
+    "draw": ("subzero.figures", "draw"),
+    "load_scenario": ("scenarios", "load"),
+    "read_record": ("subzero.measured", "read_record"),
+    "simulate": ("subzero.simulation", "simulate"),
+}
+"""Public name → (module, name there)."""
+
+__all__ = sorted([*_HOME, "__version__"])
+
+
+def __getattr__(name: str) -> Any:
+    """Fetch a public name from its module, once."""
+    if name == "__version__":
+        from importlib.metadata import version
+
+        value: Any = version("subzero")
+    elif name in _HOME:
+        module, inner = _HOME[name]
+        value = getattr(import_module(module), inner)
+    else:
+        raise AttributeError(f"module 'subzero' has no attribute '{name}'; it has {', '.join(__all__)}")
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -50,6 +50,11 @@ def fit(run: xr.Dataset, record: Record, name: str) -> Fit:
     return Fit(samples=error.size, rmse=rmse, bias=float(error.mean()), fit_percent=100.0 * (1.0 - share))
 
 
+def fits(runs: dict[str, xr.Dataset], record: Record) -> dict[str, dict[str, Fit]]:
+    """Return channel → run → how well that run explains the record."""
+    return {name: {label: fit(run, record, name) for label, run in runs.items()} for name in record.values}
+
+
 def beside(record: Record, run: xr.Dataset) -> Record:
     """Return the record with its heading shifted by whole turns, so that it starts next to the run's."""
     if CONTINUOUS not in record.values:

@@ -14,7 +14,7 @@ import os
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -33,10 +33,12 @@ class Stage:
     Args:
         path: the hidden folder.
         folder: the output folder, as the user named it.
+        written: names of the files that have been moved to the output folder.
     """
 
     path: Path
     folder: Path
+    written: list[str] = field(default_factory=list)
 
 
 @contextmanager
@@ -55,6 +57,7 @@ def staged(folder: Path) -> Iterator[Stage]:
             folder.mkdir(parents=True, exist_ok=True)
             for path in sorted(stage.path.iterdir()):
                 os.replace(path, folder / path.name)
+                stage.written.append(path.name)
     finally:
         shutil.rmtree(stage.path, ignore_errors=True)
 

@@ -7,12 +7,18 @@ that does not exist (the heading of a run without samples, the balance of a pres
 from __future__ import annotations
 
 import math
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from subzero.channels import BY_NAME
+from subzero.fit import Fit, fits
+
 if TYPE_CHECKING:
     import xarray as xr
+
+    from subzero.measured import Record
 
 ENERGY_PARTS = ("hull_loss", "cable_loss", "kinetic_change", "drum", "added_mass_term", "residual")
 """Where the work of the propeller goes; their sum is ``energy_propeller_work``."""
@@ -43,6 +49,36 @@ def summarise(run: xr.Dataset) -> dict[str, Any]:
         "time_of_largest_cable_moment_s": number(time[twist]),
         "energy": energy_balance(run),
     }
+
+
+def summary_of(runs: dict[str, xr.Dataset], record: Record | None) -> dict[str, Any]:
+    """Return some runs of one trial, and how well they explain a record, ready for JSON.
+
+    Args:
+        runs: runs by name, tethered, untethered or both.
+        record: what was measured.
+
+    Returns:
+        scenario, title, subzero_version, prescribed; each run's `summarise` under its name; and ``measured``:
+        source and channels → unit and, by run, samples, rmse, bias, fit_percent; None without a record.
+    """
+    first = next(iter(runs.values()))
+    head = {key: first.attrs[key] for key in ("scenario", "title", "subzero_version")}
+    body = {label: summarise(run) for label, run in runs.items()}
+    measured = None if record is None else {"source": record.source, "channels": _explained(runs, record)}
+    return {**head, "prescribed": bool(first.attrs["prescribed"]), **body, "measured": measured}
+
+
+def _explained(runs: dict[str, xr.Dataset], record: Record) -> dict[str, Any]:
+    """Return channel → its unit and, by run, the numbers of the fit."""
+    return {
+        name: {"unit": BY_NAME[name].unit, **{label: _plain(one) for label, one in by_run.items()}}
+        for name, by_run in fits(runs, record).items()
+    }
+
+
+def _plain(one: Fit) -> dict[str, float | int | None]:
+    return {key: value if isinstance(value, int) else number(value) for key, value in asdict(one).items()}
 
 
 def energy_balance(run: xr.Dataset) -> dict[str, float | None] | None:

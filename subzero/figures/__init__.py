@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from .cable import shape
 from .forces import forces
-from .motion import attitude, figure_6
+from .motion import attitude, figure_6, measured
 from .prescribed import exact_tension, figure_4, figure_5, is_straight
 from .style import Runs
 
@@ -21,7 +21,17 @@ if TYPE_CHECKING:
 
     from subzero.measured import Record
 
-__all__ = ["attitude", "draw", "exact_tension", "figure_4", "figure_5", "figure_6", "forces", "shape"]
+__all__ = [
+    "attitude",
+    "draw",
+    "exact_tension",
+    "figure_4",
+    "figure_5",
+    "figure_6",
+    "forces",
+    "measured",
+    "shape",
+]
 
 
 def draw(runs: Runs, record: Record | None = None) -> dict[str, Figure]:
@@ -33,7 +43,9 @@ def draw(runs: Runs, record: Record | None = None) -> dict[str, Figure]:
     """
     first = next(iter(runs.values()))
     title = f"{first.attrs['scenario']}: {first.attrs['title']}"
-    return _prescribed(runs, title) if first.attrs["prescribed"] else _commanded(runs, record, title)
+    figures = _prescribed(runs, title) if first.attrs["prescribed"] else _commanded(runs, record, title)
+    besides = measured(runs, record, title) if record is not None else None
+    return figures if besides is None else {**figures, "measured": besides}
 
 
 def _commanded(runs: Runs, record: Record | None, title: str) -> dict[str, Figure]:

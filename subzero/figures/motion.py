@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from subzero.channels import BY_NAME
+
 from . import style
 from .style import Runs, channel_panel, headline, label, legend, sheet, time_label
 
@@ -15,6 +17,17 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from subzero.measured import Record
+
+ATTITUDE = {
+    "propeller_speed": "Propeller speed",
+    "depth": "Depth",
+    "rudder_angle": "Rudder angle, positive to starboard",
+    "roll": "Roll, positive starboard side down",
+    "stern_plane_port_angle": "Stern-planes, positive raises the nose",
+    "pitch": "Pitch, positive nose up",
+}
+SHOWN = ("surge_speed", "heading", *ATTITUDE)
+"""Channels that have a panel of their own in every comparison."""
 
 SEEN = 1e-3
 """Two angles that differ by less are one line. [degree]"""
@@ -41,21 +54,30 @@ def figure_6(runs: Runs, record: Record | None, title: str) -> Figure:
 def attitude(runs: Runs, record: Record | None, title: str) -> Figure:
     """Draw what the actuators do and how the hull answers: six panels."""
     figure, panels = sheet(3, 2, title)
-    shown = {
-        "propeller_speed": "Propeller speed",
-        "depth": "Depth",
-        "rudder_angle": "Rudder angle, positive to starboard",
-        "roll": "Roll, positive starboard side down",
-        "stern_plane_port_angle": "Stern-planes, positive raises the nose",
-        "pitch": "Pitch, positive nose up",
-    }
-    for axes, (name, words) in zip(panels, shown.items(), strict=True):
+    for axes, (name, words) in zip(panels, ATTITUDE.items(), strict=True):
         channel_panel(axes, runs, name, record)
         headline(axes, words)
     _starboard_plane(runs, panels[4])
     panels[1].invert_yaxis()
     legend(panels[0], loc="lower right")
     time_label(panels, 2)
+    return figure
+
+
+def measured(runs: Runs, record: Record, title: str) -> Figure | None:
+    """Draw all measured channels that figure 6 and the attitude do not show; None if there are none."""
+    names = [name for name in record.values if name not in SHOWN]
+    if not names:
+        return None
+    figure, panels = sheet((len(names) + 1) // 2, 2, title)
+    for axes, name in zip(panels, names, strict=False):
+        channel_panel(axes, runs, name, record)
+        words = BY_NAME[name].long_name
+        headline(axes, words[0].upper() + words[1:])
+    legend(panels[0])
+    for axes in panels[len(names) :]:
+        axes.remove()
+    time_label(panels[: len(names)], 2)
     return figure
 
 

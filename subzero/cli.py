@@ -1,0 +1,195 @@
+"""The command line: ``subzero list``, ``subzero simulate``, ``subzero compare``.
+
+Exit codes: 0 all is well; 2 the user has to change something (one clean message on standard error,
+nothing is written); 3 a run could not go on (what it has is written, the message says when, where and
+what to try). A bug of ours keeps its traceback. Everything heavy (numba, xarray, matplotlib, pydantic) is
+imported inside the commands, after the request has been checked, so that help and mistakes answer at
+once.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import cyclopts
+from cyclopts import Parameter
+from rich.console import Console
+
+import scenarios
+from subzero.errors import UserError
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from subzero.measured import Record
+    from subzero.output import Stage
+    from subzero.progress import ProgressBar
+
+FINE, MISTAKE, STOPPED, INTERRUPTED = 0, 2, 3, 130
+
+
+def _version() -> str:
+    from importlib.metadata import version
+
+    return version("subzero")
+
+
+app = cyclopts.App(
+    name="subzero",
+    help="Simulate a tethered underwater vehicle and the cable it pulls off a drum on the shore.",
+    version=_version,
+    help_format="plaintext",
+)
+
+
+@app.command(name="list")
+def list_scenarios() -> int:
+    """List the scenarios that are shipped."""
+    from rich.markup import escape
+    from rich.table import Table
+
+    table = Table.grid(padding=(0, 2))
+    for name in scenarios.names():
+        table.add_row(f"[bold]{escape(name)}[/bold]", escape(scenarios.describe(name)))
+    Console(highlight=False).print(table)
+    return FINE
+
+
+@app.command
+def simulate(
+    scenario: str,
+    /,
+    *,
+    untethered: Annotated[bool, Parameter(negative=())] = False,
+    commands: Path | None = None,
+    out: Path | None = None,
+) -> int:
+    """Simulate one run, and write its channels, a summary and figures.
+
+    Args:
+        scenario: name of a scenario (see "subzero list"), or path of a scenario file.
+        untethered: leave the cable away.
+        commands: CSV file of commands, instead of those of the scenario.
+        out: folder for the files; by default one named after the scenario, here.
+    """
+    from subzero.output import staged
+
+    trial = scenarios.load(scenario, commands_csv=commands)
+    with staged(out or _folder(trial)) as stage:
+        with _progress(trial) as progress:
+            from subzero.simulation import simulate as run
+
+            result = run(trial, tethered=not untethered, progress=progress)
+        summary = _write({"untethered" if untethered else "tethered": result}, None, stage)
+    return _tell(summary, stage)
+
+
+@app.command
+def compare(
+    scenario: str,
+    /,
+    *,
+    measured: Path | None = None,
+    commands: Path | None = None,
+    out: Path | None = None,
+) -> int:
+    """Simulate with the cable and without, and set both side by side.
+
+    Args:
+        scenario: name of a scenario (see "subzero list"), or path of a scenario file.
+        measured: CSV file of measured channels, to set beside both runs.
+        commands: CSV file of commands, instead of those of the scenario.
+        out: folder for the files; by default one named after the scenario, here.
+    """
+    from subzero.measured import read_record
+    from subzero.output import staged
+
+    trial = scenarios.load(scenario, commands_csv=commands)
+    record = read_record(measured) if measured is not None else None
+    with staged(out or _folder(trial)) as stage:
+        with _progress(trial) as progress:
+            from subzero.comparison import compare as run
+
+            result = run(trial, measured=record, progress=progress)
+        summary = _write(result.runs, result.measured, stage)
+    return _tell(summary, stage)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line, and return its exit code.
+
+    Args:
+        arguments: words behind ``subzero``; those of this process if None.
+    """
+    try:
+        command, bound, _ = app.parse_args(arguments, exit_on_error=False, print_error=False)
+        return command(*bound.args, **bound.kwargs) or FINE
+    except cyclopts.CycloptsError as error:
+        return _refuse(f"{_in_words(error)}\nTry 'subzero --help'.")
+    except (UserError, scenarios.ScenarioError) as error:
+        return _refuse(str(error))
+    except KeyboardInterrupt:
+        print("Interrupted; nothing was written.", file=sys.stderr)
+        return INTERRUPTED
+
+
+def _refuse(message: str) -> int:
+    print(message, file=sys.stderr)
+    return MISTAKE
+
+
+def _in_words(error: cyclopts.CycloptsError) -> str:
+    """Say what is wrong with the words of a command."""
+    if isinstance(error, cyclopts.UnusedCliTokensError):
+        return f"Unexpected argument: {' '.join(error.unused_tokens or [])}."
+    return str(error)
+
+
+def _folder(trial: scenarios.Trial) -> Path:
+    """Return the folder that is named after a trial, here; a path in a name cannot lead elsewhere."""
+    return Path(re.sub(r"[^\w.-]+", "_", trial.name).strip(".") or "run")
+
+
+def _progress(trial: scenarios.Trial) -> ProgressBar:
+    """Return a progress bar, after saying why the first run of all takes long."""
+    from subzero.compiled import is_warm
+    from subzero.progress import ProgressBar
+
+    console = Console(stderr=True, highlight=False)
+    if not is_warm():
+        console.print("Compiling the kernels (first use, about 20 s)…")
+    return ProgressBar(f"Simulating {trial.name}", console)
+
+
+def _write(runs: dict[str, xr.Dataset], record: Record | None, stage: Stage) -> dict[str, Any]:
+    """Write everything that belongs to some runs, and return their summary."""
+    from subzero import output
+    from subzero.figures import draw
+    from subzero.summary import summary_of
+
+    summary = summary_of(runs, record)
+    for label, run in runs.items():
+        output.write_run(run, stage, label)
+    output.write_summary(summary, stage)
+    output.write_figures(draw(runs, record), stage)
+    return summary
+
+
+def _tell(summary: dict[str, Any], stage: Stage) -> int:
+    """Print the summary, where the files are, and which run could not go on; return the exit code."""
+    from subzero.report import show
+
+    console = Console()
+    show(summary, console)
+    console.print(f"Wrote {stage.folder}{os.sep}: {', '.join(stage.written)}", highlight=False, markup=False)
+    stopped = [
+        label for label in ("tethered", "untethered") if summary.get(label, {}).get("outcome") == "stopped"
+    ]
+    for label in stopped:
+        print(f"The {label} run stopped: {summary[label]['outcome_message']}", file=sys.stderr)
+    return STOPPED if stopped else FINE

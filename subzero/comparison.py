@@ -1,0 +1,80 @@
+"""The same trial with and without its cable, side by side, and beside what was measured."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import scenarios
+from subzero.fit import Fit, beside, fits
+from subzero.measured import Record, read_record
+from subzero.simulation import simulate
+from subzero.summary import summary_of
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Progress = Callable[[float], None]
+"""Called now and then with the fraction that is done, 0 to 1."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Comparison:
+    """A trial, simulated with its cable and without.
+
+    Args:
+        tethered: the run with the cable.
+        untethered: the same commands, the same code, no cable.
+        trial: what was simulated.
+        measured: what was measured in that trial, if it was.
+    """
+
+    tethered: xr.Dataset
+    untethered: xr.Dataset
+    trial: scenarios.Trial
+    measured: Record | None = None
+
+    @property
+    def runs(self) -> dict[str, xr.Dataset]:
+        """The two runs by name, the tethered one first."""
+        return {"tethered": self.tethered, "untethered": self.untethered}
+
+    def fits(self) -> dict[str, dict[str, Fit]]:
+        """Return channel → run → how well that run explains what was measured."""
+        return {} if self.measured is None else fits(self.runs, self.measured)
+
+    def summary(self) -> dict[str, Any]:
+        """Return the comparison in plain numbers and texts, ready for JSON; keys carry their units."""
+        return summary_of(self.runs, self.measured)
+
+
+def compare(
+    scenario: str | Path | scenarios.Trial,
+    *,
+    measured: str | Path | Record | None = None,
+    progress: Progress | None = None,
+) -> Comparison:
+    """Simulate a trial with its cable and without.
+
+    Args:
+        scenario: name of a shipped scenario, path of a scenario file, or a trial.
+        measured: a measured record or the path of one, to set beside both runs.
+        progress: told the fraction that is done, from 0 to 1, over both runs.
+
+    Raises:
+        scenarios.ScenarioError: if the scenario cannot be used.
+        UserError: if the measured record cannot be used.
+    """
+    trial = scenario if isinstance(scenario, scenarios.Trial) else scenarios.load(scenario)
+    record = read_record(measured) if isinstance(measured, str | Path) else measured
+    tethered = simulate(trial, tethered=True, progress=_half(progress, 0.0))
+    untethered = simulate(trial, tethered=False, progress=_half(progress, 0.5))
+    record = beside(record, tethered) if record is not None else None
+    return Comparison(tethered=tethered, untethered=untethered, trial=trial, measured=record)
+
+
+def _half(progress: Progress | None, start: float) -> Progress | None:
+    """Return a progress that fills one half of another."""
+    return (lambda fraction: progress(start + 0.5 * fraction)) if progress is not None else None

@@ -1,0 +1,110 @@
+"""What a command prints about its runs: a short table, the energy balance, how well a record is explained."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from rich import box
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+Summary = dict[str, Any]
+"""The summary of one run, as `subzero.summary.summarise` gives it."""
+
+NOTHING = "–"
+RUNS = ("tethered", "untethered")
+
+ENERGY_ROWS = {
+    "propeller_work_J": "work of the propeller [J]",
+    "hull_loss_J": "  lost by hull and fins [J]",
+    "cable_loss_J": "  lost by the cable [J]",
+    "kinetic_change_J": "  kinetic and potential [J]",
+    "drum_J": "  left at the drum [J]",
+    "added_mass_term_J": "  added-mass form of (7) [J]",
+    "residual_J": "  unexplained [J]",
+}
+
+
+def show(summary: Summary, console: Console) -> None:
+    """Print a summary, as `subzero.comparison.summary_of` gives it."""
+    console.print(f"[bold]{escape(summary['scenario'])}[/bold]: {escape(summary['title'])}", highlight=False)
+    console.print(_runs_table(summary), highlight=False)
+    if summary["measured"] is not None:
+        console.print(_fit_table(summary["measured"]), highlight=False)
+
+
+def _runs_table(summary: Summary) -> Table:
+    """Return the table of what one reads first, runs side by side."""
+    runs = {label: summary[label] for label in RUNS if label in summary}
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    table.add_column("")
+    for label in runs:
+        table.add_column(label, justify="right")
+    for words, cell in _rows(bool(summary["prescribed"])).items():
+        table.add_row(escape(words), *(escape(cell(run)) for run in runs.values()))
+    if all(run["energy"] is not None for run in runs.values()):
+        _add_energy(table, [run["energy"] for run in runs.values()])
+    return table
+
+
+def _rows(is_prescribed: bool) -> dict[str, Callable[[Summary], str]]:
+    """Return the rows of the table: words → how to read the cell from a summary."""
+    rows: dict[str, Callable[[Summary], str]] = {
+        "outcome": lambda run: f"{run['outcome']}, {run['time_at_end_s']:g} s",
+        "peak speed [m/s]": lambda run: _peak(run, "peak_speed_m_s", "time_of_peak_speed_s", 3),
+        "speed at the end [m/s]": lambda run: _plain(run["speed_at_end_m_s"], 3),
+        "heading at the end [degree]": lambda run: _plain(run["heading_at_end_deg"], 2),
+        "depth at the end [m]": lambda run: _plain(run["depth_at_end_m"], 2),
+        "path length [m]": lambda run: _plain(run["path_length_m"], 2),
+        "cable in the water at the end [m]": lambda run: _plain(run["cable_length_at_end_m"] or None, 2),
+        "largest cable force [N]": lambda run: _largest(run, "force", "N"),
+        "largest cable moment [N m]": lambda run: _largest(run, "moment", "N_m"),
+    }
+    if is_prescribed:
+        del rows["peak speed [m/s]"]
+    return rows
+
+
+def _largest(run: Summary, what: str, unit: str) -> str:
+    if not run[f"largest_cable_{what}_{unit}"]:
+        return NOTHING
+    return _peak(run, f"largest_cable_{what}_{unit}", f"time_of_largest_cable_{what}_s", 4)
+
+
+def _peak(run: Summary, value: str, time: str, digits: int) -> str:
+    return f"{_plain(run[value], digits)} at {_plain(run[time], 1)} s"
+
+
+def _plain(value: float | None, digits: int) -> str:
+    return NOTHING if value is None else f"{value + 0.0:.{digits}f}"
+
+
+def _add_energy(table: Table, balances: list[Summary]) -> None:
+    """Add the energy balance at the end, and which share of the work it leaves unexplained."""
+    table.add_section()
+    for key, words in ENERGY_ROWS.items():
+        table.add_row(escape(words), *(_plain(balance[key], 3) for balance in balances))
+    shares = [balance["unexplained_share"] for balance in balances]
+    table.add_row("  unexplained share", *(NOTHING if share is None else f"{share:.1e}" for share in shares))
+
+
+def _fit_table(measured: Summary) -> Table:
+    """Return the table of how well each run explains each measured channel."""
+    labels = [label for label in RUNS if label in next(iter(measured["channels"].values()))]
+    table = Table(
+        title=escape(f"Model − measured, {measured['source']}"), box=box.SIMPLE_HEAD, pad_edge=False
+    )
+    table.title_justify, table.title_style = "left", ""
+    table.add_column("channel")
+    table.add_column("samples", justify="right")
+    for label in labels:
+        for what in ("RMSE", "bias", "fit %"):
+            table.add_column(f"{label}\n{what}", justify="right")
+    for name, row in measured["channels"].items():
+        fits = [row[label] for label in labels]
+        numbers = [_plain(*cell) for one in fits
+                   for cell in ((one["rmse"], 4), (one["bias"], 4), (one["fit_percent"], 1))]  # fmt: skip
+        table.add_row(escape(f"{name} [{row['unit']}]"), str(fits[0]["samples"]), *numbers)
+    return table
