@@ -41,7 +41,8 @@ ROW_NAMES = (*EQUATIONS, "velocity of the tow point", "conditions at the drum")
 UPDATE_TOLERANCE = 1e-9
 """Newton converges quadratically: an update of 1e-9 (relative) leaves an error near rounding."""
 RESIDUAL_FLOOR = 1e-12
-"""Below this scaled residual rounding decides; a rise there is not divergence."""
+"""Below this scaled residual the equations hold to rounding. A slack cable at rest gets there too, although
+its angles are not determined: they stay where they are."""
 SMALLEST_FRACTION = 1.0 / 128.0
 MOST_ITERATIONS = 60
 LARGEST_TURN = 1.0
@@ -81,7 +82,11 @@ class BoxWorkspace(NamedTuple):
 def box_workspace(capacity: int) -> BoxWorkspace:
     """Return zeroed arrays for at most `capacity` nodes."""
     return BoxWorkspace(
-        *(np.zeros((capacity, SIZE)) for _ in range(5)),
+        y=np.zeros((capacity, SIZE)),
+        history=np.zeros((capacity, SIZE)),
+        known=np.zeros((capacity, SIZE)),
+        base=np.zeros((capacity, SIZE)),
+        update=np.zeros((capacity, SIZE)),
         length=np.zeros(capacity),
         count=np.zeros(1, dtype=np.int64),
         factors=np.zeros((capacity, SIZE, RIGHT + 1)),
@@ -117,48 +122,48 @@ def worst_row(window: np.ndarray, first: int, last: int, force: float, speed: fl
 
 
 @compiled
+def clear(window: np.ndarray) -> None:
+    """Set the window to zero (a loop compiles in a tenth of the time of a slice)."""
+    for row in range(WINDOW):
+        for column in range(RIGHT + 1):
+            window[row, column] = 0.0
+
+
+@compiled
+def last_length(w: BoxWorkspace, rule: BoxRule) -> float:
+    """Return the length of the last box: S_h − Vt/a − s of its first node when the end moves. [m]."""
+    last = w.count[0] - 1
+    return rule.end_history - w.y[last, 1] / rule.rate - rule.end_start if rule.moves else w.length[last]
+
+
+@compiled
 def newton_pass(
     w: BoxWorkspace, rule: BoxRule, ends: Ends, c: Equation7Numbers, force: float, speed: float
 ) -> NewtonReport:
     """Evaluate and eliminate all boxes; outcome 0 when ``w.factors`` is ready for back substitution."""
-    count = w.count[0]
-    w.window[:, :] = 0.0
+    last = w.count[0] - 1
+    inner = BoxRule(rule.weight, rule.mix, rule.rate, False, 0.0, 0.0)
+    clear(w.window)
     tow_rows(w.window, w.y[0], ends)
-    worst, row = worst_row(w.window, 0, CARRIED, force, speed)
-    node, row = 0, TOW_ROWS
-    for j in range(1, count):
-        length = w.length[j]
-        if rule.moves and j == count - 1:
-            length = rule.end_history - w.y[j, 1] / rule.rate - rule.end_start
-        last = rule.moves and j == count - 1
-        box = BoxRule(rule.weight, rule.mix, rule.rate, last, rule.end_history, rule.end_start)
-        box_rows(
-            w.window,
-            w.y[j - 1],
-            w.y[j],
-            w.history[j - 1],
-            w.history[j],
-            w.known[j],
-            length,
-            box,
-            c,
-            w.scratch,
-        )
+    worst, _ = worst_row(w.window, 0, CARRIED, force, speed)
+    node, row, regular = 0, TOW_ROWS, True
+    for j in range(1, last + 1):
+        box, length = (rule, last_length(w, rule)) if j == last else (inner, w.length[j])
+        left, right, before, after = w.y[j - 1], w.y[j], w.history[j - 1], w.history[j]
+        box_rows(w.window, left, right, before, after, w.known[j], length, box, c, w.scratch)
         value, place = worst_row(w.window, CARRIED, WINDOW, force, speed)
         if not value <= worst:
             worst, node, row = value, j, place - CARRIED
-        if not eliminate(w.window, WINDOW, w.factors[j - 1], w.orders[j - 1]):
-            return NewtonReport(SINGULAR, 0, worst, j - 1, row)
+        regular = eliminate(w.window, WINDOW, w.factors[j - 1], w.orders[j - 1]) and regular
         carry(w.window)
-    drum_rows(w.window, w.y[count - 1], w.history[count - 1], rule.rate, ends)
-    value = (
-        abs(w.window[3, RIGHT]) / speed + abs(w.window[4, RIGHT]) / speed + abs(w.window[5, RIGHT]) / force
-    )
+    drum_rows(w.window, w.y[last], w.history[last], rule.rate, ends)
+    value = max(worst_row(w.window, 4, 5, force, speed)[0], abs(w.window[5, RIGHT]) / force)
+    value = max(value, abs(w.window[3, RIGHT]) / speed)
     if not value <= worst:
-        worst, node, row = value, count - 1, DRUM_ROWS
-    if not eliminate(w.window, SIZE, w.factors[count - 1], w.orders[count - 1]):
-        return NewtonReport(SINGULAR, 0, worst, count - 1, row)
-    return NewtonReport(CONVERGED if worst < math.inf else NOT_FINITE, 0, worst, node, row)
+        worst, node, row = value, last, DRUM_ROWS
+    regular = eliminate(w.window, SIZE, w.factors[last], w.orders[last]) and regular
+    outcome = CONVERGED if regular else SINGULAR
+    return NewtonReport(outcome if worst < math.inf else NOT_FINITE, 0, worst, node, row)
 
 
 @compiled
@@ -171,6 +176,14 @@ def update_size(w: BoxWorkspace, force: float, speed: float) -> tuple[float, flo
             size = max(size, abs(w.update[j, i]) / speed)
         turn = max(turn, abs(w.update[j, 4]), abs(w.update[j, 5]))
     return max(size, turn), turn
+
+
+@compiled
+def copy_nodes(source: np.ndarray, out: np.ndarray, count: int) -> None:
+    """Copy the states of the first `count` nodes."""
+    for j in range(count):
+        for i in range(SIZE):
+            out[j, i] = source[j, i]
 
 
 @compiled
@@ -190,7 +203,9 @@ def solve_boxes(w: BoxWorkspace, rule: BoxRule, ends: Ends, c: Equation7Numbers)
     report = NewtonReport(STALLED, 0, math.inf, 0, 0)
     for iteration in range(MOST_ITERATIONS):
         now = newton_pass(w, rule, ends, c, force, speed)
-        worse = now.outcome != CONVERGED or (now.residual >= before and now.residual > RESIDUAL_FLOOR)
+        if now.residual <= RESIDUAL_FLOOR:
+            return NewtonReport(CONVERGED, iteration + 1, now.residual, now.node, now.row)
+        worse = now.outcome != CONVERGED or now.residual >= before
         if worse and iteration == 0:
             return NewtonReport(now.outcome, 1, now.residual, now.node, now.row)
         if worse:
@@ -203,7 +218,7 @@ def solve_boxes(w: BoxWorkspace, rule: BoxRule, ends: Ends, c: Equation7Numbers)
         before = now.residual
         back_substitute(w.factors, w.orders, count, w.update)
         size, turn = update_size(w, force, speed)
-        w.base[:count] = w.y[:count]
+        copy_nodes(w.y, w.base, count)
         fraction = 1.0 if turn <= LARGEST_TURN else LARGEST_TURN / turn
         move(w, fraction)
         if size < UPDATE_TOLERANCE:

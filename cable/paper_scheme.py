@@ -9,7 +9,8 @@ At t_k the cable has nodes 0 … k. A step
 
 Segment length and time step are one thing here, and the cost of a run grows with the square of its length.
 When the drum stands or is overrun (ΔS ≤ 0) the same nodes take the step and no node is added. While there is
-no cable in the water at all, the single node follows the tow point, (8)-(11).
+no cable in the water at all, the single node follows the tow point, (8)-(11). Nothing in the printed scheme
+keeps T ≥ 0: after a stop the trapezoidal rule rings about zero for ever (`PaperHistory.smallest_tension`).
 
 ``implicit=True`` takes the same boxes fully implicit in time, which removes the staircase in the tension that
 the trapezoidal rule of (22) leaves; that is our comparison, not the paper's. What the scheme does, with
@@ -33,6 +34,7 @@ from cable.box_newton import (
     BoxWorkspace,
     NewtonReport,
     box_workspace,
+    copy_nodes,
     solve_boxes,
 )
 from cable.equation7 import Equation7Numbers, angles_of, equation7_numbers, tangent
@@ -81,8 +83,7 @@ def add_node(w: BoxWorkspace, length: float, turn: float) -> None:
 @compiled
 def keep_old_time(w: BoxWorkspace, weight: float, c: Equation7Numbers) -> None:
     """Store y(t_k) and the old-time share of every box."""
-    for j in range(w.count[0]):
-        w.history[j] = w.y[j]
+    copy_nodes(w.y, w.history, w.count[0])
     for j in range(1, w.count[0]):
         known_part(w.y[j - 1], w.y[j], w.length[j], weight, c, w.scratch, w.known[j])
 
@@ -118,7 +119,7 @@ def paper_step(
     rule = BoxRule(weight, weight, 1.0 / step, False, 0.0, 0.0)
     report = solve_boxes(w, rule, ends, c)
     if report.outcome != CONVERGED:
-        w.y[: w.count[0]] = w.history[: w.count[0]]
+        copy_nodes(w.history, w.y, before)
         w.count[0] = before
     return report
 
@@ -144,6 +145,7 @@ class PaperHistory:
         states: y = [T Vt Vn Vb α β] of every node, from the vehicle to the drum; (nodes, 6) per time.
         positions: nodes relative to the drum, earth axes; (nodes, 3) per time. [m]
         iterations: Newton iterations of the step that led to this time. (n,)
+        smallest_tension: of all nodes and times; below zero the printed scheme pushes the cable. [N]
         converged: whether the whole duration was run.
         message: "completed", or when, where and why the run stopped, and what to try.
     """
@@ -156,6 +158,7 @@ class PaperHistory:
     states: list[np.ndarray] = field(repr=False)
     positions: list[np.ndarray] = field(repr=False)
     iterations: np.ndarray
+    smallest_tension: float
     converged: bool
     message: str
 
@@ -277,6 +280,7 @@ def _history(
         states=states,
         positions=[positions_of(y, length, compliance) for y in states],
         iterations=iterations,
+        smallest_tension=min(float(y[:, 0].min()) for y in states),
         converged=message == "completed",
         message=message,
     )
