@@ -6,25 +6,25 @@ the nose up, starboard plane above port plane rolls to starboard; depth is posit
 clockwise from north. A vehicle (`Vehicle`, from a file through `from_mapping`) gives `numbers()`, which the
 compiled equations take: `derivative`, `breakdown`, `power`, and so on.
 
-| symbol        | name                                   | unit       | equation | file |
-|---------------|----------------------------------------|------------|-|-|
-| η, q          | position, attitude quaternion          | m, 1       | η' = J ν | kinematics |
-| φ, θ, ψ       | roll, pitch, heading                   | rad        | Euler angles, outside only | kinematics |
-| ν             | u, v, w, p, q, r over ground           | m/s, rad/s | M ν' = Σ terms | dynamics |
-| ν_r           | the same through the water             | m/s, rad/s | ν − (R_nbᵀ v_c, 0) | terms |
-| M_RB, r_G     | mass matrix, centre of gravity         | kg, m      | Fossen 3.47 | rigid_body |
-| M_A, A_ij     | added mass                             | kg, kg m2  | Lamb, strips | added_mass |
-| C(ν)          | Coriolis matrix of a mass matrix       |            | Kirchhoff | coriolis |
-| W, B, r_B     | weight, buoyancy and its centre        | N, m       | (r_G W − r_B B) × k | restoring |
-| Y_uv, N_ur …  | lift of the hull per surge speed       | kg/m …     | Y_uv |u| v + … | body_lift |
-| C_d           | cross-flow drag coefficient            | 1          | −½ρ C_d 2R |V| V dx | cross_flow |
-| C_D           | axial drag coefficient                 | 1          | −½ρ(π/4)D² C_D u|u| | axial_drag |
-| K_p, Y_vv …   | further damping                        | kg m2/s …  | D ν, D ν|ν| | damping |
-| n, T, Q       | shaft speed, thrust, torque            | rev/s, N   | ρD⁴ K_T(J) n², ρD⁵ K_Q(J) n² | propeller |
-| w, t          | wake fraction, thrust deduction        | 1          | u_a = (1 − w) u, (1 − t) T | propeller |
-| C_L, C_D, α_s | lift, drag and stall of a fin          | 1, rad     | attached, stalled, blended | fins |
-| δ_r, δ_s      | rudder, stern-plane angle              | rad        | lag, limits, backlash | actuators |
-| V, I, q_e     | voltage, current, charge drawn         | V, A, C    | V_full − k q_e − R I | motor |
+symbol         name                                  unit        equation                      file
+-------------  ------------------------------------  ----------  ----------------------------  ------------
+η, q           position, attitude quaternion         m, 1        η' = J ν                      kinematics
+φ, θ, ψ        roll, pitch, heading                  rad         Euler angles, outside only    kinematics
+ν              u, v, w, p, q, r over ground          m/s, rad/s  M ν' = Σ terms                dynamics
+ν_r            the same through the water            m/s, rad/s  ν − (R_nbᵀ v_c, 0)            terms
+M_RB, r_G      mass matrix, centre of gravity        kg, m       Fossen 3.47                   rigid_body
+M_A, A_ij      added mass                            kg, kg m2   Lamb, strips                  added_mass
+C(ν)           Coriolis matrix of a mass matrix                  Kirchhoff                     coriolis
+W, B, r_B      weight, buoyancy and its centre       N, m        (r_G W − r_B B) × k           restoring
+Y_uv, N_ur …   lift of the hull per surge speed      kg/m …      Y_uv |u| v + …                body_lift
+C_d            cross-flow drag coefficient           1           −½ρ C_d 2R |V| V dx           cross_flow
+C_D            axial drag coefficient                1           −½ρ(π/4)D² C_D u|u|           axial_drag
+K_p, Y_vv …    further damping                       kg m2/s …   D ν, D ν|ν|                   damping
+n, T, Q        shaft speed, thrust, torque           rev/s, N    ρD⁴ K_T(J) n², ρD⁵ K_Q(J) n²  propeller
+w, t           wake fraction, thrust deduction       1           u_a = (1 − w) u, (1 − t) T    propeller
+C_L, C_D, α_s  lift, drag and stall of a fin         1, rad      attached, stalled, blended    fins
+δ_r, δ_s       rudder, stern-plane angle             rad         lag, limits, backlash         actuators
+V, I, q_e      voltage, current, charge drawn        V, A, C     V_full − k q_e − R I          motor
 """
 
 from vehicle.actuators import Servo
@@ -37,6 +37,7 @@ from vehicle.dynamics import (
     relative_velocity,
 )
 from vehicle.energy import POWERS, kinetic_energy, potential_energy, power
+from vehicle.free_run import FreeRun, free_run
 from vehicle.kinematics import euler_angles, normalise, quaternion_from_euler, rotation
 from vehicle.parameters import Problem, VehicleError
 from vehicle.state import STATE, STATE_SIZE, initial_state
@@ -51,6 +52,7 @@ __all__ = [
     "STATE",
     "STATE_SIZE",
     "TERMS",
+    "FreeRun",
     "Problem",
     "Servo",
     "Vehicle",
@@ -63,6 +65,7 @@ __all__ = [
     "derivative",
     "euler_angles",
     "finish_step",
+    "free_run",
     "from_mapping",
     "initial_state",
     "kinetic_energy",

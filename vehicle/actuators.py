@@ -9,9 +9,9 @@ rate limit (the fin then *is* at its target and the state merely follows), rate 
 backlash 0. With a finite rate limit a servo still has to stop somewhere: lags shorter than `QUICKEST` count
 as `QUICKEST`.
 
-Backlash is a play between servo and fin: the linkage stays where it is until the servo has taken up the slack.
-Inside a step the fin is the linkage clipped into the play around the servo; `settle` moves the linkage at the end
-of each step. For a servo that turns one way during a step this is the exact play operator.
+Backlash is a play between servo and fin: the linkage stays where it is until the servo has taken up the
+slack. Inside a step the fin is the linkage clipped into the play around the servo; `settle` moves the linkage
+at the end of each step. For a servo that turns one way during a step this is the exact play operator.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ def servo_rate(angle: float, command: float, servo: ServoNumbers) -> float:
 
 @compiled
 def servo_angle(angle: float, command: float, servo: ServoNumbers) -> float:
-    """Return where the servo is [rad]: at its state, or at its target if it has neither lag nor rate limit."""
+    """Return where the servo is [rad]: at its state, or at its target without any lag or rate limit."""
     if servo.lag == 0.0 and math.isinf(servo.rate_limit):
         return servo_target(command, servo)
     return angle

@@ -6,9 +6,10 @@ with
 
     N = −(A22 − A11) u v,   M = (A33 − A11) u w,   K = −(A33 − A22) v w      (Munk 1924)
 
-which turns a slender hull across the stream. Real boundary layers weaken it: viscous lift (`body_lift`) carries
-that. `munk_factor` scales the moment as it stands, for a diagnosis; at 1 the correction is exactly zero. A factor
-other than 1 is an empirical moment, no longer free of work, and is booked with the hull's losses.
+which turns a slender hull across the stream. Real boundary layers weaken it: viscous lift (`body_lift`)
+carries that. `munk_factor` scales the moment as it stands, for a diagnosis; at 1 the correction is exactly
+zero. A factor other than 1 is an empirical moment, no longer free of work, and is booked with the hull's
+losses.
 """
 
 from __future__ import annotations

@@ -3,10 +3,10 @@
     Y = Y_uv |u| v + Y_ur u r        N = N_uv u v + N_ur |u| r
     Z = Z_uw |u| w + Z_uq u q        M = M_uw u w + M_uq |u| q          (Prestero 2001, sections 4.3 to 4.5)
 
-Only the hull: the fins bring their own lift (`fins`), the Munk moment comes with the added mass. Flow separates
-on the lee side of the after body, so the force acts behind the centre; N_uv > 0 turns the nose into the flow.
-For the hull moving astern the force keeps its sign, |u|, and acts at the other end. The force stands across the
-hull, so it always brakes; a set is dissipative if 4 Y_uv N_ur ≥ (Y_ur + N_uv)².
+Only the hull: the fins bring their own lift (`fins`), the Munk moment comes with the added mass. Flow
+separates on the lee side of the after body, so the force acts behind the centre; N_uv > 0 turns the nose into
+the flow. For the hull moving astern the force keeps its sign, |u|, and acts at the other end. The force
+stands across the hull, so it always brakes; a set is dissipative if 4 Y_uv N_ur ≥ (Y_ur + N_uv)².
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ class BodyLift:
 
 @compiled
 def body_lift(nu_r: np.ndarray, lift: np.ndarray, out: np.ndarray) -> None:
-    """Fill out (6,) with the lift and its moment [N, N m]; nu_r relative to the water, `lift` from numbers()."""
+    """Fill out (6,) with the lift and its moment [N, N m]; nu_r through the water, `lift` from numbers()."""
     u, v, w, q, r = nu_r[0], nu_r[1], nu_r[2], nu_r[4], nu_r[5]
     speed = abs(u)
     out[0] = out[3] = 0.0

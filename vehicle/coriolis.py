@@ -4,8 +4,9 @@ With the momenta  P = M₁₁ v + M₁₂ ω  and  L = M₂₁ v + M₂₂ ω,
 
     C(ν) ν = [ ω × P ;  v × P + ω × L ]                                (Fossen 2021, theorem 3.2)
 
-which is skew in ν for every M, so νᵀ C(ν) ν = 0: these forces move energy about and never make any. Used with the
-rigid-body matrix it gives centripetal forces, with the added mass it gives the Munk moment and its companions.
+which is skew in ν for every M, so νᵀ C(ν) ν = 0: these forces move energy about and never make any. Used with
+the rigid-body matrix it gives centripetal forces, with the added mass it gives the Munk moment and its
+companions.
 """
 
 from __future__ import annotations

@@ -2,8 +2,9 @@
 
     dF = −½ ρ C_d 2R(x) |V⊥| V⊥ dx,   V⊥ = (v + x r, w − x q)           (Hoerner 1965; Fossen 2021, eq. 6.90)
 
-Each slice is a cylinder in its own local cross flow: sway and heave share one flow, so a drag to the side feels
-the flow from below. Acts along V⊥ at the slice, so it can only brake. Midpoint rule over `STRIPS` slices.
+Each slice is a cylinder in its own local cross flow: sway and heave share one flow, so a drag to the side
+feels the flow from below. Acts along V⊥ at the slice, so it can only brake. Each of
+`STRIPS` slices acts at its centroid.
 """
 
 from __future__ import annotations
@@ -18,7 +19,10 @@ from vehicle.geometry import Hull, hull_radius
 from vehicle.parameters import parameter
 
 STRIPS = 20
-"""Slices over the length; force and moment differ by less than 0.5 % from those of 2 000 (tests/hull)."""
+"""Slices over the length; force and moment differ by less than 0.7 % from those of 2 000 (tests/hull)."""
+
+PARTS = 50
+"""Parts of a slice for its area and centroid: one radius a slice misses the blunt nose by 2 %."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,10 +32,13 @@ class CrossFlowDrag:
     drag_coefficient: float = parameter("cross-flow drag coefficient of a slice, C_d", "1", low=0.0)
 
     def numbers(self, hull: Hull, density: float, strips: int = STRIPS) -> np.ndarray:
-        """Return (strips, 2): station x from the hull centre [m], and ½ρ C_d 2R dx [kg/m]."""
-        step = hull.length / strips
-        x = hull.nose_station - step * (np.arange(strips) + 0.5)
-        return np.column_stack([x, density * self.drag_coefficient * hull_radius(hull, x) * step])
+        """Return (strips, 2): centroid x from the hull centre [m], and ½ρ C_d ∫2R dx [kg/m]."""
+        step = hull.length / (strips * PARTS)
+        x = hull.nose_station - step * (np.arange(strips * PARTS) + 0.5)
+        part = hull_radius(hull, x) * step
+        area = part.reshape(strips, PARTS).sum(axis=1)
+        centroid = (part * x).reshape(strips, PARTS).sum(axis=1) / area
+        return np.column_stack([centroid, density * self.drag_coefficient * area])
 
 
 @compiled

@@ -2,9 +2,9 @@
 
     η' = J(η) ν,    M ν' = Σ terms,    servos, motor and battery as in `actuators` and `motor`
 
-The state is that of `vehicle.state`; the command is (propeller [rev/s], rudder, port plane, starboard plane [rad]);
-`current_n` (3,) is the velocity of the water in earth axes, steady and uniform around the vehicle; `wrench_b` (6,)
-is what pulls from outside, about the hull centre in body axes.
+The state is that of `vehicle.state`; the command is (propeller [rev/s], rudder, port plane, starboard plane
+[rad]); `current_n` (3,) is the velocity of the water in earth axes, steady and uniform around the vehicle;
+`wrench_b` (6,) is what pulls from outside, about the hull centre in body axes.
 """
 
 from __future__ import annotations
@@ -103,7 +103,7 @@ def derivative(state, command, current_n, wrench_b, numbers, out):
 
 @compiled
 def breakdown(state, command, current_n, wrench_b, numbers, out):
-    """Fill out (len(BREAKDOWN), 6) with every named term; their sum is M ν' [N, N m]. Arguments: `derivative`."""
+    """Fill out (len(BREAKDOWN), 6) with every named term [N, N m], M ν' in sum. Arguments: `derivative`."""
     evaluate(state, command, current_n, wrench_b, numbers, np.empty((3, 3)), np.empty(6), out)
 
 

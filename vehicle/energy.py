@@ -2,10 +2,10 @@
 
     d/dt (½ ν_rᵀ M ν_r + V) = P_propeller + P_loss + P_external        (P_restoring = −dV/dt)
 
-reckoned in the frame that moves with the steady, uniform current: there all terms are those of still water and
-"turning_current" is absent. P is the wrench of a term times ν_r. The kinetic energy holds that of the added mass.
-V is the potential of weight and buoyancy; in a vertical current its depth is that relative to the water, so use
-P_restoring, not V, there.
+reckoned in the frame that moves with the steady, uniform current: there all terms are those of still water
+and "turning_current" is absent. P is the wrench of a term times ν_r. The kinetic energy holds that of the
+added mass. V is the potential of weight and buoyancy; in a vertical current its depth is that relative to the
+water, so use P_restoring, not V, there.
 """
 
 from __future__ import annotations
@@ -27,7 +27,11 @@ def power(state, command, current_n, wrench_b, numbers, out):
     """Fill out (len(POWERS),) with the powers on the hull relative to the water [W].
 
     Args:
-        state, command, current_n, wrench_b, numbers: as for `derivative`.
+        state: as for `derivative`.
+        command: as for `derivative`.
+        current_n: as for `derivative`.
+        wrench_b: as for `derivative`.
+        numbers: as for `derivative`.
         out: the powers; losses are negative, whatever the motion.
     """
     R, nu_r, terms = np.empty((3, 3)), np.empty(6), np.empty((TERM_COUNT, 6))

@@ -12,8 +12,8 @@ however it is turned. Lift slopes are those on the hull (Whicker and Fehlner; hu
 radian). The flow is that of the undisturbed water: no wake of the hull, no propeller race, no interference
 between fins.
 
-Signs: a positive rudder pushes the stern to port, so the heading increases; a positive stern-plane pushes the stern
-down, so the nose goes up. Starboard plane more positive than port plane: roll to starboard.
+Signs: a positive rudder pushes the stern to port, so the heading increases; a positive stern-plane pushes the
+stern down, so the nose goes up. Starboard plane more positive than port plane: roll to starboard.
 """
 
 from __future__ import annotations
@@ -79,7 +79,8 @@ def section_force(ux: float, un: float, angle: float, fin: FinNumbers) -> tuple[
     """Return the force along the body x axis and along the fin's normal axis [N].
 
     Args:
-        ux, un: velocity of the fin through the water along those two axes. [m/s]
+        ux: velocity of the fin through the water along the body x axis. [m/s]
+        un: velocity of the fin through the water along the normal axis. [m/s]
         angle: how far the leading edge is turned towards the positive normal axis. [rad]
         fin: the fin's numbers.
     """
@@ -131,8 +132,9 @@ def rudder(nu_r: np.ndarray, angle: float, fin: FinNumbers, out: np.ndarray) -> 
 def stern_plane(nu_r: np.ndarray, angle: float, side: float, fin: FinNumbers, out: np.ndarray) -> None:
     """Fill out (6,) with the wrench of one stern-plane [N, N m].
 
-    A positive angle raises the trailing edge: the plane is pushed down, the nose goes up. On the starboard side
-    that also pushes the starboard side down (positive roll), on the port side the port side (negative roll).
+    A positive angle raises the trailing edge: the plane is pushed down, the nose goes up. On the starboard
+    side that also pushes the starboard side down (positive roll), on the port side the port side (negative
+    roll).
 
     Args:
         nu_r: velocity relative to the water (u, v, w, p, q, r). [m/s, rad/s]

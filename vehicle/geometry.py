@@ -4,9 +4,9 @@
     tail   R = D/2 − (3D/(2c²) − tan θ/c) s² + (D/c³ − tan θ/c²) s³,   s from its start, c its length
                                                                         (Myring 1976)
 
-The derived numbers in a vehicle's file that call themselves a geometry formula are made by these functions (a test
-compares them). They are plain numpy, run when a vehicle is designed and never inside a simulation, except for the
-radius of the cross-flow strips.
+The derived numbers in a vehicle's file that call themselves a geometry formula are made by these functions (a
+test compares them). They are plain numpy, run when a vehicle is designed and never inside a simulation,
+except for the radius of the cross-flow strips.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ class Hull:
 
 
 class LambFactors(NamedTuple):
-    """Added mass along and across a prolate spheroid, and added inertia, over those of the displaced water."""
+    """Added mass along and across a spheroid, and its added inertia, over those of the displaced water."""
 
     k1: float
     k2: float
@@ -99,7 +99,7 @@ def planform_area(hull: Hull) -> float:
 
 
 def lamb_factors(slenderness: float) -> LambFactors:
-    """Return Lamb's factors of a prolate spheroid of length over diameter above 1 (Lamb 1932, section 114)."""
+    """Return Lamb's factors of a prolate spheroid, length over diameter above 1 (Lamb 1932, section 114)."""
     e2 = 1.0 - 1.0 / slenderness**2
     e = math.sqrt(e2)
     log = math.log((1.0 + e) / (1.0 - e))
@@ -110,7 +110,7 @@ def lamb_factors(slenderness: float) -> LambFactors:
 
 
 def lateral_added_mass(hull: Hull, density: float) -> tuple[float, float, float]:
-    """Return A22 [kg], A26 [kg m], A66 [kg m2] of the bare hull: ∫ρπR² dx, ∫x ρπR² dx, ∫x² ρπR² dx, with Lamb."""
+    """Return A22 [kg], A26 [kg m], A66 [kg m2] of the bare hull: ∫(1, x, x²) ρπR² dx by Lamb's factors."""
     x, step = stations(hull)
     strip = density * math.pi * hull_radius(hull, x) ** 2 * step
     factors = lamb_factors(hull.length / hull.diameter)

@@ -3,9 +3,9 @@
     p_n' = R_nb v_b,    q' = ½ q ⊗ (0, ω_b)                            (Fossen 2021, section 2.2)
 
 The quaternion (w, x, y, z) takes body components to earth components and has no singular attitude. `rotation`
-divides by |q|², so the small drift of the norm inside a Runge-Kutta step never stretches a vector; `normalise`
-removes the drift after a step. Heading is counted from north, clockwise seen from above; pitch is positive nose
-up; roll is positive starboard side down.
+divides by |q|², so the small drift of the norm inside a Runge-Kutta step never stretches a vector;
+`normalise` removes the drift after a step. Heading is counted from north, clockwise seen from above; pitch is
+positive nose up; roll is positive starboard side down.
 """
 
 from __future__ import annotations

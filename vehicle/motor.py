@@ -4,9 +4,10 @@
     V  = V_full − k q_e − R I,        q_e' = I
     n' = (target − n)/lag,  target = clip(command · [1 − s (1 − V/V_full)], ± c V)
 
-The speed loop of the motor holds the commanded speed (s = 0) until the sagging voltage no longer allows it: the
-ceiling is c revolutions a second per volt. An open-loop drive (s = 1) slows down with the voltage at once. The
-inertia of the shaft is inside the lag. Neutral values: k = R = s = 0, c infinite, lag 0 (see `actuators`).
+The speed loop of the motor holds the commanded speed (s = 0) until the sagging voltage no longer allows it:
+the ceiling is c revolutions a second per volt. An open-loop drive (s = 1) slows down with the voltage at
+once. The inertia of the shaft is inside the lag. Neutral values: k = R = s = 0, c infinite, lag 0 (see
+`actuators`).
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """What a parameter of the vehicle is, and how a set of them is checked.
 
-Every number of a vehicle is a field of a frozen dataclass, made by `parameter`: it carries its meaning, its unit
-and its hard limits (outside of which the equations make no sense; plausible ranges and provenance live with the
-values, in the vehicle's file). `read_section` turns a plain mapping into such a dataclass and collects what is
-wrong instead of stopping at the first mistake.
+Every number of a vehicle is a field of a frozen dataclass, made by `parameter`: it carries its meaning, its
+unit and its hard limits (outside of which the equations make no sense; plausible ranges and provenance live
+with the values, in the vehicle's file). `read_section` turns a plain mapping into such a dataclass and
+collects what is wrong instead of stopping at the first mistake.
 """
 
 from __future__ import annotations

@@ -3,12 +3,12 @@
     T = ρ D² [ k_T0 n|n| D² − k_T1 |n| D u_a − k_T2 u_a|u_a| ],   u_a = (1 − w) u
     Q = ρ D³ [ k_Q0 n|n| D² − k_Q1 |n| D u_a − k_Q2 u_a|u_a| ]
 
-Ahead (n, u_a > 0) this is K_T = k_T0 − k_T1 J − k_T2 J² with J = u_a/(n D), the usual open-water curve; past the
-J of zero thrust the propeller windmills and brakes; stopped, it drags with k_T2; turned astern it pushes back.
-Written in n and u_a it is continuous everywhere, J = ±∞ included, and odd: T(−n, −u) = −T(n, u). Real propellers
-are weaker astern than ahead and stall between the quadrants; that asymmetry is left out, as is all swirl on the
-fins. Thrust on the hull is (1 − t) T; the motor's reaction rolls the hull by −Q (a right-handed propeller, seen
-turning clockwise from astern, rolls it to port).
+Ahead (n, u_a > 0) this is K_T = k_T0 − k_T1 J − k_T2 J² with J = u_a/(n D), the usual open-water curve; past
+the J of zero thrust the propeller windmills and brakes; stopped, it drags with k_T2; turned astern it pushes
+back. Written in n and u_a it is continuous everywhere, J = ±∞ included, and odd: T(−n, −u) = −T(n, u). Real
+propellers are weaker astern than ahead and stall between the quadrants; that asymmetry is left out, as is all
+swirl on the fins. Thrust on the hull is (1 − t) T; the motor's reaction rolls the hull by −Q (a right-handed
+propeller, seen turning clockwise from astern, rolls it to port).
 """
 
 from __future__ import annotations

@@ -3,8 +3,8 @@
     M_RB = [ m I          −m S(r_G)
              m S(r_G)   I_G − m S(r_G)² ]                              (Fossen 2021, eq. 3.47)
 
-about the hull centre; inertias are given about the centre of gravity, so that every positive set is a possible
-body. Products of inertia are left out: a torpedo with its battery amidships has none worth naming.
+about the hull centre; inertias are given about the centre of gravity, so that every positive set is a
+possible body. Products of inertia are left out: a torpedo with its battery amidships has none worth naming.
 """
 
 from __future__ import annotations

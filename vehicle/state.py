@@ -57,8 +57,12 @@ def initial_state(
     """Return a state with central fins and a full battery.
 
     Args:
-        north, east, depth: position of the hull centre. [m]
-        roll, pitch, heading: Euler angles; nose up and starboard turns are positive. [rad]
+        north: position of the hull centre. [m]
+        east: position of the hull centre. [m]
+        depth: position of the hull centre, positive down. [m]
+        roll: starboard side down is positive. [rad]
+        pitch: nose up is positive. [rad]
+        heading: from north, clockwise seen from above. [rad]
         velocity: u, v, w, p, q, r over ground in body axes. [m/s, rad/s]
         propeller_speed: n. [rev/s]
     """

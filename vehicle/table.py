@@ -15,7 +15,7 @@ NO_COMMAND, NO_CURRENT, NO_WRENCH = (0.0,) * 4, (0.0,) * 3, (0.0,) * 6
 
 def breakdown_table(
     vehicle: Vehicle,
-    state: np.ndarray,
+    state: Sequence[float] | np.ndarray,
     command: Sequence[float] = NO_COMMAND,
     *,
     current_n: Sequence[float] = NO_CURRENT,
@@ -31,6 +31,6 @@ def breakdown_table(
         wrench_b: external force and moment about the hull centre. [N, N m]
     """
     out = np.empty((len(BREAKDOWN), 6))
-    inputs = (np.asarray(values, dtype=float) for values in (state, command, current_n, wrench_b))
-    breakdown(*inputs, vehicle.numbers(), out)
+    inputs = [np.asarray(values, dtype=float) for values in (state, command, current_n, wrench_b)]
+    breakdown(inputs[0], inputs[1], inputs[2], inputs[3], vehicle.numbers(), out)
     return dict(zip(BREAKDOWN, out, strict=True))

@@ -8,8 +8,8 @@ at ν_r). Over ground ν' = ν_r' + d/dt(R_nbᵀ v_c, 0) = ν_r' − (ω × R_nb
 "turning_current" = −M (ω × R_nbᵀ v_c, 0), for a hull that turns in a current. This is exact, with G anywhere
 and M_RB full: no Coriolis matrix has to be chosen for the trick.
 
-To add a force: a small file with a compiled function that fills six components, one line in TERMS, one line at the
-same place in `fill_terms`.
+To add a force: a small file with a compiled function that fills six components, one line in TERMS, one line
+at the same place in `fill_terms`.
 """
 
 from __future__ import annotations
@@ -79,7 +79,8 @@ def fill_terms(nu, nu_r, R, n, angles, wrench_b, numbers, out):
     """Fill out (terms, 6) with every term of TERMS, in that order [N, N m].
 
     Args:
-        nu, nu_r: velocity over ground and relative to the water, body axes. [m/s, rad/s]
+        nu: velocity over ground, body axes. [m/s, rad/s]
+        nu_r: velocity relative to the water, body axes. [m/s, rad/s]
         R: R_nb.
         n: shaft speed. [rev/s]
         angles: rudder, port plane, starboard plane in the water. [rad]

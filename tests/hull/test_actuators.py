@@ -1,0 +1,119 @@
+"""Servos, motor and battery: each stage does what it says, and its neutral value switches it off exactly."""
+
+import math
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import vehicle
+from vehicle.actuators import Servo, servo_target
+
+DEGREE = math.pi / 180
+
+
+@pytest.fixture
+def angles(subzero2):
+    """Rudder in the water every 0.01 s under a series of commands, for a rudder servo with some values
+    changed.
+    """
+
+    def call(commands, **changes):
+        hull = subzero2
+        for name, value in changes.items():
+            hull = hull.with_parameter(f"rudder_servo.{name}", value)
+        commands = np.asarray(commands, dtype=float)
+        table = np.zeros((len(commands), 4))
+        table[:, 1] = commands
+        states = vehicle.free_run(hull, vehicle.initial_state(), table, 0.01 * len(commands), 0.01).states
+        numbers = hull.numbers()
+        rows = [
+            vehicle.deflections(state.copy(), command, numbers)[0]
+            for state, command in zip(states[1:], table, strict=True)
+        ]
+        return np.array(rows)
+
+    return call
+
+
+def test_a_lag_approaches_its_target_exponentially(angles):
+    found = angles(np.full(60, 0.1), lag=0.15, rate_limit=math.inf)
+    time = 0.01 * np.arange(1, 61)
+    assert_allclose(found, 0.1 * (1 - np.exp(-time / 0.15)), rtol=0, atol=1e-8)  # Runge-Kutta at h/lag = 1/15
+
+
+def test_a_rate_limit_makes_a_ramp(angles):
+    found = angles(np.full(10, 0.3), lag=0.01, rate_limit=1.0)
+    assert_allclose(found, 0.01 * np.arange(1, 11), rtol=0, atol=1e-12)
+
+
+def test_a_deflection_limit_stops_the_fin_either_way(angles):
+    for sign in (1, -1):
+        assert angles(np.full(300, sign * 2.0))[-1] == pytest.approx(sign * 0.3491, abs=1e-8)
+
+
+def test_a_dead_band_swallows_small_commands_and_shortens_large_ones(angles):
+    assert np.array_equal(angles(np.full(50, 0.9 * DEGREE), dead_band=DEGREE), np.zeros(50))
+    assert angles(np.full(300, 5 * DEGREE), dead_band=DEGREE)[-1] == pytest.approx(4 * DEGREE, abs=1e-8)
+    assert angles(np.full(300, -5 * DEGREE), dead_band=DEGREE)[-1] == pytest.approx(-4 * DEGREE, abs=1e-8)
+
+
+def test_an_offset_shifts_the_fin_at_zero_command(angles):
+    assert angles(np.zeros(300), offset=0.01)[-1] == pytest.approx(0.01, abs=1e-9)
+
+
+def test_backlash_leaves_the_fin_standing_until_the_slack_is_taken_up(angles):
+    there = angles(np.full(300, 0.1), half_backlash=0.02)
+    assert there[-1] == pytest.approx(0.08, abs=1e-8)
+    back = angles(np.concatenate([np.full(300, 0.1), np.full(300, 0.07)]), half_backlash=0.02)
+    assert back[-1] == pytest.approx(back[299], abs=1e-8)  # a reversal inside the play moves nothing
+    far = angles(np.concatenate([np.full(300, 0.1), np.full(300, 0.0)]), half_backlash=0.02)
+    assert far[-1] == pytest.approx(0.02, abs=1e-8)
+
+
+def test_neutral_values_switch_every_stage_off_exactly(angles):
+    commands = 0.3 * np.sin(np.arange(100))
+    neutral = {"dead_band": 0.0, "offset": 0.0, "lag": 0.0, "rate_limit": math.inf,
+               "deflection_limit": math.inf, "half_backlash": 0.0}  # fmt: skip
+    assert np.array_equal(angles(commands, **neutral), commands)
+    assert servo_target(0.123, Servo(**neutral).numbers()) == 0.123
+
+
+def test_the_shaft_follows_with_its_lag_and_stops_at_the_ceiling_of_the_battery(subzero2):
+    run = vehicle.free_run(subzero2, vehicle.initial_state(), (24, 0, 0, 0), 1.5, 0.01)
+    assert_allclose(run.states[:, 13], 24 * (1 - np.exp(-run.time / 0.3)), rtol=0, atol=1e-6)
+    numbers = subzero2.numbers()
+    for sign in (1, -1):
+        command = np.array([sign * 500.0, 0, 0, 0])
+        last = vehicle.free_run(subzero2, vehicle.initial_state(), command, 10.0).states[-1].copy()
+        volts = vehicle.battery_voltage(last, command, np.zeros(3), numbers)
+        assert volts < subzero2.battery.full_voltage
+        # Astern the hull tumbles slowly, so load and ceiling still move; the shaft follows within its lag.
+        assert last[13] == pytest.approx(sign * subzero2.motor.speed_per_volt * volts, rel=3e-3)
+
+
+def test_the_battery_sags_with_use_and_an_open_loop_motor_slows_down(subzero2):
+    weak = subzero2.with_parameter("battery.voltage_drop_per_charge", 1e-2)
+    run = vehicle.free_run(weak, vehicle.initial_state(), (24, 0, 0, 0), 60.0)
+    numbers, command = weak.numbers(), np.array([24.0, 0, 0, 0])
+    volts = [
+        vehicle.battery_voltage(state.copy(), command, np.zeros(3), numbers) for state in run.states[::500]
+    ]
+    assert np.all(np.diff(volts[1:]) < 0.0)
+    assert run.states[-1, 13] == pytest.approx(24.0)  # the speed loop holds the command
+    loose = weak.with_parameter("motor.voltage_sensitivity", 1.0)
+    slower = vehicle.free_run(loose, vehicle.initial_state(), (24, 0, 0, 0), 60.0).states[-1]
+    assert slower[13] < 23.9
+
+
+def test_a_motor_and_battery_with_neutral_values_obey_at_once(subzero2):
+    ideal = subzero2
+    keys = ("motor.lag", "battery.voltage_drop_per_charge", "battery.internal_resistance")
+    for key, value in (*((key, 0.0) for key in keys), ("motor.speed_per_volt", math.inf)):
+        ideal = ideal.with_parameter(key, value)
+    command = (80.0, 0.0, 0.0, 0.0)
+    at_once = vehicle.breakdown_table(ideal, vehicle.initial_state(), command)["propeller"]
+    turning = vehicle.breakdown_table(ideal, vehicle.initial_state(propeller_speed=80.0), command)[
+        "propeller"
+    ]
+    assert np.array_equal(at_once, turning)

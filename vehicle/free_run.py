@@ -1,0 +1,95 @@
+"""A run of the hull alone, in still or flowing water: no cable, no files, one compiled loop.
+
+Classic Runge-Kutta of fourth order with a fixed step; commands are held during a step. The work of each kind
+of force (`energy.POWERS`) is integrated with the same stages, so the energy balance closes to the order of
+the scheme. The coupled simulation has its own loop, because there the pull of the cable changes inside a
+step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from subzero.compiled import compiled
+from vehicle.dynamics import derivative, finish_step
+from vehicle.energy import POWERS, power
+from vehicle.state import STATE_SIZE
+from vehicle.vehicle import Vehicle, VehicleNumbers
+
+SIZE = STATE_SIZE + len(POWERS)
+
+
+class FreeRun(NamedTuple):
+    """History of a free run: time (n,) [s], states (n, STATE_SIZE), work (n, len(POWERS)) since the start
+    [J].
+    """
+
+    time: np.ndarray
+    states: np.ndarray
+    work: np.ndarray
+
+
+@compiled
+def rates(y, command, current_n, wrench_b, numbers, out):
+    """Fill out (SIZE,) with the rates of the state and of the works."""
+    state = y[:STATE_SIZE]
+    derivative(state, command, current_n, wrench_b, numbers, out[:STATE_SIZE])
+    power(state, command, current_n, wrench_b, numbers, out[STATE_SIZE:])
+
+
+@compiled
+def rk4_step(y, step, command, current_n, wrench_b, numbers, k, stage, out):
+    """Fill out (SIZE,) with y one step later [s]; k (4, SIZE) and stage (SIZE,) are scratch."""
+    rates(y, command, current_n, wrench_b, numbers, k[0])
+    for i in range(1, 4):
+        part = step if i == 3 else 0.5 * step
+        for j in range(SIZE):
+            stage[j] = y[j] + part * k[i - 1, j]
+        rates(stage, command, current_n, wrench_b, numbers, k[i])
+    for j in range(SIZE):
+        out[j] = y[j] + step / 6.0 * (k[0, j] + 2.0 * k[1, j] + 2.0 * k[2, j] + k[3, j])
+    finish_step(out[:STATE_SIZE], command, numbers)
+
+
+@compiled
+def march(commands, step, current_n, wrench_b, numbers, history):
+    """Fill history (n + 1, SIZE) from its first row on, one command of commands (n, 4) a step."""
+    k, stage = np.empty((4, SIZE)), np.empty(SIZE)
+    for i in range(commands.shape[0]):
+        rk4_step(history[i], step, commands[i], current_n, wrench_b, numbers, k, stage, history[i + 1])
+
+
+def free_run(
+    vehicle: Vehicle | VehicleNumbers,
+    state: np.ndarray,
+    commands: np.ndarray | Sequence[float],
+    duration: float,
+    step: float = 0.02,
+    *,
+    current_n: Sequence[float] = (0.0, 0.0, 0.0),
+    wrench_b: Sequence[float] = (0.0,) * 6,
+) -> FreeRun:
+    """Run the hull alone and return its history.
+
+    Args:
+        vehicle: the vehicle, or its numbers.
+        state: where it starts, for example from `initial_state`.
+        commands: one command (4,) for the whole run, or one a step (n, 4): propeller [rev/s], rudder, port
+            plane, starboard plane [rad].
+        duration: how long. [s]
+        step: of the Runge-Kutta scheme. [s]
+        current_n: velocity of the water, earth axes. [m/s]
+        wrench_b: a constant external force and moment, body axes. [N, N m]
+    """
+    numbers = vehicle.numbers() if isinstance(vehicle, Vehicle) else vehicle
+    steps = round(duration / step)
+    held = np.array(np.broadcast_to(np.asarray(commands, dtype=float), (steps, 4)))
+    history = np.zeros((steps + 1, SIZE))
+    history[0, :STATE_SIZE] = state
+    current, wrench = np.array(current_n, dtype=float), np.array(wrench_b, dtype=float)
+    march(held, float(step), current, wrench, numbers, history)
+    time = step * np.arange(steps + 1)
+    return FreeRun(time, history[:, :STATE_SIZE], history[:, STATE_SIZE:])
