@@ -91,20 +91,23 @@ def _add_energy(table: Table, balances: list[Summary]) -> None:
 
 
 def _fit_table(measured: Summary) -> Table:
-    """Return the table of how well each run explains each measured channel."""
-    labels = [label for label in RUNS if label in next(iter(measured["channels"].values()))]
+    """Return the table of how well each run explains each measured channel, one run a line."""
     table = Table(
         title=escape(f"Model − measured, {measured['source']}"), box=box.SIMPLE_HEAD, pad_edge=False
     )
     table.title_justify, table.title_style = "left", ""
-    table.add_column("channel")
-    table.add_column("samples", justify="right")
-    for label in labels:
-        for what in ("RMSE", "bias", "fit %"):
-            table.add_column(f"{label}\n{what}", justify="right")
+    table.add_column("channel", overflow="fold")
+    table.add_column("run", no_wrap=True)
+    for what in ("samples", "RMSE", "bias", "fit %"):
+        table.add_column(what, justify="right", no_wrap=True)
     for name, row in measured["channels"].items():
-        fits = [row[label] for label in labels]
-        numbers = [_plain(*cell) for one in fits
-                   for cell in ((one["rmse"], 4), (one["bias"], 4), (one["fit_percent"], 1))]  # fmt: skip
-        table.add_row(escape(f"{name} [{row['unit']}]"), str(fits[0]["samples"]), *numbers)
+        words = f"{name} [{row['unit']}]"
+        for label in (label for label in RUNS if label in row):
+            table.add_row(escape(words), label, *_fit_cells(row[label]))
+            words = ""
     return table
+
+
+def _fit_cells(one: Summary) -> list[str]:
+    errors = [_plain(one[key], digits) for key, digits in (("rmse", 4), ("bias", 4), ("fit_percent", 1))]
+    return [str(one["samples"]), *errors]

@@ -43,6 +43,7 @@ LINES: dict[str, dict[str, Any]] = {
 COMMAND: dict[str, Any] = {"color": INK, "linestyle": "-", "linewidth": 1.2}
 DOTS: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 2.6, "color": INK, "alpha": 0.6}
 
+LETTERS = 26
 DPI = 150
 WIDTH, ROW_HEIGHT, MARGIN_HEIGHT = 7.2, 2.15, 0.75
 """Inches: two columns of a journal page, one row of panels, title and time axis."""
@@ -66,7 +67,7 @@ def sheet(rows: int, columns: int, title: str) -> tuple[Figure, list[Axes]]:
     panels = [figure.add_subplot(rows, columns, at + 1) for at in range(rows * columns)]
     for at, axes in enumerate(panels):
         _style(axes)
-        if len(panels) > 1:
+        if 1 < len(panels) <= LETTERS:
             axes.set_title(f"({chr(ord('a') + at)})", loc="left", fontsize=NORMAL, pad=3)
     return figure, panels
 

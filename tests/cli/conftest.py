@@ -6,15 +6,20 @@ simulation is run from the command line once, in test_end_to_end.py.
 
 from __future__ import annotations
 
+import contextlib
+import io
 import json
 import sys
 import types
+from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray as xr
 
 from subzero.channels import BY_NAME, CHANNELS
+from subzero.cli import main
 
 DRAG_PER_METRE = 0.5 * 1000.0 * np.pi * 0.0025 * 0.01
 STOPPED = "The cable did not converge at t = 3 s, node 4. Try a shorter cable step."
@@ -127,19 +132,47 @@ def _make_run():
     return make_run
 
 
-@pytest.fixture
-def rails(monkeypatch):
-    """Replace the simulation by runs on rails; return what it was asked for."""
+def put_on_rails(patch):
+    """Replace the simulation by runs on rails; return the list that will hold what it was asked for."""
     asked = []
 
     def simulate(scenario, *, tethered=True, progress=None):
         asked.append((scenario, tethered))
-        prescribed = None if getattr(scenario, "motion", None) is None else "straight"
+        prescribed = None if scenario.motion is None else "straight"
         return make_run(tethered=tethered, prescribed=prescribed, name=scenario.name)
 
     module = types.ModuleType("subzero.simulation")
     vars(module)["simulate"] = simulate
-    monkeypatch.setitem(sys.modules, "subzero.simulation", module)
-    monkeypatch.delitem(sys.modules, "subzero.comparison", raising=False)
-    yield asked
+    patch.setitem(sys.modules, "subzero.simulation", module)
+    patch.delitem(sys.modules, "subzero.comparison", raising=False)
+    return asked
+
+
+@pytest.fixture
+def rails(monkeypatch):
+    """Runs on rails instead of the simulation; gives the list of what was asked for: (trial, tethered)."""
+    yield put_on_rails(monkeypatch)
     sys.modules.pop("subzero.comparison", None)
+
+
+@dataclass(frozen=True)
+class Done:
+    """A command that was run: exit code, standard output, working folder, what it simulated."""
+
+    code: int
+    said: str
+    here: Path
+    asked: list
+
+
+@pytest.fixture(scope="session")
+def compared(tmp_path_factory):
+    """What ``subzero compare fig6`` does, on rails, run once for all tests that only look."""
+    here, said = tmp_path_factory.mktemp("compared"), io.StringIO()
+    with pytest.MonkeyPatch.context() as patch, contextlib.redirect_stdout(said):
+        patch.chdir(here)
+        patch.setenv("COLUMNS", "200")
+        asked = put_on_rails(patch)
+        code = main(["compare", "fig6"])
+        sys.modules.pop("subzero.comparison", None)
+    return Done(code, said.getvalue(), here, asked)

@@ -1,0 +1,113 @@
+"""Figures show what they promise, in one style, with units, for every kind of run."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from subzero.figures import draw, exact_tension
+from subzero.measured import Record
+
+
+@pytest.fixture(scope="module")
+def comparison(compared):
+    """Two runs on rails (made once)."""
+    import xarray as xr
+
+    return {
+        name: xr.open_dataset(compared.here / "fig6" / f"{name}.nc") for name in ("tethered", "untethered")
+    }
+
+
+def texts(figure):
+    return [axes.get_title(loc="left") for axes in figure.axes]
+
+
+def line(axes, label):
+    return next(one for one in axes.get_lines() if one.get_label() == label)
+
+
+def test_figure_6_has_the_four_panels_of_the_paper(comparison):
+    assert texts(draw(comparison)["fig6"]) == [
+        "(a) Propeller command", "(b) Forward speed", "(c) Rudder command, positive to starboard",
+        "(d) Heading, clockwise from north",
+    ]  # fmt: skip
+
+
+def test_tethered_is_solid_untethered_dashed_and_measured_are_dots(comparison):
+    run = comparison["tethered"]
+    record = Record(source="", time=np.array([0.0, 9.0]), values={"surge_speed": np.array([0.1, 0.9])})
+    speed = draw(comparison, record)["fig6"].axes[1]
+    assert line(speed, "tethered").get_linestyle() == "-"
+    assert line(speed, "untethered").get_linestyle() == "--"
+    assert line(speed, "measured").get_linestyle() == "None"
+    assert line(speed, "measured").get_marker() == "o"
+    assert_allclose(line(speed, "tethered").get_ydata(), run["surge_speed"].values)
+    assert_allclose(line(speed, "measured").get_ydata(), [0.1, 0.9])
+
+
+def test_a_measured_channel_without_a_panel_gets_one(comparison):
+    values = {name: np.zeros(2) for name in ("cable_tension", "heading", "yaw_rate", "sway_speed")}
+    record = Record(source="", time=np.array([0.0, 9.0]), values=values)
+    assert texts(draw(comparison, record)["measured"]) == [
+        "(a) Cable tension at the tow point", "(b) Yaw rate, positive to starboard", "(c) Speed to starboard"
+    ]  # fmt: skip
+    assert "measured" not in draw(comparison)
+
+
+def test_every_panel_names_its_unit(comparison, make_run):
+    figures = [*draw(comparison).values(), *draw({"tethered": make_run(prescribed="dive")}).values()]
+    for figure in [*figures, *draw({"tethered": make_run(prescribed="straight")}).values()]:
+        assert all("[" in axes.get_ylabel() for axes in figure.axes)
+        assert all("[" in axes.get_xlabel() for axes in figure.axes[-2:])
+        assert figure.get_suptitle().startswith("fig6: a synthetic trial")
+
+
+def test_figure_4_sets_the_computed_tension_on_the_exact_line(make_run):
+    run = make_run(prescribed="straight")
+    tension, error = draw({"tethered": run})["fig4"].axes
+    exact = 0.5 * 1000.0 * np.pi * 0.0025 * 0.01 * line(tension, "exact, equation (37)").get_xdata()
+    assert_allclose(np.diff(line(tension, "exact, equation (37)").get_ydata()), np.diff(exact))
+    assert error.get_lines()[0].get_xdata().size == run.sizes["time"]  # every step, odd and even
+
+
+def test_the_exact_tension_counts_inertia_of_cable_and_drum(make_run):
+    run = make_run(prescribed="straight", samples=11)
+    run["surge_speed"] = ("time", 0.5 * run["time"].values)  # u' = 0.5 m/s², S = 0.25 t²
+    run["cable_length"] = ("time", np.zeros(11))
+    run.attrs["parameters"] = run.attrs["parameters"].replace('"inertia": 0.0', '"inertia": 0.02')
+    S, u = 0.25 * run["time"].values ** 2, run["surge_speed"].values
+    expected = (0.0049 * 0.5 + 0.0392699082 * u**2) * S + 0.02 * 0.5 / 0.1**2
+    assert_allclose(exact_tension(run)[1:], expected[1:], rtol=1e-8)
+
+
+def test_figure_5_has_the_six_panels_of_the_paper(make_run):
+    assert texts(draw({"tethered": make_run(prescribed="dive")})["fig5"]) == [
+        "(a) Pitch angle, positive nose up", "(b) Shape of the cable", "(c) Tension at the tow point",
+        "(d) Velocity of the tow point, cable's axes", "(e) Force of the cable on the vehicle",
+        "(f) Moment of the cable on the vehicle",
+    ]  # fmt: skip
+
+
+def test_down_is_down(make_run):
+    shapes = draw({"tethered": make_run(prescribed="dive")})["fig5"].axes[1]
+    assert shapes.yaxis_inverted()
+    assert [one.get_label() for one in shapes.get_lines()] == ["10 s", "15 s", "20 s", "25 s", "30 s"]
+
+
+def test_a_map_shows_both_directions_in_the_same_scale(comparison):
+    plan = draw(comparison)["cable"].axes[0]
+    box = plan.get_window_extent()
+    per_metre = [box.width / np.ptp(plan.get_xlim()), box.height / np.ptp(plan.get_ylim())]
+    assert per_metre[0] == pytest.approx(per_metre[1])
+
+
+@pytest.mark.parametrize("prescribed", [None, "straight", "dive"])
+def test_a_run_that_stopped_at_once_can_be_drawn(prescribed, make_run, tmp_path):
+    for figure in draw({"tethered": make_run(samples=1, prescribed=prescribed)}).values():
+        figure.savefig(tmp_path / "one.png")  # warnings are errors
+
+
+def test_an_untethered_prescribed_run_has_nothing_to_show(make_run):
+    assert draw({"untethered": make_run(tethered=False, prescribed="dive")}) == {}

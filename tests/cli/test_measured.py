@@ -1,0 +1,136 @@
+"""Measured records are read as they come, with gaps and jumps, or refused with all that is wrong."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from subzero.cli import FINE, MISTAKE, main
+from subzero.errors import UserError
+from subzero.fit import beside, fit
+from subzero.measured import Record, read_record
+
+
+@pytest.fixture
+def file(tmp_path, monkeypatch):
+    """Write a record.csv into the working folder; returns its name."""
+    monkeypatch.chdir(tmp_path)
+
+    def write(text):
+        (tmp_path / "record.csv").write_bytes(text.encode() if isinstance(text, str) else text)
+        return "record.csv"
+
+    return write
+
+
+def test_a_record_holds_any_subset_of_the_channels_with_gaps(file):
+    record = read_record(
+        file("time_s,heading_deg,surge_speed_m_s\n# remark\n0,27,\n\n1.5,nan,0.5\n2,28,0.6\n")
+    )
+    assert_allclose(record.time, [0.0, 1.5, 2.0])
+    assert_allclose(record.values["heading"], [27.0, np.nan, 28.0])
+    assert_allclose(record.values["surge_speed"], [np.nan, 0.5, 0.6])
+
+
+def test_what_a_spreadsheet_adds_does_no_harm(file):
+    record = read_record(file("\ufefftime_s, depth_m\r\n0, 1.0\r\n1, 2.0\r\n"))
+    assert_allclose(record.values["depth"], [1.0, 2.0])
+
+
+def test_a_heading_that_jumps_from_360_to_0_is_made_continuous(file):
+    record = read_record(file("time_s,heading_deg\n0,350\n1,358\n2,\n3,4\n4,12\n"))
+    assert_allclose(record.values["heading"], [350.0, 358.0, np.nan, 364.0, 372.0])
+
+
+REFUSED = {
+    "time_s,surge_sped_m_s,heading,x\n0,1,2,3\n": [
+        "unknown column 'surge_sped_m_s'. Did you mean 'surge_speed_m_s'?",
+        "unknown column 'heading'. Did you mean 'heading_deg'?",
+        "unknown column 'x'.",
+    ],
+    "depth_m,depth_m\n0,1\n": [
+        "column 'depth_m' occurs twice; keep one",
+        "column 'time_s' is missing; it is needed, in seconds since the first command",
+    ],
+    "time_s\n0\n": ["there is no column beside the time; add a channel, such as 'surge_speed_m_s'"],
+    "time_s,depth_m\n0,1\n1\n": ["line 3: 1 cells, but the header has 2 columns"],
+    "time_s,depth_m\n0,deep\n1,inf\n,3\n0.5,4\n0.5,5\n": [
+        "line 2, column 'depth_m': 'deep' is not a number; leave a gap empty",
+        "line 3, column 'depth_m': 'inf' is not finite; leave a gap empty",
+        "line 4: the time is missing; every sample needs one",
+        "line 6: the time 0.5 s does not come after 0.5 s; time must increase",
+    ],
+    "time_s,depth_m\n0,\n1,nan\n": ["column 'depth_m' holds no number at all; remove it"],
+}
+
+
+@pytest.mark.parametrize("text", REFUSED)
+def test_a_bad_record_is_refused_with_all_its_problems(text, file, rails, capsys):
+    assert main(["compare", "fig6", "--measured", file(text)]) == MISTAKE
+    said = capsys.readouterr().err.splitlines()
+    assert said == [
+        "The measured record record.csv cannot be used:",
+        *(f"  {line}" for line in REFUSED[text]),
+    ]
+    assert rails == []
+
+
+def test_a_hundred_problems_are_not_all_told(file):
+    rows = "".join(f"{k},deep\n" for k in range(100))
+    with pytest.raises(UserError, match=r"\.\.\. and 89 more\.$"):  # one of them: no number at all
+        read_record(file("time_s,depth_m\n" + rows))
+
+
+@pytest.mark.parametrize("content", [b"\xff\xfe\x00", b"", b"time_s,depth_m\n", b"\x00\x01"])
+def test_what_is_no_table_is_refused(content, file):
+    with pytest.raises(UserError, match=r"^The measured record record\.csv "):
+        read_record(file(content))
+
+
+def test_the_error_of_a_model_is_that_of_the_textbook(make_run):
+    run = make_run(samples=5).assign(depth=("time", [0.0, 1.0, 2.0, 3.0, 4.0]))
+    measured = np.array(
+        [1.0, 1.0, 3.0, np.nan]
+    )  # model there: 0, 2, 4 (error -1, 1, 1); the last has no time
+    record = Record(source="", time=np.array([0.0, 0.2, 0.4, 0.5]), values={"depth": measured})
+    one = fit(run, record, "depth")
+    spread = np.sqrt(np.sum((measured[:3] - 5.0 / 3.0) ** 2))
+    assert one.samples == 3
+    assert_allclose(
+        [one.rmse, one.bias, one.fit_percent], [1.0, 1.0 / 3.0, 100.0 * (1.0 - np.sqrt(3.0) / spread)]
+    )
+
+
+def test_a_perfect_model_fits_by_100_percent_and_a_constant_record_by_nothing(make_run):
+    run = make_run()
+    time = run["time"].values[::7]
+    record = Record(
+        source="", time=time, values={"surge_speed": run["surge_speed"].values[::7], "depth": 0.0 * time}
+    )
+    perfect, constant = fit(run, record, "surge_speed"), fit(run, record, "depth")
+    assert (perfect.rmse, perfect.bias, perfect.fit_percent) == (0.0, 0.0, 100.0)
+    assert constant.rmse == 0.0
+    assert np.isnan(constant.fit_percent)
+
+
+def test_a_heading_measured_one_turn_away_is_the_same_heading(make_run):
+    run = make_run()
+    record = Record(source="", time=run["time"].values, values={"heading": run["heading"].values - 720.0})
+    assert fit(run, beside(record, run), "heading").rmse == pytest.approx(0.0, abs=1e-12)
+
+
+def test_compare_prints_and_stores_the_error_of_each_model(file, rails, capsys, compared):
+    path = compared.here / "fig6" / "tethered.csv"
+    assert main(["compare", "fig6", "--measured", str(path), "--out", "out"]) == FINE
+    said = capsys.readouterr().out
+    assert "Model − measured" in said
+    assert "surge_speed [m/s]" in said
+    with open("out/summary.json", encoding="utf-8") as stored:
+        fits = json.load(stored)["measured"]["channels"]["surge_speed"]
+    assert fits["unit"] == "m/s"
+    assert fits["tethered"]["rmse"] < 1e-9  # ten digits are written
+    assert fits["untethered"]["rmse"] > 0.05
+    assert set(fits["tethered"]) == {"samples", "rmse", "bias", "fit_percent"}
