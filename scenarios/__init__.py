@@ -18,8 +18,9 @@ the heading to starboard (it increases), positive stern-planes (both) pitch the 
 degrees and revolutions per second; a `Trial` of radians and revolutions per second.
 
 Stories: `trial` what a trial is; `quantities` the one table of numbers, units and limits; `schema` what a
-file may say; `files` opening and parsing; `csv_file`, `samples` columns over time; `parts`, `changes`
-vehicles and cables; `steps` what must fit; `reader` all together; `errors` what a problem is.
+file may say; `files` opening and parsing; `csv_file`, `samples` columns over time; `instructions` commands or
+motion; `parts`, `changes` vehicles and cables; `steps` what must fit; `reader` all together; `errors` what a
+problem is.
 """
 
 from __future__ import annotations

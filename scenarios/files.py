@@ -6,6 +6,7 @@ the folder of that file.
 
 from __future__ import annotations
 
+import os
 import re
 import tomllib
 from dataclasses import dataclass, field
@@ -15,6 +16,9 @@ from typing import Any
 from scenarios.errors import Problem, ScenarioError, nearest, nearest_or_all, shown
 
 ROOT = Path(__file__).parent
+
+MOST_LEVELS = 16
+"""Tables deeper than this inside one another are refused, so that no walk through them runs out of stack."""
 
 HEADER = re.compile(r"""\s*\[\s*([^\[\]]+?)\s*\]""")
 KEY = re.compile(r"""\s*("[^"]*"|'[^']*'|[\w.\-]+)\s*=""")
@@ -72,7 +76,7 @@ def find(name_or_path: str | Path) -> Source:
     if named in shipped("trials"):
         return read_toml(shipped_path("trials", named), named)
     path = Path(named)
-    if named and (path.suffix == ".toml" or len(path.parts) > 1 or path.exists()):
+    if named and (path.suffix == ".toml" or len(path.parts) > 1 or os.path.exists(named)):
         return read_toml(path, named)
     remedy = nearest_or_all(named, shipped("trials")) + " Or give the path of a TOML file."
     raise ScenarioError([Problem(file=named or "''", why="there is no such scenario", remedy=remedy)])
@@ -119,7 +123,19 @@ def read_toml(path: Path, name: str) -> Source:
         table = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
         raise ScenarioError([_syntax_problem(name, text, str(error))]) from None
+    if _is_deep(table):
+        why = f"it has tables inside tables more than {MOST_LEVELS} levels deep"
+        raise ScenarioError([Problem(file=name, why=why, remedy="Remove them; two levels are enough.")])
     return Source(name=name, folder=path.parent, text=text, table=table, lines=_key_lines(text))
+
+
+def _is_deep(table: dict[str, Any]) -> bool:
+    """Say whether a file is nested deeper than any of ours has reason to be."""
+    level: list[Any] = [table]
+    for _ in range(MOST_LEVELS):
+        inside = [each for thing in level for each in (thing.values() if isinstance(thing, dict) else thing)]
+        level = [each for each in inside if isinstance(each, dict | list)]
+    return bool(level)
 
 
 def _syntax_problem(name: str, text: str, message: str) -> Problem:

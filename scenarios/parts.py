@@ -9,11 +9,12 @@ enforced.
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from scenarios.errors import Problem, ScenarioError, nearest_or_all
+from scenarios.errors import Problem, ScenarioError, nearest_or_all, shown
 from scenarios.files import Source, read_toml, shipped, shipped_path
 
 PATTERNS = {"vehicle": ("vehicles", "subzero2"), "cable": ("cables", "table1")}
@@ -118,7 +119,8 @@ def _complaint(leaf: Leaf, model: Leaf, key: str) -> tuple[str, str] | None:
     if unknown:
         return f"'{unknown[0]}' says nothing here", nearest_or_all(unknown[0], LEAF_KEYS)
     if leaf.get("unit") != unit:
-        return f"its unit is {leaf.get('unit', 'not given')!r}", f"Allowed: unit = '{unit}'."
+        given = shown(leaf["unit"]) if "unit" in leaf else "not given"
+        return f"its unit is {given}", f'Allowed: unit = "{unit}".'
     return value_complaint(leaf["value"], model, key)
 
 
@@ -127,9 +129,9 @@ def value_complaint(value: object, model: Leaf, key: str) -> tuple[str, str] | N
     low, high, allowed = _limits(model, key)
     if isinstance(value, bool) or not isinstance(value, int | float):
         return "this is not a number", allowed
-    if not abs(value) < math.inf:
+    if not abs(value) <= sys.float_info.max:  # true of NaN, infinity, and integers beyond every float
         return "this is not a finite number", allowed
-    if not low <= value <= high or (value == 0.0 and low == math.ulp(0.0)):
+    if not low <= value <= high:
         return "this is outside its limits", allowed
     return None
 

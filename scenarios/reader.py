@@ -13,12 +13,12 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from scenarios.changes import read_changes
-from scenarios.csv_file import read_csv
 from scenarios.errors import Problem, ScenarioError
 from scenarios.files import Source, find
+from scenarios.instructions import read_instructions
 from scenarios.parts import Part, nested, read_part
-from scenarios.samples import Samples, check_times, commands, inline, motion
-from scenarios.schema import LISTS, check_page, check_section
+from scenarios.samples import commands, motion
+from scenarios.schema import check_page, check_section
 from scenarios.steps import check_steps
 from scenarios.trial import Motion, Start, Trial
 
@@ -26,9 +26,6 @@ Found = TypeVar("Found")
 
 VehicleCheck = Callable[[Mapping[str, Any]], Iterable[Any]]
 """Takes the numbers of a vehicle; gives complaints with the attributes key, found, why, allowed."""
-
-SAID_BY_MOTION = ("heading_deg", "pitch_deg", "roll_deg", "surge_speed_m_s")
-"""Keys of [start] that a prescribed motion leaves no room for; its roll is zero."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,10 +39,6 @@ class Reading:
         """Note the problems of a result, and return the rest of it."""
         self.problems.extend(result[1])
         return result[0]
-
-    def note(self, key: str, why: str, remedy: str) -> None:
-        """Note one problem of the trial file."""
-        self.problems.append(self.source.problem(key, why, remedy))
 
     def section(self, name: str) -> dict[str, Any]:
         """Return a section, checked number by number; empty if there is a problem."""
@@ -74,7 +67,7 @@ def load(
     run, start, water = (reading.section(name) for name in ("run", "start", "water"))
     reading.problems.extend(check_steps(reading.source, run, start))
     vehicle, cable = _parts(reading, check_vehicle)
-    samples = _instructions(reading, commands_csv, run.get("duration_s"))
+    samples = reading.keep(read_instructions(reading.source, commands_csv, run.get("duration_s")))
     if reading.problems:
         raise ScenarioError(_in_order(reading.problems))
     prescribed = motion(samples["motion"]) if "motion" in samples else None
@@ -134,40 +127,6 @@ def _complaint(reading: Reading, part: Part, changed: Mapping[str, float], said:
     remedy = f"Allowed: {said.allowed}."
     line = source.line(key)
     return Problem(file=source.name, line=line, key=key, found=said.found, why=said.why, remedy=remedy)
-
-
-def _instructions(
-    reading: Reading, commands_csv: str | Path | None, duration: float | None
-) -> dict[str, Samples]:
-    """Return the commands or the motion: exactly one of the two."""
-    kinds = [kind for kind in LISTS if reading.source.table.get(kind) not in (None, {})]
-    if commands_csv is not None and "motion" in kinds:
-        why = "a prescribed motion takes no commands"
-        reading.note("motion", why, "Leave out the file of commands, or take a scenario with [commands].")
-    elif len(kinds) == 2:
-        reading.note("motion", "[commands] is given too", "Keep one of [commands] and [motion].")
-    elif not kinds and commands_csv is None:
-        why = "neither [commands] nor [motion] is given"
-        reading.note("", why, "Give one of the two; fig6 and fig5 show how.")
-    found = {
-        kind: _samples(reading, kind, commands_csv) for kind in kinds or ["commands"] * bool(commands_csv)
-    }
-    good = {kind: samples for kind, samples in found.items() if samples}
-    for samples in good.values():
-        reading.problems.extend(check_times(samples, duration))
-    return good
-
-
-def _samples(reading: Reading, kind: str, commands_csv: str | Path | None) -> Samples | None:
-    """Return the samples of a section, from the file that replaces it, from the file it names, or its own."""
-    if kind == "commands" and commands_csv is not None:
-        return reading.keep(read_csv(Path(commands_csv), str(commands_csv), kind))
-    values = reading.section(kind)
-    if not values:
-        return None
-    if "file" in values:
-        return reading.keep(read_csv(reading.source.folder / values["file"], values["file"], kind))
-    return reading.keep(inline(reading.source, kind, values))
 
 
 def _start(start: Mapping[str, float], prescribed: Motion | None) -> Start:

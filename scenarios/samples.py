@@ -64,9 +64,11 @@ def inline(
     if "time_s" not in columns:
         return None, []
     count = len(columns["time_s"])
-    remedy = "Make the lists equally long: one value for each time."
+    remedy = "Give one value for each time."
     problems = [
-        source.problem(f"{section}.{name}", f"{len(values)} values for {count} times", remedy)
+        source.problem(
+            f"{section}.{name}", f"this list has {len(values)} and time_s has {count} values", remedy
+        )
         for name, values in columns.items()
         if len(values) != count
     ]

@@ -31,7 +31,7 @@ class Page(BaseModel):
     description: str
     vehicle: str
     cable: str
-    run: dict[str, Any]
+    run: dict[str, Any] = {}
     start: dict[str, Any] = {}
     water: dict[str, Any] = {}
     commands: dict[str, Any] = {}
