@@ -5,8 +5,8 @@ length ℓ_N of the growing segment (its far node sits at the drum). With f_j = 
 Q_j = ∫(∂p/∂t + D − w_c k) ds, shared half and half by its two ends, the equations are
 
     balance of node j:      f_j − f_{j+1} + ½(Q_j + Q_{j+1}) = 0          (momentum of equation (7))
-    length of segment j:    φ(T_j, 1 + eT_j − |x_j − x_{j−1}|/ℓ_j) = 0    (compatibility of (7), `cable.slack`)
-    drum:                   T_N + ½ t_N·Q_N = (I_d/R_d² dU/dt + C_f/R_d)  (11), U = dS/dt; or U = 0 while it stands
+    length of segment j:    φ(T_j, ½(1 + eT_j)² − ½|x_j − x_{j−1}|²/ℓ_j²) = 0    (compatibility of (7), `cable.slack`)
+    drum:                   T_N + ½ t_N·Q_N = (I_d/R_d² dU/dt + C_f/R_d)  (11), U = dS/dt; see `cable.drum`
 
 Nodes are where the velocity lives and segments where the tension lives, so neither can alternate from node to node.
 The force on the vehicle (12) is f_1 − ½Q_1. The last segment ends at a fixed place where new material enters:
@@ -20,7 +20,8 @@ import numpy as np
 
 from subzero.compiled import compiled
 
-from .element import Load, chord_length, evaluate_load
+from .drum import SPINNING, STANDING
+from .element import Load, chord_length, evaluate_load, fading_rate, turning_rate
 from .line import BEFORE, NEW, NOW, Line
 from .properties import CableNumbers, DrumNumbers
 from .slack import slack_law
@@ -35,7 +36,7 @@ def node_velocities(line: Line, a0: float, a1: float, a2: float) -> None:
             line.velocity[NEW, j, i] = a0 * x[NEW, j, i] + a1 * x[NOW, j, i] + a2 * x[BEFORE, j, i]
     last = line.last_length
     line.payout[NEW] = a0 * last[NEW] + a1 * last[NOW] + a2 * last[BEFORE]
-    if line.stuck[0]:
+    if line.drum_mode[0] == STANDING:
         line.payout[NEW] = 0.0
     for i in range(3):
         chord = x[NEW, N, i] - x[NEW, N - 1, i]
@@ -110,22 +111,24 @@ def _add_influx(
     N, U, t, d = line.count[0], line.payout[NEW], work.tangent, work.chord
     by_near, by_far = work.by_near, work.by_far
     r = chord_length(d, length)
+    g, fading = turning_rate(d, length, r), fading_rate(d, length, r)
     Jt = J[0] * t[0] + J[1] * t[1] + J[2] * t[2]
-    dU = 0.0 if line.stuck[0] else a0
+    dU = 0.0 if line.drum_mode[0] == STANDING else a0
     stretch = 0.5 * c.compliance / (1.0 + c.compliance * T)
     for i in range(3):
         entering = c.mass * line.velocity[NEW, N, i] - c.added_mass * (J[i] - Jt * t[i])
         line.load[N, i] -= U * entering
         by_far[i, 0] = length * stretch * work.drag[i]
         by_far[i, 1] = work.q[i] - dU * entering - U * c.mass * (U / length - dU) * d[i] / length
+        by_far[i, 1] -= fading * (length * work.q_tt[i] - 2.0 * U * c.added_mass * Jt * t[i])
         by_far[i, 2] = 0.0
         by_far[i, 3] = 0.0
         for k in range(3):
-            P = (1.0 if i == k else 0.0) - t[i] * t[k]
-            across_k = J[k] - Jt * t[k]
+            B = ((1.0 if i == k else 0.0) - g * t[i] * t[k]) / r
+            across_k = J[k] - g * Jt * t[k]
             by_far[i, 1] += 0.5 * work.q_V[i, k] * (U / length - dU) * d[k]
             by_near[i, k] = length * (0.5 * (a0 + U / length) * work.q_V[i, k] - work.q_d[i, k])
-            by_near[i, k] += U * c.added_mass * (Jt * P + t[i] * across_k) / r
+            by_near[i, k] += U * c.added_mass * (Jt * B + t[i] * across_k / r)
         by_near[i, i] -= U * c.mass * U / length
 
 
@@ -133,7 +136,9 @@ def _add_influx(
 def _scatter_balance(line: Line, j: int, T: float, length: float, work: Load) -> None:
     """Add segment j to the balances of its two nodes: f + ½Q to the far one, −f + ½Q to the near one."""
     N, t = line.count[0], work.tangent
-    stiffness = T / chord_length(work.chord, length)
+    r_j = chord_length(work.chord, length)
+    stiffness, g = T / r_j, turning_rate(work.chord, length, r_j)
+    fading = fading_rate(work.chord, length, r_j) if j == N else 0.0
     by_near, by_far = work.by_near, work.by_far
     D, L, U, r = line.diagonal, line.lower, line.upper, line.rhs
     for i in range(3):
@@ -149,7 +154,11 @@ def _scatter_balance(line: Line, j: int, T: float, length: float, work: Load) ->
             line.tow_by_block[i, 0] = t[i]
         for k in range(4):
             far = 0.5 * by_far[i, k]
-            pull = stiffness * ((1.0 if i == k - 1 else 0.0) - t[i] * t[k - 1]) if j < N and k > 0 else 0.0
+            pull = (
+                stiffness * ((1.0 if i == k - 1 else 0.0) - g * t[i] * t[k - 1]) if j < N and k > 0 else 0.0
+            )
+            if j == N and k == 1:
+                pull = -fading * T * t[i]
             if j < N:
                 D[j, 1 + i, k] += far + pull
             if j > 1:
@@ -158,7 +167,7 @@ def _scatter_balance(line: Line, j: int, T: float, length: float, work: Load) ->
                 line.tow_by_block[i, k] = (t[i] if k == 0 else 0.0) + pull - far
         for k in range(3):
             near = 0.5 * by_near[i, k]
-            pull = stiffness * ((1.0 if i == k else 0.0) - t[i] * t[k])
+            pull = stiffness * ((1.0 if i == k else 0.0) - g * t[i] * t[k])
             if j < N:
                 L[j, 1 + i, 1 + k] += near - pull
             if j > 1:
@@ -170,17 +179,18 @@ def _scatter_balance(line: Line, j: int, T: float, length: float, work: Load) ->
 @compiled
 def _scatter_length(line: Line, j: int, T: float, length: float, c: CableNumbers, d: np.ndarray) -> None:
     """Write the length equation of segment j, the first row of its block."""
-    r = chord_length(d, length)
-    phi, by_T, by_strain = slack_law(T, 1.0 + c.compliance * T - r / length)
+    square = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) / (length * length)
+    stretch = 1.0 + c.compliance * T
+    phi, by_T, by_strain = slack_law(T, 0.5 * (stretch * stretch - square), line.smoothing[0])
     line.rhs[j, 0] = phi
-    line.diagonal[j, 0, 0] = by_T + by_strain * c.compliance
+    line.diagonal[j, 0, 0] = by_T + by_strain * stretch * c.compliance
     for i in range(3):
-        slope = by_strain * d[i] / (r * length)
+        slope = by_strain * d[i] / (length * length)
         line.lower[j, 0, 1 + i] = slope
         if j < line.count[0]:
             line.diagonal[j, 0, 1 + i] = -slope
     if j == line.count[0]:
-        line.diagonal[j, 0, 1] = by_strain * r / (length * length)
+        line.diagonal[j, 0, 1] = by_strain * square / length
 
 
 @compiled
@@ -190,29 +200,27 @@ def _drum_row(line: Line, a0: float, a1: float, a2: float, drum: DrumNumbers, wo
     D, L, r = line.diagonal[line.count[0]], line.lower[line.count[0]], line.rhs[line.count[0]]
     D[2, 2] = 1.0
     D[3, 3] = 1.0
-    if line.stuck[0]:
+    Qt = line.load[N, 0] * t[0] + line.load[N, 1] * t[1] + line.load[N, 2] * t[2]
+    line.drum_pull[0] = line.tension[NEW, N] + 0.5 * Qt
+    if line.drum_mode[0] == STANDING:
         r[1] = line.last_length[NEW] - line.last_length[NOW]
         D[1, 1] = 1.0
         return
     U = line.payout
-    r[1] = drum_tension(line, t) - drum.friction - drum.inertia * (a0 * U[NEW] + a1 * U[NOW] + a2 * U[BEFORE])
-    D[1, 0] = 1.0
+    r[1] = -drum.friction - drum.inertia * (a0 * U[NEW] + a1 * U[NOW] + a2 * U[BEFORE])
     D[1, 1] = -drum.inertia * a0 * a0
+    if line.drum_mode[0] == SPINNING:
+        return
+    r[1] += line.drum_pull[0]
+    D[1, 0] = 1.0
     by_near, by_far = work.by_near, work.by_far
     size = chord_length(work.chord, line.last_length[NEW])
-    Qt = line.load[N, 0] * t[0] + line.load[N, 1] * t[1] + line.load[N, 2] * t[2]
+    g = turning_rate(work.chord, line.last_length[NEW], size)
+    fading = fading_rate(work.chord, line.last_length[NEW], size)
     for i in range(3):
         D[1, 0] += 0.5 * t[i] * by_far[i, 0]
-        D[1, 1] += 0.5 * t[i] * by_far[i, 1]
+        D[1, 1] += 0.5 * t[i] * (by_far[i, 1] - fading * line.load[N, i])
         for k in range(3):
             L[1, 1 + k] += 0.5 * t[i] * by_near[i, k]
     for k in range(3):
-        L[1, 1 + k] -= 0.5 * (line.load[N, k] - Qt * t[k]) / size
-
-
-@compiled
-def drum_tension(line: Line, t: np.ndarray) -> float:
-    """Return the tension at the drum, T(S) = T_N + ½ t_N·Q_N at level NEW. [N]."""
-    N = line.count[0]
-    half = 0.5 * (line.load[N, 0] * t[0] + line.load[N, 1] * t[1] + line.load[N, 2] * t[2])
-    return line.tension[NEW, N] + half
+        L[1, 1 + k] -= 0.5 * (line.load[N, k] - g * Qt * t[k]) / size

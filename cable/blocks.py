@@ -84,9 +84,7 @@ def factor(L: np.ndarray, D: np.ndarray, U: np.ndarray, pivots: np.ndarray, last
 
 
 @compiled
-def solve(
-    L: np.ndarray, D: np.ndarray, U: np.ndarray, pivots: np.ndarray, last: int, r: np.ndarray
-) -> None:
+def solve(L: np.ndarray, D: np.ndarray, U: np.ndarray, pivots: np.ndarray, last: int, r: np.ndarray) -> None:
     """Overwrite r (blocks, 4) with the solution, given what `factor` left."""
     for j in range(last, 0, -1):
         if j < last:

@@ -24,8 +24,8 @@ from subzero.compiled import compiled
 
 from .properties import CableNumbers
 
-SMALLEST_CHORD = 1e-6
-"""A chord shorter than this fraction of its segment (cable heaped up) no longer defines a direction: t fades to 0."""
+FOLDING = 0.3
+"""How early a heaped segment loses its direction, see `chord_length`; without any effect on a taut one."""
 
 
 class Load(NamedTuple):
@@ -34,6 +34,7 @@ class Load(NamedTuple):
     Attributes:
         tangent, momentum, drag, q, across, velocity, chord: t, p, D, q, U_⊥, V and d (3,).
         q_V, q_d: ∂q/∂V and ∂q/∂d (3, 3).
+        q_tt, G: (∂q/∂t) t (3,) and G (3, 3), see `_differentiate_load`.
         by_near, by_far: derivatives of the segment's total load Q by the position of its near node (3, 3) and by the
             unknowns of its own block (3, 4), see `cable.assembly`.
     """
@@ -47,6 +48,8 @@ class Load(NamedTuple):
     across: np.ndarray
     velocity: np.ndarray
     chord: np.ndarray
+    q_tt: np.ndarray
+    G: np.ndarray
     by_near: np.ndarray
     by_far: np.ndarray
 
@@ -54,15 +57,33 @@ class Load(NamedTuple):
 def new_load() -> Load:
     """Return empty work space for one segment."""
     vectors = {name: np.zeros(3) for name in Load._fields}
-    matrices = {"q_V": np.zeros((3, 3)), "q_d": np.zeros((3, 3))}
-    return Load(**vectors | matrices | {"by_near": np.zeros((3, 3)), "by_far": np.zeros((3, 4))})
+    matrices = {name: np.zeros((3, 3)) for name in ("q_V", "q_d", "G", "by_near")}
+    return Load(**vectors | matrices | {"by_far": np.zeros((3, 4))})
 
 
 @compiled
 def chord_length(d: np.ndarray, length: float) -> float:
-    """Return |d|, rounded off below `SMALLEST_CHORD` of the segment's length. [m]."""
-    floor = SMALLEST_CHORD * length
-    return sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2] + floor * floor)
+    """Return r with r² = |d|² + F²(1 − |d|²/ℓ²)²ℓ², the length that the tangent t = d/r is made with. [m].
+
+    For a taut segment r = |d|, and t is a unit vector. A slack segment (|d| < ℓ) is a folded cable: its t gets shorter
+    than one, smoothly to 0 when both ends meet, and P = I − t tᵀ with it tends to the same drag in all directions.
+    """
+    square = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) / (length * length)
+    return length * sqrt(square + (FOLDING * (1.0 - square)) ** 2)
+
+
+@compiled
+def turning_rate(d: np.ndarray, length: float, r: float) -> float:
+    """Return g in ∂t/∂d = (I − g t tᵀ)/r; 1 for a taut segment. [-]."""
+    square = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) / (length * length)
+    return 1.0 - 2.0 * FOLDING * FOLDING * (1.0 - square)
+
+
+@compiled
+def fading_rate(d: np.ndarray, length: float, r: float) -> float:
+    """Return f in ∂t/∂ℓ = −f t; 0 for a taut segment. [1/m]."""
+    square = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) / (length * length)
+    return FOLDING * FOLDING * length * (1.0 - square * square) / (r * r)
 
 
 @compiled
@@ -111,31 +132,48 @@ def evaluate_load(
         out.drag[i] = kt * abs(Ut) * Ut * t[i] + kn * normal * across[i]
         out.q[i] = a0 * out.momentum[i] + out.drag[i]
     out.q[2] -= c.weight
-    _differentiate_load(t, across, Ut, normal, r, a0, kt, kn, c, out)
+    _differentiate_load(V, J, Ut, normal, r, turning_rate(d, length, r), a0, kt, kn, c, out)
 
 
 @compiled
 def _differentiate_load(
-    t: np.ndarray,
-    across: np.ndarray,
+    V: np.ndarray,
+    J: np.ndarray,
     Ut: float,
     normal: float,
     r: float,
+    g: float,
     a0: float,
     kt: float,
     kn: float,
     c: CableNumbers,
     out: Load,
 ) -> None:
-    """Fill ∂q/∂V and ∂q/∂d from ∂t/∂d = P/r, ∂U_⊥/∂V = P, ∂U_⊥/∂t = −(U_t I + t Uᵀ)."""
-    added = a0 * c.added_mass
+    """Fill ∂q/∂V and ∂q/∂d.
+
+    With C = ∂(U_t t)/∂t = t Uᵀ + U_t I = −∂U_⊥/∂t, G = |U_⊥| I + U_⊥ U_⊥ᵀ/|U_⊥| and ∂t/∂d = (I − g t tᵀ)/r:
+
+        ∂q/∂V = a₀(m I + ρA P) + 2 k_t |U_t| t tᵀ + k_n G P
+        ∂q/∂t = −a₀ρA C + k_t |U_t| (C + t Uᵀ) − k_n G C
+    """
+    t, across, G = out.tangent, out.across, out.G
     inverse = 1.0 / normal if normal > 1e-12 else 0.0
     for i in range(3):
         for k in range(3):
+            G[i, k] = across[i] * across[k] * inverse
+        G[i, i] += normal
+    for i in range(3):
+        Gt = G[i, 0] * t[0] + G[i, 1] * t[1] + G[i, 2] * t[2]
+        out.q_tt[i] = 0.0
+        for k in range(3):
             P = (1.0 if i == k else 0.0) - t[i] * t[k]
-            turn = t[i] * across[k]
-            spread = normal * P + across[i] * across[k] * inverse
-            out.q_V[i, k] = added * P + 2.0 * kt * abs(Ut) * t[i] * t[k] + kn * spread
-            along = kt * abs(Ut) * (Ut * P + 2.0 * turn)
-            out.q_d[i, k] = (along - kn * (Ut * spread + normal * turn) - added * (Ut * P + turn)) / r
+            outer = t[i] * (V[k] - J[k])
+            C = outer + (Ut if i == k else 0.0)
+            GC = Gt * (V[k] - J[k]) + Ut * G[i, k]
+            out.q_V[i, k] = a0 * c.added_mass * P + 2.0 * kt * abs(Ut) * t[i] * t[k]
+            out.q_V[i, k] += kn * (G[i, k] - Gt * t[k])
+            out.q_d[i, k] = kt * abs(Ut) * (C + outer) - kn * GC - a0 * c.added_mass * C
+            out.q_tt[i] += out.q_d[i, k] * t[k]
+        for k in range(3):
+            out.q_d[i, k] = (out.q_d[i, k] - g * out.q_tt[i] * t[k]) / r
         out.q_V[i, i] += a0 * c.mass

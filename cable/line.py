@@ -15,8 +15,10 @@ import numpy as np
 
 from subzero.compiled import compiled
 
+from .drum import TURNING
 from .element import Load, chord_length, evaluate_momentum
 from .properties import CableNumbers
+from .slack import SMOOTHING
 
 NEW, NOW, BEFORE = 0, 1, 2
 
@@ -37,11 +39,15 @@ class Line(NamedTuple):
         payout: rate dS/dt at which cable enters the water (3 levels,). [m/s]
         load: ∫(∂p/∂t + D − w_c k) ds of the segments at level NEW (nodes, 3). [N]
         count: number of segments, in a one-element array.
-        stuck: 1 while the drum stands and holds the cable, in a one-element array.
+        drum_mode: what the drum does (`cable.drum`), in a one-element array.
         previous_step: t_now − t_before, 0 after a start, in a one-element array. [s]
         tow_force: force on the vehicle at level NEW (3,). [N]
         tow_by_tow, tow_by_block: derivatives of the tow force by the tow point's position (3, 3) and by the
             unknowns of the first block (3, 4).
+        tow_answer: minus the answer of the first block's unknowns (columns) to a displacement of the tow point
+            (rows) (3, 4), from the last Newton matrix.
+        drum_pull: tension at the drum at level NEW, in a one-element array. [N]
+        smoothing: T₀ of the slack law in force, in a one-element array. [N]
         lower, diagonal, upper, pivots, rhs, guess, newton_step: work space of Newton's method.
     """
 
@@ -54,11 +60,13 @@ class Line(NamedTuple):
     payout: np.ndarray
     load: np.ndarray
     count: np.ndarray
-    stuck: np.ndarray
+    drum_mode: np.ndarray
     previous_step: np.ndarray
     tow_force: np.ndarray
     tow_by_tow: np.ndarray
     tow_by_block: np.ndarray
+    tow_answer: np.ndarray
+    drum_pull: np.ndarray
     lower: np.ndarray
     diagonal: np.ndarray
     upper: np.ndarray
@@ -66,6 +74,7 @@ class Line(NamedTuple):
     rhs: np.ndarray
     guess: np.ndarray
     newton_step: np.ndarray
+    smoothing: np.ndarray
 
 
 def new_line(capacity: int) -> Line:
@@ -81,16 +90,19 @@ def new_line(capacity: int) -> Line:
         payout=np.zeros(3),
         load=np.zeros((n, 3)),
         count=np.zeros(1, np.int64),
-        stuck=np.zeros(1, np.int64),
+        drum_mode=np.zeros(1, np.int64),
         previous_step=np.zeros(1),
         tow_force=np.zeros(3),
         tow_by_tow=np.zeros((3, 3)),
         tow_by_block=np.zeros((3, 4)),
+        tow_answer=np.zeros((3, 4)),
+        drum_pull=np.zeros(1),
         **blocks,
         pivots=np.zeros((n, 4), np.int64),
         rhs=np.zeros((n, 4)),
         guess=np.zeros((n, 4)),
         newton_step=np.zeros((n, 4)),
+        smoothing=np.full(1, SMOOTHING),
     )
 
 
@@ -105,7 +117,7 @@ def lay_straight(
     """
     count = max(1, int(np.floor(wet_length / segment_length + 0.5)))
     line.count[0] = count
-    line.stuck[0] = 0
+    line.drum_mode[0] = TURNING
     line.previous_step[0] = 0.0
     last = wet_length - (count - 1) * segment_length
     for level in range(3):
@@ -140,7 +152,7 @@ def segment_momentum(
     for i in range(3):
         work.chord[i] = line.position[NOW, j, i] - line.position[NOW, j - 1, i]
         work.velocity[i] = 0.5 * (line.velocity[level, j - 1, i] + line.velocity[level, j, i])
-    r = chord_length(work.chord, length)
+    r = chord_length(work.chord, line.last_length[NOW] if j == line.count[0] else line.length[j])
     for i in range(3):
         work.tangent[i] = work.chord[i] / r
     evaluate_momentum(work.velocity, J, work.tangent, c, work.momentum)

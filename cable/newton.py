@@ -58,6 +58,7 @@ def solve_step(
             return Solved(True, iteration, size, node, equation)
         if factor(line.lower, line.diagonal, line.upper, line.pivots, N) > 0:
             break
+        _keep_tow_answer(line)
         solve(line.lower, line.diagonal, line.upper, line.pivots, N, line.rhs)
         last_length = _save(line)
         fraction = 1.0
@@ -73,6 +74,14 @@ def solve_step(
         if not isfinite(merit):
             break
     return Solved(size <= 1.0, MAX_ITERATIONS, size, node, equation)
+
+
+@compiled
+def _keep_tow_answer(line: Line) -> None:
+    """Keep W_1 of the elimination (`cable.blocks`), before the next assembly overwrites it."""
+    for k in range(3):
+        for m in range(4):
+            line.tow_answer[k, m] = line.lower[1, 1 + k, m]
 
 
 @compiled

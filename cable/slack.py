@@ -1,7 +1,7 @@
 """The law between tension and strain: inextensible or elastic when taut, and never a push.
 
 A thin cable cannot be compressed: it buckles, and its chord gets shorter. With the shortening
-σ = 1 + eT − |d|/ℓ of a segment, slackness is the alternative
+σ = ½(1 + eT)² − ½|d|²/ℓ² of a segment (the strain, for a small one), slackness is the alternative
 
     T ≥ 0,   σ ≥ 0,   T σ = 0
 
@@ -28,10 +28,11 @@ SMOOTHING = 1e-10
 
 
 @compiled
-def slack_law(T: float, strain_deficit: float) -> tuple[float, float, float]:
-    """Return φ and its derivatives by the tension T [N] and the shortening σ [-]."""
-    a, b = T / TENSION_SCALE, strain_deficit / STRAIN_SCALE
-    s = sqrt(a * a + b * b + 2.0 * SMOOTHING / (TENSION_SCALE * STRAIN_SCALE))
+def slack_law(T: float, shortening: float, smoothing: float) -> tuple[float, float, float]:
+    """Return φ and its derivatives by the tension T [N] and the shortening σ [-], for T₀ = `smoothing` [N]."""
+    a, b = T / TENSION_SCALE, shortening / STRAIN_SCALE
+    mu = smoothing / (TENSION_SCALE * STRAIN_SCALE)
+    s = sqrt(a * a + b * b + 2.0 * mu)
     # a + b − s, without cancellation when one of the two is large
-    phi = 2.0 * (a * b - SMOOTHING / (TENSION_SCALE * STRAIN_SCALE)) / (a + b + s) if a + b > 0.0 else a + b - s
+    phi = 2.0 * (a * b - mu) / (a + b + s) if a + b > 0.0 else a + b - s
     return phi, (1.0 - a / s) / TENSION_SCALE, (1.0 - b / s) / STRAIN_SCALE

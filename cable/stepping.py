@@ -4,8 +4,8 @@
 can ask "what if" until they agree. `accept` makes the new level the present one and, when the growing segment has
 become long, splits it.
 
-The drum either turns, equation (11), or stands and holds the cable (it cannot take cable up, and friction may hold
-it): `try_step` solves with the state that the drum had and changes it when the answer contradicts it.
+What the drum does in the step (turn, stand, spin ahead of the cable) is guessed from the step before, and changed
+when the answer contradicts it (`cable.drum`).
 """
 
 from __future__ import annotations
@@ -14,15 +14,18 @@ import numpy as np
 
 from subzero.compiled import compiled
 
-from .assembly import drum_tension
 from .differences import backward_weights
+from .drum import STANDING, next_mode
 from .element import Load
 from .line import BEFORE, NEW, NOW, SPLIT_AT, Line, segment_momentum
 from .newton import Solved, solve_step
 from .properties import CableNumbers, DrumNumbers
+from .slack import SMOOTHING
 
-HELD = 1e-12
-"""A standing frictionless drum starts to turn above this tension. [N]"""
+SOFTEST = 1e-4
+"""T₀ that a difficult step starts with, a tenth at a time down to `slack.SMOOTHING`. [N]"""
+MOST_DRUM_CHANGES = 4
+"""How often one step may change its mind about what the drum does."""
 
 
 @compiled
@@ -46,15 +49,42 @@ def try_step(
         drum: drum.
         work: work space.
     """
+    for _ in range(MOST_DRUM_CHANGES):
+        solved = _solve_softly(line, step, tow, J, c, drum, work)
+        mode = next_mode(line.drum_mode[0], solved.converged, line.payout[NEW], line.drum_pull[0], drum)
+        if mode == line.drum_mode[0]:
+            break
+        line.drum_mode[0] = mode
+    return solved
+
+
+@compiled
+def _solve_softly(
+    line: Line,
+    step: float,
+    tow: np.ndarray,
+    J: np.ndarray,
+    c: CableNumbers,
+    drum: DrumNumbers,
+    work: Load,
+) -> Solved:
+    """Solve from a prediction; if that fails, with a slack law that is made sharp little by little."""
     a0, a1, a2 = backward_weights(step, line.previous_step[0])
     _predict(line, step, tow)
     solved = solve_step(line, a0, a1, a2, J, c, drum, work)
-    was_stuck = line.stuck[0]
-    if solved.converged and _contradicts(line, drum, work):
-        line.stuck[0] = 1 - was_stuck
-        _predict(line, step, tow)
+    if solved.converged:
+        return solved
+    _predict(line, step, tow)
+    spent = solved.iterations
+    line.smoothing[0] = SOFTEST
+    while True:
         solved = solve_step(line, a0, a1, a2, J, c, drum, work)
-    return solved
+        spent += solved.iterations
+        if not solved.converged or line.smoothing[0] <= SMOOTHING:
+            break
+        line.smoothing[0] = max(0.1 * line.smoothing[0], SMOOTHING)
+    line.smoothing[0] = SMOOTHING
+    return Solved(solved.converged, spent, solved.residual, solved.worst_node, solved.worst_equation)
 
 
 @compiled
@@ -68,16 +98,8 @@ def _predict(line: Line, step: float, tow: np.ndarray) -> None:
             line.position[NEW, j, i] = moved if j < N else line.position[NOW, j, i]
     for i in range(3):
         line.position[NEW, 0, i] = tow[i]
-    growth = 0.0 if line.stuck[0] else step * line.payout[NOW]
+    growth = 0.0 if line.drum_mode[0] == STANDING else step * line.payout[NOW]
     line.last_length[NEW] = max(line.last_length[NOW] + growth, 0.5 * line.last_length[NOW])
-
-
-@compiled
-def _contradicts(line: Line, drum: DrumNumbers, work: Load) -> bool:
-    """Say whether the drum turns backwards, or stands though the cable pulls harder than friction holds."""
-    if line.stuck[0]:
-        return drum_tension(line, work.tangent) > drum.friction * (1.0 + 1e-9) + HELD
-    return line.payout[NEW] < 0.0
 
 
 @compiled

@@ -1,0 +1,43 @@
+"""What the drum can do: turn with the cable, stand and hold it, or spin ahead of it.
+
+    turning    T(S) R_d = I_d dΩ/dt + C_f      (11); the cable is taut at the drum
+    standing   dS/dt = 0                        friction holds up to T(S) = C_f/R_d; cable is never taken up
+    spinning   0 = I_d dΩ/dt + C_f              the drum overruns: its inertia throws cable out, slack at the drum
+
+Departs from source: the paper writes (11) for a drum that always turns with a taut cable. A frictionless drum without
+inertia turns whenever it is pulled, and cannot overrun.
+"""
+
+from __future__ import annotations
+
+from subzero.compiled import compiled
+
+from .properties import DrumNumbers
+
+TURNING, STANDING, SPINNING = 0, 1, 2
+
+HELD = 1e-12
+"""A tension or pay-out rate below this is none. [N], [m/s]"""
+
+
+@compiled
+def next_mode(mode: int, converged: bool, payout: float, pull: float, drum: DrumNumbers) -> int:
+    """Return what the drum does, given the answer found by supposing that it does `mode`; the same if consistent.
+
+    A drum that stands while a taut cable must get longer leaves no solution at all (`converged` is false).
+
+    Args:
+        mode: what was supposed.
+        converged: whether a solution was found with it.
+        payout: dS/dt of that solution. [m/s]
+        pull: T(S) of that solution. [N]
+        drum: the drum.
+    """
+    if mode == STANDING:
+        pulled = not converged or pull > drum.friction * (1.0 + 1e-9) + HELD
+        return TURNING if pulled else STANDING
+    if converged and payout < 0.0:
+        return STANDING
+    if mode == SPINNING:
+        return TURNING if not converged or pull > HELD else SPINNING
+    return SPINNING if converged and drum.inertia > 0.0 and pull < -HELD else TURNING

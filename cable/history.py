@@ -1,0 +1,94 @@
+"""What a cable did: tensions, forces, lengths and shapes over time, with units and how the solving went."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True, kw_only=True)
+class Outcome:
+    """How a run ended, in words.
+
+    Attributes:
+        completed: the run reached its end.
+        message: what happened, when and where, and what to try; one sentence when all went well.
+        iterations: Newton iterations in all.
+        worst_residual: largest residual left in any step, as a multiple of its tolerance.
+    """
+
+    completed: bool
+    message: str
+    iterations: int
+    worst_residual: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class History:
+    """The record of a cable run.
+
+    Attributes:
+        time: (n,). [s]
+        tow_force: force of the cable on the vehicle, earth axes north, east, down (n, 3). [N]
+        tow_tension: tension at the tow point T(0) (n,). [N]
+        drum_tension: tension at the drum T(S) (n,). [N]
+        length: length of the cable in the water S (n,). [m]
+        tow_point: position of the tow point relative to the drum (n, 3). [m]
+        shapes: node positions relative to the drum, tow point first, one array (nodes, 3) per time. [m]
+        tensions: tensions at the nodes, one array (nodes,) per time. [N]
+        outcome: how the run ended; a stopped run keeps what it has.
+        scheme: the scheme that was used.
+    """
+
+    time: np.ndarray
+    tow_force: np.ndarray
+    tow_tension: np.ndarray
+    drum_tension: np.ndarray
+    length: np.ndarray
+    tow_point: np.ndarray
+    shapes: tuple[np.ndarray, ...]
+    tensions: tuple[np.ndarray, ...]
+    outcome: Outcome
+    scheme: str
+
+    def shape(self, t: float) -> np.ndarray:
+        """Return the node positions (nodes, 3) relative to the drum at the recorded time nearest to t. [m].
+
+        Raises:
+            ValueError: t lies outside the run.
+        """
+        return self.shapes[self._row(t)]
+
+    def tension(self, t: float) -> np.ndarray:
+        """Return the tensions at the nodes (nodes,) at the recorded time nearest to t. [N].
+
+        Raises:
+            ValueError: t lies outside the run.
+        """
+        return self.tensions[self._row(t)]
+
+    @property
+    def closure_error(self) -> np.ndarray:
+        """Distance between the tow point and the end of the cable summed up from the drum (n,). [m]."""
+        return np.array(
+            [np.linalg.norm(shape[0] - x) for shape, x in zip(self.shapes, self.tow_point, strict=True)]
+        )
+
+    def diagnostics(self) -> Mapping[str, float]:
+        """Return the numbers that tell how far to trust the run, by name."""
+        return {
+            "closure_error_m": float(self.closure_error.max()),
+            "smallest_tension_N": float(min(tension.min() for tension in self.tensions)),
+            "newton_iterations": float(self.outcome.iterations),
+            "worst_residual": self.outcome.worst_residual,
+        }
+
+    def _row(self, t: float) -> int:
+        """Return the row whose time is nearest to t."""
+        first, last = self.time[0], self.time[-1]
+        if not first - 1e-9 <= t <= last + 1e-9:
+            message = f"There is no shape at t = {t!r} s: the run covers {first:g} to {last:g} s."
+            raise ValueError(message)
+        return int(np.abs(self.time - t).argmin())

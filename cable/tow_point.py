@@ -1,0 +1,35 @@
+"""The two ends of the cable: tensions there, and how the tow force answers to the tow point."""
+
+from __future__ import annotations
+
+from math import sqrt
+
+import numpy as np
+
+from subzero.compiled import compiled
+
+from .line import Line
+
+
+@compiled
+def ends(line: Line) -> tuple[float, float]:
+    """Return the tensions T(0) at the tow point and T(S) at the drum, of the last solved step. [N].
+
+    T(0) is the size of the force (12); T(S) is the tension that drives the drum (11), with the drag and the inertia
+    of the last half segment; a slack end has none.
+    """
+    F = line.tow_force
+    return sqrt(F[0] * F[0] + F[1] * F[1] + F[2] * F[2]), max(line.drum_pull[0], 0.0)
+
+
+@compiled
+def impedance(line: Line, Z: np.ndarray) -> None:
+    """Fill Z = ∂F/∂x (3, 3), the change of the tow force by a displacement of the tow point at the end of the step.
+
+    Taken from the last Newton matrix, the answer of the whole cable included. [N/m].
+    """
+    for i in range(3):
+        for k in range(3):
+            Z[i, k] = line.tow_by_tow[i, k]
+            for m in range(4):
+                Z[i, k] -= line.tow_by_block[i, m] * line.tow_answer[k, m]
