@@ -41,6 +41,10 @@ class ServoNumbers(NamedTuple):
     half_backlash: float
 
 
+Servos = tuple[ServoNumbers, ServoNumbers, ServoNumbers]
+"""Those of rudder, port plane and starboard plane."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Servo:
     """One servo with its linkage."""
@@ -80,23 +84,14 @@ def servo_angle(angle: float, command: float, servo: ServoNumbers) -> float:
 
 
 @compiled
-def fin_angle(
-    state: np.ndarray,
-    command: np.ndarray,
-    which: int,
-    servos: tuple[ServoNumbers, ServoNumbers, ServoNumbers],
-) -> float:
-    """Return the angle of a fin in the water [rad]: 0 rudder, 1 port plane, 2 starboard plane."""
-    servo = servos[which]
-    angle = servo_angle(state[SERVO + which], command[1 + which], servo)
-    play = servo.half_backlash
-    return max(angle - play, min(angle + play, state[LINKAGE + which]))
+def fin_angle(angle: float, linkage: float, command: float, servo: ServoNumbers) -> float:
+    """Return the angle of a fin in the water, from the angles of servo, linkage and command [rad]."""
+    where = servo_angle(angle, command, servo)
+    return max(where - servo.half_backlash, min(where + servo.half_backlash, linkage))
 
 
 @compiled
-def settle(
-    state: np.ndarray, command: np.ndarray, servos: tuple[ServoNumbers, ServoNumbers, ServoNumbers]
-) -> None:
+def settle(state: np.ndarray, command: np.ndarray, servos: Servos) -> None:
     """Move the linkages of a state to where their servos have taken them, at the end of a step."""
-    for which in range(3):
-        state[LINKAGE + which] = fin_angle(state, command, which, servos)
+    for i in range(3):
+        state[LINKAGE + i] = fin_angle(state[SERVO + i], state[LINKAGE + i], command[1 + i], servos[i])

@@ -14,7 +14,7 @@ import numpy as np
 from subzero.compiled import compiled
 from vehicle.actuators import fin_angle, servo_rate, settle
 from vehicle.kinematics import motion, normalise, rotation
-from vehicle.motor import battery_current, shaft_rate, shaft_target, voltage
+from vehicle.motor import battery_current, shaft_goal, shaft_rate, shaft_speed, voltage
 from vehicle.state import CHARGE, LINKAGE, SERVO, SHAFT
 from vehicle.terms import TERM_COUNT, fill_terms
 
@@ -37,18 +37,13 @@ def surge_through_water(state: np.ndarray, current_n: np.ndarray) -> float:
 
 
 @compiled
-def shaft_goal(state, command, u, numbers):
-    """Return the shaft speed the motor is heading for [rev/s] at surge speed u through the water [m/s]."""
-    current = battery_current(state[SHAFT], u, numbers.motor, numbers.propeller)
-    return shaft_target(command[0], voltage(state[CHARGE], current, numbers.motor), numbers.motor)
-
-
-@compiled
-def shaft_speed(state, command, u, numbers):
-    """Return the shaft speed [rev/s]: the state's, or the goal itself if the motor has no lag."""
-    if numbers.motor.lag == 0.0:
-        return shaft_goal(state, command, u, numbers)
-    return state[SHAFT]
+def deflections(state, command, numbers):
+    """Return the angles of rudder, port and starboard plane in the water [rad], after backlash."""
+    servos = numbers.servos
+    rudder = fin_angle(state[SERVO], state[LINKAGE], command[1], servos[0])
+    port = fin_angle(state[SERVO + 1], state[LINKAGE + 1], command[2], servos[1])
+    starboard = fin_angle(state[SERVO + 2], state[LINKAGE + 2], command[3], servos[2])
+    return rudder, port, starboard
 
 
 @compiled
@@ -56,21 +51,20 @@ def evaluate(state, command, current_n, wrench_b, numbers, R, nu_r, out):
     """Fill R_nb (3, 3), nu_r (6,) and all terms (terms, 6) of a state."""
     rotation(state[3:7], R)
     relative_velocity(state, R, current_n, nu_r)
-    rudder = fin_angle(state, command, 0, numbers.servos)
-    port = fin_angle(state, command, 1, numbers.servos)
-    starboard = fin_angle(state, command, 2, numbers.servos)
-    n = shaft_speed(state, command, nu_r[0], numbers)
-    fill_terms(state[7:13], nu_r, R, n, (rudder, port, starboard), wrench_b, numbers, out)
+    n = shaft_speed(state[SHAFT], state[CHARGE], command[0], nu_r[0], numbers.motor, numbers.propeller)
+    fill_terms(state[7:13], nu_r, R, n, deflections(state, command, numbers), wrench_b, numbers, out)
 
 
 @compiled
 def actuators(state, command, u, numbers, out):
     """Fill the rates of shaft, servos, charge and linkages; u is the surge speed through the water [m/s]."""
-    out[SHAFT] = shaft_rate(state[SHAFT], shaft_goal(state, command, u, numbers), numbers.motor)
+    motor, propeller = numbers.motor, numbers.propeller
+    goal = shaft_goal(state[SHAFT], state[CHARGE], command[0], u, motor, propeller)
+    out[SHAFT] = shaft_rate(state[SHAFT], goal, motor)
     for i in range(3):
         out[SERVO + i] = servo_rate(state[SERVO + i], command[1 + i], numbers.servos[i])
         out[LINKAGE + i] = 0.0
-    out[CHARGE] = battery_current(state[SHAFT], u, numbers.motor, numbers.propeller)
+    out[CHARGE] = battery_current(state[SHAFT], u, motor, propeller)
 
 
 @compiled
@@ -115,17 +109,9 @@ def finish_step(state, command, numbers):
 
 
 @compiled
-def deflections(state, command, numbers):
-    """Return the angles of rudder, port and starboard plane in the water [rad], after backlash."""
-    rudder = fin_angle(state, command, 0, numbers.servos)
-    port = fin_angle(state, command, 1, numbers.servos)
-    return rudder, port, fin_angle(state, command, 2, numbers.servos)
-
-
-@compiled
 def battery_voltage(state, command, current_n, numbers):
     """Return the battery voltage under load [V]."""
     u = surge_through_water(state, current_n)
-    n = shaft_speed(state, command, u, numbers)
-    current = battery_current(n, u, numbers.motor, numbers.propeller)
-    return voltage(state[CHARGE], current, numbers.motor)
+    motor, propeller = numbers.motor, numbers.propeller
+    n = shaft_speed(state[SHAFT], state[CHARGE], command[0], u, motor, propeller)
+    return voltage(state[CHARGE], battery_current(n, u, motor, propeller), motor)

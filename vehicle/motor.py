@@ -85,6 +85,24 @@ def shaft_target(command: float, volts: float, motor: MotorNumbers) -> float:
 
 
 @compiled
+def shaft_goal(
+    n: float, charge: float, command: float, u: float, motor: MotorNumbers, propeller: PropellerNumbers
+) -> float:
+    """Return the shaft speed the motor heads for [rev/s], with the battery under the load of n and u."""
+    return shaft_target(command, voltage(charge, battery_current(n, u, motor, propeller), motor), motor)
+
+
+@compiled
+def shaft_speed(
+    n: float, charge: float, command: float, u: float, motor: MotorNumbers, propeller: PropellerNumbers
+) -> float:
+    """Return the shaft speed [rev/s]: the state n, or the goal itself if the motor has no lag."""
+    if motor.lag == 0.0:
+        return shaft_goal(n, charge, command, u, motor, propeller)
+    return n
+
+
+@compiled
 def shaft_rate(n: float, target: float, motor: MotorNumbers) -> float:
     """Return n' [rev/s2]."""
     return (target - n) / max(motor.lag, QUICKEST)

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vehicle.actuators import Servo, ServoNumbers
+from vehicle.actuators import Servo, Servos
 from vehicle.added_mass import AddedMass
 from vehicle.axial_drag import AxialDrag
 from vehicle.body_lift import BodyLift
@@ -45,7 +45,7 @@ class VehicleNumbers(NamedTuple):
     propeller: PropellerNumbers
     rudder: FinNumbers
     stern_planes: FinNumbers
-    servos: tuple[ServoNumbers, ServoNumbers, ServoNumbers]
+    servos: Servos
     motor: MotorNumbers
 
 
