@@ -21,7 +21,7 @@ _HOME = {
     "UserError": ("subzero.errors", "UserError"),
     "compare": ("subzero.comparison", "compare"),
     "draw": ("subzero.figures", "draw"),
-    "load_scenario": ("scenarios", "load"),
+    "load_scenario": ("subzero.trials", "load"),
     "read_record": ("subzero.measured", "read_record"),
     "simulate": ("subzero.simulation", "simulate"),
 }

@@ -81,6 +81,7 @@ def simulate(
 
     trial = scenarios.load(scenario, commands_csv=commands)
     with staged(out or _folder(trial)) as stage:
+        trial = _checked(scenario, commands)
         with _progress(trial) as progress:
             from subzero.simulation import simulate as run
 
@@ -112,6 +113,7 @@ def compare(
     trial = scenarios.load(scenario, commands_csv=commands)
     record = read_record(measured) if measured is not None else None
     with staged(out or _folder(trial)) as stage:
+        trial = _checked(scenario, commands)
         with _progress(trial) as progress:
             from subzero.comparison import compare as run
 
@@ -148,6 +150,13 @@ def _in_words(error: cyclopts.CycloptsError) -> str:
     if isinstance(error, cyclopts.UnusedCliTokensError):
         return f"Unexpected argument: {' '.join(error.unused_tokens or [])}."
     return str(error)
+
+
+def _checked(scenario: str, commands: Path | None) -> scenarios.Trial:
+    """Read the scenario again with the vehicle's own check, which needs the compiler and so comes late."""
+    from subzero.trials import load
+
+    return load(scenario, commands_csv=commands)
 
 
 def _folder(trial: scenarios.Trial) -> Path:

@@ -12,6 +12,7 @@ from subzero.fit import Fit, beside, fits
 from subzero.measured import Record, read_record
 from subzero.simulation import simulate
 from subzero.summary import summary_of
+from subzero.trials import load
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -67,7 +68,7 @@ def compare(
         scenarios.ScenarioError: if the scenario cannot be used.
         UserError: if the measured record cannot be used.
     """
-    trial = scenario if isinstance(scenario, scenarios.Trial) else scenarios.load(scenario)
+    trial = scenario if isinstance(scenario, scenarios.Trial) else load(scenario)
     record = read_record(measured) if isinstance(measured, str | Path) else measured
     tethered = simulate(trial, tethered=True, progress=_half(progress, 0.0))
     untethered = simulate(trial, tethered=False, progress=_half(progress, 0.5))

@@ -1,0 +1,47 @@
+"""What the README says is what happens."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+
+from subzero.channels import BY_COLUMN
+from subzero.cli import app
+
+ROOT = Path(__file__).resolve().parents[2]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+SHELL = [line for block in re.findall(r"```sh\n(.*?)```", README, re.DOTALL) for line in block.splitlines()]
+COMMANDS = [line.partition("#")[0].strip() for line in SHELL if line.startswith("subzero ")]
+
+
+def test_two_lines_do_everything_each_with_its_own_environment():
+    lines = [line for line in SHELL if line.startswith("python3 -m venv ")]
+    assert lines == [
+        "python3 -m venv .venv && .venv/bin/pip install . && .venv/bin/subzero compare fig6",
+        'python3 -m venv .venv && .venv/bin/pip install ".[test]" && .venv/bin/pytest',
+    ]
+
+
+def test_ci_takes_its_test_line_from_the_readme():
+    script = (ROOT / ".ci" / "run").read_text(encoding="utf-8")
+    pattern = re.search(r"grep -E '(.*)' README\.md", script)
+    assert pattern is not None
+    found = [line for line in README.splitlines() if re.search(pattern[1], line)]
+    assert found == ['python3 -m venv .venv && .venv/bin/pip install ".[test]" && .venv/bin/pytest']
+    assert all(step in script for step in ("ruff check", "ruff format --check", "mypy", "lint-imports"))
+
+
+@pytest.mark.parametrize("line", COMMANDS)
+def test_every_command_of_the_readme_is_understood(line):
+    command, bound, _ = app.parse_args(shlex.split(line)[1:], exit_on_error=False, print_error=False)
+    assert command.__name__ in ("list_scenarios", "simulate", "compare")
+    assert bound.arguments or command.__name__ == "list_scenarios"
+
+
+def test_every_column_of_the_readme_exists():
+    columns = set(re.findall(r"`(time_s, [^`]*_N), …`", README)[0].split(", "))
+    assert columns
+    assert columns <= set(BY_COLUMN)
