@@ -26,6 +26,7 @@ from vehicle.parameters import Problem, VehicleError, nearest, parameter, read_s
 from vehicle.propeller import Propeller, PropellerNumbers
 from vehicle.restoring import Buoyancy, RestoringNumbers
 from vehicle.rigid_body import RigidBody
+from vehicle.tow_point import TowPoint
 
 
 class VehicleNumbers(NamedTuple):
@@ -79,6 +80,7 @@ class Vehicle:
     rudder_servo: Servo
     stern_plane_port_servo: Servo
     stern_plane_starboard_servo: Servo
+    tow_point: TowPoint
 
     def numbers(self) -> VehicleNumbers:
         """Return what the compiled equations take."""
@@ -134,6 +136,7 @@ SECTIONS: dict[str, type] = {
     "rudder_servo": Servo,
     "stern_plane_port_servo": Servo,
     "stern_plane_starboard_servo": Servo,
+    "tow_point": TowPoint,
 }
 """Every section of a vehicle and the dataclass that reads it."""
 
