@@ -8,7 +8,7 @@ and Σ over the two nodes:
 is equation (22) of Feng and Allen (2004), multiplied by ΔS/2, for w = φ = ½, h = y(t_k) and K half of
 M Δy − ΔS q at t_k; it is fully implicit for w = φ = 1, K = 0; and a stage of any method with ẏ = a (y − h)
 looks the same. Multiplied by ΔS, the equations stay harmless for a short box. A box whose right node is no
-material point but the moving end s = S(t), S = S_h − Vt/a (``rule.moves``), sees the change at fixed s:
+material point but the moving end s = S(t), dS/dt = −Vt (``rule.moves``), sees the change at fixed s:
 a (y − h) + Vt ∂y/∂s there.
 """
 
@@ -37,9 +37,7 @@ class BoxRule(NamedTuple):
     moves: bool
     """The last node is the moving end."""
     end_history: float
-    """S_h [m], when it moves."""
-    end_start: float
-    """s of the last material node [m], when it moves."""
+    """L_h, from which the length L = L_h − Vt/a of the last box is measured when its end moves [m]."""
 
 
 class Ends(NamedTuple):
@@ -53,6 +51,8 @@ class Ends(NamedTuple):
     """I_d/R_d² [kg]."""
     friction: float
     """C_f/R_d [N]."""
+    stands: bool
+    """The drum stands still: Vt = 0 there instead of (26)."""
 
 
 class BoxScratch(NamedTuple):
@@ -233,5 +233,8 @@ def drum_rows(window: np.ndarray, y: np.ndarray, history: np.ndarray, rate: floa
     """Fill rows 3-5 for the last node: Vn = Vb = 0 (24)-(25), and the turning drum (26) over R_d²."""
     window[3, 2], window[3, RIGHT] = 1.0, -y[2]
     window[4, 3], window[4, RIGHT] = 1.0, -y[3]
+    if ends.stands:
+        window[5, 1], window[5, RIGHT] = 1.0, -y[1]
+        return
     window[5, 0], window[5, 1] = 1.0, ends.inertia * rate
     window[5, RIGHT] = ends.friction - y[0] - ends.inertia * rate * (y[1] - history[1])

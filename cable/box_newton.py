@@ -27,13 +27,14 @@ from cable.box_solver import CARRIED, RIGHT, SIZE, WINDOW, back_substitute, carr
 from cable.equation7 import EQUATIONS, Equation7Numbers
 from subzero.compiled import compiled
 
-CONVERGED, STALLED, SINGULAR, NOT_FINITE, FULL = 0, 1, 2, 3, 4
+CONVERGED, STALLED, SINGULAR, NOT_FINITE, FULL, SLACK = 0, 1, 2, 3, 4, 5
 OUTCOMES = (
     "converged",
     "Newton's method stalled: no damped step lowers the residual",
     "the equations do not determine a node (slack cable, or vertical tangent)",
     "a number that is not finite appeared",
     "more nodes are needed than the workspace holds",
+    "the cable goes slack: it would have to push",
 )
 TOW_ROWS, DRUM_ROWS = 6, 7
 ROW_NAMES = (*EQUATIONS, "velocity of the tow point", "conditions at the drum")
@@ -131,9 +132,9 @@ def clear(window: np.ndarray) -> None:
 
 @compiled
 def last_length(w: BoxWorkspace, rule: BoxRule) -> float:
-    """Return the length of the last box: S_h − Vt/a − s of its first node when the end moves. [m]."""
+    """Return the length of the last box, which is L_h − Vt/a when its end moves. [m]."""
     last = w.count[0] - 1
-    return rule.end_history - w.y[last, 1] / rule.rate - rule.end_start if rule.moves else w.length[last]
+    return rule.end_history - w.y[last, 1] / rule.rate if rule.moves else w.length[last]
 
 
 @compiled
@@ -142,7 +143,7 @@ def newton_pass(
 ) -> NewtonReport:
     """Evaluate and eliminate all boxes; outcome 0 when ``w.factors`` is ready for back substitution."""
     last = w.count[0] - 1
-    inner = BoxRule(rule.weight, rule.mix, rule.rate, False, 0.0, 0.0)
+    inner = BoxRule(rule.weight, rule.mix, rule.rate, False, 0.0)
     clear(w.window)
     tow_rows(w.window, w.y[0], ends)
     worst, _ = worst_row(w.window, 0, CARRIED, force, speed)

@@ -10,7 +10,7 @@ At t_k the cable has nodes 0 … k. A step
 Segment length and time step are one thing here, and the cost of a run grows with the square of its length.
 When the drum stands or is overrun (ΔS ≤ 0) the same nodes take the step and no node is added. While there is
 no cable in the water at all, the single node follows the tow point, (8)-(11). Nothing in the printed scheme
-keeps T ≥ 0: after a stop the trapezoidal rule rings about zero for ever (`PaperHistory.smallest_tension`).
+keeps T ≥ 0: after a stop the trapezoidal rule rings about zero for ever (`BoxHistory.smallest_tension`).
 
 ``implicit=True`` takes the same boxes fully implicit in time, which removes the staircase in the tension that
 the trapezoidal rule of (22) leaves; that is our comparison, not the paper's. What the scheme does, with
@@ -21,16 +21,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
-
-import numpy as np
 
 from cable.box_equations import BoxRule, Ends, known_part
+from cable.box_history import BoxHistory, BoxRecord, check_positive, explain, velocity_at
 from cable.box_newton import (
     CONVERGED,
     FULL,
-    OUTCOMES,
-    ROW_NAMES,
     BoxWorkspace,
     NewtonReport,
     box_workspace,
@@ -116,7 +112,7 @@ def paper_step(
         add_node(w, length, wound * length)
     weight = 1.0 if implicit else 0.5
     keep_old_time(w, weight, c)
-    rule = BoxRule(weight, weight, 1.0 / step, False, 0.0, 0.0)
+    rule = BoxRule(weight, weight, 1.0 / step, False, 0.0)
     report = solve_boxes(w, rule, ends, c)
     if report.outcome != CONVERGED:
         copy_nodes(w.history, w.y, before)
@@ -132,37 +128,6 @@ def node_force(w: BoxWorkspace, node: int) -> tuple[float, float, float]:
     return T * north, T * east, T * down
 
 
-@dataclass(frozen=True, kw_only=True)
-class PaperHistory:
-    """What a run of the paper's scheme leaves, one entry per time.
-
-    Attributes:
-        time: (n,) [s].
-        tow_force: force on the vehicle, earth axes. (n, 3) [N]
-        tow_tension: T at the vehicle. (n,) [N]
-        drum_tension: T at the drum. (n,) [N]
-        length: cable in the water. (n,) [m]
-        states: y = [T Vt Vn Vb α β] of every node, from the vehicle to the drum; (nodes, 6) per time.
-        positions: nodes relative to the drum, earth axes; (nodes, 3) per time. [m]
-        iterations: Newton iterations of the step that led to this time. (n,)
-        smallest_tension: of all nodes and times; below zero the printed scheme pushes the cable. [N]
-        converged: whether the whole duration was run.
-        message: "completed", or when, where and why the run stopped, and what to try.
-    """
-
-    time: np.ndarray
-    tow_force: np.ndarray
-    tow_tension: np.ndarray
-    drum_tension: np.ndarray
-    length: np.ndarray
-    states: list[np.ndarray] = field(repr=False)
-    positions: list[np.ndarray] = field(repr=False)
-    iterations: np.ndarray
-    smallest_tension: float
-    converged: bool
-    message: str
-
-
 def pull_out_paper(
     tow_velocity: Callable[[float], Sequence[float]],
     duration: float,
@@ -173,7 +138,7 @@ def pull_out_paper(
     *,
     reading: str = "tangent",
     implicit: bool = False,
-) -> PaperHistory:
+) -> BoxHistory:
     """Pull cable off the drum along a given motion with the paper's scheme (14)-(26).
 
     Args:
@@ -192,95 +157,29 @@ def pull_out_paper(
     Raises:
         ValueError: a reading that is not one of `READINGS`, or a step or duration that is not positive.
     """
-    _check(step, duration, reading)
-    cable, drum = cable or CableProperties(), drum or DrumProperties()
-    north, east, down = (0.0, 0.0, 0.0) if current is None else (float(x) for x in current)
-    c = equation7_numbers(cable, (north, east, down))
-    wound = 1.0 / drum.radius if reading == "drum" else 0.0
-    turning = drum.numbers()
-    steps = max(1, round(duration / step))
-    w = box_workspace(steps + 2)
-    start_paper(w, *_velocity(tow_velocity, 0.0), turning.friction)
-    states, iterations, message = [w.y[:1].copy()], [0], "completed"
-    for k in range(1, steps + 1):
-        ends = Ends(*_velocity(tow_velocity, k * step), turning.inertia, turning.friction)
-        report = paper_step(w, step, ends, wound, implicit, c)
-        if report.outcome != CONVERGED:
-            message = explain(report, k * step, reading, implicit)
-            break
-        states.append(w.y[: w.count[0]].copy())
-        iterations.append(report.iterations)
-    return _history(states, w.length.copy(), step, c.e, np.array(iterations), message)
-
-
-def explain(report: NewtonReport, time: float, reading: str, implicit: bool) -> str:
-    """Say when, where and why a step failed, and what to try."""
-    remedy = "the default scheme (scheme='moving_end')"
-    if reading == "drum":
-        remedy = f"reading='tangent' or {remedy}"
-    elif not implicit:
-        remedy = f"a smaller step, or {remedy}"
-    return (
-        f"Stopped at {time:g} s: {OUTCOMES[report.outcome]}; worst at node {report.node}, "
-        f"{ROW_NAMES[report.row]}, scaled residual {report.residual:.2g} after {report.iterations} "
-        f"iterations. Try {remedy}."
-    )
-
-
-def positions_of(state: np.ndarray, length: np.ndarray, compliance: float = 0.0) -> np.ndarray:
-    """Return node positions relative to the drum, by integrating (1 + eT) t from the drum. (nodes, 3) [m].
-
-    Args:
-        state: y of the nodes, vehicle first. (nodes, 6)
-        length: of the box before each node; the first entry is not used. (nodes,) [m]
-        compliance: e. [1/N]
-    """
-    middle = 0.5 * (state[1:] + state[:-1])
-    alpha, beta = middle[:, 4], middle[:, 5]
-    t = np.stack([np.cos(alpha) * np.cos(beta), -np.sin(alpha) * np.cos(beta), -np.sin(beta)], axis=1)
-    pieces = t * (length[1 : len(state)] * (1.0 + compliance * middle[:, 0]))[:, None]
-    return np.concatenate([-np.cumsum(pieces[::-1], axis=0)[::-1], np.zeros((1, 3))])
-
-
-def _check(step: float, duration: float, reading: str) -> None:
-    """Refuse what cannot be run."""
-    for name, value in (("step", step), ("duration", duration)):
-        if not (math.isfinite(value) and value > 0.0):
-            raise ValueError(f"{name} is {value!r}; it must be a finite number of seconds, more than 0.")
+    check_positive(duration=duration, step=step)
     if reading not in READINGS:
         raise ValueError(f"reading is {reading!r}; it must be one of {', '.join(READINGS)}.")
+    cable, drum = cable or CableProperties(), drum or DrumProperties()
+    north, east, down = (0.0, 0.0, 0.0) if current is None else (float(x) for x in current)
+    c, turning = equation7_numbers(cable, (north, east, down)), drum.numbers()
+    wound = 1.0 / drum.radius if reading == "drum" else 0.0
+    steps = max(1, round(duration / step))
+    w, record = box_workspace(steps + 2), BoxRecord(compliance=c.e)
+    start_paper(w, *velocity_at(tow_velocity, 0.0), turning.friction)
+    record.add(0.0, w, 0)
+    for k in range(1, steps + 1):
+        ends = Ends(*velocity_at(tow_velocity, k * step), turning.inertia, turning.friction, False)
+        report = paper_step(w, step, ends, wound, implicit, c)
+        if report.outcome != CONVERGED:
+            return record.history(explain(report, k * step, _remedy(reading, implicit)))
+        record.add(k * step, w, report.iterations)
+    return record.history()
 
 
-def _velocity(tow_velocity: Callable[[float], Sequence[float]], time: float) -> tuple[float, float, float]:
-    """Return the tow point's velocity as three floats, or refuse it."""
-    north, east, down = (float(x) for x in tow_velocity(time))
-    if not math.isfinite(north + east + down):
-        raise ValueError(f"tow_velocity({time:g}) is ({north}, {east}, {down}); it must be finite, in m/s.")
-    return north, east, down
-
-
-def _history(
-    states: list[np.ndarray],
-    length: np.ndarray,
-    step: float,
-    compliance: float,
-    iterations: np.ndarray,
-    message: str,
-) -> PaperHistory:
-    """Collect the arrays of a run."""
-    first = np.array([y[0] for y in states])
-    directions = np.array([tangent(y[4], y[5]) for y in first])
-    along = np.cumsum(length)
-    return PaperHistory(
-        time=step * np.arange(len(states)),
-        tow_force=first[:, :1] * directions,
-        tow_tension=first[:, 0],
-        drum_tension=np.array([y[-1, 0] for y in states]),
-        length=np.array([along[len(y) - 1] for y in states]),
-        states=states,
-        positions=[positions_of(y, length, compliance) for y in states],
-        iterations=iterations,
-        smallest_tension=min(float(y[:, 0].min()) for y in states),
-        converged=message == "completed",
-        message=message,
-    )
+def _remedy(reading: str, implicit: bool) -> str:
+    """Say what to try when a step fails."""
+    default = "the default scheme (scheme='moving_end')"
+    if reading == "drum":
+        return f"reading='tangent' or {default}"
+    return default if implicit else f"a smaller step, or {default}"

@@ -23,16 +23,16 @@ from cable.properties import CableProperties
 HEAVY = equation7_numbers(CableProperties(mass_per_length=0.02, compliance=0.05), (0.2, 0.1, -0.1))
 TABLE_1 = equation7_numbers(CableProperties())
 RULES = {
-    "trapezoidal": BoxRule(0.5, 0.5, 3.0, False, 0.0, 0.0),
-    "implicit": BoxRule(1.0, 1.0, 3.0, False, 0.0, 0.0),
-    "moving end": BoxRule(1.0, 1.0, 3.0, True, 2.0, 1.7),
+    "trapezoidal": BoxRule(0.5, 0.5, 3.0, False, 0.0),
+    "implicit": BoxRule(1.0, 1.0, 3.0, False, 0.0),
+    "moving end": BoxRule(1.0, 1.0, 3.0, True, 0.3),
 }
 
 
 def window_of(pair, histories, rule):
     """Fill a window with the rows of a box for the two states in `pair` (12,)."""
     window = np.zeros((9, 13))
-    length = rule.end_history - pair[7] / rule.rate - rule.end_start if rule.moves else 0.4
+    length = rule.end_history - pair[7] / rule.rate if rule.moves else 0.4
     left, right = histories
     known = np.zeros(6)
     box_rows(window, pair[:6], pair[6:], left, right, known, length, rule, HEAVY, box_scratch())
@@ -53,7 +53,7 @@ def test_box_slopes_are_the_differences_of_the_box_residual(name):
 
 
 def test_tow_slopes_are_the_differences_of_the_tow_condition():
-    ends, y, step = Ends(0.9, -0.3, 0.4, 0.0, 0.0), np.array([1.0, -1.0, 0.1, 0.2, 0.3, 3.3]), 1e-6
+    ends, y, step = Ends(0.9, -0.3, 0.4, 0.0, 0.0, False), np.array([1.0, -1.0, 0.1, 0.2, 0.3, 3.3]), 1e-6
 
     def rows(state):
         window = np.zeros((9, 13))
@@ -68,7 +68,7 @@ def test_tow_slopes_are_the_differences_of_the_tow_condition():
 def diving_cable(segments, length):
     """Return a workspace with a bent cable in the middle of an implicit step, its rule and its ends."""
     s = np.linspace(0.0, 1.0, segments + 1)
-    w, rule = box_workspace(segments + 2), BoxRule(1.0, 1.0, 1.0 / length, False, 0.0, 0.0)
+    w, rule = box_workspace(segments + 2), BoxRule(1.0, 1.0, 1.0 / length, False, 0.0)
     zero = np.zeros_like(s)
     w.y[: segments + 1] = np.stack(
         [0.5 * (1 - s), zero - 0.97, 0.17 * (1 - s) ** 2, zero, zero, np.pi - 0.3 * (1 - s) ** 2], axis=1
@@ -77,7 +77,7 @@ def diving_cable(segments, length):
     w.count[0] = segments + 1
     add_node(w, length, 0.0)
     keep_old_time(w, 1.0, TABLE_1)
-    return w, rule, Ends(0.93, 0.0, 0.36, 0.0, 0.0)
+    return w, rule, Ends(0.93, 0.0, 0.36, 0.0, 0.0, False)
 
 
 def dense_system(w, rule, ends):
