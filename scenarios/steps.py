@@ -44,7 +44,7 @@ def check_steps(source: Source, run: Mapping[str, float], start: Mapping[str, fl
 def _whole(source: Source, name: str, value: float, step_name: str, step: float) -> list[Problem]:
     """Return the problem that a time is not a whole number of steps, with the nearest that are."""
     ratio = value / step
-    if round(ratio) >= 1 and abs(ratio - round(ratio)) <= TOLERANCE * ratio:
+    if abs(ratio - round(ratio)) <= TOLERANCE * ratio:
         return []
     below, above = int(ratio) * step, (int(ratio) + 1) * step
     near = f"{below:.9g} or {above:.9g}" if below > 0.0 else f"{above:.9g}"

@@ -40,6 +40,11 @@ LOGS = {
         "log.csv, line 4, time_s: found 8.0, but the file ends early: the run lasts 30 s. "
         "Add rows up to 30 s, or set duration_s to 8.",
     ),
+    "two rows far apart": (
+        HEADER + "0,27,0,0,0\n28,27,0,0,0\n",
+        "log.csv, line 3, time_s: found 28.0, but the file ends early: the run lasts 30 s. "
+        "Add rows up to 30 s, or set duration_s to 28.",
+    ),
     "one row": (
         HEADER + "0,27,0,0,0\n",
         "log.csv, line 2, time_s: found 0.0, but the file ends early: the run lasts 30 s. "

@@ -134,6 +134,16 @@ ONE_EDIT = {
         "mine.toml, line 13, commands.rudder_deg: this list has 1 and time_s has 2 values. "
         "Give one value for each time.",
     ),
+    "list too long": (
+        "[0.0, 2.0]", "[0.0, 2.0, 0.0]",
+        "mine.toml, line 13, commands.rudder_deg: this list has 3 and time_s has 2 values. "
+        "Give one value for each time.",
+    ),
+    "integer of thousands of digits": (
+        "0.02", "0x1" + "0" * 5000,
+        "mine.toml, line 6, run.hull_step_s: found a number far too long, but this is not a number. "
+        "Allowed: 0.0001 to 1 s (time step of the vehicle).",
+    ),
     "zero step": (
         "0.02", "0",
         "mine.toml, line 6, run.hull_step_s: found 0, but this is outside its limits. "
@@ -200,6 +210,9 @@ CHANGES = {
     '"cable.normal_drag_coefficient" = "one"':
         "changes.cable.normal_drag_coefficient: found 'one', but this is not a number. "
         "Allowed: 0 to 10; plausible is 0.8 to 1.5.",
+    '"vehicle.rigid_body.mass" = true':
+        "changes.vehicle.rigid_body.mass: found True, but this is not a number. "
+        "Allowed: above 0 kg; plausible is 6.4 to 7.5.",
     '"vehicle.rigid_body.mass" = -7.0':
         "changes.vehicle.rigid_body.mass: found -7.0, but this is outside its limits. "
         "Allowed: above 0 kg; plausible is 6.4 to 7.5.",

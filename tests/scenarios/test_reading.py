@@ -6,11 +6,13 @@ import math
 import pickle
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import scenarios
+import vehicle
 
 COMMANDS = """
 [commands]
@@ -55,6 +57,34 @@ def test_what_is_not_said_takes_its_default(write):
     assert trial.source == "mine.toml", "as the user gave it"
 
 
+def test_every_number_of_a_trial_arrives_where_it_belongs(write):
+    sections = """
+[run]
+duration_s = 12.0
+hull_step_s = 0.05
+cable_step_s = 0.25
+segment_length_m = 0.3
+scheme = "paper_drum"
+[start]
+heading_deg = 90.0
+pitch_deg = -45.0
+roll_deg = 30.0
+depth_m = 2.0
+surge_speed_m_s = 0.7
+wet_length_m = 6.0
+[water]
+current_north_m_s = 0.1
+current_east_m_s = 0.2
+current_down_m_s = 0.3
+"""
+    trial = scenarios.load(write(SHORT.replace("run.duration_s = 10.0", sections)))
+    assert (trial.duration, trial.hull_step, trial.cable_step) == (12.0, 0.05, 0.25)
+    assert (trial.segment_length, trial.scheme, trial.current) == (0.3, "paper_drum", (0.1, 0.2, 0.3))
+    angles = [trial.start.heading, trial.start.pitch, trial.start.roll]
+    np.testing.assert_allclose(angles, [math.pi / 2, -math.pi / 4, math.pi / 6], rtol=1e-15)  # rounding only
+    assert (trial.start.depth, trial.start.surge_speed, trial.start.wet_length) == (2.0, 0.7, 6.0)
+
+
 def test_degrees_become_radians_and_rev_per_second_stay(write):
     trial = scenarios.load(write(SHORT))
     expected = [[20.0, 0.0, 0.0, 0.0], [27.0, math.pi / 2, -math.pi / 4, math.pi / 4]]
@@ -63,7 +93,7 @@ def test_degrees_become_radians_and_rev_per_second_stay(write):
 
 
 def test_commands_from_a_csv_file_are_those_of_the_same_lists(write):
-    log = "# a remark\n" + HEADER + "\n0,20,0,0,0\r\n5,27,90,-45,45\n10,27,90,-45,45\n"
+    log = "\ufeff# a remark\n" + HEADER + "\n0,20,0,0,0\r\n5,27,90,-45,45\n10,27,90,-45,45\n"
     write(log, "log.csv")
     own = scenarios.load(write(SHORT)).commands
     text = SHORT.replace(COMMANDS, '[commands]\nfile = "log.csv"\n')
@@ -98,7 +128,10 @@ def test_a_csv_file_is_looked_for_beside_the_scenario_that_names_it(write, tmp_p
 
 def test_a_motion_may_stand_in_a_csv_file_too(write):
     write("time_s,surge_speed_m_s,pitch_deg,heading_deg\n0,1,-30,10\n10,2,0,0\n", "motion.csv")
-    trial = scenarios.load(write(SHORT.replace(COMMANDS, '[motion]\nfile = "motion.csv"\n')))
+    start = "start = { depth_m = 2.0, wet_length_m = 6.0 }\n"
+    text = SHORT.replace(COMMANDS, start + '[motion]\nfile = "motion.csv"\n')
+    trial = scenarios.load(write(text))
+    assert (trial.start.depth, trial.start.wet_length) == (2.0, 6.0)
     assert trial.commands is None
     assert trial.start.surge_speed == 1.0
     assert trial.start.pitch == pytest.approx(-math.pi / 6, rel=1e-15)
@@ -132,10 +165,8 @@ def test_an_own_vehicle_or_cable_is_a_path_from_the_scenario(write, kind):
 def test_what_a_vehicle_finds_wrong_with_its_numbers_joins_the_problems(write):
     def grumble(vehicle):
         assert vehicle["rigid_body"]["mass"] == 7.0
-        return [
-            scenarios_complaint("rigid_body.mass"),
-            scenarios_complaint("hull.length"),
-        ]
+        said = {"found": "1", "why": "it is not so", "allowed": "another"}
+        return [SimpleNamespace(key=key, **said) for key in ("rigid_body.mass", "hull.length")]
 
     text = SHORT + '[changes]\n"vehicle.rigid_body.mass" = 7.0\n'
     with pytest.raises(scenarios.ScenarioError) as caught:
@@ -146,10 +177,20 @@ def test_what_a_vehicle_finds_wrong_with_its_numbers_joins_the_problems(write):
     assert (own.file, own.key, own.found, own.why) == ("subzero2", "hull.length", "1", "it is not so")
 
 
-def scenarios_complaint(key):
-    from types import SimpleNamespace
+def test_the_vehicles_own_complaints_fit(write):
+    def complaints(numbers):
+        try:
+            vehicle.from_mapping(numbers)
+        except vehicle.VehicleError as error:
+            return error.problems
+        return ()
 
-    return SimpleNamespace(key=key, found="1", why="it is not so", allowed="another")
+    scenarios.load("fig6", check_vehicle=complaints)
+    text = SHORT + "[changes]\nvehicle.hull.nose_length = 0.9\n"
+    with pytest.raises(
+        scenarios.ScenarioError, match="nose 0.9 m and tail 0.25 m, but together they are longer"
+    ):
+        scenarios.load(write(text), check_vehicle=complaints)
 
 
 def test_a_trial_can_be_varied_and_sent_to_another_process():
