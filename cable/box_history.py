@@ -8,10 +8,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from cable.box_newton import OUTCOMES, ROW_NAMES, BoxWorkspace, NewtonReport
+from cable.box_newton import CONVERGED, OUTCOMES, ROW_NAMES, BoxWorkspace, NewtonReport
 from cable.equation7 import tangent
 
+TowVelocity = Callable[[float], Sequence[float] | np.ndarray]
+"""Gives the tow point's velocity (north, east, down) [m/s] at a time [s]."""
 COMPLETED = "completed"
+START = NewtonReport(CONVERGED, 0, 0.0, 0, 0)
+"""The report of the time at which a run starts."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,6 +32,7 @@ class BoxHistory:
         positions: nodes relative to the drum, earth axes; (nodes, 3) per time. [m]
         iterations: Newton iterations of the step that led to this time. (n,)
         smallest_tension: of all nodes and times; below zero the cable would push. [N]
+        residual: largest scaled residual of any step, before its last Newton update. [-]
         converged: whether the whole duration was run.
         message: "completed", or when, where and why the run stopped, and what to try.
     """
@@ -41,6 +46,7 @@ class BoxHistory:
     positions: list[np.ndarray] = field(repr=False)
     iterations: np.ndarray
     smallest_tension: float
+    residual: float
     converged: bool
     message: str
 
@@ -55,6 +61,7 @@ class BoxRecord:
         states: node states, copied at every time.
         lengths: of the box before each node, copied at every time. [m]
         iterations: of Newton's method.
+        residual: the largest so far.
     """
 
     compliance: float
@@ -62,14 +69,16 @@ class BoxRecord:
     states: list[np.ndarray] = field(default_factory=list)
     lengths: list[np.ndarray] = field(default_factory=list)
     iterations: list[int] = field(default_factory=list)
+    residual: float = 0.0
 
-    def add(self, time: float, w: BoxWorkspace, iterations: int) -> None:
-        """Copy the cable as it is now."""
+    def add(self, time: float, w: BoxWorkspace, report: NewtonReport) -> None:
+        """Copy the cable as it is now, and how it was solved."""
         count = int(w.count[0])
         self.times.append(time)
         self.states.append(w.y[:count].copy())
         self.lengths.append(w.length[:count].copy())
-        self.iterations.append(iterations)
+        self.iterations.append(report.iterations)
+        self.residual = max(self.residual, report.residual)
 
     def history(self, message: str = COMPLETED) -> BoxHistory:
         """Return the run so far, with the message that ended it."""
@@ -86,6 +95,7 @@ class BoxRecord:
             positions=[positions_of(y, length, self.compliance) for y, length in pairs],
             iterations=np.array(self.iterations),
             smallest_tension=min(float(y[:, 0].min()) for y in self.states),
+            residual=self.residual,
             converged=message == COMPLETED,
             message=message,
         )
@@ -122,7 +132,7 @@ def check_positive(**values: float) -> None:
             raise ValueError(f"{name} is {value!r}; it must be a finite number, more than 0.")
 
 
-def velocity_at(tow_velocity: Callable[[float], Sequence[float]], time: float) -> tuple[float, float, float]:
+def velocity_at(tow_velocity: TowVelocity, time: float) -> tuple[float, float, float]:
     """Return the tow point's velocity as three floats, or refuse it. [m/s]."""
     north, east, down = (float(x) for x in tow_velocity(time))
     if not math.isfinite(north + east + down):

@@ -24,11 +24,11 @@ back.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 from cable.box_end import MovingEnd, fit_nodes, moving_end, start_moving_end, with_room
 from cable.box_equations import BoxRule, Ends
-from cable.box_history import BoxHistory, BoxRecord, check_positive, explain, velocity_at
+from cable.box_history import START, BoxHistory, BoxRecord, TowVelocity, check_positive, explain, velocity_at
 from cable.box_newton import (
     CONVERGED,
     FULL,
@@ -155,7 +155,7 @@ def box_step(
 
 
 def pull_out_boxes(
-    tow_velocity: Callable[[float], Sequence[float]],
+    tow_velocity: TowVelocity,
     duration: float,
     step: float = 0.1,
     cable: CableProperties | None = None,
@@ -189,20 +189,20 @@ def pull_out_boxes(
     steps = max(1, round(duration / step))
     b = moving_end(64)
     start_moving_end(b, *velocity_at(tow_velocity, 0.0), turning.friction)
-    record.add(0.0, b.boxes, 0)
+    record.add(0.0, b.boxes, START)
     for k in range(steps):
         b = with_room(b, step, segment_length)
         report = _advance(b, tow_velocity, k * step, step, turning, segment_length, c, MOST_HALVINGS)
         if report.outcome != CONVERGED:
             remedy = "another step or segment length, or the default scheme (scheme='moving_end')"
             return record.history(explain(report, (k + 1) * step, remedy))
-        record.add((k + 1) * step, b.boxes, report.iterations)
+        record.add((k + 1) * step, b.boxes, report)
     return record.history()
 
 
 def _advance(
     b: MovingEnd,
-    tow_velocity: Callable[[float], Sequence[float]],
+    tow_velocity: TowVelocity,
     time: float,
     step: float,
     turning: DrumNumbers,

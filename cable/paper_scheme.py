@@ -20,10 +20,10 @@ numbers: ``docs/paper_scheme.md``.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 from cable.box_equations import BoxRule, Ends, known_part
-from cable.box_history import BoxHistory, BoxRecord, check_positive, explain, velocity_at
+from cable.box_history import START, BoxHistory, BoxRecord, TowVelocity, check_positive, explain, velocity_at
 from cable.box_newton import (
     CONVERGED,
     FULL,
@@ -129,7 +129,7 @@ def node_force(w: BoxWorkspace, node: int) -> tuple[float, float, float]:
 
 
 def pull_out_paper(
-    tow_velocity: Callable[[float], Sequence[float]],
+    tow_velocity: TowVelocity,
     duration: float,
     step: float,
     cable: CableProperties | None = None,
@@ -167,13 +167,13 @@ def pull_out_paper(
     steps = max(1, round(duration / step))
     w, record = box_workspace(steps + 2), BoxRecord(compliance=c.e)
     start_paper(w, *velocity_at(tow_velocity, 0.0), turning.friction)
-    record.add(0.0, w, 0)
+    record.add(0.0, w, START)
     for k in range(1, steps + 1):
         ends = Ends(*velocity_at(tow_velocity, k * step), turning.inertia, turning.friction, False)
         report = paper_step(w, step, ends, wound, implicit, c)
         if report.outcome != CONVERGED:
             return record.history(explain(report, k * step, _remedy(reading, implicit)))
-        record.add(k * step, w, report.iterations)
+        record.add(k * step, w, report)
     return record.history()
 
 
