@@ -46,7 +46,6 @@ class RigidBody:
         matrix[:3, :3] = self.mass * np.eye(3)
         matrix[:3, 3:] = -self.mass * S
         matrix[3:, :3] = self.mass * S
-        matrix[3:, 3:] = (
-            np.diag([self.roll_inertia, self.pitch_inertia, self.yaw_inertia]) - self.mass * S @ S
-        )
+        inertia = np.diag([self.roll_inertia, self.pitch_inertia, self.yaw_inertia])
+        matrix[3:, 3:] = inertia - self.mass * S @ S
         return matrix

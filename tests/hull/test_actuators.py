@@ -92,6 +92,28 @@ def test_the_shaft_follows_with_its_lag_and_stops_at_the_ceiling_of_the_battery(
         assert last[13] == pytest.approx(sign * subzero2.motor.speed_per_volt * volts, rel=3e-3)
 
 
+def test_the_battery_gives_what_the_shaft_takes(subzero2):
+    """I = 2π n Q/(η V) + hotel, V = V_full − k q − R I, at a state written down by hand."""
+    n, u, charge = 24.0, 0.8, 500.0
+    P, motor, battery = subzero2.propeller, subzero2.motor, subzero2.battery
+    J = (1 - P.wake_fraction) * u / (n * P.diameter)
+    KQ = P.torque_constant - P.torque_slope * J - P.torque_curvature * J**2
+    shaft = 2 * math.pi * n * 1000 * n**2 * P.diameter**5 * KQ
+    current = shaft / (motor.efficiency * battery.full_voltage) + battery.hotel_current
+    volts = (
+        battery.full_voltage
+        - battery.voltage_drop_per_charge * charge
+        - battery.internal_resistance * current
+    )
+    state = vehicle.initial_state(velocity=(u, 0, 0, 0, 0, 0), propeller_speed=n)
+    state[17] = charge
+    numbers, rate = subzero2.numbers(), np.empty(vehicle.STATE_SIZE)
+    command = np.array([n, 0, 0, 0])
+    vehicle.derivative(state, command, np.zeros(3), np.zeros(6), numbers, rate)
+    assert rate[17] == pytest.approx(current)
+    assert vehicle.battery_voltage(state, command, np.zeros(3), numbers) == pytest.approx(volts)
+
+
 def test_the_battery_sags_with_use_and_an_open_loop_motor_slows_down(subzero2):
     weak = subzero2.with_parameter("battery.voltage_drop_per_charge", 1e-2)
     run = vehicle.free_run(weak, vehicle.initial_state(), (24, 0, 0, 0), 60.0)
