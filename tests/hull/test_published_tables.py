@@ -1,8 +1,8 @@
 """REMUS 100 as data alone: Prestero's table (2001, adjusted set) put into a vehicle comes out of it again.
 
 Card: coefficients as listed in hull_parameters 3.1, rho 1030; hull lift and fins split as printed there; the
-pair of fins has Y_uu_dr 9.64 kg/(m rad) at x -0.638 m. Tolerance 2 %: the table is printed to three digits and
-its M_rp, N_pq (4.86) carry a rounding of their own (4.88 and 0.0704 make 4.81).
+pair of fins has Y_uu_dr 9.64 kg/(m rad) at x -0.638 m. Tolerance 2 %: the table is printed to three digits
+and its M_rp, N_pq (4.86) carry a rounding of their own (4.88 and 0.0704 make 4.81).
 """
 
 import copy
