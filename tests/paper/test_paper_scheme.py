@@ -5,6 +5,9 @@ Configuration: Table 1, tow point half a metre behind the hull's centre, Δt = 1
 Tolerances: rounding on the straight line; 5e-4 N, half the last printed digit, beside the prototype's dive.
 """
 
+import importlib.util
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -175,3 +178,16 @@ def test_what_cannot_be_run_is_refused_by_name(bad):
     arguments = {"duration": 1.0, "step": 0.5, **bad}
     with pytest.raises(ValueError, match=next(iter(bad))):
         pull_out_paper(ahead, **arguments)
+
+
+def test_the_page_on_the_paper_scheme_shows_what_its_command_prints():
+    root = Path(__file__).parents[2]
+    spec = importlib.util.spec_from_file_location("paper_scheme", root / "benchmarks" / "paper_scheme.py")
+    assert spec is not None
+    assert spec.loader is not None
+    benchmark = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(benchmark)
+    page = (root / "docs" / "paper_scheme.md").read_text(encoding="utf-8")
+    for make in (benchmark.straight_table, benchmark.stop_table):
+        for line in make().splitlines():
+            assert line in page, f"not in docs/paper_scheme.md, run python -m benchmarks.paper_scheme: {line}"
