@@ -73,7 +73,7 @@ class BoxWorkspace(NamedTuple):
     length: np.ndarray
     """Length of box j [m]."""
     count: np.ndarray
-    """(1,), the number of nodes in use."""
+    """(2,): the number of nodes in use, and before the last step of the paper's scheme."""
     factors: np.ndarray
     orders: np.ndarray
     window: np.ndarray
@@ -89,7 +89,7 @@ def box_workspace(capacity: int) -> BoxWorkspace:
         base=np.zeros((capacity, SIZE)),
         update=np.zeros((capacity, SIZE)),
         length=np.zeros(capacity),
-        count=np.zeros(1, dtype=np.int64),
+        count=np.zeros(2, dtype=np.int64),
         factors=np.zeros((capacity, SIZE, RIGHT + 1)),
         orders=np.zeros((capacity, SIZE), dtype=np.int64),
         window=np.zeros((WINDOW, RIGHT + 1)),

@@ -102,6 +102,8 @@ def paper_step(
         The outcome; the force on the vehicle is T t of node 0, `node_force`.
     """
     before = w.count[0]
+    w.count[1] = before
+    copy_nodes(w.y, w.history, before)
     length = -w.y[before - 1, 1] * step
     if length <= NOTHING and before == 1:
         start_paper(w, ends.north, ends.east, ends.down, ends.friction)
@@ -115,9 +117,15 @@ def paper_step(
     rule = BoxRule(weight, weight, 1.0 / step, False, 0.0)
     report = solve_boxes(w, rule, ends, c)
     if report.outcome != CONVERGED:
-        copy_nodes(w.history, w.y, before)
-        w.count[0] = before
+        undo_paper_step(w)
     return report
+
+
+@compiled
+def undo_paper_step(w: BoxWorkspace) -> None:
+    """Take back the last step, so that a coupled vehicle can ask again with another velocity."""
+    w.count[0] = w.count[1]
+    copy_nodes(w.history, w.y, w.count[0])
 
 
 @compiled

@@ -11,7 +11,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cable.paper_scheme import pull_out_paper
+from cable.box_equations import Ends
+from cable.box_newton import box_workspace
+from cable.equation7 import equation7_numbers
+from cable.paper_scheme import node_force, paper_step, pull_out_paper, start_paper, undo_paper_step
 from cable.properties import CableProperties, DrumProperties
 
 DRAG = 0.5 * 1000.0 * np.pi * 0.0025 * 0.01
@@ -140,6 +143,20 @@ def test_a_run_that_stops_says_when_where_and_what_to_try():
     assert "node 45" in run.message
     assert "Try reading='tangent'" in run.message
     assert len(run.time) == len(run.states) == len(run.positions) == 46
+
+
+def test_a_step_taken_back_and_taken_again_gives_the_same_bits():
+    c, w = equation7_numbers(CableProperties()), box_workspace(12)
+    start_paper(w, 1.0, 0.0, 0.0, 0.0)
+    forces = []
+    for k in range(1, 9):
+        right, wrong = (Ends(1.0, 0.05 * k * x, 0.0, 0.0, 0.0, False) for x in (1.0, -3.0))
+        assert paper_step(w, 0.5, wrong, 0.0, False, c).outcome == 0
+        undo_paper_step(w)
+        assert paper_step(w, 0.5, right, 0.0, False, c).outcome == 0
+        forces.append(node_force(w, 0))
+    plain = pull_out_paper(lambda t: (1.0, 0.1 * t, 0.0), 4.0, 0.5)
+    assert (plain.tow_force[1:] == np.array(forces)).all()
 
 
 def test_a_stopped_drum_adds_no_node_and_keeps_its_length():
