@@ -1,1 +1,31 @@
-"""The tether."""
+"""The cable: a thin, flexible, growing line in water, pulled off a drum; it knows no vehicle.
+
+Everything is SI, earth axes are north, east, down, positions are relative to the drum. The arc length s runs from
+the tow point to the drum, the tangent t points that way, so V_t is negative while cable is pulled out.
+
+symbol         name                                  unit      equation                           file
+-------------  ------------------------------------  --------  ---------------------------------  ---------------
+T              tension                               N         (7), slack law T σ = T₀            slack
+t, d           tangent, chord of a segment           1, m      t = d/|d|                          element
+V, U           velocity, and relative to the water   m/s       U = V − J                          element
+p              momentum per length                   kg/s      p = m V + ρA (V − J)_⊥             element
+m, m1          mass, and with added mass, per length kg/m      m1 = m + ρA                        properties
+w_c            weight in water per length            N/m       (m − ρA) g                         properties
+e              compliance 1/(E A)                    1/N       strain e T                         properties
+C_t, C_n       drag coefficients                     1         ½ρπdC_t U_t|U_t|, ½ρdC_n U_⊥|U_⊥|  properties
+S              length in the water                   m         dS/dt = −V_t(S), (14)-(19)         line
+R_d, I_d, C_f  drum: radius, inertia, friction       m …       (11)                               drum
+F_c            force on the vehicle                  N         (12), f_1 − ½Q_1                   assembly
+α, β           angles of the paper's local frame     rad       (3)-(4)                            equation7
+
+The balances are vectors, `element` and `assembly` (their equivalence with the paper's six scalar equations, whose
+signs are derived anew, is in `equation7` and tested); time is differenced backward, `differences`; a step is solved by
+Newton's method, `newton`, on a block tridiagonal system, `blocks`, and made real by `stepping`. The paper's own scheme
+(20)-(26) stands beside it as `paper_scheme`.
+"""
+
+from cable.history import History, Outcome
+from cable.properties import CableProperties, DrumProperties
+from cable.pull_out import SCHEMES, pull_out
+
+__all__ = ["SCHEMES", "CableProperties", "DrumProperties", "History", "Outcome", "pull_out"]

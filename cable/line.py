@@ -106,6 +106,14 @@ def new_line(capacity: int) -> Line:
     )
 
 
+def enlarged(line: Line, capacity: int) -> Line:
+    """Return the same line with room for `capacity` segments."""
+    larger = new_line(capacity)
+    for old, new in zip(line, larger, strict=True):
+        new[tuple(slice(0, size) for size in old.shape)] = old
+    return larger
+
+
 @compiled
 def lay_straight(
     line: Line, wet_length: float, direction: np.ndarray, speed: float, segment_length: float, c: CableNumbers

@@ -78,7 +78,7 @@ def _peak(run: Summary, value: str, time: str, digits: int) -> str:
 
 
 def _plain(value: float | None, digits: int) -> str:
-    return NOTHING if value is None else f"{value + 0.0:.{digits}f}"
+    return NOTHING if value is None else f"{round(value, digits) + 0.0:.{digits}f}"
 
 
 def _add_energy(table: Table, balances: list[Summary]) -> None:

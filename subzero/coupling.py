@@ -1,0 +1,189 @@
+"""Hull and cable, step by step together: both must agree on force and motion at the end of every exchange.
+
+In an exchange of length h the hull is pulled by a force that goes linearly from F_n to F_{n+1}; the cable is solved for
+the place to which that takes the tow point; and F_{n+1} is right when the cable answers with it:
+
+    G(F) = F_cable(x_tow(F)) − F = 0
+
+Newton's method solves it, with the cable's own ∂F/∂x (`cable.tow_point.impedance`) and the hull's ∂x/∂F = (h²/6) A,
+A the inverse mass at the tow point. A loose exchange (last step's force) would be unstable for a cable heavier than
+the vehicle; this one is stable for any, and costs two to three evaluations. An exchange that does not converge is
+tried again in halves.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cable.energy import energy_flow
+from cable.newton import Solved
+from cable.stepping import accept, try_step
+from cable.tow_point import impedance
+from subzero.compiled import compiled
+from subzero.energy import book
+from subzero.hull import advance_hull, follow_track, tow_point
+from subzero.run_state import Live, Setup
+from vehicle import STATE_SIZE
+
+MOST_EXCHANGES = 25
+FORCE_TOLERANCE = 1e-9
+"""Hull and cable agree when their forces differ by less than this fraction (and 1e-11 N)."""
+MOST_HALVINGS = 8
+FASTEST = 50.0
+"""Speed beyond which a run is stopped as absurd. [m/s]"""
+
+FINE, CABLE_FAILED, DISAGREED, ABSURD = range(4)
+"""How an exchange ended."""
+
+
+@compiled
+def exchange(setup: Setup, live: Live, start: float, span: float) -> tuple[int, Solved]:
+    """Take one exchange from `start`, in halves where needed; the live state moves on only as far as it went well."""
+    done, step = 0.0, span
+    while True:
+        last = done + step >= span * (1.0 - 1e-9)
+        mode = live.line.drum_mode[0]
+        ending, solved = _agree(setup, live, start + done, step)
+        if ending == FINE:
+            _accept(setup, live, start + done, step)
+            done += step
+            if last:
+                return FINE, solved
+            step = min(2.0 * step, span - done)
+        else:
+            live.line.drum_mode[0] = mode
+            step *= 0.5
+            if step < span * 0.5**MOST_HALVINGS or ending == ABSURD:
+                return ending, solved
+
+
+@compiled
+def hull_steps(setup: Setup, span: float) -> int:
+    """Return how many hull steps an exchange takes."""
+    return max(1, int(np.ceil(span / setup.hull_step - 1e-6)))
+
+
+@compiled
+def _agree(setup: Setup, live: Live, start: float, span: float) -> tuple[int, Solved]:
+    """Find the force at the end of an exchange with which hull and cable agree; nothing is made real yet."""
+    solved = Solved(True, 0, 0.0, 0, 0)
+    ratio = span / live.last_step[0] if live.last_step[0] > 0.0 else 0.0
+    for i in range(3):
+        live.guess[i] = live.force[i] + ratio * (live.force[i] - live.force_before[i])
+    for _ in range(MOST_EXCHANGES):
+        if not _move(setup, live, start, span):
+            return ABSURD, solved
+        if not setup.tethered:
+            return FINE, solved
+        solved = try_step(
+            live.line, span, live.tow, setup.current, setup.cable, setup.drum, live.load
+        )
+        if not solved.converged:
+            return CABLE_FAILED, solved
+        if setup.prescribed or _forces_agree(live.line.tow_force, live.guess):
+            return FINE, solved
+        _mobility(setup.r_c, live.hull.rotation, setup.vehicle.inverse_mass, live.gain)
+        impedance(live.line, live.Z)
+        _improve(span, live.Z, live.gain, live.line.tow_force, live.guess)
+    return DISAGREED, solved
+
+
+@compiled
+def _move(setup: Setup, live: Live, start: float, span: float) -> bool:
+    """Move the hull through an exchange; fill the tow point, relative to the drum; False if the speed is absurd."""
+    steps, hull = hull_steps(setup, span), live.hull
+    for i in range(STATE_SIZE):
+        hull.path[0, i] = live.state[i]
+    if setup.prescribed:
+        follow_track(start, span, steps, setup.track, hull)
+    else:
+        advance_hull(setup, live, start, span, steps)
+    new = hull.path[steps]
+    speed = new[7] * new[7] + new[8] * new[8] + new[9] * new[9]
+    if not speed < FASTEST * FASTEST:
+        return False
+    tow_point(new, setup.r_c, hull.rotation, live.tow)
+    for i in range(3):
+        live.tow[i] -= setup.drum_place[i]
+    return True
+
+
+@compiled
+def _forces_agree(F: np.ndarray, guess: np.ndarray) -> bool:
+    """Say whether the cable answers with the force that the hull was pulled by."""
+    size, gap = 0.0, 0.0
+    for i in range(3):
+        size = max(size, abs(F[i]))
+        gap = max(gap, abs(F[i] - guess[i]))
+    return gap <= FORCE_TOLERANCE * size + 1e-11
+
+
+@compiled
+def _improve(span: float, Z: np.ndarray, A: np.ndarray, F: np.ndarray, guess: np.ndarray) -> None:
+    """Take one Newton step on the force: (I − (h²/6) Z A) δ = F_cable − guess."""
+    M, b = np.empty((3, 3)), np.empty(3)
+    for i in range(3):
+        b[i] = F[i] - guess[i]
+        for k in range(3):
+            total = 0.0
+            for m in range(3):
+                total += Z[i, m] * A[m, k]
+            M[i, k] = (1.0 if i == k else 0.0) - span * span / 6.0 * total
+    _solve_three(M, b)
+    for i in range(3):
+        guess[i] += b[i]
+
+
+@compiled
+def _mobility(r: np.ndarray, R: np.ndarray, inverse: np.ndarray, out: np.ndarray) -> None:
+    """Fill out (3, 3) with A = R [I, −r×] M⁻¹ [I, −r×]ᵀ Rᵀ, acceleration of the tow point per force. [1/kg]."""
+    lever = np.zeros((3, 6))
+    for i in range(3):
+        lever[i, i] = 1.0
+    lever[0, 4], lever[0, 5] = r[2], -r[1]
+    lever[1, 3], lever[1, 5] = -r[2], r[0]
+    lever[2, 3], lever[2, 4] = r[1], -r[0]
+    turned = np.zeros((3, 6))
+    for i in range(3):
+        for k in range(6):
+            for m in range(3):
+                turned[i, k] += R[i, m] * lever[m, k]
+    for i in range(3):
+        for k in range(3):
+            out[i, k] = 0.0
+            for m in range(6):
+                for n in range(6):
+                    out[i, k] += turned[i, m] * inverse[m, n] * turned[k, n]
+
+
+@compiled
+def _solve_three(M: np.ndarray, b: np.ndarray) -> None:
+    """Overwrite b (3,) with M⁻¹b by elimination without pivoting: M is the identity plus a stiffness times a mobility,
+    whose leading minors stay positive.
+    """
+    for k in range(3):
+        for i in range(k + 1, 3):
+            factor = M[i, k] / M[k, k]
+            for m in range(k, 3):
+                M[i, m] -= factor * M[k, m]
+            b[i] -= factor * b[k]
+    for k in range(2, -1, -1):
+        for m in range(k + 1, 3):
+            b[k] -= M[k, m] * b[m]
+        b[k] /= M[k, k]
+
+
+@compiled
+def _accept(setup: Setup, live: Live, start: float, span: float) -> None:
+    """Make the exchange real: state, forces, cable, energies."""
+    steps, hull = hull_steps(setup, span), live.hull
+    for i in range(3):
+        live.force_before[i] = live.force[i]
+        live.force[i] = live.line.tow_force[i] if setup.tethered else 0.0
+    for i in range(STATE_SIZE):
+        live.state[i] = hull.path[steps, i]
+    live.last_step[0] = span
+    if setup.tethered:
+        accept(live.line, span, setup.current, setup.cable, setup.segment_length, live.load)
+        energy_flow(live.line, setup.current, setup.cable, live.load, live.ledger.cable_new)
+    book(setup, live, start, span, steps)

@@ -1,0 +1,157 @@
+"""Label a finished run: one variable per channel with its unit, arrays with named axes, and where it all came from."""
+
+from __future__ import annotations
+
+import json
+from importlib.metadata import version
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+
+import scenarios
+import vehicle
+from subzero.channels import BY_NAME, CHANNELS, TIME
+from subzero.model import Model
+
+if TYPE_CHECKING:
+    from subzero.simulation import Run
+
+NO_PULL = 1e-9
+"""A tow force below this has no direction; then the cable is taken to lie straight behind the vehicle. [N]"""
+
+ENERGY_CHANNELS = (
+    "energy_propeller_work",
+    "energy_hull_loss",
+    "energy_cable_loss",
+    "energy_kinetic_change",
+    "energy_drum",
+    "energy_added_mass_term",
+    "energy_residual",
+)
+"""In the order of `subzero.energy`."""
+
+AXES = {
+    "term": list(vehicle.BREAKDOWN),
+    "component": ["X", "Y", "Z", "K", "M", "N"],
+    "earth_axis": ["north", "east", "down"],
+}
+LIBRARIES = ("numpy", "numba", "xarray")
+
+
+def dataset_of(trial: scenarios.Trial, model: Model, tethered: bool, run: Run) -> xr.Dataset:
+    """Return a run as a labelled dataset; angles in degrees, all other channels in SI and rev/s."""
+    values = channel_values(run, model)
+    data: dict[str, Any] = {
+        channel.name: ("time", values[channel.name] * channel.scale, channel.attributes)
+        for channel in CHANNELS
+    }
+    data |= _arrays(run)
+    coordinates = {TIME.name: ("time", run.times, TIME.attributes)} | AXES
+    return xr.Dataset(data, coords=coordinates, attrs=_provenance(trial, model, tethered, run))
+
+
+def channel_values(run: Run, model: Model) -> dict[str, np.ndarray]:
+    """Return every channel by name, in SI units (propeller speeds in rev/s)."""
+    r = run.recording
+    attitude, velocity = _attitudes(r.state), r.state[:, 7:13]
+    names = ("north", "east", "depth", "roll", "pitch", "heading")
+    values = dict(zip(names, (*r.state[:, :3].T, *attitude), strict=True))
+    rates = ("surge_speed", "sway_speed", "heave_speed", "roll_rate", "pitch_rate", "yaw_rate")
+    values |= dict(zip(rates, velocity.T, strict=True))
+    values["speed_over_ground"] = np.linalg.norm(velocity[:, :3], axis=1)
+    fins = ("rudder", "stern_plane_port", "stern_plane_starboard")
+    values["propeller_speed"], values["propeller_command"] = r.state[:, 13], r.command[:, 0]
+    values |= {f"{fin}_angle": r.fins[:, i] for i, fin in enumerate(fins)}
+    values |= {f"{fin}_command": r.command[:, 1 + i] for i, fin in enumerate(fins)}
+    values["battery_voltage"] = r.voltage
+    values["cable_tension"] = np.linalg.norm(r.tow_force, axis=1)
+    values["drum_tension"], values["cable_length"] = r.drum_tension, r.length
+    pulls = [f"cable_force_{axis}" for axis in ("forward", "starboard", "down")]
+    twists = [f"cable_moment_{axis}" for axis in ("roll", "pitch", "yaw")]
+    values |= dict(zip(pulls + twists, r.wrench.T, strict=True))
+    local = [f"tow_velocity_{axis}" for axis in ("tangential", "normal", "binormal")]
+    values |= dict(zip(local, _tow_velocities(run, model), strict=True))
+    return values | dict(zip(ENERGY_CHANNELS, r.energy.T, strict=True))
+
+
+def _attitudes(state: np.ndarray) -> np.ndarray:
+    """Return roll, pitch and heading (3, n); the heading continuous, starting in [0, 360) degrees. [rad]."""
+    angles = np.array([vehicle.euler_angles(q) for q in state[:, 3:7]]).T
+    angles[2] = np.unwrap(angles[2])
+    angles[2] += 2.0 * np.pi * (angles[2, 0] < -1e-12)
+    return angles
+
+
+def _tow_velocities(run: Run, model: Model) -> np.ndarray:
+    """Return V_t, V_n, V_b of the tow point (3, n) in the cable's local frame (3)-(4), Fig. 5 (d). [m/s]
+
+    α and β follow from the tangent t = (cosα cosβ, −sinα cosβ, −sinβ) at the tow point, with cosβ ≤ 0: straight
+    ahead to the north α = 0, β = π and V_t = −u.
+    """
+    r = run.recording
+    R = np.array([_rotation(q) for q in r.state[:, 3:7]])
+    spin = np.cross(r.state[:, 10:13], model.vehicle.tow_point.position())
+    V = np.einsum("nij,nj->ni", R, r.state[:, 7:10] + spin)
+    if not r.count.any():
+        return np.zeros((3, run.times.size))
+    pull = np.linalg.norm(r.tow_force, axis=1, keepdims=True)
+    t = np.where(pull > NO_PULL, r.tow_force / np.maximum(pull, NO_PULL), -R[:, :, 0])
+    sin_b = -t[:, 2]
+    cos_b = -np.sqrt(np.maximum(1.0 - sin_b**2, 0.0))
+    alpha = np.where(cos_b < -1e-12, np.arctan2(t[:, 1], -t[:, 0]), 0.0)
+    n = np.stack([-np.cos(alpha) * sin_b, np.sin(alpha) * sin_b, -cos_b], axis=1)
+    b = np.stack([np.sin(alpha), np.cos(alpha), np.zeros_like(alpha)], axis=1)
+    return np.stack([np.einsum("ni,ni->n", V, axis) for axis in (t, n, b)])
+
+
+def _rotation(quaternion: np.ndarray) -> np.ndarray:
+    R = np.zeros((3, 3))
+    vehicle.rotation(quaternion, R)
+    return R
+
+
+def _arrays(run: Run) -> dict[str, Any]:
+    """Return the force breakdown, and the cable's nodes in rows of equal length, NaN behind the last node."""
+    r = run.recording
+    nodes = max(int(r.count.max(initial=0)), 1)
+    position = np.full((run.times.size, nodes, 3), np.nan)
+    tension = np.full((run.times.size, nodes), np.nan)
+    filled = np.arange(nodes) < r.count[:, None]
+    position[filled], tension[filled] = r.position, r.tension
+    about = "relative to the drum; node 0 is the tow point, the last one sits at the drum"
+    return {
+        "force_breakdown": (
+            ("time", "term", "component"),
+            r.breakdown,
+            {"units": "N; N m", "long_name": "share of every term in the force (X, Y, Z) and moment (K, M, N)"},
+        ),
+        "cable_position": (
+            ("time", "node", "earth_axis"),
+            position,
+            {"units": "m", "long_name": f"place of the cable's nodes, {about}"},
+        ),
+        "cable_node_tension": (
+            ("time", "node"),
+            tension,
+            {"units": BY_NAME["cable_tension"].unit, "long_name": "tension along the cable"},
+        ),
+        "node_count": ("time", r.count, {"units": "1", "long_name": "nodes of the cable, 0 without one"}),
+    }
+
+
+def _provenance(trial: scenarios.Trial, model: Model, tethered: bool, run: Run) -> dict[str, Any]:
+    """Return what the result came from; no clock, so that two runs are alike to the last bit."""
+    return {
+        "scenario": trial.name,
+        "title": trial.description,
+        "scenario_text": trial.text,
+        "parameters": json.dumps(model.parameters()),
+        "subzero_version": version("subzero"),
+        "versions": json.dumps({name: version(name) for name in LIBRARIES}),
+        "tethered": int(tethered),
+        "prescribed": int(trial.motion is not None),
+        "scheme": trial.scheme,
+        "outcome": "completed" if run.completed else "stopped",
+        "outcome_message": run.message,
+    }

@@ -1,0 +1,136 @@
+"""Advance the hull over one exchange with the cable, pulled by a force that changes linearly in time.
+
+Classic Runge-Kutta of fourth order in fixed steps. The cable's force is given in earth axes at both ends of the
+exchange; at every stage it is turned into the body's axes with the attitude of that stage, equations (12)-(13):
+
+    F_c = Rᵀ F,    M_c = r_c × F_c
+
+A prescribed run (section 4.1 of the paper, an "idealised vehicle" without dynamics) follows its motion instead.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+import vehicle
+from subzero.compiled import compiled
+from subzero.run_state import HullWork, Live, Setup, Track
+from vehicle import STATE_SIZE
+
+GAUSS_OFFSET = 0.5 * np.sqrt(0.6)
+"""Three-point Gauss quadrature: nodes at the middle and this fraction of a step before and behind it."""
+
+
+@compiled
+def row_at(time: np.ndarray, t: float) -> int:
+    """Return the last row whose time is not later than t (with a nanosecond of grace for rounding)."""
+    low, high = 0, time.size - 1
+    while low < high:
+        middle = (low + high + 1) // 2
+        if time[middle] <= t + 1e-9:
+            low = middle
+        else:
+            high = middle - 1
+    return low
+
+
+@compiled
+def tow_wrench(state: np.ndarray, F: np.ndarray, r_c: np.ndarray, work: HullWork) -> None:
+    """Fill work.wrench (6,) with the force (12) and the moment (13) of a pull F in earth axes (3,). [N, N m]."""
+    R, w = work.rotation, work.wrench
+    vehicle.rotation(state[3:7], R)
+    for i in range(3):
+        w[i] = R[0, i] * F[0] + R[1, i] * F[1] + R[2, i] * F[2]
+    w[3] = r_c[1] * w[2] - r_c[2] * w[1]
+    w[4] = r_c[2] * w[0] - r_c[0] * w[2]
+    w[5] = r_c[0] * w[1] - r_c[1] * w[0]
+
+
+@compiled
+def tow_point(state: np.ndarray, r_c: np.ndarray, R: np.ndarray, out: np.ndarray) -> None:
+    """Fill out (3,) with the place of the tow point in earth axes, η + R r_c. [m]."""
+    vehicle.rotation(state[3:7], R)
+    for i in range(3):
+        out[i] = state[i] + R[i, 0] * r_c[0] + R[i, 1] * r_c[1] + R[i, 2] * r_c[2]
+
+
+@compiled
+def advance_hull(setup: Setup, live: Live, start: float, span: float, steps: int) -> None:
+    """Fill live.hull.path[1 … steps] from path[0], pulled by live.force at the start and live.guess at the end.
+
+    Args:
+        setup: vehicle, water, commands (held during a step).
+        live: forces and work space.
+        start: time of the first state. [s]
+        span: length of the exchange. [s]
+        steps: Runge-Kutta steps in it.
+    """
+    work, orders = live.hull, setup.orders
+    h = span / steps
+    k, stage = work.slopes, work.stage
+    for n in range(steps):
+        state, new = work.path[n], work.path[n + 1]
+        command = orders.values[row_at(orders.time, start + n * h)]
+        for s in range(4):
+            part = 0.0 if s == 0 else (h if s == 3 else 0.5 * h)
+            for i in range(STATE_SIZE):
+                stage[i] = state[i] + (part * k[s - 1, i] if s > 0 else 0.0)
+            along = (n * h + part) / span
+            for i in range(3):
+                work.force[i] = live.force[i] + along * (live.guess[i] - live.force[i])
+            tow_wrench(stage, work.force, setup.r_c, work)
+            vehicle.derivative(stage, command, setup.current, work.wrench, setup.vehicle, k[s])
+        for i in range(STATE_SIZE):
+            new[i] = state[i] + h / 6.0 * (k[0, i] + 2.0 * k[1, i] + 2.0 * k[2, i] + k[3, i])
+        vehicle.finish_step(new, command, setup.vehicle)
+
+
+@compiled
+def _attitude(track: Track, t: float) -> tuple[float, float, float, float, float]:
+    """Return surge speed [m/s], pitch, heading [rad] and the rates of both [rad/s] at t."""
+    row = row_at(track.time, t)
+    if row == track.time.size - 1:
+        return track.surge_speed[row], track.pitch[row], track.heading[row], 0.0, 0.0
+    span = track.time[row + 1] - track.time[row]
+    x = (t - track.time[row]) / span
+    turn, dive = track.heading[row + 1] - track.heading[row], track.pitch[row + 1] - track.pitch[row]
+    speed = track.surge_speed[row] + x * (track.surge_speed[row + 1] - track.surge_speed[row])
+    return speed, track.pitch[row] + x * dive, track.heading[row] + x * turn, dive / span, turn / span
+
+
+@compiled
+def _move(track: Track, t: float, weight: float, state: np.ndarray) -> None:
+    """Add the displacement of `weight` seconds at the velocity of time t."""
+    u, pitch, heading, _, _ = _attitude(track, t)
+    state[0] += weight * u * np.cos(pitch) * np.cos(heading)
+    state[1] += weight * u * np.cos(pitch) * np.sin(heading)
+    state[2] -= weight * u * np.sin(pitch)
+
+
+@compiled
+def pose(track: Track, t: float, state: np.ndarray) -> None:
+    """Write attitude and velocities of a prescribed motion at t into a state."""
+    u, pitch, heading, dive, turn = _attitude(track, t)
+    q = vehicle.quaternion_from_euler(0.0, pitch, heading)
+    for i in range(4):
+        state[3 + i] = q[i]
+    for i in range(6):
+        state[7 + i] = 0.0
+    state[7] = u
+    state[10] = -turn * np.sin(pitch)
+    state[11] = dive
+    state[12] = turn * np.cos(pitch)
+
+
+@compiled
+def follow_track(start: float, span: float, steps: int, track: Track, work: HullWork) -> None:
+    """Fill work.path[1 … steps] with a prescribed motion, positions by three-point Gauss quadrature."""
+    h = span / steps
+    for n in range(steps):
+        new, t = work.path[n + 1], start + n * h
+        for i in range(STATE_SIZE):
+            new[i] = work.path[n, i]
+        _move(track, t + h * (0.5 - GAUSS_OFFSET), h * 5.0 / 18.0, new)
+        _move(track, t + h * 0.5, h * 8.0 / 18.0, new)
+        _move(track, t + h * (0.5 + GAUSS_OFFSET), h * 5.0 / 18.0, new)
+        pose(track, t + h, new)

@@ -1,0 +1,46 @@
+"""The compiled time loop: exchange after exchange, row after row, no Python inside."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cable.newton import Solved
+from subzero.compiled import compiled
+from subzero.coupling import FINE, exchange
+from subzero.recording import Recording, record_row
+from subzero.run_state import Live, Setup
+
+NO_ROOM = 4
+"""The room that was reserved is nearly full: enlarge it and go on; see `subzero.coupling` for the other endings."""
+SPARE = 8
+"""Nodes that one exchange may add. (A tow point at 40 segments a second would need more: `coupling.FASTEST`.)"""
+
+
+@compiled
+def run_rows(
+    setup: Setup, live: Live, recording: Recording, times: np.ndarray, first: int, last: int, used: int
+) -> tuple[int, int, int, Solved]:
+    """Fill rows first … last − 1 of a recording.
+
+    Args:
+        setup: what stays.
+        live: what changes; at times[first − 1] when called.
+        recording: filled.
+        times: of all rows (n,). [s]
+        first: row to begin with.
+        last: row to end before.
+        used: nodes of the recording in use.
+
+    Returns:
+        rows that are filled, nodes in use, how it ended (`coupling.FINE` …), and the cable's last solution.
+    """
+    solved = Solved(True, 0, 0.0, 0, 0)
+    for row in range(first, last):
+        nodes = live.line.count[0] + 1 + SPARE
+        if nodes > live.line.length.size or used + nodes > recording.tension.size:
+            return row, used, NO_ROOM, solved
+        ending, solved = exchange(setup, live, times[row - 1], times[row] - times[row - 1])
+        if ending != FINE:
+            return row, used, ending, solved
+        used = record_row(setup, live, recording, row, times[row], used)
+    return last, used, FINE, solved

@@ -1,0 +1,57 @@
+"""A model is a value: a vehicle, a cable, a drum and the water, frozen. To change one, make a new one.
+
+    >>> import dataclasses, subzero
+    >>> model = subzero.Model.of(subzero.load_scenario("fig6"))
+    >>> heavy = dataclasses.replace(model, vehicle=model.vehicle.with_parameter("rigid_body.mass", 7.0))
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from typing import Any
+
+import cable
+import scenarios
+import vehicle
+
+
+@dataclass(frozen=True, kw_only=True)
+class Model:
+    """Everything physical about a tethered vehicle.
+
+    Attributes:
+        vehicle: the hull with its propeller, fins and servos.
+        cable: the cable.
+        drum: the drum on the shore.
+        current: velocity of the water, north, east, down, the same everywhere. [m/s]
+    """
+
+    vehicle: vehicle.Vehicle
+    cable: cable.CableProperties
+    drum: cable.DrumProperties
+    current: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    @classmethod
+    def of(cls, trial: scenarios.Trial) -> Model:
+        """Return the model that a trial describes.
+
+        Raises:
+            vehicle.VehicleError: its numbers do not make a vehicle (`subzero.load_scenario` has checked them).
+            ValueError: its numbers do not make a cable or a drum.
+        """
+        return cls(
+            vehicle=vehicle.from_mapping(trial.vehicle),
+            cable=cable.CableProperties(**trial.cable),
+            drum=cable.DrumProperties(**trial.drum),
+            current=trial.current,
+        )
+
+    def parameters(self) -> dict[str, Any]:
+        """Return every number by name, ready for JSON."""
+        return {
+            "vehicle": vehicle.to_mapping(self.vehicle),
+            "cable": dataclasses.asdict(self.cable),
+            "drum": dataclasses.asdict(self.drum),
+            "current": list(self.current),
+        }

@@ -1,0 +1,109 @@
+"""What a run keeps: one row per exchange, shapes packed one behind another."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+import vehicle
+from cable.line import NOW
+from cable.tow_point import ends
+from subzero.compiled import compiled
+from subzero.hull import row_at, tow_wrench
+from subzero.run_state import Live, Setup
+from vehicle import BREAKDOWN, STATE_SIZE
+
+
+class Recording(NamedTuple):
+    """The rows of a run, filled up to some row.
+
+    Attributes:
+        state: (n, STATE_SIZE), as in `vehicle.STATE`.
+        fins: rudder, port and starboard plane in the water (n, 3). [rad]
+        command: (n, 4). [rev/s, rad]
+        voltage: of the battery (n,). [V]
+        tow_force: pull of the cable, earth axes (n, 3). [N]
+        wrench: the same on the hull, body axes, with its moment (n, 6). [N, N m]
+        drum_tension, length: (n,). [N, m]
+        breakdown: every term of the hull (n, terms, 6). [N, N m]
+        energy: rows of `subzero.energy` (n, 7). [J]
+        count: nodes (n,), 0 without a cable.
+        position, tension: nodes of all rows, relative to the drum (all, 3) [m]; tension there (all,). [N]
+    """
+
+    state: np.ndarray
+    fins: np.ndarray
+    command: np.ndarray
+    voltage: np.ndarray
+    tow_force: np.ndarray
+    wrench: np.ndarray
+    drum_tension: np.ndarray
+    length: np.ndarray
+    breakdown: np.ndarray
+    energy: np.ndarray
+    count: np.ndarray
+    position: np.ndarray
+    tension: np.ndarray
+
+
+def new_recording(rows: int, nodes: int) -> Recording:
+    """Return an empty recording of `rows` rows, with room for `nodes` nodes in all."""
+    shapes = {
+        "state": (rows, STATE_SIZE),
+        "fins": (rows, 3),
+        "command": (rows, 4),
+        "tow_force": (rows, 3),
+        "wrench": (rows, 6),
+        "breakdown": (rows, len(BREAKDOWN), 6),
+        "energy": (rows, 7),
+        "position": (nodes, 3),
+    }
+    flat = {"voltage": rows, "drum_tension": rows, "length": rows, "tension": nodes}
+    arrays = {name: np.zeros(shape) for name, shape in (shapes | flat).items()}
+    return Recording(**arrays, count=np.zeros(rows, np.int64))
+
+
+@compiled
+def record_row(setup: Setup, live: Live, recording: Recording, row: int, time: float, used: int) -> int:
+    """Write a row for the present state; return how many nodes are in use after it (`used` before)."""
+    state, r = live.state, recording
+    command = setup.orders.values[row_at(setup.orders.time, time)]
+    tow_wrench(state, live.force, setup.r_c, live.hull)
+    for i in range(STATE_SIZE):
+        r.state[row, i] = state[i]
+    for i in range(4):
+        r.command[row, i] = command[i]
+    for i in range(3):
+        r.tow_force[row, i] = live.force[i]
+    for i in range(6):
+        r.wrench[row, i] = live.hull.wrench[i]
+    for i in range(7):
+        r.energy[row, i] = live.ledger.total[i]
+    r.fins[row, 0], r.fins[row, 1], r.fins[row, 2] = vehicle.deflections(state, command, setup.vehicle)
+    if not setup.prescribed:
+        vehicle.breakdown(
+            state, command, setup.current, live.hull.wrench, setup.vehicle, r.breakdown[row]
+        )
+        r.voltage[row] = vehicle.battery_voltage(state, command, setup.current, setup.vehicle)
+    return _record_cable(live, r, row, used) if setup.tethered else used
+
+
+@compiled
+def _record_cable(live: Live, r: Recording, row: int, used: int) -> int:
+    """Write the cable's part of a row."""
+    line = live.line
+    N = line.count[0]
+    tow, r.drum_tension[row] = ends(line)
+    r.length[row] = line.last_length[NOW]
+    for j in range(1, N):
+        r.length[row] += line.length[j]
+    for j in range(N + 1):
+        for i in range(3):
+            r.position[used + j, i] = line.position[NOW, j, i]
+        near = line.tension[NOW, max(j, 1)]
+        r.tension[used + j] = 0.5 * (near + line.tension[NOW, min(j + 1, N)])
+    r.tension[used] = tow
+    r.tension[used + N] = r.drum_tension[row]
+    r.count[row] = N + 1
+    return used + N + 1
