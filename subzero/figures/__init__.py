@@ -14,6 +14,7 @@ from .cable import shape
 from .forces import forces
 from .motion import attitude, figure_6, measured
 from .prescribed import exact_tension, figure_4, figure_5, is_straight
+from .sheet import Title
 from .style import Runs
 
 if TYPE_CHECKING:
@@ -42,13 +43,13 @@ def draw(runs: Runs, record: Record | None = None) -> dict[str, Figure]:
         record: what was measured, drawn as dots.
     """
     first = next(iter(runs.values()))
-    title = f"{first.attrs['scenario']}: {first.attrs['title']}"
+    title = Title(words=first.attrs["title"], scenario=first.attrs["scenario"])
     figures = _prescribed(runs, title) if first.attrs["prescribed"] else _commanded(runs, record, title)
     besides = measured(runs, record, title) if record is not None else None
     return figures if besides is None else {**figures, "measured": besides}
 
 
-def _commanded(runs: Runs, record: Record | None, title: str) -> dict[str, Figure]:
+def _commanded(runs: Runs, record: Record | None, title: Title) -> dict[str, Figure]:
     """Return the figures of a vehicle that follows commands."""
     figures = {"fig6": figure_6(runs, record, title), "attitude": attitude(runs, record, title)}
     if "tethered" in runs:
@@ -57,7 +58,7 @@ def _commanded(runs: Runs, record: Record | None, title: str) -> dict[str, Figur
     return figures
 
 
-def _prescribed(runs: Runs, title: str) -> dict[str, Figure]:
+def _prescribed(runs: Runs, title: Title) -> dict[str, Figure]:
     """Return the figures of an idealised vehicle; without its cable there is nothing to see."""
     if "tethered" not in runs:
         return {}

@@ -8,7 +8,8 @@ import numpy as np
 from matplotlib import colormaps
 
 from . import style
-from .style import headline, label, legend, sheet
+from .panel import calm, headline, in_time, label, legend, spread
+from .sheet import Title, sheet
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -27,12 +28,12 @@ SHAPES = 5
 """So many shapes tell how a cable grows, and can still be told apart."""
 
 
-def shape(run: xr.Dataset, title: str) -> Figure:
+def shape(run: xr.Dataset, title: Title) -> Figure:
     """Draw the cable at several times from above and from the side, and the tension along it."""
     figure, panels = sheet(2, 2, title)
     along = longest(run, NORTH, EAST)
     views = ((panels[0], EAST, NORTH), (panels[1], along, DOWN))
-    times = style.spread(SHAPES, run.sizes["time"])
+    times = spread(SHAPES, run.sizes["time"])
     colours = [colormaps["viridis"](fraction) for fraction in np.linspace(0.0, 0.85, len(times))]
     for at, colour in zip(times, colours, strict=True):
         for axes, right, up in views:
@@ -47,7 +48,7 @@ def shape(run: xr.Dataset, title: str) -> Figure:
     headline(panels[1], "The cable from the east" if along == NORTH else "The cable from the south")
     headline(panels[2], "Tension along the cable")
     label(panels[2], "distance from the vehicle $s$ [m]", "$T$ [N]")
-    legend(panels[2])
+    legend(panels[2], loc="upper right")
     _pull(run, panels[3])
     return figure
 
@@ -109,6 +110,6 @@ def _pull(run: xr.Dataset, axes: Axes) -> None:
     axes.plot(time, run["drum_tension"].values, color=style.GREEN, linewidth=1.2, label="$T(S)$, drum")
     headline(axes, "Tension at the ends")
     label(axes, "time [s]", "$T$ [N]")
-    style.in_time(axes, {"": run})
-    style.calm(axes)
-    legend(axes, loc="upper left")
+    in_time(axes, {"": run})
+    calm(axes)
+    legend(axes)

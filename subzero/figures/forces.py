@@ -10,17 +10,22 @@ from subzero.channels import BY_NAME
 from subzero.summary import ENERGY_PARTS, FORCE, MOMENT
 
 from . import style
-from .style import CYCLE, headline, in_time, label, legend, sheet, time_label
+from .panel import calm, headline, in_time, label, legend, time_label
+from .sheet import Title, sheet
+from .style import CYCLE, DASHES
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+WORDS = {"external": "cable"}
 TERMS_SHOWN = 6
 """The largest terms are drawn each, the others as their sum: more lines cannot be told apart."""
 
-DASHES = ("-", (0, (5, 2)), (0, (1, 1)))
+VISIBLE = 1e-3
+"""What never reaches this share of the largest is not worth a line."""
+
 COMPONENTS = {
     "X": ("Forward force by term", "$X$ [N]"),
     "Y": ("Force to starboard by term", "$Y$ [N]"),
@@ -46,13 +51,13 @@ def cable_forces(run: xr.Dataset, force: Axes, moment: Axes) -> None:
             axes.plot(run["time"].values, run[name].values, color=colour, linestyle=dash, label=symbol)
         label(axes, None, unit)
         in_time(axes, {"": run})
-        style.calm(axes)
-        legend(axes, ncols=3)
+        calm(axes, smallest=1e-4)
+        legend(axes)
     headline(force, "Force of the cable on the vehicle")
     headline(moment, "Moment of the cable on the vehicle")
 
 
-def forces(run: xr.Dataset, title: str) -> Figure:
+def forces(run: xr.Dataset, title: Title) -> Figure:
     """Draw what acts on the vehicle: the cable's force and moment, and every term in three components."""
     figure, panels = sheet(3, 2, title)
     cable_forces(run, panels[0], panels[1])
@@ -64,18 +69,20 @@ def forces(run: xr.Dataset, title: str) -> Figure:
 
 
 def energy(run: xr.Dataset, axes: Axes) -> None:
-    """Draw where the work of the propeller goes: the parts stacked, the work as a line over them."""
+    """Draw where the work of the propeller goes: the parts in colour, the work itself in ink."""
     time = run["time"].values
     parts = [(ENERGY_WORDS[part], np.nan_to_num(run[f"energy_{part}"].values)) for part in ENERGY_PARTS]
-    for (words, values), colour in zip(parts, CYCLE, strict=False):
-        axes.plot(time, values, color=colour, linewidth=1.2, label=words)
     work = run["energy_propeller_work"].values
-    axes.plot(time, work, color=style.INK, linewidth=1.6, linestyle=DASHES[1], label="work of the propeller")
+    seen = VISIBLE * max(np.abs(values).max() for _, values in parts)
+    for (words, values), colour in zip(parts, CYCLE, strict=False):
+        if np.abs(values).max() > seen or words == ENERGY_WORDS["residual"]:
+            axes.plot(time, values, color=colour, linewidth=1.2, label=words)
+    axes.plot(time, work, color=style.INK, linewidth=1.4, label="propeller's work")
     headline(axes, "Energy since the start")
     label(axes, None, "energy [J]")
     in_time(axes, {"": run})
-    style.calm(axes)
-    legend(axes, loc="upper left", fontsize=6.5)
+    calm(axes)
+    legend(axes, columns=2, tight=True)
 
 
 def _busiest(run: xr.Dataset) -> list[str]:
@@ -89,8 +96,8 @@ def _terms(run: xr.Dataset, component: str, axes: Axes) -> None:
     """Draw the largest terms of one component, and the sum of the others."""
     table = np.nan_to_num(run["force_breakdown"].sel(component=component).values)
     size = np.abs(table).max(axis=0)
-    order = [int(at) for at in np.argsort(-size, kind="stable") if size[at] > 1e-3 * size.max()]
-    names = [str(name).replace("_", " ") for name in run["term"].values]
+    order = [int(at) for at in np.argsort(-size, kind="stable") if size[at] > VISIBLE * size.max()]
+    names = [WORDS.get(str(name), str(name)).replace("_", " ") for name in run["term"].values]
     for at, colour in zip(order[:TERMS_SHOWN], CYCLE, strict=False):
         axes.plot(run["time"].values, table[:, at], color=colour, linewidth=1.2, label=names[at])
     if len(order) > TERMS_SHOWN:
@@ -100,6 +107,6 @@ def _terms(run: xr.Dataset, component: str, axes: Axes) -> None:
     headline(axes, words)
     label(axes, None, unit)
     in_time(axes, {"": run})
-    style.calm(axes)
+    calm(axes, smallest=1e-4)
     if order:
-        legend(axes, ncols=2, fontsize=6.5)
+        legend(axes, columns=2, tight=True)

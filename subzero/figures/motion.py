@@ -9,7 +9,9 @@ import numpy as np
 from subzero.channels import BY_NAME
 
 from . import style
-from .style import Runs, channel_panel, headline, label, legend, sheet, time_label
+from .panel import channel_panel, headline, in_time, label, legend, time_label
+from .sheet import Title, sheet
+from .style import Runs
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -33,7 +35,7 @@ SEEN = 1e-3
 """Two angles that differ by less are one line. [degree]"""
 
 
-def figure_6(runs: Runs, record: Record | None, title: str) -> Figure:
+def figure_6(runs: Runs, record: Record | None, title: Title) -> Figure:
     """Draw Fig. 6 of Feng and Allen (2004): propeller command, forward speed, rudder command, heading."""
     figure, panels = sheet(2, 2, title)
     propeller, speed, rudder, heading = panels
@@ -42,7 +44,7 @@ def figure_6(runs: Runs, record: Record | None, title: str) -> Figure:
     headline(propeller, "Propeller command")
     channel_panel(speed, runs, "surge_speed", record)
     headline(speed, "Forward speed")
-    legend(speed, loc="lower right")
+    legend(speed)
     _command(rudder, first, "rudder_command", r"$\delta_{rc}$ [degree]")
     headline(rudder, "Rudder command, positive to starboard")
     channel_panel(heading, runs, "heading", record)
@@ -51,7 +53,7 @@ def figure_6(runs: Runs, record: Record | None, title: str) -> Figure:
     return figure
 
 
-def attitude(runs: Runs, record: Record | None, title: str) -> Figure:
+def attitude(runs: Runs, record: Record | None, title: Title) -> Figure:
     """Draw what the actuators do and how the hull answers: six panels."""
     figure, panels = sheet(3, 2, title)
     for axes, (name, words) in zip(panels, ATTITUDE.items(), strict=True):
@@ -59,12 +61,12 @@ def attitude(runs: Runs, record: Record | None, title: str) -> Figure:
         headline(axes, words)
     _starboard_plane(runs, panels[4])
     panels[1].invert_yaxis()
-    legend(panels[0], loc="lower right")
+    legend(panels[0])
     time_label(panels, 2)
     return figure
 
 
-def measured(runs: Runs, record: Record, title: str) -> Figure | None:
+def measured(runs: Runs, record: Record, title: Title) -> Figure | None:
     """Draw all measured channels that figure 6 and the attitude do not show; None if there are none."""
     names = [name for name in record.values if name not in SHOWN]
     if not names:
@@ -96,6 +98,6 @@ def _command(axes: Axes, run: xr.Dataset, name: str, unit: str) -> None:
     """Draw a command as the steps it is, with zero in view."""
     axes.step(run["time"].values, run[name].values, where="post", **style.COMMAND)
     label(axes, None, unit)
-    style.in_time(axes, {"": run})
+    in_time(axes, {"": run})
     axes.update_datalim([(0.0, 0.0)])
     axes.autoscale_view(scalex=False)

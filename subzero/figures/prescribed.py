@@ -7,10 +7,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from subzero.channels import BY_NAME
+
 from . import style
 from .cable import DOWN, EAST, configurations, longest
 from .forces import cable_forces
-from .style import CYCLE, headline, in_time, label, legend, sheet, time_label
+from .panel import calm, headline, in_time, label, legend, time_label
+from .sheet import Title, sheet
+from .style import CYCLE, DASHES
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -56,7 +60,7 @@ def exact_tension(run: xr.Dataset) -> np.ndarray:
     return (cable["mass_per_length"] * slope + drag * u * np.abs(u)) * S + at_drum * (u > 0.0)
 
 
-def figure_4(run: xr.Dataset, title: str) -> Figure:
+def figure_4(run: xr.Dataset, title: Title) -> Figure:
     """Draw Fig. 4: the computed tension as dots on the exact line, and how far they lie from it."""
     figure, (tension, error) = sheet(1, 2, title)
     time, computed, exact = run["time"].values, run["cable_tension"].values, exact_tension(run)
@@ -67,7 +71,7 @@ def figure_4(run: xr.Dataset, title: str) -> Figure:
     )
     headline(tension, "Tension at the tow point")
     label(tension, None, "$T(0)$ [N]")
-    legend(tension, loc="upper left")
+    legend(tension)
     difference = computed - exact
     power = int(np.floor(np.log10(np.abs(difference).max() or 1.0)))
     error.plot(time, difference / 10.0**power, color=style.BLUE, linewidth=0.8, marker=".", markersize=2.5)
@@ -79,16 +83,17 @@ def figure_4(run: xr.Dataset, title: str) -> Figure:
     return figure
 
 
-def figure_5(run: xr.Dataset, title: str) -> Figure:
+def figure_5(run: xr.Dataset, title: Title) -> Figure:
     """Draw Fig. 5: manoeuvre, shapes of the cable, tension, tow-point velocity, forces, moments."""
     figure, panels = sheet(3, 2, title)
     manoeuvre, shapes, tension, velocity, force, moment = panels
     dives = longest(run, DOWN, EAST) == DOWN
-    _over_time(run, manoeuvre, {"pitch" if dives else "heading": ""}, "[degree]")
+    angle = "pitch" if dives else "heading"
+    _over_time(run, manoeuvre, {angle: ""}, f"${BY_NAME[angle].symbol}$ [degree]")
     headline(manoeuvre, "Pitch angle, positive nose up" if dives else "Heading, clockwise from north")
     configurations(run, shapes, SHAPE_TIMES)
     headline(shapes, "Shape of the cable")
-    legend(shapes)
+    legend(shapes, loc="lower left")
     _over_time(run, tension, {"cable_tension": ""}, "$T(0)$ [N]")
     headline(tension, "Tension at the tow point")
     components = {"tangential": "$V_t$", "normal": "$V_n$", "binormal": "$V_b$"}
@@ -104,11 +109,10 @@ def figure_5(run: xr.Dataset, title: str) -> Figure:
 
 def _over_time(run: xr.Dataset, axes: Axes, names: dict[str, str], unit: str) -> None:
     """Draw some channels of one unit; those with a symbol are named in a legend."""
-    dashes = ("-", (0, (5, 2)), (0, (1, 1)))
-    for (name, symbol), colour, dash in zip(names.items(), CYCLE, dashes, strict=False):
+    for (name, symbol), colour, dash in zip(names.items(), CYCLE, DASHES, strict=False):
         axes.plot(run["time"].values, run[name].values, color=colour, linestyle=dash, label=symbol)
     label(axes, None, unit)
     in_time(axes, {"": run})
-    style.calm(axes)
+    calm(axes)
     if all(names.values()):
-        legend(axes, ncols=3)
+        legend(axes)

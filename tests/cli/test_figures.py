@@ -56,12 +56,12 @@ def test_a_measured_channel_without_a_panel_gets_one(comparison):
     assert "measured" not in draw(comparison)
 
 
-def test_every_panel_names_its_unit(comparison, make_run):
+def test_every_panel_names_its_unit_and_every_figure_its_trial(comparison, make_run):
     figures = [*draw(comparison).values(), *draw({"tethered": make_run(prescribed="dive")}).values()]
     for figure in [*figures, *draw({"tethered": make_run(prescribed="straight")}).values()]:
         assert all("[" in axes.get_ylabel() for axes in figure.axes)
         assert all("[" in axes.get_xlabel() for axes in figure.axes[-2:])
-        assert figure.get_suptitle().startswith("fig6: a synthetic trial")
+        assert [words.get_text() for words in figure.texts] == ["a synthetic trial", "fig6"]
 
 
 def test_figure_4_sets_the_computed_tension_on_the_exact_line(make_run):
@@ -94,6 +94,32 @@ def test_down_is_down(make_run):
     shapes = draw({"tethered": make_run(prescribed="dive")})["fig5"].axes[1]
     assert shapes.yaxis_inverted()
     assert [one.get_label() for one in shapes.get_lines()] == ["10 s", "15 s", "20 s", "25 s", "30 s"]
+
+
+def test_a_command_holds_until_the_next(comparison):
+    rudder = draw(comparison)["fig6"].axes[2].get_lines()[0]
+    assert rudder.get_drawstyle() == "steps-post"
+
+
+def test_depth_is_drawn_downwards(comparison):
+    figures = draw(comparison)
+    assert figures["attitude"].axes[1].yaxis_inverted()
+    assert figures["cable"].axes[1].yaxis_inverted()
+
+
+def test_the_map_has_east_to_the_right_and_north_up(comparison):
+    plan = draw(comparison)["cable"].axes[0]
+    place = comparison["tethered"]["cable_position"].values[-1]
+    assert any(np.array_equal(one.get_ydata(), place[:, 0], equal_nan=True) for one in plan.get_lines())
+    assert any(np.array_equal(one.get_xdata(), place[:, 1], equal_nan=True) for one in plan.get_lines())
+
+
+def test_forces_are_named_and_the_manoeuvre_chooses_its_components(comparison):
+    forces = draw(comparison)["forces"]
+    assert texts(forces)[2:5] == ["(c) Forward force by term", "(d) Force to starboard by term",
+                                  "(e) Yaw moment by term"]  # fmt: skip
+    named = [one.get_label() for one in forces.axes[2].get_lines()]
+    assert named == ["propeller", "axial drag", "cable"]  # the largest first
 
 
 def test_a_map_shows_both_directions_in_the_same_scale(comparison):

@@ -116,10 +116,13 @@ def test_a_perfect_model_fits_by_100_percent_and_a_constant_record_by_nothing(ma
     assert np.isnan(constant.fit_percent)
 
 
-def test_a_heading_measured_one_turn_away_is_the_same_heading(make_run):
+@pytest.mark.parametrize("offset", [-2.0, 2.0])
+def test_a_heading_measured_whole_turns_away_is_the_same_heading(offset, make_run):
     run = make_run()
-    record = Record(source="", time=run["time"].values, values={"heading": run["heading"].values - 720.0})
-    assert fit(run, beside(record, run), "heading").rmse == pytest.approx(0.0, abs=1e-12)
+    record = Record(
+        source="", time=run["time"].values, values={"heading": run["heading"].values - 720.0 + offset}
+    )
+    assert fit(run, beside(record, run), "heading").bias == pytest.approx(-offset, abs=1e-9)
 
 
 def test_compare_prints_and_stores_the_error_of_each_model(file, rails, capsys, compared):
