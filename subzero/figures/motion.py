@@ -39,13 +39,13 @@ def figure_6(runs: Runs, record: Record | None, title: Title) -> Figure:
     """Draw Fig. 6 of Feng and Allen (2004): propeller command, forward speed, rudder command, heading."""
     figure, panels = sheet(2, 2, title)
     propeller, speed, rudder, heading = panels
-    first = next(iter(runs.values()))
-    _command(propeller, first, "propeller_command", "$n_c$ [rev/s]")
+    longest = max(runs.values(), key=lambda run: run.sizes["time"])
+    _command(propeller, longest, "propeller_command", "$n_c$ [rev/s]")
     headline(propeller, "Propeller command")
     channel_panel(speed, runs, "surge_speed", record)
     headline(speed, "Forward speed")
     legend(speed)
-    _command(rudder, first, "rudder_command", r"$\delta_{rc}$ [degree]")
+    _command(rudder, longest, "rudder_command", r"$\delta_{rc}$ [degree]")
     headline(rudder, "Rudder command, positive to starboard")
     channel_panel(heading, runs, "heading", record)
     headline(heading, "Heading, clockwise from north")

@@ -98,7 +98,10 @@ def figure_5(run: xr.Dataset, title: Title) -> Figure:
     headline(tension, "Tension at the tow point")
     components = {"tangential": "$V_t$", "normal": "$V_n$", "binormal": "$V_b$"}
     _over_time(
-        run, velocity, {f"tow_velocity_{name}": symbol for name, symbol in components.items()}, "[m/s]"
+        run,
+        velocity,
+        {f"tow_velocity_{name}": symbol for name, symbol in components.items()},
+        "velocity [m/s]",
     )
     headline(velocity, "Velocity of the tow point, cable's axes")
     cable_forces(run, force, moment)

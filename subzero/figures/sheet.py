@@ -28,7 +28,7 @@ LEFT, RIGHT = 0.1, 0.985
 BOTTOM, TOP, TITLE_LINE = 0.42, 0.31, 0.16
 """Below the panels; above them without the title; one line of the title. [inch]"""
 
-TITLE_LENGTH = 80
+TITLE_LENGTH = 86
 """So many letters of a title fit on a line, with the scenario's name to its right."""
 
 LETTERS = 26
