@@ -22,6 +22,7 @@ from subzero.compiled import compiled
 
 from .drum import SPINNING, STANDING
 from .element import Load, chord_length, evaluate_load, fading_rate, turning_rate
+from .first_segment import write_single_segment
 from .line import BEFORE, NEW, NOW, Line
 from .properties import CableNumbers, DrumNumbers
 from .slack import slack_law
@@ -76,6 +77,8 @@ def assemble(
         _scatter_balance(line, j, T, length, work)
         _scatter_length(line, j, T, length, c, work.chord)
     _drum_row(line, a0, a1, a2, drum, work)
+    if N == 1:
+        write_single_segment(line, a0, drum, work.chord)
 
 
 @compiled

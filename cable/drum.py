@@ -24,7 +24,9 @@ HELD = 1e-12
 def next_mode(mode: int, converged: bool, payout: float, pull: float, drum: DrumNumbers) -> int:
     """Return what the drum does, given the answer found by supposing that it does `mode`; the same if consistent.
 
-    A drum that stands while a taut cable must get longer leaves no solution at all (`converged` is false).
+    A drum that stands while a taut cable must get longer leaves no solution at all (`converged` is false); nor does a
+    frictionless drum that turns while a current drags slack cable past the vehicle: nothing bounds its speed, the
+    problem is ill-posed, and the drum is taken to stand.
 
     Args:
         mode: what was supposed.
@@ -40,4 +42,6 @@ def next_mode(mode: int, converged: bool, payout: float, pull: float, drum: Drum
         return STANDING
     if mode == SPINNING:
         return TURNING if not converged or pull > HELD else SPINNING
-    return SPINNING if converged and drum.inertia > 0.0 and pull < -HELD else TURNING
+    if not converged:
+        return STANDING
+    return SPINNING if drum.inertia > 0.0 and pull < -HELD else TURNING

@@ -49,10 +49,15 @@ def try_step(
         drum: drum.
         work: work space.
     """
+    failed = 0
     for _ in range(MOST_DRUM_CHANGES):
         solved = _solve_softly(line, step, tow, J, c, drum, work)
+        if line.count[0] == 1:
+            break
         mode = next_mode(line.drum_mode[0], solved.converged, line.payout[NEW], line.drum_pull[0], drum)
-        if mode == line.drum_mode[0]:
+        if not solved.converged:
+            failed |= 1 << line.drum_mode[0]
+        if mode == line.drum_mode[0] or (failed >> mode) & 1:
             break
         line.drum_mode[0] = mode
     return solved
