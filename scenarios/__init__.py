@@ -5,7 +5,7 @@
     True
     >>> trial = scenarios.load("fig6")          # or the path of your own file
     >>> trial.duration, trial.commands.values[0]
-    (30.0, array([27.,  0.,  0.,  0.]))
+    (30.0, array([25.,  0.,  0.,  0.]))
 
 To make your own trial, copy `path("fig6")`, which explains every key, edit it, and load it by its path.
 Vehicles and cables are files too (`vehicles/`, `cables/`), each number with its unit, plausible range and
