@@ -45,6 +45,7 @@ def test_it_says_which_files_it_wrote(compared):
 @pytest.mark.parametrize("flag, kind", [([], "tethered"), (["--untethered"], "untethered")])
 def test_simulate_leaves_one_run(flag, kind, tmp_path, rails):
     assert main(["simulate", "fig6", *flag, "--out", str(tmp_path / "new" / "deep")]) == FINE
+    assert [tethered for _, tethered in rails] == [kind == "tethered"]
     pictures = PICTURES if kind == "tethered" else PICTURES - {"cable.png"}
     assert names(tmp_path / "new" / "deep") == {f"{kind}.nc", f"{kind}.csv", "summary.json"} | pictures
 

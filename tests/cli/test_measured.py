@@ -93,9 +93,9 @@ def test_what_is_no_table_is_refused(content, file):
 def test_the_error_of_a_model_is_that_of_the_textbook(make_run):
     run = make_run(samples=5).assign(depth=("time", [0.0, 1.0, 2.0, 3.0, 4.0]))
     measured = np.array(
-        [1.0, 1.0, 3.0, np.nan]
-    )  # model there: 0, 2, 4 (error -1, 1, 1); the last has no time
-    record = Record(source="", time=np.array([0.0, 0.2, 0.4, 0.5]), values={"depth": measured})
+        [1.0, 1.0, 3.0, np.nan, 9.0]
+    )  # the model says 0, 2, 4; then a gap; then its end is over
+    record = Record(source="", time=np.array([0.0, 0.2, 0.4, 0.4, 0.5]), values={"depth": measured})
     one = fit(run, record, "depth")
     spread = np.sqrt(np.sum((measured[:3] - 5.0 / 3.0) ** 2))
     assert one.samples == 3
