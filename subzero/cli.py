@@ -128,6 +128,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Args:
         arguments: words behind ``subzero``; those of this process if None.
     """
+    _never_choke(sys.stdout, sys.stderr)
     try:
         command, bound, _ = app.parse_args(arguments, exit_on_error=False, print_error=False)
         return command(*bound.args, **bound.kwargs) or FINE
@@ -138,6 +139,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print("Interrupted; nothing was written.", file=sys.stderr)
         return INTERRUPTED
+
+
+def _never_choke(*streams: Any) -> None:
+    """Let a terminal that lacks a letter show ``?`` instead."""
+    for stream in streams:
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="replace")
 
 
 def _refuse(message: str) -> int:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import textwrap
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -53,8 +53,9 @@ def sheet(rows: int, columns: int, title: Title) -> tuple[Figure, list[Axes]]:
     figure.subplots_adjust(left=LEFT, right=RIGHT, bottom=BOTTOM / height, top=1.0 - top / height)
     figure.subplots_adjust(wspace=0.28, hspace=0.36)
     y = 1.0 - 0.09 / height
-    figure.text(LEFT, y, "\n".join(words), va="top", fontsize=LARGE)
-    figure.text(RIGHT, y, title.scenario, va="top", ha="right", fontsize=SMALL, color=GREY)
+    figure.text(LEFT, y, "\n".join(words), va="top", fontsize=LARGE, parse_math=False)
+    corner: dict[str, Any] = {"ha": "right", "fontsize": SMALL, "color": GREY}
+    figure.text(RIGHT, y, title.scenario, va="top", parse_math=False, **corner)
     panels = [figure.add_subplot(rows, columns, at + 1) for at in range(rows * columns)]
     for at, axes in enumerate(panels):
         _style(axes)

@@ -137,3 +137,8 @@ def test_a_run_that_stopped_at_once_can_be_drawn(prescribed, make_run, tmp_path)
 
 def test_an_untethered_prescribed_run_has_nothing_to_show(make_run):
     assert draw({"untethered": make_run(tethered=False, prescribed="dive")}) == {}
+
+
+def test_a_title_is_plain_text_whatever_it_holds(make_run, tmp_path):
+    run = make_run().assign_attrs(title=r"costs $5 and $6_{ [bold] \alpha", scenario="a_$b_{$")
+    draw({"tethered": run})["fig6"].savefig(tmp_path / "money.png")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 
@@ -80,3 +81,16 @@ def test_list_shows_every_scenario_with_its_description(capsys):
 def test_version_is_that_of_the_package(capsys):
     assert main(["--version"]) == FINE
     assert capsys.readouterr().out.strip() == subzero.__version__
+
+
+def test_a_terminal_without_our_letters_is_no_reason_to_fail():
+    plain = {**os.environ, "PYTHONIOENCODING": "ascii", "PYTHONUTF8": "0"}
+    code = """if True:
+        import sys
+        from subzero.cli import main
+        main(["nonsense\u2212"])
+        print("still here \u2212")
+    """
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=plain)
+    assert 'Unknown command "nonsense?".' in done.stderr
+    assert done.stdout == "still here ?\n"
