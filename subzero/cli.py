@@ -9,8 +9,6 @@ once.
 
 from __future__ import annotations
 
-import os
-import re
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -24,10 +22,6 @@ import scenarios
 from subzero.errors import UserError
 
 if TYPE_CHECKING:
-    import xarray as xr
-
-    from subzero.measured import Record
-    from subzero.output import Stage
     from subzero.progress import ProgressBar
 
 FINE, MISTAKE, STOPPED, INTERRUPTED = 0, 2, 3, 130
@@ -77,17 +71,18 @@ def simulate(
         commands: CSV file of commands, instead of those of the scenario.
         out: folder for the files; by default one named after the scenario, here.
     """
+    from subzero import delivery
     from subzero.output import staged
 
     trial = scenarios.load(scenario, commands_csv=commands)
-    with staged(out or _folder(trial)) as stage:
+    with staged(out or delivery.default_folder(trial)) as stage:
         trial = _checked(scenario, commands)
         with _progress(trial) as progress:
             from subzero.simulation import simulate as run
 
             result = run(trial, tethered=not untethered, progress=progress)
-        summary = _write({"untethered" if untethered else "tethered": result}, None, stage)
-    return _tell(summary, stage)
+        summary = delivery.write_all({"untethered" if untethered else "tethered": result}, None, stage)
+    return STOPPED if delivery.tell(summary, stage) else FINE
 
 
 @app.command
@@ -107,19 +102,20 @@ def compare(
         commands: CSV file of commands, instead of those of the scenario.
         out: folder for the files; by default one named after the scenario, here.
     """
+    from subzero import delivery
     from subzero.measured import read_record
     from subzero.output import staged
 
     trial = scenarios.load(scenario, commands_csv=commands)
     record = read_record(measured) if measured is not None else None
-    with staged(out or _folder(trial)) as stage:
+    with staged(out or delivery.default_folder(trial)) as stage:
         trial = _checked(scenario, commands)
         with _progress(trial) as progress:
             from subzero.comparison import compare as run
 
             result = run(trial, measured=record, progress=progress)
-        summary = _write(result.runs, result.measured, stage)
-    return _tell(summary, stage)
+        summary = delivery.write_all(result.runs, result.measured, stage)
+    return STOPPED if delivery.tell(summary, stage) else FINE
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -167,11 +163,6 @@ def _checked(scenario: str, commands: Path | None) -> scenarios.Trial:
     return load(scenario, commands_csv=commands)
 
 
-def _folder(trial: scenarios.Trial) -> Path:
-    """Return the folder that is named after a trial, here; a path in a name cannot lead elsewhere."""
-    return Path(re.sub(r"[^\w.-]+", "_", trial.name).strip(".") or "run")
-
-
 def _progress(trial: scenarios.Trial) -> ProgressBar:
     """Return a progress bar, after saying why the first run of all takes long."""
     from subzero.compiled import is_warm
@@ -181,32 +172,3 @@ def _progress(trial: scenarios.Trial) -> ProgressBar:
     if not is_warm():
         console.print("Compiling the kernels (first use, about 20 s)…")
     return ProgressBar(f"Simulating {trial.name}", console)
-
-
-def _write(runs: dict[str, xr.Dataset], record: Record | None, stage: Stage) -> dict[str, Any]:
-    """Write everything that belongs to some runs, and return their summary."""
-    from subzero import output
-    from subzero.figures import draw
-    from subzero.summary import summary_of
-
-    summary = summary_of(runs, record)
-    for label, run in runs.items():
-        output.write_run(run, stage, label)
-    output.write_summary(summary, stage)
-    output.write_figures(draw(runs, record), stage)
-    return summary
-
-
-def _tell(summary: dict[str, Any], stage: Stage) -> int:
-    """Print the summary, where the files are, and which run could not go on; return the exit code."""
-    from subzero.report import show
-
-    console = Console()
-    show(summary, console)
-    console.print(f"Wrote {stage.folder}{os.sep}: {', '.join(stage.written)}", highlight=False, markup=False)
-    stopped = [
-        label for label in ("tethered", "untethered") if summary.get(label, {}).get("outcome") == "stopped"
-    ]
-    for label in stopped:
-        print(f"The {label} run stopped: {summary[label]['outcome_message']}", file=sys.stderr)
-    return STOPPED if stopped else FINE

@@ -156,6 +156,6 @@ def test_a_run_that_stops_keeps_what_it_has_and_exits_with_3(tmp_path, rails, mo
 def test_the_folder_of_a_trial_is_always_here(name, folder):
     from types import SimpleNamespace
 
-    from subzero.cli import _folder
+    from subzero.delivery import default_folder
 
-    assert str(_folder(SimpleNamespace(name=name))) == folder  # type: ignore[arg-type]
+    assert str(default_folder(SimpleNamespace(name=name))) == folder  # type: ignore[arg-type]

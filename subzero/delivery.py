@@ -1,0 +1,51 @@
+"""Deliver the runs of a command: all their files, and what is told on the terminal."""
+
+from __future__ import annotations
+
+import os
+import re
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rich.console import Console
+
+from subzero import output
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    import scenarios
+    from subzero.measured import Record
+    from subzero.output import Stage
+
+
+def default_folder(trial: scenarios.Trial) -> Path:
+    """Return the folder that is named after a trial, here; a path in a name cannot lead elsewhere."""
+    return Path(re.sub(r"[^\w.-]+", "_", trial.name).strip(".") or "run")
+
+
+def write_all(runs: dict[str, xr.Dataset], record: Record | None, stage: Stage) -> dict[str, Any]:
+    """Write everything that belongs to some runs of one trial, and return their summary."""
+    from subzero.figures import draw
+    from subzero.summary import summary_of
+
+    summary = summary_of(runs, record)
+    for label, run in runs.items():
+        output.write_run(run, stage, label)
+    output.write_summary(summary, stage)
+    output.write_figures(draw(runs, record), stage)
+    return summary
+
+
+def tell(summary: dict[str, Any], stage: Stage) -> list[str]:
+    """Print the summary and where the files are; return which runs could not go on, after saying why."""
+    from subzero.report import RUNS, show
+
+    console = Console()
+    show(summary, console)
+    console.print(f"Wrote {stage.folder}{os.sep}: {', '.join(stage.written)}", highlight=False, markup=False)
+    stopped = [label for label in RUNS if summary.get(label, {}).get("outcome") == "stopped"]
+    for label in stopped:
+        print(f"The {label} run stopped: {summary[label]['outcome_message']}", file=sys.stderr)
+    return stopped
