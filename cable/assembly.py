@@ -23,7 +23,7 @@ from subzero.compiled import compiled
 from .drum import SPINNING, STANDING
 from .element import Load, chord_length, evaluate_load, fading_rate, turning_rate
 from .first_segment import write_single_segment
-from .line import BEFORE, NEW, NOW, Line
+from .line import BEFORE, NEW, NOW, RESIDUAL, Line
 from .properties import CableNumbers, DrumNumbers
 from .slack import slack_law
 
@@ -31,17 +31,17 @@ from .slack import slack_law
 @compiled
 def node_velocities(line: Line, a0: float, a1: float, a2: float) -> None:
     """Fill the velocities of all nodes and the pay-out rate at level NEW by backward differences."""
-    x, N = line.position, line.count[0]
+    x, N = line.position, line.ends.count
     for j in range(N):
         for i in range(3):
             line.velocity[NEW, j, i] = a0 * x[NEW, j, i] + a1 * x[NOW, j, i] + a2 * x[BEFORE, j, i]
-    last = line.last_length
-    line.payout[NEW] = a0 * last[NEW] + a1 * last[NOW] + a2 * last[BEFORE]
-    if line.drum_mode[0] == STANDING:
-        line.payout[NEW] = 0.0
+    last = line.ends.last_length
+    line.ends.payout[NEW] = a0 * last[NEW] + a1 * last[NOW] + a2 * last[BEFORE]
+    if line.ends.drum_mode == STANDING:
+        line.ends.payout[NEW] = 0.0
     for i in range(3):
         chord = x[NEW, N, i] - x[NEW, N - 1, i]
-        line.velocity[NEW, N, i] = -line.payout[NEW] * chord / last[NEW]
+        line.velocity[NEW, N, i] = -line.ends.payout[NEW] * chord / last[NEW]
 
 
 @compiled
@@ -57,10 +57,10 @@ def assemble(
 ) -> None:
     """Fill the residual and the block tridiagonal Jacobian at the present guess of level NEW."""
     node_velocities(line, a0, a1, a2)
-    N = line.count[0]
+    N = line.ends.count
     _clear(line)
     for j in range(1, N + 1):
-        length = line.last_length[NEW] if j == N else line.length[j]
+        length = line.ends.last_length[NEW] if j == N else line.length[j]
         T = line.tension[NEW, j]
         for i in range(3):
             work.velocity[i] = 0.5 * (line.velocity[NEW, j - 1, i] + line.velocity[NEW, j, i])
@@ -84,9 +84,9 @@ def assemble(
 @compiled
 def _clear(line: Line) -> None:
     """Set the system to zero."""
-    for j in range(1, line.count[0] + 1):
+    for j in range(1, line.ends.count + 1):
         for i in range(4):
-            line.rhs[j, i] = 0.0
+            line.rows[RESIDUAL, j, i] = 0.0
             for k in range(4):
                 line.lower[j, i, k] = 0.0
                 line.diagonal[j, i, k] = 0.0
@@ -111,12 +111,12 @@ def _add_influx(
     line: Line, length: float, a0: float, T: float, J: np.ndarray, c: CableNumbers, work: Load
 ) -> None:
     """Complete Q of the last segment by the momentum that enters at the drum; fill ∂Q/∂x_{N−1} and ∂Q/∂(T, ℓ)."""
-    N, U, t, d = line.count[0], line.payout[NEW], work.tangent, work.chord
+    N, U, t, d = line.ends.count, line.ends.payout[NEW], work.tangent, work.chord
     by_near, by_far = work.by_near, work.by_far
     r = chord_length(d, length)
     g, fading = turning_rate(d, length, r), fading_rate(d, length, r)
     Jt = J[0] * t[0] + J[1] * t[1] + J[2] * t[2]
-    dU = 0.0 if line.drum_mode[0] == STANDING else a0
+    dU = 0.0 if line.ends.drum_mode == STANDING else a0
     stretch = 0.5 * c.compliance / (1.0 + c.compliance * T)
     for i in range(3):
         entering = c.mass * line.velocity[NEW, N, i] - c.added_mass * (J[i] - Jt * t[i])
@@ -138,12 +138,12 @@ def _add_influx(
 @compiled
 def _scatter_balance(line: Line, j: int, T: float, length: float, work: Load) -> None:
     """Add segment j to the balances of its two nodes: f + ½Q to the far one, −f + ½Q to the near one."""
-    N, t = line.count[0], work.tangent
+    N, t = line.ends.count, work.tangent
     r_j = chord_length(work.chord, length)
     stiffness, g = T / r_j, turning_rate(work.chord, length, r_j)
     fading = fading_rate(work.chord, length, r_j) if j == N else 0.0
     by_near, by_far = work.by_near, work.by_far
-    D, L, U, r = line.diagonal, line.lower, line.upper, line.rhs
+    D, L, U, r = line.diagonal, line.lower, line.upper, line.rows[RESIDUAL]
     for i in range(3):
         f, half = T * t[i], 0.5 * line.load[j, i]
         if j < N:
@@ -153,8 +153,8 @@ def _scatter_balance(line: Line, j: int, T: float, length: float, work: Load) ->
             r[j - 1, 1 + i] += half - f
             U[j - 1, 1 + i, 0] -= t[i]
         else:
-            line.tow_force[i] = f - half
-            line.tow_by_block[i, 0] = t[i]
+            line.ends.tow_force[i] = f - half
+            line.ends.tow_by_block[i, 0] = t[i]
         for k in range(4):
             far = 0.5 * by_far[i, k]
             pull = (
@@ -167,7 +167,7 @@ def _scatter_balance(line: Line, j: int, T: float, length: float, work: Load) ->
             if j > 1:
                 U[j - 1, 1 + i, k] += far - pull
             else:
-                line.tow_by_block[i, k] = (t[i] if k == 0 else 0.0) + pull - far
+                line.ends.tow_by_block[i, k] = (t[i] if k == 0 else 0.0) + pull - far
         for k in range(3):
             near = 0.5 * by_near[i, k]
             pull = stiffness * ((1.0 if i == k else 0.0) - g * t[i] * t[k])
@@ -176,7 +176,7 @@ def _scatter_balance(line: Line, j: int, T: float, length: float, work: Load) ->
             if j > 1:
                 D[j - 1, 1 + i, 1 + k] += near + pull
             else:
-                line.tow_by_tow[i, k] = -pull - near
+                line.ends.tow_by_tow[i, k] = -pull - near
 
 
 @compiled
@@ -184,42 +184,42 @@ def _scatter_length(line: Line, j: int, T: float, length: float, c: CableNumbers
     """Write the length equation of segment j, the first row of its block."""
     square = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) / (length * length)
     stretch = 1.0 + c.compliance * T
-    phi, by_T, by_strain = slack_law(T, 0.5 * (stretch * stretch - square), line.smoothing[0])
-    line.rhs[j, 0] = phi
+    phi, by_T, by_strain = slack_law(T, 0.5 * (stretch * stretch - square), line.ends.smoothing)
+    line.rows[RESIDUAL, j, 0] = phi
     line.diagonal[j, 0, 0] = by_T + by_strain * stretch * c.compliance
     for i in range(3):
         slope = by_strain * d[i] / (length * length)
         line.lower[j, 0, 1 + i] = slope
-        if j < line.count[0]:
+        if j < line.ends.count:
             line.diagonal[j, 0, 1 + i] = -slope
-    if j == line.count[0]:
+    if j == line.ends.count:
         line.diagonal[j, 0, 1] = by_strain * square / length
 
 
 @compiled
 def _drum_row(line: Line, a0: float, a1: float, a2: float, drum: DrumNumbers, work: Load) -> None:
     """Write the drum's equation (11), the second row of the last block; `work` still holds the last segment."""
-    N, t = line.count[0], work.tangent
-    D, L, r = line.diagonal[line.count[0]], line.lower[line.count[0]], line.rhs[line.count[0]]
+    N, t = line.ends.count, work.tangent
+    D, L, r = line.diagonal[line.ends.count], line.lower[line.ends.count], line.rows[RESIDUAL, line.ends.count]
     D[2, 2] = 1.0
     D[3, 3] = 1.0
     Qt = line.load[N, 0] * t[0] + line.load[N, 1] * t[1] + line.load[N, 2] * t[2]
-    line.drum_pull[0] = line.tension[NEW, N] + 0.5 * Qt
-    if line.drum_mode[0] == STANDING:
-        r[1] = line.last_length[NEW] - line.last_length[NOW]
+    line.ends.drum_pull = line.tension[NEW, N] + 0.5 * Qt
+    if line.ends.drum_mode == STANDING:
+        r[1] = line.ends.last_length[NEW] - line.ends.last_length[NOW]
         D[1, 1] = 1.0
         return
-    U = line.payout
+    U = line.ends.payout
     r[1] = -drum.friction - drum.inertia * (a0 * U[NEW] + a1 * U[NOW] + a2 * U[BEFORE])
     D[1, 1] = -drum.inertia * a0 * a0
-    if line.drum_mode[0] == SPINNING:
+    if line.ends.drum_mode == SPINNING:
         return
-    r[1] += line.drum_pull[0]
+    r[1] += line.ends.drum_pull
     D[1, 0] = 1.0
     by_near, by_far = work.by_near, work.by_far
-    size = chord_length(work.chord, line.last_length[NEW])
-    g = turning_rate(work.chord, line.last_length[NEW], size)
-    fading = fading_rate(work.chord, line.last_length[NEW], size)
+    size = chord_length(work.chord, line.ends.last_length[NEW])
+    g = turning_rate(work.chord, line.ends.last_length[NEW], size)
+    fading = fading_rate(work.chord, line.ends.last_length[NEW], size)
     for i in range(3):
         D[1, 0] += 0.5 * t[i] * by_far[i, 0]
         D[1, 1] += 0.5 * t[i] * (by_far[i, 1] - fading * line.load[N, i])

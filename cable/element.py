@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from subzero.compiled import compiled
+from subzero.compiled import compiled, packed
 
 from .properties import CableNumbers
 
@@ -58,7 +58,7 @@ def new_load() -> Load:
     """Return empty work space for one segment."""
     vectors = {name: np.zeros(3) for name in Load._fields}
     matrices = {name: np.zeros((3, 3)) for name in ("q_V", "q_d", "G", "by_near")}
-    return Load(**vectors | matrices | {"by_far": np.zeros((3, 4))})
+    return packed(Load(**vectors | matrices | {"by_far": np.zeros((3, 4))}))
 
 
 @compiled

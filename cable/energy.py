@@ -31,11 +31,11 @@ LOSS, STORED, GRAVITY_WORK, AT_DRUM, ADDED_MASS = range(5)
 @compiled
 def energy_flow(line: Line, J: np.ndarray, c: CableNumbers, work: Load, out: np.ndarray) -> None:
     """Fill out (5,) with the powers and the stored energy of the cable at level NOW."""
-    N, t, across, V = line.count[0], work.tangent, work.across, work.velocity
+    N, t, across, V = line.ends.count, work.tangent, work.across, work.velocity
     for i in range(5):
         out[i] = 0.0
     for j in range(1, N + 1):
-        length = line.last_length[NOW] if j == N else line.length[j]
+        length = line.ends.last_length[NOW] if j == N else line.length[j]
         T = line.tension[NOW, j]
         for i in range(3):
             V[i] = 0.5 * (line.velocity[NOW, j - 1, i] + line.velocity[NOW, j, i])
@@ -58,7 +58,7 @@ def energy_flow(line: Line, J: np.ndarray, c: CableNumbers, work: Load, out: np.
 @compiled
 def _drum_flow(line: Line, J: np.ndarray, c: CableNumbers, t: np.ndarray, out: np.ndarray) -> None:
     """Fill D_S; `t` is the tangent of the last segment."""
-    U, T, N = line.payout[NOW], max(line.drum_pull[0], 0.0), line.count[0]
+    U, T, N = line.ends.payout[NOW], max(line.ends.drum_pull, 0.0), line.ends.count
     Jt, square, side = 0.0, 0.0, 0.0
     for i in range(3):
         Jt += J[i] * t[i]

@@ -17,7 +17,7 @@ import numpy as np
 
 from subzero.compiled import compiled
 
-from .line import NEW, NOW, Line
+from .line import NEW, NOW, RESIDUAL, Line
 from .properties import DrumNumbers
 
 CORNER = 1e-9
@@ -29,12 +29,12 @@ CREEP = 1e-3
 @compiled
 def write_single_segment(line: Line, a0: float, drum: DrumNumbers, d: np.ndarray) -> None:
     """Replace both rows of the only block, whose second row holds the drum's equation (11) with full friction."""
-    D, L, r, T = line.diagonal[1], line.lower[1], line.rhs[1], line.tension[NEW, 1]
+    D, L, r, T = line.diagonal[1], line.lower[1], line.rows[RESIDUAL, 1], line.tension[NEW, 1]
     chord = sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2] + CORNER * CORNER)
-    longer, by_chord = _maximum(chord, line.last_length[NOW])
-    r[0] = line.last_length[NEW] - longer
+    longer, by_chord = _maximum(chord, line.ends.last_length[NOW])
+    r[0] = line.ends.last_length[NEW] - longer
     D[0, 0], D[0, 1] = 0.0, 1.0
-    U = line.payout[NEW]
+    U = line.ends.payout[NEW]
     size = sqrt(U * U + CREEP * CREEP)
     r[1] += drum.friction * (1.0 - U / size)
     D[1, 1] -= drum.friction * a0 * (1.0 - U * U / (size * size)) / size

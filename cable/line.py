@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from subzero.compiled import compiled
+from subzero.compiled import compiled, packed
 
 from .drum import TURNING
 from .element import Load, chord_length, evaluate_momentum
@@ -26,92 +26,107 @@ SPLIT_AT = 1.5
 """The last segment is split when it has grown to this many segment lengths."""
 
 
-class Line(NamedTuple):
-    """The state of a cable; segment j lies between nodes j−1 and j, so index 0 of segment arrays is unused.
+class Ends(NamedTuple):
+    """What a cable has once: its growing end at the drum, its tow point, and how it is solved.
 
     Attributes:
-        position: node positions (3 levels, nodes, 3). [m]
-        velocity: velocities of the material at the nodes (3 levels, nodes, 3). [m/s]
-        momentum: momentum ∫p ds of the segments (3 levels, nodes, 3). [kg m/s]
-        tension: tension of the segments (2 levels, nodes). [N]
-        length: unstretched lengths of the segments (nodes,); of the last one, see `last_length`. [m]
+        count: number of segments.
         last_length: length of the last, growing segment (3 levels,). [m]
         payout: rate dS/dt at which cable enters the water (3 levels,). [m/s]
-        load: ∫(∂p/∂t + D − w_c k) ds of the segments at level NEW (nodes, 3). [N]
-        count: number of segments, in a one-element array.
-        drum_mode: what the drum does (`cable.drum`), in a one-element array.
-        previous_step: t_now − t_before, 0 after a start, in a one-element array. [s]
+        drum_mode: what the drum does (`cable.drum`).
+        drum_pull: tension at the drum at level NEW. [N]
+        previous_step: t_now − t_before, 0 after a start. [s]
+        smoothing: T₀ of the slack law in force. [N]
         tow_force: force on the vehicle at level NEW (3,). [N]
         tow_by_tow, tow_by_block: derivatives of the tow force by the tow point's position (3, 3) and by the
             unknowns of the first block (3, 4).
         tow_answer: minus the answer of the first block's unknowns (columns) to a displacement of the tow point
             (rows) (3, 4), from the last Newton matrix.
-        drum_pull: tension at the drum at level NEW, in a one-element array. [N]
-        smoothing: T₀ of the slack law in force, in a one-element array. [N]
-        lower, diagonal, upper, pivots, rhs, guess, newton_step: work space of Newton's method.
     """
 
+    count: int
+    last_length: np.ndarray
+    payout: np.ndarray
+    drum_mode: int
+    drum_pull: float
+    previous_step: float
+    smoothing: float
+    tow_force: np.ndarray
+    tow_by_tow: np.ndarray
+    tow_by_block: np.ndarray
+    tow_answer: np.ndarray
+
+
+class Line(NamedTuple):
+    """The state of a cable; segment j lies between nodes j−1 and j, so index 0 of segment arrays is unused.
+
+    Attributes:
+        ends: what there is once.
+        position: node positions (3 levels, nodes, 3). [m]
+        velocity: velocities of the material at the nodes (3 levels, nodes, 3). [m/s]
+        momentum: momentum ∫p ds of the segments (3 levels, nodes, 3). [kg m/s]
+        tension: tension of the segments (2 levels, nodes). [N]
+        length: unstretched lengths of the segments (nodes,); of the last one, see `Ends.last_length`. [m]
+        load: ∫(∂p/∂t + D − w_c k) ds of the segments at level NEW (nodes, 3). [N]
+        lower, diagonal, upper: the blocks of the Newton matrix (nodes, 4, 4), see `cable.blocks`.
+        pivots: of the factored blocks (nodes, 4).
+        rows: residual, guess and Newton step of the unknowns (3, nodes, 4).
+    """
+
+    ends: Ends
     position: np.ndarray
     velocity: np.ndarray
     momentum: np.ndarray
     tension: np.ndarray
     length: np.ndarray
-    last_length: np.ndarray
-    payout: np.ndarray
     load: np.ndarray
-    count: np.ndarray
-    drum_mode: np.ndarray
-    previous_step: np.ndarray
-    tow_force: np.ndarray
-    tow_by_tow: np.ndarray
-    tow_by_block: np.ndarray
-    tow_answer: np.ndarray
-    drum_pull: np.ndarray
     lower: np.ndarray
     diagonal: np.ndarray
     upper: np.ndarray
     pivots: np.ndarray
-    rhs: np.ndarray
-    guess: np.ndarray
-    newton_step: np.ndarray
-    smoothing: np.ndarray
+    rows: np.ndarray
+
+
+RESIDUAL, GUESS, STEP = range(3)
+"""Rows of `Line.rows`."""
 
 
 def new_line(capacity: int) -> Line:
     """Return an empty line with room for `capacity` segments."""
     n = capacity + 1
-    per_node = {name: np.zeros((3, n, 3)) for name in ("position", "velocity", "momentum")}
-    blocks = {name: np.zeros((n, 4, 4)) for name in ("lower", "diagonal", "upper")}
-    return Line(
-        **per_node,
-        tension=np.zeros((2, n)),
-        length=np.zeros(n),
+    ends = Ends(
+        count=0,
         last_length=np.zeros(3),
         payout=np.zeros(3),
-        load=np.zeros((n, 3)),
-        count=np.zeros(1, np.int64),
-        drum_mode=np.zeros(1, np.int64),
-        previous_step=np.zeros(1),
+        drum_mode=TURNING,
+        drum_pull=0.0,
+        previous_step=0.0,
+        smoothing=SMOOTHING,
         tow_force=np.zeros(3),
         tow_by_tow=np.zeros((3, 3)),
         tow_by_block=np.zeros((3, 4)),
         tow_answer=np.zeros((3, 4)),
-        drum_pull=np.zeros(1),
+    )
+    per_node = {name: np.zeros((3, n, 3)) for name in ("position", "velocity", "momentum")}
+    blocks = {name: np.zeros((n, 4, 4)) for name in ("lower", "diagonal", "upper")}
+    return Line(
+        ends=packed(ends),
+        **per_node,
+        tension=np.zeros((2, n)),
+        length=np.zeros(n),
+        load=np.zeros((n, 3)),
         **blocks,
         pivots=np.zeros((n, 4), np.int64),
-        rhs=np.zeros((n, 4)),
-        guess=np.zeros((n, 4)),
-        newton_step=np.zeros((n, 4)),
-        smoothing=np.full(1, SMOOTHING),
+        rows=np.zeros((3, n, 4)),
     )
 
 
 def enlarged(line: Line, capacity: int) -> Line:
     """Return the same line with room for `capacity` segments."""
     larger = new_line(capacity)
-    for old, new in zip(line, larger, strict=True):
+    for old, new in zip(line[1:], larger[1:], strict=True):
         new[tuple(slice(0, size) for size in old.shape)] = old
-    return larger
+    return larger._replace(ends=line.ends)
 
 
 @compiled
@@ -124,13 +139,13 @@ def lay_straight(
     the drum, so a run can start at speed without a jolt. Needs 0 < wet_length and room for the segments.
     """
     count = max(1, int(np.floor(wet_length / segment_length + 0.5)))
-    line.count[0] = count
-    line.drum_mode[0] = TURNING
-    line.previous_step[0] = 0.0
+    line.ends.count = count
+    line.ends.drum_mode = TURNING
+    line.ends.previous_step = 0.0
     last = wet_length - (count - 1) * segment_length
     for level in range(3):
-        line.last_length[level] = last
-        line.payout[level] = speed
+        line.ends.last_length[level] = last
+        line.ends.payout[level] = speed
         for j in range(count + 1):
             along = wet_length - j * segment_length if j < count else 0.0
             for i in range(3):
@@ -147,8 +162,8 @@ def lay_straight(
 def set_momenta(line: Line, J: np.ndarray, c: CableNumbers, work: Load) -> None:
     """Fill the segments' momenta at levels NOW and BEFORE from positions and velocities in water that moves at J."""
     for level in (NOW, BEFORE):
-        for j in range(1, line.count[0] + 1):
-            length = line.last_length[level] if j == line.count[0] else line.length[j]
+        for j in range(1, line.ends.count + 1):
+            length = line.ends.last_length[level] if j == line.ends.count else line.length[j]
             segment_momentum(line, level, j, length, J, c, work)
 
 
@@ -160,7 +175,7 @@ def segment_momentum(
     for i in range(3):
         work.chord[i] = line.position[NOW, j, i] - line.position[NOW, j - 1, i]
         work.velocity[i] = 0.5 * (line.velocity[level, j - 1, i] + line.velocity[level, j, i])
-    r = chord_length(work.chord, line.last_length[NOW] if j == line.count[0] else line.length[j])
+    r = chord_length(work.chord, line.ends.last_length[NOW] if j == line.ends.count else line.length[j])
     for i in range(3):
         work.tangent[i] = work.chord[i] / r
     evaluate_momentum(work.velocity, J, work.tangent, c, work.momentum)

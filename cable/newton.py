@@ -12,7 +12,7 @@ from subzero.compiled import compiled
 from .assembly import assemble
 from .blocks import factor, solve
 from .element import Load
-from .line import NEW, Line
+from .line import GUESS, NEW, RESIDUAL, STEP, Line
 from .properties import CableNumbers, DrumNumbers
 
 MAX_ITERATIONS = 40
@@ -49,7 +49,7 @@ def solve_step(
     work: Load,
 ) -> Solved:
     """Solve the equations of `assembly` for level NEW, from the guess that stands there."""
-    N = line.count[0]
+    N = line.ends.count
     assemble(line, a0, a1, a2, J, c, drum, work)
     size, node, equation = _residual(line)
     merit = _merit(line)
@@ -59,7 +59,7 @@ def solve_step(
         if factor(line.lower, line.diagonal, line.upper, line.pivots, N) > 0:
             break
         _keep_tow_answer(line)
-        solve(line.lower, line.diagonal, line.upper, line.pivots, N, line.rhs)
+        solve(line.lower, line.diagonal, line.upper, line.pivots, N, line.rows[RESIDUAL])
         last_length = _save(line)
         fraction = 1.0
         for _ in range(MAX_HALVINGS):
@@ -81,37 +81,37 @@ def _keep_tow_answer(line: Line) -> None:
     """Keep W_1 of the elimination (`cable.blocks`), before the next assembly overwrites it."""
     for k in range(3):
         for m in range(4):
-            line.tow_answer[k, m] = line.lower[1, 1 + k, m]
+            line.ends.tow_answer[k, m] = line.lower[1, 1 + k, m]
 
 
 @compiled
 def _save(line: Line) -> float:
     """Keep the guess and the Newton step; return the guess of the last segment's length. [m]."""
-    for j in range(1, line.count[0] + 1):
-        line.guess[j, 0] = line.tension[NEW, j]
+    for j in range(1, line.ends.count + 1):
+        line.rows[GUESS, j, 0] = line.tension[NEW, j]
         for i in range(3):
-            line.guess[j, 1 + i] = line.position[NEW, j, i]
+            line.rows[GUESS, j, 1 + i] = line.position[NEW, j, i]
         for i in range(4):
-            line.newton_step[j, i] = line.rhs[j, i]
-    return line.last_length[NEW]
+            line.rows[STEP, j, i] = line.rows[RESIDUAL, j, i]
+    return line.ends.last_length[NEW]
 
 
 @compiled
 def _update(line: Line, last_length: float, fraction: float) -> None:
     """Write guess minus `fraction` of the Newton step to level NEW."""
-    N, guess, step = line.count[0], line.guess, line.newton_step
+    N, guess, step = line.ends.count, line.rows[GUESS], line.rows[STEP]
     for j in range(1, N + 1):
         line.tension[NEW, j] = guess[j, 0] - fraction * step[j, 0]
         if j < N:
             for i in range(3):
                 line.position[NEW, j, i] = guess[j, 1 + i] - fraction * step[j, 1 + i]
-    line.last_length[NEW] = max(last_length - fraction * step[N, 1], 0.1 * last_length, SMALLEST_SEGMENT)
+    line.ends.last_length[NEW] = max(last_length - fraction * step[N, 1], 0.1 * last_length, SMALLEST_SEGMENT)
 
 
 @compiled
 def _residual(line: Line) -> tuple[float, int, int]:
     """Return the largest residual as a multiple of its tolerance, and where it stands."""
-    N = line.count[0]
+    N = line.ends.count
     tension = 0.0
     for j in range(1, N + 1):
         tension = max(tension, abs(line.tension[NEW, j]))
@@ -119,7 +119,7 @@ def _residual(line: Line) -> tuple[float, int, int]:
     worst, node, equation = 0.0, 0, 0
     for j in range(1, N + 1):
         for i in range(4):
-            size = abs(line.rhs[j, i]) / (LENGTH_TOLERANCE if i == 0 else allowed)
+            size = abs(line.rows[RESIDUAL, j, i]) / (LENGTH_TOLERANCE if i == 0 else allowed)
             if not size <= worst:
                 worst, node, equation = size, j, i
     return worst, node, equation
@@ -129,8 +129,8 @@ def _residual(line: Line) -> tuple[float, int, int]:
 def _merit(line: Line) -> float:
     """Return the root of the sum of squares of all residuals, lengths in `STRAIN_SCALE`, balances in millinewtons."""
     total = 0.0
-    for j in range(1, line.count[0] + 1):
-        total += line.rhs[j, 0] ** 2
+    for j in range(1, line.ends.count + 1):
+        total += line.rows[RESIDUAL, j, 0] ** 2
         for i in range(1, 4):
-            total += (1e3 * line.rhs[j, i]) ** 2
+            total += (1e3 * line.rows[RESIDUAL, j, i]) ** 2
     return sqrt(total)

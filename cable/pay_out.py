@@ -71,15 +71,15 @@ def follow_path(
     Returns:
         the number of rows that are filled (all, unless it failed) and how the last step was solved.
     """
-    used = line.count[0] + 1
+    used = line.ends.count + 1
     solved = Solved(True, 0, 0.0, 0, 0)
     for k in range(1, times.size):
         solved = _cover(line, times, tow, tow_velocity, k, J, c, drum, segment_length, work)
-        if not solved.converged or used + line.count[0] + 1 > record.tension.size:
+        if not solved.converged or used + line.ends.count + 1 > record.tension.size:
             return k, solved
         write_row(line, record, k, used)
         record.iterations[k] = solved.iterations
-        used += line.count[0] + 1
+        used += line.ends.count + 1
     return times.size, solved
 
 
@@ -103,7 +103,7 @@ def _cover(
     while True:
         last = done + step >= whole * (1.0 - 1e-9)
         _hermite(tow, tow_velocity, k, whole, 1.0 if last else (done + step) / whole, point)
-        mode = line.drum_mode[0]
+        mode = line.ends.drum_mode
         solved = try_step(line, step, point, J, c, drum, work)
         spent += solved.iterations
         if solved.converged:
@@ -113,7 +113,7 @@ def _cover(
                 return Solved(True, spent, solved.residual, solved.worst_node, solved.worst_equation)
             step = min(2.0 * step, whole - done)
         else:
-            line.drum_mode[0] = mode
+            line.ends.drum_mode = mode
             step *= 0.5
             if step < whole * 0.5**MOST_HALVINGS:
                 return solved
@@ -131,14 +131,14 @@ def _hermite(tow: np.ndarray, velocity: np.ndarray, k: int, whole: float, x: flo
 @compiled
 def write_row(line: Line, record: Record, k: int, used: int) -> None:
     """Write row k of a record, with the shape of level NOW behind the `used` nodes that are there already."""
-    N = line.count[0]
+    N = line.ends.count
     record.tow_tension[k], record.drum_tension[k] = ends(line)
-    record.length[k] = line.last_length[NOW]
+    record.length[k] = line.ends.last_length[NOW]
     for j in range(1, N):
         record.length[k] += line.length[j]
     record.count[k] = N
     for i in range(3):
-        record.tow_force[k, i] = line.tow_force[i]
+        record.tow_force[k, i] = line.ends.tow_force[i]
     for j in range(N + 1):
         for i in range(3):
             record.position[used + j, i] = line.position[NOW, j, i]

@@ -10,6 +10,8 @@ from dataclasses import dataclass, fields
 from math import isfinite, sqrt
 from typing import NamedTuple
 
+from subzero.compiled import packed
+
 GRAVITY = 9.81
 """Gravitational acceleration g, as printed in section 2.2 of the source. [m/s²]"""
 
@@ -94,7 +96,7 @@ class CableProperties:
 
     def numbers(self) -> CableNumbers:
         """Return the plain numbers that compiled code takes."""
-        return CableNumbers(
+        numbers = CableNumbers(
             mass=float(self.mass_per_length),
             added_mass=float(self.water_density * self.cross_section_area),
             weight=float(self.weight_in_water),
@@ -102,6 +104,7 @@ class CableProperties:
             tangential_drag=float(self.tangential_drag),
             normal_drag=float(self.normal_drag),
         )
+        return packed(numbers)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -129,9 +132,7 @@ class DrumProperties:
 
     def numbers(self) -> DrumNumbers:
         """Return the plain numbers that compiled code takes."""
-        return DrumNumbers(
-            inertia=float(self.inertia / self.radius**2), friction=float(self.friction_torque / self.radius)
-        )
+        return packed(DrumNumbers(self.inertia / self.radius**2, self.friction_torque / self.radius))
 
 
 def _check_range(

@@ -19,7 +19,7 @@ START_LENGTH = 1e-6
 """A run "without cable" starts with this length in the water, so that there is a direction. [m]"""
 REST = 1e-12
 """Slower than this is at rest. [m/s]"""
-SCHEMES = ("moving_end", "paper_tangent", "paper_drum")
+SCHEMES = ("moving_end", "paper_tangent", "paper_drum", "equation7")
 GAUSS = ((-np.sqrt(0.15), 5.0 / 18.0), (0.0, 8.0 / 18.0), (np.sqrt(0.15), 5.0 / 18.0))
 """Offsets and weights of three-point Gauss quadrature on a step of length one."""
 EQUATIONS = ("length", "northward balance", "eastward balance", "downward balance")
@@ -43,7 +43,8 @@ def pull_out(
     The default scheme, "moving_end", is of second order in time and space (backward differences, segments between
     nodes, a last segment that grows); segment length and step are independent of one another. "paper_tangent" and
     "paper_drum" are the scheme of Feng & Allen (2004) as printed, (20)-(26), one new node a step, with the two
-    readings of the new node; there `segment_length` has no meaning.
+    readings of the new node; there `segment_length` has no meaning. "equation7" is an independent second-order
+    formulation in the paper's six unknowns, with a moving end of its own: for comparison; it has no slack law.
 
     Straight ahead at U the tension is ½ρπdC_t U² S, and the force points against the motion. A drum with no friction
     and no inertia gives T(S) = 0. The drum cannot take cable up: a vehicle that comes back makes the cable slack
@@ -75,7 +76,7 @@ def pull_out(
     if scheme != "moving_end":
         from .paper_history import pull_out_as_printed
 
-        return pull_out_as_printed(tow_velocity, duration, step, cable, drum, J, scheme)
+        return pull_out_as_printed(tow_velocity, duration, step, cable, drum, J, scheme, segment_length)
     times, tow, velocity = sample_path(tow_velocity, duration, step)
     direction, speed = first_direction(velocity), float(np.linalg.norm(velocity[0]))
     tow += START_LENGTH * direction

@@ -52,14 +52,14 @@ def try_step(
     failed = 0
     for _ in range(MOST_DRUM_CHANGES):
         solved = _solve_softly(line, step, tow, J, c, drum, work)
-        if line.count[0] == 1:
+        if line.ends.count == 1:
             break
-        mode = next_mode(line.drum_mode[0], solved.converged, line.payout[NEW], line.drum_pull[0], drum)
+        mode = next_mode(line.ends.drum_mode, solved.converged, line.ends.payout[NEW], line.ends.drum_pull, drum)
         if not solved.converged:
-            failed |= 1 << line.drum_mode[0]
-        if mode == line.drum_mode[0] or (failed >> mode) & 1:
+            failed |= 1 << line.ends.drum_mode
+        if mode == line.ends.drum_mode or (failed >> mode) & 1:
             break
-        line.drum_mode[0] = mode
+        line.ends.drum_mode = mode
     return solved
 
 
@@ -74,28 +74,28 @@ def _solve_softly(
     work: Load,
 ) -> Solved:
     """Solve from a prediction; if that fails, with a slack law that is made sharp little by little."""
-    a0, a1, a2 = backward_weights(step, line.previous_step[0])
+    a0, a1, a2 = backward_weights(step, line.ends.previous_step)
     _predict(line, step, tow)
     solved = solve_step(line, a0, a1, a2, J, c, drum, work)
     if solved.converged:
         return solved
     _predict(line, step, tow)
     spent = solved.iterations
-    line.smoothing[0] = SOFTEST
+    line.ends.smoothing = SOFTEST
     while True:
         solved = solve_step(line, a0, a1, a2, J, c, drum, work)
         spent += solved.iterations
-        if not solved.converged or line.smoothing[0] <= SMOOTHING:
+        if not solved.converged or line.ends.smoothing <= SMOOTHING:
             break
-        line.smoothing[0] = max(0.1 * line.smoothing[0], SMOOTHING)
-    line.smoothing[0] = SMOOTHING
+        line.ends.smoothing = max(0.1 * line.ends.smoothing, SMOOTHING)
+    line.ends.smoothing = SMOOTHING
     return Solved(solved.converged, spent, solved.residual, solved.worst_node, solved.worst_equation)
 
 
 @compiled
 def _predict(line: Line, step: float, tow: np.ndarray) -> None:
     """Guess level NEW: everything goes on as it moves, tensions stay."""
-    N = line.count[0]
+    N = line.ends.count
     for j in range(N + 1):
         line.tension[NEW, j] = line.tension[NOW, j]
         for i in range(3):
@@ -103,8 +103,8 @@ def _predict(line: Line, step: float, tow: np.ndarray) -> None:
             line.position[NEW, j, i] = moved if j < N else line.position[NOW, j, i]
     for i in range(3):
         line.position[NEW, 0, i] = tow[i]
-    growth = 0.0 if line.drum_mode[0] == STANDING else step * line.payout[NOW]
-    line.last_length[NEW] = max(line.last_length[NOW] + growth, 0.5 * line.last_length[NOW])
+    growth = 0.0 if line.ends.drum_mode == STANDING else step * line.ends.payout[NOW]
+    line.ends.last_length[NEW] = max(line.ends.last_length[NOW] + growth, 0.5 * line.ends.last_length[NOW])
 
 
 @compiled
@@ -112,19 +112,19 @@ def accept(
     line: Line, step: float, J: np.ndarray, c: CableNumbers, segment_length: float, work: Load
 ) -> None:
     """Make level NEW the present one, and split the last segment while it is too long."""
-    N = line.count[0]
+    N = line.ends.count
     for level in (BEFORE, NOW):
         for j in range(N + 1):
             for i in range(3):
                 line.position[level, j, i] = line.position[level - 1, j, i]
                 line.velocity[level, j, i] = line.velocity[level - 1, j, i]
                 line.momentum[level, j, i] = line.momentum[level - 1, j, i]
-        line.last_length[level] = line.last_length[level - 1]
-        line.payout[level] = line.payout[level - 1]
+        line.ends.last_length[level] = line.ends.last_length[level - 1]
+        line.ends.payout[level] = line.ends.payout[level - 1]
     for j in range(N + 1):
         line.tension[NOW, j] = line.tension[NEW, j]
-    line.previous_step[0] = step
-    while line.last_length[NOW] > SPLIT_AT * segment_length and line.count[0] < line.length.size - 1:
+    line.ends.previous_step = step
+    while line.ends.last_length[NOW] > SPLIT_AT * segment_length and line.ends.count < line.length.size - 1:
         _split_last(line, segment_length, J, c, work)
 
 
@@ -135,18 +135,18 @@ def _split_last(line: Line, segment_length: float, J: np.ndarray, c: CableNumber
     The new node is a material point. At level BEFORE it may still have been on the drum: then it is put where the
     straight continuation of the chord would have had it, so that its backward differences stay smooth.
     """
-    N = line.count[0]
+    N = line.ends.count
     for level in (NOW, BEFORE):
-        fraction = segment_length / line.last_length[level]
+        fraction = segment_length / line.ends.last_length[level]
         _insert_between(line.position[level], N, fraction)
         _insert_between(line.velocity[level], N, fraction)
-        line.last_length[level] -= segment_length
+        line.ends.last_length[level] -= segment_length
     line.length[N] = segment_length
     line.tension[NOW, N + 1] = line.tension[NOW, N]
-    line.count[0] = N + 1
+    line.ends.count = N + 1
     for level in (NOW, BEFORE):
         segment_momentum(line, level, N, segment_length, J, c, work)
-        segment_momentum(line, level, N + 1, line.last_length[level], J, c, work)
+        segment_momentum(line, level, N + 1, line.ends.last_length[level], J, c, work)
 
 
 @compiled

@@ -18,8 +18,8 @@ def ends(line: Line) -> tuple[float, float]:
     T(0) is the size of the force (12); T(S) is the tension that drives the drum (11), with the drag and the inertia
     of the last half segment; a slack end has none.
     """
-    F = line.tow_force
-    return sqrt(F[0] * F[0] + F[1] * F[1] + F[2] * F[2]), max(line.drum_pull[0], 0.0)
+    F = line.ends.tow_force
+    return sqrt(F[0] * F[0] + F[1] * F[1] + F[2] * F[2]), max(line.ends.drum_pull, 0.0)
 
 
 @compiled
@@ -30,6 +30,6 @@ def impedance(line: Line, Z: np.ndarray) -> None:
     """
     for i in range(3):
         for k in range(3):
-            Z[i, k] = line.tow_by_tow[i, k]
+            Z[i, k] = line.ends.tow_by_tow[i, k]
             for m in range(4):
-                Z[i, k] -= line.tow_by_block[i, m] * line.tow_answer[k, m]
+                Z[i, k] -= line.ends.tow_by_block[i, m] * line.ends.tow_answer[k, m]

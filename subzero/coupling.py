@@ -42,7 +42,7 @@ def exchange(setup: Setup, live: Live, start: float, span: float) -> tuple[int, 
     done, step = 0.0, span
     while True:
         last = done + step >= span * (1.0 - 1e-9)
-        mode = live.line.drum_mode[0]
+        mode = live.line.ends.drum_mode
         ending, solved = _agree(setup, live, start + done, step)
         if ending == FINE:
             _accept(setup, live, start + done, step)
@@ -51,7 +51,7 @@ def exchange(setup: Setup, live: Live, start: float, span: float) -> tuple[int, 
                 return FINE, solved
             step = min(2.0 * step, span - done)
         else:
-            live.line.drum_mode[0] = mode
+            live.line.ends.drum_mode = mode
             step *= 0.5
             if step < span * 0.5**MOST_HALVINGS or ending == ABSURD:
                 return ending, solved
@@ -60,51 +60,51 @@ def exchange(setup: Setup, live: Live, start: float, span: float) -> tuple[int, 
 @compiled
 def hull_steps(setup: Setup, span: float) -> int:
     """Return how many hull steps an exchange takes."""
-    return max(1, int(np.ceil(span / setup.hull_step - 1e-6)))
+    return max(1, int(np.ceil(span / setup.fixed.hull_step - 1e-6)))
 
 
 @compiled
 def _agree(setup: Setup, live: Live, start: float, span: float) -> tuple[int, Solved]:
     """Find the force at the end of an exchange with which hull and cable agree; nothing is made real yet."""
     solved = Solved(True, 0, 0.0, 0, 0)
-    ratio = span / live.last_step[0] if live.last_step[0] > 0.0 else 0.0
+    ratio = span / live.now.last_step if live.now.last_step > 0.0 else 0.0
     for i in range(3):
-        live.guess[i] = live.force[i] + ratio * (live.force[i] - live.force_before[i])
+        live.now.guess[i] = live.now.force[i] + ratio * (live.now.force[i] - live.now.force_before[i])
     for _ in range(MOST_EXCHANGES):
         if not _move(setup, live, start, span):
             return ABSURD, solved
-        if not setup.tethered:
+        if not setup.fixed.tethered:
             return FINE, solved
         solved = try_step(
-            live.line, span, live.tow, setup.current, setup.cable, setup.drum, live.load
+            live.line, span, live.now.tow, setup.fixed.current, setup.fixed.cable, setup.fixed.drum, live.load
         )
         if not solved.converged:
             return CABLE_FAILED, solved
-        if setup.prescribed or _forces_agree(live.line.tow_force, live.guess):
+        if setup.fixed.prescribed or _forces_agree(live.line.ends.tow_force, live.now.guess):
             return FINE, solved
-        _mobility(setup.r_c, live.hull.rotation, setup.vehicle.inverse_mass, live.gain)
-        impedance(live.line, live.Z)
-        _improve(span, live.Z, live.gain, live.line.tow_force, live.guess)
+        _mobility(setup.fixed.r_c, live.now.hull.rotation, setup.fixed.vehicle.inverse_mass, live.now.mobility)
+        impedance(live.line, live.now.Z)
+        _improve(span, live.now.Z, live.now.mobility, live.line.ends.tow_force, live.now.guess)
     return DISAGREED, solved
 
 
 @compiled
 def _move(setup: Setup, live: Live, start: float, span: float) -> bool:
     """Move the hull through an exchange; fill the tow point, relative to the drum; False if the speed is absurd."""
-    steps, hull = hull_steps(setup, span), live.hull
+    steps, hull = hull_steps(setup, span), live.now.hull
     for i in range(STATE_SIZE):
-        hull.path[0, i] = live.state[i]
-    if setup.prescribed:
-        follow_track(start, span, steps, setup.track, hull)
+        live.path[0, i] = live.now.state[i]
+    if setup.fixed.prescribed:
+        follow_track(start, span, steps, setup.track, live.path)
     else:
         advance_hull(setup, live, start, span, steps)
-    new = hull.path[steps]
+    new = live.path[steps]
     speed = new[7] * new[7] + new[8] * new[8] + new[9] * new[9]
     if not speed < FASTEST * FASTEST:
         return False
-    tow_point(new, setup.r_c, hull.rotation, live.tow)
+    tow_point(new, setup.fixed.r_c, hull.rotation, live.now.tow)
     for i in range(3):
-        live.tow[i] -= setup.drum_place[i]
+        live.now.tow[i] -= setup.fixed.drum_place[i]
     return True
 
 
@@ -176,14 +176,14 @@ def _solve_three(M: np.ndarray, b: np.ndarray) -> None:
 @compiled
 def _accept(setup: Setup, live: Live, start: float, span: float) -> None:
     """Make the exchange real: state, forces, cable, energies."""
-    steps, hull = hull_steps(setup, span), live.hull
+    steps, hull = hull_steps(setup, span), live.now.hull
     for i in range(3):
-        live.force_before[i] = live.force[i]
-        live.force[i] = live.line.tow_force[i] if setup.tethered else 0.0
+        live.now.force_before[i] = live.now.force[i]
+        live.now.force[i] = live.line.ends.tow_force[i] if setup.fixed.tethered else 0.0
     for i in range(STATE_SIZE):
-        live.state[i] = hull.path[steps, i]
-    live.last_step[0] = span
-    if setup.tethered:
-        accept(live.line, span, setup.current, setup.cable, setup.segment_length, live.load)
-        energy_flow(live.line, setup.current, setup.cable, live.load, live.ledger.cable_new)
+        live.now.state[i] = live.path[steps, i]
+    live.now.last_step = span
+    if setup.fixed.tethered:
+        accept(live.line, span, setup.fixed.current, setup.fixed.cable, setup.fixed.segment_length, live.load)
+        energy_flow(live.line, setup.fixed.current, setup.fixed.cable, live.load, live.now.ledger.cable_new)
     book(setup, live, start, span, steps)

@@ -27,8 +27,8 @@ P_PROPELLER, P_LOSS, P_RESTORING, P_EXTERNAL = range(4)
 
 @compiled
 def book(setup: Setup, live: Live, start: float, span: float, steps: int) -> None:
-    """Add an accepted exchange, whose hull states stand in live.hull.path, to the ledger."""
-    ledger = live.ledger
+    """Add an accepted exchange, whose hull states stand in live.path, to the ledger."""
+    ledger = live.now.ledger
     total, old, new = ledger.total, ledger.cable_old, ledger.cable_new
     _book_hull(setup, live, start, span, steps)
     half = 0.5 * span
@@ -46,29 +46,29 @@ def book(setup: Setup, live: Live, start: float, span: float, steps: int) -> Non
 @compiled
 def _book_hull(setup: Setup, live: Live, start: float, span: float, steps: int) -> None:
     """Add the hull's share; of a prescribed motion, the work that the tow point does on the cable."""
-    hull, ledger = live.hull, live.ledger
+    hull, ledger = live.now.hull, live.now.ledger
     h, old, new, total = span / steps, ledger.hull_old, ledger.hull_new, ledger.total
     for n in range(steps):
         command = setup.orders.values[row_at(setup.orders.time, start + n * h)]
         _hull_power(setup, live, n, n / steps, command, old)
         _hull_power(setup, live, n + 1, (n + 1) / steps, command, new)
-        if setup.prescribed:
+        if setup.fixed.prescribed:
             total[PROPELLER] -= 0.5 * h * (old[P_EXTERNAL] + new[P_EXTERNAL])
         else:
             total[PROPELLER] += 0.5 * h * (old[P_PROPELLER] + new[P_PROPELLER])
             total[HULL_LOSS] -= 0.5 * h * (old[P_LOSS] + new[P_LOSS])
             total[KINETIC] -= 0.5 * h * (old[P_RESTORING] + new[P_RESTORING])
-    if not setup.prescribed:
-        kinetic = vehicle.kinetic_energy(hull.path[steps], setup.current, setup.vehicle)
-        total[KINETIC] += kinetic - ledger.kinetic[0]
-        ledger.kinetic[0] = kinetic
+    if not setup.fixed.prescribed:
+        kinetic = vehicle.kinetic_energy(live.path[steps], setup.fixed.current, setup.fixed.vehicle)
+        total[KINETIC] += kinetic - ledger.kinetic
+        ledger.kinetic = kinetic
 
 
 @compiled
 def _hull_power(setup: Setup, live: Live, row: int, x: float, command: np.ndarray, out: np.ndarray) -> None:
     """Fill out (4,) with the powers on the hull in state `row` of the path, a fraction x into the exchange. [W]."""
-    hull = live.hull
+    hull = live.now.hull
     for i in range(3):
-        hull.force[i] = live.force_before[i] + x * (live.force[i] - live.force_before[i])
-    tow_wrench(hull.path[row], hull.force, setup.r_c, hull)
-    vehicle.power(hull.path[row], command, setup.current, hull.wrench, setup.vehicle, out)
+        hull.pull[i] = live.now.force_before[i] + x * (live.now.force[i] - live.now.force_before[i])
+    tow_wrench(live.path[row], hull.pull, setup.fixed.r_c, hull)
+    vehicle.power(live.path[row], command, setup.fixed.current, hull.wrench, setup.fixed.vehicle, out)

@@ -56,7 +56,7 @@ def tow_point(state: np.ndarray, r_c: np.ndarray, R: np.ndarray, out: np.ndarray
 
 @compiled
 def advance_hull(setup: Setup, live: Live, start: float, span: float, steps: int) -> None:
-    """Fill live.hull.path[1 … steps] from path[0], pulled by live.force at the start and live.guess at the end.
+    """Fill live.path[1 … steps] from path[0], pulled by live.now.force at the start and live.now.guess at the end.
 
     Args:
         setup: vehicle, water, commands (held during a step).
@@ -65,11 +65,11 @@ def advance_hull(setup: Setup, live: Live, start: float, span: float, steps: int
         span: length of the exchange. [s]
         steps: Runge-Kutta steps in it.
     """
-    work, orders = live.hull, setup.orders
+    work, orders = live.now.hull, setup.orders
     h = span / steps
     k, stage = work.slopes, work.stage
     for n in range(steps):
-        state, new = work.path[n], work.path[n + 1]
+        state, new = live.path[n], live.path[n + 1]
         command = orders.values[row_at(orders.time, start + n * h)]
         for s in range(4):
             part = 0.0 if s == 0 else (h if s == 3 else 0.5 * h)
@@ -77,12 +77,12 @@ def advance_hull(setup: Setup, live: Live, start: float, span: float, steps: int
                 stage[i] = state[i] + (part * k[s - 1, i] if s > 0 else 0.0)
             along = (n * h + part) / span
             for i in range(3):
-                work.force[i] = live.force[i] + along * (live.guess[i] - live.force[i])
-            tow_wrench(stage, work.force, setup.r_c, work)
-            vehicle.derivative(stage, command, setup.current, work.wrench, setup.vehicle, k[s])
+                work.pull[i] = live.now.force[i] + along * (live.now.guess[i] - live.now.force[i])
+            tow_wrench(stage, work.pull, setup.fixed.r_c, work)
+            vehicle.derivative(stage, command, setup.fixed.current, work.wrench, setup.fixed.vehicle, k[s])
         for i in range(STATE_SIZE):
             new[i] = state[i] + h / 6.0 * (k[0, i] + 2.0 * k[1, i] + 2.0 * k[2, i] + k[3, i])
-        vehicle.finish_step(new, command, setup.vehicle)
+        vehicle.finish_step(new, command, setup.fixed.vehicle)
 
 
 @compiled
@@ -123,13 +123,13 @@ def pose(track: Track, t: float, state: np.ndarray) -> None:
 
 
 @compiled
-def follow_track(start: float, span: float, steps: int, track: Track, work: HullWork) -> None:
-    """Fill work.path[1 … steps] with a prescribed motion, positions by three-point Gauss quadrature."""
+def follow_track(start: float, span: float, steps: int, track: Track, path: np.ndarray) -> None:
+    """Fill path[1 … steps] with a prescribed motion, positions by three-point Gauss quadrature."""
     h = span / steps
     for n in range(steps):
-        new, t = work.path[n + 1], start + n * h
+        new, t = path[n + 1], start + n * h
         for i in range(STATE_SIZE):
-            new[i] = work.path[n, i]
+            new[i] = path[n, i]
         _move(track, t + h * (0.5 - GAUSS_OFFSET), h * 5.0 / 18.0, new)
         _move(track, t + h * 0.5, h * 8.0 / 18.0, new)
         _move(track, t + h * (0.5 + GAUSS_OFFSET), h * 5.0 / 18.0, new)

@@ -36,7 +36,7 @@ def run_rows(
     """
     solved = Solved(True, 0, 0.0, 0, 0)
     for row in range(first, last):
-        nodes = live.line.count[0] + 1 + SPARE
+        nodes = live.line.ends.count + 1 + SPARE
         if nodes > live.line.length.size or used + nodes > recording.tension.size:
             return row, used, NO_ROOM, solved
         ending, solved = exchange(setup, live, times[row - 1], times[row] - times[row - 1])

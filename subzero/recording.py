@@ -67,35 +67,35 @@ def new_recording(rows: int, nodes: int) -> Recording:
 @compiled
 def record_row(setup: Setup, live: Live, recording: Recording, row: int, time: float, used: int) -> int:
     """Write a row for the present state; return how many nodes are in use after it (`used` before)."""
-    state, r = live.state, recording
+    state, r = live.now.state, recording
     command = setup.orders.values[row_at(setup.orders.time, time)]
-    tow_wrench(state, live.force, setup.r_c, live.hull)
+    tow_wrench(state, live.now.force, setup.fixed.r_c, live.now.hull)
     for i in range(STATE_SIZE):
         r.state[row, i] = state[i]
     for i in range(4):
         r.command[row, i] = command[i]
     for i in range(3):
-        r.tow_force[row, i] = live.force[i]
+        r.tow_force[row, i] = live.now.force[i]
     for i in range(6):
-        r.wrench[row, i] = live.hull.wrench[i]
+        r.wrench[row, i] = live.now.hull.wrench[i]
     for i in range(7):
-        r.energy[row, i] = live.ledger.total[i]
-    r.fins[row, 0], r.fins[row, 1], r.fins[row, 2] = vehicle.deflections(state, command, setup.vehicle)
-    if not setup.prescribed:
+        r.energy[row, i] = live.now.ledger.total[i]
+    r.fins[row, 0], r.fins[row, 1], r.fins[row, 2] = vehicle.deflections(state, command, setup.fixed.vehicle)
+    if not setup.fixed.prescribed:
         vehicle.breakdown(
-            state, command, setup.current, live.hull.wrench, setup.vehicle, r.breakdown[row]
+            state, command, setup.fixed.current, live.now.hull.wrench, setup.fixed.vehicle, r.breakdown[row]
         )
-        r.voltage[row] = vehicle.battery_voltage(state, command, setup.current, setup.vehicle)
-    return _record_cable(live, r, row, used) if setup.tethered else used
+        r.voltage[row] = vehicle.battery_voltage(state, command, setup.fixed.current, setup.fixed.vehicle)
+    return _record_cable(live, r, row, used) if setup.fixed.tethered else used
 
 
 @compiled
 def _record_cable(live: Live, r: Recording, row: int, used: int) -> int:
     """Write the cable's part of a row."""
     line = live.line
-    N = line.count[0]
+    N = line.ends.count
     tow, r.drum_tension[row] = ends(line)
-    r.length[row] = line.last_length[NOW]
+    r.length[row] = line.ends.last_length[NOW]
     for j in range(1, N):
         r.length[row] += line.length[j]
     for j in range(N + 1):

@@ -9,6 +9,7 @@ import numpy as np
 from cable.element import Load
 from cable.line import Line
 from cable.properties import CableNumbers, DrumNumbers
+from subzero.compiled import packed
 from vehicle import STATE_SIZE, VehicleNumbers
 
 
@@ -29,21 +30,13 @@ class Track(NamedTuple):
 
 
 class HullWork(NamedTuple):
-    """Work space: Runge-Kutta slopes and stage, wrench, rotation; and the states on the way of an exchange."""
+    """Work space of the hull: Runge-Kutta slopes and stage, rotation, pull of the cable and its wrench."""
 
     slopes: np.ndarray
     stage: np.ndarray
-    wrench: np.ndarray
     rotation: np.ndarray
-    force: np.ndarray
-    path: np.ndarray
-
-
-def new_hull_work(most_steps: int) -> HullWork:
-    """Return work space for exchanges of up to `most_steps` hull steps."""
-    slopes, stage = np.zeros((4, STATE_SIZE)), np.zeros(STATE_SIZE)
-    path = np.zeros((most_steps + 1, STATE_SIZE))
-    return HullWork(slopes, stage, np.zeros(6), np.zeros((3, 3)), np.zeros(3), path)
+    pull: np.ndarray
+    wrench: np.ndarray
 
 
 class Ledger(NamedTuple):
@@ -53,7 +46,7 @@ class Ledger(NamedTuple):
         total: (7,), rows as in `subzero.energy`. [J]
         hull_old, hull_new: powers of `vehicle.power` (4,). [W]
         cable_old, cable_new: flows of `cable.energy.energy_flow` (5,).
-        kinetic: kinetic energy of the hull at the last accepted time, in a one-element array. [J]
+        kinetic: kinetic energy of the hull at the last accepted time. [J]
     """
 
     total: np.ndarray
@@ -61,16 +54,11 @@ class Ledger(NamedTuple):
     hull_new: np.ndarray
     cable_old: np.ndarray
     cable_new: np.ndarray
-    kinetic: np.ndarray
+    kinetic: float
 
 
-def new_ledger() -> Ledger:
-    """Return an empty ledger."""
-    return Ledger(*(np.zeros(size) for size in (7, 4, 4, 5, 5, 1)))
-
-
-class Setup(NamedTuple):
-    """What does not change during a run."""
+class Fixed(NamedTuple):
+    """The numbers that do not change during a run; `drum_place` is the drum in earth axes (3,). [m]"""
 
     vehicle: VehicleNumbers
     cable: CableNumbers
@@ -78,17 +66,26 @@ class Setup(NamedTuple):
     current: np.ndarray
     r_c: np.ndarray
     drum_place: np.ndarray
-    orders: Orders
-    track: Track
     hull_step: float
-    cable_step: float
     segment_length: float
     tethered: bool
     prescribed: bool
 
 
-class Live(NamedTuple):
-    """What changes during a run: the state and the forces now and before, the cable, and work space."""
+class Now(NamedTuple):
+    """Where a run stands.
+
+    Attributes:
+        state: of the vehicle, as in `vehicle.STATE`.
+        force, force_before: pull of the cable on the vehicle, at the last two accepted times, earth axes (3,). [N]
+        guess: pull at the end of the exchange that is being tried (3,). [N]
+        tow: tow point there, relative to the drum (3,). [m]
+        Z: answer of the pull to the tow point's place (3, 3). [N/m]
+        mobility: acceleration of the tow point per pull (3, 3). [1/kg]
+        last_step: length of the last accepted exchange, 0 at the start. [s]
+        hull: work space.
+        ledger: energies.
+    """
 
     state: np.ndarray
     force: np.ndarray
@@ -96,9 +93,36 @@ class Live(NamedTuple):
     guess: np.ndarray
     tow: np.ndarray
     Z: np.ndarray
-    gain: np.ndarray
-    last_step: np.ndarray
-    line: Line
-    load: Load
+    mobility: np.ndarray
+    last_step: float
     hull: HullWork
     ledger: Ledger
+
+
+class Setup(NamedTuple):
+    """What does not change during a run."""
+
+    fixed: Fixed
+    orders: Orders
+    track: Track
+
+
+class Live(NamedTuple):
+    """What changes during a run; `path` holds the hull's states on the way of an exchange (steps + 1, STATE_SIZE)."""
+
+    now: Now
+    path: np.ndarray
+    line: Line
+    load: Load
+
+
+def new_now(state: np.ndarray, force: np.ndarray) -> Now:
+    """Return the beginning of a run in a state, with the cable pulling with `force` (3,). [N]"""
+    size = STATE_SIZE
+    work = HullWork(np.zeros((4, size)), np.zeros(size), np.zeros((3, 3)), np.zeros(3), np.zeros(6))
+    ledger = Ledger(*(np.zeros(n) for n in (7, 4, 4, 5, 5)), kinetic=0.0)
+    vectors = {name: np.zeros(3) for name in ("force_before", "guess", "tow")}
+    matrices = {name: np.zeros((3, 3)) for name in ("Z", "mobility")}
+    return packed(
+        Now(state=state, force=force, **vectors, **matrices, last_step=0.0, hull=work, ledger=ledger)
+    )

@@ -20,7 +20,8 @@ from subzero.hull import pose, tow_point
 from subzero.loop import NO_ROOM, SPARE, run_rows
 from subzero.model import Model
 from subzero.recording import Recording, new_recording, record_row
-from subzero.run_state import Live, Orders, Setup, Track, new_hull_work, new_ledger
+from subzero.compiled import packed
+from subzero.run_state import Fixed, Live, Orders, Setup, Track, new_now
 from subzero.trials import load
 
 if TYPE_CHECKING:
@@ -97,49 +98,37 @@ def run_trial(trial: scenarios.Trial, model: Model, tethered: bool, progress: Pr
 
 def prepare(trial: scenarios.Trial, model: Model, tethered: bool) -> tuple[Setup, Live]:
     """Return what stays and what changes in a run, at its start: the cable laid straight behind the vehicle."""
-    start, state = trial.start, _first_state(trial)
-    r_c, tow = model.vehicle.tow_point.position(), np.zeros(3)
-    numbers = model.vehicle.numbers()
-    current = np.array(model.current, dtype=float)
-    hull = new_hull_work(int(np.ceil(trial.cable_step / trial.hull_step - 1e-6)))
-    tow_point(state, r_c, hull.rotation, tow)
-    ahead = hull.rotation[:, 0].copy()
-    wet = max(start.wet_length, START_LENGTH)
-    setup = Setup(
-        vehicle=numbers,
+    state, R, tow = _first_state(trial), np.zeros((3, 3)), np.zeros(3)
+    fixed, wet = _fixed(trial, model, tethered), max(trial.start.wet_length, START_LENGTH)
+    tow_point(state, fixed.r_c, R, tow)
+    ahead, speed = R[:, 0].copy(), float(state[7])
+    fixed.drum_place[:] = tow - wet * ahead
+    line, load = new_line(int(wet / trial.segment_length) + 2 * SPARE), new_load()
+    lay_straight(line, wet, ahead, speed, trial.segment_length, fixed.cable)
+    set_momenta(line, fixed.current, fixed.cable, load)
+    pull = -fixed.cable.tangential_drag * speed * abs(speed) * wet * tethered
+    now = new_now(state, pull * ahead)
+    now.ledger.kinetic = vehicle.kinetic_energy(state, fixed.current, fixed.vehicle)
+    steps = int(np.ceil(trial.cable_step / trial.hull_step - 1e-6))
+    live = Live(now=now, path=np.zeros((steps + 1, vehicle.STATE_SIZE)), line=line, load=load)
+    return Setup(fixed=fixed, orders=_orders(trial), track=_track(trial)), live
+
+
+def _fixed(trial: scenarios.Trial, model: Model, tethered: bool) -> Fixed:
+    """Return the numbers of a run; the drum's place is still to be filled in."""
+    fixed = Fixed(
+        vehicle=model.vehicle.numbers(),
         cable=model.cable.numbers(),
         drum=model.drum.numbers(),
-        current=current,
-        r_c=r_c,
-        drum_place=tow - wet * ahead,
-        orders=_orders(trial),
-        track=_track(trial),
+        current=np.array(model.current, dtype=float),
+        r_c=model.vehicle.tow_point.position(),
+        drum_place=np.zeros(3),
         hull_step=trial.hull_step,
-        cable_step=trial.cable_step,
         segment_length=trial.segment_length,
         tethered=tethered,
         prescribed=trial.motion is not None,
     )
-    speed = float(state[7])
-    line, load = new_line(int(wet / trial.segment_length) + 2 * SPARE), new_load()
-    lay_straight(line, wet, ahead, speed, trial.segment_length, setup.cable)
-    set_momenta(line, current, setup.cable, load)
-    live = Live(
-        state=state,
-        force=-setup.cable.tangential_drag * speed * abs(speed) * wet * ahead * tethered,
-        force_before=np.zeros(3),
-        guess=np.zeros(3),
-        tow=np.zeros(3),
-        Z=np.zeros((3, 3)),
-        gain=np.zeros((3, 3)),
-        last_step=np.zeros(1),
-        line=line,
-        load=load,
-        hull=hull,
-        ledger=new_ledger(),
-    )
-    live.ledger.kinetic[0] = vehicle.kinetic_energy(state, current, numbers)
-    return setup, live
+    return packed(fixed)
 
 
 def _first_state(trial: scenarios.Trial) -> np.ndarray:

@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from subzero.compiled import packed
 from vehicle.actuators import Servo, Servos
 from vehicle.added_mass import AddedMass
 from vehicle.axial_drag import AxialDrag
@@ -86,7 +87,7 @@ class Vehicle:
         """Return what the compiled equations take."""
         density = self.water.density
         mass_matrix = self.rigid_body.matrix() + self.added_mass.matrix()
-        return VehicleNumbers(
+        numbers = VehicleNumbers(
             mass_matrix=mass_matrix,
             inverse_mass=np.linalg.inv(mass_matrix),
             rigid_body=self.rigid_body.matrix(),
@@ -108,6 +109,7 @@ class Vehicle:
             ),
             motor=motor_numbers(self.motor, self.battery),
         )
+        return packed(numbers)
 
     def with_parameter(self, key: str, value: float) -> Vehicle:
         """Return a new vehicle with one number changed, named "section.parameter"; raises VehicleError."""
