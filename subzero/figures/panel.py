@@ -42,9 +42,9 @@ def legend(axes: Axes, columns: int = 3, *, tight: bool = False, **where: Any) -
         taken = min((rows * LEGEND_ROW + LEGEND_MARGIN) / height, 0.6)
         low, high = axes.get_ylim()
         axes.set_ylim(low, low + (high - low) / (1.0 - taken))
-        where = {"loc": "upper left", "ncols": columns, "columnspacing": 1.2, "borderaxespad": 0.2}
-    size = {"fontsize": TINY, "handlelength": 1.3} if tight else {"fontsize": SMALL, "handlelength": 2.2}
-    axes.legend(**size | {"framealpha": 0.85, "edgecolor": "none"} | where)
+        where = {"loc": "upper left", "ncols": columns, "columnspacing": 0.9, "borderaxespad": 0.2}
+    size = {"fontsize": TINY, "handlelength": 1.3} if tight else {"fontsize": SMALL, "handlelength": 2.0}
+    axes.legend(**size | {"framealpha": 0.85, "edgecolor": "none", "handletextpad": 0.5} | where)
 
 
 def channel_panel(axes: Axes, runs: Runs, name: str, record: Record | None = None) -> None:
