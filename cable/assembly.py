@@ -200,7 +200,11 @@ def _scatter_length(line: Line, j: int, T: float, length: float, c: CableNumbers
 def _drum_row(line: Line, a0: float, a1: float, a2: float, drum: DrumNumbers, work: Load) -> None:
     """Write the drum's equation (11), the second row of the last block; `work` still holds the last segment."""
     N, t = line.ends.count, work.tangent
-    D, L, r = line.diagonal[line.ends.count], line.lower[line.ends.count], line.rows[RESIDUAL, line.ends.count]
+    D, L, r = (
+        line.diagonal[line.ends.count],
+        line.lower[line.ends.count],
+        line.rows[RESIDUAL, line.ends.count],
+    )
     D[2, 2] = 1.0
     D[3, 3] = 1.0
     Qt = line.load[N, 0] * t[0] + line.load[N, 1] * t[1] + line.load[N, 2] * t[2]

@@ -72,7 +72,7 @@ class BoxWorkspace(NamedTuple):
     update: np.ndarray
     length: np.ndarray
     """Length of box j [m]."""
-    count: np.ndarray
+    count: np.ndarray  # type: ignore[assignment]  # hides the tuple method of that name
     """(2,): the number of nodes in use, and before the last step of the paper's scheme."""
     factors: np.ndarray
     orders: np.ndarray

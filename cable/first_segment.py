@@ -1,7 +1,7 @@
 """The start of a run: while there is one segment only, it is a straight line between tow point and drum.
 
-Its shape leaves nothing to solve for, and a slack one cannot lie anywhere. So the drum gives what the chord asks for and
-takes nothing back, and the segment pulls or does not:
+Its shape leaves nothing to solve for, and a slack one cannot lie anywhere. So the drum gives what the chord asks
+for and takes nothing back, and the segment pulls or does not:
 
     ℓ = max(|d|, ℓ_now),     T = max(T(S) − ½ t·Q, 0)
 

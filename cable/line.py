@@ -9,6 +9,7 @@ NEW as often as needed and becomes real only by `accept`.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -26,7 +27,8 @@ SPLIT_AT = 1.5
 """The last segment is split when it has grown to this many segment lengths."""
 
 
-class Ends(NamedTuple):
+@dataclass(kw_only=True)
+class Ends:
     """What a cable has once: its growing end at the drum, its tow point, and how it is solved.
 
     Attributes:

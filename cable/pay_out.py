@@ -25,7 +25,7 @@ class Record(NamedTuple):
     Attributes:
         tow_force: force on the vehicle, earth axes (n, 3). [N]
         tow_tension, drum_tension, length: (n,). [N, N, m]
-        count: segments (n,).
+        segments: how many (n,).
         iterations: Newton iterations spent on the step (n,).
         position: node positions relative to the drum (all nodes of all rows, 3). [m]
         tension: tensions at the nodes (all nodes of all rows,). [N]
@@ -35,7 +35,7 @@ class Record(NamedTuple):
     tow_tension: np.ndarray
     drum_tension: np.ndarray
     length: np.ndarray
-    count: np.ndarray
+    segments: np.ndarray
     iterations: np.ndarray
     position: np.ndarray
     tension: np.ndarray
@@ -136,7 +136,7 @@ def write_row(line: Line, record: Record, k: int, used: int) -> None:
     record.length[k] = line.ends.last_length[NOW]
     for j in range(1, N):
         record.length[k] += line.length[j]
-    record.count[k] = N
+    record.segments[k] = N
     for i in range(3):
         record.tow_force[k, i] = line.ends.tow_force[i]
     for j in range(N + 1):

@@ -133,7 +133,7 @@ def _history(
     """Return the record's filled rows as a history."""
     completed = rows == times.size
     message = "The run reached its end." if completed else describe_failure(solved, times[rows - 1])
-    cuts = np.cumsum(record.count[:rows] + 1)
+    cuts = np.cumsum(record.segments[:rows] + 1)
     return History(
         time=times[:rows],
         tow_force=record.tow_force[:rows],
@@ -157,7 +157,7 @@ def _new_record(rows: int, capacity: int) -> Record:
     """Return an empty record with room for `rows` rows and a line that grows to `capacity` segments."""
     nodes = rows * (capacity + 2)
     per_row = {name: np.zeros(rows) for name in ("tow_tension", "drum_tension", "length")}
-    counts = {name: np.zeros(rows, np.int64) for name in ("count", "iterations")}
+    counts = {name: np.zeros(rows, np.int64) for name in ("segments", "iterations")}
     return Record(
         tow_force=np.zeros((rows, 3)),
         **per_row,

@@ -54,7 +54,9 @@ def try_step(
         solved = _solve_softly(line, step, tow, J, c, drum, work)
         if line.ends.count == 1:
             break
-        mode = next_mode(line.ends.drum_mode, solved.converged, line.ends.payout[NEW], line.ends.drum_pull, drum)
+        mode = next_mode(
+            line.ends.drum_mode, solved.converged, line.ends.payout[NEW], line.ends.drum_pull, drum
+        )
         if not solved.converged:
             failed |= 1 << line.ends.drum_mode
         if mode == line.ends.drum_mode or (failed >> mode) & 1:

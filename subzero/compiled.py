@@ -11,6 +11,7 @@ Setting ``NUMBA_DISABLE_JIT=1`` runs the same code interpreted.
 
 from __future__ import annotations
 
+import dataclasses
 import hashlib
 import os
 from collections.abc import Callable
@@ -22,7 +23,7 @@ import numba
 import numpy as np
 
 Function = TypeVar("Function", bound=Callable[..., Any])
-Numbers = TypeVar("Numbers", bound=tuple[Any, ...])
+Numbers = TypeVar("Numbers")
 
 SEES = {"cable": ("cable",), "vehicle": ("vehicle",)}
 """Which packages' compiled functions a package can call; all others (subzero itself, tests) see everything."""
@@ -65,29 +66,36 @@ def compiled(function: Function) -> Function:
     inner = function.__name__.startswith("_")
     package = function.__module__.partition(".")[0]
     numba.config.CACHE_DIR = str(cache_directory(package if package in SEES else "subzero"))
-    return numba.njit(
-        cache=True, error_model="numpy", no_cfunc_wrapper=True, no_cpython_wrapper=inner
-    )(function)
+    return numba.njit(cache=True, error_model="numpy", no_cfunc_wrapper=True, no_cpython_wrapper=inner)(
+        function
+    )
 
 
 def packed(values: Numbers) -> Numbers:
-    """Return a named tuple of numbers, arrays, named tuples and equal tuples as one record in memory.
+    """Return a named tuple or dataclass of numbers, arrays, and more of its kind as one record in memory.
 
-    Fields are read (and written) by the same names. Compiled functions take a record as a single pointer where they
-    take a named tuple field by field: that halves the first compilation.
+    Fields are read and written by the same names. Compiled functions take a record as a single pointer where
+    they take a named tuple field by field: that halves the first compilation.
     """
-    out = np.zeros(1, dtype=_layout(values))[0]
+    out: Any = np.zeros(1, dtype=_layout(values))[0]
     _fill(out, values)
-    return out  # type: ignore[no-any-return]
+    return out
+
+
+def _parts(value: Any) -> dict[str, Any] | None:
+    """Return the fields of a named tuple or dataclass by name; None for anything else."""
+    if dataclasses.is_dataclass(value):
+        return {field.name: getattr(value, field.name) for field in dataclasses.fields(value)}
+    return value._asdict() if hasattr(value, "_asdict") else None
 
 
 def _layout(value: Any) -> np.dtype[Any]:
     """Return the dtype that holds a value of `packed`."""
     if isinstance(value, np.record):
         return value.dtype
-    if hasattr(value, "_fields"):
-        fields = [(name, _layout(part)) for name, part in zip(value._fields, value, strict=True)]
-        return np.dtype((np.record, fields))
+    parts = _parts(value)
+    if parts is not None:
+        return np.dtype((np.record, [(name, _layout(part)) for name, part in parts.items()]))
     if isinstance(value, tuple):
         return np.dtype((_layout(value[0]), (len(value),)))
     array = np.asarray(value)
@@ -95,9 +103,9 @@ def _layout(value: Any) -> np.dtype[Any]:
 
 
 def _fill(record: Any, value: Any) -> None:
-    """Copy a named tuple into a record of its layout."""
-    for name, part in zip(value._fields, value, strict=True):
-        if hasattr(part, "_fields"):
+    """Copy the fields of a value into a record of its layout."""
+    for name, part in (_parts(value) or {}).items():
+        if _parts(part) is not None:
             _fill(record[name], part)
         elif isinstance(part, tuple):
             for row, one in zip(record[name], part, strict=True):

@@ -82,7 +82,9 @@ def _agree(setup: Setup, live: Live, start: float, span: float) -> tuple[int, So
             return CABLE_FAILED, solved
         if setup.fixed.prescribed or _forces_agree(live.line.ends.tow_force, live.now.guess):
             return FINE, solved
-        _mobility(setup.fixed.r_c, live.now.hull.rotation, setup.fixed.vehicle.inverse_mass, live.now.mobility)
+        _mobility(
+            setup.fixed.r_c, live.now.hull.rotation, setup.fixed.vehicle.inverse_mass, live.now.mobility
+        )
         impedance(live.line, live.now.Z)
         _improve(span, live.now.Z, live.now.mobility, live.line.ends.tow_force, live.now.guess)
     return DISAGREED, solved
@@ -91,7 +93,7 @@ def _agree(setup: Setup, live: Live, start: float, span: float) -> tuple[int, So
 @compiled
 def _move(setup: Setup, live: Live, start: float, span: float) -> bool:
     """Move the hull through an exchange; fill the tow point, relative to the drum; False if the speed is absurd."""
-    steps, hull = hull_steps(setup, span), live.now.hull
+    steps = hull_steps(setup, span)
     for i in range(STATE_SIZE):
         live.path[0, i] = live.now.state[i]
     if setup.fixed.prescribed:
@@ -102,7 +104,7 @@ def _move(setup: Setup, live: Live, start: float, span: float) -> bool:
     speed = new[7] * new[7] + new[8] * new[8] + new[9] * new[9]
     if not speed < FASTEST * FASTEST:
         return False
-    tow_point(new, setup.fixed.r_c, hull.rotation, live.now.tow)
+    tow_point(new, setup.fixed.r_c, live.now.hull.rotation, live.now.tow)
     for i in range(3):
         live.now.tow[i] -= setup.fixed.drum_place[i]
     return True
@@ -176,7 +178,7 @@ def _solve_three(M: np.ndarray, b: np.ndarray) -> None:
 @compiled
 def _accept(setup: Setup, live: Live, start: float, span: float) -> None:
     """Make the exchange real: state, forces, cable, energies."""
-    steps, hull = hull_steps(setup, span), live.now.hull
+    steps = hull_steps(setup, span)
     for i in range(3):
         live.now.force_before[i] = live.now.force[i]
         live.now.force[i] = live.line.ends.tow_force[i] if setup.fixed.tethered else 0.0

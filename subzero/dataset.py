@@ -93,7 +93,7 @@ def _tow_velocities(run: Run, model: Model) -> np.ndarray:
     R = np.array([_rotation(q) for q in r.state[:, 3:7]])
     spin = np.cross(r.state[:, 10:13], model.vehicle.tow_point.position())
     V = np.einsum("nij,nj->ni", R, r.state[:, 7:10] + spin)
-    if not r.count.any():
+    if not r.nodes.any():
         return np.zeros((3, run.times.size))
     pull = np.linalg.norm(r.tow_force, axis=1, keepdims=True)
     t = np.where(pull > NO_PULL, r.tow_force / np.maximum(pull, NO_PULL), -R[:, :, 0])
@@ -114,17 +114,20 @@ def _rotation(quaternion: np.ndarray) -> np.ndarray:
 def _arrays(run: Run) -> dict[str, Any]:
     """Return the force breakdown, and the cable's nodes in rows of equal length, NaN behind the last node."""
     r = run.recording
-    nodes = max(int(r.count.max(initial=0)), 1)
+    nodes = max(int(r.nodes.max(initial=0)), 1)
     position = np.full((run.times.size, nodes, 3), np.nan)
     tension = np.full((run.times.size, nodes), np.nan)
-    filled = np.arange(nodes) < r.count[:, None]
+    filled = np.arange(nodes) < r.nodes[:, None]
     position[filled], tension[filled] = r.position, r.tension
     about = "relative to the drum; node 0 is the tow point, the last one sits at the drum"
     return {
         "force_breakdown": (
             ("time", "term", "component"),
             r.breakdown,
-            {"units": "N; N m", "long_name": "share of every term in the force (X, Y, Z) and moment (K, M, N)"},
+            {
+                "units": "N; N m",
+                "long_name": "share of every term in the force (X, Y, Z) and moment (K, M, N)",
+            },
         ),
         "cable_position": (
             ("time", "node", "earth_axis"),
@@ -136,7 +139,7 @@ def _arrays(run: Run) -> dict[str, Any]:
             tension,
             {"units": BY_NAME["cable_tension"].unit, "long_name": "tension along the cable"},
         ),
-        "node_count": ("time", r.count, {"units": "1", "long_name": "nodes of the cable, 0 without one"}),
+        "node_count": ("time", r.nodes, {"units": "1", "long_name": "nodes of the cable, 0 without one"}),
     }
 
 

@@ -46,7 +46,7 @@ def book(setup: Setup, live: Live, start: float, span: float, steps: int) -> Non
 @compiled
 def _book_hull(setup: Setup, live: Live, start: float, span: float, steps: int) -> None:
     """Add the hull's share; of a prescribed motion, the work that the tow point does on the cable."""
-    hull, ledger = live.now.hull, live.now.ledger
+    ledger = live.now.ledger
     h, old, new, total = span / steps, ledger.hull_old, ledger.hull_new, ledger.total
     for n in range(steps):
         command = setup.orders.values[row_at(setup.orders.time, start + n * h)]

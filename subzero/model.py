@@ -1,8 +1,8 @@
 """A model is a value: a vehicle, a cable, a drum and the water, frozen. To change one, make a new one.
 
-    >>> import dataclasses, subzero
-    >>> model = subzero.Model.of(subzero.load_scenario("fig6"))
-    >>> heavy = dataclasses.replace(model, vehicle=model.vehicle.with_parameter("rigid_body.mass", 7.0))
+>>> import dataclasses, subzero
+>>> model = subzero.Model.of(subzero.load_scenario("fig6"))
+>>> heavy = dataclasses.replace(model, vehicle=model.vehicle.with_parameter("rigid_body.mass", 7.0))
 """
 
 from __future__ import annotations
@@ -11,9 +11,9 @@ import dataclasses
 from dataclasses import dataclass
 from typing import Any
 
-import cable
 import scenarios
-import vehicle
+from cable.properties import CableProperties, DrumProperties
+from vehicle import Vehicle, from_mapping, to_mapping
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,9 +27,9 @@ class Model:
         current: velocity of the water, north, east, down, the same everywhere. [m/s]
     """
 
-    vehicle: vehicle.Vehicle
-    cable: cable.CableProperties
-    drum: cable.DrumProperties
+    vehicle: Vehicle
+    cable: CableProperties
+    drum: DrumProperties
     current: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     @classmethod
@@ -41,16 +41,16 @@ class Model:
             ValueError: its numbers do not make a cable or a drum.
         """
         return cls(
-            vehicle=vehicle.from_mapping(trial.vehicle),
-            cable=cable.CableProperties(**trial.cable),
-            drum=cable.DrumProperties(**trial.drum),
+            vehicle=from_mapping(trial.vehicle),
+            cable=CableProperties(**trial.cable),
+            drum=DrumProperties(**trial.drum),
             current=trial.current,
         )
 
     def parameters(self) -> dict[str, Any]:
         """Return every number by name, ready for JSON."""
         return {
-            "vehicle": vehicle.to_mapping(self.vehicle),
+            "vehicle": to_mapping(self.vehicle),
             "cable": dataclasses.asdict(self.cable),
             "drum": dataclasses.asdict(self.drum),
             "current": list(self.current),

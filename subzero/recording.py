@@ -28,7 +28,7 @@ class Recording(NamedTuple):
         drum_tension, length: (n,). [N, m]
         breakdown: every term of the hull (n, terms, 6). [N, N m]
         energy: rows of `subzero.energy` (n, 7). [J]
-        count: nodes (n,), 0 without a cable.
+        nodes: how many (n,), 0 without a cable.
         position, tension: nodes of all rows, relative to the drum (all, 3) [m]; tension there (all,). [N]
     """
 
@@ -42,7 +42,7 @@ class Recording(NamedTuple):
     length: np.ndarray
     breakdown: np.ndarray
     energy: np.ndarray
-    count: np.ndarray
+    nodes: np.ndarray
     position: np.ndarray
     tension: np.ndarray
 
@@ -61,7 +61,7 @@ def new_recording(rows: int, nodes: int) -> Recording:
     }
     flat = {"voltage": rows, "drum_tension": rows, "length": rows, "tension": nodes}
     arrays = {name: np.zeros(shape) for name, shape in (shapes | flat).items()}
-    return Recording(**arrays, count=np.zeros(rows, np.int64))
+    return Recording(**arrays, nodes=np.zeros(rows, np.int64))
 
 
 @compiled
@@ -105,5 +105,5 @@ def _record_cable(live: Live, r: Recording, row: int, used: int) -> int:
         r.tension[used + j] = 0.5 * (near + line.tension[NOW, min(j + 1, N)])
     r.tension[used] = tow
     r.tension[used + N] = r.drum_tension[row]
-    r.count[row] = N + 1
+    r.nodes[row] = N + 1
     return used + N + 1

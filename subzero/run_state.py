@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -39,7 +40,8 @@ class HullWork(NamedTuple):
     wrench: np.ndarray
 
 
-class Ledger(NamedTuple):
+@dataclass(kw_only=True)
+class Ledger:
     """Sums since the start, and the flows at both ends of the last step.
 
     Attributes:
@@ -72,7 +74,8 @@ class Fixed(NamedTuple):
     prescribed: bool
 
 
-class Now(NamedTuple):
+@dataclass(kw_only=True)
+class Now:
     """Where a run stands.
 
     Attributes:
@@ -120,7 +123,14 @@ def new_now(state: np.ndarray, force: np.ndarray) -> Now:
     """Return the beginning of a run in a state, with the cable pulling with `force` (3,). [N]"""
     size = STATE_SIZE
     work = HullWork(np.zeros((4, size)), np.zeros(size), np.zeros((3, 3)), np.zeros(3), np.zeros(6))
-    ledger = Ledger(*(np.zeros(n) for n in (7, 4, 4, 5, 5)), kinetic=0.0)
+    ledger = Ledger(
+        total=np.zeros(7),
+        hull_old=np.zeros(4),
+        hull_new=np.zeros(4),
+        cable_old=np.zeros(5),
+        cable_new=np.zeros(5),
+        kinetic=0.0,
+    )
     vectors = {name: np.zeros(3) for name in ("force_before", "guess", "tow")}
     matrices = {name: np.zeros((3, 3)) for name in ("Z", "mobility")}
     return packed(

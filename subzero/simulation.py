@@ -16,11 +16,11 @@ from cable.line import enlarged, lay_straight, new_line, set_momenta
 from cable.newton import Solved
 from cable.pull_out import START_LENGTH, describe_failure
 from subzero import coupling
+from subzero.compiled import packed
 from subzero.hull import pose, tow_point
 from subzero.loop import NO_ROOM, SPARE, run_rows
 from subzero.model import Model
 from subzero.recording import Recording, new_recording, record_row
-from subzero.compiled import packed
 from subzero.run_state import Fixed, Live, Orders, Setup, Track, new_now
 from subzero.trials import load
 
