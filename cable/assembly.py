@@ -65,7 +65,7 @@ def assemble(
         for i in range(3):
             work.velocity[i] = 0.5 * (line.velocity[NEW, j - 1, i] + line.velocity[NEW, j, i])
             work.chord[i] = line.position[NEW, j, i] - line.position[NEW, j - 1, i]
-        evaluate_load(work.velocity, J, work.chord, length, T, a0, c, work)
+        evaluate_load(work.velocity, J, work.chord, length, T, line.slip[j], line.normal_gain[j], a0, c, work)
         for i in range(3):
             line.momentum[NEW, j, i] = length * work.momentum[i]
             history = a1 * line.momentum[NOW, j, i] + a2 * line.momentum[BEFORE, j, i]
@@ -76,6 +76,8 @@ def assemble(
             _add_influx(line, length, a0, T, J, c, work)
         _scatter_balance(line, j, T, length, work)
         _scatter_length(line, j, T, length, c, work.chord)
+    if N > 1:
+        _sharpen_tow_force(line)
     _drum_row(line, a0, a1, a2, drum, work)
     if N == 1:
         write_single_segment(line, a0, drum, work.chord)
@@ -180,15 +182,26 @@ def _scatter_balance(line: Line, j: int, T: float, length: float, work: Load) ->
 
 
 @compiled
+def _sharpen_tow_force(line: Line) -> None:
+    """Take the load of the first half segment at its own middle, a quarter into the segment, by extrapolation."""
+    first = line.length[1]
+    second = line.ends.last_length[NEW] if line.ends.count == 2 else line.length[2]
+    share = 0.25 * first * first / (first + second)
+    for i in range(3):
+        line.ends.tow_force[i] -= share * (line.load[1, i] / first - line.load[2, i] / second)
+
+
+@compiled
 def _scatter_length(line: Line, j: int, T: float, length: float, c: CableNumbers, d: np.ndarray) -> None:
     """Write the length equation of segment j, the first row of its block."""
-    square = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) / (length * length)
+    scale = 1.0 / (length * length)
+    square = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) * scale
     stretch = 1.0 + c.compliance * T
     phi, by_T, by_strain = slack_law(T, 0.5 * (stretch * stretch - square), line.ends.smoothing)
     line.rows[RESIDUAL, j, 0] = phi
     line.diagonal[j, 0, 0] = by_T + by_strain * stretch * c.compliance
     for i in range(3):
-        slope = by_strain * d[i] / (length * length)
+        slope = by_strain * d[i] * scale
         line.lower[j, 0, 1 + i] = slope
         if j < line.ends.count:
             line.diagonal[j, 0, 1 + i] = -slope

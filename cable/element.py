@@ -101,6 +101,8 @@ def evaluate_load(
     d: np.ndarray,
     length: float,
     T: float,
+    slip: float,
+    gain: float,
     a0: float,
     c: CableNumbers,
     out: Load,
@@ -113,6 +115,8 @@ def evaluate_load(
         d: chord vector (3,). [m]
         length: unstretched length of the segment. [m]
         T: tension (only √(1+eT) is taken from it). [N]
+        slip: added to the speed along the chord, see `cable.arc`. [m/s]
+        gain: on the normal drag, see `cable.arc`. [-]
         a0: weight of the newest value in the backward difference. [1/s]
         c: the cable.
         out: filled. Loads in [N/m].
@@ -127,12 +131,12 @@ def evaluate_load(
         across[i] = V[i] - J[i] - Ut * t[i]
     normal = sqrt(across[0] * across[0] + across[1] * across[1] + across[2] * across[2])
     stretch = sqrt(1.0 + c.compliance * T)
-    kt, kn = stretch * c.tangential_drag, stretch * c.normal_drag
+    kt, kn = stretch * c.tangential_drag, gain * stretch * c.normal_drag
     for i in range(3):
-        out.drag[i] = kt * abs(Ut) * Ut * t[i] + kn * normal * across[i]
+        out.drag[i] = kt * abs(Ut + slip) * (Ut + slip) * t[i] + kn * normal * across[i]
         out.q[i] = a0 * out.momentum[i] + out.drag[i]
     out.q[2] -= c.weight
-    _differentiate_load(V, J, Ut, normal, r, turning_rate(d, length, r), a0, kt, kn, c, out)
+    _differentiate_load(V, J, Ut, normal, r, slip, turning_rate(d, length, r), a0, kt, kn, c, out)
 
 
 @compiled
@@ -142,6 +146,7 @@ def _differentiate_load(
     Ut: float,
     normal: float,
     r: float,
+    slip: float,
     g: float,
     a0: float,
     kt: float,
@@ -153,11 +158,12 @@ def _differentiate_load(
 
     With C = ∂(U_t t)/∂t = t Uᵀ + U_t I = −∂U_⊥/∂t, G = |U_⊥| I + U_⊥ U_⊥ᵀ/|U_⊥| and ∂t/∂d = (I − g t tᵀ)/r:
 
-        ∂q/∂V = a₀(m I + ρA P) + 2 k_t |U_t| t tᵀ + k_n G P
-        ∂q/∂t = −a₀ρA C + k_t |U_t| (C + t Uᵀ) − k_n G C
+        ∂q/∂V = a₀(m I + ρA P) + 2 k_t |W| t tᵀ + k_n G P
+        ∂q/∂t = −a₀ρA C + k_t |W| (W I + 2 t Uᵀ) − k_n G C,     W = U_t + slip
     """
     t, across, G = out.tangent, out.across, out.G
     inverse = 1.0 / normal if normal > 1e-12 else 0.0
+    along = abs(Ut + slip)
     for i in range(3):
         for k in range(3):
             G[i, k] = across[i] * across[k] * inverse
@@ -170,9 +176,10 @@ def _differentiate_load(
             outer = t[i] * (V[k] - J[k])
             C = outer + (Ut if i == k else 0.0)
             GC = Gt * (V[k] - J[k]) + Ut * G[i, k]
-            out.q_V[i, k] = a0 * c.added_mass * P + 2.0 * kt * abs(Ut) * t[i] * t[k]
+            out.q_V[i, k] = a0 * c.added_mass * P + 2.0 * kt * along * t[i] * t[k]
             out.q_V[i, k] += kn * (G[i, k] - Gt * t[k])
-            out.q_d[i, k] = kt * abs(Ut) * (C + outer) - kn * GC - a0 * c.added_mass * C
+            pull = 2.0 * outer + (Ut + slip if i == k else 0.0)
+            out.q_d[i, k] = kt * along * pull - kn * GC - a0 * c.added_mass * C
             out.q_tt[i] += out.q_d[i, k] * t[k]
         for k in range(3):
             out.q_d[i, k] = (out.q_d[i, k] - g * out.q_tt[i] * t[k]) / r

@@ -40,7 +40,7 @@ def energy_flow(line: Line, J: np.ndarray, c: CableNumbers, work: Load, out: np.
         for i in range(3):
             V[i] = 0.5 * (line.velocity[NOW, j - 1, i] + line.velocity[NOW, j, i])
             work.chord[i] = line.position[NOW, j, i] - line.position[NOW, j - 1, i]
-        evaluate_load(V, J, work.chord, length, T, 0.0, c, work)
+        evaluate_load(V, J, work.chord, length, T, line.slip[j], line.normal_gain[j], 0.0, c, work)
         square, side, along, turn = 0.0, 0.0, 0.0, 0.0
         for i in range(3):
             speed = V[i] - J[i]

@@ -14,6 +14,7 @@ import numpy as np
 
 from subzero.compiled import compiled
 
+from .arc import correct_for_arc
 from .differences import backward_weights
 from .drum import STANDING, next_mode
 from .element import Load
@@ -77,11 +78,11 @@ def _solve_softly(
 ) -> Solved:
     """Solve from a prediction; if that fails, with a slack law that is made sharp little by little."""
     a0, a1, a2 = backward_weights(step, line.ends.previous_step)
-    _predict(line, step, tow)
+    _predict(line, step, tow, work)
     solved = solve_step(line, a0, a1, a2, J, c, drum, work)
     if solved.converged:
         return solved
-    _predict(line, step, tow)
+    _predict(line, step, tow, work)
     spent = solved.iterations
     line.ends.smoothing = SOFTEST
     while True:
@@ -95,7 +96,7 @@ def _solve_softly(
 
 
 @compiled
-def _predict(line: Line, step: float, tow: np.ndarray) -> None:
+def _predict(line: Line, step: float, tow: np.ndarray, work: Load) -> None:
     """Guess level NEW: everything goes on as it moves, tensions stay."""
     N = line.ends.count
     for j in range(N + 1):
@@ -107,6 +108,7 @@ def _predict(line: Line, step: float, tow: np.ndarray) -> None:
         line.position[NEW, 0, i] = tow[i]
     growth = 0.0 if line.ends.drum_mode == STANDING else step * line.ends.payout[NOW]
     line.ends.last_length[NEW] = max(line.ends.last_length[NOW] + growth, 0.5 * line.ends.last_length[NOW])
+    correct_for_arc(line, work)
 
 
 @compiled

