@@ -20,6 +20,7 @@ import numpy as np
 
 from subzero.compiled import compiled
 
+from .differences import Weights
 from .drum import SPINNING, STANDING
 from .element import Load, chord_length, evaluate_load, fading_rate, turning_rate
 from .first_segment import write_single_segment
@@ -29,14 +30,15 @@ from .slack import slack_law
 
 
 @compiled
-def node_velocities(line: Line, a0: float, a1: float, a2: float) -> None:
+def node_velocities(line: Line, w: Weights) -> None:
     """Fill the velocities of all nodes and the pay-out rate at level NEW by backward differences."""
-    x, N = line.position, line.ends.count
+    x, V, N = line.position, line.velocity, line.ends.count
     for j in range(N):
         for i in range(3):
-            line.velocity[NEW, j, i] = a0 * x[NEW, j, i] + a1 * x[NOW, j, i] + a2 * x[BEFORE, j, i]
-    last = line.ends.last_length
-    line.ends.payout[NEW] = a0 * last[NEW] + a1 * last[NOW] + a2 * last[BEFORE]
+            V[NEW, j, i] = w.b0 * x[NEW, j, i] + w.b1 * x[NOW, j, i] + w.b2 * x[BEFORE, j, i]
+            V[NEW, j, i] += w.b_now * V[NOW, j, i]
+    last, U = line.ends.last_length, line.ends.payout
+    U[NEW] = w.b0 * last[NEW] + w.b1 * last[NOW] + w.b2 * last[BEFORE] + w.b_now * U[NOW]
     if line.ends.drum_mode == STANDING:
         line.ends.payout[NEW] = 0.0
     for i in range(3):
@@ -47,16 +49,14 @@ def node_velocities(line: Line, a0: float, a1: float, a2: float) -> None:
 @compiled
 def assemble(
     line: Line,
-    a0: float,
-    a1: float,
-    a2: float,
+    w: Weights,
     J: np.ndarray,
     c: CableNumbers,
     drum: DrumNumbers,
     work: Load,
 ) -> None:
     """Fill the residual and the block tridiagonal Jacobian at the present guess of level NEW."""
-    node_velocities(line, a0, a1, a2)
+    node_velocities(line, w)
     N = line.ends.count
     _clear(line)
     for j in range(1, N + 1):
@@ -65,22 +65,24 @@ def assemble(
         for i in range(3):
             work.velocity[i] = 0.5 * (line.velocity[NEW, j - 1, i] + line.velocity[NEW, j, i])
             work.chord[i] = line.position[NEW, j, i] - line.position[NEW, j - 1, i]
-        evaluate_load(work.velocity, J, work.chord, length, T, line.slip[j], line.normal_gain[j], a0, c, work)
+        evaluate_load(
+            work.velocity, J, work.chord, length, T, line.slip[j], line.normal_gain[j], w.a0, c, work
+        )
         for i in range(3):
             line.momentum[NEW, j, i] = length * work.momentum[i]
-            history = a1 * line.momentum[NOW, j, i] + a2 * line.momentum[BEFORE, j, i]
+            history = w.a1 * line.momentum[NOW, j, i] + w.a2 * line.momentum[BEFORE, j, i]
             line.load[j, i] = length * work.q[i] + history
         if j < N:
-            _differentiate_segment(length, a0, T, c, work)
+            _differentiate_segment(length, w, T, c, work)
         else:
-            _add_influx(line, length, a0, T, J, c, work)
+            _add_influx(line, length, w, T, J, c, work)
         _scatter_balance(line, j, T, length, work)
         _scatter_length(line, j, T, length, c, work.chord)
     if N > 1:
         _sharpen_tow_force(line)
-    _drum_row(line, a0, a1, a2, drum, work)
+    _drum_row(line, w, drum, work)
     if N == 1:
-        write_single_segment(line, a0, drum, work.chord)
+        write_single_segment(line, w.b0, drum, work.chord)
 
 
 @compiled
@@ -96,21 +98,21 @@ def _clear(line: Line) -> None:
 
 
 @compiled
-def _differentiate_segment(length: float, a0: float, T: float, c: CableNumbers, work: Load) -> None:
+def _differentiate_segment(length: float, w: Weights, T: float, c: CableNumbers, work: Load) -> None:
     """Fill ∂Q/∂x of the near node (3, 3), and ∂Q/∂(T, x) of the far node (3, 4)."""
     by_near, by_far = work.by_near, work.by_far
     stretch = 0.5 * c.compliance / (1.0 + c.compliance * T)
     for i in range(3):
         by_far[i, 0] = length * stretch * work.drag[i]
         for k in range(3):
-            mean = 0.5 * a0 * work.q_V[i, k]
+            mean = 0.5 * w.b0 * work.q_V[i, k]
             by_near[i, k] = length * (mean - work.q_d[i, k])
             by_far[i, 1 + k] = length * (mean + work.q_d[i, k])
 
 
 @compiled
 def _add_influx(
-    line: Line, length: float, a0: float, T: float, J: np.ndarray, c: CableNumbers, work: Load
+    line: Line, length: float, w: Weights, T: float, J: np.ndarray, c: CableNumbers, work: Load
 ) -> None:
     """Complete Q of the last segment by the momentum that enters at the drum; fill ∂Q/∂x_{N−1} and ∂Q/∂(T, ℓ)."""
     N, U, t, d = line.ends.count, line.ends.payout[NEW], work.tangent, work.chord
@@ -118,7 +120,7 @@ def _add_influx(
     r = chord_length(d, length)
     g, fading = turning_rate(d, length, r), fading_rate(d, length, r)
     Jt = J[0] * t[0] + J[1] * t[1] + J[2] * t[2]
-    dU = 0.0 if line.ends.drum_mode == STANDING else a0
+    dU = 0.0 if line.ends.drum_mode == STANDING else w.b0
     stretch = 0.5 * c.compliance / (1.0 + c.compliance * T)
     for i in range(3):
         entering = c.mass * line.velocity[NEW, N, i] - c.added_mass * (J[i] - Jt * t[i])
@@ -132,7 +134,7 @@ def _add_influx(
             B = ((1.0 if i == k else 0.0) - g * t[i] * t[k]) / r
             across_k = J[k] - g * Jt * t[k]
             by_far[i, 1] += 0.5 * work.q_V[i, k] * (U / length - dU) * d[k]
-            by_near[i, k] = length * (0.5 * (a0 + U / length) * work.q_V[i, k] - work.q_d[i, k])
+            by_near[i, k] = length * (0.5 * (w.b0 + U / length) * work.q_V[i, k] - work.q_d[i, k])
             by_near[i, k] += U * c.added_mass * (Jt * B + t[i] * across_k / r)
         by_near[i, i] -= U * c.mass * U / length
 
@@ -210,7 +212,7 @@ def _scatter_length(line: Line, j: int, T: float, length: float, c: CableNumbers
 
 
 @compiled
-def _drum_row(line: Line, a0: float, a1: float, a2: float, drum: DrumNumbers, work: Load) -> None:
+def _drum_row(line: Line, w: Weights, drum: DrumNumbers, work: Load) -> None:
     """Write the drum's equation (11), the second row of the last block; `work` still holds the last segment."""
     N, t = line.ends.count, work.tangent
     D, L, r = (
@@ -227,8 +229,8 @@ def _drum_row(line: Line, a0: float, a1: float, a2: float, drum: DrumNumbers, wo
         D[1, 1] = 1.0
         return
     U = line.ends.payout
-    r[1] = -drum.friction - drum.inertia * (a0 * U[NEW] + a1 * U[NOW] + a2 * U[BEFORE])
-    D[1, 1] = -drum.inertia * a0 * a0
+    r[1] = -drum.friction - drum.inertia * (w.a0 * U[NEW] + w.a1 * U[NOW] + w.a2 * U[BEFORE])
+    D[1, 1] = -drum.inertia * w.a0 * w.b0
     if line.ends.drum_mode == SPINNING:
         return
     r[1] += line.ends.drum_pull

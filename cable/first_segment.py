@@ -27,7 +27,7 @@ CREEP = 1e-3
 
 
 @compiled
-def write_single_segment(line: Line, a0: float, drum: DrumNumbers, d: np.ndarray) -> None:
+def write_single_segment(line: Line, b0: float, drum: DrumNumbers, d: np.ndarray) -> None:
     """Replace both rows of the only block, whose second row holds the drum's equation (11) with full friction."""
     D, L, r, T = line.diagonal[1], line.lower[1], line.rows[RESIDUAL, 1], line.tension[NEW, 1]
     chord = sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2] + CORNER * CORNER)
@@ -37,7 +37,7 @@ def write_single_segment(line: Line, a0: float, drum: DrumNumbers, d: np.ndarray
     U = line.ends.payout[NEW]
     size = sqrt(U * U + CREEP * CREEP)
     r[1] += drum.friction * (1.0 - U / size)
-    D[1, 1] -= drum.friction * a0 * (1.0 - U * U / (size * size)) / size
+    D[1, 1] -= drum.friction * b0 * (1.0 - U * U / (size * size)) / size
     pull, by_pull = _maximum(T - r[1], 0.0)
     r[1] = T - pull
     D[1, 0] = 1.0 - by_pull * (1.0 - D[1, 0])

@@ -69,6 +69,7 @@ class Line(NamedTuple):
         momentum: momentum ∫p ds of the segments (3 levels, nodes, 3). [kg m/s]
         tension: tension of the segments (2 levels, nodes). [N]
         length: unstretched lengths of the segments (nodes,); of the last one, see `Ends.last_length`. [m]
+        node_tension: tension at the nodes at level NOW (nodes,). [N]
         slip, normal_gain: corrections for the arc that a segment stands for (nodes,), see `cable.arc`. [m/s, 1]
         load: ∫(∂p/∂t + D − w_c k) ds of the segments at level NEW (nodes, 3). [N]
         lower, diagonal, upper: the blocks of the Newton matrix (nodes, 4, 4), see `cable.blocks`.
@@ -82,6 +83,7 @@ class Line(NamedTuple):
     momentum: np.ndarray
     tension: np.ndarray
     length: np.ndarray
+    node_tension: np.ndarray
     slip: np.ndarray
     normal_gain: np.ndarray
     load: np.ndarray
@@ -119,6 +121,7 @@ def new_line(capacity: int) -> Line:
         **per_node,
         tension=np.zeros((2, n)),
         length=np.zeros(n),
+        node_tension=np.zeros(n),
         slip=np.zeros(n),
         normal_gain=np.ones(n),
         load=np.zeros((n, 3)),

@@ -11,6 +11,7 @@ from subzero.compiled import compiled
 
 from .assembly import assemble
 from .blocks import factor, solve
+from .differences import Weights
 from .element import Load
 from .line import GUESS, NEW, RESIDUAL, STEP, Line
 from .properties import CableNumbers, DrumNumbers
@@ -40,9 +41,7 @@ class Solved(NamedTuple):
 @compiled
 def solve_step(
     line: Line,
-    a0: float,
-    a1: float,
-    a2: float,
+    w: Weights,
     J: np.ndarray,
     c: CableNumbers,
     drum: DrumNumbers,
@@ -50,7 +49,7 @@ def solve_step(
 ) -> Solved:
     """Solve the equations of `assembly` for level NEW, from the guess that stands there."""
     N = line.ends.count
-    assemble(line, a0, a1, a2, J, c, drum, work)
+    assemble(line, w, J, c, drum, work)
     size, node, equation = _residual(line)
     merit = _merit(line)
     for iteration in range(MAX_ITERATIONS):
@@ -64,7 +63,7 @@ def solve_step(
         fraction = 1.0
         for _ in range(MAX_HALVINGS):
             _update(line, last_length, fraction)
-            assemble(line, a0, a1, a2, J, c, drum, work)
+            assemble(line, w, J, c, drum, work)
             new_merit = _merit(line)
             if isfinite(new_merit) and new_merit <= merit * (1.0 - 0.1 * fraction) + 1e-30:
                 break

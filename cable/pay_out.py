@@ -142,7 +142,4 @@ def write_row(line: Line, record: Record, k: int, used: int) -> None:
     for j in range(N + 1):
         for i in range(3):
             record.position[used + j, i] = line.position[NOW, j, i]
-        near = line.tension[NOW, max(j, 1)]
-        record.tension[used + j] = 0.5 * (near + line.tension[NOW, min(j + 1, N)])
-    record.tension[used] = record.tow_tension[k]
-    record.tension[used + N] = record.drum_tension[k]
+        record.tension[used + j] = line.node_tension[j]

@@ -22,6 +22,7 @@ from .line import BEFORE, NEW, NOW, SPLIT_AT, Line, segment_momentum
 from .newton import Solved, solve_step
 from .properties import CableNumbers, DrumNumbers
 from .slack import SMOOTHING
+from .tow_point import fill_node_tensions
 
 SOFTEST = 1e-4
 """T₀ that a difficult step starts with, a tenth at a time down to `slack.SMOOTHING`. [N]"""
@@ -77,16 +78,16 @@ def _solve_softly(
     work: Load,
 ) -> Solved:
     """Solve from a prediction; if that fails, with a slack law that is made sharp little by little."""
-    a0, a1, a2 = backward_weights(step, line.ends.previous_step)
+    w = backward_weights(step, line.ends.previous_step)
     _predict(line, step, tow, work)
-    solved = solve_step(line, a0, a1, a2, J, c, drum, work)
+    solved = solve_step(line, w, J, c, drum, work)
     if solved.converged:
         return solved
     _predict(line, step, tow, work)
     spent = solved.iterations
     line.ends.smoothing = SOFTEST
     while True:
-        solved = solve_step(line, a0, a1, a2, J, c, drum, work)
+        solved = solve_step(line, w, J, c, drum, work)
         spent += solved.iterations
         if not solved.converged or line.ends.smoothing <= SMOOTHING:
             break
@@ -127,6 +128,7 @@ def accept(
         line.ends.payout[level] = line.ends.payout[level - 1]
     for j in range(N + 1):
         line.tension[NOW, j] = line.tension[NEW, j]
+    fill_node_tensions(line)
     line.ends.previous_step = step
     while line.ends.last_length[NOW] > SPLIT_AT * segment_length and line.ends.count < line.length.size - 1:
         _split_last(line, segment_length, J, c, work)
@@ -145,6 +147,10 @@ def _split_last(line: Line, segment_length: float, J: np.ndarray, c: CableNumber
         _insert_between(line.position[level], N, fraction)
         _insert_between(line.velocity[level], N, fraction)
         line.ends.last_length[level] -= segment_length
+        if level == NOW:
+            near, end = line.node_tension[N - 1], line.node_tension[N]
+            line.node_tension[N] = near + fraction * (end - near)
+            line.node_tension[N + 1] = end
     line.length[N] = segment_length
     line.tension[NOW, N + 1] = line.tension[NOW, N]
     line.ends.count = N + 1

@@ -8,7 +8,7 @@ import numpy as np
 
 from subzero.compiled import compiled
 
-from .line import Line
+from .line import NEW, Line
 
 
 @compiled
@@ -20,6 +20,20 @@ def ends(line: Line) -> tuple[float, float]:
     """
     F = line.ends.tow_force
     return sqrt(F[0] * F[0] + F[1] * F[1] + F[2] * F[2]), max(line.ends.drum_pull, 0.0)
+
+
+@compiled
+def fill_node_tensions(line: Line) -> None:
+    """Fill line.node_tension (nodes,) after a step: T_j + ½ t_j·Q_j at the far end of segment j. [N]."""
+    N, x = line.ends.count, line.position
+    line.node_tension[0], line.node_tension[N] = ends(line)
+    for j in range(1, N):
+        along, square = 0.0, 0.0
+        for i in range(3):
+            d = x[NEW, j, i] - x[NEW, j - 1, i]
+            along += d * line.load[j, i]
+            square += d * d
+        line.node_tension[j] = max(line.tension[NEW, j] + 0.5 * along / sqrt(max(square, 1e-30)), 0.0)
 
 
 @compiled

@@ -17,6 +17,7 @@ from typing import Any
 _HOME = {
     "CHANNELS": ("subzero.channels", "CHANNELS"),
     "Comparison": ("subzero.comparison", "Comparison"),
+    "Model": ("subzero.model", "Model"),
     "Record": ("subzero.measured", "Record"),
     "UserError": ("subzero.errors", "UserError"),
     "compare": ("subzero.comparison", "compare"),

@@ -8,7 +8,6 @@ import numpy as np
 
 import vehicle
 from cable.line import NOW
-from cable.tow_point import ends
 from subzero.compiled import compiled
 from subzero.hull import row_at, tow_wrench
 from subzero.run_state import Live, Setup
@@ -94,16 +93,13 @@ def _record_cable(live: Live, r: Recording, row: int, used: int) -> int:
     """Write the cable's part of a row."""
     line = live.line
     N = line.ends.count
-    tow, r.drum_tension[row] = ends(line)
+    r.drum_tension[row] = line.node_tension[N]
     r.length[row] = line.ends.last_length[NOW]
     for j in range(1, N):
         r.length[row] += line.length[j]
     for j in range(N + 1):
         for i in range(3):
             r.position[used + j, i] = line.position[NOW, j, i]
-        near = line.tension[NOW, max(j, 1)]
-        r.tension[used + j] = 0.5 * (near + line.tension[NOW, min(j + 1, N)])
-    r.tension[used] = tow
-    r.tension[used + N] = r.drum_tension[row]
+        r.tension[used + j] = line.node_tension[j]
     r.nodes[row] = N + 1
     return used + N + 1
