@@ -5,11 +5,11 @@ A thin cable cannot be compressed: it buckles, and its chord gets shorter. With 
 
     T ≥ 0,   σ ≥ 0,   T σ = 0
 
-which is smoothed to T σ = T₀ (`SMOOTHING`, 1e-12 N) and written as one equation that Newton's method likes,
+which is smoothed to T σ = T₀ (`SMOOTHING`, 1e-13 N) and written as one equation that Newton's method likes,
 the Fischer-Burmeister function φ(a, b) = a + b − √(a² + b² + 2μ) = 0 with a = T/T_r and b = σ/σ_r.
 
 Departs from source: the paper takes the cable as taut everywhere (its equations are singular at T = 0). The cost of
-the smoothing is a strain of T₀/T: 1e-11 at a tenth of a newton. What happens inside a slack bight (folding, contact,
+the smoothing is a strain of T₀/T: 1e-12 at a tenth of a newton. What happens inside a slack bight (folding, contact,
 bending) is not modelled: without bending stiffness its shape below one segment length is ill-posed, and only its
 ends, its drag and its inertia mean anything.
 """
@@ -23,7 +23,7 @@ from subzero.compiled import compiled
 TENSION_SCALE = 1e-3
 """T_r [N] and σ_r [-]: where the corner between taut and slack is seen at the same size in both."""
 STRAIN_SCALE = 1e-3
-SMOOTHING = 1e-12
+SMOOTHING = 1e-13
 """T₀ = T σ of the smoothed law. [N]"""
 
 
