@@ -15,6 +15,7 @@ from subzero.channels import BY_NAME, CHANNELS, TIME
 from subzero.model import Model
 
 if TYPE_CHECKING:
+    from subzero.recording import Recording
     from subzero.simulation import Run
 
 NO_PULL = 1e-9
@@ -65,7 +66,7 @@ def channel_values(run: Run, model: Model) -> dict[str, np.ndarray]:
     values |= {f"{fin}_angle": r.fins[:, i] for i, fin in enumerate(fins)}
     values |= {f"{fin}_command": r.command[:, 1 + i] for i, fin in enumerate(fins)}
     values["battery_voltage"] = r.voltage
-    values["cable_tension"] = np.linalg.norm(r.tow_force, axis=1)
+    values["cable_tension"] = _tow_tension(r)
     values["drum_tension"], values["cable_length"] = r.drum_tension, r.length
     pulls = [f"cable_force_{axis}" for axis in ("forward", "starboard", "down")]
     twists = [f"cable_moment_{axis}" for axis in ("roll", "pitch", "yaw")]
@@ -73,6 +74,15 @@ def channel_values(run: Run, model: Model) -> dict[str, np.ndarray]:
     local = [f"tow_velocity_{axis}" for axis in ("tangential", "normal", "binormal")]
     values |= dict(zip(local, _tow_velocities(run, model), strict=True))
     return values | dict(zip(ENERGY_CHANNELS, r.energy.T, strict=True))
+
+
+def _tow_tension(r: Recording) -> np.ndarray:
+    """Return T(0) (n,), negative where the cable pushes, as it may in the paper's scheme. [N]."""
+    size = np.linalg.norm(r.tow_force, axis=1)
+    if not r.nodes.any():
+        return size
+    first = np.cumsum(r.nodes) - r.nodes
+    return np.where(r.tension[first] < 0.0, -size, size)
 
 
 def _attitudes(state: np.ndarray) -> np.ndarray:
@@ -95,8 +105,9 @@ def _tow_velocities(run: Run, model: Model) -> np.ndarray:
     V = np.einsum("nij,nj->ni", R, r.state[:, 7:10] + spin)
     if not r.nodes.any():
         return np.zeros((3, run.times.size))
-    pull = np.linalg.norm(r.tow_force, axis=1, keepdims=True)
-    t = np.where(pull > NO_PULL, r.tow_force / np.maximum(pull, NO_PULL), -R[:, :, 0])
+    pull = _tow_tension(r)[:, None]
+    pulls = np.abs(pull) > NO_PULL
+    t = np.where(pulls, r.tow_force / np.where(pulls, pull, 1.0), -R[:, :, 0])
     sin_b = -t[:, 2]
     cos_b = -np.sqrt(np.maximum(1.0 - sin_b**2, 0.0))
     alpha = np.where(cos_b < -1e-12, np.arctan2(t[:, 1], -t[:, 0]), 0.0)

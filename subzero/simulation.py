@@ -76,6 +76,10 @@ def simulate(
 
 def run_trial(trial: scenarios.Trial, model: Model, tethered: bool, progress: Progress | None = None) -> Run:
     """Run a trial with a model, in plain arrays."""
+    if tethered and trial.scheme != "moving_end":
+        from subzero.printed import run_as_printed
+
+        return run_as_printed(trial, model, progress)
     times = np.linspace(0.0, trial.duration, round(trial.duration / trial.cable_step) + 1)
     setup, live = prepare(trial, model, tethered)
     recording = new_recording(times.size, 4 * times.size * live.line.length.size if tethered else 0)
@@ -90,7 +94,7 @@ def run_trial(trial: scenarios.Trial, model: Model, tethered: bool, progress: Pr
             progress(row / times.size)
     return Run(
         times=times[:row],
-        recording=_cut(recording, row, used),
+        recording=cut(recording, row, used),
         completed=ending == coupling.FINE,
         message=_in_words(ending, solved, float(times[row - 1])),
     )
@@ -173,7 +177,7 @@ def _more_room(live: Live, recording: Recording, used: int) -> tuple[Live, Recor
     )
 
 
-def _cut(recording: Recording, rows: int, used: int) -> Recording:
+def cut(recording: Recording, rows: int, used: int) -> Recording:
     """Return the part of a recording that is filled."""
     packed = {"position": recording.position[:used], "tension": recording.tension[:used]}
     by_row = {name: values[:rows] for name, values in recording._asdict().items() if name not in packed}

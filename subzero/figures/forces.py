@@ -71,10 +71,11 @@ def forces(run: xr.Dataset, title: Title) -> Figure:
 def energy(run: xr.Dataset, axes: Axes) -> None:
     """Draw where the work of the propeller goes: the parts in colour, the work itself in ink."""
     time = run["time"].values
-    parts = [(ENERGY_WORDS[part], np.nan_to_num(run[f"energy_{part}"].values)) for part in ENERGY_PARTS]
+    parts = {ENERGY_WORDS[part]: run[f"energy_{part}"].values for part in ENERGY_PARTS}
+    parts = {words: np.nan_to_num(values) for words, values in parts.items() if np.isfinite(values).any()}
     work = run["energy_propeller_work"].values
-    seen = VISIBLE * max(np.abs(values).max() for _, values in parts)
-    for (words, values), colour in zip(parts, CYCLE, strict=False):
+    seen = VISIBLE * max(np.abs(values).max() for values in parts.values())
+    for (words, values), colour in zip(parts.items(), CYCLE, strict=False):
         if np.abs(values).max() > seen or words == ENERGY_WORDS["residual"]:
             axes.plot(time, values, color=colour, linewidth=1.2, label=words)
     axes.plot(time, work, color=style.INK, linewidth=1.4, label="propeller's work")
