@@ -21,7 +21,7 @@ import numpy as np
 from subzero.compiled import compiled
 
 from .differences import Weights
-from .drum import SPINNING, STANDING
+from .drum import SPINNING, STANDING, friction
 from .element import Load, chord_length, evaluate_load, fading_rate, turning_rate
 from .first_segment import write_single_segment
 from .line import BEFORE, NEW, NOW, RESIDUAL, Line
@@ -82,7 +82,7 @@ def assemble(
         _sharpen_tow_force(line)
     _drum_row(line, w, drum, work)
     if N == 1:
-        write_single_segment(line, w.b0, drum, work.chord)
+        write_single_segment(line, work.chord)
 
 
 @compiled
@@ -229,8 +229,9 @@ def _drum_row(line: Line, w: Weights, drum: DrumNumbers, work: Load) -> None:
         D[1, 1] = 1.0
         return
     U = line.ends.payout
-    r[1] = -drum.friction - drum.inertia * (w.a0 * U[NEW] + w.a1 * U[NOW] + w.a2 * U[BEFORE])
-    D[1, 1] = -drum.inertia * w.a0 * w.b0
+    held, slope = friction(drum, U[NEW])
+    r[1] = -held - drum.inertia * (w.a0 * U[NEW] + w.a1 * U[NOW] + w.a2 * U[BEFORE])
+    D[1, 1] = -(slope + drum.inertia * w.a0) * w.b0
     if line.ends.drum_mode == SPINNING:
         return
     r[1] += line.ends.drum_pull

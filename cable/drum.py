@@ -1,8 +1,11 @@
 """What the drum can do: turn with the cable, stand and hold it, or spin ahead of it.
 
     turning    T(S) R_d = I_d dΩ/dt + C_f      (11); the cable is taut at the drum
-    standing   dS/dt = 0                        friction holds up to T(S) = C_f/R_d; cable is never taken up
+    standing   dS/dt = 0                        nothing pulls; cable is never taken up
     spinning   0 = I_d dΩ/dt + C_f              the drum overruns: its inertia throws cable out, slack at the drum
+
+Coulomb friction is rounded off at rest: C_f U/√(U² + U_c²) with the pay-out rate U and U_c = 1 mm/s (`CREEP`). A drum
+that friction holds therefore creeps by less than that, and a taut cable always has an answer.
 
 Departs from source: the paper writes (11) for a drum that always turns with a taut cable. A frictionless drum without
 inertia turns whenever it is pulled, and cannot overrun.
@@ -10,12 +13,16 @@ inertia turns whenever it is pulled, and cannot overrun.
 
 from __future__ import annotations
 
+from math import sqrt
+
 from subzero.compiled import compiled
 
 from .properties import DrumNumbers
 
 TURNING, STANDING, SPINNING = 0, 1, 2
 
+CREEP = 1e-3
+"""Pay-out rate at which friction has come to 0.7 of its full size. [m/s]"""
 HELD = 1e-12
 """A tension or pay-out rate below this is none. [N], [m/s]"""
 
@@ -36,8 +43,7 @@ def next_mode(mode: int, converged: bool, payout: float, pull: float, drum: Drum
         drum: the drum.
     """
     if mode == STANDING:
-        pulled = not converged or pull > drum.friction * (1.0 + 1e-9) + HELD
-        return TURNING if pulled else STANDING
+        return TURNING if not converged or pull > HELD else STANDING
     if converged and payout < 0.0:
         return STANDING
     if mode == SPINNING:
@@ -45,3 +51,10 @@ def next_mode(mode: int, converged: bool, payout: float, pull: float, drum: Drum
     if not converged:
         return STANDING
     return SPINNING if drum.inertia > 0.0 and pull < -HELD else TURNING
+
+
+@compiled
+def friction(drum: DrumNumbers, payout: float) -> tuple[float, float]:
+    """Return the friction of the drum as a tension [N] and its slope by the pay-out rate [N s/m]."""
+    size = sqrt(payout * payout + CREEP * CREEP)
+    return drum.friction * payout / size, drum.friction * (CREEP / size) ** 2 / size

@@ -5,8 +5,8 @@ for and takes nothing back, and the segment pulls or does not:
 
     ℓ = max(|d|, ℓ_now),     T = max(T(S) − ½ t·Q, 0)
 
-both rounded off (`CORNER`) so that Newton's method passes. Friction of the drum fades below `CREEP`. A current that is
-faster than the vehicle would drag cable off a frictionless drum by its own; with one segment, it does not.
+both rounded off (`CORNER`) so that Newton's method passes. A current that is faster than the vehicle would drag cable
+off a frictionless drum by its own; with one segment, it does not.
 """
 
 from __future__ import annotations
@@ -18,26 +18,19 @@ import numpy as np
 from subzero.compiled import compiled
 
 from .line import NEW, NOW, RESIDUAL, Line
-from .properties import DrumNumbers
 
 CORNER = 1e-9
 """Size of the rounding of both maxima. [m], [N]"""
-CREEP = 1e-3
-"""Pay-out rate above which the drum's friction is fully there. [m/s]"""
 
 
 @compiled
-def write_single_segment(line: Line, b0: float, drum: DrumNumbers, d: np.ndarray) -> None:
-    """Replace both rows of the only block, whose second row holds the drum's equation (11) with full friction."""
+def write_single_segment(line: Line, d: np.ndarray) -> None:
+    """Replace both rows of the only block, whose second row holds the drum's equation (11)."""
     D, L, r, T = line.diagonal[1], line.lower[1], line.rows[RESIDUAL, 1], line.tension[NEW, 1]
     chord = sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2] + CORNER * CORNER)
     longer, by_chord = _maximum(chord, line.ends.last_length[NOW])
     r[0] = line.ends.last_length[NEW] - longer
     D[0, 0], D[0, 1] = 0.0, 1.0
-    U = line.ends.payout[NEW]
-    size = sqrt(U * U + CREEP * CREEP)
-    r[1] += drum.friction * (1.0 - U / size)
-    D[1, 1] -= drum.friction * b0 * (1.0 - U * U / (size * size)) / size
     pull, by_pull = _maximum(T - r[1], 0.0)
     r[1] = T - pull
     D[1, 0] = 1.0 - by_pull * (1.0 - D[1, 0])

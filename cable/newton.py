@@ -22,6 +22,8 @@ RELATIVE_TOLERANCE = 1e-9
 """Balances hold to this fraction of the largest tension in the cable."""
 ABSOLUTE_TOLERANCE = 1e-13
 """Balances of a cable without tension hold to this. [N]"""
+ROUNDING = 1e-15
+"""Positions are known to this fraction, and so the inertia of a segment, m1 ℓ a₀ b₀ x, cannot be known better."""
 LENGTH_TOLERANCE = 1e-9
 """The length equation, in units of `slack.STRAIN_SCALE`: a strain of 1e-12."""
 SMALLEST_SEGMENT = 1e-9
@@ -49,8 +51,9 @@ def solve_step(
 ) -> Solved:
     """Solve the equations of `assembly` for level NEW, from the guess that stands there."""
     N = line.ends.count
+    rounding = ROUNDING * (c.mass + c.added_mass) * w.a0 * w.b0
     assemble(line, w, J, c, drum, work)
-    size, node, equation = _residual(line)
+    size, node, equation = _residual(line, rounding)
     merit = _merit(line)
     for iteration in range(MAX_ITERATIONS):
         if size <= 1.0:
@@ -69,7 +72,7 @@ def solve_step(
                 break
             fraction *= 0.5
         merit = new_merit
-        size, node, equation = _residual(line)
+        size, node, equation = _residual(line, rounding)
         if not isfinite(merit):
             break
     return Solved(size <= 1.0, MAX_ITERATIONS, size, node, equation)
@@ -108,13 +111,13 @@ def _update(line: Line, last_length: float, fraction: float) -> None:
 
 
 @compiled
-def _residual(line: Line) -> tuple[float, int, int]:
+def _residual(line: Line, rounding: float) -> tuple[float, int, int]:
     """Return the largest residual as a multiple of its tolerance, and where it stands."""
-    N = line.ends.count
-    tension = 0.0
+    N, x, tension, reach = line.ends.count, line.position, 0.0, 0.0
     for j in range(1, N + 1):
         tension = max(tension, abs(line.tension[NEW, j]))
-    allowed = RELATIVE_TOLERANCE * tension + ABSOLUTE_TOLERANCE
+        reach = max(reach, abs(x[NEW, j, 0]), abs(x[NEW, j, 1]), abs(x[NEW, j, 2]))
+    allowed = RELATIVE_TOLERANCE * tension + ABSOLUTE_TOLERANCE + rounding * line.length[1] * reach
     worst, node, equation = 0.0, 0, 0
     for j in range(1, N + 1):
         for i in range(4):

@@ -1,7 +1,7 @@
 """Advance the hull over one exchange with the cable, pulled by a force that changes linearly in time.
 
-Classic Runge-Kutta of fourth order in fixed steps. The cable's force is given in earth axes at both ends of the
-exchange; at every stage it is turned into the body's axes with the attitude of that stage, equations (12)-(13):
+Classic Runge-Kutta of fourth order in fixed steps. The cable's force is given in earth axes; at every stage it is
+turned into the body's axes with the attitude of that stage, equations (12)-(13):
 
     F_c = Rᵀ F,    M_c = r_c × F_c
 
@@ -56,7 +56,7 @@ def tow_point(state: np.ndarray, r_c: np.ndarray, R: np.ndarray, out: np.ndarray
 
 @compiled
 def advance_hull(setup: Setup, live: Live, start: float, span: float, steps: int) -> None:
-    """Fill live.path[1 … steps] from path[0], pulled by live.now.force at the start and live.now.guess at the end.
+    """Fill live.path[1 … steps] from path[0], pulled by F(t) = F_{n+1} + (t − t_{n+1}) (F_n − F_{n−1})/h_n.
 
     Args:
         setup: vehicle, water, commands (held during a step).
@@ -65,8 +65,9 @@ def advance_hull(setup: Setup, live: Live, start: float, span: float, steps: int
         span: length of the exchange. [s]
         steps: Runge-Kutta steps in it.
     """
-    work, orders = live.now.hull, setup.orders
+    work, orders, now = live.now.hull, setup.orders, live.now
     h = span / steps
+    ratio = span / now.last_step if now.last_step > 0.0 else 0.0
     k, stage = work.slopes, work.stage
     for n in range(steps):
         state, new = live.path[n], live.path[n + 1]
@@ -77,7 +78,7 @@ def advance_hull(setup: Setup, live: Live, start: float, span: float, steps: int
                 stage[i] = state[i] + (part * k[s - 1, i] if s > 0 else 0.0)
             along = (n * h + part) / span
             for i in range(3):
-                work.pull[i] = live.now.force[i] + along * (live.now.guess[i] - live.now.force[i])
+                work.pull[i] = now.guess[i] + (along - 1.0) * ratio * (now.force[i] - now.force_before[i])
             tow_wrench(stage, work.pull, setup.fixed.r_c, work)
             vehicle.derivative(stage, command, setup.fixed.current, work.wrench, setup.fixed.vehicle, k[s])
         for i in range(STATE_SIZE):
