@@ -5,7 +5,8 @@ Verifies: equations (30)-(37), with acceleration, drum inertia and friction adde
     T(0) = (m u' + ½ρπdC_t u|u|) S + (I_d u'/R_d + C_f)/R_d,    T(s) falls linearly to the drum,
 
 force against the motion, all else zero. Configuration: Table 1 unless said. Tolerances: 1e-6 of the tension, what is
-asked of the scheme (measured: 1e-9 at 0.1 s, 1e-8 at 0.033 s; its smoothed slack law is a strain of 1e-12 N/T); rounding (1e-12 N) for what is zero; slopes of second order.
+asked of the scheme (measured: 1e-9 at 0.1 s, 1e-8 at 0.033 s; its smoothed slack law is a strain of 1e-12 N/T);
+rounding (1e-12 N) for what is zero; slopes of second order.
 """
 
 import numpy as np
