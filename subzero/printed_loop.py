@@ -62,7 +62,8 @@ def _exchange(setup: Setup, live: Live, line: Printed, start: float, span: float
     """Take steps (2)-(4): the vehicle on the held force, the cable on its velocity, and the force from node 0."""
     now, steps = live.now, hull_steps(setup, span)
     for i in range(3):
-        now.guess[i] = now.force[i]
+        now.guess[i] = now.force[i]  # held: it ends as it began, and has no slope from before
+        now.force_before[i] = now.force[i]
     if not _move(setup, live, start, span):
         return ABSURD, NewtonReport(CONVERGED, 0, 0.0, 0, 0)
     ends = _ends_of(setup, live.path[steps], now.hull.rotation)
@@ -71,7 +72,6 @@ def _exchange(setup: Setup, live: Live, line: Printed, start: float, span: float
         return CABLE_FAILED, report
     F = pull_of(line.w)
     for i in range(3):
-        now.force_before[i] = now.force[i]
         now.force[i] = F[i]
     for i in range(STATE_SIZE):
         now.state[i] = live.path[steps, i]
