@@ -26,6 +26,8 @@ from .tow_point import fill_node_tensions
 
 SOFTEST = 1e-4
 """T₀ that a difficult step starts with, a tenth at a time down to `slack.SMOOTHING`. [N]"""
+TAUT = 1e-2
+"""A step begins with at least this tension everywhere: Newton then looks for a taut cable first. [N]"""
 MOST_DRUM_CHANGES = 4
 """How often one step may change its mind about what the drum does."""
 
@@ -101,7 +103,7 @@ def _predict(line: Line, step: float, tow: np.ndarray, work: Load) -> None:
     """Guess level NEW: everything goes on as it moves, tensions stay."""
     N = line.ends.count
     for j in range(N + 1):
-        line.tension[NEW, j] = line.tension[NOW, j]
+        line.tension[NEW, j] = max(line.tension[NOW, j], TAUT)
         for i in range(3):
             moved = line.position[NOW, j, i] + step * line.velocity[NOW, j, i]
             line.position[NEW, j, i] = moved if j < N else line.position[NOW, j, i]

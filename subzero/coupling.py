@@ -25,12 +25,14 @@ from cable.tow_point import impedance
 from subzero.compiled import compiled
 from subzero.energy import book
 from subzero.hull import advance_hull, follow_track, tow_point
-from subzero.run_state import Live, Setup
+from subzero.run_state import Live, Now, Setup
 from vehicle import STATE_SIZE
 
-MOST_EXCHANGES = 25
+MOST_EXCHANGES = 60
 FORCE_TOLERANCE = 1e-9
 """Hull and cable agree when their forces differ by less than this fraction (and 1e-11 N)."""
+ROUNDING = 1e-14
+"""Places are known to this fraction, and forces to this times the cable's stiffness. [-]"""
 MOST_HALVINGS = 8
 FASTEST = 50.0
 """Speed beyond which a run is stopped as absurd. [m/s]"""
@@ -73,6 +75,7 @@ def _agree(setup: Setup, live: Live, start: float, span: float) -> tuple[int, So
     ratio = span / live.now.last_step if live.now.last_step > 0.0 else 0.0
     for i in range(3):
         live.now.guess[i] = live.now.force[i] + ratio * (live.now.force[i] - live.now.force_before[i])
+    size = np.inf
     for _ in range(MOST_EXCHANGES):
         if not _move(setup, live, start, span):
             return ABSURD, solved
@@ -83,13 +86,13 @@ def _agree(setup: Setup, live: Live, start: float, span: float) -> tuple[int, So
         )
         if not solved.converged:
             return CABLE_FAILED, solved
-        if setup.fixed.prescribed or _forces_agree(live.line.ends.tow_force, live.now.guess):
+        impedance(live.line, live.now.Z)
+        if setup.fixed.prescribed or _forces_agree(live.now, live.line.ends.tow_force):
             return FINE, solved
         _mobility(
             setup.fixed.r_c, live.now.hull.rotation, setup.fixed.vehicle.inverse_mass, live.now.mobility
         )
-        impedance(live.line, live.now.Z)
-        _improve(span, live.now.Z, live.now.mobility, live.line.ends.tow_force, live.now.guess)
+        size = _improve(span, live.now, live.line.ends.tow_force, size)
     return DISAGREED, solved
 
 
@@ -114,29 +117,40 @@ def _move(setup: Setup, live: Live, start: float, span: float) -> bool:
 
 
 @compiled
-def _forces_agree(F: np.ndarray, guess: np.ndarray) -> bool:
-    """Say whether the cable answers with the force that the hull was pulled by."""
-    size, gap = 0.0, 0.0
+def _forces_agree(now: Now, F: np.ndarray) -> bool:
+    """Say whether the cable answers with the force that the hull was pulled by, as far as rounding lets one say."""
+    size, gap, stiffness, reach = 0.0, 0.0, 0.0, 0.0
     for i in range(3):
         size = max(size, abs(F[i]))
-        gap = max(gap, abs(F[i] - guess[i]))
-    return gap <= FORCE_TOLERANCE * size + 1e-11
+        gap = max(gap, abs(F[i] - now.guess[i]))
+        reach = max(reach, abs(now.tow[i]))
+        for k in range(3):
+            stiffness = max(stiffness, abs(now.Z[i, k]))
+    return gap <= FORCE_TOLERANCE * size + 1e-11 + ROUNDING * stiffness * reach
 
 
 @compiled
-def _improve(span: float, Z: np.ndarray, A: np.ndarray, F: np.ndarray, guess: np.ndarray) -> None:
-    """Take one Newton step on the force: (I − (h²/2) Z A) δ = F_cable − guess."""
-    M, b = np.empty((3, 3)), np.empty(3)
+def _improve(span: float, now: Now, F: np.ndarray, last_size: float) -> float:
+    """Take one Newton step on the force, (I − (h²/2) Z A) δ = F_cable − guess, or go back half of the last one.
+
+    A cable between slack and taut is a stiff and bent spring: a step after which the next one would be longer than
+    itself (`last_size`) went too far. Returns the size of the step that stands. [N]
+    """
+    M, b, Z, A = np.empty((3, 3)), np.empty(3), now.Z, now.mobility
     for i in range(3):
-        b[i] = F[i] - guess[i]
+        b[i] = F[i] - now.guess[i]
         for k in range(3):
             total = 0.0
             for m in range(3):
                 total += Z[i, m] * A[m, k]
             M[i, k] = (1.0 if i == k else 0.0) - 0.5 * span * span * total
     _solve_three(M, b)
+    size = max(abs(b[0]), abs(b[1]), abs(b[2]))
+    too_far = not size < last_size
     for i in range(3):
-        guess[i] += b[i]
+        now.change[i] = 0.5 * now.change[i] if too_far else b[i]
+        now.guess[i] += -now.change[i] if too_far else b[i]
+    return last_size if too_far else size
 
 
 @compiled

@@ -82,6 +82,7 @@ class Now:
         state: of the vehicle, as in `vehicle.STATE`.
         force, force_before: pull of the cable on the vehicle, at the last two accepted times, earth axes (3,). [N]
         guess: pull at the end of the exchange that is being tried (3,). [N]
+        change: what the last guess was changed by (3,). [N]
         tow: tow point there, relative to the drum (3,). [m]
         Z: answer of the pull to the tow point's place (3, 3). [N/m]
         mobility: acceleration of the tow point per pull (3, 3). [1/kg]
@@ -94,6 +95,7 @@ class Now:
     force: np.ndarray
     force_before: np.ndarray
     guess: np.ndarray
+    change: np.ndarray
     tow: np.ndarray
     Z: np.ndarray
     mobility: np.ndarray
@@ -131,7 +133,7 @@ def new_now(state: np.ndarray, force: np.ndarray) -> Now:
         cable_new=np.zeros(5),
         kinetic=0.0,
     )
-    vectors = {name: np.zeros(3) for name in ("force_before", "guess", "tow")}
+    vectors = {name: np.zeros(3) for name in ("force_before", "guess", "change", "tow")}
     matrices = {name: np.zeros((3, 3)) for name in ("Z", "mobility")}
     return packed(
         Now(state=state, force=force, **vectors, **matrices, last_step=0.0, hull=work, ledger=ledger)
