@@ -55,6 +55,8 @@ def next_mode(mode: int, converged: bool, payout: float, pull: float, drum: Drum
 
 @compiled
 def friction(drum: DrumNumbers, payout: float) -> tuple[float, float]:
-    """Return the friction of the drum as a tension [N] and its slope by the pay-out rate [N s/m]."""
+    """Return the friction of the drum as a tension [N] and its slope by the pay-out rate [N s/m]; never a push."""
+    if payout <= 0.0:
+        return 0.0, 0.0
     size = sqrt(payout * payout + CREEP * CREEP)
     return drum.friction * payout / size, drum.friction * (CREEP / size) ** 2 / size
