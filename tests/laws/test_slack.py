@@ -108,7 +108,8 @@ def test_friction_brakes_the_drum_that_runs_on():
     """A drum of I_d/R_d² = 0.1 kg with C_f/R_d = 0.05 N loses 0.5 m/s in a second: it throws 1 m after 1 m/s."""
     run = pull("stops at once", "heavy")
     assert run.length[-1] == pytest.approx(5.0 + 1.0, abs=0.12)
-    assert np.diff(run.length)[-30:].max() <= 1e-12
+    # Friction is rounded off at rest (`cable.drum.CREEP`): what still creeps is far below 1 mm/s.
+    assert np.diff(run.length)[-30:].max() <= 1e-6
 
 
 def test_cable_that_has_gone_slack_pulls_again_as_before_when_the_vehicle_goes_on():
