@@ -15,8 +15,7 @@ from subzero.channels import BY_NAME, CHANNELS, TIME
 from subzero.model import Model
 
 if TYPE_CHECKING:
-    from subzero.recording import Recording
-    from subzero.simulation import Run
+    from subzero.recording import Recording, Run
 
 NO_PULL = 1e-9
 """A tow force below this has no direction; then the cable is taken to lie straight behind the vehicle. [N]"""

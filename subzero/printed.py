@@ -22,9 +22,9 @@ from subzero.coupling import CABLE_FAILED, FASTEST, FINE
 from subzero.hull import tow_point
 from subzero.model import Model
 from subzero.printed_loop import Printed, pull_of, record_printed, run_printed_rows, start_at_drum
-from subzero.recording import new_recording
+from subzero.recording import CHUNKS, Run, cut, new_recording
 from subzero.run_state import Live, Setup
-from subzero.simulation import CHUNKS, Run, cut, prepare
+from subzero.start import prepare
 
 REMEDIES = {
     "paper_tangent": 'a longer cable_step_s, or scheme = "moving_end", the default',

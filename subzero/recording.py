@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -12,6 +13,9 @@ from subzero.compiled import compiled
 from subzero.hull import row_at, tow_wrench
 from subzero.run_state import Live, Setup
 from vehicle import BREAKDOWN, STATE_SIZE
+
+CHUNKS = 50
+"""How often a run comes up for air, to move the progress bar."""
 
 
 class Recording(NamedTuple):
@@ -44,6 +48,16 @@ class Recording(NamedTuple):
     nodes: np.ndarray
     position: np.ndarray
     tension: np.ndarray
+
+
+@dataclass(frozen=True, kw_only=True)
+class Run:
+    """A finished run in plain arrays: `rows` rows of a recording at `times`, and how it ended in words."""
+
+    times: np.ndarray
+    recording: Recording
+    completed: bool
+    message: str
 
 
 def new_recording(rows: int, nodes: int) -> Recording:
@@ -103,3 +117,10 @@ def _record_cable(live: Live, r: Recording, row: int, used: int) -> int:
         r.tension[used + j] = line.node_tension[j]
     r.nodes[row] = N + 1
     return used + N + 1
+
+
+def cut(recording: Recording, rows: int, used: int) -> Recording:
+    """Return the part of a recording that is filled."""
+    packed = {"position": recording.position[:used], "tension": recording.tension[:used]}
+    by_row = {name: values[:rows] for name, values in recording._asdict().items() if name not in packed}
+    return Recording(**by_row | packed)

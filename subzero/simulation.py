@@ -3,25 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 import scenarios
-import vehicle
-from cable.element import new_load
-from cable.line import enlarged, lay_straight, new_line, set_momenta
+from cable.line import enlarged
 from cable.newton import Solved
-from cable.pull_out import START_LENGTH, describe_failure
+from cable.pull_out import describe_failure
 from subzero import coupling
-from subzero.compiled import packed
-from subzero.hull import pose, tow_point
-from subzero.loop import NO_ROOM, SPARE, run_rows
+from subzero.loop import NO_ROOM, run_rows
 from subzero.model import Model
-from subzero.recording import Recording, new_recording, record_row
-from subzero.run_state import Fixed, Live, Orders, Setup, Track, new_now
+from subzero.recording import CHUNKS, Recording, Run, cut, new_recording, record_row
+from subzero.run_state import Live
+from subzero.start import prepare
 from subzero.trials import load
 
 if TYPE_CHECKING:
@@ -29,19 +25,6 @@ if TYPE_CHECKING:
 
 Progress = Callable[[float], None]
 """Called now and then with the fraction that is done, 0 to 1."""
-
-CHUNKS = 50
-"""How often a run comes up for air, to move the progress bar."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Run:
-    """A finished run in plain arrays: `rows` rows of a recording at `times`, and how it ended in words."""
-
-    times: np.ndarray
-    recording: Recording
-    completed: bool
-    message: str
 
 
 def simulate(
@@ -100,72 +83,6 @@ def run_trial(trial: scenarios.Trial, model: Model, tethered: bool, progress: Pr
     )
 
 
-def prepare(trial: scenarios.Trial, model: Model, tethered: bool) -> tuple[Setup, Live]:
-    """Return what stays and what changes in a run, at its start: the cable laid straight behind the vehicle."""
-    state, R, tow = _first_state(trial), np.zeros((3, 3)), np.zeros(3)
-    fixed, wet = _fixed(trial, model, tethered), max(trial.start.wet_length, START_LENGTH)
-    tow_point(state, fixed.r_c, R, tow)
-    ahead, speed = R[:, 0].copy(), float(state[7])
-    fixed.drum_place[:] = tow - wet * ahead
-    line, load = new_line(int(wet / trial.segment_length) + 2 * SPARE), new_load()
-    lay_straight(line, wet, ahead, speed, trial.segment_length, fixed.cable)
-    set_momenta(line, fixed.current, fixed.cable, load)
-    pull = -fixed.cable.tangential_drag * speed * abs(speed) * wet * tethered
-    now = new_now(state, pull * ahead)
-    now.ledger.kinetic = vehicle.kinetic_energy(state, fixed.current, fixed.vehicle)
-    steps = int(np.ceil(trial.cable_step / trial.hull_step - 1e-6))
-    live = Live(now=now, path=np.zeros((steps + 1, vehicle.STATE_SIZE)), line=line, load=load)
-    return Setup(fixed=fixed, orders=_orders(trial), track=_track(trial)), live
-
-
-def _fixed(trial: scenarios.Trial, model: Model, tethered: bool) -> Fixed:
-    """Return the numbers of a run; the drum's place is still to be filled in."""
-    fixed = Fixed(
-        vehicle=model.vehicle.numbers(),
-        cable=model.cable.numbers(),
-        drum=model.drum.numbers(),
-        current=np.array(model.current, dtype=float),
-        r_c=model.vehicle.tow_point.position(),
-        drum_place=np.zeros(3),
-        hull_step=trial.hull_step,
-        segment_length=trial.segment_length,
-        tethered=tethered,
-        prescribed=trial.motion is not None,
-    )
-    return packed(fixed)
-
-
-def _first_state(trial: scenarios.Trial) -> np.ndarray:
-    """Return the vehicle's state at t = 0."""
-    start = trial.start
-    state = vehicle.initial_state(
-        depth=start.depth,
-        roll=start.roll,
-        pitch=start.pitch,
-        heading=start.heading,
-        velocity=(start.surge_speed, 0.0, 0.0, 0.0, 0.0, 0.0),
-    )
-    if trial.motion is not None:
-        pose(_track(trial), 0.0, state)
-    return state
-
-
-def _orders(trial: scenarios.Trial) -> Orders:
-    """Return the commands, none for a prescribed motion."""
-    if trial.commands is None:
-        return Orders(np.zeros(1), np.zeros((1, 4)))
-    return Orders(np.array(trial.commands.time, dtype=float), np.array(trial.commands.values, dtype=float))
-
-
-def _track(trial: scenarios.Trial) -> Track:
-    """Return the prescribed motion, of one resting sample for a run with commands."""
-    motion = trial.motion
-    if motion is None:
-        return Track(np.zeros(1), np.zeros(1), np.zeros(1), np.zeros(1))
-    columns = (motion.time, motion.surge_speed, motion.pitch, motion.heading)
-    return Track(*(np.array(column, dtype=float) for column in columns))
-
-
 def _more_room(live: Live, recording: Recording, used: int) -> tuple[Live, Recording]:
     """Return the same run with twice the room for nodes."""
     capacity = 2 * live.line.length.size
@@ -175,13 +92,6 @@ def _more_room(live: Live, recording: Recording, used: int) -> tuple[Live, Recor
     return live._replace(line=enlarged(live.line, capacity)), recording._replace(
         position=position, tension=tension
     )
-
-
-def cut(recording: Recording, rows: int, used: int) -> Recording:
-    """Return the part of a recording that is filled."""
-    packed = {"position": recording.position[:used], "tension": recording.tension[:used]}
-    by_row = {name: values[:rows] for name, values in recording._asdict().items() if name not in packed}
-    return Recording(**by_row | packed)
 
 
 def _in_words(ending: int, solved: Solved, time: float) -> str:
