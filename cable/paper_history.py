@@ -15,7 +15,7 @@ from cable.history import History, Outcome
 from cable.paper_scheme import pull_out_paper
 from cable.properties import CableProperties, DrumProperties
 
-READINGS = {"paper_tangent": "tangent", "paper_drum": "drum"}
+READINGS = {"paper": "tangent", "paper_tangent": "tangent", "paper_drum": "drum"}
 
 
 def pull_out_as_printed(

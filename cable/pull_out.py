@@ -19,7 +19,7 @@ START_LENGTH = 1e-6
 """A run "without cable" starts with this length in the water, so that there is a direction. [m]"""
 REST = 1e-12
 """Slower than this is at rest. [m/s]"""
-SCHEMES = ("moving_end", "paper_tangent", "paper_drum", "equation7")
+SCHEMES = ("moving_end", "paper", "paper_tangent", "paper_drum", "equation7")
 GAUSS = ((-np.sqrt(0.15), 5.0 / 18.0), (0.0, 8.0 / 18.0), (np.sqrt(0.15), 5.0 / 18.0))
 """Offsets and weights of three-point Gauss quadrature on a step of length one."""
 EQUATIONS = ("length", "northward balance", "eastward balance", "downward balance")
@@ -43,7 +43,7 @@ def pull_out(
     The default scheme, "moving_end", is of second order in time and space (backward differences, segments between
     nodes, a last segment that grows); segment length and step are independent of one another. "paper_tangent" and
     "paper_drum" are the scheme of Feng & Allen (2004) as printed, (20)-(26), one new node a step, with the two
-    readings of the new node; there `segment_length` has no meaning. "equation7" is independent of both: the six
+    readings of the new node ("paper" is the usable one, "paper_tangent"); there `segment_length` has no meaning. "equation7" is independent of both: the six
     unknowns of the paper in a scheme of second order with a moving end, for comparison; it has no slack law.
 
     Straight ahead at U the tension is ½ρπdC_t U² S, and the force points against the motion. A drum with no friction

@@ -27,6 +27,7 @@ from subzero.run_state import Live, Setup
 from subzero.start import prepare
 
 REMEDIES = {
+    "paper": 'a longer cable_step_s, or scheme = "moving_end", the default',
     "paper_tangent": 'a longer cable_step_s, or scheme = "moving_end", the default',
     "paper_drum": 'scheme = "paper_tangent", whose new node is not turned around the drum, or "moving_end"',
 }

@@ -68,9 +68,9 @@ ONE_EDIT = {
         "min.toml: there is no such file. Did you mean 'mine.toml'?",
     ),
     "unknown scheme": (
-        "[start]", 'scheme = "paper"\n[start]',
-        "mine.toml, line 8, run.scheme: found 'paper', but this is not a scheme. "
-        "Allowed: moving_end, paper_tangent, paper_drum.",
+        "[start]", 'scheme = "papers"\n[start]',
+        "mine.toml, line 8, run.scheme: found 'papers', but this is not a scheme. "
+        "Allowed: moving_end, paper, paper_tangent, paper_drum.",
     ),
     "missing key": (
         "duration_s = 10.0\n", "",
