@@ -126,6 +126,20 @@ def test_between_two_times_the_vehicle_moves_under_the_force_of_the_first():
     assert_allclose(state, rows.state[21], rtol=1e-12, atol=1e-12)
 
 
+def test_on_a_held_force_the_alternation_of_the_tension_grows_with_the_mass_of_the_cable():
+    """T_{k+1} + T_k = −2r T_k, r cable over vehicle: a factor −(1 + 2r) a step. Table 1, and three times as heavy."""
+    trial = dataclasses.replace(subzero.load_scenario("fig6"), scheme="paper_tangent", cable_step=0.2)
+    light = Model.of(trial)
+    area, mass = 3.0 * light.cable.cross_section_area, 3.0 * light.cable.mass_per_length
+    heavy = dataclasses.replace(light.cable, cross_section_area=area, mass_per_length=mass)
+    for model in (light, dataclasses.replace(light, cable=heavy)):
+        run = subzero.simulate(trial, model=model)
+        jitter = np.abs(np.diff(run["cable_tension"].values, 4))
+        wet = model.cable.mass_per_length * run["cable_length"].values[-12]
+        r = wet * model.vehicle.numbers().inverse_mass[0, 0]
+        assert (jitter[-1] / jitter[-21]) ** 0.05 == pytest.approx(1.0 + 2.0 * r, abs=0.01)
+
+
 def test_wound_around_the_drum_the_straight_cable_of_fig4_bends_and_pulls_too_hard():
     run = run_of("fig4", 1.0, "paper_drum")
     assert run.attrs["outcome"] == "completed"
