@@ -107,7 +107,7 @@ AT_THE_PAPERS_RATE = {
 def test_half_a_metre_and_a_tenth_of_a_second_are_close_to_converged(name, in_tension, in_force, friction):
     """Share of the largest pull, at the paper's 6°/s; measured 1.3e-4, 2.0e-4, 2.2e-4 in tension, more in direction.
 
-    Direction: 3e-4, 5e-4, 7e-4 rad. Against an extrapolation from 6 cm, which itself is good to 2e-5 with friction, 1e-4 without.
+    Direction: 3e-4, 5e-4, 7e-4 rad. Against an extrapolation from 6 cm, good to 2e-5 with friction, 1e-4 without.
     """
     motion, duration = AT_THE_PAPERS_RATE[name]
     drum = cable.DrumProperties(friction_torque=friction)
