@@ -101,7 +101,7 @@ def _move(setup: Setup, live: Live, start: float, span: float) -> bool:
     """Move the hull through an exchange; fill the tow point, relative to the drum; False if the speed is absurd."""
     steps = hull_steps(setup, span)
     for i in range(STATE_SIZE):
-        live.path[0, i] = live.now.state[i]
+        live.path[0, i] = live.state[i]
     if setup.fixed.prescribed:
         follow_track(start, span, steps, setup.track, live.path)
     else:
@@ -200,7 +200,7 @@ def _accept(setup: Setup, live: Live, start: float, span: float) -> None:
         live.now.force_before[i] = live.now.force[i]
         live.now.force[i] = live.line.ends.tow_force[i] if setup.fixed.tethered else 0.0
     for i in range(STATE_SIZE):
-        live.now.state[i] = live.path[steps, i]
+        live.state[i] = live.path[steps, i]
     if live.now.last_step == 0.0:
         for i in range(3):  # the force at the start is a guess: it gives no slope
             live.now.force_before[i] = live.now.force[i]

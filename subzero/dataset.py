@@ -54,7 +54,7 @@ def dataset_of(trial: scenarios.Trial, model: Model, tethered: bool, run: Run) -
 def channel_values(run: Run, model: Model) -> dict[str, np.ndarray]:
     """Return every channel by name, in SI units (propeller speeds in rev/s)."""
     r = run.recording
-    attitude, velocity = _attitudes(r.state), r.state[:, 7:13]
+    attitude, velocity = _attitudes(r.attitude), r.state[:, 7:13]
     names = ("north", "east", "depth", "roll", "pitch", "heading")
     values = dict(zip(names, (*r.state[:, :3].T, *attitude), strict=True))
     rates = ("surge_speed", "sway_speed", "heave_speed", "roll_rate", "pitch_rate", "yaw_rate")
@@ -84,9 +84,9 @@ def _tow_tension(r: Recording) -> np.ndarray:
     return np.where(r.tension[first] < 0.0, -size, size)
 
 
-def _attitudes(state: np.ndarray) -> np.ndarray:
+def _attitudes(attitude: np.ndarray) -> np.ndarray:
     """Return roll, pitch and heading (3, n); the heading continuous, starting in [0, 360) degrees. [rad]."""
-    angles = np.array([vehicle.euler_angles(q) for q in state[:, 3:7]]).T
+    angles = attitude.T.copy()
     angles[2] = np.unwrap(angles[2])
     angles[2] += 2.0 * np.pi * (angles[2, 0] < -1e-12)
     return angles
@@ -98,8 +98,7 @@ def _tow_velocities(run: Run, model: Model) -> np.ndarray:
     α and β follow from the tangent t = (cosα cosβ, −sinα cosβ, −sinβ) at the tow point, with cosβ ≤ 0: straight
     ahead to the north α = 0, β = π and V_t = −u.
     """
-    r = run.recording
-    R = np.array([_rotation(q) for q in r.state[:, 3:7]])
+    r, R = run.recording, run.recording.rotation
     spin = np.cross(r.state[:, 10:13], model.vehicle.tow_point.position())
     V = np.einsum("nij,nj->ni", R, r.state[:, 7:10] + spin)
     if not r.nodes.any():
@@ -113,12 +112,6 @@ def _tow_velocities(run: Run, model: Model) -> np.ndarray:
     n = np.stack([-np.cos(alpha) * sin_b, np.sin(alpha) * sin_b, -cos_b], axis=1)
     b = np.stack([np.sin(alpha), np.cos(alpha), np.zeros_like(alpha)], axis=1)
     return np.stack([np.einsum("ni,ni->n", V, axis) for axis in (t, n, b)])
-
-
-def _rotation(quaternion: np.ndarray) -> np.ndarray:
-    R = np.zeros((3, 3))
-    vehicle.rotation(quaternion, R)
-    return R
 
 
 def _arrays(run: Run) -> dict[str, Any]:

@@ -68,7 +68,7 @@ def advance_hull(setup: Setup, live: Live, start: float, span: float, steps: int
     work, orders, now = live.now.hull, setup.orders, live.now
     h = span / steps
     ratio = span / now.last_step if now.last_step > 0.0 else 0.0
-    k, stage = work.slopes, work.stage
+    k, stage = live.stages, live.stages[4]
     for n in range(steps):
         state, new = live.path[n], live.path[n + 1]
         command = orders.values[row_at(orders.time, start + n * h)]

@@ -60,10 +60,10 @@ def lay_cable(trial: scenarios.Trial, model: Model, setup: Setup, live: Live, ro
     wet, hull = trial.start.wet_length, live.now.hull
     boxes = max(1, round(wet / trial.segment_length)) if wet > 0.0 else 0
     w, c = box_workspace(rows + boxes + 1), equation7_numbers(model.cable, model.current)
-    tow_point(live.now.state, setup.fixed.r_c, hull.rotation, np.zeros(3))  # for the rotation
+    tow_point(live.state, setup.fixed.r_c, hull.rotation, np.zeros(3))  # for the rotation
     start_at_drum(setup, live, w)
     if boxes:
-        speed = float(live.now.state[7])
+        speed = float(live.state[7])
         w.count[0] = boxes + 1
         w.length[1 : boxes + 1] = wet / boxes
         w.y[: boxes + 1] = (0.0, -speed, 0.0, 0.0, *angles_of(*-hull.rotation[:, 0]))

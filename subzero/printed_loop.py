@@ -74,7 +74,7 @@ def _exchange(setup: Setup, live: Live, line: Printed, start: float, span: float
     for i in range(3):
         now.force[i] = F[i]
     for i in range(STATE_SIZE):
-        now.state[i] = live.path[steps, i]
+        live.state[i] = live.path[steps, i]
     now.last_step = span
     book(setup, live, start, span, steps)
     return FINE, report
@@ -100,7 +100,7 @@ def _ends_of(setup: Setup, state: np.ndarray, R: np.ndarray) -> Ends:
 @compiled
 def start_at_drum(setup: Setup, live: Live, w: BoxWorkspace) -> None:
     """Give the single node the tow point's velocity at the start; the rotation stands in live.now.hull."""
-    ends = _ends_of(setup, live.now.state, live.now.hull.rotation)
+    ends = _ends_of(setup, live.state, live.now.hull.rotation)
     start_paper(w, ends.north, ends.east, ends.down, ends.friction)
 
 

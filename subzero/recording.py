@@ -23,6 +23,8 @@ class Recording(NamedTuple):
 
     Attributes:
         state: (n, STATE_SIZE), as in `vehicle.STATE`.
+        attitude: roll, pitch, heading (n, 3). [rad]
+        rotation: R_nb (n, 3, 3).
         fins: rudder, port and starboard plane in the water (n, 3). [rad]
         command: (n, 4). [rev/s, rad]
         voltage: of the battery (n,). [V]
@@ -36,6 +38,8 @@ class Recording(NamedTuple):
     """
 
     state: np.ndarray
+    attitude: np.ndarray
+    rotation: np.ndarray
     fins: np.ndarray
     command: np.ndarray
     voltage: np.ndarray
@@ -64,6 +68,8 @@ def new_recording(rows: int, nodes: int) -> Recording:
     """Return an empty recording of `rows` rows, with room for `nodes` nodes in all."""
     shapes = {
         "state": (rows, STATE_SIZE),
+        "attitude": (rows, 3),
+        "rotation": (rows, 3, 3),
         "fins": (rows, 3),
         "command": (rows, 4),
         "tow_force": (rows, 3),
@@ -80,15 +86,19 @@ def new_recording(rows: int, nodes: int) -> Recording:
 @compiled
 def record_row(setup: Setup, live: Live, recording: Recording, row: int, time: float, used: int) -> int:
     """Write a row for the present state; return how many nodes are in use after it (`used` before)."""
-    state, r = live.now.state, recording
+    state, r = live.state, recording
     command = setup.orders.values[row_at(setup.orders.time, time)]
     tow_wrench(state, live.now.force, setup.fixed.r_c, live.now.hull)
     for i in range(STATE_SIZE):
         r.state[row, i] = state[i]
     for i in range(4):
         r.command[row, i] = command[i]
+    angles = vehicle.euler_angles(state[3:7])
     for i in range(3):
+        r.attitude[row, i] = angles[i]
         r.tow_force[row, i] = live.now.force[i]
+        for k in range(3):
+            r.rotation[row, i, k] = live.now.hull.rotation[i, k]
     for i in range(6):
         r.wrench[row, i] = live.now.hull.wrench[i]
     for i in range(7):

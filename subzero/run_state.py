@@ -11,7 +11,7 @@ from cable.element import Load
 from cable.line import Line
 from cable.properties import CableNumbers, DrumNumbers
 from subzero.compiled import packed
-from vehicle import STATE_SIZE, VehicleNumbers
+from vehicle import VehicleNumbers
 
 
 class Orders(NamedTuple):
@@ -31,10 +31,8 @@ class Track(NamedTuple):
 
 
 class HullWork(NamedTuple):
-    """Work space of the hull: Runge-Kutta slopes and stage, rotation, pull of the cable and its wrench."""
+    """Work space of the hull: rotation R_nb, pull of the cable in earth axes and its wrench."""
 
-    slopes: np.ndarray
-    stage: np.ndarray
     rotation: np.ndarray
     pull: np.ndarray
     wrench: np.ndarray
@@ -79,7 +77,6 @@ class Now:
     """Where a run stands.
 
     Attributes:
-        state: of the vehicle, as in `vehicle.STATE`.
         force, force_before: pull of the cable on the vehicle, at the last two accepted times, earth axes (3,). [N]
         guess: pull at the end of the exchange that is being tried (3,). [N]
         change: what the last guess was changed by (3,). [N]
@@ -91,7 +88,6 @@ class Now:
         ledger: energies.
     """
 
-    state: np.ndarray
     force: np.ndarray
     force_before: np.ndarray
     guess: np.ndarray
@@ -113,18 +109,28 @@ class Setup(NamedTuple):
 
 
 class Live(NamedTuple):
-    """What changes during a run; `path` holds the hull's states on the way of an exchange (steps + 1, STATE_SIZE)."""
+    """What changes during a run.
+
+    Attributes:
+        now: where it stands.
+        state: of the vehicle, as in `vehicle.STATE`.
+        path: the vehicle's states on the way of an exchange (steps + 1, STATE_SIZE).
+        stages: Runge-Kutta slopes (rows 0 … 3) and the state they are taken at (5, STATE_SIZE).
+        line: the cable.
+        load: work space of the cable.
+    """
 
     now: Now
+    state: np.ndarray
     path: np.ndarray
+    stages: np.ndarray
     line: Line
     load: Load
 
 
-def new_now(state: np.ndarray, force: np.ndarray) -> Now:
-    """Return the beginning of a run in a state, with the cable pulling with `force` (3,). [N]"""
-    size = STATE_SIZE
-    work = HullWork(np.zeros((4, size)), np.zeros(size), np.zeros((3, 3)), np.zeros(3), np.zeros(6))
+def new_now() -> Now:
+    """Return the beginning of a run, with a cable that does not pull."""
+    work = HullWork(np.zeros((3, 3)), np.zeros(3), np.zeros(6))
     ledger = Ledger(
         total=np.zeros(7),
         hull_old=np.zeros(4),
@@ -133,8 +139,6 @@ def new_now(state: np.ndarray, force: np.ndarray) -> Now:
         cable_new=np.zeros(5),
         kinetic=0.0,
     )
-    vectors = {name: np.zeros(3) for name in ("force_before", "guess", "change", "tow")}
+    vectors = {name: np.zeros(3) for name in ("force", "force_before", "guess", "change", "tow")}
     matrices = {name: np.zeros((3, 3)) for name in ("Z", "mobility")}
-    return packed(
-        Now(state=state, force=force, **vectors, **matrices, last_step=0.0, hull=work, ledger=ledger)
-    )
+    return packed(Now(**vectors, **matrices, last_step=0.0, hull=work, ledger=ledger))

@@ -9,7 +9,7 @@ import vehicle
 from cable.element import new_load
 from cable.line import lay_straight, new_line, set_momenta
 from cable.pull_out import START_LENGTH
-from subzero.compiled import packed
+from subzero.compiled import compiled, packed
 from subzero.hull import pose, tow_point
 from subzero.model import Model
 from subzero.run_state import Fixed, Live, Orders, Setup, Track, new_now
@@ -20,20 +20,37 @@ FIRST_ROOM = 16
 
 def prepare(trial: scenarios.Trial, model: Model, tethered: bool) -> tuple[Setup, Live]:
     """Return what stays and what changes in a run, at its start: the cable laid straight behind the vehicle."""
-    state, R, tow = _first_state(trial), np.zeros((3, 3)), np.zeros(3)
-    fixed, wet = _fixed(trial, model, tethered), max(trial.start.wet_length, START_LENGTH)
-    tow_point(state, fixed.r_c, R, tow)
-    ahead, speed = R[:, 0].copy(), float(state[7])
-    fixed.drum_place[:] = tow - wet * ahead
-    line, load = new_line(int(wet / trial.segment_length) + FIRST_ROOM), new_load()
-    lay_straight(line, wet, ahead, speed, trial.segment_length, fixed.cable)
-    set_momenta(line, fixed.current, fixed.cable, load)
-    pull = -fixed.cable.tangential_drag * speed * abs(speed) * wet * tethered
-    now = new_now(state, pull * ahead)
-    now.ledger.kinetic = vehicle.kinetic_energy(state, fixed.current, fixed.vehicle)
+    wet, size = max(trial.start.wet_length, START_LENGTH), vehicle.STATE_SIZE
     steps = int(np.ceil(trial.cable_step / trial.hull_step - 1e-6))
-    live = Live(now=now, path=np.zeros((steps + 1, vehicle.STATE_SIZE)), line=line, load=load)
-    return Setup(fixed=fixed, orders=_orders(trial), track=_track(trial)), live
+    setup = Setup(fixed=_fixed(trial, model, tethered), orders=_orders(trial), track=_track(trial))
+    live = Live(
+        now=new_now(),
+        state=_first_state(trial),
+        path=np.zeros((steps + 1, size)),
+        stages=np.zeros((5, size)),
+        line=new_line(int(wet / trial.segment_length) + FIRST_ROOM),
+        load=new_load(),
+    )
+    lay_out(setup, live, wet)
+    return setup, live
+
+
+@compiled
+def lay_out(setup: Setup, live: Live, wet: float) -> None:
+    """Lay `wet` metres of cable straight behind the vehicle, and put the drum at their end."""
+    fixed, now, state = setup.fixed, live.now, live.state
+    if setup.fixed.prescribed:
+        pose(setup.track, 0.0, state)
+    tow_point(state, fixed.r_c, now.hull.rotation, now.tow)
+    speed = state[7]
+    for i in range(3):
+        now.guess[i] = now.hull.rotation[i, 0]
+        fixed.drum_place[i] = now.tow[i] - wet * now.guess[i]
+        pull = fixed.cable.tangential_drag * speed * abs(speed) * wet if fixed.tethered else 0.0
+        now.force[i] = -pull * now.guess[i]
+    lay_straight(live.line, wet, now.guess, speed, fixed.segment_length, fixed.cable)
+    set_momenta(live.line, fixed.current, fixed.cable, live.load)
+    now.ledger.kinetic = vehicle.kinetic_energy(state, fixed.current, fixed.vehicle)
 
 
 def _fixed(trial: scenarios.Trial, model: Model, tethered: bool) -> Fixed:
@@ -54,18 +71,15 @@ def _fixed(trial: scenarios.Trial, model: Model, tethered: bool) -> Fixed:
 
 
 def _first_state(trial: scenarios.Trial) -> np.ndarray:
-    """Return the vehicle's state at t = 0."""
+    """Return the vehicle's state at t = 0 (of a prescribed run, its place only)."""
     start = trial.start
-    state = vehicle.initial_state(
+    return vehicle.initial_state(
         depth=start.depth,
         roll=start.roll,
         pitch=start.pitch,
         heading=start.heading,
         velocity=(start.surge_speed, 0.0, 0.0, 0.0, 0.0, 0.0),
     )
-    if trial.motion is not None:
-        pose(_track(trial), 0.0, state)
-    return state
 
 
 def _orders(trial: scenarios.Trial) -> Orders:
