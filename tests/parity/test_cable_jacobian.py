@@ -1,0 +1,134 @@
+"""The analytic Jacobian of a cable step against central differences of its residual.
+
+Verifies: every entry of the block tridiagonal matrix of `cable.assembly` (and that nothing lies outside the blocks), in
+random bent, half slack states, for all that a drum can do; and the tow force's own derivatives. Configuration: a
+heavy stretching cable, a slanting current, drum with inertia and friction, corrections for the arc switched on.
+Tolerance: differences of step 1e-6 carry 1e-9 of truncation and rounding; 2e-6 of the largest entry of a row.
+"""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from cable.assembly import assemble
+from cable.differences import backward_weights
+from cable.drum import SPINNING, STANDING, TURNING
+from cable.element import new_load
+from cable.line import BEFORE, NEW, NOW, RESIDUAL, lay_straight, new_line, set_momenta
+from cable.properties import CableProperties, DrumProperties
+
+CABLE = CableProperties(mass_per_length=0.02, compliance=0.05, tangential_drag_coefficient=0.02).numbers()
+DRUM = DrumProperties(inertia=1e-3, friction_torque=0.01).numbers()
+CURRENT = np.array([0.2, -0.1, 0.05])
+STEP = 1e-6
+
+
+def bent_line(segments, mode, seed, slackness=1e-4):
+    """Return a moving cable of half-metre segments with nodes shaken at all levels, and work space."""
+    rng = np.random.default_rng(seed)
+    line, work = new_line(segments + 2), new_load()
+    lay_straight(line, 0.5 * segments + 0.1, np.array([1.0, 0.0, 0.0]), 1.0, 0.5, CABLE)
+    line.ends.count = segments
+    line.ends.drum_mode = mode
+    for level, lag in ((NEW, 0.0), (NOW, 0.1), (BEFORE, 0.2)):
+        line.position[level, :segments, 0] -= lag
+        line.ends.last_length[level] = 0.6 - lag
+    line.position[:, :segments] += 0.05 * rng.normal(size=(segments, 3))
+    line.position[:, :segments] += 1e-3 * rng.normal(size=(3, segments, 3))
+    line.velocity[:, :segments] += 0.1 * rng.normal(size=(3, segments, 3))
+    line.ends.payout[:] += 0.1 * rng.normal(size=3)
+    chords = np.linalg.norm(np.diff(line.position[NEW, : segments + 1], axis=0), axis=1)
+    line.length[1:segments] = chords[:-1] * (1.0 + slackness * rng.normal(size=segments - 1))
+    line.ends.last_length[NEW] = chords[-1] * (1.0 + slackness)
+    line.tension[NEW, 1 : segments + 1] = rng.uniform(0.0, 0.5, segments)
+    line.slip[:] = 0.02 * rng.normal(size=line.slip.size)
+    line.normal_gain[:] = rng.uniform(0.9, 1.0, line.normal_gain.size)
+    set_momenta(line, CURRENT, CABLE, work)
+    return line, work
+
+
+def unknowns(line):
+    """Return the unknowns, 4 to a block; the last two of the last block are none."""
+    N = line.ends.count
+    blocks = np.concatenate([line.tension[NEW, 1 : N + 1, None], line.position[NEW, 1 : N + 1]], axis=1)
+    blocks[-1] = line.tension[NEW, N], line.ends.last_length[NEW], 0.0, 0.0
+    return blocks.ravel()
+
+
+def residual(line, work, values, weights):
+    """Return residual and tow force at other unknowns (which stay in the line)."""
+    N = line.ends.count
+    blocks = values.reshape(N, 4)
+    line.tension[NEW, 1 : N + 1] = blocks[:, 0]
+    line.position[NEW, 1:N] = blocks[:-1, 1:]
+    line.ends.last_length[NEW] = blocks[-1, 1]
+    assemble(line, weights, CURRENT, CABLE, DRUM, work)
+    return line.rows[RESIDUAL, 1 : N + 1].ravel().copy(), line.ends.tow_force.copy()
+
+
+def dense(line):
+    """Return the block tridiagonal matrix as a full one."""
+    N = line.ends.count
+    matrix = np.zeros((4 * N, 4 * N))
+    for j in range(N):
+        rows = slice(4 * j, 4 * j + 4)
+        matrix[rows, rows] = line.diagonal[j + 1]
+        if j > 0:
+            matrix[rows, 4 * j - 4 : 4 * j] = line.lower[j + 1]
+        if j < N - 1:
+            matrix[rows, 4 * j + 4 : 4 * j + 8] = line.upper[j + 1]
+    return matrix
+
+
+def differences(line, work, weights):
+    """Return derivatives of residual and tow force by the unknowns, by central differences."""
+    x = unknowns(line)
+    columns, pulls = [], []
+    for k in range(x.size):
+        away = np.zeros(x.size)
+        away[k] = STEP
+        high, low = residual(line, work, x + away, weights), residual(line, work, x - away, weights)
+        columns.append((high[0] - low[0]) / (2.0 * STEP))
+        pulls.append((high[1] - low[1]) / (2.0 * STEP))
+    residual(line, work, x, weights)
+    return np.transpose(columns), np.transpose(pulls)
+
+
+@pytest.mark.parametrize("mode", [TURNING, STANDING, SPINNING], ids=["turning", "standing", "spinning"])
+@pytest.mark.parametrize("segments", [2, 3, 6])
+@pytest.mark.parametrize("previous_step", [0.0, 0.07], ids=["first step", "later step"])
+def test_the_analytic_jacobian_is_that_of_the_residual(mode, segments, previous_step):
+    for seed in range(3):
+        line, work = bent_line(segments, mode, seed)
+        weights = backward_weights(0.1, previous_step)
+        numeric, _ = differences(line, work, weights)
+        analytic = dense(line)
+        # The last two unknowns of the last block do not exist; their rows keep the matrix regular.
+        assert_allclose(analytic[-2:], np.eye(4 * segments)[-2:])
+        numeric[-2:] = analytic[-2:]
+        largest = np.abs(analytic).max(axis=1, keepdims=True)
+        assert_allclose(analytic / largest, numeric / largest, rtol=0, atol=2e-6)
+
+
+def test_a_slack_line_has_its_jacobian_right_too():
+    """Two per cent too much cable in every segment: tangents shrink (`chord_length`), the slack law takes over."""
+    line, work = bent_line(4, TURNING, 5, slackness=0.0)
+    line.length[1:4] *= 1.02
+    line.ends.last_length[NEW] *= 1.02
+    weights = backward_weights(0.1, 0.1)
+    numeric, _ = differences(line, work, weights)
+    analytic = dense(line)
+    numeric[-2:] = analytic[-2:]
+    largest = np.abs(analytic).max(axis=1, keepdims=True)
+    assert_allclose(analytic / largest, numeric / largest, rtol=0, atol=2e-6)
+
+
+@pytest.mark.parametrize("segments", [2, 5])
+def test_the_tow_force_answers_to_the_first_block_as_told(segments):
+    """The coupling's Newton method uses ∂F/∂(first block); it leaves out how the load is moved in the first half
+    segment (a tenth of the load's own derivative), so a tenth of the largest entry is allowed.
+    """
+    line, work = bent_line(segments, TURNING, 1)
+    _, pulls = differences(line, work, backward_weights(0.1, 0.1))
+    told = line.ends.tow_by_block.copy()
+    assert_allclose(told, pulls[:, :4], rtol=0, atol=0.1 * np.abs(told).max())
