@@ -27,5 +27,18 @@ Newton's method, `newton`, on a block tridiagonal system, `blocks`, and made rea
 from cable.history import History, Outcome
 from cable.properties import CableProperties, DrumProperties
 from cable.pull_out import SCHEMES, pull_out
+from cable.tow import tow
+from cable.winch import Brake, ConstantTension, PayOutRate
 
-__all__ = ["SCHEMES", "CableProperties", "DrumProperties", "History", "Outcome", "pull_out"]
+__all__ = [
+    "SCHEMES",
+    "Brake",
+    "CableProperties",
+    "ConstantTension",
+    "DrumProperties",
+    "History",
+    "Outcome",
+    "PayOutRate",
+    "pull_out",
+    "tow",
+]

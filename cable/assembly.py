@@ -21,10 +21,10 @@ import numpy as np
 from subzero.compiled import compiled
 
 from .differences import Weights
-from .drum import SPINNING, STANDING, friction
+from .drum import FREE, LENGTH, SPINNING, STANDING, TENSION, friction
 from .element import Load, chord_length, evaluate_load, fading_rate, turning_rate
 from .first_segment import write_single_segment
-from .line import BEFORE, NEW, NOW, RESIDUAL, Line
+from .line import BEFORE, NEW, NOW, RESIDUAL, Line, held_node
 from .properties import CableNumbers, DrumNumbers
 from .slack import slack_law
 
@@ -33,7 +33,7 @@ from .slack import slack_law
 def node_velocities(line: Line, w: Weights) -> None:
     """Fill the velocities of all nodes and the pay-out rate at level NEW by backward differences."""
     x, V, N = line.position, line.velocity, line.ends.count
-    for j in range(N):
+    for j in range(min(held_node(line), N + 1)):
         for i in range(3):
             V[NEW, j, i] = w.b0 * x[NEW, j, i] + w.b1 * x[NOW, j, i] + w.b2 * x[BEFORE, j, i]
             V[NEW, j, i] += w.b_now * V[NOW, j, i]
@@ -41,6 +41,8 @@ def node_velocities(line: Line, w: Weights) -> None:
     U[NEW] = w.b0 * last[NEW] + w.b1 * last[NOW] + w.b2 * last[BEFORE] + w.b_now * U[NOW]
     if line.ends.drum_mode == STANDING:
         line.ends.payout[NEW] = 0.0
+    if line.ends.free_end:
+        return
     for i in range(3):
         chord = x[NEW, N, i] - x[NEW, N - 1, i]
         line.velocity[NEW, N, i] = -line.ends.payout[NEW] * chord / last[NEW]
@@ -57,7 +59,7 @@ def assemble(
 ) -> None:
     """Fill the residual and the block tridiagonal Jacobian at the present guess of level NEW."""
     node_velocities(line, w)
-    N = line.ends.count
+    N, held = line.ends.count, held_node(line)
     _clear(line)
     for j in range(1, N + 1):
         length = line.ends.last_length[NEW] if j == N else line.length[j]
@@ -72,7 +74,7 @@ def assemble(
             line.momentum[NEW, j, i] = length * work.momentum[i]
             history = w.a1 * line.momentum[NOW, j, i] + w.a2 * line.momentum[BEFORE, j, i]
             line.load[j, i] = length * work.q[i] + history
-        if j < N:
+        if j < held:
             _differentiate_segment(length, w, T, c, work)
         else:
             _add_influx(line, length, w, T, J, c, work)
@@ -80,9 +82,29 @@ def assemble(
         _scatter_length(line, j, T, length, c, work.chord)
     if N > 1:
         _sharpen_tow_force(line)
-    _drum_row(line, w, drum, work)
-    if N == 1:
+    if line.ends.free_end:
+        _add_drogue(line, w, J)
+    else:
+        _drum_row(line, w, drum, work)
+    if N == 1 and drum.control == FREE and not line.ends.free_end:
         write_single_segment(line, work.chord)
+
+
+@compiled
+def _add_drogue(line: Line, w: Weights, J: np.ndarray) -> None:
+    """Add the drag of a drogue, ½ρC_dA |U| U, to the balance of the free end."""
+    N, k, square = line.ends.count, line.ends.tail_drag, 0.0
+    for i in range(3):
+        square += (line.velocity[NEW, N, i] - J[i]) ** 2
+    size = np.sqrt(square)
+    line.ends.drum_pull = k * square
+    for i in range(3):
+        U = line.velocity[NEW, N, i] - J[i]
+        line.rows[RESIDUAL, N, 1 + i] += k * size * U
+        line.diagonal[N, 1 + i, 1 + i] += k * size * w.b0
+        for m in range(3):
+            slope = U * (line.velocity[NEW, N, m] - J[m]) / max(size, 1e-12)
+            line.diagonal[N, 1 + i, 1 + m] += k * slope * w.b0
 
 
 @compiled
@@ -142,15 +164,15 @@ def _add_influx(
 @compiled
 def _scatter_balance(line: Line, j: int, T: float, length: float, work: Load) -> None:
     """Add segment j to the balances of its two nodes: f + ½Q to the far one, −f + ½Q to the near one."""
-    N, t = line.ends.count, work.tangent
+    held, t = held_node(line), work.tangent
     r_j = chord_length(work.chord, length)
     stiffness, g = T / r_j, turning_rate(work.chord, length, r_j)
-    fading = fading_rate(work.chord, length, r_j) if j == N else 0.0
+    fading = fading_rate(work.chord, length, r_j) if j == held else 0.0
     by_near, by_far = work.by_near, work.by_far
     D, L, U, r = line.diagonal, line.lower, line.upper, line.rows[RESIDUAL]
     for i in range(3):
         f, half = T * t[i], 0.5 * line.load[j, i]
-        if j < N:
+        if j < held:
             r[j, 1 + i] += f + half
             D[j, 1 + i, 0] += t[i]
         if j > 1:
@@ -162,11 +184,11 @@ def _scatter_balance(line: Line, j: int, T: float, length: float, work: Load) ->
         for k in range(4):
             far = 0.5 * by_far[i, k]
             pull = (
-                stiffness * ((1.0 if i == k - 1 else 0.0) - g * t[i] * t[k - 1]) if j < N and k > 0 else 0.0
+                stiffness * ((1.0 if i == k - 1 else 0.0) - g * t[i] * t[k - 1]) if j < held and k > 0 else 0.0
             )
-            if j == N and k == 1:
+            if j == held and k == 1:
                 pull = -fading * T * t[i]
-            if j < N:
+            if j < held:
                 D[j, 1 + i, k] += far + pull
             if j > 1:
                 U[j - 1, 1 + i, k] += far - pull
@@ -175,7 +197,7 @@ def _scatter_balance(line: Line, j: int, T: float, length: float, work: Load) ->
         for k in range(3):
             near = 0.5 * by_near[i, k]
             pull = stiffness * ((1.0 if i == k else 0.0) - g * t[i] * t[k])
-            if j < N:
+            if j < held:
                 L[j, 1 + i, 1 + k] += near - pull
             if j > 1:
                 D[j - 1, 1 + i, 1 + k] += near + pull
@@ -205,9 +227,9 @@ def _scatter_length(line: Line, j: int, T: float, length: float, c: CableNumbers
     for i in range(3):
         slope = by_strain * d[i] * scale
         line.lower[j, 0, 1 + i] = slope
-        if j < line.ends.count:
+        if j < held_node(line):
             line.diagonal[j, 0, 1 + i] = -slope
-    if j == line.ends.count:
+    if j == held_node(line):
         line.diagonal[j, 0, 1] = by_strain * square / length
 
 
@@ -224,14 +246,17 @@ def _drum_row(line: Line, w: Weights, drum: DrumNumbers, work: Load) -> None:
     D[3, 3] = 1.0
     Qt = line.load[N, 0] * t[0] + line.load[N, 1] * t[1] + line.load[N, 2] * t[2]
     line.ends.drum_pull = line.tension[NEW, N] + 0.5 * Qt
-    if line.ends.drum_mode == STANDING:
-        r[1] = line.ends.last_length[NEW] - line.ends.last_length[NOW]
+    if drum.control == LENGTH or line.ends.drum_mode == STANDING:
+        r[1] = line.ends.last_length[NEW] - _length_wanted(line, drum)
         D[1, 1] = 1.0
         return
     U = line.ends.payout
-    held, slope = friction(drum, U[NEW])
-    r[1] = -held - drum.inertia * (w.a0 * U[NEW] + w.a1 * U[NOW] + w.a2 * U[BEFORE])
-    D[1, 1] = -(slope + drum.inertia * w.a0) * w.b0
+    if drum.control == TENSION:
+        r[1] = -drum.setpoint
+    else:
+        held, slope = friction(drum, U[NEW])
+        r[1] = -held - drum.inertia * (w.a0 * U[NEW] + w.a1 * U[NOW] + w.a2 * U[BEFORE])
+        D[1, 1] = -(slope + drum.inertia * w.a0) * w.b0
     if line.ends.drum_mode == SPINNING:
         return
     r[1] += line.ends.drum_pull
@@ -247,3 +272,14 @@ def _drum_row(line: Line, w: Weights, drum: DrumNumbers, work: Load) -> None:
             L[1, 1 + k] += 0.5 * t[i] * by_near[i, k]
     for k in range(3):
         L[1, 1 + k] -= 0.5 * (line.load[N, k] - g * Qt * t[k]) / size
+
+
+@compiled
+def _length_wanted(line: Line, drum: DrumNumbers) -> float:
+    """Return how long the last segment has to be: as long as it is, or what a winch asks for. [m]."""
+    if drum.control != LENGTH:
+        return line.ends.last_length[NOW]
+    rest = drum.setpoint
+    for j in range(1, line.ends.count):
+        rest -= line.length[j]
+    return rest

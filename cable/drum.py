@@ -7,6 +7,9 @@
 Coulomb friction is rounded off at rest: C_f U/√(U² + U_c²) with the pay-out rate U and U_c = 1 mm/s (`CREEP`). A drum
 that friction holds therefore creeps by less than that, and a taut cable always has an answer.
 
+A winch instead of the free drum either follows a prescribed length S(t) (a brake: a constant one), or keeps the tension
+T(S) at a prescribed value, paying out and reeling in as needed.
+
 Departs from source: the paper writes (11) for a drum that always turns with a taut cable. A frictionless drum without
 inertia turns whenever it is pulled, and cannot overrun.
 """
@@ -20,6 +23,9 @@ from subzero.compiled import compiled
 from .properties import DrumNumbers
 
 TURNING, STANDING, SPINNING = 0, 1, 2
+
+FREE, LENGTH, TENSION = 0, 1, 2
+"""Who decides on the pay-out (`DrumNumbers.control`): the cable, a winch that gives a length, a winch that keeps T(S)."""
 
 CREEP = 1e-3
 """Pay-out rate at which friction has come to 0.7 of its full size. [m/s]"""

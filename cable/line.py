@@ -35,6 +35,8 @@ class Ends:
         count: number of segments.
         last_length: length of the last, growing segment (3 levels,). [m]
         payout: rate dS/dt at which cable enters the water (3 levels,). [m/s]
+        free_end: whether the far end is a free tail instead of the drum.
+        tail_drag: ½ρC_dA of a drogue there. [kg/m]
         drum_mode: what the drum does (`cable.drum`).
         drum_pull: tension at the drum at level NEW. [N]
         previous_step: t_now − t_before, 0 after a start. [s]
@@ -47,6 +49,8 @@ class Ends:
     """
 
     count: int
+    free_end: bool
+    tail_drag: float
     last_length: np.ndarray
     payout: np.ndarray
     drum_mode: int
@@ -103,6 +107,8 @@ def new_line(capacity: int) -> Line:
     n = capacity + 1
     ends = Ends(
         count=0,
+        free_end=False,
+        tail_drag=0.0,
         last_length=np.zeros(3),
         payout=np.zeros(3),
         drum_mode=TURNING,
@@ -137,6 +143,12 @@ def enlarged(line: Line, capacity: int) -> Line:
     for old, new in zip(line[1:], larger[1:], strict=True):
         new[tuple(slice(0, size) for size in old.shape)] = old
     return larger._replace(ends=line.ends)
+
+
+@compiled
+def held_node(line: Line) -> int:
+    """Return the index of the node that the drum holds; with a free end, one beyond the last."""
+    return line.ends.count + 1 if line.ends.free_end else line.ends.count
 
 
 @compiled

@@ -13,7 +13,7 @@ from .assembly import assemble
 from .blocks import factor, solve
 from .differences import Weights
 from .element import Load
-from .line import GUESS, NEW, RESIDUAL, STEP, Line
+from .line import GUESS, NEW, RESIDUAL, STEP, Line, held_node
 from .properties import CableNumbers, DrumNumbers
 
 MAX_ITERATIONS = 40
@@ -101,12 +101,14 @@ def _save(line: Line) -> float:
 @compiled
 def _update(line: Line, last_length: float, fraction: float) -> None:
     """Write guess minus `fraction` of the Newton step to level NEW."""
-    N, guess, step = line.ends.count, line.rows[GUESS], line.rows[STEP]
+    N, held, guess, step = line.ends.count, held_node(line), line.rows[GUESS], line.rows[STEP]
     for j in range(1, N + 1):
         line.tension[NEW, j] = guess[j, 0] - fraction * step[j, 0]
-        if j < N:
+        if j < held:
             for i in range(3):
                 line.position[NEW, j, i] = guess[j, 1 + i] - fraction * step[j, 1 + i]
+    if line.ends.free_end:
+        return
     line.ends.last_length[NEW] = max(last_length - fraction * step[N, 1], 0.1 * last_length, SMALLEST_SEGMENT)
 
 

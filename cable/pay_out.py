@@ -50,6 +50,7 @@ def follow_path(
     J: np.ndarray,
     c: CableNumbers,
     drum: DrumNumbers,
+    setpoints: np.ndarray,
     segment_length: float,
     work: Load,
     record: Record,
@@ -63,7 +64,8 @@ def follow_path(
         tow_velocity: its velocities (n, 3), for smaller steps in between. [m/s]
         J: velocity of the water (3,). [m/s]
         c: cable.
-        drum: drum.
+        drum: drum or winch.
+        setpoints: what a winch is asked for at times (n,), length [m] or tension [N].
         segment_length: Δs. [m]
         work: work space.
         record: filled from row 1 on (row 0 is the start).
@@ -74,7 +76,7 @@ def follow_path(
     used = line.ends.count + 1
     solved = Solved(True, 0, 0.0, 0, 0)
     for k in range(1, times.size):
-        solved = _cover(line, times, tow, tow_velocity, k, J, c, drum, segment_length, work)
+        solved = _cover(line, times, tow, tow_velocity, k, J, c, drum, setpoints, segment_length, work)
         if not solved.converged or used + line.ends.count + 1 > record.tension.size:
             return k, solved
         write_row(line, record, k, used)
@@ -93,6 +95,7 @@ def _cover(
     J: np.ndarray,
     c: CableNumbers,
     drum: DrumNumbers,
+    setpoints: np.ndarray,
     segment_length: float,
     work: Load,
 ) -> Solved:
@@ -102,7 +105,9 @@ def _cover(
     point = np.zeros(3)
     while True:
         last = done + step >= whole * (1.0 - 1e-9)
-        _hermite(tow, tow_velocity, k, whole, 1.0 if last else (done + step) / whole, point)
+        x = 1.0 if last else (done + step) / whole
+        _hermite(tow, tow_velocity, k, whole, x, point)
+        drum.setpoint = setpoints[k - 1] + x * (setpoints[k] - setpoints[k - 1])
         mode = line.ends.drum_mode
         solved = try_step(line, step, point, J, c, drum, work)
         spent += solved.iterations

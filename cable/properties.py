@@ -28,10 +28,19 @@ class CableNumbers(NamedTuple):
 
 
 class DrumNumbers(NamedTuple):
-    """The drum as compiled code sees it, at the cable: I_d/R_d² [kg] and C_f/R_d [N]."""
+    """The drum as compiled code sees it, at the cable.
+
+    Attributes:
+        inertia: I_d/R_d². [kg]
+        friction: C_f/R_d. [N]
+        control: who decides on the pay-out, see `cable.drum`.
+        setpoint: what is asked for at the new time: length [m] or tension [N]; without meaning for a free drum.
+    """
 
     inertia: float
     friction: float
+    control: int
+    setpoint: float
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -132,7 +141,7 @@ class DrumProperties:
 
     def numbers(self) -> DrumNumbers:
         """Return the plain numbers that compiled code takes."""
-        return packed(DrumNumbers(self.inertia / self.radius**2, self.friction_torque / self.radius))
+        return packed(DrumNumbers(self.inertia / self.radius**2, self.friction_torque / self.radius, 0, 0.0))
 
 
 def _check_range(

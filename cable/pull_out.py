@@ -8,10 +8,11 @@ import numpy as np
 
 from .element import new_load
 from .history import History, Outcome
-from .line import Line, lay_straight, new_line, set_momenta
+from .line import lay_straight, new_line, set_momenta
 from .newton import Solved
 from .pay_out import Record, follow_path, write_row
 from .properties import CableProperties, DrumProperties
+from .winch import Brake, PayOutRate, Winch
 
 TowVelocity = Callable[[float], Sequence[float] | np.ndarray]
 
@@ -32,9 +33,10 @@ def pull_out(
     *,
     segment_length: float = 0.5,
     cable: CableProperties | None = None,
-    drum: DrumProperties | None = None,
+    drum: DrumProperties | Winch | None = None,
     current: Sequence[float] | None = None,
     scheme: str = "moving_end",
+    wet_length: float = 0.0,
 ) -> History:
     """Pull a cable off a drum, starting with no cable in the water and the tow point at the drum.
 
@@ -57,9 +59,10 @@ def pull_out(
         step: time between recorded results; a step that fails is retried in smaller pieces. [s]
         segment_length: Δs, length of a full segment. [m]
         cable: the cable; Table 1 of the source when not given.
-        drum: the drum; Table 1 when not given.
+        drum: a free drum, or a winch (`cable.winch`); the free drum of Table 1 when not given.
         current: velocity of the water north, east, down (3,); still water when not given. [m/s]
         scheme: one of `SCHEMES`.
+        wet_length: cable in the water at the start, laid straight behind the tow point. [m]
 
     Returns:
         the history from t = 0 on. Look at `history.outcome`: a run that could not go on keeps what it has.
@@ -76,20 +79,29 @@ def pull_out(
     if scheme != "moving_end":
         from .paper_history import pull_out_as_printed
 
+        if not isinstance(drum, DrumProperties) or wet_length > 0.0:
+            message = f"scheme {scheme!r} knows a free drum and no wet_length; use 'moving_end'."
+            raise ValueError(message)
         return pull_out_as_printed(tow_velocity, duration, step, cable, drum, J, scheme, segment_length)
     times, tow, velocity = sample_path(tow_velocity, duration, step)
-    direction, speed = first_direction(velocity), float(np.linalg.norm(velocity[0]))
-    tow += START_LENGTH * direction
+    direction, wet = first_direction(velocity), max(wet_length, START_LENGTH)
+    tow += wet * direction
     path = float(np.linalg.norm(np.diff(tow, axis=0), axis=1).sum())
-    capacity = int((3.0 * path + 10.0 + float(np.linalg.norm(J)) * duration) / segment_length) + 4
+    free = isinstance(drum, DrumProperties)
+    setpoints = np.zeros(times.size) if isinstance(drum, DrumProperties) else drum.setpoints(times, wet)
+    longest = wet + 3.0 * path + 5.0 + float(np.linalg.norm(J)) * duration
+    if not free and isinstance(drum, PayOutRate | Brake):
+        longest = float(setpoints.max())
+    capacity = int(longest / segment_length) + 8
     line, work = new_line(capacity), new_load()
-    lay_straight(line, START_LENGTH, direction, speed, segment_length, cable.numbers())
+    speed = float(np.linalg.norm(velocity[0]))
+    lay_straight(line, wet, direction, speed, segment_length, cable.numbers())
     set_momenta(line, J, cable.numbers(), work)
-    record = _new_record(times.size, capacity)
+    record = new_record(times.size, capacity)
     write_row(line, record, 0, 0)
-    numbers = cable.numbers(), drum.numbers(), segment_length, work, record
+    numbers = cable.numbers(), drum.numbers(), setpoints, segment_length, work, record
     rows, solved = follow_path(line, times, tow, velocity, J, *numbers)
-    return _history(times, tow, record, rows, solved, line)
+    return as_history(times, tow, record, rows, solved)
 
 
 def sample_path(
@@ -127,8 +139,8 @@ def describe_failure(solved: Solved, time: float) -> str:
     )
 
 
-def _history(
-    times: np.ndarray, tow: np.ndarray, record: Record, rows: int, solved: Solved, line: Line
+def as_history(
+    times: np.ndarray, tow: np.ndarray, record: Record, rows: int, solved: Solved
 ) -> History:
     """Return the record's filled rows as a history."""
     completed = rows == times.size
@@ -153,7 +165,7 @@ def _history(
     )
 
 
-def _new_record(rows: int, capacity: int) -> Record:
+def new_record(rows: int, capacity: int) -> Record:
     """Return an empty record with room for `rows` rows and a line that grows to `capacity` segments."""
     nodes = rows * (capacity + 2)
     per_row = {name: np.zeros(rows) for name in ("tow_tension", "drum_tension", "length")}

@@ -16,9 +16,9 @@ from subzero.compiled import compiled
 
 from .arc import correct_for_arc
 from .differences import backward_weights
-from .drum import STANDING, next_mode
+from .drum import FREE, STANDING, next_mode
 from .element import Load
-from .line import BEFORE, NEW, NOW, SPLIT_AT, Line, segment_momentum
+from .line import BEFORE, NEW, NOW, SPLIT_AT, Line, held_node, segment_momentum
 from .newton import Solved, solve_step
 from .properties import CableNumbers, DrumNumbers
 from .slack import SMOOTHING
@@ -28,6 +28,8 @@ SOFTEST = 1e-4
 """T₀ that a difficult step starts with, a tenth at a time down to `slack.SMOOTHING`. [N]"""
 TAUT = 1e-2
 """A step begins with at least this tension everywhere: Newton then looks for a taut cable first. [N]"""
+MERGE_AT = 0.5
+"""While cable is reeled in, a last segment shorter than this fraction is joined to the one before."""
 MOST_DRUM_CHANGES = 4
 """How often one step may change its mind about what the drum does."""
 
@@ -56,7 +58,7 @@ def try_step(
     failed = 0
     for _ in range(MOST_DRUM_CHANGES):
         solved = _solve_softly(line, step, tow, J, c, drum, work)
-        if line.ends.count == 1:
+        if line.ends.count == 1 or drum.control != FREE or line.ends.free_end:
             break
         mode = next_mode(
             line.ends.drum_mode, solved.converged, line.ends.payout[NEW], line.ends.drum_pull, drum
@@ -101,12 +103,12 @@ def _solve_softly(
 @compiled
 def _predict(line: Line, step: float, tow: np.ndarray, work: Load) -> None:
     """Guess level NEW: everything goes on as it moves, tensions stay."""
-    N = line.ends.count
+    N, held = line.ends.count, held_node(line)
     for j in range(N + 1):
         line.tension[NEW, j] = max(line.tension[NOW, j], TAUT)
         for i in range(3):
             moved = line.position[NOW, j, i] + step * line.velocity[NOW, j, i]
-            line.position[NEW, j, i] = moved if j < N else line.position[NOW, j, i]
+            line.position[NEW, j, i] = moved if j < held else line.position[NOW, j, i]
     for i in range(3):
         line.position[NEW, 0, i] = tow[i]
     growth = 0.0 if line.ends.drum_mode == STANDING else step * line.ends.payout[NOW]
@@ -132,8 +134,12 @@ def accept(
         line.tension[NOW, j] = line.tension[NEW, j]
     fill_node_tensions(line)
     line.ends.previous_step = step
+    if line.ends.free_end:
+        return
     while line.ends.last_length[NOW] > SPLIT_AT * segment_length and line.ends.count < line.length.size - 1:
         _split_last(line, segment_length, J, c, work)
+    while line.ends.last_length[NOW] < MERGE_AT * segment_length and line.ends.count > 1:
+        _merge_last(line, J, c, work)
 
 
 @compiled
@@ -168,3 +174,39 @@ def _insert_between(values: np.ndarray, last: int, fraction: float) -> None:
         near, end = values[last - 1, i], values[last, i]
         values[last + 1, i] = end
         values[last, i] = near + fraction * (end - near)
+
+
+@compiled
+def _merge_last(line: Line, J: np.ndarray, c: CableNumbers, work: Load) -> None:
+    """Take the node before the drum out, at levels NOW and BEFORE: the last two segments become one.
+
+    The new segment is as long as its chord (in the elastic or slack state of its neighbours): the arc that the node cut
+    off, an eighth of the angle squared, is given back to the drum, without a jolt.
+    """
+    N = line.ends.count
+    last = line.ends.last_length
+    square = 0.0
+    for i in range(3):
+        square += (line.position[NOW, N, i] - line.position[NOW, N - 2, i]) ** 2
+    whole = line.length[N - 1] + last[NOW]
+    pieces = _chord(line, N - 1) + _chord(line, N)
+    cut_off = whole * (1.0 - np.sqrt(square) / max(pieces, 1e-12))
+    for level in (NOW, BEFORE):
+        last[level] += line.length[N - 1] - cut_off
+        for i in range(3):
+            line.position[level, N - 1, i] = line.position[level, N, i]
+            line.velocity[level, N - 1, i] = line.velocity[level, N, i]
+    line.tension[NOW, N - 1] = 0.5 * (line.tension[NOW, N - 1] + line.tension[NOW, N])
+    line.node_tension[N - 1] = line.node_tension[N]
+    line.ends.count = N - 1
+    for level in (NOW, BEFORE):
+        segment_momentum(line, level, N - 1, last[level], J, c, work)
+
+
+@compiled
+def _chord(line: Line, j: int) -> float:
+    """Return the distance of the ends of segment j at level NOW. [m]."""
+    square = 0.0
+    for i in range(3):
+        square += (line.position[NOW, j, i] - line.position[NOW, j - 1, i]) ** 2
+    return np.sqrt(square)

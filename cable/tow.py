@@ -1,0 +1,98 @@
+"""Tow a cable of fixed length with a free tail, or with a drogue at its end."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from .element import new_load
+from .history import History
+from .line import NOW, lay_straight, new_line, set_momenta
+from .pay_out import follow_path, write_row
+from .properties import CableProperties, DrumProperties
+from .pull_out import TowVelocity, as_history, first_direction, new_record, sample_path
+
+
+def tow(
+    tow_velocity: TowVelocity,
+    length: float,
+    duration: float,
+    step: float = 0.1,
+    *,
+    segment_length: float = 0.5,
+    cable: CableProperties | None = None,
+    current: Sequence[float] | None = None,
+    drogue_drag_area: float = 0.0,
+) -> History:
+    """Tow a cable of fixed length, starting from the exact steady straight tow.
+
+    A neutral cable trails straight behind, T(s) = (½ρπdC_t (L − s) + ½ρC_dA) U². A cable with weight and no drogue lies
+    straight at the critical angle φ, ½ρdC_n U² sin²φ = |w_c| cosφ, below or above the tow point.
+
+    Args:
+        tow_velocity: function of time [s] that gives the tow point's velocity north, east, down (3,). [m/s]
+        length: L. [m]
+        duration: how long. [s]
+        step: time between recorded results. [s]
+        segment_length: Δs; taken a little smaller where L is not a whole number of it. [m]
+        cable: the cable; Table 1 of the source when not given.
+        current: velocity of the water north, east, down (3,); still water when not given. [m/s]
+        drogue_drag_area: C_d A of a drogue at the free end; 0 is a free tail. [m²]
+
+    Returns:
+        the history; positions are relative to where the tail is at the start, `drum_tension` is the one at the free end.
+
+    Raises:
+        ValueError: a length, duration, step or segment length that is not positive.
+
+    Checked by: tests/exact/test_tow.py
+    """
+    for name, value in (("length", length), ("duration", duration), ("step", step), ("segment", segment_length)):
+        if not (np.isfinite(value) and value > 0.0):
+            message = f"{name} is {value!r}; it must be a positive number."
+            raise ValueError(message)
+    cable, J = cable or CableProperties(), np.array(current if current is not None else (0.0, 0.0, 0.0), dtype=float)
+    times, path, velocity = sample_path(tow_velocity, duration, step)
+    count = max(1, int(np.ceil(length / segment_length - 1e-9)))
+    line, work, c = new_line(count), new_load(), cable.numbers()
+    tail_drag = 0.5 * cable.water_density * drogue_drag_area
+    uphill, speed = _steady_direction(velocity, J, cable, tail_drag), float(np.linalg.norm(velocity[0]))
+    lay_straight(line, length, uphill, speed, length / count, c)
+    line.ends.free_end, line.ends.tail_drag = True, tail_drag
+    _set_steady_tow(line, velocity[0], J, cable, tail_drag)
+    set_momenta(line, J, c, work)
+    record = new_record(times.size, count)
+    write_row(line, record, 0, 0)
+    path += length * uphill
+    idle = DrumProperties().numbers()
+    rows, solved = follow_path(
+        line, times, path, velocity, J, c, idle, np.zeros(times.size), length / count, work, record
+    )
+    return as_history(times, path, record, rows, solved)
+
+
+def _steady_direction(
+    velocity: np.ndarray, J: np.ndarray, cable: CableProperties, tail_drag: float
+) -> np.ndarray:
+    """Return the direction from the tail to the tow point in a steady tow, a unit vector (3,)."""
+    ahead = first_direction(velocity - J)
+    speed = float(np.linalg.norm(velocity[0] - J))
+    if cable.weight_in_water == 0.0 or tail_drag > 0.0 or speed == 0.0 or abs(ahead[2]) > 1e-9:
+        return ahead
+    phi = cable.critical_angle(speed)
+    return np.cos(phi) * ahead + np.array([0.0, 0.0, -np.sign(cable.weight_in_water) * np.sin(phi)])
+
+
+def _set_steady_tow(line, velocity: np.ndarray, J: np.ndarray, cable: CableProperties, tail_drag: float) -> None:  # type: ignore[no-untyped-def]
+    """Give every node the tow point's velocity, and the segments the tension of a steady straight tow."""
+    N = line.ends.count
+    line.velocity[:, : N + 1] = velocity
+    line.ends.payout[:] = 0.0
+    t = line.position[NOW, 1] - line.position[NOW, 0]
+    t /= np.linalg.norm(t)
+    U = velocity - J
+    per_metre = cable.tangential_drag * abs(U @ t) * -(U @ t) + cable.weight_in_water * t[2]
+    to_tail = line.ends.last_length[NOW] + line.length[1:N][::-1].cumsum()[::-1]
+    middles = np.append(to_tail, line.ends.last_length[NOW]) - 0.5 * line.ends.last_length[NOW]
+    line.tension[:, 1 : N + 1] = np.maximum(per_metre * middles + tail_drag * (U @ U), 0.0)

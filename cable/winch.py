@@ -1,0 +1,104 @@
+"""Winches: what turns the drum when it is not the cable alone.
+
+    PayOutRate       the length in the water follows a rate, S(t) = S(0) + ∫ rate dt; negative reels in, down to nothing
+    Brake            the drum stands: the length stays what it is
+    ConstantTension  the drum pays out and reels in so that T(S) stays what it is asked to be
+
+A free drum is `cable.DrumProperties`. Each has two methods: `numbers` for compiled code, and `setpoints`, what is asked
+for at given times. The length is a state of the cable that the winch leads; nothing along the cable is rescaled.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from subzero.compiled import packed
+
+from .drum import LENGTH, TENSION
+from .properties import DrumNumbers
+
+Schedule = float | Callable[[float], float]
+"""A number, or a function of time [s]."""
+
+SHORTEST = 1e-6
+"""A cable that is reeled in completely keeps this length in the water. [m]"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class PayOutRate:
+    """A winch that pays out at a given rate.
+
+    Attributes:
+        rate: dS/dt, negative to reel in; a number or a function of time. [m/s]
+    """
+
+    rate: Schedule
+
+    def numbers(self) -> DrumNumbers:
+        """Return the plain numbers that compiled code takes."""
+        return packed(DrumNumbers(0.0, 0.0, LENGTH, 0.0))
+
+    def setpoints(self, times: np.ndarray, start: float) -> np.ndarray:
+        """Return the length asked for at `times` (n,), from `start` on; Simpson's rule within a step. [m]."""
+        rate = _sampled(self.rate, times)
+        middle = _sampled(self.rate, 0.5 * (times[1:] + times[:-1]))
+        growth = np.diff(times) * (rate[:-1] + 4.0 * middle + rate[1:]) / 6.0
+        lengths = np.concatenate([[start], growth])
+        for k in range(1, lengths.size):
+            lengths[k] = max(lengths[k - 1] + lengths[k], SHORTEST)
+        return lengths
+
+
+@dataclass(frozen=True, kw_only=True)
+class Brake:
+    """A drum that stands."""
+
+    def numbers(self) -> DrumNumbers:
+        """Return the plain numbers that compiled code takes."""
+        return packed(DrumNumbers(0.0, 0.0, LENGTH, 0.0))
+
+    def setpoints(self, times: np.ndarray, start: float) -> np.ndarray:
+        """Return the length at `times` (n,): always `start`. [m]."""
+        return np.full(times.size, start)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ConstantTension:
+    """A winch that keeps the tension at the drum.
+
+    Attributes:
+        tension: T(S), positive; a number or a function of time. [N]
+    """
+
+    tension: Schedule
+
+    def numbers(self) -> DrumNumbers:
+        """Return the plain numbers that compiled code takes."""
+        return packed(DrumNumbers(0.0, 0.0, TENSION, 0.0))
+
+    def setpoints(self, times: np.ndarray, start: float) -> np.ndarray:
+        """Return the tension asked for at `times` (n,). [N].
+
+        Raises:
+            ValueError: a tension that is not positive: a winch cannot push.
+        """
+        wanted = _sampled(self.tension, times)
+        if not (wanted > 0.0).all():
+            message = f"ConstantTension: the tension must be positive at all times; it falls to {wanted.min():g} N."
+            raise ValueError(message)
+        return wanted
+
+
+Winch = PayOutRate | Brake | ConstantTension
+
+
+def _sampled(schedule: Schedule, times: np.ndarray) -> np.ndarray:
+    """Return a schedule at times, as finite numbers."""
+    values = np.array([schedule(float(t)) if callable(schedule) else schedule for t in times], dtype=float)
+    if not np.isfinite(values).all():
+        message = f"A winch was asked for {values[~np.isfinite(values)][0]!r}; it needs finite numbers."
+        raise ValueError(message)
+    return values
