@@ -17,7 +17,8 @@ from typing import Any
 import numpy as np
 
 SCHEMES = ("moving_end", "paper", "paper_tangent", "paper_drum")
-"""How the cable is solved: our moving end, or the paper's scheme with either reading of its new node ("paper": tangent)."""
+"""How the cable is solved: our moving end, or the paper's scheme, with either reading of its new node
+("paper" is the usable one, "paper_tangent")."""
 
 
 @dataclass(frozen=True, kw_only=True)
