@@ -46,7 +46,8 @@ def pull_out(
     nodes, a last segment that grows); segment length and step are independent of one another. "paper_tangent" and
     "paper_drum" are the scheme of Feng & Allen (2004) as printed, (20)-(26), one new node a step, with the two
     readings of the new node ("paper" is the usable one, "paper_tangent"); there `segment_length` has no meaning.
-    "equation7" is independent of both: the six unknowns of the paper in a scheme of second order with a moving end, for comparison; it has no slack law.
+    "equation7" is independent of both: the six unknowns of the paper in a scheme of second order with a moving end,
+    for comparison; it has no slack law.
 
     Straight ahead at U the tension is ½ρπdC_t U² S, and the force points against the motion. A drum with no friction
     and no inertia gives T(S) = 0. The drum cannot take cable up: a vehicle that comes back makes the cable slack
