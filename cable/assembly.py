@@ -184,7 +184,9 @@ def _scatter_balance(line: Line, j: int, T: float, length: float, work: Load) ->
         for k in range(4):
             far = 0.5 * by_far[i, k]
             pull = (
-                stiffness * ((1.0 if i == k - 1 else 0.0) - g * t[i] * t[k - 1]) if j < held and k > 0 else 0.0
+                stiffness * ((1.0 if i == k - 1 else 0.0) - g * t[i] * t[k - 1])
+                if j < held and k > 0
+                else 0.0
             )
             if j == held and k == 1:
                 pull = -fading * T * t[i]

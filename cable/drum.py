@@ -25,7 +25,7 @@ from .properties import DrumNumbers
 TURNING, STANDING, SPINNING = 0, 1, 2
 
 FREE, LENGTH, TENSION = 0, 1, 2
-"""Who decides on the pay-out (`DrumNumbers.control`): the cable, a winch that gives a length, a winch that keeps T(S)."""
+"""Who decides on the pay-out (`DrumNumbers.control`): the cable, a winch for the length, or a winch for T(S)."""
 
 CREEP = 1e-3
 """Pay-out rate at which friction has come to 0.7 of its full size. [m/s]"""

@@ -173,11 +173,17 @@ def lay_straight(
             for i in range(3):
                 line.position[level, j, i] = along * direction[i]
                 line.velocity[level, j, i] = speed * direction[i]
+    per_metre = c.tangential_drag * speed * abs(speed)
+    for i in range(3):
+        line.ends.tow_force[i] = -per_metre * wet_length * direction[i]
+    line.ends.drum_pull = 0.0
+    for j in range(count + 1):
+        line.node_tension[j] = max(per_metre, 0.0) * (wet_length - j * segment_length if j < count else 0.0)
     for j in range(1, count + 1):
         line.length[j] = segment_length if j < count else last
         middle = wet_length - (j - 0.5) * segment_length if j < count else 0.5 * last
         for level in range(2):
-            line.tension[level, j] = c.tangential_drag * speed * abs(speed) * middle
+            line.tension[level, j] = per_metre * middle
 
 
 @compiled

@@ -140,9 +140,7 @@ def describe_failure(solved: Solved, time: float) -> str:
     )
 
 
-def as_history(
-    times: np.ndarray, tow: np.ndarray, record: Record, rows: int, solved: Solved
-) -> History:
+def as_history(times: np.ndarray, tow: np.ndarray, record: Record, rows: int, solved: Solved) -> History:
     """Return the record's filled rows as a history."""
     completed = rows == times.size
     message = "The run reached its end." if completed else describe_failure(solved, times[rows - 1])

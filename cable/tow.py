@@ -8,7 +8,7 @@ import numpy as np
 
 from .element import new_load
 from .history import History
-from .line import NOW, lay_straight, new_line, set_momenta
+from .line import NOW, Line, lay_straight, new_line, set_momenta
 from .pay_out import follow_path, write_row
 from .properties import CableProperties, DrumProperties
 from .pull_out import TowVelocity, as_history, first_direction, new_record, sample_path
@@ -41,18 +41,26 @@ def tow(
         drogue_drag_area: C_d A of a drogue at the free end; 0 is a free tail. [m²]
 
     Returns:
-        the history; positions are relative to where the tail is at the start, `drum_tension` is the one at the free end.
+        the history; positions are relative to where the tail is at the start, `drum_tension` is the one at the tail.
 
     Raises:
         ValueError: a length, duration, step or segment length that is not positive.
 
     Checked by: tests/exact/test_tow.py
     """
-    for name, value in (("length", length), ("duration", duration), ("step", step), ("segment", segment_length)):
+    for name, value in (
+        ("length", length),
+        ("duration", duration),
+        ("step", step),
+        ("segment", segment_length),
+    ):
         if not (np.isfinite(value) and value > 0.0):
             message = f"{name} is {value!r}; it must be a positive number."
             raise ValueError(message)
-    cable, J = cable or CableProperties(), np.array(current if current is not None else (0.0, 0.0, 0.0), dtype=float)
+    cable, J = (
+        cable or CableProperties(),
+        np.array(current if current is not None else (0.0, 0.0, 0.0), dtype=float),
+    )
     times, path, velocity = sample_path(tow_velocity, duration, step)
     count = max(1, int(np.ceil(length / segment_length - 1e-9)))
     line, work, c = new_line(count), new_load(), cable.numbers()
@@ -84,7 +92,9 @@ def _steady_direction(
     return np.cos(phi) * ahead + np.array([0.0, 0.0, -np.sign(cable.weight_in_water) * np.sin(phi)])
 
 
-def _set_steady_tow(line, velocity: np.ndarray, J: np.ndarray, cable: CableProperties, tail_drag: float) -> None:  # type: ignore[no-untyped-def]
+def _set_steady_tow(
+    line: Line, velocity: np.ndarray, J: np.ndarray, cable: CableProperties, tail_drag: float
+) -> None:
     """Give every node the tow point's velocity, and the segments the tension of a steady straight tow."""
     N = line.ends.count
     line.velocity[:, : N + 1] = velocity
@@ -95,4 +105,8 @@ def _set_steady_tow(line, velocity: np.ndarray, J: np.ndarray, cable: CablePrope
     per_metre = cable.tangential_drag * abs(U @ t) * -(U @ t) + cable.weight_in_water * t[2]
     to_tail = line.ends.last_length[NOW] + line.length[1:N][::-1].cumsum()[::-1]
     middles = np.append(to_tail, line.ends.last_length[NOW]) - 0.5 * line.ends.last_length[NOW]
-    line.tension[:, 1 : N + 1] = np.maximum(per_metre * middles + tail_drag * (U @ U), 0.0)
+    at_tail = tail_drag * (U @ U)
+    line.tension[:, 1 : N + 1] = np.maximum(per_metre * middles + at_tail, 0.0)
+    nodes = np.append(middles + 0.5 * line.ends.last_length[NOW], 0.0)
+    line.node_tension[: N + 1] = np.maximum(per_metre * nodes + at_tail, 0.0)
+    line.ends.tow_force[:], line.ends.drum_pull = line.node_tension[0] * t, at_tail

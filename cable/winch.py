@@ -87,7 +87,9 @@ class ConstantTension:
         """
         wanted = _sampled(self.tension, times)
         if not (wanted > 0.0).all():
-            message = f"ConstantTension: the tension must be positive at all times; it falls to {wanted.min():g} N."
+            message = (
+                f"ConstantTension: the tension must be positive at all times; it falls to {wanted.min():g} N."
+            )
             raise ValueError(message)
         return wanted
 
