@@ -27,7 +27,8 @@ class CableNumbers(NamedTuple):
     normal_drag: float
 
 
-class DrumNumbers(NamedTuple):
+@dataclass
+class DrumNumbers:
     """The drum as compiled code sees it, at the cable.
 
     Attributes:
