@@ -83,6 +83,13 @@ def test_a_heavy_cable_that_comes_off_the_drum_bit_by_bit(trial_of, simulate, hu
     assert_surges_alike(simulate(trial), *surge(trial, hull_alone), 1e-3)
 
 
+def test_a_heavy_cable_on_a_heavy_rubbing_drum_starts_and_runs(trial_of, simulate, hull_alone):
+    """At rest the drum holds the cable by friction, and the propeller has to break it loose."""
+    drum = {"inertia": 1e-3, "friction_torque": 0.005}
+    trial = trial_of(held=STEADY, cable=neutral(2.0), drum=drum, start={"wet_length": 30.0}, cable_step=0.05)
+    assert_surges_alike(simulate(trial), *surge(trial, hull_alone), 2e-3)
+
+
 def test_a_heavy_cable_under_way_slows_the_vehicle_as_it_should(trial_of, simulate, hull_alone):
     """60 kg at 1 m/s behind a propeller that stands at first: the drag of the cable brakes both."""
     trial = trial_of(
