@@ -28,6 +28,8 @@ SOFTEST = 1e-4
 """T₀ that a difficult step starts with, a tenth at a time down to `slack.SMOOTHING`. [N]"""
 TAUT = 1e-2
 """A step begins with at least this tension everywhere: Newton then looks for a taut cable first. [N]"""
+TAKEN_UP = 1e-9
+"""A free drum that would take up more cable than this in a step has not been solved: try a smaller one. [m]"""
 MERGE_AT = 0.5
 """While cable is reeled in, a last segment shorter than this fraction is joined to the one before."""
 MOST_DRUM_CHANGES = 4
@@ -68,6 +70,9 @@ def try_step(
         if mode == line.ends.drum_mode or (failed >> mode) & 1:
             break
         line.ends.drum_mode = mode
+    taken_up = line.ends.last_length[NOW] - line.ends.last_length[NEW] > TAKEN_UP
+    if solved.converged and taken_up and drum.control == FREE and not line.ends.free_end:
+        return Solved(False, solved.iterations, solved.residual, line.ends.count, 0)
     return solved
 
 
