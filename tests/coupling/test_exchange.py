@@ -217,3 +217,19 @@ def test_the_coupled_run_does_not_depend_on_the_heading_it_starts_at(turn, simul
     ):
         assert_allclose(turned[channel].values, plain[channel].values, rtol=0, atol=1e-6)
     assert_allclose(turned["heading"].values - turn, plain["heading"].values, rtol=0, atol=1e-6)
+
+
+def test_a_prescribed_turn_on_a_slope_has_the_rates_of_its_angles(simulate, trial_of):
+    """Kinematics p = −ψ̇ sinθ, q = θ̇, r = ψ̇ cosθ: nose down, a turn to starboard rolls to starboard too."""
+    times, slope, course = np.array([0.0, 5.0]), np.radians([-10.0, -40.0]), np.radians([0.0, 60.0])
+    motion = scenarios.Motion(time=times, surge_speed=np.ones(2), pitch=slope, heading=course)
+    run = simulate(trial_of("fig5", motion=motion, duration=5.0))
+    theta = np.radians(run["pitch"].values)[:-1]
+    dive, turn = -6.0, 12.0  # degrees a second
+    assert_allclose(run["pitch_rate"].values[:-1], dive, rtol=1e-9)
+    assert_allclose(run["roll_rate"].values[:-1], -turn * np.sin(theta), rtol=1e-9)
+    assert_allclose(run["yaw_rate"].values[:-1], turn * np.cos(theta), rtol=1e-9)
+    assert (run["roll_rate"].values[:-1] > 0.0).all()
+    path = CubicHermiteSpline(run["time"].values, tow_point(run), tow_velocity(run))
+    middle = np.diff(tow_point(run), axis=0) / 0.1
+    assert_allclose(path.derivative()(run["time"].values[:-2] + 0.05), middle[:-1], rtol=0, atol=2e-4)
