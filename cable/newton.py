@@ -15,6 +15,7 @@ from .differences import Weights
 from .element import Load
 from .line import GUESS, NEW, RESIDUAL, STEP, Line, held_node
 from .properties import CableNumbers, DrumNumbers
+from .slack import STRAIN_SCALE
 
 MAX_ITERATIONS = 40
 MAX_HALVINGS = 8
@@ -23,7 +24,7 @@ RELATIVE_TOLERANCE = 1e-9
 ABSOLUTE_TOLERANCE = 1e-13
 """Balances of a cable without tension hold to this. [N]"""
 ROUNDING = 1e-15
-"""Positions are known to this fraction, and so the inertia of a segment, m1 ℓ a₀ b₀ x, cannot be known better."""
+"""Positions x are known to this fraction; inertia m1 ℓ a₀ b₀ x and strain x/ℓ of a segment cannot be known better."""
 LENGTH_TOLERANCE = 1e-9
 """The length equation, in units of `slack.STRAIN_SCALE`: a strain of 1e-12."""
 SMALLEST_SEGMENT = 1e-9
@@ -120,10 +121,11 @@ def _residual(line: Line, rounding: float) -> tuple[float, int, int]:
         tension = max(tension, abs(line.tension[NEW, j]))
         reach = max(reach, abs(x[NEW, j, 0]), abs(x[NEW, j, 1]), abs(x[NEW, j, 2]))
     allowed = RELATIVE_TOLERANCE * tension + ABSOLUTE_TOLERANCE + rounding * line.length[1] * reach
+    strain = LENGTH_TOLERANCE + 2.0 * ROUNDING / STRAIN_SCALE * reach / max(line.length[1], SMALLEST_SEGMENT)
     worst, node, equation = 0.0, 0, 0
     for j in range(1, N + 1):
         for i in range(4):
-            size = abs(line.rows[RESIDUAL, j, i]) / (LENGTH_TOLERANCE if i == 0 else allowed)
+            size = abs(line.rows[RESIDUAL, j, i]) / (strain if i == 0 else allowed)
             if not size <= worst:
                 worst, node, equation = size, j, i
     return worst, node, equation
