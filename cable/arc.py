@@ -23,7 +23,7 @@ from math import sqrt
 
 import numpy as np
 
-from subzero.compiled import compiled
+from subzero.compiled import compiled, inner
 
 from .element import Load, chord_length
 from .line import NEW, NOW, Line
@@ -34,7 +34,7 @@ STILL = 1e-12
 """Squares of angles and speeds below this are zero."""
 
 
-@compiled
+@inner
 def correct_for_arc(line: Line, work: Load) -> None:
     """Fill line.slip and line.normal_gain from the prediction on level NEW and the velocities of level NOW."""
     for j in range(1, line.ends.count + 1):

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from subzero.compiled import compiled
+from subzero.compiled import compiled, inner
 
 from .differences import Weights
 from .drum import FREE, LENGTH, SPINNING, STANDING, TENSION, friction
@@ -29,7 +29,7 @@ from .properties import CableNumbers, DrumNumbers
 from .slack import slack_law
 
 
-@compiled
+@inner
 def node_velocities(line: Line, w: Weights) -> None:
     """Fill the velocities of all nodes and the pay-out rate at level NEW by backward differences."""
     x, V, N = line.position, line.velocity, line.ends.count

@@ -15,12 +15,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from subzero.compiled import compiled
+from subzero.compiled import compiled, inner
 
 SIZE = 4
 
 
-@compiled
+@inner
 def factor_block(D: np.ndarray, pivots: np.ndarray) -> bool:
     """Factor a 4×4 block in place by rows exchanged for size; return False when it is singular.
 
@@ -45,7 +45,7 @@ def factor_block(D: np.ndarray, pivots: np.ndarray) -> bool:
     return True
 
 
-@compiled
+@inner
 def solve_block(D: np.ndarray, pivots: np.ndarray, b: np.ndarray) -> None:
     """Overwrite the right-hand side b (4,) with the solution of the factored block."""
     for k in range(SIZE):

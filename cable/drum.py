@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from math import sqrt
 
-from subzero.compiled import compiled
+from subzero.compiled import inner
 
 from .properties import DrumNumbers
 
@@ -33,7 +33,7 @@ HELD = 1e-12
 """A tension or pay-out rate below this is none. [N], [m/s]"""
 
 
-@compiled
+@inner
 def next_mode(mode: int, converged: bool, payout: float, pull: float, drum: DrumNumbers) -> int:
     """Return what the drum does, given the answer found by supposing that it does `mode`; the same if consistent.
 
@@ -59,7 +59,7 @@ def next_mode(mode: int, converged: bool, payout: float, pull: float, drum: Drum
     return SPINNING if drum.inertia > 0.0 and pull < -HELD else TURNING
 
 
-@compiled
+@inner
 def friction(drum: DrumNumbers, payout: float) -> tuple[float, float]:
     """Return the friction of the drum as a tension [N] and its slope by the pay-out rate [N s/m]; never a push."""
     if payout <= 0.0:

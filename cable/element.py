@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from subzero.compiled import compiled, packed
+from subzero.compiled import compiled, inner, packed
 
 from .properties import CableNumbers
 
@@ -72,21 +72,21 @@ def chord_length(d: np.ndarray, length: float) -> float:
     return length * sqrt(square + (FOLDING * (1.0 - square)) ** 2)
 
 
-@compiled
+@inner
 def turning_rate(d: np.ndarray, length: float, r: float) -> float:
     """Return g in ∂t/∂d = (I − g t tᵀ)/r; 1 for a taut segment. [-]."""
     square = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) / (length * length)
     return 1.0 - 2.0 * FOLDING * FOLDING * (1.0 - square)
 
 
-@compiled
+@inner
 def fading_rate(d: np.ndarray, length: float, r: float) -> float:
     """Return f in ∂t/∂ℓ = −f t; 0 for a taut segment. [1/m]."""
     square = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) / (length * length)
     return FOLDING * FOLDING * length * (1.0 - square * square) / (r * r)
 
 
-@compiled
+@inner
 def evaluate_momentum(V: np.ndarray, J: np.ndarray, t: np.ndarray, c: CableNumbers, p: np.ndarray) -> None:
     """Fill p = m V + ρA P (V − J), the momentum per length. [kg/s]."""
     along = (V[0] - J[0]) * t[0] + (V[1] - J[1]) * t[1] + (V[2] - J[2]) * t[2]
@@ -94,7 +94,7 @@ def evaluate_momentum(V: np.ndarray, J: np.ndarray, t: np.ndarray, c: CableNumbe
         p[i] = c.mass * V[i] + c.added_mass * (V[i] - J[i] - along * t[i])
 
 
-@compiled
+@inner
 def evaluate_load(
     V: np.ndarray,
     J: np.ndarray,

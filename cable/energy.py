@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from subzero.compiled import compiled
+from subzero.compiled import compiled, inner
 
 from .element import Load, evaluate_load
 from .line import NOW, Line
@@ -28,7 +28,7 @@ LOSS, STORED, GRAVITY_WORK, AT_DRUM, ADDED_MASS = range(5)
 """What `energy_flow` fills: L [W], E [J], G [W], D_S [W], M [W]."""
 
 
-@compiled
+@inner
 def energy_flow(line: Line, J: np.ndarray, c: CableNumbers, work: Load, out: np.ndarray) -> None:
     """Fill out (5,) with the powers and the stored energy of the cable at level NOW."""
     N, t, across, V = line.ends.count, work.tangent, work.across, work.velocity

@@ -15,7 +15,7 @@ from math import sqrt
 
 import numpy as np
 
-from subzero.compiled import compiled
+from subzero.compiled import compiled, inner
 
 from .line import NEW, NOW, RESIDUAL, Line
 
@@ -23,7 +23,7 @@ CORNER = 1e-9
 """Size of the rounding of both maxima. [m], [N]"""
 
 
-@compiled
+@inner
 def write_single_segment(line: Line, d: np.ndarray) -> None:
     """Replace both rows of the only block, whose second row holds the drum's equation (11)."""
     D, L, r, T = line.diagonal[1], line.lower[1], line.rows[RESIDUAL, 1], line.tension[NEW, 1]

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from subzero.compiled import compiled, packed
+from subzero.compiled import compiled, inner, packed
 
 from .drum import TURNING
 from .element import Load, chord_length, evaluate_momentum
@@ -145,7 +145,7 @@ def enlarged(line: Line, capacity: int) -> Line:
     return larger._replace(ends=line.ends)
 
 
-@compiled
+@inner
 def held_node(line: Line) -> int:
     """Return the index of the node that the drum holds; with a free end, one beyond the last."""
     return line.ends.count + 1 if line.ends.free_end else line.ends.count
@@ -195,7 +195,7 @@ def set_momenta(line: Line, J: np.ndarray, c: CableNumbers, work: Load) -> None:
             segment_momentum(line, level, j, length, J, c, work)
 
 
-@compiled
+@inner
 def segment_momentum(
     line: Line, level: int, j: int, length: float, J: np.ndarray, c: CableNumbers, work: Load
 ) -> None:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from subzero.compiled import compiled
+from subzero.compiled import compiled, inner
 
 from .assembly import assemble
 from .blocks import factor, solve
@@ -41,7 +41,7 @@ class Solved(NamedTuple):
     worst_equation: int
 
 
-@compiled
+@inner
 def solve_step(
     line: Line,
     w: Weights,

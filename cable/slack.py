@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from math import sqrt
 
-from subzero.compiled import compiled
+from subzero.compiled import inner
 
 TENSION_SCALE = 1e-3
 """T_r [N] and σ_r [-]: where the corner between taut and slack is seen at the same size in both."""
@@ -27,7 +27,7 @@ SMOOTHING = 1e-13
 """T₀ = T σ of the smoothed law. [N]"""
 
 
-@compiled
+@inner
 def slack_law(T: float, shortening: float, smoothing: float) -> tuple[float, float, float]:
     """Return φ and its derivatives by the tension T [N] and the shortening σ [-], for T₀ = `smoothing` [N]."""
     a, b = T / TENSION_SCALE, shortening / STRAIN_SCALE

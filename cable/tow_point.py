@@ -6,12 +6,12 @@ from math import sqrt
 
 import numpy as np
 
-from subzero.compiled import compiled
+from subzero.compiled import inner
 
 from .line import NEW, Line
 
 
-@compiled
+@inner
 def ends(line: Line) -> tuple[float, float]:
     """Return the tensions T(0) at the tow point and T(S) at the drum, of the last solved step. [N].
 
@@ -22,7 +22,7 @@ def ends(line: Line) -> tuple[float, float]:
     return sqrt(F[0] * F[0] + F[1] * F[1] + F[2] * F[2]), max(line.ends.drum_pull, 0.0)
 
 
-@compiled
+@inner
 def fill_node_tensions(line: Line) -> None:
     """Fill line.node_tension (nodes,) after a step: T_j + ½ t_j·Q_j at the far end of segment j. [N]."""
     N, x = line.ends.count, line.position
@@ -36,7 +36,7 @@ def fill_node_tensions(line: Line) -> None:
         line.node_tension[j] = max(line.tension[NEW, j] + 0.5 * along / sqrt(max(square, 1e-30)), 0.0)
 
 
-@compiled
+@inner
 def impedance(line: Line, Z: np.ndarray) -> None:
     """Fill Z = ∂F/∂x (3, 3), the change of the tow force by a displacement of the tow point at the end of the step.
 

@@ -22,7 +22,7 @@ from cable.energy import energy_flow
 from cable.newton import Solved
 from cable.stepping import accept, try_step
 from cable.tow_point import impedance
-from subzero.compiled import compiled
+from subzero.compiled import compiled, inner
 from subzero.energy import book
 from subzero.hull import advance_hull, follow_track, tow_point
 from subzero.run_state import Live, Now, Setup
@@ -41,7 +41,7 @@ FINE, CABLE_FAILED, DISAGREED, ABSURD = range(4)
 """How an exchange ended."""
 
 
-@compiled
+@inner
 def exchange(setup: Setup, live: Live, start: float, span: float) -> tuple[int, Solved]:
     """Take one exchange from `start`, in halves where needed; the live state moves on only as far as it went well."""
     done, step = 0.0, span
@@ -62,7 +62,7 @@ def exchange(setup: Setup, live: Live, start: float, span: float) -> tuple[int, 
                 return ending, solved
 
 
-@compiled
+@inner
 def hull_steps(setup: Setup, span: float) -> int:
     """Return how many hull steps an exchange takes."""
     return max(1, int(np.ceil(span / setup.fixed.hull_step - 1e-6)))

@@ -14,7 +14,7 @@ import numpy as np
 
 import vehicle
 from cable.energy import ADDED_MASS, AT_DRUM, GRAVITY_WORK, LOSS, STORED
-from subzero.compiled import compiled
+from subzero.compiled import compiled, inner
 from subzero.hull import row_at, tow_wrench
 from subzero.run_state import Live, Setup
 
@@ -25,7 +25,7 @@ P_PROPELLER, P_LOSS, P_RESTORING, P_EXTERNAL = range(4)
 """Places in `vehicle.POWERS`."""
 
 
-@compiled
+@inner
 def book(setup: Setup, live: Live, start: float, span: float, steps: int) -> None:
     """Add an accepted exchange, whose hull states stand in live.path, to the ledger."""
     ledger = live.now.ledger

@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 import vehicle
-from subzero.compiled import compiled
+from subzero.compiled import compiled, inner
 from subzero.run_state import HullWork, Live, Setup, Track
 from vehicle import STATE_SIZE
 
@@ -21,7 +21,7 @@ GAUSS_OFFSET = 0.5 * np.sqrt(0.6)
 """Three-point Gauss quadrature: nodes at the middle and this fraction of a step before and behind it."""
 
 
-@compiled
+@inner
 def row_at(time: np.ndarray, t: float) -> int:
     """Return the last row whose time is not later than t (with a nanosecond of grace for rounding)."""
     low, high = 0, time.size - 1
@@ -34,7 +34,7 @@ def row_at(time: np.ndarray, t: float) -> int:
     return low
 
 
-@compiled
+@inner
 def tow_wrench(state: np.ndarray, F: np.ndarray, r_c: np.ndarray, work: HullWork) -> None:
     """Fill work.wrench (6,) with the force (12) and the moment (13) of a pull F in earth axes (3,). [N, N m]."""
     R, w = work.rotation, work.wrench
@@ -54,7 +54,7 @@ def tow_point(state: np.ndarray, r_c: np.ndarray, R: np.ndarray, out: np.ndarray
         out[i] = state[i] + R[i, 0] * r_c[0] + R[i, 1] * r_c[1] + R[i, 2] * r_c[2]
 
 
-@compiled
+@inner
 def advance_hull(setup: Setup, live: Live, start: float, span: float, steps: int) -> None:
     """Fill live.path[1 … steps] from path[0], pulled by F(t) = F_{n+1} + (t − t_{n+1}) (F_n − F_{n−1})/h_n.
 
@@ -123,7 +123,7 @@ def pose(track: Track, t: float, state: np.ndarray) -> None:
     state[12] = turn * np.cos(pitch)
 
 
-@compiled
+@inner
 def follow_track(start: float, span: float, steps: int, track: Track, path: np.ndarray) -> None:
     """Fill path[1 … steps] with a prescribed motion, positions by three-point Gauss quadrature."""
     h = span / steps
