@@ -1,0 +1,40 @@
+"""The table of cases: one line a section of the page, in its order."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from types import ModuleType
+from typing import Any
+
+from . import straight_pull
+from .row import Row
+
+
+@dataclass(frozen=True)
+class Case:
+    """A section of the page.
+
+    Attributes:
+        name: for the command line, the figure's file and the tests.
+        title: of the section.
+        module: its docstring is the section's text; `rows(quick)` returns the comparisons; `draw(figure)`, if there is
+            one, fills a matplotlib figure.
+        slow: whether even the quick rows take more than a few seconds.
+    """
+
+    name: str
+    title: str
+    module: ModuleType
+    slow: bool = False
+
+    def rows(self, quick: bool = False) -> list[Row]:
+        """Return the comparisons; with `quick` fewer refinements and parameters, and the same gates."""
+        return list(self.module.rows(quick))
+
+    @property
+    def draw(self) -> Any:
+        """Return the function that fills a figure, or None."""
+        return getattr(self.module, "draw", None)
+
+
+CASES = (Case("straight_pull", "Pulled straight off the drum", straight_pull),)
