@@ -1,0 +1,81 @@
+"""REMUS 100 as a file: a second hull without a line of code, with Prestero's numbers in it.
+
+Verifies: that a trial takes `vehicle = "remus100"`; that velocity products and fins of the file make the coefficients
+of the adjusted set (2001), and its cruise; and that it differs from another simulator's REMUS 100 by terms that have
+names. Tolerance: 2 % for coefficients, printed to three digits; 5 % for what is left when all terms are exchanged.
+"""
+
+import numpy as np
+import pytest
+
+import subzero
+import vehicle
+from benchmarks.validation import remus
+
+
+@pytest.fixture(scope="module")
+def hull():
+    return remus.ours()
+
+
+def force(hull, velocity, rudder=0.0, plane=0.0):
+    """Return the force of everything but weight, propeller, drag that is even, and the rigid body (6,)."""
+    state = vehicle.initial_state(velocity=velocity)
+    state[14:17] = state[18:21] = rudder, plane, plane
+    table = vehicle.breakdown_table(hull, state)
+    left_out = ("restoring", "propeller", "rigid_body_coriolis", "quadratic_damping")
+    return sum(values for name, values in table.items() if name not in left_out)
+
+
+LISTED = {
+    ("Y", "v"): -28.6, ("N", "v"): -24.0, ("Y", "r"): 5.22, ("N", "r"): -2.0,
+    ("Z", "w"): -28.6, ("M", "w"): 24.0, ("Z", "q"): -5.22, ("M", "q"): -2.0,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("axis,speed", LISTED)
+def test_a_velocity_beside_surge_makes_the_listed_force(hull, axis, speed):
+    nudge = np.zeros(6)
+    nudge["uvwpqr".index(speed)] = 1e-4
+    ahead = np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    slope = (force(hull, ahead + nudge) - force(hull, ahead - nudge)) / 2e-4
+    assert slope["XYZKMN".index(axis)] == pytest.approx(LISTED[axis, speed], rel=0.02)
+
+
+def test_the_fins_push_as_listed(hull):
+    """Y_uu_dr 9.64 kg/(m rad) and N_uu_dr −6.15 kg/rad; our positive rudder pushes the stern to port."""
+    ahead = (1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    rudder, planes = force(hull, ahead, rudder=1e-3) * 1e3, force(hull, ahead, plane=1e-3) * 1e3
+    assert rudder[[1, 5]] == pytest.approx([-9.64, 6.15], rel=0.02)
+    assert planes[[2, 4]] == pytest.approx([9.64, 6.15], rel=0.02)
+
+
+def test_the_cruise_needs_the_listed_thrust(hull):
+    """X_prop 3.86 N at 1.54 m/s."""
+    drag = force(hull, (1.54, 0.0, 0.0, 0.0, 0.0, 0.0))[0]
+    assert drag == pytest.approx(-3.86, rel=0.02)
+
+
+def test_a_trial_takes_the_vehicle_by_its_name(tmp_path):
+    text = subzero.load_scenario("turning_circle").text.replace('"subzero2"', '"remus100"')
+    trial = tmp_path / "circle.toml"
+    trial.write_text(text, encoding="utf-8")
+    run = subzero.simulate(trial, tethered=False)
+    assert run.attrs["outcome"] == "completed"
+    assert float(run["yaw_rate"][-1]) > 1.0
+
+
+def test_nothing_unnamed_is_left_between_ours_and_the_other_simulator():
+    judged = [row for row in remus.rows(quick=True) if row.judged]
+    assert len(judged) == 5
+    assert all(row.passed for row in judged), [row for row in judged if not row.passed]
+
+
+def test_a_part_has_unit_range_and_source_for_every_number():
+    import tomllib
+
+    for leaves in tomllib.loads(remus.FILE.read_text(encoding="utf-8")).values():
+        for leaf in leaves.values():
+            assert leaf["range"][0] <= leaf["value"] <= leaf["range"][1]
+            assert leaf["unit"]
+            assert leaf["source"]
