@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from types import ModuleType
 from typing import Any
 
-from . import straight_pull
+from . import hanging_chain, straight_pull, taut_string, travelling_wave
 from .row import Row
 
 
@@ -37,4 +37,9 @@ class Case:
         return getattr(self.module, "draw", None)
 
 
-CASES = (Case("straight_pull", "Pulled straight off the drum", straight_pull),)
+CASES = (
+    Case("straight_pull", "Pulled straight off the drum", straight_pull),
+    Case("travelling_wave", "Waves on a taut cable", travelling_wave),
+    Case("taut_string", "Natural frequencies of a taut cable", taut_string),
+    Case("hanging_chain", "A chain that hangs and swings in water", hanging_chain),
+)

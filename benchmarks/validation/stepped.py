@@ -1,0 +1,97 @@
+"""A cable stepped by hand through `cable.stepping`: for cases whose start, ends or forces no public call offers.
+
+The start is any shape: node positions, a tension for each segment, everything at rest or moving as given. Then the tow
+point is put anywhere, step by step, and the far end is a drum, a winch or free.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cable import CableProperties
+from cable.drum import LENGTH
+from cable.element import Load, new_load
+from cable.line import NEW, NOW, Line, new_line, set_momenta
+from cable.properties import DrumNumbers
+from cable.stepping import accept, try_step
+from subzero.compiled import packed
+
+STILL = np.zeros(3)
+
+
+@dataclass
+class Stepped:
+    """A cable under way.
+
+    Attributes:
+        line: its state.
+        cable: what it is made of.
+        drum: what holds its far end.
+        segment_length: Δs. [m]
+        work: work space.
+    """
+
+    line: Line
+    cable: CableProperties
+    drum: DrumNumbers
+    segment_length: float
+    work: Load
+
+    @classmethod
+    def at_rest(
+        cls,
+        position: np.ndarray,
+        length: np.ndarray,
+        tension: np.ndarray,
+        cable: CableProperties,
+        *,
+        room: int = 0,
+        free_end: bool = False,
+    ) -> Stepped:
+        """Return a cable at rest with nodes at `position` (n+1, 3), and n segments of `length` [m] and `tension` [N].
+
+        The last node is the drum's (a brake, until `drum` is changed) or, with `free_end`, a free tail.
+        """
+        n = length.size
+        line = new_line(n + room)
+        line.position[:, : n + 1] = position
+        line.length[1 : n + 1] = length
+        line.tension[:, 1 : n + 1] = tension
+        line.ends.count, line.ends.free_end = n, free_end
+        line.ends.last_length[:] = length[-1]
+        brake = packed(DrumNumbers(0.0, 0.0, LENGTH, float(length.sum())))
+        made = cls(line, cable, brake, float(length[0]), new_load())
+        made.momenta()
+        return made
+
+    def momenta(self) -> None:
+        """Fill the momenta of the start from its velocities."""
+        set_momenta(self.line, STILL, self.cable.numbers(), self.work)
+
+    def step(self, step: float, tow: np.ndarray) -> None:
+        """Go on by one step [s], with the tow point at `tow` (3,) [m] at its end."""
+        c = self.cable.numbers()
+        solved = try_step(self.line, step, tow, STILL, c, self.drum, self.work)
+        if not solved.converged:
+            message = f"Not solved: {solved.residual:.1e} tolerances at node {solved.worst_node}."
+            raise RuntimeError(message)
+        accept(self.line, step, STILL, c, self.segment_length, self.work)
+
+    def settle(self, seconds: float = 1e4, steps: int = 6) -> None:
+        """Come to rest where the forces balance, in steps so long that inertia has no part; then forget the past."""
+        tow = self.line.position[NOW, 0].copy()
+        for _ in range(steps):
+            self.step(seconds, tow)
+        self.line.velocity[:] = 0.0
+        self.line.ends.payout[:] = 0.0
+        self.line.position[NEW + 2] = self.line.position[NOW]
+        self.line.ends.last_length[2] = self.line.ends.last_length[NOW]
+        self.line.ends.previous_step = 0.0
+        self.momenta()
+
+    @property
+    def positions(self) -> np.ndarray:
+        """Node positions now (nodes, 3). [m]."""
+        return self.line.position[NOW, : self.line.ends.count + 1].copy()
