@@ -1,0 +1,57 @@
+"""From the vehicle to its autopilot: trim, linear models, plants for python-control, sensors, controllers.
+
+    >>> import subzero
+    >>> from subzero import autopilot
+    >>> model = subzero.Model.of(subzero.load_scenario("fig6"))
+    >>> steady = autopilot.trim(model, speed=1.0, wet_length=20.0)
+    >>> steady.propeller_rps, steady.command            # what holds 1 m/s on 20 m of cable
+    >>> linear = autopilot.linearise(model, steady)     # a control.StateSpace with names
+    >>> yaw = autopilot.subsystem(linear, "yaw_sway")
+    >>> autopilot.modes(yaw, steady)                    # poles, damping, in the time scale L/U
+
+Everything is SI and radians, propeller speeds are in rev/s; names and signs are those of `subzero.channels`. Speeds
+are through the water. Names come from their modules when they are first used: python-control loads only then.
+
+symbol       name                                    unit        file
+-----------  --------------------------------------  ----------  ----------
+x, u         states and inputs of a plant            SI          states
+F_c          pull of the cable in steady motion      N           pull
+x₀, u₀       trim: steady state and its command      SI          steady
+A, B, C, D   linear model about it                   SI          linear
+λ L/U, ζ     poles in the vehicle's time scale       1           poles
+"""
+
+from importlib import import_module
+from typing import Any
+
+_HOME = {
+    "INPUTS": "states",
+    "Mode": "poles",
+    "NoTrimError": "steady",
+    "STATES": "states",
+    "SUBSYSTEMS": "linear",
+    "Trim": "steady",
+    "UNITS": "states",
+    "linearise": "linear",
+    "modes": "poles",
+    "subsystem": "linear",
+    "trim": "steady",
+}
+"""Public name → module of this package; no module may be called like a public name."""
+
+__all__ = sorted(_HOME)
+
+
+def __getattr__(name: str) -> Any:
+    """Fetch a public name from its module, once."""
+    if name not in _HOME:
+        raise AttributeError(
+            f"module 'subzero.autopilot' has no attribute '{name}'; it has {', '.join(__all__)}"
+        )
+    value = getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return __all__

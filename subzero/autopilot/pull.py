@@ -1,0 +1,95 @@
+"""What the cable does to a vehicle in steady motion.
+
+    F_c = −(½ρπdC_t |V|² S + C_f/R_d) V/|V|,   M_c = r_c × F_c          (37), with the drum's friction
+
+V is the velocity of the tow point through the water, v + ω × r_c. The cable lies along the way that the tow point
+came: exact for a straight way (the discrete cable has this solution at every step); in a turn it is the limit of a
+cable that cannot be dragged sideways, C_n ≫ C_t, and the real one cuts the corner. A cable with weight is not in the
+formula. Where that matters, `from_cable_model` pulls the cable itself along the way.
+
+A vehicle that speeds up takes its cable along: m S more of mass at the tow point, along V.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+import cable
+from subzero.model import Model
+from vehicle.rigid_body import skew
+
+SLOWEST = 1e-9
+"""Below this speed of the tow point there is no direction to pull against. [m/s]"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SteadyPull:
+    """The cable of a model at a fixed length.
+
+    Attributes:
+        drag: ½ρπdC_t S. [kg/m]
+        friction: C_f/R_d. [N]
+        mass: m S. [kg]
+        tow_point: r_c, body axes (3,). [m]
+    """
+
+    drag: float
+    friction: float
+    mass: float
+    tow_point: np.ndarray
+
+    @classmethod
+    def of(cls, model: Model, wet_length: float) -> SteadyPull:
+        """Return the cable of a model with `wet_length` metres in the water; none pulls with none."""
+        pulls = 1.0 if wet_length > 0.0 else 0.0
+        return cls(
+            drag=model.cable.tangential_drag * wet_length,
+            friction=pulls * model.drum.friction_torque / model.drum.radius,
+            mass=model.cable.mass_per_length * wet_length,
+            tow_point=model.vehicle.tow_point.position(),
+        )
+
+    def wrench(self, nu: np.ndarray) -> np.ndarray:
+        """Return force and moment on the hull (6,), body axes [N, N m], at nu (6,) through the water."""
+        V = nu[:3] + np.cross(nu[3:], self.tow_point)
+        speed = float(np.linalg.norm(V))
+        if speed < SLOWEST:
+            return np.zeros(6)
+        F = -(self.drag * speed + self.friction / speed) * V
+        return np.concatenate([F, np.cross(self.tow_point, F)])
+
+    def added_mass(self, nu: np.ndarray) -> np.ndarray:
+        """Return the matrix (6, 6) [kg …] of the cable's mass, m S t tᵀ at the tow point."""
+        V = nu[:3] + np.cross(nu[3:], self.tow_point)
+        speed = float(np.linalg.norm(V))
+        if speed < SLOWEST:
+            return np.zeros((6, 6))
+        along = np.hstack([np.eye(3), -skew(self.tow_point)]).T @ (V / speed)
+        return self.mass * np.outer(along, along)
+
+
+def from_cable_model(
+    model: Model, velocity_n: Callable[[float], np.ndarray], R_nb: np.ndarray, duration: float
+) -> np.ndarray:
+    """Return the pull of the cable itself, wrench (6,) in body axes [N, N m], at the end of a way.
+
+    Args:
+        model: whose cable, drum and tow point.
+        velocity_n: velocity of the tow point through the water at a time, earth axes. [m/s]
+        R_nb: attitude of the hull at the end of the way (3, 3).
+        duration: how long cable has been paid out. [s]
+
+    Raises:
+        UserError: the cable could not be solved along this way.
+    """
+    from subzero.errors import UserError
+
+    step = min(0.1, duration / 20.0)
+    run = cable.pull_out(velocity_n, duration, step, cable=model.cable, drum=model.drum)
+    if not run.outcome.completed:
+        raise UserError(f"The cable has no steady pull along this way. {run.outcome.message}")
+    F = R_nb.T @ run.tow_force[-1]
+    return np.concatenate([F, np.cross(model.vehicle.tow_point.position(), F)])

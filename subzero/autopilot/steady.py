@@ -1,0 +1,266 @@
+"""Steady motion: which propeller speed, fins and attitude hold a speed, a depth rate and a turn.
+
+    ν'(n, δ_r, δ_e, δ_d, θ, v, w) = 0,   z' = depth rate,   (p, q, r) = J⁻¹ (0, 0, ψ')
+
+Seven equations, seven unknowns; the roll angle is asked for (0) and held by unlike stern-planes. Propeller and fins
+are solved for without their limits first, if need be in steps from straight level motion to what is asked for: so a
+motion that cannot be had is told with the limit that is in its way. Speeds are through the water; a uniform current
+only carries the track.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import cos, degrees, isfinite, radians, sin, sqrt
+from typing import NoReturn
+
+import numpy as np
+
+from subzero.autopilot.actuators import commands, demands, ideal
+from subzero.autopilot.pull import SteadyPull, from_cable_model
+from subzero.autopilot.states import DEPTH, PITCH, ROLL, STATE_NAMES, VELOCITY, rate, to_vehicle
+from subzero.errors import UserError
+from subzero.model import Model
+from vehicle import Vehicle, VehicleNumbers, rotation
+
+CABLES = ("formula", "model")
+STEPS = 20
+"""A motion that is not found at once is approached in so many steps."""
+PASSES = 6
+"""How often hull and cable model are solved in turn: the pull hardly changes the attitude, three digits a pass."""
+RESIDUAL = 1e-9
+"""What may be left of accelerations and depth rate. [m/s2, rad/s2, m/s]"""
+FARTHEST = 1.2
+"""Fin and pitch angles beyond this are another balance than the one that is looked for. [rad]"""
+STEEPEST = radians(80.0)
+"""Pitch beyond which Euler angles are no use any more. [rad]"""
+
+
+class NoTrimError(UserError):
+    """There is no such steady motion; the message names the limit that is hit."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Trim:
+    """A steady motion.
+
+    Attributes:
+        speed: u, forward speed through the water. [m/s]
+        depth_rate: z', positive down. [m/s]
+        turn_rate: ψ', positive to starboard. [rad/s]
+        wet_length: cable in the water. [m]
+        length: of the hull, for scales of time L/U. [m]
+        state: x (16,), as in `STATES`, at the origin with heading 0.
+        command: propeller [rev/s], rudder, port and starboard plane [rad] (4,).
+        wrench: of the cable on the hull, body axes (6,). [N, N m]
+    """
+
+    speed: float
+    depth_rate: float
+    turn_rate: float
+    wet_length: float
+    length: float
+    state: np.ndarray
+    command: np.ndarray
+    wrench: np.ndarray
+
+    @property
+    def propeller_rps(self) -> float:
+        """Propeller speed [rev/s]."""
+        return float(self.state[12])
+
+    @property
+    def command_angles(self) -> np.ndarray:
+        """Command (4,) of actuators without offset, dead band and sag, as linear models have them."""
+        return self.state[12:].copy()
+
+    @property
+    def time_scale(self) -> float:
+        """L/U [s]."""
+        return self.length / self.speed
+
+    def named(self) -> dict[str, float]:
+        """Return the state by name, SI and radians."""
+        return dict(zip(STATE_NAMES, self.state.tolist(), strict=True))
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Motion:
+    """What is asked for, of which hull (its numbers without limits), with which pull beyond the formula's."""
+
+    numbers: VehicleNumbers
+    pull: SteadyPull
+    speed: float
+    depth_rate: float
+    turn_rate: float
+    roll: float
+    extra: np.ndarray
+
+    def part(self, share: float) -> _Motion:
+        """Return the same with a share of everything that is not straight and level."""
+        asked = {name: share * getattr(self, name) for name in ("depth_rate", "turn_rate", "roll", "extra")}
+        return replace(self, **asked)
+
+    def state(self, y: np.ndarray) -> np.ndarray:
+        """Return x (16,) for the unknowns n, δ_r, δ_e, δ_d, θ, v, w."""
+        n, rudder, together, unlike, pitch, v, w = y
+        x = np.zeros(16)
+        x[ROLL], x[PITCH] = self.roll, pitch
+        spin = (-sin(pitch), cos(pitch) * sin(self.roll), cos(pitch) * cos(self.roll))
+        x[VELOCITY] = self.speed, v, w, *(self.turn_rate * part for part in spin)
+        x[12:] = n, rudder, together - unlike, together + unlike
+        return x
+
+    def left(self, y: np.ndarray) -> np.ndarray:
+        """Return what is left of the seven equations."""
+        x = self.state(y)
+        rates = rate(x, x[12:], self.numbers, self.pull.wrench(x[VELOCITY]) + self.extra)
+        return np.append(rates[VELOCITY], rates[DEPTH] - self.depth_rate)
+
+    def solved(self, y: np.ndarray) -> np.ndarray | None:
+        """Return the unknowns from a guess; None if they are not found."""
+        from scipy.optimize import root
+
+        found = root(self.left, y, tol=1e-13).x
+        near = np.max(np.abs(found[1:5])) < FARTHEST
+        return found if near and np.max(np.abs(self.left(found))) < RESIDUAL else None
+
+
+def trim(
+    model: Model,
+    *,
+    speed: float,
+    depth_rate: float = 0.0,
+    turn_rate: float = 0.0,
+    wet_length: float = 0.0,
+    roll: float = 0.0,
+    cable: str = "formula",
+) -> Trim:
+    """Return the steady motion of a model at a speed.
+
+    Args:
+        model: vehicle and cable.
+        speed: u, forward speed through the water. [m/s]
+        depth_rate: z', positive down. [m/s]
+        turn_rate: ψ', positive to starboard. [rad/s]
+        wet_length: cable in the water; its pull is taken as steady although it grows. [m]
+        roll: φ, held by unlike stern-planes. [rad]
+        cable: "formula", ½ρπdC_t U² S and friction along the way of the tow point; or "model", the cable itself,
+            pulled along a way of that length. (In a turn less of it stays in the water: it cuts the corner.)
+
+    Raises:
+        NoTrimError: there is none: which limit is hit, and how far one can go.
+        UserError: a number that means nothing here.
+    """
+    _check(speed, depth_rate, turn_rate, wet_length, roll, cable)
+    hull, pull = model.vehicle, SteadyPull.of(model, wet_length)
+    motion = _Motion(
+        numbers=ideal(hull).numbers(),
+        pull=pull,
+        speed=speed,
+        depth_rate=depth_rate,
+        turn_rate=turn_rate,
+        roll=roll,
+        extra=np.zeros(6),
+    )
+    x = _balanced(hull, motion)
+    if cable == "model" and wet_length > 0.0:
+        for _ in range(PASSES):
+            extra = _cable_pull(model, x, turn_rate, wet_length) - pull.wrench(x[VELOCITY])
+            motion = replace(motion, extra=extra)
+            x = _balanced(hull, motion)
+    _check_limits(hull, x)
+    return Trim(
+        speed=speed,
+        depth_rate=depth_rate,
+        turn_rate=turn_rate,
+        wet_length=wet_length,
+        length=hull.hull.length,
+        state=x,
+        command=commands(hull, x),
+        wrench=pull.wrench(x[VELOCITY]) + motion.extra,
+    )
+
+
+def _check(
+    speed: float, depth_rate: float, turn_rate: float, wet_length: float, roll: float, cable: str
+) -> None:
+    """Refuse what cannot be asked for."""
+    asked = {"speed": speed, "depth_rate": depth_rate, "turn_rate": turn_rate, "wet_length": wet_length}
+    for name, value in (asked | {"roll": roll}).items():
+        if not isfinite(value):
+            raise UserError(f"trim: {name} is {value!r}; it must be a finite number.")
+    if speed <= 0.0:
+        raise UserError(f"trim: speed is {speed:g} m/s; fins need a flow, so it must be above 0.")
+    if wet_length < 0.0:
+        raise UserError(f"trim: wet_length is {wet_length:g} m; it must be 0 or more.")
+    if cable not in CABLES:
+        raise UserError(f"trim: cable is {cable!r}; it must be one of {', '.join(CABLES)}.")
+    if abs(depth_rate) > speed * sin(STEEPEST):
+        raise NoTrimError(
+            f"There is no steady motion at {speed:g} m/s with a depth rate of {depth_rate:g} m/s: the pitch angle would"
+            f" pass {degrees(STEEPEST):.0f} degrees. At this speed ±{speed * sin(STEEPEST):.2g} m/s is the most."
+        )
+
+
+def _balanced(hull: Vehicle, motion: _Motion) -> np.ndarray:
+    """Return the state of a steady motion, at once from straight level motion, or in steps."""
+    guess = np.array([_level_propeller(motion), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    direct = motion.solved(guess)
+    if direct is not None:
+        return motion.state(direct)
+    reached = 0.0
+    for share in np.linspace(0.0, 1.0, STEPS + 1):
+        found = motion.part(share).solved(guess)
+        if found is None:
+            _say_how_far(hull, motion.part(reached).state(guess), reached)
+        guess, reached = found, share
+    return motion.state(guess)
+
+
+def _level_propeller(motion: _Motion) -> float:
+    """Return n at which thrust balances drag and pull straight ahead with central fins, a n² − b n u − c u² = R."""
+    p, u = motion.numbers.propeller, motion.speed
+    x = motion.part(0.0).state(np.zeros(7))
+    rates = rate(x, x[12:], motion.numbers, motion.pull.wrench(x[VELOCITY]))
+    brake = -float(motion.numbers.mass_matrix[0] @ rates[VELOCITY])  # with the propeller standing still
+    if p.thrust_nn == 0.0:
+        return 0.0
+    return (p.thrust_nu * u + sqrt((p.thrust_nu * u) ** 2 + 4.0 * p.thrust_nn * brake)) / (2.0 * p.thrust_nn)
+
+
+def _cable_pull(model: Model, x: np.ndarray, turn_rate: float, wet_length: float) -> np.ndarray:
+    """Return the pull of the cable itself at the end of a steady way of the tow point, `wet_length` long."""
+    nu, r_c = x[VELOCITY], model.vehicle.tow_point.position()
+    V = nu[:3] + np.cross(nu[3:], r_c)
+    duration = wet_length / float(np.linalg.norm(V))
+    R = np.empty((3, 3))
+    rotation(to_vehicle(x)[3:7], R)
+
+    def turned(time: float) -> np.ndarray:
+        c, s = cos(turn_rate * time), sin(turn_rate * time)
+        return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]) @ R
+
+    return from_cable_model(model, lambda t: turned(t) @ V, turned(duration), duration)
+
+
+def _check_limits(hull: Vehicle, x: np.ndarray) -> None:
+    """Refuse a steady motion that some actuator cannot hold."""
+    beyond = [one for one in demands(hull, x) if one.value > one.limit]
+    if beyond:
+        said = "; ".join(
+            f"the {one.name} would need {one.value:.3g} {one.unit}, its limit is {one.limit:.3g}"
+            for one in beyond
+        )
+        raise NoTrimError(f"There is no such steady motion: {said}. Ask for less speed, turn or depth rate.")
+
+
+def _say_how_far(hull: Vehicle, x: np.ndarray, share: float) -> NoReturn:
+    """Raise the error of a motion that has no balance."""
+    _check_limits(hull, x)
+    most = max(demands(hull, x), key=lambda one: one.value / one.limit)
+    raise NoTrimError(
+        f"There is no such steady motion: there is no balance beyond {share:.0%} of the asked depth rate, turn rate and"
+        f" roll, where the {most.name} stands at {most.value:.3g} {most.unit} (limit {most.limit:.3g}): they stall."
+        " Ask for less, or for more speed."
+    )
