@@ -7,7 +7,7 @@
 
 Names come from their modules when they are first used, so that ``import subzero`` costs nothing:
 `simulate` and `compare` run a trial, `Comparison` holds two runs, `load_scenario` reads a trial,
-`read_record` a measured record, `draw` makes the figures, `CHANNELS` is the table of everything that a
+`read_record` a measured record, `draw` makes the figures, `autopilot` leads to linear models and controllers, `CHANNELS` is the table of everything that a
 run gives.
 """
 
@@ -28,7 +28,10 @@ _HOME = {
 }
 """Public name → (module, name there)."""
 
-__all__ = sorted([*_HOME, "__version__"])
+_PACKAGES = ("autopilot",)
+"""Packages inside, fetched as a whole."""
+
+__all__ = sorted([*_HOME, *_PACKAGES, "__version__"])
 
 
 def __getattr__(name: str) -> Any:
@@ -37,6 +40,8 @@ def __getattr__(name: str) -> Any:
         from importlib.metadata import version
 
         value: Any = version("subzero")
+    elif name in _PACKAGES:
+        value = import_module(f"subzero.{name}")
     elif name in _HOME:
         module, inner = _HOME[name]
         value = getattr(import_module(module), inner)
