@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from types import ModuleType
 from typing import Any
 
-from . import hanging_chain, straight_pull, taut_string, travelling_wave
+from . import hanging_chain, straight_pull, taut_string, travelling_wave, turns
 from .row import Row
 
 
@@ -39,6 +39,7 @@ class Case:
 
 CASES = (
     Case("straight_pull", "Pulled straight off the drum", straight_pull),
+    Case("turns", "Steady turns, and turns too tight to be steady", turns),
     Case("travelling_wave", "Waves on a taut cable", travelling_wave),
     Case("taut_string", "Natural frequencies of a taut cable", taut_string),
     Case("hanging_chain", "A chain that hangs and swings in water", hanging_chain),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -69,6 +69,13 @@ class Setting:
         errors = np.abs(ours - reference) / (np.abs(reference) if scale is None else scale)
         k = int(np.argmax(errors))
         return self._row(what, float(ours[k]), float(reference[k]), float(errors[k]))
+
+    def vector(self, ours: np.ndarray, reference: np.ndarray, what: str = "") -> Row:
+        """Compare two vectors: their sizes are shown, the size of their difference is judged."""
+        size = float(np.linalg.norm(reference))
+        error = float(np.linalg.norm(np.subtract(ours, reference))) / size
+        row = self._row(what, float(np.linalg.norm(ours)), size, error)
+        return replace(row, measure="of the vector")
 
     def _row(self, what: str, ours: float, reference: float, error: float) -> Row:
         name = f"{self.name}: {what}" if what else self.name
