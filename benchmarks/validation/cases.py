@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from types import ModuleType
 from typing import Any
 
-from . import hanging_chain, straight_pull, taut_string, travelling_wave, turns
+from . import hanging_chain, moordyn_2, straight_pull, taut_string, travelling_wave, turns
 from .row import Row
 
 
@@ -43,4 +43,5 @@ CASES = (
     Case("travelling_wave", "Waves on a taut cable", travelling_wave),
     Case("taut_string", "Natural frequencies of a taut cable", taut_string),
     Case("hanging_chain", "A chain that hangs and swings in water", hanging_chain),
+    Case("moordyn_2", "Another code: MoorDyn 2", moordyn_2),
 )
