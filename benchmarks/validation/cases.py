@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from types import ModuleType
 from typing import Any
 
-from . import hanging_chain, moordyn_2, straight_pull, taut_string, travelling_wave, turns
+from . import hanging_chain, moordyn_2, sagging_cable, straight_pull, taut_string, travelling_wave, turns
 from .row import Row
 
 
@@ -42,6 +42,7 @@ CASES = (
     Case("turns", "Steady turns, and turns too tight to be steady", turns),
     Case("travelling_wave", "Waves on a taut cable", travelling_wave),
     Case("taut_string", "Natural frequencies of a taut cable", taut_string),
+    Case("sagging_cable", "Vibrations of a sagging cable", sagging_cable),
     Case("hanging_chain", "A chain that hangs and swings in water", hanging_chain),
     Case("moordyn_2", "Another code: MoorDyn 2", moordyn_2),
 )

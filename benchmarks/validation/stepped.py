@@ -49,6 +49,7 @@ class Stepped:
         *,
         room: int = 0,
         free_end: bool = False,
+        current: object = None,
     ) -> Stepped:
         """Return a cable at rest with nodes at `position` (n+1, 3), and n segments of `length` [m] and `tension` [N].
 
@@ -63,11 +64,11 @@ class Stepped:
         line.ends.last_length[:] = length[-1]
         brake = packed(DrumNumbers(0.0, 0.0, LENGTH, float(length.sum())))
         made = cls(line, cable, brake, float(length[0]), new_load())
-        made.momenta()
+        made.begin()
         return made
 
-    def momenta(self) -> None:
-        """Fill the momenta of the start from its velocities."""
+    def begin(self) -> None:
+        """Take the velocities that stand there as those of the start."""
         set_momenta(self.line, STILL, self.cable.numbers(), self.work)
 
     def step(self, step: float, tow: np.ndarray) -> None:
@@ -89,9 +90,19 @@ class Stepped:
         self.line.position[NEW + 2] = self.line.position[NOW]
         self.line.ends.last_length[2] = self.line.ends.last_length[NOW]
         self.line.ends.previous_step = 0.0
-        self.momenta()
+        self.begin()
 
     @property
     def positions(self) -> np.ndarray:
         """Node positions now (nodes, 3). [m]."""
         return self.line.position[NOW, : self.line.ends.count + 1].copy()
+
+    @property
+    def tensions(self) -> np.ndarray:
+        """Tensions at the nodes now (nodes,). [N]."""
+        return self.line.node_tension[: self.line.ends.count + 1].copy()
+
+    def nodes(self, length: float) -> np.ndarray:
+        """Return how far the nodes are from the drum along the cable (nodes,), when its length is `length`. [m]."""
+        settled = np.cumsum(self.line.length[1 : self.line.ends.count])
+        return np.concatenate([[length], length - settled, [0.0]])
