@@ -72,18 +72,18 @@ def run_trial(trial: scenarios.Trial, model: Model, tethered: bool, progress: Pr
         last = min(times.size, row + 1 + times.size // CHUNKS)
         row, used, ending, solved = run_rows(setup, live, recording, times, row, last, used)
         if ending == NO_ROOM:
-            live, recording = _more_room(live, recording, used)
+            live, recording = more_room(live, recording, used)
         if progress is not None:
             progress(row / times.size)
     return Run(
         times=times[:row],
         recording=cut(recording, row, used),
         completed=ending == coupling.FINE,
-        message=_in_words(ending, solved, float(times[row - 1])),
+        message=in_words(ending, solved, float(times[row - 1])),
     )
 
 
-def _more_room(live: Live, recording: Recording, used: int) -> tuple[Live, Recording]:
+def more_room(live: Live, recording: Recording, used: int) -> tuple[Live, Recording]:
     """Return the same run with twice the room for nodes."""
     capacity = 2 * live.line.length.size
     nodes = 2 * max(recording.tension.size, used + 64 * capacity)
@@ -94,7 +94,7 @@ def _more_room(live: Live, recording: Recording, used: int) -> tuple[Live, Recor
     )
 
 
-def _in_words(ending: int, solved: Solved, time: float) -> str:
+def in_words(ending: int, solved: Solved, time: float) -> str:
     """Say how a run ended: when, where, and what to try."""
     if ending == coupling.FINE:
         return "The run reached its end."

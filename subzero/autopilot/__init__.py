@@ -12,6 +12,8 @@
 Everything is SI and radians, propeller speeds are in rev/s; names and signs are those of `subzero.channels`. Speeds
 are through the water. Names come from their modules when they are first used: python-control loads only then.
 
+    >>> hull = autopilot.plant(model)                     # a control.NonlinearIOSystem; tethered=True: with the cable
+
 symbol       name                                    unit        file
 -----------  --------------------------------------  ----------  ----------
 x, u         states and inputs of a plant            SI          states
@@ -34,6 +36,7 @@ _HOME = {
     "UNITS": "states",
     "linearise": "linear",
     "modes": "poles",
+    "plant": "plants",
     "subsystem": "linear",
     "trim": "steady",
 }
