@@ -28,6 +28,7 @@ from cable.history import History, Outcome
 from cable.properties import CableProperties, DrumProperties
 from cable.pull_out import SCHEMES, pull_out
 from cable.tow import tow
+from cable.water import Current
 from cable.winch import Brake, ConstantTension, PayOutRate
 
 __all__ = [
@@ -35,6 +36,7 @@ __all__ = [
     "Brake",
     "CableProperties",
     "ConstantTension",
+    "Current",
     "DrumProperties",
     "History",
     "Outcome",

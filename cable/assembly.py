@@ -22,9 +22,9 @@ from subzero.compiled import compiled, inner
 
 from .differences import Weights
 from .drum import FREE, LENGTH, SPINNING, STANDING, TENSION, friction
-from .element import Load, chord_length, evaluate_load, fading_rate, turning_rate
+from .element import Load, differentiate_load, evaluate_load, fading_rate, turning_rate
 from .first_segment import write_single_segment
-from .line import BEFORE, NEW, NOW, RESIDUAL, Line, held_node
+from .line import BEFORE, NEW, NOW, RESIDUAL, Line, held_node, take_segment
 from .properties import CableNumbers, DrumNumbers
 from .slack import slack_law
 
@@ -45,14 +45,13 @@ def node_velocities(line: Line, w: Weights) -> None:
         return
     for i in range(3):
         chord = x[NEW, N, i] - x[NEW, N - 1, i]
-        line.velocity[NEW, N, i] = -line.ends.payout[NEW] * chord / last[NEW]
+        V[NEW, N, i] = line.ends.drum_velocity[i] - U[NEW] * chord / last[NEW]
 
 
 @compiled
 def assemble(
     line: Line,
     w: Weights,
-    J: np.ndarray,
     c: CableNumbers,
     drum: DrumNumbers,
     work: Load,
@@ -64,26 +63,24 @@ def assemble(
     for j in range(1, N + 1):
         length = line.ends.last_length[NEW] if j == N else line.length[j]
         T = line.tension[NEW, j]
+        take_segment(line, NEW, j, work)
+        evaluate_load(length, T, line.slip[j], line.normal_gain[j], w.a0, c, work)
+        differentiate_load(length, line.slip[j], w.a0, c, work)
         for i in range(3):
-            work.velocity[i] = 0.5 * (line.velocity[NEW, j - 1, i] + line.velocity[NEW, j, i])
-            work.chord[i] = line.position[NEW, j, i] - line.position[NEW, j - 1, i]
-        evaluate_load(
-            work.velocity, J, work.chord, length, T, line.slip[j], line.normal_gain[j], w.a0, c, work
-        )
-        for i in range(3):
+            work.q[i] -= line.forcing[j, i]
             line.momentum[NEW, j, i] = length * work.momentum[i]
             history = w.a1 * line.momentum[NOW, j, i] + w.a2 * line.momentum[BEFORE, j, i]
             line.load[j, i] = length * work.q[i] + history
         if j < held:
             _differentiate_segment(length, w, T, c, work)
         else:
-            _add_influx(line, length, w, T, J, c, work)
+            _add_influx(line, length, w, T, c, work)
         _scatter_balance(line, j, T, length, work)
         _scatter_length(line, j, T, length, c, work.chord)
     if N > 1:
         _sharpen_tow_force(line)
     if line.ends.free_end:
-        _add_drogue(line, w, J)
+        _add_drogue(line, w)
     else:
         _drum_row(line, w, drum, work)
     if N == 1 and drum.control == FREE and not line.ends.free_end:
@@ -91,9 +88,10 @@ def assemble(
 
 
 @compiled
-def _add_drogue(line: Line, w: Weights, J: np.ndarray) -> None:
+def _add_drogue(line: Line, w: Weights) -> None:
     """Add the drag of a drogue, ½ρC_dA |U| U, to the balance of the free end."""
     N, k, square = line.ends.count, line.ends.tail_drag, 0.0
+    J = line.water[NEW, N]
     for i in range(3):
         square += (line.velocity[NEW, N, i] - J[i]) ** 2
     size = np.sqrt(square)
@@ -133,14 +131,13 @@ def _differentiate_segment(length: float, w: Weights, T: float, c: CableNumbers,
 
 
 @compiled
-def _add_influx(
-    line: Line, length: float, w: Weights, T: float, J: np.ndarray, c: CableNumbers, work: Load
-) -> None:
+def _add_influx(line: Line, length: float, w: Weights, T: float, c: CableNumbers, work: Load) -> None:
     """Complete Q of the last segment by the momentum that enters at the drum; fill ∂Q/∂x_{N−1} and ∂Q/∂(T, ℓ)."""
     N, U, t, d = line.ends.count, line.ends.payout[NEW], work.tangent, work.chord
-    by_near, by_far = work.by_near, work.by_far
-    r = chord_length(d, length)
-    g, fading = turning_rate(d, length, r), fading_rate(d, length, r)
+    by_near, by_far, J, r = work.by_near, work.by_far, work.water, work.chord_length
+    g, fading = turning_rate(d, length), fading_rate(d, length, r)
+    for i in range(3):  # the water at the drum, as the drum sees it
+        J[i] = line.water[NEW, N, i] - line.ends.drum_velocity[i]
     Jt = J[0] * t[0] + J[1] * t[1] + J[2] * t[2]
     dU = 0.0 if line.ends.drum_mode == STANDING else w.b0
     stretch = 0.5 * c.compliance / (1.0 + c.compliance * T)
@@ -164,14 +161,13 @@ def _add_influx(
 @compiled
 def _scatter_balance(line: Line, j: int, T: float, length: float, work: Load) -> None:
     """Add segment j to the balances of its two nodes: f + ½Q to the far one, −f + ½Q to the near one."""
-    held, t = held_node(line), work.tangent
-    r_j = chord_length(work.chord, length)
-    stiffness, g = T / r_j, turning_rate(work.chord, length, r_j)
-    fading = fading_rate(work.chord, length, r_j) if j == held else 0.0
+    held, t, d, brace = held_node(line), work.tangent, work.chord, line.bracing[j]
+    stiffness, g = T / work.chord_length, turning_rate(d, length)
+    fading = fading_rate(d, length, work.chord_length) if j == held else 0.0
     by_near, by_far = work.by_near, work.by_far
     D, L, U, r = line.diagonal, line.lower, line.upper, line.rows[RESIDUAL]
     for i in range(3):
-        f, half = T * t[i], 0.5 * line.load[j, i]
+        f, half = T * t[i] + brace * d[i] - line.shear[j, i], 0.5 * line.load[j, i]
         if j < held:
             r[j, 1 + i] += f + half
             D[j, 1 + i, 0] += t[i]
@@ -188,6 +184,8 @@ def _scatter_balance(line: Line, j: int, T: float, length: float, work: Load) ->
                 if j < held and k > 0
                 else 0.0
             )
+            if j < held and i == k - 1:
+                pull += brace
             if j == held and k == 1:
                 pull = -fading * T * t[i]
             if j < held:
@@ -198,7 +196,7 @@ def _scatter_balance(line: Line, j: int, T: float, length: float, work: Load) ->
                 line.ends.tow_by_block[i, k] = (t[i] if k == 0 else 0.0) + pull - far
         for k in range(3):
             near = 0.5 * by_near[i, k]
-            pull = stiffness * ((1.0 if i == k else 0.0) - g * t[i] * t[k])
+            pull = stiffness * ((1.0 if i == k else 0.0) - g * t[i] * t[k]) + (brace if i == k else 0.0)
             if j < held:
                 L[j, 1 + i, 1 + k] += near - pull
             if j > 1:
@@ -264,8 +262,8 @@ def _drum_row(line: Line, w: Weights, drum: DrumNumbers, work: Load) -> None:
     r[1] += line.ends.drum_pull
     D[1, 0] = 1.0
     by_near, by_far = work.by_near, work.by_far
-    size = chord_length(work.chord, line.ends.last_length[NEW])
-    g = turning_rate(work.chord, line.ends.last_length[NEW], size)
+    size = work.chord_length
+    g = turning_rate(work.chord, line.ends.last_length[NEW])
     fading = fading_rate(work.chord, line.ends.last_length[NEW], size)
     for i in range(3):
         D[1, 0] += 0.5 * t[i] * by_far[i, 0]
@@ -281,7 +279,4 @@ def _length_wanted(line: Line, drum: DrumNumbers) -> float:
     """Return how long the last segment has to be: as long as it is, or what a winch asks for. [m]."""
     if drum.control != LENGTH:
         return line.ends.last_length[NOW]
-    rest = drum.setpoint
-    for j in range(1, line.ends.count):
-        rest -= line.length[j]
-    return rest
+    return drum.setpoint - line.ends.settled

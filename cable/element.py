@@ -10,7 +10,7 @@ whose components along t, n, b are the six scalar equations of Feng & Allen (200
 `docs/theory.md`. No angle appears, so no direction is singular, and a turned motion gives turned forces.
 
 `evaluate_load` fills q = a₀ p + D − w_c k, where a₀ is the weight of the newest value in the time derivative
-(`cable.differences`), and ∂q/∂V, ∂q/∂d: all that Newton's method needs from the physics.
+(`cable.differences`), and `differentiate_load` ∂q/∂V and ∂q/∂d: all that Newton's method needs from the physics.
 """
 
 from __future__ import annotations
@@ -32,22 +32,31 @@ class Load(NamedTuple):
     """Work space for one segment: what is known of it, its load q, and derivatives.
 
     Attributes:
-        tangent, momentum, drag, q, across, velocity, chord: t, p, D, q, U_⊥, V and d (3,).
+        velocity, water, chord: V of the segment's middle, J there, and d (3,).
+        tangent, momentum, drag, q, across: t, p, D, q and U_⊥ (3,).
+        along, side, chord_length: U_t, |U_⊥| and r.
+        kt, kn: drag constants with stretch and correction.
         q_V, q_d: ∂q/∂V and ∂q/∂d (3, 3).
         q_tt, G: (∂q/∂t) t (3,) and G (3, 3), see `_differentiate_load`.
         by_near, by_far: derivatives of the segment's total load Q by the position of its near node (3, 3) and by the
             unknowns of its own block (3, 4), see `cable.assembly`.
     """
 
+    velocity: np.ndarray
+    water: np.ndarray
+    chord: np.ndarray
     tangent: np.ndarray
     momentum: np.ndarray
     drag: np.ndarray
     q: np.ndarray
+    across: np.ndarray
+    along: float
+    side: float
+    chord_length: float
+    kt: float
+    kn: float
     q_V: np.ndarray
     q_d: np.ndarray
-    across: np.ndarray
-    velocity: np.ndarray
-    chord: np.ndarray
     q_tt: np.ndarray
     G: np.ndarray
     by_near: np.ndarray
@@ -58,7 +67,8 @@ def new_load() -> Load:
     """Return empty work space for one segment."""
     vectors = {name: np.zeros(3) for name in Load._fields}
     matrices = {name: np.zeros((3, 3)) for name in ("q_V", "q_d", "G", "by_near")}
-    return packed(Load(**vectors | matrices | {"by_far": np.zeros((3, 4))}))
+    numbers = dict.fromkeys(("along", "side", "chord_length", "kt", "kn"), 0.0)
+    return packed(Load(**vectors | matrices | numbers | {"by_far": np.zeros((3, 4))}))
 
 
 @compiled
@@ -73,7 +83,7 @@ def chord_length(d: np.ndarray, length: float) -> float:
 
 
 @inner
-def turning_rate(d: np.ndarray, length: float, r: float) -> float:
+def turning_rate(d: np.ndarray, length: float) -> float:
     """Return g in ∂t/∂d = (I − g t tᵀ)/r; 1 for a taut segment. [-]."""
     square = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) / (length * length)
     return 1.0 - 2.0 * FOLDING * FOLDING * (1.0 - square)
@@ -87,45 +97,35 @@ def fading_rate(d: np.ndarray, length: float, r: float) -> float:
 
 
 @inner
-def evaluate_momentum(V: np.ndarray, J: np.ndarray, t: np.ndarray, c: CableNumbers, p: np.ndarray) -> None:
-    """Fill p = m V + ρA P (V − J), the momentum per length. [kg/s]."""
+def evaluate_momentum(c: CableNumbers, work: Load) -> None:
+    """Fill p = m V + ρA P (V − J), the momentum per length, from velocity, water and tangent. [kg/s]."""
+    V, J, t = work.velocity, work.water, work.tangent
     along = (V[0] - J[0]) * t[0] + (V[1] - J[1]) * t[1] + (V[2] - J[2]) * t[2]
     for i in range(3):
-        p[i] = c.mass * V[i] + c.added_mass * (V[i] - J[i] - along * t[i])
+        work.momentum[i] = c.mass * V[i] + c.added_mass * (V[i] - J[i] - along * t[i])
 
 
 @inner
 def evaluate_load(
-    V: np.ndarray,
-    J: np.ndarray,
-    d: np.ndarray,
-    length: float,
-    T: float,
-    slip: float,
-    gain: float,
-    a0: float,
-    c: CableNumbers,
-    out: Load,
+    length: float, T: float, slip: float, gain: float, a0: float, c: CableNumbers, work: Load
 ) -> None:
-    """Fill tangent, momentum, drag, q = a₀p + D − w_c k, and the derivatives of q by velocity V and chord d.
+    """Fill tangent, momentum, drag and q = a₀p + D − w_c k from velocity, water and chord. [N/m].
 
     Args:
-        V: velocity of the segment's middle, earth axes (3,). [m/s]
-        J: velocity of the water there (3,). [m/s]
-        d: chord vector (3,). [m]
         length: unstretched length of the segment. [m]
         T: tension (only √(1+eT) is taken from it). [N]
         slip: added to the speed along the chord, see `cable.arc`. [m/s]
         gain: on the normal drag, see `cable.arc`. [-]
         a0: weight of the newest value in the backward difference. [1/s]
         c: the cable.
-        out: filled. Loads in [N/m].
+        work: filled.
     """
-    r = chord_length(d, length)
-    t, across = out.tangent, out.across
+    V, J, t, across = work.velocity, work.water, work.tangent, work.across
+    r = chord_length(work.chord, length)
+    work.chord_length = r
     for i in range(3):
-        t[i] = d[i] / r
-    evaluate_momentum(V, J, t, c, out.momentum)
+        t[i] = work.chord[i] / r
+    evaluate_momentum(c, work)
     Ut = (V[0] - J[0]) * t[0] + (V[1] - J[1]) * t[1] + (V[2] - J[2]) * t[2]
     for i in range(3):
         across[i] = V[i] - J[i] - Ut * t[i]
@@ -133,35 +133,24 @@ def evaluate_load(
     stretch = sqrt(1.0 + c.compliance * T)
     kt, kn = stretch * c.tangential_drag, gain * stretch * c.normal_drag
     for i in range(3):
-        out.drag[i] = kt * abs(Ut + slip) * (Ut + slip) * t[i] + kn * normal * across[i]
-        out.q[i] = a0 * out.momentum[i] + out.drag[i]
-    out.q[2] -= c.weight
-    _differentiate_load(V, J, Ut, normal, r, slip, turning_rate(d, length, r), a0, kt, kn, c, out)
+        work.drag[i] = kt * abs(Ut + slip) * (Ut + slip) * t[i] + kn * normal * across[i]
+        work.q[i] = a0 * work.momentum[i] + work.drag[i]
+    work.q[2] -= c.weight
+    work.along, work.side, work.kt, work.kn = Ut, normal, kt, kn
 
 
-@compiled
-def _differentiate_load(
-    V: np.ndarray,
-    J: np.ndarray,
-    Ut: float,
-    normal: float,
-    r: float,
-    slip: float,
-    g: float,
-    a0: float,
-    kt: float,
-    kn: float,
-    c: CableNumbers,
-    out: Load,
-) -> None:
-    """Fill ∂q/∂V and ∂q/∂d.
+@inner
+def differentiate_load(length: float, slip: float, a0: float, c: CableNumbers, work: Load) -> None:
+    """Fill ∂q/∂V and ∂q/∂d of what `evaluate_load` has filled.
 
     With C = ∂(U_t t)/∂t = t Uᵀ + U_t I = −∂U_⊥/∂t, G = |U_⊥| I + U_⊥ U_⊥ᵀ/|U_⊥| and ∂t/∂d = (I − g t tᵀ)/r:
 
         ∂q/∂V = a₀(m I + ρA P) + 2 k_t |W| t tᵀ + k_n G P
         ∂q/∂t = −a₀ρA C + k_t |W| (W I + 2 t Uᵀ) − k_n G C,     W = U_t + slip
     """
-    t, across, G = out.tangent, out.across, out.G
+    V, J, t, across, G = work.velocity, work.water, work.tangent, work.across, work.G
+    Ut, normal, r, kt, kn = work.along, work.side, work.chord_length, work.kt, work.kn
+    g = turning_rate(work.chord, length)
     inverse = 1.0 / normal if normal > 1e-12 else 0.0
     along = abs(Ut + slip)
     for i in range(3):
@@ -170,17 +159,17 @@ def _differentiate_load(
         G[i, i] += normal
     for i in range(3):
         Gt = G[i, 0] * t[0] + G[i, 1] * t[1] + G[i, 2] * t[2]
-        out.q_tt[i] = 0.0
+        work.q_tt[i] = 0.0
         for k in range(3):
             P = (1.0 if i == k else 0.0) - t[i] * t[k]
             outer = t[i] * (V[k] - J[k])
             C = outer + (Ut if i == k else 0.0)
             GC = Gt * (V[k] - J[k]) + Ut * G[i, k]
-            out.q_V[i, k] = a0 * c.added_mass * P + 2.0 * kt * along * t[i] * t[k]
-            out.q_V[i, k] += kn * (G[i, k] - Gt * t[k])
+            work.q_V[i, k] = a0 * c.added_mass * P + 2.0 * kt * along * t[i] * t[k]
+            work.q_V[i, k] += kn * (G[i, k] - Gt * t[k])
             pull = 2.0 * outer + (Ut + slip if i == k else 0.0)
-            out.q_d[i, k] = kt * along * pull - kn * GC - a0 * c.added_mass * C
-            out.q_tt[i] += out.q_d[i, k] * t[k]
+            work.q_d[i, k] = kt * along * pull - kn * GC - a0 * c.added_mass * C
+            work.q_tt[i] += work.q_d[i, k] * t[k]
         for k in range(3):
-            out.q_d[i, k] = (out.q_d[i, k] - g * out.q_tt[i] * t[k]) / r
-        out.q_V[i, i] += a0 * c.mass
+            work.q_d[i, k] = (work.q_d[i, k] - g * work.q_tt[i] * t[k]) / r
+        work.q_V[i, i] += a0 * c.mass

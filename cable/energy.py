@@ -1,17 +1,19 @@
 """Where the energy of a moving cable goes, per unit time.
 
-In axes that move with the steady, uniform water (V' = V − J; still water: V), the balance of `element` times V' gives
+Relative to the water, U = V − J, the balance of `element` times U gives
 
-    −F·V'(0) = dE/dt + L − G + D_S + M
+    −F·U(0) = dE/dt + L − G + D_S + M + C
 
-with F the force on the vehicle, E = ∫(½mV'² + ½ρA V'_⊥² + ½eT²) ds the energy in the water, L = ∫D·V' ds the loss to
-drag, G = ∫w_c V'_k ds the work of gravity, and
+with F the force on the vehicle, E = ∫(½mU² + ½ρA U_⊥² + ½eT²) ds (and bending) the energy in the water, L = ∫D·U ds the
+loss to drag, G = ∫w_c U_k ds the work of gravity, and
 
-    D_S = T(S) (U + t·J) − U e(S)        work on the drum, less the energy that enters with new cable; U = dS/dt
-    M   = −ρA ∫ V'_t V'_⊥·(∂t/∂t) ds     (the paper's added mass is no gradient of an energy when the cable turns)
+    D_S = −T(S) t·U(S) − (dS/dt) e(S)    work on the drum, less the energy that enters with new cable; at a free end, the
+                                         loss of the drogue
+    M   = −ρA ∫ U_t U_⊥·(∂t/∂t) ds       (the paper's added mass is no gradient of an energy when the cable turns)
+    C   = ∫ m U·dJ/dt ds − ∫ T t·∂J/∂s ds    what a current that changes along the cable's way does; 0 in a uniform one
 
-M is the vector form of −(m1 − m)∫V_t V_n β̇ ds. It follows from V'·∂(P V')/∂t = ∂(½V'_⊥²)/∂t − V'_t V'_⊥·∂t/∂t, because
-V'_⊥ has no component along t; and ∂t/∂t = ∂V/∂s across.
+M is the vector form of −(m1 − m)∫V_t V_n β̇ ds. It follows from U·∂(P U)/∂t = ∂(½U_⊥²)/∂t − U_t U_⊥·∂t/∂t, because
+U_⊥ has no component along t; and ∂t/∂t = ∂V/∂s across.
 """
 
 from __future__ import annotations
@@ -21,49 +23,90 @@ import numpy as np
 from subzero.compiled import compiled, inner
 
 from .element import Load, evaluate_load
-from .line import NOW, Line
+from .line import BEFORE, NOW, Line, take_segment
 from .properties import CableNumbers
 
-LOSS, STORED, GRAVITY_WORK, AT_DRUM, ADDED_MASS = range(5)
-"""What `energy_flow` fills: L [W], E [J], G [W], D_S [W], M [W]."""
+LOSS, STORED, GRAVITY_WORK, AT_DRUM, ADDED_MASS, STRAINED, CARRIED, TOWED = range(8)
+"""What `energy_flow` fills: L, E [J], G, D_S, M, −∫T t·∂J/∂s ds, ∫m U·dJ/dt ds (mean over the last step), −F·U(0). [W]"""
+FLOWS = 8
 
 
 @inner
-def energy_flow(line: Line, J: np.ndarray, c: CableNumbers, work: Load, out: np.ndarray) -> None:
-    """Fill out (5,) with the powers and the stored energy of the cable at level NOW."""
-    N, t, across, V = line.ends.count, work.tangent, work.across, work.velocity
-    for i in range(5):
+def energy_flow(line: Line, c: CableNumbers, work: Load, out: np.ndarray) -> None:
+    """Fill out (FLOWS,) with the powers and the stored energy of the cable at level NOW."""
+    N, t, across, V, J = line.ends.count, work.tangent, work.across, work.velocity, work.water
+    for i in range(FLOWS):
         out[i] = 0.0
     for j in range(1, N + 1):
         length = line.ends.last_length[NOW] if j == N else line.length[j]
         T = line.tension[NOW, j]
-        for i in range(3):
-            V[i] = 0.5 * (line.velocity[NOW, j - 1, i] + line.velocity[NOW, j, i])
-            work.chord[i] = line.position[NOW, j, i] - line.position[NOW, j - 1, i]
-        evaluate_load(V, J, work.chord, length, T, line.slip[j], line.normal_gain[j], 0.0, c, work)
-        square, side, along, turn = 0.0, 0.0, 0.0, 0.0
+        take_segment(line, NOW, j, work)
+        evaluate_load(length, T, line.slip[j], line.normal_gain[j], 0.0, c, work)
+        square, turn = 0.0, 0.0
         for i in range(3):
             speed = V[i] - J[i]
-            out[LOSS] += length * work.drag[i] * speed
             square += speed * speed
-            side += across[i] * across[i]
-            along += speed * t[i]
+            out[LOSS] += length * work.drag[i] * speed
             turn += across[i] * (line.velocity[NOW, j, i] - line.velocity[NOW, j - 1, i])
-        out[STORED] += 0.5 * length * (c.mass * square + c.added_mass * side + c.compliance * T * T)
+            out[STRAINED] -= T * t[i] * (line.water[NOW, j, i] - line.water[NOW, j - 1, i])
+        stored = c.mass * square + c.added_mass * work.side * work.side + c.compliance * T * T
+        out[STORED] += 0.5 * length * stored
         out[GRAVITY_WORK] += length * c.weight * (V[2] - J[2])
-        out[ADDED_MASS] -= c.added_mass * along * turn
-    _drum_flow(line, J, c, t, out)
+        out[ADDED_MASS] -= c.added_mass * work.along * turn
+        out[CARRIED] += length * c.mass * _carried(line, j)
+    _flow_at_ends(line, c, out)
 
 
 @compiled
-def _drum_flow(line: Line, J: np.ndarray, c: CableNumbers, t: np.ndarray, out: np.ndarray) -> None:
-    """Fill D_S; `t` is the tangent of the last segment."""
-    U, T, N = line.ends.payout[NOW], max(line.ends.drum_pull, 0.0), line.ends.count
-    Jt, square, side = 0.0, 0.0, 0.0
+def _carried(line: Line, j: int) -> float:
+    """Return U·dJ/dt in the middle of segment j, over the last step. [m²/s³]."""
+    if line.ends.previous_step <= 0.0:
+        return 0.0
+    power, V, J = 0.0, line.velocity, line.water
     for i in range(3):
-        Jt += J[i] * t[i]
-        square += (line.velocity[NOW, N, i] - J[i]) ** 2
+        change = J[NOW, j - 1, i] + J[NOW, j, i] - J[BEFORE, j - 1, i] - J[BEFORE, j, i]
+        now = V[NOW, j - 1, i] + V[NOW, j, i] - J[NOW, j - 1, i] - J[NOW, j, i]
+        before = V[BEFORE, j - 1, i] + V[BEFORE, j, i] - J[BEFORE, j - 1, i] - J[BEFORE, j, i]
+        power += 0.125 * (now + before) * change
+    return power / line.ends.previous_step
+
+
+@compiled
+def _flow_at_ends(line: Line, c: CableNumbers, out: np.ndarray) -> None:
+    """Fill −F·U(0) and D_S."""
+    T, N = max(line.ends.drum_pull, 0.0), line.ends.count
+    along, square, size = 0.0, 0.0, 0.0
     for i in range(3):
-        side += (J[i] - Jt * t[i]) ** 2
-    entering = 0.5 * (c.mass * square + c.added_mass * side + c.compliance * T * T)
-    out[AT_DRUM] = T * (U + Jt) - U * entering
+        d = line.position[NOW, N, i] - line.position[NOW, N - 1, i]
+        U = line.velocity[NOW, N, i] - line.water[NOW, N, i]
+        along += d * U
+        size += d * d
+        square += U * U
+        out[TOWED] -= line.ends.tow_force[i] * (line.velocity[NOW, 0, i] - line.water[NOW, 0, i])
+    if line.ends.free_end:
+        out[AT_DRUM] = T * np.sqrt(square)
+        return
+    along /= np.sqrt(max(size, 1e-30))
+    entering = 0.5 * (c.mass * square + c.added_mass * (square - along * along) + c.compliance * T * T)
+    out[AT_DRUM] = -T * along - line.ends.payout[NOW] * entering
+
+
+@inner
+def book_step(line: Line, step: float, c: CableNumbers, work: Load, ledger: np.ndarray) -> None:
+    """Add an accepted step to a ledger (3, FLOWS): flows before, flows now, and what came in, went out and is missing.
+
+    The third row holds the work of the tow point, the sum of the sizes of all terms, and the residual of the balance
+    at TOWED, LOSS and STORED. [J]
+    """
+    for i in range(FLOWS):
+        ledger[0, i] = ledger[1, i]
+    energy_flow(line, c, work, ledger[1])
+    old, new, total, half = ledger[0], ledger[1], ledger[2], 0.5 * step
+    stored = new[STORED] - old[STORED]
+    spent = half * (old[LOSS] + new[LOSS]) + half * (old[AT_DRUM] + new[AT_DRUM])
+    spent += half * (old[ADDED_MASS] + new[ADDED_MASS] + old[STRAINED] + new[STRAINED])
+    spent += step * new[CARRIED] - half * (old[GRAVITY_WORK] + new[GRAVITY_WORK])
+    towed = half * (old[TOWED] + new[TOWED])
+    total[TOWED] += towed
+    total[LOSS] += abs(towed) + half * (old[LOSS] + new[LOSS])
+    total[STORED] += towed - stored - spent

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import nan
 
 import numpy as np
 
@@ -16,13 +17,19 @@ class Outcome:
         completed: the run reached its end.
         message: what happened, when and where, and what to try; one sentence when all went well.
         iterations: Newton iterations in all.
-        worst_residual: largest residual left in any step, as a multiple of its tolerance.
+        worst_residual: residual left in the last step, as a multiple of its tolerance.
+        steps: how many steps were taken, with those that were made smaller than the time between two results.
+        largest_courant_number: √(T/m1) Δt/Δs, how many segments a transverse wave crosses in a step, at most.
+        energy_residual: what is missing in the balance of `cable.energy`, as a share of the work and the loss in all.
     """
 
     completed: bool
     message: str
     iterations: int
     worst_residual: float
+    steps: int = 0
+    largest_courant_number: float = nan
+    energy_residual: float = nan
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,6 +90,9 @@ class History:
             "smallest_tension_N": float(min(tension.min() for tension in self.tensions)),
             "newton_iterations": float(self.outcome.iterations),
             "worst_residual": self.outcome.worst_residual,
+            "steps": float(self.outcome.steps),
+            "largest_courant_number": self.outcome.largest_courant_number,
+            "energy_residual": self.outcome.energy_residual,
         }
 
     def _row(self, t: float) -> int:

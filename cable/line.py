@@ -18,8 +18,9 @@ from subzero.compiled import compiled, inner, packed
 
 from .drum import TURNING
 from .element import Load, chord_length, evaluate_momentum
-from .properties import CableNumbers
+from .properties import CableNumbers, DrumNumbers
 from .slack import SMOOTHING
+from .water import Water, water_velocity
 
 NEW, NOW, BEFORE = 0, 1, 2
 
@@ -41,6 +42,10 @@ class Ends:
         drum_pull: tension at the drum at level NEW. [N]
         previous_step: t_now − t_before, 0 after a start. [s]
         smoothing: T₀ of the slack law in force. [N]
+        time: of level NOW. [s]
+        segment_length, grading: new segments are `segment_length` + `grading` s long, s from the tow point. [m], [-]
+        settled: length of all segments but the last. [m]
+        drum_velocity: of the drum at level NEW (3,). [m/s]
         tow_force: force on the vehicle at level NEW (3,). [N]
         tow_by_tow, tow_by_block: derivatives of the tow force by the tow point's position (3, 3) and by the
             unknowns of the first block (3, 4).
@@ -57,6 +62,11 @@ class Ends:
     drum_pull: float
     previous_step: float
     smoothing: float
+    time: float
+    segment_length: float
+    grading: float
+    settled: float
+    drum_velocity: np.ndarray
     tow_force: np.ndarray
     tow_by_tow: np.ndarray
     tow_by_block: np.ndarray
@@ -74,6 +84,10 @@ class Line(NamedTuple):
         tension: tension of the segments (2 levels, nodes). [N]
         length: unstretched lengths of the segments (nodes,); of the last one, see `Ends.last_length`. [m]
         node_tension: tension at the nodes at level NOW (nodes,). [N]
+        water: velocity of the water at the nodes (3 levels, nodes, 3). [m/s]
+        forcing: a further force per length on segment j at level NEW (nodes, 3), for made-up solutions. [N/m]
+        shear: bending's part of the force in segment j (nodes, 3), and `bracing` what holds its chord, see
+            `cable.bending`. [N], [N/m]
         slip, normal_gain: corrections for the arc that a segment stands for (nodes,), see `cable.arc`. [m/s, 1]
         load: ∫(∂p/∂t + D − w_c k) ds of the segments at level NEW (nodes, 3). [N]
         lower, diagonal, upper: the blocks of the Newton matrix (nodes, 4, 4), see `cable.blocks`.
@@ -88,6 +102,10 @@ class Line(NamedTuple):
     tension: np.ndarray
     length: np.ndarray
     node_tension: np.ndarray
+    water: np.ndarray
+    forcing: np.ndarray
+    shear: np.ndarray
+    bracing: np.ndarray
     slip: np.ndarray
     normal_gain: np.ndarray
     load: np.ndarray
@@ -115,12 +133,17 @@ def new_line(capacity: int) -> Line:
         drum_pull=0.0,
         previous_step=0.0,
         smoothing=SMOOTHING,
+        time=0.0,
+        segment_length=1.0,
+        grading=0.0,
+        settled=0.0,
+        drum_velocity=np.zeros(3),
         tow_force=np.zeros(3),
         tow_by_tow=np.zeros((3, 3)),
         tow_by_block=np.zeros((3, 4)),
         tow_answer=np.zeros((3, 4)),
     )
-    per_node = {name: np.zeros((3, n, 3)) for name in ("position", "velocity", "momentum")}
+    per_node = {name: np.zeros((3, n, 3)) for name in ("position", "velocity", "momentum", "water")}
     blocks = {name: np.zeros((n, 4, 4)) for name in ("lower", "diagonal", "upper")}
     return Line(
         ends=packed(ends),
@@ -128,6 +151,9 @@ def new_line(capacity: int) -> Line:
         tension=np.zeros((2, n)),
         length=np.zeros(n),
         node_tension=np.zeros(n),
+        forcing=np.zeros((n, 3)),
+        shear=np.zeros((n, 3)),
+        bracing=np.zeros(n),
         slip=np.zeros(n),
         normal_gain=np.ones(n),
         load=np.zeros((n, 3)),
@@ -151,61 +177,97 @@ def held_node(line: Line) -> int:
     return line.ends.count + 1 if line.ends.free_end else line.ends.count
 
 
+@inner
+def spacing(line: Line) -> float:
+    """Return how long a segment that starts at the end of the full ones has to be. [m]."""
+    return line.ends.segment_length + line.ends.grading * line.ends.settled
+
+
 @compiled
 def lay_straight(
-    line: Line, wet_length: float, direction: np.ndarray, speed: float, segment_length: float, c: CableNumbers
+    line: Line, wet_length: float, direction: np.ndarray, speed: float, drum: DrumNumbers, c: CableNumbers
 ) -> None:
     """Lay a straight cable from the drum along `direction` (unit vector, earth axes), moving at `speed` along it.
 
-    The cable is as long as `wet_length` says; its tension is the one of a steady straight pull with no tension at
-    the drum, so a run can start at speed without a jolt. Needs 0 < wet_length and room for the segments.
+    The cable is as long as `wet_length` says, in segments of `spacing`; its tension is the one of a steady straight
+    pull with no tension at the drum, so a run can start at speed without a jolt. Needs 0 < wet_length and room.
     """
-    count = max(1, int(np.floor(wet_length / segment_length + 0.5)))
-    line.ends.count = count
-    line.ends.drum_mode = TURNING
-    line.ends.previous_step = 0.0
-    last = wet_length - (count - 1) * segment_length
-    for level in range(3):
-        line.ends.last_length[level] = last
-        line.ends.payout[level] = speed
-        for j in range(count + 1):
-            along = wet_length - j * segment_length if j < count else 0.0
-            for i in range(3):
-                line.position[level, j, i] = along * direction[i]
-                line.velocity[level, j, i] = speed * direction[i]
-    per_metre = c.tangential_drag * speed * abs(speed)
+    ends = line.ends
+    ends.count, ends.settled, ends.time, ends.previous_step = 1, 0.0, 0.0, 0.0
+    ends.drum_mode, ends.drum_pull = TURNING, 0.0
+    while wet_length - ends.settled > SPLIT_AT * spacing(line):
+        line.length[ends.count] = spacing(line)
+        ends.settled += line.length[ends.count]
+        ends.count += 1
+    line.length[ends.count] = wet_length - ends.settled
+    payout = speed
     for i in range(3):
-        line.ends.tow_force[i] = -per_metre * wet_length * direction[i]
-    line.ends.drum_pull = 0.0
-    for j in range(count + 1):
-        line.node_tension[j] = max(per_metre, 0.0) * (wet_length - j * segment_length if j < count else 0.0)
-    for j in range(1, count + 1):
-        line.length[j] = segment_length if j < count else last
-        middle = wet_length - (j - 0.5) * segment_length if j < count else 0.5 * last
-        for level in range(2):
-            line.tension[level, j] = per_metre * middle
+        payout -= drum.velocity[i] * direction[i]
+    for level in range(3):
+        ends.last_length[level] = line.length[ends.count]
+        ends.payout[level] = payout
+    _pull_straight(line, wet_length, direction, speed, c)
 
 
 @compiled
-def set_momenta(line: Line, J: np.ndarray, c: CableNumbers, work: Load) -> None:
-    """Fill the segments' momenta at levels NOW and BEFORE from positions and velocities in water that moves at J."""
+def _pull_straight(
+    line: Line, wet_length: float, direction: np.ndarray, speed: float, c: CableNumbers
+) -> None:
+    """Fill places, velocities and tensions of a straight cable that moves along itself in still water."""
+    per_metre = c.tangential_drag * speed * abs(speed)
+    along = wet_length
+    for j in range(line.ends.count + 1):
+        if j > 0:
+            for level in range(2):
+                line.tension[level, j] = per_metre * (along - 0.5 * line.length[j])
+            along = along - line.length[j] if j < line.ends.count else 0.0
+        line.node_tension[j] = max(per_metre, 0.0) * along
+        for level in range(3):
+            for i in range(3):
+                line.position[level, j, i] = along * direction[i]
+                line.velocity[level, j, i] = speed * direction[i]
+    for i in range(3):
+        line.ends.tow_force[i] = -per_metre * wet_length * direction[i]
+
+
+@compiled
+def start_in_water(line: Line, water: Water, c: CableNumbers, work: Load) -> None:
+    """Fill the water's velocity at the nodes and the segments' momenta, at all levels, from what moves at the start."""
+    for level in range(3):
+        feel_water(line, level, water, line.ends.time)
     for level in (NOW, BEFORE):
         for j in range(1, line.ends.count + 1):
             length = line.ends.last_length[level] if j == line.ends.count else line.length[j]
-            segment_momentum(line, level, j, length, J, c, work)
+            segment_momentum(line, level, j, length, c, work)
 
 
 @inner
-def segment_momentum(
-    line: Line, level: int, j: int, length: float, J: np.ndarray, c: CableNumbers, work: Load
-) -> None:
+def feel_water(line: Line, level: int, water: Water, time: float) -> None:
+    """Fill the water's velocity at the nodes of a level."""
+    for j in range(line.ends.count + 1):
+        water_velocity(water, line.position[level, j], time, line.water[level, j])
+
+
+@inner
+def take_segment(line: Line, level: int, j: int, work: Load) -> None:
+    """Fill chord, velocity and water of segment j at a level."""
+    x, V, J = line.position[level], line.velocity[level], line.water[level]
+    for i in range(3):
+        work.chord[i] = x[j, i] - x[j - 1, i]
+        work.velocity[i] = 0.5 * (V[j - 1, i] + V[j, i])
+        work.water[i] = 0.5 * (J[j - 1, i] + J[j, i])
+
+
+@inner
+def segment_momentum(line: Line, level: int, j: int, length: float, c: CableNumbers, work: Load) -> None:
     """Fill ∫p ds of segment j at a level; the tangent is the one of level NOW, where the segment has a length."""
     for i in range(3):
         work.chord[i] = line.position[NOW, j, i] - line.position[NOW, j - 1, i]
         work.velocity[i] = 0.5 * (line.velocity[level, j - 1, i] + line.velocity[level, j, i])
+        work.water[i] = 0.5 * (line.water[level, j - 1, i] + line.water[level, j, i])
     r = chord_length(work.chord, line.ends.last_length[NOW] if j == line.ends.count else line.length[j])
     for i in range(3):
         work.tangent[i] = work.chord[i] / r
-    evaluate_momentum(work.velocity, J, work.tangent, c, work.momentum)
+    evaluate_momentum(c, work)
     for i in range(3):
         line.momentum[level, j, i] = length * work.momentum[i]

@@ -5,8 +5,6 @@ from __future__ import annotations
 from math import isfinite, sqrt
 from typing import NamedTuple
 
-import numpy as np
-
 from subzero.compiled import compiled, inner
 
 from .assembly import assemble
@@ -45,7 +43,6 @@ class Solved(NamedTuple):
 def solve_step(
     line: Line,
     w: Weights,
-    J: np.ndarray,
     c: CableNumbers,
     drum: DrumNumbers,
     work: Load,
@@ -53,7 +50,7 @@ def solve_step(
     """Solve the equations of `assembly` for level NEW, from the guess that stands there."""
     N = line.ends.count
     rounding = ROUNDING * (c.mass + c.added_mass) * w.a0 * w.b0
-    assemble(line, w, J, c, drum, work)
+    assemble(line, w, c, drum, work)
     size, node, equation = _residual(line, rounding)
     merit = _merit(line)
     for iteration in range(MAX_ITERATIONS):
@@ -67,7 +64,7 @@ def solve_step(
         fraction = 1.0
         for _ in range(MAX_HALVINGS):
             _update(line, last_length, fraction)
-            assemble(line, w, J, c, drum, work)
+            assemble(line, w, c, drum, work)
             new_merit = _merit(line)
             if isfinite(new_merit) and new_merit <= merit * (1.0 - 0.1 * fraction) + 1e-30:
                 break

@@ -32,7 +32,7 @@ def pull_out_as_printed(
 
     `segment_length` counts for "equation7" only; the paper ties it to the step.
     """
-    from cable.pull_out import sample_path
+    from cable.runs import sample_path
 
     step = duration / max(1, round(duration / step))
     water = tuple(float(x) for x in current)
@@ -41,8 +41,7 @@ def pull_out_as_printed(
         run = pull_out_paper(tow_velocity, duration, step, cable, drum, water, reading=reading)
     else:
         run = pull_out_boxes(tow_velocity, duration, step, cable, drum, water, segment_length=segment_length)
-    _, tow, _ = sample_path(tow_velocity, duration, step)
-    return _as_history(run, tow, scheme)
+    return _as_history(run, sample_path(tow_velocity, duration, step).place, scheme)
 
 
 def _as_history(run: BoxHistory, tow: np.ndarray, scheme: str) -> History:

@@ -1,4 +1,4 @@
-"""The compiled loop of a cable whose tow point moves on a given path; steps that fail are retried smaller."""
+"""The compiled loop of a cable whose tow point moves on a given path; steps that fail or err are retried smaller."""
 
 from __future__ import annotations
 
@@ -8,15 +8,36 @@ import numpy as np
 
 from subzero.compiled import compiled
 
+from .drum_path import DrumPath, hermite, lead_drum
 from .element import Load
+from .energy import FLOWS, book_step, energy_flow
 from .line import NOW, Line
 from .newton import Solved
 from .properties import CableNumbers, DrumNumbers
+from .step_size import estimate_error, next_step
 from .stepping import accept, try_step
 from .tow_point import ends
+from .water import Water
 
 MOST_HALVINGS = 10
 """A failing step is halved up to this many times before the run gives up."""
+MOST_CUTS = 6
+"""A step that errs too much is made smaller by this many halvings at most: a jolt has no accurate step."""
+FIRST_STEP = 0.1
+"""With an error allowed, a run begins with this share of the first row: it cannot tell its error yet."""
+
+
+class TowPath(NamedTuple):
+    """How the tow point moves, relative to the drum at the start, earth axes; cubic between the times.
+
+    Attributes:
+        times: (n,). [s]
+        place, velocity: (n, 3). [m], [m/s]
+    """
+
+    times: np.ndarray
+    place: np.ndarray
+    velocity: np.ndarray
 
 
 class Record(NamedTuple):
@@ -26,9 +47,11 @@ class Record(NamedTuple):
         tow_force: force on the vehicle, earth axes (n, 3). [N]
         tow_tension, drum_tension, length: (n,). [N, N, m]
         segments: how many (n,).
-        iterations: Newton iterations spent on the step (n,).
+        iterations, steps: Newton iterations and steps spent on the row (n,).
+        courant: largest √(T/m1) Δt/ℓ of all segments (n,). [-]
         position: node positions relative to the drum (all nodes of all rows, 3). [m]
         tension: tensions at the nodes (all nodes of all rows,). [N]
+        ledger: of the energies, see `cable.energy.book_step` (3, FLOWS).
     """
 
     tow_force: np.ndarray
@@ -37,110 +60,120 @@ class Record(NamedTuple):
     length: np.ndarray
     segments: np.ndarray
     iterations: np.ndarray
+    steps: np.ndarray
+    courant: np.ndarray
     position: np.ndarray
     tension: np.ndarray
+    ledger: np.ndarray
+
+
+def new_record(rows: int, capacity: int) -> Record:
+    """Return an empty record with room for `rows` rows and a line that grows to `capacity` segments."""
+    nodes = rows * (capacity + 2)
+    per_row = {name: np.zeros(rows) for name in ("tow_tension", "drum_tension", "length", "courant")}
+    counts = {name: np.zeros(rows, np.int64) for name in ("segments", "iterations", "steps")}
+    return Record(
+        tow_force=np.zeros((rows, 3)),
+        **per_row,
+        **counts,
+        position=np.zeros((nodes, 3)),
+        tension=np.zeros(nodes),
+        ledger=np.zeros((3, FLOWS)),
+    )
 
 
 @compiled
 def follow_path(
     line: Line,
-    times: np.ndarray,
-    tow: np.ndarray,
-    tow_velocity: np.ndarray,
-    J: np.ndarray,
+    path: TowPath,
+    led: DrumPath,
+    water: Water,
     c: CableNumbers,
     drum: DrumNumbers,
-    setpoints: np.ndarray,
-    segment_length: float,
+    rtol: float,
     work: Load,
     record: Record,
 ) -> tuple[int, Solved]:
     """Pull the cable along a path of the tow point, recording after every step.
 
     Args:
-        line: the cable at times[0]; changed.
-        times: (n,). [s]
-        tow: positions of the tow point relative to the drum, earth axes (n, 3). [m]
-        tow_velocity: its velocities (n, 3), for smaller steps in between. [m/s]
-        J: velocity of the water (3,). [m/s]
+        line: the cable at path.times[0]; changed.
+        path: how the tow point moves.
+        led: how the drum moves, and what its winch is asked for.
+        water: how the water moves.
         c: cable.
         drum: drum or winch.
-        setpoints: what a winch is asked for at times (n,), length [m] or tension [N].
-        segment_length: Δs. [m]
+        rtol: relative error of a step that is allowed; 0 takes every step as it is.
         work: work space.
-        record: filled from row 1 on (row 0 is the start).
+        record: filled from row 0 on, the start.
 
     Returns:
         the number of rows that are filled (all, unless it failed) and how the last step was solved.
     """
-    used = line.ends.count + 1
+    rows, used = path.times.size, line.ends.count + 1
+    suggested = FIRST_STEP * (path.times[1] - path.times[0])
     solved = Solved(True, 0, 0.0, 0, 0)
-    for k in range(1, times.size):
-        solved = _cover(line, times, tow, tow_velocity, k, J, c, drum, setpoints, segment_length, work)
+    energy_flow(line, c, work, record.ledger[1])
+    write_row(line, record, 0, 0, c)
+    for k in range(1, rows):
+        solved, suggested = _cover(line, path, k, led, water, c, drum, rtol, suggested, work, record)
         if not solved.converged or used + line.ends.count + 1 > record.tension.size:
             return k, solved
-        write_row(line, record, k, used)
+        write_row(line, record, k, used, c)
         record.iterations[k] = solved.iterations
         used += line.ends.count + 1
-    return times.size, solved
+    return rows, solved
 
 
 @compiled
 def _cover(
     line: Line,
-    times: np.ndarray,
-    tow: np.ndarray,
-    tow_velocity: np.ndarray,
+    path: TowPath,
     k: int,
-    J: np.ndarray,
+    led: DrumPath,
+    water: Water,
     c: CableNumbers,
     drum: DrumNumbers,
-    setpoints: np.ndarray,
-    segment_length: float,
+    rtol: float,
+    suggested: float,
     work: Load,
-) -> Solved:
-    """Go from times[k−1] to times[k], in smaller steps where needed."""
-    whole = times[k] - times[k - 1]
-    step, done, spent = whole, 0.0, 0
-    point = np.zeros(3)
+    record: Record,
+) -> tuple[Solved, float]:
+    """Go from times[k−1] to times[k], in smaller steps where needed; return also the step to go on with."""
+    whole = path.times[k] - path.times[k - 1]
+    finest, done, spent, point = whole * 0.5**MOST_CUTS, 0.0, 0, np.zeros(3)
+    step = min(suggested, whole) if rtol > 0.0 else whole
     while True:
-        last = done + step >= whole * (1.0 - 1e-9)
-        x = 1.0 if last else (done + step) / whole
-        _hermite(tow, tow_velocity, k, whole, x, point)
-        drum.setpoint = setpoints[k - 1] + x * (setpoints[k] - setpoints[k - 1])
+        step = (whole - done) / np.ceil((whole - done) / step - 1e-9)
+        hermite(path.place, path.velocity, k, whole, (done + step) / whole, point)
+        lead_drum(led, path.times[k - 1] + done + step, drum)
         mode = line.ends.drum_mode
-        solved = try_step(line, step, point, J, c, drum, work)
+        solved = try_step(line, step, point, water, c, drum, work)
         spent += solved.iterations
-        if solved.converged:
-            accept(line, step, J, c, segment_length, work)
+        error = estimate_error(line, step) if rtol > 0.0 and solved.converged else 0.0
+        if solved.converged and (error <= rtol or step <= finest):
+            accept(line, step, c, work)
+            book_step(line, step, c, work, record.ledger)
+            record.steps[k] += 1
             done += step
-            if last:
-                return Solved(True, spent, solved.residual, solved.worst_node, solved.worst_equation)
-            step = min(2.0 * step, whole - done)
+            suggested = next_step(step, error, rtol)
+            if done >= whole * (1.0 - 1e-9):
+                result = Solved(True, spent, solved.residual, solved.worst_node, solved.worst_equation)
+                return result, suggested
+            step = suggested
         else:
             line.ends.drum_mode = mode
-            step *= 0.5
+            step = max(next_step(step, error, rtol), finest) if solved.converged else 0.5 * step
             if step < whole * 0.5**MOST_HALVINGS:
-                return solved
+                return solved, step
 
 
 @compiled
-def _hermite(tow: np.ndarray, velocity: np.ndarray, k: int, whole: float, x: float, out: np.ndarray) -> None:
-    """Fill the tow point at the fraction x of step k, cubic between positions and velocities. [m]."""
-    a, b = (1.0 - x) * (1.0 - x), x * x
-    for i in range(3):
-        out[i] = (1.0 + 2.0 * x) * a * tow[k - 1, i] + (3.0 - 2.0 * x) * b * tow[k, i]
-        out[i] += whole * (x * a * velocity[k - 1, i] - (1.0 - x) * b * velocity[k, i])
-
-
-@compiled
-def write_row(line: Line, record: Record, k: int, used: int) -> None:
+def write_row(line: Line, record: Record, k: int, used: int, c: CableNumbers) -> None:
     """Write row k of a record, with the shape of level NOW behind the `used` nodes that are there already."""
     N = line.ends.count
     record.tow_tension[k], record.drum_tension[k] = ends(line)
-    record.length[k] = line.ends.last_length[NOW]
-    for j in range(1, N):
-        record.length[k] += line.length[j]
+    record.length[k] = line.ends.settled + line.ends.last_length[NOW]
     record.segments[k] = N
     for i in range(3):
         record.tow_force[k, i] = line.ends.tow_force[i]
@@ -148,3 +181,6 @@ def write_row(line: Line, record: Record, k: int, used: int) -> None:
         for i in range(3):
             record.position[used + j, i] = line.position[NOW, j, i]
         record.tension[used + j] = line.node_tension[j]
+        if 0 < j < N:
+            wave = np.sqrt(max(line.tension[NOW, j], 0.0) / (c.mass + c.added_mass))
+            record.courant[k] = max(record.courant[k], wave * line.ends.previous_step / line.length[j])

@@ -6,9 +6,11 @@ moment of inertia I_d is not printed there: 0 makes the tension at a frictionles
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from math import isfinite, sqrt
 from typing import NamedTuple
+
+import numpy as np
 
 from subzero.compiled import packed
 
@@ -17,7 +19,7 @@ GRAVITY = 9.81
 
 
 class CableNumbers(NamedTuple):
-    """The cable as compiled code sees it: m, ρA, w_c, e and the two drag constants ½ρdπC_t and ½ρdC_n."""
+    """The cable as compiled code sees it: m, ρA, w_c, e, the drag constants ½ρdπC_t and ½ρdC_n, and EI."""
 
     mass: float
     added_mass: float
@@ -25,6 +27,7 @@ class CableNumbers(NamedTuple):
     compliance: float
     tangential_drag: float
     normal_drag: float
+    bending_stiffness: float
 
 
 @dataclass
@@ -36,12 +39,15 @@ class DrumNumbers:
         friction: C_f/R_d. [N]
         control: who decides on the pay-out, see `cable.drum`.
         setpoint: what is asked for at the new time: length [m] or tension [N]; without meaning for a free drum.
+        place, velocity: of the drum at the new time, relative to its place at the start (3,). [m], [m/s]
     """
 
     inertia: float
     friction: float
     control: int
     setpoint: float
+    place: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    velocity: np.ndarray = field(default_factory=lambda: np.zeros(3))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,6 +62,7 @@ class CableProperties:
         tangential_drag_coefficient: C_t, on the wetted surface π d. [-]
         normal_drag_coefficient: C_n, on the projected area d. [-]
         compliance: e = 1/(E A); 0 is an inextensible cable. [1/N]
+        bending_stiffness: E I; see `cable.bending`. [N m²]
 
     Raises:
         ValueError: a value that is not a finite number, or not in its physical range.
@@ -68,12 +75,13 @@ class CableProperties:
     tangential_drag_coefficient: float = 0.01
     normal_drag_coefficient: float = 1.0
     compliance: float = 0.0
+    bending_stiffness: float = 0.0
 
     def __post_init__(self) -> None:
         """Refuse what cannot be a cable."""
         positive = ("water_density", "mass_per_length", "cross_section_area", "diameter")
         _check_range(self, positive, minimum=0.0, inclusive=False)
-        drags = ("tangential_drag_coefficient", "normal_drag_coefficient", "compliance")
+        drags = ("tangential_drag_coefficient", "normal_drag_coefficient", "compliance", "bending_stiffness")
         _check_range(self, drags, minimum=0.0, inclusive=True)
 
     @property
@@ -113,6 +121,7 @@ class CableProperties:
             compliance=float(self.compliance),
             tangential_drag=float(self.tangential_drag),
             normal_drag=float(self.normal_drag),
+            bending_stiffness=float(self.bending_stiffness),
         )
         return packed(numbers)
 

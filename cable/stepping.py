@@ -15,14 +15,16 @@ import numpy as np
 from subzero.compiled import compiled
 
 from .arc import correct_for_arc
+from .bending import bend
 from .differences import backward_weights
 from .drum import FREE, STANDING, next_mode
 from .element import Load
-from .line import BEFORE, NEW, NOW, SPLIT_AT, Line, held_node, segment_momentum
+from .line import BEFORE, NEW, NOW, SPLIT_AT, Line, feel_water, held_node, segment_momentum, spacing
 from .newton import Solved, solve_step
 from .properties import CableNumbers, DrumNumbers
 from .slack import SMOOTHING
 from .tow_point import fill_node_tensions
+from .water import Water
 
 SOFTEST = 1e-4
 """T₀ that a difficult step starts with, a tenth at a time down to `slack.SMOOTHING`. [N]"""
@@ -31,7 +33,7 @@ TAUT = 1e-2
 TAKEN_UP = 1e-9
 """A free drum that would take up more cable than this in a step has not been solved: try a smaller one. [m]"""
 MERGE_AT = 0.5
-"""While cable is reeled in, a last segment shorter than this fraction is joined to the one before."""
+"""While cable is reeled in, a last segment shorter than this fraction of the one before is joined to it."""
 MOST_DRUM_CHANGES = 4
 """How often one step may change its mind about what the drum does."""
 
@@ -41,7 +43,7 @@ def try_step(
     line: Line,
     step: float,
     tow: np.ndarray,
-    J: np.ndarray,
+    water: Water,
     c: CableNumbers,
     drum: DrumNumbers,
     work: Load,
@@ -52,14 +54,14 @@ def try_step(
         line: the cable; levels NOW and BEFORE stay untouched.
         step: Δt. [s]
         tow: position of the tow point at the new time, earth axes (3,). [m]
-        J: velocity of the water (3,). [m/s]
+        water: how the water moves.
         c: cable.
-        drum: drum.
+        drum: drum, with its place and velocity at the new time.
         work: work space.
     """
     failed = 0
     for _ in range(MOST_DRUM_CHANGES):
-        solved = _solve_softly(line, step, tow, J, c, drum, work)
+        solved = _solve_softly(line, step, tow, water, c, drum, work)
         if line.ends.count == 1 or drum.control != FREE or line.ends.free_end:
             break
         mode = next_mode(
@@ -81,22 +83,22 @@ def _solve_softly(
     line: Line,
     step: float,
     tow: np.ndarray,
-    J: np.ndarray,
+    water: Water,
     c: CableNumbers,
     drum: DrumNumbers,
     work: Load,
 ) -> Solved:
     """Solve from a prediction; if that fails, with a slack law that is made sharp little by little."""
     w = backward_weights(step, line.ends.previous_step)
-    _predict(line, step, tow, work)
-    solved = solve_step(line, w, J, c, drum, work)
+    _predict(line, step, tow, water, c, drum, work)
+    solved = solve_step(line, w, c, drum, work)
     if solved.converged:
         return solved
-    _predict(line, step, tow, work)
+    _predict(line, step, tow, water, c, drum, work)
     spent = solved.iterations
     line.ends.smoothing = SOFTEST
     while True:
-        solved = solve_step(line, w, J, c, drum, work)
+        solved = solve_step(line, w, c, drum, work)
         spent += solved.iterations
         if not solved.converged or line.ends.smoothing <= SMOOTHING:
             break
@@ -106,26 +108,30 @@ def _solve_softly(
 
 
 @compiled
-def _predict(line: Line, step: float, tow: np.ndarray, work: Load) -> None:
-    """Guess level NEW: everything goes on as it moves, tensions stay."""
+def _predict(
+    line: Line, step: float, tow: np.ndarray, water: Water, c: CableNumbers, drum: DrumNumbers, work: Load
+) -> None:
+    """Guess level NEW: everything goes on as it moves, tensions stay; and what is held at its prediction."""
     N, held = line.ends.count, held_node(line)
     for j in range(N + 1):
         line.tension[NEW, j] = max(line.tension[NOW, j], TAUT)
         for i in range(3):
             moved = line.position[NOW, j, i] + step * line.velocity[NOW, j, i]
-            line.position[NEW, j, i] = moved if j < held else line.position[NOW, j, i]
+            line.position[NEW, j, i] = moved if j < held else drum.place[i]
     for i in range(3):
         line.position[NEW, 0, i] = tow[i]
+        line.ends.drum_velocity[i] = drum.velocity[i]
     growth = 0.0 if line.ends.drum_mode == STANDING else step * line.ends.payout[NOW]
     line.ends.last_length[NEW] = max(line.ends.last_length[NOW] + growth, 0.5 * line.ends.last_length[NOW])
+    feel_water(line, NEW, water, line.ends.time + step)
     correct_for_arc(line, work)
+    if c.bending_stiffness > 0.0:
+        bend(line, c)
 
 
 @compiled
-def accept(
-    line: Line, step: float, J: np.ndarray, c: CableNumbers, segment_length: float, work: Load
-) -> None:
-    """Make level NEW the present one, and split the last segment while it is too long."""
+def accept(line: Line, step: float, c: CableNumbers, work: Load) -> None:
+    """Make level NEW the present one; split the last segment while it is too long, join it while it is too short."""
     N = line.ends.count
     for level in (BEFORE, NOW):
         for j in range(N + 1):
@@ -133,22 +139,25 @@ def accept(
                 line.position[level, j, i] = line.position[level - 1, j, i]
                 line.velocity[level, j, i] = line.velocity[level - 1, j, i]
                 line.momentum[level, j, i] = line.momentum[level - 1, j, i]
+                line.water[level, j, i] = line.water[level - 1, j, i]
         line.ends.last_length[level] = line.ends.last_length[level - 1]
         line.ends.payout[level] = line.ends.payout[level - 1]
     for j in range(N + 1):
         line.tension[NOW, j] = line.tension[NEW, j]
     fill_node_tensions(line)
     line.ends.previous_step = step
+    line.ends.time += step
     if line.ends.free_end:
         return
-    while line.ends.last_length[NOW] > SPLIT_AT * segment_length and line.ends.count < line.length.size - 1:
-        _split_last(line, segment_length, J, c, work)
-    while line.ends.last_length[NOW] < MERGE_AT * segment_length and line.ends.count > 1:
-        _merge_last(line, J, c, work)
+    last = line.ends.last_length
+    while last[NOW] > SPLIT_AT * spacing(line) and line.ends.count < line.length.size - 1:
+        _split_last(line, spacing(line), c, work)
+    while line.ends.count > 1 and last[NOW] < MERGE_AT * line.length[line.ends.count - 1]:
+        _merge_last(line, c, work)
 
 
 @compiled
-def _split_last(line: Line, segment_length: float, J: np.ndarray, c: CableNumbers, work: Load) -> None:
+def _split_last(line: Line, segment_length: float, c: CableNumbers, work: Load) -> None:
     """Insert a node `segment_length` from the start of the last segment, on its chord, at levels NOW and BEFORE.
 
     The new node is a material point. At level BEFORE it may still have been on the drum: then it is put where the
@@ -159,6 +168,7 @@ def _split_last(line: Line, segment_length: float, J: np.ndarray, c: CableNumber
         fraction = segment_length / line.ends.last_length[level]
         _insert_between(line.position[level], N, fraction)
         _insert_between(line.velocity[level], N, fraction)
+        _insert_between(line.water[level], N, fraction)
         line.ends.last_length[level] -= segment_length
         if level == NOW:
             near, end = line.node_tension[N - 1], line.node_tension[N]
@@ -167,9 +177,10 @@ def _split_last(line: Line, segment_length: float, J: np.ndarray, c: CableNumber
     line.length[N] = segment_length
     line.tension[NOW, N + 1] = line.tension[NOW, N]
     line.ends.count = N + 1
+    line.ends.settled += segment_length
     for level in (NOW, BEFORE):
-        segment_momentum(line, level, N, segment_length, J, c, work)
-        segment_momentum(line, level, N + 1, line.ends.last_length[level], J, c, work)
+        segment_momentum(line, level, N, segment_length, c, work)
+        segment_momentum(line, level, N + 1, line.ends.last_length[level], c, work)
 
 
 @compiled
@@ -182,7 +193,7 @@ def _insert_between(values: np.ndarray, last: int, fraction: float) -> None:
 
 
 @compiled
-def _merge_last(line: Line, J: np.ndarray, c: CableNumbers, work: Load) -> None:
+def _merge_last(line: Line, c: CableNumbers, work: Load) -> None:
     """Take the node before the drum out, at levels NOW and BEFORE: the last two segments become one.
 
     The new segment is as long as its chord (in the elastic or slack state of its neighbours): the arc that the node cut
@@ -201,11 +212,13 @@ def _merge_last(line: Line, J: np.ndarray, c: CableNumbers, work: Load) -> None:
         for i in range(3):
             line.position[level, N - 1, i] = line.position[level, N, i]
             line.velocity[level, N - 1, i] = line.velocity[level, N, i]
+            line.water[level, N - 1, i] = line.water[level, N, i]
     line.tension[NOW, N - 1] = 0.5 * (line.tension[NOW, N - 1] + line.tension[NOW, N])
     line.node_tension[N - 1] = line.node_tension[N]
     line.ends.count = N - 1
+    line.ends.settled -= line.length[N - 1]
     for level in (NOW, BEFORE):
-        segment_momentum(line, level, N - 1, last[level], J, c, work)
+        segment_momentum(line, level, N - 1, last[level], c, work)
 
 
 @compiled

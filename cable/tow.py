@@ -6,12 +6,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from .drum_path import resting
 from .element import new_load
 from .history import History
-from .line import NOW, Line, lay_straight, new_line, set_momenta
-from .pay_out import follow_path, write_row
+from .line import NOW, Line, lay_straight, new_line
 from .properties import CableProperties, DrumProperties
-from .pull_out import TowVelocity, as_history, first_direction, new_record, sample_path
+from .runs import TowVelocity, current_of, first_direction, run, sample_path
+from .water import Current
 
 
 def tow(
@@ -22,13 +23,14 @@ def tow(
     *,
     segment_length: float = 0.5,
     cable: CableProperties | None = None,
-    current: Sequence[float] | None = None,
+    current: Sequence[float] | np.ndarray | Current | None = None,
     drogue_drag_area: float = 0.0,
+    rtol: float = 0.0,
 ) -> History:
     """Tow a cable of fixed length, starting from the exact steady straight tow.
 
     A neutral cable trails straight behind, T(s) = (½ρπdC_t (L − s) + ½ρC_dA) U². A cable with weight and no drogue lies
-    straight at the critical angle φ, ½ρdC_n U² sin²φ = |w_c| cosφ, below or above the tow point.
+    straight at the critical angle φ, ½ρdC_n U² sin²φ = |w_c| cosφ, below or above the tow point; at rest it hangs.
 
     Args:
         tow_velocity: function of time [s] that gives the tow point's velocity north, east, down (3,). [m/s]
@@ -37,8 +39,10 @@ def tow(
         step: time between recorded results. [s]
         segment_length: Δs; taken a little smaller where L is not a whole number of it. [m]
         cable: the cable; Table 1 of the source when not given.
-        current: velocity of the water north, east, down (3,); still water when not given. [m/s]
+        current: velocity of the water north, east, down (3,) [m/s], or a `cable.Current` that changes with place and
+            time (places relative to the tow point at the start); still water when not given.
         drogue_drag_area: C_d A of a drogue at the free end; 0 is a free tail. [m²]
+        rtol: as in `cable.pull_out`.
 
     Returns:
         the history; positions are relative to where the tail is at the start, `drum_tension` is the one at the tail.
@@ -48,48 +52,37 @@ def tow(
 
     Checked by: tests/exact/test_tow.py
     """
-    for name, value in (
-        ("length", length),
-        ("duration", duration),
-        ("step", step),
-        ("segment", segment_length),
-    ):
+    lengths = {"length": length, "duration": duration, "step": step, "segment_length": segment_length}
+    for name, value in lengths.items():
         if not (np.isfinite(value) and value > 0.0):
             message = f"{name} is {value!r}; it must be a positive number."
             raise ValueError(message)
-    cable, J = (
-        cable or CableProperties(),
-        np.array(current if current is not None else (0.0, 0.0, 0.0), dtype=float),
-    )
-    times, path, velocity = sample_path(tow_velocity, duration, step)
+    cable, water = cable or CableProperties(), current_of(current)
+    path = sample_path(tow_velocity, duration, step)
     count = max(1, int(np.ceil(length / segment_length - 1e-9)))
-    line, work, c = new_line(count), new_load(), cable.numbers()
-    tail_drag = 0.5 * cable.water_density * drogue_drag_area
-    uphill, speed = _steady_direction(velocity, J, cable, tail_drag), float(np.linalg.norm(velocity[0]))
-    lay_straight(line, length, uphill, speed, length / count, c)
+    line, work, c, idle = new_line(count), new_load(), cable.numbers(), DrumProperties().numbers()
+    tail_drag, J = 0.5 * cable.water_density * drogue_drag_area, water.at((0.0, 0.0, 0.0))
+    uphill = _steady_direction(path.velocity, J, cable, tail_drag)
+    line.ends.segment_length = length / count
+    lay_straight(line, length, uphill, float(np.linalg.norm(path.velocity[0])), idle, c)
     line.ends.free_end, line.ends.tail_drag = True, tail_drag
-    _set_steady_tow(line, velocity[0], J, cable, tail_drag)
-    set_momenta(line, J, c, work)
-    record = new_record(times.size, count)
-    write_row(line, record, 0, 0)
-    path += length * uphill
-    idle = DrumProperties().numbers()
-    rows, solved = follow_path(
-        line, times, path, velocity, J, c, idle, np.zeros(times.size), length / count, work, record
-    )
-    return as_history(times, path, record, rows, solved)
+    _set_steady_tow(line, path.velocity[0], J, cable, tail_drag)
+    path.place[:] += length * uphill
+    return run(line, path, resting(path.times), water.numbers(-length * uphill), c, idle, rtol, work, count)
 
 
 def _steady_direction(
     velocity: np.ndarray, J: np.ndarray, cable: CableProperties, tail_drag: float
 ) -> np.ndarray:
     """Return the direction from the tail to the tow point in a steady tow, a unit vector (3,)."""
+    speed, weight = float(np.linalg.norm(velocity[0] - J)), cable.weight_in_water
+    if speed == 0.0 and weight != 0.0:
+        return np.array([0.0, 0.0, -np.sign(weight)])
     ahead = first_direction(velocity - J)
-    speed = float(np.linalg.norm(velocity[0] - J))
-    if cable.weight_in_water == 0.0 or tail_drag > 0.0 or speed == 0.0 or abs(ahead[2]) > 1e-9:
+    if weight == 0.0 or tail_drag > 0.0 or speed == 0.0 or abs(ahead[2]) > 1e-9:
         return ahead
     phi = cable.critical_angle(speed)
-    return np.cos(phi) * ahead + np.array([0.0, 0.0, -np.sign(cable.weight_in_water) * np.sin(phi)])
+    return np.cos(phi) * ahead + np.array([0.0, 0.0, -np.sign(weight) * np.sin(phi)])
 
 
 def _set_steady_tow(

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from cable.drum_path import lead_drum
 from cable.energy import energy_flow
 from cable.newton import Solved
 from cable.stepping import accept, try_step
@@ -75,6 +76,7 @@ def _agree(setup: Setup, live: Live, start: float, span: float) -> tuple[int, So
     ratio = span / live.now.last_step if live.now.last_step > 0.0 else 0.0
     for i in range(3):
         live.now.guess[i] = live.now.force[i] + ratio * (live.now.force[i] - live.now.force_before[i])
+    lead_drum(setup.led, start + span, setup.fixed.drum)
     size = np.inf
     for _ in range(MOST_EXCHANGES):
         if not _move(setup, live, start, span):
@@ -82,7 +84,7 @@ def _agree(setup: Setup, live: Live, start: float, span: float) -> tuple[int, So
         if not setup.fixed.tethered:
             return FINE, solved
         solved = try_step(
-            live.line, span, live.now.tow, setup.fixed.current, setup.fixed.cable, setup.fixed.drum, live.load
+            live.line, span, live.now.tow, setup.water, setup.fixed.cable, setup.fixed.drum, live.load
         )
         if not solved.converged:
             return CABLE_FAILED, solved
@@ -206,6 +208,6 @@ def _accept(setup: Setup, live: Live, start: float, span: float) -> None:
             live.now.force_before[i] = live.now.force[i]
     live.now.last_step = span
     if setup.fixed.tethered:
-        accept(live.line, span, setup.fixed.current, setup.fixed.cable, setup.fixed.segment_length, live.load)
-        energy_flow(live.line, setup.fixed.current, setup.fixed.cable, live.load, live.now.ledger.cable_new)
+        accept(live.line, span, setup.fixed.cable, live.load)
+        energy_flow(live.line, setup.fixed.cable, live.load, live.now.ledger.cable_new)
     book(setup, live, start, span, steps)

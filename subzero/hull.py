@@ -13,6 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 import vehicle
+from cable.water import water_velocity
 from subzero.compiled import compiled, inner
 from subzero.run_state import HullWork, Live, Setup, Track
 from vehicle import STATE_SIZE
@@ -44,6 +45,18 @@ def tow_wrench(state: np.ndarray, F: np.ndarray, r_c: np.ndarray, work: HullWork
     w[3] = r_c[1] * w[2] - r_c[2] * w[1]
     w[4] = r_c[2] * w[0] - r_c[0] * w[2]
     w[5] = r_c[0] * w[1] - r_c[1] * w[0]
+
+
+@inner
+def feel_current(setup: Setup, state: np.ndarray, time: float, work: HullWork) -> None:
+    """Fill work.current (3,) with the water's velocity at the hull's centre. [m/s].
+
+    Departs from source: where the water changes along the vehicle's way, the hull takes every instant as steady and
+    uniform; the pressure of the accelerating water, (m + M_A) dJ/dt, is left out.
+    """
+    for i in range(3):
+        work.place[i] = state[i] - setup.fixed.drum_place[i]
+    water_velocity(setup.water, work.place, time, work.current)
 
 
 @compiled
@@ -80,7 +93,8 @@ def advance_hull(setup: Setup, live: Live, start: float, span: float, steps: int
             for i in range(3):
                 work.pull[i] = now.guess[i] + (along - 1.0) * ratio * (now.force[i] - now.force_before[i])
             tow_wrench(stage, work.pull, setup.fixed.r_c, work)
-            vehicle.derivative(stage, command, setup.fixed.current, work.wrench, setup.fixed.vehicle, k[s])
+            feel_current(setup, stage, start + n * h + part, work)
+            vehicle.derivative(stage, command, work.current, work.wrench, setup.fixed.vehicle, k[s])
         for i in range(STATE_SIZE):
             new[i] = state[i] + h / 6.0 * (k[0, i] + 2.0 * k[1, i] + 2.0 * k[2, i] + k[3, i])
         vehicle.finish_step(new, command, setup.fixed.vehicle)

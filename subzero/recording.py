@@ -10,7 +10,7 @@ import numpy as np
 import vehicle
 from cable.line import NOW
 from subzero.compiled import compiled
-from subzero.hull import row_at, tow_wrench
+from subzero.hull import feel_current, row_at, tow_wrench
 from subzero.run_state import Live, Setup
 from vehicle import BREAKDOWN, STATE_SIZE
 
@@ -105,10 +105,10 @@ def record_row(setup: Setup, live: Live, recording: Recording, row: int, time: f
         r.energy[row, i] = live.now.ledger.total[i]
     r.fins[row, 0], r.fins[row, 1], r.fins[row, 2] = vehicle.deflections(state, command, setup.fixed.vehicle)
     if not setup.fixed.prescribed:
-        vehicle.breakdown(
-            state, command, setup.fixed.current, live.now.hull.wrench, setup.fixed.vehicle, r.breakdown[row]
-        )
-        r.voltage[row] = vehicle.battery_voltage(state, command, setup.fixed.current, setup.fixed.vehicle)
+        water, wrench = live.now.hull.current, live.now.hull.wrench
+        feel_current(setup, state, time, live.now.hull)
+        vehicle.breakdown(state, command, water, wrench, setup.fixed.vehicle, r.breakdown[row])
+        r.voltage[row] = vehicle.battery_voltage(state, command, water, setup.fixed.vehicle)
     return _record_cable(live, r, row, used) if setup.fixed.tethered else used
 
 
@@ -118,9 +118,7 @@ def _record_cable(live: Live, r: Recording, row: int, used: int) -> int:
     line = live.line
     N = line.ends.count
     r.drum_tension[row] = line.node_tension[N]
-    r.length[row] = line.ends.last_length[NOW]
-    for j in range(1, N):
-        r.length[row] += line.length[j]
+    r.length[row] = line.ends.settled + line.ends.last_length[NOW]
     for j in range(N + 1):
         for i in range(3):
             r.position[used + j, i] = line.position[NOW, j, i]

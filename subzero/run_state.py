@@ -7,9 +7,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cable.drum_path import DrumPath
 from cable.element import Load
+from cable.energy import FLOWS
 from cable.line import Line
 from cable.properties import CableNumbers, DrumNumbers
+from cable.water import Water
 from subzero.compiled import packed
 from vehicle import VehicleNumbers
 
@@ -31,11 +34,13 @@ class Track(NamedTuple):
 
 
 class HullWork(NamedTuple):
-    """Work space of the hull: rotation R_nb, pull of the cable in earth axes and its wrench."""
+    """Work space of the hull: rotation R_nb, pull of the cable in earth axes and its wrench, place and water."""
 
     rotation: np.ndarray
     pull: np.ndarray
     wrench: np.ndarray
+    place: np.ndarray
+    current: np.ndarray
 
 
 @dataclass(kw_only=True)
@@ -45,7 +50,7 @@ class Ledger:
     Attributes:
         total: (7,), rows as in `subzero.energy`. [J]
         hull_old, hull_new: powers of `vehicle.power` (4,). [W]
-        cable_old, cable_new: flows of `cable.energy.energy_flow` (5,).
+        cable_old, cable_new: flows of `cable.energy.energy_flow` (FLOWS,).
         kinetic: kinetic energy of the hull at the last accepted time. [J]
     """
 
@@ -58,16 +63,14 @@ class Ledger:
 
 
 class Fixed(NamedTuple):
-    """The numbers that do not change during a run; `drum_place` is the drum in earth axes (3,). [m]"""
+    """The numbers that do not change during a run; `drum_place` is the drum at the start, earth axes (3,). [m]"""
 
     vehicle: VehicleNumbers
     cable: CableNumbers
     drum: DrumNumbers
-    current: np.ndarray
     r_c: np.ndarray
     drum_place: np.ndarray
     hull_step: float
-    segment_length: float
     tethered: bool
     prescribed: bool
 
@@ -101,11 +104,20 @@ class Now:
 
 
 class Setup(NamedTuple):
-    """What does not change during a run."""
+    """What does not change during a run.
+
+    Attributes:
+        fixed: numbers; `drum` in it is where the drum is at the end of the step that is being tried.
+        orders, track: what the vehicle is told, or how it moves.
+        water: how the water moves; its origin is the drum's place at the start.
+        led: how the drum moves, and what its winch is asked for.
+    """
 
     fixed: Fixed
     orders: Orders
     track: Track
+    water: Water
+    led: DrumPath
 
 
 class Live(NamedTuple):
@@ -130,13 +142,13 @@ class Live(NamedTuple):
 
 def new_now() -> Now:
     """Return the beginning of a run, with a cable that does not pull."""
-    work = HullWork(np.zeros((3, 3)), np.zeros(3), np.zeros(6))
+    work = HullWork(np.zeros((3, 3)), np.zeros(3), np.zeros(6), np.zeros(3), np.zeros(3))
     ledger = Ledger(
         total=np.zeros(7),
         hull_old=np.zeros(4),
         hull_new=np.zeros(4),
-        cable_old=np.zeros(5),
-        cable_new=np.zeros(5),
+        cable_old=np.zeros(FLOWS),
+        cable_new=np.zeros(FLOWS),
         kinetic=0.0,
     )
     vectors = {name: np.zeros(3) for name in ("force", "force_before", "guess", "change", "tow")}

@@ -11,7 +11,7 @@ import numpy as np
 import scenarios
 from cable.line import enlarged
 from cable.newton import Solved
-from cable.pull_out import describe_failure
+from cable.runs import describe_failure
 from subzero import coupling
 from subzero.loop import NO_ROOM, run_rows
 from subzero.model import Model

@@ -6,11 +6,14 @@ import numpy as np
 
 import scenarios
 import vehicle
+from cable.drum_path import lead_drum, resting
 from cable.element import new_load
-from cable.line import lay_straight, new_line, set_momenta
+from cable.energy import FLOWS, energy_flow
+from cable.line import lay_straight, new_line, start_in_water
 from cable.pull_out import START_LENGTH
+from cable.water import Current
 from subzero.compiled import compiled, packed
-from subzero.hull import pose, tow_point
+from subzero.hull import feel_current, pose, tow_point
 from subzero.model import Model
 from subzero.run_state import Fixed, Live, Orders, Setup, Track, new_now
 
@@ -22,7 +25,13 @@ def prepare(trial: scenarios.Trial, model: Model, tethered: bool) -> tuple[Setup
     """Return what stays and what changes in a run, at its start: the cable laid straight behind the vehicle."""
     wet, size = max(trial.start.wet_length, START_LENGTH), vehicle.STATE_SIZE
     steps = int(np.ceil(trial.cable_step / trial.hull_step - 1e-6))
-    setup = Setup(fixed=_fixed(trial, model, tethered), orders=_orders(trial), track=_track(trial))
+    setup = Setup(
+        fixed=_fixed(trial, model, tethered),
+        orders=_orders(trial),
+        track=_track(trial),
+        water=Current.uniform(model.current).numbers(),
+        led=resting(np.array([0.0, trial.duration])),
+    )
     live = Live(
         now=new_now(),
         state=_first_state(trial),
@@ -31,6 +40,7 @@ def prepare(trial: scenarios.Trial, model: Model, tethered: bool) -> tuple[Setup
         line=new_line(int(wet / trial.segment_length) + FIRST_ROOM),
         load=new_load(),
     )
+    live.line.ends.segment_length = trial.segment_length
     lay_out(setup, live, wet)
     return setup, live
 
@@ -46,11 +56,17 @@ def lay_out(setup: Setup, live: Live, wet: float) -> None:
     for i in range(3):
         now.guess[i] = now.hull.rotation[i, 0]
         fixed.drum_place[i] = now.tow[i] - wet * now.guess[i]
+        setup.water.origin[i] = fixed.drum_place[i]
         pull = fixed.cable.tangential_drag * speed * abs(speed) * wet if fixed.tethered else 0.0
         now.force[i] = -pull * now.guess[i]
-    lay_straight(live.line, wet, now.guess, speed, fixed.segment_length, fixed.cable)
-    set_momenta(live.line, fixed.current, fixed.cable, live.load)
-    now.ledger.kinetic = vehicle.kinetic_energy(state, fixed.current, fixed.vehicle)
+    lead_drum(setup.led, 0.0, fixed.drum)
+    lay_straight(live.line, wet, now.guess, speed, fixed.drum, fixed.cable)
+    start_in_water(live.line, setup.water, fixed.cable, live.load)
+    energy_flow(live.line, fixed.cable, live.load, now.ledger.cable_new)
+    for i in range(FLOWS):
+        now.ledger.cable_old[i] = now.ledger.cable_new[i]
+    feel_current(setup, state, 0.0, now.hull)
+    now.ledger.kinetic = vehicle.kinetic_energy(state, now.hull.current, fixed.vehicle)
 
 
 def _fixed(trial: scenarios.Trial, model: Model, tethered: bool) -> Fixed:
@@ -59,11 +75,9 @@ def _fixed(trial: scenarios.Trial, model: Model, tethered: bool) -> Fixed:
         vehicle=model.vehicle.numbers(),
         cable=model.cable.numbers(),
         drum=model.drum.numbers(),
-        current=np.array(model.current, dtype=float),
         r_c=model.vehicle.tow_point.position(),
         drum_place=np.zeros(3),
         hull_step=trial.hull_step,
-        segment_length=trial.segment_length,
         tethered=tethered,
         prescribed=trial.motion is not None,
     )

@@ -2,7 +2,8 @@
 
 Verifies: every entry of the block tridiagonal matrix of `cable.assembly` (and that nothing lies outside the blocks), in
 random bent, half slack states, for all that a drum can do; and the tow force's own derivatives. Configuration: a
-heavy stretching cable, a slanting current, drum with inertia and friction, corrections for the arc switched on.
+heavy stretching cable, a current that differs from node to node, a moving drum with inertia and friction, corrections
+for the arc, a bending stiffness and a further force switched on.
 Tolerance: differences of step 1e-6 carry 1e-9 of truncation and rounding; 2e-6 of the largest entry of a row.
 """
 
@@ -14,12 +15,13 @@ from cable.assembly import assemble
 from cable.differences import backward_weights
 from cable.drum import SPINNING, STANDING, TURNING
 from cable.element import new_load
-from cable.line import BEFORE, NEW, NOW, RESIDUAL, lay_straight, new_line, set_momenta
+from cable.line import BEFORE, NEW, NOW, RESIDUAL, lay_straight, new_line, start_in_water
 from cable.properties import CableProperties, DrumProperties
+from cable.water import Current
 
 CABLE = CableProperties(mass_per_length=0.02, compliance=0.05, tangential_drag_coefficient=0.02).numbers()
 DRUM = DrumProperties(inertia=1e-3, friction_torque=0.01).numbers()
-CURRENT = np.array([0.2, -0.1, 0.05])
+CURRENT = Current.uniform([0.2, -0.1, 0.05]).numbers()
 STEP = 1e-6
 
 
@@ -27,7 +29,9 @@ def bent_line(segments, mode, seed, slackness=1e-4):
     """Return a moving cable of half-metre segments with nodes shaken at all levels, and work space."""
     rng = np.random.default_rng(seed)
     line, work = new_line(segments + 2), new_load()
-    lay_straight(line, 0.5 * segments + 0.1, np.array([1.0, 0.0, 0.0]), 1.0, 0.5, CABLE)
+    line.ends.segment_length = 0.5
+    line.ends.drum_velocity[:] = 0.1, 0.3, -0.2
+    lay_straight(line, 0.5 * segments + 0.1, np.array([1.0, 0.0, 0.0]), 1.0, DRUM, CABLE)
     line.ends.count = segments
     line.ends.drum_mode = mode
     for level, lag in ((NEW, 0.0), (NOW, 0.1), (BEFORE, 0.2)):
@@ -43,7 +47,10 @@ def bent_line(segments, mode, seed, slackness=1e-4):
     line.tension[NEW, 1 : segments + 1] = rng.uniform(0.0, 0.5, segments)
     line.slip[:] = 0.02 * rng.normal(size=line.slip.size)
     line.normal_gain[:] = rng.uniform(0.9, 1.0, line.normal_gain.size)
-    set_momenta(line, CURRENT, CABLE, work)
+    start_in_water(line, CURRENT, CABLE, work)
+    line.water[:] += 0.1 * rng.normal(size=line.water.shape)
+    line.forcing[:], line.shear[:] = 0.1 * rng.normal(size=(2, *line.shear.shape))
+    line.bracing[:] = rng.uniform(0.0, 0.5, line.bracing.size)
     return line, work
 
 
@@ -62,7 +69,7 @@ def residual(line, work, values, weights):
     line.tension[NEW, 1 : N + 1] = blocks[:, 0]
     line.position[NEW, 1:N] = blocks[:-1, 1:]
     line.ends.last_length[NEW] = blocks[-1, 1]
-    assemble(line, weights, CURRENT, CABLE, DRUM, work)
+    assemble(line, weights, CABLE, DRUM, work)
     return line.rows[RESIDUAL, 1 : N + 1].ravel().copy(), line.ends.tow_force.copy()
 
 

@@ -1,0 +1,123 @@
+"""Run the default scheme along sampled paths: what `cable.pull_out` and `cable.tow` share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from .drum_path import DrumPath
+from .element import Load
+from .energy import LOSS, STORED
+from .history import History, Outcome
+from .line import Line, start_in_water
+from .newton import Solved
+from .pay_out import Record, TowPath, follow_path, new_record
+from .properties import CableNumbers, DrumNumbers
+from .water import Current, Water
+
+TowVelocity = Callable[[float], Sequence[float] | np.ndarray]
+
+REST = 1e-12
+"""Slower than this is at rest. [m/s]"""
+GAUSS = ((-np.sqrt(0.15), 5.0 / 18.0), (0.0, 8.0 / 18.0), (np.sqrt(0.15), 5.0 / 18.0))
+"""Offsets and weights of three-point Gauss quadrature on a step of length one."""
+EQUATIONS = ("length", "northward balance", "eastward balance", "downward balance")
+
+
+def run(
+    line: Line,
+    path: TowPath,
+    led: DrumPath,
+    water: Water,
+    c: CableNumbers,
+    drum: DrumNumbers,
+    rtol: float,
+    work: Load,
+    capacity: int,
+) -> History:
+    """Run a line that is laid out, and return its history."""
+    start_in_water(line, water, c, work)
+    record = new_record(path.times.size, capacity)
+    rows, solved = follow_path(line, path, led, water, c, drum, rtol, work, record)
+    return as_history(path, record, rows, solved)
+
+
+def as_history(path: TowPath, record: Record, rows: int, solved: Solved) -> History:
+    """Return the record's filled rows as a history."""
+    times, tow, completed = path.times, path.place, rows == path.times.size
+    message = "The run reached its end." if completed else describe_failure(solved, times[rows - 1])
+    cuts = np.cumsum(record.segments[:rows] + 1)
+    return History(
+        time=times[:rows],
+        tow_force=record.tow_force[:rows],
+        tow_tension=record.tow_tension[:rows],
+        drum_tension=record.drum_tension[:rows],
+        length=record.length[:rows],
+        tow_point=tow[:rows],
+        shapes=tuple(np.split(record.position[: cuts[-1]], cuts[:-1])),
+        tensions=tuple(np.split(record.tension[: cuts[-1]], cuts[:-1])),
+        outcome=Outcome(
+            completed=completed,
+            message=message,
+            iterations=int(record.iterations[:rows].sum()),
+            worst_residual=float(solved.residual),
+            steps=int(record.steps[:rows].sum()),
+            largest_courant_number=float(record.courant[:rows].max()),
+            energy_residual=float(abs(record.ledger[2, STORED]) / max(record.ledger[2, LOSS], 1e-30)),
+        ),
+        scheme="moving_end",
+    )
+
+
+def describe_failure(solved: Solved, time: float) -> str:
+    """Return what went wrong in a step that starts at `time`, where, and what to try."""
+    return (
+        f"The cable could not be solved beyond t = {time:g} s: after {solved.iterations} Newton iterations the "
+        f"{EQUATIONS[solved.worst_equation]} at node {solved.worst_node} is off by {solved.residual:.1e} times its "
+        "tolerance. Try a shorter step, other segments, or a smoother motion of the tow point."
+    )
+
+
+def sample_path(velocity: TowVelocity, duration: float, step: float, name: str = "tow_velocity") -> TowPath:
+    """Return the way of a point that moves at `velocity`, from 0: places by Gauss quadrature of order six."""
+    steps = max(1, round(duration / step))
+    times = np.linspace(0.0, duration, steps + 1)
+    at_times = np.array([_three_numbers(velocity(t), f"{name}({t:g})") for t in times])
+    place, h = np.zeros((steps + 1, 3)), duration / steps
+    for offset, weight in GAUSS:
+        inner = [_three_numbers(velocity(t), f"{name}({t:g})") for t in times[:-1] + h * (0.5 + offset)]
+        place[1:] += weight * h * np.array(inner)
+    return TowPath(times, np.cumsum(place, axis=0), at_times)
+
+
+def first_direction(velocity: np.ndarray) -> np.ndarray:
+    """Return the unit vector of the first motion in velocities (n, 3); north when there is none."""
+    speeds = np.linalg.norm(velocity, axis=1)
+    moving = np.flatnonzero(speeds > REST)
+    if moving.size == 0:
+        return np.array([1.0, 0.0, 0.0])
+    return velocity[moving[0]] / speeds[moving[0]]
+
+
+def segments_needed(length: float, segment_length: float, grading: float) -> int:
+    """Return how many segments a cable of some length [m] takes at most."""
+    if grading * length < segment_length:
+        return int(length / segment_length) + 8
+    return int(np.log1p(grading * length / segment_length) / np.log1p(grading)) + 12
+
+
+def current_of(current: Sequence[float] | np.ndarray | Current | None) -> Current:
+    """Return a current from what users give: nothing, three numbers, or a current."""
+    if isinstance(current, Current):
+        return current
+    return Current.uniform(np.zeros(3) if current is None else current)
+
+
+def _three_numbers(values: Sequence[float] | np.ndarray, name: str) -> np.ndarray:
+    """Return three finite numbers as an array, or say what is wrong with them."""
+    array = np.asarray(values, dtype=float)
+    if array.shape != (3,) or not np.isfinite(array).all():
+        message = f"{name} must be three finite numbers (north, east, down in m/s); got {values!r}."
+        raise ValueError(message)
+    return array
