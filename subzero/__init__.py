@@ -7,8 +7,8 @@
 
 Names come from their modules when they are first used, so that ``import subzero`` costs nothing:
 `simulate` and `compare` run a trial, `Comparison` holds two runs, `load_scenario` reads a trial,
-`read_record` a measured record, `draw` makes the figures, `autopilot` leads to linear models and controllers, `CHANNELS` is the table of everything that a
-run gives.
+`read_record` a measured record, `draw` makes the figures, `Simulator` steps a run for a controller of your own,
+`autopilot` leads to linear models and controllers, `CHANNELS` is the table of everything that a run gives.
 """
 
 from importlib import import_module
@@ -18,7 +18,10 @@ _HOME = {
     "CHANNELS": ("subzero.channels", "CHANNELS"),
     "Comparison": ("subzero.comparison", "Comparison"),
     "Model": ("subzero.model", "Model"),
+    "Observation": ("subzero.simulator", "Observation"),
     "Record": ("subzero.measured", "Record"),
+    "RunStoppedError": ("subzero.simulator", "RunStoppedError"),
+    "Simulator": ("subzero.simulator", "Simulator"),
     "UserError": ("subzero.errors", "UserError"),
     "compare": ("subzero.comparison", "compare"),
     "draw": ("subzero.figures", "draw"),
