@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from types import ModuleType
 from typing import Any
 
-from . import hanging_chain, moordyn_2, sagging_cable, straight_pull, taut_string, travelling_wave, turns
+from . import hanging_chain, manufactured, moordyn_2, sagging_cable, straight_pull, taut_string, travelling_wave, turns
 from .row import Row
 
 
@@ -38,6 +38,7 @@ class Case:
 
 
 CASES = (
+    Case("manufactured", "Made-up motions: all terms of (7)", manufactured),
     Case("straight_pull", "Pulled straight off the drum", straight_pull),
     Case("turns", "Steady turns, and turns too tight to be steady", turns),
     Case("travelling_wave", "Waves on a taut cable", travelling_wave),

@@ -10,15 +10,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cable import CableProperties
-from cable.drum import LENGTH
+from cable import Brake, CableProperties, Current
 from cable.element import Load, new_load
-from cable.line import NEW, NOW, Line, new_line, set_momenta
+from cable.line import NOW, Line, new_line, start_in_water
 from cable.properties import DrumNumbers
 from cable.stepping import accept, try_step
-from subzero.compiled import packed
+from cable.water import Water
 
-STILL = np.zeros(3)
+STILL = Current.uniform((0.0, 0.0, 0.0))
 
 
 @dataclass
@@ -29,14 +28,14 @@ class Stepped:
         line: its state.
         cable: what it is made of.
         drum: what holds its far end.
-        segment_length: Δs. [m]
+        water: how the water moves.
         work: work space.
     """
 
     line: Line
     cable: CableProperties
     drum: DrumNumbers
-    segment_length: float
+    water: Water
     work: Load
 
     @classmethod
@@ -49,36 +48,37 @@ class Stepped:
         *,
         room: int = 0,
         free_end: bool = False,
-        current: object = None,
+        current: Current = STILL,
     ) -> Stepped:
         """Return a cable at rest with nodes at `position` (n+1, 3), and n segments of `length` [m] and `tension` [N].
 
         The last node is the drum's (a brake, until `drum` is changed) or, with `free_end`, a free tail.
         """
-        n = length.size
-        line = new_line(n + room)
+        n, brake = length.size, Brake().numbers()
+        line, brake.setpoint = new_line(n + room), length.sum()
         line.position[:, : n + 1] = position
         line.length[1 : n + 1] = length
         line.tension[:, 1 : n + 1] = tension
         line.ends.count, line.ends.free_end = n, free_end
-        line.ends.last_length[:] = length[-1]
-        brake = packed(DrumNumbers(0.0, 0.0, LENGTH, float(length.sum())))
-        made = cls(line, cable, brake, float(length[0]), new_load())
+        line.ends.last_length[:], line.ends.settled = length[-1], length[:-1].sum()
+        line.ends.segment_length = length[0]
+        made = cls(line, cable, brake, current.numbers(), new_load())
         made.begin()
         return made
 
     def begin(self) -> None:
         """Take the velocities that stand there as those of the start."""
-        set_momenta(self.line, STILL, self.cable.numbers(), self.work)
+        self.line.ends.previous_step = 0.0
+        start_in_water(self.line, self.water, self.cable.numbers(), self.work)
 
     def step(self, step: float, tow: np.ndarray) -> None:
         """Go on by one step [s], with the tow point at `tow` (3,) [m] at its end."""
         c = self.cable.numbers()
-        solved = try_step(self.line, step, tow, STILL, c, self.drum, self.work)
+        solved = try_step(self.line, step, tow, self.water, c, self.drum, self.work)
         if not solved.converged:
             message = f"Not solved: {solved.residual:.1e} tolerances at node {solved.worst_node}."
             raise RuntimeError(message)
-        accept(self.line, step, STILL, c, self.segment_length, self.work)
+        accept(self.line, step, c, self.work)
 
     def settle(self, seconds: float = 1e4, steps: int = 6) -> None:
         """Come to rest where the forces balance, in steps so long that inertia has no part; then forget the past."""
@@ -87,9 +87,8 @@ class Stepped:
             self.step(seconds, tow)
         self.line.velocity[:] = 0.0
         self.line.ends.payout[:] = 0.0
-        self.line.position[NEW + 2] = self.line.position[NOW]
-        self.line.ends.last_length[2] = self.line.ends.last_length[NOW]
-        self.line.ends.previous_step = 0.0
+        self.line.position[:] = self.line.position[NOW]
+        self.line.ends.last_length[:] = self.line.ends.last_length[NOW]
         self.begin()
 
     @property
