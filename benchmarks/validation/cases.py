@@ -6,7 +6,16 @@ from dataclasses import dataclass
 from types import ModuleType
 from typing import Any
 
-from . import hanging_chain, manufactured, moordyn_2, sagging_cable, straight_pull, taut_string, travelling_wave, turns
+from . import (
+    hanging_chain,
+    manufactured,
+    moordyn_2,
+    sagging_cable,
+    straight_pull,
+    taut_string,
+    travelling_wave,
+    turns,
+)
 from .row import Row
 
 
