@@ -27,11 +27,15 @@ from importlib import import_module
 from typing import Any
 
 _HOME = {
+    "ESTIMATED": "sensors",
     "INPUTS": "states",
     "Mode": "poles",
     "NoTrimError": "steady",
+    "PERFECT": "sensors",
     "STATES": "states",
     "SUBSYSTEMS": "linear",
+    "Sensor": "sensors",
+    "Sensors": "sensors",
     "Trim": "steady",
     "UNITS": "states",
     "linearise": "linear",

@@ -1,0 +1,161 @@
+"""Sensors: from what is true to what a controller is told.
+
+    sample = quantised(truth + bias + drift + noise), every period, told after the delay, or dropped
+
+Each stage has a neutral value that switches it off exactly. Between samples, and when one is dropped, the last sample
+stands. Every sensor has random numbers of its own, from one seed: another sensor beside it changes nothing, and the
+same seed gives the same run.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from subzero.errors import UserError, suggestion
+from subzero.simulator import Observation
+
+GRACE = 1e-9
+"""Times that differ by less than this are the same. [s]"""
+
+UNKNOWN = Observation(*[math.nan] * len(Observation._fields))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sensor:
+    """One sensor of one channel; all in the unit of `Observation`: SI, radians.
+
+    Attributes:
+        channel: what it measures, a field of `Observation`.
+        period: time between samples; 0 samples whenever it is asked. [s]
+        noise: standard deviation of each sample, white.
+        bias: constant error.
+        drift: growth of a random walk: its standard deviation is drift·√t. [unit/√s]
+        quantum: samples are whole multiples of this; 0 is exact.
+        delay: until a sample is told. [s]
+        drop_out: probability that a sample is lost.
+
+    Raises:
+        UserError: no such channel, or a number that is not in its range.
+    """
+
+    channel: str
+    period: float = 0.0
+    noise: float = 0.0
+    bias: float = 0.0
+    drift: float = 0.0
+    quantum: float = 0.0
+    delay: float = 0.0
+    drop_out: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be a sensor."""
+        allowed = Observation._fields[1:]
+        if self.channel not in allowed:
+            raise UserError(
+                f"Sensor: there is no channel '{self.channel}'.{suggestion(self.channel, allowed)}"
+                f" Allowed: {', '.join(allowed)}."
+            )
+        for field in fields(self)[1:]:
+            value = getattr(self, field.name)
+            least = -math.inf if field.name == "bias" else 0.0
+            most = 1.0 if field.name == "drop_out" else math.inf
+            if not (math.isfinite(value) and least <= value <= most):
+                said = "a finite number" if field.name == "bias" else f"{least:g} to {most:g}"
+                raise UserError(f"Sensor of {self.channel}: {field.name} is {value!r}. Allowed: {said}.")
+
+
+DEGREE = math.pi / 180.0
+
+ESTIMATED = (
+    Sensor(channel="surge_speed", period=0.2, noise=0.02, quantum=0.005, delay=0.1),
+    Sensor(channel="heading", period=0.1, noise=0.5 * DEGREE, delay=0.1),
+    Sensor(channel="roll", period=0.1, noise=0.5 * DEGREE, delay=0.1),
+    Sensor(channel="pitch", period=0.1, noise=0.5 * DEGREE, delay=0.1),
+    Sensor(channel="roll_rate", period=0.1, noise=0.5 * DEGREE, drift=0.01 * DEGREE, delay=0.1),
+    Sensor(channel="pitch_rate", period=0.1, noise=0.5 * DEGREE, drift=0.01 * DEGREE, delay=0.1),
+    Sensor(channel="yaw_rate", period=0.1, noise=0.5 * DEGREE, drift=0.01 * DEGREE, delay=0.1),
+    Sensor(channel="depth", period=0.2, noise=0.02, quantum=0.005, delay=0.1),
+    Sensor(channel="cable_length", period=0.1, quantum=0.01),
+    Sensor(channel="drum_tension", period=0.1, noise=0.01),
+)
+"""A set of the class that the paper names (speed, heading, attitude, rates, depth on board; length and tension at the
+drum), 5 to 10 Hz. None of the numbers is published for Subzero: they are estimates."""
+
+PERFECT = tuple(Sensor(channel=sensor.channel) for sensor in ESTIMATED)
+"""The same channels without any error."""
+
+
+class Sensors:
+    """A set of sensors at work.
+
+    Args:
+        sensors: which; at most one for a channel.
+        seed: of all their random numbers.
+
+    Raises:
+        UserError: two sensors of one channel.
+    """
+
+    def __init__(self, sensors: Sequence[Sensor] = PERFECT, *, seed: int = 0) -> None:
+        names = [sensor.channel for sensor in sensors]
+        twice = sorted({name for name in names if names.count(name) > 1})
+        if twice:
+            raise UserError(f"Sensors: there are two of {', '.join(twice)}. Allowed: one for a channel.")
+        self.sensors, self.seed = tuple(sensors), seed
+        self.reset()
+
+    def reset(self) -> None:
+        """Begin again, with the same random numbers."""
+        self._running = [_Running(sensor, self.seed) for sensor in self.sensors]
+
+    def read(self, seen: Observation) -> Observation:
+        """Return what the sensors tell now; NaN for channels that have none. (Clocks are exact.)"""
+        told = {one.sensor.channel: one.read(seen) for one in self._running}
+        return UNKNOWN._replace(time=seen.time, **told)
+
+
+class _Running:
+    """A sensor with its memory."""
+
+    def __init__(self, sensor: Sensor, seed: int) -> None:
+        self.sensor = sensor
+        own = Observation._fields.index(sensor.channel)
+        self._rng = np.random.default_rng([seed, own])
+        self._next, self._last_time, self._walk = -math.inf, math.nan, 0.0
+        self._waiting: deque[tuple[float, float]] = deque()
+        self._told = math.nan
+
+    def read(self, seen: Observation) -> float:
+        """Return the newest sample that has arrived."""
+        if seen.time >= self._next - GRACE:
+            self._take(seen)
+        while self._waiting and self._waiting[0][0] <= seen.time + GRACE:
+            self._told = self._waiting.popleft()[1]
+        return self._told
+
+    def _take(self, seen: Observation) -> None:
+        """Take a sample, and set the time of the next; the first one is told at once, and never lost."""
+        first = math.isnan(self._last_time)
+        passed = 0.0 if first else seen.time - self._last_time
+        sample = self._sample(getattr(seen, self.sensor.channel), passed)
+        lost = self._rng.random() < self.sensor.drop_out
+        if first:
+            self._told, self._next = sample, seen.time
+        elif not lost:
+            self._waiting.append((seen.time + self.sensor.delay, sample))
+        self._last_time = seen.time
+        if self.sensor.period > 0.0:
+            behind = math.floor((seen.time - self._next + GRACE) / self.sensor.period)
+            self._next += (behind + 1) * self.sensor.period
+
+    def _sample(self, truth: float, passed: float) -> float:
+        """Return what the sensor makes of the truth, `passed` seconds after the sample before."""
+        s = self.sensor
+        self._walk += s.drift * math.sqrt(passed) * self._rng.standard_normal()
+        value = truth + s.bias + self._walk + s.noise * self._rng.standard_normal()
+        return s.quantum * round(value / s.quantum) if s.quantum > 0.0 else value
