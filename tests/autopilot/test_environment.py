@@ -1,0 +1,58 @@
+"""The Gymnasium environment passes Gymnasium's own checker, and can be won.
+
+Verifies: "subzero/TetheredHeading-v0" with `gymnasium.utils.env_checker.check_env`; signs of action and reward with a
+proportional controller, which has to earn more than a fixed rudder. Tolerance: none; 2 degrees for the heading.
+"""
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+
+import subzero.environment
+
+
+@pytest.fixture
+def env():
+    made = gymnasium.make("subzero/TetheredHeading-v0")
+    yield made
+    made.close()
+
+
+def test_gymnasiums_own_checker_finds_nothing(env):
+    check_env(env.unwrapped)
+
+
+def episode(env, policy, turn=0.3):
+    seen, info = env.reset(seed=3, options={"turn": turn})
+    total, over = 0.0, False
+    while not over:
+        seen, reward, ended, cut, info = env.step(policy(seen))
+        total += reward
+        over = ended or cut
+    return total, info
+
+
+def proportional(seen):
+    return np.array([np.clip(2.0 * seen[0] - 0.5 * seen[2], -1.0, 1.0)], dtype=np.float32)
+
+
+def test_steering_towards_the_heading_wins(env):
+    total, info = episode(env, proportional)
+    idle, _ = episode(env, lambda _: np.zeros(1, dtype=np.float32))
+    wrong, _ = episode(env, lambda seen: -proportional(seen))
+    assert abs(info["wanted_heading"] - info["heading"]) < np.radians(2.0)
+    assert info["time"] == pytest.approx(30.0)
+    assert wrong < idle < total < 0.0
+
+
+def test_the_same_seed_draws_the_same_heading(env):
+    drawn = [env.reset(seed=seed)[1]["wanted_heading"] for seed in (1, 1, 2)]
+    assert drawn[0] == drawn[1] != drawn[2]
+
+
+def test_it_can_be_made_without_its_cable():
+    env = gymnasium.make(subzero.environment.ENVIRONMENT, tethered=False, sample_time=0.2)
+    _, info = episode(env, proportional)
+    assert info["time"] == pytest.approx(60.0)
+    assert info["cable_length"] == 0.0
