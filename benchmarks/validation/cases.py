@@ -7,10 +7,15 @@ from types import ModuleType
 from typing import Any
 
 from . import (
+    catenary,
+    critical_angle,
+    cross_current,
     hanging_chain,
+    invariance,
     manufactured,
     moordyn_2,
     sagging_cable,
+    sinking,
     straight_pull,
     taut_string,
     travelling_wave,
@@ -49,7 +54,12 @@ class Case:
 CASES = (
     Case("manufactured", "Made-up motions: all terms of (7)", manufactured),
     Case("straight_pull", "Pulled straight off the drum", straight_pull),
+    Case("critical_angle", "A heavy cable in tow", critical_angle),
     Case("turns", "Steady turns, and turns too tight to be steady", turns),
+    Case("cross_current", "A neutral cable across a current", cross_current),
+    Case("catenary", "Catenaries, inextensible and elastic", catenary),
+    Case("sinking", "A horizontal wire sinks", sinking),
+    Case("invariance", "Turned, mirrored, later, and back again", invariance),
     Case("travelling_wave", "Waves on a taut cable", travelling_wave),
     Case("taut_string", "Natural frequencies of a taut cable", taut_string),
     Case("sagging_cable", "Vibrations of a sagging cable", sagging_cable),

@@ -4,8 +4,8 @@ tail, with tangential and normal drag, centripetal inertia and added mass. Segme
 
 No turn can be tighter than R_c: the tail lies further in than the tow point, R_c is where it reaches the centre, and
 R_c = 0.197 L for this cable. In a tighter circle only a part of the cable can turn, the longest that has a steady shape
-at that radius. It pulls as if the rest were not there; the rest lies slack about the centre, with a tail that does not
-turn with the vehicle and has no shape to settle to. Both are shown.
+at that radius. It pulls as if the rest were not there. The rest lies slack in the water beyond the centre, left where
+it was, with a tail that does not turn with the vehicle: there is no shape to settle to. Both are shown.
 """
 
 from __future__ import annotations
@@ -61,12 +61,11 @@ def steady_rows(radius: float, gate: float) -> list[Row]:
         [nodes[-1].real, nodes[-1].imag], [exact.place[0].real, exact.place[0].imag], "tail from the centre"
     )
     tail = replace(tail, error=abs(nodes[-1] - exact.place[0]) / LENGTH, measure="of the place, per length")
-    return [force_row(f"R = {radius:g} m", ours, exact.force, gate), tail, rate_row(radius, 1.0, 1e-3)]
+    return [force_row(f"R = {radius:g} m", ours, exact.force, gate), tail, rate_row(run, radius, 1.0, 1e-3)]
 
 
-def rate_row(radius: float, expected: float, gate: float) -> Row:
+def rate_row(run: cable.History, radius: float, expected: float, gate: float) -> Row:
     """Compare how fast the tail goes round the centre in the last turn with the tow point's rate."""
-    run = turning(radius)
     last = np.flatnonzero(run.time > run.time[-1] - 2.0 * np.pi * radius / SPEED)
     angles = np.unwrap([np.angle(seen_turning(run, radius, k)[1][-1]) for k in last])
     rate = 1.0 + (angles[-1] - angles[0]) / (2.0 * np.pi)
@@ -77,8 +76,9 @@ def rate_row(radius: float, expected: float, gate: float) -> Row:
 def tighter_rows(radius: float) -> list[Row]:
     """Compare the force in a turn tighter than R_c with that of the longest cable that can turn; the tail stays."""
     most = from_tail(smallest_tail(TABLE_1), SPEED / radius, longest(radius, TABLE_1), TABLE_1)
-    ours, _ = seen_turning(turning(radius), radius)
-    return [force_row(f"R = {radius:g} m < R_c", ours, most.force, 1e-3), rate_row(radius, 0.0, 0.05)]
+    run = turning(radius, 100, 1.0 / 100.0)
+    ours, _ = seen_turning(run, radius)
+    return [force_row(f"R = {radius:g} m < R_c", ours, most.force, 1e-3), rate_row(run, radius, 0.0, 0.05)]
 
 
 def rows(quick: bool) -> list[Row]:
@@ -104,7 +104,7 @@ def draw(figure: Any) -> None:
         steady.plot(exact.real, exact.imag, color=colour, linewidth=1.0, label=f"R = {radius:g} m")
         steady.plot(nodes.real[::5], nodes.imag[::5], "o", color=colour, markersize=2.5)
     for ago, colour in ((0.0, BLUE), (4.0, ORANGE), (8.0, GREEN)):
-        run = turning(4.0)
+        run = turning(4.0, 100, 1.0 / 100.0)
         _, nodes = seen_turning(run, 4.0, -1 - round(ago / (run.time[1] - run.time[0])))
         tight.plot(nodes.real, nodes.imag, color=colour, linewidth=1.0, label=f"{ago:g} s before the end")
     arm = from_tail(smallest_tail(TABLE_1), SPEED / 4.0, longest(4.0, TABLE_1), TABLE_1).place
