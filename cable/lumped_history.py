@@ -1,0 +1,241 @@
+"""Runs of the lumped cable with the meaning of `cable.pull_out` and `cable.tow`: an independent second opinion.
+
+Masses at nodes and springs between them, velocities as unknowns, TR-BDF2 in time (`cable.lumped_rope`,
+`cable.lumped_step`): no part of the solver is shared with the scheme "moving_end".
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .history import History, Outcome
+from .lumped_rope import DIRECTION, OLD, PULL, REST, STATE, Rope, new_rope, unknowns
+from .lumped_run import Course, Journey, run_rope
+from .lumped_spring import LEAST_COMPLIANCE, spring_law, spring_state
+from .properties import CableProperties, DrumProperties
+from .runs import TowVelocity, first_direction, sample_path
+from .water import Current, Water
+from .winch import SHORTEST, Brake, PayOutRate, Winch
+
+AXES = ("northward", "eastward", "downward")
+STRAIGHT_UP = np.array([0.0, 0.0, -1.0])
+START_LENGTH = 1e-6
+"""A run "without cable" starts with this length in the water. [m]"""
+FAINTEST = 1e-11
+"""Least tension that a cable starts with. [N]"""
+
+
+def pull_out_lumped(
+    tow_velocity: TowVelocity,
+    duration: float,
+    step: float,
+    *,
+    segment_length: float,
+    cable: CableProperties,
+    drum: DrumProperties | Winch,
+    current: Current,
+    wet_length: float,
+    drum_velocity: TowVelocity | None = None,
+) -> History:
+    """Pull a cable off a drum, as `cable.pull_out` does.
+
+    An inextensible cable stretches by 1e-6 of its length at one newton (`lumped_spring.LEAST_COMPLIANCE`).
+
+    Args:
+        tow_velocity: function of time [s] that gives the tow point's velocity north, east, down (3,). [m/s]
+        duration: how long. [s]
+        step: time between recorded results; a step that fails is retried in smaller pieces. [s]
+        segment_length: Δs. [m]
+        cable: the cable.
+        drum: a free drum or a winch.
+        current: the water's velocity, at places relative to the drum at the start.
+        wet_length: cable in the water at the start, straight behind the tow point. [m]
+        drum_velocity: like tow_velocity, of the drum; it stands when not given.
+
+    Returns:
+        the history; positions are relative to where the drum is at the start.
+    """
+    times, tow, velocity = sample_path(tow_velocity, duration, step)
+    still = np.zeros_like(tow)
+    place, speed = still, still
+    if drum_velocity is not None:
+        _, place, speed = sample_path(drum_velocity, duration, step, "drum_velocity")
+    ahead, wet = first_direction(velocity), max(wet_length, START_LENGTH)
+    tow += wet * ahead
+    setpoint, rate = _winch_rows(drum, times, wet)
+    course = Course(times, np.c_[tow, place, setpoint], np.c_[velocity, speed, rate])
+    led = isinstance(drum, PayOutRate | Brake)
+    way = sum(float(np.linalg.norm(np.diff(x, axis=0), axis=1).sum()) for x in (tow, place))
+    longest = float(setpoint.max()) if led else 5.0 + 3.0 * (wet + way + current.fastest * duration)
+    count = max(1, int(np.floor(wet / segment_length + 0.5)))
+    lengths = np.full(count, segment_length)
+    lengths[-1] = wet - segment_length * (count - 1)
+    rope = new_rope(max(int(longest / segment_length) + 8, count + 2))
+    U = float((velocity[0] - speed[0]) @ ahead)
+    along = wet - np.append(0.0, np.cumsum(lengths))
+    k = cable.tangential_drag * U * abs(U)
+    _lay(rope, cable, lengths, k * 0.5 * (along[1:] + along[:-1]), tow[0], ahead)
+    rope.velocity[:, :count] = velocity[0]
+    rope.velocity[:, count] = speed[0]
+    rope.position[:, count] = 0.0
+    rope.ends.payout[:] = rate[0] if led else U
+    rope.ends.tow_force[:] = -k * wet * ahead
+    return _run(rope, course, cable, drum, current.numbers(), segment_length)
+
+
+def tow_lumped(
+    tow_velocity: TowVelocity,
+    length: float,
+    duration: float,
+    step: float,
+    *,
+    segment_length: float,
+    cable: CableProperties,
+    current: Current,
+    drogue_drag_area: float,
+) -> History:
+    """Tow a cable of fixed length from its steady straight tow on, as `cable.tow` does.
+
+    Args:
+        tow_velocity: function of time [s] that gives the tow point's velocity north, east, down (3,). [m/s]
+        length: L. [m]
+        duration: how long. [s]
+        step: time between recorded results. [s]
+        segment_length: Δs; taken a little smaller where L is not a whole number of it. [m]
+        cable: the cable.
+        current: the water's velocity, at places relative to the tow point at the start.
+        drogue_drag_area: C_d A of a drogue at the free end. [m²]
+
+    Returns:
+        the history; positions are relative to where the tail is at the start.
+    """
+    times, tow, velocity = sample_path(tow_velocity, duration, step)
+    count = max(1, int(np.ceil(length / segment_length - 1e-9)))
+    rope, lengths = new_rope(count), np.full(count, length / count)
+    tail_drag = 0.5 * cable.water_density * drogue_drag_area
+    J = current.at((0.0, 0.0, 0.0), 0.0)
+    ahead = _steady_direction(velocity[0] - J, first_direction(velocity - J), cable, tail_drag)
+    tow += length * ahead
+    still = np.zeros((times.size, 4))
+    course = Course(times, np.c_[tow, still], np.c_[velocity, still])
+    tail = tail_drag * float(np.sum((velocity[0] - J) ** 2))
+    tensions = _steady_tensions(velocity[0] - J, ahead, cable, lengths, tail)
+    _lay(rope, cable, lengths, 0.5 * (tensions[1:] + tensions[:-1]), tow[0], ahead)
+    rope.velocity[:, : count + 1] = velocity[0]
+    rope.ends.free_end, rope.ends.tail_drag, rope.ends.drum_pull = True, tail_drag, tail
+    rope.ends.tow_force[:] = -tensions[0] * ahead
+    return _run(rope, course, cable, DrumProperties(), current.numbers(-tow[0]), length / count)
+
+
+def _steady_tensions(
+    U: np.ndarray, ahead: np.ndarray, cable: CableProperties, lengths: np.ndarray, tail: float
+) -> np.ndarray:
+    """Return the tensions at the nodes of a steady straight tow (n + 1,), √(1 + eT) in the drag and all. [N]."""
+    tensions = np.full(lengths.size + 1, tail)
+    drag, weight = cable.tangential_drag * abs(U @ ahead) * float(U @ ahead), cable.weight_in_water * ahead[2]
+    for j in range(lengths.size - 1, -1, -1):
+        here = tensions[j + 1]
+        for _ in range(4):
+            middle = max(0.5 * (here + tensions[j + 1]), 0.0)
+            here = tensions[j + 1] + lengths[j] * (drag * np.sqrt(1.0 + cable.compliance * middle) - weight)
+        tensions[j] = here
+    return tensions
+
+
+def _lay(
+    rope: Rope,
+    cable: CableProperties,
+    lengths: np.ndarray,
+    tensions: np.ndarray,
+    tow: np.ndarray,
+    ahead: np.ndarray,
+) -> None:
+    """Lay springs of given lengths and tensions (n,) straight behind the tow point, on all levels."""
+    n = lengths.size
+    rope.ends.count = n
+    rope.ends.stretch = cable.compliance
+    rope.ends.compliance = max(cable.compliance, LEAST_COMPLIANCE)
+    rope.ends.bending = cable.bending_stiffness
+    rope.spring[REST, 1 : n + 1] = lengths
+    rope.ends.last[:] = lengths[-1]
+    behind = 0.0
+    rope.position[:, 0] = tow
+    for j in range(1, n + 1):
+        rope.spring[STATE, j] = spring_state(max(tensions[j - 1], FAINTEST))
+        rope.spring[PULL, j], _, strain, _ = spring_law(rope.spring[STATE, j], rope.ends.compliance)
+        rope.stretched[:, j] = lengths[j - 1] * (1.0 + strain)
+        behind += rope.stretched[OLD, j]
+        rope.position[:, j] = tow - behind * ahead
+        rope.vector[DIRECTION, j] = -ahead
+
+
+def _winch_rows(drum: DrumProperties | Winch, times: np.ndarray, wet: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return what a winch is asked for at times (n,), and its rate: dS/dt where the length is prescribed."""
+    if isinstance(drum, DrumProperties):
+        return np.zeros(times.size), np.zeros(times.size)
+    setpoint = drum.setpoints(times, wet)
+    if not isinstance(drum, PayOutRate):
+        return setpoint, np.gradient(setpoint, times)
+    rate = drum.rate
+    rates = np.array([float(rate(t) if callable(rate) else rate) for t in times])
+    return setpoint, np.where((setpoint <= SHORTEST) & (rates < 0.0), 0.0, rates)
+
+
+def _steady_direction(
+    U: np.ndarray, ahead: np.ndarray, cable: CableProperties, tail_drag: float
+) -> np.ndarray:
+    """Return the direction from the tail to the tow point in a steady tow, a unit vector (3,)."""
+    speed, weight = float(np.linalg.norm(U)), cable.weight_in_water
+    if speed == 0.0 and weight != 0.0:
+        return np.sign(weight) * STRAIGHT_UP
+    if weight == 0.0 or tail_drag > 0.0 or speed == 0.0 or abs(ahead[2]) > 1e-9:
+        return ahead
+    phi = cable.critical_angle(speed)
+    return np.cos(phi) * ahead + np.sin(phi) * np.sign(weight) * STRAIGHT_UP
+
+
+def _run(
+    rope: Rope,
+    course: Course,
+    cable: CableProperties,
+    drum: DrumProperties | Winch,
+    water: Water,
+    segment_length: float,
+) -> History:
+    """Run, and return the history."""
+    journey = run_rope(rope, course, cable.numbers(), drum.numbers(), water, segment_length)
+    rows, completed = journey.rows, journey.solved.converged
+    force = np.array([row.tow_force for row in rows])
+    return History(
+        time=course.times[: len(rows)],
+        tow_force=force,
+        tow_tension=np.linalg.norm(force, axis=1),
+        drum_tension=np.array([row.drum_tension for row in rows]),
+        length=np.array([row.length for row in rows]),
+        tow_point=course.values[: len(rows), :3],
+        shapes=tuple(row.position for row in rows),
+        tensions=tuple(row.tension for row in rows),
+        outcome=Outcome(
+            completed=completed,
+            message="The run reached its end." if completed else _reason(rope, journey),
+            iterations=journey.iterations,
+            worst_residual=journey.solved.residual,
+            steps=journey.steps,
+        ),
+        scheme="lumped",
+    )
+
+
+def _reason(rope: Rope, journey: Journey) -> str:
+    """Return why a run ended early: when, where, and what to try."""
+    held, solved = unknowns(rope), journey.solved
+    node, axis = divmod(solved.worst, 3)
+    if solved.worst >= 3 * held + (0 if rope.ends.free_end else 1):
+        place = f"length of segment {solved.worst - 3 * held - (0 if rope.ends.free_end else 1)}"
+    else:
+        place = "pay-out at the drum" if node >= held else f"{AXES[axis]} balance at node {node + 1}"
+    return (
+        f"The cable could not be solved beyond t = {journey.stopped_at:g} s: the {place} is off by "
+        f"{solved.residual:.1e} times its tolerance, even in the smallest step. Try other segments, or a smoother "
+        "motion of the tow point."
+    )
