@@ -13,6 +13,9 @@ Everything is SI and radians, propeller speeds are in rev/s; names and signs are
 are through the water. Names come from their modules when they are first used: python-control loads only then.
 
     >>> hull = autopilot.plant(model)                     # a control.NonlinearIOSystem; tethered=True: with the cable
+    >>> trial = subzero.load_scenario("fig6")
+    >>> pilot = autopilot.make("lqr", trial, feed_forward="model")
+    >>> run = autopilot.fly(trial, pilot, lambda t: autopilot.Wanted(speed=1.0, heading=0.5, depth=1.0))
 
 symbol       name                                    unit        file
 -----------  --------------------------------------  ----------  ----------
@@ -21,28 +24,56 @@ F_c          pull of the cable in steady motion      N           pull
 x₀, u₀       trim: steady state and its command      SI          steady
 A, B, C, D   linear model about it                   SI          linear
 λ L/U, ζ     poles in the vehicle's time scale       1           poles
+k, k_I       feedback and integral gains             SI          design, tuning
+δ_ff         feed-forward, against hull and cable    SI          standard
 """
 
 from importlib import import_module
 from typing import Any
 
 _HOME = {
+    "AUTOPILOTS": "table",
+    "Autopilot": "flight",
+    "CableModel": "feed_forward",
     "ESTIMATED": "sensors",
+    "EstimatorLoop": "estimator",
+    "FEED_FORWARD": "table",
+    "FormulaCable": "feed_forward",
+    "Gains": "design",
     "INPUTS": "states",
+    "Law": "loops",
+    "Loop": "loops",
+    "Margins": "design",
     "Mode": "poles",
+    "NoCable": "feed_forward",
     "NoTrimError": "steady",
     "PERFECT": "sensors",
     "STATES": "states",
     "SUBSYSTEMS": "linear",
+    "Schedule": "schedule",
     "Sensor": "sensors",
     "Sensors": "sensors",
+    "StandardAutopilot": "standard",
     "Trim": "steady",
+    "Tuning": "tuning",
+    "TwinCable": "feed_forward",
     "UNITS": "states",
+    "WEIGHTS": "tuning",
+    "Wanted": "standard",
+    "Weights": "tuning",
+    "design_gains": "design",
+    "estimates": "estimator",
+    "fly": "flight",
     "linearise": "linear",
+    "make": "table",
+    "margins": "design",
     "modes": "poles",
     "plant": "plants",
+    "reduced": "design",
     "subsystem": "linear",
     "trim": "steady",
+    "tune": "tuning",
+    "with_weights": "tuning",
 }
 """Public name → module of this package; no module may be called like a public name."""
 

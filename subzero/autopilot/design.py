@@ -1,0 +1,182 @@
+"""Gains from linear models: one recipe for every loop, and the user's own weights.
+
+    minimise ∫ Σ (x_i/x_i,max)² + (∫e/i_max)² + (δ/δ_max)² dt,   δ = −k·x + k_I ∫e     (linear-quadratic, with integral)
+
+on the part of the vehicle that a loop moves (`SUBSYSTEMS`). With all states of that part it is LQR, for a controller
+that estimates what it cannot measure; with the fast and unmeasured ones left to follow at once, the feedback of an
+angle, its rate and its integral is a PID. The largest acceptable deviations are the weights (Bryson's rule).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from subzero.errors import UserError
+
+if TYPE_CHECKING:
+    import control
+
+INTEGRAL = "integral"
+"""Name of ∫e among the weights."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Gains:
+    """What a design gives, with the matrices it was made from: δ = −feedback · x + integral ∫(wanted − y).
+
+    Attributes:
+        states: the states that are fed back.
+        tracked: which of them follows what is wanted.
+        feedback: gains of the states (n,).
+        integral: gain of ∫e.
+        A, B: the model with ∫e as its last state (n + 1, n + 1), (n + 1, 1); its derivative is −y.
+        Q, R: the weights. (n + 1, n + 1), (1, 1)
+        loop: the loop opened at the plant's input, as a transfer from δ to δ, for margins.
+    """
+
+    states: tuple[str, ...]
+    tracked: str
+    feedback: np.ndarray
+    integral: float
+    A: np.ndarray
+    B: np.ndarray
+    Q: np.ndarray
+    R: np.ndarray
+    loop: control.StateSpace
+
+
+def reduced(part: control.StateSpace, keep: Sequence[str]) -> control.StateSpace:
+    """Return a linear model of fewer states, the others following at once: exact at rest, good for slow motions.
+
+    Args:
+        part: from `subsystem`.
+        keep: names of the states that stay.
+
+    Raises:
+        UserError: there is no such state, or the others cannot follow (they integrate).
+    """
+    import control
+
+    labels = list(part.state_labels)
+    missing = [name for name in keep if name not in labels]
+    if missing:
+        raise UserError(f"There is no state '{missing[0]}' in '{part.name}'. Allowed: {', '.join(labels)}.")
+    A, B = np.asarray(part.A), np.asarray(part.B)
+    k = [labels.index(name) for name in keep]
+    f = [i for i in range(len(labels)) if i not in k and np.any(A[:, i])]  # depth, say, moves nothing
+    if f and np.linalg.cond(A[np.ix_(f, f)]) > 1e9:
+        raise UserError(
+            f"'{part.name}' without {', '.join(labels[i] for i in f)} means nothing: they do not settle."
+        )
+    follow = (
+        np.linalg.solve(A[np.ix_(f, f)], np.hstack([A[np.ix_(f, k)], B[f]]))
+        if f
+        else np.zeros((0, len(k) + 1))
+    )
+    A11 = A[np.ix_(k, k)] - A[np.ix_(k, f)] @ follow[:, : len(k)]
+    B1 = B[k] - A[np.ix_(k, f)] @ follow[:, len(k) :]
+    names = {"states": list(keep), "outputs": list(keep), "inputs": list(part.input_labels)}
+    return control.ss(A11, B1, np.eye(len(k)), np.zeros(B1.shape), name=part.name, **names)
+
+
+def design_gains(
+    part: control.StateSpace, *, tracked: str, largest: Mapping[str, float], largest_command: float
+) -> Gains:
+    """Return the linear-quadratic gains of a loop with integral action.
+
+    Args:
+        part: the linear model: all its states are fed back; from `subsystem`, or `reduced`.
+        tracked: the state that has to follow what is wanted.
+        largest: state, or "integral" → the largest deviation that is acceptable [its unit, integral in unit·s]; a
+            state that is not named costs nothing.
+        largest_command: the same for the command.
+
+    Raises:
+        UserError: a weight of nothing, a weight that is not above 0, a loop that cannot be stabilised.
+    """
+    import control
+
+    labels = tuple(part.state_labels)
+    _check_weights(labels, tracked, largest, largest_command)
+    n, y = len(labels), labels.index(tracked)
+    A, B = np.zeros((n + 1, n + 1)), np.zeros((n + 1, 1))
+    A[:n, :n], B[:n] = np.asarray(part.A), np.asarray(part.B)
+    A[n, y] = -1.0
+    Q = np.diag([1.0 / largest[name] ** 2 if name in largest else 0.0 for name in (*labels, INTEGRAL)])
+    R = np.array([[1.0 / largest_command**2]])
+    try:
+        K = np.asarray(control.lqr(A, B, Q, R)[0])[0]
+    except (np.linalg.LinAlgError, ValueError) as error:
+        raise UserError(f"'{part.name}' cannot be stabilised with these weights: {error}.") from error
+    return Gains(
+        states=labels, tracked=tracked, feedback=K[:n], integral=-float(K[n]), A=A, B=B, Q=Q, R=R,
+        loop=control.ss(A, B, K[None], [[0.0]], name=f"{part.name}_loop"),
+    )  # fmt: skip
+
+
+def _check_weights(
+    labels: tuple[str, ...], tracked: str, largest: Mapping[str, float], largest_command: float
+) -> None:
+    """Refuse weights that mean nothing."""
+    allowed = (*labels, INTEGRAL)
+    for name in (tracked, *largest):
+        if name not in allowed:
+            raise UserError(f"design_gains: there is no state '{name}' here. Allowed: {', '.join(allowed)}.")
+    for name, value in {**largest, "largest_command": largest_command}.items():
+        if not (np.isfinite(value) and value > 0.0):
+            raise UserError(f"design_gains: the largest {name} is {value!r}. Allowed: a number above 0.")
+    if INTEGRAL not in largest:
+        raise UserError('design_gains: "integral" has no weight. Allowed: a number above 0 [unit s].')
+
+
+@dataclass(frozen=True, kw_only=True)
+class Margins:
+    """How far a loop is from instability, opened at the plant's input.
+
+    Attributes:
+        gain: factor that the gain may grow by; infinite where none is too much.
+        gain_down: factor that it may shrink to; 0 where none is too little.
+        phase: lag that may be added. [rad]
+        delay: delay that may be added. [s]
+        crossover: frequency of gain 1. [rad/s]
+    """
+
+    gain: float
+    gain_down: float
+    phase: float
+    delay: float
+    crossover: float
+
+
+def margins(
+    loop: control.StateSpace, *, lag: control.StateSpace | None = None, delay: float = 0.0
+) -> Margins:
+    """Return gain and phase margin of a loop, from its frequency response at 4000 frequencies.
+
+    Args:
+        loop: L(s) from the command to minus the command, such as `Gains.loop`.
+        lag: another system in the loop, such as a servo that the design left out.
+        delay: of sampling, computing and sensors. [s]
+    """
+    w = np.geomspace(1e-3, 1e3, 4000)
+    L = np.squeeze(np.asarray(loop(1j * w))) * np.exp(-1j * w * delay)
+    if lag is not None:
+        L = L * np.squeeze(np.asarray(lag(1j * w)))
+    size, phase = np.abs(L), np.unwrap(np.angle(L))
+    crossing = np.flatnonzero((size[:-1] >= 1.0) & (size[1:] < 1.0))
+    real = np.flatnonzero((np.imag(L[:-1]) * np.imag(L[1:]) <= 0.0) & (np.real(L[:-1]) < 0.0))
+    factors = 1.0 / size[real]
+    up, down = factors[factors > 1.0], factors[factors < 1.0]
+    last = int(crossing[-1]) if crossing.size else 0
+    left = float((phase[last] + np.pi) % (2.0 * np.pi)) if crossing.size else np.inf
+    return Margins(
+        gain=float(up.min()) if up.size else np.inf,
+        gain_down=float(down.max()) if down.size else 0.0,
+        phase=left,
+        delay=left / float(w[last]),
+        crossover=float(w[last]) if crossing.size else 0.0,
+    )

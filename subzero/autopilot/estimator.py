@@ -1,0 +1,165 @@
+"""The heading by full state feedback: LQR on a linear model, with a Kalman filter for what is not measured.
+
+    δ = limited(δ_ff − k·(x̂ − x_w) + I),   x = (v, r, ψ, δ_r)
+    x̂ ← A_d x̂ + B_d (δ − δ_ff) + L (y − C x̂),   y = (r, ψ)
+
+Sway speed and rudder angle are estimated; the gains are those of `control.lqr` on the printed matrices (`Gains`), the
+filter that of `control.dlqe` on the model sampled at the controller's rate. Matrices are scheduled on the speed. What
+the feed-forward path cancels is no part of the filter's model; what it leaves is learned by the integral.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import inf, pi, radians
+
+import numpy as np
+
+from subzero.autopilot.design import Gains, design_gains
+from subzero.autopilot.linear import linearise, subsystem
+from subzero.autopilot.schedule import Schedule
+from subzero.autopilot.steady import trim
+from subzero.autopilot.tuning import Tuning
+from subzero.simulator import Observation
+
+STATES = ("sway_speed", "yaw_rate", "heading", "rudder_angle")
+MEASURED = np.array([[0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]])
+LARGEST = {"yaw_rate": radians(20.0), "heading": radians(8.0), "integral": radians(16.0)}
+LARGEST_COMMAND = radians(10.0)
+UNREST = np.diag([0.05, 0.05, 0.01, 0.02]) ** 2
+"""Covariance of what moves the hull beside the model, per second: sway [m/s], yaw rate, heading, rudder [rad …]."""
+NOISE = np.diag([radians(0.5), radians(0.5)]) ** 2
+"""Covariance of the measured yaw rate and heading [rad2/s2, rad2]."""
+LARGEST_ERROR = radians(25.0)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Estimates:
+    """The heading loop's matrices over speed.
+
+    Attributes:
+        designs: the LQR design at each speed.
+        feedback: k (4,) and k_I over speed.
+        model: A_d (4, 4) and B_d (4,), side by side (4, 5), over speed.
+        filter: L (4, 2) over speed.
+        turn: sway speed and rudder of a steady turn over its yaw rate (2,), over speed [m, s].
+    """
+
+    designs: tuple[Gains, ...]
+    feedback: Schedule
+    model: Schedule
+    filter: Schedule
+    turn: Schedule
+
+
+def estimates(
+    tuning: Tuning,
+    sample_time: float,
+    *,
+    largest: dict[str, float] | None = None,
+    largest_command: float = LARGEST_COMMAND,
+) -> Estimates:
+    """Return the matrices of the full-state heading loop at the speeds of a tuning.
+
+    Args:
+        tuning: the vehicle.
+        sample_time: of the controller. [s]
+        largest: weights that replace those of `LARGEST`.
+        largest_command: weight of the rudder. [rad]
+    """
+    import control
+
+    weights = LARGEST | (largest or {})
+    parts = []
+    for speed in tuning.speeds:
+        line = linearise(tuning.model, trim(tuning.model, speed=speed))
+        parts.append(subsystem(line, "yaw_sway"))
+    designs = tuple(
+        design_gains(part, tracked="heading", largest=weights, largest_command=largest_command)
+        for part in parts
+    )
+    sampled = [control.c2d(part, sample_time) for part in parts]
+    filters = [
+        np.asarray(control.dlqe(np.asarray(one.A), np.eye(4), MEASURED, UNREST * sample_time, NOISE)[0])
+        for one in sampled
+    ]
+    speeds = np.array(tuning.speeds)
+    turn = np.stack([tuning.sway_per_yaw.values, tuning.rudder_per_yaw.values], axis=1)
+    return Estimates(
+        designs=designs,
+        feedback=Schedule(speeds, np.array([np.append(one.feedback, one.integral) for one in designs])),
+        model=Schedule(speeds, np.array([np.hstack([one.A, one.B]) for one in sampled])),
+        filter=Schedule(speeds, np.array(filters)),
+        turn=Schedule(speeds, turn),
+    )
+
+
+class EstimatorLoop:
+    """The full-state heading loop at work; the interface is that of `loops.Loop`.
+
+    Args:
+        matrices: from `estimates`, for the same sample time.
+        sample_time: of the controller. [s]
+    """
+
+    def __init__(self, matrices: Estimates, sample_time: float) -> None:
+        self.matrices, self.sample_time = matrices, sample_time
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the estimate and what was integrated."""
+        self.integral = 0.0
+        self.estimate: np.ndarray | None = None
+
+    def engage(
+        self,
+        reading: Observation,
+        wanted: float,
+        speed: float,
+        feed_forward: float,
+        command: float,
+        rate: float = 0.0,
+    ) -> None:
+        """Take over from a command without a jump: the next command, unlimited, is this one."""
+        self.estimate = np.array([0.0, reading.yaw_rate, reading.heading, command - feed_forward])
+        self.integral = command - feed_forward - self._feedback(wanted, speed, rate)[0]
+
+    def update(
+        self,
+        reading: Observation,
+        wanted: float,
+        speed: float,
+        feed_forward: float = 0.0,
+        limits: tuple[float, float] = (-inf, inf),
+        integrate: bool = True,
+        rate: float = 0.0,
+    ) -> float:
+        """Return the rudder command for the next sample [rad]; arguments as of `loops.Loop.update`."""
+        if self.estimate is None:
+            self.estimate = np.array([0.0, reading.yaw_rate, reading.heading, 0.0])
+        feedback, growth = self._feedback(wanted, speed, rate)
+        low, high = limits
+        command = feed_forward + feedback + self.integral + growth
+        if not integrate or (command > high and growth > 0.0) or (command < low and growth < 0.0):
+            growth = 0.0
+        self.integral += growth
+        command = min(high, max(low, feed_forward + feedback + self.integral))
+        self._predict(reading, speed, command - feed_forward + float(self.matrices.turn.at(speed)[1]) * rate)
+        return command
+
+    def _feedback(self, wanted: float, speed: float, rate: float) -> tuple[float, float]:
+        """Return −k·(x̂ − x_w) and how the integral grows in this sample."""
+        assert self.estimate is not None
+        *k, k_integral = self.matrices.feedback.at(speed).tolist()
+        sway, rudder = (self.matrices.turn.at(speed) * rate).tolist()
+        error = max(-LARGEST_ERROR, min(LARGEST_ERROR, wanted - float(self.estimate[2])))
+        off = self.estimate - np.array([sway, rate, self.estimate[2] + error, rudder])
+        return -float(np.dot(k, off)), self.sample_time * k_integral * error
+
+    def _predict(self, reading: Observation, speed: float, command: float) -> None:
+        """Move the estimate on by a sample, corrected by what was measured."""
+        assert self.estimate is not None
+        model, gain = self.matrices.model.at(speed), self.matrices.filter.at(speed)
+        surprise = np.array([reading.yaw_rate, reading.heading]) - MEASURED @ self.estimate
+        surprise[1] -= 2.0 * pi * round(surprise[1] / (2.0 * pi)) if abs(surprise[1]) > pi else 0.0
+        self.estimate = model[:, :4] @ self.estimate + model[:, 4] * command + gain @ surprise

@@ -1,0 +1,111 @@
+"""What the cable does to the vehicle, as a controller can know it: for the feed-forward path.
+
+Both need no look at the true state. The formula takes drum length, speed and yaw rate as measured, and has the cable
+straight along the way of the tow point (`pull`). The twin is a simulation of vehicle and cable that runs beside the
+controller under the commands that were sent; its pull is taken in proportion to the length of cable that the drum has
+really let go.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+
+import numpy as np
+
+import scenarios
+from subzero.autopilot.pull import SteadyPull
+from subzero.autopilot.tuning import Tuning
+from subzero.model import Model
+from subzero.simulator import Observation, RunStoppedError, Simulator
+
+SHORT = 0.5
+"""Cable shorter than this pulls with nothing worth cancelling. [m]"""
+
+
+class CableModel(ABC):
+    """What estimates the cable's pull; to write one:
+
+    1. `reset` begins again at the start of a run.
+    2. `wrench` is called once a sample, in order, with what the sensors tell and the command of the sample before; it
+       returns force and moment of the cable on the hull (6,), body axes, about the hull centre [N, N m].
+    3. It never looks at anything else.
+    """
+
+    @abstractmethod
+    def reset(self) -> None:
+        """Begin again."""
+
+    @abstractmethod
+    def wrench(self, reading: Observation, last_command: np.ndarray | None) -> np.ndarray:
+        """Return the cable's pull now; `last_command` is None at the first sample."""
+
+
+class NoCable(CableModel):
+    """Feedback alone."""
+
+    def reset(self) -> None:
+        """Nothing to forget."""
+
+    def wrench(self, reading: Observation, last_command: np.ndarray | None) -> np.ndarray:
+        """Return no pull."""
+        return np.zeros(6)
+
+
+class FormulaCable(CableModel):
+    """½ρπdC_t U² S along the way of the tow point, from drum length, speed and yaw rate.
+
+    Args:
+        tuning: of the vehicle, for the sway that goes with a yaw rate.
+        model: whose cable is believed in; the tuning's by default.
+    """
+
+    def __init__(self, tuning: Tuning, model: Model | None = None) -> None:
+        self._tuning, self._model = tuning, model or tuning.model
+
+    def reset(self) -> None:
+        """Nothing to forget."""
+
+    def wrench(self, reading: Observation, last_command: np.ndarray | None) -> np.ndarray:
+        """Return the pull of a cable that lies behind the tow point."""
+        length = reading.cable_length
+        if not length > SHORT:
+            return np.zeros(6)
+        u, r = reading.surge_speed, reading.yaw_rate
+        sway = float(self._tuning.sway_per_yaw.at(u)) * r
+        nu = np.array([u, sway, 0.0, 0.0, reading.pitch_rate, r])
+        return SteadyPull.of(self._model, length).wrench(nu)
+
+
+class TwinCable(CableModel):
+    """A simulation beside the controller, told the same commands, corrected by the drum's length.
+
+    Args:
+        trial: where the run starts, and its steps.
+        sample_time: of the controller. [s]
+        model: what is believed of vehicle, cable and water; the trial's by default.
+    """
+
+    def __init__(self, trial: scenarios.Trial, sample_time: float, model: Model | None = None) -> None:
+        self._twin = Simulator(trial, model=model, sample_time=sample_time)
+        self._lost = False
+
+    def reset(self) -> None:
+        """Begin again at the start of the trial."""
+        self._twin.reset()
+        self._lost = False
+
+    def wrench(self, reading: Observation, last_command: np.ndarray | None) -> np.ndarray:
+        """Return the twin's pull, in proportion to the length that is out."""
+        if last_command is not None and not self._lost:
+            try:
+                self._twin.step(last_command)
+            except RunStoppedError:
+                self._lost = True  # the last pull goes on with the length
+        seen = self._twin.observation
+        if not (reading.cable_length > SHORT and seen.cable_length > SHORT):
+            return np.zeros(6)
+        pull = (
+            seen.cable_force_forward, seen.cable_force_starboard, seen.cable_force_down,
+            seen.cable_moment_roll, seen.cable_moment_pitch, seen.cable_moment_yaw,
+        )  # fmt: skip
+        return np.array(pull) * (reading.cable_length / seen.cable_length)

@@ -1,0 +1,187 @@
+"""Everything that the standard autopilots know of a vehicle, at several speeds: gains, trims, what its fins are worth.
+
+Only the hull alone is designed for: the cable is no part of it, so what is fed back moves unchanged on board when the
+cable is cut. `WEIGHTS` are the largest acceptable deviations of each loop; call `tune` with others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from math import radians
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from subzero.autopilot.design import Gains, design_gains, reduced
+from subzero.autopilot.linear import linearise, subsystem
+from subzero.autopilot.schedule import Schedule
+from subzero.autopilot.steady import Trim, trim
+from subzero.model import Model
+from vehicle.propeller import thrust
+
+if TYPE_CHECKING:
+    import control
+
+SPEEDS = (0.4, 0.6, 0.8, 1.0, 1.2, 1.4)
+"""Speeds that gains are designed at. [m/s]"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Weights:
+    """What a loop feeds back, the tracked state last, and the largest acceptable deviations (`design_gains`)."""
+
+    part: str
+    measured: tuple[str, ...]
+    largest: Mapping[str, float]
+    largest_command: float
+
+
+WEIGHTS: dict[str, Weights] = {
+    "speed": Weights(
+        part="surge",
+        measured=("surge_speed",),
+        largest={"surge_speed": 0.1, "integral": 0.2},
+        largest_command=4.0,
+    ),
+    "heading": Weights(
+        part="yaw_sway",
+        measured=("yaw_rate", "heading"),
+        largest={"yaw_rate": radians(20.0), "heading": radians(8.0), "integral": radians(16.0)},
+        largest_command=radians(10.0),
+    ),
+    "pitch": Weights(
+        part="pitch_heave",
+        measured=("pitch_rate", "pitch"),
+        largest={"pitch_rate": radians(20.0), "pitch": radians(8.0), "integral": radians(16.0)},
+        largest_command=radians(10.0),
+    ),
+    "roll": Weights(
+        part="roll",
+        measured=("roll_rate", "roll"),
+        largest={"roll_rate": radians(60.0), "roll": radians(8.0), "integral": radians(16.0)},
+        largest_command=radians(6.0),
+    ),
+}
+"""Loop → its weights."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Tuning:
+    """A vehicle at several speeds.
+
+    Attributes:
+        model: the hull that was designed for.
+        speeds: [m/s]
+        designs: loop → the design at each speed.
+        gains: loop → (k of each measured, k_I) over speed.
+        hull_drag: thrust that the hull alone needs over speed. [N]
+        planes: trim of the planes, together and unlike, over speed (2,). [rad]
+        rudder_for: rudder that cancels a sway force and a yaw moment from outside (2,). [rad/N, rad/(N m)]
+        planes_for: planes together that cancel a heave force and a pitch moment (2,). [rad/N, rad/(N m)]
+        sway_per_yaw: sway speed of a steady turn over its yaw rate. [m]
+        rudder_per_yaw: rudder of a steady turn over its yaw rate. [s]
+    """
+
+    model: Model
+    speeds: tuple[float, ...]
+    designs: Mapping[str, tuple[Gains, ...]]
+    gains: Mapping[str, Schedule]
+    hull_drag: Schedule
+    planes: Schedule
+    rudder_for: Schedule
+    planes_for: Schedule
+    sway_per_yaw: Schedule
+    rudder_per_yaw: Schedule
+
+
+def tune(
+    model: Model, *, speeds: tuple[float, ...] = SPEEDS, weights: Mapping[str, Weights] | None = None
+) -> Tuning:
+    """Return the tuning of a vehicle: linear models and gains at several speeds.
+
+    Args:
+        model: whose hull; its cable is not looked at.
+        speeds: increasing; speeds beyond them get the gains of the ends. [m/s]
+        weights: loop → weights that replace those of `WEIGHTS`.
+
+    Raises:
+        NoTrimError: the vehicle has no steady motion at one of the speeds.
+        UserError: weights that mean nothing.
+    """
+    weights = WEIGHTS | dict(weights or {})
+    trims = [trim(model, speed=speed) for speed in speeds]
+    lines = [linearise(model, steady) for steady in trims]
+    designs = {name: tuple(design_loop(line, weight) for line in lines) for name, weight in weights.items()}
+
+    def over_speed(values: list[np.ndarray]) -> Schedule:
+        return Schedule(np.array(speeds, dtype=float), np.array(values))
+
+    inverse = model.vehicle.numbers().inverse_mass
+    return Tuning(
+        model=model,
+        speeds=speeds,
+        designs=designs,
+        gains={
+            name: over_speed([np.append(one.feedback, one.integral) for one in found])
+            for name, found in designs.items()
+        },
+        hull_drag=over_speed([np.array(_thrust(model, steady)) for steady in trims]),
+        planes=over_speed([_mixed_planes(steady) for steady in trims]),
+        rudder_for=over_speed(
+            [_against(line, "yaw_sway", inverse[np.ix_((1, 5), (1, 5))]) for line in lines]
+        ),
+        planes_for=over_speed(
+            [_against(line, "pitch_heave", inverse[np.ix_((2, 4), (2, 4))]) for line in lines]
+        ),
+        sway_per_yaw=over_speed([_steady_turn(line)[0] for line in lines]),
+        rudder_per_yaw=over_speed([_steady_turn(line)[1] for line in lines]),
+    )
+
+
+def design_loop(linear: control.StateSpace, weights: Weights) -> Gains:
+    """Return the gains of one loop on a linear model of the whole hull."""
+    part = reduced(subsystem(linear, weights.part), weights.measured)
+    return design_gains(
+        part, tracked=weights.measured[-1], largest=weights.largest, largest_command=weights.largest_command
+    )
+
+
+def with_weights(name: str, **changes: float | Mapping[str, float]) -> dict[str, Weights]:
+    """Return one loop's weights with changes, for `tune(weights=...)`."""
+    return {name: replace(WEIGHTS[name], **changes)}  # type: ignore[arg-type]
+
+
+def _thrust(model: Model, steady: Trim) -> float:
+    """Return the thrust on the hull of a steady motion [N]."""
+    return float(
+        thrust(
+            steady.propeller_rps, steady.speed, model.vehicle.propeller.numbers(model.vehicle.water.density)
+        )
+    )
+
+
+def _mixed_planes(steady: Trim) -> np.ndarray:
+    """Return the planes together and unlike [rad]."""
+    port, starboard = steady.state[14], steady.state[15]
+    return np.array([0.5 * (starboard + port), 0.5 * (starboard - port)])
+
+
+def _against(linear: control.StateSpace, name: str, inverse_mass: np.ndarray) -> np.ndarray:
+    """Return the fin angle per force and moment (2,) that leaves the turn rate at rest: sway (or heave) follows.
+
+    A = [a_v  a_vr; a_rv  a_r], b by the fin: with v' = 0 and r = 0, r' = (1, −a_rv/a_v)·(d_r + b_r δ, d_v + b_v δ).
+    """
+    part = subsystem(linear, name)
+    A, labels = np.asarray(part.A), list(part.state_labels)
+    fin = labels[-1]
+    v, r, f = 0, 1, labels.index(fin)
+    row = np.array([-A[r, v] / A[v, v], 1.0])
+    return -(row @ inverse_mass) / float(row @ A[[v, r], f])
+
+
+def _steady_turn(linear: control.StateSpace) -> np.ndarray:
+    """Return sway speed [m] and rudder [s] of a steady turn, over its yaw rate."""
+    part = subsystem(linear, "yaw_sway")
+    A = np.asarray(part.A)
+    return np.linalg.solve(A[:2][:, [0, 3]], -A[:2, 1])
