@@ -123,7 +123,9 @@ def _drum_row(
     )
     row, by_V, Q = 3 * (N - 1), np.zeros(3), np.zeros(3)
     unit = unit_length(rope, N) * rope.ends.by_payout
-    along, by_U = rope.spring[PULL, N], -rope.spring[GAIN, N] * unit
+    thinner = 0.5 * half * rope.ends.stretch / (1.0 + rope.ends.stretch * rope.spring[PULL, N])
+    gain = rope.spring[GAIN, N] * (1.0 + thinner * _along(rope.vector[DIRECTION, N], end.drag))
+    along, by_U = rope.spring[PULL, N], -gain * unit
     for i in range(3):
         t = rope.vector[DIRECTION, N, i]
         rope.momentum[NEW, N, i] = half * end.momentum[i]
@@ -132,7 +134,7 @@ def _drum_row(
         along += t * Q[i]
         grown = 0.5 * rope.ends.by_payout * (end.momentum[i] / g + end.force[i])
         by_U += t * (grown - end.momentum[i] + flow_by_U[i])
-        by_V[i] -= rope.spring[GAIN, N] * rope.vector[ANSWER, N, i]
+        by_V[i] -= gain * rope.vector[ANSWER, N, i]
         for k in range(3):
             by_U -= t * half * end.by_velocity[i, k] * rope.vector[DIRECTION, N, k]
             by_V[k] += t * flow[i, k] + Q[i] * turn(rope, g, i, k)
@@ -143,11 +145,17 @@ def _drum_row(
     excess, by_excess, spins = _drum_law(rope, g, drum, along)
     if spins < 1.0:
         by_V *= 0.0
-    rope.right[row] = excess - spins * rope.spring[GAIN, N] * rope.spring[GAP, N]
+    rope.right[row] = excess - spins * gain * rope.spring[GAP, N]
     add(rope.band, row, row, by_excess - spins * by_U)
     if N > 1:
         for k in range(3):
             add(rope.band, row, row - 3 + k, -spins * by_V[k])
+
+
+@inner
+def _along(t: np.ndarray, vector: np.ndarray) -> float:
+    """Return t·vector."""
+    return t[0] * vector[0] + t[1] * vector[1] + t[2] * vector[2]
 
 
 @compiled
