@@ -101,6 +101,7 @@ def draw(figure: Any) -> None:
         slopes.loglog([LENGTH / n for n in SIZES], errors, "o-", color=colour, markersize=3, linewidth=1.0)
     guide = np.array([LENGTH / SIZES[-1], LENGTH / SIZES[0]])
     slopes.loglog(guide, 1e-3 * guide**2, ":", color=INK, linewidth=1.0, label="order 2")
+    slopes.xaxis.set_minor_formatter("")
     shapes.invert_yaxis()
     shapes.set_title("catenary (lines), 25 segments (dots)", fontsize=NORMAL)
     slopes.set_title("error of the tow force", fontsize=NORMAL)

@@ -91,7 +91,9 @@ class Setting:
 
 
 def order(sizes: Sequence[float], errors: Sequence[float]) -> float:
-    """Return the slope of log error over log size, fitted to all refinements."""
+    """Return the slope of log error over log size, fitted to all refinements; no number where there is no error."""
+    if not (np.asarray(errors) > 0.0).all():
+        return float("nan")
     return float(np.polyfit(np.log(sizes), np.log(errors), 1)[0])
 
 
