@@ -76,7 +76,7 @@ def test_feed_forward_makes_the_speed_error_five_times_smaller(fig6, tuning, fee
     assert rms(alone) > 5.0 * rms(helped)
 
 
-@pytest.mark.parametrize("name", ["pid", "lqr"])
+@pytest.mark.parametrize("name", ["pid", pytest.param("lqr", marks=pytest.mark.slow)])
 def test_the_cable_model_makes_the_heading_error_in_a_wide_turn_three_times_smaller(wide_turn, tuning, name):
     errors = {}
     for feed_forward in ("none", "model"):

@@ -1,0 +1,293 @@
+"""Manoeuvres: programs of commands that look at the vehicle, flown like an autopilot, with and without the cable.
+
+Each begins with a straight run at the trim of the bare hull, so that both vehicles come to the manoeuvre as they would
+in water: the tethered one with cable behind it, and slower for it. To add one: a class with `update`, a function that
+measures it (`indices`), and a line in `MANOEUVRES`.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from math import degrees, radians
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+import scenarios
+from subzero.autopilot import indices
+from subzero.autopilot.flight import fly
+from subzero.autopilot.standard import Wanted
+from subzero.autopilot.states import INPUT_NAMES
+from subzero.autopilot.steady import trim
+from subzero.errors import UserError, suggestion
+from subzero.model import Model
+from subzero.simulator import Observation
+from subzero.trials import load
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+RUN_IN = 12.0
+"""How long the straight run before a manoeuvre lasts. [s]"""
+
+Command = tuple[float, float, float, float]
+
+
+@dataclass(kw_only=True)
+class Program(ABC):
+    """What all manoeuvres have: the straight run. Final classes say what comes then, in `after`.
+
+    Attributes:
+        straight: command of the straight run: propeller [rev/s], rudder, port and starboard plane [rad].
+        size: of the manoeuvre: rudder or planes; share of the propeller speed for a crash stop. [rad, 1]
+        sample_time: [s]
+        name: for messages.
+    """
+
+    straight: Command
+    size: float
+    sample_time: float = 0.1
+    name: str = "manoeuvre"
+    begun: Observation | None = field(default=None, init=False)
+    side: float = field(default=1.0, init=False)
+
+    def reset(self) -> None:
+        """Begin again."""
+        self.begun, self.side = None, 1.0
+
+    def update(self, reading: Observation, wanted: Wanted) -> Command:
+        """Return the command for the next sample."""
+        if reading.time < RUN_IN - 1e-9:
+            return self.straight
+        self.begun = self.begun or reading
+        return self.after(reading, self.begun)
+
+    @abstractmethod
+    def after(self, now: Observation, begun: Observation) -> Command:
+        """Return the command once the manoeuvre has begun."""
+
+    def with_rudder(self, angle: float) -> Command:
+        """Return the straight command with a rudder [rad]."""
+        n, _, port, starboard = self.straight
+        return n, angle, port, starboard
+
+    def with_planes(self, angle: float) -> Command:
+        """Return the straight command with both planes moved [rad]."""
+        n, rudder, port, starboard = self.straight
+        return n, rudder, port + angle, starboard + angle
+
+
+class TurningCircle(Program):
+    """The rudder put over, and kept."""
+
+    def after(self, now: Observation, begun: Observation) -> Command:
+        """Return the rudder over."""
+        return self.with_rudder(self.size)
+
+
+class ZigZag(Program):
+    """The rudder reversed each time the heading has changed by as much as the rudder."""
+
+    def after(self, now: Observation, begun: Observation) -> Command:
+        """Return the rudder on its present side."""
+        if self.side * (now.heading - begun.heading) >= abs(self.size):
+            self.side = -self.side
+        return self.with_rudder(self.side * self.size)
+
+
+class VerticalZigZag(Program):
+    """The planes reversed each time the pitch has changed by as much as the planes."""
+
+    def after(self, now: Observation, begun: Observation) -> Command:
+        """Return the planes on their present side."""
+        if self.side * (now.pitch - begun.pitch) >= abs(self.size):
+            self.side = -self.side
+        return self.with_planes(self.side * self.size)
+
+
+SPIRAL_SHARES = (
+    1.0,
+    0.5,
+    0.25,
+    0.1,
+    0.0,
+    -0.1,
+    -0.25,
+    -0.5,
+    -1.0,
+    -0.5,
+    -0.25,
+    -0.1,
+    0.0,
+    0.1,
+    0.25,
+    0.5,
+    1.0,
+)
+SPIRAL_HOLD = 6.0
+"""Rudders of a spiral, as shares of the largest, and how long each is held [s]."""
+
+
+class Spiral(Program):
+    """Dieudonné's spiral: rudders in steps from one side to the other and back, each until the turn is steady."""
+
+    def after(self, now: Observation, begun: Observation) -> Command:
+        """Return the rudder of the present step."""
+        step = int((now.time - begun.time + 1e-9) / SPIRAL_HOLD)
+        return self.with_rudder(self.size * SPIRAL_SHARES[min(step, len(SPIRAL_SHARES) - 1)])
+
+
+class CrashStop(Program):
+    """The propeller full astern."""
+
+    def after(self, now: Observation, begun: Observation) -> Command:
+        """Return the propeller astern, the fins as they were."""
+        n, *fins = self.straight
+        return (-self.size * n, *fins)  # type: ignore[return-value]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Manoeuvre:
+    """A line of the table.
+
+    Attributes:
+        meaning: in words.
+        program: what commands it.
+        size: by default. [degree; 1]
+        unit: of the size.
+        duration: of the manoeuvre after the straight run. [s]
+        index: what measures it, from `indices`.
+        channels: what of a run the index takes, in its order, SI and radians.
+        numbers: what else it takes, by name.
+        takes_size_as: the name of the size among these, if it takes it.
+    """
+
+    meaning: str
+    program: type[Program]
+    size: float
+    unit: str = "degree"
+    duration: float
+    index: Callable[..., dict[str, float]]
+    channels: tuple[str, ...]
+    numbers: Mapping[str, float] = field(default_factory=lambda: {"start": RUN_IN})
+    takes_size_as: str = ""
+
+    def measure(self, run: Mapping[str, np.ndarray], size: float) -> dict[str, float]:
+        """Return the indices of a run; the size in radians (or a share)."""
+        sized = {self.takes_size_as: size} if self.takes_size_as else {}
+        return self.index(*(run[name] for name in self.channels), **self.numbers, **sized)
+
+
+MANOEUVRES: dict[str, Manoeuvre] = {
+    "turning_circle": Manoeuvre(
+        meaning="rudder put over and kept",
+        program=TurningCircle,
+        size=10.0,
+        duration=45.0,
+        index=indices.turning_circle,
+        channels=("time", "north", "east", "heading"),
+    ),
+    "zigzag": Manoeuvre(
+        meaning="rudder reversed when the heading has changed by as much",
+        program=ZigZag,
+        size=10.0,
+        duration=30.0,
+        index=indices.zigzag,
+        channels=("time", "heading", "rudder_command"),
+        takes_size_as="limit",
+    ),
+    "vertical_zigzag": Manoeuvre(
+        meaning="stern-planes reversed when the pitch has changed by as much",
+        program=VerticalZigZag,
+        size=5.0,
+        duration=40.0,
+        index=indices.zigzag,
+        channels=("time", "pitch", "planes"),
+        takes_size_as="limit",
+    ),
+    "spiral": Manoeuvre(
+        meaning="rudder in steps to the other side and back",
+        program=Spiral,
+        size=15.0,
+        duration=SPIRAL_HOLD * len(SPIRAL_SHARES),
+        index=indices.spiral,
+        channels=("time", "yaw_rate", "rudder_command"),
+        numbers={"start": RUN_IN, "hold": SPIRAL_HOLD},
+    ),
+    "crash_stop": Manoeuvre(
+        meaning="propeller astern, size times as fast",
+        program=CrashStop,
+        size=1.0,
+        unit="1",
+        duration=15.0,
+        index=indices.crash_stop,
+        channels=("time", "north", "east", "surge_speed", "heading"),
+    ),
+}
+"""Manoeuvre by name."""
+
+
+def manoeuvre(
+    name: str,
+    scenario: str | scenarios.Trial = "fig6",
+    *,
+    size: float | None = None,
+    speed: float = 1.0,
+    tethered: bool = True,
+    model: Model | None = None,
+) -> tuple[xr.Dataset, dict[str, float]]:
+    """Return the run of a manoeuvre, and its indices (units in their names).
+
+    Args:
+        name: one of `MANOEUVRES`.
+        scenario: whose vehicle, cable and start; its commands are not used.
+        size: rudder or planes [degree], or the share of the propeller speed of a crash stop; the table's by default.
+        speed: of the bare hull in the straight run, which the propeller is set for. [m/s]
+        tethered: with the cable.
+        model: another model than the scenario's.
+
+    Raises:
+        UserError: there is no such manoeuvre, a size of nothing or beyond the fins, no steady motion at this speed.
+    """
+    if name not in MANOEUVRES:
+        allowed = ", ".join(MANOEUVRES)
+        raise UserError(f"There is no manoeuvre '{name}'.{suggestion(name, MANOEUVRES)} Allowed: {allowed}.")
+    line = MANOEUVRES[name]
+    trial = scenario if isinstance(scenario, scenarios.Trial) else load(scenario)
+    model = model or Model.of(trial)
+    asked = line.size if size is None else size
+    inner = _checked_size(line, asked, model)
+    straight = tuple(trim(model, speed=speed).command.tolist())
+    program = line.program(straight=straight, size=inner, name=name, sample_time=trial.cable_step)
+    begin = replace(trial, start=replace(trial.start, surge_speed=speed))
+    run = fly(
+        begin, program, lambda t: _NOTHING, tethered=tethered, model=model, duration=RUN_IN + line.duration
+    )
+    run = run.drop_vars(["wanted_speed", "wanted_heading", "wanted_depth"])
+    return run, line.measure(_inner(run), inner)
+
+
+_NOTHING = Wanted(float("nan"), float("nan"))
+
+
+def _checked_size(line: Manoeuvre, size: float, model: Model) -> float:
+    """Return a size in radians (or as a share), if fins can do it."""
+    most = 5.0 if line.unit == "1" else degrees(model.vehicle.rudder_servo.deflection_limit)
+    if not 0.0 < abs(size) <= most:
+        unit = "" if line.unit == "1" else " degrees"
+        raise UserError(f"A size of {size:g}{unit} cannot be done. Allowed: up to {most:.3g}{unit}, not 0.")
+    return size if line.unit == "1" else radians(size)
+
+
+def _inner(run: xr.Dataset) -> dict[str, np.ndarray]:
+    """Return the channels that are measured, in SI and radians."""
+    names = ("north", "east", "heading", "pitch", "surge_speed", "yaw_rate", *INPUT_NAMES)
+    found: dict[str, Any] = {"time": run["time"].values}
+    for name in names:
+        scale = np.pi / 180.0 if run[name].attrs["units"].startswith("degree") else 1.0
+        found[name] = run[name].values * scale
+    together = 0.5 * (found["stern_plane_port_command"] + found["stern_plane_starboard_command"])
+    found["planes"] = np.where(np.abs(together - together[0]) < 1e-9, 0.0, together - together[0])
+    return found

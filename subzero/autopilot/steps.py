@@ -1,0 +1,98 @@
+"""Steps of what an autopilot has to hold, and how well it does: heading, depth, speed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import radians
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+import scenarios
+from subzero.autopilot.flight import fly
+from subzero.autopilot.indices import step_response
+from subzero.autopilot.sensors import PERFECT, Sensor
+from subzero.autopilot.standard import Wanted
+from subzero.autopilot.table import make
+from subzero.autopilot.tuning import Tuning
+from subzero.errors import UserError, suggestion
+from subzero.model import Model
+from subzero.trials import load
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import xarray as xr
+
+STEP_AT, DURATION = 15.0, 60.0
+"""When the step comes, and how long a run lasts. [s]"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Step:
+    """A line of the table: what is stepped, its channel, by how much (in the unit of the channel), inner per unit."""
+
+    field: str
+    channel: str
+    size: float
+    scale: float
+
+
+STEPS = {
+    "heading_step": Step(field="heading", channel="heading", size=10.0, scale=radians(1.0)),
+    "depth_step": Step(field="depth", channel="depth", size=1.0, scale=1.0),
+    "speed_step": Step(field="speed", channel="surge_speed", size=0.2, scale=1.0),
+}
+"""Step by name: degrees, m, m/s."""
+
+
+def step(
+    name: str,
+    scenario: str | scenarios.Trial = "fig6",
+    *,
+    autopilot: str = "pid",
+    feed_forward: str = "none",
+    size: float | None = None,
+    speed: float = 1.0,
+    tethered: bool = True,
+    model: Model | None = None,
+    tuning: Tuning | None = None,
+    sensors: Sequence[Sensor] = PERFECT,
+    seed: int = 0,
+) -> tuple[xr.Dataset, dict[str, float]]:
+    """Return the run of a step and its indices: rise, overshoot, settling, steady error (in the channel's unit).
+
+    Args:
+        name: one of `STEPS`.
+        scenario: whose vehicle, cable and start; its commands are not used.
+        autopilot: one of `AUTOPILOTS`.
+        feed_forward: one of `FEED_FORWARD`.
+        size: of the step, in degrees, m or m/s; the table's by default.
+        speed: to hold. [m/s]
+        tethered: with the cable.
+        model: what is true; the autopilot believes the scenario's.
+        tuning: gains.
+        sensors: what the autopilot is told.
+        seed: of the sensors.
+
+    Raises:
+        UserError: there is no such step, autopilot or feed-forward, or a step of nothing.
+    """
+    if name not in STEPS:
+        raise UserError(f"There is no step '{name}'.{suggestion(name, STEPS)} Allowed: {', '.join(STEPS)}.")
+    line = STEPS[name]
+    size = line.size if size is None else size
+    if not np.isfinite(size) or size == 0.0:
+        raise UserError(f"A step of {size!r} is none. Allowed: a finite number, not 0.")
+    trial = scenario if isinstance(scenario, scenarios.Trial) else load(scenario)
+    before = Wanted(speed, trial.start.heading, trial.start.depth)
+    goal = before._replace(**{line.field: getattr(before, line.field) + size * line.scale})
+    pilot = make(autopilot, trial, feed_forward=feed_forward, sample_time=trial.cable_step, tuning=tuning)
+    begin = replace(trial, start=replace(trial.start, surge_speed=speed))
+    run = fly(
+        begin, pilot, lambda t: goal if t >= STEP_AT - 1e-9 else before,
+        tethered=tethered, model=model, duration=DURATION, sensors=sensors, seed=seed,
+    )  # fmt: skip
+    values = run[line.channel].values
+    wanted = getattr(goal, line.field) / line.scale
+    return run, step_response(run["time"].values, values, wanted, STEP_AT)
