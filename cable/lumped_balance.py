@@ -27,15 +27,12 @@ def balance_nodes(rope: Rope, g: float, c: CableNumbers) -> None:
     s = np.zeros(3)
     for j in range(1, unknowns(rope) + 1):
         before, after, width = neighbours(rope, j, s)
-        load_node(rope, j, s, 1.0 / g, c)
+        thin = load_node(rope, j, s, 1.0 / g, c)
         for i in range(3):
             rope.momentum[NEW, j, i] = width * rope.node.momentum[i]
             rate = (rope.momentum[NEW, j, i] - rope.vector[START_MOMENTUM, j, i]) / g
             rope.right[3 * (j - 1) + i] += rate + width * rope.node.force[i]
-            tension = 0.5 * (
-                rope.spring[PULL, j] + (0.0 if j == rope.ends.count else rope.spring[PULL, j + 1])
-            )
-            thinner = 0.25 * rope.ends.stretch / (1.0 + rope.ends.stretch * tension)
+            thinner = (0.5 if j == rope.ends.count else 0.25) * rope.ends.stretch / (thin * thin)
             rope.vector[THINNING, j, i] = width * rope.node.drag[i] * thinner
         _slopes(rope, j, g, before, after, width)
         if j == rope.ends.count - 1 and not rope.ends.free_end:
@@ -63,16 +60,17 @@ def neighbours(rope: Rope, j: int, s: np.ndarray) -> tuple[float, float, float]:
 
 
 @inner
-def load_node(rope: Rope, j: int, s: np.ndarray, a: float, c: CableNumbers) -> None:
-    """Fill rope.node with the load of a metre of cable at node j, its tangent along s (3,)."""
+def load_node(rope: Rope, j: int, s: np.ndarray, a: float, c: CableNumbers) -> float:
+    """Fill rope.node with the load of a metre of cable at node j, its tangent along s (3,); return √(1 + eT)."""
     here, N = rope.node, rope.ends.count
     shorten(s, here)
     for i in range(3):
         here.velocity[i] = rope.velocity[NEW, j, i]
         here.water[i] = rope.vector[WATER, j, i]
-    tension = 0.5 * (rope.spring[PULL, max(j, 1)] + (0.0 if j == N else rope.spring[PULL, j + 1]))
+    tension = 0.5 * (rope.spring[PULL, max(j, 1)] + rope.spring[PULL, min(j + 1, N)])
     thin = sqrt(1.0 + rope.ends.stretch * tension)
     evaluate_node(c.mass, c.added_mass, c.weight, thin * c.tangential_drag, thin * c.normal_drag, a, here)
+    return thin
 
 
 @compiled

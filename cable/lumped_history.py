@@ -10,12 +10,12 @@ import numpy as np
 
 from .history import History, Outcome
 from .lumped_rope import DIRECTION, OLD, PULL, REST, STATE, Rope, new_rope, unknowns
-from .lumped_run import Course, Journey, run_rope
+from .lumped_run import FULL, Course, Journey, run_rope
 from .lumped_spring import LEAST_COMPLIANCE, spring_law, spring_state
 from .properties import CableProperties, DrumProperties
 from .runs import TowVelocity, first_direction, sample_path
 from .water import Current, Water
-from .winch import SHORTEST, Brake, PayOutRate, Winch
+from .winch import SHORTEST, Brake, ConstantTension, PayOutRate, Winch
 
 AXES = ("northward", "eastward", "downward")
 STRAIGHT_UP = np.array([0.0, 0.0, -1.0])
@@ -74,12 +74,13 @@ def pull_out_lumped(
     U = float((velocity[0] - speed[0]) @ ahead)
     along = wet - np.append(0.0, np.cumsum(lengths))
     k = cable.tangential_drag * U * abs(U)
-    _lay(rope, cable, lengths, k * 0.5 * (along[1:] + along[:-1]), tow[0], ahead)
+    held = _held_at_drum(drum, float(setpoint[0]), U)
+    _lay(rope, cable, lengths, held + k * 0.5 * (along[1:] + along[:-1]), tow[0], ahead)
     rope.velocity[:, :count] = velocity[0]
     rope.velocity[:, count] = speed[0]
     rope.position[:, count] = 0.0
     rope.ends.payout[:] = rate[0] if led else U
-    rope.ends.tow_force[:] = -k * wet * ahead
+    rope.ends.tow_force[:], rope.ends.drum_pull = -(held + k * wet) * ahead, held
     return _run(rope, course, cable, drum, current.numbers(), segment_length)
 
 
@@ -169,6 +170,13 @@ def _lay(
         rope.vector[DIRECTION, j] = -ahead
 
 
+def _held_at_drum(drum: DrumProperties | Winch, setpoint: float, payout: float) -> float:
+    """Return the tension at the drum that a run starts with: a winch's, or what friction holds. [N]."""
+    if isinstance(drum, DrumProperties):
+        return drum.friction_torque / drum.radius if payout > 0.0 else 0.0
+    return setpoint if isinstance(drum, ConstantTension) else 0.0
+
+
 def _winch_rows(drum: DrumProperties | Winch, times: np.ndarray, wet: float) -> tuple[np.ndarray, np.ndarray]:
     """Return what a winch is asked for at times (n,), and its rate: dS/dt where the length is prescribed."""
     if isinstance(drum, DrumProperties):
@@ -229,6 +237,11 @@ def _run(
 def _reason(rope: Rope, journey: Journey) -> str:
     """Return why a run ended early: when, where, and what to try."""
     held, solved = unknowns(rope), journey.solved
+    if solved.worst == FULL:
+        return (
+            f"The drum gave far more cable than the paths of its ends ask for until t = {journey.stopped_at:g} s: "
+            "nothing holds it back. Let the drum rub, or use a winch."
+        )
     node, axis = divmod(solved.worst, 3)
     if solved.worst >= 3 * held + (0 if rope.ends.free_end else 1):
         place = f"length of segment {solved.worst - 3 * held - (0 if rope.ends.free_end else 1)}"

@@ -174,7 +174,7 @@ def _chord(rope: Rope, j: int) -> float:
 def settle(rope: Rope, j: int) -> None:
     """Give spring j the length that its ξ asks for, and the rate at which its nodes lengthen it, at level OLD."""
     T, _, strain, _ = spring_law(rope.spring[STATE, j], rope.ends.compliance)
-    rope.spring[PULL, j] = T
+    rope.spring[PULL, j], rope.spring[SIZE, j] = T, _chord(rope, j)
     rope.stretched[OLD, j] = rope.spring[REST, j] * (1.0 + strain)
     x, V, size, rate = rope.position[OLD], rope.velocity[OLD], max(_chord(rope, j), 1e-15), 0.0
     for i in range(3):

@@ -15,6 +15,10 @@ MOST_HALVINGS = 12
 """A failing step is halved up to this many times before the run gives up."""
 
 
+FULL = -1
+"""In place of the worst equation of a step: no room for more cable."""
+
+
 class Course(NamedTuple):
     """Where the ends are and what the winch does, at times, with cubics in between.
 
@@ -54,6 +58,7 @@ def run_rope(
 ) -> Journey:
     """Follow a course from its first row on, to its end or until a step fails however small."""
     begin(rope, _leg(course, 1, 0.0), c, water)
+    capacity = rope.spring.shape[1] - 2
     rows, spent, steps, solved = [_row(rope)], 0, 0, StageSolved(True, 0, 0.0, 0)
     for k in range(1, course.times.size):
         done, step = 0.0, 1.0
@@ -68,6 +73,8 @@ def run_rope(
             else:
                 time = float(course.times[k - 1] + done * (course.times[k] - course.times[k - 1]))
                 return Journey(rows, spent, steps, solved, time)
+        if rope.ends.count == capacity and rope.ends.last[OLD] > 2.0 * segment_length:
+            return Journey(rows, spent, steps, StageSolved(False, 0, 0.0, FULL), float(course.times[k]))
         rows.append(_row(rope))
     return Journey(rows, spent, steps, solved, float(course.times[-1]))
 

@@ -3,8 +3,8 @@
 Verifies: every entry of the banded matrix of `cable.lumped_step.assemble_stage`, the elimination of the springs' own
 unknowns included, in random bent states with taut and slack springs, for each thing the far end can be: a free drum
 that turns, one that stands, one that overruns, a winch that keeps a tension, one that keeps a length, a tail with a
-drogue. Configuration: five springs; a heavy stretching cable with bending stiffness, a slanting uniform current, a moving drum
-with inertia and friction.
+drogue. Configuration: five springs; a heavy stretching cable with bending stiffness, a slanting uniform current, a
+moving drum with inertia and friction.
 Tolerance: differences of step 1e-6 carry 1e-9 of truncation and rounding; 2e-6 of the largest entry of a row.
 """
 
