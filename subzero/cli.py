@@ -1,4 +1,4 @@
-"""The command line: ``subzero list``, ``subzero simulate``, ``subzero compare``.
+"""The command line: ``subzero list``, ``simulate``, ``compare``; ``manoeuvre`` and ``autopilot`` (`cli_autopilot`).
 
 Exit codes: 0 all is well; 2 the user has to change something (one clean message on standard error,
 nothing is written); 3 a run could not go on (what it has is written, the message says when, where and
@@ -19,6 +19,7 @@ from cyclopts import Parameter
 from rich.console import Console
 
 import scenarios
+from subzero import cli_autopilot
 from subzero.errors import UserError
 
 if TYPE_CHECKING:
@@ -116,6 +117,9 @@ def compare(
             result = run(trial, measured=record, progress=progress)
         summary = delivery.write_all(result.runs, result.measured, stage)
     return STOPPED if delivery.tell(summary, stage) else FINE
+
+
+cli_autopilot.add_to(app)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -1,0 +1,144 @@
+"""The commands ``subzero manoeuvre`` and ``subzero autopilot``: everything heavy is imported inside them."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import cyclopts
+from cyclopts import Parameter
+
+import scenarios
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from subzero.autopilot.showing import Measured
+
+RUNS = ("tethered", "untethered")
+FINE, STOPPED = 0, 3
+
+Flag = Annotated[bool, Parameter(negative=())]
+
+MANOEUVRE_COMMANDS = {
+    "vertical_zigzag": ("pitch", "stern_plane_port_command"),
+    "crash_stop": ("heading", "propeller_command"),
+}
+STEP_COMMANDS = {
+    "heading_step": ("heading", "rudder_command"),
+    "depth_step": ("depth", "stern_plane_port_command"),
+    "speed_step": ("heading", "propeller_command"),
+}
+"""What the figure shows: the answer of the vehicle and the command."""
+
+
+def manoeuvre(
+    name: str,
+    /,
+    *,
+    scenario: str = "fig6",
+    rudder: float | None = None,
+    planes: float | None = None,
+    speed: float = 1.0,
+    out: Path | None = None,
+) -> int:
+    """Fly a manoeuvre with the cable and without, and measure it.
+
+    Args:
+        name: turning_circle, zigzag, vertical_zigzag, spiral or crash_stop.
+        scenario: whose vehicle, cable and start: a name (see "subzero list") or a path.
+        rudder: size of a manoeuvre with the rudder, in degrees.
+        planes: size of a manoeuvre with the stern-planes, in degrees.
+        speed: of the bare hull before it, in m/s.
+        out: folder for the files; by default one named after the manoeuvre, here.
+    """
+    scenarios.load(scenario)  # a mistake in it answers at once
+    from subzero.autopilot.manoeuvres import MANOEUVRES
+    from subzero.autopilot.manoeuvres import manoeuvre as run
+
+    size = _size(name, rudder, planes)
+
+    def fly() -> Measured:
+        return {
+            label: run(name, scenario, size=size, speed=speed, tethered=label == "tethered") for label in RUNS
+        }
+
+    meaning = f": {MANOEUVRES[name].meaning}" if name in MANOEUVRES else ""
+    shown = MANOEUVRE_COMMANDS.get(name, ("heading", "rudder_command"))
+    return _deliver(fly, out or Path(name), f"{name}{meaning}", shown)
+
+
+def fly_step(
+    name: str,
+    /,
+    *,
+    scenario: str = "fig6",
+    autopilot: str = "pid",
+    feed_forward: str = "none",
+    size: float | None = None,
+    speed: float = 1.0,
+    noisy: Flag = False,
+    seed: int = 0,
+    out: Path | None = None,
+) -> int:
+    """Let an autopilot follow a step, with the cable and without, and measure it.
+
+    Args:
+        name: heading_step, depth_step or speed_step.
+        scenario: whose vehicle, cable and start: a name (see "subzero list") or a path.
+        autopilot: pid or lqr.
+        feed_forward: none, formula or model: what it knows of the cable.
+        size: of the step, in degrees, m or m/s.
+        speed: to hold, in m/s.
+        noisy: through estimated sensors instead of perfect ones.
+        seed: of the sensors.
+        out: folder for the files; by default one named after the step, here.
+    """
+    scenarios.load(scenario)  # a mistake in it answers at once
+    from subzero.autopilot import ESTIMATED, PERFECT
+    from subzero.autopilot.steps import step as run
+
+    def fly() -> Measured:
+        return {
+            label: run(
+                name, scenario, autopilot=autopilot, feed_forward=feed_forward if label == "tethered" else "none",
+                size=size, speed=speed, tethered=label == "tethered", seed=seed,
+                sensors=ESTIMATED if noisy else PERFECT,
+            )
+            for label in RUNS
+        }  # fmt: skip
+
+    title = f"{name}: autopilot {autopilot}, fed forward of the cable: {feed_forward}"
+    return _deliver(fly, out or Path(name), title, STEP_COMMANDS.get(name, ("heading", "rudder_command")))
+
+
+def add_to(app: cyclopts.App) -> None:
+    """Add the commands to the command line."""
+    app.command(manoeuvre)
+    app.command(fly_step, name="autopilot")
+
+
+def _size(name: str, rudder: float | None, planes: float | None) -> float | None:
+    """Return the size that was asked for, in degrees; refuse the fin that the manoeuvre does not use."""
+    from subzero.errors import UserError
+
+    if name == "vertical_zigzag" and rudder is not None:
+        raise UserError("vertical_zigzag moves the stern-planes. Use --planes.")
+    if name != "vertical_zigzag" and planes is not None:
+        raise UserError(f"{name} does not move the stern-planes. Use --rudder.")
+    return planes if rudder is None else rudder
+
+
+def _deliver(fly: Callable[[], Measured], folder: Path, title: str, shown: tuple[str, str]) -> int:
+    """Fly, write and tell; return the exit code."""
+    from subzero.autopilot import showing
+    from subzero.output import staged
+
+    with staged(folder) as stage:
+        measured = fly()
+        summary = showing.write(measured, title, *shown, stage)
+    stopped = showing.tell(summary, list(measured), stage)
+    for message in stopped:
+        print(message, file=sys.stderr)
+    return STOPPED if stopped else FINE

@@ -1,0 +1,76 @@
+"""``subzero manoeuvre`` and ``subzero autopilot`` deliver files and a table, and refuse in one line.
+
+Verifies: exit codes, files, the indices of summary.json against those of the Python functions. Tolerance: none.
+"""
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+from subzero import autopilot
+from subzero.cli import FINE, MISTAKE, main
+
+FILES = {"manoeuvre.png", "summary.json", "tethered.csv", "tethered.nc", "untethered.csv", "untethered.nc"}
+
+
+def test_a_manoeuvre_delivers_both_runs_and_their_indices(tmp_path, capsys):
+    assert main(["manoeuvre", "zigzag", "--rudder", "12", "--out", str(tmp_path / "z")]) == FINE
+    assert {path.name for path in (tmp_path / "z").iterdir()} == FILES
+    summary = json.loads((tmp_path / "z" / "summary.json").read_text())
+    _, expected = autopilot.manoeuvre("zigzag", size=12.0, tethered=False)
+    assert summary["untethered"]["indices"] == expected
+    told = capsys.readouterr().out
+    assert "overshoot_1_deg" in told
+    assert "tethered" in told
+
+
+@pytest.mark.slow
+def test_an_autopilot_delivers_a_step(tmp_path, capsys):
+    words = [
+        "autopilot",
+        "heading_step",
+        "--autopilot",
+        "lqr",
+        "--feed-forward",
+        "formula",
+        "--out",
+        str(tmp_path / "s"),
+    ]
+    assert main(words) == FINE
+    assert {path.name for path in (tmp_path / "s").iterdir()} == FILES
+    assert "fed forward of the cable: formula" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    "words,told",
+    [
+        (["manoeuvre", "zigzagg"], "Did you mean 'zigzag'"),
+        (["manoeuvre", "zigzag", "--planes", "5"], "Use --rudder"),
+        (["manoeuvre", "vertical_zigzag", "--rudder", "5"], "Use --planes"),
+        (["manoeuvre", "zigzag", "--scenario", "fig66"], "fig6"),
+        (["autopilot", "depth"], "Did you mean 'depth_step'"),
+        (["autopilot", "heading_step", "--feed-forward", "all"], "Allowed: none, formula, model"),
+    ],
+)
+def test_mistakes_are_told_and_write_nothing(words, told, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(words) == MISTAKE
+    assert told in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    "words", [["manoeuvre", "--help"], ["autopilot", "--help"], ["autopilot", "x", "--scenario", "fig66"]]
+)
+def test_help_imports_nothing_heavy(words):
+    heavy = ("numba", "xarray", "matplotlib", "scipy", "netCDF4", "control", "vehicle", "cable", "gymnasium")
+    code = f"""if True:
+        import sys
+        from subzero.cli import main
+        main({words!r})
+        print("LOADED", *(name for name in {heavy!r} if name in sys.modules))
+    """
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.rstrip().endswith("LOADED"), done.stdout[-200:]
