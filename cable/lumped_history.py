@@ -9,20 +9,17 @@ from __future__ import annotations
 import numpy as np
 
 from .history import History, Outcome
-from .lumped_rope import DIRECTION, OLD, PULL, REST, STATE, Rope, new_rope, unknowns
+from .lumped_rope import Rope, new_rope, unknowns
 from .lumped_run import FULL, Course, Journey, run_rope
-from .lumped_spring import LEAST_COMPLIANCE, spring_law, spring_state
+from .lumped_start import held_at_drum, lay, steady_direction, steady_tensions, winch_rows
 from .properties import CableProperties, DrumProperties
 from .runs import TowVelocity, first_direction, sample_path
 from .water import Current, Water
-from .winch import SHORTEST, Brake, ConstantTension, PayOutRate, Winch
+from .winch import Brake, PayOutRate, Winch
 
 AXES = ("northward", "eastward", "downward")
-STRAIGHT_UP = np.array([0.0, 0.0, -1.0])
 START_LENGTH = 1e-6
 """A run "without cable" starts with this length in the water. [m]"""
-FAINTEST = 1e-11
-"""Least tension that a cable starts with. [N]"""
 
 
 def pull_out_lumped(
@@ -62,7 +59,7 @@ def pull_out_lumped(
         _, place, speed = sample_path(drum_velocity, duration, step, "drum_velocity")
     ahead, wet = first_direction(velocity), max(wet_length, START_LENGTH)
     tow += wet * ahead
-    setpoint, rate = _winch_rows(drum, times, wet)
+    setpoint, rate = winch_rows(drum, times, wet)
     course = Course(times, np.c_[tow, place, setpoint], np.c_[velocity, speed, rate])
     led = isinstance(drum, PayOutRate | Brake)
     way = sum(float(np.linalg.norm(np.diff(x, axis=0), axis=1).sum()) for x in (tow, place))
@@ -74,8 +71,8 @@ def pull_out_lumped(
     U = float((velocity[0] - speed[0]) @ ahead)
     along = wet - np.append(0.0, np.cumsum(lengths))
     k = cable.tangential_drag * U * abs(U)
-    held = _held_at_drum(drum, float(setpoint[0]), U)
-    _lay(rope, cable, lengths, held + k * 0.5 * (along[1:] + along[:-1]), tow[0], ahead)
+    held = held_at_drum(drum, float(setpoint[0]), U)
+    lay(rope, cable, lengths, held + k * 0.5 * (along[1:] + along[:-1]), tow[0], ahead)
     rope.velocity[:, :count] = velocity[0]
     rope.velocity[:, count] = speed[0]
     rope.position[:, count] = 0.0
@@ -115,91 +112,17 @@ def tow_lumped(
     rope, lengths = new_rope(count), np.full(count, length / count)
     tail_drag = 0.5 * cable.water_density * drogue_drag_area
     J = current.at((0.0, 0.0, 0.0), 0.0)
-    ahead = _steady_direction(velocity[0] - J, first_direction(velocity - J), cable, tail_drag)
+    ahead = steady_direction(velocity[0] - J, first_direction(velocity - J), cable, tail_drag)
     tow += length * ahead
     still = np.zeros((times.size, 4))
     course = Course(times, np.c_[tow, still], np.c_[velocity, still])
     tail = tail_drag * float(np.sum((velocity[0] - J) ** 2))
-    tensions = _steady_tensions(velocity[0] - J, ahead, cable, lengths, tail)
-    _lay(rope, cable, lengths, 0.5 * (tensions[1:] + tensions[:-1]), tow[0], ahead)
+    tensions = steady_tensions(velocity[0] - J, ahead, cable, lengths, tail)
+    lay(rope, cable, lengths, 0.5 * (tensions[1:] + tensions[:-1]), tow[0], ahead)
     rope.velocity[:, : count + 1] = velocity[0]
     rope.ends.free_end, rope.ends.tail_drag, rope.ends.drum_pull = True, tail_drag, tail
     rope.ends.tow_force[:] = -tensions[0] * ahead
     return _run(rope, course, cable, DrumProperties(), current.numbers(-tow[0]), length / count)
-
-
-def _steady_tensions(
-    U: np.ndarray, ahead: np.ndarray, cable: CableProperties, lengths: np.ndarray, tail: float
-) -> np.ndarray:
-    """Return the tensions at the nodes of a steady straight tow (n + 1,), √(1 + eT) in the drag and all. [N]."""
-    tensions = np.full(lengths.size + 1, tail)
-    drag, weight = cable.tangential_drag * abs(U @ ahead) * float(U @ ahead), cable.weight_in_water * ahead[2]
-    for j in range(lengths.size - 1, -1, -1):
-        here = tensions[j + 1]
-        for _ in range(4):
-            middle = max(0.5 * (here + tensions[j + 1]), 0.0)
-            here = tensions[j + 1] + lengths[j] * (drag * np.sqrt(1.0 + cable.compliance * middle) - weight)
-        tensions[j] = here
-    return tensions
-
-
-def _lay(
-    rope: Rope,
-    cable: CableProperties,
-    lengths: np.ndarray,
-    tensions: np.ndarray,
-    tow: np.ndarray,
-    ahead: np.ndarray,
-) -> None:
-    """Lay springs of given lengths and tensions (n,) straight behind the tow point, on all levels."""
-    n = lengths.size
-    rope.ends.count = n
-    rope.ends.stretch = cable.compliance
-    rope.ends.compliance = max(cable.compliance, LEAST_COMPLIANCE)
-    rope.ends.bending = cable.bending_stiffness
-    rope.spring[REST, 1 : n + 1] = lengths
-    rope.ends.last[:] = lengths[-1]
-    behind = 0.0
-    rope.position[:, 0] = tow
-    for j in range(1, n + 1):
-        rope.spring[STATE, j] = spring_state(max(tensions[j - 1], FAINTEST))
-        rope.spring[PULL, j], _, strain, _ = spring_law(rope.spring[STATE, j], rope.ends.compliance)
-        rope.stretched[:, j] = lengths[j - 1] * (1.0 + strain)
-        behind += rope.stretched[OLD, j]
-        rope.position[:, j] = tow - behind * ahead
-        rope.vector[DIRECTION, j] = -ahead
-
-
-def _held_at_drum(drum: DrumProperties | Winch, setpoint: float, payout: float) -> float:
-    """Return the tension at the drum that a run starts with: a winch's, or what friction holds. [N]."""
-    if isinstance(drum, DrumProperties):
-        return drum.friction_torque / drum.radius if payout > 0.0 else 0.0
-    return setpoint if isinstance(drum, ConstantTension) else 0.0
-
-
-def _winch_rows(drum: DrumProperties | Winch, times: np.ndarray, wet: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return what a winch is asked for at times (n,), and its rate: dS/dt where the length is prescribed."""
-    if isinstance(drum, DrumProperties):
-        return np.zeros(times.size), np.zeros(times.size)
-    setpoint = drum.setpoints(times, wet)
-    if not isinstance(drum, PayOutRate):
-        return setpoint, np.gradient(setpoint, times)
-    rate = drum.rate
-    rates = np.array([float(rate(t) if callable(rate) else rate) for t in times])
-    return setpoint, np.where((setpoint <= SHORTEST) & (rates < 0.0), 0.0, rates)
-
-
-def _steady_direction(
-    U: np.ndarray, ahead: np.ndarray, cable: CableProperties, tail_drag: float
-) -> np.ndarray:
-    """Return the direction from the tail to the tow point in a steady tow, a unit vector (3,)."""
-    speed, weight = float(np.linalg.norm(U)), cable.weight_in_water
-    if speed == 0.0 and weight != 0.0:
-        return np.sign(weight) * STRAIGHT_UP
-    if weight == 0.0 or tail_drag > 0.0 or speed == 0.0 or abs(ahead[2]) > 1e-9:
-        return ahead
-    phi = cable.critical_angle(speed)
-    return np.cos(phi) * ahead + np.sin(phi) * np.sign(weight) * STRAIGHT_UP
 
 
 def _run(

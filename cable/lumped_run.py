@@ -6,8 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .lumped_newton import StageSolved
 from .lumped_rope import OLD, PULL, REST, STATE, Rope
-from .lumped_step import GAMMA, START_OF_LEG, StageSolved, begin, take_step
+from .lumped_step import GAMMA, START_OF_LEG, begin, take_step
 from .properties import CableNumbers, DrumNumbers
 from .water import Water
 

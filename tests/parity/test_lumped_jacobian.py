@@ -1,6 +1,6 @@
 """The Newton system of the lumped cable against central differences of its residual, and its band solver against numpy.
 
-Verifies: every entry of the banded matrix of `cable.lumped_step.assemble_stage`, the elimination of the springs' own
+Verifies: every entry of the banded matrix of `cable.lumped_newton.assemble_stage`, the elimination of the springs' own
 unknowns included, in random bent states with taut and slack springs, for each thing the far end can be: a free drum
 that turns, one that stands, one that overruns, a winch that keeps a tension, one that keeps a length, a tail with a
 drogue. Configuration: five springs; a heavy stretching cable with bending stiffness, a slanting uniform current, a
@@ -14,6 +14,7 @@ from numpy.testing import assert_allclose
 from scipy.optimize import brentq
 
 from cable.lumped_band import REACH, WIDTH, solve_band
+from cable.lumped_newton import assemble_stage
 from cable.lumped_rope import (
     NEW,
     REST,
@@ -26,7 +27,6 @@ from cable.lumped_rope import (
 )
 from cable.lumped_spring import spring_law
 from cable.lumped_springs import observe
-from cable.lumped_step import assemble_stage
 from cable.properties import CableProperties, DrumProperties
 from cable.water import Current
 from cable.winch import ConstantTension, PayOutRate
