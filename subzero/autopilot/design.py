@@ -48,6 +48,20 @@ class Gains:
     R: np.ndarray
     loop: control.StateSpace
 
+    @property
+    def share(self) -> float:
+        """b: how much of a step of what is wanted goes to the proportional part; the rest is left to the integral.
+
+        The step response has a zero at −k_I/(b k); b puts it on the slowest pole, whose long tail is then not excited.
+        """
+        K = np.append(self.feedback, -self.integral)[None]
+        slowest = float(np.min(np.abs(np.linalg.eigvals(self.A - self.B @ K))))
+        return min(1.0, self.integral / (float(self.feedback[self.states.index(self.tracked)]) * slowest))
+
+    def numbers(self) -> np.ndarray:
+        """Return k of each state, k_I and b (n + 2,), as loops take them."""
+        return np.array([*self.feedback, self.integral, self.share])
+
 
 def reduced(part: control.StateSpace, keep: Sequence[str]) -> control.StateSpace:
     """Return a linear model of fewer states, the others following at once: exact at rest, good for slow motions.

@@ -39,7 +39,7 @@ class Estimates:
 
     Attributes:
         designs: the LQR design at each speed.
-        feedback: k (4,) and k_I over speed.
+        feedback: k (4,), k_I and b over speed.
         model: A_d (4, 4) and B_d (4,), side by side (4, 5), over speed.
         filter: L (4, 2) over speed.
         turn: sway speed and rudder of a steady turn over its yaw rate (2,), over speed [m, s].
@@ -87,7 +87,7 @@ def estimates(
     turn = np.stack([tuning.sway_per_yaw.values, tuning.rudder_per_yaw.values], axis=1)
     return Estimates(
         designs=designs,
-        feedback=Schedule(speeds, np.array([np.append(one.feedback, one.integral) for one in designs])),
+        feedback=Schedule(speeds, np.array([one.numbers() for one in designs])),
         model=Schedule(speeds, np.array([np.hstack([one.A, one.B]) for one in sampled])),
         filter=Schedule(speeds, np.array(filters)),
         turn=Schedule(speeds, turn),
@@ -110,6 +110,7 @@ class EstimatorLoop:
         """Forget the estimate and what was integrated."""
         self.integral = 0.0
         self.estimate: np.ndarray | None = None
+        self._wanted: float | None = None
 
     def engage(
         self,
@@ -123,6 +124,7 @@ class EstimatorLoop:
         """Take over from a command without a jump: the next command, unlimited, is this one."""
         self.estimate = np.array([0.0, reading.yaw_rate, reading.heading, command - feed_forward])
         self.integral = command - feed_forward - self._feedback(wanted, speed, rate)[0]
+        self._wanted = wanted
 
     def update(
         self,
@@ -137,6 +139,7 @@ class EstimatorLoop:
         """Return the rudder command for the next sample [rad]; arguments as of `loops.Loop.update`."""
         if self.estimate is None:
             self.estimate = np.array([0.0, reading.yaw_rate, reading.heading, 0.0])
+        self.integral -= self._jump(wanted, speed, rate)
         feedback, growth = self._feedback(wanted, speed, rate)
         low, high = limits
         command = feed_forward + feedback + self.integral + growth
@@ -150,11 +153,20 @@ class EstimatorLoop:
     def _feedback(self, wanted: float, speed: float, rate: float) -> tuple[float, float]:
         """Return −k·(x̂ − x_w) and how the integral grows in this sample."""
         assert self.estimate is not None
-        *k, k_integral = self.matrices.feedback.at(speed).tolist()
+        *k, k_integral, _ = self.matrices.feedback.at(speed).tolist()
         sway, rudder = (self.matrices.turn.at(speed) * rate).tolist()
-        error = max(-LARGEST_ERROR, min(LARGEST_ERROR, wanted - float(self.estimate[2])))
+        error = _limited(wanted - float(self.estimate[2]))
         off = self.estimate - np.array([sway, rate, self.estimate[2] + error, rudder])
         return -float(np.dot(k, off)), self.sample_time * k_integral * error
+
+    def _jump(self, wanted: float, speed: float, rate: float) -> float:
+        """Return what a jump of what is wanted takes off the integral, as in `loops`."""
+        assert self.estimate is not None
+        before = wanted if self._wanted is None else self._wanted + rate * self.sample_time
+        self._wanted = wanted
+        k, b = self.matrices.feedback.at(speed)[[2, 5]].tolist()
+        now = float(self.estimate[2])
+        return (1.0 - b) * k * (_limited(wanted - now) - _limited(before - now))
 
     def _predict(self, reading: Observation, speed: float, command: float) -> None:
         """Move the estimate on by a sample, corrected by what was measured."""
@@ -163,3 +175,8 @@ class EstimatorLoop:
         surprise = np.array([reading.yaw_rate, reading.heading]) - MEASURED @ self.estimate
         surprise[1] -= 2.0 * pi * round(surprise[1] / (2.0 * pi)) if abs(surprise[1]) > pi else 0.0
         self.estimate = model[:, :4] @ self.estimate + model[:, 4] * command + gain @ surprise
+
+
+def _limited(error: float) -> float:
+    """Return an error, no larger than counts [rad]."""
+    return max(-LARGEST_ERROR, min(LARGEST_ERROR, error))

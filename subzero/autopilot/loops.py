@@ -1,6 +1,7 @@
 """One loop of an autopilot, in discrete time: state feedback with integral action.
 
     δ = limited(δ_ff + k_y (y_w − y) + k_r (y_w' − r) + I),   I ← I + T k_I (y_w − y), not further into a limit
+    and when what is wanted jumps by Δ, more than it was said to move on:  I ← I − (1 − b) k_y Δ
 
 y is what is measured: the speed for the propeller (a PI), an angle y and its rate r for a fin (a PID). The integral is
 kept in units of the command, so gains that change with the speed change nothing by themselves, and the loop can take
@@ -23,7 +24,7 @@ class Law:
 
     Attributes:
         measured: channels that are fed back: the tracked one alone, or its rate and it.
-        gains: (k of each, k_I) over speed, (n + 1,) at a speed.
+        gains: (k of each, k_I, b) over speed, (n + 2,) at a speed, from `Gains.numbers`.
         largest_error: errors beyond this count as this, so that a far goal asks for no more than the fins can do
             [unit of the tracked channel].
     """
@@ -34,10 +35,10 @@ class Law:
 
     def __post_init__(self) -> None:
         """Refuse gains that do not fit."""
-        if self.gains.values.shape[1:] != (len(self.measured) + 1,):
+        if self.gains.values.shape[1:] != (len(self.measured) + 2,):
             raise UserError(
                 f"Law: gains of shape {self.gains.values.shape[1:]} for {', '.join(self.measured)}."
-                f" Allowed: ({len(self.measured) + 1},), one for each and the integral's."
+                f" Allowed: ({len(self.measured) + 2},), one for each, the integral's and the share of a step."
             )
 
 
@@ -51,11 +52,12 @@ class Loop:
 
     def __init__(self, law: Law, sample_time: float) -> None:
         self.law, self.sample_time = law, sample_time
-        self.integral = 0.0
+        self.reset()
 
     def reset(self) -> None:
         """Forget what was integrated."""
         self.integral = 0.0
+        self._wanted: float | None = None
 
     def engage(
         self,
@@ -69,6 +71,7 @@ class Loop:
         """Take over from a command without a jump: the next command, unlimited, is this one."""
         feedback, _ = self._feedback(reading, wanted, speed, rate)
         self.integral = command - feed_forward - feedback
+        self._wanted = wanted
 
     def update(
         self,
@@ -91,6 +94,7 @@ class Loop:
             integrate: whether to; a fin without flow has nothing to learn from its error.
             rate: y_w', how fast what is wanted moves on.
         """
+        self.integral -= self._jump(reading, wanted, speed, rate)
         feedback, growth = self._feedback(reading, wanted, speed, rate)
         low, high = limits
         command = feed_forward + feedback + self.integral + growth
@@ -99,14 +103,25 @@ class Loop:
         self.integral += growth
         return min(high, max(low, feed_forward + feedback + self.integral))
 
+    def _jump(self, reading: Observation, wanted: float, speed: float, rate: float) -> float:
+        """Return what a jump of what is wanted takes off the integral, (1 − b) k_y Δ."""
+        before = wanted if self._wanted is None else self._wanted + rate * self.sample_time
+        self._wanted = wanted
+        *_, k, _, b = self.law.gains.at(speed).tolist()
+        measured = getattr(reading, self.law.measured[-1])
+        return (1.0 - b) * k * (self._limited(wanted - measured) - self._limited(before - measured))
+
+    def _limited(self, error: float) -> float:
+        """Return an error, no larger than counts."""
+        return max(-self.law.largest_error, min(self.law.largest_error, error))
+
     def _feedback(
         self, reading: Observation, wanted: float, speed: float, rate: float
     ) -> tuple[float, float]:
         """Return k·(what is wanted − what is measured) and how the integral grows in this sample."""
-        *gains, k_integral = self.law.gains.at(speed).tolist()
+        *gains, k_integral, _ = self.law.gains.at(speed).tolist()
         *others, tracked = self.law.measured
-        most = self.law.largest_error
-        error = max(-most, min(most, wanted - getattr(reading, tracked)))
+        error = self._limited(wanted - getattr(reading, tracked))
         total = gains[-1] * error
         for gain, name in zip(gains, others, strict=False):
             total += gain * (rate - getattr(reading, name))

@@ -74,7 +74,7 @@ class Tuning:
         model: the hull that was designed for.
         speeds: [m/s]
         designs: loop → the design at each speed.
-        gains: loop → (k of each measured, k_I) over speed.
+        gains: loop → (k of each measured, k_I, b) over speed.
         hull_drag: thrust that the hull alone needs over speed. [N]
         planes: trim of the planes, together and unlike, over speed (2,). [rad]
         rudder_for: rudder that cancels a sway force and a yaw moment from outside (2,). [rad/N, rad/(N m)]
@@ -122,10 +122,7 @@ def tune(
         model=model,
         speeds=speeds,
         designs=designs,
-        gains={
-            name: over_speed([np.append(one.feedback, one.integral) for one in found])
-            for name, found in designs.items()
-        },
+        gains={name: over_speed([one.numbers() for one in found]) for name, found in designs.items()},
         hull_drag=over_speed([np.array(_thrust(model, steady)) for steady in trims]),
         planes=over_speed([_mixed_planes(steady) for steady in trims]),
         rudder_for=over_speed(

@@ -115,7 +115,7 @@ def test_a_small_step_of_the_bare_hull_is_the_one_it_was_designed_for(fig6, tuni
         autopilot.linearise(tuning.model, autopilot.trim(tuning.model, speed=1.0)), "yaw_sway"
     )
     sampled = control.c2d(part, 0.1)
-    k_rate, k_angle, k_integral = tuning.gains["heading"].at(1.0)
+    k_rate, k_angle, k_integral, _ = tuning.gains["heading"].at(1.0)
     x, integral, headings = np.zeros(4), 0.0, []
     for _ in run["time"].values:
         headings.append(x[2])
@@ -151,7 +151,7 @@ def test_the_twin_sees_nothing_but_the_drum_and_the_commands(fig6, tuning):
     assert pulls[0][0] < 0.0
 
 
-def law(gains=(0.5, 1.0, 0.4), largest_error=10.0):
+def law(gains=(0.5, 1.0, 0.4, 1.0), largest_error=10.0):
     return Law(
         measured=("yaw_rate", "heading"),
         gains=Schedule(np.array([1.0]), np.array([gains])),
@@ -186,7 +186,7 @@ def test_a_loop_takes_over_without_a_jump(fig6, tuning):
 
 
 def test_gains_that_change_with_the_speed_do_not_jump_at_rest():
-    gains = Schedule(np.array([0.5, 1.5]), np.array([[1.0, 2.0, 0.5], [0.3, 0.6, 0.5]]))
+    gains = Schedule(np.array([0.5, 1.5]), np.array([[1.0, 2.0, 0.5, 1.0], [0.3, 0.6, 0.5, 1.0]]))
     loop = Loop(Law(measured=("yaw_rate", "heading"), gains=gains, largest_error=1.0), 0.1)
     still = UNKNOWN._replace(heading=0.2, yaw_rate=0.0)
     loop.engage(still, 0.2, 0.5, 0.0, 0.07)
@@ -246,3 +246,22 @@ def test_a_flight_with_noisy_sensors_repeats_with_its_seed(fig6, tuning):
     )
     assert np.array_equal(first["heading"], again["heading"])
     assert not np.array_equal(first["heading"], other["heading"])
+
+
+def test_a_jump_of_what_is_wanted_goes_to_the_proportional_part_by_its_share_only():
+    """And what is said to move on does not jump: a ramp with its rate leaves the integral alone."""
+    loop, still = Loop(law((0.5, 1.0, 0.0, 0.6)), 0.1), UNKNOWN._replace(heading=0.0, yaw_rate=0.0)
+    assert loop.update(still, 0.0, 1.0) == 0.0
+    assert loop.update(still, 0.2, 1.0) == pytest.approx(0.6 * 0.2)
+    ramp = Loop(law((0.0, 1.0, 0.0, 0.6)), 0.1)
+    assert [ramp.update(still, 0.03 * k, 1.0, rate=0.3) for k in range(4)] == pytest.approx(
+        [0.0, 0.03, 0.06, 0.09]
+    )
+
+
+def test_the_share_puts_the_zero_of_the_step_on_the_slowest_pole(tuning):
+    gains = tuning.designs["heading"][3]
+    closed = gains.A - gains.B @ np.append(gains.feedback, -gains.integral)[None]
+    zero = -gains.integral / (gains.share * gains.feedback[-1])
+    assert 0.0 < gains.share < 1.0
+    assert np.min(np.abs(np.linalg.eigvals(closed) - zero)) < 1e-9
