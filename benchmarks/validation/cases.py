@@ -10,6 +10,8 @@ from . import (
     catenary,
     critical_angle,
     cross_current,
+    energy_balance,
+    formulations,
     hanging_chain,
     invariance,
     manufactured,
@@ -64,5 +66,7 @@ CASES = (
     Case("taut_string", "Natural frequencies of a taut cable", taut_string),
     Case("sagging_cable", "Vibrations of a sagging cable", sagging_cable),
     Case("hanging_chain", "A chain that hangs and swings in water", hanging_chain),
+    Case("energy_balance", "Where the work goes", energy_balance),
+    Case("formulations", "Three formulations of one cable", formulations),
     Case("moordyn_2", "Another code: MoorDyn 2", moordyn_2),
 )
