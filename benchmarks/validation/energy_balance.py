@@ -20,7 +20,8 @@ import numpy as np
 
 import cable
 
-from .formulations import MANOEUVRES, SHEARED, Manoeuvre, history
+from .formulations import history
+from .manoeuvres import MANOEUVRES, SHEARED, Manoeuvre
 from .row import Row, order_row
 
 HEAVY = cable.CableProperties(mass_per_length=0.0055, compliance=0.05)
