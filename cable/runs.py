@@ -6,11 +6,12 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from .drum import LENGTH
 from .drum_path import DrumPath
 from .element import Load
 from .energy import LOSS, STORED
 from .history import History, Outcome
-from .line import Line, start_in_water
+from .line import NEW, Line, start_in_water
 from .newton import Solved
 from .pay_out import Record, TowPath, follow_path, new_record
 from .properties import CableNumbers, DrumNumbers
@@ -22,6 +23,8 @@ REST = 1e-12
 """Slower than this is at rest. [m/s]"""
 GAUSS = ((-np.sqrt(0.15), 5.0 / 18.0), (0.0, 8.0 / 18.0), (np.sqrt(0.15), 5.0 / 18.0))
 """Offsets and weights of three-point Gauss quadrature on a step of length one."""
+NEARLY_TAUT = 0.999
+"""A cable whose ends are this share of its length apart, or more, and that has no solution, is too short."""
 EQUATIONS = ("length", "northward balance", "eastward balance", "downward balance")
 
 
@@ -40,13 +43,14 @@ def run(
     start_in_water(line, water, c, work)
     record = new_record(path.times.size, capacity)
     rows, solved = follow_path(line, path, led, water, c, drum, rtol, work, record)
-    return as_history(path, record, rows, solved)
+    trouble = too_short(path.times[rows - 1], line, drum) or describe_failure(solved, path.times[rows - 1])
+    return as_history(path, record, rows, solved, trouble)
 
 
-def as_history(path: TowPath, record: Record, rows: int, solved: Solved) -> History:
-    """Return the record's filled rows as a history."""
+def as_history(path: TowPath, record: Record, rows: int, solved: Solved, trouble: str) -> History:
+    """Return the record's filled rows as a history; `trouble` says what stopped it, if it was stopped."""
     times, tow, completed = path.times, path.place, rows == path.times.size
-    message = "The run reached its end." if completed else describe_failure(solved, times[rows - 1])
+    message = "The run reached its end." if completed else trouble
     cuts = np.cumsum(record.segments[:rows] + 1)
     return History(
         time=times[:rows],
@@ -76,6 +80,17 @@ def describe_failure(solved: Solved, time: float) -> str:
         f"The cable could not be solved beyond t = {time:g} s: after {solved.iterations} Newton iterations the "
         f"{EQUATIONS[solved.worst_equation]} at node {solved.worst_node} is off by {solved.residual:.1e} times its "
         "tolerance. Try a shorter step, other segments, or a smoother motion of the tow point."
+    )
+
+
+def too_short(time: float, line: Line, drum: DrumNumbers) -> str:
+    """Return that a step from `time` asks for more cable than a winch has paid out; empty if it does not."""
+    way = float(np.linalg.norm(line.position[NEW, 0] - drum.place))
+    if drum.control != LENGTH or way < NEARLY_TAUT * drum.setpoint:
+        return ""
+    return (
+        f"The cable is too short beyond t = {time:g} s: the winch has paid out {drum.setpoint:.5g} m, the vehicle is "
+        f"{way:.5g} m away. Pay out faster, or start with more cable in the water."
     )
 
 

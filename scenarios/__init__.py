@@ -19,8 +19,8 @@ degrees and revolutions per second; a `Trial` of radians and revolutions per sec
 
 Stories: `trial` what a trial is; `quantities` the one table of numbers, units and limits; `schema` what a
 file may say; `files` opening and parsing; `csv_file`, `samples` columns over time; `instructions` commands or
-motion; `parts`, `changes` vehicles and cables; `steps` what must fit; `reader` all together; `errors` what a
-problem is.
+motion; `surroundings` water, winch and vessel; `parts`, `changes` vehicles and cables; `steps` what must fit;
+`reader` all together; `errors` what a problem is.
 """
 
 from __future__ import annotations
@@ -30,16 +30,20 @@ from pathlib import Path
 from typing import Any
 
 from scenarios.errors import Problem, ScenarioError
-from scenarios.trial import SCHEMES, Commands, Motion, Start, Trial
+from scenarios.trial import CONTROLS, SCHEMES, Commands, Motion, Profile, Start, Trial, Vessel, Winch
 
 __all__ = [
+    "CONTROLS",
     "SCHEMES",
     "Commands",
     "Motion",
     "Problem",
+    "Profile",
     "ScenarioError",
     "Start",
     "Trial",
+    "Vessel",
+    "Winch",
     "describe",
     "load",
     "names",

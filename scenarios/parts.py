@@ -1,9 +1,9 @@
 """Vehicle and cable files: every number with its unit, its plausible range, and where it comes from.
 
 A number is an inline table ``{ value = 6.6, unit = "kg", range = [6.4, 7.5], source = "..." }``. The first
-file we ship of each kind is its *pattern*: a user's file must have the same sections, keys and units.
-``range`` says what is plausible and is for readers; ``limits`` in the pattern says what is possible, and is
-enforced.
+file we ship of each kind is its *pattern*: a user's file must have the same sections, keys and units; only what is
+`OPTIONAL` may be missing. ``range`` says what is plausible and is for readers; ``limits`` in the pattern says what is
+possible, and is enforced.
 """
 
 from __future__ import annotations
@@ -21,6 +21,9 @@ PATTERNS = {"vehicle": ("vehicles", "subzero2"), "cable": ("cables", "table1")}
 """Kind of part → the folder of its files, and the file that is the pattern."""
 
 LEAF_KEYS = ("value", "unit", "range", "limits", "source")
+
+OPTIONAL = {"cable.bending_stiffness": 0.0}
+"""Keys of the pattern that a file need not have → the value that is taken then."""
 
 ABOVE_ZERO = ("mass", "density", "diameter", "radius", "area", "inertia")
 """Where the pattern gives no limits, a number whose name ends in one of these must be above zero."""
@@ -88,7 +91,9 @@ def _checked(source: Source, model: Source) -> tuple[dict[str, float], list[Prob
     ]
     values = {}
     for key, leaf in wanted.items():
-        if key not in given:
+        if key not in given and key in OPTIONAL:
+            values[key] = OPTIONAL[key]
+        elif key not in given:
             why = "this key is missing"
             problems.append(
                 source.problem(key, why, f'Add it as {{ value = ..., unit = "{leaf["unit"]}" }}.')

@@ -25,6 +25,7 @@ class Quantity:
         high: greatest allowed value, in that unit.
         default: taken where the number is not given; None if it must be given.
         meaning: in words, with its sign.
+        many: whether it is a list of numbers, one value a sample; a default then means that it may be left out.
     """
 
     name: str
@@ -33,6 +34,7 @@ class Quantity:
     high: float
     default: float | None
     meaning: str
+    many: bool = False
 
     @property
     def scale(self) -> float:
@@ -42,16 +44,17 @@ class Quantity:
     @property
     def allowed(self) -> str:
         """What is allowed, as a sentence for a message."""
-        return f"Allowed: {self.low:g} to {self.high:g} {self.unit} ({self.meaning})."
+        unit = "" if self.unit == "1" else f" {self.unit}"
+        return f"Allowed: {self.low:g} to {self.high:g}{unit} ({self.meaning})."
 
 
-def _read(table: str) -> tuple[Quantity, ...]:
+def _read(table: str, *, many: bool = False) -> tuple[Quantity, ...]:
     """Turn the rows of a table, ``name | unit | low | high | default | meaning``, into quantities."""
     rows = [[cell.strip() for cell in line.split("|")] for line in table.strip().splitlines()]
     return tuple(
         Quantity(
             name=name, unit=unit, low=float(low), high=float(high),
-            default=float(default) if default else None, meaning=meaning,
+            default=float(default) if default else None, meaning=meaning, many=many,
         )
         for name, unit, low, high, default, meaning in rows
     )  # fmt: skip
@@ -62,6 +65,7 @@ duration_s       | s | 0.001  | 86400 |      | how long the run lasts
 hull_step_s      | s | 0.0001 | 1     | 0.02 | time step of the vehicle
 cable_step_s     | s | 0.0001 | 10    | 0.1  | time step of the cable
 segment_length_m | m | 0.001  | 100   | 0.5  | length of a cable segment
+grading          | 1 | 0      | 0.5   | 0    | how much longer segments get per metre of cable from the vehicle
 """)
 
 START = _read("""
@@ -79,20 +83,63 @@ current_east_m_s  | m/s | -5 | 5 | 0 | velocity of the water to the east
 current_down_m_s  | m/s | -5 | 5 | 0 | velocity of the water downwards
 """)
 
-COMMANDS = _read("""
+PROFILE = _read(
+    """
+depth_m             | m   | 0  | 11000 | 0 | depths of a profile that is added to the current, positive down
+profile_north_m_s   | m/s | -5 | 5     | 0 | velocity of the water to the north at these depths
+profile_east_m_s    | m/s | -5 | 5     | 0 | velocity of the water to the east at these depths
+profile_down_m_s    | m/s | -5 | 5     | 0 | velocity of the water downwards at these depths
+""",
+    many=True,
+)
+
+WINCH = _read(
+    """
+time_s           | s   | 0    | 86400 | 0 | time since the start
+pay_out_rate_m_s | m/s | -10  | 10    | 0 | rate at which cable comes off the drum, negative reels in
+tension_N        | N   | 0.01 | 1e6   | 0 | tension at the drum, which a winch can keep
+""",
+    many=True,
+)
+
+VESSEL = _read(
+    """
+time_s             | s   | 0   | 86400 |   | time since the start
+velocity_north_m_s | m/s | -20 | 20    | 0 | velocity of the vessel to the north
+velocity_east_m_s  | m/s | -20 | 20    | 0 | velocity of the vessel to the east
+velocity_down_m_s  | m/s | -20 | 20    | 0 | velocity of the vessel downwards
+""",
+    many=True,
+)
+
+COMMANDS = _read(
+    """
 time_s                   | s      | 0    | 86400 |   | time since the start
 propeller_rps            | rev/s  | -200 | 200   |   | propeller speed, positive drives forward
 rudder_deg               | degree | -90  | 90    |   | rudder, positive turns to starboard
 stern_plane_port_deg     | degree | -90  | 90    |   | port stern-plane, positive raises the nose
 stern_plane_starboard_deg | degree | -90 | 90    |   | starboard stern-plane, positive raises the nose
-""")
+""",
+    many=True,
+)
 
-MOTION = _read("""
+MOTION = _read(
+    """
 time_s          | s      | 0      | 86400 |  | time since the start
 surge_speed_m_s | m/s    | -20    | 20    |  | forward speed
 pitch_deg       | degree | -89    | 89    |  | pitch, positive nose up
 heading_deg     | degree | -36000 | 36000 |  | heading, clockwise from north
-""")
+""",
+    many=True,
+)
 
-SECTIONS = {"run": RUN, "start": START, "water": WATER, "commands": COMMANDS, "motion": MOTION}
-"""Section of a trial file → the numbers it may hold; in the last two, each is a list of numbers."""
+SECTIONS = {
+    "run": RUN,
+    "start": START,
+    "water": WATER + PROFILE,
+    "winch": WINCH,
+    "vessel": VESSEL,
+    "commands": COMMANDS,
+    "motion": MOTION,
+}
+"""Section of a trial file → the numbers it may hold."""

@@ -20,6 +20,7 @@ from scenarios.parts import Part, nested, read_part
 from scenarios.samples import commands, motion
 from scenarios.schema import check_page, check_section
 from scenarios.steps import check_steps
+from scenarios.surroundings import check_scheme, read_surroundings
 from scenarios.trial import Motion, Start, Trial
 
 Found = TypeVar("Found")
@@ -64,9 +65,11 @@ def load(
     """
     reading = Reading(source=find(name_or_path))
     reading.problems.extend(check_page(reading.source))
-    run, start, water = (reading.section(name) for name in ("run", "start", "water"))
+    run, start = (reading.section(name) for name in ("run", "start"))
     reading.problems.extend(check_steps(reading.source, run, start))
+    around = reading.keep(read_surroundings(reading.source))
     vehicle, cable = _parts(reading, check_vehicle)
+    reading.problems.extend(check_scheme(reading.source, run, cable.get("cable", {})))
     samples = reading.keep(read_instructions(reading.source, commands_csv, run.get("duration_s")))
     if reading.problems:
         raise ScenarioError(_in_order(reading.problems))
@@ -80,12 +83,13 @@ def load(
         hull_step=run["hull_step_s"],
         cable_step=run["cable_step_s"],
         segment_length=run["segment_length_m"],
+        grading=run["grading"],
         scheme=run["scheme"],
         start=_start(start, prescribed),
         vehicle=vehicle,
         cable=cable["cable"],
         drum=cable["drum"],
-        current=(water["current_north_m_s"], water["current_east_m_s"], water["current_down_m_s"]),
+        **around,
         commands=commands(samples["commands"]) if "commands" in samples else None,
         motion=prescribed,
     )

@@ -15,12 +15,15 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 from scenarios.errors import Problem, nearest_or_all
 from scenarios.files import Source
 from scenarios.quantities import SECTIONS, Quantity
-from scenarios.trial import SCHEMES
+from scenarios.trial import CONTROLS, SCHEMES
 
 STRICT = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
 
 LISTS = ("commands", "motion")
-"""Sections whose numbers are lists: one value a sample."""
+"""Sections that may stand in a CSV file: one value a sample."""
+
+CHOICES = {"scheme": ("this is not a scheme", SCHEMES), "control": ("a winch cannot do this", CONTROLS)}
+"""Keys that hold one of some words → why another cannot be, and the words."""
 
 
 class Page(BaseModel):
@@ -34,6 +37,8 @@ class Page(BaseModel):
     run: dict[str, Any] = {}
     start: dict[str, Any] = {}
     water: dict[str, Any] = {}
+    winch: dict[str, Any] = {}
+    vessel: dict[str, Any] = {}
     commands: dict[str, Any] = {}
     motion: dict[str, Any] = {}
     changes: dict[str, Any] = {}
@@ -53,11 +58,15 @@ def section_model(name: str) -> type[BaseModel]:
     fields: dict[str, Any] = {}
     for quantity in SECTIONS[name]:
         kind: Any = Annotated[float, Field(ge=quantity.low, le=quantity.high)]
-        if name in LISTS:
+        default: Any = ... if quantity.default is None else quantity.default
+        if quantity.many:
             kind = Annotated[list[kind], Field(min_length=1)]
-        fields[quantity.name] = (kind, ... if quantity.default is None else quantity.default)
+            default = ... if quantity.default is None else None
+        fields[quantity.name] = (kind, default)
     if name == "run":
         fields["scheme"] = (Literal[SCHEMES], SCHEMES[0])
+    if name == "winch":
+        fields["control"] = (Literal[CONTROLS], ...)
     return create_model(name, __config__=STRICT, **fields)
 
 
@@ -123,8 +132,10 @@ def _explain(
     limits = quantities[name].allowed if name in quantities else ""
     if kind == "extra_forbidden":
         return f"{where} has no such key", nearest_or_all(name, allowed)
+    if name in CHOICES:
+        limits = f"Allowed: {', '.join(CHOICES[name][1])}."
     if kind == "literal_error":
-        return "this is not a scheme", f"Allowed: {', '.join(SCHEMES)}."
+        return CHOICES[name][0], limits
     why = {
         "missing": f"this key is missing in {where}",
         "too_short": "the list is empty",

@@ -86,6 +86,7 @@ def _agree(setup: Setup, live: Live, start: float, span: float) -> tuple[int, So
         solved = try_step(
             live.line, span, live.now.tow, setup.water, setup.fixed.cable, setup.fixed.drum, live.load
         )
+        live.now.iterations += solved.iterations
         if not solved.converged:
             return CABLE_FAILED, solved
         impedance(live.line, live.now.Z)

@@ -46,7 +46,7 @@ def dataset_of(trial: scenarios.Trial, model: Model, tethered: bool, run: Run) -
         channel.name: ("time", values[channel.name] * channel.scale, channel.attributes)
         for channel in CHANNELS
     }
-    data |= _arrays(run)
+    data |= _arrays(run) | _diagnostics(run, values, model)
     coordinates = {TIME.name: ("time", run.times, TIME.attributes)} | AXES
     return xr.Dataset(data, coords=coordinates, attrs=_provenance(trial, model, tethered, run))
 
@@ -122,7 +122,9 @@ def _arrays(run: Run) -> dict[str, Any]:
     tension = np.full((run.times.size, nodes), np.nan)
     filled = np.arange(nodes) < r.nodes[:, None]
     position[filled], tension[filled] = r.position, r.tension
-    about = "relative to the drum; node 0 is the tow point, the last one sits at the drum"
+    about = (
+        "relative to the drum's place at the start; node 0 is the tow point, the last one sits at the drum"
+    )
     return {
         "force_breakdown": (
             ("time", "term", "component"),
@@ -144,6 +146,32 @@ def _arrays(run: Run) -> dict[str, Any]:
         ),
         "node_count": ("time", r.nodes, {"units": "1", "long_name": "nodes of the cable, 0 without one"}),
     }
+
+
+def _diagnostics(run: Run, values: dict[str, np.ndarray], model: Model) -> dict[str, Any]:
+    """Return what tells how far to trust the cable, row by row."""
+    r, words = run.recording, "how far the cable, summed up from the drum, ends from the tow point"
+    wave = "segments of the cable that a transverse wave crosses in an exchange, at most"
+    return {
+        "closure_error": ("time", _closure_error(run, values, model), {"units": "m", "long_name": words}),
+        "courant_number": ("time", r.courant, {"units": "1", "long_name": wave}),
+        "newton_iterations": (
+            "time",
+            r.iterations,
+            {"units": "1", "long_name": "iterations of Newton's method on the cable since the start"},
+        ),
+    }
+
+
+def _closure_error(run: Run, values: dict[str, np.ndarray], model: Model) -> np.ndarray:
+    """Return the distance between the tow point and node 0, counted from the start, (n,). [m]."""
+    r = run.recording
+    if not r.nodes.all():
+        return np.zeros(run.times.size)
+    hull = np.stack([values[name] for name in ("north", "east", "depth")], axis=1)
+    tow = hull + r.rotation @ model.vehicle.tow_point.position()
+    gap = tow - r.position[np.cumsum(r.nodes) - r.nodes]
+    return np.linalg.norm(gap - gap[0], axis=1)
 
 
 def _provenance(trial: scenarios.Trial, model: Model, tethered: bool, run: Run) -> dict[str, Any]:

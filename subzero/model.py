@@ -23,14 +23,20 @@ class Model:
     Attributes:
         vehicle: the hull with its propeller, fins and servos.
         cable: the cable.
-        drum: the drum on the shore.
+        drum: the drum, free unless a winch turns it.
         current: velocity of the water, north, east, down, the same everywhere. [m/s]
+        profile: what is added to the current by depth.
+        winch: what turns the drum; None for a free drum.
+        vessel: how the drum moves; None for a drum on the shore.
     """
 
     vehicle: Vehicle
     cable: CableProperties
     drum: DrumProperties
     current: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    profile: scenarios.Profile | None = None
+    winch: scenarios.Winch | None = None
+    vessel: scenarios.Vessel | None = None
 
     @classmethod
     def of(cls, trial: scenarios.Trial) -> Model:
@@ -45,6 +51,9 @@ class Model:
             cable=CableProperties(**trial.cable),
             drum=DrumProperties(**trial.drum),
             current=trial.current,
+            profile=trial.profile,
+            winch=trial.winch,
+            vessel=trial.vessel,
         )
 
     def parameters(self) -> dict[str, Any]:
@@ -54,4 +63,10 @@ class Model:
             "cable": dataclasses.asdict(self.cable),
             "drum": dataclasses.asdict(self.drum),
             "current": list(self.current),
+            **{name: _plain(getattr(self, name)) for name in ("profile", "winch", "vessel")},
         }
+
+
+def _plain(value: Any) -> dict[str, Any] | None:
+    """Return the fields of a value by name, None for none."""
+    return None if value is None else dataclasses.asdict(value)

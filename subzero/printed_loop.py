@@ -68,6 +68,7 @@ def _exchange(setup: Setup, live: Live, line: Printed, start: float, span: float
         return ABSURD, NewtonReport(CONVERGED, 0, 0.0, 0, 0)
     ends = _ends_of(setup, live.path[steps], now.hull.rotation)
     report = paper_step(line.w, span, ends, line.wound, False, line.c)
+    now.iterations += report.iterations
     if report.outcome != CONVERGED:
         return CABLE_FAILED, report
     F = pull_of(line.w)
@@ -120,6 +121,7 @@ def record_printed(
     record_row(setup, live, recording, row, time, used)
     for i in range(CABLE_LOSS, recording.energy.shape[1]):
         recording.energy[row, i] = math.nan
+    recording.courant[row] = math.nan
     return _record_cable(line.w, line.c.e, recording, row, used)
 
 

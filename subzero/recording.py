@@ -31,6 +31,8 @@ class Recording(NamedTuple):
         tow_force: pull of the cable, earth axes (n, 3). [N]
         wrench: the same on the hull, body axes, with its moment (n, 6). [N, N m]
         drum_tension, length: (n,). [N, m]
+        courant: √(T/m1) Δt/ℓ, how many segments a transverse wave crosses in an exchange, at most (n,). [-]
+        iterations: of Newton's method on the cable since the start (n,).
         breakdown: every term of the hull (n, terms, 6). [N, N m]
         energy: rows of `subzero.energy` (n, 7). [J]
         nodes: how many (n,), 0 without a cable.
@@ -47,6 +49,8 @@ class Recording(NamedTuple):
     wrench: np.ndarray
     drum_tension: np.ndarray
     length: np.ndarray
+    courant: np.ndarray
+    iterations: np.ndarray
     breakdown: np.ndarray
     energy: np.ndarray
     nodes: np.ndarray
@@ -78,9 +82,9 @@ def new_recording(rows: int, nodes: int) -> Recording:
         "energy": (rows, 7),
         "position": (nodes, 3),
     }
-    flat = {"voltage": rows, "drum_tension": rows, "length": rows, "tension": nodes}
+    flat = dict.fromkeys(("voltage", "drum_tension", "length", "courant"), rows) | {"tension": nodes}
     arrays = {name: np.zeros(shape) for name, shape in (shapes | flat).items()}
-    return Recording(**arrays, nodes=np.zeros(rows, np.int64))
+    return Recording(**arrays, nodes=np.zeros(rows, np.int64), iterations=np.zeros(rows, np.int64))
 
 
 @compiled
@@ -109,20 +113,25 @@ def record_row(setup: Setup, live: Live, recording: Recording, row: int, time: f
         feel_current(setup, state, time, live.now.hull)
         vehicle.breakdown(state, command, water, wrench, setup.fixed.vehicle, r.breakdown[row])
         r.voltage[row] = vehicle.battery_voltage(state, command, water, setup.fixed.vehicle)
-    return _record_cable(live, r, row, used) if setup.fixed.tethered else used
+    r.iterations[row] = live.now.iterations
+    m1 = setup.fixed.cable.mass + setup.fixed.cable.added_mass
+    return _record_cable(live, r, row, used, m1) if setup.fixed.tethered else used
 
 
 @compiled
-def _record_cable(live: Live, r: Recording, row: int, used: int) -> int:
+def _record_cable(live: Live, r: Recording, row: int, used: int, m1: float) -> int:
     """Write the cable's part of a row."""
     line = live.line
-    N = line.ends.count
+    N, step = line.ends.count, line.ends.previous_step
     r.drum_tension[row] = line.node_tension[N]
     r.length[row] = line.ends.settled + line.ends.last_length[NOW]
     for j in range(N + 1):
         for i in range(3):
             r.position[used + j, i] = line.position[NOW, j, i]
         r.tension[used + j] = line.node_tension[j]
+        if 0 < j < N:
+            wave = np.sqrt(max(line.tension[NOW, j], 0.0) / m1)
+            r.courant[row] = max(r.courant[row], wave * step / line.length[j])
     r.nodes[row] = N + 1
     return used + N + 1
 

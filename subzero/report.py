@@ -26,6 +26,15 @@ ENERGY_ROWS = {
     "residual_J": "  unexplained [J]",
 }
 
+DIAGNOSTIC_ROWS = {
+    "closure_error_m": ("closure error [m]", "{:.1e}"),
+    "energy_residual": ("energy residual, share", "{:.1e}"),
+    "largest_courant_number": ("largest Courant number", "{:.2f}"),
+    "smallest_tension_N": ("smallest tension in the cable [N]", "{:.4f}"),
+    "newton_iterations": ("Newton iterations", "{:d}"),
+}
+"""What tells how far to trust the cable: words, and how to write the number."""
+
 
 def show(summary: Summary, console: Console) -> None:
     """Print a summary, as `subzero.comparison.summary_of` gives it."""
@@ -46,6 +55,8 @@ def _runs_table(summary: Summary) -> Table:
         table.add_row(escape(words), *(escape(cell(run)) for run in runs.values()))
     if all(run["energy"] is not None for run in runs.values()):
         _add_energy(table, [run["energy"] for run in runs.values()])
+    if any(run["diagnostics"] is not None for run in runs.values()):
+        _add_diagnostics(table, [run["diagnostics"] or {} for run in runs.values()])
     return table
 
 
@@ -88,6 +99,14 @@ def _add_energy(table: Table, balances: list[Summary]) -> None:
         table.add_row(escape(words), *(_plain(balance[key], 3) for balance in balances))
     shares = [balance["unexplained_share"] for balance in balances]
     table.add_row("  unexplained share", *(NOTHING if share is None else f"{share:.1e}" for share in shares))
+
+
+def _add_diagnostics(table: Table, found: list[Summary]) -> None:
+    """Add what tells how far to trust the cable; nothing where there is no cable."""
+    table.add_section()
+    for key, (words, form) in DIAGNOSTIC_ROWS.items():
+        values = [one.get(key) for one in found]
+        table.add_row(escape(words), *(NOTHING if x is None else form.format(x) for x in values))
 
 
 def _fit_table(measured: Summary) -> Table:

@@ -87,6 +87,7 @@ class Now:
         Z: answer of the pull to the tow point's place (3, 3). [N/m]
         mobility: acceleration of the tow point per pull (3, 3). [1/kg]
         last_step: length of the last accepted exchange, 0 at the start. [s]
+        iterations: of Newton's method on the cable, since the start.
         hull: work space.
         ledger: energies.
     """
@@ -99,6 +100,7 @@ class Now:
     Z: np.ndarray
     mobility: np.ndarray
     last_step: float
+    iterations: int
     hull: HullWork
     ledger: Ledger
 
@@ -153,4 +155,4 @@ def new_now() -> Now:
     )
     vectors = {name: np.zeros(3) for name in ("force", "force_before", "guess", "change", "tow")}
     matrices = {name: np.zeros((3, 3)) for name in ("Z", "mobility")}
-    return packed(Now(**vectors, **matrices, last_step=0.0, hull=work, ledger=ledger))
+    return packed(Now(**vectors, **matrices, last_step=0.0, iterations=0, hull=work, ledger=ledger))

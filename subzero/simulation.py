@@ -11,12 +11,12 @@ import numpy as np
 import scenarios
 from cable.line import enlarged
 from cable.newton import Solved
-from cable.runs import describe_failure
+from cable.runs import describe_failure, too_short
 from subzero import coupling
 from subzero.loop import NO_ROOM, run_rows
 from subzero.model import Model
 from subzero.recording import CHUNKS, Recording, Run, cut, new_recording, record_row
-from subzero.run_state import Live
+from subzero.run_state import Live, Setup
 from subzero.start import prepare
 from subzero.trials import load
 
@@ -79,7 +79,7 @@ def run_trial(trial: scenarios.Trial, model: Model, tethered: bool, progress: Pr
         times=times[:row],
         recording=cut(recording, row, used),
         completed=ending == coupling.FINE,
-        message=in_words(ending, solved, float(times[row - 1])),
+        message=in_words(ending, solved, float(times[row - 1]), setup, live),
     )
 
 
@@ -94,12 +94,15 @@ def more_room(live: Live, recording: Recording, used: int) -> tuple[Live, Record
     )
 
 
-def in_words(ending: int, solved: Solved, time: float) -> str:
-    """Say how a run ended: when, where, and what to try."""
+def in_words(
+    ending: int, solved: Solved, time: float, setup: Setup | None = None, live: Live | None = None
+) -> str:
+    """Say how a run ended: when, where, and what to try; `setup` and `live` tell of a winch that fell behind."""
     if ending == coupling.FINE:
         return "The run reached its end."
     if ending == coupling.CABLE_FAILED:
-        return describe_failure(solved, time)
+        behind = too_short(time, live.line, setup.fixed.drum) if setup and live else ""
+        return behind or describe_failure(solved, time)
     if ending == coupling.DISAGREED:
         return (
             f"Vehicle and cable found no common tow force beyond t = {time:g} s, even in the smallest steps. "

@@ -6,16 +6,17 @@ import numpy as np
 
 import scenarios
 import vehicle
-from cable.drum_path import lead_drum, resting
+from cable.drum import FREE
+from cable.drum_path import lead_drum
 from cable.element import new_load
 from cable.energy import FLOWS, energy_flow
-from cable.line import lay_straight, new_line, start_in_water
+from cable.line import NOW, Line, lay_straight, new_line, start_in_water
 from cable.pull_out import START_LENGTH
-from cable.water import Current
 from subzero.compiled import compiled, packed
 from subzero.hull import feel_current, pose, tow_point
 from subzero.model import Model
 from subzero.run_state import Fixed, Live, Orders, Setup, Track, new_now
+from subzero.surroundings import drum_of, water_of, way_of_drum
 
 FIRST_ROOM = 16
 """Segments that a new cable has room for, beyond those that are in the water."""
@@ -29,8 +30,8 @@ def prepare(trial: scenarios.Trial, model: Model, tethered: bool) -> tuple[Setup
         fixed=_fixed(trial, model, tethered),
         orders=_orders(trial),
         track=_track(trial),
-        water=Current.uniform(model.current).numbers(),
-        led=resting(np.array([0.0, trial.duration])),
+        water=water_of(model).numbers(),
+        led=way_of_drum(trial, model, wet),
     )
     live = Live(
         now=new_now(),
@@ -40,7 +41,7 @@ def prepare(trial: scenarios.Trial, model: Model, tethered: bool) -> tuple[Setup
         line=new_line(int(wet / trial.segment_length) + FIRST_ROOM),
         load=new_load(),
     )
-    live.line.ends.segment_length = trial.segment_length
+    live.line.ends.segment_length, live.line.ends.grading = trial.segment_length, trial.grading
     lay_out(setup, live, wet)
     return setup, live
 
@@ -61,6 +62,8 @@ def lay_out(setup: Setup, live: Live, wet: float) -> None:
         now.force[i] = -pull * now.guess[i]
     lead_drum(setup.led, 0.0, fixed.drum)
     lay_straight(live.line, wet, now.guess, speed, fixed.drum, fixed.cable)
+    if fixed.drum.control != FREE:
+        _hang(live.line, now.guess[2] * fixed.cable.weight)
     start_in_water(live.line, setup.water, fixed.cable, live.load)
     energy_flow(live.line, fixed.cable, live.load, now.ledger.cable_new)
     for i in range(FLOWS):
@@ -69,12 +72,24 @@ def lay_out(setup: Setup, live: Live, wet: float) -> None:
     now.ledger.kinetic = vehicle.kinetic_energy(state, now.hull.current, fixed.vehicle)
 
 
+@compiled
+def _hang(line: Line, weight: float) -> None:
+    """Add the weight that the drum carries, `weight` [N/m] per length of a straight cable below it."""
+    along = 0.0
+    for j in range(1, line.ends.count + 1):
+        length = line.ends.last_length[NOW] if j == line.ends.count else line.length[j]
+        for level in range(2):
+            line.tension[level, j] += max(weight, 0.0) * (along + 0.5 * length)
+        along += length
+        line.node_tension[j] += max(weight, 0.0) * along
+
+
 def _fixed(trial: scenarios.Trial, model: Model, tethered: bool) -> Fixed:
     """Return the numbers of a run; the drum's place is still to be filled in."""
     fixed = Fixed(
         vehicle=model.vehicle.numbers(),
         cable=model.cable.numbers(),
-        drum=model.drum.numbers(),
+        drum=drum_of(model).numbers(),
         r_c=model.vehicle.tow_point.position(),
         drum_place=np.zeros(3),
         hull_step=trial.hull_step,

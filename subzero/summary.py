@@ -48,6 +48,27 @@ def summarise(run: xr.Dataset) -> dict[str, Any]:
         "largest_cable_moment_N_m": number(moment[twist]),
         "time_of_largest_cable_moment_s": number(time[twist]),
         "energy": energy_balance(run),
+        "diagnostics": diagnostics(run),
+    }
+
+
+def diagnostics(run: xr.Dataset) -> dict[str, float | int | None] | None:
+    """Return the numbers that tell how far to trust the cable; None for a run without one.
+
+    ``energy_residual`` is what the balance of all energies leaves unexplained at the end, as a share of the work and
+    the losses in all; a scheme that keeps no such balance has none.
+    """
+    if not run.attrs["tethered"]:
+        return None
+    work = np.abs(np.diff(run["energy_propeller_work"].values)).sum()
+    spent = work + run["energy_hull_loss"].values[-1] + run["energy_cable_loss"].values[-1]
+    residual = abs(run["energy_residual"].values[-1])
+    return {
+        "closure_error_m": number(run["closure_error"].values.max()),
+        "energy_residual": number(residual / spent) if spent > 0.0 else None,
+        "largest_courant_number": number(run["courant_number"].values.max()),
+        "smallest_tension_N": number(np.nanmin(run["cable_node_tension"].values)),
+        "newton_iterations": int(run["newton_iterations"].values[-1]),
     }
 
 

@@ -3,7 +3,7 @@
 `draw` gives the figures that belong to some runs. A run that follows commands gets the four panels of
 Fig. 6 of Feng and Allen (2004), actuators and attitude, the cable's shape and tension, forces and energy.
 A prescribed run gets Fig. 4 if it is straight, with its exact solution, and Fig. 5 if it is not, besides
-the cable.
+the cable. A winch, or a vessel that carries the drum, adds a figure of what it does.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from .cable import shape
+from .deployment import deployment, is_deployed
 from .forces import forces
 from .motion import attitude, figure_6, measured
 from .prescribed import exact_tension, figure_4, figure_5, is_straight
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "attitude",
+    "deployment",
     "draw",
     "exact_tension",
     "figure_4",
@@ -45,6 +47,8 @@ def draw(runs: Runs, record: Record | None = None) -> dict[str, Figure]:
     first = next(iter(runs.values()))
     title = Title(words=first.attrs["title"], scenario=first.attrs["scenario"])
     figures = _prescribed(runs, title) if first.attrs["prescribed"] else _commanded(runs, record, title)
+    if "tethered" in runs and is_deployed(runs["tethered"]):
+        figures["deployment"] = deployment(runs["tethered"], title)
     besides = measured(runs, record, title) if record is not None else None
     return figures if besides is None else {**figures, "measured": besides}
 

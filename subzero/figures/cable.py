@@ -19,8 +19,11 @@ if TYPE_CHECKING:
 Colour = tuple[float, float, float, float]
 NORTH, EAST, DOWN = 0, 1, 2
 AXES = ("north of the drum", "east of the drum", "below the drum")
+MOVING = ("north of the vessel's start", "east of the vessel's start", "below the vessel")
 CHANNEL = ("north", "east", "depth")
 TINY = 1e-9
+RESTING = 1e-6
+"""A drum that moves less than this stands. [m]"""
 SHORTEST = 0.1
 """A view shows at least this much, even if nothing has moved. [m]"""
 
@@ -39,16 +42,18 @@ def shape(run: xr.Dataset, title: Title) -> Figure:
         for axes, right, up in views:
             _one_shape(run["cable_position"].values[at], axes, right, up, colour)
         _one_tension(run, int(at), panels[2], colour)
+    names = axes_of(run)
     for axes, right, up in views:
-        _track(run, axes, right, up)
-        label(axes, f"{AXES[right]} [m]", f"{AXES[up]} [m]")
+        _track(run, axes, right, up, times, colours)
+        label(axes, f"{names[right]} [m]", f"{names[up]} [m]")
         in_scale(axes)
     panels[1].invert_yaxis()
     headline(panels[0], "The cable from above")
     headline(panels[1], "The cable from the east" if along == NORTH else "The cable from the south")
     headline(panels[2], "Tension along the cable")
     label(panels[2], "distance from the vehicle $s$ [m]", "$T$ [N]")
-    legend(panels[2], loc="upper right")
+    hangs = float(run["drum_tension"].values[-1]) > float(run["cable_tension"].values[-1])
+    legend(panels[2], loc="upper left" if hangs else "upper right")
     _pull(run, panels[3])
     return figure
 
@@ -61,9 +66,21 @@ def configurations(run: xr.Dataset, axes: Axes, times: list[float]) -> None:
     for time, colour in zip(shown, style.CYCLE, strict=False):
         place = run["cable_position"].values[int(np.argmin(np.abs(now - time)))]
         axes.plot(place[:, NORTH], place[:, across], color=colour, linewidth=1.3, label=f"{time:g} s")
-    label(axes, f"{AXES[NORTH]} [m]", f"{AXES[across]} [m]")
+    names = axes_of(run)
+    label(axes, f"{names[NORTH]} [m]", f"{names[across]} [m]")
     in_scale(axes)
     axes.invert_yaxis()  # down is down; and from above, with north to the right, east is down
+
+
+def way_of_drum(run: xr.Dataset) -> np.ndarray:
+    """Return where the drum is, relative to its place at the start (n, 3); without a cable it is not known. [m]."""
+    nodes = run["node_count"].values
+    return run["cable_position"].values[np.arange(nodes.size), np.maximum(nodes - 1, 0)]
+
+
+def axes_of(run: xr.Dataset) -> tuple[str, str, str]:
+    """Return what the earth axes are called: counted from a drum that stands, or from where a vessel started."""
+    return MOVING if np.ptp(way_of_drum(run), axis=0).max() > RESTING else AXES
 
 
 def longest(run: xr.Dataset, *candidates: int) -> int:
@@ -96,11 +113,18 @@ def _one_tension(run: xr.Dataset, at: int, axes: Axes, colour: Colour) -> None:
     axes.plot(s, run["cable_node_tension"].values[at], color=colour, linewidth=1.3, label=words)
 
 
-def _track(run: xr.Dataset, axes: Axes, right: int, up: int) -> None:
-    """Draw where the tow point went, and the drum, behind the shapes."""
-    tow = run["cable_position"].values[:, 0]
+def _track(
+    run: xr.Dataset, axes: Axes, right: int, up: int, times: np.ndarray, colours: list[Colour]
+) -> None:
+    """Draw where the tow point went, and the drum, behind the shapes; if the drum moves, its way and its places."""
+    tow, drum = run["cable_position"].values[:, 0], way_of_drum(run)
     axes.plot(tow[:, right], tow[:, up], color=style.GREY, linewidth=0.9, linestyle=":", zorder=1.5)
-    axes.plot(0.0, 0.0, "s", color=style.INK, markersize=4.5)
+    if axes_of(run) is AXES:
+        axes.plot(0.0, 0.0, "s", color=style.INK, markersize=4.5)
+        return
+    axes.plot(drum[:, right], drum[:, up], color=style.INK, linewidth=0.9, linestyle="--", zorder=1.5)
+    for at, colour in zip(times, colours, strict=True):
+        axes.plot(drum[at, right], drum[at, up], "s", color=colour, markersize=4.5)
 
 
 def _pull(run: xr.Dataset, axes: Axes) -> None:

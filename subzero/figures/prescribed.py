@@ -12,7 +12,7 @@ from subzero.channels import BY_NAME
 from . import style
 from .cable import DOWN, EAST, configurations, longest
 from .forces import cable_forces
-from .panel import calm, headline, in_time, label, legend, time_label
+from .panel import calm, headline, in_time, label, legend, spread, time_label
 from .sheet import Title, sheet
 from .style import CYCLE, DASHES
 
@@ -22,18 +22,26 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 SHAPE_TIMES = [10.0, 15.0, 20.0, 25.0, 30.0]
-"""The times of Fig. 5 (b). [s]"""
+"""The times of Fig. 5 (b), for runs that last no longer. [s]"""
 
 ROUNDING = 1e-9
 """An angle that moves less than this is a straight course. [degree]"""
+
+NEUTRAL = 1e-6
+"""A cable whose mass is that of the water it displaces, to within this share, neither sinks nor floats."""
 
 DOTS_SHOWN = 61
 
 
 def is_straight(run: xr.Dataset) -> bool:
-    """Say whether the run is a straight course through still water, which has an exact solution."""
+    """Say whether the run pulls a neutral cable straight off a free drum in still water: that has an exact solution."""
     turns = max(float(np.ptp(run[name].values)) for name in ("pitch", "heading", "roll"))
-    return turns < ROUNDING and not any(json.loads(run.attrs["parameters"]).get("current", ()))
+    told = json.loads(run.attrs["parameters"])
+    cable = told["cable"]
+    displaced = cable["water_density"] * cable.get("cross_section_area", np.inf)
+    heavy = np.isfinite(displaced) and abs(cable["mass_per_length"] - displaced) > NEUTRAL * displaced
+    moved = any(told.get("current", ())) or any(told.get(name) for name in ("profile", "winch", "vessel"))
+    return turns < ROUNDING and not heavy and not moved
 
 
 def exact_tension(run: xr.Dataset) -> np.ndarray:
@@ -87,11 +95,8 @@ def figure_5(run: xr.Dataset, title: Title) -> Figure:
     """Draw Fig. 5: manoeuvre, shapes of the cable, tension, tow-point velocity, forces, moments."""
     figure, panels = sheet(3, 2, title)
     manoeuvre, shapes, tension, velocity, force, moment = panels
-    dives = longest(run, DOWN, EAST) == DOWN
-    angle = "pitch" if dives else "heading"
-    _over_time(run, manoeuvre, {angle: ""}, f"${BY_NAME[angle].symbol}$ [degree]")
-    headline(manoeuvre, "Pitch angle, positive nose up" if dives else "Heading, clockwise from north")
-    configurations(run, shapes, SHAPE_TIMES)
+    _manoeuvre(run, manoeuvre)
+    configurations(run, shapes, _shape_times(run))
     headline(shapes, "Shape of the cable")
     legend(shapes, loc="lower left")
     _over_time(run, tension, {"cable_tension": ""}, "$T(0)$ [N]")
@@ -108,6 +113,26 @@ def figure_5(run: xr.Dataset, title: Title) -> Figure:
     time_label(panels, 2)
     shapes.xaxis.labelpad = 1
     return figure
+
+
+def _manoeuvre(run: xr.Dataset, axes: Axes) -> None:
+    """Draw the angle that changes, pitch or heading, or both."""
+    turns = [angle for angle in ("pitch", "heading") if np.ptp(run[angle].values) > ROUNDING]
+    if len(turns) == 2:
+        names = {angle: f"${BY_NAME[angle].symbol}$, {angle}" for angle in turns}
+        _over_time(run, axes, names, "angle [degree]")
+        headline(axes, "Pitch, positive nose up, and heading")
+        return
+    dives = longest(run, DOWN, EAST) == DOWN
+    angle = "pitch" if dives else "heading"
+    _over_time(run, axes, {angle: ""}, f"${BY_NAME[angle].symbol}$ [degree]")
+    headline(axes, "Pitch angle, positive nose up" if dives else "Heading, clockwise from north")
+
+
+def _shape_times(run: xr.Dataset) -> list[float]:
+    """Return at which times the cable is drawn: those of the paper, or as many, spread over a longer run. [s]."""
+    time = run["time"].values
+    return SHAPE_TIMES if time[-1] <= SHAPE_TIMES[-1] else time[spread(len(SHAPE_TIMES), time.size)].tolist()
 
 
 def _over_time(run: xr.Dataset, axes: Axes, names: dict[str, str], unit: str) -> None:

@@ -118,6 +118,9 @@ def _arrays(run, tethered):
     run["cable_position"] = (("time", "node", "earth_axis"), position, {"units": "m"})
     run["cable_node_tension"] = (("time", "node"), tension, {"units": "N"})
     run["node_count"] = ("time", np.isfinite(tension).sum(axis=1))
+    run["closure_error"] = ("time", np.full(samples, 1e-15))
+    run["courant_number"] = ("time", np.linspace(0.0, 0.5, samples))
+    run["newton_iterations"] = ("time", 2 * np.arange(samples))
     forces = np.zeros((samples, len(TERMS), 6))
     forces[:, 0, 0], forces[:, 1, 0] = 6.0, -2.0 * run["surge_speed"].values ** 2
     forces[:, 4, 5] = run["rudder_angle"].values * 0.1

@@ -135,6 +135,38 @@ def test_a_run_that_stopped_at_once_can_be_drawn(prescribed, make_run, tmp_path)
         figure.savefig(tmp_path / "one.png")  # warnings are errors
 
 
+def test_a_drum_that_moves_is_drawn_with_its_way_and_a_winch_with_what_it_does(make_run):
+    run = make_run(prescribed="dive")
+    told = run.attrs["parameters"].replace('"current"', '"vessel": {"time": [0.0]}, "current"')
+    still = draw({"tethered": run})
+    assert "deployment" not in still
+    assert still["cable"].axes[0].get_xlabel() == "east of the drum [m]"
+    way = 0.3 * run["time"].values
+    place = run["cable_position"].values.copy()
+    for k, nodes in enumerate(run["node_count"].values):
+        place[k, nodes - 1, 0] = way[k]
+    run["cable_position"] = (run["cable_position"].dims, place)
+    figures = draw({"tethered": run.assign_attrs(parameters=told)})
+    assert figures["cable"].axes[0].get_xlabel() == "east of the vessel's start [m]"
+    for axes in (figures["cable"].axes[0], figures["deployment"].axes[3]):
+        assert any(np.array_equal(one.get_ydata(), way) for one in axes.get_lines())
+    rate = figures["deployment"].axes[1].get_lines()[0].get_ydata()
+    assert_allclose(rate[5:-5].mean(), 1.0, rtol=1e-2)  # a vehicle at 1 m/s pulls it out at 1 m/s
+
+
+def test_a_run_longer_than_the_papers_shows_the_cable_up_to_its_end(make_run):
+    shapes = draw({"tethered": make_run(prescribed="dive", samples=1001)})["fig5"].axes[1]
+    assert [one.get_label() for one in shapes.get_lines()] == ["20 s", "40 s", "60 s", "80 s", "100 s"]
+
+
+@pytest.mark.parametrize("besides", ['"winch": {"control": "brake"}', '"profile": {"depth": [0.0]}'])
+def test_a_straight_course_has_an_exact_tension_only_on_a_free_drum_in_still_water(besides, make_run):
+    run = make_run(prescribed="straight")
+    assert "fig4" in draw({"tethered": run})
+    told = run.attrs["parameters"].replace('"current"', f'{besides}, "current"')
+    assert "fig4" not in draw({"tethered": run.assign_attrs(parameters=told)})
+
+
 def test_an_untethered_prescribed_run_has_nothing_to_show(make_run):
     assert draw({"untethered": make_run(tethered=False, prescribed="dive")}) == {}
 

@@ -47,6 +47,18 @@ def test_a_summary_says_what_happened_and_when(run):
     assert summary["energy"]["unexplained_share"] == pytest.approx(0.5 / 200.0)
 
 
+def test_a_summary_says_how_far_to_trust_the_cable(run, make_run):
+    run["newton_iterations"] = ("time", np.array([0, 3, 7]))
+    run["energy_cable_loss"] = ("time", np.array([0.0, 10.0, 40.0]))
+    expected = {
+        "closure_error_m": 1e-15, "largest_courant_number": 0.5, "newton_iterations": 7,
+        "smallest_tension_N": float(np.nanmin(run["cable_node_tension"].values)),
+        "energy_residual": 0.5 / (200.0 + 40.0),
+    }  # fmt: skip
+    assert summarise(run)["diagnostics"] == pytest.approx(expected)
+    assert summarise(make_run(tethered=False))["diagnostics"] is None
+
+
 def test_the_table_shows_the_runs_side_by_side(run):
     out = io.StringIO()
     show(summary_of({"tethered": run, "untethered": run.assign(surge_speed=0.5 * run["surge_speed"])}, None),
@@ -63,6 +75,9 @@ def test_the_table_shows_the_runs_side_by_side(run):
         "largest cable moment [N m] 2.0000 at 0.2 s 2.0000 at 0.2 s",
         "work of the propeller [J] 200.000 200.000",
         "unexplained share 2.5e-03 2.5e-03",
+        "closure error [m] 1.0e-15 1.0e-15",
+        "largest Courant number 0.50 0.50",
+        "Newton iterations 4 4",
     ):
         assert row in rows, rows
 

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 import scenarios
 
 FIG6 = scenarios.path("fig6").read_text(encoding="utf-8")
+UMBILICAL = scenarios.path("rov_umbilical").read_text(encoding="utf-8")
 CABLE = (scenarios.path("fig6").parent.parent / "cables" / "table1.toml").read_text(encoding="utf-8")
 HEADER = "time_s,propeller_rps,rudder_deg,stern_plane_port_deg,stern_plane_starboard_deg\n"
 LOG = HEADER + "".join(f"{time},27,0,0.5,-0.5\n" for time in range(31))
@@ -59,6 +60,7 @@ SPICES = (
         "\u2028",
         " " * 9,
     ),
+    *('control = "brake"', "depth_m = [1.0]", "pay_out_rate_m_s", "[winch]", "[vessel]"),
     *("a.b.c = 1", "time_s", "file = '.'", "file = '/'", 'file = "x\\u0000y"', ".".join("a" * 900) + " = 1"),
     *(
         "[" * 3000,
@@ -114,6 +116,9 @@ def is_usable(trial):
         round(trial.cable_step / trial.hull_step), rel=1e-8
     )
     assert set(trial.cable) == set(scenarios.load("fig6").cable)
+    for name in ("profile", "winch", "vessel"):
+        for values in vars(getattr(trial, name)).values() if getattr(trial, name) else ():
+            assert isinstance(values, str) or np.isfinite(np.array(values)).all()
     for samples in (trial.commands, trial.motion):
         for values in vars(samples).values() if samples else ():
             assert values.dtype == float
@@ -130,6 +135,15 @@ def is_usable(trial):
 @example(text=FIG6.replace("[changes]", '[changes]\n"cable.diameter" = 1' + "0" * 400))
 @example(text="[changes." + "a." * 900 + "a]\nb = 1")
 def test_a_spoiled_trial_is_a_trial_or_a_scenario_error(tmp_path, text):
+    (tmp_path / "mine.toml").write_text(text, encoding="utf-8", newline="")
+    trial = outcome(tmp_path / "mine.toml")
+    if trial:
+        is_usable(trial)
+
+
+@QUIET
+@given(text=spoiled(UMBILICAL))
+def test_a_spoiled_trial_with_winch_and_vessel_is_a_trial_or_a_scenario_error(tmp_path, text):
     (tmp_path / "mine.toml").write_text(text, encoding="utf-8", newline="")
     trial = outcome(tmp_path / "mine.toml")
     if trial:

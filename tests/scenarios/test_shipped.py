@@ -10,7 +10,7 @@ from scenarios.quantities import SECTIONS
 
 REQUIRED = {
     "fig4", "fig5", "fig5_turn", "fig6", "wide_turn", "zigzag",
-    "turning_circle", "dive", "spiral", "stop_and_drift", "current",
+    "turning_circle", "dive", "spiral", "stop_and_drift", "current", "rov_umbilical",
 }  # fmt: skip
 
 
@@ -79,11 +79,15 @@ def test_fig6_says_that_its_commands_are_not_the_papers():
     assert "paper prints NEITHER the propeller speed NOR the rudder angles" in scenarios.load("fig6").text
 
 
-def test_fig6_shows_every_key_that_a_trial_can_hold():
-    shown = tomllib.loads(scenarios.load("fig6").text)
-    for section in ("run", "start", "water", "commands"):
-        assert {quantity.name for quantity in SECTIONS[section]} <= set(shown[section])
-    assert "changes" in shown
+def test_fig6_and_rov_umbilical_show_every_key_that_a_trial_can_hold():
+    fig6, umbilical = (scenarios.load(name).text for name in ("fig6", "rov_umbilical"))
+    for section in ("run", "start", "commands"):
+        assert {quantity.name for quantity in SECTIONS[section]} <= set(tomllib.loads(fig6)[section])
+    assert "changes" in tomllib.loads(fig6)
+    for section in ("water", "winch", "vessel", "motion"):
+        for quantity in SECTIONS[section]:
+            assert quantity.name in umbilical, quantity.name
+    assert "rov_umbilical.toml" in fig6
 
 
 def test_stop_and_drift_stops_the_propeller_at_half_time():
@@ -108,11 +112,19 @@ def test_the_cable_is_table_1_and_the_drum_that_of_section_4():
         "tangential_drag_coefficient": 0.01,
         "normal_drag_coefficient": 1.0,
         "compliance": 0.0,
+        "bending_stiffness": 0.0,
     }
     assert trial.drum == {"radius": 0.1, "inertia": 0.0, "friction_torque": 0.0}
 
 
-@pytest.mark.parametrize("part", ["cables/table1.toml", "vehicles/subzero2.toml"])
+def test_the_umbilical_weighs_a_few_newtons_a_metre_in_water():
+    cable = scenarios.load("rov_umbilical").cable
+    displaced = cable["water_density"] * cable["cross_section_area"]
+    assert 1.0 < 9.81 * (cable["mass_per_length"] - displaced) < 5.0
+    assert cable["cross_section_area"] == pytest.approx(np.pi * cable["diameter"] ** 2 / 4.0, rel=1e-3)
+
+
+@pytest.mark.parametrize("part", ["cables/table1.toml", "cables/umbilical.toml", "vehicles/subzero2.toml"])
 def test_every_number_of_a_part_has_unit_range_and_provenance(part):
     root = scenarios.path("fig6").parent.parent
     sections = tomllib.loads((root / part).read_text(encoding="utf-8"))

@@ -1,0 +1,67 @@
+"""From plain values to what compiled code takes: how the water moves, how the drum moves, and what its winch does."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+import scenarios
+from cable.drum_path import DrumPath, resting
+from cable.properties import DrumProperties
+from cable.water import Current
+from cable.winch import Brake, ConstantTension, PayOutRate, Winch
+from subzero.model import Model
+
+
+def water_of(model: Model) -> Current:
+    """Return how the water moves: the uniform current, and what is added to it by depth."""
+    if model.profile is None:
+        return Current.uniform(model.current)
+    added = np.array(model.profile.velocity, dtype=float)
+    return Current.profile(down=model.profile.depth, velocity=added + np.array(model.current))
+
+
+def drum_of(model: Model) -> DrumProperties | Winch:
+    """Return the free drum, or what turns it."""
+    winch = model.winch
+    if winch is None:
+        return model.drum
+    if winch.control == "brake":
+        return Brake()
+    follow = _follow(winch.time, winch.setpoint)
+    return PayOutRate(rate=follow) if winch.control == "pay_out_rate" else ConstantTension(tension=follow)
+
+
+def way_of_drum(trial: scenarios.Trial, model: Model, wet: float) -> DrumPath:
+    """Return where the drum goes, and what its winch is asked for, from a length `wet` [m] on.
+
+    The times are those of the exchanges, and of all changes of winch and vessel: between them a velocity is linear, so
+    the way is summed up exactly.
+    """
+    drum, vessel = drum_of(model), model.vessel
+    if isinstance(drum, DrumProperties) and vessel is None:
+        return resting(np.array([0.0, max(trial.duration, trial.cable_step)]))
+    times = _times(trial, model)
+    led = resting(times) if isinstance(drum, DrumProperties) else resting(times, drum.setpoints(times, wet))
+    if vessel is None:
+        return led
+    at = np.array(vessel.velocity, dtype=float)
+    velocity = np.column_stack([np.interp(times, vessel.time, column) for column in at.T])
+    steps = 0.5 * np.diff(times)[:, None] * (velocity[1:] + velocity[:-1])
+    place = np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
+    return led._replace(place=place, velocity=np.ascontiguousarray(velocity))
+
+
+def _times(trial: scenarios.Trial, model: Model) -> np.ndarray:
+    """Return the times of the exchanges and of the changes of winch and vessel, increasing. [s]."""
+    steps = max(1, round(trial.duration / trial.cable_step))
+    changes = [thing.time for thing in (model.winch, model.vessel) if thing is not None]
+    times = np.concatenate([np.linspace(0.0, steps * trial.cable_step, steps + 1), *changes])
+    times = np.unique(times[times <= steps * trial.cable_step])
+    return times[np.diff(times, prepend=-np.inf) > 1e-9]  # decimal fractions are not exact in binary
+
+
+def _follow(time: tuple[float, ...], values: tuple[float, ...]) -> Callable[[float], float]:
+    """Return the function that is linear between values at times, and constant behind the last."""
+    return lambda t: float(np.interp(t, time, values))
