@@ -1,7 +1,7 @@
 """Winch, vessel and sheared water in a coupled run: each does what its words say.
 
 Verifies: the way from a `Trial` to the cable's drum and water, with signs. Configuration: a vehicle at rest or at a
-steady speed, a light neutral cable (Table 1) or one that sinks. Tolerance: lengths and ways are exact integrals, 1e-9 m;
+steady speed, a neutral cable (Table 1) or one that sinks. Tolerance: lengths and ways are exact integrals, 1e-9 m;
 tensions of a steady straight pull to 1e-4, of a cable at rest as said.
 """
 
