@@ -67,6 +67,7 @@ _HOME = {
     "estimates": "estimator",
     "fly": "flight",
     "linearise": "linear",
+    "loop_margins": "robustness",
     "make": "table",
     "manoeuvre": "manoeuvres",
     "margins": "design",

@@ -166,20 +166,18 @@ class Margins:
     crossover: float
 
 
-def margins(
-    loop: control.StateSpace, *, lag: control.StateSpace | None = None, delay: float = 0.0
-) -> Margins:
+def margins(loop: control.StateSpace, *, delay: float = 0.0) -> Margins:
     """Return gain and phase margin of a loop, from its frequency response at 4000 frequencies.
 
     Args:
-        loop: L(s) from the command to minus the command, such as `Gains.loop`.
-        lag: another system in the loop, such as a servo that the design left out.
-        delay: of sampling, computing and sensors. [s]
+        loop: L, from the command to minus the command, such as `Gains.loop`; continuous or sampled.
+        delay: beside it, of computing and sensors. [s]
     """
-    w = np.geomspace(1e-3, 1e3, 4000)
-    L = np.squeeze(np.asarray(loop(1j * w))) * np.exp(-1j * w * delay)
-    if lag is not None:
-        L = L * np.squeeze(np.asarray(lag(1j * w)))
+    sampled = loop.dt not in (None, 0)
+    w = np.geomspace(1e-3, np.pi / loop.dt if sampled else 1e3, 4000)
+    L = np.squeeze(np.asarray(loop(np.exp(1j * w * loop.dt) if sampled else 1j * w))) * np.exp(
+        -1j * w * delay
+    )
     size, phase = np.abs(L), np.unwrap(np.angle(L))
     crossing = np.flatnonzero((size[:-1] >= 1.0) & (size[1:] < 1.0))
     real = np.flatnonzero((np.imag(L[:-1]) * np.imag(L[1:]) <= 0.0) & (np.real(L[:-1]) < 0.0))

@@ -1,7 +1,7 @@
 """What the cable does to the vehicle, as a controller can know it: for the feed-forward path.
 
 Both need no look at the true state. The formula takes drum length, speed and yaw rate as measured, and has the cable
-straight along the way of the tow point (`pull`). The twin is a simulation of vehicle and cable that runs beside the
+slide along the way of the tow point. The twin is a simulation of vehicle and cable that runs beside the
 controller under the commands that were sent; its pull is taken in proportion to the length of cable that the drum has
 really let go.
 """
@@ -9,17 +9,23 @@ really let go.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from math import exp
 
 import numpy as np
 
 import scenarios
 from subzero.autopilot.pull import SteadyPull
+from subzero.autopilot.sensors import UNKNOWN
 from subzero.autopilot.tuning import Tuning
 from subzero.model import Model
 from subzero.simulator import Observation, RunStoppedError, Simulator
 
 SHORT = 0.5
 """Cable shorter than this pulls with nothing worth cancelling. [m]"""
+SLOW = 0.05
+"""Below this speed of the tow point there is no way to lie along. [m/s]"""
+SMOOTHED = 1.0
+"""Time constant of the drum's speed: the length is counted in steps. [s]"""
 
 
 class CableModel(ABC):
@@ -52,7 +58,10 @@ class NoCable(CableModel):
 
 
 class FormulaCable(CableModel):
-    """½ρπdC_t U² S along the way of the tow point, from drum length, speed and yaw rate.
+    """½ρπdC_t S'|S'| S against the way of the tow point, from drum length, speed and yaw rate.
+
+    Without stretch a cable slides along itself with the speed S' at which the drum lets it go: on a straight way that
+    is the vehicle's own; in a turn it is less. S' is the slope of the drum length, smoothed over `SMOOTHED`.
 
     Args:
         tuning: of the vehicle, for the sway that goes with a yaw rate.
@@ -61,19 +70,36 @@ class FormulaCable(CableModel):
 
     def __init__(self, tuning: Tuning, model: Model | None = None) -> None:
         self._tuning, self._model = tuning, model or tuning.model
+        self.reset()
 
     def reset(self) -> None:
-        """Nothing to forget."""
+        """Forget how fast the drum turns."""
+        self._rate, self._before = 0.0, UNKNOWN
 
     def wrench(self, reading: Observation, last_command: np.ndarray | None) -> np.ndarray:
         """Return the pull of a cable that lies behind the tow point."""
+        self._follow(reading)
         length = reading.cable_length
         if not length > SHORT:
             return np.zeros(6)
         u, r = reading.surge_speed, reading.yaw_rate
         sway = float(self._tuning.sway_per_yaw.at(u)) * r
         nu = np.array([u, sway, 0.0, 0.0, reading.pitch_rate, r])
-        return SteadyPull.of(self._model, length).wrench(nu)
+        pull = SteadyPull.of(self._model, length)
+        V = nu[:3] + np.cross(nu[3:], pull.tow_point)
+        speed = float(np.linalg.norm(V))
+        if speed < SLOW or self._rate <= 0.0:
+            return np.zeros(6)
+        F = -(pull.drag * self._rate**2 + pull.friction) / speed * V
+        return np.concatenate([F, np.cross(pull.tow_point, F)])
+
+    def _follow(self, reading: Observation) -> None:
+        """Smooth the slope of the drum length."""
+        passed = reading.time - self._before.time
+        if passed > 0.0:
+            slope = (reading.cable_length - self._before.cable_length) / passed
+            self._rate += (1.0 - exp(-passed / SMOOTHED)) * (slope - self._rate)
+        self._before = reading
 
 
 class TwinCable(CableModel):

@@ -1,0 +1,109 @@
+"""Stability margins of the loops as they fly: sampled, with servo, unmeasured states and cable.
+
+    L(z) = −C(z) P(z),   P the hull on its cable (`linearise`), sampled; C the controller, opened at the plant's input
+
+The design leaves out the servo's lag, the sway behind a PID, the sampling and the cable. Here they are all in; the
+gains are those of the bare hull at the same speed.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from subzero.autopilot.design import Margins, margins
+from subzero.autopilot.estimator import MEASURED, STATES, Estimates
+from subzero.autopilot.linear import linearise, subsystem
+from subzero.autopilot.steady import trim
+from subzero.autopilot.tuning import WEIGHTS, Tuning
+from subzero.errors import UserError, suggestion
+from subzero.model import Model
+
+if TYPE_CHECKING:
+    import control
+
+
+def loop_margins(tuning: Tuning, loop: str, *, late: float = 0.0, **options: Any) -> Margins:
+    """Return gain and phase margin of a loop at the plant's input.
+
+    Args:
+        tuning: the gains.
+        loop: "speed", "heading", "pitch" or "roll".
+        late: further delay, of sensors and computing. [s]
+        options: speed, wet_length and so on, as for `sampled_loop`.
+    """
+    return margins(sampled_loop(tuning, loop, **options), delay=late)
+
+
+def sampled_loop(
+    tuning: Tuning,
+    loop: str,
+    *,
+    speed: float,
+    wet_length: float = 0.0,
+    sample_time: float = 0.1,
+    model: Model | None = None,
+    estimates: Estimates | None = None,
+) -> control.StateSpace:
+    """Return L(z) of a loop, opened at the plant's input: from the command to minus the command.
+
+    Args:
+        tuning: the gains.
+        loop: "speed", "heading", "pitch" or "roll".
+        speed: of the vehicle. [m/s]
+        wet_length: of the cable that it pulls. [m]
+        sample_time: of the controller; the hold of half a sample is in it. [s]
+        model: the vehicle; the tuning's by default.
+        estimates: a heading by full state feedback instead of the PID.
+
+    Raises:
+        NoTrimError: the vehicle cannot pull that cable at that speed.
+        UserError: there is no such loop.
+    """
+    import control
+
+    if loop not in WEIGHTS:
+        raise UserError(
+            f"There is no loop '{loop}'.{suggestion(loop, WEIGHTS)} Allowed: {', '.join(WEIGHTS)}."
+        )
+    model = model or tuning.model
+    part = subsystem(linearise(model, trim(model, speed=speed, wet_length=wet_length)), WEIGHTS[loop].part)
+    sampled = control.c2d(part, sample_time)
+    if estimates is not None and loop == "heading":
+        controller, rows = (
+            _estimator(estimates, speed, sample_time),
+            [STATES.index(name) for name in STATES[1:3]],
+        )
+    else:
+        controller = _pid(tuning.gains[loop].at(speed), sample_time)
+        rows = [part.state_labels.index(name) for name in WEIGHTS[loop].measured]
+    measured = control.ss(
+        sampled.A, sampled.B, np.asarray(sampled.C)[rows], np.zeros((len(rows), 1)), sample_time
+    )
+    return -1.0 * (controller * measured)
+
+
+def _pid(gains: np.ndarray, T: float) -> control.StateSpace:
+    """Return u = −k·y + I, I ← I − T k_I y_tracked, the new error already in it."""
+    import control
+
+    *k, k_integral, _ = gains.tolist()
+    fast = np.zeros(len(k))
+    fast[-1] = T * k_integral
+    return control.ss([[1.0]], -fast[None], [[1.0]], -(np.array(k) + fast)[None], T)
+
+
+def _estimator(estimates: Estimates, speed: float, T: float) -> control.StateSpace:
+    """Return the full-state loop from (r, ψ) to the rudder: its states are the estimate and the integral."""
+    import control
+
+    *k, k_integral, _ = estimates.feedback.at(speed).tolist()
+    model, L = estimates.model.at(speed), estimates.filter.at(speed)
+    fast = np.array([0.0, 0.0, T * k_integral, 0.0])
+    out = np.append(-(np.array(k) + fast), 1.0)
+    A = np.zeros((5, 5))
+    A[:4, :4] = model[:, :4] - L @ MEASURED
+    A[:4] += np.outer(model[:, 4], out)
+    A[4] = np.append(-fast, 1.0)
+    return control.ss(A, np.vstack([L, np.zeros((1, 2))]), out[None], np.zeros((1, 2)), T)
