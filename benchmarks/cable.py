@@ -211,7 +211,10 @@ def draw(grown):
 
     figure = Figure(figsize=(5.5, 3.4), dpi=110, layout="constrained")
     axes = figure.subplots()
-    for grading, label in (("0", "segments of 1 m"), ("0.02", "1 m + 0.02 s from the tow point on")):
+    for grading, label in (
+        ("0", "segments of 1 m"),
+        ("0.02", "growing by 2 % of the distance to the tow point"),
+    ):
         rows = [row for row in grown if row[1] == grading]
         axes.loglog([float(row[2]) for row in rows], [float(row[4]) for row in rows], "o-", label=label)
     lengths = np.array([60.0, 3600.0])
