@@ -165,7 +165,8 @@ class Simulator:
             self._grip()
         self.observation = Observation(*self._seen.tolist())
         if ending != coupling.FINE:
-            self._ending, self._message = ending, in_words(ending, solved, self.time)
+            words = in_words(ending, solved, self.time, self._setup, self._live)
+            self._ending, self._message = ending, words
             raise RunStoppedError(self._message)
         return self.observation
 

@@ -63,7 +63,7 @@ def plant(
     """Return a model as a system for python-control, with named inputs, outputs and states (`INPUTS`, `STATES`).
 
     Its attribute `initial_state` is where a run begins. Everything is SI, rad and rev/s (`UNITS`). The water has the
-    model's current.
+    model's current; what a profile adds to it, a winch and a vessel are in the tethered plant only.
 
     Args:
         model: vehicle, cable, drum and current.
@@ -172,7 +172,7 @@ class Tethered:
         live.state[CHARGE], live.state[LINKAGE : LINKAGE + 3] = x[16], x[17:HULL_SIZE]
         self._memory.write(x[HULL_SIZE:])
         self._setup.orders.values[0] = u
-        times = np.array([0.0, self._step])
+        times = np.array([t, t + self._step])
         _, _, ending, solved = run_rows(self._setup, live, self._recording, times, 1, 2, 0)
         if ending != FINE:
             raise UserError(self._trouble(ending, solved, t))
@@ -196,4 +196,4 @@ class Tethered:
         """Say why there is no next state."""
         if ending == NO_ROOM:
             return f"plant: at t = {time:g} s there is no room for more than longest = {self._longest:g} m of cable."
-        return in_words(ending, solved, time)
+        return in_words(ending, solved, time, self._setup, self._live)
