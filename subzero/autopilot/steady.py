@@ -11,27 +11,24 @@ only carries the track.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import cos, degrees, isfinite, radians, sin, sqrt
+from math import cos, degrees, isfinite, radians, sin
 from typing import NoReturn
 
 import numpy as np
 
 from subzero.autopilot.actuators import commands, demands, ideal
+from subzero.autopilot.balance import Motion, level_propeller
 from subzero.autopilot.pull import SteadyPull, from_cable_model
-from subzero.autopilot.states import DEPTH, PITCH, ROLL, STATE_NAMES, VELOCITY, rate, to_vehicle
+from subzero.autopilot.states import STATE_NAMES, VELOCITY, to_vehicle
 from subzero.errors import UserError
 from subzero.model import Model
-from vehicle import Vehicle, VehicleNumbers, rotation
+from vehicle import Vehicle, rotation
 
 CABLES = ("formula", "model")
 STEPS = 20
 """A motion that is not found at once is approached in so many steps."""
 PASSES = 6
 """How often hull and cable model are solved in turn: the pull hardly changes the attitude, three digits a pass."""
-RESIDUAL = 1e-9
-"""What may be left of accelerations and depth rate. [m/s2, rad/s2, m/s]"""
-FARTHEST = 1.2
-"""Fin and pitch angles beyond this are another balance than the one that is looked for. [rad]"""
 STEEPEST = radians(80.0)
 """Pitch beyond which Euler angles are no use any more. [rad]"""
 
@@ -84,48 +81,6 @@ class Trim:
         return dict(zip(STATE_NAMES, self.state.tolist(), strict=True))
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Motion:
-    """What is asked for, of which hull (its numbers without limits), with which pull beyond the formula's."""
-
-    numbers: VehicleNumbers
-    pull: SteadyPull
-    speed: float
-    depth_rate: float
-    turn_rate: float
-    roll: float
-    extra: np.ndarray
-
-    def part(self, share: float) -> _Motion:
-        """Return the same with a share of everything that is not straight and level."""
-        asked = {name: share * getattr(self, name) for name in ("depth_rate", "turn_rate", "roll", "extra")}
-        return replace(self, **asked)
-
-    def state(self, y: np.ndarray) -> np.ndarray:
-        """Return x (16,) for the unknowns n, δ_r, δ_e, δ_d, θ, v, w."""
-        n, rudder, together, unlike, pitch, v, w = y
-        x = np.zeros(16)
-        x[ROLL], x[PITCH] = self.roll, pitch
-        spin = (-sin(pitch), cos(pitch) * sin(self.roll), cos(pitch) * cos(self.roll))
-        x[VELOCITY] = self.speed, v, w, *(self.turn_rate * part for part in spin)
-        x[12:] = n, rudder, together - unlike, together + unlike
-        return x
-
-    def left(self, y: np.ndarray) -> np.ndarray:
-        """Return what is left of the seven equations."""
-        x = self.state(y)
-        rates = rate(x, x[12:], self.numbers, self.pull.wrench(x[VELOCITY]) + self.extra)
-        return np.append(rates[VELOCITY], rates[DEPTH] - self.depth_rate)
-
-    def solved(self, y: np.ndarray) -> np.ndarray | None:
-        """Return the unknowns from a guess; None if they are not found."""
-        from scipy.optimize import root
-
-        found = root(self.left, y, tol=1e-13).x
-        near = np.max(np.abs(found[1:5])) < FARTHEST
-        return found if near and np.max(np.abs(self.left(found))) < RESIDUAL else None
-
-
 def trim(
     model: Model,
     *,
@@ -154,7 +109,7 @@ def trim(
     """
     _check(speed, depth_rate, turn_rate, wet_length, roll, cable)
     hull, pull = model.vehicle, SteadyPull.of(model, wet_length)
-    motion = _Motion(
+    motion = Motion(
         numbers=ideal(hull).numbers(),
         pull=pull,
         speed=speed,
@@ -203,9 +158,9 @@ def _check(
         )
 
 
-def _balanced(hull: Vehicle, motion: _Motion) -> np.ndarray:
+def _balanced(hull: Vehicle, motion: Motion) -> np.ndarray:
     """Return the state of a steady motion, at once from straight level motion, or in steps."""
-    guess = np.array([_level_propeller(motion), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    guess = np.array([level_propeller(motion), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
     direct = motion.solved(guess)
     if direct is not None:
         return motion.state(direct)
@@ -216,17 +171,6 @@ def _balanced(hull: Vehicle, motion: _Motion) -> np.ndarray:
             _say_how_far(hull, motion.part(reached).state(guess), reached)
         guess, reached = found, share
     return motion.state(guess)
-
-
-def _level_propeller(motion: _Motion) -> float:
-    """Return n at which thrust balances drag and pull straight ahead with central fins, a n² − b n u − c u² = R."""
-    p, u = motion.numbers.propeller, motion.speed
-    x = motion.part(0.0).state(np.zeros(7))
-    rates = rate(x, x[12:], motion.numbers, motion.pull.wrench(x[VELOCITY]))
-    brake = -float(motion.numbers.mass_matrix[0] @ rates[VELOCITY])  # with the propeller standing still
-    if p.thrust_nn == 0.0:
-        return 0.0
-    return (p.thrust_nu * u + sqrt((p.thrust_nu * u) ** 2 + 4.0 * p.thrust_nn * brake)) / (2.0 * p.thrust_nn)
 
 
 def _cable_pull(model: Model, x: np.ndarray, turn_rate: float, wet_length: float) -> np.ndarray:
