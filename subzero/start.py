@@ -43,6 +43,8 @@ def prepare(trial: scenarios.Trial, model: Model, tethered: bool) -> tuple[Setup
     )
     live.line.ends.segment_length, live.line.ends.grading = trial.segment_length, trial.grading
     lay_out(setup, live, wet)
+    if setup.fixed.drum.control != FREE:
+        _hang(live.line, float(live.now.guess[2] * setup.fixed.cable.weight))
     return setup, live
 
 
@@ -62,8 +64,6 @@ def lay_out(setup: Setup, live: Live, wet: float) -> None:
         now.force[i] = -pull * now.guess[i]
     lead_drum(setup.led, 0.0, fixed.drum)
     lay_straight(live.line, wet, now.guess, speed, fixed.drum, fixed.cable)
-    if fixed.drum.control != FREE:
-        _hang(live.line, now.guess[2] * fixed.cable.weight)
     start_in_water(live.line, setup.water, fixed.cable, live.load)
     energy_flow(live.line, fixed.cable, live.load, now.ledger.cable_new)
     for i in range(FLOWS):
@@ -72,16 +72,13 @@ def lay_out(setup: Setup, live: Live, wet: float) -> None:
     now.ledger.kinetic = vehicle.kinetic_energy(state, now.hull.current, fixed.vehicle)
 
 
-@compiled
 def _hang(line: Line, weight: float) -> None:
-    """Add the weight that the drum carries, `weight` [N/m] per length of a straight cable below it."""
-    along = 0.0
-    for j in range(1, line.ends.count + 1):
-        length = line.ends.last_length[NOW] if j == line.ends.count else line.length[j]
-        for level in range(2):
-            line.tension[level, j] += max(weight, 0.0) * (along + 0.5 * length)
-        along += length
-        line.node_tension[j] += max(weight, 0.0) * along
+    """Add the weight that a winch carries, `weight` [N/m] per length of a straight cable below it."""
+    N = int(line.ends.count)
+    lengths = np.append(line.length[1:N], line.ends.last_length[NOW])
+    along = np.cumsum(lengths)
+    line.tension[:, 1 : N + 1] += max(weight, 0.0) * (along - 0.5 * lengths)
+    line.node_tension[1 : N + 1] += max(weight, 0.0) * along
 
 
 def _fixed(trial: scenarios.Trial, model: Model, tethered: bool) -> Fixed:

@@ -73,6 +73,15 @@ def test_a_winch_that_reels_in_makes_the_cable_shorter_by_its_rate(trial_of, sim
     assert run["cable_tension"].values[-1] == pytest.approx(0.02 / 10.0 / 1e-3, rel=0.05)  # and some drag
 
 
+def test_a_winch_carries_from_the_first_row_on_what_hangs_below_it(trial_of, simulate):
+    """20 m of cable of w_c = 0.148 N/m straight below the drum, the vehicle on its end carries nothing."""
+    elastic = HEAVY | {"compliance": 1e-6}
+    run = simulate(trial_of(pitch=-np.radians(89.0), cable=elastic, winch=winch("brake"), duration=0.2))
+    weight = (0.02 - 1000.0 * 4.9e-6) * 9.81 * 20.0 * np.sin(np.radians(89.0))
+    assert run["drum_tension"].values[0] == pytest.approx(weight, rel=1e-12)
+    assert run["cable_tension"].values[0] == 0.0
+
+
 def test_a_brake_keeps_the_length(trial_of, simulate):
     run = simulate(trial_of(winch=winch("brake"), vessel=vessel((0.0, (0.3, 0.0, 0.0)))))
     assert_allclose(run["cable_length"].values, 20.0, atol=1e-9)
