@@ -39,16 +39,16 @@ def correct_for_arc(line: Line, work: Load) -> None:
     """Fill line.slip and line.normal_gain from the prediction on level NEW and the velocities of level NOW."""
     for j in range(1, line.ends.count + 1):
         square = _turning_angle(line, j, work)
-        theta, t, V = work.across, work.tangent, work.velocity
+        theta, t, U = work.across, work.tangent, work.velocity
         _tangent(line, j, t)
         slide, side, along, speed = 0.0, 0.0, 0.0, 0.0
         for i in range(3):
             near, far = line.velocity[NOW, j - 1, i], line.velocity[NOW, j, i]
-            V[i] = 0.5 * (near + far)
+            U[i] = 0.5 * (near + far - line.water[NOW, j - 1, i] - line.water[NOW, j, i])
             slide += theta[i] * (far - near)
-            side += theta[i] * V[i]
-            along += t[i] * V[i]
-            speed += V[i] * V[i]
+            side += theta[i] * U[i]
+            along += t[i] * U[i]
+            speed += U[i] * U[i]
         line.slip[j] = 0.25 * slide
         in_plane = side * side / max(square * (speed - along * along), STILL)
         line.normal_gain[j] = 1.0 - square * min(in_plane, 1.0) / 6.0

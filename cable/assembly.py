@@ -20,11 +20,12 @@ import numpy as np
 
 from subzero.compiled import compiled, inner
 
+from .bending import add_bending
 from .differences import Weights
 from .drum import FREE, LENGTH, SPINNING, STANDING, TENSION, friction
 from .element import Load, differentiate_load, evaluate_load, fading_rate, turning_rate
 from .first_segment import write_single_segment
-from .line import BEFORE, NEW, NOW, RESIDUAL, Line, held_node, take_segment
+from .line import BEFORE, DIAGONAL, LOWER, NEW, NOW, RESIDUAL, UPPER, Line, held_node, take_segment
 from .properties import CableNumbers, DrumNumbers
 from .slack import slack_law
 
@@ -63,7 +64,7 @@ def assemble(
     for j in range(1, N + 1):
         length = line.ends.last_length[NEW] if j == N else line.length[j]
         T = line.tension[NEW, j]
-        take_segment(line, NEW, j, work)
+        take_segment(line.position[NEW], line.velocity[NEW], line.water[NEW], j, work)
         evaluate_load(length, T, line.slip[j], line.normal_gain[j], w.a0, c, work)
         differentiate_load(length, line.slip[j], w.a0, c, work)
         for i in range(3):
@@ -77,6 +78,7 @@ def assemble(
             _add_influx(line, length, w, T, c, work)
         _scatter_balance(line, j, T, length, work)
         _scatter_length(line, j, T, length, c, work.chord)
+    add_bending(line, c)
     if N > 1:
         _sharpen_tow_force(line)
     if line.ends.free_end:
@@ -99,10 +101,10 @@ def _add_drogue(line: Line, w: Weights) -> None:
     for i in range(3):
         U = line.velocity[NEW, N, i] - J[i]
         line.rows[RESIDUAL, N, 1 + i] += k * size * U
-        line.diagonal[N, 1 + i, 1 + i] += k * size * w.b0
+        line.blocks[DIAGONAL, N, 1 + i, 1 + i] += k * size * w.b0
         for m in range(3):
             slope = U * (line.velocity[NEW, N, m] - J[m]) / max(size, 1e-12)
-            line.diagonal[N, 1 + i, 1 + m] += k * slope * w.b0
+            line.blocks[DIAGONAL, N, 1 + i, 1 + m] += k * slope * w.b0
 
 
 @compiled
@@ -112,9 +114,9 @@ def _clear(line: Line) -> None:
         for i in range(4):
             line.rows[RESIDUAL, j, i] = 0.0
             for k in range(4):
-                line.lower[j, i, k] = 0.0
-                line.diagonal[j, i, k] = 0.0
-                line.upper[j, i, k] = 0.0
+                line.blocks[LOWER, j, i, k] = 0.0
+                line.blocks[DIAGONAL, j, i, k] = 0.0
+                line.blocks[UPPER, j, i, k] = 0.0
 
 
 @compiled
@@ -161,13 +163,13 @@ def _add_influx(line: Line, length: float, w: Weights, T: float, c: CableNumbers
 @compiled
 def _scatter_balance(line: Line, j: int, T: float, length: float, work: Load) -> None:
     """Add segment j to the balances of its two nodes: f + ½Q to the far one, −f + ½Q to the near one."""
-    held, t, d, brace = held_node(line), work.tangent, work.chord, line.bracing[j]
+    held, t, d = held_node(line), work.tangent, work.chord
     stiffness, g = T / work.chord_length, turning_rate(d, length)
     fading = fading_rate(d, length, work.chord_length) if j == held else 0.0
     by_near, by_far = work.by_near, work.by_far
-    D, L, U, r = line.diagonal, line.lower, line.upper, line.rows[RESIDUAL]
+    D, L, U, r = line.blocks[DIAGONAL], line.blocks[LOWER], line.blocks[UPPER], line.rows[RESIDUAL]
     for i in range(3):
-        f, half = T * t[i] + brace * d[i] - line.shear[j, i], 0.5 * line.load[j, i]
+        f, half = T * t[i], 0.5 * line.load[j, i]
         if j < held:
             r[j, 1 + i] += f + half
             D[j, 1 + i, 0] += t[i]
@@ -184,8 +186,6 @@ def _scatter_balance(line: Line, j: int, T: float, length: float, work: Load) ->
                 if j < held and k > 0
                 else 0.0
             )
-            if j < held and i == k - 1:
-                pull += brace
             if j == held and k == 1:
                 pull = -fading * T * t[i]
             if j < held:
@@ -196,7 +196,7 @@ def _scatter_balance(line: Line, j: int, T: float, length: float, work: Load) ->
                 line.ends.tow_by_block[i, k] = (t[i] if k == 0 else 0.0) + pull - far
         for k in range(3):
             near = 0.5 * by_near[i, k]
-            pull = stiffness * ((1.0 if i == k else 0.0) - g * t[i] * t[k]) + (brace if i == k else 0.0)
+            pull = stiffness * ((1.0 if i == k else 0.0) - g * t[i] * t[k])
             if j < held:
                 L[j, 1 + i, 1 + k] += near - pull
             if j > 1:
@@ -223,14 +223,14 @@ def _scatter_length(line: Line, j: int, T: float, length: float, c: CableNumbers
     stretch = 1.0 + c.compliance * T
     phi, by_T, by_strain = slack_law(T, 0.5 * (stretch * stretch - square), line.ends.smoothing)
     line.rows[RESIDUAL, j, 0] = phi
-    line.diagonal[j, 0, 0] = by_T + by_strain * stretch * c.compliance
+    line.blocks[DIAGONAL, j, 0, 0] = by_T + by_strain * stretch * c.compliance
     for i in range(3):
         slope = by_strain * d[i] * scale
-        line.lower[j, 0, 1 + i] = slope
+        line.blocks[LOWER, j, 0, 1 + i] = slope
         if j < held_node(line):
-            line.diagonal[j, 0, 1 + i] = -slope
+            line.blocks[DIAGONAL, j, 0, 1 + i] = -slope
     if j == held_node(line):
-        line.diagonal[j, 0, 1] = by_strain * square / length
+        line.blocks[DIAGONAL, j, 0, 1] = by_strain * square / length
 
 
 @compiled
@@ -238,14 +238,16 @@ def _drum_row(line: Line, w: Weights, drum: DrumNumbers, work: Load) -> None:
     """Write the drum's equation (11), the second row of the last block; `work` still holds the last segment."""
     N, t = line.ends.count, work.tangent
     D, L, r = (
-        line.diagonal[line.ends.count],
-        line.lower[line.ends.count],
+        line.blocks[DIAGONAL, line.ends.count],
+        line.blocks[LOWER, line.ends.count],
         line.rows[RESIDUAL, line.ends.count],
     )
     D[2, 2] = 1.0
     D[3, 3] = 1.0
     Qt = line.load[N, 0] * t[0] + line.load[N, 1] * t[1] + line.load[N, 2] * t[2]
     line.ends.drum_pull = line.tension[NEW, N] + 0.5 * Qt
+    for i in range(3):
+        line.ends.drum_force[i] = line.tension[NEW, N] * t[i] + 0.5 * line.load[N, i]
     if drum.control == LENGTH or line.ends.drum_mode == STANDING:
         r[1] = line.ends.last_length[NEW] - _length_wanted(line, drum)
         D[1, 1] = 1.0

@@ -1,16 +1,13 @@
 """Bending: a cable with a bending stiffness EI resists curvature, also where it is slack.
 
-The bending energy of a chain of straight segments with tangents t_j, and the force in segment j that follows from it:
+The bending energy of a chain of straight segments with tangents t_j, and the shear force in segment j that follows:
 
     E_B = Σ ½ EI |t_{j+1} − t_j|²/ℓ̄_j,   M_j = EI (t_{j+1} − t_j)/ℓ̄_j,   q_j = P_j (M_j − M_{j−1})/|d_j|
 
-with ℓ̄_j = ½(ℓ_j + ℓ_{j+1}) and no moment at the two ends (hinges at the vehicle and at the drum). Then f_j becomes
-T_j t_j − q_j wherever `cable.assembly` uses it; q_j is the shear force, EI ∂³x/∂s³ for a gently bent cable.
-
-q reaches over five nodes where the rest of the equations reaches over three. So it is taken at the prediction of the
-step, and a brace S_j (d_j − d_j*) with S = 4EI/ℓ³ holds the chord d to its prediction d*: with S at least as stiff as
-bending is between neighbours (and it is: 4(1 − cos θ)² ≤ 8(1 − cos θ)) the step is stable for any EI and Δt. The price is an
-error S ½Δt² ∂²d/∂t², of second order, and none at rest. A layer of thickness √(EI/T) at a clamped end is not modelled.
+with ℓ̄_j = ½(ℓ_j + ℓ_{j+1}) and no moment at the two ends (hinges at the vehicle and at the drum; a layer of thickness
+√(EI/T) at a clamped end is not modelled). f_j of `cable.assembly` becomes T_j t_j − q_j; for a gently bent cable q is
+EI ∂³x/∂s³. It depends on four nodes, so a balance depends on five: the matrix gets blocks beside its three diagonals.
+ℓ̄ of the growing segment is taken from the step before. A cable without EI compiles nothing of this.
 """
 
 from __future__ import annotations
@@ -19,52 +16,144 @@ from math import sqrt
 
 import numpy as np
 
-from subzero.compiled import compiled, inner
+from subzero.compiled import by_field, compiled, inner
 
-from .line import NEW, Line
-from .properties import CableNumbers
+from .blocks import factor, solve
+from .line import DIAGONAL, LOWER, LOWER2, NEW, NOW, RESIDUAL, UPPER, UPPER2, Line, held_node
+from .properties import CableNumbers, StiffCableNumbers
+from .wide_blocks import factor_wide, solve_wide
 
 
 @inner
-def bend(line: Line, c: CableNumbers) -> None:
-    """Fill line.shear with q_j + S_j d_j* and line.bracing with S_j, from the prediction on level NEW."""
-    near, far = np.zeros(3), np.zeros(3)
+def _add_bending(line: Line, c: StiffCableNumbers) -> None:
+    """Add the shear forces to the balances and the tow force, and their derivatives to the matrix."""
     for j in range(1, line.ends.count + 1):
-        for i in range(3):
-            near[i] = far[i]
-        _moment(line, j, c.bending_stiffness, far)
-        shortest = min(_length(line, j), _length(line, max(j - 1, 1)), _length(line, j + 1))
-        line.bracing[j] = 4.0 * c.bending_stiffness / shortest**3
-        along, square = 0.0, 0.0
-        for i in range(3):
-            d = line.position[NEW, j, i] - line.position[NEW, j - 1, i]
-            along += d * (far[i] - near[i])
-            square += d * d
-        r = sqrt(max(square, 1e-30))
-        for i in range(3):
-            d = line.position[NEW, j, i] - line.position[NEW, j - 1, i]
-            q = (far[i] - near[i] - along * d / (r * r)) / r
-            line.shear[j, i] = q + line.bracing[j] * d
+        for i in range(4):
+            for k in range(4):
+                line.blocks[LOWER2, j, i, k] = 0.0
+                line.blocks[UPPER2, j, i, k] = 0.0
+    tangents, chords = np.empty((3, 3)), np.empty(3)
+    for j in range(1, line.ends.count + 1):
+        for side in range(3):
+            _tangent(line, j + side - 1, side, tangents, chords)
+        _add_shear(line, j, c.bending_stiffness, tangents, chords)
 
 
 @compiled
-def _moment(line: Line, j: int, stiffness: float, out: np.ndarray) -> None:
-    """Fill out (3,) with M_j = EI (t_{j+1} − t_j)/ℓ̄_j at node j, none at the ends. [N m]."""
+def _tangent(line: Line, j: int, side: int, tangents: np.ndarray, chords: np.ndarray) -> None:
+    """Fill tangent and chord length of segment j; zeros where there is none."""
+    square, x = 0.0, line.position[NEW]
+    inside = 1 <= j <= line.ends.count
     for i in range(3):
-        out[i] = 0.0
-    if j == line.ends.count:
-        return
-    spread = 0.5 * (_length(line, j) + _length(line, j + 1))
-    for side in range(2):
-        square = 0.0
-        for i in range(3):
-            square += (line.position[NEW, j + side, i] - line.position[NEW, j + side - 1, i]) ** 2
-        weight = (2 * side - 1) * stiffness / (spread * sqrt(max(square, 1e-30)))
-        for i in range(3):
-            out[i] += weight * (line.position[NEW, j + side, i] - line.position[NEW, j + side - 1, i])
+        tangents[side, i] = x[j, i] - x[j - 1, i] if inside else 0.0
+        square += tangents[side, i] ** 2
+    chords[side] = sqrt(max(square, 1e-30))
+    for i in range(3):
+        tangents[side, i] /= chords[side]
 
 
 @compiled
-def _length(line: Line, j: int) -> float:
-    """Return the predicted length of segment j; of the last one for any j beyond. [m]."""
-    return line.length[j] if j < line.ends.count else line.ends.last_length[NEW]
+def _spring(line: Line, j: int, stiffness: float) -> float:
+    """Return EI/ℓ̄_j of the hinge at node j; none at the ends. [N m]."""
+    N = line.ends.count
+    if j < 1 or j >= N:
+        return 0.0
+    far = line.ends.last_length[NOW] if j + 1 == N else line.length[j + 1]
+    return 2.0 * stiffness / (line.length[j] + far)
+
+
+@compiled
+def _add_shear(line: Line, j: int, stiffness: float, t: np.ndarray, r: np.ndarray) -> None:
+    """Add q_j to the nodes j and j−1; t and r are tangents and chords of segments j−1, j and j+1."""
+    near, far = _spring(line, j - 1, stiffness), _spring(line, j, stiffness)
+    m, q, along = np.empty(3), np.empty(3), 0.0
+    for i in range(3):
+        m[i] = far * (t[2, i] - t[1, i]) - near * (t[1, i] - t[0, i])
+        along += t[1, i] * m[i]
+    for i in range(3):
+        q[i] = (m[i] - along * t[1, i]) / r[1]
+        _add_to_balances(line, j, i, q[i])
+    before_after_0, before_after_2 = 0.0, 0.0
+    for i in range(3):
+        before_after_0 += t[1, i] * t[0, i]
+        before_after_2 += t[1, i] * t[2, i]
+    for i in range(3):
+        for k in range(3):
+            P = (1.0 if i == k else 0.0) - t[1, i] * t[1, k]
+            to_0 = P - t[0, k] * (t[0, i] - t[1, i] * before_after_0)
+            to_2 = P - t[2, k] * (t[2, i] - t[1, i] * before_after_2)
+            A, C = near * to_0 / (r[1] * r[0]), far * to_2 / (r[1] * r[2])
+            B = -((near + far) * P + along * P) / (r[1] * r[1]) - (t[1, i] * q[k] + q[i] * t[1, k]) / r[1]
+            _add_to_matrix(line, j, i, k, A, B, C)
+
+
+@compiled
+def _add_to_balances(line: Line, j: int, i: int, q: float) -> None:
+    """Add a component of q_j: −q to node j, +q to node j−1, −q to the tow force."""
+    if j < held_node(line):
+        line.rows[RESIDUAL, j, 1 + i] -= q
+    if j > 1:
+        line.rows[RESIDUAL, j - 1, 1 + i] += q
+    else:
+        line.ends.tow_force[i] -= q
+
+
+@compiled
+def _add_to_matrix(line: Line, j: int, i: int, k: int, A: float, B: float, C: float) -> None:
+    """Add the derivatives of a component of q_j by the chords j−1 (A), j (B) and j+1 (C)."""
+    held, row, column = held_node(line), 1 + i, 1 + k
+    if j < held:
+        line.blocks[LOWER2, j, row, column] += A
+        line.blocks[LOWER, j, row, column] += B - A
+        line.blocks[DIAGONAL, j, row, column] += C - B
+        if j + 1 < held:
+            line.blocks[UPPER, j, row, column] -= C
+    if j > 1:
+        line.blocks[LOWER, j - 1, row, column] -= A
+        line.blocks[DIAGONAL, j - 1, row, column] += A - B
+        if j < held:
+            line.blocks[UPPER, j - 1, row, column] += B - C
+        if j + 1 < held:
+            line.blocks[UPPER2, j - 1, row, column] += C
+    else:
+        line.ends.tow_by_tow[i, k] += B
+        if j < held:
+            line.ends.tow_by_block[i, column] -= B - C
+
+
+@inner
+def _no_bending(line: Line, c: CableNumbers) -> None:
+    """Add nothing."""
+
+
+@inner
+def _newton_step(line: Line, c: CableNumbers) -> bool:
+    """Overwrite the residual with the Newton step; False where the matrix is singular."""
+    L, D, U, N = line.blocks[LOWER], line.blocks[DIAGONAL], line.blocks[UPPER], line.ends.count
+    if factor(L, D, U, line.pivots, N) > 0:
+        return False
+    keep_tow_answer(line)
+    solve(L, D, U, line.pivots, N, line.rows[RESIDUAL])
+    return True
+
+
+@inner
+def _stiff_newton_step(line: Line, c: StiffCableNumbers) -> bool:
+    """Do the same for five diagonals of blocks."""
+    if factor_wide(line.blocks, line.pivots, line.ends.count) > 0:
+        return False
+    keep_tow_answer(line)
+    solve_wide(line.blocks, line.pivots, line.ends.count, line.rows[RESIDUAL])
+    return True
+
+
+@inner
+def keep_tow_answer(line: Line) -> None:
+    """Keep W_1 of the elimination (`cable.blocks`), before the next assembly overwrites it."""
+    for k in range(3):
+        for m in range(4):
+            line.ends.tow_answer[k, m] = line.blocks[LOWER, 1, 1 + k, m]
+
+
+add_bending = by_field("bending_stiffness", _add_bending, _no_bending)
+newton_step = by_field("bending_stiffness", _stiff_newton_step, _newton_step)

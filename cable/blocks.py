@@ -24,7 +24,8 @@ SIZE = 4
 def factor_block(D: np.ndarray, pivots: np.ndarray) -> bool:
     """Factor a 4×4 block in place by rows exchanged for size; return False when it is singular.
 
-    Multipliers stay in the row they were made in, so `solve_block` exchanges and eliminates in the same order.
+    Multipliers stay in the row they were made in, so `solve_block` exchanges and eliminates in the same order;
+    the diagonal keeps the inverses of the pivots.
     """
     for k in range(SIZE):
         best = k
@@ -38,6 +39,7 @@ def factor_block(D: np.ndarray, pivots: np.ndarray) -> bool:
             for c in range(k, SIZE):
                 D[k, c], D[best, c] = D[best, c], D[k, c]
         inverse = 1.0 / D[k, k]
+        D[k, k] = inverse
         for i in range(k + 1, SIZE):
             D[i, k] *= inverse
             for c in range(k + 1, SIZE):
@@ -57,7 +59,7 @@ def solve_block(D: np.ndarray, pivots: np.ndarray, b: np.ndarray) -> None:
     for k in range(SIZE - 1, -1, -1):
         for c in range(k + 1, SIZE):
             b[k] -= D[k, c] * b[c]
-        b[k] /= D[k, k]
+        b[k] *= D[k, k]
 
 
 @compiled
@@ -69,7 +71,7 @@ def factor(L: np.ndarray, D: np.ndarray, U: np.ndarray, pivots: np.ndarray, last
     """
     for j in range(last, 0, -1):
         if j < last:
-            for row in range(SIZE):
+            for row in range(1, SIZE):
                 for column in range(1, SIZE):
                     total = 0.0
                     for k in range(SIZE):
@@ -77,7 +79,7 @@ def factor(L: np.ndarray, D: np.ndarray, U: np.ndarray, pivots: np.ndarray, last
                     D[j, row, column] -= total
         if not factor_block(D[j], pivots[j]):
             return j
-        _transpose(L[j])
+        transpose(L[j])
         for column in range(1, SIZE):
             solve_block(D[j], pivots[j], L[j, column])
     return 0
@@ -88,7 +90,7 @@ def solve(L: np.ndarray, D: np.ndarray, U: np.ndarray, pivots: np.ndarray, last:
     """Overwrite r (blocks, 4) with the solution, given what `factor` left."""
     for j in range(last, 0, -1):
         if j < last:
-            for row in range(SIZE):
+            for row in range(1, SIZE):
                 for k in range(SIZE):
                     r[j, row] -= U[j, row, k] * r[j + 1, k]
         solve_block(D[j], pivots[j], r[j])
@@ -98,8 +100,8 @@ def solve(L: np.ndarray, D: np.ndarray, U: np.ndarray, pivots: np.ndarray, last:
                 r[j, row] -= L[j, column, row] * r[j - 1, column]
 
 
-@compiled
-def _transpose(A: np.ndarray) -> None:
+@inner
+def transpose(A: np.ndarray) -> None:
     """Transpose a 4×4 block in place."""
     for i in range(SIZE):
         for k in range(i + 1, SIZE):

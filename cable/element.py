@@ -73,27 +73,27 @@ def new_load() -> Load:
 
 @compiled
 def chord_length(d: np.ndarray, length: float) -> float:
-    """Return r with r² = |d|² + F²(1 − |d|²/ℓ²)²ℓ², the length that the tangent t = d/r is made with. [m].
+    """Return r with r² = |d|² + F² max(1 − |d|²/ℓ², 0)² ℓ², the length that the tangent t = d/r is made with. [m].
 
-    For a taut segment r = |d|, and t is a unit vector. A slack segment (|d| < ℓ) is a folded cable: its t gets shorter
-    than one, smoothly to 0 when both ends meet, and P = I − t tᵀ with it tends to the same drag in all directions.
+    For a taut or stretched segment r = |d|, and t is a unit vector. A slack one (|d| < ℓ) is a folded cable: its t gets
+    shorter than one, smoothly to 0 when both ends meet, and P = I − t tᵀ then tends to equal drag in all directions.
     """
     square = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) / (length * length)
-    return length * sqrt(square + (FOLDING * (1.0 - square)) ** 2)
+    return length * sqrt(square + (FOLDING * max(1.0 - square, 0.0)) ** 2)
 
 
 @inner
 def turning_rate(d: np.ndarray, length: float) -> float:
     """Return g in ∂t/∂d = (I − g t tᵀ)/r; 1 for a taut segment. [-]."""
     square = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) / (length * length)
-    return 1.0 - 2.0 * FOLDING * FOLDING * (1.0 - square)
+    return 1.0 - 2.0 * FOLDING * FOLDING * max(1.0 - square, 0.0)
 
 
 @inner
 def fading_rate(d: np.ndarray, length: float, r: float) -> float:
     """Return f in ∂t/∂ℓ = −f t; 0 for a taut segment. [1/m]."""
     square = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) / (length * length)
-    return FOLDING * FOLDING * length * (1.0 - square * square) / (r * r)
+    return FOLDING * FOLDING * length * max(1.0 - square * square, 0.0) / (r * r)
 
 
 @inner
@@ -122,9 +122,9 @@ def evaluate_load(
     """
     V, J, t, across = work.velocity, work.water, work.tangent, work.across
     r = chord_length(work.chord, length)
-    work.chord_length = r
+    work.chord_length, shorter = r, 1.0 / r
     for i in range(3):
-        t[i] = work.chord[i] / r
+        t[i] = work.chord[i] * shorter
     evaluate_momentum(c, work)
     Ut = (V[0] - J[0]) * t[0] + (V[1] - J[1]) * t[1] + (V[2] - J[2]) * t[2]
     for i in range(3):
@@ -152,7 +152,7 @@ def differentiate_load(length: float, slip: float, a0: float, c: CableNumbers, w
     Ut, normal, r, kt, kn = work.along, work.side, work.chord_length, work.kt, work.kn
     g = turning_rate(work.chord, length)
     inverse = 1.0 / normal if normal > 1e-12 else 0.0
-    along = abs(Ut + slip)
+    along, shorter = abs(Ut + slip), 1.0 / r
     for i in range(3):
         for k in range(3):
             G[i, k] = across[i] * across[k] * inverse
@@ -171,5 +171,5 @@ def differentiate_load(length: float, slip: float, a0: float, c: CableNumbers, w
             work.q_d[i, k] = kt * along * pull - kn * GC - a0 * c.added_mass * C
             work.q_tt[i] += work.q_d[i, k] * t[k]
         for k in range(3):
-            work.q_d[i, k] = (work.q_d[i, k] - g * work.q_tt[i] * t[k]) / r
+            work.q_d[i, k] = (work.q_d[i, k] - g * work.q_tt[i] * t[k]) * shorter
         work.q_V[i, i] += a0 * c.mass

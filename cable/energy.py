@@ -7,8 +7,8 @@ Relative to the water, U = V − J, the balance of `element` times U gives
 with F the force on the vehicle, E = ∫(½mU² + ½ρA U_⊥² + ½eT²) ds (and bending) the energy in the water, L = ∫D·U ds the
 loss to drag, G = ∫w_c U_k ds the work of gravity, and
 
-    D_S = −T(S) t·U(S) − (dS/dt) e(S)    work on the drum, less the energy that enters with new cable; at a free end, the
-                                         loss of the drogue
+    D_S = −F_S·U(S) − (dS/dt) e(S)       work on the drum, F_S = T_N t_N + ½Q_N, less the energy that enters with new
+                                         cable; at a free end, the loss of the drogue
     M   = −ρA ∫ U_t U_⊥·(∂t/∂t) ds       (the paper's added mass is no gradient of an energy when the cable turns)
     C   = ∫ m U·dJ/dt ds − ∫ T t·∂J/∂s ds    what a current that changes along the cable's way does; 0 in a uniform one
 
@@ -27,7 +27,7 @@ from .line import BEFORE, NOW, Line, take_segment
 from .properties import CableNumbers
 
 LOSS, STORED, GRAVITY_WORK, AT_DRUM, ADDED_MASS, STRAINED, CARRIED, TOWED = range(8)
-"""What `energy_flow` fills: L, E [J], G, D_S, M, −∫T t·∂J/∂s ds, ∫m U·dJ/dt ds (mean over the last step), −F·U(0). [W]"""
+"""What `energy_flow` fills: L, E [J], G, D_S, M, −∫T t·∂J/∂s ds, ∫m U·dJ/dt ds (mean over a step), −F·U(0). [W]"""
 FLOWS = 8
 
 
@@ -40,7 +40,7 @@ def energy_flow(line: Line, c: CableNumbers, work: Load, out: np.ndarray) -> Non
     for j in range(1, N + 1):
         length = line.ends.last_length[NOW] if j == N else line.length[j]
         T = line.tension[NOW, j]
-        take_segment(line, NOW, j, work)
+        take_segment(line.position[NOW], line.velocity[NOW], line.water[NOW], j, work)
         evaluate_load(length, T, line.slip[j], line.normal_gain[j], 0.0, c, work)
         square, turn = 0.0, 0.0
         for i in range(3):
@@ -88,7 +88,9 @@ def _flow_at_ends(line: Line, c: CableNumbers, out: np.ndarray) -> None:
         return
     along /= np.sqrt(max(size, 1e-30))
     entering = 0.5 * (c.mass * square + c.added_mass * (square - along * along) + c.compliance * T * T)
-    out[AT_DRUM] = -T * along - line.ends.payout[NOW] * entering
+    out[AT_DRUM] = -line.ends.payout[NOW] * entering
+    for i in range(3):
+        out[AT_DRUM] -= line.ends.drum_force[i] * (line.velocity[NOW, N, i] - line.water[NOW, N, i])
 
 
 @inner

@@ -17,7 +17,7 @@ import numpy as np
 
 from subzero.compiled import compiled, inner
 
-from .line import NEW, NOW, RESIDUAL, Line
+from .line import DIAGONAL, LOWER, NEW, NOW, RESIDUAL, Line
 
 CORNER = 1e-9
 """Size of the rounding of both maxima. [m], [N]"""
@@ -26,7 +26,8 @@ CORNER = 1e-9
 @inner
 def write_single_segment(line: Line, d: np.ndarray) -> None:
     """Replace both rows of the only block, whose second row holds the drum's equation (11)."""
-    D, L, r, T = line.diagonal[1], line.lower[1], line.rows[RESIDUAL, 1], line.tension[NEW, 1]
+    D, L = line.blocks[DIAGONAL, 1], line.blocks[LOWER, 1]
+    r, T = line.rows[RESIDUAL, 1], line.tension[NEW, 1]
     chord = sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2] + CORNER * CORNER)
     longer, by_chord = _maximum(chord, line.ends.last_length[NOW])
     r[0] = line.ends.last_length[NEW] - longer

@@ -40,6 +40,7 @@ class Ends:
         tail_drag: ½ρC_dA of a drogue there. [kg/m]
         drum_mode: what the drum does (`cable.drum`).
         drum_pull: tension at the drum at level NEW. [N]
+        drum_force: the cable's pull on it, with what acts across the last half segment (3,). [N]
         previous_step: t_now − t_before, 0 after a start. [s]
         smoothing: T₀ of the slack law in force. [N]
         time: of level NOW. [s]
@@ -60,6 +61,7 @@ class Ends:
     payout: np.ndarray
     drum_mode: int
     drum_pull: float
+    drum_force: np.ndarray
     previous_step: float
     smoothing: float
     time: float
@@ -81,16 +83,15 @@ class Line(NamedTuple):
         position: node positions (3 levels, nodes, 3). [m]
         velocity: velocities of the material at the nodes (3 levels, nodes, 3). [m/s]
         momentum: momentum ∫p ds of the segments (3 levels, nodes, 3). [kg m/s]
-        tension: tension of the segments (2 levels, nodes). [N]
+        tension: tension of the segments (3 levels, nodes). [N]
         length: unstretched lengths of the segments (nodes,); of the last one, see `Ends.last_length`. [m]
         node_tension: tension at the nodes at level NOW (nodes,). [N]
         water: velocity of the water at the nodes (3 levels, nodes, 3). [m/s]
         forcing: a further force per length on segment j at level NEW (nodes, 3), for made-up solutions. [N/m]
-        shear: bending's part of the force in segment j (nodes, 3), and `bracing` what holds its chord, see
-            `cable.bending`. [N], [N/m]
         slip, normal_gain: corrections for the arc that a segment stands for (nodes,), see `cable.arc`. [m/s, 1]
         load: ∫(∂p/∂t + D − w_c k) ds of the segments at level NEW (nodes, 3). [N]
-        lower, diagonal, upper: the blocks of the Newton matrix (nodes, 4, 4), see `cable.blocks`.
+        blocks: of the Newton matrix (5, nodes, 4, 4): `LOWER`, `DIAGONAL`, `UPPER`, see `cable.blocks`; beside them
+            `LOWER2` and `UPPER2` of a cable with bending stiffness, see `cable.wide_blocks`.
         pivots: of the factored blocks (nodes, 4).
         rows: residual, guess and Newton step of the unknowns (3, nodes, 4).
     """
@@ -104,20 +105,18 @@ class Line(NamedTuple):
     node_tension: np.ndarray
     water: np.ndarray
     forcing: np.ndarray
-    shear: np.ndarray
-    bracing: np.ndarray
     slip: np.ndarray
     normal_gain: np.ndarray
     load: np.ndarray
-    lower: np.ndarray
-    diagonal: np.ndarray
-    upper: np.ndarray
+    blocks: np.ndarray
     pivots: np.ndarray
     rows: np.ndarray
 
 
 RESIDUAL, GUESS, STEP = range(3)
 """Rows of `Line.rows`."""
+LOWER, DIAGONAL, UPPER, LOWER2, UPPER2 = range(5)
+"""Rows of `Line.blocks`."""
 
 
 def new_line(capacity: int) -> Line:
@@ -131,6 +130,7 @@ def new_line(capacity: int) -> Line:
         payout=np.zeros(3),
         drum_mode=TURNING,
         drum_pull=0.0,
+        drum_force=np.zeros(3),
         previous_step=0.0,
         smoothing=SMOOTHING,
         time=0.0,
@@ -144,20 +144,17 @@ def new_line(capacity: int) -> Line:
         tow_answer=np.zeros((3, 4)),
     )
     per_node = {name: np.zeros((3, n, 3)) for name in ("position", "velocity", "momentum", "water")}
-    blocks = {name: np.zeros((n, 4, 4)) for name in ("lower", "diagonal", "upper")}
     return Line(
         ends=packed(ends),
         **per_node,
-        tension=np.zeros((2, n)),
+        tension=np.zeros((3, n)),
         length=np.zeros(n),
         node_tension=np.zeros(n),
         forcing=np.zeros((n, 3)),
-        shear=np.zeros((n, 3)),
-        bracing=np.zeros(n),
         slip=np.zeros(n),
         normal_gain=np.ones(n),
         load=np.zeros((n, 3)),
-        **blocks,
+        blocks=np.zeros((5, n, 4, 4)),
         pivots=np.zeros((n, 4), np.int64),
         rows=np.zeros((3, n, 4)),
     )
@@ -185,14 +182,15 @@ def spacing(line: Line) -> float:
 
 @compiled
 def lay_straight(
-    line: Line, wet_length: float, direction: np.ndarray, speed: float, drum: DrumNumbers, c: CableNumbers
+    line: Line, wet_length: float, direction: np.ndarray, tow: np.ndarray, drum: DrumNumbers, c: CableNumbers
 ) -> None:
-    """Lay a straight cable from the drum along `direction` (unit vector, earth axes), moving at `speed` along it.
+    """Lay a straight cable from the drum along `direction` (a unit vector) to a tow point that moves at `tow`.
 
-    The cable is as long as `wet_length` says, in segments of `spacing`; its tension is the one of a steady straight
-    pull with no tension at the drum, so a run can start at speed without a jolt. Needs 0 < wet_length and room.
+    The cable is as long as `wet_length` says, in segments of `spacing`; it comes off the drum as fast as the tow point
+    moves away, and its tension is that of a steady straight pull with none at the drum, so a run can start at speed
+    without a jolt. Needs 0 < wet_length and room.
     """
-    ends = line.ends
+    ends, away = line.ends, 0.0
     ends.count, ends.settled, ends.time, ends.previous_step = 1, 0.0, 0.0, 0.0
     ends.drum_mode, ends.drum_pull = TURNING, 0.0
     while wet_length - ends.settled > SPLIT_AT * spacing(line):
@@ -200,32 +198,33 @@ def lay_straight(
         ends.settled += line.length[ends.count]
         ends.count += 1
     line.length[ends.count] = wet_length - ends.settled
-    payout = speed
     for i in range(3):
-        payout -= drum.velocity[i] * direction[i]
+        away += (tow[i] - drum.velocity[i]) * direction[i]
     for level in range(3):
         ends.last_length[level] = line.length[ends.count]
-        ends.payout[level] = payout
-    _pull_straight(line, wet_length, direction, speed, c)
+        ends.payout[level] = away
+    _pull_straight(line, wet_length, direction, tow, drum, c)
 
 
 @compiled
 def _pull_straight(
-    line: Line, wet_length: float, direction: np.ndarray, speed: float, c: CableNumbers
+    line: Line, wet_length: float, direction: np.ndarray, tow: np.ndarray, drum: DrumNumbers, c: CableNumbers
 ) -> None:
-    """Fill places, velocities and tensions of a straight cable that moves along itself in still water."""
-    per_metre = c.tangential_drag * speed * abs(speed)
-    along = wet_length
+    """Fill places, velocities (even between both ends) and tensions of a straight cable that moves along itself."""
+    speed = tow[0] * direction[0] + tow[1] * direction[1] + tow[2] * direction[2]
+    per_metre, along = c.tangential_drag * speed * abs(speed), wet_length
     for j in range(line.ends.count + 1):
         if j > 0:
             for level in range(2):
                 line.tension[level, j] = per_metre * (along - 0.5 * line.length[j])
             along = along - line.length[j] if j < line.ends.count else 0.0
         line.node_tension[j] = max(per_metre, 0.0) * along
-        for level in range(3):
-            for i in range(3):
+        for i in range(3):
+            at_drum = drum.velocity[i] + line.ends.payout[NOW] * direction[i]
+            velocity = at_drum + along / wet_length * (tow[i] - at_drum)
+            for level in range(3):
                 line.position[level, j, i] = along * direction[i]
-                line.velocity[level, j, i] = speed * direction[i]
+                line.velocity[level, j, i] = velocity
     for i in range(3):
         line.ends.tow_force[i] = -per_metre * wet_length * direction[i]
 
@@ -233,25 +232,27 @@ def _pull_straight(
 @compiled
 def start_in_water(line: Line, water: Water, c: CableNumbers, work: Load) -> None:
     """Fill the water's velocity at the nodes and the segments' momenta, at all levels, from what moves at the start."""
-    for level in range(3):
-        feel_water(line, level, water, line.ends.time)
+    feel_water(line, water, line.ends.time)
     for level in (NOW, BEFORE):
+        for j in range(line.ends.count + 1):
+            for i in range(3):
+                line.water[level, j, i] = line.water[NEW, j, i]
         for j in range(1, line.ends.count + 1):
             length = line.ends.last_length[level] if j == line.ends.count else line.length[j]
             segment_momentum(line, level, j, length, c, work)
 
 
 @inner
-def feel_water(line: Line, level: int, water: Water, time: float) -> None:
-    """Fill the water's velocity at the nodes of a level."""
+def feel_water(line: Line, water: Water, time: float) -> None:
+    """Fill the water's velocity at the nodes of level NEW."""
     for j in range(line.ends.count + 1):
-        water_velocity(water, line.position[level, j], time, line.water[level, j])
+        x, J = line.position[NEW, j], line.water[NEW, j]
+        J[0], J[1], J[2] = water_velocity(water, x[0], x[1], x[2], time)
 
 
 @inner
-def take_segment(line: Line, level: int, j: int, work: Load) -> None:
-    """Fill chord, velocity and water of segment j at a level."""
-    x, V, J = line.position[level], line.velocity[level], line.water[level]
+def take_segment(x: np.ndarray, V: np.ndarray, J: np.ndarray, j: int, work: Load) -> None:
+    """Fill chord, velocity and water of segment j, given those of the nodes at one level (nodes, 3)."""
     for i in range(3):
         work.chord[i] = x[j, i] - x[j - 1, i]
         work.velocity[i] = 0.5 * (V[j - 1, i] + V[j, i])
@@ -261,10 +262,7 @@ def take_segment(line: Line, level: int, j: int, work: Load) -> None:
 @inner
 def segment_momentum(line: Line, level: int, j: int, length: float, c: CableNumbers, work: Load) -> None:
     """Fill ∫p ds of segment j at a level; the tangent is the one of level NOW, where the segment has a length."""
-    for i in range(3):
-        work.chord[i] = line.position[NOW, j, i] - line.position[NOW, j - 1, i]
-        work.velocity[i] = 0.5 * (line.velocity[level, j - 1, i] + line.velocity[level, j, i])
-        work.water[i] = 0.5 * (line.water[level, j - 1, i] + line.water[level, j, i])
+    take_segment(line.position[NOW], line.velocity[level], line.water[level], j, work)
     r = chord_length(work.chord, line.ends.last_length[NOW] if j == line.ends.count else line.length[j])
     for i in range(3):
         work.tangent[i] = work.chord[i] / r

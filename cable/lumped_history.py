@@ -52,12 +52,12 @@ def pull_out_lumped(
     Returns:
         the history; positions are relative to where the drum is at the start.
     """
-    times, tow, velocity = sample_path(tow_velocity, duration, step)
+    times, tow, velocity, _ = sample_path(tow_velocity, duration, step)
     still = np.zeros_like(tow)
     place, speed = still, still
     if drum_velocity is not None:
-        _, place, speed = sample_path(drum_velocity, duration, step, "drum_velocity")
-    ahead, wet = first_direction(velocity), max(wet_length, START_LENGTH)
+        _, place, speed, _ = sample_path(drum_velocity, duration, step, "drum_velocity")
+    ahead, wet = first_direction(velocity - speed), max(wet_length, START_LENGTH)
     tow += wet * ahead
     setpoint, rate = winch_rows(drum, times, wet)
     course = Course(times, np.c_[tow, place, setpoint], np.c_[velocity, speed, rate])
@@ -107,7 +107,7 @@ def tow_lumped(
     Returns:
         the history; positions are relative to where the tail is at the start.
     """
-    times, tow, velocity = sample_path(tow_velocity, duration, step)
+    times, tow, velocity, _ = sample_path(tow_velocity, duration, step)
     count = max(1, int(np.ceil(length / segment_length - 1e-9)))
     rope, lengths = new_rope(count), np.full(count, length / count)
     tail_drag = 0.5 * cable.water_density * drogue_drag_area

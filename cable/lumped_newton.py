@@ -71,7 +71,8 @@ def assemble_stage(
     """Fill the Newton system at the guess on level NEW; the change of J over a Newton step is left out of it."""
     observe(rope, g)
     for j in range(rope.ends.count + 1):
-        water_velocity(water, rope.position[NEW, j], time, rope.vector[WATER, j])
+        x, J = rope.position[NEW, j], rope.vector[WATER, j]
+        J[0], J[1], J[2] = water_velocity(water, x[0], x[1], x[2], time)
     for i in range(3 * rope.ends.count + 1):
         rope.right[i] = 0.0
         for k in range(WIDTH):

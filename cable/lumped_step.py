@@ -86,7 +86,8 @@ def begin(rope: Rope, leg: np.ndarray, c: CableNumbers, water: Water) -> None:
     """Complete the state of a cable that is laid out: lengths, momenta and their rates."""
     N, U = rope.ends.count, rope.ends.payout[OLD]
     for j in range(N + 1):
-        water_velocity(water, rope.position[OLD, j], leg[0], rope.vector[WATER, j])
+        x, J = rope.position[OLD, j], rope.vector[WATER, j]
+        J[0], J[1], J[2] = water_velocity(water, x[0], x[1], x[2], leg[0])
         if j > 0:
             settle(rope, j)
     fill_momenta(rope, c)

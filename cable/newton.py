@@ -8,7 +8,7 @@ from typing import NamedTuple
 from subzero.compiled import compiled, inner
 
 from .assembly import assemble
-from .blocks import factor, solve
+from .bending import newton_step
 from .differences import Weights
 from .element import Load
 from .line import GUESS, NEW, RESIDUAL, STEP, Line, held_node
@@ -48,7 +48,6 @@ def solve_step(
     work: Load,
 ) -> Solved:
     """Solve the equations of `assembly` for level NEW, from the guess that stands there."""
-    N = line.ends.count
     rounding = ROUNDING * (c.mass + c.added_mass) * w.a0 * w.b0
     assemble(line, w, c, drum, work)
     size, node, equation = _residual(line, rounding)
@@ -56,10 +55,8 @@ def solve_step(
     for iteration in range(MAX_ITERATIONS):
         if size <= 1.0:
             return Solved(True, iteration, size, node, equation)
-        if factor(line.lower, line.diagonal, line.upper, line.pivots, N) > 0:
+        if not newton_step(line, c):
             break
-        _keep_tow_answer(line)
-        solve(line.lower, line.diagonal, line.upper, line.pivots, N, line.rows[RESIDUAL])
         last_length = _save(line)
         fraction = 1.0
         for _ in range(MAX_HALVINGS):
@@ -74,14 +71,6 @@ def solve_step(
         if not isfinite(merit):
             break
     return Solved(size <= 1.0, MAX_ITERATIONS, size, node, equation)
-
-
-@compiled
-def _keep_tow_answer(line: Line) -> None:
-    """Keep W_1 of the elimination (`cable.blocks`), before the next assembly overwrites it."""
-    for k in range(3):
-        for m in range(4):
-            line.ends.tow_answer[k, m] = line.lower[1, 1 + k, m]
 
 
 @compiled
@@ -123,7 +112,7 @@ def _residual(line: Line, rounding: float) -> tuple[float, int, int]:
     for j in range(1, N + 1):
         for i in range(4):
             size = abs(line.rows[RESIDUAL, j, i]) / (strain if i == 0 else allowed)
-            if not size <= worst:
+            if worst == worst and not size <= worst:
                 worst, node, equation = size, j, i
     return worst, node, equation
 

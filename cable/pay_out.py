@@ -8,7 +8,7 @@ import numpy as np
 
 from subzero.compiled import compiled
 
-from .drum_path import DrumPath, hermite, lead_drum
+from .drum_path import hermite, lead_drum
 from .element import Load
 from .energy import FLOWS, book_step, energy_flow
 from .line import NOW, Line
@@ -32,12 +32,14 @@ class TowPath(NamedTuple):
 
     Attributes:
         times: (n,). [s]
-        place, velocity: (n, 3). [m], [m/s]
+        place: (n, 3). [m]
+        leaving, arriving: velocity just after and just before the times (n, 3). [m/s]
     """
 
     times: np.ndarray
     place: np.ndarray
-    velocity: np.ndarray
+    leaving: np.ndarray
+    arriving: np.ndarray
 
 
 class Record(NamedTuple):
@@ -86,7 +88,7 @@ def new_record(rows: int, capacity: int) -> Record:
 def follow_path(
     line: Line,
     path: TowPath,
-    led: DrumPath,
+    led: np.ndarray,
     water: Water,
     c: CableNumbers,
     drum: DrumNumbers,
@@ -99,7 +101,7 @@ def follow_path(
     Args:
         line: the cable at path.times[0]; changed.
         path: how the tow point moves.
-        led: how the drum moves, and what its winch is asked for.
+        led: how the drum moves, and what its winch is asked for, see `cable.drum_path`.
         water: how the water moves.
         c: cable.
         drum: drum or winch.
@@ -130,7 +132,7 @@ def _cover(
     line: Line,
     path: TowPath,
     k: int,
-    led: DrumPath,
+    led: np.ndarray,
     water: Water,
     c: CableNumbers,
     drum: DrumNumbers,
@@ -145,7 +147,8 @@ def _cover(
     step = min(suggested, whole) if rtol > 0.0 else whole
     while True:
         step = (whole - done) / np.ceil((whole - done) / step - 1e-9)
-        hermite(path.place, path.velocity, k, whole, (done + step) / whole, point)
+        x, near, far = (done + step) / whole, path.place[k - 1], path.place[k]
+        hermite(near, far, path.leaving[k - 1], path.arriving[k], whole, x, point)
         lead_drum(led, path.times[k - 1] + done + step, drum)
         mode = line.ends.drum_mode
         solved = try_step(line, step, point, water, c, drum, work)

@@ -19,7 +19,7 @@ GRAVITY = 9.81
 
 
 class CableNumbers(NamedTuple):
-    """The cable as compiled code sees it: m, ρA, w_c, e, the drag constants ½ρdπC_t and ½ρdC_n, and EI."""
+    """The cable as compiled code sees it: m, ρA, w_c, e, the drag constants ½ρdπC_t and ½ρdC_n."""
 
     mass: float
     added_mass: float
@@ -27,7 +27,20 @@ class CableNumbers(NamedTuple):
     compliance: float
     tangential_drag: float
     normal_drag: float
+
+
+class StiffCableNumbers(NamedTuple):
+    """`CableNumbers` of a cable that resists bending, with EI, which stands first: a record that begins like
+    `CableNumbers` would pass for one, and its EI would be overlooked.
+    """
+
     bending_stiffness: float
+    mass: float
+    added_mass: float
+    weight: float
+    compliance: float
+    tangential_drag: float
+    normal_drag: float
 
 
 @dataclass
@@ -112,7 +125,7 @@ class CableProperties:
         ratio = abs(self.weight_in_water) / (2.0 * self.normal_drag * speed * speed)
         return acos(sqrt(1.0 + ratio * ratio) - ratio)
 
-    def numbers(self) -> CableNumbers:
+    def numbers(self) -> CableNumbers | StiffCableNumbers:
         """Return the plain numbers that compiled code takes."""
         numbers = CableNumbers(
             mass=float(self.mass_per_length),
@@ -121,8 +134,9 @@ class CableProperties:
             compliance=float(self.compliance),
             tangential_drag=float(self.tangential_drag),
             normal_drag=float(self.normal_drag),
-            bending_stiffness=float(self.bending_stiffness),
         )
+        if self.bending_stiffness > 0.0:
+            return packed(StiffCableNumbers(float(self.bending_stiffness), *numbers))
         return packed(numbers)
 
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .drum_path import DrumPath, resting
+from .drum_path import PLACE, SETPOINT, VELOCITY, drum_path, resting
 from .element import new_load
 from .history import History
 from .line import lay_straight, new_line
@@ -17,7 +17,7 @@ from .winch import Brake, PayOutRate, Winch
 
 START_LENGTH = 1e-6
 """A run "without cable" starts with this length in the water, so that there is a direction. [m]"""
-SCHEMES = ("moving_end", "paper", "paper_tangent", "paper_drum", "equation7")
+SCHEMES = ("moving_end", "paper", "paper_tangent", "paper_drum", "equation7", "lumped")
 
 
 def pull_out(
@@ -44,7 +44,8 @@ def pull_out(
     "paper_drum" are the scheme of Feng & Allen (2004) as printed, (20)-(26), one new node a step, with the two
     readings of the new node ("paper" is the usable one, "paper_tangent"); there `segment_length` has no meaning.
     "equation7" is independent of both: the six unknowns of the paper in a scheme of second order with a moving end,
-    for comparison; it has no slack law.
+    for comparison; it has no slack law. "lumped" is a third formulation, of masses at nodes and stiff springs between
+    them, that does all the default does but `rtol` and `grading`: the other code to compare with.
 
     Straight ahead at U the tension is ½ρπdC_t U² S, and the force points against the motion. A drum with no friction
     and no inertia gives T(S) = 0. The drum cannot take cable up: a vehicle that comes back makes the cable slack
@@ -81,12 +82,18 @@ def pull_out(
     cable, drum = cable or CableProperties(), drum or DrumProperties()
     _check(duration, step, segment_length, scheme, rtol, grading)
     water = current_of(current)
+    if scheme == "lumped" and rtol == 0.0 and grading == 0.0:
+        from .lumped_history import pull_out_lumped
+
+        settings = {"segment_length": segment_length, "cable": cable, "drum": drum, "current": water}
+        ends = {"wet_length": wet_length, "drum_velocity": drum_velocity}
+        return pull_out_lumped(tow_velocity, duration, step, **settings, **ends)
     if scheme != "moving_end":
         free = isinstance(drum, DrumProperties) and wet_length == 0.0 and drum_velocity is None
         if not (free and rtol == 0.0 and grading == 0.0 and water.velocity.size == 3):
             message = (
                 f"scheme {scheme!r} knows a free drum on the shore and a uniform current, and no wet_length, rtol or "
-                "grading; use 'moving_end'."
+                "grading ('lumped' knows all but these two); use 'moving_end'."
             )
             raise ValueError(message)
         from .paper_history import pull_out_as_printed
@@ -94,28 +101,28 @@ def pull_out(
         uniform = water.velocity.reshape(3)
         return pull_out_as_printed(tow_velocity, duration, step, cable, drum, uniform, scheme, segment_length)
     path, wet = sample_path(tow_velocity, duration, step), max(wet_length, START_LENGTH)
-    direction = first_direction(path.velocity)
-    path.place[:] += wet * direction
     led = _led_drum(drum, drum_velocity, path.times, wet)
-    reach = 1.5 * (_way(path.place) + _way(led.place) + water.fastest * duration) + wet
-    longest = led.setpoints.max() if isinstance(drum, PayOutRate | Brake) else 2.0 * reach + 5.0
+    direction = first_direction(path.leaving - led[:, VELOCITY:SETPOINT])
+    path.place[:] += wet * direction
+    reach = 1.5 * (_way(path.place) + _way(led[:, PLACE:VELOCITY]) + water.fastest * duration) + wet
+    longest = led[:, SETPOINT].max() if isinstance(drum, PayOutRate | Brake) else 2.0 * reach + 5.0
     capacity = segments_needed(float(longest), segment_length, grading)
     line, work, c, turning = new_line(capacity), new_load(), cable.numbers(), drum.numbers()
     line.ends.segment_length, line.ends.grading = segment_length, grading
-    turning.velocity[:] = led.velocity[0]
-    lay_straight(line, wet, direction, float(np.linalg.norm(path.velocity[0])), turning, c)
+    turning.velocity[:] = led[0, VELOCITY:SETPOINT]
+    lay_straight(line, wet, direction, path.leaving[0], turning, c)
     return run(line, path, led, water.numbers(), c, turning, rtol, work, capacity)
 
 
 def _led_drum(
     drum: DrumProperties | Winch, velocity: TowVelocity | None, times: np.ndarray, wet: float
-) -> DrumPath:
+) -> np.ndarray:
     """Return the drum's way and its winch's setpoints at times (n,)."""
     setpoints = np.zeros(times.size) if isinstance(drum, DrumProperties) else drum.setpoints(times, wet)
     if velocity is None:
         return resting(times, setpoints)
     way = sample_path(velocity, float(times[-1]), float(times[1] - times[0]), "drum_velocity")
-    return DrumPath(times, way.place, way.velocity, setpoints)
+    return drum_path(times, way.place, way.leaving, setpoints)
 
 
 def _way(place: np.ndarray) -> float:

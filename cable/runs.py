@@ -7,7 +7,6 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from .drum import LENGTH
-from .drum_path import DrumPath
 from .element import Load
 from .energy import LOSS, STORED
 from .history import History, Outcome
@@ -23,6 +22,8 @@ REST = 1e-12
 """Slower than this is at rest. [m/s]"""
 GAUSS = ((-np.sqrt(0.15), 5.0 / 18.0), (0.0, 8.0 / 18.0), (np.sqrt(0.15), 5.0 / 18.0))
 """Offsets and weights of three-point Gauss quadrature on a step of length one."""
+MOMENT = 1e-9
+"""Just before and just after, as a share of the step."""
 NEARLY_TAUT = 0.999
 """A cable whose ends are this share of its length apart, or more, and that has no solution, is too short."""
 EQUATIONS = ("length", "northward balance", "eastward balance", "downward balance")
@@ -31,7 +32,7 @@ EQUATIONS = ("length", "northward balance", "eastward balance", "downward balanc
 def run(
     line: Line,
     path: TowPath,
-    led: DrumPath,
+    led: np.ndarray,
     water: Water,
     c: CableNumbers,
     drum: DrumNumbers,
@@ -95,15 +96,22 @@ def too_short(time: float, line: Line, drum: DrumNumbers) -> str:
 
 
 def sample_path(velocity: TowVelocity, duration: float, step: float, name: str = "tow_velocity") -> TowPath:
-    """Return the way of a point that moves at `velocity`, from 0: places by Gauss quadrature of order six."""
+    """Return the way of a point that moves at `velocity`, from 0: places by Gauss quadrature of order six.
+
+    Velocities are taken just after and just before the times: the motion may change abruptly at a recorded time.
+    """
     steps = max(1, round(duration / step))
-    times = np.linspace(0.0, duration, steps + 1)
-    at_times = np.array([_three_numbers(velocity(t), f"{name}({t:g})") for t in times])
-    place, h = np.zeros((steps + 1, 3)), duration / steps
+    times, h = np.linspace(0.0, duration, steps + 1), duration / steps
+
+    def at(moments: np.ndarray) -> np.ndarray:
+        return np.array([_three_numbers(velocity(t), f"{name}({t:g})") for t in moments])
+
+    place = np.zeros((steps + 1, 3))
     for offset, weight in GAUSS:
-        inner = [_three_numbers(velocity(t), f"{name}({t:g})") for t in times[:-1] + h * (0.5 + offset)]
-        place[1:] += weight * h * np.array(inner)
-    return TowPath(times, np.cumsum(place, axis=0), at_times)
+        place[1:] += weight * h * at(times[:-1] + h * (0.5 + offset))
+    leaving, arriving = at(times[:-1] + MOMENT * h), at(times[1:] - MOMENT * h)
+    leaving, arriving = np.vstack([leaving, arriving[-1:]]), np.vstack([leaving[:1], arriving])
+    return TowPath(times, np.cumsum(place, axis=0), leaving, arriving)
 
 
 def first_direction(velocity: np.ndarray) -> np.ndarray:

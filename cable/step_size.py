@@ -23,15 +23,15 @@ def estimate_error(line: Line, step: float) -> float:
     if line.ends.previous_step <= 0.0:
         return 0.0
     ratio, V = step / line.ends.previous_step, line.velocity
-    worst, fastest = 0.0, 1e-30
+    total, fastest = 0.0, 1e-30
     for j in range(line.ends.count):
         gap, speed = 0.0, 0.0
         for i in range(3):
             expected = V[NOW, j, i] + ratio * (V[NOW, j, i] - V[BEFORE, j, i])
             gap += (V[NEW, j, i] - expected) ** 2
             speed += V[NEW, j, i] ** 2
-        worst, fastest = max(worst, gap), max(fastest, speed)
-    return 2.0 / 3.0 * sqrt(worst / fastest)
+        total, fastest = total + gap, max(fastest, speed)
+    return 2.0 / 3.0 * sqrt(total / (line.ends.count * fastest))
 
 
 @inner

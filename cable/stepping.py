@@ -15,7 +15,6 @@ import numpy as np
 from subzero.compiled import compiled
 
 from .arc import correct_for_arc
-from .bending import bend
 from .differences import backward_weights
 from .drum import FREE, STANDING, next_mode
 from .element import Load
@@ -32,6 +31,8 @@ TAUT = 1e-2
 """A step begins with at least this tension everywhere: Newton then looks for a taut cable first. [N]"""
 TAKEN_UP = 1e-9
 """A free drum that would take up more cable than this in a step has not been solved: try a smaller one. [m]"""
+KNOWN = 1e-4
+"""A tension above this is extrapolated from the two steps before; below, see `TAUT`. [N]"""
 MERGE_AT = 0.5
 """While cable is reeled in, a last segment shorter than this fraction of the one before is joined to it."""
 MOST_DRUM_CHANGES = 4
@@ -95,6 +96,9 @@ def _solve_softly(
     if solved.converged:
         return solved
     _predict(line, step, tow, water, c, drum, work)
+    pull = drum.friction + abs(c.weight) * (line.ends.settled + line.ends.last_length[NOW])
+    for j in range(1, line.ends.count + 1):
+        line.tension[NEW, j] = max(line.tension[NEW, j], pull)
     spent = solved.iterations
     line.ends.smoothing = SOFTEST
     while True:
@@ -113,20 +117,27 @@ def _predict(
 ) -> None:
     """Guess level NEW: everything goes on as it moves, tensions stay; and what is held at its prediction."""
     N, held = line.ends.count, held_node(line)
+    ratio = step / line.ends.previous_step if line.ends.previous_step > 0.0 else 0.0
     for j in range(N + 1):
-        line.tension[NEW, j] = max(line.tension[NOW, j], TAUT)
+        tension = line.tension[NOW, j] + ratio * (line.tension[NOW, j] - line.tension[BEFORE, j])
+        line.tension[NEW, j] = tension if tension > KNOWN else max(line.tension[NOW, j], TAUT)
         for i in range(3):
-            moved = line.position[NOW, j, i] + step * line.velocity[NOW, j, i]
+            change = ratio * (line.velocity[NOW, j, i] - line.velocity[BEFORE, j, i])
+            moved = line.position[NOW, j, i] + step * (line.velocity[NOW, j, i] + 0.5 * change)
             line.position[NEW, j, i] = moved if j < held else drum.place[i]
     for i in range(3):
         line.position[NEW, 0, i] = tow[i]
         line.ends.drum_velocity[i] = drum.velocity[i]
-    growth = 0.0 if line.ends.drum_mode == STANDING else step * line.ends.payout[NOW]
-    line.ends.last_length[NEW] = max(line.ends.last_length[NOW] + growth, 0.5 * line.ends.last_length[NOW])
-    feel_water(line, NEW, water, line.ends.time + step)
+    growth, last = (
+        0.0 if line.ends.drum_mode == STANDING else step * line.ends.payout[NOW],
+        line.ends.last_length,
+    )
+    last[NEW] = max(last[NOW] + growth, 0.5 * last[NOW])
+    if not line.ends.free_end:
+        pull = max(line.ends.drum_pull, 0.0)
+        line.tension[NEW, N] = max(pull + (line.tension[NOW, N] - pull) * last[NEW] / last[NOW], KNOWN)
+    feel_water(line, water, line.ends.time + step)
     correct_for_arc(line, work)
-    if c.bending_stiffness > 0.0:
-        bend(line, c)
 
 
 @compiled
@@ -143,6 +154,7 @@ def accept(line: Line, step: float, c: CableNumbers, work: Load) -> None:
         line.ends.last_length[level] = line.ends.last_length[level - 1]
         line.ends.payout[level] = line.ends.payout[level - 1]
     for j in range(N + 1):
+        line.tension[BEFORE, j] = line.tension[NOW, j]
         line.tension[NOW, j] = line.tension[NEW, j]
     fill_node_tensions(line)
     line.ends.previous_step = step
@@ -161,21 +173,24 @@ def _split_last(line: Line, segment_length: float, c: CableNumbers, work: Load) 
     """Insert a node `segment_length` from the start of the last segment, on its chord, at levels NOW and BEFORE.
 
     The new node is a material point. At level BEFORE it may still have been on the drum: then it is put where the
-    straight continuation of the chord would have had it, so that its backward differences stay smooth.
+    straight continuation of the chord would have had it, so that its backward differences stay smooth. Where little or
+    nothing of the last segment was out of the drum then, the segment before it is continued: a step may pay out several
+    segments, or one exactly.
     """
     N = line.ends.count
     for level in (NOW, BEFORE):
-        fraction = segment_length / line.ends.last_length[level]
-        _insert_between(line.position[level], N, fraction)
-        _insert_between(line.velocity[level], N, fraction)
-        _insert_between(line.water[level], N, fraction)
+        beyond = N > 1 and line.ends.last_length[level] < 0.5 * segment_length
+        fraction = segment_length / (line.length[N - 1] if beyond else line.ends.last_length[level])
+        _insert_between(line.position[level], N, fraction, beyond)
+        _insert_between(line.velocity[level], N, fraction, beyond)
+        _insert_between(line.water[level], N, fraction, beyond)
         line.ends.last_length[level] -= segment_length
         if level == NOW:
             near, end = line.node_tension[N - 1], line.node_tension[N]
             line.node_tension[N] = near + fraction * (end - near)
             line.node_tension[N + 1] = end
+            _share_tension(line, N, fraction, near - end)
     line.length[N] = segment_length
-    line.tension[NOW, N + 1] = line.tension[NOW, N]
     line.ends.count = N + 1
     line.ends.settled += segment_length
     for level in (NOW, BEFORE):
@@ -184,12 +199,23 @@ def _split_last(line: Line, segment_length: float, c: CableNumbers, work: Load) 
 
 
 @compiled
-def _insert_between(values: np.ndarray, last: int, fraction: float) -> None:
-    """Move the last row of `values` (nodes, 3) one down, and interpolate (or extrapolate) a new row before it."""
+def _share_tension(line: Line, N: int, fraction: float, drop: float) -> None:
+    """Give both parts of a split segment the tension at their middles, for a tension that falls evenly by `drop`."""
+    for level in (NOW, BEFORE):
+        line.tension[level, N + 1] = max(line.tension[level, N] - 0.5 * fraction * drop, 0.0)
+        line.tension[level, N] += 0.5 * (1.0 - fraction) * drop
+
+
+@compiled
+def _insert_between(values: np.ndarray, last: int, fraction: float, beyond: bool) -> None:
+    """Move the last row of `values` (nodes, 3) one down, and interpolate or extrapolate a new row before it.
+
+    Either along the last interval, or, `beyond`, along the one before it.
+    """
     for i in range(3):
         near, end = values[last - 1, i], values[last, i]
         values[last + 1, i] = end
-        values[last, i] = near + fraction * (end - near)
+        values[last, i] = near + fraction * (near - values[last - 2, i] if beyond else end - near)
 
 
 @compiled
@@ -214,6 +240,7 @@ def _merge_last(line: Line, c: CableNumbers, work: Load) -> None:
             line.velocity[level, N - 1, i] = line.velocity[level, N, i]
             line.water[level, N - 1, i] = line.water[level, N, i]
     line.tension[NOW, N - 1] = 0.5 * (line.tension[NOW, N - 1] + line.tension[NOW, N])
+    line.tension[BEFORE, N - 1] = 0.5 * (line.tension[BEFORE, N - 1] + line.tension[BEFORE, N])
     line.node_tension[N - 1] = line.node_tension[N]
     line.ends.count = N - 1
     line.ends.settled -= line.length[N - 1]

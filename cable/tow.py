@@ -26,6 +26,7 @@ def tow(
     current: Sequence[float] | np.ndarray | Current | None = None,
     drogue_drag_area: float = 0.0,
     rtol: float = 0.0,
+    scheme: str = "moving_end",
 ) -> History:
     """Tow a cable of fixed length, starting from the exact steady straight tow.
 
@@ -43,12 +44,13 @@ def tow(
             time (places relative to the tow point at the start); still water when not given.
         drogue_drag_area: C_d A of a drogue at the free end; 0 is a free tail. [m²]
         rtol: as in `cable.pull_out`.
+        scheme: "moving_end" or "lumped", as in `cable.pull_out`.
 
     Returns:
         the history; positions are relative to where the tail is at the start, `drum_tension` is the one at the tail.
 
     Raises:
-        ValueError: a length, duration, step or segment length that is not positive.
+        ValueError: a length, duration, step or segment length that is not positive, or a scheme that cannot tow.
 
     Checked by: tests/exact/test_tow.py
     """
@@ -58,17 +60,26 @@ def tow(
             message = f"{name} is {value!r}; it must be a positive number."
             raise ValueError(message)
     cable, water = cable or CableProperties(), current_of(current)
+    if scheme == "lumped":
+        from .lumped_history import tow_lumped
+
+        settings = {"segment_length": segment_length, "cable": cable, "current": water}
+        return tow_lumped(tow_velocity, length, duration, step, **settings, drogue_drag_area=drogue_drag_area)
+    if scheme != "moving_end":
+        message = f"scheme {scheme!r} cannot tow a free end; choose 'moving_end' or 'lumped'."
+        raise ValueError(message)
     path = sample_path(tow_velocity, duration, step)
     count = max(1, int(np.ceil(length / segment_length - 1e-9)))
     line, work, c, idle = new_line(count), new_load(), cable.numbers(), DrumProperties().numbers()
     tail_drag, J = 0.5 * cable.water_density * drogue_drag_area, water.at((0.0, 0.0, 0.0))
-    uphill = _steady_direction(path.velocity, J, cable, tail_drag)
+    uphill = _steady_direction(path.leaving, J, cable, tail_drag)
     line.ends.segment_length = length / count
-    lay_straight(line, length, uphill, float(np.linalg.norm(path.velocity[0])), idle, c)
+    lay_straight(line, length, uphill, path.leaving[0], idle, c)
     line.ends.free_end, line.ends.tail_drag = True, tail_drag
-    _set_steady_tow(line, path.velocity[0], J, cable, tail_drag)
-    path.place[:] += length * uphill
-    return run(line, path, resting(path.times), water.numbers(-length * uphill), c, idle, rtol, work, count)
+    _set_steady_tow(line, path.leaving[0], J, cable, tail_drag)
+    path.place[:] += line.position[NOW, 0]
+    origin = -line.position[NOW, 0]
+    return run(line, path, resting(path.times), water.numbers(origin), c, idle, rtol, work, count)
 
 
 def _steady_direction(
@@ -88,18 +99,27 @@ def _steady_direction(
 def _set_steady_tow(
     line: Line, velocity: np.ndarray, J: np.ndarray, cable: CableProperties, tail_drag: float
 ) -> None:
-    """Give every node the tow point's velocity, and the segments the tension of a steady straight tow."""
-    N = line.ends.count
+    """Give every node the tow point's velocity, and the segments tension and stretch of a steady straight tow."""
+    N, U = line.ends.count, velocity - J
+    t = -line.position[NOW, 0] / np.linalg.norm(line.position[NOW, 0])
+    drag, weight = cable.tangential_drag * abs(U @ t) * -(U @ t), cable.weight_in_water * t[2]
     line.velocity[:, : N + 1] = velocity
     line.ends.payout[:] = 0.0
-    t = line.position[NOW, 1] - line.position[NOW, 0]
-    t /= np.linalg.norm(t)
-    U = velocity - J
-    per_metre = cable.tangential_drag * abs(U @ t) * -(U @ t) + cable.weight_in_water * t[2]
-    to_tail = line.ends.last_length[NOW] + line.length[1:N][::-1].cumsum()[::-1]
-    middles = np.append(to_tail, line.ends.last_length[NOW]) - 0.5 * line.ends.last_length[NOW]
-    at_tail = tail_drag * (U @ U)
-    line.tension[:, 1 : N + 1] = np.maximum(per_metre * middles + at_tail, 0.0)
-    nodes = np.append(middles + 0.5 * line.ends.last_length[NOW], 0.0)
-    line.node_tension[: N + 1] = np.maximum(per_metre * nodes + at_tail, 0.0)
+    pull = at_tail = tail_drag * float(U @ U)
+    line.node_tension[N] = at_tail
+    for j in range(N, 0, -1):
+        length = line.ends.last_length[NOW] if j == N else line.length[j]
+        middle = _grown(pull, 0.5 * length, drag, weight, cable.compliance)
+        pull = _grown(middle, 0.5 * length, drag, weight, cable.compliance)
+        line.tension[:, j], line.node_tension[j - 1] = middle, pull
+        chord = length * (1.0 + cable.compliance * middle)
+        line.position[:, j - 1] = line.position[NOW, j] - chord * t
     line.ends.tow_force[:], line.ends.drum_pull = line.node_tension[0] * t, at_tail
+
+
+def _grown(T: float, length: float, drag: float, weight: float, e: float) -> float:
+    """Return the tension `length` further up, dT/ds = drag √(1 + eT) + weight; none where it would push. [N]."""
+    end = T
+    for _ in range(20):
+        end = T + length * (drag * np.sqrt(1.0 + e * 0.5 * (T + end)) + weight)
+    return max(end, 0.0)

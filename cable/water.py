@@ -26,20 +26,16 @@ WaterVelocity = Callable[[float, float, float, float], Sequence[float]]
 
 
 class Water(NamedTuple):
-    """A current as compiled code sees it.
+    """A current as compiled code sees it: two arrays, for few arguments compile sooner.
 
     Attributes:
-        north, east, down, time: grid points, increasing; at least one each. [m], [s]
-        velocity: north, east, down at the grid points (time, north, east, down, 3). [m/s]
-        origin: where the cable's positions are zero, on the grid's axes (3,). [m]
+        points: where the cable's positions are zero on the grid's axes (3 numbers), how many points the axes time,
+            north, east and down have (4), and these points, one axis behind another. [m], [s]
+        velocity: north, east, down at the grid points, down running fastest (points of the grid, 3). [m/s]
     """
 
-    north: np.ndarray
-    east: np.ndarray
-    down: np.ndarray
-    time: np.ndarray
+    points: np.ndarray
     velocity: np.ndarray
-    origin: np.ndarray
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -128,39 +124,50 @@ class Current:
 
     def numbers(self, origin: Sequence[float] | np.ndarray = (0.0, 0.0, 0.0)) -> Water:
         """Return the arrays that compiled code takes, for a cable whose positions are zero at `origin`."""
-        place = np.array(origin, dtype=float)
-        return Water(self.north, self.east, self.down, self.time, self.velocity, place)
+        axes = (self.time, self.north, self.east, self.down)
+        sizes = [float(axis.size) for axis in axes]
+        points = np.concatenate([np.asarray(origin, dtype=float), sizes, *axes])
+        return Water(points, self.velocity.reshape(-1, 3).copy())
 
 
 @inner
-def water_velocity(water: Water, place: np.ndarray, time: float, out: np.ndarray) -> None:
-    """Fill out (3,) with the water's velocity at a place relative to `water.origin` (3,) [m] and time [s]. [m/s]."""
-    i, a = _cell(water.time, time)
-    j, b = _cell(water.north, place[0] + water.origin[0])
-    k, c = _cell(water.east, place[1] + water.origin[1])
-    m, d = _cell(water.down, place[2] + water.origin[2])
-    for n in range(3):
-        out[n] = 0.0
+def water_velocity(
+    water: Water, north: float, east: float, down: float, time: float
+) -> tuple[float, float, float]:
+    """Return the water's velocity at a place relative to the grid's origin [m] and a time [s]. [m/s]."""
+    J = water.velocity
+    if J.shape[0] == 1:
+        return J[0, 0], J[0, 1], J[0, 2]
+    place = (time, north + water.points[0], east + water.points[1], down + water.points[2])
+    row, share, first = np.zeros(16, np.int64), np.ones(16), 7
+    for axis in range(4):
+        n = int(water.points[3 + axis])
+        x = place[axis]
+        k, along = _cell(water.points, first, n, x)
+        for corner in range(16):
+            far = (corner >> axis) & 1
+            row[corner] = row[corner] * n + min(k + far, n - 1)
+            share[corner] *= along if far else 1.0 - along
+        first += n
+    out = np.zeros(3)
     for corner in range(16):
-        p, q, r, s = corner & 1, (corner >> 1) & 1, (corner >> 2) & 1, corner >> 3
-        share = (a if p else 1.0 - a) * (b if q else 1.0 - b) * (c if r else 1.0 - c) * (d if s else 1.0 - d)
-        if share > 0.0:
-            for n in range(3):
-                out[n] += share * water.velocity[i + p, j + q, k + r, m + s, n]
+        for i in range(3):
+            out[i] += share[corner] * J[row[corner], i]
+    return out[0], out[1], out[2]
 
 
 @inner
-def _cell(points: np.ndarray, x: float) -> tuple[int, float]:
-    """Return the interval of increasing `points` that x lies in, and where in it (0 … 1; cut off beyond the ends)."""
-    low, high = 0, points.size - 1
-    if x <= points[0] or high == 0:
+def _cell(points: np.ndarray, first: int, n: int, x: float) -> tuple[int, float]:
+    """Return the interval of n increasing points, from `first` on, that x lies in, and where in it (0 … 1)."""
+    low, high = 0, n - 1
+    if x <= points[first] or high == 0:
         return 0, 0.0
-    if x >= points[high]:
+    if x >= points[first + high]:
         return high - 1, 1.0
     while high - low > 1:
         middle = (low + high) // 2
-        if points[middle] <= x:
+        if points[first + middle] <= x:
             low = middle
         else:
             high = middle
-    return low, (x - points[low]) / (points[low + 1] - points[low])
+    return low, (x - points[first + low]) / (points[first + low + 1] - points[first + low])

@@ -17,9 +17,11 @@ import os
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
+from types import FunctionType
 from typing import Any, TypeVar
 
 import numba
+import numba.extending
 import numpy as np
 
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -85,6 +87,25 @@ def _compile(function: Function, *, gate: bool) -> Function:
         "no_cpython_wrapper": not gate,
     }
     return numba.njit(**options)(function)
+
+
+def by_field(field: str, yes: Function, no: Function) -> Function:
+    """Return a function (line, c) that is `yes` where the record c has a field, else `no`; only one is compiled.
+
+    What few runs need so does not lengthen the first compilation of all others.
+    """
+
+    def choose(line, c):  # type: ignore[no-untyped-def]  # numba compares this signature with the next
+        return (yes if field in c.dtype.names else no)(line, c)
+
+    def typed(line, c):  # type: ignore[no-untyped-def]
+        chosen: Any = (yes if field in c.fields else no).py_func  # type: ignore[attr-defined]
+        return FunctionType(
+            chosen.__code__, chosen.__globals__
+        )  # without the annotations, which numba compares too
+
+    numba.extending.overload(choose)(typed)
+    return choose  # type: ignore[return-value]
 
 
 def packed(values: Numbers) -> Numbers:

@@ -4,9 +4,10 @@
 
 relative to the water. ΔE is the change of the kinetic energy (hull with its added mass, cable), of the potential energy
 and of the elastic energy. In a current that changes along the way, the hull's balance closes only as far as it may be
-taken as steady (`hull.feel_current`), and what the current does to the cable is booked with its added mass. The terms of the cable are those of `cable.energy`. Powers are summed
-up by the trapezoidal rule over hull steps (hull) and exchanges (cable), so the residual is of second order in both.
-In a prescribed run the "propeller" is whatever moves the tow point.
+taken as steady (`hull.feel_current`), and what the current does to the cable is booked with its added mass. The
+terms of the cable are those of `cable.energy`. Powers are summed up by the trapezoidal rule over hull steps (hull) and
+exchanges (cable), so the residual is of second order in both. In a prescribed run the "propeller" is whatever moves the
+tow point.
 """
 
 from __future__ import annotations

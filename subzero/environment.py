@@ -22,7 +22,9 @@ from subzero.trials import load
 try:
     import gymnasium
 except ImportError as missing:  # pragma: no cover - told to the user
-    raise UserError("The environment needs Gymnasium. Install it with: pip install 'subzero[gym]'") from missing
+    raise UserError(
+        "The environment needs Gymnasium. Install it with: pip install 'subzero[gym]'"
+    ) from missing
 
 ENVIRONMENT = "subzero/TetheredHeading-v0"
 STEPS = 300
@@ -99,7 +101,14 @@ class TetheredHeading(gymnasium.Env[np.ndarray, np.ndarray]):
     def _observed(self, seen: Observation) -> np.ndarray:
         """Return what the agent sees, within the limits of its space."""
         error = self._wanted - seen.heading
-        values = (sin(error), cos(error), seen.yaw_rate, seen.surge_speed, seen.rudder_angle, seen.cable_length)
+        values = (
+            sin(error),
+            cos(error),
+            seen.yaw_rate,
+            seen.surge_speed,
+            seen.rudder_angle,
+            seen.cable_length,
+        )
         space: Any = self.observation_space
         return np.clip(np.array(values, dtype=np.float32), space.low, space.high)
 

@@ -57,7 +57,15 @@ def hold(setup: Setup, live: Live, recording: Recording, times: np.ndarray) -> A
 
 @compiled
 def advance(
-    handle: Any, row: int, count: int, used: int, n: float, rudder: float, port: float, starboard: float, seen: np.ndarray
+    handle: Any,
+    row: int,
+    count: int,
+    used: int,
+    n: float,
+    rudder: float,
+    port: float,
+    starboard: float,
+    seen: np.ndarray,
 ) -> tuple[int, int, int, Solved]:
     """Take some exchanges under one command, from a row that is written anew with that command.
 

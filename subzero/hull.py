@@ -15,7 +15,7 @@ import numpy as np
 import vehicle
 from cable.water import water_velocity
 from subzero.compiled import compiled, inner
-from subzero.run_state import HullWork, Live, Setup, Track
+from subzero.run_state import HEADING, PITCH, SPEED, TIME, HullWork, Live, Setup
 from vehicle import STATE_SIZE
 
 GAUSS_OFFSET = 0.5 * np.sqrt(0.6)
@@ -54,9 +54,9 @@ def feel_current(setup: Setup, state: np.ndarray, time: float, work: HullWork) -
     Departs from source: where the water changes along the vehicle's way, the hull takes every instant as steady and
     uniform; the pressure of the accelerating water, (m + M_A) dJ/dt, is left out.
     """
-    for i in range(3):
-        work.place[i] = state[i] - setup.fixed.drum_place[i]
-    water_velocity(setup.water, work.place, time, work.current)
+    drum, J = setup.fixed.drum_place, work.current
+    place = state[0] - drum[0], state[1] - drum[1], state[2] - drum[2]
+    J[0], J[1], J[2] = water_velocity(setup.water, place[0], place[1], place[2], time)
 
 
 @compiled
@@ -101,20 +101,20 @@ def advance_hull(setup: Setup, live: Live, start: float, span: float, steps: int
 
 
 @compiled
-def _attitude(track: Track, t: float) -> tuple[float, float, float, float, float]:
+def _attitude(track: np.ndarray, t: float) -> tuple[float, float, float, float, float]:
     """Return surge speed [m/s], pitch, heading [rad] and the rates of both [rad/s] at t."""
-    row = row_at(track.time, t)
-    if row == track.time.size - 1:
-        return track.surge_speed[row], track.pitch[row], track.heading[row], 0.0, 0.0
-    span = track.time[row + 1] - track.time[row]
-    x = (t - track.time[row]) / span
-    turn, dive = track.heading[row + 1] - track.heading[row], track.pitch[row + 1] - track.pitch[row]
-    speed = track.surge_speed[row] + x * (track.surge_speed[row + 1] - track.surge_speed[row])
-    return speed, track.pitch[row] + x * dive, track.heading[row] + x * turn, dive / span, turn / span
+    row = row_at(track[TIME], t)
+    if row == track.shape[1] - 1:
+        return track[SPEED, row], track[PITCH, row], track[HEADING, row], 0.0, 0.0
+    span = track[TIME, row + 1] - track[TIME, row]
+    x = (t - track[TIME, row]) / span
+    turn, dive = track[HEADING, row + 1] - track[HEADING, row], track[PITCH, row + 1] - track[PITCH, row]
+    speed = track[SPEED, row] + x * (track[SPEED, row + 1] - track[SPEED, row])
+    return speed, track[PITCH, row] + x * dive, track[HEADING, row] + x * turn, dive / span, turn / span
 
 
 @compiled
-def _move(track: Track, t: float, weight: float, state: np.ndarray) -> None:
+def _move(track: np.ndarray, t: float, weight: float, state: np.ndarray) -> None:
     """Add the displacement of `weight` seconds at the velocity of time t."""
     u, pitch, heading, _, _ = _attitude(track, t)
     state[0] += weight * u * np.cos(pitch) * np.cos(heading)
@@ -123,7 +123,7 @@ def _move(track: Track, t: float, weight: float, state: np.ndarray) -> None:
 
 
 @compiled
-def pose(track: Track, t: float, state: np.ndarray) -> None:
+def pose(track: np.ndarray, t: float, state: np.ndarray) -> None:
     """Write attitude and velocities of a prescribed motion at t into a state."""
     u, pitch, heading, dive, turn = _attitude(track, t)
     q = vehicle.quaternion_from_euler(0.0, pitch, heading)
@@ -138,7 +138,7 @@ def pose(track: Track, t: float, state: np.ndarray) -> None:
 
 
 @inner
-def follow_track(start: float, span: float, steps: int, track: Track, path: np.ndarray) -> None:
+def follow_track(start: float, span: float, steps: int, track: np.ndarray, path: np.ndarray) -> None:
     """Fill path[1 … steps] with a prescribed motion, positions by three-point Gauss quadrature."""
     h = span / steps
     for n in range(steps):

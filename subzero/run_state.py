@@ -7,7 +7,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cable.drum_path import DrumPath
 from cable.element import Load
 from cable.energy import FLOWS
 from cable.line import Line
@@ -24,22 +23,16 @@ class Orders(NamedTuple):
     values: np.ndarray
 
 
-class Track(NamedTuple):
-    """A prescribed motion, linear between samples: time (n,) [s], surge speed [m/s], pitch, heading (n,) [rad]."""
-
-    time: np.ndarray
-    surge_speed: np.ndarray
-    pitch: np.ndarray
-    heading: np.ndarray
+TIME, SPEED, PITCH, HEADING = range(4)
+"""Rows of a prescribed motion (4, n), linear between samples: time [s], surge speed [m/s], pitch, heading [rad]."""
 
 
 class HullWork(NamedTuple):
-    """Work space of the hull: rotation R_nb, pull of the cable in earth axes and its wrench, place and water."""
+    """Work space of the hull: rotation R_nb, pull of the cable in earth axes and its wrench, the water around it."""
 
     rotation: np.ndarray
     pull: np.ndarray
     wrench: np.ndarray
-    place: np.ndarray
     current: np.ndarray
 
 
@@ -110,16 +103,16 @@ class Setup(NamedTuple):
 
     Attributes:
         fixed: numbers; `drum` in it is where the drum is at the end of the step that is being tried.
-        orders, track: what the vehicle is told, or how it moves.
+        orders, track: what the vehicle is told, or how it moves (4, n).
         water: how the water moves; its origin is the drum's place at the start.
-        led: how the drum moves, and what its winch is asked for.
+        led: how the drum moves, and what its winch is asked for, see `cable.drum_path` (n, 8).
     """
 
     fixed: Fixed
     orders: Orders
-    track: Track
+    track: np.ndarray
     water: Water
-    led: DrumPath
+    led: np.ndarray
 
 
 class Live(NamedTuple):
@@ -144,7 +137,7 @@ class Live(NamedTuple):
 
 def new_now() -> Now:
     """Return the beginning of a run, with a cable that does not pull."""
-    work = HullWork(np.zeros((3, 3)), np.zeros(3), np.zeros(6), np.zeros(3), np.zeros(3))
+    work = HullWork(np.zeros((3, 3)), np.zeros(3), np.zeros(6), np.zeros(3))
     ledger = Ledger(
         total=np.zeros(7),
         hull_old=np.zeros(4),

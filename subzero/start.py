@@ -15,7 +15,7 @@ from cable.pull_out import START_LENGTH
 from subzero.compiled import compiled, packed
 from subzero.hull import feel_current, pose, tow_point
 from subzero.model import Model
-from subzero.run_state import Fixed, Live, Orders, Setup, Track, new_now
+from subzero.run_state import Fixed, Live, Orders, Setup, new_now
 from subzero.surroundings import drum_of, water_of, way_of_drum
 
 FIRST_ROOM = 16
@@ -59,11 +59,11 @@ def lay_out(setup: Setup, live: Live, wet: float) -> None:
     for i in range(3):
         now.guess[i] = now.hull.rotation[i, 0]
         fixed.drum_place[i] = now.tow[i] - wet * now.guess[i]
-        setup.water.origin[i] = fixed.drum_place[i]
+        setup.water.points[i] = fixed.drum_place[i]
         pull = fixed.cable.tangential_drag * speed * abs(speed) * wet if fixed.tethered else 0.0
-        now.force[i] = -pull * now.guess[i]
+        now.force[i], now.change[i] = -pull * now.guess[i], speed * now.guess[i]
     lead_drum(setup.led, 0.0, fixed.drum)
-    lay_straight(live.line, wet, now.guess, speed, fixed.drum, fixed.cable)
+    lay_straight(live.line, wet, now.guess, now.change, fixed.drum, fixed.cable)
     start_in_water(live.line, setup.water, fixed.cable, live.load)
     energy_flow(live.line, fixed.cable, live.load, now.ledger.cable_new)
     for i in range(FLOWS):
@@ -115,10 +115,10 @@ def _orders(trial: scenarios.Trial) -> Orders:
     return Orders(np.array(trial.commands.time, dtype=float), np.array(trial.commands.values, dtype=float))
 
 
-def _track(trial: scenarios.Trial) -> Track:
+def _track(trial: scenarios.Trial) -> np.ndarray:
     """Return the prescribed motion, of one resting sample for a run with commands."""
     motion = trial.motion
     if motion is None:
-        return Track(np.zeros(1), np.zeros(1), np.zeros(1), np.zeros(1))
+        return np.zeros((4, 1))
     columns = (motion.time, motion.surge_speed, motion.pitch, motion.heading)
-    return Track(*(np.array(column, dtype=float) for column in columns))
+    return np.array(columns, dtype=float)

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 import scenarios
-from cable.drum_path import DrumPath, resting
+from cable.drum_path import PLACE, SETPOINT, VELOCITY, resting
 from cable.properties import DrumProperties
 from cable.water import Current
 from cable.winch import Brake, ConstantTension, PayOutRate, Winch
@@ -33,8 +33,8 @@ def drum_of(model: Model) -> DrumProperties | Winch:
     return PayOutRate(rate=follow) if winch.control == "pay_out_rate" else ConstantTension(tension=follow)
 
 
-def way_of_drum(trial: scenarios.Trial, model: Model, wet: float) -> DrumPath:
-    """Return where the drum goes, and what its winch is asked for, from a length `wet` [m] on.
+def way_of_drum(trial: scenarios.Trial, model: Model, wet: float) -> np.ndarray:
+    """Return where the drum goes, and what its winch is asked for, from a length `wet` [m] on, as `cable.drum_path`.
 
     The times are those of the exchanges, and of all changes of winch and vessel: between them a velocity is linear, so
     the way is summed up exactly.
@@ -49,8 +49,9 @@ def way_of_drum(trial: scenarios.Trial, model: Model, wet: float) -> DrumPath:
     at = np.array(vessel.velocity, dtype=float)
     velocity = np.column_stack([np.interp(times, vessel.time, column) for column in at.T])
     steps = 0.5 * np.diff(times)[:, None] * (velocity[1:] + velocity[:-1])
-    place = np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
-    return led._replace(place=place, velocity=np.ascontiguousarray(velocity))
+    led[:, PLACE:VELOCITY] = np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
+    led[:, VELOCITY:SETPOINT] = velocity
+    return led
 
 
 def _times(trial: scenarios.Trial, model: Model) -> np.ndarray:

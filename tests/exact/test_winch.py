@@ -101,7 +101,7 @@ def test_a_current_across_a_hanging_umbilical_bends_it_downstream():
 def test_a_drum_cannot_pay_out_less_than_the_vehicle_takes():
     run = cable.pull_out(lambda t: (1.0, 0.0, 0.0), 5.0, drum=cable.PayOutRate(rate=0.8))
     assert not run.outcome.completed
-    assert "could not be solved beyond t = 0 s" in run.outcome.message
+    assert "too short beyond t = 0 s: the winch has paid out" in run.outcome.message
 
 
 def test_a_winch_cannot_push_and_needs_numbers():

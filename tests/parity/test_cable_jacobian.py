@@ -3,7 +3,7 @@
 Verifies: every entry of the block tridiagonal matrix of `cable.assembly` (and that nothing lies outside the blocks), in
 random bent, half slack states, for all that a drum can do; and the tow force's own derivatives. Configuration: a
 heavy stretching cable, a current that differs from node to node, a moving drum with inertia and friction, corrections
-for the arc, a bending stiffness and a further force switched on.
+for the arc and a further force switched on; with and without a bending stiffness.
 Tolerance: differences of step 1e-6 carry 1e-9 of truncation and rounding; 2e-6 of the largest entry of a row.
 """
 
@@ -15,23 +15,46 @@ from cable.assembly import assemble
 from cable.differences import backward_weights
 from cable.drum import SPINNING, STANDING, TURNING
 from cable.element import new_load
-from cable.line import BEFORE, NEW, NOW, RESIDUAL, lay_straight, new_line, start_in_water
+from cable.line import (
+    BEFORE,
+    DIAGONAL,
+    LOWER,
+    LOWER2,
+    NEW,
+    NOW,
+    RESIDUAL,
+    UPPER,
+    UPPER2,
+    lay_straight,
+    new_line,
+    start_in_water,
+)
 from cable.properties import CableProperties, DrumProperties
 from cable.water import Current
+from cable.wide_blocks import factor_wide, solve_wide
+from subzero.compiled import compiled
 
 CABLE = CableProperties(mass_per_length=0.02, compliance=0.05, tangential_drag_coefficient=0.02).numbers()
 DRUM = DrumProperties(inertia=1e-3, friction_torque=0.01).numbers()
+STIFF = CableProperties(mass_per_length=0.02, compliance=0.05, bending_stiffness=0.05).numbers()
 CURRENT = Current.uniform([0.2, -0.1, 0.05]).numbers()
 STEP = 1e-6
 
 
-def bent_line(segments, mode, seed, slackness=1e-4):
+@compiled
+def factor_and_solve(blocks, pivots, last, r):
+    factor_wide(blocks, pivots, last)
+    solve_wide(blocks, pivots, last, r)
+
+
+def bent_line(segments, mode, seed, slackness=1e-4, c=CABLE):
     """Return a moving cable of half-metre segments with nodes shaken at all levels, and work space."""
     rng = np.random.default_rng(seed)
     line, work = new_line(segments + 2), new_load()
     line.ends.segment_length = 0.5
     line.ends.drum_velocity[:] = 0.1, 0.3, -0.2
-    lay_straight(line, 0.5 * segments + 0.1, np.array([1.0, 0.0, 0.0]), 1.0, DRUM, CABLE)
+    north = np.array([1.0, 0.0, 0.0])
+    lay_straight(line, 0.5 * segments + 0.1, north, north, DRUM, c)
     line.ends.count = segments
     line.ends.drum_mode = mode
     for level, lag in ((NEW, 0.0), (NOW, 0.1), (BEFORE, 0.2)):
@@ -47,10 +70,9 @@ def bent_line(segments, mode, seed, slackness=1e-4):
     line.tension[NEW, 1 : segments + 1] = rng.uniform(0.0, 0.5, segments)
     line.slip[:] = 0.02 * rng.normal(size=line.slip.size)
     line.normal_gain[:] = rng.uniform(0.9, 1.0, line.normal_gain.size)
-    start_in_water(line, CURRENT, CABLE, work)
+    start_in_water(line, CURRENT, c, work)
     line.water[:] += 0.1 * rng.normal(size=line.water.shape)
-    line.forcing[:], line.shear[:] = 0.1 * rng.normal(size=(2, *line.shear.shape))
-    line.bracing[:] = rng.uniform(0.0, 0.5, line.bracing.size)
+    line.forcing[:] = 0.1 * rng.normal(size=line.forcing.shape)
     return line, work
 
 
@@ -62,14 +84,14 @@ def unknowns(line):
     return blocks.ravel()
 
 
-def residual(line, work, values, weights):
+def residual(line, work, values, weights, c=CABLE):
     """Return residual and tow force at other unknowns (which stay in the line)."""
     N = line.ends.count
     blocks = values.reshape(N, 4)
     line.tension[NEW, 1 : N + 1] = blocks[:, 0]
     line.position[NEW, 1:N] = blocks[:-1, 1:]
     line.ends.last_length[NEW] = blocks[-1, 1]
-    assemble(line, weights, CABLE, DRUM, work)
+    assemble(line, weights, c, DRUM, work)
     return line.rows[RESIDUAL, 1 : N + 1].ravel().copy(), line.ends.tow_force.copy()
 
 
@@ -79,25 +101,29 @@ def dense(line):
     matrix = np.zeros((4 * N, 4 * N))
     for j in range(N):
         rows = slice(4 * j, 4 * j + 4)
-        matrix[rows, rows] = line.diagonal[j + 1]
+        matrix[rows, rows] = line.blocks[DIAGONAL, j + 1]
         if j > 0:
-            matrix[rows, 4 * j - 4 : 4 * j] = line.lower[j + 1]
+            matrix[rows, 4 * j - 4 : 4 * j] = line.blocks[LOWER, j + 1]
         if j < N - 1:
-            matrix[rows, 4 * j + 4 : 4 * j + 8] = line.upper[j + 1]
+            matrix[rows, 4 * j + 4 : 4 * j + 8] = line.blocks[UPPER, j + 1]
+        if j > 1:
+            matrix[rows, 4 * j - 8 : 4 * j - 4] = line.blocks[LOWER2, j + 1]
+        if j < N - 2:
+            matrix[rows, 4 * j + 8 : 4 * j + 12] = line.blocks[UPPER2, j + 1]
     return matrix
 
 
-def differences(line, work, weights):
+def differences(line, work, weights, c=CABLE):
     """Return derivatives of residual and tow force by the unknowns, by central differences."""
     x = unknowns(line)
     columns, pulls = [], []
     for k in range(x.size):
         away = np.zeros(x.size)
         away[k] = STEP
-        high, low = residual(line, work, x + away, weights), residual(line, work, x - away, weights)
+        high, low = (residual(line, work, x + side * away, weights, c) for side in (1, -1))
         columns.append((high[0] - low[0]) / (2.0 * STEP))
         pulls.append((high[1] - low[1]) / (2.0 * STEP))
-    residual(line, work, x, weights)
+    residual(line, work, x, weights, c)
     return np.transpose(columns), np.transpose(pulls)
 
 
@@ -115,6 +141,28 @@ def test_the_analytic_jacobian_is_that_of_the_residual(mode, segments, previous_
         numeric[-2:] = analytic[-2:]
         largest = np.abs(analytic).max(axis=1, keepdims=True)
         assert_allclose(analytic / largest, numeric / largest, rtol=0, atol=2e-6)
+
+
+@pytest.mark.parametrize("segments", [2, 3, 4, 6])
+def test_bending_has_its_jacobian_right_too(segments):
+    line, work = bent_line(segments, TURNING, 2, c=STIFF)
+    weights = backward_weights(0.1, 0.1)
+    numeric, _ = differences(line, work, weights, STIFF)
+    analytic = dense(line)
+    numeric[-2:] = analytic[-2:]
+    largest = np.abs(analytic).max(axis=1, keepdims=True)
+    assert_allclose(analytic / largest, numeric / largest, rtol=0, atol=2e-6)
+
+
+@pytest.mark.parametrize("segments", [3, 4, 7])
+def test_the_wide_elimination_solves_what_a_dense_one_solves(segments):
+    """Verifies `cable.wide_blocks` against LAPACK; round-off only."""
+    line, work = bent_line(segments, TURNING, 3, c=STIFF)
+    residual(line, work, unknowns(line), backward_weights(0.1, 0.1), STIFF)
+    expected = np.linalg.solve(dense(line), line.rows[RESIDUAL, 1 : segments + 1].ravel())
+    factor_and_solve(line.blocks, line.pivots, segments, line.rows[RESIDUAL])
+    found = line.rows[RESIDUAL, 1 : segments + 1].ravel()
+    assert_allclose(found, expected, rtol=0, atol=1e-11 * np.abs(expected).max())
 
 
 def test_a_slack_line_has_its_jacobian_right_too():

@@ -169,4 +169,6 @@ def test_the_courant_number_of_a_straight_pull_is_that_of_its_first_segment(tria
     run = simulate(trial_of(speed=1.0))
     T = DRAG * (run["cable_length"].values - 0.25)
     assert_allclose(run["courant_number"].values[1:], (np.sqrt(T / 0.0098) * 0.1 / 0.5)[1:], rtol=1e-4)
-    assert (np.diff(run["newton_iterations"].values) >= 1).all()
+    iterations = np.diff(run["newton_iterations"].values)
+    assert (iterations >= 0).all(), "a count never falls"
+    assert iterations.sum() > 50, "a straight pull is nearly foreseen, but not where a node is new"
