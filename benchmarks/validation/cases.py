@@ -16,6 +16,7 @@ from . import (
     invariance,
     manufactured,
     moordyn_2,
+    remus,
     sagging_cable,
     sinking,
     straight_pull,
@@ -69,4 +70,5 @@ CASES = (
     Case("energy_balance", "Where the work goes", energy_balance),
     Case("formulations", "Three formulations of one cable", formulations),
     Case("moordyn_2", "Another code: MoorDyn 2", moordyn_2),
+    Case("remus", "Another hull: REMUS 100", remus),
 )
