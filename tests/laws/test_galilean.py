@@ -1,12 +1,12 @@
 """Only motion through the water counts: drum, water and tow point that all drift along with V change no force.
 
 Verifies: `drum_velocity=` and `Current` of `cable.pull_out` and `cable.tow`. Configuration: heavy stretching cable,
-three-dimensional motion at about 1 m/s, 0.1 s, 0.5 m, V of 0.8 m/s; free drum with inertia and friction, winches; uniform
-current and one with shear in depth, which a horizontal V leaves as it is.
-Tolerance: 1e-12 N where drum and Newton's method take the same way in both runs, 2e-7 N where a winch's equation ends a
-Newton iteration earlier (1e-9 of the tension in each of 30 balances). The first step is left out: it differences momenta
-to first order (`cable.differences`), and the momentum of what has not yet been in the water, m V of the new cable, is
-not the same in both. It is 3e-5 N on a free drum, and is forgotten by the second step.
+three-dimensional motion at about 1 m/s, 0.1 s, 0.5 m, V of 0.8 m/s; free drum with inertia and friction, winches;
+uniform current and one with shear in depth, which a horizontal V leaves as it is.
+Tolerance: 1e-12 N where Newton's method takes the same way in both runs, 2e-7 N where it ends an iteration earlier in
+one (1e-9 of the tension in each of 30 balances). The first step is left out: it differences momenta to first order
+(`cable.differences`), and m V of the cable that enters is not the same in both. That is 3e-5 N on a free drum, and is
+forgotten by the second step.
 """
 
 import numpy as np

@@ -58,8 +58,11 @@ def test_at_its_points_the_grid_is_what_was_given(sizes, seed):
 def test_a_linear_current_is_held_exactly_inside_the_grid_and_at_its_edge_beyond():
     """The value between the points by hand: 0.3 + 0.02 d − 0.1 t, whose edges are at 10 m and 4 s."""
     current = cable.Current.sampled(
-        lambda n, e, d, t: (0.3 + 0.02 * d - 0.1 * t, 0.0, 0.01 * n), north=[0.0, 2.0], down=[0.0, 10.0], time=[0.0, 4.0]
-    )  # fmt: skip
+        lambda n, e, d, t: (0.3 + 0.02 * d - 0.1 * t, 0.0, 0.01 * n),
+        north=[0.0, 2.0],
+        down=[0.0, 10.0],
+        time=[0.0, 4.0],
+    )
     for place, time, expected in [
         ((1.0, 99.0, 5.0), 1.0, (0.3, 0.0, 0.01)),
         ((3.0, -7.0, 40.0), 9.0, (0.1, 0.0, 0.02)),
@@ -117,8 +120,8 @@ def test_the_grid_of_a_pulled_cable_is_relative_to_the_drum_and_of_a_towed_one_t
         (lambda: cable.Current.profile([0.0, 0.0], np.zeros((2, 3))), "down must be finite and increase"),
         (lambda: cable.Current.profile([5.0, 1.0], np.zeros((2, 3))), "down must be finite and increase"),
         (lambda: cable.Current.profile([0.0, np.inf], np.zeros((2, 3))), "down must be finite and increase"),
-        (lambda: cable.Current.profile([0.0, 1.0], np.zeros((3, 3))), r"shape \(1, 1, 1, 2, 3\) \(time, north, east, down"),
-        (lambda: cable.Current.profile([0.0, 1.0], np.full((2, 3), np.nan)), "velocity must be finite numbers of shape"),
+        (lambda: cable.Current.profile([0.0, 1.0], np.zeros((3, 3))), r"shape \(1, 1, 1, 2, 3\) \(time, north"),
+        (lambda: cable.Current.profile([0.0, 1.0], np.full((2, 3), np.nan)), "velocity must be finite numbers"),
         (lambda: cable.Current.sampled(lambda *_: (0.0, 0.0), time=[0.0, 1.0]), r"shape \(2, 1, 1, 1, 3\)"),
         (lambda: cable.Current.sampled(lambda *_: (0.0,) * 3, time=[1.0, 0.0]), "time must be finite and increase"),
         (lambda: cable.pull_out(swaying, 1.0, current=[0.1, 0.2]), "current must be three finite numbers"),
