@@ -127,6 +127,26 @@ def _no_bending(line: Line, c: CableNumbers) -> None:
 
 
 @inner
+def _energy(line: Line, c: StiffCableNumbers) -> float:
+    """Return E_B at level NOW. [J]."""
+    total, x = 0.0, line.position[NOW]
+    for j in range(1, line.ends.count):
+        near, far, along = 0.0, 0.0, 0.0
+        for i in range(3):
+            near += (x[j, i] - x[j - 1, i]) ** 2
+            far += (x[j + 1, i] - x[j, i]) ** 2
+            along += (x[j, i] - x[j - 1, i]) * (x[j + 1, i] - x[j, i])
+        total += _spring(line, j, c.bending_stiffness) * (1.0 - along / sqrt(max(near * far, 1e-30)))
+    return total
+
+
+@inner
+def _no_energy(line: Line, c: CableNumbers) -> float:
+    """Return none. [J]."""
+    return 0.0
+
+
+@inner
 def _newton_step(line: Line, c: CableNumbers) -> bool:
     """Overwrite the residual with the Newton step; False where the matrix is singular."""
     L, D, U, N = line.blocks[LOWER], line.blocks[DIAGONAL], line.blocks[UPPER], line.ends.count
@@ -157,3 +177,4 @@ def keep_tow_answer(line: Line) -> None:
 
 add_bending = by_field("bending_stiffness", _add_bending, _no_bending)
 newton_step = by_field("bending_stiffness", _stiff_newton_step, _newton_step)
+bending_energy = by_field("bending_stiffness", _energy, _no_energy)

@@ -65,8 +65,8 @@ def pull_out(
         wet_length: cable in the water at the start, laid straight behind the tow point. [m]
         drum_velocity: function of time [s] that gives the velocity of a moving drum (a boat) north, east, down (3,); a
             drum on the shore when not given. [m/s]
-        rtol: with a positive value, steps are made as small as needed for an error of this share of the speeds, and so
-            about of the tension (`cable.step_size`); 0 takes every step as it is.
+        rtol: with a positive value, steps are made as small as needed for an error of the tow force of about this share
+            of its largest (`cable.step_size`), but for jolts; 0 takes every step as it is.
         grading: new segments are Δs + grading · s long, s from the tow point: far from the vehicle a cable is coarser.
 
     Returns:
