@@ -2,7 +2,8 @@
 
 A backward difference of second order errs by h(h + h')/6 x‴ in the velocity V, that is by h(h + h')/6 V̈. The tow force
 goes about with the square of the velocity, so it errs by h(h + h')/6 F̈ or so, while the force that is extrapolated from
-the two steps before is off by h(h + h')/2 F̈. A third of that gap, as a share of the largest force so far, is the estimate.
+the two steps before is off by h(h + h')/2 F̈. A third of that gap, as a share of the largest force so far, is what is
+taken for the error.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ LARGEST_GROWTH, LARGEST_CUT = 2.0, 0.2
 
 @inner
 def estimate_error(line: Line, step: float) -> float:
-    """Return the relative error of the tow force after the step on level NEW; 0 when there is no history to tell. [-]."""
+    """Return the relative error of the tow force on level NEW; 0 when there is no history to tell. [-]."""
     if line.ends.previous_step <= 0.0:
         return 0.0
     ratio, F, past = step / line.ends.previous_step, line.ends.tow_force, line.ends.past_force
