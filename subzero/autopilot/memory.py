@@ -12,8 +12,8 @@ import numpy as np
 
 from subzero.run_state import Live
 
-NOT_KEPT = ("lower", "diagonal", "upper", "pivots", "rows", "load")
-"""Fields of `cable.line.Line` that a step fills before it reads them."""
+NOT_KEPT = ("blocks", "pivots", "rows", "load", "slip", "normal_gain", "forcing")
+"""Fields of `cable.line.Line` that a step fills before it reads them, or that stay zero."""
 OF_NOW = ("force", "force_before", "last_step")
 """Fields of `subzero.run_state.Now` that a step leaves for the next."""
 
