@@ -8,6 +8,10 @@ with ℓ̄_j = ½(ℓ_j + ℓ_{j+1}) and no moment at the two ends (hinges at th
 √(EI/T) at a clamped end is not modelled). f_j of `cable.assembly` becomes T_j t_j − q_j; for a gently bent cable q is
 EI ∂³x/∂s³. It depends on four nodes, so a balance depends on five: the matrix gets blocks beside its three diagonals.
 ℓ̄ of the growing segment is taken from the step before. A cable without EI compiles nothing of this.
+
+What it does not do: a cable cannot be pushed here (`cable.slack`), stiff or not. Where a winch pays out more than is
+taken, while less is in the water than the length (EI/w_c)^⅓ in which weight begins to bend it, a stiff cable would push;
+such a run stops.
 """
 
 from __future__ import annotations
@@ -127,6 +131,26 @@ def _no_bending(line: Line, c: CableNumbers) -> None:
 
 
 @inner
+def _energy(line: Line, c: StiffCableNumbers) -> float:
+    """Return E_B at level NOW. [J]."""
+    total, x = 0.0, line.position[NOW]
+    for j in range(1, line.ends.count):
+        near, far, along = 0.0, 0.0, 0.0
+        for i in range(3):
+            near += (x[j, i] - x[j - 1, i]) ** 2
+            far += (x[j + 1, i] - x[j, i]) ** 2
+            along += (x[j, i] - x[j - 1, i]) * (x[j + 1, i] - x[j, i])
+        total += _spring(line, j, c.bending_stiffness) * (1.0 - along / sqrt(max(near * far, 1e-30)))
+    return total
+
+
+@inner
+def _no_energy(line: Line, c: CableNumbers) -> float:
+    """Return none. [J]."""
+    return 0.0
+
+
+@inner
 def _newton_step(line: Line, c: CableNumbers) -> bool:
     """Overwrite the residual with the Newton step; False where the matrix is singular."""
     L, D, U, N = line.blocks[LOWER], line.blocks[DIAGONAL], line.blocks[UPPER], line.ends.count
@@ -157,3 +181,4 @@ def keep_tow_answer(line: Line) -> None:
 
 add_bending = by_field("bending_stiffness", _add_bending, _no_bending)
 newton_step = by_field("bending_stiffness", _stiff_newton_step, _newton_step)
+bending_energy = by_field("bending_stiffness", _energy, _no_energy)

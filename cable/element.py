@@ -15,8 +15,9 @@ whose components along t, n, b are the six scalar equations of Feng & Allen (200
 
 from __future__ import annotations
 
+from dataclasses import dataclass, fields
 from math import sqrt
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -28,7 +29,8 @@ FOLDING = 0.3
 """How early a heaped segment loses its direction, see `chord_length`; without any effect on a taut one."""
 
 
-class Load(NamedTuple):
+@dataclass(kw_only=True)
+class Load:
     """Work space for one segment: what is known of it, its load q, and derivatives.
 
     Attributes:
@@ -65,10 +67,10 @@ class Load(NamedTuple):
 
 def new_load() -> Load:
     """Return empty work space for one segment."""
-    vectors = {name: np.zeros(3) for name in Load._fields}
-    matrices = {name: np.zeros((3, 3)) for name in ("q_V", "q_d", "G", "by_near")}
-    numbers = dict.fromkeys(("along", "side", "chord_length", "kt", "kn"), 0.0)
-    return packed(Load(**vectors | matrices | numbers | {"by_far": np.zeros((3, 4))}))
+    parts: dict[str, Any] = {field.name: np.zeros(3) for field in fields(Load)}
+    parts |= {name: np.zeros((3, 3)) for name in ("q_V", "q_d", "G", "by_near")}
+    parts |= dict.fromkeys(("along", "side", "chord_length", "kt", "kn"), 0.0)
+    return packed(Load(**parts | {"by_far": np.zeros((3, 4))}))
 
 
 @compiled

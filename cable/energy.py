@@ -22,6 +22,7 @@ import numpy as np
 
 from subzero.compiled import compiled, inner
 
+from .bending import bending_energy
 from .element import Load, evaluate_load
 from .line import BEFORE, NOW, Line, take_segment
 from .properties import CableNumbers
@@ -54,6 +55,7 @@ def energy_flow(line: Line, c: CableNumbers, work: Load, out: np.ndarray) -> Non
         out[GRAVITY_WORK] += length * c.weight * (V[2] - J[2])
         out[ADDED_MASS] -= c.added_mass * work.along * turn
         out[CARRIED] += length * c.mass * _carried(line, j)
+    out[STORED] += bending_energy(line, c)
     _flow_at_ends(line, c, out)
 
 

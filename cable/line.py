@@ -48,6 +48,7 @@ class Ends:
         settled: length of all segments but the last. [m]
         drum_velocity: of the drum at level NEW (3,). [m/s]
         tow_force: force on the vehicle at level NEW (3,). [N]
+        past_force: the same at levels NOW and BEFORE (2, 3), and `largest_force`, the largest so far. [N]
         tow_by_tow, tow_by_block: derivatives of the tow force by the tow point's position (3, 3) and by the
             unknowns of the first block (3, 4).
         tow_answer: minus the answer of the first block's unknowns (columns) to a displacement of the tow point
@@ -70,6 +71,8 @@ class Ends:
     settled: float
     drum_velocity: np.ndarray
     tow_force: np.ndarray
+    past_force: np.ndarray
+    largest_force: float
     tow_by_tow: np.ndarray
     tow_by_block: np.ndarray
     tow_answer: np.ndarray
@@ -139,6 +142,8 @@ def new_line(capacity: int) -> Line:
         settled=0.0,
         drum_velocity=np.zeros(3),
         tow_force=np.zeros(3),
+        past_force=np.zeros((2, 3)),
+        largest_force=0.0,
         tow_by_tow=np.zeros((3, 3)),
         tow_by_block=np.zeros((3, 4)),
         tow_answer=np.zeros((3, 4)),

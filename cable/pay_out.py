@@ -14,7 +14,7 @@ from .energy import FLOWS, book_step, energy_flow
 from .line import NOW, Line
 from .newton import Solved
 from .properties import CableNumbers, DrumNumbers
-from .step_size import estimate_error, next_step
+from .step_size import estimate_error, next_step, note_force
 from .stepping import accept, try_step
 from .tow_point import ends
 from .water import Water
@@ -115,6 +115,7 @@ def follow_path(
     rows, used = path.times.size, line.ends.count + 1
     suggested = FIRST_STEP * (path.times[1] - path.times[0])
     solved = Solved(True, 0, 0.0, 0, 0)
+    note_force(line)
     energy_flow(line, c, work, record.ledger[1])
     write_row(line, record, 0, 0, c)
     for k in range(1, rows):
@@ -156,6 +157,7 @@ def _cover(
         error = estimate_error(line, step) if rtol > 0.0 and solved.converged else 0.0
         if solved.converged and (error <= rtol or step <= finest):
             accept(line, step, c, work)
+            note_force(line)
             book_step(line, step, c, work, record.ledger)
             record.steps[k] += 1
             done += step

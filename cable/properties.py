@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, fields
 from math import isfinite, sqrt
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -125,8 +125,8 @@ class CableProperties:
         ratio = abs(self.weight_in_water) / (2.0 * self.normal_drag * speed * speed)
         return acos(sqrt(1.0 + ratio * ratio) - ratio)
 
-    def numbers(self) -> CableNumbers | StiffCableNumbers:
-        """Return the plain numbers that compiled code takes."""
+    def numbers(self) -> Any:
+        """Return the plain numbers that compiled code takes: `CableNumbers` or `StiffCableNumbers`."""
         numbers = CableNumbers(
             mass=float(self.mass_per_length),
             added_mass=float(self.water_density * self.cross_section_area),

@@ -65,8 +65,8 @@ def pull_out(
         wet_length: cable in the water at the start, laid straight behind the tow point. [m]
         drum_velocity: function of time [s] that gives the velocity of a moving drum (a boat) north, east, down (3,); a
             drum on the shore when not given. [m/s]
-        rtol: with a positive value, steps are made as small as needed for an error of this share of the speeds, and so
-            about of the tension (`cable.step_size`); 0 takes every step as it is.
+        rtol: with a positive value, steps are made as small as needed for an error of the tow force of about this share
+            of its largest (`cable.step_size`), but for jolts; 0 takes every step as it is.
         grading: new segments are Δs + grading · s long, s from the tow point: far from the vehicle a cable is coarser.
 
     Returns:
@@ -85,12 +85,20 @@ def pull_out(
     if scheme == "lumped" and rtol == 0.0 and grading == 0.0:
         from .lumped_history import pull_out_lumped
 
-        settings = {"segment_length": segment_length, "cable": cable, "drum": drum, "current": water}
-        ends = {"wet_length": wet_length, "drum_velocity": drum_velocity}
-        return pull_out_lumped(tow_velocity, duration, step, **settings, **ends)
+        return pull_out_lumped(
+            tow_velocity,
+            duration,
+            step,
+            segment_length=segment_length,
+            cable=cable,
+            drum=drum,
+            current=water,
+            wet_length=wet_length,
+            drum_velocity=drum_velocity,
+        )
     if scheme != "moving_end":
-        free = isinstance(drum, DrumProperties) and wet_length == 0.0 and drum_velocity is None
-        if not (free and rtol == 0.0 and grading == 0.0 and water.velocity.size == 3):
+        plain = wet_length == rtol == grading == 0.0 and drum_velocity is None and water.velocity.size == 3
+        if not (plain and isinstance(drum, DrumProperties)):
             message = (
                 f"scheme {scheme!r} knows a free drum on the shore and a uniform current, and no wet_length, rtol or "
                 "grading ('lumped' knows all but these two); use 'moving_end'."

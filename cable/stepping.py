@@ -222,7 +222,7 @@ def _insert_between(values: np.ndarray, last: int, fraction: float, beyond: bool
 def _merge_last(line: Line, c: CableNumbers, work: Load) -> None:
     """Take the node before the drum out, at levels NOW and BEFORE: the last two segments become one.
 
-    The new segment is as long as its chord (in the elastic or slack state of its neighbours): the arc that the node cut
+    A taut new segment is as long as its chord (in the elastic state of its neighbours): the arc that the node cut
     off, an eighth of the angle squared, is given back to the drum, without a jolt.
     """
     N = line.ends.count
@@ -232,7 +232,8 @@ def _merge_last(line: Line, c: CableNumbers, work: Load) -> None:
         square += (line.position[NOW, N, i] - line.position[NOW, N - 2, i]) ** 2
     whole = line.length[N - 1] + last[NOW]
     pieces = _chord(line, N - 1) + _chord(line, N)
-    cut_off = whole * (1.0 - np.sqrt(square) / max(pieces, 1e-12))
+    taut = min(line.tension[NOW, N - 1], line.tension[NOW, N]) > KNOWN
+    cut_off = whole * (1.0 - np.sqrt(square) / max(pieces, 1e-12)) if taut else 0.0
     for level in (NOW, BEFORE):
         last[level] += line.length[N - 1] - cut_off
         for i in range(3):

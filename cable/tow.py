@@ -63,8 +63,16 @@ def tow(
     if scheme == "lumped":
         from .lumped_history import tow_lumped
 
-        settings = {"segment_length": segment_length, "cable": cable, "current": water}
-        return tow_lumped(tow_velocity, length, duration, step, **settings, drogue_drag_area=drogue_drag_area)
+        return tow_lumped(
+            tow_velocity,
+            length,
+            duration,
+            step,
+            segment_length=segment_length,
+            cable=cable,
+            current=water,
+            drogue_drag_area=drogue_drag_area,
+        )
     if scheme != "moving_end":
         message = f"scheme {scheme!r} cannot tow a free end; choose 'moving_end' or 'lumped'."
         raise ValueError(message)

@@ -95,10 +95,10 @@ def by_field(field: str, yes: Function, no: Function) -> Function:
     What few runs need so does not lengthen the first compilation of all others.
     """
 
-    def choose(line, c):  # type: ignore[no-untyped-def]  # numba compares this signature with the next
+    def choose(line, c):
         return (yes if field in c.dtype.names else no)(line, c)
 
-    def typed(line, c):  # type: ignore[no-untyped-def]
+    def typed(line, c):
         chosen: Any = (yes if field in c.fields else no).py_func  # type: ignore[attr-defined]
         return FunctionType(
             chosen.__code__, chosen.__globals__
