@@ -1,7 +1,7 @@
 """What the cable does to the vehicle, as a controller can know it: for the feed-forward path.
 
-Both need no look at the true state. The formula takes drum length, speed and yaw rate as measured, and has the cable
-slide along the way of the tow point. The twin is a simulation of vehicle and cable that runs beside the
+Both need no look at the true state. The formula takes drum length, speed and yaw rate as measured, and knows how a
+cable cuts a corner (`behind`). The twin is a simulation of vehicle and cable that runs beside the
 controller under the commands that were sent; its pull is taken in proportion to the length of cable that the drum has
 really let go.
 """
@@ -9,12 +9,12 @@ really let go.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from math import exp
+from math import cos, exp, sin
 
 import numpy as np
 
 import scenarios
-from subzero.autopilot.pull import SteadyPull
+from subzero.autopilot.behind import Behind
 from subzero.autopilot.sensors import UNKNOWN
 from subzero.autopilot.tuning import Tuning
 from subzero.model import Model
@@ -58,10 +58,10 @@ class NoCable(CableModel):
 
 
 class FormulaCable(CableModel):
-    """½ρπdC_t S'|S'| S against the way of the tow point, from drum length, speed and yaw rate.
+    """½ρπdC_t ∫V_t² ds against the end of the cable, from drum length, speed and yaw rate.
 
-    Without stretch a cable slides along itself with the speed S' at which the drum lets it go: on a straight way that
-    is the vehicle's own; in a turn it is less. S' is the slope of the drum length, smoothed over `SMOOTHED`.
+    On a straight way the cable slides with the speed S' at which the drum lets it go, and pulls against the way of the
+    tow point; in a turn it cuts the corner (`behind`). S' is the slope of the drum length, smoothed over `SMOOTHED`.
 
     Args:
         tuning: of the vehicle, for the sway that goes with a yaw rate.
@@ -70,35 +70,36 @@ class FormulaCable(CableModel):
 
     def __init__(self, tuning: Tuning, model: Model | None = None) -> None:
         self._tuning, self._model = tuning, model or tuning.model
+        self._tow_point = self._model.vehicle.tow_point.position()
         self.reset()
 
     def reset(self) -> None:
-        """Forget how fast the drum turns."""
+        """Forget how fast the drum turns, and how the cable lies."""
+        drum = self._model.drum
+        self._behind = Behind(self._model.cable, drum.friction_torque / drum.radius)
         self._rate, self._before = 0.0, UNKNOWN
 
     def wrench(self, reading: Observation, last_command: np.ndarray | None) -> np.ndarray:
         """Return the pull of a cable that lies behind the tow point."""
-        self._follow(reading)
-        length = reading.cable_length
-        if not length > SHORT:
-            return np.zeros(6)
         u, r = reading.surge_speed, reading.yaw_rate
-        sway = float(self._tuning.sway_per_yaw.at(u)) * r
-        nu = np.array([u, sway, 0.0, 0.0, reading.pitch_rate, r])
-        pull = SteadyPull.of(self._model, length)
-        V = nu[:3] + np.cross(nu[3:], pull.tow_point)
+        nu = np.array([u, float(self._tuning.sway_per_yaw.at(u)) * r, 0.0, 0.0, reading.pitch_rate, r])
+        V = nu[:3] + np.cross(nu[3:], self._tow_point)
+        self._follow(reading, V)
         speed = float(np.linalg.norm(V))
-        if speed < SLOW or self._rate <= 0.0:
+        if not reading.cable_length > SHORT or speed < SLOW or self._rate <= 0.0:
             return np.zeros(6)
-        F = -(pull.drag * self._rate**2 + pull.friction) / speed * V
-        return np.concatenate([F, np.cross(pull.tow_point, F)])
+        T = self._behind.pull(reading.cable_length, self._rate, float(V[0]), float(V[1]))
+        angle = self._behind.angle
+        F = -T * np.array([cos(angle), sin(angle), V[2] / speed])
+        return np.concatenate([F, np.cross(self._tow_point, F)])
 
-    def _follow(self, reading: Observation) -> None:
-        """Smooth the slope of the drum length."""
+    def _follow(self, reading: Observation, V: np.ndarray) -> None:
+        """Smooth the slope of the drum length, and move the cable on."""
         passed = reading.time - self._before.time
         if passed > 0.0:
             slope = (reading.cable_length - self._before.cable_length) / passed
             self._rate += (1.0 - exp(-passed / SMOOTHED)) * (slope - self._rate)
+            self._behind.move(passed, float(V[0]), float(V[1]), reading.yaw_rate)
         self._before = reading
 
 
