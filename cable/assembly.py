@@ -9,9 +9,8 @@ Q_j = ∫(∂p/∂t + D − w_c k) ds, shared half and half by its two ends, the
     drum:                   T_N + ½ t_N·Q_N = (I_d/R_d² dU/dt + C_f/R_d)  (11), U = dS/dt; see `cable.drum`
 
 Nodes are where the velocity lives and segments where the tension lives, so neither can alternate from node to node.
-The force on the vehicle (12) is f_1 − ½Q_1. The last segment ends at a fixed place where new material enters:
-
-    Q_N = d/dt(ℓ_N p_N) − U p(S) + ℓ_N (D − w_c k),   velocity at the drum −U d_N/ℓ_N.
+The force on the vehicle (12) is f_1 − ½Q_1. What the last segment has of its own, at the drum or with a drogue, is in
+`cable.far_end`; bending, which adds a shear force to f_j, in `cable.bending`.
 """
 
 from __future__ import annotations
@@ -22,8 +21,9 @@ from subzero.compiled import compiled, inner
 
 from .bending import add_bending
 from .differences import Weights
-from .drum import FREE, LENGTH, SPINNING, STANDING, TENSION, friction
+from .drum import FREE, STANDING
 from .element import Load, differentiate_load, evaluate_load, fading_rate, turning_rate
+from .far_end import add_drogue, add_influx, drum_row
 from .first_segment import write_single_segment
 from .line import BEFORE, DIAGONAL, LOWER, NEW, NOW, RESIDUAL, UPPER, Line, held_node, take_segment
 from .properties import CableNumbers, DrumNumbers
@@ -75,36 +75,18 @@ def assemble(
         if j < held:
             _differentiate_segment(length, w, T, c, work)
         else:
-            _add_influx(line, length, w, T, c, work)
+            add_influx(line, length, w, T, c, work)
         _scatter_balance(line, j, T, length, work)
         _scatter_length(line, j, T, length, c, work.chord)
     add_bending(line, c)
     if N > 1:
         _sharpen_tow_force(line)
     if line.ends.free_end:
-        _add_drogue(line, w)
+        add_drogue(line, w)
     else:
-        _drum_row(line, w, drum, work)
+        drum_row(line, w, drum, work)
     if N == 1 and drum.control == FREE and not line.ends.free_end:
         write_single_segment(line, work.chord)
-
-
-@compiled
-def _add_drogue(line: Line, w: Weights) -> None:
-    """Add the drag of a drogue, ½ρC_dA |U| U, to the balance of the free end."""
-    N, k, square = line.ends.count, line.ends.tail_drag, 0.0
-    J = line.water[NEW, N]
-    for i in range(3):
-        square += (line.velocity[NEW, N, i] - J[i]) ** 2
-    size = np.sqrt(square)
-    line.ends.drum_pull = k * square
-    for i in range(3):
-        U = line.velocity[NEW, N, i] - J[i]
-        line.rows[RESIDUAL, N, 1 + i] += k * size * U
-        line.blocks[DIAGONAL, N, 1 + i, 1 + i] += k * size * w.b0
-        for m in range(3):
-            slope = U * (line.velocity[NEW, N, m] - J[m]) / max(size, 1e-12)
-            line.blocks[DIAGONAL, N, 1 + i, 1 + m] += k * slope * w.b0
 
 
 @compiled
@@ -130,34 +112,6 @@ def _differentiate_segment(length: float, w: Weights, T: float, c: CableNumbers,
             mean = 0.5 * w.b0 * work.q_V[i, k]
             by_near[i, k] = length * (mean - work.q_d[i, k])
             by_far[i, 1 + k] = length * (mean + work.q_d[i, k])
-
-
-@compiled
-def _add_influx(line: Line, length: float, w: Weights, T: float, c: CableNumbers, work: Load) -> None:
-    """Complete Q of the last segment by the momentum that enters at the drum; fill ∂Q/∂x_{N−1} and ∂Q/∂(T, ℓ)."""
-    N, U, t, d = line.ends.count, line.ends.payout[NEW], work.tangent, work.chord
-    by_near, by_far, J, r = work.by_near, work.by_far, work.water, work.chord_length
-    g, fading = turning_rate(d, length), fading_rate(d, length, r)
-    for i in range(3):  # the water at the drum, as the drum sees it
-        J[i] = line.water[NEW, N, i] - line.ends.drum_velocity[i]
-    Jt = J[0] * t[0] + J[1] * t[1] + J[2] * t[2]
-    dU = 0.0 if line.ends.drum_mode == STANDING else w.b0
-    stretch = 0.5 * c.compliance / (1.0 + c.compliance * T)
-    for i in range(3):
-        entering = c.mass * line.velocity[NEW, N, i] - c.added_mass * (J[i] - Jt * t[i])
-        line.load[N, i] -= U * entering
-        by_far[i, 0] = length * stretch * work.drag[i]
-        by_far[i, 1] = work.q[i] - dU * entering - U * c.mass * (U / length - dU) * d[i] / length
-        by_far[i, 1] -= fading * (length * work.q_tt[i] - 2.0 * U * c.added_mass * Jt * t[i])
-        by_far[i, 2] = 0.0
-        by_far[i, 3] = 0.0
-        for k in range(3):
-            B = ((1.0 if i == k else 0.0) - g * t[i] * t[k]) / r
-            across_k = J[k] - g * Jt * t[k]
-            by_far[i, 1] += 0.5 * work.q_V[i, k] * (U / length - dU) * d[k]
-            by_near[i, k] = length * (0.5 * (w.b0 + U / length) * work.q_V[i, k] - work.q_d[i, k])
-            by_near[i, k] += U * c.added_mass * (Jt * B + t[i] * across_k / r)
-        by_near[i, i] -= U * c.mass * U / length
 
 
 @compiled
@@ -231,54 +185,3 @@ def _scatter_length(line: Line, j: int, T: float, length: float, c: CableNumbers
             line.blocks[DIAGONAL, j, 0, 1 + i] = -slope
     if j == held_node(line):
         line.blocks[DIAGONAL, j, 0, 1] = by_strain * square / length
-
-
-@compiled
-def _drum_row(line: Line, w: Weights, drum: DrumNumbers, work: Load) -> None:
-    """Write the drum's equation (11), the second row of the last block; `work` still holds the last segment."""
-    N, t = line.ends.count, work.tangent
-    D, L, r = (
-        line.blocks[DIAGONAL, line.ends.count],
-        line.blocks[LOWER, line.ends.count],
-        line.rows[RESIDUAL, line.ends.count],
-    )
-    D[2, 2] = 1.0
-    D[3, 3] = 1.0
-    Qt = line.load[N, 0] * t[0] + line.load[N, 1] * t[1] + line.load[N, 2] * t[2]
-    line.ends.drum_pull = line.tension[NEW, N] + 0.5 * Qt
-    for i in range(3):
-        line.ends.drum_force[i] = line.tension[NEW, N] * t[i] + 0.5 * line.load[N, i]
-    if drum.control == LENGTH or line.ends.drum_mode == STANDING:
-        r[1] = line.ends.last_length[NEW] - _length_wanted(line, drum)
-        D[1, 1] = 1.0
-        return
-    U = line.ends.payout
-    if drum.control == TENSION:
-        r[1] = -drum.setpoint
-    else:
-        held, slope = friction(drum, U[NEW])
-        r[1] = -held - drum.inertia * (w.a0 * U[NEW] + w.a1 * U[NOW] + w.a2 * U[BEFORE])
-        D[1, 1] = -(slope + drum.inertia * w.a0) * w.b0
-    if line.ends.drum_mode == SPINNING:
-        return
-    r[1] += line.ends.drum_pull
-    D[1, 0] = 1.0
-    by_near, by_far = work.by_near, work.by_far
-    size = work.chord_length
-    g = turning_rate(work.chord, line.ends.last_length[NEW])
-    fading = fading_rate(work.chord, line.ends.last_length[NEW], size)
-    for i in range(3):
-        D[1, 0] += 0.5 * t[i] * by_far[i, 0]
-        D[1, 1] += 0.5 * t[i] * (by_far[i, 1] - fading * line.load[N, i])
-        for k in range(3):
-            L[1, 1 + k] += 0.5 * t[i] * by_near[i, k]
-    for k in range(3):
-        L[1, 1 + k] -= 0.5 * (line.load[N, k] - g * Qt * t[k]) / size
-
-
-@compiled
-def _length_wanted(line: Line, drum: DrumNumbers) -> float:
-    """Return how long the last segment has to be: as long as it is, or what a winch asks for. [m]."""
-    if drum.control != LENGTH:
-        return line.ends.last_length[NOW]
-    return drum.setpoint - line.ends.settled

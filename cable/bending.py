@@ -10,8 +10,8 @@ EI ∂³x/∂s³. It depends on four nodes, so a balance depends on five: the ma
 ℓ̄ of the growing segment is taken from the step before. A cable without EI compiles nothing of this.
 
 What it does not do: a cable cannot be pushed here (`cable.slack`), stiff or not. Where a winch pays out more than is
-taken, while less is in the water than the length (EI/w_c)^⅓ in which weight begins to bend it, a stiff cable would push;
-such a run stops.
+taken, while less is in the water than the length (EI/w_c)^⅓ in which weight begins to bend it, a stiff cable would
+push; such a run stops.
 """
 
 from __future__ import annotations

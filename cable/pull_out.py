@@ -9,7 +9,8 @@ import numpy as np
 from .drum_path import PLACE, SETPOINT, VELOCITY, drum_path, resting
 from .element import new_load
 from .history import History
-from .line import lay_straight, new_line
+from .laying import lay_straight
+from .line import new_line
 from .properties import CableProperties, DrumProperties
 from .runs import TowVelocity, current_of, first_direction, run, sample_path, segments_needed
 from .water import Current

@@ -10,7 +10,8 @@ from .drum import LENGTH
 from .element import Load
 from .energy import LOSS, STORED
 from .history import History, Outcome
-from .line import NEW, Line, start_in_water
+from .laying import start_in_water
+from .line import NEW, Line
 from .newton import Solved
 from .pay_out import Record, TowPath, follow_path, new_record
 from .properties import CableNumbers, DrumNumbers

@@ -9,7 +9,8 @@ import numpy as np
 from .drum_path import resting
 from .element import new_load
 from .history import History
-from .line import NOW, Line, lay_straight, new_line
+from .laying import lay_straight
+from .line import NOW, Line, new_line
 from .properties import CableProperties, DrumProperties
 from .runs import TowVelocity, current_of, first_direction, run, sample_path
 from .water import Current

@@ -10,7 +10,8 @@ from cable.drum import FREE
 from cable.drum_path import lead_drum
 from cable.element import new_load
 from cable.energy import FLOWS, energy_flow
-from cable.line import NOW, Line, lay_straight, new_line, start_in_water
+from cable.laying import lay_straight, start_in_water
+from cable.line import NOW, Line, new_line
 from cable.pull_out import START_LENGTH
 from subzero.compiled import compiled, packed
 from subzero.hull import feel_current, pose, tow_point

@@ -12,7 +12,8 @@ import numpy as np
 
 from cable import Brake, CableProperties, Current
 from cable.element import Load, new_load
-from cable.line import NOW, Line, new_line, start_in_water
+from cable.laying import start_in_water
+from cable.line import NOW, Line, new_line
 from cable.properties import DrumNumbers
 from cable.stepping import accept, try_step
 from cable.water import Water

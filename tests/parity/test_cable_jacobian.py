@@ -15,6 +15,7 @@ from cable.assembly import assemble
 from cable.differences import backward_weights
 from cable.drum import SPINNING, STANDING, TURNING
 from cable.element import new_load
+from cable.laying import lay_straight, start_in_water
 from cable.line import (
     BEFORE,
     DIAGONAL,
@@ -25,9 +26,7 @@ from cable.line import (
     RESIDUAL,
     UPPER,
     UPPER2,
-    lay_straight,
     new_line,
-    start_in_water,
 )
 from cable.properties import CableProperties, DrumProperties
 from cable.water import Current
