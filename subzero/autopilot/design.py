@@ -35,6 +35,7 @@ class Gains:
         integral: gain of ∫e.
         A, B: the model with ∫e as its last state (n + 1, n + 1), (n + 1, 1); its derivative is −y.
         Q, R: the weights. (n + 1, n + 1), (1, 1)
+        ahead: what is fed forward per unit of what is wanted, beside the loop.
         loop: the loop opened at the plant's input, as a transfer from δ to δ, for margins.
     """
 
@@ -46,17 +47,20 @@ class Gains:
     B: np.ndarray
     Q: np.ndarray
     R: np.ndarray
+    ahead: float
     loop: control.StateSpace
 
     @property
     def share(self) -> float:
         """b: how much of a step of what is wanted goes to the proportional part; the rest is left to the integral.
 
-        The step response has a zero at −k_I/(b k); b puts it on the slowest pole, whose long tail is then not excited.
+        The step response has a zero at −k_I/(δ_w + b k), with δ_w `ahead`; b puts it on the slowest pole, whose long
+        tail is then not excited. (Without it a step that is fed forward must overshoot: its ∫e has to end at 0.)
         """
         K = np.append(self.feedback, -self.integral)[None]
         slowest = float(np.min(np.abs(np.linalg.eigvals(self.A - self.B @ K))))
-        return min(1.0, self.integral / (float(self.feedback[self.states.index(self.tracked)]) * slowest))
+        k = float(self.feedback[self.states.index(self.tracked)])
+        return min(1.0, max(0.0, (self.integral / slowest - self.ahead) / k))
 
     def numbers(self) -> np.ndarray:
         """Return k of each state, k_I and b (n + 2,), as loops take them."""
@@ -98,7 +102,12 @@ def reduced(part: control.StateSpace, keep: Sequence[str]) -> control.StateSpace
 
 
 def design_gains(
-    part: control.StateSpace, *, tracked: str, largest: Mapping[str, float], largest_command: float
+    part: control.StateSpace,
+    *,
+    tracked: str,
+    largest: Mapping[str, float],
+    largest_command: float,
+    ahead: float = 0.0,
 ) -> Gains:
     """Return the linear-quadratic gains of a loop with integral action.
 
@@ -108,6 +117,7 @@ def design_gains(
         largest: state, or "integral" → the largest deviation that is acceptable [its unit, integral in unit·s]; a
             state that is not named costs nothing.
         largest_command: the same for the command.
+        ahead: what is fed forward per unit of what is wanted, beside this loop; it changes `Gains.share` alone.
 
     Raises:
         UserError: a weight of nothing, a weight that is not above 0, a loop that cannot be stabilised.
@@ -127,7 +137,7 @@ def design_gains(
     except (np.linalg.LinAlgError, ValueError) as error:
         raise UserError(f"'{part.name}' cannot be stabilised with these weights: {error}.") from error
     return Gains(
-        states=labels, tracked=tracked, feedback=K[:n], integral=-float(K[n]), A=A, B=B, Q=Q, R=R,
+        states=labels, tracked=tracked, feedback=K[:n], integral=-float(K[n]), A=A, B=B, Q=Q, R=R, ahead=ahead,
         loop=control.ss(A, B, K[None], [[0.0]], name=f"{part.name}_loop"),
     )  # fmt: skip
 

@@ -29,12 +29,16 @@ SPEEDS = (0.4, 0.6, 0.8, 1.0, 1.2, 1.4)
 
 @dataclass(frozen=True, kw_only=True)
 class Weights:
-    """What a loop feeds back, the tracked state last, and the largest acceptable deviations (`design_gains`)."""
+    """What a loop feeds back, the tracked state last, and the largest acceptable deviations (`design_gains`).
+
+    `foreseen`: whether what is wanted is fed forward too, with the steady command that it needs.
+    """
 
     part: str
     measured: tuple[str, ...]
     largest: Mapping[str, float]
     largest_command: float
+    foreseen: bool = False
 
 
 WEIGHTS: dict[str, Weights] = {
@@ -43,6 +47,7 @@ WEIGHTS: dict[str, Weights] = {
         measured=("surge_speed",),
         largest={"surge_speed": 0.1, "integral": 0.2},
         largest_command=4.0,
+        foreseen=True,
     ),
     "heading": Weights(
         part="yaw_sway",
@@ -139,9 +144,11 @@ def tune(
 def design_loop(linear: control.StateSpace, weights: Weights) -> Gains:
     """Return the gains of one loop on a linear model of the whole hull."""
     part = reduced(subsystem(linear, weights.part), weights.measured)
+    steady = -np.linalg.lstsq(np.asarray(part.B), np.asarray(part.A), rcond=None)[0][0, -1]
     return design_gains(
-        part, tracked=weights.measured[-1], largest=weights.largest, largest_command=weights.largest_command
-    )
+        part, tracked=weights.measured[-1], largest=weights.largest, largest_command=weights.largest_command,
+        ahead=float(steady) if weights.foreseen else 0.0,
+    )  # fmt: skip
 
 
 def with_weights(name: str, **changes: float | Mapping[str, float]) -> dict[str, Weights]:
