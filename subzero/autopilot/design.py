@@ -124,6 +124,7 @@ def design_gains(
     """
     import control
 
+    _check_part(part)
     labels = tuple(part.state_labels)
     _check_weights(labels, tracked, largest, largest_command)
     n, y = len(labels), labels.index(tracked)
@@ -135,11 +136,35 @@ def design_gains(
     try:
         K = np.asarray(control.lqr(A, B, Q, R)[0])[0]
     except (np.linalg.LinAlgError, ValueError) as error:
-        raise UserError(f"'{part.name}' cannot be stabilised with these weights: {error}.") from error
+        raise UserError(
+            f"'{part.name}' cannot be stabilised with these weights: {str(error).rstrip('.')}. Allowed: a model whose"
+            " command reaches all that does not settle by itself, and weights that see it."
+        ) from error
     return Gains(
         states=labels, tracked=tracked, feedback=K[:n], integral=-float(K[n]), A=A, B=B, Q=Q, R=R, ahead=ahead,
         loop=control.ss(A, B, K[None], [[0.0]], name=f"{part.name}_loop"),
     )  # fmt: skip
+
+
+def _check_part(part: control.StateSpace) -> None:
+    """Refuse a model that the recipe does not hold for."""
+    import control
+
+    allowed = "Allowed: a continuous control.StateSpace with one input and no feedthrough, of finite numbers."
+    if not isinstance(part, control.StateSpace):
+        raise UserError(f"design_gains: the model is a {type(part).__name__}. {allowed}")
+    wrong = (
+        (part.isdtime(strict=True), f"is sampled every {part.dt!r} s"),
+        (part.ninputs != 1, f"has {part.ninputs} inputs"),
+        (bool(np.any(part.D)), "feeds its input through: it is not strictly proper"),
+        (
+            not (np.all(np.isfinite(part.A)) and np.all(np.isfinite(part.B))),
+            "has a number that is not finite",
+        ),
+    )
+    for is_wrong, words in wrong:
+        if is_wrong:
+            raise UserError(f"design_gains: '{part.name}' {words}. {allowed}")
 
 
 def _check_weights(

@@ -14,7 +14,7 @@ from subzero.autopilot.standard import Wanted
 from subzero.channels import DEGREE
 from subzero.errors import UserError
 from subzero.model import Model
-from subzero.simulator import Observation, Simulator
+from subzero.simulator import COMMANDED, Observation, Simulator
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -68,8 +68,9 @@ def fly(
         ``attrs["outcome_message"]``.
 
     Raises:
-        UserError: a sample time that does not fit the trial's cable step, or impossible sensors.
+        UserError: a sample time that does not fit the trial's cable step, what is no autopilot, a duration of nothing.
     """
+    _check(autopilot, duration)
     sim = Simulator(scenario, tethered=tethered, model=model, sample_time=autopilot.sample_time)
     told = Sensors(sensors, seed=seed)
     autopilot.reset()
@@ -80,11 +81,31 @@ def fly(
         goals.append((seen.time, *goal[:3]))
         try:
             command = autopilot.update(told.read(seen), goal)
-            seen = sim.step((np.nan,) if command is None else command)
+            seen = sim.step(_given(command, seen.time))
         except UserError as error:
             trouble = f"Autopilot '{autopilot.name}': {error}"
             break
     return _with_goals(sim.result(), np.array(goals), trouble)
+
+
+def _check(autopilot: Autopilot, duration: float | None) -> None:
+    """Refuse what cannot fly."""
+    missing = [name for name in ("name", "sample_time", "reset", "update") if not hasattr(autopilot, name)]
+    if missing:
+        raise UserError(
+            f"{type(autopilot).__name__} has no {', '.join(missing)}. Allowed: an object as `Autopilot` says."
+        )
+    if duration is not None and not (np.isfinite(duration) and duration > 0.0):
+        raise UserError(f"fly: the duration is {duration!r}. Allowed: a time above 0 s.")
+
+
+def _given(command: Sequence[float] | None, time: float) -> Sequence[float]:
+    """Return a command, or refuse none: the simulator would take it for the scenario's own."""
+    if command is None:
+        raise UserError(
+            f"At t = {time:g} s the command is None. Allowed: four finite numbers, {', '.join(COMMANDED)}."
+        )
+    return command
 
 
 def _with_goals(run: xr.Dataset, goals: np.ndarray, trouble: str) -> xr.Dataset:

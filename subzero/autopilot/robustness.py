@@ -23,6 +23,9 @@ from subzero.model import Model
 if TYPE_CHECKING:
     import control
 
+MARGINAL = 1e-6
+"""A motion that grows by less than this a sample counts as one that stays, as the depth behind the pitch loop does."""
+
 
 def loop_margins(tuning: Tuning, loop: str, *, late: float = 0.0, **options: Any) -> Margins:
     """Return gain and phase margin of a loop at the plant's input.
@@ -61,14 +64,51 @@ def sampled_loop(
         NoTrimError: the vehicle cannot pull that cable at that speed.
         UserError: there is no such loop.
     """
-    import control
-
     if loop not in WEIGHTS:
         raise UserError(
             f"There is no loop '{loop}'.{suggestion(loop, WEIGHTS)} Allowed: {', '.join(WEIGHTS)}."
         )
     model = model or tuning.model
-    part = subsystem(linearise(model, trim(model, speed=speed, wet_length=wet_length)), WEIGHTS[loop].part)
+    linear = linearise(model, trim(model, speed=speed, wet_length=wet_length))
+    return _opened(tuning, loop, linear, speed, sample_time, estimates)
+
+
+def check_stable(tuning: Tuning, sample_time: float, estimates: Estimates | None = None) -> None:
+    """Refuse gains with which the sampled bare hull is unstable.
+
+    Args:
+        tuning: the gains.
+        sample_time: of the controller. [s]
+        estimates: a heading by full state feedback instead of the PID.
+
+    Raises:
+        UserError: a loop is unstable at one of the speeds: which, and what to change.
+    """
+    for loop in WEIGHTS:
+        for speed, linear in zip(tuning.speeds, tuning.linear, strict=True):
+            opened = _opened(tuning, loop, linear, speed, sample_time, estimates)
+            closed = np.asarray(opened.A) - np.asarray(opened.B) @ np.asarray(opened.C)
+            largest = float(np.max(np.abs(np.linalg.eigvals(closed))))
+            if largest > 1.0 + MARGINAL:
+                raise UserError(
+                    f"The {loop} loop is unstable at {speed:g} m/s with a sample time of {sample_time:g} s: a motion"
+                    f" grows by a factor of {largest:.3g} a sample. Allowed: a shorter sample time, weights that ask"
+                    " for less (a smaller largest_command), or a tuning for slower motion."
+                )
+
+
+def _opened(
+    tuning: Tuning,
+    loop: str,
+    linear: control.StateSpace,
+    speed: float,
+    sample_time: float,
+    estimates: Estimates | None,
+) -> control.StateSpace:
+    """Return L(z) of a loop on a linear model of the hull."""
+    import control
+
+    part = subsystem(linear, WEIGHTS[loop].part)
     sampled = control.c2d(part, sample_time)
     if estimates is not None and loop == "heading":
         controller, rows = (

@@ -39,7 +39,13 @@ class Schedule:
             raise UserError("Schedule: a value is not a finite number.")
 
     def at(self, speed: float) -> np.ndarray:
-        """Return the array at a speed [m/s]."""
+        """Return the array at a speed [m/s].
+
+        Raises:
+            UserError: the speed is not a number: nothing is wanted, or no sensor measures it.
+        """
+        if speed != speed:
+            raise UserError("there are no gains for a speed that is not a number. Allowed: a speed in m/s.")
         place = float(np.interp(speed, self.speeds, np.arange(self.speeds.size)))
         low = min(int(place), self.speeds.size - 1)
         high = min(low + 1, self.speeds.size - 1)

@@ -1,32 +1,42 @@
 """The one table of autopilots, and of what can be fed forward, by name.
 
-To add one of your own: a small file with a class as `flight.Autopilot` says, and a line here, or hand the object to
-`fly` directly.
+To add one of your own: a small file with a class as `flight.Autopilot` says, and a line here; or hand the object to
+`fly`; or give the path of the file as the name (`own`), on the command line too.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from math import isfinite
+from typing import TypeVar
 
 import scenarios
 from subzero.autopilot.estimator import EstimatorLoop, estimates
 from subzero.autopilot.feed_forward import CableModel, FormulaCable, NoCable, TwinCable
+from subzero.autopilot.flight import Autopilot
+from subzero.autopilot.own import Build, from_file
+from subzero.autopilot.robustness import check_stable
 from subzero.autopilot.standard import StandardAutopilot
 from subzero.autopilot.tuning import Tuning, tune
 from subzero.errors import UserError, suggestion
 from subzero.model import Model
 
+Line = TypeVar("Line")
+
 
 def _pid(tuning: Tuning, sample_time: float, cable: CableModel) -> StandardAutopilot:
+    check_stable(tuning, sample_time)
     return StandardAutopilot(tuning, sample_time, cable=cable, name="pid")
 
 
 def _lqr(tuning: Tuning, sample_time: float, cable: CableModel) -> StandardAutopilot:
-    heading = EstimatorLoop(estimates(tuning, sample_time), sample_time)
+    matrices = estimates(tuning, sample_time)
+    check_stable(tuning, sample_time, matrices)
+    heading = EstimatorLoop(matrices, sample_time)
     return StandardAutopilot(tuning, sample_time, cable=cable, heading=heading, name="lqr")
 
 
-AUTOPILOTS: dict[str, Callable[[Tuning, float, CableModel], StandardAutopilot]] = {"pid": _pid, "lqr": _lqr}
+AUTOPILOTS: dict[str, Build] = {"pid": _pid, "lqr": _lqr}
 """Name → what makes one, from a tuning, a sample time [s] and a cable model."""
 
 FEED_FORWARD: dict[str, Callable[[Tuning, scenarios.Trial, float, Model], CableModel]] = {
@@ -45,11 +55,11 @@ def make(
     sample_time: float = 0.1,
     tuning: Tuning | None = None,
     believed: Model | None = None,
-) -> StandardAutopilot:
+) -> Autopilot:
     """Return an autopilot by name.
 
     Args:
-        name: one of `AUTOPILOTS`.
+        name: one of `AUTOPILOTS`, or the path of a Python file with one (`own`).
         trial: what it will fly.
         feed_forward: one of `FEED_FORWARD`.
         sample_time: of the controller. [s]
@@ -57,15 +67,20 @@ def make(
         believed: what the autopilot believes of vehicle, cable and water; the trial's by default.
 
     Raises:
-        UserError: there is no such autopilot or feed-forward.
+        UserError: there is no such autopilot or feed-forward; a sample time of nothing; with these gains and this
+            sample time the hull is unstable.
     """
-    for word, table, what in ((name, AUTOPILOTS, "autopilot"), (feed_forward, FEED_FORWARD, "feed-forward")):
-        if word not in table:
-            raise UserError(
-                f"There is no {what} '{word}'.{suggestion(word, table)} Allowed: {', '.join(table)}."
-            )
+    if not (isfinite(sample_time) and sample_time > 0.0):
+        raise UserError(f"make: the sample time is {sample_time!r}. Allowed: a time above 0 s.")
+    build = from_file(name) if name.endswith(".py") else _named(AUTOPILOTS, name, "autopilot")
+    cable = _named(FEED_FORWARD, feed_forward, "feed-forward")
     believed = believed or Model.of(trial)
     tuning = tuning or tune(believed)
-    return AUTOPILOTS[name](
-        tuning, sample_time, FEED_FORWARD[feed_forward](tuning, trial, sample_time, believed)
-    )
+    return build(tuning, sample_time, cable(tuning, trial, sample_time, believed))
+
+
+def _named(table: Mapping[str, Line], name: str, what: str) -> Line:
+    """Return a line of a table, or say what there is."""
+    if name not in table:
+        raise UserError(f"There is no {what} '{name}'.{suggestion(name, table)} Allowed: {', '.join(table)}.")
+    return table[name]

@@ -17,6 +17,7 @@ from subzero.autopilot.design import Gains, design_gains, reduced
 from subzero.autopilot.linear import linearise, subsystem
 from subzero.autopilot.schedule import Schedule
 from subzero.autopilot.steady import Trim, trim
+from subzero.errors import UserError, suggestion
 from subzero.model import Model
 from vehicle.propeller import thrust
 
@@ -78,6 +79,7 @@ class Tuning:
     Attributes:
         model: the hull that was designed for.
         speeds: [m/s]
+        linear: the linear model of the bare hull at each speed.
         designs: loop → the design at each speed.
         gains: loop → (k of each measured, k_I, b) over speed.
         hull_drag: thrust that the hull alone needs over speed. [N]
@@ -90,6 +92,7 @@ class Tuning:
 
     model: Model
     speeds: tuple[float, ...]
+    linear: tuple[control.StateSpace, ...]
     designs: Mapping[str, tuple[Gains, ...]]
     gains: Mapping[str, Schedule]
     hull_drag: Schedule
@@ -114,7 +117,7 @@ def tune(
         NoTrimError: the vehicle has no steady motion at one of the speeds.
         UserError: weights that mean nothing.
     """
-    weights = WEIGHTS | dict(weights or {})
+    weights = WEIGHTS | _checked(dict(weights or {}))
     trims = [trim(model, speed=speed) for speed in speeds]
     lines = [linearise(model, steady) for steady in trims]
     designs = {name: tuple(design_loop(line, weight) for line in lines) for name, weight in weights.items()}
@@ -126,6 +129,7 @@ def tune(
     return Tuning(
         model=model,
         speeds=speeds,
+        linear=tuple(lines),
         designs=designs,
         gains={name: over_speed([one.numbers() for one in found]) for name, found in designs.items()},
         hull_drag=over_speed([np.array(_thrust(model, steady)) for steady in trims]),
@@ -139,6 +143,18 @@ def tune(
         sway_per_yaw=over_speed([_steady_turn(line)[0] for line in lines]),
         rudder_per_yaw=over_speed([_steady_turn(line)[1] for line in lines]),
     )
+
+
+def _checked(weights: dict[str, Weights]) -> dict[str, Weights]:
+    """Return weights, or refuse what they are not."""
+    for name, value in weights.items():
+        if name not in WEIGHTS:
+            raise UserError(
+                f"tune: there is no loop '{name}'.{suggestion(name, WEIGHTS)} Allowed: {', '.join(WEIGHTS)}."
+            )
+        if not isinstance(value, Weights) or value.measured != WEIGHTS[name].measured:
+            raise UserError(f"tune: the weights of '{name}' are {value!r}. Allowed: those of `with_weights`.")
+    return weights
 
 
 def design_loop(linear: control.StateSpace, weights: Weights) -> Gains:
