@@ -1,7 +1,11 @@
 """A Gymnasium environment: hold a heading while the cable grows.
 
-    >>> import gymnasium, subzero.environment
-    >>> env = gymnasium.make("subzero/TetheredHeading-v0")
+    >>> import gymnasium
+    >>> env = gymnasium.make("subzero.environment:subzero/TetheredHeading-v0")
+
+What stands before the colon is imported, and registers the name; once it is imported,
+``gymnasium.make("subzero/TetheredHeading-v0")`` will do. (Gymnasium looks for no environments in installed packages
+since 1.0.)
 
 It needs the extra ``subzero[gym]``. The vehicle starts from rest as in a scenario, with a constant propeller command;
 the action is the rudder, and the reward punishes the heading error and the work of the rudder. A new heading is drawn

@@ -1,8 +1,12 @@
 """The Gymnasium environment passes Gymnasium's own checker, and can be won.
 
 Verifies: "subzero/TetheredHeading-v0" with `gymnasium.utils.env_checker.check_env`; signs of action and reward with a
-proportional controller, which has to earn more than a fixed rudder. Tolerance: none; 2 degrees for the heading.
+proportional controller, which has to earn more than a fixed rudder; that a program that imports Gymnasium only can make
+it. Tolerance: none; 2 degrees for the heading.
 """
+
+import subprocess
+import sys
 
 import gymnasium
 import numpy as np
@@ -56,3 +60,20 @@ def test_it_can_be_made_without_its_cable():
     _, info = episode(env, proportional)
     assert info["time"] == pytest.approx(60.0)
     assert info["cable_length"] == 0.0
+
+
+@pytest.mark.parametrize(
+    "program",
+    [
+        "import gymnasium; env = gymnasium.make('subzero.environment:subzero/TetheredHeading-v0')",
+        "import gymnasium, subzero.environment; env = gymnasium.make('subzero/TetheredHeading-v0')",
+        "import subzero.environment, gymnasium; env = gymnasium.make('subzero/TetheredHeading-v0')",
+    ],
+)
+def test_a_program_of_its_own_can_make_it(program, tmp_path):
+    """Elsewhere than in the checkout, with every warning an error."""
+    code = f"{program}; env.reset(seed=1); print(env.step(env.action_space.sample())[4]['time'])"
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", code], capture_output=True, text=True, check=True, cwd=tmp_path
+    )
+    assert done.stdout.strip() == "0.1"
