@@ -20,6 +20,7 @@ import numpy as np
 
 from cable.drum_path import lead_drum
 from cable.energy import energy_flow
+from cable.line import NOW
 from cable.newton import Solved
 from cable.stepping import accept, try_step
 from cable.tow_point import impedance
@@ -212,3 +213,5 @@ def _accept(setup: Setup, live: Live, start: float, span: float) -> None:
         accept(live.line, span, setup.fixed.cable, live.load)
         energy_flow(live.line, setup.fixed.cable, live.load, live.now.ledger.cable_new)
     book(setup, live, start, span, steps)
+    if setup.fixed.tethered:
+        live.now.length = live.line.ends.settled + live.line.ends.last_length[NOW]

@@ -3,11 +3,11 @@
     W_propeller = L_hull + L_cable + ΔE + W_drum + W_added mass + residual
 
 relative to the water. ΔE is the change of the kinetic energy (hull with its added mass, cable), of the potential energy
-and of the elastic energy. In a current that changes along the way, the hull's balance closes only as far as it may be
-taken as steady (`hull.feel_current`), and what the current does to the cable is booked with its added mass. The
-terms of the cable are those of `cable.energy`. Powers are summed up by the trapezoidal rule over hull steps (hull) and
-exchanges (cable), so the residual is of second order in both. In a prescribed run the "propeller" is whatever moves the
-tow point.
+and of the elastic energy. What a missing force takes is booked with the loss of the hull. In a current that changes
+along the way, the hull's balance closes only as far as it may be taken as steady (`hull.feel_current`), and what the
+current does to the cable is booked with its added mass. The terms of the cable are those of `cable.energy`. Powers are
+summed up by the trapezoidal rule over hull steps (hull) and exchanges (cable), so the residual is of second order in
+both. In a prescribed run the "propeller" is whatever moves the tow point.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ import vehicle
 from cable.energy import ADDED_MASS, AT_DRUM, CARRIED, FLOWS, GRAVITY_WORK, LOSS, STORED, STRAINED, TOWED
 from subzero.compiled import compiled, inner
 from subzero.hull import feel_current, row_at, tow_wrench
+from subzero.missing_wrench import add_missing
 from subzero.run_state import Live, Setup
 
 PROPELLER, HULL_LOSS, CABLE_LOSS, KINETIC, DRUM, ADDED, RESIDUAL = range(7)
@@ -62,7 +63,8 @@ def _book_hull(setup: Setup, live: Live, start: float, span: float, steps: int) 
             total[PROPELLER] -= 0.5 * h * (old[P_EXTERNAL] + new[P_EXTERNAL])
             continue
         total[PROPELLER] += 0.5 * h * (old[P_PROPELLER] + new[P_PROPELLER])
-        total[HULL_LOSS] -= 0.5 * h * (old[P_LOSS] + new[P_LOSS])
+        loss = old[P_LOSS] + old[P_EXTERNAL] + (new[P_LOSS] + new[P_EXTERNAL])
+        total[HULL_LOSS] -= 0.5 * h * loss
         total[KINETIC] -= 0.5 * h * (old[P_RESTORING] + new[P_RESTORING])
     if setup.fixed.prescribed:
         return
@@ -75,10 +77,17 @@ def _book_hull(setup: Setup, live: Live, start: float, span: float, steps: int) 
 def _hull_power(
     setup: Setup, live: Live, row: int, time: float, x: float, command: np.ndarray, out: np.ndarray
 ) -> None:
-    """Fill out (4,) with the powers on the hull in state `row` of the path, a fraction x into the exchange. [W]."""
+    """Fill out (4,) with the powers on the hull in state `row` of the path, a fraction x into the exchange. [W].
+
+    "External" is the pull of the cable in a prescribed run, and the missing force in any other.
+    """
     hull = live.now.hull
     for i in range(3):
         hull.pull[i] = live.now.force_before[i] + x * (live.now.force[i] - live.now.force_before[i])
     tow_wrench(live.path[row], hull.pull, setup.fixed.r_c, hull)
     feel_current(setup, live.path[row], time, hull)
+    if not setup.fixed.prescribed:
+        for i in range(6):
+            hull.wrench[i] = 0.0
+        add_missing(setup, live, live.path[row], command, time, hull)
     vehicle.power(live.path[row], command, hull.current, hull.wrench, setup.fixed.vehicle, out)

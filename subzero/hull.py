@@ -15,6 +15,7 @@ import numpy as np
 import vehicle
 from cable.water import water_velocity
 from subzero.compiled import compiled, inner
+from subzero.missing_wrench import add_missing
 from subzero.run_state import HEADING, PITCH, SPEED, TIME, HullWork, Live, Setup
 from vehicle import STATE_SIZE
 
@@ -94,6 +95,7 @@ def advance_hull(setup: Setup, live: Live, start: float, span: float, steps: int
                 work.pull[i] = now.guess[i] + (along - 1.0) * ratio * (now.force[i] - now.force_before[i])
             tow_wrench(stage, work.pull, setup.fixed.r_c, work)
             feel_current(setup, stage, start + n * h + part, work)
+            add_missing(setup, live, stage, command, start + n * h + part, work)
             vehicle.derivative(stage, command, work.current, work.wrench, setup.fixed.vehicle, k[s])
         for i in range(STATE_SIZE):
             new[i] = state[i] + h / 6.0 * (k[0, i] + 2.0 * k[1, i] + 2.0 * k[2, i] + k[3, i])

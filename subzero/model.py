@@ -13,6 +13,7 @@ from typing import Any
 
 import scenarios
 from cable.properties import CableProperties, DrumProperties
+from subzero.missing_force import MissingForce
 from vehicle import Vehicle, from_mapping, to_mapping
 
 
@@ -28,6 +29,7 @@ class Model:
         profile: what is added to the current by depth.
         winch: what turns the drum; None for a free drum.
         vessel: how the drum moves; None for a drum on the shore.
+        missing: a force that all of these lack; None for nothing.
     """
 
     vehicle: Vehicle
@@ -37,6 +39,7 @@ class Model:
     profile: scenarios.Profile | None = None
     winch: scenarios.Winch | None = None
     vessel: scenarios.Vessel | None = None
+    missing: MissingForce | None = None
 
     @classmethod
     def of(cls, trial: scenarios.Trial) -> Model:
@@ -64,6 +67,7 @@ class Model:
             "drum": dataclasses.asdict(self.drum),
             "current": list(self.current),
             **{name: _plain(getattr(self, name)) for name in ("profile", "winch", "vessel")},
+            **({"missing": _plain(self.missing)} if self.missing else {}),
         }
 
 

@@ -81,6 +81,7 @@ class Now:
         mobility: acceleration of the tow point per pull (3, 3). [1/kg]
         last_step: length of the last accepted exchange, 0 at the start. [s]
         iterations: of Newton's method on the cable, since the start.
+        length: of the cable in the water, at the last accepted time, 0 without a cable. [m]
         hull: work space.
         ledger: energies.
     """
@@ -94,6 +95,7 @@ class Now:
     mobility: np.ndarray
     last_step: float
     iterations: int
+    length: float
     hull: HullWork
     ledger: Ledger
 
@@ -106,6 +108,7 @@ class Setup(NamedTuple):
         orders, track: what the vehicle is told, or how it moves (4, n).
         water: how the water moves; its origin is the drum's place at the start.
         led: how the drum moves, and what its winch is asked for, see `cable.drum_path` (n, 8).
+        added, terms: what the model lacks, see `MissingForce.numbers` (7, n), (m, 5); empty for nothing.
     """
 
     fixed: Fixed
@@ -113,6 +116,8 @@ class Setup(NamedTuple):
     track: np.ndarray
     water: Water
     led: np.ndarray
+    added: np.ndarray
+    terms: np.ndarray
 
 
 class Live(NamedTuple):
@@ -148,4 +153,6 @@ def new_now() -> Now:
     )
     vectors = {name: np.zeros(3) for name in ("force", "force_before", "guess", "change", "tow")}
     matrices = {name: np.zeros((3, 3)) for name in ("Z", "mobility")}
-    return packed(Now(**vectors, **matrices, last_step=0.0, iterations=0, hull=work, ledger=ledger))
+    return packed(
+        Now(**vectors, **matrices, last_step=0.0, iterations=0, length=0.0, hull=work, ledger=ledger)
+    )

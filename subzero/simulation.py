@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,6 +14,7 @@ from cable.line import enlarged
 from cable.newton import Solved
 from cable.runs import describe_failure, too_short
 from subzero import coupling
+from subzero.later import Later, go_on_with, rows_of_changes
 from subzero.loop import NO_ROOM, run_rows
 from subzero.model import Model
 from subzero.recording import CHUNKS, Recording, Run, cut, new_recording, record_row
@@ -32,6 +34,7 @@ def simulate(
     *,
     tethered: bool = True,
     model: Model | None = None,
+    later: Later = (),
     progress: Progress | None = None,
 ) -> xr.Dataset:
     """Simulate a trial and return its labelled result.
@@ -40,6 +43,7 @@ def simulate(
         scenario: name of a shipped scenario, path of a scenario file, or a trial.
         tethered: with the cable; the same code runs without.
         model: another model than the one that the scenario describes.
+        later: times of results [s] and the model that holds from each of them on, such as one with a bent rudder.
         progress: told the fraction that is done.
 
     Returns:
@@ -49,27 +53,41 @@ def simulate(
 
     Raises:
         scenarios.ScenarioError: the scenario cannot be used.
+        UserError: a time of `later` is none of the run.
     """
     trial = scenario if isinstance(scenario, scenarios.Trial) else load(scenario)
     model = model or Model.of(trial)
     from subzero.dataset import dataset_of
 
-    return dataset_of(trial, model, tethered, run_trial(trial, model, tethered, progress))
+    result = dataset_of(trial, model, tethered, run_trial(trial, model, tethered, progress, later=later))
+    if later:
+        result.attrs["later"] = json.dumps([[time, changed.parameters()] for time, changed in later])
+    return result
 
 
-def run_trial(trial: scenarios.Trial, model: Model, tethered: bool, progress: Progress | None = None) -> Run:
-    """Run a trial with a model, in plain arrays."""
+def run_trial(
+    trial: scenarios.Trial,
+    model: Model,
+    tethered: bool,
+    progress: Progress | None = None,
+    *,
+    later: Later = (),
+) -> Run:
+    """Run a trial with a model, and with others from later times on, in plain arrays."""
+    times = np.linspace(0.0, trial.duration, round(trial.duration / trial.cable_step) + 1)
+    changes = rows_of_changes(trial, tethered, times, later)
     if tethered and trial.scheme != "moving_end":
         from subzero.printed import run_as_printed
 
         return run_as_printed(trial, model, progress)
-    times = np.linspace(0.0, trial.duration, round(trial.duration / trial.cable_step) + 1)
     setup, live = prepare(trial, model, tethered)
     recording = new_recording(times.size, 4 * times.size * live.line.length.size if tethered else 0)
     used = record_row(setup, live, recording, 0, 0.0, 0)
     row, ending, solved = 1, coupling.FINE, Solved(True, 0, 0.0, 0, 0)
     while row < times.size and ending in (coupling.FINE, NO_ROOM):
-        last = min(times.size, row + 1 + times.size // CHUNKS)
+        if row - 1 in changes:
+            setup = go_on_with(changes.pop(row - 1), setup, live, trial, tethered, float(times[row - 1]))
+        last = min(times.size, row + 1 + times.size // CHUNKS, *(change + 1 for change in changes))
         row, used, ending, solved = run_rows(setup, live, recording, times, row, last, used)
         if ending == NO_ROOM:
             live, recording = more_room(live, recording, used)

@@ -15,6 +15,7 @@ from cable.line import NOW, Line, new_line
 from cable.pull_out import START_LENGTH
 from subzero.compiled import compiled, packed
 from subzero.hull import feel_current, pose, tow_point
+from subzero.missing_force import MissingForce
 from subzero.model import Model
 from subzero.run_state import Fixed, Live, Orders, Setup, new_now
 from subzero.surroundings import drum_of, water_of, way_of_drum
@@ -25,15 +26,9 @@ FIRST_ROOM = 16
 
 def prepare(trial: scenarios.Trial, model: Model, tethered: bool) -> tuple[Setup, Live]:
     """Return what stays and what changes in a run, at its start: the cable laid straight behind the vehicle."""
-    wet, size = max(trial.start.wet_length, START_LENGTH), vehicle.STATE_SIZE
+    wet, size = _wet_length(trial), vehicle.STATE_SIZE
     steps = int(np.ceil(trial.cable_step / trial.hull_step - 1e-6))
-    setup = Setup(
-        fixed=_fixed(trial, model, tethered),
-        orders=_orders(trial),
-        track=_track(trial),
-        water=water_of(model).numbers(),
-        led=way_of_drum(trial, model, wet),
-    )
+    setup = setup_of(trial, model, tethered)
     live = Live(
         now=new_now(),
         state=_first_state(trial),
@@ -42,11 +37,31 @@ def prepare(trial: scenarios.Trial, model: Model, tethered: bool) -> tuple[Setup
         line=new_line(int(wet / trial.segment_length) + FIRST_ROOM),
         load=new_load(),
     )
+    live.now.length = wet if tethered else 0.0
     live.line.ends.segment_length, live.line.ends.grading = trial.segment_length, trial.grading
     lay_out(setup, live, wet)
     if setup.fixed.drum.control != FREE:
         _hang(live.line, float(live.now.guess[2] * setup.fixed.cable.weight))
     return setup, live
+
+
+def setup_of(trial: scenarios.Trial, model: Model, tethered: bool) -> Setup:
+    """Return what stays in a run; where its drum is, is still to be filled in."""
+    added, terms = (model.missing or MissingForce()).numbers()
+    return Setup(
+        fixed=_fixed(trial, model, tethered),
+        orders=_orders(trial),
+        track=_track(trial),
+        water=water_of(model).numbers(),
+        led=way_of_drum(trial, model, _wet_length(trial)),
+        added=added,
+        terms=terms,
+    )
+
+
+def _wet_length(trial: scenarios.Trial) -> float:
+    """Return the length of cable in the water at the start; there is always some, for its direction. [m]."""
+    return max(trial.start.wet_length, START_LENGTH)
 
 
 @compiled

@@ -2,12 +2,12 @@
 
     I  = P/(η V_full) + I_hotel,      P = 2π n Q, no less than zero
     V  = V_full − k q_e − R I,        q_e' = I
-    n' = (target − n)/lag,  target = clip(command · [1 − s (1 − V/V_full)], ± c V)
+    n' = (target − n)/lag,  target = clip(command · [1 − l q_e] · [1 − s (1 − V/V_full)], ± c V)
 
 The speed loop of the motor holds the commanded speed (s = 0) until the sagging voltage no longer allows it:
 the ceiling is c revolutions a second per volt. An open-loop drive (s = 1) slows down with the voltage at
-once. The inertia of the shaft is inside the lag. Neutral values: k = R = s = 0, c infinite, lag 0 (see
-`actuators`).
+once; l says the same of the charge alone, whatever the voltage. The inertia of the shaft is inside the lag. Neutral
+values: k = R = s = l = 0, c infinite, lag 0 (see `actuators`).
 """
 
 from __future__ import annotations
@@ -33,6 +33,7 @@ class MotorNumbers(NamedTuple):
     voltage_drop_per_charge: float
     internal_resistance: float
     hotel_current: float
+    speed_loss_per_charge: float
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,6 +54,7 @@ class Battery:
     voltage_drop_per_charge: float = parameter("fall of the voltage with the charge drawn, k", "V/C", low=0.0)
     internal_resistance: float = parameter("internal resistance, R", "ohm", low=0.0)
     hotel_current: float = parameter("current of everything but the motor", "A", low=0.0)
+    speed_loss_per_charge: float = parameter("share of the commanded speed lost per charge drawn, l", "1/C")
 
 
 def motor_numbers(motor: Motor, battery: Battery) -> MotorNumbers:
@@ -89,7 +91,10 @@ def shaft_goal(
     n: float, charge: float, command: float, u: float, motor: MotorNumbers, propeller: PropellerNumbers
 ) -> float:
     """Return the shaft speed the motor heads for [rev/s], with the battery under the load of n and u."""
-    return shaft_target(command, voltage(charge, battery_current(n, u, motor, propeller), motor), motor)
+    left = max(0.0, 1.0 - motor.speed_loss_per_charge * charge)
+    return shaft_target(
+        command * left, voltage(charge, battery_current(n, u, motor, propeller), motor), motor
+    )
 
 
 @compiled

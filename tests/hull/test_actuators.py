@@ -139,3 +139,17 @@ def test_a_motor_and_battery_with_neutral_values_obey_at_once(subzero2):
         "propeller"
     ]
     assert np.array_equal(at_once, turning)
+
+
+def test_an_open_loop_drive_slows_down_with_the_charge_drawn(subzero2):
+    """Shaft speed → command · (1 − l q_e); l = 0 is off to the last bit."""
+    command, start = (24.0, 0.0, 0.0, 0.0), vehicle.initial_state()
+    plain = vehicle.free_run(subzero2, start, command, 30.0).states
+    off = subzero2.with_parameter("battery.speed_loss_per_charge", 0.0)
+    assert np.array_equal(vehicle.free_run(off, start, command, 30.0).states, plain)
+    loose = subzero2.with_parameter("battery.speed_loss_per_charge", 1e-3)
+    last = vehicle.free_run(loose, start, command, 30.0).states[-1]
+    assert last[17] > 10.0
+    assert last[13] == pytest.approx(24.0 * (1.0 - 1e-3 * last[17]), rel=1e-3)
+    empty = subzero2.with_parameter("battery.speed_loss_per_charge", 1.0)
+    assert vehicle.free_run(empty, start, command, 30.0).states[-1][13] >= 0.0
