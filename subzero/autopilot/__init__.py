@@ -24,7 +24,7 @@ F_c          pull of the cable in steady motion      N           pull
 x₀, u₀       trim: steady state and its command      SI          steady
 A, B, C, D   linear model about it                   SI          linear
 λ L/U, ζ     poles in the vehicle's time scale       1           poles
-k, k_I       feedback and integral gains             SI          design, tuning
+k, k_I       feedback and integral gains             SI          design, weighting
 δ_ff         feed-forward, against hull and cable    SI          standard
 """
 
@@ -44,10 +44,10 @@ _HOME = {
     "Law": "loops",
     "Loop": "loops",
     "MANOEUVRES": "manoeuvres",
-    "Margins": "design",
+    "Margins": "frequency",
     "Mode": "poles",
     "NoCable": "feed_forward",
-    "NoTrimError": "steady",
+    "NoTrimError": "limits",
     "PERFECT": "sensors",
     "STATES": "states",
     "STEPS": "steps",
@@ -60,9 +60,9 @@ _HOME = {
     "Tuning": "tuning",
     "TwinCable": "feed_forward",
     "UNITS": "states",
-    "WEIGHTS": "tuning",
+    "WEIGHTS": "weighting",
     "Wanted": "standard",
-    "Weights": "tuning",
+    "Weights": "weighting",
     "design_gains": "design",
     "estimates": "estimator",
     "fly": "flight",
@@ -70,7 +70,7 @@ _HOME = {
     "loop_margins": "robustness",
     "make": "table",
     "manoeuvre": "manoeuvres",
-    "margins": "design",
+    "margins": "frequency",
     "modes": "poles",
     "plant": "plants",
     "reduced": "design",
@@ -78,7 +78,7 @@ _HOME = {
     "subsystem": "linear",
     "trim": "steady",
     "tune": "tuning",
-    "with_weights": "tuning",
+    "with_weights": "weighting",
 }
 """Public name → module of this package; no module may be called like a public name."""
 

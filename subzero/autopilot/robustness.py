@@ -12,11 +12,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from subzero.autopilot.design import Margins, margins
 from subzero.autopilot.estimator import MEASURED, STATES, Estimates
+from subzero.autopilot.frequency import Margins, margins
 from subzero.autopilot.linear import linearise, subsystem
 from subzero.autopilot.steady import trim
-from subzero.autopilot.tuning import WEIGHTS, Tuning
+from subzero.autopilot.tuning import Tuning
+from subzero.autopilot.weighting import WEIGHTS
 from subzero.errors import UserError, suggestion
 from subzero.model import Model
 

@@ -17,7 +17,8 @@ import numpy as np
 
 from subzero.autopilot.feed_forward import CableModel, NoCable
 from subzero.autopilot.loops import Law, Loop
-from subzero.autopilot.tuning import WEIGHTS, Tuning
+from subzero.autopilot.tuning import Tuning
+from subzero.autopilot.weighting import WEIGHTS
 from subzero.simulator import Observation
 from vehicle import Servo
 

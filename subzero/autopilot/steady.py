@@ -11,30 +11,22 @@ only carries the track.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import cos, degrees, isfinite, radians, sin
-from typing import NoReturn
+from math import cos, sin
 
 import numpy as np
 
-from subzero.autopilot.actuators import commands, demands, ideal
+from subzero.autopilot.actuators import commands, ideal
 from subzero.autopilot.balance import Motion, level_propeller
+from subzero.autopilot.limits import check_limits, check_request, say_how_far
 from subzero.autopilot.pull import SteadyPull, from_cable_model
 from subzero.autopilot.states import STATE_NAMES, VELOCITY, to_vehicle
-from subzero.errors import UserError
 from subzero.model import Model
 from vehicle import Vehicle, rotation
 
-CABLES = ("formula", "model")
 STEPS = 20
 """A motion that is not found at once is approached in so many steps."""
 PASSES = 6
 """How often hull and cable model are solved in turn: the pull hardly changes the attitude, three digits a pass."""
-STEEPEST = radians(80.0)
-"""Pitch beyond which Euler angles are no use any more. [rad]"""
-
-
-class NoTrimError(UserError):
-    """There is no such steady motion; the message names the limit that is hit."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -107,7 +99,7 @@ def trim(
         NoTrimError: there is none: which limit is hit, and how far one can go.
         UserError: a number that means nothing here.
     """
-    _check(speed, depth_rate, turn_rate, wet_length, roll, cable)
+    check_request(speed, depth_rate, turn_rate, wet_length, roll, cable)
     hull, pull = model.vehicle, SteadyPull.of(model, wet_length)
     motion = Motion(
         numbers=ideal(hull).numbers(),
@@ -124,7 +116,7 @@ def trim(
             extra = _cable_pull(model, x, turn_rate, wet_length) - pull.wrench(x[VELOCITY])
             motion = replace(motion, extra=extra)
             x = _balanced(hull, motion)
-    _check_limits(hull, x)
+    check_limits(hull, x)
     return Trim(
         speed=speed,
         depth_rate=depth_rate,
@@ -137,27 +129,6 @@ def trim(
     )
 
 
-def _check(
-    speed: float, depth_rate: float, turn_rate: float, wet_length: float, roll: float, cable: str
-) -> None:
-    """Refuse what cannot be asked for."""
-    asked = {"speed": speed, "depth_rate": depth_rate, "turn_rate": turn_rate, "wet_length": wet_length}
-    for name, value in (asked | {"roll": roll}).items():
-        if not isfinite(value):
-            raise UserError(f"trim: {name} is {value!r}; it must be a finite number.")
-    if speed <= 0.0:
-        raise UserError(f"trim: speed is {speed:g} m/s; fins need a flow, so it must be above 0.")
-    if wet_length < 0.0:
-        raise UserError(f"trim: wet_length is {wet_length:g} m; it must be 0 or more.")
-    if cable not in CABLES:
-        raise UserError(f"trim: cable is {cable!r}; it must be one of {', '.join(CABLES)}.")
-    if abs(depth_rate) > speed * sin(STEEPEST):
-        raise NoTrimError(
-            f"There is no steady motion at {speed:g} m/s with a depth rate of {depth_rate:g} m/s: the pitch angle would"
-            f" pass {degrees(STEEPEST):.0f} degrees. At this speed ±{speed * sin(STEEPEST):.2g} m/s is the most."
-        )
-
-
 def _balanced(hull: Vehicle, motion: Motion) -> np.ndarray:
     """Return the state of a steady motion, at once from straight level motion, or in steps."""
     guess = np.array([level_propeller(motion), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
@@ -168,7 +139,7 @@ def _balanced(hull: Vehicle, motion: Motion) -> np.ndarray:
     for share in np.linspace(0.0, 1.0, STEPS + 1):
         found = motion.part(share).solved(guess)
         if found is None:
-            _say_how_far(hull, motion.part(reached).state(guess), reached)
+            say_how_far(hull, motion.part(reached).state(guess), reached)
         guess, reached = found, share
     return motion.state(guess)
 
@@ -186,25 +157,3 @@ def _cable_pull(model: Model, x: np.ndarray, turn_rate: float, wet_length: float
         return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]) @ R
 
     return from_cable_model(model, lambda t: turned(t) @ V, turned(duration), duration)
-
-
-def _check_limits(hull: Vehicle, x: np.ndarray) -> None:
-    """Refuse a steady motion that some actuator cannot hold."""
-    beyond = [one for one in demands(hull, x) if one.value > one.limit]
-    if beyond:
-        said = "; ".join(
-            f"the {one.name} would need {one.value:.3g} {one.unit}, its limit is {one.limit:.3g}"
-            for one in beyond
-        )
-        raise NoTrimError(f"There is no such steady motion: {said}. Ask for less speed, turn or depth rate.")
-
-
-def _say_how_far(hull: Vehicle, x: np.ndarray, share: float) -> NoReturn:
-    """Raise the error of a motion that has no balance."""
-    _check_limits(hull, x)
-    most = max(demands(hull, x), key=lambda one: one.value / one.limit)
-    raise NoTrimError(
-        f"There is no such steady motion: there is no balance beyond {share:.0%} of the asked depth rate, turn rate and"
-        f" roll, where the {most.name} stands at {most.value:.3g} {most.unit} (limit {most.limit:.3g}): they stall."
-        " Ask for less, or for more speed."
-    )

@@ -7,8 +7,7 @@ cable is cut. `WEIGHTS` are the largest acceptable deviations of each loop; call
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from math import radians
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,7 +16,7 @@ from subzero.autopilot.design import Gains, design_gains, reduced
 from subzero.autopilot.linear import linearise, subsystem
 from subzero.autopilot.schedule import Schedule
 from subzero.autopilot.steady import Trim, trim
-from subzero.errors import UserError, suggestion
+from subzero.autopilot.weighting import WEIGHTS, Weights, checked
 from subzero.model import Model
 from vehicle.propeller import thrust
 
@@ -26,50 +25,6 @@ if TYPE_CHECKING:
 
 SPEEDS = (0.4, 0.6, 0.8, 1.0, 1.2, 1.4)
 """Speeds that gains are designed at. [m/s]"""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Weights:
-    """What a loop feeds back, the tracked state last, and the largest acceptable deviations (`design_gains`).
-
-    `foreseen`: whether what is wanted is fed forward too, with the steady command that it needs.
-    """
-
-    part: str
-    measured: tuple[str, ...]
-    largest: Mapping[str, float]
-    largest_command: float
-    foreseen: bool = False
-
-
-WEIGHTS: dict[str, Weights] = {
-    "speed": Weights(
-        part="surge",
-        measured=("surge_speed",),
-        largest={"surge_speed": 0.1, "integral": 0.2},
-        largest_command=4.0,
-        foreseen=True,
-    ),
-    "heading": Weights(
-        part="yaw_sway",
-        measured=("yaw_rate", "heading"),
-        largest={"yaw_rate": radians(20.0), "heading": radians(8.0), "integral": radians(16.0)},
-        largest_command=radians(10.0),
-    ),
-    "pitch": Weights(
-        part="pitch_heave",
-        measured=("pitch_rate", "pitch"),
-        largest={"pitch_rate": radians(20.0), "pitch": radians(8.0), "integral": radians(16.0)},
-        largest_command=radians(10.0),
-    ),
-    "roll": Weights(
-        part="roll",
-        measured=("roll_rate", "roll"),
-        largest={"roll_rate": radians(60.0), "roll": radians(8.0), "integral": radians(16.0)},
-        largest_command=radians(6.0),
-    ),
-}
-"""Loop → its weights."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -117,7 +72,7 @@ def tune(
         NoTrimError: the vehicle has no steady motion at one of the speeds.
         UserError: weights that mean nothing.
     """
-    weights = WEIGHTS | _checked(dict(weights or {}))
+    weights = WEIGHTS | checked(dict(weights or {}))
     trims = [trim(model, speed=speed) for speed in speeds]
     lines = [linearise(model, steady) for steady in trims]
     designs = {name: tuple(design_loop(line, weight) for line in lines) for name, weight in weights.items()}
@@ -145,18 +100,6 @@ def tune(
     )
 
 
-def _checked(weights: dict[str, Weights]) -> dict[str, Weights]:
-    """Return weights, or refuse what they are not."""
-    for name, value in weights.items():
-        if name not in WEIGHTS:
-            raise UserError(
-                f"tune: there is no loop '{name}'.{suggestion(name, WEIGHTS)} Allowed: {', '.join(WEIGHTS)}."
-            )
-        if not isinstance(value, Weights) or value.measured != WEIGHTS[name].measured:
-            raise UserError(f"tune: the weights of '{name}' are {value!r}. Allowed: those of `with_weights`.")
-    return weights
-
-
 def design_loop(linear: control.StateSpace, weights: Weights) -> Gains:
     """Return the gains of one loop on a linear model of the whole hull."""
     part = reduced(subsystem(linear, weights.part), weights.measured)
@@ -165,11 +108,6 @@ def design_loop(linear: control.StateSpace, weights: Weights) -> Gains:
         part, tracked=weights.measured[-1], largest=weights.largest, largest_command=weights.largest_command,
         ahead=float(steady) if weights.foreseen else 0.0,
     )  # fmt: skip
-
-
-def with_weights(name: str, **changes: float | Mapping[str, float]) -> dict[str, Weights]:
-    """Return one loop's weights with changes, for `tune(weights=...)`."""
-    return {name: replace(WEIGHTS[name], **changes)}  # type: ignore[arg-type]
 
 
 def _thrust(model: Model, steady: Trim) -> float:

@@ -2,8 +2,8 @@
 
 Verifies: `autopilot.linearise` and `subsystem` against runs of the nonlinear hull and of the coupled simulation; poles
 against the decay of a run that starts on an eigenvector. Tolerance: 2 % of the largest deviation for the whole model
-(inputs of a tenth of a degree leave 1 % to the quadratic terms); 5 % for a subsystem, which leaves the others out, and
-for the cable, which the linear model takes as straight.
+(inputs of a tenth of a degree leave 1 % to the quadratic terms); 1e-3 of a pole; 5 % for a
+subsystem, which leaves the others out, and for the cable, which the linear model takes as straight.
 """
 
 import dataclasses
@@ -89,24 +89,31 @@ def test_a_subsystem_moves_like_its_part_of_the_hull(model, steady, name, push, 
         assert np.max(np.abs(own - whole)) < 0.05 * np.max(np.abs(whole)), state
 
 
-def test_every_pole_is_the_decay_of_the_hull_itself(model, steady):
-    """A run that starts a little off, along an eigenvector of a real pole, decays with that pole: to 2 %."""
-    linear = autopilot.linearise(model, steady)
-    poles, vectors = np.linalg.eig(linear.A)
-    chosen = [i for i, pole in enumerate(poles) if abs(pole.imag) < 1e-9 and -5.0 < pole.real < -0.3]
-    assert len(chosen) >= 3
+@pytest.mark.parametrize("speed", [0.6, 1.0, 1.4])
+def test_every_pole_is_the_decay_of_the_hull_itself(model, speed):
+    """A run that starts a little off along an eigenvector decays, and swings, with that pole: ln(l·x(t)/l·x(0))/t.
+
+    l is the left eigenvector, so that what else is set off by the quadratic terms does not count. 2 % are asked for;
+    what is left, 1.7e-4, is the curvature of drag over a deviation of 1e-4.
+    """
+    steady = autopilot.trim(model, speed=speed)
+    poles, vectors = np.linalg.eig(np.asarray(autopilot.linearise(model, steady).A))
+    lefts = np.linalg.inv(vectors)
+    chosen = [i for i, pole in enumerate(poles) if abs(pole) > 1e-6 and pole.imag >= 0.0]
+    assert len(chosen) >= 10, "of 14 two integrate: depth and heading"
     for i in chosen:
         vector = np.real(vectors[:, i])
         off = np.concatenate([[0.0, 0.0], 1e-4 * vector / np.max(np.abs(vector))])
-        starts = [to_vehicle(steady.state + sign * off) for sign in (1.0, -1.0)]
-        duration = 1.0 / -poles[i].real
+        duration = 1.0 / abs(poles[i])
         ends = [
-            vehicle.free_run(model.vehicle, start, steady.command, duration, duration / 200)
-            for start in starts
+            vehicle.free_run(
+                model.vehicle, to_vehicle(steady.state + sign * off), steady.command, duration, duration / 200
+            )
+            for sign in (1.0, -1.0)
         ]
-        left = from_vehicle(ends[0].states[-1]) - from_vehicle(ends[1].states[-1])
-        decay = float(left[2:] @ vector / (2.0 * off[2:] @ vector))
-        assert np.log(decay) / duration == pytest.approx(poles[i].real, rel=0.02)
+        left = 0.5 * (from_vehicle(ends[0].states[-1]) - from_vehicle(ends[1].states[-1]))[2:]
+        found = np.log((lefts[i] @ left + 0j) / (lefts[i] @ off[2:])) / duration
+        assert abs(found - poles[i]) < 1e-3 * abs(poles[i]), poles[i]
 
 
 def test_the_surge_pole_is_that_of_thrust_and_drag(model, steady):

@@ -1,0 +1,126 @@
+"""The coupled simulation as a discrete-time system: state and command in, next state out, nothing remembered.
+
+The vector of its state starts with the hull's 16 states and goes on with everything the cable remembers (`memory`).
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+import vehicle
+from cable.line import enlarged
+from scenarios import Start, Trial
+from subzero.autopilot.memory import Memory
+from subzero.autopilot.states import INPUT_NAMES, STATE_NAMES, from_vehicle, to_vehicle
+from subzero.coupling import FINE
+from subzero.errors import UserError
+from subzero.loop import NO_ROOM, SPARE, run_rows
+from subzero.model import Model
+from subzero.recording import new_recording
+from subzero.simulation import in_words
+from subzero.start import prepare
+from vehicle.state import CHARGE, LINKAGE
+
+if TYPE_CHECKING:
+    import control
+
+CABLE_OUTPUTS = (
+    "cable_length",
+    "cable_tension",
+    "drum_tension",
+    "cable_force_forward",
+    "cable_force_starboard",
+    "cable_force_down",
+    "cable_moment_roll",
+    "cable_moment_pitch",
+    "cable_moment_yaw",
+)
+"""What the tethered plant gives beside its hull's states, as channels of `subzero.channels` [m, N, N m]."""
+
+HIDDEN = ("battery_charge", "rudder_linkage", "stern_plane_port_linkage", "stern_plane_starboard_linkage")
+"""States of the hull that only the tethered plant has [C, rad]."""
+HULL_SIZE = len(STATE_NAMES) + len(HIDDEN)
+
+
+def _blank_trial(model: Model, x: np.ndarray, wet_length: float, steps: dict[str, float]) -> Trial:
+    """Return a trial that says only how the hull lies, how much cable is out, and the steps."""
+    start = Start(roll=x[3], pitch=x[4], heading=x[5], depth=x[2], surge_speed=x[6], wet_length=wet_length)
+    nothing: dict[str, Any] = {
+        "vehicle": {},
+        "cable": {},
+        "drum": {},
+        "text": "",
+        "source": "",
+        "description": "",
+    }
+    return Trial(name="plant", duration=0.0, start=start, current=model.current, **(nothing | steps))
+
+
+class Tethered:
+    """The coupled simulation as a function from state and command to the next state."""
+
+    def __init__(
+        self, model: Model, x: np.ndarray, wet_length: float, steps: dict[str, float], longest: float
+    ) -> None:
+        trial = _blank_trial(model, x, wet_length, steps)
+        self._setup, live = prepare(trial, model, True)
+        room = int(longest / trial.segment_length) + SPARE + 4
+        self._live = live._replace(line=enlarged(live.line, max(room, live.line.length.size)))
+        self._memory = Memory(self._live)
+        self._recording = new_recording(2, 4 * self._live.line.length.size)
+        self._r_c = model.vehicle.tow_point.position()
+        self._step, self._longest = trial.cable_step, longest
+        self._initial = np.concatenate([x, np.zeros(len(HIDDEN)), self._memory.read()])
+        self._initial[len(STATE_NAMES) + 1 : HULL_SIZE] = x[13:]
+
+    def system(self) -> control.NonlinearIOSystem:
+        """Return the discrete-time system."""
+        import control
+
+        cable = [f"cable[{i}]" for i in range(self._memory.size)]
+        system = control.NonlinearIOSystem(
+            self.update,
+            self.output,
+            inputs=list(INPUT_NAMES),
+            outputs=[*STATE_NAMES, *CABLE_OUTPUTS],
+            states=[*STATE_NAMES, *HIDDEN, *cable],
+            dt=self._step,
+            name="tethered",
+        )
+        system.initial_state = self._initial
+        return system
+
+    def update(self, t: float, x: np.ndarray, u: np.ndarray, params: dict[str, Any]) -> np.ndarray:
+        """Return the state one step after x under a command u (4,)."""
+        live = self._live
+        live.state[:] = to_vehicle(x[: len(STATE_NAMES)])
+        live.state[CHARGE], live.state[LINKAGE : LINKAGE + 3] = x[16], x[17:HULL_SIZE]
+        self._memory.write(x[HULL_SIZE:])
+        self._setup.orders.values[0] = u
+        times = np.array([t, t + self._step])
+        _, _, ending, solved = run_rows(self._setup, live, self._recording, times, 1, 2, 0)
+        if ending != FINE:
+            raise UserError(self._trouble(ending, solved, t))
+        hull = from_vehicle(live.state, heading_near=float(x[5]))
+        hidden = (live.state[CHARGE], *live.state[LINKAGE : LINKAGE + 3])
+        return np.concatenate([hull, hidden, self._memory.read()])
+
+    def output(self, t: float, x: np.ndarray, u: np.ndarray, params: dict[str, Any]) -> np.ndarray:
+        """Return hull states and cable channels of a state."""
+        flat, places = x[HULL_SIZE:], self._memory.places
+        count = round(float(flat[places["count"]][0]))
+        levels = flat[places["last_length"]]
+        length = levels[1] + flat[places["length"]][1:count].sum()
+        F, R = flat[places["force"]], np.empty((3, 3))
+        vehicle.rotation(to_vehicle(x[: len(STATE_NAMES)])[3:7], R)
+        pull = R.T @ F
+        tensions = (np.linalg.norm(F), flat[places["node_tension"]][count])
+        return np.concatenate([x[: len(STATE_NAMES)], [length, *tensions], pull, np.cross(self._r_c, pull)])
+
+    def _trouble(self, ending: int, solved: Any, time: float) -> str:
+        """Say why there is no next state."""
+        if ending == NO_ROOM:
+            return f"plant: at t = {time:g} s there is no room for more than longest = {self._longest:g} m of cable."
+        return in_words(ending, solved, time, self._setup, self._live)
