@@ -1,0 +1,182 @@
+"""From files to what a diagnosis takes: measured records, each with the trial that it belongs to.
+
+A record is a CSV file of `subzero.measured`, with or without columns of commands, and with a sidecar (`sidecar`) or
+without. Everything that can be wrong with it is said before anything long is begun, in one message for a record.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from subzero.channels import BY_NAME
+from subzero.diagnosis.effects.sensors import NOISE, SPECS
+from subzero.diagnosis.plausible import is_constant, repeating, stuck, unit_questions
+from subzero.diagnosis.setting import Setting
+from subzero.diagnosis.sidecar import Sidecar, read_sidecar
+from subzero.diagnosis.timing import beside, cut_to, time_problems, without_repeats
+from subzero.diagnosis.told import FROM_RECORD, TOLD, commanded
+from subzero.errors import UserError, listed
+from subzero.measured import CONTINUOUS, Record, read_record
+from subzero.model import Model
+from subzero.trials import load
+
+Simulated = Callable[[Setting, np.ndarray, Sequence[str]], Mapping[str, np.ndarray]]
+"""(setting, times, channels) → channel → what the sensors would have measured."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Logged:
+    """A record and the trial in which it was measured.
+
+    Attributes:
+        record: the channels that are diagnosed.
+        setting: the trial with its commands, and the nominal model.
+        noise: channel → standard deviation, where it is known. [display unit]
+        name: short, for figures and tables.
+        notes: what was left out, and why.
+    """
+
+    record: Record
+    setting: Setting
+    noise: Mapping[str, float] = field(default_factory=dict)
+    name: str
+    notes: tuple[str, ...] = ()
+
+
+def read_trials(
+    paths: Sequence[str | Path] | str | Path,
+    *,
+    scenario: str | Path | None = None,
+    commands: str | None = None,
+    simulated: Simulated | None = None,
+) -> list[Logged]:
+    """Read measured records, each with the trial it belongs to.
+
+    Args:
+        paths: CSV files, or folders of them.
+        scenario: the trial of every record whose sidecar does not name one.
+        commands: "record" or "scenario", if a record's commands may differ from the scenario's.
+        simulated: the nominal simulation; `subzero.diagnosis.response.respond` if None.
+
+    Raises:
+        UserError: a record, or its sidecar, cannot be used.
+        scenarios.ScenarioError: a scenario cannot be used.
+    """
+    files = _files([paths] if isinstance(paths, str | Path) else paths)
+    names = _names(files)
+    logged = [_logged(file, name, scenario, commands) for file, name in zip(files, names, strict=True)]
+    return [_checked(one, read_sidecar(file.with_suffix(".toml")), simulated)
+            for one, file in zip(logged, files, strict=True)]  # fmt: skip
+
+
+def _files(paths: Sequence[str | Path]) -> list[Path]:
+    """Return the files, those of a folder in alphabetical order."""
+    files: list[Path] = []
+    for path in map(Path, paths):
+        inside = sorted(path.glob("*.csv")) if path.is_dir() else [path]
+        if not inside:
+            raise UserError(f"The folder {path} holds no measured record. Put CSV files into it.")
+        files += inside
+    return list(dict.fromkeys(files))
+
+
+def _names(files: Sequence[Path]) -> list[str]:
+    """Return a short name for each file, unlike the others'."""
+    stems = [file.stem for file in files]
+    return [
+        stem if stems.count(stem) == 1 else f"{file.parent.name or '.'}/{stem}"
+        for file, stem in zip(files, stems, strict=True)
+    ]
+
+
+def _logged(path: Path, name: str, scenario: str | Path | None, commands: str | None) -> Logged:
+    """Read one record with its sidecar and its trial, and cut the trial to its length."""
+    record, sidecar = read_record(path), read_sidecar(path.with_suffix(".toml"))
+    named = sidecar.scenario or scenario
+    if not named:
+        raise UserError(
+            f"Which trial is {path}? Give --scenario, or scenario = '…' in {path.stem}.toml beside it."
+        )
+    trial = load(named)
+    _refuse(path, time_problems(record, trial, longer=commands == FROM_RECORD))
+    trial = cut_to(commanded(trial, record, commands), record)
+    values, notes = _channels(record, sidecar)
+    if CONTINUOUS in values:
+        values[CONTINUOUS] = beside(values[CONTINUOUS], math.degrees(trial.start.heading))
+    return Logged(
+        record=Record(source=str(path), time=record.time, values=values),
+        setting=Setting(trial=trial, model=Model.of(trial), tethered=sidecar.tethered),
+        noise={channel: sd for channel, sd in sidecar.noise.items() if channel in values},
+        name=name,
+        notes=notes,
+    )
+
+
+def _channels(record: Record, sidecar: Sidecar) -> tuple[dict[str, np.ndarray], tuple[str, ...]]:
+    """Return the channels that can be diagnosed, and what was left out."""
+    values = {channel: column for channel, column in record.values.items() if channel in SPECS}
+    others = [channel for channel in record.values if channel not in SPECS and channel not in TOLD]
+    notes: tuple[str, ...] = (f"Not used, for no sensor shows it: {_columns(others)}.",) if others else ()
+    if sidecar.over_ground and "surge_speed" in values:
+        if "speed_over_ground" in values:
+            raise UserError(
+                f"{record.source} has speed_over_ground_m_s and a surge_speed_m_s that its sidecar calls over ground: "
+                "keep one of them."
+            )
+        values["speed_over_ground"] = np.abs(values.pop("surge_speed"))
+        notes += ("The surge speed is over ground, so it is read as the speed over ground.",)
+    if not values:
+        raise UserError(
+            f"{record.source} has no channel that can be diagnosed. Add one of: {_columns(SPECS)}."
+        )
+    rates = sidecar.rate
+    return {name: without_repeats(record.time, one, rates.get(name)) for name, one in values.items()}, notes
+
+
+def _checked(logged: Logged, sidecar: Sidecar, simulated: Simulated | None) -> Logged:
+    """Return a record whose channels look like its trial."""
+    record, values = logged.record, logged.record.values
+    nominal = (simulated or _nominal())(logged.setting, record.time, tuple(values))
+    noise = {channel: logged.noise.get(channel, NOISE[channel]) for channel in values}
+    suspects = {channel: column for channel, column in values.items() if not sidecar.trusts(channel)}
+    still = [channel for channel, column in suspects.items() if is_constant(column)]
+    moving = {channel: column for channel, column in suspects.items() if channel not in still}
+    _refuse(record.source, stuck(suspects, nominal, noise) + unit_questions(moving, nominal, noise))
+    kept = {channel: column for channel, column in values.items() if channel not in still}
+    if not kept:
+        raise UserError(f"{record.source}: no channel moves. A diagnosis needs one that the trial moves.")
+    notes = (*logged.notes, *_notes(still, repeating(kept)))
+    return dataclasses.replace(logged, record=dataclasses.replace(record, values=kept), notes=notes)
+
+
+def _nominal() -> Simulated:
+    """Return the simulation itself; the compiler comes only with it."""
+    from subzero.diagnosis.response import respond
+
+    return respond
+
+
+def _notes(still: Sequence[str], held: Sequence[str]) -> list[str]:
+    """Say what is left out, and what is hard to tell."""
+    notes = [f"Left out, for it never changes: {_columns(still)}."] if still else []
+    if held:
+        notes.append(
+            f"Most samples repeat the one before: {_columns(held)}. If the sensor is slower than the record, give its "
+            "rate under [rate_hz] in the sidecar."
+        )
+    return notes
+
+
+def _columns(channels: Sequence[str] | Mapping[str, object]) -> str:
+    return ", ".join(BY_NAME[channel].column for channel in channels)
+
+
+def _refuse(path: str | Path, problems: list[str]) -> None:
+    if problems:
+        raise UserError(listed(f"The measured record {path} cannot be diagnosed:", problems))
