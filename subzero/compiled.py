@@ -83,6 +83,7 @@ def _compile(function: Function, *, gate: bool) -> Function:
     options = {
         "cache": True,
         "error_model": "numpy",
+        "nogil": True,
         "no_cfunc_wrapper": True,
         "no_cpython_wrapper": not gate,
     }

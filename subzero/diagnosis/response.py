@@ -1,0 +1,160 @@
+"""What the sensors would measure in a setting, without their noise: h(z) of the diagnosis.
+
+The record's `surge_speed` is what a speed log shows: through the water.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from cable.line import enlarged
+from subzero import coupling
+from subzero.channels import DEGREE
+from subzero.diagnosis.setting import Sensing, Setting
+from subzero.diagnosis.track import COLUMNS, LENGTH, RUDDER, TENSION, VOLTAGE, WATER, follow
+from subzero.hull import row_at
+from subzero.later import go_on_with
+from subzero.loop import NO_ROOM
+from subzero.run_state import Live
+from subzero.start import prepare
+from vehicle.state import QUATERNION, SHAFT, VELOCITY
+
+HULL_STEP, CABLE_STEP, SEGMENT = 0.05, 0.2, 1.0
+"""Steps of a diagnosis: errors of 1e-4 m/s and 0.03 degrees on fig6, a twentieth of the sensors' noise, in a third of
+the time."""
+FASTEST_PAY_OUT = 2.0
+"""Room for nodes is made for this speed, and doubled when that is not enough. [m/s]"""
+
+
+def economical(setting: Setting, duration: float) -> Setting:
+    """Return a setting in the steps of a diagnosis, no longer than needed; commands stay at their times."""
+    trial = setting.trial
+    on_grid = trial.commands is None or multiples(trial.commands.time, HULL_STEP)
+    hull_step = max(trial.hull_step, HULL_STEP) if on_grid else trial.hull_step
+    cable_step = max(trial.cable_step, CABLE_STEP)
+    steps = int(np.ceil(min(duration, trial.duration) / cable_step - 1e-9))
+    made = replace(trial, hull_step=hull_step, cable_step=cable_step, duration=steps * cable_step,
+                   segment_length=max(trial.segment_length, SEGMENT))  # fmt: skip
+    return replace(setting, trial=made)
+
+
+def multiples(times: np.ndarray, step: float) -> bool:
+    """Say whether all times are whole multiples of a step."""
+    return bool(np.all(np.abs(times / step - np.round(times / step)) < 1e-6))
+
+
+def respond(setting: Setting, times: np.ndarray, channels: Iterable[str]) -> dict[str, np.ndarray]:
+    """Return what the sensors would show.
+
+    Args:
+        setting: of the trial.
+        times: when they are read (n,). [s]
+        channels: names of `subzero.channels`, of those in `TRUTHS`.
+
+    Returns:
+        channel → values (n,) in its display unit; NaN from where the run could not go on.
+    """
+    grid, track = tracked(setting)
+    earlier = times - setting.clock_offset
+    return {
+        name: np.interp(
+            earlier, grid, sensed(setting.sensing.get(name), grid, TRUTHS[name](track)), right=np.nan
+        )
+        for name in channels
+    }
+
+
+def tracked(setting: Setting) -> tuple[np.ndarray, np.ndarray]:
+    """Return times (m,) [s] and track (m, COLUMNS) of a setting, NaN from where it could not go on."""
+    trial = setting.trial
+    times = np.linspace(0.0, trial.duration, round(trial.duration / trial.cable_step) + 1)
+    setup, live = prepare(trial, setting.model, setting.tethered)
+    live = _roomy(live, trial.start.wet_length + FASTEST_PAY_OUT * trial.duration, trial.segment_length)
+    steps = int(coupling.hull_steps.py_func(setup, times[1] - times[0]))
+    track = np.full((1 + (times.size - 1) * steps, COLUMNS), np.nan)
+    changes = {row_at.py_func(times, time): model for time, model in setting.later}
+    row, ending = 1, coupling.FINE
+    while row < times.size and ending in (coupling.FINE, NO_ROOM):
+        if row - 1 in changes:
+            setup = go_on_with(
+                changes.pop(row - 1), setup, live, trial, setting.tethered, float(times[row - 1])
+            )
+        last = min([times.size, *(change + 1 for change in changes)])
+        row, ending = follow(setup, live, times, row, last, track)
+        if ending == NO_ROOM:
+            live = live._replace(line=enlarged(live.line, 2 * live.line.length.size))
+    return np.linspace(0.0, times[-1], track.shape[0]), track
+
+
+def _roomy(live: Live, length: float, segment: float) -> Live:
+    """Return the same run with room for a length of cable."""
+    needed = int(length / segment) + 16
+    return live if needed <= live.line.length.size else live._replace(line=enlarged(live.line, needed))
+
+
+def sensed(sensor: Sensing | None, grid: np.ndarray, truth: np.ndarray) -> np.ndarray:
+    """Return what a sensor makes of the truth on an even grid."""
+    if sensor is None:
+        return truth
+    lagged = _lagged(truth, sensor.lag / (grid[1] - grid[0])) if sensor.lag > 0.0 else truth
+    return (1.0 + sensor.scale) * lagged + sensor.bias
+
+
+def _lagged(truth: np.ndarray, lag: float) -> np.ndarray:
+    """Return a first-order delay of values that are linear between samples, exactly; the lag in samples."""
+    from scipy.signal import lfilter
+
+    keep = np.exp(-1.0 / lag)
+    old, new = lag * (1.0 - keep) - keep, 1.0 - lag * (1.0 - keep)
+    return lfilter([new, old], [1.0, -keep], truth, zi=[truth[0] * (1.0 - new)])[0]
+
+
+def _angles(track: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return roll, pitch and continuous heading. [degree]"""
+    w, x, y, z = track[:, QUATERNION : QUATERNION + 4].T
+    roll = np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
+    pitch = np.arcsin(np.clip(2.0 * (w * y - z * x), -1.0, 1.0))
+    heading = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+    first = DEGREE * heading[0] % 360.0
+    return DEGREE * roll, DEGREE * pitch, DEGREE * (np.unwrap(heading) - heading[0]) + first
+
+
+def _surge_through_water(track: np.ndarray) -> np.ndarray:
+    """Return u − (Rᵀ J)_x. [m/s]"""
+    w, x, y, z = track[:, QUATERNION : QUATERNION + 4].T
+    forward = np.stack([1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)], axis=1)
+    return track[:, VELOCITY] - np.sum(forward * track[:, WATER : WATER + 3], axis=1)
+
+
+def _over_ground(track: np.ndarray) -> np.ndarray:
+    return np.linalg.norm(track[:, VELOCITY : VELOCITY + 3], axis=1)
+
+
+def _column(at: int, scale: float = 1.0) -> Callable[[np.ndarray], np.ndarray]:
+    return lambda track: scale * track[:, at]
+
+
+TRUTHS: Mapping[str, Callable[[np.ndarray], np.ndarray]] = {
+    "north": _column(0),
+    "east": _column(1),
+    "depth": _column(2),
+    "roll": lambda track: _angles(track)[0],
+    "pitch": lambda track: _angles(track)[1],
+    "heading": lambda track: _angles(track)[2],
+    "surge_speed": _surge_through_water,
+    "sway_speed": _column(VELOCITY + 1),
+    "heave_speed": _column(VELOCITY + 2),
+    "roll_rate": _column(VELOCITY + 3, DEGREE),
+    "pitch_rate": _column(VELOCITY + 4, DEGREE),
+    "yaw_rate": _column(VELOCITY + 5, DEGREE),
+    "speed_over_ground": _over_ground,
+    "propeller_speed": _column(SHAFT),
+    "rudder_angle": _column(RUDDER, DEGREE),
+    "battery_voltage": _column(VOLTAGE),
+    "cable_tension": _column(TENSION),
+    "cable_length": _column(LENGTH),
+}
+"""Channel → what is true of it, from a track, in its display unit."""

@@ -1,0 +1,273 @@
+"""What a diagnosis found, as values."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from subzero.missing_force import MissingForce
+
+NOTHING_WRONG, CAUSE_NAMED, UNDECIDED, OUTSIDE = (
+    "nothing_wrong",
+    "cause_named",
+    "undecided",
+    "outside_catalogue",
+)
+"""The four verdicts."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Estimate:
+    """A parameter as the records have it.
+
+    Attributes:
+        value: as a whole, with the nominal model's part. [unit]
+        low, high: 95 % interval. [unit]
+        unit: of all of them.
+        nominal: of the model. [unit]
+        deviation: value − nominal. [unit]
+        deviation_sd: its standard deviation. [unit]
+    """
+
+    value: float
+    low: float
+    high: float
+    unit: str
+    nominal: float
+    deviation: float
+    deviation_sd: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cause:
+    """A cause with its probability, parameters, and when it began (None: before the trial) [s]."""
+
+    id: str
+    sentence: str
+    probability: float
+    parameters: Mapping[str, Estimate]
+    start_time: float | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rival:
+    """Another explanation.
+
+    Attributes:
+        ids: the causes it is made of; empty for "nothing is wrong".
+        sentence: in words.
+        probability: of it.
+        discrimination: D between it and the named cause: below 9 the records cannot tell them apart. [-]
+        parameters: cause id → name → estimate.
+    """
+
+    ids: tuple[str, ...]
+    sentence: str
+    probability: float
+    discrimination: float
+    parameters: Mapping[str, Mapping[str, Estimate]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Detectability:
+    """What these records could show of a cause, known before they are looked at.
+
+    Attributes:
+        id: the cause.
+        signal: size of what one effect scale does, in noise and tolerances. [-]
+        smallest: the smallest deviation that would have been seen (signal 4), by parameter. [unit]
+        rival: the cause that looks most alike.
+        discrimination: D against it at one effect scale. [-]
+        cosine: how much alike, 0 to 1.
+    """
+
+    id: str
+    signal: float
+    smallest: Mapping[str, float]
+    rival: str
+    discrimination: float
+    cosine: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Misfit:
+    """How a channel of a record differs from the nominal simulation; residual = measured − simulated, display units.
+
+    Attributes:
+        rmse: root mean square.
+        nrmse: the same over the noise. [-]
+        fit_percent: 100 (1 − |residual| / |measured − its mean|).
+        bias: mean.
+        whiteness_p: probability that white noise would be as coloured (Ljung-Box, 25 lags, after whitening).
+        command_correlation: command → (lag [s], correlation), the strongest.
+        windows: when the misfit lives: (from, to). [s]
+        noise_sd: of the channel, estimated.
+        noise_rho: its correlation from sample to sample.
+        outliers: samples that are left out.
+        gaps: samples that are missing.
+    """
+
+    rmse: float
+    nrmse: float
+    fit_percent: float
+    bias: float
+    whiteness_p: float
+    command_correlation: Mapping[str, tuple[float, float]]
+    windows: tuple[tuple[float, float], ...]
+    noise_sd: float
+    noise_rho: float
+    outliers: int
+    gaps: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class ChannelGain:
+    """Error of a channel in its own unit: nominal, refit within tolerances, extended, best rival, and the noise floor."""
+
+    before: float
+    tolerance: float
+    after: float
+    rival: float
+    floor: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Gain:
+    """What the extended model explains (`gain`).
+
+    Attributes:
+        fitted: channel → errors on the data that were fitted.
+        held_out: channel → errors on blocks or trials that were not.
+        total: G0 = (E_nominal − E_extended)/(E_nominal − floor), held out. [-]
+        owed: G1 = (E_tolerance − E_extended)/(E_tolerance − floor), held out: owed to the new physics. [-]
+        owed_low: its 95 % lower bound by block bootstrap. [-]
+        how: "blocks of the same trial" or "other trials".
+    """
+
+    fitted: Mapping[str, ChannelGain]
+    held_out: Mapping[str, ChannelGain]
+    total: float
+    owed: float
+    owed_low: float
+    how: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class NextTrial:
+    """The trial that would best separate what is left.
+
+    Attributes:
+        name: of the library, or "optimised".
+        sentence: what to do, in words.
+        decides: expected probability that it decides. [-]
+        discrimination: D between the two causes hardest to tell apart, there. [-]
+        channel: a channel worth adding, "" if none is needed.
+        commands: rows (time [s], propeller [rev/s], rudder, port, starboard plane [rad]).
+    """
+
+    name: str
+    sentence: str
+    decides: float
+    discrimination: float
+    channel: str
+    commands: tuple[tuple[float, ...], ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Extended:
+    """The extended model: deviations from the nominal one (effect id → parameter → deviation), and what else is new.
+
+    Attributes:
+        deviations: of the named causes.
+        start_times: effect id → when it began. [s]
+        calibration: deviations within tolerance that the refit found, of all other effects.
+        missing: the force that no effect explains.
+    """
+
+    deviations: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    start_times: Mapping[str, float] = field(default_factory=dict)
+    calibration: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    missing: MissingForce | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Unknown:
+    """The force or moment that no cause explains.
+
+    Attributes:
+        axis: X, Y, Z, K, M or N.
+        time: [s]
+        force: body axes. [N, N m]
+        band: its standard deviation. [N, N m]
+        formula: terms in words with coefficient and interval: (words, feature, coefficient, low, high).
+    """
+
+    axis: str
+    time: np.ndarray
+    force: np.ndarray
+    band: np.ndarray
+    formula: tuple[tuple[str, str, float, float, float], ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Curves:
+    """A record and what models say to it, for the figures: name → channel → values at the record's times.
+
+    Attributes:
+        time: of the record. [s]
+        measured: channel → values, NaN in gaps.
+        models: "nominal", "tolerance", "extended", "rival: <ids>" → channel → values.
+        used: channel → which samples were used.
+    """
+
+    time: np.ndarray
+    measured: Mapping[str, np.ndarray]
+    models: Mapping[str, Mapping[str, np.ndarray]]
+    used: Mapping[str, np.ndarray]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Verdict:
+    """The outcome of `subzero.diagnose`.
+
+    Attributes:
+        verdict: one of the four.
+        sentence: the verdict in words.
+        causes: what is named.
+        rivals: what else the records allow, most probable first.
+        probabilities: hypothesis ("none", "rudder_lag", "a + b", "unknown_force:X") → probability.
+        tolerance_scale: κ → probability that the tolerances are κ times as declared.
+        detectable: what could be seen at all.
+        misfit: record → channel → how the nominal model fails.
+        gain: what the extended model explains.
+        unknown: the force outside the catalogue.
+        extended: the extended model.
+        next_trial: what to do next.
+        deviations: parameter → (mean, standard deviation) of the best fit, in tolerances.
+        curves: record → curves.
+        notes: what else a reader should know.
+        seconds: how long each part took.
+        seed: of everything random.
+        complete: False if it was interrupted.
+    """
+
+    verdict: str
+    sentence: str
+    causes: tuple[Cause, ...] = ()
+    rivals: tuple[Rival, ...] = ()
+    probabilities: Mapping[str, float] = field(default_factory=dict)
+    tolerance_scale: Mapping[float, float] = field(default_factory=dict)
+    detectable: tuple[Detectability, ...] = ()
+    misfit: Mapping[str, Mapping[str, Misfit]] = field(default_factory=dict)
+    gain: Gain | None = None
+    unknown: Unknown | None = None
+    extended: Extended = field(default_factory=Extended)
+    next_trial: NextTrial | None = None
+    deviations: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    curves: Mapping[str, Curves] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+    seconds: Mapping[str, float] = field(default_factory=dict)
+    seed: int = 0
+    complete: bool = True
