@@ -216,7 +216,7 @@ def manoeuvres() -> str:
     """Indices with and without the cable."""
     text = "## Manoeuvres\n\n"
     for name, line in MANOEUVRES.items():
-        for size in (10.0, 20.0) if name == "zigzag" else (line.size,):
+        for size in (10.0, 20.0) if name.endswith("zigzag") else (line.size,):
             found = [autopilot.manoeuvre(name, size=size, tethered=tethered)[1] for tethered in (True, False)]
             rows = [(key, *(one[key] for one in found)) for key in found[0]]
             unit = "°" if line.unit == "degree" else ""

@@ -92,7 +92,7 @@ MANOEUVRES: dict[str, Manoeuvre] = {
     "vertical_zigzag": Manoeuvre(
         meaning="stern-planes reversed when the pitch has changed by as much",
         program=VerticalZigZag,
-        size=5.0,
+        size=10.0,
         duration=40.0,
         index=indices.zigzag,
         channels=("time", "pitch", "planes"),

@@ -18,7 +18,7 @@ HEADLINES = {
     "pitch": "Pitch, positive nose up",
     "surge_speed": "Forward speed",
     "rudder_command": "Rudder command, positive to starboard",
-    "stern_plane_port_command": "Command of the port plane, positive: nose up",
+    "stern_plane_port_command": "Port plane command, positive nose up",
     "propeller_command": "Propeller command",
 }
 

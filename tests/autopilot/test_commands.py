@@ -74,3 +74,12 @@ def test_help_imports_nothing_heavy(words):
     """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.rstrip().endswith("LOADED"), done.stdout[-200:]
+
+
+@pytest.mark.parametrize("command", ["rudder_command", "stern_plane_port_command", "propeller_command"])
+def test_the_headlines_of_the_figure_are_on_the_sheet(command):
+    from subzero.autopilot.picture import picture
+
+    run, _ = autopilot.manoeuvre("crash_stop", tethered=False)
+    figure = picture({"untethered": run}, "title", "heading", command)
+    assert figure.get_tightbbox().x1 <= figure.get_figwidth()
