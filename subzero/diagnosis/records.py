@@ -22,7 +22,7 @@ from subzero.diagnosis.sidecar import Sidecar, read_sidecar
 from subzero.diagnosis.timing import beside, cut_to, time_problems, without_repeats
 from subzero.diagnosis.told import FROM_RECORD, TOLD, commanded
 from subzero.errors import UserError, listed
-from subzero.measured import CONTINUOUS, Record, read_record
+from subzero.measured import CONTINUOUS, FULL_TURN, Record, read_record
 from subzero.model import Model
 from subzero.trials import load
 
@@ -108,7 +108,7 @@ def _logged(path: Path, name: str, scenario: str | Path | None, commands: str | 
     trial = cut_to(commanded(trial, record, commands), record)
     values, notes = _channels(record, sidecar)
     if CONTINUOUS in values:
-        values[CONTINUOUS] = beside(values[CONTINUOUS], math.degrees(trial.start.heading))
+        values[CONTINUOUS] = beside(values[CONTINUOUS], math.degrees(trial.start.heading) % FULL_TURN)
     return Logged(
         record=Record(source=str(path), time=record.time, values=values),
         setting=Setting(trial=trial, model=Model.of(trial), tethered=sidecar.tethered),

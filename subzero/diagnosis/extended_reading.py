@@ -1,0 +1,188 @@
+"""Read an extended model, as `subzero.diagnosis.extended` explains it, and say all that is wrong with it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from scenarios import ScenarioError
+from scenarios.files import Source, read_toml
+from subzero.diagnosis.effect import Effect, Parameter
+from subzero.diagnosis.effects import load
+from subzero.diagnosis.extended import STARTS, ExtendedFile, all_effects, force_key, key_of
+from subzero.diagnosis.verdict import Extended
+from subzero.errors import UserError, listed, suggestion
+from subzero.missing_force import AXES, MissingForce, Term
+
+KEYS = ("scenario", "source", "effects_file", "effects", "calibration", "missing_force", "missing_term")
+
+
+def read_extended(path: str | Path) -> ExtendedFile:
+    """Read an extended model.
+
+    Raises:
+        UserError: it cannot be used; names every problem with its line.
+    """
+    source = _toml(Path(path))
+    table = source.table
+    own = table.get("effects_file", "")
+    more = load(source.folder / own) if isinstance(own, str) and own else ()
+    known = all_effects(more)
+    problems = [
+        f"{_at(source, key)}: there is no such key.{suggestion(key, KEYS)} Allowed: {', '.join(KEYS)}."
+        for key in table
+        if key not in KEYS
+    ]
+    starts: dict[str, float] = {}
+    deviations = _effects(source, "effects", known, starts, problems)
+    calibration = _effects(source, "calibration", known, None, problems)
+    missing = _missing(source, problems)
+    if problems:
+        raise UserError(listed(f"The extended model {path} cannot be used:", problems))
+    extended = Extended(deviations=deviations, start_times=starts, calibration=calibration, missing=missing)
+    named = str(table.get("scenario", ""))
+    return ExtendedFile(extended=extended, effects=known, scenario=named)
+
+
+def _toml(path: Path) -> Source:
+    try:
+        return read_toml(path, str(path))
+    except ScenarioError as error:
+        problems = [str(problem) for problem in error.problems]
+        raise UserError(listed(f"The extended model {path} cannot be used:", problems)) from None
+
+
+def _at(source: Source, key: str) -> str:
+    line = source.line(key)
+    return f"line {line}, {key}" if line else key
+
+
+def _effects(
+    source: Source,
+    section: str,
+    known: Mapping[str, Effect],
+    starts: dict[str, float] | None,
+    problems: list[str],
+) -> dict[str, dict[str, float]]:
+    """Return id → parameter → deviation of a section; what is wrong becomes a problem."""
+    table = source.table.get(section, {})
+    if not isinstance(table, Mapping):
+        problems.append(f"{_at(source, section)}: this is not a section; write [{section}.rudder_lag]")
+        return {}
+    found: dict[str, dict[str, float]] = {}
+    for name, numbers in table.items():
+        at = _at(source, f"{section}.{name}")
+        if name not in known:
+            problems.append(f"{at}: there is no effect '{name}'.{suggestion(name, known)}")
+        elif not isinstance(numbers, Mapping):
+            problems.append(f"{at}: this is not a section; write [{section}.{name}]")
+        else:
+            found[name] = _numbers(at, known[name], numbers, starts, problems)
+    return found
+
+
+def _numbers(
+    at: str,
+    effect: Effect,
+    numbers: Mapping[str, Any],
+    starts: dict[str, float] | None,
+    problems: list[str],
+) -> dict[str, float]:
+    """Return parameter → deviation of one effect, and note when it starts."""
+    parameters = {key_of(parameter): parameter for parameter in effect.parameters}
+    found: dict[str, float] = {}
+    for key, value in numbers.items():
+        if not _is_number(value):
+            problems.append(f"{at}: {key} is {value!r}, which is not a finite number")
+        elif key == STARTS and starts is not None:
+            problems += _start_problems(at, effect, value)
+            starts[effect.id] = float(value)
+        elif key not in parameters:
+            allowed = (*parameters, *([STARTS] if starts is not None else []))
+            problems.append(
+                f"{at}: there is no '{key}'.{suggestion(key, allowed)} Allowed: {', '.join(allowed)}."
+            )
+        else:
+            problems += _range_problems(at, key, parameters[key], value)
+            found[parameters[key].name] = float(value)
+    return found
+
+
+def _start_problems(at: str, effect: Effect, value: float) -> list[str]:
+    if not effect.sudden:
+        return [f"{at}: {effect.id} does not begin in mid-trial; remove {STARTS}"]
+    return [] if value > 0.0 else [f"{at}: {STARTS} is {value:g}; it must be above 0, or be left out"]
+
+
+def _range_problems(at: str, key: str, parameter: Parameter, value: float) -> list[str]:
+    if parameter.low <= value <= parameter.high:
+        return []
+    return [f"{at}: {key} is {value:g}. Allowed: {parameter.low:g} to {parameter.high:g} (a deviation)."]
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def _missing(source: Source, problems: list[str]) -> MissingForce | None:
+    """Return the missing force of a file, None if it has none."""
+    histories = _parts(source, "missing_force", _history, problems)
+    terms = _parts(source, "missing_term", _term, problems)
+    total: MissingForce | None = None
+    for part in (*_together(histories), *terms):
+        total = part if total is None else total + part
+    return total
+
+
+def _together(histories: list[MissingForce]) -> list[MissingForce]:
+    """Return histories with those at the same times added, so that they stay exactly what they are."""
+    sums: dict[tuple[float, ...], np.ndarray] = {}
+    for one in histories:
+        sums[one.time] = sums.get(one.time, 0.0) + np.array(one.wrench)
+    return [
+        MissingForce(time=time, wrench=tuple(map(tuple, wrench.tolist()))) for time, wrench in sums.items()
+    ]
+
+
+def _parts(
+    source: Source, key: str, read: Callable[[Mapping[str, Any]], MissingForce], problems: list[str]
+) -> list[MissingForce]:
+    entries = source.table.get(key, [])
+    if not isinstance(entries, list) or not all(isinstance(entry, Mapping) for entry in entries):
+        problems.append(f"{_at(source, key)}: write [[{key}]] and its keys below")
+        return []
+    found = []
+    for at, entry in enumerate(entries, start=1):
+        try:
+            found.append(read(entry))
+        except (KeyError, TypeError, ValueError) as error:
+            what = f"{error.args[0]} is missing" if isinstance(error, KeyError) else str(error)
+            problems.append(f"[[{key}]] number {at}: {what}")
+    return found
+
+
+def _history(entry: Mapping[str, Any]) -> MissingForce:
+    axis = entry["axis"]
+    if axis not in AXES:
+        raise ValueError(f"axis is {axis!r}. Allowed: {', '.join(AXES)}.")
+    time, force = entry["time_s"], entry[force_key(axis)]
+    for name, values in (("time_s", time), (force_key(axis), force)):
+        if not isinstance(values, list) or not all(map(_is_number, values)):
+            raise ValueError(f"{name} is not a list of numbers")
+    if len(time) != len(force):
+        raise ValueError(
+            f"time_s has {len(time)} numbers and {force_key(axis)} has {len(force)}; give as many"
+        )
+    at = AXES.index(axis)
+    wrench = tuple(tuple(float(value) if i == at else 0.0 for i in range(len(AXES))) for value in force)
+    return MissingForce(time=tuple(map(float, time)), wrench=wrench)
+
+
+def _term(entry: Mapping[str, Any]) -> MissingForce:
+    if not _is_number(entry["coefficient"]):
+        raise ValueError(f"coefficient is {entry['coefficient']!r}, which is not a finite number")
+    return MissingForce(terms=(Term(entry["axis"], entry["feature"], float(entry["coefficient"])),))
