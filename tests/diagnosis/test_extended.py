@@ -120,7 +120,7 @@ EFFECTS = [Effect(id="lost_ballast", sentence="ballast was lost", slot="hull", a
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ("[effects.ruder_lag]\ntime_constant_s = 0.2", "line 1, effects.ruder_lag: there is no effect 'ruder_lag'. Did you"),
+        ("[effects.ruder_lag]\ntime_constant_s = 0.2", "line 1, effects.ruder_lag: there is no effect 'ruder_lag'"),
         ("[effects.rudder_lag]\ntime_constant = 0.2", "there is no 'time_constant'. Did you mean 'time_constant_s'?"),
         ("[effects.rudder_lag]\ntime_constant_s = 99.0", "time_constant_s is 99. Allowed: -0.12 to 5 (a deviation)."),
         ("[effects.rudder_lag]\ntime_constant_s = nan", "which is not a finite number"),

@@ -1,0 +1,112 @@
+"""A verdict in words: sentences that the terminal and the report share."""
+
+from __future__ import annotations
+
+import math
+
+from subzero.channels import BY_NAME
+from subzero.diagnosis.verdict import (
+    CAUSE_NAMED,
+    NOTHING_WRONG,
+    OUTSIDE,
+    UNDECIDED,
+    Cause,
+    Estimate,
+    NextTrial,
+    Unknown,
+    Verdict,
+)
+
+HEADLINES = {
+    NOTHING_WRONG: "Nothing is wrong beyond tolerance",
+    CAUSE_NAMED: "The cause is named",
+    UNDECIDED: "Undecided: several causes explain the records as well",
+    OUTSIDE: "Something real, and outside the catalogue",
+}
+
+NOTHING = "–"
+
+
+def number(value: float, unit: str = "") -> str:
+    """Return a number in three digits with its unit; a share in per cent."""
+    if not math.isfinite(value):
+        return NOTHING
+    if unit == "1":
+        return f"{100.0 * value:+.3g} %"
+    return f"{value + 0.0:.3g} {unit}".strip()
+
+
+def estimate(name: str, one: Estimate) -> str:
+    """Return a parameter in words: value, interval, what the model has."""
+    value, low, high = (number(x, one.unit) for x in (one.value, one.low, one.high))
+    return f"{name.replace('_', ' ')} {value} (95 %: {low} to {high}; model: {number(one.nominal, one.unit)})"
+
+
+def cause(one: Cause) -> str:
+    """Return a cause in words, with its parameters and its probability."""
+    since = "" if one.start_time is None else f", since t = {one.start_time:.3g} s"
+    numbers = "; ".join(estimate(name, parameter) for name, parameter in one.parameters.items())
+    return f"{_capital(one.sentence)}{since}: {numbers}. Probability {probability(one.probability)}."
+
+
+def probability(value: float) -> str:
+    """Return a probability, without a promise that nothing else is possible."""
+    return "> 0.999" if value > 0.999 else "< 0.001" if value < 0.001 else f"{value:.3f}"
+
+
+def headline(verdict: Verdict) -> str:
+    """Return the verdict as a headline."""
+    named = HEADLINES[verdict.verdict]
+    if verdict.verdict == CAUSE_NAMED and len(verdict.causes) > 1:
+        named = f"{len(verdict.causes)} causes are named"
+    return named if verdict.complete else f"{named} (interrupted: this is as far as it came)"
+
+
+def story(verdict: Verdict) -> list[str]:
+    """Return the verdict in sentences: what it is, the causes, what is missing, the next trial."""
+    told = [verdict.sentence] if verdict.sentence else []
+    told += [cause(one) for one in verdict.causes]
+    told += [unknown(verdict.unknown)] if verdict.unknown else []
+    if verdict.gain:
+        share = f"{100.0 * verdict.gain.total:.1f} %"
+        told.append(
+            f"The extended model explains {share} of what can be explained of data that were not fitted "
+            f"({verdict.gain.how})."
+        )
+    told += [next_trial(verdict.next_trial)] if verdict.next_trial else []
+    return [*told, *verdict.notes]
+
+
+def unknown(one: Unknown) -> str:
+    """Return the force outside the catalogue in words: axis, size, formula."""
+    unit = "N" if one.axis in "XYZ" else "N m"
+    most = max(range(len(one.force)), key=lambda at: abs(one.force[at]))
+    what = (
+        f"A {'force' if unit == 'N' else 'moment'} along {one.axis} that no cause explains: {one.force[most]:.3g} ± "
+        f"{1.96 * one.band[most]:.2g} {unit} at t = {one.time[most]:.3g} s, where it is largest."
+    )
+    if not one.formula:
+        return what
+    return f"{what} It looks like {' + '.join(formula_term(term) for term in one.formula)}."
+
+
+def formula_term(term: tuple[str, str, float, float, float]) -> str:
+    """Return a term of a formula in words, with the interval of its coefficient."""
+    words, feature, value, low, high = term
+    return f"{value:.3g} ({low:.3g} to {high:.3g}) × {feature}, {words}"
+
+
+def next_trial(one: NextTrial) -> str:
+    """Return what to do next."""
+    adds = f" Log {column(one.channel)} too." if one.channel else ""
+    sentence = one.sentence.rstrip(".")
+    return f"Next trial: {sentence} ({one.name}); it decides with probability {one.decides:.2f}.{adds}"
+
+
+def column(name: str) -> str:
+    """Return a channel as the column of a record."""
+    return BY_NAME[name].column if name in BY_NAME else name
+
+
+def _capital(sentence: str) -> str:
+    return sentence[:1].upper() + sentence[1:]

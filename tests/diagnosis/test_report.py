@@ -1,0 +1,206 @@
+"""What was found is told: the same numbers in words, tables, figures, a page and a JSON file."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+from subzero.diagnosis import json_file, report, tables, words
+from subzero.diagnosis.verdict import (
+    CAUSE_NAMED,
+    NOTHING_WRONG,
+    OUTSIDE,
+    Cause,
+    ChannelGain,
+    Curves,
+    Detectability,
+    Estimate,
+    Extended,
+    Gain,
+    Misfit,
+    NextTrial,
+    Rival,
+    Unknown,
+    Verdict,
+)
+from subzero.figures.diagnosis import draw_diagnosis
+from subzero.figures.sheet import Title
+
+TIME = np.linspace(0.0, 30.0, 301)
+LAG = Estimate(value=0.31, low=0.23, high=0.39, unit="s", nominal=0.1, deviation=0.21, deviation_sd=0.04)
+INERTIA = Estimate(value=0.35, low=0.2, high=0.5, unit="1", nominal=0.0, deviation=0.35, deviation_sd=0.08)
+
+
+def make_curves(seed=0):
+    rng = np.random.default_rng(seed)
+    truth = {"surge_speed": 1.1 * (1 - np.exp(-TIME / 2)), "heading": 27 + 8 / (1 + np.exp(-(TIME - 3)))}
+    noise = {"surge_speed": 0.015, "heading": 0.4}
+    measured = {name: one + noise[name] * rng.normal(size=TIME.size) for name, one in truth.items()}
+    measured["heading"][100] += 8.0
+    measured["surge_speed"][150:160] = np.nan
+    used = {name: np.isfinite(one) for name, one in measured.items()}
+    used["heading"][100] = False
+    late = 27 + 8 / (1 + np.exp(-(TIME - 2.6)))
+    models = {
+        "nominal": {"surge_speed": truth["surge_speed"] * 1.02, "heading": late},
+        "extended": truth,
+        "rival: yaw_inertia": {
+            "surge_speed": truth["surge_speed"],
+            "heading": 0.5 * (late + truth["heading"]),
+        },
+        "rival: rudder_rate_limit": {"surge_speed": truth["surge_speed"], "heading": truth["heading"] + 0.2},
+    }
+    return Curves(time=TIME, measured=measured, models=models, used=used)
+
+
+def make_misfit(sd):
+    return Misfit(rmse=2.3 * sd, nrmse=2.3, fit_percent=91.2, bias=0.1 * sd, whiteness_p=1e-7,
+                  command_correlation={"rudder_command": (0.4, 0.61), "propeller_command": (0.0, 0.1)},
+                  windows=((1.2, 3.9),), noise_sd=sd, noise_rho=0.5, outliers=1, gaps=10)  # fmt: skip
+
+
+GAIN = {
+    "surge_speed": ChannelGain(before=0.05, tolerance=0.016, after=0.0151, rival=0.0155, floor=0.015),
+    "heading": ChannelGain(before=3.0, tolerance=0.9, after=0.41, rival=0.8, floor=0.4),
+}
+
+NAMED = Verdict(
+    verdict=CAUSE_NAMED,
+    sentence="The rudder servo lags (p = 0.97); the runner-up is another yaw inertia (p = 0.02, D 37).",
+    causes=(Cause(id="rudder_lag", sentence="the rudder servo lags", probability=0.97,
+                  parameters={"time_constant": LAG}),),
+    rivals=(
+        Rival(ids=("yaw_inertia",), sentence="the yaw inertia differs", probability=0.02, discrimination=37.0,
+              parameters={"yaw_inertia": {"share": INERTIA}}),
+        Rival(ids=(), sentence="nothing is wrong", probability=0.001, discrimination=math.nan),
+    ),
+    probabilities={"rudder_lag": 0.97, "yaw_inertia": 0.02, "rudder_rate_limit": 0.006, "none": 0.001,
+                   "hull_drag + rudder_lag": 0.003},
+    tolerance_scale={1.0: 0.9, 2.0: 0.08, 4.0: 0.02},
+    detectable=(
+        Detectability(id="rudder_lag", signal=20.0, smallest={"time_constant": 0.05}, rival="yaw_inertia",
+                      discrimination=37.0, cosine=0.9),
+        Detectability(id="current", signal=2.0, smallest={"north": 0.3, "east": 0.5}, rival="cable_tangential_drag",
+                      discrimination=0.2, cosine=0.998),
+        Detectability(id="surge_added_mass", signal=14.0, smallest={"share": 0.05}, rival="drum_inertia",
+                      discrimination=1.5, cosine=0.993),
+    ),
+    misfit={"record": {"surge_speed": make_misfit(0.015), "heading": make_misfit(0.4)}},
+    gain=Gain(fitted=GAIN, held_out=GAIN, total=0.991, owed=0.8, owed_low=0.6, how="blocks of the same trial"),
+    extended=Extended(deviations={"rudder_lag": {"time_constant": 0.21}}),
+    next_trial=NextTrial(name="rudder_doublets", sentence="fly rudder doublets of 10 degrees", decides=0.93,
+                         discrimination=40.0, channel="rudder_angle",
+                         commands=((0.0, 25.0, 0.0, 0.0, 0.0), (2.0, 25.0, math.radians(10.0), 0.0, 0.0))),
+    deviations={"hull_drag.share": (2.4, 0.5), "yaw_damping.share": (0.1, 0.9)},
+    curves={"record": make_curves()},
+    notes=("Left out, for it never changes: depth_m.",),
+    seconds={"screen": 2.1, "search": 9.0},
+    seed=7,
+)  # fmt: skip
+
+FORCE = Verdict(
+    verdict=OUTSIDE,
+    sentence="A force along X that no catalogued effect explains.",
+    unknown=Unknown(axis="X", time=TIME[::20], force=-0.5 / (1 + np.exp(-(TIME[::20] - 12) / 0.8)),
+                    band=np.full(16, 0.05),
+                    formula=(("the square of the speed through the water", "u|u|", -1.2, -1.5, -0.9),)),
+    probabilities={"unknown_force:X": 0.99},
+)  # fmt: skip
+
+
+def test_a_cause_is_named_in_words_with_value_interval_unit_and_model():
+    said = words.cause(NAMED.causes[0])
+    assert (
+        said
+        == "The rudder servo lags: time constant 0.31 s (95 %: 0.23 s to 0.39 s; model: 0.1 s). Probability 0.970."
+    )
+    assert "+35 % (95 %: +20 % to +50 %; model: +0 %)" in words.estimate("share", INERTIA)
+
+
+def test_the_story_ends_with_what_to_do_next():
+    told = words.story(NAMED)
+    assert any("explains 99.1 % of what can be explained" in line for line in told)
+    assert (
+        "Next trial: fly rudder doublets of 10 degrees (rudder_doublets); it decides with probability 0.93."
+        in told[-2]
+    )
+    assert "Log rudder_angle_deg too." in told[-2]
+
+
+def test_an_interrupted_verdict_says_so():
+    from dataclasses import replace
+
+    assert "interrupted" in words.headline(replace(NAMED, complete=False))
+
+
+def test_the_table_of_what_can_be_seen_shows_what_would_be_missed_or_mixed_up_worst_first():
+    shown = tables.detectable(NAMED)
+    assert [row[0] for row in shown.rows] == ["current", "surge_added_mass"]
+    assert [row[-1] for row in shown.rows] == ["not seen", "not told apart"]
+    assert len(tables.detectable(NAMED, every=True).rows) == 3
+
+
+def test_the_misfit_names_the_command_it_follows():
+    row = tables.misfit(NAMED.misfit["record"]).rows[1]
+    assert row[0] == "heading_deg"
+    assert row[-2:] == ("rudder +0.61 at 0.4 s", "1.2–3.9 s")
+
+
+def test_json_has_the_promised_keys_and_no_nan():
+    found = json.loads(json_file.text(NAMED))
+    assert found["verdict"] == "cause_named"
+    (cause,) = found["causes"]
+    assert (cause["id"], cause["probability"]) == ("rudder_lag", 0.97)
+    assert cause["parameters"]["time_constant"]["value"] == 0.31
+    assert set(cause["parameters"]["time_constant"]) == set(json_file.NUMBERS)
+    assert found["rivals"][0]["parameters"]["share"]["unit"] == "1"
+    assert found["rivals"][1]["id"] == "none"
+    assert found["rivals"][1]["discrimination"] is None
+    speed = found["gain"]["surge_speed"]
+    assert (speed["before"], speed["after"], speed["floor"]) == (0.05, 0.0151, 0.015)
+    assert speed["held_out"]["before"] == speed["fitted"]["before"] == 0.05
+    assert found["next_trial"]["commands"]["rudder_deg"] == pytest.approx([0.0, 10.0])
+    assert found["extended"]["deviations"] == {"rudder_lag": {"time_constant": 0.21}}
+
+
+def test_json_holds_a_force_and_an_empty_verdict():
+    found = json.loads(json_file.text(FORCE))
+    assert found["unknown"]["axis"] == "X"
+    assert found["unknown"]["formula"][0]["feature"] == "u|u|"
+    empty = json.loads(json_file.text(Verdict(verdict=NOTHING_WRONG, sentence="")))
+    assert empty["gain"] == {}
+    assert empty["next_trial"] is None
+
+
+def test_the_report_tells_all_of_it_and_its_page_stands_alone():
+    figures = draw_diagnosis(NAMED, Title(words="a trial", scenario="fig6"))
+    text = report.markdown(NAMED, {"record": "record.csv, fig6"}, tuple(figures))
+    for part in (
+        "# The cause is named",
+        "## What is wrong",
+        "rudder\\_lag",
+        "![misfit](misfit.png)",
+        "## The gain",
+        "Seed 7",
+    ):
+        assert part in text
+    page = report.page(text, dict.fromkeys(figures, b"png"), "a trial")
+    assert page.count("data:image/png;base64,") == len(figures)
+    assert ".png" not in page.replace("image/png", "")
+    assert "<td>hull" not in page  # no column is torn by a letter of ours
+
+
+def test_what_a_file_is_called_cannot_put_markup_into_the_page():
+    text = report.markdown(NAMED, {"record": "<script>alert(1)</script>|*x*"})
+    assert "<script>" not in report.page(text, {}, "<b>t</b>")
+    assert "<b>" not in report.page(text, {}, "<b>t</b>")
+
+
+def test_every_verdict_has_the_figures_that_belong_to_it():
+    title = Title(words="a trial", scenario="fig6")
+    assert set(draw_diagnosis(NAMED, title)) == {"misfit", "rivals", "evidence", "detectable", "gain"}
+    assert set(draw_diagnosis(FORCE, title)) == {"evidence", "missing_force"}
+    assert draw_diagnosis(Verdict(verdict=NOTHING_WRONG, sentence=""), title) == {}
