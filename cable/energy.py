@@ -48,7 +48,7 @@ def energy_flow(line: Line, c: CableNumbers, work: Load, out: np.ndarray) -> Non
             speed = V[i] - J[i]
             square += speed * speed
             out[LOSS] += length * work.drag[i] * speed
-            turn += across[i] * (line.velocity[NOW, j, i] - line.velocity[NOW, j - 1, i])
+            turn += across[i] * (line.velocity[NOW, j, i] - line.velocity[NOW, j - 1, i]) * length / work.chord_length
             out[STRAINED] -= T * t[i] * (line.water[NOW, j, i] - line.water[NOW, j - 1, i])
         stored = c.mass * square + c.added_mass * work.side * work.side + c.compliance * T * T
         out[STORED] += 0.5 * length * stored

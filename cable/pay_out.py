@@ -22,7 +22,8 @@ from .water import Water
 MOST_HALVINGS = 10
 """A failing step is halved up to this many times before the run gives up."""
 MOST_CUTS = 6
-"""A step that errs too much is made smaller by this many halvings at most: a jolt has no accurate step."""
+"""A step that errs too much is made smaller by this many halvings at most, and so are those behind it: a jolt has no
+accurate step, and in ever smaller ones it only rings louder."""
 FIRST_STEP = 0.1
 """With an error allowed, a run begins with this share of the first row: it cannot tell its error yet."""
 
@@ -155,13 +156,13 @@ def _cover(
         solved = try_step(line, step, point, water, c, drum, work)
         spent += solved.iterations
         error = estimate_error(line, step) if rtol > 0.0 and solved.converged else 0.0
-        if solved.converged and (error <= rtol or step <= finest):
+        if solved.converged and (error <= rtol or step <= finest * (1.0 + 1e-6)):
             accept(line, step, c, work)
             note_force(line)
             book_step(line, step, c, work, record.ledger)
             record.steps[k] += 1
             done += step
-            suggested = next_step(step, error, rtol)
+            suggested = next_step(step, error, rtol) if error <= rtol else max(step, finest)
             if done >= whole * (1.0 - 1e-9):
                 result = Solved(True, spent, solved.residual, solved.worst_node, solved.worst_equation)
                 return result, suggested

@@ -133,7 +133,7 @@ def _predict(
     )
     last[NEW] = max(last[NOW] + growth, 0.5 * last[NOW])
     if not line.ends.free_end:
-        pull = max(line.ends.drum_pull, 0.0)
+        pull = max(line.node_tension[N], 0.0)
         line.tension[NEW, N] = max(pull + (line.tension[NOW, N] - pull) * last[NEW] / last[NOW], KNOWN)
     feel_water(line, water, line.ends.time + step)
     correct_for_arc(line, work)
