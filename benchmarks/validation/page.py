@@ -41,7 +41,7 @@ def write_page(found: dict[str, list[Row]]) -> None:
             parts[case.title] = old[case.title]
     body = "\n".join(parts.values())
     passed, failed = body.count(f"| {PASS} |"), body.count(f"| {FAIL} |")
-    verdict = "Those that are not stand in their tables as **FAIL**." if failed else ""
+    verdict = "Those that are not stand in their tables as **FAIL**, the reason below." if failed else ""
     PAGE.write_text(HEAD.format(passed=passed, judged=passed + failed, verdict=verdict) + "\n" + body)
 
 
@@ -55,7 +55,13 @@ def section(case: Case, rows: list[Row]) -> str:
     """Return the section of a case: title, text, table, figure."""
     text = inspect.getdoc(case.module) or ""
     figure = f"\n![{case.title}](figures/{figure_path(case).name})\n" if case.draw else ""
-    return f"## {case.title}\n\n{text}\n\n{table(rows)}\n{figure}"
+    return f"## {case.title}\n\n{text}\n\n{table(rows)}\n{reasons(case, rows)}{figure}"
+
+
+def reasons(case: Case, rows: list[Row]) -> str:
+    """Return why the rows that fail do so, a paragraph each."""
+    failed = [row.name for row in rows if row.judged and not row.passed]
+    return "".join(f"\n*Not met*, {name}: {case.missed.get(name, 'not explained yet.')}\n" for name in failed)
 
 
 def table(rows: list[Row]) -> str:

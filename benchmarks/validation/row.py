@@ -8,10 +8,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 
-class NotAvailableError(Exception):
-    """What a case needs is not installed; the page keeps what was measured before."""
-
-
 @dataclass(frozen=True, kw_only=True)
 class Row:
     """One comparison.

