@@ -48,12 +48,12 @@ def energy_flow(line: Line, c: CableNumbers, work: Load, out: np.ndarray) -> Non
             speed = V[i] - J[i]
             square += speed * speed
             out[LOSS] += length * work.drag[i] * speed
-            turn += across[i] * (line.velocity[NOW, j, i] - line.velocity[NOW, j - 1, i]) * length / work.chord_length
+            turn += across[i] * (line.velocity[NOW, j, i] - line.velocity[NOW, j - 1, i])
             out[STRAINED] -= T * t[i] * (line.water[NOW, j, i] - line.water[NOW, j - 1, i])
         stored = c.mass * square + c.added_mass * work.side * work.side + c.compliance * T * T
         out[STORED] += 0.5 * length * stored
         out[GRAVITY_WORK] += length * c.weight * (V[2] - J[2])
-        out[ADDED_MASS] -= c.added_mass * work.along * turn
+        out[ADDED_MASS] -= c.added_mass * work.along * turn * length / work.chord_length
         out[CARRIED] += length * c.mass * _carried(line, j)
     out[STORED] += bending_energy(line, c)
     _flow_at_ends(line, c, out)
