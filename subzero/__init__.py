@@ -8,6 +8,7 @@
 Names come from their modules when they are first used, so that ``import subzero`` costs nothing:
 `simulate` and `compare` run a trial, `Comparison` holds two runs, `load_scenario` reads a trial,
 `read_record` a measured record, `draw` makes the figures, `Simulator` steps a run for a controller of your own,
+`diagnose` says what a simulation gets wrong in measured records, `read_trials` reads those as `Logged`,
 `autopilot` leads to linear models and controllers, `CHANNELS` is the table of everything that a run gives.
 """
 
@@ -17,6 +18,7 @@ from typing import Any
 _HOME = {
     "CHANNELS": ("subzero.channels", "CHANNELS"),
     "Comparison": ("subzero.comparison", "Comparison"),
+    "Logged": ("subzero.diagnosis.records", "Logged"),
     "Model": ("subzero.model", "Model"),
     "Observation": ("subzero.simulator", "Observation"),
     "Record": ("subzero.measured", "Record"),
@@ -24,9 +26,11 @@ _HOME = {
     "Simulator": ("subzero.simulator", "Simulator"),
     "UserError": ("subzero.errors", "UserError"),
     "compare": ("subzero.comparison", "compare"),
+    "diagnose": ("subzero.diagnosis.entrance", "diagnose"),
     "draw": ("subzero.figures", "draw"),
     "load_scenario": ("subzero.trials", "load"),
     "read_record": ("subzero.measured", "read_record"),
+    "read_trials": ("subzero.diagnosis.records", "read_trials"),
     "simulate": ("subzero.simulation", "simulate"),
 }
 """Public name → (module, name there)."""

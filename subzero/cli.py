@@ -1,4 +1,5 @@
-"""The command line: ``subzero list``, ``simulate``, ``compare``; ``manoeuvre`` and ``autopilot`` (`cli_autopilot`).
+"""The command line: ``subzero list``, ``simulate``, ``compare``; ``manoeuvre`` and ``autopilot`` (`cli_autopilot`);
+``diagnose`` and ``challenge`` (`cli_diagnosis`).
 
 Exit codes: 0 all is well; 2 the user has to change something (one clean message on standard error,
 nothing is written); 3 a run could not go on (what it has is written, the message says when, where and
@@ -19,7 +20,7 @@ from cyclopts import Parameter
 from rich.console import Console
 
 import scenarios
-from subzero import cli_autopilot
+from subzero import cli_autopilot, cli_diagnosis
 from subzero.errors import UserError
 
 if TYPE_CHECKING:
@@ -61,6 +62,7 @@ def simulate(
     /,
     *,
     untethered: Annotated[bool, Parameter(negative=())] = False,
+    with_: cli_diagnosis.With = None,
     commands: Path | None = None,
     out: Path | None = None,
 ) -> int:
@@ -69,6 +71,7 @@ def simulate(
     Args:
         scenario: name of a scenario (see "subzero list"), or path of a scenario file.
         untethered: leave the cable away.
+        with_: extended model that a diagnosis has written (extended.toml).
         commands: CSV file of commands, instead of those of the scenario.
         out: folder for the files; by default one named after the scenario, here.
     """
@@ -77,11 +80,11 @@ def simulate(
 
     trial = scenarios.load(scenario, commands_csv=commands)
     with staged(out or delivery.default_folder(trial)) as stage:
-        trial = _checked(scenario, commands)
+        trial, extended = cli_diagnosis.extended_run(_checked(scenario, commands), with_)
         with _progress(trial) as progress:
             from subzero.simulation import simulate as run
 
-            result = run(trial, tethered=not untethered, progress=progress)
+            result = run(trial, tethered=not untethered, **extended, progress=progress)
         summary = delivery.write_all({"untethered" if untethered else "tethered": result}, None, stage)
     return STOPPED if delivery.tell(summary, stage) else FINE
 
@@ -92,6 +95,7 @@ def compare(
     /,
     *,
     measured: Path | None = None,
+    with_: cli_diagnosis.With = None,
     commands: Path | None = None,
     out: Path | None = None,
 ) -> int:
@@ -100,6 +104,7 @@ def compare(
     Args:
         scenario: name of a scenario (see "subzero list"), or path of a scenario file.
         measured: CSV file of measured channels, to set beside both runs.
+        with_: extended model that a diagnosis has written (extended.toml).
         commands: CSV file of commands, instead of those of the scenario.
         out: folder for the files; by default one named after the scenario, here.
     """
@@ -110,16 +115,17 @@ def compare(
     trial = scenarios.load(scenario, commands_csv=commands)
     record = read_record(measured) if measured is not None else None
     with staged(out or delivery.default_folder(trial)) as stage:
-        trial = _checked(scenario, commands)
+        trial, extended = cli_diagnosis.extended_run(_checked(scenario, commands), with_)
         with _progress(trial) as progress:
             from subzero.comparison import compare as run
 
-            result = run(trial, measured=record, progress=progress)
+            result = run(trial, measured=record, **extended, progress=progress)
         summary = delivery.write_all(result.runs, result.measured, stage)
     return STOPPED if delivery.tell(summary, stage) else FINE
 
 
 cli_autopilot.add_to(app)
+cli_diagnosis.add_to(app)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import scenarios
 from subzero.fit import Fit, beside, fits
+from subzero.later import Later
 from subzero.measured import Record, read_record
+from subzero.model import Model
 from subzero.simulation import simulate
 from subzero.summary import summary_of
 from subzero.trials import load
@@ -55,6 +57,8 @@ def compare(
     scenario: str | Path | scenarios.Trial,
     *,
     measured: str | Path | Record | None = None,
+    model: Model | None = None,
+    later: Later = (),
     progress: Progress | None = None,
 ) -> Comparison:
     """Simulate a trial with its cable and without.
@@ -62,6 +66,8 @@ def compare(
     Args:
         scenario: name of a shipped scenario, path of a scenario file, or a trial.
         measured: a measured record or the path of one, to set beside both runs.
+        model: another model than the one that the scenario describes.
+        later: times of results [s] and the model that holds from each of them on.
         progress: told the fraction that is done, from 0 to 1, over both runs.
 
     Raises:
@@ -70,8 +76,9 @@ def compare(
     """
     trial = scenario if isinstance(scenario, scenarios.Trial) else load(scenario)
     record = read_record(measured) if isinstance(measured, str | Path) else measured
-    tethered = simulate(trial, tethered=True, progress=_half(progress, 0.0))
-    untethered = simulate(trial, tethered=False, progress=_half(progress, 0.5))
+    other: dict[str, Any] = {"model": model, "later": later} if model or later else {}
+    tethered = simulate(trial, tethered=True, **other, progress=_half(progress, 0.0))
+    untethered = simulate(trial, tethered=False, **other, progress=_half(progress, 0.5))
     record = beside(record, tethered) if record is not None else None
     return Comparison(tethered=tethered, untethered=untethered, trial=trial, measured=record)
 

@@ -27,12 +27,13 @@ class ProgressBar:
         self._bar: Progress | None = None
         self._started = time.monotonic()
 
-    def __call__(self, fraction: float) -> None:
-        """Show that this fraction, 0 to 1, is done."""
+    def __call__(self, fraction: float, words: str = "") -> None:
+        """Show that this fraction, 0 to 1, is done, and what is being done."""
+        self._words = words or self._words
         if self._bar is None and time.monotonic() - self._started > PATIENCE and self._console.is_terminal:
             self._open()
         if self._bar is not None:
-            self._bar.update(self._bar.task_ids[0], completed=fraction)
+            self._bar.update(self._bar.task_ids[0], completed=fraction, description=self._words)
 
     def _open(self) -> None:
         from rich.progress import Progress

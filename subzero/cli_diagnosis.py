@@ -1,0 +1,167 @@
+"""The commands ``subzero diagnose`` and ``subzero challenge``, and ``--with``: everything heavy is imported inside."""
+
+from __future__ import annotations
+
+import dataclasses
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import cyclopts
+from cyclopts import Parameter
+from rich.console import Console
+
+import scenarios
+
+if TYPE_CHECKING:
+    from subzero.diagnosis.effect import Effect
+    from subzero.diagnosis.records import Logged
+    from subzero.diagnosis.verdict import Verdict
+
+FINE, INTERRUPTED = 0, 130
+
+Flag = Annotated[bool, Parameter(negative=())]
+With = Annotated[Path | None, Parameter(name="--with")]
+
+
+def diagnose(
+    records: Annotated[list[Path], Parameter(negative=())],
+    /,
+    *,
+    scenario: str | None = None,
+    out: Path = Path("found"),
+    effects: Path | None = None,
+    commands: Literal["record", "scenario"] | None = None,
+    seed: int = 0,
+    screen: Flag = False,
+) -> int:
+    """Say what the simulation gets wrong in measured records, name the cause, extend the model and measure the gain.
+
+    Args:
+        records: CSV files of one vehicle, or folders of them; they are explained together.
+        scenario: what was flown: a name (see "subzero list") or a path; a record's sidecar may name another.
+        out: folder for the files.
+        effects: Python file with causes of your own (EFFECTS = [...]), besides the catalogue.
+        commands: whose commands hold if the record and the scenario differ.
+        seed: of everything random.
+        screen: only the first look, in a few seconds.
+    """
+    from subzero.output import staged
+
+    if scenario is not None:
+        scenarios.load(scenario)  # a mistake in it answers at once
+    with staged(out) as stage:
+        own = _own(effects)
+        logged = _read(records, scenario, commands)
+        from subzero import delivery_diagnosis
+
+        verdict = _ask(logged, own, seed, "screen" if screen else "full")
+        delivery_diagnosis.write_all(verdict, logged, stage, effects=own, effects_file=effects)
+    delivery_diagnosis.tell(verdict, stage)
+    return FINE if verdict.complete else INTERRUPTED
+
+
+def challenge(
+    *,
+    scenario: str = "fig6",
+    seed: int = 0,
+    out: Path = Path("hidden"),
+    reveal: Path | None = None,
+) -> int:
+    """Hide an effect in a record, to find it with "subzero diagnose"; --reveal tells afterwards what it was.
+
+    Args:
+        scenario: what is flown: a name (see "subzero list") or a path.
+        seed: draws the effect, its size, and every number within its tolerance.
+        out: folder for the record.
+        reveal: folder of a challenge, to be told what is hidden in it.
+    """
+    if reveal is not None:
+        from subzero.diagnosis.challenge import reveal as told
+
+        print(told(reveal))
+        return FINE
+    scenarios.load(scenario)
+    from subzero.diagnosis.challenge import challenge as hide
+    from subzero.output import staged
+
+    with staged(out) as stage, _bar("Hiding an effect"):
+        hide(scenario, seed, stage.path)
+    print(f"Wrote {out}: {', '.join(stage.written)}")
+    print(f"Find it: subzero diagnose {out / 'record.csv'} --scenario {scenario}")
+    print(f"Be told: subzero challenge --reveal {out}")
+    return FINE
+
+
+def add_to(app: cyclopts.App) -> None:
+    """Add the commands to the command line."""
+    app.command(diagnose)
+    app.command(challenge)
+
+
+def extended_run(trial: scenarios.Trial, path: Path | None) -> tuple[scenarios.Trial, dict[str, Any]]:
+    """Return a trial and what to run it with, as an extended model says (``--with``)."""
+    if path is None:
+        return trial, {}
+    from subzero.diagnosis.extended import apply, unseen
+    from subzero.diagnosis.extended_reading import read_extended
+    from subzero.diagnosis.setting import Setting
+    from subzero.model import Model
+
+    found = read_extended(path)
+    setting = apply(found.extended, Setting(trial=trial, model=Model.of(trial)), found.effects)
+    hidden = unseen(found.extended, found.effects)
+    if hidden:
+        print(
+            f"A run shows what is, not what sensors show, so it is without {', '.join(hidden)}.",
+            file=sys.stderr,
+        )
+    words = f"{trial.description}, with {path}"
+    return dataclasses.replace(setting.trial, description=words), {
+        "model": setting.model,
+        "later": setting.later,
+    }
+
+
+def _own(path: Path | None) -> tuple[Effect, ...]:
+    """Return the user's own causes."""
+    if path is None:
+        return ()
+    from subzero.diagnosis.effects import load
+
+    return load(path)
+
+
+def _read(paths: list[Path], scenario: str | None, commands: str | None) -> list[Logged]:
+    """Read the records; the compiler is needed to see whether their units are plausible."""
+    from subzero.diagnosis.records import read_trials
+
+    with _bar("Reading"):
+        return read_trials(paths, scenario=scenario, commands=commands)
+
+
+def _ask(logged: list[Logged], own: tuple[Effect, ...], seed: int, budget: str) -> Verdict:
+    """Diagnose under a progress bar; Ctrl-C ends it with what it has."""
+    from subzero.delivery_diagnosis import tell_before
+    from subzero.diagnosis.diagnose import Interrupted
+    from subzero.diagnosis.entrance import diagnose as run
+
+    try:
+        with _bar("Diagnosing") as progress:
+            return run(logged, effects=own, progress=progress, seed=seed, budget=budget, before=tell_before)
+    except Interrupted as stop:
+        if stop.verdict is None:
+            raise KeyboardInterrupt from None
+        print("Interrupted; what it has is written.", file=sys.stderr)
+        return stop.verdict
+
+
+def _bar(words: str) -> Any:
+    """Return a progress bar, after saying why the first run of all takes long."""
+    from subzero.compiled import is_warm
+    from subzero.progress import ProgressBar
+
+    console = Console(stderr=True, highlight=False)
+    if not is_warm():
+        console.print("Compiling the kernels (first use, about 25 s)…")
+    return ProgressBar(words, console)

@@ -1,0 +1,168 @@
+"""What ``subzero diagnose`` and ``--with`` do around the engine, which is on rails: files, words, mistakes, Ctrl-C."""
+
+from __future__ import annotations
+
+import json
+import sys
+import types
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from subzero.cli import FINE, INTERRUPTED, MISTAKE, main
+from subzero.diagnosis.verdict import (
+    CAUSE_NAMED,
+    NOTHING_WRONG,
+    Cause,
+    Curves,
+    Detectability,
+    Estimate,
+    Extended,
+    Verdict,
+)
+
+TIME = np.arange(0.0, 10.01, 0.1)
+SPEED = 1.1 * (1.0 - np.exp(-TIME / 2.0))
+LAG = Estimate(value=0.31, low=0.23, high=0.39, unit="s", nominal=0.1, deviation=0.21, deviation_sd=0.04)
+ROWS = (
+    Detectability(id="current", signal=2.0, smallest={"north": 0.3}, rival="cable_tangential_drag",
+                  discrimination=0.2, cosine=0.998),
+)  # fmt: skip
+NAMED = Verdict(
+    verdict=CAUSE_NAMED,
+    sentence="The rudder servo lags.",
+    causes=(Cause(id="rudder_lag", sentence="the rudder servo lags", probability=0.97,
+                  parameters={"time_constant": LAG}),),
+    probabilities={"rudder_lag": 0.97, "none": 0.03},
+    detectable=ROWS,
+    extended=Extended(deviations={"rudder_lag": {"time_constant": 0.21}}),
+    curves={"record": Curves(time=TIME, measured={"surge_speed": SPEED}, used={},
+                             models={"nominal": {"surge_speed": SPEED}})},
+)  # fmt: skip
+
+
+class Interrupted(Exception):  # noqa: N818 - as the engine calls it
+    def __init__(self, verdict):
+        self.verdict = verdict
+
+
+@pytest.fixture
+def engine(monkeypatch, tmp_path):
+    """An engine that knows its answer, and a simulation on rails; gives what it was asked with."""
+    asked = {}
+
+    def diagnose(records, *, before, progress, **more):
+        asked.update(more, records=records)
+        before(ROWS)
+        progress(0.5, "trying rudder_lag")
+        answer = asked.get("answer", NAMED)
+        if isinstance(answer, BaseException):
+            raise answer
+        return answer
+
+    def respond(setting, times, channels):
+        return dict.fromkeys(channels, np.interp(times, TIME, SPEED))
+
+    for name, members in (
+        ("diagnose", {"diagnose": diagnose, "Interrupted": Interrupted}),
+        ("response", {"respond": respond}),
+    ):
+        module = types.ModuleType(f"subzero.diagnosis.{name}")
+        vars(module).update(members)
+        monkeypatch.setitem(sys.modules, f"subzero.diagnosis.{name}", module)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "200")
+    rows = "\n".join(f"{t:.1f},{v:.5f}" for t, v in zip(TIME, SPEED, strict=True))
+    (tmp_path / "record.csv").write_text(f"time_s,surge_speed_m_s\n{rows}\n")
+    return asked
+
+
+def test_a_diagnosis_tells_what_cannot_be_told_apart_then_the_verdict_and_leaves_all_its_files(
+    engine, tmp_path, capsys
+):
+    assert main(["diagnose", "record.csv", "--scenario", "fig6", "--out", "found", "--seed", "3"]) == FINE
+    said = capsys.readouterr().out
+    assert said.index("current") < said.index("The cause is named") < said.index("time constant 0.31 s")
+    assert "not seen" in said
+    left = {path.name for path in (tmp_path / "found").iterdir()}
+    assert left == {"diagnosis.json", "extended.toml", "report.md", "report.html", "misfit.png", "evidence.png",
+                    "detectable.png"}  # fmt: skip
+    found = json.loads((tmp_path / "found/diagnosis.json").read_text())
+    assert found["causes"][0]["id"] == "rudder_lag"
+    assert found["records"]["record"]["channels"] == ["surge_speed"]
+    assert "time_constant_s = 0.21" in (tmp_path / "found/extended.toml").read_text()
+    assert (engine["seed"], engine["budget"]) == (3, "full")
+    assert engine["records"][0].setting.trial.duration == pytest.approx(10.0)
+
+
+def test_a_screen_is_the_first_look(engine):
+    assert main(["diagnose", "record.csv", "--scenario", "fig6", "--screen"]) == FINE
+    assert engine["budget"] == "screen"
+
+
+def test_effects_of_the_users_own_are_given_to_the_engine_and_copied_beside_the_model(engine, tmp_path):
+    (tmp_path / "mine.py").write_text(
+        "from subzero.diagnosis.effect import Effect\n"
+        "EFFECTS = [Effect(id='mine', sentence='mine', slot='hull', parameters=(), apply=lambda s: s)]\n"
+    )
+    assert (
+        main(["diagnose", "record.csv", "--scenario", "fig6", "--effects", "mine.py", "--out", "found"])
+        == FINE
+    )
+    assert [one.id for one in engine["effects"]] == ["mine"]
+    assert (tmp_path / "found/mine.py").exists()
+    assert 'effects_file = "mine.py"' in (tmp_path / "found/extended.toml").read_text()
+
+
+def test_ctrl_c_keeps_what_there_is(engine, tmp_path, capsys):
+    engine["answer"] = Interrupted(replace(NAMED, complete=False))
+    assert main(["diagnose", "record.csv", "--scenario", "fig6", "--out", "found"]) == INTERRUPTED
+    said = capsys.readouterr()
+    assert "what it has is written" in said.err
+    assert "interrupted: this is as far as it came" in said.out
+    assert json.loads((tmp_path / "found/diagnosis.json").read_text())["complete"] is False
+
+
+def test_ctrl_c_before_there_is_anything_writes_nothing(engine, tmp_path, capsys):
+    engine["answer"] = Interrupted(None)
+    assert main(["diagnose", "record.csv", "--scenario", "fig6", "--out", "found"]) == INTERRUPTED
+    assert "nothing was written" in capsys.readouterr().err
+    assert not (tmp_path / "found").exists()
+
+
+def test_a_healthy_record_is_told_as_one(engine, capsys):
+    engine["answer"] = Verdict(verdict=NOTHING_WRONG, sentence="All is within tolerance.", detectable=ROWS)
+    assert main(["diagnose", "record.csv", "--scenario", "fig6"]) == FINE
+    assert "Nothing is wrong beyond tolerance" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["diagnose", "nowhere.csv", "--scenario", "fig6"], "There is no measured record nowhere.csv"),
+        (["diagnose", "record.csv"], "Which trial is record.csv?"),
+        (["diagnose", "record.csv", "--scenario", "fig7"], "there is no such scenario"),
+        (["diagnose", "record.csv", "--scenario", "fig6", "--effects", "no.py"], "There is no effects file 'no.py'"),
+        (["diagnose", "record.csv", "--scenario", "fig6", "--commands", "mine"], "--commands"),
+        (["diagnose", "--scenario", "fig6"], "requires an argument"),
+        (["diagnose", ".", "--scenario", "fig4"], "prescribes the motion"),
+        (["simulate", "fig6", "--with", "no.toml"], "there is no such file"),
+        (["compare", "fig6", "--with", "record.csv"], "this is not valid TOML"),
+    ],
+)  # fmt: skip
+def test_a_mistake_is_told_in_one_message_and_leaves_nothing(engine, tmp_path, capsys, words, says):
+    assert main([*words, "--out", "found"]) == MISTAKE
+    assert says in " ".join(capsys.readouterr().err.split())
+    assert not (tmp_path / "found").exists()
+
+
+def test_the_same_in_python_takes_files_records_and_models(engine):
+    import subzero
+
+    verdict = subzero.diagnose("record.csv", "fig6", before=print, progress=lambda fraction, words: None)
+    assert verdict.causes[0].id == "rudder_lag"
+    (logged,) = subzero.read_trials("record.csv", scenario="fig6")
+    model = replace(logged.setting.model, current=(0.1, 0.0, 0.0))
+    subzero.diagnose(logged, model, before=print, progress=lambda fraction, words: None)
+    assert engine["records"][0].setting.model.current == (0.1, 0.0, 0.0)
