@@ -61,9 +61,36 @@ def pull_out_lumped(
     tow += wet * ahead
     setpoint, rate = winch_rows(drum, times, wet)
     course = Course(times, np.c_[tow, place, setpoint], np.c_[velocity, speed, rate])
+    rope = rope_off_drum(course, segment_length, cable, drum, current.fastest, wet, ahead)
+    return _run(rope, course, cable, drum, current.numbers(), segment_length)
+
+
+def rope_off_drum(
+    course: Course,
+    segment_length: float,
+    cable: CableProperties,
+    drum: DrumProperties | Winch,
+    fastest: float,
+    wet: float,
+    ahead: np.ndarray,
+) -> Rope:
+    """Return a rope laid straight from the drum to where a course begins, with room for all that comes off on its way.
+
+    Args:
+        course: of the tow point, which begins `wet` ahead of the drum.
+        segment_length: Δs. [m]
+        cable: the cable.
+        drum: a free drum or a winch.
+        fastest: of the water. [m/s]
+        wet: cable in the water at the start. [m]
+        ahead: from the drum to the tow point, a unit vector (3,).
+    """
+    duration, tow, velocity = float(course.times[-1]), course.values[:, :3], course.rates[:, :3]
+    place, speed = course.values[:, 3:6], course.rates[:, 3:6]
+    setpoint, rate = course.values[:, 6], course.rates[:, 6]
     led = isinstance(drum, PayOutRate | Brake)
     way = sum(float(np.linalg.norm(np.diff(x, axis=0), axis=1).sum()) for x in (tow, place))
-    longest = float(setpoint.max()) if led else 5.0 + 3.0 * (wet + way + current.fastest * duration)
+    longest = float(setpoint.max()) if led else 5.0 + 3.0 * (wet + way + fastest * duration)
     count = max(1, int(np.floor(wet / segment_length + 0.5)))
     lengths = np.full(count, segment_length)
     lengths[-1] = wet - segment_length * (count - 1)
@@ -78,7 +105,7 @@ def pull_out_lumped(
     rope.position[:, count] = 0.0
     rope.ends.payout[:] = rate[0] if led else U
     rope.ends.tow_force[:], rope.ends.drum_pull = -(held + k * wet) * ahead, held
-    return _run(rope, course, cable, drum, current.numbers(), segment_length)
+    return rope
 
 
 def tow_lumped(

@@ -52,6 +52,20 @@ def take_step(
     segment_length: float,
 ) -> StageSolved:
     """Take a step of length h; what the ends do at the end of both stages stands in `legs` (2, 15)."""
+    solved = try_step(rope, h, legs, c, drum, water)
+    if solved.converged:
+        accept_step(rope, h, segment_length, c)
+    return solved
+
+
+@inner
+def try_step(
+    rope: Rope, h: float, legs: np.ndarray, c: CableNumbers, drum: DrumNumbers, water: Water
+) -> StageSolved:
+    """Solve a step, as `take_step`, and leave level OLD as it is: the step can be tried again to other places.
+
+    Before another try the springs need their states of the start of the step back (`lumped_rope.STATE`).
+    """
     g = 0.5 * GAMMA * h
     rope.ends.by_payout = 0.0 if drum.control == LENGTH or rope.ends.free_end else g
     start_trapezoid(rope, g)
@@ -65,9 +79,14 @@ def take_step(
         spent += solved.iterations
         if not solved.converged:
             return StageSolved(False, spent, solved.residual, solved.worst)
-    keep(rope, g)
-    mind_the_drum(rope, segment_length, c)
     return StageSolved(True, spent, solved.residual, solved.worst)
+
+
+@inner
+def accept_step(rope: Rope, h: float, segment_length: float, c: CableNumbers) -> None:
+    """Make a step that was solved real."""
+    keep(rope, 0.5 * GAMMA * h)
+    mind_the_drum(rope, segment_length, c)
 
 
 @inner
