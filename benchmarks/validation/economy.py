@@ -2,7 +2,10 @@
 
 A 30 m cable is towed into the helix of 5 m radius, in segments of half a metre, with rows every 0.4 s and `rtol` in
 between; the error is that of the steps alone, against the same segments in steps of 1/320 s. `rtol` is what one step
-may err by, by an estimate; errors of steps add up where the cable follows its own way. So the gate is 3 `rtol`.
+may err by, by an estimate; errors of steps add up where the cable follows its own way. So the gate is 3 `rtol`:
+from 3e-4 down the whole errs by more than `rtol` (by 1.3 to 2.9 times). On so even a motion equal steps are cheaper;
+steps are chosen for motions that are even only in part.
+
 (Between two rows the way of the tow point is a cubic through their velocities: rows 0.8 s apart would leave 2e-4.)
 
 Then a vehicle winds along at 1 m/s for 600 s and pays out 560 m off a drum with friction. Segments are 1 m long at the
@@ -137,4 +140,6 @@ def draw(figure: Figure) -> None:
         right.annotate(f"{g:g}", (n, graded_error(g)), fontsize=6, xytext=(4, 3), textcoords="offset points")
     right.axvline(segments(paid_out(0.0)), color="0.7", label="all of 1 m")
     right.set(xlabel="segments after 10 minutes", ylabel="error of the tow force")
+    right.set_xticks([50, 100, 200, 500], ["50", "100", "200", "500"])
+    right.minorticks_off()
     right.legend(frameon=False)

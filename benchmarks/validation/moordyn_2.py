@@ -116,6 +116,6 @@ def draw(figure: Figure) -> None:
         )
         difference = np.linalg.norm(peer.force - force, axis=1) / ours(name).tow_tension.max()
         right.semilogy(peer.time, difference, lw=0.8)
-    left.set(xlabel="time [s]", ylabel="force on the tow point [N]", ylim=(0.9, 1.4))
+    left.set(xlabel="time [s]", ylabel="force on the tow point [N]", ylim=(0.7, 1.4))
     right.set(xlabel="time [s]", ylabel="difference / largest force", ylim=(1e-5, 1.0))
     left.legend(frameon=False)
