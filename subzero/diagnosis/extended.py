@@ -76,13 +76,26 @@ def apply(extended: Extended, setting: Setting, effects: Mapping[str, Effect]) -
         setting: the nominal one.
         effects: by id, all that are named.
     """
-    for name, numbers in (*extended.calibration.items(), *_throughout(extended)):
+    starts = starts_of(extended)
+    throughout = [(name, numbers) for name, numbers in extended.deviations.items() if name not in starts]
+    for name, numbers in (*extended.calibration.items(), *throughout):
         setting = _with(setting, effects[name], numbers)
     if extended.missing is not None:
         setting = setting.with_model(missing=extended.missing + setting.model.missing)
-    for start, name in sorted((start, name) for name, start in extended.start_times.items()):
-        setting = from_then_on(setting, effects[name], extended.deviations[name], start)
+    for start, name in sorted((start, name) for name, start in starts.items()):
+        setting = from_then_on(setting, effects[plain_id(name)], extended.deviations[name], start)
     return setting
+
+
+def plain_id(name: str) -> str:
+    """Return the id of an effect without the time at which it begins: ``hull_drag@12`` → hull_drag."""
+    return name.partition("@")[0]
+
+
+def starts_of(extended: Extended) -> dict[str, float]:
+    """Return when causes that began in mid-trial began, whether their id says it or `start_times`. [s]"""
+    said = {name: float(name.partition("@")[2]) for name in extended.deviations if "@" in name}
+    return said | {name: start for name, start in extended.start_times.items() if name in extended.deviations}
 
 
 def from_then_on(setting: Setting, effect: Effect, numbers: Mapping[str, float], start: float) -> Setting:
@@ -99,12 +112,8 @@ def unseen(extended: Extended, effects: Mapping[str, Effect]) -> list[str]:
     return [
         name
         for name in (*extended.deviations, *extended.calibration)
-        if effects[name].slot in ("sensors", "clock")
+        if effects[plain_id(name)].slot in ("sensors", "clock")
     ]
-
-
-def _throughout(extended: Extended) -> list[tuple[str, Mapping[str, float]]]:
-    return [(name, one) for name, one in extended.deviations.items() if name not in extended.start_times]
 
 
 def _with(setting: Setting, effect: Effect, numbers: Mapping[str, float]) -> Setting:

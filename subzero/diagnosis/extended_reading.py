@@ -13,7 +13,7 @@ from scenarios import ScenarioError
 from scenarios.files import Source, read_toml
 from subzero.diagnosis.effect import Effect, Parameter
 from subzero.diagnosis.effects import load
-from subzero.diagnosis.extended import STARTS, ExtendedFile, all_effects, force_key, key_of
+from subzero.diagnosis.extended import STARTS, ExtendedFile, all_effects, force_key, key_of, plain_id
 from subzero.diagnosis.verdict import Extended
 from subzero.errors import UserError, listed, suggestion
 from subzero.missing_force import AXES, MissingForce, Term
@@ -76,20 +76,24 @@ def _effects(
     found: dict[str, dict[str, float]] = {}
     for name, numbers in table.items():
         at = _at(source, f"{section}.{name}")
-        if name not in known:
+        if plain_id(name) not in known:
             problems.append(f"{at}: there is no effect '{name}'.{suggestion(name, known)}")
+        elif "@" in name and not _is_time(name.partition("@")[2]):
+            problems.append(f"{at}: behind the @ stands when it begins, in seconds: {plain_id(name)}@12")
         elif not isinstance(numbers, Mapping):
             problems.append(f"{at}: this is not a section; write [{section}.{name}]")
         else:
-            found[name] = _numbers(at, known[name], numbers, starts, problems)
+            began = {} if starts is None else starts
+            found[name] = _numbers(at, name, known[plain_id(name)], numbers, began, problems)
     return found
 
 
 def _numbers(
     at: str,
+    name: str,
     effect: Effect,
     numbers: Mapping[str, Any],
-    starts: dict[str, float] | None,
+    starts: dict[str, float],
     problems: list[str],
 ) -> dict[str, float]:
     """Return parameter → deviation of one effect, and note when it starts."""
@@ -98,11 +102,11 @@ def _numbers(
     for key, value in numbers.items():
         if not _is_number(value):
             problems.append(f"{at}: {key} is {value!r}, which is not a finite number")
-        elif key == STARTS and starts is not None:
+        elif key == STARTS:
             problems += _start_problems(at, effect, value)
-            starts[effect.id] = float(value)
+            starts[name] = float(value)
         elif key not in parameters:
-            allowed = (*parameters, *([STARTS] if starts is not None else []))
+            allowed = (*parameters, *([STARTS] if effect.sudden else []))
             problems.append(
                 f"{at}: there is no '{key}'.{suggestion(key, allowed)} Allowed: {', '.join(allowed)}."
             )
@@ -122,6 +126,10 @@ def _range_problems(at: str, key: str, parameter: Parameter, value: float) -> li
     if parameter.low <= value <= parameter.high:
         return []
     return [f"{at}: {key} is {value:g}. Allowed: {parameter.low:g} to {parameter.high:g} (a deviation)."]
+
+
+def _is_time(text: str) -> bool:
+    return text.replace(".", "", 1).isdigit()
 
 
 def _is_number(value: object) -> bool:

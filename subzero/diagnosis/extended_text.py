@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
 from subzero.diagnosis.effect import Effect
-from subzero.diagnosis.extended import STARTS, all_effects, force_key, key_of
+from subzero.diagnosis.extended import STARTS, all_effects, force_key, key_of, plain_id, starts_of
 from subzero.diagnosis.setting import Setting
 from subzero.diagnosis.verdict import Extended
 from subzero.missing_force import AXES, FEATURES, MissingForce
@@ -40,16 +40,18 @@ def text_of(
     lines += [f"effects_file = {_text(str(effects_file))}"] if effects_file else []
     for section, table in (("effects", extended.deviations), ("calibration", extended.calibration)):
         for name, numbers in table.items():
-            start = extended.start_times.get(name) if section == "effects" else None
-            lines += ["", *_effect_lines(section, known[name], numbers, start, setting)]
+            start = starts_of(extended).get(name) if section == "effects" else None
+            lines += [
+                "",
+                *_effect_lines(f"{section}.{_key(name)}", known[plain_id(name)], numbers, start, setting),
+            ]
     return "\n".join([*lines, *_missing_lines(extended.missing)]) + "\n"
 
 
 def _effect_lines(
-    section: str, effect: Effect, numbers: Mapping[str, float], start: float | None, setting: Setting
+    header: str, effect: Effect, numbers: Mapping[str, float], start: float | None, setting: Setting
 ) -> Iterator[str]:
-    name = effect.id if effect.id.replace("_", "").isalnum() else _text(effect.id)
-    yield f"[{section}.{name}]{'':8}# {effect.sentence}"
+    yield f"[{header}]{'':8}# {effect.sentence}"
     for parameter in effect.parameters:
         value, nominal = numbers.get(parameter.name, 0.0), parameter.nominal(setting)
         unit = "" if parameter.unit == "1" else f" {parameter.unit}"
@@ -79,6 +81,11 @@ def _list(values: Iterable[float]) -> str:
 def _number(value: float) -> str:
     """Return a number that TOML reads as a float, the same to the last bit."""
     return repr(float(value))
+
+
+def _key(name: str) -> str:
+    """Return an id as TOML takes it: in quotes if it has a colon or an @."""
+    return name if name.replace("_", "").isalnum() else _text(name)
 
 
 def _text(text: str) -> str:

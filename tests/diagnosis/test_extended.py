@@ -84,6 +84,15 @@ def test_an_extended_model_is_applied_each_part_in_its_place(setting):
     assert_allclose(changed.trial.start.heading, setting.trial.start.heading - math.radians(0.2))
 
 
+def test_a_cause_whose_id_says_when_it_began_is_written_and_applied_too(setting, tmp_path):
+    found = Extended(deviations={"hull_drag": {"share": 0.1}, "hull_drag@12": {"share": 0.3}})
+    back = read_extended(written(tmp_path, text_of(found, setting)))
+    changed = apply(back.extended, setting, back.effects)
+    ((start, later),) = changed.later
+    assert start == pytest.approx(12.0)
+    assert later != changed.model != setting.model
+
+
 def test_two_causes_that_begin_one_after_the_other_add_up(setting):
     found = Extended(
         deviations={"rudder_offset": {"angle": 2.0}, "hull_drag": {"share": 0.3}},
@@ -126,6 +135,7 @@ EFFECTS = [Effect(id="lost_ballast", sentence="ballast was lost", slot="hull", a
         ("[effects.rudder_lag]\ntime_constant_s = nan", "which is not a finite number"),
         ("[effects.rudder_lag]\ntime_constant_s = 0.2\nstarts_at_s = 3.0", "does not begin in mid-trial"),
         ("[effects.rudder_offset]\nangle_deg = 0.2\nstarts_at_s = -3.0", "must be above 0"),
+        ('[effects."hull_drag@noon"]\nshare = 0.1', "behind the @ stands when it begins, in seconds: hull_drag@12"),
         ("[effect.rudder_lag]\n", "there is no such key. Did you mean 'effects'?"),
         ("[effects]\nrudder_lag = 3", "this is not a section; write [effects.rudder_lag]"),
         ("missing_force = 3", "write [[missing_force]]"),
