@@ -18,7 +18,7 @@ from typing import Any
 _HOME = {
     "CHANNELS": ("subzero.channels", "CHANNELS"),
     "Comparison": ("subzero.comparison", "Comparison"),
-    "Logged": ("subzero.diagnosis.records", "Logged"),
+    "Logged": ("subzero.diagnosis.logged", "Logged"),
     "Model": ("subzero.model", "Model"),
     "Observation": ("subzero.simulator", "Observation"),
     "Record": ("subzero.measured", "Record"),

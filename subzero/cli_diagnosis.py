@@ -15,7 +15,7 @@ import scenarios
 
 if TYPE_CHECKING:
     from subzero.diagnosis.effect import Effect
-    from subzero.diagnosis.records import Logged
+    from subzero.diagnosis.logged import Logged
     from subzero.diagnosis.verdict import Verdict
 
 FINE, INTERRUPTED = 0, 130
@@ -141,19 +141,15 @@ def _read(paths: list[Path], scenario: str | None, commands: str | None) -> list
 
 
 def _ask(logged: list[Logged], own: tuple[Effect, ...], seed: int, budget: str) -> Verdict:
-    """Diagnose under a progress bar; Ctrl-C ends it with what it has."""
+    """Diagnose under a progress bar; Ctrl-C ends it with what it has, if it has anything."""
     from subzero.delivery_diagnosis import tell_before
-    from subzero.diagnosis.diagnose import Interrupted
     from subzero.diagnosis.entrance import diagnose as run
 
-    try:
-        with _bar("Diagnosing") as progress:
-            return run(logged, effects=own, progress=progress, seed=seed, budget=budget, before=tell_before)
-    except Interrupted as stop:
-        if stop.verdict is None:
-            raise KeyboardInterrupt from None
+    with _bar("Diagnosing") as progress:
+        verdict = run(logged, effects=own, progress=progress, seed=seed, budget=budget, seen=tell_before)
+    if not verdict.complete:
         print("Interrupted; what it has is written.", file=sys.stderr)
-        return stop.verdict
+    return verdict
 
 
 def _bar(words: str) -> Any:

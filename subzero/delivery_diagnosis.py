@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from subzero.diagnosis.effect import Effect
-    from subzero.diagnosis.records import Logged
+    from subzero.diagnosis.logged import Logged
     from subzero.output import Stage
 
 MOST_ROWS = 12

@@ -5,16 +5,17 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
 
 from subzero.diagnosis.effect import Effect
 from subzero.diagnosis.effects import load
-from subzero.diagnosis.records import Logged, read_trials
-from subzero.diagnosis.verdict import Verdict
+from subzero.diagnosis.logged import Logged
+from subzero.diagnosis.records import read_trials
+from subzero.diagnosis.verdict import Detectability, Verdict
 from subzero.model import Model
 
 Given = Logged | str | Path
 Progress = Callable[[float, str], None]
+Seen = Callable[[tuple[Detectability, ...]], None]
 
 
 def diagnose(
@@ -26,7 +27,7 @@ def diagnose(
     progress: Progress | None = None,
     seed: int = 0,
     budget: str = "full",
-    **more: Any,
+    seen: Seen | None = None,
 ) -> Verdict:
     """Say what a simulation gets wrong, name the cause, extend the model and measure the gain.
 
@@ -41,8 +42,8 @@ def diagnose(
         commands: "record" or "scenario", if a record's commands may differ from the scenario's.
         progress: told the fraction that is done, and what is being tried.
         seed: of everything random.
-        budget: "full", or "screen" for the first look of a few seconds.
-        more: what the engine takes besides.
+        budget: "full", "verdict" without gain and next trial, or "screen" for the first look of a few seconds.
+        seen: told what the records can show, before they are looked at.
 
     Raises:
         UserError: a record, a sidecar or an effects file cannot be used.
@@ -52,7 +53,7 @@ def diagnose(
 
     own = load(effects) if isinstance(effects, str | Path) else tuple(effects)
     logged = _logged([records] if isinstance(records, Logged | str | Path) else records, model, commands)
-    return engine(logged, effects=own, progress=progress, seed=seed, budget=budget, **more)
+    return engine(logged, effects=own, progress=progress, seed=seed, budget=budget, seen=seen)
 
 
 def _logged(records: Sequence[Given], model: str | Path | Model | None, commands: str | None) -> list[Logged]:

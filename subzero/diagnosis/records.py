@@ -9,13 +9,13 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
 from subzero.channels import BY_NAME
 from subzero.diagnosis.effects.sensors import NOISE, SPECS
+from subzero.diagnosis.logged import Logged
 from subzero.diagnosis.plausible import is_constant, repeating, stuck, unit_questions
 from subzero.diagnosis.setting import Setting
 from subzero.diagnosis.sidecar import Sidecar, read_sidecar
@@ -28,25 +28,6 @@ from subzero.trials import load
 
 Simulated = Callable[[Setting, np.ndarray, Sequence[str]], Mapping[str, np.ndarray]]
 """(setting, times, channels) → channel → what the sensors would have measured."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Logged:
-    """A record and the trial in which it was measured.
-
-    Attributes:
-        record: the channels that are diagnosed.
-        setting: the trial with its commands, and the nominal model.
-        noise: channel → standard deviation, where it is known. [display unit]
-        name: short, for figures and tables.
-        notes: what was left out, and why.
-    """
-
-    record: Record
-    setting: Setting
-    noise: Mapping[str, float] = field(default_factory=dict)
-    name: str
-    notes: tuple[str, ...] = ()
 
 
 def read_trials(

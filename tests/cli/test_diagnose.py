@@ -42,19 +42,14 @@ NAMED = Verdict(
 )  # fmt: skip
 
 
-class Interrupted(Exception):  # noqa: N818 - as the engine calls it
-    def __init__(self, verdict):
-        self.verdict = verdict
-
-
 @pytest.fixture
 def engine(monkeypatch, tmp_path):
     """An engine that knows its answer, and a simulation on rails; gives what it was asked with."""
     asked = {}
 
-    def diagnose(records, *, before, progress, **more):
+    def diagnose(records, *, seen, progress, **more):
         asked.update(more, records=records)
-        before(ROWS)
+        seen(ROWS)
         progress(0.5, "trying rudder_lag")
         answer = asked.get("answer", NAMED)
         if isinstance(answer, BaseException):
@@ -65,7 +60,7 @@ def engine(monkeypatch, tmp_path):
         return dict.fromkeys(channels, np.interp(times, TIME, SPEED))
 
     for name, members in (
-        ("diagnose", {"diagnose": diagnose, "Interrupted": Interrupted}),
+        ("diagnose", {"diagnose": diagnose}),
         ("response", {"respond": respond}),
     ):
         module = types.ModuleType(f"subzero.diagnosis.{name}")
@@ -116,7 +111,7 @@ def test_effects_of_the_users_own_are_given_to_the_engine_and_copied_beside_the_
 
 
 def test_ctrl_c_keeps_what_there_is(engine, tmp_path, capsys):
-    engine["answer"] = Interrupted(replace(NAMED, complete=False))
+    engine["answer"] = replace(NAMED, complete=False)
     assert main(["diagnose", "record.csv", "--scenario", "fig6", "--out", "found"]) == INTERRUPTED
     said = capsys.readouterr()
     assert "what it has is written" in said.err
@@ -125,7 +120,7 @@ def test_ctrl_c_keeps_what_there_is(engine, tmp_path, capsys):
 
 
 def test_ctrl_c_before_there_is_anything_writes_nothing(engine, tmp_path, capsys):
-    engine["answer"] = Interrupted(None)
+    engine["answer"] = KeyboardInterrupt()
     assert main(["diagnose", "record.csv", "--scenario", "fig6", "--out", "found"]) == INTERRUPTED
     assert "nothing was written" in capsys.readouterr().err
     assert not (tmp_path / "found").exists()
@@ -160,9 +155,9 @@ def test_a_mistake_is_told_in_one_message_and_leaves_nothing(engine, tmp_path, c
 def test_the_same_in_python_takes_files_records_and_models(engine):
     import subzero
 
-    verdict = subzero.diagnose("record.csv", "fig6", before=print, progress=lambda fraction, words: None)
+    verdict = subzero.diagnose("record.csv", "fig6", seen=print, progress=lambda fraction, words: None)
     assert verdict.causes[0].id == "rudder_lag"
     (logged,) = subzero.read_trials("record.csv", scenario="fig6")
     model = replace(logged.setting.model, current=(0.1, 0.0, 0.0))
-    subzero.diagnose(logged, model, before=print, progress=lambda fraction, words: None)
+    subzero.diagnose(logged, model, seen=print, progress=lambda fraction, words: None)
     assert engine["records"][0].setting.model.current == (0.1, 0.0, 0.0)
