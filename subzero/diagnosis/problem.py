@@ -18,10 +18,10 @@ from subzero.diagnosis.noise import Noise
 from subzero.diagnosis.response import TRUTHS, multiples, sensed, tracked
 from subzero.diagnosis.setting import Setting
 
-ROUGH = (0.1, 0.5, 2.0)
+ROUGH = (0.1, 0.5, 1.0)
 """Hull step, cable step [s] and segment length [m] for sensitivities: their error counts only in second order."""
 STEP = 0.2
-"""Step of a sensitivity, in tolerances."""
+"""Step of a sensitivity, in tolerances; a whole one from a state of rest (a play, a friction), where slopes jump."""
 LATE = ("sensors", "clock")
 """Slots that act on a finished run."""
 
@@ -91,16 +91,18 @@ class Problem:
     def jacobian(self, z: np.ndarray, columns: Sequence[int] | None = None) -> np.ndarray:
         """Return J (m, k) at z by one-sided differences; only some of its columns, if asked, others 0."""
         wanted = range(len(self.entries)) if columns is None else columns
-        base = self._tracks([(i, z) for i in range(len(self.records))], rough=True)
+        at_z = [(i, z) for i in range(len(self.records))]
+        base, fine = self._tracks(at_z, rough=True), self._tracks(at_z)
         shown = [self._whitened(i, self.setting(i, z), track) for i, track in enumerate(base)]
+        finely = [self._whitened(i, self.setting(i, z), track) for i, track in enumerate(fine)]
         jobs = [(k, i, self._moved(z, k)) for k in wanted for i in range(len(self.records))
                 if self.entries[k].record in (-1, i)]  # fmt: skip
         runs = iter(self._tracks([(i, moved) for k, i, moved in jobs if not self._late(k)], rough=True))
         J = np.zeros((sum(part.size for part in shown), len(self.entries)))
         first = np.cumsum([0, *(part.size for part in shown)])
         for k, i, moved in jobs:
-            track = base[i] if self._late(k) else next(runs)
-            change = self._whitened(i, self.setting(i, moved), track) - shown[i]
+            track, old = (fine[i], finely[i]) if self._late(k) else (next(runs), shown[i])
+            change = self._whitened(i, self.setting(i, moved), track) - old
             J[first[i] : first[i + 1], k] = change / (moved[k] - z[k])
         return np.nan_to_num(J)
 
@@ -114,7 +116,8 @@ class Problem:
     def _moved(self, z: np.ndarray, k: int) -> np.ndarray:
         """Return z with entry k moved by a step, away from the nearer bound."""
         parameter, moved = self.entries[k].parameter, z.copy()
-        step = STEP * parameter.tolerance
+        at_rest = parameter.low == 0.0 and z[k] < parameter.tolerance
+        step = (1.0 if at_rest else STEP) * parameter.tolerance
         moved[k] += step if z[k] + step <= parameter.high else -step
         return moved
 

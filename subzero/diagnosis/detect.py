@@ -1,0 +1,92 @@
+"""What records can show at all, before they are looked at: signal and discrimination of every cause.
+
+    G = information of two causes with all other tolerances free
+    signal² = sᵀ G_aa s,    D(a|b) = sᵀ (G_aa − G_ab (G_bb + 1/s_b²)⁻¹ G_ba) s,    D = min over b
+
+D is twice the expected log evidence by which the data prefer a to b: below 9 they cannot be told apart, from 16 on they
+can. A cause of another size v has (v/s)² times as much.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from subzero.diagnosis.hypotheses import named, places
+from subzero.diagnosis.problem import Problem
+from subzero.diagnosis.verdict import Detectability
+
+SEEN = 4.0
+"""A signal that would be seen."""
+
+
+def marginal(problem: Problem, J: np.ndarray, kappa: float = 1.0) -> np.ndarray:
+    """Return the covariance of all entries under data and tolerances (k, k)."""
+    tolerance = np.array([kappa * entry.parameter.tolerance for entry in problem.entries])
+    scaled = tolerance[:, None] * (J.T @ J) * tolerance + np.eye(tolerance.size)
+    return tolerance[:, None] * np.linalg.inv(scaled) * tolerance
+
+
+def information(problem: Problem, M: np.ndarray, at: list[int]) -> np.ndarray:
+    """Return what the data alone say of some entries, all others within tolerance (n, n)."""
+    tolerance = np.array([problem.entries[k].parameter.tolerance for k in at])
+    return np.linalg.inv(M[np.ix_(at, at)]) - np.diag(1.0 / tolerance**2)
+
+
+def against(problem: Problem, M: np.ndarray, own: list[int], step: np.ndarray, other: list[int]) -> tuple[float, float]:
+    """Return D of a step (n,) of its own entries against other entries, and how much alike they are (0 to 1)."""
+    G = information(problem, M, own + other)
+    n = len(own)
+    scale = np.array([problem.entries[k].parameter.scale for k in other])
+    cross = step @ G[:n, n:]
+    answer = np.linalg.solve(G[n:, n:] + np.diag(1.0 / scale**2), cross)
+    whole = float(step @ G[:n, :n] @ step)
+    alike = np.linalg.lstsq(G[n:, n:], cross, rcond=None)[0] @ cross
+    return max(whole - float(cross @ answer), 0.0), float(np.sqrt(max(alike, 0.0) / max(whole, 1e-300)))
+
+
+def detectability(problem: Problem, J: np.ndarray) -> tuple[Detectability, ...]:
+    """Return what the records can show of every cause, at one effect scale, the weakest first."""
+    M = marginal(problem, J)
+    found = [_of(problem, M, J, one, named(problem)) for one in named(problem)]
+    return tuple(sorted(found, key=lambda one: one.discrimination))
+
+
+def _of(problem: Problem, M: np.ndarray, J: np.ndarray, one: str, others: list[str]) -> Detectability:
+    """Return the detectability of a cause: of its parameter with the greatest signal."""
+    at = places(problem.entries, (one,))
+    signals = {k: _signal(problem, M, k) for k in at}
+    step = np.array([problem.entries[k].parameter.scale if signals[k] == max(signals.values()) else 0.0 for k in at])
+    ranked = sorted(
+        ((*against(problem, M, at, step, places(problem.entries, (other,))), other) for other in others if other != one),
+        key=lambda triple: triple[0],
+    )
+    D, cosine, rival = ranked[0] if ranked else (max(signals.values()) ** 2, 0.0, "none")
+    return Detectability(
+        id=one,
+        signal=max(signals.values()),
+        smallest={
+            problem.entries[k].parameter.name: SEEN * problem.entries[k].parameter.scale / max(signals[k], 1e-9) for k in at
+        },
+        rival=rival,
+        discrimination=D,
+        cosine=cosine,
+    )
+
+
+def _signal(problem: Problem, M: np.ndarray, k: int) -> float:
+    """Return the size of one effect scale of an entry, in standard deviations."""
+    scale = problem.entries[k].parameter.scale
+    return float(scale * np.sqrt(max(information(problem, M, [k])[0, 0], 0.0)))
+
+
+def separation(problem: Problem, J: np.ndarray, z: np.ndarray, ids: tuple[str, ...], kappa: float = 1.0) -> tuple[float, str]:
+    """Return D of causes as they are in z against their closest rival, and that rival ("none": the tolerances)."""
+    M = marginal(problem, J, kappa)
+    own = places(problem.entries, ids)
+    whole = float(z[own] @ information(problem, M, own) @ z[own])
+    best, who = whole, "none"
+    for other in named(problem):
+        if other not in ids:
+            D = against(problem, M, own, z[own], places(problem.entries, (other,)))[0]
+            best, who = (D, other) if D < best else (best, who)
+    return best, who

@@ -1,0 +1,86 @@
+"""From records to a verdict: the engine from end to end.
+
+    pose → what could be seen → misfit → search → what is outside → rules → extended model → gain → next trial
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from time import perf_counter
+
+from subzero.diagnosis.detect import detectability
+from subzero.diagnosis.effect import Effect
+from subzero.diagnosis.foreign import foreigners
+from subzero.diagnosis.misfit import misfits
+from subzero.diagnosis.pose import pose
+from subzero.diagnosis.problem import Progress
+from subzero.diagnosis.records import Logged
+from subzero.diagnosis.response import respond
+from subzero.diagnosis.search import Search
+from subzero.diagnosis.telling import tell
+from subzero.diagnosis.verdict import Detectability, Verdict
+from subzero.diagnosis.work import Work
+
+BUDGETS = ("screen", "verdict", "full")
+"""Linear evidence only; up to the verdict and the extended model; with gain and next trial."""
+
+Seen = Callable[[tuple[Detectability, ...]], None]
+
+
+def diagnose(
+    records: Sequence[Logged],
+    *,
+    effects: Iterable[Effect] = (),
+    progress: Progress | None = None,
+    seen: Seen | None = None,
+    seed: int = 0,
+    budget: str = "full",
+) -> Verdict:
+    """Say what the nominal models of some records get wrong, and why.
+
+    Args:
+        records: of one vehicle, each with its trial.
+        effects: causes besides the catalogue.
+        progress: told the fraction that is done, and what is being tried.
+        seen: told what the records can show, before they are looked at.
+        seed: of everything random.
+        budget: one of BUDGETS.
+
+    Raises:
+        UserError: the nominal model cannot be run through a trial.
+    """
+    problem = pose(records, effects)
+    search = Search(problem=problem, progress=progress or (lambda share, words: None))
+    work = Work(problem=problem, search=search, seed=seed, budget=budget)
+    try:
+        _work(work, seen or (lambda table: None))
+    except KeyboardInterrupt:
+        work.complete = False
+        if () not in search.candidates:
+            raise
+    return tell(work)
+
+
+def _work(work: Work, seen: Seen) -> None:
+    """Do all parts in turn, and keep their times."""
+    search, start = work.search, perf_counter()
+
+    def done(part: str) -> None:
+        work.seconds[part] = perf_counter() - start - sum(work.seconds.values())
+
+    for one in work.problem.records:
+        work.misfit[one.name] = misfits(one, respond(one.setting, one.time, one.noise))
+    search.begin()
+    work.detectable = detectability(work.problem, search.nominal[1])
+    seen(work.detectable)
+    search.look()
+    done("screen")
+    if work.budget == "screen":
+        search.fit(())
+        return
+    search.refit_best()
+    search.grow()
+    done("fits")
+    search.progress(0.8, "forces that no cause explains")
+    work.foreign = foreigners(search)
+    done("outside")

@@ -1,0 +1,101 @@
+"""What no cause explains: forces, drifts and sudden changes, set beside the causes on one scale of probability."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from subzero.diagnosis.evidence import KAPPAS, log_sum
+from subzero.diagnosis.hypotheses import PRIOR, Ids, variances
+from subzero.diagnosis.search import Candidate, Search
+from subzero.diagnosis.sudden import Begun, scan
+from subzero.diagnosis.unknown import Suspect, all_columns, knots_of, suspects
+
+WORTH = 2.0
+"""A force that raises the log posterior by this much is worth a closer look for sudden changes."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Foreign:
+    """An explanation from outside the list of hypotheses.
+
+    Attributes:
+        beside: the causes that hold as well.
+        what: a force or a drift, or a cause that begins in mid-trial.
+        log_posterior: on the scale of `Candidate.log_posterior`.
+    """
+
+    beside: Ids
+    what: Suspect | Begun
+    log_posterior: float
+
+    @property
+    def id(self) -> str:
+        """Such as "unknown_force:X" or "rudder_offset@12"."""
+        return self.what.id if isinstance(self.what, Suspect) else self.what.begun.id
+
+
+def foreigners(search: Search) -> list[Foreign]:
+    """Return what lies outside, most probable first: beside nothing, and beside the best causes."""
+    problem, knots = search.problem, knots_of(search.problem)
+    columns = all_columns(problem, search.best().fit.z, knots)
+    found: list[Foreign] = []
+    for candidate in _bases(search):
+        D = variances(problem.entries, candidate.ids, candidate.kappa)
+        prior = np.log(PRIOR["unknown"] / len(columns))
+        found += [Foreign(beside=candidate.ids, what=one, log_posterior=candidate.log_posterior + one.log_gain + prior)
+                  for one in suspects(problem, columns, candidate.fit, D, knots)]  # fmt: skip
+    if max(one.log_posterior for one in found) > search.best().log_posterior - WORTH:
+        found += _sudden(search)
+    return sorted(found, key=lambda one: -one.log_posterior)
+
+
+def _bases(search: Search) -> list[Candidate]:
+    """Return the candidates that something may be added to."""
+    best = search.best()
+    return [search.candidates[()]] + ([best] if best.ids else [])
+
+
+def _sudden(search: Search) -> list[Foreign]:
+    """Return causes that begin in mid-trial, beside nothing else."""
+    problem, none = search.problem, search.candidates[()]
+    effects = list({entry.effect.id: entry.effect for entry in problem.entries if entry.record < 0}.values())
+    able = [effect for effect in effects if effect.sudden]
+    found = []
+    for record in range(len(problem.records)):
+        D = variances(problem.entries, (), none.kappa)
+        times = max(float(problem.records[record].time[-1]) / 2.0, 1.0)
+        prior = np.log(PRIOR["unknown"] / (len(able) * times * len(problem.records)))
+        found += [Foreign(beside=(), what=one, log_posterior=none.log_posterior + one.log_gain + prior)
+                  for one in scan(problem, none.fit, D, able, record)]  # fmt: skip
+    return found
+
+
+def shares(search: Search, foreign: list[Foreign]) -> tuple[dict[Ids, float], dict[str, float]]:
+    """Return the probabilities of hypotheses, and of everything outside by id; together they sum to 1."""
+    inside = search.probabilities()
+    best = search.best()
+    scale = best.log_posterior - np.log(max(inside[best.ids], 1e-300))
+    outside = log_sum([one.log_posterior for one in foreign]) if foreign else -np.inf
+    total = log_sum([scale, outside])
+    found: dict[str, float] = {}
+    for one in foreign:
+        found[one.id] = found.get(one.id, 0.0) + float(np.exp(one.log_posterior - total))
+    kept = float(np.exp(scale - total))
+    return {ids: kept * p for ids, p in inside.items()}, found
+
+
+def tolerance_scale(search: Search) -> dict[float, float]:
+    """Return κ → probability, over all candidates."""
+    top = search.best().log_posterior
+    weight = {kappa: 0.0 for kappa in KAPPAS}
+    for candidate in search.candidates.values():
+        parts = {kappa: np.log(prior) + candidate.log_evidence[kappa] for kappa, prior in KAPPAS.items()}
+        mixed = log_sum(list(parts.values()))
+        for kappa, value in parts.items():
+            weight[kappa] += float(np.exp(candidate.log_posterior - top + value - mixed))
+    total = sum(weight.values())
+    return {kappa: value / total for kappa, value in weight.items()}
+
+

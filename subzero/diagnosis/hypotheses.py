@@ -1,0 +1,51 @@
+"""The hypotheses and how probable they are before a record is seen, in one visible table."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import combinations
+
+import numpy as np
+
+from subzero.diagnosis.problem import Entry, Problem
+
+Ids = tuple[str, ...]
+"""The causes of a hypothesis, in the order of the alphabet; () is "nothing is wrong"."""
+
+PRIOR = {"none": 0.50, "single": 0.40, "pair": 0.06, "unknown": 0.04, "more": 0.004}
+"""Probability of each kind, shared by all hypotheses of the kind."""
+
+
+def named(problem: Problem) -> list[str]:
+    """Return the ids that can be named: all but those of the start."""
+    found = dict.fromkeys(entry.effect.id for entry in problem.entries if entry.record < 0)
+    return list(found)
+
+
+def places(entries: Sequence[Entry], ids: Ids) -> list[int]:
+    """Return where the parameters of causes stand in z."""
+    return [k for k, entry in enumerate(entries) if entry.record < 0 and entry.effect.id in ids]
+
+
+def compatible(entries: Sequence[Entry], ids: Sequence[str]) -> list[Ids]:
+    """Return all pairs of different causes."""
+    return [tuple(sorted(pair)) for pair in combinations(ids, 2)]
+
+
+def log_prior(ids: Ids, count: int) -> float:
+    """Return the log of a hypothesis' probability beforehand, of `count` causes that can be named."""
+    if not ids:
+        return float(np.log(PRIOR["none"]))
+    if len(ids) == 1:
+        return float(np.log(PRIOR["single"] / count))
+    if len(ids) == 2:
+        return float(np.log(PRIOR["pair"] / (count * (count - 1) / 2)))
+    return float(np.log(PRIOR["more"] / (count * (count - 1) * (count - 2) / 6)))
+
+
+def variances(entries: Sequence[Entry], ids: Ids, kappa: float) -> np.ndarray:
+    """Return the prior variances of z (k,): (κτ)², or s² for the causes that are named."""
+    D = np.array([(kappa * entry.parameter.tolerance) ** 2 for entry in entries])
+    for k in places(entries, ids):
+        D[k] = max(entries[k].parameter.scale, 2.0 * kappa * entries[k].parameter.tolerance) ** 2
+    return D

@@ -1,0 +1,84 @@
+"""What is wrong, channel by channel, before anybody asks why: the nominal simulation beside what was measured."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.stats import chi2
+
+from subzero.diagnosis.noise import Noise
+from subzero.diagnosis.problem import Observed
+from subzero.diagnosis.verdict import Misfit
+
+LAGS = 25
+WINDOW = 2.0
+"""Length of the windows in which a misfit is looked for [s]."""
+COMMANDS = ("propeller", "rudder", "port stern-plane", "starboard stern-plane")
+
+
+def misfits(one: Observed, simulated: dict[str, np.ndarray]) -> dict[str, Misfit]:
+    """Return channel → misfit of a record, from what the nominal model says to its times."""
+    return {name: _misfit(one, name, simulated[name]) for name in one.noise}
+
+
+def _misfit(one: Observed, name: str, simulated: np.ndarray) -> Misfit:
+    noise, measured = one.noise[name], one.values[name]
+    residual = (measured - simulated)[noise.used]
+    spread = measured[noise.used] - np.mean(measured[noise.used])
+    rmse = float(np.sqrt(np.mean(residual**2)))
+    norm = float(np.linalg.norm(spread))
+    return Misfit(
+        rmse=rmse,
+        nrmse=rmse / noise.sd,
+        fit_percent=100.0 * (1.0 - float(np.linalg.norm(residual)) / norm) if norm > 0.0 else float("nan"),
+        bias=float(np.mean(residual)),
+        whiteness_p=whiteness(noise.whiten(measured - simulated)),
+        command_correlation=_correlations(one, noise, measured - simulated),
+        windows=_windows(one.time[noise.used], residual, noise),
+        noise_sd=noise.sd,
+        noise_rho=noise.rho,
+        outliers=int(np.sum(np.isfinite(measured) & ~noise.used)),
+        gaps=int(np.sum(~np.isfinite(measured))),
+    )
+
+
+def whiteness(white: np.ndarray, lags: int = LAGS) -> float:
+    """Return the p-value of Ljung and Box: how often white noise would be as coloured."""
+    x = white - np.mean(white)
+    n, total = x.size, float(x @ x)
+    if n <= lags + 1 or total == 0.0:
+        return float("nan")
+    rho = np.array([x[k:] @ x[:-k] for k in range(1, lags + 1)]) / total
+    return float(chi2.sf(n * (n + 2) * np.sum(rho**2 / (n - np.arange(1, lags + 1))), lags))
+
+
+def _correlations(one: Observed, noise: Noise, difference: np.ndarray) -> dict[str, tuple[float, float]]:
+    """Return command → (lag [s], correlation) of the residual with the command up to 25 samples earlier, the strongest."""
+    commands = one.setting.trial.commands
+    if commands is None:
+        return {}
+    held = np.asarray(commands.values)[np.searchsorted(commands.time, one.time + 1e-9, side="right") - 1]
+    residual = np.where(noise.used, difference, 0.0)
+    residual = np.where(noise.used, residual - np.mean(difference[noise.used]), 0.0)
+    step, found = float(np.median(np.diff(one.time))), {}
+    for name, column in zip(COMMANDS, held.T, strict=True):
+        x = column - np.mean(column)
+        if np.any(x != 0.0):
+            scale = np.linalg.norm(x) * np.linalg.norm(residual)
+            values = [float(residual[k:] @ x[: x.size - k]) / scale for k in range(LAGS)]
+            at = int(np.argmax(np.abs(values)))
+            found[name] = (at * step, values[at])
+    return found
+
+
+def _windows(time: np.ndarray, residual: np.ndarray, noise: Noise) -> tuple[tuple[float, float], ...]:
+    """Return the times in which the mean residual is more than noise can be, joined."""
+    found: list[tuple[float, float]] = []
+    spread = noise.sd * np.sqrt((1.0 + noise.rho) / (1.0 - noise.rho))
+    for begin in np.arange(time[0], time[-1], WINDOW):
+        own = (time >= begin) & (time < begin + WINDOW)
+        if own.sum() > 3 and abs(np.mean(residual[own])) > 3.0 * spread / np.sqrt(own.sum()):
+            if found and abs(found[-1][1] - begin) < 1e-9:
+                found[-1] = (found[-1][0], float(begin + WINDOW))
+            else:
+                found.append((float(begin), float(begin + WINDOW)))
+    return tuple(found)

@@ -1,0 +1,131 @@
+"""The best fit of a hypothesis with real runs: bounded Gauss-Newton on data and priors, and its evidence by Laplace."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from subzero.diagnosis.evidence import Quadratic
+from subzero.diagnosis.problem import Problem
+
+ENOUGH = 0.1
+"""A step that would gain less than this in the objective is not taken: sensitivities are made in rough steps."""
+NEARLY = 0.5
+"""A fit that no step improves although the linear model promises less than this has converged, too."""
+MOST_STEPS = 8
+POOR = 0.75
+"""A step that gains less than this share of what the linear model promised has old sensitivities."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Fit:
+    """The most probable parameters of a hypothesis.
+
+    Attributes:
+        z: deviations (k,).
+        r: whitened residual there (m,).
+        J: sensitivities there, or close by (m, k).
+        D: prior variances (k,).
+        objective: ½|r|² + ½ zᵀD⁻¹z.
+        converged: no step would gain more.
+        fresh: how many times sensitivities were made.
+    """
+
+    z: np.ndarray
+    r: np.ndarray
+    J: np.ndarray
+    D: np.ndarray
+    objective: float
+    converged: bool
+    fresh: int
+
+    @property
+    def quadratic(self) -> Quadratic:
+        """The linear problem around the fit."""
+        return Quadratic.at(self.z, self.r, self.J)
+
+
+def refit(
+    problem: Problem, z: np.ndarray, J: np.ndarray, D: np.ndarray, *, r: np.ndarray | None = None, most_fresh: int = 1
+) -> Fit:
+    """Return the best fit under prior variances D, from z and sensitivities J close by.
+
+    Args:
+        problem: records and parameters.
+        z: where to begin (k,).
+        J: sensitivities to begin with (m, k).
+        D: prior variances (k,).
+        r: the residual at z, if it is known.
+        most_fresh: how many times sensitivities may be made again.
+    """
+    low, high = bounds(problem)
+    z = np.clip(z, low, high)
+    r = problem.residual(z) if r is None else r
+    now, fresh, converged = _objective(r, z, D), 0, False
+    for _ in range(MOST_STEPS):
+        step = bounded_step(J, r, z, D, low, high)
+        promised = now - _objective(r - J @ step, z + step, D)
+        if promised < ENOUGH:
+            converged = True
+            break
+        share, z, r, now = _walk(problem, z, r, now, step, promised, D)
+        if share < POOR and promised > NEARLY and fresh < most_fresh:
+            J, fresh = problem.jacobian(z), fresh + 1
+        elif share <= 0.0:
+            converged = promised < NEARLY
+            break
+    return Fit(z=z, r=r, J=J, D=D, objective=now, converged=converged, fresh=fresh)
+
+
+def _walk(
+    problem: Problem, z: np.ndarray, r: np.ndarray, now: float, step: np.ndarray, promised: float, D: np.ndarray
+) -> tuple[float, np.ndarray, np.ndarray, float]:
+    """Return the share of what was promised that a step, or a part of it, gains; and where it leads."""
+    for part in (1.0, 0.4, 0.1):
+        there = z + part * step
+        r_there = problem.residual(there)
+        then = _objective(r_there, there, D)
+        if then < now:
+            return (now - then) / promised, there, r_there, then
+    return 0.0, z, r, now
+
+
+def _objective(r: np.ndarray, z: np.ndarray, D: np.ndarray) -> float:
+    """Return ½|r|² + ½ zᵀD⁻¹z, infinite for a run that could not go on."""
+    value = 0.5 * float(r @ r) + 0.5 * float(np.sum(z * z / D))
+    return value if np.isfinite(value) else np.inf
+
+
+def bounds(problem: Problem) -> tuple[np.ndarray, np.ndarray]:
+    """Return the lowest and highest deviations (k,) each."""
+    pairs = [(entry.parameter.low, entry.parameter.high) for entry in problem.entries]
+    low, high = np.array(pairs).T
+    return low, high
+
+
+def bounded_step(
+    J: np.ndarray, r: np.ndarray, z: np.ndarray, D: np.ndarray, low: np.ndarray, high: np.ndarray
+) -> np.ndarray:
+    """Return the step that is best for the linear model within bounds: entries that would leave are held there, and
+    let go again when they want to come back.
+    """
+    P, g = J.T @ J + np.diag(1.0 / D), J.T @ r - z / D
+    return quadratic_step(P, g, low - z, high - z)
+
+
+def quadratic_step(P: np.ndarray, g: np.ndarray, least: np.ndarray, most: np.ndarray) -> np.ndarray:
+    """Return argmin ½ xᵀPx − gᵀx with least ≤ x ≤ most, by holding and letting go."""
+    x, held = np.zeros_like(g), np.zeros(g.size, dtype=bool)
+    for _ in range(20):
+        free = ~held
+        right = g[free] - P[np.ix_(free, held)] @ x[held]
+        x[free] = np.linalg.solve(P[np.ix_(free, free)], right)
+        out = free & ((x < least - 1e-12) | (x > most + 1e-12))
+        slope = g - P @ x
+        back = held & (((x <= least) & (slope > 1e-9)) | ((x >= most) & (slope < -1e-9)))
+        if not out.any() and not back.any():
+            break
+        x = np.clip(x, least, most)
+        held = (held | out) & ~back
+    return np.clip(x, least, most)

@@ -1,0 +1,62 @@
+"""From probabilities to a verdict: one visible set of rules.
+
+    nothing_wrong      p(none) ≥ 0.5, or the named size is within the practical one (then the model wants calibration)
+    cause_named        one hypothesis with p ≥ 0.8, its size beyond 4 tolerances
+    outside_catalogue  a force or a drift that no cause explains has p ≥ 0.5
+    undecided          everything else: the smallest set with p ≥ 0.95
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from subzero.diagnosis.hypotheses import Ids, places
+from subzero.diagnosis.problem import Entry
+from subzero.diagnosis.verdict import CAUSE_NAMED, NOTHING_WRONG, OUTSIDE, UNDECIDED
+
+NAMED, HEALTHY, FOREIGN, SET = 0.8, 0.5, 0.5, 0.95
+PRACTICAL = 4.0
+"""A deviation within this many tolerances is a matter of calibration, whatever its evidence."""
+
+
+def sizes(entries: Sequence[Entry], ids: Ids, z: np.ndarray, kappa: float) -> dict[str, float]:
+    """Return cause → its size in tolerances, of its largest parameter."""
+    found: dict[str, float] = {}
+    for one in ids:
+        at = places(entries, (one,))
+        found[one] = max(abs(float(z[k])) / (kappa * entries[k].parameter.tolerance) for k in at)
+    return found
+
+
+def smallest_set(probabilities: Mapping[Ids, float], total: float = SET) -> list[Ids]:
+    """Return the most probable hypotheses that together have a probability."""
+    found: list[Ids] = []
+    have = 0.0
+    for ids, p in sorted(probabilities.items(), key=lambda pair: -pair[1]):
+        found.append(ids)
+        have += p
+        if have >= total:
+            break
+    return found
+
+
+def decide(probabilities: Mapping[Ids, float], foreign: float, practical: bool) -> str:
+    """Return the verdict.
+
+    Args:
+        probabilities: hypothesis → probability; with those outside the catalogue they sum to 1.
+        foreign: probability of a force or a drift that no cause explains.
+        practical: the most probable hypothesis' causes are all of a practical size.
+    """
+    best = max(probabilities, key=lambda ids: probabilities[ids])
+    if foreign >= FOREIGN:
+        return OUTSIDE
+    if probabilities.get((), 0.0) >= HEALTHY:
+        return NOTHING_WRONG
+    if best and not practical and probabilities[best] >= HEALTHY:
+        return NOTHING_WRONG
+    if best and practical and probabilities[best] >= NAMED:
+        return CAUSE_NAMED
+    return UNDECIDED

@@ -1,0 +1,262 @@
+"""The search: from all hypotheses by linear evidence to a few by real fits.
+
+    all tolerances wide → a point close to the data → linear evidence of everything there → refits of what is left
+    → a second cause beside the best, and a third → probabilities
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.stats import norm
+
+from subzero.diagnosis.evidence import KAPPAS, Posterior, Quadratic, freed, log_sum, posterior
+from subzero.diagnosis.hypotheses import Ids, compatible, log_prior, named, places, variances
+from subzero.diagnosis.problem import Problem, Progress
+from subzero.diagnosis.refit import Fit, refit
+
+WIDE = 4.0
+"""κ of the fit that the linear evidence is made at."""
+KEEP, SINGLES, PAIRS = 12.0, 7, 4
+"""Refit hypotheses whose log evidence is this close to the best of their kind, and at most so many."""
+RACERS, HOPELESS = 4, 6.0
+"""At most so many fits with sensitivities of their own in a race; none for what is this far behind in log posterior."""
+UNTRIED = 2.0
+"""A hypothesis without a fit of its own is at least this far behind the best in log posterior."""
+SWEEP = (0.25, 0.5, 1.0, 2.0)
+"""Sizes, in effect scales, that effects without a slope at the nominal model are tried at."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Candidate:
+    """A hypothesis with a real fit.
+
+    Attributes:
+        ids: its causes.
+        fit: the best fit, under the most probable κ.
+        log_evidence: κ → log evidence.
+        log_posterior: log (evidence, mixed over κ, times prior).
+    """
+
+    ids: Ids
+    fit: Fit
+    log_evidence: dict[float, float]
+    log_posterior: float
+
+    @property
+    def kappa(self) -> float:
+        """The most probable scale of the tolerances."""
+        return max(KAPPAS, key=lambda kappa: np.log(KAPPAS[kappa]) + self.log_evidence[kappa])
+
+
+@dataclass(kw_only=True, eq=False)
+class Search:
+    """A search that goes on: what was found so far is always in `candidates`.
+
+    Attributes:
+        problem: records and parameters.
+        progress: told what is being tried.
+        wide: the fit with wide tolerances.
+        screen: hypothesis → linear log posterior at the wide fit.
+        candidates: hypothesis → its real fit.
+        secants: hypothesis → where its fit begins, for causes without a slope.
+        raced: hypotheses that were fitted with sensitivities of their own.
+    """
+
+    problem: Problem
+    progress: Progress
+    wide: Fit = field(init=False)
+    nominal: tuple[np.ndarray, np.ndarray] = field(init=False)
+    screen: dict[Ids, float] = field(default_factory=dict)
+    candidates: dict[Ids, Candidate] = field(default_factory=dict)
+    secants: dict[Ids, np.ndarray] = field(default_factory=dict)
+    raced: set[Ids] = field(default_factory=set)
+
+    def begin(self) -> None:
+        """Make the sensitivities at the nominal model, and the fit with wide tolerances."""
+        self.progress(0.05, "sensitivities of the nominal model")
+        zero = np.zeros(len(self.problem.entries))
+        self.nominal = (self.problem.residual(zero), self.problem.jacobian(zero))
+        self.progress(0.15, "fit within wide tolerances")
+        D = variances(self.problem.entries, (), WIDE)
+        self.wide = refit(self.problem, zero, self.nominal[1], D, r=self.nominal[0], most_fresh=2)
+
+    def look(self) -> None:
+        """Fill the screen: linear evidence of nothing, every cause, and every pair."""
+        ids = named(self.problem)
+        q = self.wide.quadratic
+        D = {kappa: variances(self.problem.entries, (), kappa) for kappa in KAPPAS}
+        base = {kappa: posterior(q, D[kappa]) for kappa in KAPPAS}
+        for hypothesis in [(), *((one,) for one in ids), *compatible(self.problem.entries, ids)]:
+            self.screen[hypothesis] = self._linear(hypothesis, base, D) + log_prior(hypothesis, len(ids))
+        self._sweep()
+
+    def _linear(self, ids: Ids, base: dict[float, Posterior], D: dict[float, np.ndarray]) -> float:
+        """Return the log evidence of a hypothesis in a linear problem, mixed over κ."""
+        at = places(self.problem.entries, ids)
+        found = []
+        for kappa, prior in KAPPAS.items():
+            if at:
+                value, mean, covariance = freed(base[kappa], D[kappa], at, variances(self.problem.entries, ids, kappa)[at])
+                value += self._inside(at, mean, np.sqrt(np.diag(covariance)))
+            else:
+                value = base[kappa].log_evidence
+            found.append(np.log(prior) + value)
+        return log_sum(found)
+
+    def _inside(self, at: list[int], mean: np.ndarray, sd: np.ndarray, *, held: bool = False) -> float:
+        """Return what is added to a log evidence because values below a bound at 0 are not possible; `held` if it was
+        taken at the best values within bounds.
+        """
+        low = np.array([self.problem.entries[k].parameter.low for k in at])
+        x = (mean / sd)[low == 0.0]
+        return float(np.sum(norm.logcdf(x) + np.log(2.0) + (0.5 * np.minimum(x, 0.0) ** 2 if held else 0.0)))
+
+    def _sweep(self) -> None:
+        """Try sizes of the causes that do nothing when they are small."""
+        J, entries, fit = self.wide.J, self.problem.entries, self.wide
+        norms = np.linalg.norm(J, axis=0) * [entry.parameter.scale for entry in entries]
+        for k, entry in enumerate(entries):
+            if entry.record >= 0 or entry.parameter.low != 0.0 or norms[k] > 1.0:
+                continue
+            best = max((self._secant(k, size * entry.parameter.scale) for size in SWEEP), key=lambda pair: pair[0])
+            ids = (entry.effect.id,)
+            self.screen[ids] = best[0] + log_prior(ids, len(named(self.problem)))
+            self.secants[ids] = fit.z + best[1]
+
+    def _secant(self, k: int, size: float) -> tuple[float, np.ndarray]:
+        """Return the log evidence of entry k at a size, all others within their tolerances; and what is added to z."""
+        fit, entry = self.wide, self.problem.entries[k]
+        moved = fit.z.copy()
+        moved[k] = size
+        r = self.problem.residual(moved)
+        if not np.isfinite(r).all():
+            return -np.inf, moved - fit.z
+        found = []
+        for kappa, prior in KAPPAS.items():
+            D = variances(self.problem.entries, (), kappa)
+            z = moved.copy()
+            z[k] = 0.0
+            q = Quadratic.at(z, r, fit.J)
+            value = posterior(q, D).log_evidence - 0.5 * (size / entry.parameter.scale) ** 2 - 1.0
+            found.append(np.log(prior) + value)
+        return log_sum(found), moved - fit.z
+
+    def refit_best(self) -> None:
+        """Fit nothing, and the best causes and pairs of the screen, with real runs: all with the sensitivities at hand,
+        then those that come out best with their own.
+        """
+        kinds = (((),), _best(self.screen, 1, SINGLES), _best(self.screen, 2, PAIRS))
+        for ids in (ids for kind in kinds for ids in kind):
+            self.progress(0.3, "fitting " + (" + ".join(ids) or "nothing wrong"))
+            self.fit(ids)
+        self.race()
+
+    def fit(self, ids: Ids, start: Fit | None = None) -> None:
+        """Fit a hypothesis with real runs and the sensitivities of another fit, unless it was fitted."""
+        if ids not in self.candidates:
+            start = start or self.wide
+            D, z = variances(self.problem.entries, ids, 1.0), self.secants.get(ids)
+            z = posterior(start.quadratic, D).z if z is None else z
+            self._keep(ids, refit(self.problem, z, start.J, D, most_fresh=0))
+
+    def race(self, most: int = RACERS, hopeless: float = HOPELESS) -> None:
+        """Fit candidates again with sensitivities of their own, the best first, until the next is hopeless."""
+        for _ in range(most):
+            waiting = [one for one in self.candidates.values() if one.ids not in self.raced]
+            if not waiting:
+                return
+            now = max(waiting, key=lambda one: one.log_posterior)
+            done = [self.candidates[ids].log_posterior for ids in self.raced]
+            if len(done) >= 2 and now.log_posterior < max(done) - hopeless:
+                return
+            self.progress(0.5, "fitting again " + (" + ".join(now.ids) or "nothing wrong"))
+            self._again(now)
+
+    def _again(self, one: Candidate) -> None:
+        """Fit a candidate with sensitivities of its own, under its most probable κ."""
+        self.raced.add(one.ids)
+        D = variances(self.problem.entries, one.ids, one.kappa)
+        J = self.problem.jacobian(one.fit.z)
+        now = self._keep(one.ids, refit(self.problem, one.fit.z, J, D, r=one.fit.r, most_fresh=1))
+        if now.kappa != one.kappa:
+            D = variances(self.problem.entries, one.ids, now.kappa)
+            self._keep(one.ids, refit(self.problem, now.fit.z, now.fit.J, D, r=now.fit.r, most_fresh=0))
+
+    def _keep(self, ids: Ids, fit: Fit) -> Candidate:
+        """Keep a fit and return its candidate."""
+        self.candidates[ids] = self._candidate(ids, fit)
+        return self.candidates[ids]
+
+    def _candidate(self, ids: Ids, fit: Fit) -> Candidate:
+        """Return a candidate with its evidence by Laplace's method around a fit, for every κ."""
+        q, entries = fit.quadratic, self.problem.entries
+        under = {kappa: variances(entries, ids, kappa) for kappa in KAPPAS}
+        found = {kappa: posterior(q, under[kappa]) for kappa in KAPPAS}
+        nearest = min(KAPPAS, key=lambda kappa: float(np.sum(np.abs(np.log(under[kappa] / fit.D)))))
+        here = -fit.objective - found[nearest].log_evidence - 0.5 * found[nearest].log_det
+        every = list(range(len(entries)))
+        evidence = {
+            kappa: one.log_evidence + here + self._inside(every, one.z, np.sqrt(np.diag(one.M)), held=True)
+            for kappa, one in found.items()
+        }
+        mixed = log_sum([np.log(KAPPAS[kappa]) + evidence[kappa] for kappa in KAPPAS])
+        prior = log_prior(ids, len(named(self.problem)))
+        posterior_ = mixed + prior if np.isfinite(fit.objective) else -np.inf
+        return Candidate(ids=ids, fit=fit, log_evidence=evidence, log_posterior=posterior_)
+
+    def best(self) -> Candidate:
+        """Return the most probable candidate."""
+        return max(self.candidates.values(), key=lambda candidate: candidate.log_posterior)
+
+    def grow(self, most: int = 3) -> None:
+        """Add a cause to the best candidate as long as that pays; look at those with one cause less, too."""
+        while len(self.best().ids) < most:
+            before = self.best()
+            self.progress(0.75, "a further cause beside " + (" + ".join(before.ids) or "nothing"))
+            for ids in self._beside(before):
+                self.fit(ids, before.fit)
+            self.race(2, 2.0)
+            if self.best().ids == before.ids:
+                break
+        for without in list(self.best().ids):
+            self.fit(tuple(one for one in self.best().ids if one != without), self.best().fit)
+        self.race(2, 2.0)
+
+    def _beside(self, candidate: Candidate, most: int = 2, worth: float = -4.0) -> list[Ids]:
+        """Return the hypotheses with one cause more that the linear problem at a fit finds best."""
+        q, entries = candidate.fit.quadratic, self.problem.entries
+        count, found = len(named(self.problem)), {}
+        D = {kappa: variances(entries, candidate.ids, kappa) for kappa in KAPPAS}
+        base = {kappa: posterior(q, D[kappa]) for kappa in KAPPAS}
+        for one in named(self.problem):
+            ids = tuple(sorted({*candidate.ids, one}))
+            if len(ids) > len(candidate.ids) and ids not in self.candidates:
+                at, parts = places(entries, (one,)), []
+                for kappa, prior in KAPPAS.items():
+                    own = variances(entries, ids, kappa)[at]
+                    value, mean, covariance = freed(base[kappa], D[kappa], at, own)
+                    parts.append(np.log(prior) + value + self._inside(at, mean, np.sqrt(np.diag(covariance))))
+                found[ids] = log_sum(parts) + log_prior(ids, count)
+        ranked = sorted(found, key=lambda ids: -found[ids])[:most]
+        return [ids for ids in ranked if found[ids] > candidate.log_posterior + worth]
+
+    def probabilities(self) -> dict[Ids, float]:
+        """Return the probability of every hypothesis: by its fit, or by the screen if it was not worth one."""
+        log = {ids: candidate.log_posterior for ids, candidate in self.candidates.items()}
+        best = max(log.values())
+        shift = min(best - self.screen[self.best().ids], 0.0) if self.best().ids in self.screen else 0.0
+        for ids, value in self.screen.items():
+            log.setdefault(ids, min(value + shift, best - UNTRIED))
+        total = log_sum(list(log.values()))
+        return {ids: float(np.exp(value - total)) for ids, value in sorted(log.items(), key=lambda pair: -pair[1])}
+
+
+def _best(screen: dict[Ids, float], size: int, most: int) -> list[Ids]:
+    """Return the best hypotheses of a size, close to the best of all of that size."""
+    ranked = sorted((ids for ids in screen if len(ids) == size), key=lambda ids: -screen[ids])[:most]
+    return [ids for ids in ranked if screen[ids] > screen[ranked[0]] - KEEP]
+
+
