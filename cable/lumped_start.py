@@ -10,8 +10,8 @@ from .properties import CableProperties, DrumProperties
 from .winch import SHORTEST, ConstantTension, PayOutRate, Winch
 
 STRAIGHT_UP = np.array([0.0, 0.0, -1.0])
-FAINTEST = 1e-11
-"""Least tension that a cable starts with. [N]"""
+FAINTEST = 1e-6
+"""Least tension that a cable starts with: a spring that pulls less is shortened, by 1e-12 N/T of its length. [N]"""
 
 
 def lay(

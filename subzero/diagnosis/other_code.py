@@ -96,7 +96,8 @@ def truth_of(setting: Setting) -> Truth:
         return _alone(setting, times.size)
     changes = rows_of_changes(trial, True, times, setting.later)
     setup, live = prepare(trial, model, True)
-    rope, led = _rope(setting, setup, live, times), _led(times.size, live)
+    rope = _rope(setting, setup, live, times)
+    led = _led(times.size, rope.spring.shape[1])
     recording = new_recording(times.size, live.line.length.size)
     row = 1
     record_row(setup, live, recording, 0, 0.0, 0)
@@ -105,11 +106,11 @@ def truth_of(setting: Setting) -> Truth:
         if row - 1 in changes:
             setup = go_on_with(changes.pop(row - 1), setup, live, trial, True, float(times[row - 1]))
             rope.ends.stretch = setup.fixed.cable.compliance
-        last = min(times.size, *(change + 1 for change in changes), times.size)
+        last = min([times.size, *(change + 1 for change in changes)])
         row, ending = follow_rope(setup, live, rope, led, recording, times, row, last, trial.segment_length)
         if ending != FINE:
             raise NoTruthError(
-                f"The hull and the lumped cable of '{trial.name}' found no common force beyond t = {times[row - 1]:g} s."
+                f"Hull and lumped cable of '{trial.name}' found no common force beyond t = {times[row - 1]:g} s."
             )
     run = Run(times=times, recording=recording, completed=True, message="")
     history = led.history
@@ -139,19 +140,21 @@ def _rope(setting: Setting, setup: Setup, live: Live, times: np.ndarray) -> Rope
     still = np.zeros((2, 3))
     course = Course(ends, np.c_[tow, still, setpoint], np.c_[velocity, still, rate])
     fastest = water_of(model).fastest
-    rope = rope_off_drum(course, setting.trial.segment_length, model.cable, drum_of(model), fastest, wet, ahead)
+    rope = rope_off_drum(
+        course, setting.trial.segment_length, model.cable, drum_of(model), fastest, wet, ahead
+    )
     leg = np.r_[0.0, course.values[0], course.rates[0]]
     begin(rope, leg, setup.fixed.cable, setup.water)
     live.now.force[:], live.now.length = rope.ends.tow_force, wet
     return rope
 
 
-def _led(rows: int, live: Live) -> Led:
+def _led(rows: int, springs: int) -> Led:
     """Return the work space of a run."""
     return Led(
         ends=np.zeros((2, 6)),
         legs=np.zeros((2, 15)),
         matrix=np.eye(3),
-        states=np.zeros(100_000),
+        states=np.zeros(springs),
         history=np.zeros((rows, 5)),
     )

@@ -178,7 +178,9 @@ def _lead(setup: Setup, led: Led, start: float, span: float, x: float, leg: np.n
     leg[0] = start + x * span
     for i in range(3):
         u, v = a[3 + i], b[3 + i]
-        leg[1 + i] = (1.0 + 2.0 * x) * y * y * a[i] + (3.0 - 2.0 * x) * x * x * b[i] + span * x * y * (y * u - x * v)
+        leg[1 + i] = (
+            (1.0 + 2.0 * x) * y * y * a[i] + (3.0 - 2.0 * x) * x * x * b[i] + span * x * y * (y * u - x * v)
+        )
         leg[8 + i] = 6.0 * x * y * (b[i] - a[i]) / span + y * (1.0 - 3.0 * x) * u + x * (3.0 * x - 2.0) * v
     drum = setup.fixed.drum
     lead_drum(setup.led, leg[0] - MOMENT, drum)

@@ -1,6 +1,6 @@
 """What sensors show of a truth by the other formulation, written independently of `response`.
 
-    y' = (x − y)/lag,   shown = (1 + scale) y + bias,   at t − clock offset
+y' = (x − y)/lag,   shown = (1 + scale) y + bias,   at t − clock offset
 """
 
 from __future__ import annotations
