@@ -52,7 +52,7 @@ def tell(verdict: Verdict, stage: Stage, console: Console | None = None) -> None
     for line in words.story(verdict):
         console.print(line, highlight=False, markup=False)
     if verdict.rivals:
-        console.print(_rich(tables.rivals(verdict)), highlight=False)
+        console.print(_rich(tables.rivals(verdict, short=True)), highlight=False)
     for name, table in tables.gain(verdict).items():
         console.print(f"Root mean square error, {name}:", highlight=False, markup=False)
         console.print(_rich(table), highlight=False)

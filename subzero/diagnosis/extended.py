@@ -108,12 +108,8 @@ def from_then_on(setting: Setting, effect: Effect, numbers: Mapping[str, float],
 
 
 def unseen(extended: Extended, effects: Mapping[str, Effect]) -> list[str]:
-    """Return the ids of effects of sensors and their clock, which change what is shown and not what is."""
-    return [
-        name
-        for name in (*extended.deviations, *extended.calibration)
-        if effects[plain_id(name)].slot in ("sensors", "clock")
-    ]
+    """Return the named causes of sensors and their clock, which change what is shown and not what is."""
+    return [name for name in extended.deviations if effects[plain_id(name)].slot in ("sensors", "clock")]
 
 
 def _with(setting: Setting, effect: Effect, numbers: Mapping[str, float]) -> Setting:

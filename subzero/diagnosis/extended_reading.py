@@ -123,7 +123,8 @@ def _start_problems(at: str, effect: Effect, value: float) -> list[str]:
 
 
 def _range_problems(at: str, key: str, parameter: Parameter, value: float) -> list[str]:
-    if parameter.low <= value <= parameter.high:
+    slack = 1e-9 * (1.0 + abs(value))
+    if parameter.low - slack <= value <= parameter.high + slack:
         return []
     return [f"{at}: {key} is {value:g}. Allowed: {parameter.low:g} to {parameter.high:g} (a deviation)."]
 

@@ -13,6 +13,9 @@ from subzero.diagnosis.verdict import Extended
 from subzero.missing_force import AXES, FEATURES, MissingForce
 
 
+DIGITS = 8
+
+
 def text_of(
     extended: Extended,
     setting: Setting,
@@ -79,8 +82,8 @@ def _list(values: Iterable[float]) -> str:
 
 
 def _number(value: float) -> str:
-    """Return a number that TOML reads as a float, the same to the last bit."""
-    return repr(float(value))
+    """Return a number that TOML reads as a float, in more digits than any of them is good for."""
+    return repr(float(f"{value:.{DIGITS}g}"))
 
 
 def _key(name: str) -> str:

@@ -15,6 +15,13 @@ SEEN = 4.0
 """Signal, in noise and tolerances, that is seen."""
 
 
+MOST_RIVALS = 5
+"""So many are shown where space is short."""
+
+INVISIBLE = 0.01
+"""Signal below which no size that makes sense would be seen."""
+
+
 class Table(NamedTuple):
     """Rows of texts below a header."""
 
@@ -33,6 +40,8 @@ def detectable(verdict: Verdict | Sequence[Detectability], *, every: bool = Fals
 
 
 def _smallest(one: Detectability) -> str:
+    if one.signal < INVISIBLE:
+        return NOTHING
     return (
         "; ".join(f"{name.replace('_', ' ')} {value:.3g}" for name, value in one.smallest.items()) or NOTHING
     )
@@ -66,8 +75,14 @@ def _when(one: Misfit) -> str:
     return ", ".join(f"{start:.3g}–{end:.3g} s" for start, end in one.windows[:3]) or NOTHING
 
 
-def rivals(verdict: Verdict) -> Table:
-    """Return what else explains the records, and how far it is from the named cause."""
+def rivals(verdict: Verdict, *, short: bool = False) -> Table:
+    """Return what else explains the records, and how far it is from the named cause; `short` without parameters."""
+    if short:
+        rows = [
+            (rival_words(one), probability(one.probability), number(one.discrimination))
+            for one in verdict.rivals
+        ]
+        return Table(("what else explains the records", "probability", "D"), rows[:MOST_RIVALS])
     return Table(("explanation", "probability", "D", "parameters"),
                  [(rival_words(one), probability(one.probability), number(one.discrimination), _numbers(one))
                   for one in verdict.rivals])  # fmt: skip

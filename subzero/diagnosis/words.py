@@ -44,7 +44,7 @@ def estimate(name: str, one: Estimate) -> str:
 
 def cause(one: Cause) -> str:
     """Return a cause in words, with its parameters and its probability."""
-    since = "" if one.start_time is None else f", since t = {one.start_time:.3g} s"
+    since = "" if one.start_time is None or "@" in one.id else f", since t = {one.start_time:.3g} s"
     numbers = "; ".join(estimate(name, parameter) for name, parameter in one.parameters.items())
     return f"{_capital(one.sentence)}{since}: {numbers}. Probability {probability(one.probability)}."
 
@@ -64,7 +64,7 @@ def headline(verdict: Verdict) -> str:
 
 def story(verdict: Verdict) -> list[str]:
     """Return the verdict in sentences: what it is, the causes, what is missing, the next trial."""
-    told = [verdict.sentence] if verdict.sentence else []
+    told = [verdict.sentence] if verdict.sentence and not verdict.causes else []
     told += [cause(one) for one in verdict.causes]
     told += [unknown(verdict.unknown)] if verdict.unknown else []
     if verdict.gain:

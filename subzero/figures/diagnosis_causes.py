@@ -43,7 +43,7 @@ def evidence(verdict: Verdict, title: Title) -> Figure | None:
     ranked = [(name, p) for name, p in ranked if p >= LEAST]
     if not ranked:
         return None
-    figure, (plain, logarithmic) = _bars(2, len(ranked), title)
+    figure, (plain, logarithmic) = _bars(2, len(ranked), title, left=0.34, apart=0.12)
     named = " + ".join(sorted(cause.id for cause in verdict.causes))
     colours = [style.BLUE if _sorted(name) == named else style.GREY for name, _ in ranked]
     for axes in (plain, logarithmic):
@@ -133,15 +133,19 @@ def _sorted(name: str) -> str:
     return " + ".join(sorted(name.split(" + ")))
 
 
-def _bars(columns: int, rows: int, title: Title) -> tuple[Figure, list[Axes]]:
+def _bars(
+    columns: int, rows: int, title: Title, *, left: float = 0.2, apart: float = 0.72
+) -> tuple[Figure, list[Axes]]:
     """Return a sheet for horizontal bars, as high as they need, with room for their names."""
     from .sheet import BOTTOM, TOP, WIDTH
 
     figure, panels = sheet(1, columns, title)
     height = TOP + 0.4 + BOTTOM + 0.17 * max(rows, 3)
     figure.set_size_inches(WIDTH, height)
-    figure.subplots_adjust(left=0.2, wspace=0.72, bottom=BOTTOM / height, top=1.0 - (TOP + 0.2) / height)
-    figure.texts[0].set_position((0.02, 1.0 - 0.09 / height))
+    figure.subplots_adjust(left=left, wspace=apart, bottom=BOTTOM / height, top=1.0 - (TOP + 0.2) / height)
+    for text in figure.texts:
+        text.set_y(1.0 - 0.09 / height)
+    figure.texts[0].set_x(0.02)
     return figure, panels
 
 
