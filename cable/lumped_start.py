@@ -10,8 +10,10 @@ from .properties import CableProperties, DrumProperties
 from .winch import SHORTEST, ConstantTension, PayOutRate, Winch
 
 STRAIGHT_UP = np.array([0.0, 0.0, -1.0])
-FAINTEST = 1e-6
-"""Least tension that a cable starts with: a spring that pulls less is shortened, by 1e-12 N/T of its length. [N]"""
+FAINTEST = 1e-11
+"""Least tension that a cable starts with. [N]"""
+CRUMPLED = 1e-6
+"""Springs that pull with T are shorter by 1e-12 N/T of their length: a cable is laid no more than this too long. [m]"""
 
 
 def lay(
@@ -25,6 +27,7 @@ def lay(
     """Lay springs of given lengths and tensions (n,) straight behind the tow point, on all levels."""
     n = lengths.size
     rope.ends.count = n
+    least = max(FAINTEST, 1e-12 / CRUMPLED * float(lengths.sum()))
     rope.ends.stretch = cable.compliance
     rope.ends.compliance = max(cable.compliance, LEAST_COMPLIANCE)
     rope.ends.bending = cable.bending_stiffness
@@ -33,7 +36,7 @@ def lay(
     behind = 0.0
     rope.position[:, 0] = tow
     for j in range(1, n + 1):
-        rope.spring[STATE, j] = spring_state(max(tensions[j - 1], FAINTEST))
+        rope.spring[STATE, j] = spring_state(max(tensions[j - 1], least))
         rope.spring[PULL, j], _, strain, _ = spring_law(rope.spring[STATE, j], rope.ends.compliance)
         rope.stretched[:, j] = lengths[j - 1] * (1.0 + strain)
         behind += rope.stretched[OLD, j]
