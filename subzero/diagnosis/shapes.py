@@ -1,0 +1,136 @@
+"""What a missing force may look like in time: a feature of the motion, from some time on, dying away, or a wave.
+
+    φ(t) = feature(state(t)) · window(t),   window = 1,  [t ≥ t₀],  [t₀ ≤ t < t₁],  exp(−t/T);   or  cos ωt, sin ωt
+
+Features are those of `missing_force`, along a track that was fitted.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+import vehicle
+from subzero.diagnosis.response import tracked
+from subzero.diagnosis.setting import Setting
+from subzero.diagnosis.told import held
+from subzero.diagnosis.track import LENGTH, RUDDER, WATER
+from subzero.missing_force import FACTORS, FEATURES, feature_value, fill_factors
+from vehicle.dynamics import relative_velocity
+from vehicle.kinematics import rotation
+from vehicle.motor import shaft_speed
+from vehicle.state import CHARGE, SHAFT
+
+SAMPLE = 0.1
+"""Shapes are sampled so often. [s]"""
+DECAYS = (3.0, 6.0, 12.0)
+"""Times in which a force dies away. [s]"""
+PERIODS = (1.5, 12.0)
+"""Of waves, the shortest and the longest; frequencies in between are a quarter of a turn of the trial apart. [s]"""
+FEWEST = 1.0
+"""No window is shorter. [s]"""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Shape:
+    """One term of a formula.
+
+    Attributes:
+        feature: of FEATURES, or "wave".
+        words: what it is.
+        columns: φ at the samples (n, 1), or (n, 2) for a wave.
+        start, end: of its window; None if it holds throughout. [s]
+        decay: time in which it dies away; 0 if it does not. [s]
+        log_prior: how much less probable it is than its plain feature, by the number of its windows.
+    """
+
+    feature: str
+    words: str
+    columns: np.ndarray
+    start: float | None = None
+    end: float | None = None
+    decay: float = 0.0
+    log_prior: float = 0.0
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether it is a feature that holds throughout: what a model can have as a term."""
+        return self.feature in FEATURES and self.start is None and self.decay == 0.0
+
+
+def factors_along(setting: Setting, times: np.ndarray) -> np.ndarray:
+    """Return the factors of features (n, len(FACTORS)) along the run of a setting, at times (n,). [s]"""
+    grid, track = tracked(setting)
+    rows = track[np.searchsorted(grid, times + 1e-9, side="right") - 1]
+    commands = setting.trial.commands
+    assert commands is not None
+    told = np.column_stack([held(commands.time, column, times) for column in commands.values.T])
+    found, numbers = np.zeros((times.size, len(FACTORS))), setting.model.vehicle.numbers()
+    R, nu_r = np.zeros((3, 3)), np.zeros(6)
+    for out, row, command, time in zip(found, rows, told, times, strict=True):
+        state = np.ascontiguousarray(row[: vehicle.STATE_SIZE])
+        rotation(state[3:7], R)
+        relative_velocity(state, R, np.ascontiguousarray(row[WATER : WATER + 3]), nu_r)
+        n = shaft_speed(state[SHAFT], state[CHARGE], command[0], nu_r[0], numbers.motor, numbers.propeller)
+        _, port, starboard = vehicle.deflections(state, command, numbers)
+        fill_factors(nu_r, n, row[RUDDER], 0.5 * (port + starboard), row[LENGTH], time, state[2], out)
+    return found
+
+
+def plain_shapes(factors: np.ndarray) -> list[Shape]:
+    """Return every feature, as it holds throughout; without those that are 0."""
+    found = [
+        Shape(feature=name, words=feature.words, columns=feature_value(name, factors)[:, None])
+        for name, feature in FEATURES.items()
+    ]
+    return [shape for shape in found if np.abs(shape.columns).max() > 1e-9]
+
+
+def windowed(shape: Shape, times: np.ndarray, edges: np.ndarray) -> list[Shape]:
+    """Return a plain shape from every edge on, and between any two of them. [s]"""
+    pairs = [(a, b) for a in edges for b in edges if b - a >= FEWEST]
+    log_prior = -float(np.log(2.0 * edges.size + 2.0 * len(pairs)))
+    found = [
+        _between(shape, times, a, None, log_prior + np.log(len(pairs) / edges.size)) for a in edges if a > 0.0
+    ]
+    found += [_between(shape, times, a, b, log_prior) for a, b in pairs]
+    return [one for one in found if np.abs(one.columns).max() > 1e-9]
+
+
+def _between(shape: Shape, times: np.ndarray, start: float, end: float | None, log_prior: float) -> Shape:
+    last = np.inf if end is None else end
+    inside = np.where((times >= start - 1e-9) & (times < last - 1e-9), 1.0, 0.0)
+    when = f"from {start:g} s on" if end is None else f"from {start:g} to {end:g} s"
+    return Shape(feature=shape.feature, words=f"{shape.words}, {when}", columns=shape.columns * inside[:, None],
+                 start=float(start), end=None if end is None else float(end), log_prior=float(log_prior))  # fmt: skip
+
+
+def decaying(shape: Shape, times: np.ndarray, edges: np.ndarray) -> list[Shape]:
+    """Return a plain shape that begins at an edge and dies away, in several times."""
+    log_prior = -float(np.log(8.0 * len(DECAYS)))
+    found = [_dying(shape, times, 0.0, T, log_prior) for T in DECAYS]
+    found += [
+        _dying(shape, times, edge, T, log_prior - np.log(edges.size)) for T in DECAYS for edge in edges[1:]
+    ]
+    return [one for one in found if np.abs(one.columns).max() > 1e-9]
+
+
+def _dying(shape: Shape, times: np.ndarray, start: float, T: float, log_prior: float) -> Shape:
+    """Return exp(−(t − start)/T) times a shape, 0 before the start."""
+    window = np.where(times >= start - 1e-9, np.exp(-np.maximum(times - start, 0.0) / T), 0.0)
+    when = f"from {start:g} s on, dying away in {T:g} s" if start else f"dying away in {T:g} s"
+    return Shape(feature=shape.feature, words=f"{shape.words}, {when}", columns=shape.columns * window[:, None],
+                 start=float(start) or None, decay=T, log_prior=float(log_prior))  # fmt: skip
+
+
+def waves(times: np.ndarray) -> list[Shape]:
+    """Return waves of several periods, of any phase."""
+    apart = 0.25 / (times[-1] - times[0])
+    periods = 1.0 / np.arange(1.0 / PERIODS[1], 1.0 / PERIODS[0], apart)
+    log_prior = -float(np.log(periods.size))
+    return [
+        Shape(feature="wave", words=f"a wave with a period of {period:.2g} s", log_prior=log_prior,
+              columns=np.column_stack([trig(2.0 * np.pi * times / period) for trig in (np.cos, np.sin)]))
+        for period in periods
+    ]  # fmt: skip

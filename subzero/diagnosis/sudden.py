@@ -1,0 +1,186 @@
+"""Effects that begin in the middle of a trial: a fin struck at 12 s, the cable caught at 20 s.
+
+    θ(t) = θ₀ for t < t₀,  θ₀ + z from t₀ on
+
+Every sudden effect is tried from every time of a grid, in the linear problem with all tolerances free; the best one
+again on a finer grid. What is left out: effects that end again, and two that begin at different times.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from subzero.diagnosis.effect import Effect
+from subzero.diagnosis.latent import Seen, seen
+from subzero.diagnosis.problem import Entry, Problem, _rough
+from subzero.diagnosis.refit import Fit
+from subzero.diagnosis.response import tracked
+from subzero.diagnosis.setting import Setting
+
+COARSE, FINE = 2.0, 0.5
+"""Grids of times to begin at. [s]"""
+SECANT = 0.25
+"""Step of a sensitivity, in effect scales."""
+
+
+def begun_at(effect: Effect, time: float) -> Effect:
+    """Return the effect as it begins at a time [s]: id "<id>@<time>". To be applied after all that hold throughout."""
+    return replace(
+        effect,
+        id=f"{effect.id}@{time:g}",
+        sentence=f"from {time:g} s on {effect.sentence}",
+        apply=partial(_from_then_on, effect, time),
+        sudden=False,
+    )
+
+
+def _from_then_on(effect: Effect, time: float, setting: Setting, *deviations: float) -> Setting:
+    """Return a setting that has an effect from a time on, beside all other changes in mid-trial."""
+    if time <= 0.0:
+        return effect.apply(setting, *deviations)
+    before = [pair for pair in setting.later if pair[0] < time]
+    base = before[-1][1] if before else setting.model
+    after = [(time, base), *(pair for pair in setting.later if pair[0] > time)]
+    changed = [
+        (when, effect.apply(replace(setting, model=model), *deviations).model) for when, model in after
+    ]
+    return replace(setting, later=(*before, *changed))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Begun:
+    """A sudden effect in the linear problem.
+
+    Attributes:
+        effect: as it holds throughout.
+        time: when it begins. [s]
+        record: in which record; a sudden effect is an event of one trial.
+        log_gain: log evidence over that of no such effect.
+        mean: deviations of its parameters. [their unit]
+    """
+
+    effect: Effect
+    time: float
+    record: int
+    log_gain: float
+    mean: np.ndarray
+
+    @property
+    def begun(self) -> Effect:
+        """The effect as it begins at that time."""
+        return begun_at(self.effect, self.time)
+
+
+def times_of(problem: Problem, record: int, spacing: float = COARSE) -> list[float]:
+    """Return times to begin at: a grid within a record, without its first and last two seconds. [s]"""
+    end = float(problem.records[record].time[-1])
+    return [float(time) for time in np.arange(2.0, end - 1.0, spacing)]
+
+
+def scan(
+    problem: Problem, fit: Fit, D: np.ndarray, effects: Sequence[Effect], record: int = 0, *, best: int = 3
+) -> list[Begun]:
+    """Return every sudden effect at its best time, most probable first; the `best` of them with finer times.
+
+    Args:
+        problem: records and parameters.
+        fit: close to the data.
+        D: prior variances of its entries (k,).
+        effects: of the catalogue; those that are not sudden are left out.
+        record: in which they begin.
+        best: how many are tried on the finer grid.
+    """
+    able = [effect for effect in effects if effect.sudden]
+    coarse = times_of(problem, record)
+    found = _strongest(_tried(problem, fit, D, [(one, time) for one in able for time in coarse], record))
+    finer = [(one.effect, time) for one in found[:best] for time in _around(one.time, coarse)]
+    return _strongest(found + _tried(problem, fit, D, finer, record))
+
+
+def _around(time: float, coarse: list[float]) -> list[float]:
+    """Return the finer times between a time of the grid and its neighbours."""
+    near = np.arange(time - COARSE + FINE, time + COARSE - 0.5 * FINE, FINE)
+    return [float(one) for one in near if coarse[0] <= one <= coarse[-1] + COARSE and abs(one - time) > 1e-9]
+
+
+def _strongest(found: list[Begun]) -> list[Begun]:
+    """Return the best time of every effect, most probable first."""
+    ranked = sorted(found, key=lambda one: -one.log_gain)
+    first = {one.effect.id: one for one in reversed(ranked)}
+    return sorted(first.values(), key=lambda one: -one.log_gain)
+
+
+def _tried(
+    problem: Problem, fit: Fit, D: np.ndarray, pairs: list[tuple[Effect, float]], record: int
+) -> list[Begun]:
+    """Return the linear evidence of effects that begin at times."""
+    q, whole = fit.quadratic, fit.r + fit.J @ fit.z
+    made = columns(problem, fit.z, pairs, record)
+    sizes = np.cumsum([0, *(C.shape[1] for C in made)])
+    data = seen(q.A, q.b, D, fit.J, np.hstack(made), whole)
+    found = []
+    for (effect, time), first, last in zip(pairs, sizes[:-1], sizes[1:], strict=True):
+        own = Seen(data.M[first:last, first:last], data.q[first:last])
+        gain, mean = _gain(own, np.array([parameter.scale**2 for parameter in effect.parameters]))
+        found.append(Begun(effect=effect, time=time, record=record, log_gain=gain, mean=mean))
+    return found
+
+
+def _gain(data: Seen, variance: np.ndarray) -> tuple[float, np.ndarray]:
+    """Return the log evidence over that of zero of coefficients with prior variances (n,), and their mean."""
+    inner = np.eye(variance.size) + variance[:, None] * data.M
+    mean = np.linalg.solve(inner, variance * data.q)
+    return 0.5 * float(data.q @ mean) - 0.5 * float(np.linalg.slogdet(inner)[1]), mean
+
+
+def columns(
+    problem: Problem, z: np.ndarray, pairs: Sequence[tuple[Effect, float]], record: int = 0
+) -> list[np.ndarray]:
+    """Return whitened sensitivities (m, parameters) to each (effect, time) in one record; secants of a small step."""
+    base, steps = _plain(problem, record, z), [np.diag(_steps(effect)) for effect, _ in pairs]
+    jobs = [base] + [begun_at(effect, time).apply(base, *row.tolist())
+                     for (effect, time), rows in zip(pairs, steps, strict=True) for row in rows]  # fmt: skip
+    problem.runs[0] += len(jobs)
+    shown = problem.setting(record, z)
+    seen_of = [problem._whitened(record, shown, track) for track in problem.pool.map(_run, jobs)]
+    first, size = _rows(problem, record)
+    changes, at = np.array(seen_of[1:]) - seen_of[0], 0
+    found: list[np.ndarray] = []
+    for rows in steps:
+        C = np.zeros((size, rows.shape[0]))
+        own = changes[at : at + rows.shape[0]] / np.diag(rows)[:, None]
+        C[first : first + own.shape[1]] = np.nan_to_num(own.T)
+        found, at = [*found, C], at + rows.shape[0]
+    return found
+
+
+def _steps(effect: Effect) -> list[float]:
+    """Return the step of each parameter, to where there is more room."""
+    return [SECANT * one.scale * (1.0 if one.high >= -one.low else -1.0) for one in effect.parameters]
+
+
+def _plain(problem: Problem, record: int, z: np.ndarray) -> Setting:
+    """Return the setting of a record, its sensors right, in the rough steps of sensitivities."""
+    setting = problem.setting(record, z, late=False)
+    return replace(_rough(replace(setting, later=())), later=setting.later)
+
+
+def _run(setting: Setting) -> tuple[np.ndarray, np.ndarray]:
+    return tracked(setting)
+
+
+def _rows(problem: Problem, record: int) -> tuple[int, int]:
+    """Return where the rows of a record begin, and how many there are in all."""
+    sizes = [sum(noise.gap.size for noise in one.noise.values()) for one in problem.records]
+    return sum(sizes[:record]), sum(sizes)
+
+
+def with_begun(problem: Problem, begun: Begun) -> Problem:
+    """Return the problem with a sudden effect's parameters behind its entries."""
+    effect = begun.begun
+    more = tuple(Entry(effect, i, begun.record) for i in range(len(effect.parameters)))
+    return replace(problem, entries=(*problem.entries, *more))

@@ -1,0 +1,178 @@
+"""A force that no cause explains: is there one, on which axis, and what is it as a function of time?
+
+    w(t) = Σ f_k Λ((t − t_k)/Δ) on one axis,   f ~ a Gaussian process        (Λ: hat function)
+
+An effect like any other: its parameters are the knots f_k, or modes x of the process (f = L x, x ~ N(0, I)), so that
+sensitivities and refits are those of `problem` and `refit`. Records have histories of their own. A sensor that
+drifts is the same in one channel, without a run.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+
+from subzero.diagnosis.effect import Effect, Parameter
+from subzero.diagnosis.effects.sensors import SPECS
+from subzero.diagnosis.latent import SHARES, Seen, Shape, log_evidence_unknown, seen
+from subzero.diagnosis.problem import Entry, Problem
+from subzero.diagnosis.refit import Fit
+from subzero.diagnosis.setting import Setting
+from subzero.missing_force import AXES, MissingForce
+
+SPACING, FINE = 2.0, 1.0
+"""Of knots: to look for a force, and to tell its history. [s]"""
+WORDS = {
+    "X": "forward force", "Y": "force to starboard", "Z": "downward force",
+    "K": "moment that rolls it to starboard", "M": "moment that raises the nose",
+    "N": "moment that turns it to starboard",
+}  # fmt: skip
+"""What a positive force or moment does to the vehicle."""
+FORCE, DRIFT = "unknown_force:", "sensor_drift:"
+DRIFTS = 30.0
+"""A drift can be this many tolerances of the sensor's bias."""
+
+
+class Knots(NamedTuple):
+    """Where histories have their knots: record and time [s] of each (n,), and their spacing. [s]"""
+
+    record: np.ndarray
+    time: np.ndarray
+    spacing: float
+
+
+def knots_of(problem: Problem, spacing: float = SPACING) -> Knots:
+    """Return knots over all records, from start to end of each."""
+    ends = [float(one.time[-1]) for one in problem.records]
+    times = [np.linspace(0.0, end, max(round(end / spacing), 1) + 1) for end in ends]
+    record = np.repeat(np.arange(len(times)), [one.size for one in times])
+    return Knots(record, np.concatenate(times), spacing)
+
+
+def usual(setting: Setting, axis: str) -> float:
+    """Return the size of a usual force on an axis: the hull's drag at 1 m/s; a moment by a lever. [N, N m]"""
+    drag = setting.model.vehicle.numbers().axial_drag
+    lever = {"K": 0.02, "M": 0.2, "N": 0.2}.get(axis, 1.0)
+    return drag * lever
+
+
+def amplitude_grid(setting: Setting, axis: str) -> list[float]:
+    """Return the amplitudes that are mixed. [N, N m]"""
+    return [share * usual(setting, axis) for share in SHARES]
+
+
+def lacking(setting: Setting, force: MissingForce) -> Setting:
+    """Return a setting with a missing force, from the start to the end."""
+    later = tuple((time, replace(model, missing=force + model.missing)) for time, model in setting.later)
+    return replace(setting.with_model(missing=force + setting.model.missing), later=later)
+
+
+def history(axis: str, times: np.ndarray, force: np.ndarray) -> MissingForce:
+    """Return a missing force with a history (n,) on one axis only. [N, N m]"""
+    wrench = np.zeros((times.size, len(AXES)))
+    wrench[:, AXES.index(axis)] = force
+    return MissingForce(time=tuple(times.tolist()), wrench=tuple(map(tuple, wrench.tolist())))
+
+
+def _push(axis: str, times: np.ndarray, L: np.ndarray, setting: Setting, *amounts: float) -> Setting:
+    return lacking(setting, history(axis, times, L @ np.array(amounts)))
+
+
+def force_effect(axis: str, times: np.ndarray, L: np.ndarray, size: float) -> Effect:
+    """Return the effect of a force with history L x at knots; parameters x (n,), of a size."""
+    parameters = tuple(
+        Parameter(name=f"knot_{i}", unit="1", tolerance=size, scale=size) for i in range(L.shape[1])
+    )
+    sentence = f"a {WORDS[axis]} acts that no cause explains"
+    return Effect(id=FORCE + axis, sentence=sentence, slot="hull", parameters=parameters,
+                  apply=partial(_push, axis, times, L))  # fmt: skip
+
+
+def with_force(problem: Problem, axis: str, knots: Knots, L: np.ndarray, size: float) -> Problem:
+    """Return the problem with a force's knots behind its entries, L (n, n) within each record."""
+    added: list[Entry] = []
+    for record in range(len(problem.records)):
+        own = knots.record == record
+        effect = force_effect(axis, knots.time[own], L[np.ix_(own, own)], size)
+        added += [Entry(effect, i, record) for i in range(int(own.sum()))]
+    return replace(problem, entries=(*problem.entries, *added))
+
+
+def force_columns(
+    problem: Problem, z: np.ndarray, axes: Iterable[str], knots: Knots
+) -> dict[str, np.ndarray]:
+    """Return axis → whitened sensitivities (m, n) of what is simulated to a force of 1 N (1 N m) at each knot."""
+    found, eye = {}, np.eye(knots.time.size)
+    for axis in axes:
+        more = with_force(problem, axis, knots, eye, 0.5 * usual(problem.records[0].setting, axis))
+        there = np.concatenate([z, np.zeros(knots.time.size)])
+        found[axis] = more.jacobian(there, range(z.size, there.size))[:, z.size :]
+    return found
+
+
+def drift_columns(problem: Problem, channel: str, knots: Knots) -> np.ndarray:
+    """Return the whitened sensitivities (m, n) to a drift of one unit at each knot; of one channel, without runs."""
+    rows: list[np.ndarray] = []
+    for record, one in enumerate(problem.records):
+        own = np.where(knots.record == record, 1.0, 0.0)
+        apart = np.abs(np.subtract.outer(one.time, knots.time)) / knots.spacing
+        hats = np.maximum(1.0 - apart, 0.0) * own
+        rows += [noise.whiten(hats if name == channel else 0.0 * hats) for name, noise in one.noise.items()]
+    return np.concatenate(rows)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Suspect:
+    """A force or a drift in the linear problem.
+
+    Attributes:
+        id: "unknown_force:X", "sensor_drift:heading".
+        log_gain: log evidence over that of none, amplitudes and correlation times mixed.
+        shape: the most probable of them.
+        data: what the data say of its knots.
+    """
+
+    id: str
+    log_gain: float
+    shape: Shape
+    data: Seen
+
+
+def suspects(
+    problem: Problem, columns: dict[str, np.ndarray], fit: Fit, D: np.ndarray, knots: Knots
+) -> list[Suspect]:
+    """Return every force and drift of `columns` (id → (m, n)), in the linear problem around a fit, most probable first.
+
+    Args:
+        problem: of the columns.
+        columns: as of `all_columns`.
+        fit: that the columns were made close to.
+        D: prior variances of its entries, of the κ in question (k,).
+        knots: of the columns.
+    """
+    q, whole = fit.quadratic, fit.r + fit.J @ fit.z
+    found = []
+    for name, C in columns.items():
+        data = seen(q.A, q.b, D, fit.J, C, whole)
+        gain, shape = log_evidence_unknown(data, knots.time, knots.record, _amplitudes(problem, name))
+        found.append(Suspect(id=name, log_gain=gain, shape=shape, data=data))
+    return sorted(found, key=lambda one: -one.log_gain)
+
+
+def all_columns(problem: Problem, z: np.ndarray, knots: Knots) -> dict[str, np.ndarray]:
+    """Return id → columns of a force on every axis and of a drift of every channel."""
+    forces = {FORCE + axis: C for axis, C in force_columns(problem, z, AXES, knots).items()}
+    channels = problem.records[0].noise
+    return {**forces, **{DRIFT + channel: drift_columns(problem, channel, knots) for channel in channels}}
+
+
+def _amplitudes(problem: Problem, name: str) -> list[float]:
+    """Return the amplitudes that are mixed for a force or a drift."""
+    kind, _, which = name.partition(":")
+    if kind + ":" == FORCE:
+        return amplitude_grid(problem.records[0].setting, which)
+    return [share * DRIFTS * SPECS[which].bias for share in SHARES]
