@@ -12,8 +12,8 @@ from subzero.diagnosis.setting import Setting
 from subzero.diagnosis.verdict import Extended
 from subzero.missing_force import AXES, FEATURES, MissingForce
 
-
 DIGITS = 8
+"""Significant ones in the file."""
 
 
 def text_of(

@@ -26,6 +26,9 @@ HEADLINES = {
 
 NOTHING = "–"
 
+MOST = 5
+"""So many explanations are named in a sentence."""
+
 
 def number(value: float, unit: str = "") -> str:
     """Return a number in three digits with its unit; a share in per cent."""
@@ -64,7 +67,7 @@ def headline(verdict: Verdict) -> str:
 
 def story(verdict: Verdict) -> list[str]:
     """Return the verdict in sentences: what it is, the causes, what is missing, the next trial."""
-    told = [verdict.sentence] if verdict.sentence and not verdict.causes else []
+    told = [_sentence(verdict)] if verdict.sentence and not verdict.causes else []
     told += [cause(one) for one in verdict.causes]
     told += [unknown(verdict.unknown)] if verdict.unknown else []
     if verdict.gain:
@@ -75,6 +78,20 @@ def story(verdict: Verdict) -> list[str]:
         )
     told += [next_trial(verdict.next_trial)] if verdict.next_trial else []
     return [*told, *verdict.notes]
+
+
+def _sentence(verdict: Verdict) -> str:
+    """Return the verdict's own sentence; of what cannot be told apart, no more than one can read."""
+    if verdict.verdict != UNDECIDED:
+        return verdict.sentence
+    ranked = sorted(verdict.probabilities.items(), key=lambda item: -item[1])
+    shown = ", ".join(f"{name} ({probability(p)})" for name, p in ranked[:MOST])
+    rest = (
+        f", and {len(verdict.rivals) + 1 - MOST} more that are less probable"
+        if len(verdict.rivals) >= MOST
+        else ""
+    )
+    return f"These records cannot tell apart: {shown}{rest}."
 
 
 def unknown(one: Unknown) -> str:

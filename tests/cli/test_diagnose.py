@@ -161,3 +161,25 @@ def test_the_same_in_python_takes_files_records_and_models(engine):
     model = replace(logged.setting.model, current=(0.1, 0.0, 0.0))
     subzero.diagnose(logged, model, seen=print, progress=lambda fraction, words: None)
     assert engine["records"][0].setting.model.current == (0.1, 0.0, 0.0)
+
+
+def test_a_challenge_is_written_with_what_to_do_next_and_its_answer_is_told_when_asked(
+    engine, monkeypatch, capsys
+):
+    def challenge(scenario, seed, folder):
+        (folder / "record.csv").write_text(f"{scenario} {seed}")
+
+    module = types.ModuleType("subzero.diagnosis.challenge")
+    vars(module).update(challenge=challenge, reveal=lambda folder: f"in {folder}: the rudder servo lags")
+    monkeypatch.setitem(sys.modules, "subzero.diagnosis.challenge", module)
+    assert main(["challenge", "--scenario", "fig6", "--seed", "7", "--out", "hidden"]) == FINE
+    said = capsys.readouterr().out
+    assert "subzero diagnose hidden/record.csv --scenario fig6" in said
+    assert "subzero challenge --reveal hidden" in said
+    assert main(["challenge", "--reveal", "hidden"]) == FINE
+    assert "in hidden: the rudder servo lags" in capsys.readouterr().out
+
+
+def test_nothing_to_reveal_is_a_mistake(engine, capsys):
+    assert main(["challenge", "--reveal", "nowhere"]) == MISTAKE
+    assert "There is no sealed answer" in capsys.readouterr().err

@@ -1,0 +1,115 @@
+"""The seven stories: what is hidden in which trial, and what the diagnosis should say to it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+from subzero.diagnosis.setting import Setting
+from subzero.diagnosis.trial_library import rich, rudder_doublets
+from subzero.diagnosis.verdict import CAUSE_NAMED, NOTHING_WRONG, OUTSIDE, UNDECIDED
+from subzero.missing_force import MissingForce
+
+BASIC = ("surge_speed", "heading", "yaw_rate", "pitch", "roll", "depth")
+
+
+def as_it_is(setting: Setting) -> Setting:
+    """Return fig6 as it stands."""
+    return setting
+
+
+@dataclass(frozen=True, kw_only=True)
+class Story:
+    """A record with something hidden in it.
+
+    Attributes:
+        name: of the command.
+        title: of the section.
+        words: what happens, and what to look at.
+        trial: (nominal setting of fig6) → that of the trial that is flown.
+        hidden: effect id → deviations.
+        missing: a force that is in no catalogue.
+        begins: the log begins here. [s]
+        channels: that are logged.
+        expected: verdict.
+        figures: that are shown.
+        seed: of tolerances and noise.
+    """
+
+    name: str
+    title: str
+    words: str
+    trial: Callable[[Setting], Setting] = as_it_is
+    hidden: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    missing: MissingForce | None = None
+    begins: float = 0.0
+    channels: tuple[str, ...] = BASIC
+    expected: str = CAUSE_NAMED
+    figures: tuple[str, ...] = ("misfit",)
+    seed: int = 1
+
+
+def weed() -> MissingForce:
+    """Return what a weed does that is caught at 9 s, drags more and more, and is lost at 21 s. [N]"""
+    drag = {0.0: 0.0, 9.0: 0.0, 11.0: -0.25, 15.0: -0.45, 20.0: -0.6, 21.0: -0.1, 22.0: 0.0, 30.0: 0.0}
+    return MissingForce(
+        time=tuple(drag), wrench=tuple((force, 0.0, 0.0, 0.0, 0.0, 0.0) for force in drag.values())
+    )
+
+
+STORIES = (
+    Story(
+        name="healthy",
+        title="1. A healthy vehicle",
+        words="Every number of the vehicle, the cable and the sensors is a little off, as in any basin, and no more.",
+        expected=NOTHING_WRONG,
+        figures=(),
+    ),
+    Story(
+        name="rudder_lag_with_doublets",
+        title="2. A rudder that lags, found with doublets",
+        words="The rudder's servo has a time constant of 0.55 s instead of 0.15 s. The trial is made for it.",
+        trial=rudder_doublets,
+        hidden={"rudder_lag": (0.4,)},
+    ),
+    Story(
+        name="rudder_lag_on_fig6",
+        title="3. The same rudder on the trial of Fig. 6",
+        words="One short rudder pulse cannot tell a lag from all else that delays a turn: a set is the answer,"
+        " and the trial to fly next.",
+        hidden={"rudder_lag": (0.4,)},
+        expected=UNDECIDED,
+        figures=("evidence",),
+    ),
+    Story(
+        name="cable_drag_or_current",
+        title="4. Drag along the cable, or a current?",
+        words="The log begins at 8 s, under way. Water that moves with the vehicle only shows in the length of cable "
+        "that is pulled out; without a ground speed or another heading the record cannot say which of the two it is.",
+        hidden={"cable_tangential_drag": (0.45,)},
+        begins=8.0,
+        expected=UNDECIDED,
+        figures=("evidence",),
+    ),
+    Story(
+        name="battery_sag_or_cable",
+        title="5. A battery that sags, or the cable?",
+        words="Both let the speed fall slowly. A battery takes the propeller's torque along, and the roll angle tells.",
+        hidden={"battery_sag": (0.20,)},
+    ),
+    Story(
+        name="two_effects",
+        title="6. Two causes at once",
+        words="The propeller lost 30 % of its thrust and the rudder is 1.5 degrees off its centre.",
+        trial=rich,
+        hidden={"propeller_thrust_gain": (-0.30,), "rudder_offset": (1.5,)},
+    ),
+    Story(
+        name="weed_in_mid_run",
+        title="7. A weed that is caught, and lost again",
+        words="It drags at the hull from 9 to 21 s and is in no catalogue: its force is recovered as a history.",
+        missing=weed(),
+        expected=OUTSIDE,
+        figures=("missing_force",),
+    ),
+)  # fmt: skip
