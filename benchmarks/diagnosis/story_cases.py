@@ -86,7 +86,7 @@ STORIES = (
         title="4. Drag along the cable, or a current?",
         words="The log begins at 8 s, under way. Water that moves with the vehicle only shows in the length of cable "
         "that is pulled out; without a ground speed or another heading the record cannot say which of the two it is.",
-        hidden={"cable_tangential_drag": (0.45,)},
+        hidden={"cable_tangential_drag": (0.30,)},
         begins=8.0,
         expected=UNDECIDED,
         figures=("evidence",),

@@ -15,8 +15,8 @@ SEEN = 4.0
 """Signal, in noise and tolerances, that is seen."""
 
 
-MOST_RIVALS = 5
-"""So many are shown where space is short."""
+MOST_RIVALS, WORTH_A_LINE = 5, 0.01
+"""So many are shown where space is short, and none that is less probable."""
 
 INVISIBLE = 0.01
 """Signal below which no size that makes sense would be seen."""
@@ -78,14 +78,20 @@ def _when(one: Misfit) -> str:
 def rivals(verdict: Verdict, *, short: bool = False) -> Table:
     """Return what else explains the records, and how far it is from the named cause; `short` without parameters."""
     if short:
-        rows = [
-            (rival_words(one), probability(one.probability), number(one.discrimination))
-            for one in verdict.rivals
-        ]
+        rows = [_short(one) for one in _worth(verdict.rivals)]
         return Table(("what else explains the records", "probability", "D"), rows[:MOST_RIVALS])
     return Table(("explanation", "probability", "D", "parameters"),
                  [(rival_words(one), probability(one.probability), number(one.discrimination), _numbers(one))
                   for one in verdict.rivals])  # fmt: skip
+
+
+def _short(one: Rival) -> tuple[str, ...]:
+    return rival_words(one), probability(one.probability), number(one.discrimination)
+
+
+def _worth(found: Sequence[Rival]) -> Sequence[Rival]:
+    """Return the rivals that are worth a line; the first one if none is."""
+    return [one for one in found if one.probability >= WORTH_A_LINE] or found[:1]
 
 
 def rival_words(one: Rival) -> str:

@@ -70,7 +70,7 @@ def story(verdict: Verdict) -> list[str]:
     told = [_sentence(verdict)] if verdict.sentence and not verdict.causes else []
     told += [cause(one) for one in verdict.causes]
     told += [unknown(verdict.unknown)] if verdict.unknown else []
-    if verdict.gain:
+    if verdict.gain and math.isfinite(verdict.gain.total):
         share = f"{100.0 * verdict.gain.total:.1f} %"
         told.append(
             f"The extended model explains {share} of what can be explained of data that were not fitted "
