@@ -31,8 +31,6 @@ from subzero.run_state import Live, Now, Setup
 from vehicle import STATE_SIZE
 
 MOST_EXCHANGES = 60
-FORCE_TOLERANCE = 1e-9
-"""Hull and cable agree when their forces differ by less than this fraction (and 1e-11 N)."""
 ROUNDING = 1e-14
 """Places are known to this fraction, and forces to this times the cable's stiffness. [-]"""
 MOST_HALVINGS = 8
@@ -91,7 +89,7 @@ def _agree(setup: Setup, live: Live, start: float, span: float) -> tuple[int, So
         if not solved.converged:
             return CABLE_FAILED, solved
         impedance(live.line, live.now.Z)
-        if setup.fixed.prescribed or _forces_agree(live.now, live.line.ends.tow_force):
+        if setup.fixed.prescribed or _forces_agree(live.now, live.line.ends.tow_force, setup.fixed.agreement):
             return FINE, solved
         _mobility(
             setup.fixed.r_c, live.now.hull.rotation, setup.fixed.vehicle.inverse_mass, live.now.mobility
@@ -121,7 +119,7 @@ def _move(setup: Setup, live: Live, start: float, span: float) -> bool:
 
 
 @compiled
-def _forces_agree(now: Now, F: np.ndarray) -> bool:
+def _forces_agree(now: Now, F: np.ndarray, agreement: float) -> bool:
     """Say whether the cable answers with the force that the hull was pulled by, as far as rounding lets one say."""
     size, gap, stiffness, reach = 0.0, 0.0, 0.0, 0.0
     for i in range(3):
@@ -130,7 +128,7 @@ def _forces_agree(now: Now, F: np.ndarray) -> bool:
         reach = max(reach, abs(now.tow[i]))
         for k in range(3):
             stiffness = max(stiffness, abs(now.Z[i, k]))
-    return gap <= FORCE_TOLERANCE * size + 1e-11 + ROUNDING * stiffness * reach
+    return gap <= agreement * size + 1e-11 + ROUNDING * stiffness * reach
 
 
 @compiled

@@ -56,7 +56,11 @@ class Ledger:
 
 
 class Fixed(NamedTuple):
-    """The numbers that do not change during a run; `drum_place` is the drum at the start, earth axes (3,). [m]"""
+    """The numbers that do not change during a run.
+
+    `drum_place` is the drum at the start, earth axes (3,) [m]; hull and cable agree when their forces differ by less than
+    the fraction `agreement`.
+    """
 
     vehicle: VehicleNumbers
     cable: CableNumbers
@@ -64,6 +68,7 @@ class Fixed(NamedTuple):
     r_c: np.ndarray
     drum_place: np.ndarray
     hull_step: float
+    agreement: float
     tethered: bool
     prescribed: bool
 

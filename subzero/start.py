@@ -20,6 +20,8 @@ from subzero.model import Model
 from subzero.run_state import Fixed, Live, Orders, Setup, new_now
 from subzero.surroundings import drum_of, water_of, way_of_drum
 
+FORCE_TOLERANCE = 1e-9
+"""Hull and cable agree when their forces differ by less than this fraction (and 1e-11 N)."""
 FIRST_ROOM = 16
 """Segments that a new cable has room for, beyond those that are in the water."""
 
@@ -106,6 +108,7 @@ def _fixed(trial: scenarios.Trial, model: Model, tethered: bool) -> Fixed:
         r_c=model.vehicle.tow_point.position(),
         drum_place=np.zeros(3),
         hull_step=trial.hull_step,
+        agreement=FORCE_TOLERANCE,
         tethered=tethered,
         prescribed=trial.motion is not None,
     )

@@ -32,7 +32,9 @@ def information(problem: Problem, M: np.ndarray, at: list[int]) -> np.ndarray:
     return np.linalg.inv(M[np.ix_(at, at)]) - np.diag(1.0 / tolerance**2)
 
 
-def against(problem: Problem, M: np.ndarray, own: list[int], step: np.ndarray, other: list[int]) -> tuple[float, float]:
+def against(
+    problem: Problem, M: np.ndarray, own: list[int], step: np.ndarray, other: list[int]
+) -> tuple[float, float]:
     """Return D of a step (n,) of its own entries against other entries, and how much alike they are (0 to 1)."""
     G = information(problem, M, own + other)
     n = len(own)
@@ -55,9 +57,15 @@ def _of(problem: Problem, M: np.ndarray, J: np.ndarray, one: str, others: list[s
     """Return the detectability of a cause: of its parameter with the greatest signal."""
     at = places(problem.entries, (one,))
     signals = {k: _signal(problem, M, k) for k in at}
-    step = np.array([problem.entries[k].parameter.scale if signals[k] == max(signals.values()) else 0.0 for k in at])
+    step = np.array(
+        [problem.entries[k].parameter.scale if signals[k] == max(signals.values()) else 0.0 for k in at]
+    )
     ranked = sorted(
-        ((*against(problem, M, at, step, places(problem.entries, (other,))), other) for other in others if other != one),
+        (
+            (*against(problem, M, at, step, places(problem.entries, (other,))), other)
+            for other in others
+            if other != one
+        ),
         key=lambda triple: triple[0],
     )
     D, cosine, rival = ranked[0] if ranked else (max(signals.values()) ** 2, 0.0, "none")
@@ -65,7 +73,10 @@ def _of(problem: Problem, M: np.ndarray, J: np.ndarray, one: str, others: list[s
         id=one,
         signal=max(signals.values()),
         smallest={
-            problem.entries[k].parameter.name: SEEN * problem.entries[k].parameter.scale / max(signals[k], 1e-9) for k in at
+            problem.entries[k].parameter.name: SEEN
+            * problem.entries[k].parameter.scale
+            / max(signals[k], 1e-9)
+            for k in at
         },
         rival=rival,
         discrimination=D,
@@ -79,7 +90,9 @@ def _signal(problem: Problem, M: np.ndarray, k: int) -> float:
     return float(scale * np.sqrt(max(information(problem, M, [k])[0, 0], 0.0)))
 
 
-def separation(problem: Problem, J: np.ndarray, z: np.ndarray, ids: tuple[str, ...], kappa: float = 1.0) -> tuple[float, str]:
+def separation(
+    problem: Problem, J: np.ndarray, z: np.ndarray, ids: tuple[str, ...], kappa: float = 1.0
+) -> tuple[float, str]:
     """Return D of causes as they are in z against their closest rival, and that rival ("none": the tolerances)."""
     M = marginal(problem, J, kappa)
     own = places(problem.entries, ids)
@@ -88,5 +101,5 @@ def separation(problem: Problem, J: np.ndarray, z: np.ndarray, ids: tuple[str, .
     for other in named(problem):
         if other not in ids:
             D = against(problem, M, own, z[own], places(problem.entries, (other,)))[0]
-            best, who = (D, other) if D < best else (best, who)
+            best, who = (D, other) if best > D else (best, who)
     return best, who

@@ -1,6 +1,6 @@
 """From records to a verdict: the engine from end to end.
 
-    pose → what could be seen → misfit → search → what is outside → rules → extended model → gain → next trial
+pose → what could be seen → misfit → search → what is outside → rules → extended model → gain → next trial
 """
 
 from __future__ import annotations

@@ -61,7 +61,9 @@ def posterior(q: Quadratic, D: np.ndarray) -> Posterior:
     return Posterior(z=z, M=M, log_evidence=-0.5 * (q.rr - float(q.b @ z)) - 0.5 * log_det, log_det=log_det)
 
 
-def freed(base: Posterior, D: np.ndarray, places: Sequence[int], variance: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
+def freed(
+    base: Posterior, D: np.ndarray, places: Sequence[int], variance: np.ndarray
+) -> tuple[float, np.ndarray, np.ndarray]:
     """Return log evidence, means and covariance of some entries when their prior variance is another.
 
     Args:

@@ -89,7 +89,7 @@ def shares(search: Search, foreign: list[Foreign]) -> tuple[dict[Ids, float], di
 def tolerance_scale(search: Search) -> dict[float, float]:
     """Return κ → probability, over all candidates."""
     top = search.best().log_posterior
-    weight = {kappa: 0.0 for kappa in KAPPAS}
+    weight = dict.fromkeys(KAPPAS, 0.0)
     for candidate in search.candidates.values():
         parts = {kappa: np.log(prior) + candidate.log_evidence[kappa] for kappa, prior in KAPPAS.items()}
         mixed = log_sum(list(parts.values()))
@@ -97,5 +97,3 @@ def tolerance_scale(search: Search) -> dict[float, float]:
             weight[kappa] += float(np.exp(candidate.log_posterior - top + value - mixed))
     total = sum(weight.values())
     return {kappa: value / total for kappa, value in weight.items()}
-
-

@@ -68,10 +68,10 @@ def estimate(time: np.ndarray, difference: np.ndarray, spec: float, known: float
 
 
 def spikes(values: np.ndarray, spec: float) -> np.ndarray:
-    """Say which samples stand alone, far from the median of five around them."""
-    if values.size < 5:
+    """Say which samples stand alone, far from the median of seven around them."""
+    if values.size < 7:
         return np.zeros(values.size, dtype=bool)
-    around = np.median(np.lib.stride_tricks.sliding_window_view(np.pad(values, 2, mode="edge"), 5), axis=1)
+    around = np.median(np.lib.stride_tricks.sliding_window_view(np.pad(values, 3, mode="reflect"), 7), axis=1)
     off = np.abs(values - around)
     level = max(1.4826 * float(np.median(off)) * 1.2, 0.1 * spec)
     return off > SPIKE * level
@@ -96,16 +96,34 @@ def _moments(time: np.ndarray, values: np.ndarray, step: float) -> tuple[float, 
 
 @lru_cache(maxsize=64)
 def _behind(ticks: tuple[int, ...], tick: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return what leaves a smooth curve's rest (m, m), and what it leaves of AR(1) noise of level 1, for RHO."""
+    """Return what leaves a smooth curve's rest (m, m), and what it leaves of AR(1) noise of level 1, for RHO.
+
+    With Q the curve's basis, orthonormal, C the noise's covariance and T = C Q:
+    (I − QQᵀ) C (I − QQᵀ) = C − Q Tᵀ − T Qᵀ + Q (Qᵀ T) Qᵀ, of which only two diagonals are needed.
+    """
     time = np.array(ticks) * tick
-    basis = _splines(time)
-    rest = np.eye(time.size) - basis @ np.linalg.pinv(basis)
-    apart = np.abs(np.subtract.outer(time, time)) / np.median(np.diff(time))
-    square, product = np.empty(RHO.size), np.empty(RHO.size)
-    for i, rho in enumerate(RHO):
-        covered = rest @ (np.where(apart == 0.0, 1.0, rho**apart) @ rest)
-        square[i], product[i] = np.mean(np.diag(covered)), np.mean(np.diag(covered, 1))
-    return rest, square, product
+    Q = np.linalg.qr(_splines(time))[0]
+    gap = np.diff(time) / np.median(np.diff(time))
+    kept = RHO ** gap[:, None]
+    T = _coloured(Q, kept)
+    flat = Q.T @ T.reshape(Q.shape[0], -1)
+    S = flat.reshape(Q.shape[1], RHO.size, Q.shape[1]).transpose(1, 0, 2)
+    own = T @ Q[:, :, None]
+    twice = (Q @ S).transpose(1, 0, 2)
+    square = np.mean(1.0 - 2.0 * own[..., 0] + (twice @ Q[:, :, None])[..., 0], axis=0)
+    across = (T[1:] @ Q[:-1, :, None] + T[:-1] @ Q[1:, :, None] - twice[:-1] @ Q[1:, :, None])[..., 0]
+    product = np.mean(kept - across, axis=0)
+    return np.eye(time.size) - Q @ Q.T, square, product
+
+
+def _coloured(Q: np.ndarray, kept: np.ndarray) -> np.ndarray:
+    """Return C Q (m, levels of colour, functions) for C_ij = Π kept between i and j, by one pass each way."""
+    ahead = np.repeat(Q[:, None, :], kept.shape[1], axis=1)
+    behind = ahead.copy()
+    for i in range(1, Q.shape[0]):
+        ahead[i] += kept[i - 1, :, None] * ahead[i - 1]
+        behind[-1 - i] += kept[-i, :, None] * behind[-i]
+    return ahead + behind - Q[:, None, :]
 
 
 def _splines(time: np.ndarray) -> np.ndarray:

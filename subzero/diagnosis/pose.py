@@ -46,7 +46,9 @@ def _observed(one: Logged) -> Observed:
     values = {name: column for name, column in one.record.values.items() if name in SPECS}
     simulated = respond(setting, time, values)
     if not all(np.isfinite(column).all() for column in simulated.values()):
-        raise UserError(f"The nominal model cannot be run through '{one.name}'. Try `subzero simulate` on its scenario.")
+        raise UserError(
+            f"The nominal model cannot be run through '{one.name}'. Try `subzero simulate` on its scenario."
+        )
     noise = {
         name: estimate(time, column - simulated[name], SPECS[name].noise, one.noise.get(name))
         for name, column in values.items()

@@ -1,6 +1,6 @@
 """The least-squares problem behind a diagnosis: all parameters, all records, one whitened residual.
 
-    r(z) = W (y − h(z)),    J = ∂(W h)/∂z
+r(z) = W (y − h(z)),    J = ∂(W h)/∂z
 """
 
 from __future__ import annotations
@@ -88,16 +88,19 @@ class Problem:
             self._whitened(i, self.setting(i, z), track, measured=True) for i, track in enumerate(tracks)
         ])  # fmt: skip
 
-    def jacobian(self, z: np.ndarray, columns: Sequence[int] | None = None) -> np.ndarray:
+    def jacobian(
+        self, z: np.ndarray, columns: Sequence[int] | None = None, *, rough: bool = True
+    ) -> np.ndarray:
         """Return J (m, k) at z by one-sided differences; only some of its columns, if asked, others 0."""
         wanted = range(len(self.entries)) if columns is None else columns
         at_z = [(i, z) for i in range(len(self.records))]
-        base, fine = self._tracks(at_z, rough=True), self._tracks(at_z)
+        fine = self._tracks(at_z)
+        base = self._tracks(at_z, rough=True) if rough else fine
         shown = [self._whitened(i, self.setting(i, z), track) for i, track in enumerate(base)]
         finely = [self._whitened(i, self.setting(i, z), track) for i, track in enumerate(fine)]
         jobs = [(k, i, self._moved(z, k)) for k in wanted for i in range(len(self.records))
                 if self.entries[k].record in (-1, i)]  # fmt: skip
-        runs = iter(self._tracks([(i, moved) for k, i, moved in jobs if not self._late(k)], rough=True))
+        runs = iter(self._tracks([(i, moved) for k, i, moved in jobs if not self._late(k)], rough=rough))
         J = np.zeros((sum(part.size for part in shown), len(self.entries)))
         first = np.cumsum([0, *(part.size for part in shown)])
         for k, i, moved in jobs:
@@ -121,7 +124,9 @@ class Problem:
         moved[k] += step if z[k] + step <= parameter.high else -step
         return moved
 
-    def _tracks(self, jobs: list[tuple[int, np.ndarray]], *, rough: bool = False) -> list[tuple[np.ndarray, np.ndarray]]:
+    def _tracks(
+        self, jobs: list[tuple[int, np.ndarray]], *, rough: bool = False
+    ) -> list[tuple[np.ndarray, np.ndarray]]:
         """Return the track of each (record, z), side by side."""
         self.runs[0] += len(jobs)
 
@@ -159,7 +164,9 @@ def _rough(setting: Setting) -> Setting:
     told = trial.commands is None or multiples(trial.commands.time, hull_step)
     if trial.cable_step > cable_step or setting.later or not told:
         return setting
-    made = replace(trial, hull_step=max(trial.hull_step, hull_step), segment_length=max(trial.segment_length, segment))
+    made = replace(
+        trial, hull_step=max(trial.hull_step, hull_step), segment_length=max(trial.segment_length, segment)
+    )
     if abs(trial.duration / cable_step - round(trial.duration / cable_step)) < 1e-6:
         made = replace(made, cable_step=cable_step)
     return replace(setting, trial=made)
@@ -168,7 +175,12 @@ def _rough(setting: Setting) -> Setting:
 def entries_of(effects: Sequence[Effect], start: Sequence[Effect], records: int) -> tuple[Entry, ...]:
     """Return the entries of z: effects that all records share, and the start of each record."""
     shared = [Entry(effect, i, -1) for effect in effects for i in range(len(effect.parameters))]
-    own = [Entry(effect, i, record) for record in range(records) for effect in start for i in range(len(effect.parameters))]
+    own = [
+        Entry(effect, i, record)
+        for record in range(records)
+        for effect in start
+        for i in range(len(effect.parameters))
+    ]
     return (*shared, *own)
 
 

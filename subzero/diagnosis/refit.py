@@ -29,6 +29,7 @@ class Fit:
         D: prior variances (k,).
         objective: ½|r|² + ½ zᵀD⁻¹z.
         converged: no step would gain more.
+        promise: what the linear model says that a further step would gain; of old sensitivities, little to rely on.
         fresh: how many times sensitivities were made.
     """
 
@@ -38,6 +39,7 @@ class Fit:
     D: np.ndarray
     objective: float
     converged: bool
+    promise: float
     fresh: int
 
     @property
@@ -47,7 +49,13 @@ class Fit:
 
 
 def refit(
-    problem: Problem, z: np.ndarray, J: np.ndarray, D: np.ndarray, *, r: np.ndarray | None = None, most_fresh: int = 1
+    problem: Problem,
+    z: np.ndarray,
+    J: np.ndarray,
+    D: np.ndarray,
+    *,
+    r: np.ndarray | None = None,
+    most_fresh: int = 1,
 ) -> Fit:
     """Return the best fit under prior variances D, from z and sensitivities J close by.
 
@@ -62,7 +70,7 @@ def refit(
     low, high = bounds(problem)
     z = np.clip(z, low, high)
     r = problem.residual(z) if r is None else r
-    now, fresh, converged = _objective(r, z, D), 0, False
+    now, fresh, converged, promised = _objective(r, z, D), 0, False, 0.0
     for _ in range(MOST_STEPS):
         step = bounded_step(J, r, z, D, low, high)
         promised = now - _objective(r - J @ step, z + step, D)
@@ -71,15 +79,30 @@ def refit(
             break
         share, z, r, now = _walk(problem, z, r, now, step, promised, D)
         if share < POOR and promised > NEARLY and fresh < most_fresh:
-            J, fresh = problem.jacobian(z), fresh + 1
+            J, fresh = problem.jacobian(z, rough=share > 0.0), fresh + 1
         elif share <= 0.0:
             converged = promised < NEARLY
             break
-    return Fit(z=z, r=r, J=J, D=D, objective=now, converged=converged, fresh=fresh)
+    return Fit(
+        z=z,
+        r=r,
+        J=J,
+        D=D,
+        objective=now,
+        converged=converged,
+        promise=0.0 if converged else promised,
+        fresh=fresh,
+    )
 
 
 def _walk(
-    problem: Problem, z: np.ndarray, r: np.ndarray, now: float, step: np.ndarray, promised: float, D: np.ndarray
+    problem: Problem,
+    z: np.ndarray,
+    r: np.ndarray,
+    now: float,
+    step: np.ndarray,
+    promised: float,
+    D: np.ndarray,
 ) -> tuple[float, np.ndarray, np.ndarray, float]:
     """Return the share of what was promised that a step, or a part of it, gains; and where it leads."""
     for part in (1.0, 0.4, 0.1):

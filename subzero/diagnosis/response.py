@@ -25,6 +25,8 @@ from vehicle.state import QUATERNION, SHAFT, VELOCITY
 HULL_STEP, CABLE_STEP, SEGMENT = 0.05, 0.2, 1.0
 """Steps of a diagnosis: errors of 1e-4 m/s and 0.03 degrees on fig6, a twentieth of the sensors' noise, in a third of
 the time."""
+AGREEMENT = 1e-6
+"""Fraction within which the forces of hull and cable agree, in the place of 1e-9: a quarter of the time, no visible error."""
 FASTEST_PAY_OUT = 2.0
 """Room for nodes is made for this speed, and doubled when that is not enough. [m/s]"""
 
@@ -72,6 +74,7 @@ def tracked(setting: Setting) -> tuple[np.ndarray, np.ndarray]:
     trial = setting.trial
     times = np.linspace(0.0, trial.duration, round(trial.duration / trial.cable_step) + 1)
     setup, live = prepare(trial, setting.model, setting.tethered)
+    setup.fixed.agreement = AGREEMENT
     live = _roomy(live, trial.start.wet_length + FASTEST_PAY_OUT * trial.duration, trial.segment_length)
     steps = int(coupling.hull_steps.py_func(setup, times[1] - times[0]))
     track = np.full((1 + (times.size - 1) * steps, COLUMNS), np.nan)

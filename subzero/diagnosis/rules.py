@@ -1,9 +1,9 @@
 """From probabilities to a verdict: one visible set of rules.
 
-    nothing_wrong      p(none) ≥ 0.5, or the named size is within the practical one (then the model wants calibration)
-    cause_named        one hypothesis with p ≥ 0.8, its size beyond 4 tolerances
-    outside_catalogue  a force or a drift that no cause explains has p ≥ 0.5
-    undecided          everything else: the smallest set with p ≥ 0.95
+nothing_wrong      p(none) ≥ 0.5, or the named size is within the practical one (then the model wants calibration)
+cause_named        one hypothesis with p ≥ 0.8, its size beyond 4 tolerances
+outside_catalogue  a force or a drift that no cause explains has p ≥ 0.5
+undecided          everything else: the smallest set with p ≥ 0.95
 """
 
 from __future__ import annotations

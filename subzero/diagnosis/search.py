@@ -1,13 +1,13 @@
 """The search: from all hypotheses by linear evidence to a few by real fits.
 
-    all tolerances wide → a point close to the data → linear evidence of everything there → refits of what is left
-    → a second cause beside the best, and a third → probabilities
+all tolerances wide → a point close to the data → linear evidence of everything there → refits of what is left
+→ a second cause beside the best, and a third → probabilities
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
+from itertools import combinations
 
 import numpy as np
 from scipy.stats import norm
@@ -21,7 +21,11 @@ WIDE = 4.0
 """κ of the fit that the linear evidence is made at."""
 KEEP, SINGLES, PAIRS = 12.0, 7, 4
 """Refit hypotheses whose log evidence is this close to the best of their kind, and at most so many."""
-RACERS, HOPELESS = 4, 6.0
+BENT, LEAST_BENT = 2, 10.0
+"""So many causes that the wide fit bends by at least so many tolerances are fitted by themselves."""
+MOST_HOPE = 300.0
+"""A promise of old sensitivities counts up to this much."""
+RACERS, HOPELESS = 6, 6.0
 """At most so many fits with sensitivities of their own in a race; none for what is this far behind in log posterior."""
 UNTRIED = 2.0
 """A hypothesis without a fit of its own is at least this far behind the best in log posterior."""
@@ -46,6 +50,11 @@ class Candidate:
     log_posterior: float
 
     @property
+    def hope(self) -> float:
+        """The log posterior that a better fit might have."""
+        return self.log_posterior + min(self.fit.promise, MOST_HOPE)
+
+    @property
     def kappa(self) -> float:
         """The most probable scale of the tolerances."""
         return max(KAPPAS, key=lambda kappa: np.log(KAPPAS[kappa]) + self.log_evidence[kappa])
@@ -63,6 +72,7 @@ class Search:
         candidates: hypothesis → its real fit.
         secants: hypothesis → where its fit begins, for causes without a slope.
         raced: hypotheses that were fitted with sensitivities of their own.
+        beside: hypothesis → log posterior, estimated at the fit of one with a cause less.
     """
 
     problem: Problem
@@ -73,6 +83,7 @@ class Search:
     candidates: dict[Ids, Candidate] = field(default_factory=dict)
     secants: dict[Ids, np.ndarray] = field(default_factory=dict)
     raced: set[Ids] = field(default_factory=set)
+    beside: dict[Ids, float] = field(default_factory=dict)
 
     def begin(self) -> None:
         """Make the sensitivities at the nominal model, and the fit with wide tolerances."""
@@ -99,7 +110,9 @@ class Search:
         found = []
         for kappa, prior in KAPPAS.items():
             if at:
-                value, mean, covariance = freed(base[kappa], D[kappa], at, variances(self.problem.entries, ids, kappa)[at])
+                value, mean, covariance = freed(
+                    base[kappa], D[kappa], at, variances(self.problem.entries, ids, kappa)[at]
+                )
                 value += self._inside(at, mean, np.sqrt(np.diag(covariance)))
             else:
                 value = base[kappa].log_evidence
@@ -121,7 +134,9 @@ class Search:
         for k, entry in enumerate(entries):
             if entry.record >= 0 or entry.parameter.low != 0.0 or norms[k] > 1.0:
                 continue
-            best = max((self._secant(k, size * entry.parameter.scale) for size in SWEEP), key=lambda pair: pair[0])
+            best = max(
+                (self._secant(k, size * entry.parameter.scale) for size in SWEEP), key=lambda pair: pair[0]
+            )
             ids = (entry.effect.id,)
             self.screen[ids] = best[0] + log_prior(ids, len(named(self.problem)))
             self.secants[ids] = fit.z + best[1]
@@ -148,11 +163,30 @@ class Search:
         """Fit nothing, and the best causes and pairs of the screen, with real runs: all with the sensitivities at hand,
         then those that come out best with their own.
         """
-        kinds = (((),), _best(self.screen, 1, SINGLES), _best(self.screen, 2, PAIRS))
+        kinds = (((),), self._bent(), _best(self.screen, 1, SINGLES), _best(self.screen, 2, PAIRS))
+        for ids in kinds[1]:
+            self.progress(0.3, "fitting " + ids[0] + " by itself")
+            self._alone(ids)
         for ids in (ids for kind in kinds for ids in kind):
             self.progress(0.3, "fitting " + (" + ".join(ids) or "nothing wrong"))
             self.fit(ids)
         self.race()
+
+    def _bent(self) -> list[Ids]:
+        """Return the causes whose parameters the wide fit bends most: of a large effect the linear problem says little."""
+        bent = {}
+        for z, entry in zip(self.wide.z, self.problem.entries, strict=True):
+            if entry.record < 0:
+                size = abs(z) / entry.parameter.tolerance
+                bent[entry.effect.id] = max(size, bent.get(entry.effect.id, 0.0))
+        return [(one,) for one in sorted(bent, key=lambda one: -bent[one])[:BENT] if bent[one] > LEAST_BENT]
+
+    def _alone(self, ids: Ids) -> None:
+        """Fit a cause from where the wide fit has it, all else nominal, with the sensitivities there."""
+        z, at = np.zeros(len(self.problem.entries)), places(self.problem.entries, ids)
+        z[at] = self.wide.z[at]
+        D = variances(self.problem.entries, ids, 1.0)
+        self._keep(ids, refit(self.problem, z, self.problem.jacobian(z), D, most_fresh=2))
 
     def fit(self, ids: Ids, start: Fit | None = None) -> None:
         """Fit a hypothesis with real runs and the sensitivities of another fit, unless it was fitted."""
@@ -168,9 +202,9 @@ class Search:
             waiting = [one for one in self.candidates.values() if one.ids not in self.raced]
             if not waiting:
                 return
-            now = max(waiting, key=lambda one: one.log_posterior)
+            now = max(waiting, key=lambda one: one.hope)
             done = [self.candidates[ids].log_posterior for ids in self.raced]
-            if len(done) >= 2 and now.log_posterior < max(done) - hopeless:
+            if len(done) >= 2 and now.hope < max(done) - hopeless:
                 return
             self.progress(0.5, "fitting again " + (" + ".join(now.ids) or "nothing wrong"))
             self._again(now)
@@ -180,7 +214,7 @@ class Search:
         self.raced.add(one.ids)
         D = variances(self.problem.entries, one.ids, one.kappa)
         J = self.problem.jacobian(one.fit.z)
-        now = self._keep(one.ids, refit(self.problem, one.fit.z, J, D, r=one.fit.r, most_fresh=1))
+        now = self._keep(one.ids, refit(self.problem, one.fit.z, J, D, r=one.fit.r, most_fresh=2))
         if now.kappa != one.kappa:
             D = variances(self.problem.entries, one.ids, now.kappa)
             self._keep(one.ids, refit(self.problem, now.fit.z, now.fit.J, D, r=now.fit.r, most_fresh=0))
@@ -211,19 +245,31 @@ class Search:
         """Return the most probable candidate."""
         return max(self.candidates.values(), key=lambda candidate: candidate.log_posterior)
 
-    def grow(self, most: int = 3) -> None:
-        """Add a cause to the best candidate as long as that pays; look at those with one cause less, too."""
-        while len(self.best().ids) < most:
-            before = self.best()
-            self.progress(0.75, "a further cause beside " + (" + ".join(before.ids) or "nothing"))
-            for ids in self._beside(before):
-                self.fit(ids, before.fit)
+    def grow(self, most: int = 3, rounds: int = 4) -> None:
+        """Look beside the best candidate for one more cause, and below it for one less, until the best stays."""
+        looked: set[Ids] = set()
+        for _ in range(rounds):
+            best = self.best()
+            if best.ids in looked:
+                return
+            looked.add(best.ids)
+            self.progress(0.75, "a further cause beside " + (" + ".join(best.ids) or "nothing"))
+            if len(best.ids) < most:
+                for ids in self._beside(best):
+                    self.fit(ids, best.fit)
+            for without in best.ids:
+                self._below(tuple(one for one in best.ids if one != without), best.fit)
             self.race(2, 2.0)
-            if self.best().ids == before.ids:
-                break
-        for without in list(self.best().ids):
-            self.fit(tuple(one for one in self.best().ids if one != without), self.best().fit)
-        self.race(2, 2.0)
+
+    def _below(self, ids: Ids, fit: Fit) -> None:
+        """Fit a part of a hypothesis from its fit, if that is better than what is known of the part."""
+        known = self.candidates.get(ids)
+        kappa = known.kappa if known else 1.0
+        D = variances(self.problem.entries, ids, kappa)
+        found = refit(self.problem, posterior(fit.quadratic, D).z, fit.J, D, most_fresh=0)
+        if known is None or found.objective < known.fit.objective - 0.1:
+            self._keep(ids, found)
+            self.raced.discard(ids)
 
     def _beside(self, candidate: Candidate, most: int = 2, worth: float = -4.0) -> list[Ids]:
         """Return the hypotheses with one cause more that the linear problem at a fit finds best."""
@@ -231,6 +277,7 @@ class Search:
         count, found = len(named(self.problem)), {}
         D = {kappa: variances(entries, candidate.ids, kappa) for kappa in KAPPAS}
         base = {kappa: posterior(q, D[kappa]) for kappa in KAPPAS}
+        none = [np.log(prior) + base[kappa].log_evidence for kappa, prior in KAPPAS.items()]
         for one in named(self.problem):
             ids = tuple(sorted({*candidate.ids, one}))
             if len(ids) > len(candidate.ids) and ids not in self.candidates:
@@ -239,24 +286,36 @@ class Search:
                     own = variances(entries, ids, kappa)[at]
                     value, mean, covariance = freed(base[kappa], D[kappa], at, own)
                     parts.append(np.log(prior) + value + self._inside(at, mean, np.sqrt(np.diag(covariance))))
-                found[ids] = log_sum(parts) + log_prior(ids, count)
+                gain = (
+                    log_sum(parts) - log_sum(none) + log_prior(ids, count) - log_prior(candidate.ids, count)
+                )
+                found[ids] = self.beside[ids] = candidate.log_posterior + gain
         ranked = sorted(found, key=lambda ids: -found[ids])[:most]
         return [ids for ids in ranked if found[ids] > candidate.log_posterior + worth]
+
+    def estimated(self, ids: Ids) -> float:
+        """Return the log posterior of a hypothesis without a fit: of the best fit of a part of it, and what the linear
+        problem there, or else the screen, says that the rest adds.
+        """
+        if ids in self.beside:
+            return self.beside[ids]
+        parts = [one for part in range(len(ids)) for one in combinations(ids, part) if one in self.candidates]
+        part = max(parts, key=lambda one: self.candidates[one].log_posterior, default=())
+        return self.candidates[part].log_posterior + self.screen[ids] - self.screen[part]
 
     def probabilities(self) -> dict[Ids, float]:
         """Return the probability of every hypothesis: by its fit, or by the screen if it was not worth one."""
         log = {ids: candidate.log_posterior for ids, candidate in self.candidates.items()}
         best = max(log.values())
-        shift = min(best - self.screen[self.best().ids], 0.0) if self.best().ids in self.screen else 0.0
-        for ids, value in self.screen.items():
-            log.setdefault(ids, min(value + shift, best - UNTRIED))
+        for ids in self.screen:
+            log.setdefault(ids, min(self.estimated(ids), best - UNTRIED))
         total = log_sum(list(log.values()))
-        return {ids: float(np.exp(value - total)) for ids, value in sorted(log.items(), key=lambda pair: -pair[1])}
+        return {
+            ids: float(np.exp(value - total)) for ids, value in sorted(log.items(), key=lambda pair: -pair[1])
+        }
 
 
 def _best(screen: dict[Ids, float], size: int, most: int) -> list[Ids]:
     """Return the best hypotheses of a size, close to the best of all of that size."""
     ranked = sorted((ids for ids in screen if len(ids) == size), key=lambda ids: -screen[ids])[:most]
     return [ids for ids in ranked if screen[ids] > screen[ranked[0]] - KEEP]
-
-

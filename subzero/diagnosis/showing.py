@@ -26,4 +26,9 @@ def _curves(problem: Problem, record: int, fits: Mapping[str, Fit | None], found
         wide = found.problem if found and z.size > len(problem.entries) else problem
         z = np.pad(z, (0, max(len(wide.entries) - z.size, 0)))
         models[label] = respond(wide.setting(record, z), one.time, one.noise)
-    return Curves(time=one.time, measured=one.values, models=models, used={name: n.used for name, n in one.noise.items()})
+    return Curves(
+        time=one.time,
+        measured=one.values,
+        models=models,
+        used={name: n.used for name, n in one.noise.items()},
+    )

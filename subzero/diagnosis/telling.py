@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from subzero.diagnosis.effects.sensors import SPECS
 from subzero.diagnosis.evidence import posterior
 from subzero.diagnosis.foreign import shares, tolerance_scale
 from subzero.diagnosis.hypotheses import Ids, places, variances
@@ -16,7 +17,6 @@ from subzero.diagnosis.search import Candidate, Search
 from subzero.diagnosis.showing import curves
 from subzero.diagnosis.sudden import Begun, with_begun
 from subzero.diagnosis.unknown import DRIFTS, FORCE, Suspect
-from subzero.diagnosis.effects.sensors import SPECS
 from subzero.diagnosis.verdict import (
     CAUSE_NAMED,
     NOTHING_WRONG,
@@ -47,7 +47,9 @@ def tell(work: Work) -> Verdict:
     inside, outside = shares(search, work.foreign)
     begun = {key: p for key, p in outside.items() if "@" in key}
     best = search.candidates.get(max(inside, key=lambda ids: inside[ids]), search.best())
-    practical = min(sizes(search.problem.entries, best.ids, best.fit.z, best.kappa).values(), default=0.0) > PRACTICAL
+    practical = (
+        min(sizes(search.problem.entries, best.ids, best.fit.z, best.kappa).values(), default=0.0) > PRACTICAL
+    )
     strange = sum(p for key, p in outside.items() if "@" not in key)
     verdict = decide(inside, strange, practical)
     sudden = max(begun, key=lambda key: begun[key], default="")
@@ -56,7 +58,9 @@ def tell(work: Work) -> Verdict:
     return _told(work, verdict, best, inside, outside)
 
 
-def _told(work: Work, verdict: str, best: Candidate, inside: dict[Ids, float], outside: dict[str, float]) -> Verdict:
+def _told(
+    work: Work, verdict: str, best: Candidate, inside: dict[Ids, float], outside: dict[str, float]
+) -> Verdict:
     """Return the verdict for hypotheses that hold throughout the trials."""
     problem = work.problem
     found = _recovered(work, best) if verdict == OUTSIDE else None
@@ -66,7 +70,11 @@ def _told(work: Work, verdict: str, best: Candidate, inside: dict[Ids, float], o
     rivals = _rivals(work, best, inside, outside)
     first = next((one.ids for one in rivals if one.ids and one.ids in work.search.candidates), None)
     fits |= {f"rival: {name(first)}": work.search.candidates[first].fit} if first else {}
-    extended = _extended(work, best, found) if verdict in (CAUSE_NAMED, OUTSIDE) else _calibrated(work, best, verdict)
+    extended = (
+        _extended(work, best, found)
+        if verdict in (CAUSE_NAMED, OUTSIDE)
+        else _calibrated(work, best, verdict)
+    )
     return Verdict(
         verdict=verdict,
         sentence=_sentence(verdict, causes, best, rivals, found.unknown if found else None),
@@ -110,9 +118,13 @@ def _notes(work: Work, best: Candidate) -> tuple[str, ...]:
     scale = tolerance_scale(work.search)
     wide = max(scale, key=lambda kappa: scale[kappa])
     if wide > 1.0:
-        found.append(f"The declared tolerances look too tight: {wide:g} times as wide explains the records best.")
+        found.append(
+            f"The declared tolerances look too tight: {wide:g} times as wide explains the records best."
+        )
     if not best.fit.converged:
-        found.append("The best fit has not settled entirely; its numbers are less certain than their intervals say.")
+        found.append(
+            "The best fit has not settled entirely; its numbers are less certain than their intervals say."
+        )
     for record, channels in work.misfit.items():
         for channel, one in channels.items():
             ratio = one.noise_sd / SPECS[channel].noise
@@ -132,7 +144,9 @@ def _causes(work: Work, best: Candidate, inside: Mapping[Ids, float]) -> tuple[C
     for one in best.ids:
         p = sum(share for ids, share in inside.items() if one in ids)
         sentence = next(entry.effect.sentence for entry in work.problem.entries if entry.effect.id == one)
-        found.append(Cause(id=one, sentence=sentence, probability=min(p, 1.0), parameters=_estimates(work, best, one)))
+        found.append(
+            Cause(id=one, sentence=sentence, probability=min(p, 1.0), parameters=_estimates(work, best, one))
+        )
     return tuple(found)
 
 
@@ -145,13 +159,17 @@ def _estimates(work: Work, candidate: Candidate, one: str) -> dict[str, Estimate
     for k in places(problem.entries, (one,)):
         parameter = problem.entries[k].parameter
         nominal, mean = parameter.nominal(setting), float(fit.z[k])
-        low, high = (float(np.clip(mean + side * PROBABLE * sd[k], parameter.low, parameter.high)) for side in (-1, 1))
+        low, high = (
+            float(np.clip(mean + side * PROBABLE * sd[k], parameter.low, parameter.high)) for side in (-1, 1)
+        )
         found[parameter.name] = Estimate(value=nominal + mean, low=nominal + low, high=nominal + high, unit=parameter.unit,
                                          nominal=nominal, deviation=mean, deviation_sd=float(sd[k]))  # fmt: skip
     return found
 
 
-def _rivals(work: Work, best: Candidate, inside: Mapping[Ids, float], outside: Mapping[str, float]) -> tuple[Rival, ...]:
+def _rivals(
+    work: Work, best: Candidate, inside: Mapping[Ids, float], outside: Mapping[str, float]
+) -> tuple[Rival, ...]:
     """Return the other members of the 95 % set, and the runner-up."""
     listed = [ids for ids in smallest_set(inside, SET) if ids != best.ids]
     listed = listed or [ids for ids in sorted(inside, key=lambda ids: -inside[ids]) if ids != best.ids][:1]
@@ -160,7 +178,9 @@ def _rivals(work: Work, best: Candidate, inside: Mapping[Ids, float], outside: M
 
 def _rival(work: Work, best: Candidate, ids: Ids, p: float) -> Rival:
     problem, candidate = work.problem, work.search.candidates.get(ids)
-    words = [next(entry.effect.sentence for entry in problem.entries if entry.effect.id == one) for one in ids]
+    words = [
+        next(entry.effect.sentence for entry in problem.entries if entry.effect.id == one) for one in ids
+    ]
     numbers = {one: _estimates(work, candidate, one) for one in ids} if candidate else {}
     return Rival(ids=ids, sentence=" and ".join(words) or "nothing is wrong", probability=p,
                  discrimination=_between(work, best, ids), parameters=numbers)  # fmt: skip
@@ -222,7 +242,9 @@ def _told_sudden(work: Work, inside: dict[Ids, float], outside: dict[str, float]
     assert isinstance(what, Begun)
     none = work.search.candidates[()]
     more = with_begun(work.problem, what)
-    D = np.concatenate([variances(work.problem.entries, (), none.kappa), [p.scale**2 for p in what.effect.parameters]])
+    D = np.concatenate(
+        [variances(work.problem.entries, (), none.kappa), [p.scale**2 for p in what.effect.parameters]]
+    )
     start = np.concatenate([none.fit.z, what.mean])
     fit = refit(more, start, more.jacobian(start), D, most_fresh=2)
     estimates = _sudden_estimates(work, what, fit, D)
@@ -235,7 +257,9 @@ def _told_sudden(work: Work, inside: dict[Ids, float], outside: dict[str, float]
         sentence=f"From {what.time:g} s on {what.effect.sentence}.",
         causes=(cause,),
         rivals=_rivals(work, none, inside, outside),
-        extended=Extended(deviations={what.effect.id: deviation}, start_times={what.effect.id: what.time}, calibration=rest),
+        extended=Extended(
+            deviations={what.effect.id: deviation}, start_times={what.effect.id: what.time}, calibration=rest
+        ),
         curves=curves(more, {"nominal": None, "tolerance": none.fit, "extended": fit}, None),
         **_common(work, none, inside, outside),
     )
@@ -255,7 +279,11 @@ def _sudden_estimates(work: Work, what: Begun, fit: Fit, D: np.ndarray) -> dict[
 
 
 def _sentence(
-    verdict: str, causes: tuple[Cause, ...], best: Candidate, rivals: tuple[Rival, ...], unknown: Unknown | None
+    verdict: str,
+    causes: tuple[Cause, ...],
+    best: Candidate,
+    rivals: tuple[Rival, ...],
+    unknown: Unknown | None,
 ) -> str:
     """Return the verdict in a sentence."""
     if verdict == NOTHING_WRONG:
