@@ -1,0 +1,77 @@
+"""The formula of a missing force: the right feature, coefficient and window, from what data say of the force."""
+
+import numpy as np
+import pytest
+
+from subzero.diagnosis.formula import all_shapes, at_knots, choose, describe, samples_of
+from subzero.diagnosis.latent import Seen
+from subzero.diagnosis.recover import recover
+from subzero.diagnosis.shapes import factors_along
+from subzero.diagnosis.unknown import lacking
+from subzero.missing_force import FEATURES, MissingForce, Term, feature_value
+
+TIMES, KNOTS = samples_of(30.0), np.linspace(0.0, 30.0, 31)
+
+
+@pytest.fixture(scope="module")
+def track(plant):
+    planted = plant()
+    factors = factors_along(planted.problem.records[0].setting, TIMES)
+    return planted, factors, all_shapes(factors, TIMES)
+
+
+def seen_of(force, sd=0.02, seed=0):
+    """What data would say that measure the force at knots directly, with noise."""
+    to_knots = at_knots(TIMES, KNOTS)
+    noisy = to_knots @ force + sd * np.random.default_rng(seed).standard_normal(KNOTS.size)
+    return Seen(np.eye(KNOTS.size) / sd**2, noisy / sd**2)
+
+
+def chosen(shapes, force, axis):
+    return choose(shapes, seen_of(force), at_knots(TIMES, KNOTS), axis, [0.05, 0.2, 1.0])
+
+
+@pytest.mark.parametrize("feature", ["u|u|", "wet_length", "time*u2", "n u"])
+def test_the_feature_is_found_with_its_coefficient(track, feature):
+    _, factors, shapes = track
+    value = feature_value(feature, factors)
+    c = -0.5 / np.abs(value).max()
+    found = chosen(shapes, c * value, "X")
+    words, name, best, low, high = found.terms()[0]
+    assert name == feature
+    assert words == FEATURES[feature].words
+    assert low < c < high or abs(best / c - 1.0) < 0.1
+    assert next(iter(found.features)) == feature
+
+
+def test_a_window_is_found(track):
+    _, factors, shapes = track
+    force = -0.6 * feature_value("u|u|", factors) * ((TIMES >= 9.0) & (TIMES < 17.0))
+    found = chosen(shapes, force, "X")
+    assert (found.shapes[0].start, found.shapes[0].end) == (9.0, 17.0)
+    assert "from 9 to 17 s" in found.terms()[0][0]
+    assert np.sqrt(np.mean((found.force() - force) ** 2)) < 0.1 * 0.6
+
+
+def test_a_wave_is_called_a_wave(track):
+    _, _, shapes = track
+    found = chosen(shapes, 0.3 * np.sin(2.0 * np.pi * TIMES / 5.0 + 1.0), "Y")
+    words, name, amplitude, *_ = found.terms()[0]
+    assert (name, words) == ("wave", "a wave with a period of 5 s")
+    assert amplitude == pytest.approx(0.3, rel=0.1)
+
+
+def test_the_drag_that_the_model_lacks_is_found_in_a_record(plant):
+    """X = −0.02 · wet length, far beyond the tolerances, from six noisy channels."""
+    force = MissingForce(terms=(Term("X", "wet_length", -0.02),))
+    planted = plant(lambda setting: lacking(setting, force))
+    found = describe(recover(planted.problem, planted.fit(), "X"))
+    assert "wet_length" in list(found.features)[:2]
+    known = np.interp(TIMES, KNOTS, -0.02 * _length(planted))
+    assert np.sqrt(np.mean((found.force() - known) ** 2)) < 0.3 * np.abs(known).max()
+
+
+def _length(planted):
+    factors = factors_along(planted.problem.records[0].setting, KNOTS[:-1])
+    length = feature_value("wet_length", factors)
+    return np.append(length, length[-1])

@@ -1,0 +1,79 @@
+"""The gain on data that were not fitted: all of it for the right cause, none for a wrong one or for nothing."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from subzero.diagnosis.effects import catalogue
+from subzero.diagnosis.gain import BLOCKS, Fitted, coloured, gain, held_out, parts_of, raw, rows_of, share
+from subzero.diagnosis.noise import Noise
+
+
+def hidden(name, size):
+    return lambda setting: catalogue(("heading",))[name].apply(setting, size)
+
+
+@pytest.fixture(scope="module")
+def struck(plant):
+    """The propeller's torque rolls the hull thrice as much as it should: far beyond its tolerance."""
+    planted = plant(hidden("propeller_torque", 3.0))
+    fits = {
+        ids: Fitted(planted.problem, planted.fit(*ids))
+        for ids in ((), ("propeller_torque",), ("yaw_damping",))
+    }
+    return planted, fits
+
+
+def test_the_right_cause_explains_nearly_all_and_a_wrong_one_nothing(struck):
+    planted, fits = struck
+    right = gain(planted.r, fits[()], fits["propeller_torque",], fits["yaw_damping",])
+    wrong = gain(planted.r, fits[()], fits["yaw_damping",])
+    assert right.total > 0.95
+    assert right.owed > 0.8
+    assert right.owed_low > 0.2
+    assert abs(wrong.owed) < 0.2
+    assert wrong.owed_low < 0.05
+    assert right.how == BLOCKS
+    roll = right.held_out["roll"]
+    assert roll.after < roll.rival < 1.05 * roll.tolerance
+    assert roll.after == pytest.approx(roll.floor, rel=0.25)
+
+
+def test_a_healthy_record_owes_nothing(plant):
+    planted = plant()
+    tolerance, extended = (Fitted(planted.problem, planted.fit(*ids)) for ids in ((), ("hull_drag",)))
+    found = gain(planted.r, tolerance, extended)
+    assert abs(found.owed) < 0.3
+    assert found.owed_low < 0.1
+
+
+def test_gains_repeat_with_their_seed(struck):
+    planted, fits = struck
+    one, same = (gain(planted.r, fits[()], fits["propeller_torque",], seed=3) for _ in range(2))
+    assert one == same
+
+
+def test_parts_cover_the_trial_and_a_refit_without_them_is_worse(struck):
+    planted, fits = struck
+    parts = parts_of(planted.problem, rows_of(planted.problem))
+    assert sorted(set(parts)) == [0, 1, 2, 3, 4]
+    fit = fits["propeller_torque",].fit
+    out = held_out(fits["propeller_torque",], parts)
+    assert np.sum(fit.r**2) < np.sum(out**2) < 1.2 * np.sum(fit.r**2)
+
+
+def test_what_was_whitened_gets_its_colour_and_unit_back(struck):
+    values = np.random.default_rng(0).standard_normal(8)
+    used = np.array([True, True, False, True, True, True, False, True])
+    noise = Noise(sd=0.3, rho=0.6, used=used, gap=np.array([1, 1, 2, 1, 1, 2]))
+    assert_allclose(coloured(noise, noise.whiten(values)), values[used])
+    planted, _ = struck
+    assert raw(planted.problem, planted.r).shape == planted.r.shape
+
+
+def test_a_share_is_one_at_the_noise_and_negative_for_harm():
+    assert share(5.0, 1.0, 1e6) == pytest.approx(1.0)
+    assert share(5.0, 0.98, 1e6) == pytest.approx(1.0)
+    assert share(5.0, 3.0, 1e6) == pytest.approx(0.5)
+    assert share(2.0, 3.0, 1e6) == pytest.approx(-1.0)
+    assert abs(share(1.001, 0.999, 2000.0)) < 0.1

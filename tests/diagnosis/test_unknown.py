@@ -1,0 +1,108 @@
+"""A force that no cause explains is found on its axis, with its history, and is not found where there is none.
+
+Configuration: fig6, 30 s, six channels with coloured noise, all parameters nominal but free within their tolerances.
+"""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from subzero.diagnosis.latent import Seen, log_evidence_unknown, log_gains
+from subzero.diagnosis.recover import drifted, recover
+from subzero.diagnosis.unknown import (
+    WORDS,
+    all_columns,
+    force_columns,
+    history,
+    knots_of,
+    lacking,
+    suspects,
+)
+
+TIME = np.arange(0.0, 30.05, 0.1)
+
+
+def pulse(time):
+    return np.where((time >= 10.0) & (time < 18.0), -0.6, 0.0)
+
+
+def bend(time):
+    return 0.025 * (1.0 - np.cos(2.0 * np.pi * time / 30.0))
+
+
+def pushed(axis, force):
+    return lambda setting: lacking(setting, history(axis, TIME, force(TIME)))
+
+
+@pytest.fixture(scope="module")
+def healthy(plant):
+    return plant()
+
+
+def found_in(planted):
+    fit, knots = planted.fit(), knots_of(planted.problem)
+    columns = all_columns(planted.problem, fit.z, knots)
+    return fit, suspects(planted.problem, columns, fit, fit.D, knots)
+
+
+def test_a_healthy_record_has_no_unknown_force(healthy):
+    _, found = found_in(healthy)
+    assert len(found) == 12
+    assert max(one.log_gain for one in found) < 3.0
+
+
+def test_a_snag_is_found_on_its_axis_and_its_history_follows(plant):
+    planted = plant(pushed("X", pulse))
+    fit, found = found_in(planted)
+    assert found[0].id == "unknown_force:X"
+    assert found[0].log_gain > 20.0
+    unknown = recover(planted.problem, fit, "X").unknown
+    error = unknown.force - pulse(unknown.time)
+    assert np.sqrt(np.mean(error**2)) < 0.35 * 0.6, "its edges are sharper than knots"
+    assert np.mean(np.abs(error) < 3.0 * unknown.band) > 0.8
+    assert unknown.force[14] < -0.3 < unknown.force[4], "held back: forward force is negative"
+
+
+def test_a_yaw_moment_is_recovered_within_a_tenth(plant):
+    planted = plant(pushed("N", bend), seed=2)
+    fit, found = found_in(planted)
+    assert found[0].id == "unknown_force:N"
+    done = recover(planted.problem, fit, "N")
+    error = done.unknown.force - bend(done.unknown.time)
+    assert np.sqrt(np.mean(error**2)) < 0.15 * 0.05
+    assert done.missing is not None
+    assert "starboard" in WORDS[done.unknown.axis]
+
+
+def test_a_drifting_sensor_is_no_force(plant):
+    planted = plant(drift={"pitch": lambda time: 1.5 * np.sin(2.0 * np.pi * time / 20.0)})
+    fit, found = found_in(planted)
+    assert found[0].id == "sensor_drift:pitch"
+    drift = drifted(planted.problem, fit, "pitch", 3.0).unknown
+    assert_allclose(drift.force, 1.5 * np.sin(2.0 * np.pi * drift.time / 20.0), atol=0.5)
+
+
+def test_columns_add_up_to_what_a_force_does(healthy):
+    """A small constant force is the sum of all hat functions."""
+    problem, zero = healthy.problem, np.zeros(len(healthy.problem.entries))
+    knots = knots_of(problem)
+    columns = force_columns(problem, zero, ("X",), knots)["X"].sum(axis=1)
+    small = lacking(problem.records[0].setting, history("X", np.array([0.0, 30.0]), np.full(2, 0.05)))
+    tracks = problem._tracks([(0, zero)])[0]
+    from subzero.diagnosis.response import tracked
+
+    change = problem._whitened(0, small, tracked(small)) - problem._whitened(
+        0, problem.setting(0, zero), tracks
+    )
+    assert np.linalg.norm(0.05 * columns - change) < 0.05 * np.linalg.norm(change)
+
+
+def test_the_evidence_is_that_of_a_normal_distribution():
+    random = np.random.default_rng(0)
+    columns, r = random.standard_normal((40, 5)), random.standard_normal(40)
+    data = Seen(columns.T @ columns, columns.T @ r)
+    covariance = np.eye(40) + 0.7**2 * columns @ columns.T
+    exact = -0.5 * np.linalg.slogdet(covariance)[1] - 0.5 * r @ (np.linalg.solve(covariance, r) - r)
+    assert_allclose(log_gains(data, np.eye(5), [0.7])[0], exact, rtol=1e-4)
+    mixed, _ = log_evidence_unknown(data, np.arange(5.0), np.zeros(5), [1e-9])
+    assert abs(mixed) < 1e-6, "no amplitude, no gain"
