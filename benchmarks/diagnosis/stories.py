@@ -61,7 +61,8 @@ def tell(story: Story, verdict: Verdict) -> str:
         f"    python -m benchmarks.diagnosis.stories {story.name}",
         "",
     ]
-    lines += [f"**{words.headline(verdict)}.**", ""]
+    missed = "" if verdict.verdict == story.expected else f" *It should have been {story.expected}.*"
+    lines += [f"**{words.headline(verdict)}.**{missed}", ""]
     lines += [f"> {line}\n>" for line in words.story(verdict)[:6]]
     lines += ["", *(table(tables.rivals(verdict, short=True)) if verdict.rivals else [])]
     for name in story.figures:

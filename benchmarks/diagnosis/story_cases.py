@@ -68,16 +68,16 @@ STORIES = (
     Story(
         name="rudder_lag_with_doublets",
         title="2. A rudder that lags, found with doublets",
-        words="The rudder's servo has a time constant of 0.55 s instead of 0.15 s. The trial is made for it.",
+        words="The rudder's servo has a time constant of 0.40 s instead of 0.15 s. The trial is made for it.",
         trial=rudder_doublets,
-        hidden={"rudder_lag": (0.4,)},
+        hidden={"rudder_lag": (0.25,)},
     ),
     Story(
         name="rudder_lag_on_fig6",
         title="3. The same rudder on the trial of Fig. 6",
         words="One short rudder pulse cannot tell a lag from all else that delays a turn: a set is the answer,"
         " and the trial to fly next.",
-        hidden={"rudder_lag": (0.4,)},
+        hidden={"rudder_lag": (0.25,)},
         expected=UNDECIDED,
         figures=("evidence",),
     ),
