@@ -84,8 +84,8 @@ STORIES = (
     Story(
         name="cable_drag_or_current",
         title="4. Drag along the cable, or a current?",
-        words="The log begins at 8 s, under way, and the cable drags 30 % more along itself. What else slows the vehicle "
-        "down slowly explains so short a piece nearly as well.",
+        words="The log begins at 8 s, under way, and the cable drags 30 % more along itself. What else slows the "
+        "vehicle down slowly explains so short a piece nearly as well.",
         hidden={"cable_tangential_drag": (0.30,)},
         begins=8.0,
         expected=UNDECIDED,
