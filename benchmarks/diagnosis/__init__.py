@@ -1,0 +1,1 @@
+"""How well a diagnosis finds hidden effects: ``python -m benchmarks.diagnosis`` writes docs/diagnosis_benchmark.md."""

@@ -1,0 +1,58 @@
+"""Two usual ways, for comparison: both hold all nuisances at their nominal values, and take the noise for white.
+
+score       every cause alone: (J_kᵀ r)² / (J_kᵀ J_k), χ² with one degree of freedom, Bonferroni over all causes
+selection   forward selection of columns by BIC, m ln RSS + k ln m, each fitted by least squares
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.stats import chi2
+
+from subzero.diagnosis.noise import Noise
+from subzero.diagnosis.problem import Observed, Problem
+
+from .distance import sensitivities
+
+ALARM, MOST = 0.05, 12
+
+
+def white(problem: Problem) -> tuple[Problem, np.ndarray, np.ndarray]:
+    """Return the problem as it were with white noise, its residual at the nominal model, and J."""
+    records = tuple(replace(one, noise=_colourless(one)) for one in problem.records)
+    plain = replace(problem, records=records)
+    return plain, plain.residual(np.zeros(len(problem.entries))), sensitivities(plain)
+
+
+def _colourless(one: Observed) -> dict[str, Noise]:
+    return {name: replace(noise, rho=0.0) for name, noise in one.noise.items()}
+
+
+def score(problem: Problem, r: np.ndarray, J: np.ndarray) -> tuple[str, bool]:
+    """Return the cause that the score test ranks first, and whether it raises an alarm."""
+    own = [k for k, entry in enumerate(problem.entries) if entry.record < 0]
+    found = {k: float((J[:, k] @ r) ** 2 / max(J[:, k] @ J[:, k], 1e-12)) for k in own}
+    best = max(found, key=lambda k: found[k])
+    return problem.entries[best].effect.id, bool(found[best] > chi2.isf(ALARM / len(own), 1))
+
+
+def selection(problem: Problem, r: np.ndarray, J: np.ndarray) -> list[str]:
+    """Return the causes that forward selection by BIC names, in order."""
+    own = [k for k, entry in enumerate(problem.entries) if entry.record < 0]
+    chosen: list[int] = []
+    best = _bic(r, J[:, chosen])
+    while len(chosen) < MOST:
+        tried = {k: _bic(r, J[:, [*chosen, k]]) for k in own if k not in chosen}
+        k = min(tried, key=lambda one: tried[one])
+        if tried[k] >= best:
+            break
+        best, chosen = tried[k], [*chosen, k]
+    return list(dict.fromkeys(problem.entries[k].effect.id for k in chosen))
+
+
+def _bic(r: np.ndarray, J: np.ndarray) -> float:
+    """Return m ln RSS + k ln m."""
+    left = r - J @ np.linalg.lstsq(J, r, rcond=None)[0] if J.shape[1] else r
+    return float(r.size * np.log(left @ left) + J.shape[1] * np.log(r.size))

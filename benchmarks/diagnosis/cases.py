@@ -1,0 +1,128 @@
+"""The cases: a list from a seed, balanced in every prefix, each a record with a truth that the diagnosis does not know.
+
+single     one hidden effect                         pair      two of them
+healthy    only nuisances                            outside   what no effect of the catalogue is
+twin       one that the trial cannot tell from a rival (D < 4, though its signal is clear)
+degraded   3 × noise, two channels, 10 s, true spread 2 × or ½ × the declared one: healthy and single in turn
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from subzero.diagnosis.logged import Logged
+from subzero.diagnosis.setting import Setting
+
+from . import outside
+from .draws import Values, hidden, nuisances, with_values
+from .manoeuvres import CHANNELS, FEW, ids, nominal, times
+from .outside import Strange
+from .truth import NoRunError, noisy, shown_by
+
+SHARES = {"single": 400, "healthy": 200, "pair": 100, "outside": 60, "twin": 20, "degraded": 20}
+"""How many of each make the whole benchmark."""
+DEGRADED = ("noise", "channels", "short", "wide", "narrow")
+AFTER = 4.0
+"""The trial goes on behind its record, for sensors whose clock runs ahead. [s]"""
+TWINS = (("cable_tangential_drag", 0), ("current", 0), ("surge_added_mass", 0), ("drum_inertia", 0), ("rudder_lag", 0),
+         ("rudder_rate_limit", 0), ("hull_drag", 0), ("propeller_thrust_slope", 0), ("yaw_inertia", 0))  # fmt: skip
+"""Effect, and its parameter, that have rivals on `fig6`."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Case:
+    """What a case is to be.
+
+    Attributes:
+        seed, index: decide all that is random.
+        kind: of `SHARES`.
+        number: of its kind.
+        manoeuvre: of `manoeuvres`.
+        how: of DEGRADED, or "".
+        causes: ids of hidden effects.
+    """
+
+    seed: int
+    index: int
+    kind: str
+    number: int
+    manoeuvre: str
+    how: str = ""
+    causes: tuple[str, ...] = ()
+
+    def rng(self, attempt: int = 0) -> np.random.Generator:
+        """Return the random numbers of an attempt to make the case."""
+        return np.random.default_rng([self.seed, self.index, attempt])
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Made:
+    """A case with its record: what is hidden, all deviations, what is strange, who ran it, and the true setting."""
+
+    logged: Logged
+    hidden: Values
+    values: Values
+    strange: Strange | None
+    source: str
+    true: Setting
+    dropped: int = field(default=0)
+
+
+def cases(seed: int = 5, scale: float = 1.0) -> list[Case]:
+    """Return the cases of a benchmark, all kinds in turn; fewer or more of them by a factor."""
+    counts = {kind: max(round(scale * count), 1) for kind, count in SHARES.items()}
+    order = sorted(((i + 0.5) / n, kind, i) for kind, n in counts.items() for i in range(n))
+    return [_case(seed, index, kind, number) for index, (_, kind, number) in enumerate(order)]
+
+
+def _case(seed: int, index: int, kind: str, number: int) -> Case:
+    """Return a case: every effect in turn, on `fig6` twice as often as on `rich`."""
+    rng = np.random.default_rng([seed, 1 + list(SHARES).index(kind), number // len(ids())])
+    names = rng.permutation(ids()).tolist()
+    one, other = names[number % len(names)], names[(number + 7) % len(names)]
+    on_rich = kind not in ("twin", "degraded") and number % 3 == 1
+    how = DEGRADED[number % len(DEGRADED)] if kind == "degraded" else ""
+    alone = kind == "single" or (kind == "degraded" and (number // len(DEGRADED)) % 2 == 1)
+    causes = (one,) if alone else (one, other) if kind == "pair" else ()
+    causes = (TWINS[number % len(TWINS)][0],) if kind == "twin" else causes
+    manoeuvre = "short" if how == "short" else "rich" if on_rich else "fig6"
+    return Case(seed=seed, index=index, kind=kind, number=number, manoeuvre=manoeuvre, how=how, causes=causes)
+
+
+def make(case: Case, attempt: int = 0, size: float = 1.0) -> Made:
+    """Return a case with its record; drawn again as long as its truth cannot be run.
+
+    Args:
+        case: what it is to be.
+        attempt: number of the draw.
+        size: of what is outside the catalogue.
+    """
+    for again in range(20):
+        try:
+            return replace(_made(case, case.rng(attempt * 20 + again), size), dropped=again)
+        except NoRunError:
+            continue
+    message = f"Case {case.index} ({case.causes}) has no truth that can be run."
+    raise NoRunError(message)
+
+
+def _made(case: Case, rng: np.random.Generator, size: float) -> Made:
+    setting = nominal(case.manoeuvre)
+    spread = {"wide": 2.0, "narrow": 0.5}.get(case.how, 1.0)
+    main = 0 if case.kind == "twin" else None
+    found = {one: hidden(rng, one, main=main) for one in case.causes}
+    values = {**nuisances(rng, spread), **found}
+    strange = None
+    if case.kind == "outside":
+        strange = outside.KINDS[case.number % len(outside.KINDS)](rng, setting.trial.duration, size)
+    true = with_values(setting, values)
+    channels = FEW if case.how == "channels" else CHANNELS
+    flown = replace(true, trial=replace(true.trial, duration=true.trial.duration + AFTER))
+    shown, source = shown_by(strange.on(flown) if strange else flown, times(setting), channels)
+    if strange and strange.drift:
+        shown[strange.axis] = shown[strange.axis] + strange.drift(times(setting))
+    record = noisy(shown, times(setting), rng, 3.0 if case.how == "noise" else 1.0)
+    logged = Logged(record=record, setting=setting, name=case.manoeuvre)
+    return Made(logged=logged, hidden=found, values=values, strange=strange, source=source, true=true)

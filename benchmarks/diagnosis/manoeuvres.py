@@ -1,0 +1,51 @@
+"""The trials of the benchmark, and what is measured in them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+
+import subzero
+from subzero.diagnosis.effect import Effect
+from subzero.diagnosis.effects import START, catalogue
+from subzero.diagnosis.setting import Setting
+from subzero.diagnosis.trial_library import rich
+from subzero.model import Model
+
+CHANNELS = ("surge_speed", "heading", "yaw_rate", "pitch", "roll", "depth")
+"""The six basic ones."""
+FEW = ("surge_speed", "heading")
+RATE = 10.0
+"""Samples of a record a second. [Hz]"""
+NAMES = ("fig6", "rich")
+OTHER = {"fig6": "rich", "rich": "fig6"}
+"""Where a gain is held out."""
+
+
+@cache
+def nominal(name: str) -> Setting:
+    """Return the nominal setting of a manoeuvre."""
+    trial = subzero.load_scenario("fig6")
+    setting = Setting(trial=trial, model=Model.of(trial))
+    if name == "short":
+        return replace(setting, trial=replace(trial, duration=10.0))
+    return rich(setting) if name == "rich" else setting
+
+
+def times(setting: Setting) -> np.ndarray:
+    """Return when the sensors are read. [s]"""
+    return np.arange(round(setting.trial.duration * RATE) + 1) / RATE
+
+
+@cache
+def effects() -> Mapping[str, Effect]:
+    """Return all that may differ from the nominal model, by id: the catalogue of the basic channels, and the start."""
+    return {**catalogue(CHANNELS), **{effect.id: effect for effect in START}}
+
+
+def ids() -> list[str]:
+    """Return all causes that can be named."""
+    return list(catalogue(CHANNELS))

@@ -1,0 +1,42 @@
+"""How well something outside the catalogue was found: flagged, axis, history, and the feature of its formula."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from subzero.diagnosis.verdict import Unknown, Verdict
+from subzero.missing_force import AXES, history_at
+
+from .cases import Made
+
+FIRST = 2
+
+
+def judged(made: Made, verdict: Verdict) -> dict[str, Any]:
+    """Return what was found of it."""
+    strange, unknown = made.strange, verdict.unknown
+    assert strange is not None
+    found: dict[str, Any] = {"axis": strange.axis, "found": unknown.axis if unknown else "",
+                             "features": list(strange.features)}  # fmt: skip
+    if unknown is None:
+        return found
+    found["first"] = [feature for _, feature, *_ in unknown.formula][:FIRST]
+    if unknown.axis == strange.axis and not strange.features:
+        found["rms"] = _off(made, unknown)
+    return found
+
+
+def _off(made: Made, unknown: Unknown) -> float:
+    """Return the RMS error of a history as a share of its largest size, at a tenth of a second."""
+    strange = made.strange
+    assert strange is not None
+    times = np.arange(0.0, unknown.time[-1], 0.1)
+    if strange.drift is not None:
+        true = strange.drift(times)
+    else:
+        assert strange.force is not None
+        true = history_at(strange.force, times)[:, AXES.index(strange.axis)]
+    told = np.interp(times, unknown.time, unknown.force)
+    return float(np.sqrt(np.mean((told - true) ** 2)) / np.abs(true).max())
