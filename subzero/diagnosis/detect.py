@@ -15,8 +15,25 @@ from subzero.diagnosis.hypotheses import named, places
 from subzero.diagnosis.problem import Problem
 from subzero.diagnosis.verdict import Detectability
 
+WEAK = 1.0
+"""A cause of one scale that seems to do less than this, in noise, has no slope at the nominal model."""
 SEEN = 4.0
 """A signal that would be seen."""
+
+
+def with_secants(problem: Problem, J: np.ndarray) -> np.ndarray:
+    """Return sensitivities of the nominal model with those of a whole effect for causes that do nothing when small."""
+    zero, J = np.zeros(len(problem.entries)), J.copy()
+    for k, entry in enumerate(problem.entries):
+        if (
+            entry.parameter.low == 0.0
+            and entry.record < 0
+            and np.linalg.norm(J[:, k]) * entry.parameter.scale < WEAK
+        ):
+            moved = zero.copy()
+            moved[k] = entry.parameter.scale
+            J[:, k] = np.nan_to_num(problem.change(zero, moved)) / entry.parameter.scale
+    return J
 
 
 def marginal(problem: Problem, J: np.ndarray, kappa: float = 1.0) -> np.ndarray:

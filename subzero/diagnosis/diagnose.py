@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from time import perf_counter
 
-from subzero.diagnosis.detect import detectability
+from subzero.diagnosis.detect import detectability, with_secants
 from subzero.diagnosis.effect import Effect
 from subzero.diagnosis.foreign import foreigners
 from subzero.diagnosis.misfit import misfits
@@ -51,7 +51,7 @@ def diagnose(
     """
     problem = pose(records, effects)
     search = Search(problem=problem, progress=progress or (lambda share, words: None))
-    work = Work(problem=problem, search=search, seed=seed, budget=budget)
+    work = Work(search=search, seed=seed, budget=budget)
     try:
         _work(work, seen or (lambda table: None))
     except KeyboardInterrupt:
@@ -68,10 +68,10 @@ def _work(work: Work, seen: Seen) -> None:
     def done(part: str) -> None:
         work.seconds[part] = perf_counter() - start - sum(work.seconds.values())
 
+    search.begin()
     for one in work.problem.records:
         work.misfit[one.name] = misfits(one, respond(one.setting, one.time, one.noise))
-    search.begin()
-    work.detectable = detectability(work.problem, search.nominal[1])
+    work.detectable = detectability(work.problem, with_secants(work.problem, search.nominal[1]))
     seen(work.detectable)
     search.look()
     done("screen")
@@ -80,6 +80,7 @@ def _work(work: Work, seen: Seen) -> None:
         return
     search.refit_best()
     search.grow()
+    search.sharpen()
     done("fits")
     search.progress(0.8, "forces that no cause explains")
     work.foreign = foreigners(search)

@@ -75,8 +75,7 @@ def _sudden(search: Search) -> list[Foreign]:
 def shares(search: Search, foreign: list[Foreign]) -> tuple[dict[Ids, float], dict[str, float]]:
     """Return the probabilities of hypotheses, and of everything outside by id; together they sum to 1."""
     inside = search.probabilities()
-    best = search.best()
-    scale = best.log_posterior - np.log(max(inside[best.ids], 1e-300))
+    scale = search.log_total()
     outside = log_sum([one.log_posterior for one in foreign]) if foreign else -np.inf
     total = log_sum([scale, outside])
     found: dict[str, float] = {}

@@ -10,7 +10,7 @@ smoothed before. Sensible features for an axis come first: they have a larger pr
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -18,13 +18,23 @@ import numpy as np
 from subzero.diagnosis.evidence import log_sum
 from subzero.diagnosis.latent import SHARES, Seen
 from subzero.diagnosis.recover import Recovered
-from subzero.diagnosis.shapes import SAMPLE, Shape, decaying, factors_along, plain_shapes, waves, windowed
+from subzero.diagnosis.shapes import (
+    SAMPLE,
+    SWITCHED,
+    Shape,
+    decaying,
+    factors_along,
+    plain_shapes,
+    shifted,
+    waves,
+    windowed,
+)
 from subzero.diagnosis.unknown import usual
 
 SENSIBLE: Mapping[str, tuple[str, ...]] = {
     "X": ("u|u|", "constant", "n|n|", "n u", "wet_length*u2", "wet_length", "time*u2"),
     "Y": ("uv", "ur", "constant", "rudder_angle*u2", "v|v|", "u|u|"),
-    "Z": ("constant", "uw", "uq", "stern_plane*u2", "w|w|", "u|u|", "depth"),
+    "Z": ("constant", "time", "uw", "uq", "stern_plane*u2", "w|w|", "u|u|", "depth"),
     "K": ("n|n|", "constant", "p|p|", "u|u|"),
     "M": ("uw", "uq", "constant", "stern_plane*u2", "q|q|", "u|u|"),
     "N": ("uv", "ur", "rudder_angle*u2", "r|r|", "constant", "u|u|", "n|n|"),
@@ -88,15 +98,43 @@ def describe(found: Recovered) -> Formula:
     own = found.knots.record == found.record
     data = Seen(found.data.M[np.ix_(own, own)], found.data.q[own])
     amplitudes = [share * usual(setting, axis) for share in SHARES]
-    return choose(shapes, data, at_knots(times, found.unknown.time), axis, amplitudes)
+    to_knots = at_knots(times, found.unknown.time)
+    return refined(choose(shapes, data, to_knots, axis, amplitudes), shapes, data, to_knots, amplitudes)
+
+
+def refined(
+    formula: Formula, shapes: Sequence[Shape], data: Seen, to_knots: np.ndarray, amplitudes: Sequence[float]
+) -> Formula:
+    """Return a formula with the edges of its windows on a finer grid; the probabilities of features stay."""
+    times = SAMPLE * np.arange(to_knots.shape[1])
+    plain = {shape.feature: shape for shape in shapes if shape.is_plain}
+    for shape in formula.shapes:
+        others = [one for one in formula.shapes if one is not shape]
+        tried = [(*others, one) for one in shifted(shape, plain.get(shape.feature, shape), times)]
+        best = max(
+            (_fixed(formula.axis, one, data, to_knots, amplitudes) for one in tried),
+            key=lambda one: one.log_gain,
+        )
+        formula = replace(best, features=formula.features)
+    return formula
+
+
+def _fixed(
+    axis: str, terms: Sequence[Shape], data: Seen, to_knots: np.ndarray, amplitudes: Sequence[float]
+) -> Formula:
+    """Return the formula of given terms."""
+    scaled, every = [to_knots @ (term.columns / _rms(term)) for term in terms], tuple(range(len(terms)))
+    score = _score(every, terms, scaled, data, axis, amplitudes)
+    return _formula(every, {every: score}, terms, scaled, data, axis, amplitudes)
 
 
 def all_shapes(factors: np.ndarray, times: np.ndarray) -> list[Shape]:
     """Return every shape that is tried, from the factors of features at times."""
     plain = plain_shapes(factors)
     edges = np.arange(0.0, times[-1], 1.0 if times[-1] < 40.0 else 2.0)
-    parts = [[one, *windowed(one, times, edges), *decaying(one, times, edges)] for one in plain]
-    return [shape for part in parts for shape in part] + waves(times)
+    able = [one for one in plain if one.feature in SWITCHED]
+    parts = [[*windowed(one, times, edges), *decaying(one, times, edges)] for one in able]
+    return plain + [shape for part in parts for shape in part] + waves(times)
 
 
 def at_knots(times: np.ndarray, knots: np.ndarray) -> np.ndarray:

@@ -18,8 +18,10 @@ from subzero.diagnosis.evidence import log_sum
 
 CORRELATION_TIMES = (2.0, 6.0)
 """T of the mixture: a force that changes within seconds, or lasts. [s]"""
-SHARES = (0.01, 0.03, 0.1, 0.3, 1.0)
-"""Amplitudes of the mixture, in units of the axis' usual force."""
+DRIFT_TIMES = (10.0, 30.0)
+"""The same of a sensor's drift, which is slow: one that follows every step of a force is no drift. [s]"""
+SHARES = (0.1, 0.3, 1.0)
+"""Amplitudes of the mixture, in units of the axis' usual force: smaller ones are of no practical size."""
 JITTER = 1e-6
 
 
@@ -58,10 +60,15 @@ def seen(
     return Seen(M=0.5 * (M + M.T), q=columns.T @ r - cross.T @ answer[:, -1])
 
 
-def correlation(times: np.ndarray, groups: np.ndarray, time: float) -> np.ndarray:
-    """Return R (n, n) = exp(−|Δt|/T) between knots; knots of different groups (records) have nothing in common."""
-    apart = np.abs(np.subtract.outer(times, times))
-    return np.where(np.equal.outer(groups, groups), np.exp(-apart / time), 0.0)
+def correlation(times: np.ndarray, groups: np.ndarray, time: float, *, smooth: bool = False) -> np.ndarray:
+    """Return R (n, n) between knots: exp(−|Δt|/T), or Matérn's with two derivatives for what never jumps.
+
+    Knots of different groups (records) have nothing in common.
+    """
+    d = np.abs(np.subtract.outer(times, times)) / time
+    root = np.sqrt(5.0) * d
+    R = (1.0 + root + root**2 / 3.0) * np.exp(-root) if smooth else np.exp(-d)
+    return np.where(np.equal.outer(groups, groups), R, 0.0)
 
 
 def log_gains(data: Seen, R: np.ndarray, amplitudes: Sequence[float]) -> np.ndarray:
@@ -74,12 +81,20 @@ def log_gains(data: Seen, R: np.ndarray, amplitudes: Sequence[float]) -> np.ndar
 
 
 def log_evidence_unknown(
-    data: Seen, times: np.ndarray, groups: np.ndarray, amplitudes: Sequence[float]
+    data: Seen,
+    times: np.ndarray,
+    groups: np.ndarray,
+    amplitudes: Sequence[float],
+    *,
+    drift: bool = False,
 ) -> tuple[float, Shape]:
     """Return log evidence over that of f = 0, amplitudes and correlation times mixed; and which of them fits best."""
-    table = np.array([log_gains(data, correlation(times, groups, T), amplitudes) for T in CORRELATION_TIMES])
+    lasting = DRIFT_TIMES if drift else CORRELATION_TIMES
+    table = np.array(
+        [log_gains(data, correlation(times, groups, T, smooth=drift), amplitudes) for T in lasting]
+    )
     i, j = divmod(int(np.argmax(table)), table.shape[1])
-    return log_sum(table.ravel()) - float(np.log(table.size)), Shape(amplitudes[j], CORRELATION_TIMES[i])
+    return log_sum(table.ravel()) - float(np.log(table.size)), Shape(amplitudes[j], lasting[i])
 
 
 def modes(times: np.ndarray, groups: np.ndarray, shape: Shape) -> np.ndarray:

@@ -73,7 +73,7 @@ def spikes(values: np.ndarray, spec: float) -> np.ndarray:
         return np.zeros(values.size, dtype=bool)
     around = np.median(np.lib.stride_tricks.sliding_window_view(np.pad(values, 3, mode="reflect"), 7), axis=1)
     off = np.abs(values - around)
-    level = max(1.4826 * float(np.median(off)) * 1.2, 0.1 * spec)
+    level = max(1.4826 * float(np.median(off)) * 1.2, 0.5 * spec)
     return off > SPIKE * level
 
 

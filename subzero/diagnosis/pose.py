@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from subzero.diagnosis.effect import Effect
 from subzero.diagnosis.effects import START, catalogue
 from subzero.diagnosis.effects.sensors import SPECS
-from subzero.diagnosis.noise import estimate
+from subzero.diagnosis.noise import Noise, estimate
 from subzero.diagnosis.problem import Observed, Problem, entries_of
 from subzero.diagnosis.records import Logged
-from subzero.diagnosis.response import economical, respond
+from subzero.diagnosis.response import economical, finer, respond
 from subzero.errors import UserError
+
+VISIBLE = 1.0
+"""Squared size, in noise, of an error of the steps that is worth correcting."""
+ANOTHER = 0.1
+"""Change of a noise level, as a logarithm, that is worth beginning again."""
 
 
 def pose(records: Sequence[Logged], more: Iterable[Effect] = ()) -> Problem:
@@ -49,8 +55,48 @@ def _observed(one: Logged) -> Observed:
         raise UserError(
             f"The nominal model cannot be run through '{one.name}'. Try `subzero simulate` on its scenario."
         )
-    noise = {
-        name: estimate(time, column - simulated[name], SPECS[name].noise, one.noise.get(name))
+    noise = noise_of(time, values, simulated, one.noise)
+    return Observed(
+        name=one.name, time=time, values=dict(values), noise=noise, setting=setting, known=one.noise
+    )
+
+
+def noise_of(
+    time: np.ndarray,
+    values: Mapping[str, np.ndarray],
+    simulated: Mapping[str, np.ndarray],
+    known: Mapping[str, float],
+) -> dict[str, Noise]:
+    """Return channel → noise, from what is left of a simulation."""
+    return {
+        name: estimate(time, column - simulated[name], SPECS[name].noise, known.get(name))
         for name, column in values.items()
     }
-    return Observed(name=one.name, time=time, values=dict(values), noise=noise, setting=setting)
+
+
+def with_noise_behind(problem: Problem, z: np.ndarray) -> Problem | None:
+    """Return the problem with the noise that is left behind deviations z; None if that is as good as known.
+
+    Behind the nominal model, what a lag does in quick manoeuvres looks like noise: it is only left out behind a fit.
+    """
+    records, changed = [], False
+    for i, one in enumerate(problem.records):
+        noise = noise_of(one.time, one.values, respond(problem.setting(i, z), one.time, one.noise), one.known)
+        ratios = [noise[name].sd / one.noise[name].sd for name in noise]
+        changed = changed or max(np.abs(np.log(ratios))) > ANOTHER
+        records.append(replace(one, noise=noise))
+    return replace(problem, records=tuple(records)) if changed else None
+
+
+def with_finer_steps(problem: Problem, z: np.ndarray) -> Problem | None:
+    """Return the problem with records from which the error of economical steps at z is taken; None if it is not seen."""
+    records, size = [], 0.0
+    for i, one in enumerate(problem.records):
+        setting = problem.setting(i, z)
+        coarse, fine = (respond(made, one.time, one.noise) for made in (setting, finer(setting)))
+        wrong = {name: fine[name] - coarse[name] for name in one.noise}
+        size += sum(float(np.sum(one.noise[name].whiten(column) ** 2)) for name, column in wrong.items())
+        records.append(
+            replace(one, values={name: one.values[name] - column for name, column in wrong.items()})
+        )
+    return replace(problem, records=tuple(records)) if VISIBLE < size < np.inf else None

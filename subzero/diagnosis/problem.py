@@ -5,7 +5,7 @@ r(z) = W (y − h(z)),    J = ∂(W h)/∂z
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from os import cpu_count
@@ -47,13 +47,16 @@ class Entry(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Observed:
-    """A record, ready: times [s] (n,), channel → values (n,), channel → noise, and its nominal setting."""
+    """A record, ready: times [s] (n,), channel → values (n,), channel → noise, its nominal setting, and the levels of
+    noise that the user knows.
+    """
 
     name: str
     time: np.ndarray
     values: dict[str, np.ndarray]
     noise: dict[str, Noise]
     setting: Setting
+    known: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

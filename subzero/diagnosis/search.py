@@ -14,11 +14,14 @@ from scipy.stats import norm
 
 from subzero.diagnosis.evidence import KAPPAS, Posterior, Quadratic, freed, log_sum, posterior
 from subzero.diagnosis.hypotheses import Ids, compatible, log_prior, named, places, variances
+from subzero.diagnosis.pose import with_finer_steps, with_noise_behind
 from subzero.diagnosis.problem import Problem, Progress
 from subzero.diagnosis.refit import Fit, refit
 
 WIDE = 4.0
 """κ of the fit that the linear evidence is made at."""
+NOISE_ROUNDS = 2
+"""How often the noise may be estimated again, behind the wide fit."""
 KEEP, SINGLES, PAIRS = 12.0, 7, 4
 """Refit hypotheses whose log evidence is this close to the best of their kind, and at most so many."""
 BENT, LEAST_BENT = 2, 10.0
@@ -27,6 +30,10 @@ MOST_HOPE = 300.0
 """A promise of old sensitivities counts up to this much."""
 RACERS, HOPELESS = 6, 6.0
 """At most so many fits with sensitivities of their own in a race; none for what is this far behind in log posterior."""
+MOST_RUNS = 800
+"""No further race after so many runs."""
+FURTHER = 20.0
+"""A further cause has to make the records this many times as probable, prior and all (log-odds 3)."""
 UNTRIED = 2.0
 """A hypothesis without a fit of its own is at least this far behind the best in log posterior."""
 SWEEP = (0.25, 0.5, 1.0, 2.0)
@@ -89,10 +96,21 @@ class Search:
         """Make the sensitivities at the nominal model, and the fit with wide tolerances."""
         self.progress(0.05, "sensitivities of the nominal model")
         zero = np.zeros(len(self.problem.entries))
-        self.nominal = (self.problem.residual(zero), self.problem.jacobian(zero))
+        self._from(zero, self.problem.jacobian(zero))
+        for _ in range(NOISE_ROUNDS):
+            again = with_noise_behind(self.problem, self.wide.z) if np.isfinite(self.wide.r).all() else None
+            if again is None:
+                return
+            self.problem = again
+            self._from(self.wide.z, self.problem.jacobian(zero))
+
+    def _from(self, z: np.ndarray, nominal: np.ndarray) -> None:
+        """Make the fit with wide tolerances, from z; `nominal` are the sensitivities of the nominal model."""
         self.progress(0.15, "fit within wide tolerances")
-        D = variances(self.problem.entries, (), WIDE)
-        self.wide = refit(self.problem, zero, self.nominal[1], D, r=self.nominal[0], most_fresh=2)
+        zero, D = np.zeros(z.size), variances(self.problem.entries, (), WIDE)
+        self.nominal = (self.problem.residual(zero), nominal)
+        J = self.problem.jacobian(z) if np.any(z != 0.0) else nominal
+        self.wide = refit(self.problem, z, J, D, most_fresh=2)
 
     def look(self) -> None:
         """Fill the screen: linear evidence of nothing, every cause, and every pair."""
@@ -200,7 +218,7 @@ class Search:
         """Fit candidates again with sensitivities of their own, the best first, until the next is hopeless."""
         for _ in range(most):
             waiting = [one for one in self.candidates.values() if one.ids not in self.raced]
-            if not waiting:
+            if not waiting or self.problem.runs[0] > MOST_RUNS:
                 return
             now = max(waiting, key=lambda one: one.hope)
             done = [self.candidates[ids].log_posterior for ids in self.raced]
@@ -240,6 +258,17 @@ class Search:
         prior = log_prior(ids, len(named(self.problem)))
         posterior_ = mixed + prior if np.isfinite(fit.objective) else -np.inf
         return Candidate(ids=ids, fit=fit, log_evidence=evidence, log_posterior=posterior_)
+
+    def sharpen(self) -> None:
+        """Take from the records what economical steps get wrong at the best fit, if that can be seen, and fit again."""
+        sharper = with_finer_steps(self.problem, self.best().fit.z)
+        if sharper is None:
+            return
+        self.progress(0.78, "finer steps")
+        self.problem = sharper
+        self.candidates = {ids: one for ids, one in self.candidates.items() if ids in self.raced or not ids}
+        for ids, one in list(self.candidates.items()):
+            self._keep(ids, refit(self.problem, one.fit.z, one.fit.J, one.fit.D, most_fresh=1))
 
     def best(self) -> Candidate:
         """Return the most probable candidate."""
@@ -305,14 +334,33 @@ class Search:
 
     def probabilities(self) -> dict[Ids, float]:
         """Return the probability of every hypothesis: by its fit, or by the screen if it was not worth one."""
+        log, total = self.log_posteriors(), self.log_total()
+        return _folded({ids: float(np.exp(value - total)) for ids, value in log.items()})
+
+    def log_posteriors(self) -> dict[Ids, float]:
+        """Return the log posterior of every hypothesis, but for a common constant."""
         log = {ids: candidate.log_posterior for ids, candidate in self.candidates.items()}
         best = max(log.values())
         for ids in self.screen:
             log.setdefault(ids, min(self.estimated(ids), best - UNTRIED))
-        total = log_sum(list(log.values()))
-        return {
-            ids: float(np.exp(value - total)) for ids, value in sorted(log.items(), key=lambda pair: -pair[1])
-        }
+        return log
+
+    def log_total(self) -> float:
+        """Return the log of the sum of all posteriors."""
+        return log_sum(list(self.log_posteriors().values()))
+
+
+def _folded(probabilities: dict[Ids, float]) -> dict[Ids, float]:
+    """Return probabilities, the most probable first, where a further cause that is not needed is not told: those of
+    hypotheses that are not FURTHER times as probable as a part of them are that part's.
+    """
+    found = dict(probabilities)
+    for ids in sorted(probabilities, key=len, reverse=True):
+        if len(ids) > 1:
+            part = max(combinations(ids, len(ids) - 1), key=lambda one: probabilities.get(one, 0.0))
+            if probabilities.get(part, 0.0) * FURTHER > probabilities[ids]:
+                found[part] += found.pop(ids)
+    return dict(sorted(found.items(), key=lambda pair: -pair[1]))
 
 
 def _best(screen: dict[Ids, float], size: int, most: int) -> list[Ids]:

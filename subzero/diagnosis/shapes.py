@@ -28,6 +28,10 @@ DECAYS = (3.0, 6.0, 12.0)
 """Times in which a force dies away. [s]"""
 PERIODS = (1.5, 12.0)
 """Of waves, the shortest and the longest; frequencies in between are a quarter of a turn of the trial apart. [s]"""
+SWITCHED = ("constant", "u|u|", "n|n|", "n u", "rudder_angle*u2", "stern_plane*u2")
+"""Features that may begin, end or die away; what grows by itself (time, length, depth) or answers (sway) does not."""
+NUDGES = (-0.8, -0.6, -0.4, -0.2, 0.0, 0.2, 0.4, 0.6, 0.8)
+"""By how much edges of windows are moved in the end. [s]"""
 FEWEST = 1.0
 """No window is shorter. [s]"""
 
@@ -96,6 +100,14 @@ def windowed(shape: Shape, times: np.ndarray, edges: np.ndarray) -> list[Shape]:
     ]
     found += [_between(shape, times, a, b, log_prior) for a, b in pairs]
     return [one for one in found if np.abs(one.columns).max() > 1e-9]
+
+
+def shifted(shape: Shape, plain: Shape, times: np.ndarray) -> list[Shape]:
+    """Return a windowed shape with its edges moved by less than the grid that they were found on. [s]"""
+    if shape.start is None or shape.decay:
+        return [shape]
+    ends = [None] if shape.end is None else [shape.end + by for by in NUDGES]
+    return [_between(plain, times, shape.start + by, end, shape.log_prior) for by in NUDGES for end in ends]
 
 
 def _between(shape: Shape, times: np.ndarray, start: float, end: float | None, log_prior: float) -> Shape:

@@ -18,7 +18,13 @@ import numpy as np
 
 from subzero.diagnosis.effect import Effect, Parameter
 from subzero.diagnosis.effects.sensors import SPECS
-from subzero.diagnosis.latent import SHARES, Seen, Shape, log_evidence_unknown, seen
+from subzero.diagnosis.latent import (
+    SHARES,
+    Seen,
+    Shape,
+    log_evidence_unknown,
+    seen,
+)
 from subzero.diagnosis.problem import Entry, Problem
 from subzero.diagnosis.refit import Fit
 from subzero.diagnosis.setting import Setting
@@ -158,7 +164,9 @@ def suspects(
     found = []
     for name, C in columns.items():
         data = seen(q.A, q.b, D, fit.J, C, whole)
-        gain, shape = log_evidence_unknown(data, knots.time, knots.record, _amplitudes(problem, name))
+        gain, shape = log_evidence_unknown(
+            data, knots.time, knots.record, _amplitudes(problem, name), drift=name.startswith(DRIFT)
+        )
         found.append(Suspect(id=name, log_gain=gain, shape=shape, data=data))
     return sorted(found, key=lambda one: -one.log_gain)
 

@@ -15,7 +15,6 @@ class Work:
     """What was found so far.
 
     Attributes:
-        problem: records and parameters.
         search: over hypotheses.
         detectable: what could be seen at all.
         misfit: record → channel → how the nominal model fails.
@@ -26,7 +25,6 @@ class Work:
         budget: one of BUDGETS.
     """
 
-    problem: Problem
     search: Search
     detectable: tuple[Detectability, ...] = ()
     misfit: dict[str, dict[str, Misfit]] = field(default_factory=dict)
@@ -35,3 +33,8 @@ class Work:
     complete: bool = True
     seed: int = 0
     budget: str = "full"
+
+    @property
+    def problem(self) -> Problem:
+        """Records and parameters, with the noise as it is known by now."""
+        return self.search.problem

@@ -1,0 +1,139 @@
+"""The extended model: named causes, a force that is missing, a cause that begins in mid-trial; the rest as calibration."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from subzero.diagnosis.effects.sensors import SPECS
+from subzero.diagnosis.estimates import estimate, name
+from subzero.diagnosis.evidence import posterior
+from subzero.diagnosis.foreign import Foreign
+from subzero.diagnosis.formula import describe
+from subzero.diagnosis.gain import Fitted, gain
+from subzero.diagnosis.hypotheses import Ids, variances
+from subzero.diagnosis.next_trial import next_trial
+from subzero.diagnosis.problem import Problem
+from subzero.diagnosis.recover import Recovered, drifted, recover
+from subzero.diagnosis.refit import Fit, refit
+from subzero.diagnosis.search import Candidate
+from subzero.diagnosis.sudden import Begun, with_begun
+from subzero.diagnosis.unknown import DRIFTS, FORCE, Suspect
+from subzero.diagnosis.verdict import Cause, Extended, Gain, NextTrial, Unknown
+from subzero.diagnosis.work import Work
+
+SURVIVORS = 4
+"""At most so many hypotheses are to be told apart by the next trial."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Extension:
+    """What a verdict adds to the model.
+
+    Attributes:
+        fit: the best fit with it.
+        problem: whose entries the fit has.
+        extended: the model.
+        unknown: the force that is missing.
+        cause: the cause that begins in mid-trial.
+    """
+
+    fit: Fit
+    problem: Problem
+    extended: Extended
+    unknown: Unknown | None = None
+    cause: Cause | None = None
+
+
+def of_causes(work: Work, best: Candidate) -> Extension:
+    """Return the extension by named causes."""
+    extended = Extended(
+        deviations=by_effect(work.problem, best.fit.z, best.ids),
+        calibration=by_effect(work.problem, best.fit.z, None, but=best.ids),
+    )
+    return Extension(fit=best.fit, problem=work.problem, extended=extended)
+
+
+def of_nothing(work: Work, best: Candidate) -> Extension:
+    """Return the model as calibrated within tolerances, with nothing new in it."""
+    fit = best.fit if len(best.ids) == 0 else work.search.candidates[()].fit
+    return Extension(
+        fit=fit, problem=work.problem, extended=Extended(calibration=by_effect(work.problem, fit.z, None))
+    )
+
+
+def of_unknown(work: Work) -> Extension:
+    """Return the extension by the most probable force, or the drift of a sensor."""
+    foreign = next(one for one in work.foreign if isinstance(one.what, Suspect))
+    found = _recovered(work, foreign)
+    deviations = by_effect(work.problem, found.fit.z, foreign.beside)
+    calibration = by_effect(work.problem, found.fit.z, None, but=foreign.beside)
+    extended = Extended(deviations=deviations, calibration=calibration, missing=found.missing)
+    unknown = found.unknown
+    if found.missing is not None:
+        unknown = replace(unknown, formula=describe(found).terms())
+    return Extension(fit=found.fit, problem=found.problem, extended=extended, unknown=unknown)
+
+
+def _recovered(work: Work, foreign: Foreign) -> Recovered:
+    """Return a force or a drift, fitted beside the causes that it stands beside."""
+    base = work.search.candidates[foreign.beside]
+    D = variances(work.problem.entries, base.ids, base.kappa)
+    kind, _, which = foreign.id.partition(":")
+    if kind + ":" == FORCE:
+        return recover(work.problem, base.fit, which, D)
+    return drifted(work.problem, base.fit, which, DRIFTS * SPECS[which].bias, D)
+
+
+def of_sudden(work: Work, key: str, probability: float) -> Extension:
+    """Return the extension by a cause that begins in mid-trial, fitted with real runs."""
+    what = next(one.what for one in work.foreign if one.id == key)
+    assert isinstance(what, Begun)
+    none, more, parameters = (
+        work.search.candidates[()],
+        with_begun(work.problem, what),
+        what.effect.parameters,
+    )
+    D = np.concatenate([variances(work.problem.entries, (), none.kappa), [p.scale**2 for p in parameters]])
+    start = np.concatenate([none.fit.z, what.mean])
+    fit = refit(more, start, more.jacobian(start), D, most_fresh=2)
+    sd, k = np.sqrt(np.diag(posterior(fit.quadratic, D).M)), len(work.problem.entries)
+    setting = work.problem.records[0].setting
+    numbers = {
+        p.name: estimate(p, p.nominal(setting), float(fit.z[k + i]), float(sd[k + i]))
+        for i, p in enumerate(parameters)
+    }
+    cause = Cause(id=what.effect.id, sentence=what.effect.sentence, probability=probability, parameters=numbers,
+                  start_time=what.time)  # fmt: skip
+    extended = Extended(
+        deviations={cause.id: {parameter: one.deviation for parameter, one in numbers.items()}},
+        start_times={cause.id: what.time},
+        calibration=by_effect(work.problem, fit.z, None, but=(cause.id,)),
+    )
+    return Extension(fit=fit, problem=more, extended=extended, cause=cause)
+
+
+def by_effect(problem: Problem, z: np.ndarray, ids: Ids | None, but: Ids = ()) -> dict[str, dict[str, float]]:
+    """Return effect → parameter → deviation of some effects; of all that hold for every trial if `ids` is None."""
+    found: dict[str, dict[str, float]] = {}
+    for value, entry in zip(z, problem.entries, strict=False):
+        one = entry.effect.id
+        if entry.record < 0 and one not in but and (ids is None or one in ids):
+            found.setdefault(one, {})[entry.parameter.name] = float(value)
+    return found
+
+
+def gained(work: Work, new: Extension, rival: Fit | None) -> Gain:
+    """Return what an extension explains of held-out data, beside a refit within tolerances and the best rival."""
+    tolerance = Fitted(work.problem, work.search.candidates[()].fit)
+    other = Fitted(work.problem, rival) if rival else None
+    return gain(work.search.nominal[0], tolerance, Fitted(new.problem, new.fit), other, seed=work.seed)
+
+
+def ahead(work: Work, listed: list[Ids], inside: dict[Ids, float]) -> NextTrial | None:
+    """Return the trial that would best tell apart the hypotheses that are left."""
+    left = [ids for ids in listed if ids in work.search.candidates][:SURVIVORS]
+    work.search.progress(0.92, "the next trial, for " + ", ".join(name(ids) for ids in left))
+    survivors = [work.search.candidates[ids] for ids in left]
+    return next_trial(work.problem, survivors, probabilities=[inside[ids] for ids in left], seed=work.seed)
