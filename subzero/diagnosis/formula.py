@@ -29,7 +29,8 @@ from subzero.diagnosis.shapes import (
     waves,
     windowed,
 )
-from subzero.diagnosis.unknown import usual
+from subzero.diagnosis.unknown import history, usual
+from subzero.missing_force import MissingForce, Term
 
 SENSIBLE: Mapping[str, tuple[str, ...]] = {
     "X": ("u|u|", "constant", "n|n|", "n u", "wet_length*u2", "wet_length", "time*u2"),
@@ -82,6 +83,18 @@ class Formula:
     def force(self) -> np.ndarray:
         """Return the force at the samples (n,). [N, N m]"""
         return np.sum([s.columns @ c for s, c in zip(self.shapes, self.coefficients, strict=True)], axis=0)
+
+
+def as_missing(formula: Formula) -> MissingForce:
+    """Return a formula as a part of a model: plain features as terms, all others as a history of this very trial."""
+    terms, rest = [], np.zeros(formula.shapes[0].columns.shape[0])
+    for shape, c in zip(formula.shapes, formula.coefficients, strict=True):
+        if shape.is_plain:
+            terms.append(Term(formula.axis, shape.feature, float(c[0])))
+        else:
+            rest = rest + shape.columns @ c
+    told = history(formula.axis, SAMPLE * np.arange(rest.size), rest) if np.any(rest) else MissingForce()
+    return told + MissingForce(terms=tuple(terms))
 
 
 def samples_of(end: float) -> np.ndarray:

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from subzero.diagnosis.formula import all_shapes, at_knots, choose, describe, samples_of
+from subzero.diagnosis.formula import all_shapes, as_missing, at_knots, choose, describe, samples_of
 from subzero.diagnosis.latent import Seen
 from subzero.diagnosis.recover import recover
 from subzero.diagnosis.shapes import factors_along
 from subzero.diagnosis.unknown import lacking
-from subzero.missing_force import FEATURES, MissingForce, Term, feature_value
+from subzero.missing_force import FEATURES, MissingForce, Term, feature_value, history_at
 
 TIMES, KNOTS = samples_of(30.0), np.linspace(0.0, 30.0, 31)
 
@@ -42,6 +42,16 @@ def test_the_feature_is_found_with_its_coefficient(track, feature):
     assert words == FEATURES[feature].words
     assert low < c < high or abs(best / c - 1.0) < 0.1
     assert next(iter(found.features)) == feature
+
+
+def test_a_plain_formula_becomes_terms_and_a_window_a_history(track):
+    _, factors, shapes = track
+    force = -0.6 * feature_value("u|u|", factors)
+    plain, window = chosen(shapes, force, "X"), chosen(shapes, force * (TIMES >= 12.0), "X")
+    assert as_missing(plain).terms == (Term("X", "u|u|", plain.terms()[0][2]),)
+    assert as_missing(plain).time == ()
+    assert not as_missing(window).terms
+    assert np.abs(history_at(as_missing(window), TIMES)[:, 0] - window.force()).max() < 1e-9
 
 
 def test_a_window_is_found(track):
