@@ -58,8 +58,8 @@ class Ledger:
 class Fixed(NamedTuple):
     """The numbers that do not change during a run.
 
-    `drum_place` is the drum at the start, earth axes (3,) [m]; hull and cable agree when their forces differ by less than
-    the fraction `agreement`.
+    `drum_place` is the drum at the start, earth axes (3,) [m]; hull and cable agree when their forces differ by less
+    than the fraction `agreement`.
     """
 
     vehicle: VehicleNumbers

@@ -113,7 +113,7 @@ def _rival(work: Work, best: Candidate, ids: Ids, p: float) -> Rival:
 
 
 def between(problem: Problem, fit: Fit, ids: Ids, others: Ids) -> float:
-    """Return D of causes as they are in a fit against others; of nothing, against what they would be one scale large."""
+    """Return D of causes as they are in a fit against others; of nothing, against what they would be in full size."""
     if not ids:
         return between(problem, _scaled(problem, fit, others), others, ids) if others else 0.0
     own = places(problem.entries, ids)

@@ -3,8 +3,8 @@
     r = J z + e,   z ~ N(0, D),   e ~ N(0, I);      A = Jᵀ J,  b = Jᵀ r,  P = D⁻¹ + A
     log p = −½ (rᵀr − bᵀ P⁻¹ b) − ½ log det(D P)
 
-A hypothesis frees some entries: their variance becomes s² in the place of (κτ)². That changes P on a few diagonal places
-only, so that all pairs cost a few products of 2 × 2 matrices each.
+A hypothesis frees some entries: their variance becomes s² in the place of (κτ)². That changes P on a few places of
+its diagonal only, so that all pairs cost a few products of 2 × 2 matrices each.
 """
 
 from __future__ import annotations

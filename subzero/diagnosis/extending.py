@@ -1,4 +1,4 @@
-"""The extended model: named causes, a force that is missing, a cause that begins in mid-trial; the rest as calibration."""
+"""The extended model: named causes, a missing force, a cause that begins in mid-trial; the rest as calibration."""
 
 from __future__ import annotations
 

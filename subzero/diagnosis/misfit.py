@@ -52,7 +52,7 @@ def whiteness(white: np.ndarray, lags: int = LAGS) -> float:
 
 
 def _correlations(one: Observed, noise: Noise, difference: np.ndarray) -> dict[str, tuple[float, float]]:
-    """Return command → (lag [s], correlation) of the residual with the command up to 25 samples earlier, the strongest."""
+    """Return command → (lag [s], correlation) of the residual with a command up to 25 samples earlier, the strongest."""
     commands = one.setting.trial.commands
     if commands is None:
         return {}
@@ -66,7 +66,7 @@ def _correlations(one: Observed, noise: Noise, difference: np.ndarray) -> dict[s
             scale = np.linalg.norm(x) * np.linalg.norm(residual)
             values = [float(residual[k:] @ x[: x.size - k]) / scale for k in range(LAGS)]
             at = int(np.argmax(np.abs(values)))
-            found[name] = (at * step, values[at])
+            found[name] = (at * step, float(values[at]))
     return found
 
 

@@ -31,8 +31,13 @@ COLOUR = 0.5
 class Survivor(Protocol):
     """A hypothesis with its fit, such as `search.Candidate`."""
 
-    ids: tuple[str, ...]
-    fit: Fit
+    @property
+    def ids(self) -> tuple[str, ...]:
+        """Its causes."""
+
+    @property
+    def fit(self) -> Fit:
+        """Its best fit."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

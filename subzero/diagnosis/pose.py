@@ -89,7 +89,7 @@ def with_noise_behind(problem: Problem, z: np.ndarray) -> Problem | None:
 
 
 def with_finer_steps(problem: Problem, z: np.ndarray) -> Problem | None:
-    """Return the problem with records from which the error of economical steps at z is taken; None if it is not seen."""
+    """Return the problem with records freed from the error of economical steps at z; None if that is not seen."""
     records, size = [], 0.0
     for i, one in enumerate(problem.records):
         setting = problem.setting(i, z)

@@ -30,13 +30,13 @@ class Entry(NamedTuple):
     """A number of z: a parameter of an effect; of one record only, for a start (else −1)."""
 
     effect: Effect
-    index: int
+    place: int
     record: int
 
     @property
     def parameter(self) -> Parameter:
         """The parameter."""
-        return self.effect.parameters[self.index]
+        return self.effect.parameters[self.place]
 
     @property
     def name(self) -> str:

@@ -191,8 +191,8 @@ class Search:
         self.race()
 
     def _bent(self) -> list[Ids]:
-        """Return the causes whose parameters the wide fit bends most: of a large effect the linear problem says little."""
-        bent = {}
+        """Return the causes that the wide fit bends most: of a large effect the linear problem says little."""
+        bent: dict[str, float] = {}
         for z, entry in zip(self.wide.z, self.problem.entries, strict=True):
             if entry.record < 0:
                 size = abs(z) / entry.parameter.tolerance

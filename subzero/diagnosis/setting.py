@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import scenarios
 from subzero.model import Model
@@ -46,7 +47,7 @@ class Setting:
     later: tuple[tuple[float, Model], ...] = ()
 
     def with_vehicle(self, **changes: float | Callable[[float], float]) -> Setting:
-        """Return the setting with numbers of the vehicle changed: ``section__key=value``, or what makes it of the old."""
+        """Return the setting with numbers of the vehicle changed: ``section__key=value or function``."""
         vehicle = self.model.vehicle
         for key, change in changes.items():
             section, name = key.split("__")
@@ -63,7 +64,7 @@ class Setting:
         """Return the setting with numbers of the drum changed."""
         return self.with_model(drum=dataclasses.replace(self.model.drum, **changes))
 
-    def with_model(self, **changes: object) -> Setting:
+    def with_model(self, **changes: Any) -> Setting:
         """Return the setting with parts of the model changed."""
         return dataclasses.replace(self, model=dataclasses.replace(self.model, **changes))
 

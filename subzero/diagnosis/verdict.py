@@ -124,7 +124,7 @@ class Misfit:
 
 @dataclass(frozen=True, kw_only=True)
 class ChannelGain:
-    """Error of a channel in its own unit: nominal, refit within tolerances, extended, best rival, and the noise floor."""
+    """Error of a channel in its unit: nominal, refit within tolerances, extended, best rival, and the noise floor."""
 
     before: float
     tolerance: float
