@@ -1,0 +1,137 @@
+"""All figures of the issue's "It is right when", in its order."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from .scores import (
+    CLEAR,
+    Result,
+    Score,
+    calibration,
+    errors,
+    first,
+    gain_of,
+    is_foreign,
+    is_right,
+    names,
+    number,
+    of,
+    share,
+    smallest_D,
+    truth,
+    wrongly_sure,
+)
+
+
+def rows(results: Sequence[Result]) -> list[Score]:
+    """Return all figures."""
+    return [*_singles(results), *_healthy(results), *_pairs(results), *_outside(results), *_numbers(results),
+            *_gains(results), *_degraded(results), *_baselines(results)]  # fmt: skip
+
+
+def _holds(one: Result) -> bool:
+    return truth(one) in one["set"] or (bool(one["strange"]) and any(map(is_foreign, one["set"])))
+
+
+def _singles(results: Sequence[Result]) -> list[Score]:
+    singles, twins = of(results, "single"), of(results, "twin")
+    clear = [one for one in singles if smallest_D(one) >= CLEAR]
+    sizes = [float(len(one["set"])) for one in singles]
+    return [
+        share("singles, D ≥ 16: right name first", clear, is_right, "≥ 97 %", least=0.97),
+        share("… named outright (verdict `cause_named`, no other name)", clear,
+              lambda one: names(one) == set(one["truth"]), "–"),
+        share("… with D ≥ 25: right name first", [one for one in clear if smallest_D(one) >= 25.0], is_right, "–"),
+        share("all singles: right name first", singles, is_right, "–"),
+        share("all singles: the 95 % set holds the truth", singles, _holds, "93 … 98 %", least=0.93, most=0.98),
+        number("… median size of that set", sizes, "≤ 2", "{:.0f}", most=2.0),
+        share("twins: the verdict is a set that holds the truth", twins,
+              lambda one: one["verdict"] == "undecided" and _holds(one), "all", least=0.9999),
+    ]  # fmt: skip
+
+
+def _healthy(results: Sequence[Result]) -> list[Score]:
+    healthy = of(results, "healthy")
+    sound = [one for one in results if one["kind"] != "degraded"]
+    _, error = calibration(sound)
+    return [
+        share("healthy: false names", healthy, lambda one: bool(one["causes"]), "≤ 1 %", most=0.01),
+        share("healthy: `nothing_wrong`", healthy, lambda one: one["verdict"] == "nothing_wrong", "–"),
+        share("all cases: a wrong name with p ≥ 0.95", sound, wrongly_sure, "≤ 0.5 %", most=0.005),
+        Score("expected calibration error", f"{error:.3f}", "≤ 0.03", "–", len(sound), error <= 0.03),
+    ]
+
+
+def _pairs(results: Sequence[Result]) -> list[Score]:
+    clear = [one for one in of(results, "pair") if smallest_D(one) >= CLEAR]
+    return [
+        share("pairs, both D ≥ 16: exactly named first", clear, is_right, "≥ 85 %", least=0.85),
+        share("… at least one right", clear, lambda one: bool(set(first(one)[0].split(" + ")) & set(one["truth"])),
+              "≥ 98 %", least=0.98),
+    ]  # fmt: skip
+
+
+def _outside(results: Sequence[Result]) -> list[Score]:
+    cases = of(results, "outside")
+    flagged = [one for one in cases if one["verdict"] == "outside_catalogue"]
+    forces = [one for one in flagged if one["strange"] != "wandering"]
+    rms = [one["outside"]["rms"] for one in forces if "rms" in one["outside"]]
+    told = [one for one in forces if one["outside"]["features"] and one["outside"].get("first") is not None]
+    return [
+        share("outside: flagged", cases, lambda one: one["verdict"] == "outside_catalogue", "≥ 95 %", least=0.95),
+        share("outside: confidently misnamed (p ≥ 0.95)", cases, wrongly_sure, "≤ 2 %", most=0.02),
+        share("outside: axis (or channel) right, of those flagged", flagged,
+              lambda one: one["outside"]["axis"] == one["outside"]["found"], "≥ 90 %", least=0.9),
+        number("outside: RMS error of the history, of its largest", rms, "≤ 10 %", "{:.1%}", most=0.1),
+        share("outside: right feature in the formula's first two", told,
+              lambda one: bool(set(one["outside"]["features"]) & set(one["outside"]["first"])), "≥ 70 %", least=0.7),
+    ]  # fmt: skip
+
+
+def _numbers(results: Sequence[Result]) -> list[Score]:
+    off, covered = errors(of(results, "single", "twin"))
+    inside = share("… 95 % interval covers the truth", [{"in": x} for x in covered], lambda one: one["in"],
+                   "93 … 97 %", least=0.93, most=0.97)  # fmt: skip
+    return [number("parameter of the named cause: error", off, "median ≤ 4 %", "{:.1%}", most=0.04), inside]
+
+
+def _gains(results: Sequence[Result]) -> list[Score]:
+    right = [
+        one for one in of(results, "single") if names(one) == set(one["truth"]) and "extended" in one["gain"]
+    ]
+    named = [one for one in of(results, "single", "pair", "healthy") if "extended" in one.get("gain", {})]
+    found = [number("held-out gain on the other manoeuvre, right cause", [gain_of(one, "extended") for one in right],
+                    "≥ 0.95", "{:.4f}", least=0.95)]  # fmt: skip
+    found += [
+        number(words, [gain_of(one, model) for one in right if model in one["gain"]], "–", "{:.4f}")
+        for words, model in (
+            ("… of the refit within tolerances", "tolerance"),
+            ("… of the best rival", "rival"),
+        )
+    ]
+    harm = share("harm: worse than the nominal model there", [one for one in named if one["causes"]],
+                 lambda one: gain_of(one, "extended") < 0.0, "≤ 1 %", most=0.01)  # fmt: skip
+    return [*found, harm]
+
+
+def _degraded(results: Sequence[Result]) -> list[Score]:
+    cases = of(results, "degraded")
+    healthy = [one for one in cases if not one["truth"]]
+    return [
+        share("degraded, healthy: false names", healthy, lambda one: bool(one["causes"]), "≤ 5 %", most=0.05),
+        share("degraded: a wrong name with p ≥ 0.95", cases, wrongly_sure, "–"),
+    ]
+
+
+def _baselines(results: Sequence[Result]) -> list[Score]:
+    clear = [one for one in of(results, "single") if smallest_D(one) >= CLEAR]
+    healthy = of(results, "healthy")
+    return [
+        share("score test, D ≥ 16: right name first", clear, lambda one: one["score"][0] in one["truth"], "–"),
+        share("score test, healthy: alarms", healthy, lambda one: bool(one["score"][1]), "–"),
+        share("forward selection by BIC, D ≥ 16: right name first", clear,
+              lambda one: one["selection"][:1] == list(one["truth"]), "–"),
+        share("… D ≥ 16: the truth and nothing else", clear, lambda one: one["selection"] == list(one["truth"]), "–"),
+        share("forward selection by BIC, healthy: names something", healthy, lambda one: bool(one["selection"]), "–"),
+    ]  # fmt: skip

@@ -1,0 +1,152 @@
+"""The page docs/diagnosis_benchmark.md, from whatever results there are."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from .cases import SHARES
+from .figures_of import rows
+from .pictures import FIGURES, draw
+from .scores import CLEAR, Result, Score, first, is_right, names, of, smallest_D, truth, wrongly_sure
+from .words import CONFOUNDED_WORDS, HEAD, LIMITS_WORDS, MISSED_WORDS, TIMES_WORDS
+
+PAGE = FIGURES.parent / "diagnosis_benchmark.md"
+CONFOUNDED = 9.0
+MARK = {True: "pass", False: "**FAIL**", None: ""}
+
+
+def write_page(results: Sequence[Result]) -> Path:
+    """Write the page and its figures, and return its path."""
+    broken = [one for one in results if "error" in one]
+    sound = [one for one in results if "error" not in one]
+    draw(sound)
+    parts = [_head(sound, broken), _scores(rows(sound)), _pictures(), _missed(sound), _confounded(sound),
+             _limits(sound), _times(sound), _all_cases(sound)]  # fmt: skip
+    PAGE.write_text("\n\n".join(parts) + "\n")
+    return PAGE
+
+
+def _table(header: Sequence[str], body: Sequence[Sequence[str]]) -> str:
+    lines = [header, ["---"] * len(header), *body]
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
+
+
+def _head(results: Sequence[Result], broken: Sequence[Result]) -> str:
+    """Return what the page is, and what it rests on."""
+    count = Counter(one["kind"] for one in results)
+    kinds = _table(["kind", "cases here", "of the whole benchmark"],
+                   [[kind, str(count[kind]), str(whole)] for kind, whole in SHARES.items()])  # fmt: skip
+    where = Counter(one["manoeuvre"] for one in results)
+    source = Counter(one["source"] for one in results)
+    return HEAD.format(
+        cases=len(results), whole=sum(SHARES.values()), kinds=kinds, fig6=where["fig6"] + where["short"],
+        rich=where["rich"], other=source["other"], fine=source["fine"], broken=len(broken),
+        dropped=sum(one["dropped"] for one in results),
+    )  # fmt: skip
+
+
+def _scores(found: Sequence[Score]) -> str:
+    """Return the table of all figures."""
+    body = [[s.words, s.value, s.interval, str(s.cases), s.target, MARK[s.met]] for s in found]
+    met, judged = sum(s.met is True for s in found), sum(s.met is not None for s in found)
+    return (f"## It is right when\n\n**{met} of {judged} targets are met** on these cases.\n\n"
+            + _table(["figure", "value", "95 % interval", "cases", "target", ""], body))  # fmt: skip
+
+
+def _pictures() -> str:
+    return ("## What is taken for what\n\n![confusion](figures/diagnosis_confusion.png)\n\n"
+            "## How certain, and how right\n\n![calibration](figures/diagnosis_calibration.png)\n\n"
+            "![success over D](figures/diagnosis_success.png)")  # fmt: skip
+
+
+def _missed(results: Sequence[Result]) -> str:
+    """Return every case that should have been told and was not."""
+    body = [[str(one["index"]), one["kind"], one["manoeuvre"] + (f" ({one['how']})" if one["how"] else ""), _true(one),
+             *_said(one)] for one in results if _is_missed(one)]  # fmt: skip
+    header = ["case", "kind", "manoeuvre", "truth (D, closest rival)", "verdict", "first hypothesis", "p"]
+    return f"## What was missed\n\n{MISSED_WORDS}\n\n" + _table(header, body)
+
+
+def _is_missed(one: Result) -> bool:
+    """Say whether a case with D ≥ 16 throughout was not told rightly, or a healthy one got a name."""
+    if one["kind"] == "healthy":
+        return bool(one["causes"])
+    return wrongly_sure(one) or (smallest_D(one) >= CLEAR and not is_right(one))
+
+
+def _true(one: Result) -> str:
+    """Return what is true, with D."""
+    parts = [f"`{name}` ({d:.0f}, {one['rival'][name]})" for name, d in one["D"].items()]
+    return ", ".join(parts) or truth(one)
+
+
+def _said(one: Result) -> list[str]:
+    """Return what was said."""
+    name, p = first(one)
+    named = " + ".join(sorted(names(one)))
+    return [one["verdict"] + (f": {named}" if named else ""), name, f"{p:.2f}"]
+
+
+def _tables_of(results: Sequence[Result]) -> dict[str, list]:
+    """Return manoeuvre → what a healthy record of it can show."""
+    found: dict[str, list] = {}
+    for one in of(results, "healthy", "single"):
+        if one.get("detectable") and one["manoeuvre"] not in found:
+            found[one["manoeuvre"]] = one["detectable"]
+    return found
+
+
+def _confounded(results: Sequence[Result]) -> str:
+    """Return the pairs that a manoeuvre cannot tell apart."""
+    body = [[manoeuvre, f"`{name}`", f"`{rival}`", f"{D:.1f}", f"{alike:.3f}"]
+            for manoeuvre, table in _tables_of(results).items()
+            for name, _, _, rival, D, alike in table if CONFOUNDED > D]  # fmt: skip
+    header = ["manoeuvre", "cause, one effect scale", "closest rival", "D", "cosine"]
+    return f"## What is confounded with what\n\n{CONFOUNDED_WORDS}\n\n" + _table(header, body)
+
+
+def _limits(results: Sequence[Result]) -> str:
+    """Return the smallest sizes that would be seen, and those that could be told from the closest rival."""
+    tables = {name: {row[0]: row for row in table} for name, table in _tables_of(results).items()}
+    every = list(dict.fromkeys(one for table in tables.values() for one in sorted(table)))
+    header = [
+        "cause",
+        *(f"{name}: {what}" for name in tables for what in ("smallest seen", "signal, D at one scale")),
+    ]
+    body = [
+        [f"`{one}`", *(cell for table in tables.values() for cell in _limit(table.get(one)))] for one in every
+    ]
+    return f"## Detection limits\n\n{LIMITS_WORDS}\n\n" + _table(header, body)
+
+
+def _limit(row: list | None) -> tuple[str, str]:
+    if row is None:
+        return "–", "–"
+    _, signal, smallest, rival, D, _ = row
+    return ", ".join(
+        f"{name} {size:.3g}" for name, size in smallest.items()
+    ), f"{signal:.1f}, {D:.0f} ({rival})"
+
+
+def _times(results: Sequence[Result]) -> str:
+    """Return how long a diagnosis takes."""
+    body = []
+    for manoeuvre in ("fig6", "rich"):
+        own = [one["seconds"] for one in results if one["manoeuvre"] == manoeuvre]
+        if own:
+            cells = [np.percentile([one[key] for one in own], [50, 90]) for key in ("cpu", "wall")]
+            body.append([manoeuvre, str(len(own)), *(f"{a:.0f} s, {b:.0f} s" for a, b in cells)])
+    header = ["manoeuvre", "cases", "processor time: median, nine in ten", "wall clock: median, nine in ten"]
+    return f"## Times\n\n{TIMES_WORDS}\n\n" + _table(header, body)
+
+
+def _all_cases(results: Sequence[Result]) -> str:
+    """Return a line for every case with a truth."""
+    body = [[str(one["index"]), one["manoeuvre"] + (f" ({one['how']})" if one["how"] else ""), _true(one), *_said(one)]
+            for one in sorted(results, key=lambda one: one["index"]) if one["D"]]  # fmt: skip
+    header = ["case", "manoeuvre", "truth (D, closest rival)", "verdict", "first hypothesis", "p"]
+    return "## Every case with something hidden\n\n" + _table(header, body)

@@ -1,0 +1,129 @@
+"""The figures of the benchmark, from its results: each with its target, its interval, and the cases it rests on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.stats import binomtest
+
+Result = dict[str, Any]
+CLEAR, SURE = 16.0, 0.95
+FOREIGN = ("unknown_force:", "sensor_drift:")
+
+
+class Score(NamedTuple):
+    """A figure: words, value as text, target as text, 95 % interval as text, cases, met (None: not judged)."""
+
+    words: str
+    value: str
+    target: str
+    interval: str
+    cases: int
+    met: bool | None
+
+
+def first(one: Result) -> tuple[str, float]:
+    """Return the most probable hypothesis and its probability."""
+    return max(one["probabilities"].items(), key=lambda pair: pair[1])
+
+
+def is_foreign(name: str) -> bool:
+    """Say whether a hypothesis is outside the catalogue."""
+    return name.startswith(FOREIGN)
+
+
+def truth(one: Result) -> str:
+    """Return the hypothesis that is true, "outside" for what is none."""
+    return "outside" if one["strange"] else " + ".join(sorted(one["truth"])) or "none"
+
+
+def is_right(one: Result) -> bool:
+    """Say whether the most probable hypothesis is true."""
+    return one["verdict"] == "outside_catalogue" if one["strange"] else first(one)[0] == truth(one)
+
+
+def smallest_D(one: Result) -> float:
+    """Return the smallest D of its causes."""
+    return min(one["D"].values(), default=0.0)
+
+
+def names(one: Result) -> set[str]:
+    """Return the causes that are named, without when they began."""
+    return {cause["id"].partition("@")[0] for cause in one["causes"]}
+
+
+def wrongly_sure(one: Result, sure: float = SURE) -> bool:
+    """Say whether a wrong name is stated with certainty."""
+    return any(cause["p"] >= sure and cause["id"] not in one["truth"] for cause in one["causes"])
+
+
+def of(results: Iterable[Result], *kinds: str) -> list[Result]:
+    """Return the results of some kinds."""
+    return [one for one in results if one["kind"] in kinds]
+
+
+def share(
+    words: str,
+    cases: Sequence[Result],
+    good: Callable[[Result], bool],
+    target: str,
+    *,
+    least: float | None = None,
+    most: float | None = None,
+) -> Score:
+    """Return a share of cases as a figure."""
+    n, k = len(cases), sum(map(good, cases))
+    if n == 0:
+        return Score(words, "–", target, "–", 0, None)
+    low, high = binomtest(k, n).proportion_ci(0.95)
+    value = k / n
+    met = (least is None or value >= least) and (most is None or value <= most)
+    return Score(words, f"{100 * value:.1f} %", target, f"{100 * low:.1f} … {100 * high:.1f} %", n, met)
+
+
+def number(words: str, values: Sequence[float], target: str, form: str, *, least: float | None = None,
+           most: float | None = None) -> Score:  # fmt: skip
+    """Return a median as a figure, with the quartiles in the place of an interval."""
+    if not values:
+        return Score(words, "–", target, "–", 0, None)
+    low, value, high = np.percentile(values, [25, 50, 75])
+    met = (least is None or value >= least) and (most is None or value <= most)
+    judged = met if (least, most) != (None, None) else None
+    return Score(words, form.format(value), target, f"{form.format(low)} … {form.format(high)} (quartiles)",
+                 len(values), judged)  # fmt: skip
+
+
+def calibration(results: Sequence[Result]) -> tuple[list[tuple[float, float, int]], float]:
+    """Return (stated, right, cases) by bins of the first hypothesis' probability, and the expected error."""
+    edges = [0.0, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9, 0.95, 0.99, 1.0 + 1e-9]
+    stated = np.array([first(one)[1] for one in results])
+    right = np.array([is_right(one) for one in results], dtype=float)
+    found = []
+    for low, high in pairwise(edges):
+        own = (stated >= low) & (stated < high)
+        if own.any():
+            found.append((float(stated[own].mean()), float(right[own].mean()), int(own.sum())))
+    error = sum(n * abs(a - b) for a, b, n in found) / max(len(results), 1)
+    return found, float(error)
+
+
+def errors(results: Sequence[Result]) -> tuple[list[float], list[bool]]:
+    """Return relative errors of the parameters of rightly named causes, and whether their intervals cover the truth."""
+    off, covered = [], []
+    for one in results:
+        for cause in one["causes"]:
+            for (value, low, high, _), true in zip(cause["parameters"].values(), one["truth"].get(cause["id"], ()),
+                                                   strict=False):  # fmt: skip
+                if cause["id"] in one["truth"] and true:
+                    off.append(abs(value - true) / abs(true))
+                    covered.append(low <= true <= high)
+    return off, covered
+
+
+def gain_of(one: Result, model: str) -> float:
+    """Return the gain of a model on the other manoeuvre."""
+    gain = one["gain"]
+    return (gain["nominal"] - gain[model]) / gain["nominal"]

@@ -1,0 +1,233 @@
+"""The engine's parts against closed forms and brute force.
+
+Verifies: evidence, bounded steps, noise, sensitivities and responses of a diagnosis; that every effect is exactly off
+at 0; that the catalogue has the ids it promises. Configuration: made-up linear problems, and fig6 with the cable.
+Tolerance: linear algebra to 1e-8; noise to a few per cent over many records; sensitivities to 1 %.
+"""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.optimize import lsq_linear
+from scipy.stats import multivariate_normal
+
+import subzero
+from subzero.diagnosis import effects
+from subzero.diagnosis.effects.sensors import NOISE
+from subzero.diagnosis.evidence import Quadratic, freed, posterior
+from subzero.diagnosis.noise import Noise, estimate, spikes
+from subzero.diagnosis.problem import Observed, Problem, entries_of
+from subzero.diagnosis.refit import quadratic_step
+from subzero.diagnosis.response import TRUTHS, economical, respond, tracked
+from subzero.diagnosis.setting import Setting
+
+BASIC = ("surge_speed", "heading", "yaw_rate", "pitch", "roll", "depth")
+KINDS = ("scale", "bias", "lag")
+IDS = {
+    *("propeller_thrust_gain", "propeller_thrust_slope", "motor_lag", "battery_sag", "propeller_torque"),
+    *("rudder_lag", "rudder_rate_limit", "rudder_offset", "rudder_lift_slope", "rudder_backlash"),
+    *("stern_plane_offset", "hull_drag", "surge_added_mass", "yaw_inertia", "yaw_damping", "sway_damping"),
+    *("munk_moment", "cable_tangential_drag", "cable_normal_drag", "cable_initial_length", "drum_friction"),
+    *(
+        "drum_inertia",
+        "cable_weight",
+        "current",
+        "net_buoyancy",
+        "cg_offset",
+        "roll_stiffness",
+        "clock_offset",
+    ),
+    *(f"sensor_{kind}:{channel}" for kind in KINDS for channel in BASIC),
+}
+TRIAL = subzero.load_scenario("fig6")
+FIG6 = Setting(trial=TRIAL, model=subzero.Model.of(TRIAL))
+CATALOGUE = effects.catalogue(BASIC)
+ALL = {**CATALOGUE, **{effect.id: effect for effect in effects.START}}
+
+
+def linear_problem(seed, m=40, k=6):
+    random = np.random.default_rng(seed)
+    J, D, z = random.standard_normal((m, k)), random.uniform(0.1, 4.0, k), 0.3 * random.standard_normal(k)
+    r = random.standard_normal(m)
+    return J, D, z, r
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_evidence_is_that_of_the_dense_gaussian(seed):
+    """Evidence = ln N(r + J z; 0, I + J D Jᵀ), but for its constant."""
+    J, D, z, r = linear_problem(seed)
+    found = posterior(Quadratic.at(z, r, J), D)
+    y = r + J @ z
+    dense = multivariate_normal(np.zeros(y.size), np.eye(y.size) + J @ np.diag(D) @ J.T).logpdf(y)
+    assert_allclose(found.log_evidence, dense + 0.5 * y.size * np.log(2.0 * np.pi), atol=1e-8)
+    covariance = np.linalg.inv(J.T @ J + np.diag(1.0 / D))
+    assert_allclose(found.M, covariance, atol=1e-10)
+    assert_allclose(found.z, covariance @ J.T @ y, atol=1e-10)
+
+
+@pytest.mark.parametrize("at", [[2], [0, 4]])
+def test_freeing_entries_is_another_prior(at):
+    J, D, z, r = linear_problem(7)
+    q, wide = Quadratic.at(z, r, J), D.copy()
+    wide[at] = 25.0 * D[at]
+    value, mean, covariance = freed(posterior(q, D), D, at, wide[at])
+    direct = posterior(q, wide)
+    assert_allclose(value, direct.log_evidence, atol=1e-8)
+    assert_allclose(mean, direct.z[at], atol=1e-8)
+    assert_allclose(covariance, direct.M[np.ix_(at, at)], atol=1e-8)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_a_bounded_step_is_the_best_within_bounds(seed):
+    random = np.random.default_rng(seed)
+    A, b = random.standard_normal((20, 8)), 3.0 * random.standard_normal(20)
+    low, high = -random.uniform(0.0, 0.4, 8), random.uniform(0.05, 0.4, 8)
+    low[random.random(8) < 0.3] = 0.0
+    step = quadratic_step(A.T @ A, A.T @ b, low, high)
+    best = lsq_linear(A, b, (low, high), method="bvls", tol=1e-14).x
+    assert_allclose(step, best, atol=1e-8)
+
+
+def coloured(random, size, rho):
+    noise = random.standard_normal(size)
+    for k in range(1, size):
+        noise[k] = rho * noise[k - 1] + np.sqrt(1.0 - rho**2) * noise[k]
+    return noise
+
+
+@pytest.mark.parametrize("rho", [0.0, 0.5])
+def test_noise_is_found_behind_a_smooth_misfit(rho):
+    """Level within 3 %, colour within 0.04, as means of 60 records of 30 s: what the smooth curve takes is put back."""
+    random, time = np.random.default_rng(3), np.arange(300) / 10.0
+    smooth = 5.0 * np.sin(time / 4.0) + 0.02 * time**2
+    found = [estimate(time, smooth + 0.3 * coloured(random, 300, rho), 0.3) for _ in range(60)]
+    assert_allclose(np.mean([one.sd for one in found]), 0.3, rtol=0.03)
+    assert abs(np.mean([one.rho for one in found]) - rho) < 0.04
+
+
+def test_noise_is_found_among_outliers_and_gaps():
+    random, time, found = np.random.default_rng(4), np.arange(300) / 10.0, []
+    for _ in range(20):
+        values = np.sin(time) + 0.3 * coloured(random, 300, 0.5)
+        values[random.random(300) < 0.01] += 4.5
+        values[random.random(300) < 0.02] = np.nan
+        found.append(estimate(time, values, 0.3))
+    assert_allclose(np.mean([one.sd for one in found]), 0.3, rtol=0.05)
+    assert abs(np.mean([one.rho for one in found]) - 0.5) < 0.06
+
+
+def test_spikes_are_those_that_stand_alone():
+    values = np.sin(np.arange(200) / 200.0) + 0.02 * np.random.default_rng(5).standard_normal(200)
+    values[[20, 77, 150]] += [1.0, -0.8, 0.5]
+    assert np.flatnonzero(spikes(values, 0.02)).tolist() == [20, 77, 150]
+    values[100:] += 3.0
+    assert np.flatnonzero(spikes(values, 0.02)).tolist() == [20, 77, 150], "a step is no spike"
+
+
+def test_whitening_makes_coloured_noise_white_across_gaps():
+    random = np.random.default_rng(6)
+    used = random.random(20000) > 0.1
+    gap = np.diff(np.flatnonzero(used), prepend=-1).astype(float)
+    noise = Noise(sd=0.3, rho=0.7, used=used, gap=gap)
+    white = noise.whiten(0.3 * coloured(random, 20000, 0.7))
+    assert abs(white.std() - 1.0) < 0.02
+    assert abs(np.mean(white[1:] * white[:-1])) < 0.02
+
+
+def test_a_response_shows_what_a_run_records():
+    """In the run's own steps: to the tolerance within which hull and cable agree."""
+    run = subzero.simulate("fig6")
+    names = [name for name in TRUTHS if name in run]
+    shown = respond(FIG6, run["time"].values, names)
+    for name in names:
+        if name == "heading":
+            continue
+        scale = float(np.abs(run[name]).max()) + 1e-9
+        assert_allclose(shown[name], run[name].values, atol=1e-3 * max(scale, 1.0), err_msg=name)
+    turned = np.degrees(np.unwrap(np.radians(shown["heading"] - run["heading"].values)))
+    assert np.abs((turned + 180.0) % 360.0 - 180.0).max() < 0.01
+
+
+def test_economical_steps_cost_less_than_a_tenth_of_the_noise():
+    times = np.arange(301) / 10.0
+    exact, cheap = respond(FIG6, times, BASIC), respond(economical(FIG6, 30.0), times, BASIC)
+    for name in BASIC:
+        assert np.abs(exact[name] - cheap[name]).max() < 0.1 * NOISE[name], name
+
+
+def test_the_catalogue_has_the_ids_that_are_promised():
+    assert set(CATALOGUE) == IDS
+
+
+@pytest.mark.parametrize("name", sorted(ALL))
+def test_every_effect_is_off_at_zero(name):
+    """Bit for bit: the whole run with all deviations 0 is the run without the effect."""
+    effect = ALL[name]
+    short = economical(dataclasses.replace(FIG6, trial=dataclasses.replace(TRIAL, duration=4.0)), 4.0)
+    off = effect.apply(short, *(0.0 for _ in effect.parameters))
+    times = np.arange(41) / 10.0
+    plain, same = respond(short, times, BASIC), respond(off, times, BASIC)
+    for channel in BASIC:
+        assert np.array_equal(plain[channel], same[channel]), channel
+
+
+@pytest.fixture(scope="module")
+def problem():
+    """fig6, all six channels, noise as of the usual sensors."""
+    times = np.arange(301) / 10.0
+    setting = economical(FIG6, 30.0)
+    used, gap = np.ones(301, bool), np.ones(301)
+    noise = {name: Noise(sd=NOISE[name], rho=0.5, used=used, gap=gap) for name in BASIC}
+    record = Observed(
+        name="fig6", time=times, values=respond(setting, times, BASIC), noise=noise, setting=setting
+    )
+    return Problem(records=(record,), entries=entries_of(tuple(CATALOGUE.values()), effects.START, 1))
+
+
+CURVED = {
+    "rudder_backlash": "a play takes a tolerance before it is felt throughout",
+    "cable_initial_length": "its step is a whole tolerance, from a cable that begins at the drum",
+    "drum_friction": "its step is a whole tolerance, from a drum that turns freely",
+    "sensor_lag": "its step is a whole tolerance, and a lag is felt in its square, too",
+}
+"""Effects that only go one way: their steps are whole tolerances, and curvature counts. Allowed: 4 %."""
+ROUGH = {
+    "rudder_rate_limit": "a step of 2 degrees is over before the limit is felt: no slope at all",
+    "drum_inertia": "a light drum chatters in the steps of a diagnosis: 5 mm/s, a third of the speed log's noise",
+}
+"""Effects whose sensitivity at the nominal model is not to be relied on; the engine tries sizes, or refits."""
+
+
+def test_sensitivities_are_smooth(problem):
+    """|J(h) − J(h/2)| < 1 % of |J(h)|, or of a tenth of the noise per tolerance where there is nothing to see."""
+    zero = np.zeros(len(problem.entries))
+    whole, half = (_differences(problem, zero, share) for share in (1.0, 0.5))
+    bad = {}
+    for k, entry in enumerate(problem.entries):
+        if entry.effect.id in ROUGH:
+            continue
+        size = max(float(np.linalg.norm(whole[:, k])), 0.1 / entry.parameter.tolerance)
+        error = float(np.linalg.norm(whole[:, k] - half[:, k])) / size
+        if error >= (0.04 if entry.effect.id.split(":")[0] in CURVED else 0.01):
+            bad[entry.name] = error
+    assert not bad
+
+
+def _differences(problem, zero, share):
+    """Return J with a share of the steps of `Problem.jacobian`."""
+    return np.column_stack([_column(problem, zero, k, share) for k in range(zero.size)])
+
+
+def _column(problem, zero, k, share):
+    moved = zero + share * (problem._moved(zero, k) - zero)
+    return problem.change(zero, moved) / moved[k]
+
+
+def test_a_run_that_cannot_go_on_is_told_by_nan():
+    broken = FIG6.with_model(current=(-30.0, 0.0, 0.0))
+    _, track = tracked(economical(broken, 30.0))
+    shown = respond(economical(broken, 30.0), np.array([0.0, 30.0]), ["surge_speed"])["surge_speed"]
+    assert np.isfinite(shown[0])
+    assert np.isfinite(track[-1]).all() == np.isfinite(shown[1])
