@@ -24,18 +24,24 @@ def struck(plant):
     return planted, fits
 
 
-def test_the_right_cause_explains_nearly_all_and_a_wrong_one_nothing(struck):
-    planted, fits = struck
-    right = gain(planted.r, fits[()], fits["propeller_torque",], fits["yaw_damping",])
-    wrong = gain(planted.r, fits[()], fits["yaw_damping",])
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_the_right_cause_is_sure_to_gain_and_a_wrong_one_is_not(plant, seed):
+    """It is the lower bound that tells them apart: the fit of a wrong cause is strained, and its gain scatters widely
+    (0.52, 0.66 and 0.00 for these seeds, with lower bounds of −0.30, −0.11 and −0.03).
+    """
+    planted = plant(hidden("propeller_torque", 3.0), seed=seed)
+    tolerance, cause, rival = (
+        Fitted(planted.problem, planted.fit(*ids)) for ids in ((), ("propeller_torque",), ("yaw_damping",))
+    )
+    right, wrong = gain(planted.r, tolerance, cause, rival), gain(planted.r, tolerance, rival)
     assert right.total > 0.95
-    assert right.owed > 0.8
+    assert right.owed > 0.9
     assert right.owed_low > 0.2
-    assert abs(wrong.owed) < 0.2
+    assert wrong.owed < right.owed - 0.2
     assert wrong.owed_low < 0.05
     assert right.how == BLOCKS
     roll = right.held_out["roll"]
-    assert roll.after < roll.rival < 1.05 * roll.tolerance
+    assert roll.after < min(roll.rival, roll.tolerance)
     assert roll.after == pytest.approx(roll.floor, rel=0.25)
 
 
