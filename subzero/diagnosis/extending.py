@@ -10,7 +10,7 @@ from subzero.diagnosis.effects.sensors import SPECS
 from subzero.diagnosis.estimates import estimate, name
 from subzero.diagnosis.evidence import posterior
 from subzero.diagnosis.foreign import Foreign
-from subzero.diagnosis.formula import describe
+from subzero.diagnosis.formula import Formula, describe, samples_of
 from subzero.diagnosis.gain import Fitted, gain
 from subzero.diagnosis.hypotheses import Ids, variances
 from subzero.diagnosis.next_trial import next_trial
@@ -70,10 +70,18 @@ def of_unknown(work: Work) -> Extension:
     deviations = by_effect(work.problem, found.fit.z, foreign.beside)
     calibration = by_effect(work.problem, found.fit.z, None, but=foreign.beside)
     extended = Extended(deviations=deviations, calibration=calibration, missing=found.missing)
-    unknown = found.unknown
-    if found.missing is not None:
-        unknown = replace(unknown, formula=describe(found).terms())
+    unknown = found.unknown if found.missing is None else _told(found.unknown, describe(found))
     return Extension(fit=found.fit, problem=found.problem, extended=extended, unknown=unknown)
+
+
+def _told(unknown: Unknown, formula: Formula) -> Unknown:
+    """Return a force as its formula tells it, if there is one: far closer to what acts than the free history."""
+    if not formula.shapes or formula.log_gain <= 0.0:
+        return unknown
+    times = samples_of(float(unknown.time[-1]))
+    columns = np.column_stack([shape.columns for shape in formula.shapes])
+    band = np.sqrt(np.maximum(np.sum(columns @ formula.covariance * columns, axis=1), 0.0))
+    return replace(unknown, time=times, force=formula.force(), band=band, formula=formula.terms())
 
 
 def _recovered(work: Work, foreign: Foreign) -> Recovered:

@@ -52,7 +52,7 @@ def whiteness(white: np.ndarray, lags: int = LAGS) -> float:
 
 
 def _correlations(one: Observed, noise: Noise, difference: np.ndarray) -> dict[str, tuple[float, float]]:
-    """Return command → (lag [s], correlation) of the residual with a command up to 25 samples earlier, the strongest."""
+    """Return command → (lag [s], correlation) of the residual with a command up to 25 samples before, strongest."""
     commands = one.setting.trial.commands
     if commands is None:
         return {}

@@ -120,31 +120,16 @@ def _looked_at(
     problem: Problem, plans: Sequence[Plan], held: Sequence[Belief], most: int = PROMISING
 ) -> list[Plan]:
     """Return the most promising plans that are safe, in their order, up to the first that decides for sure."""
-    shown = {
-        plan.name: _shown(to_come(problem, plan.setting), _turned(problem, plan.setting, held))
-        for plan in plans
-    }
+    shown = {plan.name: _shown(to_come(problem, plan.setting), held) for plan in plans}
     apart = {name: _apart(h) for name, h in shown.items() if h is not None}
     names = sorted(apart, key=lambda name: -apart[name])[:most]
     found: list[Plan] = []
     for plan in plans:
         if plan.name in names and _most(found) < SURE:
-            there, h = _turned(problem, plan.setting, held), shown[plan.name]
+            h = shown[plan.name]
             assert h is not None
-            found.append(_viewed(to_come(problem, plan.setting), plan, h, there))
+            found.append(_viewed(to_come(problem, plan.setting), plan, h, held))
     return found
-
-
-def _turned(problem: Problem, setting: Setting, held: Sequence[Belief]) -> list[Belief]:
-    """Return beliefs for a trial with another heading: a current is told along and across the heading."""
-    angle = setting.trial.start.heading - problem.records[0].setting.trial.start.heading
-    names = [entry.name for entry in to_come(problem, setting).entries]
-    if angle == 0.0 or "current.along" not in names:
-        return list(held)
-    at = [names.index("current.along"), names.index("current.across")]
-    T = np.eye(len(names))
-    T[np.ix_(at, at)] = [[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]]
-    return [Belief(z=T @ one.z, M=T @ one.M @ T.T) for one in held]
 
 
 def _shown(coming: Problem, held: Sequence[Belief]) -> np.ndarray | None:

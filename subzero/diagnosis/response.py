@@ -67,14 +67,12 @@ def respond(setting: Setting, times: np.ndarray, channels: Iterable[str]) -> dic
         channels: names of `subzero.channels`, of those in `TRUTHS`.
 
     Returns:
-        channel → values (n,) in its display unit; NaN from where the run could not go on.
+        channel → values (n,) in its display unit; NaN from where the run could not go on. Behind its end the last hold.
     """
     grid, track = tracked(setting)
     earlier = times - setting.clock_offset
     return {
-        name: np.interp(
-            earlier, grid, sensed(setting.sensing.get(name), grid, TRUTHS[name](track)), right=np.nan
-        )
+        name: np.interp(earlier, grid, sensed(setting.sensing.get(name), grid, TRUTHS[name](track)))
         for name in channels
     }
 

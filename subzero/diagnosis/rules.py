@@ -1,7 +1,7 @@
 """From probabilities to a verdict: one visible set of rules.
 
 nothing_wrong      p(none) ≥ 0.5, or the named size is within the practical one (then the model wants calibration)
-cause_named        one hypothesis with p ≥ 0.8, its size beyond 4 tolerances
+cause_named        one hypothesis with p ≥ 0.8, D ≥ 9 to its closest rival, its size beyond 4 tolerances
 outside_catalogue  a force or a drift that no cause explains has p ≥ 0.5
 undecided          everything else: the smallest set with p ≥ 0.95
 """
@@ -17,6 +17,8 @@ from subzero.diagnosis.problem import Entry
 from subzero.diagnosis.verdict import CAUSE_NAMED, NOTHING_WRONG, OUTSIDE, UNDECIDED
 
 NAMED, HEALTHY, FOREIGN, SET = 0.8, 0.5, 0.5, 0.95
+APART = 9.0
+"""With less than this squared distance to a rival no cause is named, whatever the record happens to say."""
 PRACTICAL = 4.0
 """A deviation within this many tolerances is a matter of calibration, whatever its evidence."""
 
@@ -42,13 +44,14 @@ def smallest_set(probabilities: Mapping[Ids, float], total: float = SET) -> list
     return found
 
 
-def decide(probabilities: Mapping[Ids, float], foreign: float, practical: bool) -> str:
+def decide(probabilities: Mapping[Ids, float], foreign: float, practical: bool, apart: float) -> str:
     """Return the verdict.
 
     Args:
         probabilities: hypothesis → probability; with those outside the catalogue they sum to 1.
         foreign: probability of a force or a drift that no cause explains.
         practical: the most probable hypothesis' causes are all of a practical size.
+        apart: D of the most probable hypothesis against its closest rival.
     """
     best = max(probabilities, key=lambda ids: probabilities[ids])
     if foreign >= FOREIGN:
@@ -57,6 +60,6 @@ def decide(probabilities: Mapping[Ids, float], foreign: float, practical: bool) 
         return NOTHING_WRONG
     if best and not practical and probabilities[best] >= HEALTHY:
         return NOTHING_WRONG
-    if best and practical and probabilities[best] >= NAMED:
+    if best and practical and apart >= APART and probabilities[best] >= NAMED:
         return CAUSE_NAMED
     return UNDECIDED

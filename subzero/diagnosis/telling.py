@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from subzero.diagnosis.detect import separation
 from subzero.diagnosis.effects.sensors import SPECS
 from subzero.diagnosis.estimates import causes, deviations, name, rivals
 from subzero.diagnosis.extending import Extension, ahead, gained, of_causes, of_nothing, of_sudden, of_unknown
@@ -40,11 +41,16 @@ def tell(work: Work) -> Verdict:
     sudden = max((key for key in outside if "@" in key), key=lambda key: outside[key], default="")
     if outside.get(sudden, 0.0) >= HEALTHY:
         return _told(work, CAUSE_NAMED, best, inside, outside, of_sudden(work, sudden, outside[sudden]))
-    practical = (
-        min(sizes(search.problem.entries, best.ids, best.fit.z, best.kappa).values(), default=0.0) > PRACTICAL
-    )
-    verdict = decide(inside, sum(p for key, p in outside.items() if "@" not in key), practical)
+    verdict = decide(inside, sum(p for key, p in outside.items() if "@" not in key), *_large(work, best))
     return _told(work, verdict, best, inside, outside, _extension(work, verdict, best))
+
+
+def _large(work: Work, best: Candidate) -> tuple[bool, float]:
+    """Return whether the causes of a candidate are of a practical size, and D against its closest rival."""
+    if not best.ids:
+        return False, 0.0
+    size = min(sizes(work.problem.entries, best.ids, best.fit.z, best.kappa).values())
+    return size > PRACTICAL, separation(work.problem, best.fit.J, best.fit.z, best.ids, best.kappa)[0]
 
 
 def _extension(work: Work, verdict: str, best: Candidate) -> Extension:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from math import cos, sin
-
 from subzero.diagnosis.effect import Effect, Parameter
 from subzero.diagnosis.setting import Setting
 
@@ -45,12 +43,10 @@ def drum_inertia(setting: Setting, mass: float) -> Setting:
     return setting.with_drum(inertia=max(drum.inertia + mass * drum.radius**2, 0.0))
 
 
-def current(setting: Setting, along: float, across: float) -> Setting:
-    """A uniform current along the first heading, and to starboard of it."""
-    heading, (north, east, down) = setting.trial.start.heading, setting.model.current
-    north += along * cos(heading) - across * sin(heading)
-    east += along * sin(heading) + across * cos(heading)
-    return setting.with_model(current=(north, east, down))
+def current(setting: Setting, north: float, east: float) -> Setting:
+    """A uniform current, northward and eastward."""
+    old = setting.model.current
+    return setting.with_model(current=(old[0] + north, old[1] + east, old[2]))
 
 
 def _wet_length(setting: Setting) -> float:
@@ -98,6 +94,6 @@ EFFECTS = (
                                  nominal=_weight),),
            apply=cable_weight),
     Effect(id="current", sentence="the water moves", slot="water",
-           parameters=(_velocity("along"), _velocity("across")), apply=current),
+           parameters=(_velocity("north"), _velocity("east")), apply=current),
 )  # fmt: skip
 """To add one: a function (setting, deviation) → setting, and a line here."""
