@@ -31,6 +31,7 @@ class Fit:
         converged: no step would gain more.
         promise: what the linear model says that a further step would gain; of old sensitivities, little to rely on.
         fresh: how many times sensitivities were made.
+        made_at: deviations that the sensitivities were made at, if that is known (k,).
     """
 
     z: np.ndarray
@@ -41,6 +42,7 @@ class Fit:
     converged: bool
     promise: float
     fresh: int
+    made_at: np.ndarray | None = None
 
     @property
     def quadratic(self) -> Quadratic:
@@ -56,6 +58,7 @@ def refit(
     *,
     r: np.ndarray | None = None,
     most_fresh: int = 1,
+    made_at: np.ndarray | None = None,
 ) -> Fit:
     """Return the best fit under prior variances D, from z and sensitivities J close by.
 
@@ -66,6 +69,7 @@ def refit(
         D: prior variances (k,).
         r: the residual at z, if it is known.
         most_fresh: how many times sensitivities may be made again.
+        made_at: where J was made (k,).
     """
     low, high = bounds(problem)
     z = np.clip(z, low, high)
@@ -79,7 +83,7 @@ def refit(
             break
         share, z, r, now = _walk(problem, z, r, now, step, promised, D)
         if share < POOR and promised > NEARLY and fresh < most_fresh:
-            J, fresh = problem.jacobian(z, rough=share > 0.0), fresh + 1
+            J, fresh, made_at = problem.jacobian(z, rough=share > 0.0), fresh + 1, z.copy()
         elif share <= 0.0:
             converged = promised < NEARLY
             break
@@ -92,6 +96,7 @@ def refit(
         converged=converged,
         promise=0.0 if converged else promised,
         fresh=fresh,
+        made_at=made_at,
     )
 
 

@@ -30,6 +30,8 @@ MOST_HOPE = 300.0
 """A promise of old sensitivities counts up to this much."""
 RACERS, HOPELESS = 6, 6.0
 """At most so many fits with sensitivities of their own in a race; none for what is this far behind in log posterior."""
+NEAR = 4.0
+"""Sensitivities hold as far as this from where they were made, in tolerances."""
 MOST_RUNS = 800
 """No further race after so many runs."""
 FURTHER = 20.0
@@ -110,7 +112,7 @@ class Search:
         zero, D = np.zeros(z.size), variances(self.problem.entries, (), WIDE)
         self.nominal = (self.problem.residual(zero), nominal)
         J = self.problem.jacobian(z) if np.any(z != 0.0) else nominal
-        self.wide = refit(self.problem, z, J, D, most_fresh=2)
+        self.wide = refit(self.problem, z, J, D, most_fresh=2, made_at=z)
 
     def look(self) -> None:
         """Fill the screen: linear evidence of nothing, every cause, and every pair."""
@@ -204,7 +206,7 @@ class Search:
         z, at = np.zeros(len(self.problem.entries)), places(self.problem.entries, ids)
         z[at] = self.wide.z[at]
         D = variances(self.problem.entries, ids, 1.0)
-        self._keep(ids, refit(self.problem, z, self.problem.jacobian(z), D, most_fresh=2))
+        self._keep(ids, refit(self.problem, z, self.problem.jacobian(z), D, most_fresh=2, made_at=z))
 
     def fit(self, ids: Ids, start: Fit | None = None) -> None:
         """Fit a hypothesis with real runs and the sensitivities of another fit, unless it was fitted."""
@@ -212,11 +214,12 @@ class Search:
             start = start or self.wide
             D, z = variances(self.problem.entries, ids, 1.0), self.secants.get(ids)
             z = posterior(start.quadratic, D).z if z is None else z
-            self._keep(ids, refit(self.problem, z, start.J, D, most_fresh=0))
+            self._keep(ids, refit(self.problem, z, start.J, D, most_fresh=0, made_at=start.made_at))
 
     def race(self, most: int = RACERS, hopeless: float = HOPELESS) -> None:
         """Fit candidates again with sensitivities of their own, the best first, until the next is hopeless."""
         for _ in range(most):
+            self.raced |= {one.ids for one in self.candidates.values() if self._settled(one.fit)}
             waiting = [one for one in self.candidates.values() if one.ids not in self.raced]
             if not waiting or self.problem.runs[0] > MOST_RUNS:
                 return
@@ -227,15 +230,29 @@ class Search:
             self.progress(0.5, "fitting again " + (" + ".join(now.ids) or "nothing wrong"))
             self._again(now)
 
+    def _settled(self, fit: Fit) -> bool:
+        """Say whether a fit has converged, close to where its sensitivities were made."""
+        if not fit.converged or fit.made_at is None:
+            return False
+        tolerance = np.array([entry.parameter.tolerance for entry in self.problem.entries])
+        return bool(np.max(np.abs(fit.z - fit.made_at) / tolerance) < NEAR)
+
     def _again(self, one: Candidate) -> None:
         """Fit a candidate with sensitivities of its own, under its most probable κ."""
         self.raced.add(one.ids)
         D = variances(self.problem.entries, one.ids, one.kappa)
         J = self.problem.jacobian(one.fit.z)
-        now = self._keep(one.ids, refit(self.problem, one.fit.z, J, D, r=one.fit.r, most_fresh=2))
+        now = self._keep(
+            one.ids, refit(self.problem, one.fit.z, J, D, r=one.fit.r, most_fresh=2, made_at=one.fit.z)
+        )
         if now.kappa != one.kappa:
             D = variances(self.problem.entries, one.ids, now.kappa)
-            self._keep(one.ids, refit(self.problem, now.fit.z, now.fit.J, D, r=now.fit.r, most_fresh=0))
+            self._keep(
+                one.ids,
+                refit(
+                    self.problem, now.fit.z, now.fit.J, D, r=now.fit.r, most_fresh=0, made_at=now.fit.made_at
+                ),
+            )
 
     def _keep(self, ids: Ids, fit: Fit) -> Candidate:
         """Keep a fit and return its candidate."""
@@ -266,9 +283,15 @@ class Search:
             return
         self.progress(0.78, "finer steps")
         self.problem = sharper
-        self.candidates = {ids: one for ids, one in self.candidates.items() if ids in self.raced or not ids}
+        least = self.best().log_posterior - HOPELESS
+        self.candidates = {
+            ids: one for ids, one in self.candidates.items() if one.log_posterior > least or not ids
+        }
         for ids, one in list(self.candidates.items()):
-            self._keep(ids, refit(self.problem, one.fit.z, one.fit.J, one.fit.D, most_fresh=1))
+            self._keep(
+                ids,
+                refit(self.problem, one.fit.z, one.fit.J, one.fit.D, most_fresh=0, made_at=one.fit.made_at),
+            )
 
     def best(self) -> Candidate:
         """Return the most probable candidate."""
@@ -295,7 +318,9 @@ class Search:
         known = self.candidates.get(ids)
         kappa = known.kappa if known else 1.0
         D = variances(self.problem.entries, ids, kappa)
-        found = refit(self.problem, posterior(fit.quadratic, D).z, fit.J, D, most_fresh=0)
+        found = refit(
+            self.problem, posterior(fit.quadratic, D).z, fit.J, D, most_fresh=0, made_at=fit.made_at
+        )
         if known is None or found.objective < known.fit.objective - 0.1:
             self._keep(ids, found)
             self.raced.discard(ids)
