@@ -11,10 +11,10 @@ from time import perf_counter
 from subzero.diagnosis.detect import detectability, with_secants
 from subzero.diagnosis.effect import Effect
 from subzero.diagnosis.foreign import foreigners
+from subzero.diagnosis.logged import Logged
 from subzero.diagnosis.misfit import misfits
 from subzero.diagnosis.pose import pose
 from subzero.diagnosis.problem import Progress
-from subzero.diagnosis.records import Logged
 from subzero.diagnosis.response import respond
 from subzero.diagnosis.search import Search
 from subzero.diagnosis.telling import tell
