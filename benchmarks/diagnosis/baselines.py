@@ -39,20 +39,17 @@ def score(problem: Problem, r: np.ndarray, J: np.ndarray) -> tuple[str, bool]:
 
 
 def selection(problem: Problem, r: np.ndarray, J: np.ndarray) -> list[str]:
-    """Return the causes that forward selection by BIC names, in order."""
+    """Return the causes that forward selection by BIC names, in order; all chosen are fitted by least squares."""
     own = [k for k, entry in enumerate(problem.entries) if entry.record < 0]
-    chosen: list[int] = []
-    best = _bic(r, J[:, chosen])
+    C, left, chosen = J[:, own].copy(), r.copy(), []
+    least = 1e-9 * np.sum(C**2, axis=0) + 1e-30
     while len(chosen) < MOST:
-        tried = {k: _bic(r, J[:, [*chosen, k]]) for k in own if k not in chosen}
-        k = min(tried, key=lambda one: tried[one])
-        if tried[k] >= best:
+        square = np.sum(C**2, axis=0)
+        drop = np.where(square > least, (C.T @ left) ** 2 / np.maximum(square, least), 0.0)
+        k, before = int(np.argmax(drop)), float(left @ left)
+        if r.size * np.log((before - drop[k]) / before) + np.log(r.size) >= 0.0:
             break
-        best, chosen = tried[k], [*chosen, k]
-    return list(dict.fromkeys(problem.entries[k].effect.id for k in chosen))
-
-
-def _bic(r: np.ndarray, J: np.ndarray) -> float:
-    """Return m ln RSS + k ln m."""
-    left = r - J @ np.linalg.lstsq(J, r, rcond=None)[0] if J.shape[1] else r
-    return float(r.size * np.log(left @ left) + J.shape[1] * np.log(r.size))
+        q = C[:, k] / np.sqrt(square[k])
+        left, C = left - q * (q @ left), C - np.outer(q, q @ C)
+        chosen.append(problem.entries[own[k]].effect.id)
+    return list(dict.fromkeys(chosen))

@@ -26,8 +26,8 @@ SHARES = {"single": 400, "healthy": 200, "pair": 100, "outside": 60, "twin": 20,
 DEGRADED = ("noise", "channels", "short", "wide", "narrow")
 AFTER = 4.0
 """The trial goes on behind its record, for sensors whose clock runs ahead. [s]"""
-TWINS = (("cable_tangential_drag", 0), ("current", 0), ("surge_added_mass", 0), ("drum_inertia", 0), ("rudder_lag", 0),
-         ("rudder_rate_limit", 0), ("hull_drag", 0), ("propeller_thrust_slope", 0), ("yaw_inertia", 0))  # fmt: skip
+TWINS = (("sway_damping", 0), ("munk_moment", 0), ("hull_drag", 0), ("propeller_thrust_slope", 0),
+         ("sensor_bias:depth", 0), ("sensor_scale:heading", 0), ("rudder_lift_slope", 0))  # fmt: skip
 """Effect, and its parameter, that have rivals on `fig6`."""
 
 
@@ -42,6 +42,7 @@ class Case:
         manoeuvre: of `manoeuvres`.
         how: of DEGRADED, or "".
         causes: ids of hidden effects.
+        sign: of their main parameter; 0 for any.
     """
 
     seed: int
@@ -51,6 +52,7 @@ class Case:
     manoeuvre: str
     how: str = ""
     causes: tuple[str, ...] = ()
+    sign: int = 0
 
     def rng(self, attempt: int = 0) -> np.random.Generator:
         """Return the random numbers of an attempt to make the case."""
@@ -112,7 +114,7 @@ def _made(case: Case, rng: np.random.Generator, size: float) -> Made:
     setting = nominal(case.manoeuvre)
     spread = {"wide": 2.0, "narrow": 0.5}.get(case.how, 1.0)
     main = 0 if case.kind == "twin" else None
-    found = {one: hidden(rng, one, main=main) for one in case.causes}
+    found = {one: hidden(rng, one, case.sign, main) for one in case.causes}
     values = {**nuisances(rng, spread), **found}
     strange = None
     if case.kind == "outside":

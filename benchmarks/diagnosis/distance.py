@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from subzero.diagnosis.detect import separation
+from subzero.diagnosis.detect import information, marginal, separation
 from subzero.diagnosis.evidence import Quadratic, posterior
 from subzero.diagnosis.hypotheses import named, places, variances
 from subzero.diagnosis.problem import Problem
@@ -46,6 +46,15 @@ def discriminations(problem: Problem, J: np.ndarray, hidden: Hidden) -> dict[str
             if value:
                 J[:, k], z[k] = secant(problem, k, value), value
     return {one: _of(problem, J, z, one, hidden) for one in hidden}
+
+
+def signals(problem: Problem, J: np.ndarray, hidden: Hidden) -> dict[str, float]:
+    """Return cause → squared distance from what the tolerances of all others could do."""
+    M, found = marginal(problem, J), {}
+    for one, values in hidden.items():
+        at, z = places(problem.entries, (one,)), np.array(values)
+        found[one] = float(z @ information(problem, M, at) @ z)
+    return found
 
 
 def _of(problem: Problem, J: np.ndarray, z: np.ndarray, one: str, hidden: Hidden) -> tuple[float, str]:

@@ -47,7 +47,8 @@ def hidden(rng: np.random.Generator, one: str, sign: int = 0, main: int | None =
 def _size(rng: np.random.Generator, p: Parameter, sign: int) -> float:
     """Return a size, of a sign that the bounds allow."""
     sides = [side for side in (1, -1) if room(p, side) > 0.0 and sign in (0, side)]
-    side = int(rng.choice(sides)) if sides else 1
+    sides = sides or [side for side in (1, -1) if room(p, side) > 0.0]
+    side = int(rng.choice(sides))
     most = room(p, side)
     least = min(max(SMALLEST * p.scale, TOLERANCES * p.tolerance), 0.8 * most)
     return side * float(rng.uniform(least, most))

@@ -73,13 +73,13 @@ def _pairs(results: Sequence[Result]) -> list[Score]:
 
 
 def _outside(results: Sequence[Result]) -> list[Score]:
-    cases = of(results, "outside")
+    cases = [one for one in of(results, "outside") if smallest_D(one) >= CLEAR]
     flagged = [one for one in cases if one["verdict"] == "outside_catalogue"]
     forces = [one for one in flagged if one["strange"] != "wandering"]
     rms = [one["outside"]["rms"] for one in forces if "rms" in one["outside"]]
     told = [one for one in forces if one["outside"]["features"] and one["outside"].get("first") is not None]
     return [
-        share("outside: flagged", cases, lambda one: one["verdict"] == "outside_catalogue", "≥ 95 %", least=0.95),
+        share("outside, D ≥ 16: flagged", cases, is_right, "≥ 95 %", least=0.95),
         share("outside: confidently misnamed (p ≥ 0.95)", cases, wrongly_sure, "≤ 2 %", most=0.02),
         share("outside: axis (or channel) right, of those flagged", flagged,
               lambda one: one["outside"]["axis"] == one["outside"]["found"], "≥ 90 %", least=0.9),
@@ -100,7 +100,7 @@ def _gains(results: Sequence[Result]) -> list[Score]:
     right = [
         one for one in of(results, "single") if names(one) == set(one["truth"]) and "extended" in one["gain"]
     ]
-    named = [one for one in of(results, "single", "pair", "healthy") if "extended" in one.get("gain", {})]
+    named = [one for one in of(results, "single", "pair") if "extended" in one.get("gain", {})]
     found = [number("held-out gain on the other manoeuvre, right cause", [gain_of(one, "extended") for one in right],
                     "≥ 0.95", "{:.4f}", least=0.95)]  # fmt: skip
     found += [

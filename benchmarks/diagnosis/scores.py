@@ -81,7 +81,8 @@ def share(
     low, high = binomtest(k, n).proportion_ci(0.95)
     value = k / n
     met = (least is None or value >= least) and (most is None or value <= most)
-    return Score(words, f"{100 * value:.1f} %", target, f"{100 * low:.1f} … {100 * high:.1f} %", n, met)
+    judged = met if (least, most) != (None, None) else None
+    return Score(words, f"{100 * value:.1f} %", target, f"{100 * low:.1f} … {100 * high:.1f} %", n, judged)
 
 
 def number(words: str, values: Sequence[float], target: str, form: str, *, least: float | None = None,

@@ -14,38 +14,50 @@ from subzero.diagnosis.verdict import Verdict
 
 from . import baselines
 from .cases import Case, Made, make
-from .distance import change_by, discriminations, sensitivities, strangeness
+from .distance import change_by, discriminations, sensitivities, signals, strangeness
 from .held_out import gains
 from .sharing import Shared
 from .strange_found import judged
 
 Result = dict[str, Any]
-CONFOUNDED, CLEAR, LISTED = 4.0, 16.0, 12
+ATTEMPTS, LISTED = 12, 12
+CONFOUNDED, CLEAR = 4.0, 16.0
 """A twin has D below the first against its rival, and above the second against nothing."""
 
 
 def result_of(case: Case, shared: Shared, budget: str = "verdict") -> Result:
-    """Return what a case is, and what the diagnosis says of it."""
-    made, problem, D, rival = posed(case)
-    start, cpu = perf_counter(), process_time()
-    verdict = diagnose([made.logged], seed=case.index, budget=budget)
-    taken = {"wall": perf_counter() - start, "cpu": process_time() - cpu, "parts": dict(verdict.seconds)}
-    found = {**_truth(case, made), "D": D, "rival": rival, "seconds": taken, **_said(verdict)}
+    """Return what a case is, what the diagnosis says of it, and what other ways say."""
+    made, problem, verdict, found = _asked(case, budget)
     plain, r, J = baselines.white(problem)
     found["score"] = baselines.score(plain, r, J)
     found["selection"] = baselines.selection(plain, r, J)
-    if made.strange:
-        found["outside"] = judged(made, verdict)
-    if case.kind in ("single", "pair", "healthy") and shared.work is not None:
+    if case.kind in ("single", "pair") and case.number % 2 == 0 and shared.work is not None:
         found["gain"] = gains(case, made, verdict, shared.work)
     if case.kind == "healthy" or case.index < 3:
         found["detectable"] = _detectable(verdict)
     return found
 
 
+def briefly(case: Case) -> Result:
+    """Return what a case is, and what the diagnosis says of it."""
+    return _asked(case, "verdict")[3]
+
+
+def _asked(case: Case, budget: str) -> tuple[Made, Problem, Verdict, Result]:
+    """Return a case, and what the diagnosis says of it."""
+    made, problem, D, rival = posed(case)
+    start, cpu = perf_counter(), process_time()
+    verdict = diagnose([made.logged], seed=case.index, budget=budget)
+    taken = {"wall": perf_counter() - start, "cpu": process_time() - cpu, "parts": dict(verdict.seconds)}
+    found = {**_truth(case, made), "D": D, "rival": rival, "seconds": taken, **_said(verdict)}
+    if made.strange:
+        found["outside"] = judged(made, verdict)
+    return made, problem, verdict, found
+
+
 def posed(case: Case) -> tuple[Made, Problem, dict[str, float], dict[str, str]]:
     """Return a case with D of each of its causes; twins and strange ones drawn until they are what they should be."""
-    for attempt in range(12):
+    for attempt in range(ATTEMPTS):
         made = make(case, attempt, size=1.3 ** min(attempt, 5))
         problem = pose([made.logged])
         D, rival, fits = _measured(case, made, problem)
@@ -64,8 +76,10 @@ def _measured(case: Case, made: Made, problem: Problem) -> tuple[dict[str, float
         return {made.strange.kind: D}, {made.strange.kind: rival}, D >= CLEAR
     found = discriminations(problem, J, {one: v for one, v in made.hidden.items() if _known(problem, one)})
     D, rivals = {one: d for one, (d, _) in found.items()}, {one: who for one, (_, who) in found.items()}
-    twin = case.kind != "twin" or all(d < CONFOUNDED and rivals[one] != "none" for one, d in D.items())
-    return D, rivals, twin
+    if case.kind != "twin":
+        return D, rivals, True
+    clear = min(signals(problem, J, made.hidden).values()) >= CLEAR
+    return D, rivals, clear and all(d < CONFOUNDED for d in D.values())
 
 
 def _known(problem: Problem, one: str) -> bool:

@@ -1,0 +1,114 @@
+"""Effects are hidden in records of the other cable formulation; the diagnosis is asked for their names only.
+
+Verifies: the whole diagnosis. Configuration: fig6, six channels at 10 Hz, coloured noise, outliers, gaps, and
+every parameter drawn from its tolerance. Cases are drawn from a seed (benchmarks/diagnosis); chosen are
+those that the trial can tell at all, D ≥ 25, whatever comes out. Slow: every id of the catalogue, with both signs.
+"""
+
+import dataclasses
+import multiprocessing
+import sys
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+
+import pytest
+
+sys.path.append(str(Path(__file__).resolve().parents[2]))
+
+from benchmarks.diagnosis import draws, manoeuvres
+from benchmarks.diagnosis.cases import Case, cases
+from benchmarks.diagnosis.sharing import share
+from benchmarks.diagnosis.trial_of import briefly
+from subzero.diagnosis.effects import catalogue
+
+SEED = 7
+CLEAR = 25.0
+IDS = sorted(catalogue(manoeuvres.CHANNELS))
+
+
+def drawn(kind, number, **changes):
+    """Return a case of a kind on fig6."""
+    found = next(one for one in cases(SEED) if (one.kind, one.number) == (kind, number))
+    return pytest.param(dataclasses.replace(found, manoeuvre="fig6", **changes), id=f"{kind}_{number}")
+
+
+def both_signs():
+    """Return a case for every id and sign that its bounds have room for."""
+    for name in IDS:
+        for sign in (1, -1):
+            if any(draws.room(parameter, sign) > 0.0 for parameter in manoeuvres.effects()[name].parameters):
+                case = Case(seed=SEED, index=900 + IDS.index(name), kind="single", number=0, manoeuvre="rich",
+                            causes=(name,), sign=sign)  # fmt: skip
+                yield pytest.param(case, id=f"{name}_{'plus' if sign > 0 else 'minus'}")
+
+
+@pytest.fixture(scope="module")
+def told(request):
+    """Return the results of the cases that this session asks for, by two processes side by side."""
+    asked = [item.callspec.params["case"] for item in request.session.items if item.path == request.path]
+    with ProcessPoolExecutor(2, multiprocessing.get_context("spawn"), share, (1,)) as pool:
+        yield {case: pool.submit(briefly, case) for case in asked}
+        pool.shutdown(cancel_futures=True)
+
+
+def names(result):
+    return {cause["id"] for cause in result["causes"]}
+
+
+def words(result):
+    """Return truth and answer in a line, for the message of a failure."""
+    first = [f"{name} {p:.2f}" for name, p in list(result["probabilities"].items())[:4]]
+    return f"{result['truth'] or result['strange'] or 'nothing'}, D {result['D']}: {result['verdict']}, {', '.join(first)}"
+
+
+@pytest.mark.parametrize(
+    "case", [drawn("single", number) for number in (5, 8, 9, 11, 12, 13, 18, 19, 20, 25)]
+)
+def test_a_hidden_effect_is_named(told, case):
+    result = told[case].result()
+    assert min(result["D"].values()) >= CLEAR
+    assert names(result) == set(result["truth"]), words(result)
+
+
+@pytest.mark.parametrize("case", [drawn("healthy", number) for number in (0, 1, 2)])
+def test_a_healthy_record_gets_no_name(told, case):
+    result = told[case].result()
+    assert not names(result), words(result)
+
+
+@pytest.mark.parametrize("case", [drawn("pair", 6)])
+def test_two_hidden_effects_are_named(told, case):
+    result = told[case].result()
+    assert min(result["D"].values()) >= CLEAR
+    assert names(result) == set(result["truth"]), words(result)
+
+
+@pytest.mark.parametrize("case", [drawn("outside", number) for number in (0, 3)])
+def test_what_is_outside_the_catalogue_is_flagged(told, case):
+    result = told[case].result()
+    assert result["verdict"] == "outside_catalogue", words(result)
+
+
+@pytest.mark.parametrize("case", [drawn("twin", 0)])
+def test_twins_are_told_as_a_set(told, case):
+    """No name, and the truth among those that are left."""
+    result = told[case].result()
+    assert max(result["D"].values()) < 4.0
+    assert not names(result), words(result)
+    assert any(set(one.split(" + ")) & set(result["truth"]) for one in result["probabilities"]), words(result)
+
+
+@pytest.mark.parametrize("case", [drawn("healthy", 3, how="wide")])
+def test_tolerances_declared_half_as_wide_make_no_false_name(told, case):
+    result = told[case].result()
+    assert not names(result), words(result)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", list(both_signs()))
+def test_every_effect_is_found_with_both_signs(told, case):
+    """On the rich manoeuvre: no wrong name, and the right one first where D says that it can be told."""
+    result = told[case].result()
+    assert names(result) <= set(case.causes), words(result)
+    if min(result["D"].values()) >= 16.0:
+        assert next(iter(result["probabilities"])) == case.causes[0], words(result)
