@@ -15,6 +15,7 @@ from subzero.compiled import cache_directory
 
 from .cases import Case, cases
 from .sharing import Shared, share
+from .times import keep, kept, timed
 from .trial_of import Result, result_of
 
 app = cyclopts.App(name="python -m benchmarks.diagnosis", help_format="plaintext", version_flags=[])
@@ -55,7 +56,9 @@ def benchmark(
     if page:
         from .page import write_page
 
-        console.print(f"Written: {write_page(read(path))}")
+        if not quick:
+            keep(path, timed(seed))
+        console.print(f"Written: {write_page(read(path), kept(path))}")
 
 
 def read(path: Path) -> list[Result]:

@@ -98,7 +98,9 @@ def _numbers(results: Sequence[Result]) -> list[Score]:
 
 def _gains(results: Sequence[Result]) -> list[Score]:
     right = [
-        one for one in of(results, "single") if names(one) == set(one["truth"]) and "extended" in one["gain"]
+        one
+        for one in of(results, "single")
+        if names(one) == set(one["truth"]) and "extended" in one.get("gain", {})
     ]
     named = [one for one in of(results, "single", "pair") if "extended" in one.get("gain", {})]
     found = [number("held-out gain on the other manoeuvre, right cause", [gain_of(one, "extended") for one in right],

@@ -12,20 +12,21 @@ from .cases import SHARES
 from .figures_of import rows
 from .pictures import FIGURES, draw
 from .scores import CLEAR, Result, Score, first, is_right, names, of, smallest_D, truth, wrongly_sure
-from .words import CONFOUNDED_WORDS, HEAD, LIMITS_WORDS, MISSED_WORDS, TIMES_WORDS
+from .times import LIMITS, Row
+from .words import ALONE_WORDS, CONFOUNDED_WORDS, HEAD, LIMITS_WORDS, MISSED_WORDS, TIMES_WORDS, WHY
 
 PAGE = FIGURES.parent / "diagnosis_benchmark.md"
 CONFOUNDED = 9.0
 MARK = {True: "pass", False: "**FAIL**", None: ""}
 
 
-def write_page(results: Sequence[Result]) -> Path:
+def write_page(results: Sequence[Result], alone: Sequence[Row] = ()) -> Path:
     """Write the page and its figures, and return its path."""
     broken = [one for one in results if "error" in one]
     sound = [one for one in results if "error" not in one]
     draw(sound)
     parts = [_head(sound, broken), _scores(rows(sound)), _pictures(), _missed(sound), _confounded(sound),
-             _limits(sound), _times(sound), _all_cases(sound)]  # fmt: skip
+             _limits(sound), _times(sound, alone), _all_cases(sound)]  # fmt: skip
     PAGE.write_text("\n\n".join(parts) + "\n")
     return PAGE
 
@@ -68,7 +69,7 @@ def _missed(results: Sequence[Result]) -> str:
     body = [[str(one["index"]), one["kind"], one["manoeuvre"] + (f" ({one['how']})" if one["how"] else ""), _true(one),
              *_said(one)] for one in results if _is_missed(one)]  # fmt: skip
     header = ["case", "kind", "manoeuvre", "truth (D, closest rival)", "verdict", "first hypothesis", "p"]
-    return f"## What was missed\n\n{MISSED_WORDS}\n\n" + _table(header, body)
+    return f"## What was missed\n\n{MISSED_WORDS}\n\n" + _table(header, body) + f"\n\n{WHY}"
 
 
 def _is_missed(one: Result) -> bool:
@@ -132,7 +133,7 @@ def _limit(row: list | None) -> tuple[str, str]:
     ), f"{signal:.1f}, {D:.0f} ({rival})"
 
 
-def _times(results: Sequence[Result]) -> str:
+def _times(results: Sequence[Result], alone: Sequence[Row]) -> str:
     """Return how long a diagnosis takes."""
     body = []
     for manoeuvre in ("fig6", "rich"):
@@ -141,7 +142,14 @@ def _times(results: Sequence[Result]) -> str:
             cells = [np.percentile([one[key] for one in own], [50, 90]) for key in ("cpu", "wall")]
             body.append([manoeuvre, str(len(own)), *(f"{a:.0f} s, {b:.0f} s" for a, b in cells)])
     header = ["manoeuvre", "cases", "processor time: median, nine in ten", "wall clock: median, nine in ten"]
-    return f"## Times\n\n{TIMES_WORDS}\n\n" + _table(header, body)
+    own = [[manoeuvre, words, *(_within(*pair) for pair in zip((screen, verdict), LIMITS[manoeuvre], strict=True))]
+           for manoeuvre, words, screen, verdict in alone]  # fmt: skip
+    single = _table(["manoeuvre", "record", "to the first screen", "to the verdict"], own)
+    return f"## Times\n\n{ALONE_WORDS}\n\n{single}\n\n{TIMES_WORDS}\n\n" + _table(header, body)
+
+
+def _within(seconds: float, limit: float) -> str:
+    return f"{seconds:.1f} s (≤ {limit:.0f} s: {MARK[seconds <= limit]})"
 
 
 def _all_cases(results: Sequence[Result]) -> str:

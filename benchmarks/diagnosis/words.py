@@ -35,10 +35,17 @@ Intervals are exact binomial ones. The advice for the next trial takes the full 
 MISSED_WORDS = """Every case with D ≥ 16 whose truth does not come first, every healthy record with a name, and every
 wrong name with p ≥ 0.95."""
 
-CONFOUNDED_WORDS = "Of one effect scale, with all tolerances free: below D = 9 this manoeuvre cannot tell them apart."
+CONFOUNDED_WORDS = (
+    "Of one effect scale, with all tolerances free: below D = 9 this manoeuvre cannot tell them apart."
+)
 
 LIMITS_WORDS = """The deviation that has a signal of 4, in its unit; the signal of one effect scale, and D against the
 closest rival. D grows with the square of the size."""
 
 TIMES_WORDS = """Of a diagnosis up to its verdict with one thread, two processes beside other work on two cores; runs
 around the nominal model are shared between the cases of a process: a single diagnosis takes some seconds more."""
+
+ALONE_WORDS = """One record, the whole catalogue, six channels, both cores, nothing shared, without the
+compiler's time."""
+
+WHY = ""

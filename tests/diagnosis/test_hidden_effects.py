@@ -58,7 +58,8 @@ def names(result):
 def words(result):
     """Return truth and answer in a line, for the message of a failure."""
     first = [f"{name} {p:.2f}" for name, p in list(result["probabilities"].items())[:4]]
-    return f"{result['truth'] or result['strange'] or 'nothing'}, D {result['D']}: {result['verdict']}, {', '.join(first)}"
+    truth = result["truth"] or result["strange"] or "nothing"
+    return f"{truth}, D {result['D']}: {result['verdict']}, {', '.join(first)}"
 
 
 @pytest.mark.parametrize(
