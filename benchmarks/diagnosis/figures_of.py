@@ -60,7 +60,20 @@ def _healthy(results: Sequence[Result]) -> list[Score]:
         share("healthy: `nothing_wrong`", healthy, lambda one: one["verdict"] == "nothing_wrong", "–"),
         share("all cases: a wrong name with p ≥ 0.95", sound, wrongly_sure, "≤ 0.5 %", most=0.005),
         Score("expected calibration error", f"{error:.3f}", "≤ 0.03", "–", len(sound), error <= 0.03),
+        Score(
+            "… stated less right, on average (below 0: too modest)",
+            f"{_overstated(sound):+.3f}",
+            "0",
+            "–",
+            len(sound),
+            None,
+        ),
     ]
+
+
+def _overstated(results: Sequence[Result]) -> float:
+    """Return how much more is stated than is right."""
+    return sum(first(one)[1] - is_right(one) for one in results) / max(len(results), 1)
 
 
 def _pairs(results: Sequence[Result]) -> list[Score]:

@@ -18,6 +18,9 @@ from subzero.model import Model
 CHANNELS = ("surge_speed", "heading", "yaw_rate", "pitch", "roll", "depth")
 """The six basic ones."""
 FEW = ("surge_speed", "heading")
+BRAKE = 0.1
+"""Friction of the drum on `rich`, at its rim: a free drum overruns a vehicle that slows, and what slack cable does then
+depends on everything; runs that differ by 0.01 mN would be several noise levels apart. [N]"""
 RATE = 10.0
 """Samples of a record a second. [Hz]"""
 NAMES = ("fig6", "rich")
@@ -32,7 +35,11 @@ def nominal(name: str) -> Setting:
     setting = Setting(trial=trial, model=Model.of(trial))
     if name == "short":
         return replace(setting, trial=replace(trial, duration=10.0))
-    return rich(setting) if name == "rich" else setting
+    return rich(_braked(setting)) if name == "rich" else setting
+
+
+def _braked(setting: Setting) -> Setting:
+    return setting.with_drum(friction_torque=BRAKE * setting.model.drum.radius)
 
 
 def times(setting: Setting) -> np.ndarray:

@@ -6,7 +6,7 @@ All parameters are deviations from the nominal model, so that 0 is the model as 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from subzero.diagnosis.setting import Setting
 
@@ -30,6 +30,8 @@ class Parameter:
         scale: s, how far when something is wrong (one standard deviation). [unit]
         low, high: deviations that make sense. [unit]
         nominal: what the nominal model has, so that the value can be named as a whole. [unit]
+        step: of a sensitivity, if not a share of the tolerance. [unit]
+        least: the whole value cannot be less, or not less than the nominal model's if that is less already. [unit]
     """
 
     name: str
@@ -39,6 +41,13 @@ class Parameter:
     low: float = -float("inf")
     high: float = float("inf")
     nominal: Callable[[Setting], float] = nothing
+    step: float = 0.0
+    least: float = -float("inf")
+
+    def within(self, setting: Setting) -> Parameter:
+        """Return the parameter with the bounds that a nominal model leaves it."""
+        low = max(self.low, min(self.least - self.nominal(setting), 0.0))
+        return replace(self, low=low)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from subzero.diagnosis import rules
 from subzero.diagnosis.detect import against, information, marginal
 from subzero.diagnosis.effect import Parameter
 from subzero.diagnosis.evidence import posterior
@@ -74,10 +75,15 @@ def sentence_of(problem: Problem, one: str) -> str:
     return next(entry.effect.sentence for entry in problem.entries if entry.effect.id == one)
 
 
-def causes(work: Work, best: Candidate, inside: Mapping[Ids, float]) -> tuple[Cause, ...]:
-    """Return the named causes, each with the probability that it is among those of the truth."""
+def large(work: Work, candidate: Candidate) -> Ids:
+    """Return those causes of a candidate that are of a practical size."""
+    return rules.large(work.problem.entries, candidate.ids, candidate.fit.z, candidate.kappa)
+
+
+def causes(work: Work, best: Candidate, inside: Mapping[Ids, float], ids: Ids) -> tuple[Cause, ...]:
+    """Return the named causes of a candidate, each with the probability that it is among those of the truth."""
     found = []
-    for one in best.ids:
+    for one in ids:
         p = sum(share for ids, share in inside.items() if one in ids)
         found.append(
             Cause(

@@ -46,11 +46,11 @@ class Extension:
     cause: Cause | None = None
 
 
-def of_causes(work: Work, best: Candidate) -> Extension:
-    """Return the extension by named causes."""
+def of_causes(work: Work, best: Candidate, ids: Ids) -> Extension:
+    """Return the extension by those causes of a candidate that are named."""
     extended = Extended(
-        deviations=by_effect(work.problem, best.fit.z, best.ids),
-        calibration=by_effect(work.problem, best.fit.z, None, but=best.ids),
+        deviations=by_effect(work.problem, best.fit.z, ids),
+        calibration=by_effect(work.problem, best.fit.z, None, but=ids),
     )
     return Extension(fit=best.fit, problem=work.problem, extended=extended)
 

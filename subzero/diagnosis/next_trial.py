@@ -133,16 +133,13 @@ def _looked_at(
 
 
 def _shown(coming: Problem, held: Sequence[Belief]) -> np.ndarray | None:
-    """Return h(z) (hypotheses, m) of a trial; None if a hypothesis leads it out of safe depths.
-
-    Runs take the rough steps of the sensitivities: what both get wrong alike does not look like a difference.
-    """
-    tracks = coming._tracks([(0, one.z) for one in held], rough=True)
+    """Return h(z) (hypotheses, m) of a trial; None if a hypothesis leads it out of safe depths."""
+    tracks = coming.tracks([(0, one.z) for one in held])
     depths = np.stack([track[1][:, 2] for track in tracks])
     start = coming.records[0].setting.trial.start.depth
     if not np.isfinite(depths).all() or depths.min() < min(SHALLOW, start) or depths.max() > start + DEEPER:
         return None
-    return np.stack([coming._whitened(0, coming.setting(0, one.z), track)
+    return np.stack([coming.whitened(0, coming.setting(0, one.z), track)
                      for one, track in zip(held, tracks, strict=True)])  # fmt: skip
 
 

@@ -34,7 +34,12 @@ def pose(records: Sequence[Logged], more: Iterable[Effect] = ()) -> Problem:
     """
     observed = tuple(_observed(one) for one in records)
     channels = list(dict.fromkeys(name for one in observed for name in one.noise))
-    effects = [effect for effect in catalogue(channels, more).values() if _possible(effect, observed)]
+    nominal = observed[0].setting
+    effects = [
+        replace(effect, parameters=tuple(one.within(nominal) for one in effect.parameters))
+        for effect in catalogue(channels, more).values()
+        if _possible(effect, observed)
+    ]
     return Problem(records=observed, entries=entries_of(effects, START, len(observed)))
 
 

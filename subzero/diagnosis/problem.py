@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from os import cpu_count
 from typing import NamedTuple
 
@@ -15,11 +15,9 @@ import numpy as np
 
 from subzero.diagnosis.effect import Effect, Parameter
 from subzero.diagnosis.noise import Noise
-from subzero.diagnosis.response import TRUTHS, multiples, sensed, tracked
+from subzero.diagnosis.response import TRUTHS, sensed, tracked
 from subzero.diagnosis.setting import Setting
 
-ROUGH = (0.1, 0.5, 1.0)
-"""Hull step, cable step [s] and segment length [m] for sensitivities: their error counts only in second order."""
 STEP = 0.2
 """Step of a sensitivity, in tolerances; a whole one from a state of rest (a play, a friction), where slopes jump."""
 LATE = ("sensors", "clock")
@@ -86,29 +84,24 @@ class Problem:
 
     def residual(self, z: np.ndarray) -> np.ndarray:
         """Return r(z) (m,); NaN if a run could not go on."""
-        tracks = self._tracks([(i, z) for i in range(len(self.records))])
+        tracks = self.tracks([(i, z) for i in range(len(self.records))])
         return np.concatenate([
-            self._whitened(i, self.setting(i, z), track, measured=True) for i, track in enumerate(tracks)
+            self.whitened(i, self.setting(i, z), track, measured=True) for i, track in enumerate(tracks)
         ])  # fmt: skip
 
-    def jacobian(
-        self, z: np.ndarray, columns: Sequence[int] | None = None, *, rough: bool = True
-    ) -> np.ndarray:
+    def jacobian(self, z: np.ndarray, columns: Sequence[int] | None = None) -> np.ndarray:
         """Return J (m, k) at z by one-sided differences; only some of its columns, if asked, others 0."""
         wanted = range(len(self.entries)) if columns is None else columns
-        at_z = [(i, z) for i in range(len(self.records))]
-        fine = self._tracks(at_z)
-        base = self._tracks(at_z, rough=True) if rough else fine
-        shown = [self._whitened(i, self.setting(i, z), track) for i, track in enumerate(base)]
-        finely = [self._whitened(i, self.setting(i, z), track) for i, track in enumerate(fine)]
+        base = self.tracks([(i, z) for i in range(len(self.records))])
+        shown = [self.whitened(i, self.setting(i, z), track) for i, track in enumerate(base)]
         jobs = [(k, i, self._moved(z, k)) for k in wanted for i in range(len(self.records))
                 if self.entries[k].record in (-1, i)]  # fmt: skip
-        runs = iter(self._tracks([(i, moved) for k, i, moved in jobs if not self._late(k)], rough=rough))
+        runs = iter(self.tracks([(i, moved) for k, i, moved in jobs if not self._late(k)]))
         J = np.zeros((sum(part.size for part in shown), len(self.entries)))
         first = np.cumsum([0, *(part.size for part in shown)])
         for k, i, moved in jobs:
-            track, old = (fine[i], finely[i]) if self._late(k) else (next(runs), shown[i])
-            change = self._whitened(i, self.setting(i, moved), track) - old
+            track = base[i] if self._late(k) else next(runs)
+            change = self.whitened(i, self.setting(i, moved), track) - shown[i]
             J[first[i] : first[i + 1], k] = change / (moved[k] - z[k])
         return np.nan_to_num(J)
 
@@ -123,23 +116,20 @@ class Problem:
         """Return z with entry k moved by a step, away from the nearer bound."""
         parameter, moved = self.entries[k].parameter, z.copy()
         at_rest = parameter.low == 0.0 and z[k] < parameter.tolerance
-        step = (1.0 if at_rest else STEP) * parameter.tolerance
+        step = parameter.step or (1.0 if at_rest else STEP) * parameter.tolerance
         moved[k] += step if z[k] + step <= parameter.high else -step
         return moved
 
-    def _tracks(
-        self, jobs: list[tuple[int, np.ndarray]], *, rough: bool = False
-    ) -> list[tuple[np.ndarray, np.ndarray]]:
+    def tracks(self, jobs: list[tuple[int, np.ndarray]]) -> list[tuple[np.ndarray, np.ndarray]]:
         """Return the track of each (record, z), side by side."""
         self.runs[0] += len(jobs)
 
         def run(job: tuple[int, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-            setting = self.setting(*job, late=False)
-            return tracked(_rough(setting) if rough else setting)
+            return tracked(self.setting(*job, late=False))
 
         return list(self.pool.map(run, jobs)) if len(jobs) > 1 else [run(job) for job in jobs]
 
-    def _whitened(
+    def whitened(
         self, record: int, setting: Setting, track: tuple[np.ndarray, np.ndarray], *, measured: bool = False
     ) -> np.ndarray:
         """Return W h of a record, or W (y − h)."""
@@ -158,21 +148,6 @@ def _grouped(entries: tuple[Entry, ...]) -> list[tuple[Effect, list[int], int]]:
     for k, entry in enumerate(entries):
         found.setdefault((entry.effect.id, entry.record), (entry.effect, [], entry.record))[1].append(k)
     return list(found.values())
-
-
-def _rough(setting: Setting) -> Setting:
-    """Return a setting in the coarse steps of sensitivities, where commands allow them."""
-    hull_step, cable_step, segment = ROUGH
-    trial = setting.trial
-    told = trial.commands is None or multiples(trial.commands.time, hull_step)
-    if trial.cable_step > cable_step or setting.later or not told:
-        return setting
-    made = replace(
-        trial, hull_step=max(trial.hull_step, hull_step), segment_length=max(trial.segment_length, segment)
-    )
-    if abs(trial.duration / cable_step - round(trial.duration / cable_step)) < 1e-6:
-        made = replace(made, cable_step=cable_step)
-    return replace(setting, trial=made)
 
 
 def entries_of(effects: Sequence[Effect], start: Sequence[Effect], records: int) -> tuple[Entry, ...]:

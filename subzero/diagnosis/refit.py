@@ -10,11 +10,11 @@ from subzero.diagnosis.evidence import Quadratic
 from subzero.diagnosis.problem import Problem
 
 ENOUGH = 0.1
-"""A step that would gain less than this in the objective is not taken: sensitivities are made in rough steps."""
+"""A step that would gain less than this in the objective is not taken: no evidence hangs on it."""
 NEARLY = 0.5
 """A fit that no step improves although the linear model promises less than this has converged, too."""
 MOST_STEPS = 8
-POOR = 0.75
+POOR = 0.5
 """A step that gains less than this share of what the linear model promised has old sensitivities."""
 
 
@@ -73,7 +73,7 @@ def refit(
     """
     low, high = bounds(problem)
     z = np.clip(z, low, high)
-    r = problem.residual(z) if r is None else r
+    z, r = _runnable(problem, z, r)
     now, fresh, converged, promised = _objective(r, z, D), 0, False, 0.0
     for _ in range(MOST_STEPS):
         step = bounded_step(J, r, z, D, low, high)
@@ -81,9 +81,12 @@ def refit(
         if promised < ENOUGH:
             converged = True
             break
-        share, z, r, now = _walk(problem, z, r, now, step, promised, D)
+        share, there, r_there, now = _walk(problem, z, r, now, step, promised, D)
+        if share > 0.0:
+            J = secant(J, there - z, r_there - r, D)
+        z, r = there, r_there
         if share < POOR and promised > NEARLY and fresh < most_fresh:
-            J, fresh, made_at = problem.jacobian(z, rough=share > 0.0), fresh + 1, z.copy()
+            J, fresh, made_at = problem.jacobian(z), fresh + 1, z.copy()
         elif share <= 0.0:
             converged = promised < NEARLY
             break
@@ -98,6 +101,25 @@ def refit(
         fresh=fresh,
         made_at=made_at,
     )
+
+
+def secant(J: np.ndarray, step: np.ndarray, change: np.ndarray, D: np.ndarray) -> np.ndarray:
+    """Return sensitivities that explain the change of the residual along a step, otherwise as they were (Broyden
+    1965), with steps measured in prior deviations: J + (−Δr − J s) (D⁻¹s)ᵀ/(sᵀD⁻¹s).
+    """
+    weighted = step / D
+    return J + np.outer(-change - J @ step, weighted / (step @ weighted))
+
+
+def _runnable(problem: Problem, z: np.ndarray, r: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
+    """Return z, or what is nearer to the nominal model if that cannot be run, and the residual there."""
+    r = problem.residual(z) if r is None else r
+    for share in (0.5, 0.2, 0.0):
+        if np.isfinite(r).all():
+            break
+        z = share * z
+        r = problem.residual(z)
+    return z, r
 
 
 def _walk(

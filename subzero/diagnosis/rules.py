@@ -32,6 +32,12 @@ def sizes(entries: Sequence[Entry], ids: Ids, z: np.ndarray, kappa: float) -> di
     return found
 
 
+def large(entries: Sequence[Entry], ids: Ids, z: np.ndarray, kappa: float) -> Ids:
+    """Return those causes that are of a practical size: beyond what calibration may do."""
+    found = sizes(entries, ids, z, kappa)
+    return tuple(one for one in ids if found[one] > PRACTICAL)
+
+
 def smallest_set(probabilities: Mapping[Ids, float], total: float = SET) -> list[Ids]:
     """Return the most probable hypotheses that together have a probability."""
     found: list[Ids] = []

@@ -17,6 +17,7 @@ from subzero.diagnosis.hypotheses import Ids, compatible, log_prior, named, plac
 from subzero.diagnosis.pose import with_finer_steps, with_noise_behind
 from subzero.diagnosis.problem import Problem, Progress
 from subzero.diagnosis.refit import Fit, refit
+from subzero.diagnosis.rules import large
 
 WIDE = 4.0
 """κ of the fit that the linear evidence is made at."""
@@ -30,6 +31,8 @@ MOST_HOPE = 300.0
 """A promise of old sensitivities counts up to this much."""
 RACERS, HOPELESS = 6, 6.0
 """At most so many fits with sensitivities of their own in a race; none for what is this far behind in log posterior."""
+FAR = 1.08
+"""A wide fit that leaves a greater mean square, in noise, is not close to the records."""
 NEAR = 4.0
 """Sensitivities hold as far as this from where they were made, in tolerances."""
 MOST_RUNS = 800
@@ -82,6 +85,8 @@ class Search:
         secants: hypothesis → where its fit begins, for causes without a slope.
         raced: hypotheses that were fitted with sensitivities of their own.
         beside: hypothesis → log posterior, estimated at the fit of one with a cause less.
+        economical: the problem before what economical steps get wrong was taken from its records.
+        sharp_at: the hypothesis at whose fit that was done.
     """
 
     problem: Problem
@@ -93,6 +98,8 @@ class Search:
     secants: dict[Ids, np.ndarray] = field(default_factory=dict)
     raced: set[Ids] = field(default_factory=set)
     beside: dict[Ids, float] = field(default_factory=dict)
+    economical: Problem = field(init=False)
+    sharp_at: Ids | None = None
 
     def begin(self) -> None:
         """Make the sensitivities at the nominal model, and the fit with wide tolerances."""
@@ -102,9 +109,10 @@ class Search:
         for _ in range(NOISE_ROUNDS):
             again = with_noise_behind(self.problem, self.wide.z) if np.isfinite(self.wide.r).all() else None
             if again is None:
-                return
+                break
             self.problem = again
             self._from(self.wide.z, self.problem.jacobian(zero))
+        self.economical = self.problem
 
     def _from(self, z: np.ndarray, nominal: np.ndarray) -> None:
         """Make the fit with wide tolerances, from z; `nominal` are the sensitivities of the nominal model."""
@@ -149,35 +157,40 @@ class Search:
 
     def _sweep(self) -> None:
         """Try sizes of the causes that do nothing when they are small."""
-        J, entries, fit = self.wide.J, self.problem.entries, self.wide
+        zero, entries = np.zeros(len(self.problem.entries)), self.problem.entries
+        z, J = (self.wide.z, self.wide.J) if self._is_close() else (zero, self.nominal[1])
         norms = np.linalg.norm(J, axis=0) * [entry.parameter.scale for entry in entries]
         for k, entry in enumerate(entries):
             if entry.record >= 0 or entry.parameter.low != 0.0 or norms[k] > 1.0:
                 continue
             best = max(
-                (self._secant(k, size * entry.parameter.scale) for size in SWEEP), key=lambda pair: pair[0]
+                (self._secant(k, size * entry.parameter.scale, z, J) for size in SWEEP),
+                key=lambda pair: pair[0],
             )
             ids = (entry.effect.id,)
             self.screen[ids] = best[0] + log_prior(ids, len(named(self.problem)))
-            self.secants[ids] = fit.z + best[1]
+            self.secants[ids] = best[1]
 
-    def _secant(self, k: int, size: float) -> tuple[float, np.ndarray]:
-        """Return the log evidence of entry k at a size, all others within their tolerances; and what is added to z."""
-        fit, entry = self.wide, self.problem.entries[k]
-        moved = fit.z.copy()
+    def _is_close(self) -> bool:
+        """Say whether the wide fit leaves nothing but noise."""
+        return float(self.wide.r @ self.wide.r) < FAR * self.wide.r.size
+
+    def _secant(self, k: int, size: float, z: np.ndarray, J: np.ndarray) -> tuple[float, np.ndarray]:
+        """Return the log evidence of entry k at a size, others within their tolerances about z; and where it is."""
+        entry, moved = self.problem.entries[k], z.copy()
         moved[k] = size
         r = self.problem.residual(moved)
         if not np.isfinite(r).all():
-            return -np.inf, moved - fit.z
+            return -np.inf, moved
         found = []
         for kappa, prior in KAPPAS.items():
             D = variances(self.problem.entries, (), kappa)
-            z = moved.copy()
-            z[k] = 0.0
-            q = Quadratic.at(z, r, fit.J)
+            others = moved.copy()
+            others[k] = 0.0
+            q = Quadratic.at(others, r, J)
             value = posterior(q, D).log_evidence - 0.5 * (size / entry.parameter.scale) ** 2 - 1.0
             found.append(np.log(prior) + value)
-        return log_sum(found), moved - fit.z
+        return log_sum(found), moved
 
     def refit_best(self) -> None:
         """Fit nothing, and the best causes and pairs of the screen, with real runs: all with the sensitivities at hand,
@@ -190,6 +203,8 @@ class Search:
         for ids in (ids for kind in kinds for ids in kind):
             self.progress(0.3, "fitting " + (" + ".join(ids) or "nothing wrong"))
             self.fit(ids)
+        self.race(2)
+        self.sharpen()
         self.race()
 
     def _bent(self) -> list[Ids]:
@@ -199,12 +214,15 @@ class Search:
             if entry.record < 0:
                 size = abs(z) / entry.parameter.tolerance
                 bent[entry.effect.id] = max(size, bent.get(entry.effect.id, 0.0))
-        return [(one,) for one in sorted(bent, key=lambda one: -bent[one])[:BENT] if bent[one] > LEAST_BENT]
+        found: list[Ids] = [
+            (one,) for one in sorted(bent, key=lambda one: -bent[one])[:BENT] if bent[one] > LEAST_BENT
+        ]
+        return found if self._is_close() else [*found, *(ids for ids in self.secants if ids not in found)]
 
     def _alone(self, ids: Ids) -> None:
         """Fit a cause from where the wide fit has it, all else nominal, with the sensitivities there."""
         z, at = np.zeros(len(self.problem.entries)), places(self.problem.entries, ids)
-        z[at] = self.wide.z[at]
+        z[at] = self.secants.get(ids, self.wide.z)[at]
         D = variances(self.problem.entries, ids, 1.0)
         self._keep(ids, refit(self.problem, z, self.problem.jacobian(z), D, most_fresh=2, made_at=z))
 
@@ -243,7 +261,7 @@ class Search:
         D = variances(self.problem.entries, one.ids, one.kappa)
         J = self.problem.jacobian(one.fit.z)
         now = self._keep(
-            one.ids, refit(self.problem, one.fit.z, J, D, r=one.fit.r, most_fresh=2, made_at=one.fit.z)
+            one.ids, refit(self.problem, one.fit.z, J, D, r=one.fit.r, most_fresh=1, made_at=one.fit.z)
         )
         if now.kappa != one.kappa:
             D = variances(self.problem.entries, one.ids, now.kappa)
@@ -278,15 +296,22 @@ class Search:
 
     def sharpen(self) -> None:
         """Take from the records what economical steps get wrong at the best fit, if that can be seen, and fit again."""
-        sharper = with_finer_steps(self.problem, self.best().fit.z)
+        best = self.best()
+        if self.sharp_at == best.ids:
+            return
+        self.progress(0.6, "finer steps")
+        sharper = with_finer_steps(self.economical, best.fit.z)
+        self.sharp_at = best.ids
         if sharper is None:
             return
-        self.progress(0.78, "finer steps")
         self.problem = sharper
-        least = self.best().log_posterior - HOPELESS
+        least = best.log_posterior - HOPELESS
         self.candidates = {
-            ids: one for ids, one in self.candidates.items() if one.log_posterior > least or not ids
+            ids: one
+            for ids, one in self.candidates.items()
+            if one.log_posterior > least or set(ids) <= set(best.ids)
         }
+        self.raced &= set(self.candidates)
         for ids, one in list(self.candidates.items()):
             self._keep(
                 ids,
@@ -310,7 +335,10 @@ class Search:
                 for ids in self._beside(best):
                     self.fit(ids, best.fit)
             for without in best.ids:
-                self._below(tuple(one for one in best.ids if one != without), best.fit)
+                rest = tuple(one for one in best.ids if one != without)
+                self._below(rest, best.fit)
+                for ids in self._instead(best, rest):
+                    self.fit(ids, best.fit)
             self.race(2, 2.0)
 
     def _below(self, ids: Ids, fit: Fit) -> None:
@@ -324,6 +352,18 @@ class Search:
         if known is None or found.objective < known.fit.objective - 0.1:
             self._keep(ids, found)
             self.raced.discard(ids)
+
+    def _instead(self, best: Candidate, rest: Ids, most: int = 3) -> list[Ids]:
+        """Return the hypotheses with another cause beside the rest that the linear problem at a fit finds best."""
+        q, found = best.fit.quadratic, {}
+        for one in named(self.problem):
+            ids = tuple(sorted({*rest, one}))
+            if len(ids) > len(rest) and ids not in self.candidates:
+                under = {kappa: variances(self.problem.entries, ids, kappa) for kappa in KAPPAS}
+                found[ids] = log_sum([
+                    np.log(prior) + posterior(q, under[kappa]).log_evidence for kappa, prior in KAPPAS.items()
+                ])  # fmt: skip
+        return sorted(found, key=lambda ids: -found[ids])[:most]
 
     def _beside(self, candidate: Candidate, most: int = 2, worth: float = -4.0) -> list[Ids]:
         """Return the hypotheses with one cause more that the linear problem at a fit finds best."""
@@ -360,7 +400,17 @@ class Search:
     def probabilities(self) -> dict[Ids, float]:
         """Return the probability of every hypothesis: by its fit, or by the screen if it was not worth one."""
         log, total = self.log_posteriors(), self.log_total()
-        return _folded({ids: float(np.exp(value - total)) for ids, value in log.items()})
+        found = {ids: float(np.exp(value - total)) for ids, value in log.items()}
+        return _folded(self._without_small(found))
+
+    def _without_small(self, probabilities: dict[Ids, float]) -> dict[Ids, float]:
+        """Return probabilities where causes of less than a practical size are not told beside others of more."""
+        found = dict(probabilities)
+        for ids, one in self.candidates.items():
+            kept = large(self.problem.entries, ids, one.fit.z, one.kappa)
+            if kept and kept != ids:
+                found[kept] = found.get(kept, 0.0) + found.pop(ids)
+        return found
 
     def log_posteriors(self) -> dict[Ids, float]:
         """Return the log posterior of every hypothesis, but for a common constant."""

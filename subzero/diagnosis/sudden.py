@@ -16,7 +16,7 @@ import numpy as np
 
 from subzero.diagnosis.effect import Effect
 from subzero.diagnosis.latent import Seen, seen
-from subzero.diagnosis.problem import Entry, Problem, _rough
+from subzero.diagnosis.problem import Entry, Problem
 from subzero.diagnosis.refit import Fit
 from subzero.diagnosis.response import tracked
 from subzero.diagnosis.setting import Setting
@@ -146,7 +146,7 @@ def columns(
                      for (effect, time), rows in zip(pairs, steps, strict=True) for row in rows]  # fmt: skip
     problem.runs[0] += len(jobs)
     shown = problem.setting(record, z)
-    seen_of = [problem._whitened(record, shown, track) for track in problem.pool.map(_run, jobs)]
+    seen_of = [problem.whitened(record, shown, track) for track in problem.pool.map(_run, jobs)]
     first, size = _rows(problem, record)
     changes, at = np.array(seen_of[1:]) - seen_of[0], 0
     found: list[np.ndarray] = []
@@ -164,9 +164,8 @@ def _steps(effect: Effect) -> list[float]:
 
 
 def _plain(problem: Problem, record: int, z: np.ndarray) -> Setting:
-    """Return the setting of a record, its sensors right, in the rough steps of sensitivities."""
-    setting = problem.setting(record, z, late=False)
-    return replace(_rough(replace(setting, later=())), later=setting.later)
+    """Return the setting of a record, its sensors right."""
+    return problem.setting(record, z, late=False)
 
 
 def _run(setting: Setting) -> tuple[np.ndarray, np.ndarray]:

@@ -7,11 +7,11 @@ from typing import Any
 
 from subzero.diagnosis.detect import separation
 from subzero.diagnosis.effects.sensors import SPECS
-from subzero.diagnosis.estimates import causes, deviations, name, rivals
+from subzero.diagnosis.estimates import causes, deviations, large, name, rivals
 from subzero.diagnosis.extending import Extension, ahead, gained, of_causes, of_nothing, of_sudden, of_unknown
 from subzero.diagnosis.foreign import shares, tolerance_scale
 from subzero.diagnosis.hypotheses import Ids
-from subzero.diagnosis.rules import HEALTHY, PRACTICAL, SET, decide, sizes, smallest_set
+from subzero.diagnosis.rules import HEALTHY, SET, decide, smallest_set
 from subzero.diagnosis.search import Candidate
 from subzero.diagnosis.showing import curves
 from subzero.diagnosis.verdict import (
@@ -46,18 +46,18 @@ def tell(work: Work) -> Verdict:
 
 
 def _large(work: Work, best: Candidate) -> tuple[bool, float]:
-    """Return whether the causes of a candidate are of a practical size, and D against its closest rival."""
-    if not best.ids:
+    """Return whether causes of a candidate are of a practical size, and their D against the closest rival."""
+    ids = large(work, best)
+    if not ids:
         return False, 0.0
-    size = min(sizes(work.problem.entries, best.ids, best.fit.z, best.kappa).values())
-    return size > PRACTICAL, separation(work.problem, best.fit.J, best.fit.z, best.ids, best.kappa)[0]
+    return True, separation(work.problem, best.fit.J, best.fit.z, ids, best.kappa)[0]
 
 
 def _extension(work: Work, verdict: str, best: Candidate) -> Extension:
     """Return what a verdict adds to the model."""
     if verdict == OUTSIDE:
         return of_unknown(work)
-    return of_causes(work, best) if verdict == CAUSE_NAMED else of_nothing(work, best)
+    return of_causes(work, best, large(work, best)) if verdict == CAUSE_NAMED else of_nothing(work, best)
 
 
 def _told(
@@ -71,7 +71,13 @@ def _told(
     """Return the verdict as a value."""
     candidates = work.search.candidates
     others = rivals(work, best, inside)
-    named = (new.cause,) if new.cause else causes(work, best, inside) if verdict == CAUSE_NAMED else ()
+    named = (
+        (new.cause,)
+        if new.cause
+        else causes(work, best, inside, large(work, best))
+        if verdict == CAUSE_NAMED
+        else ()
+    )
     first = next((one.ids for one in others if one.ids and one.ids in candidates), None)
     rival = candidates[first].fit if first else None
     fits = {"nominal": None, "tolerance": candidates[()].fit}

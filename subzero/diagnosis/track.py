@@ -49,10 +49,16 @@ def follow(
         ending, _ = exchange(setup, live, times[row - 1], span)
         if ending != FINE:
             return row, ending
-        whole = live.now.last_step > 0.999 * span
+        whole, pull, length = (
+            live.now.last_step > 0.999 * span,
+            track[(row - 1) * steps, TENSION],
+            track[(row - 1) * steps, LENGTH],
+        )
         for i in range(1, steps + 1):
             at, share = track[(row - 1) * steps + i], i / steps
             _write(setup, live, times[row - 1] + share * span, live.path[i] if whole else live.state, at)
+            at[TENSION] = share * at[TENSION] + (1.0 - share) * pull
+            at[LENGTH] = share * at[LENGTH] + (1.0 - share) * length
             if not whole:
                 for j in range(STATE_SIZE):
                     at[j] = share * live.state[j] + (1.0 - share) * track[(row - 1) * steps, j]
@@ -61,7 +67,7 @@ def follow(
 
 @inner
 def _write(setup: Setup, live: Live, time: float, state: np.ndarray, out: np.ndarray) -> None:
-    """Write a state and what else sensors see; tension and length are those at the end of the exchange."""
+    """Write a state and what else sensors see; tension and length as they are at the end of the exchange."""
     command, force = setup.orders.values[row_at(setup.orders.time, time)], live.now.force
     feel_current(setup, state, time, live.now.hull)
     for j in range(STATE_SIZE):

@@ -25,6 +25,8 @@ MODELS: dict[str, dict[str, Any]] = {
     "extended": {"color": style.BLUE, "linestyle": style.DASHES[0], "linewidth": 1.4},
 }
 """Models that are drawn over what was measured, the best one last."""
+CALIBRATED = "tolerance", "within tolerances"
+"""The nominal model refitted within its tolerances, drawn where nothing is extended; its label."""
 
 RIVAL = "rival: "
 MOST_RIVALS = 2
@@ -55,7 +57,7 @@ def draw_diagnosis(verdict: Verdict, title: Title) -> dict[str, Figure]:
 
 
 def misfit(curves: Curves, noise: Mapping[str, Misfit], title: Title, name: str) -> Figure | None:
-    """Draw every channel: measured over nominal and extended on the left, what they leave on the right."""
+    """Draw every channel: measured over models on the left, what they leave unexplained on the right."""
     if not curves.measured:
         return None
     figure, panels = sheet(len(curves.measured), 2, _named(title, name))
@@ -113,7 +115,10 @@ def _beside(axes: Axes, curves: Curves, channel: str, misfit: Misfit | None, nam
 
 
 def _shown(curves: Curves) -> dict[str, dict[str, Any]]:
-    return {name: look for name, look in MODELS.items() if name in curves.models}
+    """Return the models that are drawn, and how: without an extended one, the calibrated."""
+    best = "extended" if "extended" in curves.models else CALIBRATED[0]
+    looks = {"nominal": MODELS["nominal"], best: MODELS["extended"]}
+    return {name: look for name, look in looks.items() if name in curves.models}
 
 
 def _overlay(axes: Axes, curves: Curves, channel: str) -> None:
@@ -127,7 +132,8 @@ def _overlay(axes: Axes, curves: Curves, channel: str) -> None:
             curves.time[left_out], values[left_out], "x", color=style.GREY, markersize=4, label="left out"
         )
     for name, look in _shown(curves).items():
-        axes.plot(curves.time, curves.models[name][channel], label=name, **look)
+        words = CALIBRATED[1] if name == CALIBRATED[0] else name
+        axes.plot(curves.time, curves.models[name][channel], label=words, **look)
     label(axes, None, f"${BY_NAME[channel].symbol}$ [{BY_NAME[channel].unit}]")
     _in_time(axes, curves)
     if left_out.any():

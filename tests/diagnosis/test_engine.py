@@ -137,7 +137,7 @@ def test_whitening_makes_coloured_noise_white_across_gaps():
 
 
 def test_a_response_shows_what_a_run_records():
-    """In the run's own steps: to the tolerance within which hull and cable agree."""
+    """In the run's own steps: to the tolerance within which hull and cable agree, and the rub of its drum, 1 mN."""
     run = subzero.simulate("fig6")
     names = [name for name in TRUTHS if name in run]
     shown = respond(FIG6, run["time"].values, names)
@@ -145,7 +145,7 @@ def test_a_response_shows_what_a_run_records():
         if name == "heading":
             continue
         scale = float(np.abs(run[name]).max()) + 1e-9
-        assert_allclose(shown[name], run[name].values, atol=1e-3 * max(scale, 1.0), err_msg=name)
+        assert_allclose(shown[name], run[name].values, atol=3e-3 * max(scale, 1.0), err_msg=name)
     turned = np.degrees(np.unwrap(np.radians(shown["heading"] - run["heading"].values)))
     assert np.abs((turned + 180.0) % 360.0 - 180.0).max() < 0.01
 

@@ -130,7 +130,7 @@ EFFECTS = [Effect(id="lost_ballast", sentence="ballast was lost", slot="hull", a
     [
         ("[effects.ruder_lag]\ntime_constant_s = 0.2", "line 1, effects.ruder_lag: there is no effect 'ruder_lag'"),
         ("[effects.rudder_lag]\ntime_constant = 0.2", "there is no 'time_constant'. Did you mean 'time_constant_s'?"),
-        ("[effects.rudder_lag]\ntime_constant_s = 99.0", "time_constant_s is 99. Allowed: -0.12 to 5 (a deviation)."),
+        ("[effects.rudder_lag]\ntime_constant_s = 99.0", "time_constant_s is 99. Allowed: -0.09 to 5 (a deviation)."),
         ("[effects.rudder_lag]\ntime_constant_s = nan", "which is not a finite number"),
         ("[effects.rudder_lag]\ntime_constant_s = 0.2\nstarts_at_s = 3.0", "does not begin in mid-trial"),
         ("[effects.rudder_offset]\nangle_deg = 0.2\nstarts_at_s = -3.0", "must be above 0"),

@@ -63,13 +63,16 @@ def test_a_snag_is_found_on_its_axis_and_its_history_follows(plant):
     assert unknown.force[14] < -0.3 < unknown.force[4], "held back: forward force is negative"
 
 
-def test_a_yaw_moment_is_recovered_within_a_tenth(plant):
+def test_a_yaw_moment_is_recovered_within_its_band(plant):
     planted = plant(pushed("N", bend), seed=2)
     fit, found = found_in(planted)
     assert found[0].id == "unknown_force:N"
     done = recover(planted.problem, fit, "N")
     error = done.unknown.force - bend(done.unknown.time)
-    assert np.sqrt(np.mean(error**2)) < 0.15 * 0.05
+    assert np.sqrt(np.mean((error / done.unknown.band) ** 2)) < 1.7, "six other seeds: 0.6 to 1.3"
+    assert np.sqrt(np.mean(error**2)) < 0.25 * 0.05, (
+        "what a rudder offset within tolerance could do, and noise"
+    )
     assert done.missing is not None
     assert "starboard" in WORDS[done.unknown.axis]
 
@@ -88,10 +91,10 @@ def test_columns_add_up_to_what_a_force_does(healthy):
     knots = knots_of(problem)
     columns = force_columns(problem, zero, ("X",), knots)["X"].sum(axis=1)
     small = lacking(problem.records[0].setting, history("X", np.array([0.0, 30.0]), np.full(2, 0.05)))
-    tracks = problem._tracks([(0, zero)])[0]
+    tracks = problem.tracks([(0, zero)])[0]
     from subzero.diagnosis.response import tracked
 
-    change = problem._whitened(0, small, tracked(small)) - problem._whitened(
+    change = problem.whitened(0, small, tracked(small)) - problem.whitened(
         0, problem.setting(0, zero), tracks
     )
     assert np.linalg.norm(0.05 * columns - change) < 0.05 * np.linalg.norm(change)

@@ -63,8 +63,8 @@ def _angle(name: str) -> Parameter:
 
 EFFECTS = (
     Effect(id="rudder_lag", sentence="the rudder servo lags", slot="fins",
-           parameters=(Parameter(name="time_constant", unit="s", tolerance=0.03, scale=0.4, low=-0.12, high=5.0,
-                                 nominal=_lag),),
+           parameters=(Parameter(name="time_constant", unit="s", tolerance=0.03, scale=0.4, low=-0.09, high=5.0,
+                                 least=0.06, nominal=_lag),),
            apply=rudder_lag),
     Effect(id="rudder_rate_limit", sentence="the rudder servo turns slowly", slot="fins",
            parameters=(Parameter(name="inverse_rate", unit="s/degree", tolerance=0.004, scale=0.1, low=0.0, high=2.0,
