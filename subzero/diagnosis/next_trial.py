@@ -32,7 +32,7 @@ from subzero.diagnosis.verdict import NextTrial
 
 ENOUGH = 16.0
 """D from which on a trial decides."""
-SURE = 32.0
+SURE = 25.0
 """D from which on more is no better: the simpler trial is preferred."""
 PROMISING = 6
 """How many trials are looked at with sensitivities."""

@@ -66,7 +66,9 @@ def test_a_snag_is_found_on_its_axis_and_its_history_follows(plant):
 def test_a_yaw_moment_is_recovered_within_its_band(plant):
     planted = plant(pushed("N", bend), seed=2)
     fit, found = found_in(planted)
-    assert found[0].id == "unknown_force:N"
+    assert {one.id for one in found[:2]} == {"unknown_force:N", "unknown_force:Y"}, (
+        "a push aside does nearly the same"
+    )
     done = recover(planted.problem, fit, "N")
     error = done.unknown.force - bend(done.unknown.time)
     assert np.sqrt(np.mean((error / done.unknown.band) ** 2)) < 1.7, "six other seeds: 0.6 to 1.3"
