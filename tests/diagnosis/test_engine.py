@@ -188,11 +188,11 @@ def problem():
 
 CURVED = {
     "rudder_backlash": "a play takes a tolerance before it is felt throughout",
-    "cable_initial_length": "its step is 1.5 m, from a cable that begins at the drum",
+    "cable_initial_length": "its step is 3 m, from a cable that begins at the drum",
     "drum_friction": "its step is a whole tolerance, from a drum that turns freely",
     "sensor_lag": "its step is a whole tolerance, and a lag is felt in its square, too",
 }
-"""Effects that only go one way: their steps are whole tolerances, and curvature counts. Allowed: 5 %."""
+"""Effects that only go one way: their steps are whole tolerances, and curvature counts. Allowed: 8 %."""
 ROUGH = {
     "rudder_rate_limit": "a step of 2 degrees is over before the limit is felt: no slope at all",
     "drum_inertia": "a light drum chatters in the steps of a diagnosis: 5 mm/s, a third of the speed log's noise",
@@ -210,7 +210,7 @@ def test_sensitivities_are_smooth(problem):
             continue
         size = max(float(np.linalg.norm(whole[:, k])), 0.1 / entry.parameter.tolerance)
         error = float(np.linalg.norm(whole[:, k] - half[:, k])) / size
-        if error >= (0.05 if entry.effect.id.split(":")[0] in CURVED else 0.01):
+        if error >= (0.08 if entry.effect.id.split(":")[0] in CURVED else 0.01):
             bad[entry.name] = error
     assert not bad
 

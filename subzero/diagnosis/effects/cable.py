@@ -78,7 +78,7 @@ EFFECTS = (
            parameters=(Parameter(name="share", unit="1", tolerance=0.10, scale=0.80, low=-0.95, high=10.0),),
            apply=cable_normal_drag),
     Effect(id="cable_initial_length", sentence="more cable was in the water at the start", slot="cable",
-           parameters=(Parameter(name="length", unit="m", tolerance=0.3, scale=12.0, low=0.0, high=60.0, step=1.5,
+           parameters=(Parameter(name="length", unit="m", tolerance=0.3, scale=12.0, low=0.0, high=60.0, step=3.0,
                                  nominal=_wet_length),),
            apply=cable_initial_length),
     Effect(id="drum_friction", sentence="the drum rubs", slot="drum",
