@@ -1,0 +1,143 @@
+"""Does the next trial decide? The advice is taken, flown by the truth, and diagnosed: run by ``-m`` as the benchmark is.
+
+For every twin the truth and its best rival are left. The trial that is proposed for these two is flown by the truth, run
+by the other formulation, and both records are diagnosed together. Whether any trial of the library could decide at all
+is asked of all of them (D ≥ 16).
+"""
+
+from __future__ import annotations
+
+import json
+import multiprocessing
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+import cyclopts
+
+from subzero.compiled import cache_directory
+from subzero.diagnosis.diagnose import diagnose
+from subzero.diagnosis.logged import Logged
+from subzero.diagnosis.next_trial import ENOUGH, next_trial, outlooks
+from subzero.diagnosis.setting import Setting
+from subzero.diagnosis.trial_library import LIBRARY, flown
+from subzero.diagnosis.verdict import NextTrial
+from subzero.diagnosis.work import Work
+
+from .cases import Case, Made, cases
+from .draws import with_values
+from .held_out import STARTS
+from .manoeuvres import CHANNELS, times
+from .sharing import Shared, share
+from .trial_of import Result, posed
+from .truth import NoRunError, noisy, shown_by
+
+DECIDED = 0.95
+OPTIMISED = 40.0
+"""Length of a trial that was made to measure. [s]"""
+app = cyclopts.App(name="python -m benchmarks.diagnosis.advice", help_format="plaintext", version_flags=[])
+_shared: list[Shared] = []
+
+
+@app.default
+def benchmark(*, count: int = 20, workers: int = 2, seed: int = 5, results: Path | None = None) -> None:
+    """Take the advice for twins, and keep what came of it for the page of the benchmark.
+
+    Args:
+        count: of twins.
+        workers: processes.
+        seed: of all cases.
+        results: the benchmark's results; the advice is kept beside them.
+    """
+    path = beside(results or cache_directory().parent / "diagnosis_benchmark.jsonl")
+    twins = [case for case in cases(seed) if case.kind == "twin"][:count]
+    with (
+        multiprocessing.get_context("fork").Pool(workers, initializer=_begin) as pool,
+        path.open("w") as file,
+    ):
+        for one in pool.imap_unordered(_measured, twins):
+            file.write(json.dumps(one) + "\n")
+            file.flush()
+            print(one)
+
+
+def beside(results: Path) -> Path:
+    """Return where the advice is kept."""
+    return results.with_suffix(".advice.jsonl")
+
+
+def kept(results: Path) -> list[Result]:
+    """Return what came of the advice."""
+    path = beside(results)
+    return [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
+
+
+def _begin() -> None:
+    os.environ["OPENBLAS_NUM_THREADS"] = "1"
+    _shared.append(share(1))
+
+
+def _measured(case: Case) -> Result:
+    made = posed(case)[0]
+    before = diagnose([made.logged], seed=case.index, budget="verdict")
+    work = _shared[0].work
+    assert work is not None
+    pair = _pair(case, work)
+    found: Result = {"index": case.index, "truth": case.causes[0], "before": before.verdict}
+    if len(pair) < 2:
+        return {**found, "skipped": "only one of two was fitted"}
+    best = {name: view.discrimination() for name, view in outlooks(work.problem, pair)}
+    found |= {"rival": " + ".join(pair[1].ids) or "none", "library": max(best.values()),
+              "able": max(best, key=lambda name: best[name])}  # fmt: skip
+    advice = next_trial(work.problem, pair, seed=case.index)
+    assert advice is not None
+    found |= {"advice": advice.name, "channel": advice.channel, "promised": advice.decides}
+    try:
+        second = _flown(case, made, advice)
+    except NoRunError:
+        return {**found, "skipped": "the truth cannot be run there"}
+    after = diagnose([made.logged, second], seed=case.index, budget="verdict")
+    return {**found, **_judged(case, after.probabilities, found["rival"]), "after": after.verdict}
+
+
+def _pair(case: Case, work: Work) -> list:
+    """Return the candidates of the truth and of its best rival."""
+    candidates = work.search.candidates
+    work.search.fit(case.causes)
+    others = [one for ids, one in candidates.items() if not set(ids) & set(case.causes)]
+    return [candidates[case.causes], max(others, key=lambda one: one.log_posterior)] if others else []
+
+
+def _flown(case: Case, made: Made, advice: NextTrial) -> Logged:
+    """Return the record of a trial that was proposed, flown by the truth."""
+    setting, channels = _trial(made.logged.setting, advice), (*CHANNELS, *filter(None, [advice.channel]))
+    values = {name: one for name, one in made.values.items() if not name.startswith(STARTS)}
+    shown, _ = shown_by(with_values(setting, values), times(setting), channels)
+    record = noisy(shown, times(setting), case.rng(attempt=999))
+    return Logged(record=record, setting=setting, name="advised")
+
+
+def _trial(setting: Setting, advice: NextTrial) -> Setting:
+    """Return the setting of a trial that was proposed."""
+    if advice.name in LIBRARY:
+        return LIBRARY[advice.name][1](setting)
+    if advice.name == "same":
+        return setting
+    return flown(setting, advice.commands, OPTIMISED)  # type: ignore[arg-type]
+
+
+def _judged(case: Case, probabilities: dict[str, float], rival: str) -> Result:
+    """Return what both records say of the two."""
+    truth, other = probabilities.get(case.causes[0], 0.0), probabilities.get(rival, 0.0)
+    first = max(probabilities, key=lambda name: probabilities[name])
+    return {"odds": truth / max(truth + other, 1e-12), "first": first, "p": probabilities[first]}
+
+
+def decided(results: Sequence[Result]) -> tuple[list[Result], list[Result]]:
+    """Return what some trial of the library could decide, and what of it was decided for the truth."""
+    able = [one for one in results if "odds" in one and one["library"] >= ENOUGH]
+    return able, [one for one in able if one["odds"] >= DECIDED]
+
+
+if __name__ == "__main__":
+    app()
