@@ -1,8 +1,8 @@
-"""Does the next trial decide? The advice is taken, flown by the truth, and diagnosed: run by ``-m`` as the benchmark is.
+"""Does the next trial decide? The advice is taken and flown by the truth: ``python -m benchmarks.diagnosis.advice``.
 
-For every twin the truth and its best rival are left. The trial that is proposed for these two is flown by the truth, run
-by the other formulation, and both records are diagnosed together. Whether any trial of the library could decide at all
-is asked of all of them (D ≥ 16).
+For every twin the truth and its best rival are left. The trial that is proposed for these two is flown by the truth,
+run by the other formulation, and both records are diagnosed together. Whether any trial of the library could decide
+at all is asked of all of them (D ≥ 16).
 """
 
 from __future__ import annotations
