@@ -80,7 +80,7 @@ def _work(work: Work, seen: Seen) -> None:
         return
     search.refit_best()
     search.grow()
-    search.sharpen()
+    search.settle()
     done("fits")
     search.progress(0.8, "forces that no cause explains")
     work.foreign = foreigners(search)

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from subzero.diagnosis import rules
+from subzero.diagnosis.candidate import Candidate
 from subzero.diagnosis.detect import against, information, marginal
 from subzero.diagnosis.effect import Parameter
 from subzero.diagnosis.evidence import posterior
@@ -14,7 +15,6 @@ from subzero.diagnosis.hypotheses import Ids, places, variances
 from subzero.diagnosis.problem import Problem
 from subzero.diagnosis.refit import Fit
 from subzero.diagnosis.rules import SET, smallest_set
-from subzero.diagnosis.search import Candidate
 from subzero.diagnosis.verdict import Cause, Estimate, Rival
 from subzero.diagnosis.work import Work
 

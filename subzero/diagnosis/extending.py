@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from subzero.diagnosis.candidate import Candidate
 from subzero.diagnosis.effects.sensors import SPECS
 from subzero.diagnosis.estimates import estimate, name
 from subzero.diagnosis.evidence import posterior
@@ -17,7 +18,6 @@ from subzero.diagnosis.next_trial import next_trial
 from subzero.diagnosis.problem import Problem
 from subzero.diagnosis.recover import Recovered, drifted, recover
 from subzero.diagnosis.refit import Fit, refit
-from subzero.diagnosis.search import Candidate
 from subzero.diagnosis.sudden import Begun, with_begun
 from subzero.diagnosis.unknown import DRIFTS, FORCE, Suspect
 from subzero.diagnosis.verdict import Cause, Extended, Gain, NextTrial, Unknown

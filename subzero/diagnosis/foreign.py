@@ -6,9 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from subzero.diagnosis.candidate import Candidate
 from subzero.diagnosis.evidence import KAPPAS, log_sum
 from subzero.diagnosis.hypotheses import PRIOR, Ids, variances
-from subzero.diagnosis.search import Candidate, Search
+from subzero.diagnosis.search import Search
 from subzero.diagnosis.sudden import Begun, scan
 from subzero.diagnosis.unknown import Suspect, all_columns, knots_of, suspects
 
@@ -74,8 +75,8 @@ def _sudden(search: Search) -> list[Foreign]:
 
 def shares(search: Search, foreign: list[Foreign]) -> tuple[dict[Ids, float], dict[str, float]]:
     """Return the probabilities of hypotheses, and of everything outside by id; together they sum to 1."""
-    inside = search.probabilities()
-    scale = search.log_total()
+    inside = search.beliefs.probabilities(search.problem)
+    scale = search.beliefs.log_total()
     outside = log_sum([one.log_posterior for one in foreign]) if foreign else -np.inf
     total = log_sum([scale, outside])
     found: dict[str, float] = {}

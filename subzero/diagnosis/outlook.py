@@ -29,7 +29,7 @@ COLOUR = 0.5
 
 
 class Survivor(Protocol):
-    """A hypothesis with its fit, such as `search.Candidate`."""
+    """A hypothesis with its fit, such as `candidate.Candidate`."""
 
     @property
     def ids(self) -> tuple[str, ...]:

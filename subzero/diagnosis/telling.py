@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from subzero.diagnosis.candidate import Candidate
 from subzero.diagnosis.detect import separation
 from subzero.diagnosis.effects.sensors import SPECS
 from subzero.diagnosis.estimates import causes, deviations, large, name, rivals
@@ -12,7 +13,6 @@ from subzero.diagnosis.extending import Extension, ahead, gained, of_causes, of_
 from subzero.diagnosis.foreign import shares, tolerance_scale
 from subzero.diagnosis.hypotheses import Ids
 from subzero.diagnosis.rules import HEALTHY, SET, decide, smallest_set
-from subzero.diagnosis.search import Candidate
 from subzero.diagnosis.showing import curves
 from subzero.diagnosis.verdict import (
     CAUSE_NAMED,
