@@ -77,7 +77,7 @@ def challenge(
         reveal: folder of a challenge, to be told what is hidden in it.
     """
     if reveal is not None:
-        from subzero.diagnosis.challenge import reveal as told
+        from subzero.diagnosis.answer import reveal as told
 
         print(told(reveal))
         return FINE

@@ -21,10 +21,11 @@ from benchmarks.diagnosis.story_cases import STORIES, Story
 from subzero import delivery_diagnosis
 from subzero.channels import BY_NAME
 from subzero.diagnosis import tables, words
-from subzero.diagnosis.challenge import SAMPLE, make_record
+from subzero.diagnosis.challenge import SAMPLE
 from subzero.diagnosis.effects import START, catalogue
 from subzero.diagnosis.hidden import Hidden, draw_deviations, hide
 from subzero.diagnosis.logged import Logged
+from subzero.diagnosis.noisy_record import make_record
 from subzero.diagnosis.report import table
 from subzero.diagnosis.setting import Setting
 from subzero.diagnosis.verdict import Verdict

@@ -1,30 +1,23 @@
-"""Hide an effect in a record, drawn from a seed; sealed, so that nobody reads it by accident.
-
-The truth comes from the other cable formulation (`other_code`), with every number drawn from its tolerance. Noise is
-coloured, with outliers and gaps.
-"""
+"""Hide an effect in a record, drawn from a seed: every number from its tolerance, and what is hidden among them."""
 
 from __future__ import annotations
 
-import base64
 import csv
-import hashlib
 import json
-import zlib
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import asdict, dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 import scenarios
 from subzero.channels import TIME, column_name
+from subzero.diagnosis.answer import SEALED, Answer, seal
 from subzero.diagnosis.effect import Effect
 from subzero.diagnosis.effects import START, catalogue
-from subzero.diagnosis.effects.sensors import NOISE
 from subzero.diagnosis.hidden import Hidden, draw_deviations, draw_effect, hide
-from subzero.diagnosis.other_code import NoTruthError, simulate_otherwise
+from subzero.diagnosis.noisy_record import make_record
+from subzero.diagnosis.other_code import NoTruthError
 from subzero.diagnosis.outside import draw_outside
 from subzero.diagnosis.setting import Setting
 from subzero.diagnosis.told import TOLD
@@ -39,51 +32,6 @@ SAMPLE = 0.1
 """Time between samples. [s]"""
 ODDS = {"none": 0.2, "single": 0.4, "sudden": 0.1, "pair": 0.15, "outside": 0.15}
 """What is hidden, how often."""
-OUTLIER = (8.0, 25.0)
-"""Outliers lie so many noise levels off."""
-SEALED = "answer.sealed"
-
-Simulate = Callable[[Setting, np.ndarray, Iterable[str]], Mapping[str, np.ndarray]]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Answer:
-    """What is hidden.
-
-    Attributes:
-        kind: one of ODDS.
-        names: as `Hidden.names`; empty for nothing.
-        sentences: the same in words.
-        deviations: effect id → parameter → deviation.
-        starts: effect id → when it begins. [s]
-        axis, feature: of a force outside the catalogue.
-        tolerances: effect id → deviations that were drawn within the tolerances.
-        scenario, seed: what was asked for.
-    """
-
-    kind: str
-    names: tuple[str, ...] = ()
-    sentences: tuple[str, ...] = ()
-    deviations: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
-    starts: Mapping[str, float] = field(default_factory=dict)
-    axis: str = ""
-    feature: str = ""
-    tolerances: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
-    scenario: str = ""
-    seed: int = 0
-
-    def __str__(self) -> str:
-        """Return the answer in words."""
-        if not self.names:
-            return "Nothing is wrong: every number is within its tolerance."
-        lines = [f"{name}: {words}" for name, words in zip(self.names, self.sentences, strict=True)]
-        for key, values in self.deviations.items():
-            at = f", from t = {self.starts[key]:g} s on" if key in self.starts else ""
-            sizes = ", ".join(f"{name} {value:+.4g}" for name, value in values.items())
-            lines.append(f"  {key} differs from the model by {sizes}{at}")
-        if self.axis:
-            lines.append(f"  on the axis {self.axis}" + (f", with {self.feature}" if self.feature else ""))
-        return "\n".join(lines)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,66 +43,6 @@ class Challenge:
     true: Setting
     hidden: Hidden
     answer: Answer
-
-
-def make_record(
-    setting: Setting,
-    times: np.ndarray,
-    channels: Iterable[str],
-    *,
-    seed: int | np.random.Generator,
-    noise: Mapping[str, float] | float = 1.0,
-    rho: float = 0.5,
-    outliers: float = 0.01,
-    missing: float = 0.02,
-    dropout: float = 0.0,
-    quantum: Mapping[str, float] | None = None,
-    simulate: Simulate = simulate_otherwise,
-    source: str = "simulated",
-) -> Record:
-    """Return what is measured in a setting.
-
-    Args:
-        setting: the truth.
-        times: of the samples (n,). [s]
-        channels: names of `subzero.channels`.
-        seed: of the noise.
-        noise: channel → standard deviation in its display unit, or a factor on that of usual sensors.
-        rho: correlation of the noise from sample to sample.
-        outliers: share of samples far off.
-        missing: share of samples that are not there.
-        dropout: length of a gap in every channel, somewhere. [s]
-        quantum: channel → smallest step that its sensor shows.
-        simulate: what gives the truth.
-        source: of the record, in words.
-    """
-    rng, channels = np.random.default_rng(seed), tuple(channels)
-    factor = noise if isinstance(noise, float | int) else 1.0
-    levels = {
-        **{name: factor * level for name, level in NOISE.items()},
-        **(noise if isinstance(noise, Mapping) else {}),
-    }
-    truth, values = simulate(setting, times, channels), {}
-    for name in channels:
-        shown = truth[name] + levels[name] * _coloured(rng, times.size, rho)
-        far = rng.random(times.size) < outliers
-        shown += far * rng.choice([-1.0, 1.0], times.size) * rng.uniform(*OUTLIER, times.size) * levels[name]
-        step = (quantum or {}).get(name, 0.0)
-        shown = np.round(shown / step) * step if step > 0.0 else shown
-        gone = rng.random(times.size) < missing
-        begins = rng.uniform(0.0, max(times[-1] - dropout, 0.0))
-        gone |= (dropout > 0.0) & (times >= begins) & (times < begins + dropout)
-        values[name] = np.where(gone, np.nan, shown)
-    return Record(source=source, time=times, values=values)
-
-
-def _coloured(rng: np.random.Generator, n: int, rho: float) -> np.ndarray:
-    """Return AR(1) noise of level one."""
-    white, out = rng.normal(size=n), np.zeros(n)
-    out[0] = white[0]
-    for k in range(1, n):
-        out[k] = rho * out[k - 1] + np.sqrt(1.0 - rho * rho) * white[k]
-    return out
 
 
 def draw_hidden(
@@ -273,36 +161,3 @@ def _write_csv(made: Challenge, path: Path) -> None:
         writer.writerow(columns)
         for row in zip(*columns.values(), strict=True):
             writer.writerow("" if np.isnan(cell) else f"{cell:.7g}" for cell in row)
-
-
-def seal(answer: Answer) -> str:
-    """Return an answer that nobody reads by accident, with its hash."""
-    text = json.dumps(asdict(answer)).encode()
-    packed = base64.b64encode(zlib.compress(text)).decode()
-    return json.dumps({"sha256": hashlib.sha256(text).hexdigest(), "sealed": packed}, indent=1) + "\n"
-
-
-def reveal(folder: str | Path) -> Answer:
-    """Return what is hidden in the record of a folder.
-
-    Raises:
-        UserError: there is no sealed answer, or it has been changed.
-    """
-    path = Path(folder) / SEALED
-    if not path.is_file():
-        raise UserError(
-            f"There is no sealed answer '{path}'. Allowed: a folder made by subzero challenge --out FOLDER."
-        )
-    try:
-        sealed: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-        text = zlib.decompress(base64.b64decode(sealed["sealed"]))
-        intact = hashlib.sha256(text).hexdigest() == sealed["sha256"]
-    except (ValueError, KeyError, TypeError, zlib.error):
-        intact = False
-    if not intact:
-        raise UserError(
-            f"The sealed answer '{path}' has been changed. Make the challenge again from its seed."
-        )
-    said: dict[str, Any] = json.loads(text)
-    said |= {key: tuple(said[key]) for key in ("names", "sentences")}
-    return Answer(**said)

@@ -11,7 +11,8 @@ from subzero.diagnosis.effects.sensors import SPECS
 from subzero.diagnosis.estimates import estimate, name
 from subzero.diagnosis.evidence import posterior
 from subzero.diagnosis.foreign import Foreign
-from subzero.diagnosis.formula import Formula, describe, samples_of
+from subzero.diagnosis.formula import Formula, samples_of
+from subzero.diagnosis.formula_choice import describe
 from subzero.diagnosis.gain import Fitted, gain
 from subzero.diagnosis.hypotheses import Ids, variances
 from subzero.diagnosis.next_trial import next_trial

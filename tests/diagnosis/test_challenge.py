@@ -11,10 +11,12 @@ import pytest
 from numpy.testing import assert_allclose
 
 import subzero
-from subzero.diagnosis.challenge import BASIC, ODDS, SEALED, challenge, draw_hidden, make_record, reveal
+from subzero.diagnosis.answer import SEALED, reveal
+from subzero.diagnosis.challenge import BASIC, ODDS, challenge, draw_hidden
 from subzero.diagnosis.effects import START, catalogue
 from subzero.diagnosis.effects.sensors import NOISE
 from subzero.diagnosis.hidden import Hidden, apply_all, draw_deviations, draw_effect, hide
+from subzero.diagnosis.noisy_record import make_record
 from subzero.diagnosis.other_code import simulate_otherwise, truth_of
 from subzero.diagnosis.outside import KINDS, draw_outside, force_along
 from subzero.diagnosis.setting import Setting

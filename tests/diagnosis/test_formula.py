@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from subzero.diagnosis.formula import all_shapes, as_missing, at_knots, choose, describe, samples_of
+from subzero.diagnosis.formula import as_missing, samples_of
+from subzero.diagnosis.formula_choice import all_shapes, at_knots, choose, describe
 from subzero.diagnosis.latent import Seen
 from subzero.diagnosis.recover import recover
 from subzero.diagnosis.shapes import factors_along

@@ -1,0 +1,89 @@
+"""What is hidden in a challenge: told in words, and sealed, so that nobody reads it by accident."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+import zlib
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+from subzero.errors import UserError
+
+SEALED = "answer.sealed"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Answer:
+    """What is hidden.
+
+    Attributes:
+        kind: one of `challenge.ODDS`.
+        names: as `Hidden.names`; empty for nothing.
+        sentences: the same in words.
+        deviations: effect id → parameter → deviation.
+        starts: effect id → when it begins. [s]
+        axis, feature: of a force outside the catalogue.
+        tolerances: effect id → deviations that were drawn within the tolerances.
+        scenario, seed: what was asked for.
+    """
+
+    kind: str
+    names: tuple[str, ...] = ()
+    sentences: tuple[str, ...] = ()
+    deviations: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    starts: Mapping[str, float] = field(default_factory=dict)
+    axis: str = ""
+    feature: str = ""
+    tolerances: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    scenario: str = ""
+    seed: int = 0
+
+    def __str__(self) -> str:
+        """Return the answer in words."""
+        if not self.names:
+            return "Nothing is wrong: every number is within its tolerance."
+        lines = [f"{name}: {words}" for name, words in zip(self.names, self.sentences, strict=True)]
+        for key, values in self.deviations.items():
+            at = f", from t = {self.starts[key]:g} s on" if key in self.starts else ""
+            sizes = ", ".join(f"{name} {value:+.4g}" for name, value in values.items())
+            lines.append(f"  {key} differs from the model by {sizes}{at}")
+        if self.axis:
+            lines.append(f"  on the axis {self.axis}" + (f", with {self.feature}" if self.feature else ""))
+        return "\n".join(lines)
+
+
+def seal(answer: Answer) -> str:
+    """Return an answer that nobody reads by accident, with its hash."""
+    text = json.dumps(asdict(answer)).encode()
+    packed = base64.b64encode(zlib.compress(text)).decode()
+    return json.dumps({"sha256": hashlib.sha256(text).hexdigest(), "sealed": packed}, indent=1) + "\n"
+
+
+def reveal(folder: str | Path) -> Answer:
+    """Return what is hidden in the record of a folder.
+
+    Raises:
+        UserError: there is no sealed answer, or it has been changed.
+    """
+    path = Path(folder) / SEALED
+    if not path.is_file():
+        raise UserError(
+            f"There is no sealed answer '{path}'. Allowed: a folder made by subzero challenge --out FOLDER."
+        )
+    try:
+        sealed: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        text = zlib.decompress(base64.b64decode(sealed["sealed"]))
+        intact = hashlib.sha256(text).hexdigest() == sealed["sha256"]
+    except (ValueError, KeyError, TypeError, zlib.error):
+        intact = False
+    if not intact:
+        raise UserError(
+            f"The sealed answer '{path}' has been changed. Make the challenge again from its seed."
+        )
+    said: dict[str, Any] = json.loads(text)
+    said |= {key: tuple(said[key]) for key in ("names", "sentences")}
+    return Answer(**said)

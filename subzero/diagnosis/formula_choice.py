@@ -1,0 +1,229 @@
+"""What a missing force is made of: a short sum of features, chosen by evidence from the data themselves.
+
+    w(t) = Σ c_j φ_j(t),   φ_j of `shapes`;      c ~ N(0, (a/rms φ)²), amplitudes a mixed
+    log p = log evidence of the sum (tolerances free) + log prior of its features and of their number
+
+The smoothed history is only described by what the data say of it (`latent.Seen`): nothing is fitted to a curve that was
+smoothed before. Sensible features for an axis come first: they have a larger prior.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from subzero.diagnosis.evidence import log_sum
+from subzero.diagnosis.formula import Formula, samples_of
+from subzero.diagnosis.latent import SHARES, Seen
+from subzero.diagnosis.recover import Recovered
+from subzero.diagnosis.shapes import (
+    SAMPLE,
+    SWITCHED,
+    Shape,
+    decaying,
+    factors_along,
+    plain_shapes,
+    shifted,
+    waves,
+    windowed,
+)
+from subzero.diagnosis.unknown import usual
+
+SENSIBLE: Mapping[str, tuple[str, ...]] = {
+    "X": ("u|u|", "constant", "n|n|", "n u", "wet_length*u2", "wet_length", "time*u2"),
+    "Y": ("uv", "ur", "constant", "rudder_angle*u2", "v|v|", "u|u|"),
+    "Z": ("constant", "time", "uw", "uq", "stern_plane*u2", "w|w|", "u|u|", "depth"),
+    "K": ("n|n|", "constant", "p|p|", "u|u|"),
+    "M": ("uw", "uq", "constant", "stern_plane*u2", "q|q|", "u|u|"),
+    "N": ("uv", "ur", "rudder_angle*u2", "r|r|", "constant", "u|u|", "n|n|"),
+}
+"""What usually acts along an axis, and what is therefore more probable beforehand."""
+ODD, FURTHER = 0.25, 0.05
+"""Prior of another feature beside a sensible one; of a further term beside none."""
+KEPT, MOST = 10, 3
+"""How many sums are carried on from one size to the next, and the most terms."""
+
+
+def describe(found: Recovered) -> Formula:
+    """Return the most probable formula of a recovered force."""
+    setting = found.problem.setting(found.record, found.fit.z)
+    times = samples_of(float(found.unknown.time[-1]))
+    shapes = all_shapes(factors_along(setting, times), times)
+    axis = found.unknown.axis
+    own = found.knots.record == found.record
+    data = Seen(found.data.M[np.ix_(own, own)], found.data.q[own])
+    amplitudes = [share * usual(setting, axis) for share in SHARES]
+    to_knots = at_knots(times, found.unknown.time)
+    return refined(choose(shapes, data, to_knots, axis, amplitudes), shapes, data, to_knots, amplitudes)
+
+
+def refined(
+    formula: Formula, shapes: Sequence[Shape], data: Seen, to_knots: np.ndarray, amplitudes: Sequence[float]
+) -> Formula:
+    """Return a formula with the edges of its windows on a finer grid; the probabilities of features stay."""
+    times = SAMPLE * np.arange(to_knots.shape[1])
+    plain = {shape.feature: shape for shape in shapes if shape.is_plain}
+    for shape in formula.shapes:
+        others = [one for one in formula.shapes if one is not shape]
+        tried = [(*others, one) for one in shifted(shape, plain.get(shape.feature, shape), times)]
+        best = max(
+            (_fixed(formula.axis, one, data, to_knots, amplitudes) for one in tried),
+            key=lambda one: one.log_gain,
+        )
+        formula = replace(best, features=formula.features)
+    return formula
+
+
+def _fixed(
+    axis: str, terms: Sequence[Shape], data: Seen, to_knots: np.ndarray, amplitudes: Sequence[float]
+) -> Formula:
+    """Return the formula of given terms."""
+    scaled, every = [to_knots @ (term.columns / _rms(term)) for term in terms], tuple(range(len(terms)))
+    score = _score(every, terms, scaled, data, axis, amplitudes)
+    return _formula(every, {every: score}, terms, scaled, data, axis, amplitudes)
+
+
+def all_shapes(factors: np.ndarray, times: np.ndarray) -> list[Shape]:
+    """Return every shape that is tried, from the factors of features at times."""
+    plain = plain_shapes(factors)
+    edges = np.arange(0.0, times[-1], 1.0 if times[-1] < 40.0 else 2.0)
+    able = [one for one in plain if one.feature in SWITCHED]
+    parts = [[*windowed(one, times, edges), *decaying(one, times, edges)] for one in able]
+    return plain + [shape for part in parts for shape in part] + waves(times)
+
+
+def at_knots(times: np.ndarray, knots: np.ndarray) -> np.ndarray:
+    """Return the matrix (knots, times) that turns values at times into those of the hat functions closest to them."""
+    spacing = knots[1] - knots[0]
+    hats = np.maximum(1.0 - np.abs(np.subtract.outer(times, knots)) / spacing, 0.0)
+    return np.linalg.pinv(hats)
+
+
+def choose(
+    shapes: Sequence[Shape], data: Seen, to_knots: np.ndarray, axis: str, amplitudes: Sequence[float]
+) -> Formula:
+    """Return the most probable sum of shapes.
+
+    Args:
+        shapes: that are tried.
+        data: what the data say of the force at knots.
+        to_knots: from samples to knots (knots, samples).
+        axis: of the force.
+        amplitudes: that are mixed. [N, N m]
+    """
+    scaled = [to_knots @ (shape.columns / _rms(shape)) for shape in shapes]
+    scores: dict[tuple[int, ...], float] = {}
+    kept: list[tuple[int, ...]] = [()]
+    narrow: list[int] = list(range(len(shapes)))
+    for size in range(1, MOST + 1):
+        sets = {tuple(sorted({*one, i})) for one in kept for i in narrow if i not in one}
+        for one in sets:
+            scores[one] = _score(one, shapes, scaled, data, axis, amplitudes)
+        ranked = sorted((one for one in sets), key=lambda one: -scores[one])
+        kept = _different(ranked, shapes)
+        narrow = _narrow(narrow, ranked, shapes) if size == 1 else narrow
+    best = max(scores, key=lambda one: scores[one])
+    return _formula(best, scores, shapes, scaled, data, axis, amplitudes)
+
+
+def _rms(shape: Shape) -> float:
+    """Return the size of a shape where it is not 0."""
+    inside = np.any(shape.columns != 0.0, axis=1)
+    return float(np.sqrt(np.mean(shape.columns[inside] ** 2)))
+
+
+def _different(ranked: list[tuple[int, ...]], shapes: Sequence[Shape]) -> list[tuple[int, ...]]:
+    """Return the best sums, no more than two of the same features."""
+    kept: list[tuple[int, ...]] = []
+    counts: dict[tuple[str, ...], int] = {}
+    for one in ranked:
+        key = tuple(shapes[i].feature for i in one)
+        counts[key] = counts.get(key, 0) + 1
+        kept += [one] if counts[key] <= 2 and len(kept) < KEPT else []
+    return kept
+
+
+def _narrow(narrow: list[int], ranked: list[tuple[int, ...]], shapes: Sequence[Shape]) -> list[int]:
+    """Return the shapes that may be further terms: all plain ones, and the best others."""
+    return sorted({*(i for i in narrow if shapes[i].is_plain), *(i for (i,) in _different(ranked, shapes))})
+
+
+def _score(
+    chosen: tuple[int, ...],
+    shapes: Sequence[Shape],
+    scaled: Sequence[np.ndarray],
+    data: Seen,
+    axis: str,
+    amplitudes: Sequence[float],
+) -> float:
+    """Return the log posterior of a sum, over that of no force, but for a common constant."""
+    gains = [_gain(_own(chosen, scaled, data), a) for a in amplitudes]
+    return log_sum(gains) - float(np.log(len(gains))) + _log_prior([shapes[i] for i in chosen], axis)
+
+
+def _log_prior(terms: Sequence[Shape], axis: str) -> float:
+    weights = [1.0 if term.feature in SENSIBLE[axis] else ODD for term in terms]
+    return float(
+        np.sum(np.log(weights))
+        + np.sum([term.log_prior for term in terms])
+        + (len(terms) - 1) * np.log(FURTHER)
+    )
+
+
+def _own(chosen: tuple[int, ...], scaled: Sequence[np.ndarray], data: Seen) -> Seen:
+    """Return what the data say of the coefficients of a sum."""
+    phi = np.hstack([scaled[i] for i in chosen])
+    return Seen(phi.T @ data.M @ phi, phi.T @ data.q)
+
+
+def _gain(data: Seen, amplitude: float) -> float:
+    """Return the log evidence over that of no force, for coefficients of an amplitude."""
+    a2 = amplitude**2
+    if data.q.size == 1:
+        stiff = 1.0 + a2 * float(data.M[0, 0])
+        return 0.5 * a2 * float(data.q[0]) ** 2 / stiff - 0.5 * float(np.log(stiff))
+    inner = np.eye(data.q.size) + a2 * data.M
+    return 0.5 * a2 * float(data.q @ np.linalg.solve(inner, data.q)) - 0.5 * float(
+        np.linalg.slogdet(inner)[1]
+    )
+
+
+def _formula(
+    best: tuple[int, ...],
+    scores: Mapping[tuple[int, ...], float],
+    shapes: Sequence[Shape],
+    scaled: Sequence[np.ndarray],
+    data: Seen,
+    axis: str,
+    amplitudes: Sequence[float],
+) -> Formula:
+    """Return the formula of the best sum, its largest term first."""
+    own = _own(best, scaled, data)
+    a = max(amplitudes, key=partial(_gain, own))
+    covariance = np.linalg.inv(np.eye(own.q.size) / a**2 + own.M)
+    mean, sizes = covariance @ own.q, [shapes[i].columns.shape[1] for i in best]
+    parts = np.split(np.arange(mean.size), np.cumsum(sizes)[:-1])
+    order = sorted(range(len(best)), key=lambda j: -float(np.linalg.norm(mean[parts[j]])))
+    scale = np.concatenate([np.full(size, _rms(shapes[i])) for i, size in zip(best, sizes, strict=True)])
+    places = np.concatenate([parts[j] for j in order])
+    return Formula(
+        axis=axis,
+        shapes=tuple(shapes[best[j]] for j in order),
+        coefficients=tuple(mean[parts[j]] / scale[parts[j]] for j in order),
+        covariance=(covariance / np.outer(scale, scale))[np.ix_(places, places)],
+        log_gain=scores[best],
+        features=_features(scores, shapes),
+    )
+
+
+def _features(scores: Mapping[tuple[int, ...], float], shapes: Sequence[Shape]) -> dict[str, float]:
+    """Return the probability of every feature to belong to the formula."""
+    total = log_sum(list(scores.values()))
+    found: dict[str, float] = {}
+    for one, score in scores.items():
+        for name in {shapes[i].feature for i in one}:
+            found[name] = found.get(name, 0.0) + float(np.exp(score - total))
+    return dict(sorted(found.items(), key=lambda pair: -pair[1]))
