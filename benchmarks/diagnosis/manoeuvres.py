@@ -35,11 +35,12 @@ def nominal(name: str) -> Setting:
     setting = Setting(trial=trial, model=Model.of(trial))
     if name == "short":
         return replace(setting, trial=replace(trial, duration=10.0))
-    return rich(_braked(setting)) if name == "rich" else setting
+    return braked_rich(setting) if name == "rich" else setting
 
 
-def _braked(setting: Setting) -> Setting:
-    return setting.with_drum(friction_torque=BRAKE * setting.model.drum.radius)
+def braked_rich(setting: Setting) -> Setting:
+    """Return the rich trial of the library with a drum that rubs."""
+    return rich(setting.with_drum(friction_torque=BRAKE * setting.model.drum.radius))
 
 
 def times(setting: Setting) -> np.ndarray:

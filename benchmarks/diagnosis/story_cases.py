@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
+from benchmarks.diagnosis.manoeuvres import braked_rich
 from subzero.diagnosis.setting import Setting
-from subzero.diagnosis.trial_library import rich, rudder_doublets
+from subzero.diagnosis.trial_library import cruise, flown, rudder_doublets
 from subzero.diagnosis.verdict import CAUSE_NAMED, NOTHING_WRONG, OUTSIDE, UNDECIDED
 from subzero.missing_force import MissingForce
 
@@ -16,6 +17,11 @@ BASIC = ("surge_speed", "heading", "yaw_rate", "pitch", "roll", "depth")
 def fig6(setting: Setting) -> Setting:
     """Return fig6 as it stands."""
     return setting
+
+
+def straight_run(setting: Setting) -> Setting:
+    """Return half a minute straight ahead, at the speed of fig6."""
+    return flown(setting, [(0.0, cruise(setting), 0.0, 0.0, 0.0)], 30.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,9 +90,10 @@ STORIES = (
     Story(
         name="cable_drag_or_current",
         title="4. Drag along the cable, or a current?",
-        words="The log begins at 8 s, under way, and the cable drags 30 % more along itself. What else slows the "
-        "vehicle down slowly explains so short a piece nearly as well.",
-        hidden={"cable_tangential_drag": (0.30,)},
+        words="A straight run; the log begins at 8 s, under way. The cable drags 40 % more along itself, or a current "
+        "pays out as much more of it: speed through the water cannot tell.",
+        trial=straight_run,
+        hidden={"cable_tangential_drag": (0.40,)},
         begins=8.0,
         expected=UNDECIDED,
         figures=("evidence",),
@@ -101,7 +108,7 @@ STORIES = (
         name="two_effects",
         title="6. Two causes at once",
         words="The propeller lost 30 % of its thrust and the rudder is 1.5 degrees off its centre.",
-        trial=rich,
+        trial=braked_rich,
         hidden={"propeller_thrust_gain": (-0.30,), "rudder_offset": (1.5,)},
     ),
     Story(

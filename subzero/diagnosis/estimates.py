@@ -14,7 +14,6 @@ from subzero.diagnosis.evidence import posterior
 from subzero.diagnosis.hypotheses import Ids, places, variances
 from subzero.diagnosis.problem import Problem
 from subzero.diagnosis.refit import Fit
-from subzero.diagnosis.rules import SET, smallest_set
 from subzero.diagnosis.verdict import Cause, Estimate, Rival
 from subzero.diagnosis.work import Work
 
@@ -96,13 +95,14 @@ def causes(work: Work, best: Candidate, inside: Mapping[Ids, float], ids: Ids) -
     return tuple(found)
 
 
-def rivals(work: Work, best: Candidate, inside: Mapping[Ids, float], most: int = 8) -> tuple[Rival, ...]:
-    """Return the other members of the 95 % set, at most so many, or else the runner-up."""
-    total = sum(inside.values())
-    listed = [ids for ids in smallest_set(inside, SET * total) if ids != best.ids][:most]
+def rivals(
+    work: Work, best: Candidate, inside: Mapping[Ids, float], left: Sequence[Ids], most: int = 8
+) -> tuple[Rival, ...]:
+    """Return the other hypotheses that are left, at most so many, or else the runner-up."""
+    listed = [ids for ids in left if ids != best.ids][:most]
     ranked: Sequence[Ids] = sorted(inside, key=lambda ids: -inside[ids])
     listed = listed or [ids for ids in ranked if ids != best.ids][:1]
-    return tuple(_rival(work, best, ids, inside[ids]) for ids in listed)
+    return tuple(_rival(work, best, ids, inside.get(ids, 0.0)) for ids in listed)
 
 
 def _rival(work: Work, best: Candidate, ids: Ids, p: float) -> Rival:

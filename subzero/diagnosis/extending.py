@@ -145,4 +145,6 @@ def ahead(work: Work, listed: list[Ids], inside: dict[Ids, float]) -> NextTrial 
     left = [ids for ids in listed if ids in work.search.candidates][:SURVIVORS]
     work.search.progress(0.92, "the next trial, for " + ", ".join(name(ids) for ids in left))
     survivors = [work.search.candidates[ids] for ids in left]
-    return next_trial(work.problem, survivors, probabilities=[inside[ids] for ids in left], seed=work.seed)
+    return next_trial(
+        work.problem, survivors, probabilities=[inside.get(ids, 0.0) for ids in left], seed=work.seed
+    )

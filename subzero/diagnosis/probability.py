@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import combinations
 
 import numpy as np
@@ -29,19 +29,25 @@ class Beliefs:
         candidates: hypothesis → its real fit.
         screen: what the linear problem at the wide fit says.
         beside: hypothesis → log posterior, estimated at the fit of one with a cause less.
+        behind: hypothesis → how far its fit was behind the best when it was given up, in log posterior.
     """
 
     candidates: Mapping[Ids, Candidate]
     screen: Screen
     beside: Mapping[Ids, float]
+    behind: Mapping[Ids, float] = field(default_factory=dict)
 
     def log_posteriors(self) -> dict[Ids, float]:
         """Return the log posterior of every hypothesis, but for a common constant: by its fit, or estimated."""
+        log = self._fitted()
+        best, untried = max(log.values()), [ids for ids in self.screen.log_posterior if ids not in log]
+        return log | {ids: min(self._estimated(ids, log), best - UNTRIED) for ids in untried}
+
+    def _fitted(self) -> dict[Ids, float]:
+        """Return the log posterior of every hypothesis that has been fitted, now or before it was given up."""
         log = {ids: candidate.log_posterior for ids, candidate in self.candidates.items()}
         best = max(log.values())
-        for ids in self.screen.log_posterior:
-            log.setdefault(ids, min(self._estimated(ids), best - UNTRIED))
-        return log
+        return {ids: best + behind for ids, behind in self.behind.items()} | log
 
     def log_total(self) -> float:
         """Return the log of the sum of all posteriors."""
@@ -53,16 +59,15 @@ class Beliefs:
         found = {ids: float(np.exp(value - total)) for ids, value in log.items()}
         return folded(self._without_small(problem, found))
 
-    def _estimated(self, ids: Ids) -> float:
+    def _estimated(self, ids: Ids, fitted: Mapping[Ids, float]) -> float:
         """Return the log posterior of a hypothesis without a fit: of the best fit of a part of it, and what the linear
         problem there, or else the screen, says that the rest adds.
         """
         if ids in self.beside:
             return self.beside[ids]
-        screen = self.screen.log_posterior
-        parts = [one for part in range(len(ids)) for one in combinations(ids, part) if one in self.candidates]
-        part = max(parts, key=lambda one: self.candidates[one].log_posterior, default=())
-        return self.candidates[part].log_posterior + screen[ids] - screen[part]
+        parts = [one for size in range(len(ids)) for one in combinations(ids, size) if one in fitted]
+        part = max(parts, key=lambda one: fitted[one], default=())
+        return fitted[part] + self.screen.adds(ids, part)
 
     def _without_small(self, problem: Problem, probabilities: Mapping[Ids, float]) -> dict[Ids, float]:
         """Return probabilities where causes of less than a practical size are not told beside others of more."""

@@ -1,6 +1,7 @@
 """The screen: how probable every hypothesis is in the linear problem at a wide fit, before any is fitted.
 
-Causes that do nothing when they are small have no place in a linear problem: real runs try some sizes of them.
+Causes that do nothing when they are small have no place in a linear problem: real runs try some sizes of them. If even
+wide tolerances do not come close to the records, that is done with all of them.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from subzero.diagnosis.candidate import Candidate, possible
+from subzero.diagnosis.effect import Parameter
 from subzero.diagnosis.evidence import KAPPAS, Posterior, Quadratic, freed, log_sum, posterior
 from subzero.diagnosis.hypotheses import Ids, compatible, log_prior, named, places, variances
 from subzero.diagnosis.problem import Problem
@@ -19,7 +21,7 @@ from subzero.diagnosis.refit import Fit
 FAR = 1.08
 """A wide fit that leaves a greater mean square, in noise, is not close to the records."""
 SWEEP = (0.25, 0.5, 1.0, 2.0)
-"""Sizes, in effect scales, that effects without a slope at the nominal model are tried at."""
+"""Sizes, in effect scales, that causes are tried at by real runs, either way."""
 FELT = 1.0
 """An effect of one scale that seems to do less than this, in noise, has no slope at the nominal model."""
 
@@ -31,10 +33,20 @@ class Screen:
     Attributes:
         log_posterior: hypothesis → log (evidence, mixed over κ, times prior).
         secants: hypothesis → where its fit begins, for causes without a slope.
+        count: of causes that can be named.
+        far: the wide fit was not close to the records: sums of causes are no more than guesses.
     """
 
     log_posterior: dict[Ids, float] = field(default_factory=dict)
     secants: dict[Ids, np.ndarray] = field(default_factory=dict)
+    count: int = 1
+    far: bool = False
+
+    def adds(self, ids: Ids, part: Ids) -> float:
+        """Return what a hypothesis has over a part of it; from afar only what the prior says."""
+        if self.far:
+            return log_prior(ids, self.count) - log_prior(part, self.count)
+        return self.log_posterior[ids] - self.log_posterior[part]
 
     def best(self, size: int, most: int, keep: float) -> list[Ids]:
         """Return the best hypotheses of a size, at most so many, this close to the best of all of that size."""
@@ -48,19 +60,36 @@ def is_close(wide: Fit) -> bool:
     return float(wide.r @ wide.r) < FAR * wide.r.size
 
 
-def look(problem: Problem, wide: Fit, nominal: np.ndarray) -> Screen:
+def look(problem: Problem, wide: Fit, nominal: tuple[np.ndarray, np.ndarray]) -> Screen:
     """Return the screen: nothing, every cause, and every pair.
 
     Args:
         problem: records and parameters.
         wide: the fit with wide tolerances.
-        nominal: sensitivities of the nominal model (m, k).
+        nominal: residual (m,) and sensitivities (m, k) of the nominal model.
     """
-    found, names = Screen(), named(problem)
+    if not is_close(wide):
+        return _from_afar(problem, *nominal)
+    names = named(problem)
+    found = Screen(count=len(names))
     base = {kappa: posterior(wide.quadratic, variances(problem.entries, (), kappa)) for kappa in KAPPAS}
     for ids in [(), *((one,) for one in names), *compatible(problem.entries, names)]:
         found.log_posterior[ids] = linear(problem, base, (), ids) + log_prior(ids, len(names))
-    _sweep(problem, wide, nominal, found)
+    _sweep(problem, wide.z, wide.J, _without_slope(problem, wide.J), found)
+    return found
+
+
+def _from_afar(problem: Problem, r: np.ndarray, J: np.ndarray) -> Screen:
+    """Return the screen if even wide tolerances do not come close: every cause is tried at some sizes by real runs, and
+    a pair is as good as the better of the two.
+    """
+    names, zero = named(problem), np.zeros(J.shape[1])
+    found = Screen(count=len(names), far=True)
+    found.log_posterior[()] = _mixed(problem, Quadratic.at(zero, r, J)) + log_prior((), len(names))
+    _sweep(problem, zero, J, [k for k, entry in enumerate(problem.entries) if entry.record < 0], found)
+    for pair in compatible(problem.entries, names):
+        better = max(found.log_posterior[(one,)] for one in pair)
+        found.log_posterior[pair] = better + log_prior(pair, len(names)) - log_prior(pair[:1], len(names))
     return found
 
 
@@ -105,27 +134,44 @@ def instead(problem: Problem, one: Candidate, rest: Ids) -> dict[Ids, float]:
     return found
 
 
-def _sweep(problem: Problem, wide: Fit, nominal: np.ndarray, found: Screen) -> None:
-    """Try sizes of the causes that do nothing when they are small: at the wide fit, if that is close to the records."""
-    z, J = (wide.z, wide.J) if is_close(wide) else (np.zeros_like(wide.z), nominal)
-    for k, entry in enumerate(problem.entries):
-        felt = float(np.linalg.norm(J[:, k])) * entry.parameter.scale
-        if entry.record < 0 and entry.parameter.low == 0.0 and felt <= FELT:
-            tried = [_secant(problem, k, size * entry.parameter.scale, z, J) for size in SWEEP]
-            best, ids = max(tried, key=lambda pair: pair[0]), (entry.effect.id,)
-            found.log_posterior[ids] = best[0] + log_prior(ids, len(named(problem)))
-            found.secants[ids] = best[1]
+def _without_slope(problem: Problem, J: np.ndarray) -> list[int]:
+    """Return the entries that do nothing when they are small."""
+    felt = np.linalg.norm(J, axis=0) * [entry.parameter.scale for entry in problem.entries]
+    return [k for k, entry in enumerate(problem.entries)
+            if entry.record < 0 and entry.parameter.low == 0.0 and felt[k] <= FELT]  # fmt: skip
+
+
+def _sweep(problem: Problem, z: np.ndarray, J: np.ndarray, places: list[int], found: Screen) -> None:
+    """Try sizes of entries about z, side by side; keep the best of every cause."""
+    jobs = [(k, size) for k in places for size in _sizes(problem.entries[k].parameter)]
+    tried = problem.pool.map(lambda job: _secant(problem, job[0], job[1], z, J), jobs)
+    best: dict[Ids, float] = {}
+    for (k, _), (value, moved) in zip(jobs, tried, strict=True):
+        ids: Ids = (problem.entries[k].effect.id,)
+        if value > best.get(ids, -np.inf) or ids not in best:
+            best[ids], found.secants[ids] = value, moved
+    found.log_posterior.update({ids: best[ids] + log_prior(ids, len(named(problem))) for ids in best})
+
+
+def _sizes(parameter: Parameter) -> list[float]:
+    """Return the deviations that are tried."""
+    both = [side * size * parameter.scale for size in SWEEP for side in (1.0, -1.0)]
+    return [size for size in both if parameter.low <= size <= parameter.high]
 
 
 def _secant(problem: Problem, k: int, size: float, z: np.ndarray, J: np.ndarray) -> tuple[float, np.ndarray]:
     """Return the log evidence of entry k at a size, others within their tolerances about z; and where it is."""
-    others, moved, found = z.copy(), z.copy(), []
+    others, moved = z.copy(), z.copy()
     others[k], moved[k] = 0.0, size
     r = problem.residual(moved)
     if not np.isfinite(r).all():
         return -np.inf, moved
-    q = Quadratic.at(others, r, J)
-    for kappa, prior in KAPPAS.items():
-        value = posterior(q, variances(problem.entries, (), kappa)).log_evidence
-        found.append(np.log(prior) + value - 0.5 * (size / problem.entries[k].parameter.scale) ** 2 - 1.0)
-    return log_sum(found), moved
+    return _mixed(problem, Quadratic.at(others, r, J)) - 0.5 * (
+        size / problem.entries[k].parameter.scale
+    ) ** 2 - 1.0, moved
+
+
+def _mixed(problem: Problem, q: Quadratic) -> float:
+    """Return the log evidence with nothing but tolerances, mixed over κ."""
+    return log_sum([np.log(prior) + posterior(q, variances(problem.entries, (), kappa)).log_evidence
+                    for kappa, prior in KAPPAS.items()])  # fmt: skip

@@ -25,6 +25,8 @@ KEEP, SINGLES, PAIRS = 12.0, 7, 4
 """Refit hypotheses whose log evidence is this close to the best of their kind, and at most so many."""
 BENT, LEAST_BENT = 2, 10.0
 """So many causes that the wide fit bends by at least so many tolerances are fitted by themselves."""
+SWEPT = 4
+"""So many causes are fitted by themselves if the wide fit is not close."""
 RACERS, HOPELESS = 6, 6.0
 """At most so many fits with sensitivities of their own in a race; none for what is this far behind in log posterior."""
 NEAR = 4.0
@@ -52,6 +54,7 @@ class Search:
         candidates: hypothesis → its real fit.
         raced: hypotheses that were fitted with sensitivities of their own.
         beside: hypothesis → log posterior, estimated at the fit of one with a cause less.
+        behind: hypothesis → how far its fit was behind the best when it was given up, in log posterior.
         economical: the problem before what economical steps get wrong was taken from its records.
         sharp_at: the hypothesis at whose fit that was done.
     """
@@ -64,6 +67,7 @@ class Search:
     candidates: dict[Ids, Candidate] = field(default_factory=dict)
     raced: set[Ids] = field(default_factory=set)
     beside: dict[Ids, float] = field(default_factory=dict)
+    behind: dict[Ids, float] = field(default_factory=dict)
     economical: Problem = field(init=False)
     sharp_at: Ids | None = None
 
@@ -74,18 +78,18 @@ class Search:
 
     def look(self) -> None:
         """Fill the screen: linear evidence of nothing, every cause, and every pair."""
-        self.screen = look(self.problem, self.wide, self.nominal[1])
+        self.screen = look(self.problem, self.wide, self.nominal)
 
     def refit_best(self) -> None:
         """Fit nothing, and the best causes and pairs of the screen, with real runs: all with the sensitivities at hand,
         then those that come out best with their own.
         """
-        bent = self._bent()
-        for ids in bent:
+        first = self._first()
+        for ids in first:
             self._say(0.3, "fitting", ids, " by itself")
             self._alone(ids)
         best = self.screen.best(1, SINGLES, KEEP), self.screen.best(2, PAIRS, KEEP)
-        for ids in chain([()], bent, *best):
+        for ids in chain([()], first, *best):
             self._say(0.3, "fitting", ids)
             self.fit(ids)
         self.race(2)
@@ -151,8 +155,11 @@ class Search:
         if sharper is None:
             return
         self.problem, least = sharper, best.log_posterior - HOPELESS
-        self.candidates = {ids: one for ids, one in self.candidates.items()
-                           if one.log_posterior > least or set(ids) <= set(best.ids)}  # fmt: skip
+        kept = {ids: one for ids, one in self.candidates.items()
+                if one.log_posterior > least or set(ids) <= set(best.ids)}  # fmt: skip
+        self.behind |= {ids: one.log_posterior - best.log_posterior for ids, one in self.candidates.items()
+                        if ids not in kept}  # fmt: skip
+        self.candidates = kept
         for ids, one in list(self.candidates.items()):
             fit = one.fit
             now = self._keep(ids, refit(self.problem, fit.z, fit.J, fit.D, most_fresh=0, made_at=fit.made_at))
@@ -166,23 +173,23 @@ class Search:
     @property
     def beliefs(self) -> Beliefs:
         """What is known of all hypotheses by now."""
-        return Beliefs(candidates=self.candidates, screen=self.screen, beside=self.beside)
+        return Beliefs(candidates=self.candidates, screen=self.screen, beside=self.beside, behind=self.behind)
 
     def _say(self, share: float, words: str, ids: Ids, more: str = "") -> None:
         self.progress(share, f"{words} {' + '.join(ids) or 'nothing wrong'}{more}")
 
-    def _bent(self) -> list[Ids]:
-        """Return the causes that the wide fit bends most, of which the linear problem says little; and if it is not
-        close to the records, those that were swept.
+    def _first(self) -> list[Ids]:
+        """Return the causes that are fitted by themselves: those that the wide fit bends most, of which the linear
+        problem says little; and if it is not close to the records, the best of those that were swept.
         """
+        if not is_close(self.wide):
+            return self.screen.best(1, SWEPT, np.inf)
         bent: dict[Ids, float] = {}
         for z, entry in zip(self.wide.z, self.problem.entries, strict=True):
             if entry.record < 0:
                 size, ids = abs(float(z)) / entry.parameter.tolerance, (entry.effect.id,)
                 bent[ids] = max(size, bent.get(ids, 0.0))
-        found = [ids for ids in sorted(bent, key=lambda ids: -bent[ids])[:BENT] if bent[ids] > LEAST_BENT]
-        swept = [] if is_close(self.wide) else list(self.screen.secants)
-        return list(dict.fromkeys([*found, *swept]))
+        return [ids for ids in sorted(bent, key=lambda ids: -bent[ids])[:BENT] if bent[ids] > LEAST_BENT]
 
     def _alone(self, ids: Ids) -> None:
         """Fit a cause from where the wide fit has it, all else nominal, with the sensitivities there."""

@@ -70,7 +70,9 @@ def _told(
 ) -> Verdict:
     """Return the verdict as a value."""
     candidates = work.search.candidates
-    others = rivals(work, best, inside)
+    left = smallest_set(inside, SET * sum(inside.values()))
+    left = _contenders(work, best, left) if verdict == UNDECIDED else left
+    others = rivals(work, best, inside, left)
     named = (
         (new.cause,)
         if new.cause
@@ -84,7 +86,6 @@ def _told(
     fits |= {"extended": new.fit} if verdict in (CAUSE_NAMED, OUTSIDE) else {}
     fits |= {f"rival: {name(first)}": rival} if first else {}
     full = work.budget == "full" and work.complete
-    left = smallest_set(inside, SET * sum(inside.values()))
     return Verdict(
         verdict=verdict,
         sentence=_sentence(verdict, named, best, others, new.unknown),
@@ -99,6 +100,18 @@ def _told(
         tolerance_scale=tolerance_scale(work.search),
         **_common(work, best),
     )
+
+
+def _contenders(work: Work, best: Candidate, left: list[Ids]) -> list[Ids]:
+    """Return the hypotheses that the next trial is to tell apart: those that are left, or the best and its closest
+    rival, which may be improbable by luck alone.
+    """
+    if len(left) > 1 or not best.ids:
+        return left
+    rival = separation(work.problem, best.fit.J, best.fit.z, best.ids, best.kappa)[1]
+    closest = () if rival == "none" else (rival,)
+    work.search.fit(closest)
+    return [*left, closest]
 
 
 def _common(work: Work, best: Candidate) -> dict[str, Any]:
