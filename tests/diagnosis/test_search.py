@@ -1,0 +1,113 @@
+"""The search's bookkeeping: what is known of hypotheses that were fitted, given up, or never tried.
+
+Verifies: secants keep sensitivities true along a step; further causes are told only if they are needed; nothing that
+was given up or never tried comes first by a guess.
+"""
+
+import dataclasses
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import subzero
+from subzero.diagnosis.candidate import Candidate
+from subzero.diagnosis.effect import Parameter
+from subzero.diagnosis.effects import catalogue
+from subzero.diagnosis.hypotheses import log_prior
+from subzero.diagnosis.probability import FURTHER, UNTRIED, Beliefs, folded
+from subzero.diagnosis.refit import secant
+from subzero.diagnosis.rules import large
+from subzero.diagnosis.screen import Screen
+from subzero.diagnosis.setting import Setting
+
+
+def fitted(**log_posteriors):
+    """Return candidates of single causes, and of nothing as `none`."""
+    found = {}
+    for name, value in log_posteriors.items():
+        ids = () if name == "none" else tuple(name.split("__"))
+        found[ids] = Candidate(ids=ids, fit=None, log_evidence={}, log_posterior=value)
+    return found
+
+
+def screen(far=False, **log_posteriors):
+    names = {
+        () if name == "none" else tuple(name.split("__")): value for name, value in log_posteriors.items()
+    }
+    return Screen(log_posterior=names, count=30, far=far)
+
+
+def test_secants_explain_the_step_and_leave_other_directions():
+    random = np.random.default_rng(1)
+    J, step, change = random.normal(size=(9, 4)), random.normal(size=4), random.normal(size=9)
+    D = np.array([1.0, 4.0, 0.01, 9.0])
+    new = secant(J, step, change, D)
+    assert_allclose(new @ step, -change, atol=1e-12, err_msg="a residual falls by J times the step")
+    other = np.array([step[1] * D[0], -step[0] * D[1], 0.0, 0.0])
+    assert abs(step @ (other / D)) < 1e-12
+    assert_allclose(new @ other, J @ other, atol=1e-12)
+
+
+def test_a_further_cause_is_told_only_if_it_is_needed():
+    half = folded({("a",): 0.4, ("a", "b"): 0.6})
+    assert half == {("a",): 1.0}
+    needed = folded({("a",): 0.01, ("a", "b"): 0.01 * FURTHER + 0.79})
+    assert next(iter(needed)) == ("a", "b")
+    assert sum(needed.values()) == pytest.approx(1.0)
+
+
+def test_what_was_given_up_stays_behind():
+    beliefs = Beliefs(candidates=fitted(none=-50.0, a=-10.0), screen=screen(none=0.0, a=5.0, b=99.0), beside={},
+                      behind={("b",): -30.0})  # fmt: skip
+    assert beliefs.log_posteriors()[("b",)] == -40.0, "not what the screen hoped"
+
+
+def test_what_was_never_tried_comes_no_closer_than_a_guess_may():
+    beliefs = Beliefs(
+        candidates=fitted(none=-50.0, a=-10.0), screen=screen(none=0.0, a=5.0, b=99.0), beside={}
+    )
+    assert beliefs.log_posteriors()[("b",)] == -10.0 - UNTRIED
+    assert beliefs.log_total() == pytest.approx(-10.0 + math.log1p(math.exp(-UNTRIED)), abs=1e-6)
+
+
+def test_a_pair_is_estimated_from_the_better_of_its_parts():
+    seen = screen(none=0.0, a=5.0, b=1.0, a__b=3.0)
+    beliefs = Beliefs(candidates=fitted(none=-50.0, a=-10.0), screen=seen, beside={})
+    assert beliefs.log_posteriors()[("a", "b")] == -12.0
+    beside = Beliefs(candidates=fitted(none=-50.0, a=-10.0), screen=seen, beside={("a", "b"): -17.0})
+    assert beside.log_posteriors()[("a", "b")] == -17.0, "estimated at a fit, that counts more"
+
+
+def test_from_afar_a_further_cause_adds_nothing_but_its_prior():
+    far = screen(far=True, none=0.0, a=5.0, b=1.0, a__b=99.0)
+    added = log_prior(("a", "b"), 30) - log_prior(("a",), 30)
+    assert far.adds(("a", "b"), ("a",)) == added < -3.0
+
+
+def test_the_screen_keeps_the_best_of_a_size():
+    seen = screen(none=0.0, a=5.0, b=1.0, c=-20.0, a__b=3.0)
+    assert seen.best(1, 7, 12.0) == [("a",), ("b",)]
+    assert seen.best(2, 7, 12.0) == [("a", "b")]
+
+
+def test_only_causes_beyond_four_tolerances_are_large():
+    effects = [catalogue(("heading",))[name] for name in ("rudder_offset", "rudder_lag")]
+    entries = [SimpleNamespace(effect=one, record=-1, parameter=one.parameters[0]) for one in effects]
+    tolerance = np.array([one.parameters[0].tolerance for one in effects])
+    ids = ("rudder_lag", "rudder_offset")
+    assert large(entries, ids, tolerance * [-5.0, 3.0], 1.0) == ("rudder_offset",)
+    assert large(entries, ids, tolerance * [-5.0, 3.0], 2.0) == (), "tolerances twice as wide"
+
+
+def test_a_bound_on_the_whole_value_follows_the_nominal_model():
+    trial = subzero.load_scenario("fig6")
+    setting = Setting(trial=trial, model=subzero.Model.of(trial))
+    made = Parameter(
+        name="x", unit="s", tolerance=0.1, scale=1.0, low=-9.0, nominal=lambda _: 0.15, least=0.06
+    )
+    assert made.within(setting).low == pytest.approx(-0.09)
+    quick = dataclasses.replace(made, nominal=lambda _: 0.02)
+    assert quick.within(setting).low == 0.0, "a model below the least stays as it is"
