@@ -21,7 +21,7 @@ from subzero.diagnosis.logged import Logged
 from subzero.diagnosis.next_trial import ENOUGH, next_trial, outlooks
 from subzero.diagnosis.setting import Setting
 from subzero.diagnosis.trial_library import LIBRARY, flown
-from subzero.diagnosis.verdict import NextTrial
+from subzero.diagnosis.verdict import UNDECIDED, NextTrial
 from subzero.diagnosis.work import Work
 
 from .cases import Case, Made, cases
@@ -84,8 +84,8 @@ def _measured(case: Case) -> Result:
     assert work is not None
     pair = _pair(case, work)
     found: Result = {"index": case.index, "truth": case.causes[0], "before": before.verdict}
-    if len(pair) < 2:
-        return {**found, "skipped": "only one of two was fitted"}
+    if before.verdict != UNDECIDED or len(pair) < 2:
+        return {**found, "skipped": "nothing is left to decide"}
     best = {name: view.discrimination() for name, view in outlooks(work.problem, pair)}
     found |= {"rival": " + ".join(pair[1].ids) or "none", "library": max(best.values()),
               "able": max(best, key=lambda name: best[name])}  # fmt: skip

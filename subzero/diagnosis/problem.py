@@ -84,10 +84,15 @@ class Problem:
 
     def residual(self, z: np.ndarray) -> np.ndarray:
         """Return r(z) (m,); NaN if a run could not go on."""
-        tracks = self.tracks([(i, z) for i in range(len(self.records))])
-        return np.concatenate([
-            self.whitened(i, self.setting(i, z), track, measured=True) for i, track in enumerate(tracks)
-        ])  # fmt: skip
+        return self.residuals([z])[0]
+
+    def residuals(self, several: Sequence[np.ndarray]) -> list[np.ndarray]:
+        """Return r(z) (m,) of several z, run side by side."""
+        jobs = [(i, z) for z in several for i in range(len(self.records))]
+        shown = [self.whitened(i, self.setting(i, z), track, measured=True)
+                 for (i, z), track in zip(jobs, self.tracks(jobs), strict=True)]  # fmt: skip
+        count = len(self.records)
+        return [np.concatenate(shown[at : at + count]) for at in range(0, len(shown), count)]
 
     def jacobian(self, z: np.ndarray, columns: Sequence[int] | None = None) -> np.ndarray:
         """Return J (m, k) at z by one-sided differences; only some of its columns, if asked, others 0."""

@@ -144,12 +144,13 @@ def _without_slope(problem: Problem, J: np.ndarray) -> list[int]:
 def _sweep(problem: Problem, z: np.ndarray, J: np.ndarray, places: list[int], found: Screen) -> None:
     """Try sizes of entries about z, side by side; keep the best of every cause."""
     jobs = [(k, size) for k in places for size in _sizes(problem.entries[k].parameter)]
-    tried = problem.pool.map(lambda job: _secant(problem, job[0], job[1], z, J), jobs)
+    moved = [np.concatenate([z[:k], [size], z[k + 1 :]]) for k, size in jobs]
     best: dict[Ids, float] = {}
-    for (k, _), (value, moved) in zip(jobs, tried, strict=True):
+    for (k, size), there, r in zip(jobs, moved, problem.residuals(moved), strict=True):
         ids: Ids = (problem.entries[k].effect.id,)
+        value = _at_size(problem, k, size, there, r, J)
         if value > best.get(ids, -np.inf) or ids not in best:
-            best[ids], found.secants[ids] = value, moved
+            best[ids], found.secants[ids] = value, there
     found.log_posterior.update({ids: best[ids] + log_prior(ids, len(named(problem))) for ids in best})
 
 
@@ -159,16 +160,14 @@ def _sizes(parameter: Parameter) -> list[float]:
     return [size for size in both if parameter.low <= size <= parameter.high]
 
 
-def _secant(problem: Problem, k: int, size: float, z: np.ndarray, J: np.ndarray) -> tuple[float, np.ndarray]:
-    """Return the log evidence of entry k at a size, others within their tolerances about z; and where it is."""
-    others, moved = z.copy(), z.copy()
-    others[k], moved[k] = 0.0, size
-    r = problem.residual(moved)
+def _at_size(problem: Problem, k: int, size: float, z: np.ndarray, r: np.ndarray, J: np.ndarray) -> float:
+    """Return the log evidence of entry k at a size, others within their tolerances about z, with the residual there."""
     if not np.isfinite(r).all():
-        return -np.inf, moved
-    return _mixed(problem, Quadratic.at(others, r, J)) - 0.5 * (
-        size / problem.entries[k].parameter.scale
-    ) ** 2 - 1.0, moved
+        return -np.inf
+    others = z.copy()
+    others[k] = 0.0
+    far = 0.5 * (size / problem.entries[k].parameter.scale) ** 2
+    return _mixed(problem, Quadratic.at(others, r, J)) - far - 1.0
 
 
 def _mixed(problem: Problem, q: Quadratic) -> float:

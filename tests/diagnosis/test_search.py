@@ -15,12 +15,13 @@ from numpy.testing import assert_allclose
 import subzero
 from subzero.diagnosis.candidate import Candidate
 from subzero.diagnosis.effect import Parameter
-from subzero.diagnosis.effects import catalogue
-from subzero.diagnosis.hypotheses import log_prior
+from subzero.diagnosis.effects import START, catalogue
+from subzero.diagnosis.hypotheses import log_prior, named
 from subzero.diagnosis.probability import FURTHER, UNTRIED, Beliefs, folded
+from subzero.diagnosis.problem import Problem, entries_of
 from subzero.diagnosis.refit import secant
 from subzero.diagnosis.rules import large
-from subzero.diagnosis.screen import Screen
+from subzero.diagnosis.screen import Screen, look
 from subzero.diagnosis.setting import Setting
 
 
@@ -111,3 +112,27 @@ def test_a_bound_on_the_whole_value_follows_the_nominal_model():
     assert made.within(setting).low == pytest.approx(-0.09)
     quick = dataclasses.replace(made, nominal=lambda _: 0.02)
     assert quick.within(setting).low == 0.0, "a model below the least stays as it is"
+
+
+def test_a_large_effect_is_seen_from_afar_in_two_records(plant):
+    """Even wide tolerances are not close: every cause is tried at some sizes, in both records side by side."""
+    planted = plant(
+        lambda setting: catalogue(("heading",))["roll_stiffness"].apply(setting, -0.6), duration=12.0
+    )
+    effects = list(dict.fromkeys(one.effect for one in planted.problem.entries if one.record < 0))
+    both = Problem(records=planted.problem.records * 2, entries=entries_of(effects, START, 2))
+    zero = np.zeros(len(both.entries))
+    nominal = both.residual(zero), both.jacobian(zero)
+    seen = look(both, SimpleNamespace(r=nominal[0], z=zero, J=nominal[1]), nominal)
+    assert seen.far
+    assert seen.best(1, 1, np.inf) == [("roll_stiffness",)]
+    assert seen.count == len(named(both))
+
+
+def test_several_residuals_are_those_of_each(plant):
+    problem = plant(duration=6.0).problem
+    random = np.random.default_rng(2)
+    several = [0.01 * random.normal(size=len(problem.entries)) for _ in range(3)]
+    several = [np.where([one.parameter.low == 0.0 for one in problem.entries], abs(z), z) for z in several]
+    for z, r in zip(several, problem.residuals(several), strict=True):
+        assert np.array_equal(r, problem.residual(z))
