@@ -14,6 +14,7 @@ from .scores import (
     gain_of,
     is_foreign,
     is_right,
+    is_right_as_told,
     names,
     number,
     of,
@@ -73,7 +74,7 @@ def _healthy(results: Sequence[Result]) -> list[Score]:
 
 def _overstated(results: Sequence[Result]) -> float:
     """Return how much more is stated than is right."""
-    return sum(first(one)[1] - is_right(one) for one in results) / max(len(results), 1)
+    return sum(first(one)[1] - is_right_as_told(one) for one in results) / max(len(results), 1)
 
 
 def _pairs(results: Sequence[Result]) -> list[Score]:

@@ -30,6 +30,9 @@ speed through the water, heading, yaw rate, pitch, roll, depth. Cases that ended
 * Gains are those of the fitted model on the *other* manoeuvre, flown by the truth without noise:
   G = (E_nominal − E)/E_nominal. "First" is the most probable of all hypotheses, pairs and strange forces included.
 
+* **Calibration** takes the most probable hypothesis as it is meant: with or without further causes that the record
+  cannot show, so that a second cause with D < 16 may be missing beside the first.
+
 Intervals are exact binomial ones. The advice for the next trial takes the full budget and is not in this run."""
 
 MISSED_WORDS = """Every case with D ≥ 16 whose truth does not come first, every healthy record with a name, and every

@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from subzero.diagnosis.hypotheses import named, places
-from subzero.diagnosis.problem import Problem
+from subzero.diagnosis.problem import Entry, Problem
 from subzero.diagnosis.verdict import Detectability
 
 WEAK = 1.0
@@ -21,19 +21,28 @@ SEEN = 4.0
 """A signal that would be seen."""
 
 
-def with_secants(problem: Problem, J: np.ndarray) -> np.ndarray:
-    """Return sensitivities of the nominal model with those of a whole effect for causes that do nothing when small."""
-    zero, J = np.zeros(len(problem.entries)), J.copy()
-    for k, entry in enumerate(problem.entries):
-        if (
-            entry.parameter.low == 0.0
-            and entry.record < 0
-            and np.linalg.norm(J[:, k]) * entry.parameter.scale < WEAK
-        ):
-            moved = zero.copy()
-            moved[k] = entry.parameter.scale
-            J[:, k] = np.nan_to_num(problem.change(zero, moved)) / entry.parameter.scale
+def with_secants(problem: Problem, J: np.ndarray, z: np.ndarray | None = None) -> np.ndarray:
+    """Return sensitivities at z (the nominal model, if none) with those of a whole effect, beside nothing else, for
+    causes that do nothing when small: they would act in the place of others, not on top of them.
+    """
+    zero = np.zeros(len(problem.entries))
+    here, J = zero if z is None else z, J.copy()
+    dull = [k for k, entry in enumerate(problem.entries) if _is_dull(entry, here[k], J[:, k])]
+    scales = [problem.entries[k].parameter.scale for k in dull]
+    moved = [
+        np.concatenate([zero[:k], [scale], zero[k + 1 :]]) for k, scale in zip(dull, scales, strict=True)
+    ]
+    r, *there = problem.residuals([zero, *moved])
+    for k, scale, r_k in zip(dull, scales, there, strict=True):
+        J[:, k] = np.nan_to_num(r - r_k) / scale
     return J
+
+
+def _is_dull(entry: Entry, value: float, column: np.ndarray) -> bool:
+    """Say whether a parameter at its bound seems to do nothing."""
+    parameter = entry.parameter
+    at_rest = entry.record < 0 and parameter.low == 0.0 and value < parameter.tolerance
+    return bool(at_rest and np.linalg.norm(column) * parameter.scale < WEAK)
 
 
 def marginal(problem: Problem, J: np.ndarray, kappa: float = 1.0) -> np.ndarray:

@@ -10,7 +10,7 @@ from subzero.diagnosis import rules
 from subzero.diagnosis.candidate import Candidate
 from subzero.diagnosis.detect import against, information, marginal
 from subzero.diagnosis.effect import Parameter
-from subzero.diagnosis.evidence import posterior
+from subzero.diagnosis.evidence import KAPPAS, log_sum, posterior
 from subzero.diagnosis.hypotheses import Ids, places, variances
 from subzero.diagnosis.problem import Problem
 from subzero.diagnosis.refit import Fit
@@ -36,9 +36,13 @@ def deviations(work: Work, best: Candidate) -> dict[str, tuple[float, float]]:
 
 
 def _spread(problem: Problem, candidate: Candidate) -> np.ndarray:
-    """Return the standard deviations of all entries in a candidate's fit (k,)."""
-    D = variances(problem.entries, candidate.ids, candidate.kappa)
-    return np.sqrt(np.diag(posterior(candidate.fit.quadratic, D).M))
+    """Return the standard deviations of all entries about a candidate's fit (k,), mixed over κ."""
+    log = {kappa: np.log(prior) + candidate.log_evidence[kappa] for kappa, prior in KAPPAS.items()}
+    square, total = np.zeros(len(problem.entries)), log_sum(list(log.values()))
+    for kappa, weight in log.items():
+        found = posterior(candidate.fit.quadratic, variances(problem.entries, candidate.ids, kappa))
+        square += np.exp(weight - total) * (np.diag(found.M) + (found.z - candidate.fit.z) ** 2)
+    return np.sqrt(square)
 
 
 def estimate(parameter: Parameter, nominal: float, mean: float, sd: float) -> Estimate:

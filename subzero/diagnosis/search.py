@@ -7,7 +7,7 @@ all tolerances wide → a point close to the data → linear evidence of everyth
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from itertools import chain
+from itertools import chain, combinations
 
 import numpy as np
 
@@ -37,8 +37,8 @@ BESIDE, INSTEAD, WORTH = 2, 3, -4.0
 """At most so many with a cause more, of a log posterior that adds at least WORTH; so many with another cause."""
 MOST_CAUSES, ROUNDS = 3, 4
 """Causes of a hypothesis, and rounds of growing."""
-LAST = 2
-"""Rounds of settling the best."""
+LAST, CLOSE = 3, 6.0
+"""Rounds of settling the best; so far behind it, in log posterior, a part of it counts no more."""
 
 
 @dataclass(kw_only=True, eq=False)
@@ -115,13 +115,19 @@ class Search:
             self.sharpen()
 
     def settle(self) -> None:
-        """Fit the best candidate again until it has converged, so that its numbers can be told."""
+        """Fit the best candidate again until it has converged, so that its numbers can be told; and what it has over
+        the same with a cause less, if that might still catch up.
+        """
+        tried: set[Ids] = set()
         for _ in range(LAST):
             best = self.best()
-            if best.fit.converged:
-                return
-            self._say(0.75, "settling", best.ids)
-            self._again(best)
+            parts = combinations(best.ids, max(len(best.ids) - 1, 0))
+            open_ = [one for ids in (best.ids, *parts) if (one := self.candidates.get(ids)) and ids not in tried
+                     and not one.fit.converged and one.hope > best.log_posterior - CLOSE]  # fmt: skip
+            for one in open_:
+                tried.add(one.ids)
+                self._say(0.75, "settling", one.ids)
+                self._again(one)
 
     def fit(self, ids: Ids, start: Fit | None = None) -> None:
         """Fit a hypothesis with real runs and the sensitivities of another fit, unless it was fitted."""

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from subzero.diagnosis.candidate import Candidate
-from subzero.diagnosis.detect import separation
+from subzero.diagnosis.detect import separation, with_secants
 from subzero.diagnosis.effects.sensors import SPECS
 from subzero.diagnosis.estimates import causes, deviations, large, name, rivals
 from subzero.diagnosis.extending import Extension, ahead, gained, of_causes, of_nothing, of_sudden, of_unknown
@@ -50,7 +50,8 @@ def _large(work: Work, best: Candidate) -> tuple[bool, float]:
     ids = large(work, best)
     if not ids:
         return False, 0.0
-    return True, separation(work.problem, best.fit.J, best.fit.z, ids, best.kappa)[0]
+    J = with_secants(work.problem, best.fit.J, best.fit.z)
+    return True, separation(work.problem, J, best.fit.z, ids, best.kappa)[0]
 
 
 def _extension(work: Work, verdict: str, best: Candidate) -> Extension:
@@ -108,7 +109,8 @@ def _contenders(work: Work, best: Candidate, left: list[Ids]) -> list[Ids]:
     """
     if len(left) > 1 or not best.ids:
         return left
-    rival = separation(work.problem, best.fit.J, best.fit.z, best.ids, best.kappa)[1]
+    J = with_secants(work.problem, best.fit.J, best.fit.z)
+    rival = separation(work.problem, J, best.fit.z, best.ids, best.kappa)[1]
     closest = () if rival == "none" else (rival,)
     work.search.fit(closest)
     return [*left, closest]
