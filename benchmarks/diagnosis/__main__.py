@@ -14,6 +14,7 @@ from rich.console import Console
 from subzero.compiled import cache_directory
 
 from .cases import Case, cases
+from .results import read
 from .sharing import Shared, share
 from .times import keep, kept, timed
 from .trial_of import Result, result_of
@@ -54,18 +55,12 @@ def benchmark(
     wanted = cases(seed)[: QUICK if quick else count]
     measure([case for case in wanted if case.index not in known], path, workers)
     if page:
+        from . import advice
         from .page import write_page
 
         if not quick:
             keep(path, timed(seed))
-        console.print(f"Written: {write_page(read(path), kept(path))}")
-
-
-def read(path: Path) -> list[Result]:
-    """Return the results that are there."""
-    if not path.exists():
-        return []
-    return [json.loads(line) for line in path.read_text().splitlines() if line.endswith("}")]
+        console.print(f"Written: {write_page(read(path), kept(path), advice.kept(path))}")
 
 
 def measure(wanted: list[Case], path: Path, workers: int) -> None:

@@ -1,8 +1,8 @@
 """Does the next trial decide? The advice is taken and flown by the truth: ``python -m benchmarks.diagnosis.advice``.
 
-For every twin the truth and its best rival are left. The trial that is proposed for these two is flown by the truth,
-run by the other formulation, and both records are diagnosed together. Whether any trial of the library could decide
-at all is asked of all of them (D ≥ 16).
+Of single causes that the benchmark left undecided on fig6, the truth and its best rival are taken. The trial that is
+proposed for these two is flown by the truth, run by the other formulation, and both records are diagnosed together.
+Whether any trial of the library could decide at all is asked of all of them (D ≥ 16).
 """
 
 from __future__ import annotations
@@ -28,6 +28,7 @@ from .cases import Case, Made, cases
 from .draws import with_values
 from .held_out import STARTS
 from .manoeuvres import CHANNELS, times
+from .results import read
 from .sharing import Shared, share
 from .trial_of import Result, posed
 from .truth import NoRunError, noisy, shown_by
@@ -41,24 +42,31 @@ _shared: list[Shared] = []
 
 @app.default
 def benchmark(*, count: int = 20, workers: int = 2, seed: int = 5, results: Path | None = None) -> None:
-    """Take the advice for twins, and keep what came of it for the page of the benchmark.
+    """Take the advice, and keep what came of it for the page of the benchmark.
 
     Args:
-        count: of twins.
+        count: of undecided cases.
         workers: processes.
         seed: of all cases.
         results: the benchmark's results; the advice is kept beside them.
     """
-    path = beside(results or cache_directory().parent / "diagnosis_benchmark.jsonl")
-    twins = [case for case in cases(seed) if case.kind == "twin"][:count]
+    known = results or cache_directory().parent / "diagnosis_benchmark.jsonl"
+    path, undecided = beside(known), {one["index"] for one in read(known) if _is_open(one)}
+    asked = [case for case in cases(seed) if case.index in undecided][:count]
     with (
         multiprocessing.get_context("fork").Pool(workers, initializer=_begin) as pool,
         path.open("w") as file,
     ):
-        for one in pool.imap_unordered(_measured, twins):
+        for one in pool.imap_unordered(_measured, asked):
             file.write(json.dumps(one) + "\n")
             file.flush()
             print(one)
+
+
+def _is_open(one: Result) -> bool:
+    """Say whether a result is an undecided single cause on fig6."""
+    single = one["kind"] in ("single", "twin") and one["manoeuvre"] == "fig6"
+    return single and one.get("verdict") == UNDECIDED
 
 
 def beside(results: Path) -> Path:
@@ -84,8 +92,8 @@ def _measured(case: Case) -> Result:
     assert work is not None
     pair = _pair(case, work)
     found: Result = {"index": case.index, "truth": case.causes[0], "before": before.verdict}
-    if before.verdict != UNDECIDED or len(pair) < 2:
-        return {**found, "skipped": "nothing is left to decide"}
+    if len(pair) < 2:
+        return {**found, "skipped": "nothing else was fitted"}
     best = {name: view.discrimination() for name, view in outlooks(work.problem, pair)}
     found |= {"rival": " + ".join(pair[1].ids) or "none", "library": max(best.values()),
               "able": max(best, key=lambda name: best[name])}  # fmt: skip

@@ -8,25 +8,35 @@ from pathlib import Path
 
 import numpy as np
 
+from .advice import decided
 from .cases import SHARES
 from .figures_of import rows
 from .pictures import FIGURES, draw
 from .scores import CLEAR, Result, Score, first, is_right, names, of, smallest_D, truth, wrongly_sure
 from .times import LIMITS, Row
-from .words import ALONE_WORDS, CONFOUNDED_WORDS, HEAD, LIMITS_WORDS, MISSED_WORDS, TIMES_WORDS, WHY
+from .words import (
+    ADVICE_WORDS,
+    ALONE_WORDS,
+    CONFOUNDED_WORDS,
+    HEAD,
+    LIMITS_WORDS,
+    MISSED_WORDS,
+    TIMES_WORDS,
+    WHY,
+)
 
 PAGE = FIGURES.parent / "diagnosis_benchmark.md"
 CONFOUNDED = 9.0
 MARK = {True: "pass", False: "**FAIL**", None: ""}
 
 
-def write_page(results: Sequence[Result], alone: Sequence[Row] = ()) -> Path:
+def write_page(results: Sequence[Result], alone: Sequence[Row] = (), advice: Sequence[Result] = ()) -> Path:
     """Write the page and its figures, and return its path."""
     broken = [one for one in results if "error" in one]
     sound = [one for one in results if "error" not in one]
     draw(sound)
     parts = [_head(sound, broken), _scores(rows(sound)), _pictures(), _missed(sound), _confounded(sound),
-             _limits(sound), _times(sound, alone), _all_cases(sound)]  # fmt: skip
+             _limits(sound), _advice(advice), _times(sound, alone), _all_cases(sound)]  # fmt: skip
     PAGE.write_text("\n\n".join(parts) + "\n")
     return PAGE
 
@@ -131,6 +141,25 @@ def _limit(row: list | None) -> tuple[str, str]:
     return ", ".join(
         f"{name} {size:.3g}" for name, size in smallest.items()
     ), f"{signal:.1f}, {D:.0f} ({rival})"
+
+
+def _advice(results: Sequence[Result]) -> str:
+    """Return what came of flying the trials that were proposed."""
+    able, good = decided(results)
+    body = [[str(one["index"]), f"`{one['truth']}`", f"`{one['rival']}`", f"{one['able']} ({one['library']:.0f})",
+             one["advice"] + (f" + {one['channel']}" if one["channel"] else ""), f"{one['promised']:.2f}",
+             f"{one['odds']:.3f}"] for one in results if "odds" in one]  # fmt: skip
+    header = [
+        "case",
+        "truth",
+        "rival",
+        "best of the library (D)",
+        "advice",
+        "promised",
+        "truth : both, afterwards",
+    ]
+    share = f"**{len(good)} of {len(able)}** pairs that a trial of the library can decide are decided (target: 80 %)."
+    return f"## The next trial\n\n{ADVICE_WORDS}\n\n{share}\n\n" + _table(header, body)
 
 
 def _times(results: Sequence[Result], alone: Sequence[Row]) -> str:

@@ -33,7 +33,7 @@ speed through the water, heading, yaw rate, pitch, roll, depth. Cases that ended
 * **Calibration** takes the most probable hypothesis as it is meant: with or without further causes that the record
   cannot show, so that a second cause with D < 16 may be missing beside the first.
 
-Intervals are exact binomial ones. The advice for the next trial takes the full budget and is not in this run."""
+Intervals are exact binomial ones."""
 
 MISSED_WORDS = """Every case with D ≥ 16 whose truth does not come first, every healthy record with a name, and every
 wrong name with p ≥ 0.95."""
@@ -44,6 +44,11 @@ CONFOUNDED_WORDS = (
 
 LIMITS_WORDS = """The deviation that has a signal of 4, in its unit; the signal of one effect scale, and D against the
 closest rival. D grows with the square of the size."""
+
+ADVICE_WORDS = """Single causes that were left undecided on `fig6`, by `python -m benchmarks.diagnosis.advice`. The trial
+that is proposed for the truth and its best rival is flown by the truth, and both records are diagnosed together.
+Decided: the truth has at least 95 % of what both have. Where no trial of the library has D ≥ 16, nothing can be asked
+of the advice."""
 
 TIMES_WORDS = """Of a diagnosis up to its verdict with one thread, two processes beside other work on two cores; runs
 around the nominal model are shared between the cases of a process: a single diagnosis takes some seconds more."""
