@@ -45,7 +45,7 @@ CONFOUNDED_WORDS = (
 LIMITS_WORDS = """The deviation that has a signal of 4, in its unit; the signal of one effect scale, and D against the
 closest rival. D grows with the square of the size."""
 
-ADVICE_WORDS = """Single causes that were left undecided on `fig6`, by `python -m benchmarks.diagnosis.advice`. The trial
+ADVICE_WORDS = """Single causes left undecided on `fig6`, by `python -m benchmarks.diagnosis.advice`. The trial
 that is proposed for the truth and its best rival is flown by the truth, and both records are diagnosed together.
 Decided: the truth has at least 95 % of what both have. Where no trial of the library has D ≥ 16, nothing can be asked
 of the advice."""
