@@ -16,6 +16,7 @@ from subzero.diagnosis.verdict import (
     Unknown,
     Verdict,
 )
+from subzero.missing_force import FEATURES
 
 HEADLINES = {
     NOTHING_WRONG: "Nothing is wrong beyond tolerance",
@@ -110,7 +111,10 @@ def unknown(one: Unknown) -> str:
 def formula_term(term: tuple[str, str, float, float, float]) -> str:
     """Return a term of a formula in words, with the interval of its coefficient."""
     words, feature, value, low, high = term
-    return f"{value:.3g} ({low:.3g} to {high:.3g}) × {feature}, {words}"
+    size = f"{value:.3g} ({low:.3g} to {high:.3g})"
+    if feature == "constant":
+        return f"{size}, constant{words.removeprefix(FEATURES['constant'].words)}"
+    return f"{size} × {feature}, {words}"
 
 
 def next_trial(one: NextTrial) -> str:
