@@ -11,6 +11,7 @@ import json
 import multiprocessing
 import os
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import cyclopts
@@ -24,7 +25,7 @@ from subzero.diagnosis.trial_library import LIBRARY, flown
 from subzero.diagnosis.verdict import UNDECIDED, NextTrial
 from subzero.diagnosis.work import Work
 
-from .cases import Case, Made, cases
+from .cases import AFTER, Case, Made, cases
 from .draws import with_values
 from .held_out import STARTS
 from .manoeuvres import CHANNELS, times
@@ -42,7 +43,7 @@ _shared: list[Shared] = []
 
 @app.default
 def benchmark(*, count: int = 20, workers: int = 2, seed: int = 5, results: Path | None = None) -> None:
-    """Take the advice, and keep what came of it for the page of the benchmark.
+    """Take the advice, and keep what came of it for the page of the benchmark; an interrupted run goes on.
 
     Args:
         count: of undecided cases.
@@ -52,15 +53,17 @@ def benchmark(*, count: int = 20, workers: int = 2, seed: int = 5, results: Path
     """
     known = results or cache_directory().parent / "diagnosis_benchmark.jsonl"
     path, undecided = beside(known), {one["index"] for one in read(known) if _is_open(one)}
+    done = {one["index"] for one in kept(known)}
     asked = [case for case in cases(seed) if case.index in undecided][:count]
+    asked = [case for case in asked if case.index not in done]
     with (
         multiprocessing.get_context("fork").Pool(workers, initializer=_begin) as pool,
-        path.open("w") as file,
+        path.open("a") as file,
     ):
         for one in pool.imap_unordered(_measured, asked):
             file.write(json.dumps(one) + "\n")
             file.flush()
-            print(one)
+            print(one, flush=True)
 
 
 def _is_open(one: Result) -> bool:
@@ -120,7 +123,9 @@ def _flown(case: Case, made: Made, advice: NextTrial) -> Logged:
     """Return the record of a trial that was proposed, flown by the truth."""
     setting, channels = _trial(made.logged.setting, advice), (*CHANNELS, *filter(None, [advice.channel]))
     values = {name: one for name, one in made.values.items() if not name.startswith(STARTS)}
-    shown, _ = shown_by(with_values(setting, values), times(setting), channels)
+    true = with_values(setting, values)
+    true = replace(true, trial=replace(true.trial, duration=true.trial.duration + AFTER))
+    shown, _ = shown_by(true, times(setting), channels)
     record = noisy(shown, times(setting), case.rng(attempt=999))
     return Logged(record=record, setting=setting, name="advised")
 
