@@ -169,15 +169,20 @@ def test_a_challenge_is_written_with_what_to_do_next_and_its_answer_is_told_when
     def challenge(scenario, seed, folder):
         (folder / "record.csv").write_text(f"{scenario} {seed}")
 
-    module = types.ModuleType("subzero.diagnosis.challenge")
-    vars(module).update(challenge=challenge, reveal=lambda folder: f"in {folder}: the rudder servo lags")
-    monkeypatch.setitem(sys.modules, "subzero.diagnosis.challenge", module)
+    parts = {
+        "challenge": {"challenge": challenge},
+        "answer": {"reveal": lambda folder: f"in {folder}: the rudder lags"},
+    }
+    for name, contents in parts.items():
+        module = types.ModuleType(f"subzero.diagnosis.{name}")
+        vars(module).update(contents)
+        monkeypatch.setitem(sys.modules, module.__name__, module)
     assert main(["challenge", "--scenario", "fig6", "--seed", "7", "--out", "hidden"]) == FINE
     said = capsys.readouterr().out
     assert "subzero diagnose hidden/record.csv --scenario fig6" in said
     assert "subzero challenge --reveal hidden" in said
     assert main(["challenge", "--reveal", "hidden"]) == FINE
-    assert "in hidden: the rudder servo lags" in capsys.readouterr().out
+    assert "in hidden: the rudder lags" in capsys.readouterr().out
 
 
 def test_nothing_to_reveal_is_a_mistake(engine, capsys):
