@@ -107,6 +107,7 @@ def _of(problem: Problem, M: np.ndarray, J: np.ndarray, one: str, others: list[s
         rival=rival,
         discrimination=D,
         cosine=cosine,
+        units={problem.entries[k].parameter.name: problem.entries[k].parameter.unit for k in at},
     )
 
 

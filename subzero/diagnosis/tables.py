@@ -40,11 +40,14 @@ def detectable(verdict: Verdict | Sequence[Detectability], *, every: bool = Fals
 
 
 def _smallest(one: Detectability) -> str:
+    """Return the smallest deviations that are seen, with their units; of a share there is none."""
     if one.signal < INVISIBLE:
         return NOTHING
-    return (
-        "; ".join(f"{name.replace('_', ' ')} {value:.3g}" for name, value in one.smallest.items()) or NOTHING
-    )
+    units = {name: "" if unit == "1" else f" {unit}" for name, unit in one.units.items()}
+    sizes = [
+        f"{name.replace('_', ' ')} {size:.3g}{units.get(name, '')}" for name, size in one.smallest.items()
+    ]
+    return "; ".join(sizes) or NOTHING
 
 
 def _told(one: Detectability) -> str:

@@ -81,6 +81,7 @@ class Detectability:
         rival: the cause that looks most alike.
         discrimination: D against it at one effect scale. [-]
         cosine: how much alike, 0 to 1.
+        units: of `smallest`, by parameter; "1" for a share.
     """
 
     id: str
@@ -89,6 +90,7 @@ class Detectability:
     rival: str
     discrimination: float
     cosine: float
+    units: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, kw_only=True)

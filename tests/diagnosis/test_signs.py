@@ -10,7 +10,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from subzero.diagnosis.candidate import Candidate
-from subzero.diagnosis.detect import with_secants
+from subzero.diagnosis.detect import detectability, with_secants
 from subzero.diagnosis.effects import START, catalogue
 from subzero.diagnosis.estimates import deviations
 from subzero.diagnosis.evidence import Quadratic, posterior
@@ -18,6 +18,7 @@ from subzero.diagnosis.hypotheses import variances
 from subzero.diagnosis.noise import Noise
 from subzero.diagnosis.problem import Observed, Problem, entries_of
 from subzero.diagnosis.response import respond
+from subzero.diagnosis.tables import detectable
 
 from .conftest import CHANNELS, nominal
 
@@ -113,3 +114,13 @@ def test_an_interval_is_that_of_the_scale_that_is_believed(sure):
     told = deviations(SimpleNamespace(problem=SimpleNamespace(entries=entries)), one)
     tolerance = np.array([entry.parameter.tolerance for entry in entries])
     assert_allclose([sd for _, sd in told.values()] * tolerance, np.sqrt(np.diag(found.M)), rtol=1e-8)
+
+
+def test_what_can_be_seen_has_its_unit():
+    made = problem(PLAIN)
+    found = {one.id: one for one in detectability(made, made.jacobian(np.zeros(len(made.entries))))}
+    rows = {row[0]: row[2] for row in detectable(tuple(found.values()), every=True).rows}
+    assert rows["rudder_offset"].endswith(" degree")
+    assert rows["rudder_lag"].startswith("time constant ")
+    assert rows["rudder_lag"].endswith(" s")
+    assert not rows["hull_drag"].endswith(" 1"), "a share has no unit"
