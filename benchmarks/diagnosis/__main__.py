@@ -40,7 +40,7 @@ def benchmark(
 
     Args:
         quick: the first 40 cases only.
-        count: the first so many of the 880 cases.
+        count: the first so many of the 800 cases.
         workers: processes.
         resume: keep the results of an interrupted run, and go on behind them.
         seed: of all cases.

@@ -80,11 +80,11 @@ def cases(seed: int = 5, scale: float = 1.0) -> list[Case]:
 
 
 def _case(seed: int, index: int, kind: str, number: int) -> Case:
-    """Return a case: every effect in turn, three quarters of them on `fig6`, the others on `rich`."""
+    """Return a case: every effect in turn, four fifths of them on `fig6`, the others on `rich`."""
     rng = np.random.default_rng([seed, 1 + list(SHARES).index(kind), number // len(ids())])
     names = rng.permutation(ids()).tolist()
     one, other = names[number % len(names)], names[(number + 7) % len(names)]
-    on_rich = kind not in ("twin", "degraded") and number % 4 == 1
+    on_rich = kind not in ("twin", "degraded") and number % 5 == 1
     how = DEGRADED[number % len(DEGRADED)] if kind == "degraded" else ""
     alone = kind == "single" or (kind == "degraded" and (number // len(DEGRADED)) % 2 == 1)
     causes = (one,) if alone else (one, other) if kind == "pair" else ()

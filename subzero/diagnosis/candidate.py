@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import norm
 
-from subzero.diagnosis.evidence import KAPPAS, log_sum, posterior
+from subzero.diagnosis.evidence import KAPPAS, Scale, Scales, log_sum, posterior
 from subzero.diagnosis.hypotheses import Ids, log_prior, named, variances
 from subzero.diagnosis.problem import Entry, Problem
 from subzero.diagnosis.refit import Fit
@@ -37,6 +37,21 @@ class Candidate:
     def hope(self) -> float:
         """The log posterior that a better fit might have."""
         return self.log_posterior + min(self.fit.promise, MOST_HOPE)
+
+    @property
+    def log_mixed(self) -> float:
+        """The log evidence, mixed over κ."""
+        return log_sum([np.log(prior) + self.log_evidence[kappa] for kappa, prior in KAPPAS.items()])
+
+    def scales(self, problem: Problem) -> Scales:
+        """Return what the hypothesis makes of κ: what else there is may be what asked for a wide one."""
+        return {
+            kappa: Scale(
+                float(np.log(prior)) + self.log_evidence[kappa] - self.log_mixed,
+                variances(problem.entries, self.ids, kappa),
+            )
+            for kappa, prior in KAPPAS.items()
+        }
 
     @property
     def kappa(self) -> float:

@@ -9,13 +9,25 @@ its diagonal only, so that all pairs cost a few products of 2 × 2 matrices each
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 KAPPAS = {1.0: 0.6, 2.0: 0.3, 4.0: 0.1}
 """κ, how much wider than declared the tolerances are → its prior probability."""
+
+
+class Scale(NamedTuple):
+    """A κ, given a hypothesis and the data: its log probability, and the prior variances under it (k,)."""
+
+    log_weight: float
+    D: np.ndarray
+
+
+Scales = Mapping[float, Scale]
+"""κ → what is made of it."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -96,6 +108,12 @@ def discrimination(G: np.ndarray, step: np.ndarray, free: np.ndarray) -> float:
     own = G @ step
     answer = np.linalg.solve(G[np.ix_(free, free)], own[free])
     return float(step @ own - own[free] @ answer)
+
+
+def mixed(scales: Scales, gains: Mapping[float, float]) -> tuple[float, float]:
+    """Return a log gain mixed over κ, from those under every κ, and the κ that is most probable with it."""
+    log = {kappa: scales[kappa].log_weight + gain for kappa, gain in gains.items()}
+    return log_sum(list(log.values())), max(log, key=lambda kappa: log[kappa])
 
 
 def log_sum(values: Sequence[float] | np.ndarray) -> float:

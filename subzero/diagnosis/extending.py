@@ -88,7 +88,7 @@ def _told(unknown: Unknown, formula: Formula) -> Unknown:
 def _recovered(work: Work, foreign: Foreign) -> Recovered:
     """Return a force or a drift, fitted beside the causes that it stands beside."""
     base = work.search.candidates[foreign.beside]
-    D = variances(work.problem.entries, base.ids, base.kappa)
+    D = variances(work.problem.entries, base.ids, foreign.what.kappa)
     kind, _, which = foreign.id.partition(":")
     if kind + ":" == FORCE:
         return recover(work.problem, base.fit, which, D)
@@ -104,7 +104,7 @@ def of_sudden(work: Work, key: str, probability: float) -> Extension:
         with_begun(work.problem, what),
         what.effect.parameters,
     )
-    D = np.concatenate([variances(work.problem.entries, (), none.kappa), [p.scale**2 for p in parameters]])
+    D = np.concatenate([variances(work.problem.entries, (), what.kappa), [p.scale**2 for p in parameters]])
     start = np.concatenate([none.fit.z, what.mean])
     fit = refit(more, start, more.jacobian(start), D, most_fresh=2)
     sd, k = np.sqrt(np.diag(posterior(fit.quadratic, D).M)), len(work.problem.entries)

@@ -8,11 +8,24 @@ import numpy as np
 
 from subzero.diagnosis.candidate import Candidate
 from subzero.diagnosis.evidence import KAPPAS, log_sum
-from subzero.diagnosis.hypotheses import PRIOR, Ids, variances
+from subzero.diagnosis.hypotheses import PRIOR, Ids
+from subzero.diagnosis.one_term import one_terms
 from subzero.diagnosis.search import Search
 from subzero.diagnosis.sudden import Begun, scan
-from subzero.diagnosis.unknown import Suspect, all_columns, knots_of, suspects
+from subzero.diagnosis.unknown import (
+    FINE,
+    FORCE,
+    Knots,
+    Suspect,
+    all_columns,
+    force_columns,
+    knots_of,
+    suspects,
+)
+from subzero.missing_force import AXES
 
+ALIKE = 10.0
+"""Forces whose log posteriors differ by less are told apart with finer knots."""
 WORTH = 2.0
 """A force that raises the log posterior by this much is worth a closer look for sudden changes."""
 
@@ -40,16 +53,35 @@ class Foreign:
 def foreigners(search: Search) -> list[Foreign]:
     """Return what lies outside, most probable first: beside nothing, and beside the best causes."""
     problem, knots = search.problem, knots_of(search.problem)
-    columns = all_columns(problem, search.best().fit.z, knots)
-    found: list[Foreign] = []
-    for candidate in _bases(search):
-        D = variances(problem.entries, candidate.ids, candidate.kappa)
-        prior = np.log(PRIOR["unknown"] / len(columns))
-        found += [Foreign(beside=candidate.ids, what=one, log_posterior=candidate.log_posterior + one.log_gain + prior)
-                  for one in suspects(problem, columns, candidate.fit, D, knots)]  # fmt: skip
+    found = _suspected(search, all_columns(problem, search.best().fit.z, knots), knots)
+    alike = {one.id.removeprefix(FORCE) for one in _close(found) if one.id.startswith(FORCE)}
+    if len(alike) > 1:
+        finer = knots_of(problem, FINE)
+        columns = {
+            FORCE + axis: C for axis, C in force_columns(problem, search.best().fit.z, alike, finer).items()
+        }
+        found = [one for one in found if one.id not in columns] + _suspected(search, columns, finer)
     if max(one.log_posterior for one in found) > search.best().log_posterior - WORTH:
         found += _sudden(search)
     return sorted(found, key=lambda one: -one.log_posterior)
+
+
+def _suspected(search: Search, columns: dict[str, np.ndarray], knots: Knots) -> list[Foreign]:
+    """Return the forces and drifts of columns, beside nothing and beside the best causes."""
+    problem, count = search.problem, len(AXES) + len(search.problem.records[0].noise)
+    terms, prior = one_terms(problem, search.best().fit.z, knots), np.log(PRIOR["unknown"] / count)
+    found: list[Foreign] = []
+    for candidate in _bases(search):
+        scales = candidate.scales(problem)
+        found += [Foreign(beside=candidate.ids, what=one, log_posterior=candidate.log_posterior + one.log_gain + prior)
+                  for one in suspects(problem, columns, candidate.fit, scales, knots, terms)]  # fmt: skip
+    return found
+
+
+def _close(found: list[Foreign]) -> list[Foreign]:
+    """Return what is about as probable as the best."""
+    best = max(one.log_posterior for one in found)
+    return [one for one in found if one.log_posterior > best - ALIKE]
 
 
 def _bases(search: Search) -> list[Candidate]:
@@ -65,11 +97,10 @@ def _sudden(search: Search) -> list[Foreign]:
     able = [effect for effect in effects if effect.sudden]
     found = []
     for record in range(len(problem.records)):
-        D = variances(problem.entries, (), none.kappa)
         times = max(float(problem.records[record].time[-1]) / 2.0, 1.0)
         prior = np.log(PRIOR["unknown"] / (len(able) * times * len(problem.records)))
         found += [Foreign(beside=(), what=one, log_posterior=none.log_posterior + one.log_gain + prior)
-                  for one in scan(problem, none.fit, D, able, record)]  # fmt: skip
+                  for one in scan(problem, none.fit, none.scales(problem), able, record)]  # fmt: skip
     return found
 
 

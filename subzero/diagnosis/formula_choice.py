@@ -81,7 +81,7 @@ def _fixed(
     axis: str, terms: Sequence[Shape], data: Seen, to_knots: np.ndarray, amplitudes: Sequence[float]
 ) -> Formula:
     """Return the formula of given terms."""
-    scaled, every = [to_knots @ (term.columns / _rms(term)) for term in terms], tuple(range(len(terms)))
+    scaled, every = [to_knots @ (term.columns / size_of(term)) for term in terms], tuple(range(len(terms)))
     score = _score(every, terms, scaled, data, axis, amplitudes)
     return _formula(every, {every: score}, terms, scaled, data, axis, amplitudes)
 
@@ -114,7 +114,7 @@ def choose(
         axis: of the force.
         amplitudes: that are mixed. [N, N m]
     """
-    scaled = [to_knots @ (shape.columns / _rms(shape)) for shape in shapes]
+    scaled = [to_knots @ (shape.columns / size_of(shape)) for shape in shapes]
     scores: dict[tuple[int, ...], float] = {}
     kept: list[tuple[int, ...]] = [()]
     narrow: list[int] = list(range(len(shapes)))
@@ -129,7 +129,7 @@ def choose(
     return _formula(best, scores, shapes, scaled, data, axis, amplitudes)
 
 
-def _rms(shape: Shape) -> float:
+def size_of(shape: Shape) -> float:
     """Return the size of a shape where it is not 0."""
     inside = np.any(shape.columns != 0.0, axis=1)
     return float(np.sqrt(np.mean(shape.columns[inside] ** 2)))
@@ -165,12 +165,12 @@ def _score(
 
 
 def _log_prior(terms: Sequence[Shape], axis: str) -> float:
-    weights = [1.0 if term.feature in SENSIBLE[axis] else ODD for term in terms]
-    return float(
-        np.sum(np.log(weights))
-        + np.sum([term.log_prior for term in terms])
-        + (len(terms) - 1) * np.log(FURTHER)
-    )
+    return sum(shape_weight(term, axis) for term in terms) + (len(terms) - 1) * float(np.log(FURTHER))
+
+
+def shape_weight(shape: Shape, axis: str) -> float:
+    """Return how probable a shape is along an axis beforehand, as a logarithm, but for a common constant."""
+    return shape.log_prior + (0.0 if shape.feature in SENSIBLE[axis] else float(np.log(ODD)))
 
 
 def _own(chosen: tuple[int, ...], scaled: Sequence[np.ndarray], data: Seen) -> Seen:
@@ -207,7 +207,7 @@ def _formula(
     mean, sizes = covariance @ own.q, [shapes[i].columns.shape[1] for i in best]
     parts = np.split(np.arange(mean.size), np.cumsum(sizes)[:-1])
     order = sorted(range(len(best)), key=lambda j: -float(np.linalg.norm(mean[parts[j]])))
-    scale = np.concatenate([np.full(size, _rms(shapes[i])) for i, size in zip(best, sizes, strict=True)])
+    scale = np.concatenate([np.full(size, size_of(shapes[i])) for i, size in zip(best, sizes, strict=True)])
     places = np.concatenate([parts[j] for j in order])
     return Formula(
         axis=axis,

@@ -32,6 +32,13 @@ class Seen(NamedTuple):
     q: np.ndarray
 
 
+class Terms(NamedTuple):
+    """What a force may look like, as formulas of one term: values at the knots (n, terms), of size 1, and log prior."""
+
+    phi: np.ndarray
+    log_prior: np.ndarray
+
+
 class Shape(NamedTuple):
     """Prior of a process: amplitude [unit of f] and correlation time [s]."""
 
@@ -80,21 +87,28 @@ def log_gains(data: Seen, R: np.ndarray, amplitudes: Sequence[float]) -> np.ndar
     return np.sum(-0.5 * np.log1p(a2 * values) + 0.5 * a2 * y**2 / (1.0 + a2 * values), axis=1)
 
 
-def log_evidence_unknown(
+def log_evidence_process(
     data: Seen,
     times: np.ndarray,
     groups: np.ndarray,
     amplitudes: Sequence[float],
     *,
     drift: bool = False,
-) -> tuple[float, Shape]:
-    """Return log evidence over that of f = 0, amplitudes and correlation times mixed; and which of them fits best."""
+) -> float:
+    """Return the log evidence of a process over that of f = 0, amplitudes and correlation times mixed."""
     lasting = DRIFT_TIMES if drift else CORRELATION_TIMES
     table = np.array(
         [log_gains(data, correlation(times, groups, T, smooth=drift), amplitudes) for T in lasting]
     )
-    i, j = divmod(int(np.argmax(table)), table.shape[1])
-    return log_sum(table.ravel()) - float(np.log(table.size)), Shape(amplitudes[j], lasting[i])
+    return log_sum(table.ravel()) - float(np.log(table.size))
+
+
+def log_evidence_term(data: Seen, terms: Terms, amplitudes: Sequence[float]) -> float:
+    """Return the log evidence of f = c φ over that of f = 0, c ~ N(0, a²); terms and amplitudes mixed."""
+    M = np.sum(terms.phi * (data.M @ terms.phi), axis=0)
+    q, a2 = terms.phi.T @ data.q, np.square(amplitudes)[:, None]
+    table = 0.5 * a2 * q**2 / (1.0 + a2 * M) - 0.5 * np.log1p(a2 * M) + terms.log_prior
+    return log_sum(table.ravel()) - float(np.log(len(amplitudes)))
 
 
 def modes(times: np.ndarray, groups: np.ndarray, shape: Shape) -> np.ndarray:

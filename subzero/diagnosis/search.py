@@ -128,6 +128,7 @@ class Search:
                 tried.add(one.ids)
                 self._say(0.75, "settling", one.ids)
                 self._again(one)
+        self._nothing()
 
     def fit(self, ids: Ids, start: Fit | None = None) -> None:
         """Fit a hypothesis with real runs and the sensitivities of another fit, unless it was fitted."""
@@ -230,6 +231,15 @@ class Search:
         if known is None or found.objective < known.fit.objective - 0.1:
             self._keep(ids, found)
             self.raced.discard(ids)
+
+    def _nothing(self) -> None:
+        """Fit "nothing is wrong" from where the best fit is, if that explains more: what is outside is beside it."""
+        best, none = self.best(), self.candidates[()]
+        for kappa in sorted({best.kappa, none.kappa}) if best.ids else ():
+            D = variances(self.problem.entries, (), kappa)
+            fit = refit(self.problem, best.fit.z, best.fit.J, D, most_fresh=0, made_at=best.fit.made_at)
+            if candidate_of(self.problem, (), fit).log_posterior > self.candidates[()].log_posterior:
+                self._keep((), fit)
 
     def _settled(self, fit: Fit) -> bool:
         """Say whether a fit has converged, close to where its sensitivities were made."""

@@ -15,6 +15,7 @@ from functools import partial
 import numpy as np
 
 from subzero.diagnosis.effect import Effect
+from subzero.diagnosis.evidence import Scales, mixed
 from subzero.diagnosis.latent import Seen, seen
 from subzero.diagnosis.problem import Entry, Problem
 from subzero.diagnosis.refit import Fit
@@ -59,8 +60,9 @@ class Begun:
         effect: as it holds throughout.
         time: when it begins. [s]
         record: in which record; a sudden effect is an event of one trial.
-        log_gain: log evidence over that of no such effect.
+        log_gain: log evidence over that of no such effect, mixed over κ.
         mean: deviations of its parameters. [their unit]
+        kappa: the most probable κ; mean is under it.
     """
 
     effect: Effect
@@ -68,6 +70,7 @@ class Begun:
     record: int
     log_gain: float
     mean: np.ndarray
+    kappa: float
 
     @property
     def begun(self) -> Effect:
@@ -82,23 +85,23 @@ def times_of(problem: Problem, record: int, spacing: float = COARSE) -> list[flo
 
 
 def scan(
-    problem: Problem, fit: Fit, D: np.ndarray, effects: Sequence[Effect], record: int = 0, *, best: int = 3
+    problem: Problem, fit: Fit, scales: Scales, effects: Sequence[Effect], record: int = 0, *, best: int = 3
 ) -> list[Begun]:
     """Return every sudden effect at its best time, most probable first; the `best` of them with finer times.
 
     Args:
         problem: records and parameters.
         fit: close to the data.
-        D: prior variances of its entries (k,).
+        scales: κ → its log weight and the prior variances of the entries.
         effects: of the catalogue; those that are not sudden are left out.
         record: in which they begin.
         best: how many are tried on the finer grid.
     """
     able = [effect for effect in effects if effect.sudden]
     coarse = times_of(problem, record)
-    found = _strongest(_tried(problem, fit, D, [(one, time) for one in able for time in coarse], record))
+    found = _strongest(_tried(problem, fit, scales, [(one, time) for one in able for time in coarse], record))
     finer = [(one.effect, time) for one in found[:best] for time in _around(one.time, coarse)]
-    return _strongest(found + _tried(problem, fit, D, finer, record))
+    return _strongest(found + _tried(problem, fit, scales, finer, record))
 
 
 def _around(time: float, coarse: list[float]) -> list[float]:
@@ -115,18 +118,21 @@ def _strongest(found: list[Begun]) -> list[Begun]:
 
 
 def _tried(
-    problem: Problem, fit: Fit, D: np.ndarray, pairs: list[tuple[Effect, float]], record: int
+    problem: Problem, fit: Fit, scales: Scales, pairs: list[tuple[Effect, float]], record: int
 ) -> list[Begun]:
     """Return the linear evidence of effects that begin at times."""
     q, whole = fit.quadratic, fit.r + fit.J @ fit.z
     made = columns(problem, fit.z, pairs, record)
     sizes = np.cumsum([0, *(C.shape[1] for C in made)])
-    data = seen(q.A, q.b, D, fit.J, np.hstack(made), whole)
+    data = {kappa: seen(q.A, q.b, one.D, fit.J, np.hstack(made), whole) for kappa, one in scales.items()}
     found = []
     for (effect, time), first, last in zip(pairs, sizes[:-1], sizes[1:], strict=True):
-        own = Seen(data.M[first:last, first:last], data.q[first:last])
-        gain, mean = _gain(own, np.array([parameter.scale**2 for parameter in effect.parameters]))
-        found.append(Begun(effect=effect, time=time, record=record, log_gain=gain, mean=mean))
+        variance, own = np.array([parameter.scale**2 for parameter in effect.parameters]), slice(first, last)
+        gains = {kappa: _gain(Seen(all.M[own, own], all.q[own]), variance) for kappa, all in data.items()}
+        log, best = mixed(scales, {kappa: gain for kappa, (gain, _) in gains.items()})
+        found.append(
+            Begun(effect=effect, time=time, record=record, log_gain=log, mean=gains[best][1], kappa=best)
+        )
     return found
 
 

@@ -9,7 +9,7 @@ drifts is the same in one channel, without a run.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import NamedTuple
@@ -18,11 +18,13 @@ import numpy as np
 
 from subzero.diagnosis.effect import Effect, Parameter
 from subzero.diagnosis.effects.sensors import SPECS
+from subzero.diagnosis.evidence import Scales, log_sum, mixed
 from subzero.diagnosis.latent import (
     SHARES,
     Seen,
-    Shape,
-    log_evidence_unknown,
+    Terms,
+    log_evidence_process,
+    log_evidence_term,
     seen,
 )
 from subzero.diagnosis.problem import Entry, Problem
@@ -62,7 +64,7 @@ def knots_of(problem: Problem, spacing: float = SPACING) -> Knots:
 def usual(setting: Setting, axis: str) -> float:
     """Return the size of a usual force on an axis: the hull's drag at 1 m/s; a moment by a lever. [N, N m]"""
     drag = setting.model.vehicle.numbers().axial_drag
-    lever = {"K": 0.02, "M": 0.2, "N": 0.2}.get(axis, 1.0)
+    lever = {"K": 0.02, "M": 0.1, "N": 0.1}.get(axis, 1.0)
     return drag * lever
 
 
@@ -137,19 +139,22 @@ class Suspect:
 
     Attributes:
         id: "unknown_force:X", "sensor_drift:heading".
-        log_gain: log evidence over that of none, amplitudes and correlation times mixed.
-        shape: the most probable of them.
-        data: what the data say of its knots.
+        log_gain: log evidence over that of none; amplitudes, correlation times, formulas of one term and κ mixed.
+        kappa: the most probable κ.
     """
 
     id: str
     log_gain: float
-    shape: Shape
-    data: Seen
+    kappa: float
 
 
 def suspects(
-    problem: Problem, columns: dict[str, np.ndarray], fit: Fit, D: np.ndarray, knots: Knots
+    problem: Problem,
+    columns: dict[str, np.ndarray],
+    fit: Fit,
+    scales: Scales,
+    knots: Knots,
+    terms: Mapping[str, Terms] | None = None,
 ) -> list[Suspect]:
     """Return every force and drift of `columns` (id → (m, n)), in the linear problem around a fit, most probable first.
 
@@ -157,18 +162,29 @@ def suspects(
         problem: of the columns.
         columns: as of `all_columns`.
         fit: that the columns were made close to.
-        D: prior variances of its entries, of the κ in question (k,).
+        scales: κ → its log weight and the prior variances of the entries.
         knots: of the columns.
+        terms: axis → what a force on it may look like beside a process.
     """
     q, whole = fit.quadratic, fit.r + fit.J @ fit.z
     found = []
     for name, C in columns.items():
-        data = seen(q.A, q.b, D, fit.J, C, whole)
-        gain, shape = log_evidence_unknown(
-            data, knots.time, knots.record, _amplitudes(problem, name), drift=name.startswith(DRIFT)
-        )
-        found.append(Suspect(id=name, log_gain=gain, shape=shape, data=data))
+        gains = {
+            kappa: _log_gain(problem, name, seen(q.A, q.b, one.D, fit.J, C, whole), knots, terms or {})
+            for kappa, one in scales.items()
+        }
+        gain, kappa = mixed(scales, gains)
+        found.append(Suspect(id=name, log_gain=gain, kappa=kappa))
     return sorted(found, key=lambda one: -one.log_gain)
+
+
+def _log_gain(problem: Problem, name: str, data: Seen, knots: Knots, terms: Mapping[str, Terms]) -> float:
+    """Return the log evidence of a force or a drift over that of none: a process, or as probably a formula."""
+    amplitudes, axis = _amplitudes(problem, name), name.partition(":")[2]
+    process = log_evidence_process(data, knots.time, knots.record, amplitudes, drift=name.startswith(DRIFT))
+    if name.startswith(DRIFT) or axis not in terms:
+        return process
+    return log_sum([process, log_evidence_term(data, terms[axis], amplitudes)]) - float(np.log(2.0))
 
 
 def all_columns(problem: Problem, z: np.ndarray, knots: Knots) -> dict[str, np.ndarray]:

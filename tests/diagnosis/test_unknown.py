@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from subzero.diagnosis.latent import Seen, log_evidence_unknown, log_gains
+from subzero.diagnosis.evidence import Scale
+from subzero.diagnosis.latent import Seen, log_evidence_process, log_gains
+from subzero.diagnosis.one_term import one_terms
 from subzero.diagnosis.recover import drifted, recover
 from subzero.diagnosis.unknown import (
     WORDS,
@@ -41,8 +43,8 @@ def healthy(plant):
 
 def found_in(planted):
     fit, knots = planted.fit(), knots_of(planted.problem)
-    columns = all_columns(planted.problem, fit.z, knots)
-    return fit, suspects(planted.problem, columns, fit, fit.D, knots)
+    columns, terms = all_columns(planted.problem, fit.z, knots), one_terms(planted.problem, fit.z, knots)
+    return fit, suspects(planted.problem, columns, fit, {1.0: Scale(0.0, fit.D)}, knots, terms)
 
 
 def test_a_healthy_record_has_no_unknown_force(healthy):
@@ -109,5 +111,5 @@ def test_the_evidence_is_that_of_a_normal_distribution():
     covariance = np.eye(40) + 0.7**2 * columns @ columns.T
     exact = -0.5 * np.linalg.slogdet(covariance)[1] - 0.5 * r @ (np.linalg.solve(covariance, r) - r)
     assert_allclose(log_gains(data, np.eye(5), [0.7])[0], exact, rtol=1e-4)
-    mixed, _ = log_evidence_unknown(data, np.arange(5.0), np.zeros(5), [1e-9])
+    mixed = log_evidence_process(data, np.arange(5.0), np.zeros(5), [1e-9])
     assert abs(mixed) < 1e-6, "no amplitude, no gain"
