@@ -66,3 +66,10 @@ def as_missing(formula: Formula) -> MissingForce:
 def samples_of(end: float) -> np.ndarray:
     """Return the times that shapes are sampled at. [s]"""
     return np.arange(0.0, end + 0.5 * SAMPLE, SAMPLE)
+
+
+def at_knots(times: np.ndarray, knots: np.ndarray) -> np.ndarray:
+    """Return the matrix (knots, times) that turns values at times into those of the hat functions closest to them."""
+    spacing = knots[1] - knots[0]
+    hats = np.maximum(1.0 - np.abs(np.subtract.outer(times, knots)) / spacing, 0.0)
+    return np.linalg.pinv(hats)

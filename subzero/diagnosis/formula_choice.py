@@ -16,33 +16,15 @@ from functools import partial
 import numpy as np
 
 from subzero.diagnosis.evidence import log_sum
-from subzero.diagnosis.formula import Formula, samples_of
+from subzero.diagnosis.formula import Formula, at_knots, samples_of
 from subzero.diagnosis.latent import SHARES, Seen
 from subzero.diagnosis.recover import Recovered
-from subzero.diagnosis.shapes import (
-    SAMPLE,
-    SWITCHED,
-    Shape,
-    decaying,
-    factors_along,
-    plain_shapes,
-    shifted,
-    waves,
-    windowed,
-)
+from subzero.diagnosis.shape_prior import all_shapes, shape_weight, size_of
+from subzero.diagnosis.shapes import SAMPLE, Shape, factors_along, shifted
 from subzero.diagnosis.unknown import usual
 
-SENSIBLE: Mapping[str, tuple[str, ...]] = {
-    "X": ("u|u|", "constant", "n|n|", "n u", "wet_length*u2", "wet_length", "time*u2"),
-    "Y": ("uv", "ur", "constant", "rudder_angle*u2", "v|v|", "u|u|"),
-    "Z": ("constant", "time", "uw", "uq", "stern_plane*u2", "w|w|", "u|u|", "depth"),
-    "K": ("n|n|", "constant", "p|p|", "u|u|"),
-    "M": ("uw", "uq", "constant", "stern_plane*u2", "q|q|", "u|u|"),
-    "N": ("uv", "ur", "rudder_angle*u2", "r|r|", "constant", "u|u|", "n|n|"),
-}
-"""What usually acts along an axis, and what is therefore more probable beforehand."""
-ODD, FURTHER = 0.25, 0.05
-"""Prior of another feature beside a sensible one; of a further term beside none."""
+FURTHER = 0.05
+"""Prior of a further term beside none."""
 KEPT, MOST = 10, 3
 """How many sums are carried on from one size to the next, and the most terms."""
 
@@ -86,22 +68,6 @@ def _fixed(
     return _formula(every, {every: score}, terms, scaled, data, axis, amplitudes)
 
 
-def all_shapes(factors: np.ndarray, times: np.ndarray) -> list[Shape]:
-    """Return every shape that is tried, from the factors of features at times."""
-    plain = plain_shapes(factors)
-    edges = np.arange(0.0, times[-1], 1.0 if times[-1] < 40.0 else 2.0)
-    able = [one for one in plain if one.feature in SWITCHED]
-    parts = [[*windowed(one, times, edges), *decaying(one, times, edges)] for one in able]
-    return plain + [shape for part in parts for shape in part] + waves(times)
-
-
-def at_knots(times: np.ndarray, knots: np.ndarray) -> np.ndarray:
-    """Return the matrix (knots, times) that turns values at times into those of the hat functions closest to them."""
-    spacing = knots[1] - knots[0]
-    hats = np.maximum(1.0 - np.abs(np.subtract.outer(times, knots)) / spacing, 0.0)
-    return np.linalg.pinv(hats)
-
-
 def choose(
     shapes: Sequence[Shape], data: Seen, to_knots: np.ndarray, axis: str, amplitudes: Sequence[float]
 ) -> Formula:
@@ -127,12 +93,6 @@ def choose(
         narrow = _narrow(narrow, ranked, shapes) if size == 1 else narrow
     best = max(scores, key=lambda one: scores[one])
     return _formula(best, scores, shapes, scaled, data, axis, amplitudes)
-
-
-def size_of(shape: Shape) -> float:
-    """Return the size of a shape where it is not 0."""
-    inside = np.any(shape.columns != 0.0, axis=1)
-    return float(np.sqrt(np.mean(shape.columns[inside] ** 2)))
 
 
 def _different(ranked: list[tuple[int, ...]], shapes: Sequence[Shape]) -> list[tuple[int, ...]]:
@@ -166,11 +126,6 @@ def _score(
 
 def _log_prior(terms: Sequence[Shape], axis: str) -> float:
     return sum(shape_weight(term, axis) for term in terms) + (len(terms) - 1) * float(np.log(FURTHER))
-
-
-def shape_weight(shape: Shape, axis: str) -> float:
-    """Return how probable a shape is along an axis beforehand, as a logarithm, but for a common constant."""
-    return shape.log_prior + (0.0 if shape.feature in SENSIBLE[axis] else float(np.log(ODD)))
 
 
 def _own(chosen: tuple[int, ...], scaled: Sequence[np.ndarray], data: Seen) -> Seen:

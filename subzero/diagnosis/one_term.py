@@ -11,10 +11,10 @@ from collections.abc import Mapping
 import numpy as np
 
 from subzero.diagnosis.evidence import log_sum
-from subzero.diagnosis.formula import samples_of
-from subzero.diagnosis.formula_choice import all_shapes, at_knots, shape_weight, size_of
+from subzero.diagnosis.formula import at_knots, samples_of
 from subzero.diagnosis.latent import Terms
 from subzero.diagnosis.problem import Problem
+from subzero.diagnosis.shape_prior import all_shapes, shape_weight, size_of
 from subzero.diagnosis.shapes import factors_along
 from subzero.diagnosis.unknown import Knots
 from subzero.missing_force import AXES

@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
-from subzero.diagnosis.formula import as_missing, samples_of
-from subzero.diagnosis.formula_choice import all_shapes, at_knots, choose, describe
+from subzero.diagnosis.formula import as_missing, at_knots, samples_of
+from subzero.diagnosis.formula_choice import choose, describe
 from subzero.diagnosis.latent import Seen
 from subzero.diagnosis.recover import recover
+from subzero.diagnosis.shape_prior import all_shapes
 from subzero.diagnosis.shapes import factors_along
 from subzero.diagnosis.unknown import lacking
 from subzero.missing_force import FEATURES, MissingForce, Term, feature_value, history_at
