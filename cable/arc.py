@@ -23,7 +23,7 @@ from math import sqrt
 
 import numpy as np
 
-from subzero.compiled import compiled, inner
+from subzero.compiled import compiled, inlined, inner
 
 from .element import Load, chord_length
 from .line import NEW, NOW, Line
@@ -54,7 +54,7 @@ def correct_for_arc(line: Line, work: Load) -> None:
         line.normal_gain[j] = 1.0 - square * min(in_plane, 1.0) / 6.0
 
 
-@compiled
+@inlined
 def _turning_angle(line: Line, j: int, work: Load) -> float:
     """Fill work.across (3,) with θ = ℓκ of segment j, as a vector towards the inside; return θ² (cut off)."""
     N, before, theta = line.ends.count, work.chord, work.across
@@ -75,13 +75,13 @@ def _turning_angle(line: Line, j: int, work: Load) -> float:
     return min(square, MOST_BENT * MOST_BENT)
 
 
-@compiled
+@inlined
 def _length(line: Line, j: int) -> float:
     """Return the predicted length of segment j. [m]."""
     return line.ends.last_length[NEW] if j == line.ends.count else line.length[j]
 
 
-@compiled
+@inlined
 def _tangent(line: Line, j: int, out: np.ndarray) -> None:
     """Fill the predicted tangent of segment j (3,)."""
     for i in range(3):

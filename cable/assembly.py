@@ -17,13 +17,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from subzero.compiled import compiled, inner
+from subzero.compiled import compiled, inlined, inner
 
 from .bending import add_bending
 from .differences import Weights
 from .drum import FREE, STANDING
 from .element import Load, differentiate_load, evaluate_load, fading_rate, turning_rate
-from .far_end import add_drogue, add_influx, drum_row
+from .far_end import add_drogue, add_influx, differentiate_influx, drum_row
 from .first_segment import write_single_segment
 from .line import BEFORE, DIAGONAL, LOWER, NEW, NOW, RESIDUAL, UPPER, Line, held_node, take_segment
 from .properties import CableNumbers, DrumNumbers
@@ -50,58 +50,70 @@ def node_velocities(line: Line, w: Weights) -> None:
 
 
 @compiled
-def assemble(
-    line: Line,
-    w: Weights,
-    c: CableNumbers,
-    drum: DrumNumbers,
-    work: Load,
-) -> None:
+def assemble(line: Line, w: Weights, c: CableNumbers, drum: DrumNumbers, work: Load) -> None:
     """Fill the residual and the block tridiagonal Jacobian at the present guess of level NEW."""
+    _fill(line, w, c, drum, work, True)
+
+
+@compiled
+def assemble_residual(line: Line, w: Weights, c: CableNumbers, drum: DrumNumbers, work: Load) -> None:
+    """Fill the residual only; the matrix, or its factors, stay as they are."""
+    _fill(line, w, c, drum, work, False)
+
+
+@inlined
+def _fill(line: Line, w: Weights, c: CableNumbers, drum: DrumNumbers, work: Load, slopes: bool) -> None:
+    """Fill the residual and, if `slopes`, the matrix: compiled once for each."""
     node_velocities(line, w)
     N, held = line.ends.count, held_node(line)
-    _clear(line)
+    _clear(line, slopes)
     for j in range(1, N + 1):
         length = line.ends.last_length[NEW] if j == N else line.length[j]
         T = line.tension[NEW, j]
         take_segment(line.position[NEW], line.velocity[NEW], line.water[NEW], j, work)
         evaluate_load(length, T, line.slip[j], line.normal_gain[j], w.a0, c, work)
-        differentiate_load(length, line.slip[j], w.a0, c, work)
         for i in range(3):
             work.q[i] -= line.forcing[j, i]
             line.momentum[NEW, j, i] = length * work.momentum[i]
             history = w.a1 * line.momentum[NOW, j, i] + w.a2 * line.momentum[BEFORE, j, i]
             line.load[j, i] = length * work.q[i] + history
-        if j < held:
-            _differentiate_segment(length, w, T, c, work)
-        else:
-            add_influx(line, length, w, T, c, work)
-        _scatter_balance(line, j, T, length, work)
-        _scatter_length(line, j, T, length, c, work.chord)
+        if slopes:
+            differentiate_load(length, line.slip[j], w.a0, c, work)
+        if j == held:
+            add_influx(line, c, work)
+        _add_balance(line, j, T, work)
+        by_strain = _length_equation(line, j, T, length, c, work.chord, slopes)
+        if slopes:
+            if j < held:
+                _differentiate_segment(length, w, T, c, work)
+            else:
+                differentiate_influx(line, length, w, T, c, work)
+            _scatter_balance(line, j, T, length, work)
+            _scatter_length(line, j, length, by_strain, work.chord)
     add_bending(line, c)
     if N > 1:
         _sharpen_tow_force(line)
     if line.ends.free_end:
-        add_drogue(line, w)
+        add_drogue(line, w, slopes)
     else:
-        drum_row(line, w, drum, work)
+        drum_row(line, w, drum, work, slopes)
     if N == 1 and drum.control == FREE and not line.ends.free_end:
         write_single_segment(line, work.chord)
 
 
-@compiled
-def _clear(line: Line) -> None:
-    """Set the system to zero."""
+@inlined
+def _clear(line: Line, slopes: bool) -> None:
+    """Set the residual to zero, and the matrix."""
     for j in range(1, line.ends.count + 1):
         for i in range(4):
             line.rows[RESIDUAL, j, i] = 0.0
-            for k in range(4):
+            for k in range(4 if slopes else 0):
                 line.blocks[LOWER, j, i, k] = 0.0
                 line.blocks[DIAGONAL, j, i, k] = 0.0
                 line.blocks[UPPER, j, i, k] = 0.0
 
 
-@compiled
+@inlined
 def _differentiate_segment(length: float, w: Weights, T: float, c: CableNumbers, work: Load) -> None:
     """Fill ∂Q/∂x of the near node (3, 3), and ∂Q/∂(T, x) of the far node (3, 4)."""
     by_near, by_far = work.by_near, work.by_far
@@ -114,24 +126,34 @@ def _differentiate_segment(length: float, w: Weights, T: float, c: CableNumbers,
             by_far[i, 1 + k] = length * (mean + work.q_d[i, k])
 
 
-@compiled
-def _scatter_balance(line: Line, j: int, T: float, length: float, work: Load) -> None:
+@inlined
+def _add_balance(line: Line, j: int, T: float, work: Load) -> None:
     """Add segment j to the balances of its two nodes: f + ½Q to the far one, −f + ½Q to the near one."""
-    held, t, d = held_node(line), work.tangent, work.chord
-    stiffness, g = T / work.chord_length, turning_rate(d, length)
-    fading = fading_rate(d, length, work.chord_length) if j == held else 0.0
-    by_near, by_far = work.by_near, work.by_far
-    D, L, U, r = line.blocks[DIAGONAL], line.blocks[LOWER], line.blocks[UPPER], line.rows[RESIDUAL]
+    held, t, r = held_node(line), work.tangent, line.rows[RESIDUAL]
     for i in range(3):
         f, half = T * t[i], 0.5 * line.load[j, i]
         if j < held:
             r[j, 1 + i] += f + half
-            D[j, 1 + i, 0] += t[i]
         if j > 1:
             r[j - 1, 1 + i] += half - f
-            U[j - 1, 1 + i, 0] -= t[i]
         else:
             line.ends.tow_force[i] = f - half
+
+
+@inlined
+def _scatter_balance(line: Line, j: int, T: float, length: float, work: Load) -> None:
+    """Add the derivatives of what `_add_balance` adds."""
+    held, t, d = held_node(line), work.tangent, work.chord
+    stiffness, g = T / work.chord_length, turning_rate(d, length)
+    fading = fading_rate(d, length, work.chord_length) if j == held else 0.0
+    by_near, by_far = work.by_near, work.by_far
+    D, L, U = line.blocks[DIAGONAL], line.blocks[LOWER], line.blocks[UPPER]
+    for i in range(3):
+        if j < held:
+            D[j, 1 + i, 0] += t[i]
+        if j > 1:
+            U[j - 1, 1 + i, 0] -= t[i]
+        else:
             line.ends.tow_by_block[i, 0] = t[i]
         for k in range(4):
             far = 0.5 * by_far[i, k]
@@ -159,7 +181,7 @@ def _scatter_balance(line: Line, j: int, T: float, length: float, work: Load) ->
                 line.ends.tow_by_tow[i, k] = -pull - near
 
 
-@compiled
+@inlined
 def _sharpen_tow_force(line: Line) -> None:
     """Take the load of the first half segment at its own middle, a quarter into the segment, by extrapolation."""
     first = line.length[1]
@@ -169,19 +191,29 @@ def _sharpen_tow_force(line: Line) -> None:
         line.ends.tow_force[i] -= share * (line.load[1, i] / first - line.load[2, i] / second)
 
 
-@compiled
-def _scatter_length(line: Line, j: int, T: float, length: float, c: CableNumbers, d: np.ndarray) -> None:
-    """Write the length equation of segment j, the first row of its block."""
-    scale = 1.0 / (length * length)
-    square = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) * scale
+@inlined
+def _length_equation(
+    line: Line, j: int, T: float, length: float, c: CableNumbers, d: np.ndarray, slopes: bool
+) -> float:
+    """Write the length equation of segment j, the first row of its block; return ∂φ/∂σ."""
+    square = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) / (length * length)
     stretch = 1.0 + c.compliance * T
     phi, by_T, by_strain = slack_law(T, 0.5 * (stretch * stretch - square), line.ends.smoothing)
     line.rows[RESIDUAL, j, 0] = phi
-    line.blocks[DIAGONAL, j, 0, 0] = by_T + by_strain * stretch * c.compliance
+    if slopes:
+        line.blocks[DIAGONAL, j, 0, 0] = by_T + by_strain * stretch * c.compliance
+    return by_strain
+
+
+@inlined
+def _scatter_length(line: Line, j: int, length: float, by_strain: float, d: np.ndarray) -> None:
+    """Write the derivatives of the length equation by the ends of segment j, and by its length."""
+    scale, held = 1.0 / (length * length), held_node(line)
     for i in range(3):
         slope = by_strain * d[i] * scale
         line.blocks[LOWER, j, 0, 1 + i] = slope
-        if j < held_node(line):
+        if j < held:
             line.blocks[DIAGONAL, j, 0, 1 + i] = -slope
-    if j == held_node(line):
+    if j == held:
+        square = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) * scale
         line.blocks[DIAGONAL, j, 0, 1] = by_strain * square / length

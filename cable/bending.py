@@ -151,24 +151,46 @@ def _no_energy(line: Line, c: CableNumbers) -> float:
 
 
 @inner
-def _newton_step(line: Line, c: CableNumbers) -> bool:
-    """Overwrite the residual with the Newton step; False where the matrix is singular."""
-    L, D, U, N = line.blocks[LOWER], line.blocks[DIAGONAL], line.blocks[UPPER], line.ends.count
-    if factor(L, D, U, line.pivots, N) > 0:
+def _factor(line: Line, c: CableNumbers) -> bool:
+    """Factor the matrix in place; False where it is singular."""
+    if factor(line.blocks[LOWER], line.blocks[DIAGONAL], line.blocks[UPPER], line.pivots, line.ends.count) > 0:
         return False
     keep_tow_answer(line)
-    solve(L, D, U, line.pivots, N, line.rows[RESIDUAL])
     return True
 
 
 @inner
-def _stiff_newton_step(line: Line, c: StiffCableNumbers) -> bool:
+def _stiff_factor(line: Line, c: StiffCableNumbers) -> bool:
     """Do the same for five diagonals of blocks."""
     if factor_wide(line.blocks, line.pivots, line.ends.count) > 0:
         return False
     keep_tow_answer(line)
-    solve_wide(line.blocks, line.pivots, line.ends.count, line.rows[RESIDUAL])
     return True
+
+
+@inner
+def _solve(line: Line, c: CableNumbers) -> None:
+    """Overwrite the residual with the Newton step of the factors."""
+    L, D, U = line.blocks[LOWER], line.blocks[DIAGONAL], line.blocks[UPPER]
+    solve(L, D, U, line.pivots, line.ends.count, line.rows[RESIDUAL])
+
+
+@inner
+def _stiff_solve(line: Line, c: StiffCableNumbers) -> None:
+    """Do the same for five diagonals of blocks."""
+    solve_wide(line.blocks, line.pivots, line.ends.count, line.rows[RESIDUAL])
+
+
+@inner
+def _can_reuse(line: Line, c: CableNumbers) -> bool:
+    """Say whether a residual can be had without the matrix: not for a single segment, whose equations are its own."""
+    return line.ends.count > 1
+
+
+@inner
+def _cannot_reuse(line: Line, c: StiffCableNumbers) -> bool:
+    """Say no: bending fills residual and matrix at once."""
+    return False
 
 
 @inner
@@ -180,5 +202,7 @@ def keep_tow_answer(line: Line) -> None:
 
 
 add_bending = by_field("bending_stiffness", _add_bending, _no_bending)
-newton_step = by_field("bending_stiffness", _stiff_newton_step, _newton_step)
+factor_step = by_field("bending_stiffness", _stiff_factor, _factor)
+solve_again = by_field("bending_stiffness", _stiff_solve, _solve)
+can_reuse = by_field("bending_stiffness", _cannot_reuse, _can_reuse)
 bending_energy = by_field("bending_stiffness", _energy, _no_energy)

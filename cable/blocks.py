@@ -15,12 +15,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from subzero.compiled import compiled, inner
+from subzero.compiled import compiled, inlined
 
 SIZE = 4
 
 
-@inner
+@inlined
 def factor_block(D: np.ndarray, pivots: np.ndarray) -> bool:
     """Factor a 4×4 block in place by rows exchanged for size; return False when it is singular.
 
@@ -47,7 +47,7 @@ def factor_block(D: np.ndarray, pivots: np.ndarray) -> bool:
     return True
 
 
-@inner
+@inlined
 def solve_block(D: np.ndarray, pivots: np.ndarray, b: np.ndarray) -> None:
     """Overwrite the right-hand side b (4,) with the solution of the factored block."""
     for k in range(SIZE):
@@ -100,7 +100,7 @@ def solve(L: np.ndarray, D: np.ndarray, U: np.ndarray, pivots: np.ndarray, last:
                 r[j, row] -= L[j, column, row] * r[j - 1, column]
 
 
-@inner
+@inlined
 def transpose(A: np.ndarray) -> None:
     """Transpose a 4×4 block in place."""
     for i in range(SIZE):

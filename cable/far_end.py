@@ -19,7 +19,7 @@ from .properties import CableNumbers, DrumNumbers
 
 
 @inner
-def add_drogue(line: Line, w: Weights) -> None:
+def add_drogue(line: Line, w: Weights, slopes: bool) -> None:
     """Add the drag of a drogue, ½ρC_dA |U| U, to the balance of the free end."""
     N, k, square = line.ends.count, line.ends.tail_drag, 0.0
     J = line.water[NEW, N]
@@ -30,6 +30,8 @@ def add_drogue(line: Line, w: Weights) -> None:
     for i in range(3):
         U = line.velocity[NEW, N, i] - J[i]
         line.rows[RESIDUAL, N, 1 + i] += k * size * U
+        if not slopes:
+            continue
         line.blocks[DIAGONAL, N, 1 + i, 1 + i] += k * size * w.b0
         for m in range(3):
             slope = U * (line.velocity[NEW, N, m] - J[m]) / max(size, 1e-12)
@@ -37,19 +39,28 @@ def add_drogue(line: Line, w: Weights) -> None:
 
 
 @inner
-def add_influx(line: Line, length: float, w: Weights, T: float, c: CableNumbers, work: Load) -> None:
-    """Complete Q of the last segment by the momentum that enters at the drum; fill ∂Q/∂x_{N−1} and ∂Q/∂(T, ℓ)."""
+def add_influx(line: Line, c: CableNumbers, work: Load) -> None:
+    """Complete Q of the last segment by the momentum that enters at the drum, where `work.water` is from here on."""
+    N, U, t, J = line.ends.count, line.ends.payout[NEW], work.tangent, work.water
+    for i in range(3):  # the water at the drum, as the drum sees it
+        J[i] = line.water[NEW, N, i] - line.ends.drum_velocity[i]
+    Jt = J[0] * t[0] + J[1] * t[1] + J[2] * t[2]
+    for i in range(3):
+        entering = c.mass * line.velocity[NEW, N, i] - c.added_mass * (J[i] - Jt * t[i])
+        line.load[N, i] -= U * entering
+
+
+@inner
+def differentiate_influx(line: Line, length: float, w: Weights, T: float, c: CableNumbers, work: Load) -> None:
+    """Fill ∂Q/∂x_{N−1} and ∂Q/∂(T, ℓ) of the last segment."""
     N, U, t, d = line.ends.count, line.ends.payout[NEW], work.tangent, work.chord
     by_near, by_far, J, r = work.by_near, work.by_far, work.water, work.chord_length
     g, fading = turning_rate(d, length), fading_rate(d, length, r)
-    for i in range(3):  # the water at the drum, as the drum sees it
-        J[i] = line.water[NEW, N, i] - line.ends.drum_velocity[i]
     Jt = J[0] * t[0] + J[1] * t[1] + J[2] * t[2]
     dU = 0.0 if line.ends.drum_mode == STANDING else w.b0
     stretch = 0.5 * c.compliance / (1.0 + c.compliance * T)
     for i in range(3):
         entering = c.mass * line.velocity[NEW, N, i] - c.added_mass * (J[i] - Jt * t[i])
-        line.load[N, i] -= U * entering
         by_far[i, 0] = length * stretch * work.drag[i]
         by_far[i, 1] = work.q[i] - dU * entering - U * c.mass * (U / length - dU) * d[i] / length
         by_far[i, 1] -= fading * (length * work.q_tt[i] - 2.0 * U * c.added_mass * Jt * t[i])
@@ -65,39 +76,41 @@ def add_influx(line: Line, length: float, w: Weights, T: float, c: CableNumbers,
 
 
 @inner
-def drum_row(line: Line, w: Weights, drum: DrumNumbers, work: Load) -> None:
+def drum_row(line: Line, w: Weights, drum: DrumNumbers, work: Load, slopes: bool) -> None:
     """Write the drum's equation (11), the second row of the last block; `work` still holds the last segment."""
-    N, t = line.ends.count, work.tangent
-    D, L, r = (
-        line.blocks[DIAGONAL, line.ends.count],
-        line.blocks[LOWER, line.ends.count],
-        line.rows[RESIDUAL, line.ends.count],
-    )
-    D[2, 2] = 1.0
-    D[3, 3] = 1.0
+    N, t, r = line.ends.count, work.tangent, line.rows[RESIDUAL, line.ends.count]
     Qt = line.load[N, 0] * t[0] + line.load[N, 1] * t[1] + line.load[N, 2] * t[2]
     line.ends.drum_pull = line.tension[NEW, N] + 0.5 * Qt
     for i in range(3):
         line.ends.drum_force[i] = line.tension[NEW, N] * t[i] + 0.5 * line.load[N, i]
-    if drum.control == LENGTH or line.ends.drum_mode == STANDING:
+    U, by_length = line.ends.payout, 1.0
+    pulled = drum.control != LENGTH and line.ends.drum_mode != STANDING
+    if not pulled:
         r[1] = line.ends.last_length[NEW] - _length_wanted(line, drum)
-        D[1, 1] = 1.0
-        return
-    U = line.ends.payout
-    if drum.control == TENSION:
-        r[1] = -drum.setpoint
+    elif drum.control == TENSION:
+        r[1], by_length = -drum.setpoint, 0.0
     else:
         held, slope = friction(drum, U[NEW])
         r[1] = -held - drum.inertia * (w.a0 * U[NEW] + w.a1 * U[NOW] + w.a2 * U[BEFORE])
-        D[1, 1] = -(slope + drum.inertia * w.a0) * w.b0
-    if line.ends.drum_mode == SPINNING:
+        by_length = -(slope + drum.inertia * w.a0) * w.b0
+    pulled = pulled and line.ends.drum_mode != SPINNING
+    if pulled:
+        r[1] += line.ends.drum_pull
+    if slopes:
+        _differentiate_drum(line, by_length, pulled, Qt, work)
+
+
+@compiled
+def _differentiate_drum(line: Line, by_length: float, pulled: bool, Qt: float, work: Load) -> None:
+    """Write the derivatives of the drum's equation; of the pull Q_N·t + T_N only if the drum is `pulled`."""
+    N, t, by_near, by_far = line.ends.count, work.tangent, work.by_near, work.by_far
+    D, L = line.blocks[DIAGONAL, N], line.blocks[LOWER, N]
+    D[1, 1], D[2, 2], D[3, 3] = by_length, 1.0, 1.0
+    if not pulled:
         return
-    r[1] += line.ends.drum_pull
     D[1, 0] = 1.0
-    by_near, by_far = work.by_near, work.by_far
-    size = work.chord_length
-    g = turning_rate(work.chord, line.ends.last_length[NEW])
-    fading = fading_rate(work.chord, line.ends.last_length[NEW], size)
+    size, length = work.chord_length, line.ends.last_length[NEW]
+    g, fading = turning_rate(work.chord, length), fading_rate(work.chord, length, size)
     for i in range(3):
         D[1, 0] += 0.5 * t[i] * by_far[i, 0]
         D[1, 1] += 0.5 * t[i] * (by_far[i, 1] - fading * line.load[N, i])

@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 from subzero.compiled import compiled, inner
 
-from .assembly import assemble
-from .bending import newton_step
+from .assembly import assemble, assemble_residual
+from .bending import can_reuse, factor_step, solve_again
 from .differences import Weights
 from .element import Load
 from .line import GUESS, NEW, RESIDUAL, STEP, Line, held_node
@@ -21,6 +21,8 @@ RELATIVE_TOLERANCE = 1e-9
 """Balances hold to this fraction of the largest tension in the cable."""
 ABSOLUTE_TOLERANCE = 1e-13
 """Balances of a cable without tension hold to this. [N]"""
+KEEP = 0.1
+"""A matrix is kept while a step with it leaves at most this share of what was wrong."""
 ROUNDING = 1e-15
 """Positions x are known to this fraction; inertia m1 ℓ a₀ b₀ x and strain x/ℓ of a segment cannot be known better."""
 LENGTH_TOLERANCE = 1e-9
@@ -47,29 +49,42 @@ def solve_step(
     drum: DrumNumbers,
     work: Load,
 ) -> Solved:
-    """Solve the equations of `assembly` for level NEW, from the guess that stands there."""
-    rounding = ROUNDING * (c.mass + c.added_mass) * w.a0 * w.b0
+    """Solve the equations of `assembly` for level NEW, from the guess that stands there.
+
+    The matrix and its factors serve as long as each step leaves little (`KEEP`) of what was wrong: a residual by itself
+    costs a quarter of both. Then they are made again.
+    """
+    rounding, reusable = ROUNDING * (c.mass + c.added_mass) * w.a0 * w.b0, can_reuse(line, c)
     assemble(line, w, c, drum, work)
     size, node, equation = _residual(line, rounding)
-    merit = _merit(line)
+    merit, fresh = _merit(line), True
     for iteration in range(MAX_ITERATIONS):
         if size <= 1.0:
             return Solved(True, iteration, size, node, equation)
-        if not newton_step(line, c):
+        if fresh and not factor_step(line, c):
             break
+        solve_again(line, c)
         last_length = _save(line)
-        fraction = 1.0
-        for _ in range(MAX_HALVINGS):
+        before, fraction = merit, 1.0
+        for _ in range(MAX_HALVINGS if fresh else 1):
             _update(line, last_length, fraction)
-            assemble(line, w, c, drum, work)
-            new_merit = _merit(line)
-            if isfinite(new_merit) and new_merit <= merit * (1.0 - 0.1 * fraction) + 1e-30:
+            if reusable:
+                assemble_residual(line, w, c, drum, work)
+            else:
+                assemble(line, w, c, drum, work)
+            merit = _merit(line)
+            if isfinite(merit) and merit <= before * (1.0 - 0.1 * fraction) + 1e-30:
                 break
             fraction *= 0.5
-        merit = new_merit
-        size, node, equation = _residual(line, rounding)
         if not isfinite(merit):
             break
+        size, node, equation = _residual(line, rounding)
+        fresh = not reusable or merit > KEEP * before
+        if fresh and reusable and size > 1.0:
+            if merit > before:
+                _update(line, last_length, 0.0)
+            assemble(line, w, c, drum, work)
+            merit = _merit(line)
     return Solved(size <= 1.0, MAX_ITERATIONS, size, node, equation)
 
 

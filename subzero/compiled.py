@@ -76,7 +76,15 @@ def inner(function: Function) -> Function:
     return _compile(function, gate=False)
 
 
-def _compile(function: Function, *, gate: bool) -> Function:
+def inlined(function: Function) -> Function:
+    """Compile a function as a part of each that calls it: for what is done at every node.
+
+    A call hands over a `Line` array by array, which takes longer than the arithmetic of a node.
+    """
+    return _compile(function, gate=False, inline=True)
+
+
+def _compile(function: Function, *, gate: bool, inline: bool = False) -> Function:
     """Compile a function, and keep its machine code in the directory of its package."""
     package = function.__module__.partition(".")[0]
     numba.config.CACHE_DIR = str(cache_directory(package if package in SEES else "subzero"))
@@ -86,6 +94,7 @@ def _compile(function: Function, *, gate: bool) -> Function:
         "nogil": True,
         "no_cfunc_wrapper": True,
         "no_cpython_wrapper": not gate,
+        "forceinline": inline,
     }
     return numba.njit(**options)(function)
 
