@@ -123,10 +123,10 @@ def _residual(line: Line, rounding: float) -> tuple[float, int, int]:
         reach = max(reach, abs(x[NEW, j, 0]), abs(x[NEW, j, 1]), abs(x[NEW, j, 2]))
     allowed = RELATIVE_TOLERANCE * tension + ABSOLUTE_TOLERANCE + rounding * line.length[1] * reach
     strain = LENGTH_TOLERANCE + 2.0 * ROUNDING / STRAIN_SCALE * reach / max(line.length[1], SMALLEST_SEGMENT)
-    worst, node, equation = 0.0, 0, 0
+    worst, node, equation, per_strain, per_newton = 0.0, 0, 0, 1.0 / strain, 1.0 / allowed
     for j in range(1, N + 1):
         for i in range(4):
-            size = abs(line.rows[RESIDUAL, j, i]) / (strain if i == 0 else allowed)
+            size = abs(line.rows[RESIDUAL, j, i]) * (per_strain if i == 0 else per_newton)
             if worst == worst and not size <= worst:
                 worst, node, equation = size, j, i
     return worst, node, equation

@@ -21,8 +21,8 @@ TowVelocity = Callable[[float], Sequence[float] | np.ndarray]
 
 REST = 1e-12
 """Slower than this is at rest. [m/s]"""
-GAUSS = ((-np.sqrt(0.15), 5.0 / 18.0), (0.0, 8.0 / 18.0), (np.sqrt(0.15), 5.0 / 18.0))
-"""Offsets and weights of three-point Gauss quadrature on a step of length one."""
+AT_ENDS, INSIDE = 1.0 / 12.0, ((-0.5 * np.sqrt(0.2), 5.0 / 12.0), (0.5 * np.sqrt(0.2), 5.0 / 12.0))
+"""Lobatto's quadrature on a step of length one: weight of both ends, and offsets and weights of two times inside."""
 MOMENT = 1e-9
 """Just before and just after, as a share of the step."""
 NEARLY_TAUT = 0.999
@@ -97,7 +97,7 @@ def too_short(time: float, line: Line, drum: DrumNumbers) -> str:
 
 
 def sample_path(velocity: TowVelocity, duration: float, step: float, name: str = "tow_velocity") -> TowPath:
-    """Return the way of a point that moves at `velocity`, from 0: places by Gauss quadrature of order six.
+    """Return the way of a point that moves at `velocity`, from 0: places by Lobatto's quadrature of order six.
 
     Velocities are taken just after and just before the times: the motion may change abruptly at a recorded time.
     """
@@ -105,12 +105,13 @@ def sample_path(velocity: TowVelocity, duration: float, step: float, name: str =
     times, h = np.linspace(0.0, duration, steps + 1), duration / steps
 
     def at(moments: np.ndarray) -> np.ndarray:
-        return np.array([_three_numbers(velocity(t), f"{name}({t:g})") for t in moments])
+        return _three_numbers([velocity(t) for t in moments.tolist()], name, moments)
 
-    place = np.zeros((steps + 1, 3))
-    for offset, weight in GAUSS:
-        place[1:] += weight * h * at(times[:-1] + h * (0.5 + offset))
     leaving, arriving = at(times[:-1] + MOMENT * h), at(times[1:] - MOMENT * h)
+    place = np.zeros((steps + 1, 3))
+    place[1:] = AT_ENDS * h * (leaving + arriving)
+    for offset, weight in INSIDE:
+        place[1:] += weight * h * at(times[:-1] + h * (0.5 + offset))
     leaving, arriving = np.vstack([leaving, arriving[-1:]]), np.vstack([leaving[:1], arriving])
     return TowPath(times, np.cumsum(place, axis=0), leaving, arriving)
 
@@ -138,10 +139,19 @@ def current_of(current: Sequence[float] | np.ndarray | Current | None) -> Curren
     return Current.uniform(np.zeros(3) if current is None else current)
 
 
-def _three_numbers(values: Sequence[float] | np.ndarray, name: str) -> np.ndarray:
-    """Return three finite numbers as an array, or say what is wrong with them."""
-    array = np.asarray(values, dtype=float)
-    if array.shape != (3,) or not np.isfinite(array).all():
-        message = f"{name} must be three finite numbers (north, east, down in m/s); got {values!r}."
-        raise ValueError(message)
+def _three_numbers(
+    values: Sequence[Sequence[float] | np.ndarray], name: str, moments: np.ndarray
+) -> np.ndarray:
+    """Return velocities as an array (times, 3) of finite numbers, or say what is wrong with the first that is none."""
+    try:
+        array = np.array(values, dtype=float)
+    except ValueError:
+        array = np.empty(0)
+    if array.shape == (moments.size, 3) and np.isfinite(array).all():
+        return array
+    for t, value in zip(moments.tolist(), values, strict=True):
+        one = np.asarray(value, dtype=float)
+        if one.shape != (3,) or not np.isfinite(one).all():
+            message = f"{name}({t:g}) must be three finite numbers (north, east, down in m/s); got {value!r}."
+            raise ValueError(message)
     return array

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from math import sqrt
+
 import numpy as np
 
 from .drum_path import resting
@@ -128,7 +130,7 @@ def _set_steady_tow(
 
 def _grown(T: float, length: float, drag: float, weight: float, e: float) -> float:
     """Return the tension `length` further up, dT/ds = drag √(1 + eT) + weight; none where it would push. [N]."""
-    end = T
-    for _ in range(20):
-        end = T + length * (drag * np.sqrt(1.0 + e * 0.5 * (T + end)) + weight)
+    end, before = T, np.inf
+    while abs(end - before) > 1e-15 * abs(end):
+        before, end = end, T + length * (drag * sqrt(1.0 + e * 0.5 * (T + end)) + weight)
     return max(end, 0.0)
