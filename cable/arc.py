@@ -23,7 +23,7 @@ from math import sqrt
 
 import numpy as np
 
-from subzero.compiled import compiled, inlined, inner
+from subzero.compiled import inlined, inner
 
 from .element import Load, chord_length
 from .line import NEW, NOW, Line

@@ -153,7 +153,10 @@ def _no_energy(line: Line, c: CableNumbers) -> float:
 @inner
 def _factor(line: Line, c: CableNumbers) -> bool:
     """Factor the matrix in place; False where it is singular."""
-    if factor(line.blocks[LOWER], line.blocks[DIAGONAL], line.blocks[UPPER], line.pivots, line.ends.count) > 0:
+    if (
+        factor(line.blocks[LOWER], line.blocks[DIAGONAL], line.blocks[UPPER], line.pivots, line.ends.count)
+        > 0
+    ):
         return False
     keep_tow_answer(line)
     return True

@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from subzero.compiled import compiled, inner, packed
+from subzero.compiled import inlined, inner, packed
 
 from .properties import CableNumbers
 
@@ -73,7 +73,7 @@ def new_load() -> Load:
     return packed(Load(**parts | {"by_far": np.zeros((3, 4))}))
 
 
-@compiled
+@inlined
 def chord_length(d: np.ndarray, length: float) -> float:
     """Return r with r² = |d|² + F² max(1 − |d|²/ℓ², 0)² ℓ², the length that the tangent t = d/r is made with. [m].
 
@@ -84,21 +84,21 @@ def chord_length(d: np.ndarray, length: float) -> float:
     return length * sqrt(square + (FOLDING * max(1.0 - square, 0.0)) ** 2)
 
 
-@inner
+@inlined
 def turning_rate(d: np.ndarray, length: float) -> float:
     """Return g in ∂t/∂d = (I − g t tᵀ)/r; 1 for a taut segment. [-]."""
     square = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) / (length * length)
     return 1.0 - 2.0 * FOLDING * FOLDING * max(1.0 - square, 0.0)
 
 
-@inner
+@inlined
 def fading_rate(d: np.ndarray, length: float, r: float) -> float:
     """Return f in ∂t/∂ℓ = −f t; 0 for a taut segment. [1/m]."""
     square = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) / (length * length)
     return FOLDING * FOLDING * length * max(1.0 - square * square, 0.0) / (r * r)
 
 
-@inner
+@inlined
 def evaluate_momentum(c: CableNumbers, work: Load) -> None:
     """Fill p = m V + ρA P (V − J), the momentum per length, from velocity, water and tangent. [kg/s]."""
     V, J, t = work.velocity, work.water, work.tangent
@@ -107,7 +107,7 @@ def evaluate_momentum(c: CableNumbers, work: Load) -> None:
         work.momentum[i] = c.mass * V[i] + c.added_mass * (V[i] - J[i] - along * t[i])
 
 
-@inner
+@inlined
 def evaluate_load(
     length: float, T: float, slip: float, gain: float, a0: float, c: CableNumbers, work: Load
 ) -> None:

@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from subzero.compiled import compiled, inner
+from subzero.compiled import compiled, inlined, inner
 
 from .bending import bending_energy
 from .element import Load, evaluate_load
@@ -59,7 +59,7 @@ def energy_flow(line: Line, c: CableNumbers, work: Load, out: np.ndarray) -> Non
     _flow_at_ends(line, c, out)
 
 
-@compiled
+@inlined
 def _carried(line: Line, j: int) -> float:
     """Return U·dJ/dt in the middle of segment j, over the last step. [m²/s³]."""
     if line.ends.previous_step <= 0.0:

@@ -51,7 +51,9 @@ def add_influx(line: Line, c: CableNumbers, work: Load) -> None:
 
 
 @inner
-def differentiate_influx(line: Line, length: float, w: Weights, T: float, c: CableNumbers, work: Load) -> None:
+def differentiate_influx(
+    line: Line, length: float, w: Weights, T: float, c: CableNumbers, work: Load
+) -> None:
     """Fill ∂Q/∂x_{N−1} and ∂Q/∂(T, ℓ) of the last segment."""
     N, U, t, d = line.ends.count, line.ends.payout[NEW], work.tangent, work.chord
     by_near, by_far, J, r = work.by_near, work.by_far, work.water, work.chord_length

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from subzero.compiled import inner, packed
+from subzero.compiled import inlined, inner, packed
 
 from .drum import TURNING
 from .element import Load, chord_length, evaluate_momentum
@@ -173,7 +173,7 @@ def enlarged(line: Line, capacity: int) -> Line:
     return larger._replace(ends=line.ends)
 
 
-@inner
+@inlined
 def held_node(line: Line) -> int:
     """Return the index of the node that the drum holds; with a free end, one beyond the last."""
     return line.ends.count + 1 if line.ends.free_end else line.ends.count
@@ -193,7 +193,7 @@ def feel_water(line: Line, water: Water, time: float) -> None:
         J[0], J[1], J[2] = water_velocity(water, x[0], x[1], x[2], time)
 
 
-@inner
+@inlined
 def take_segment(x: np.ndarray, V: np.ndarray, J: np.ndarray, j: int, work: Load) -> None:
     """Fill chord, velocity and water of segment j, given those of the nodes at one level (nodes, 3)."""
     for i in range(3):

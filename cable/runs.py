@@ -53,7 +53,8 @@ def as_history(path: TowPath, record: Record, rows: int, solved: Solved, trouble
     """Return the record's filled rows as a history; `trouble` says what stopped it, if it was stopped."""
     times, tow, completed = path.times, path.place, rows == path.times.size
     message = "The run reached its end." if completed else trouble
-    cuts = np.cumsum(record.segments[:rows] + 1)
+    cuts = np.cumsum(record.segments[:rows] + 1).tolist()
+    parts = [slice(first, last) for first, last in zip([0, *cuts], cuts, strict=False)]
     return History(
         time=times[:rows],
         tow_force=record.tow_force[:rows],
@@ -61,8 +62,8 @@ def as_history(path: TowPath, record: Record, rows: int, solved: Solved, trouble
         drum_tension=record.drum_tension[:rows],
         length=record.length[:rows],
         tow_point=tow[:rows],
-        shapes=tuple(np.split(record.position[: cuts[-1]], cuts[:-1])),
-        tensions=tuple(np.split(record.tension[: cuts[-1]], cuts[:-1])),
+        shapes=tuple(record.position[part] for part in parts),
+        tensions=tuple(record.tension[part] for part in parts),
         outcome=Outcome(
             completed=completed,
             message=message,

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from math import sqrt
 
-from subzero.compiled import inner
+from subzero.compiled import inlined
 
 TENSION_SCALE = 1e-3
 """T_r [N] and σ_r [-]: where the corner between taut and slack is seen at the same size in both."""
@@ -29,7 +29,7 @@ KNOWN = 1e-4
 """A cable with more tension than this is taut, and its tension is foreseen from the steps before. [N]"""
 
 
-@inner
+@inlined
 def slack_law(T: float, shortening: float, smoothing: float) -> tuple[float, float, float]:
     """Return φ and its derivatives by the tension T [N] and the shortening σ [-], for T₀ = `smoothing` [N]."""
     a, b = T / TENSION_SCALE, shortening / STRAIN_SCALE
