@@ -52,12 +52,12 @@ def solve_step(
     """Solve the equations of `assembly` for level NEW, from the guess that stands there.
 
     The matrix and its factors serve as long as each step leaves little (`KEEP`) of what was wrong: a residual by itself
-    costs a quarter of both. Then they are made again.
+    costs a quarter of both. Then they are made again, at the last guess that was better than the one before.
     """
-    rounding, reusable = ROUNDING * (c.mass + c.added_mass) * w.a0 * w.b0, can_reuse(line, c)
+    rounding, reusable, fresh = ROUNDING * (c.mass + c.added_mass) * w.a0 * w.b0, can_reuse(line, c), True
     assemble(line, w, c, drum, work)
     size, node, equation = _residual(line, rounding)
-    merit, fresh = _merit(line), True
+    merit = _merit(line)
     for iteration in range(MAX_ITERATIONS):
         if size <= 1.0:
             return Solved(True, iteration, size, node, equation)
@@ -76,12 +76,13 @@ def solve_step(
             if isfinite(merit) and merit <= before * (1.0 - 0.1 * fraction) + 1e-30:
                 break
             fraction *= 0.5
-        if not isfinite(merit):
+        if fresh and not isfinite(merit):
             break
         size, node, equation = _residual(line, rounding)
-        fresh = not reusable or merit > KEEP * before
-        if fresh and reusable and size > 1.0:
-            if merit > before:
+        worse = not fresh and not merit <= before
+        fresh = not reusable or not merit <= KEEP * before
+        if fresh and reusable and not size <= 1.0:
+            if worse:
                 _update(line, last_length, 0.0)
             assemble(line, w, c, drum, work)
             merit = _merit(line)
