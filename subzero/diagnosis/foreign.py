@@ -27,7 +27,7 @@ from subzero.missing_force import AXES
 ALIKE = 10.0
 """Forces whose log posteriors differ by less are told apart with finer knots."""
 WORTH = 2.0
-"""A force that raises the log posterior by this much is worth a closer look for sudden changes."""
+"""A force that is no further behind the best, in log posterior, is worth a closer look, and one for sudden changes."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -54,6 +54,8 @@ def foreigners(search: Search) -> list[Foreign]:
     """Return what lies outside, most probable first: beside nothing, and beside the best causes."""
     problem, knots = search.problem, knots_of(search.problem)
     found = _suspected(search, all_columns(problem, search.best().fit.z, knots), knots)
+    if max(one.log_posterior for one in found) < search.best().log_posterior - WORTH:
+        return sorted(found, key=lambda one: -one.log_posterior)
     alike = {one.id.removeprefix(FORCE) for one in _close(found) if one.id.startswith(FORCE)}
     if len(alike) > 1:
         finer = knots_of(problem, FINE)
@@ -61,9 +63,7 @@ def foreigners(search: Search) -> list[Foreign]:
             FORCE + axis: C for axis, C in force_columns(problem, search.best().fit.z, alike, finer).items()
         }
         found = [one for one in found if one.id not in columns] + _suspected(search, columns, finer)
-    if max(one.log_posterior for one in found) > search.best().log_posterior - WORTH:
-        found += _sudden(search)
-    return sorted(found, key=lambda one: -one.log_posterior)
+    return sorted(found + _sudden(search), key=lambda one: -one.log_posterior)
 
 
 def _suspected(search: Search, columns: dict[str, np.ndarray], knots: Knots) -> list[Foreign]:

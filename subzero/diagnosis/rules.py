@@ -2,7 +2,7 @@
 
 nothing_wrong      p(none) ≥ 0.5, or the named size is within the practical one (then the model wants calibration)
 cause_named        one hypothesis with p ≥ 0.8, D ≥ 9 to its closest rival, its size beyond 4 tolerances
-outside_catalogue  a force or a drift that no cause explains has p ≥ 0.5
+outside_catalogue  a force or a drift that no cause explains has p ≥ 0.8
 undecided          everything else: the smallest set with p ≥ 0.95
 """
 
@@ -16,7 +16,7 @@ from subzero.diagnosis.hypotheses import Ids, places
 from subzero.diagnosis.problem import Entry
 from subzero.diagnosis.verdict import CAUSE_NAMED, NOTHING_WRONG, OUTSIDE, UNDECIDED
 
-NAMED, HEALTHY, FOREIGN, SET = 0.8, 0.5, 0.5, 0.95
+NAMED, HEALTHY, FOREIGN, SET = 0.8, 0.5, 0.8, 0.95
 APART = 9.0
 """With less than this squared distance to a rival no cause is named, whatever the record happens to say."""
 PRACTICAL = 4.0
