@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from .scores import (
     CLEAR,
+    PLAIN,
     Result,
     Score,
     calibration,
@@ -59,6 +60,12 @@ def _healthy(results: Sequence[Result]) -> list[Score]:
     return [
         share("healthy: false names", healthy, lambda one: bool(one["causes"]), "≤ 1 %", most=0.01),
         share("healthy: `nothing_wrong`", healthy, lambda one: one["verdict"] == "nothing_wrong", "–"),
+        share(
+            "healthy: called outside the catalogue",
+            healthy,
+            lambda one: one["verdict"] == "outside_catalogue",
+            "–",
+        ),
         share("all cases: a wrong name with p ≥ 0.95", sound, wrongly_sure, "≤ 0.5 %", most=0.005),
         Score("expected calibration error", f"{error:.3f}", "≤ 0.03", "–", len(sound), error <= 0.03),
         Score(
@@ -94,6 +101,7 @@ def _outside(results: Sequence[Result]) -> list[Score]:
     told = [one for one in forces if one["outside"]["features"] and one["outside"].get("first") is not None]
     return [
         share("outside, D ≥ 16: flagged", cases, is_right, "≥ 95 %", least=0.95),
+        share("… with D ≥ 50: flagged", [one for one in cases if smallest_D(one) >= PLAIN], is_right, "–"),
         share("outside: confidently misnamed (p ≥ 0.95)", cases, wrongly_sure, "≤ 2 %", most=0.02),
         share("outside: axis (or channel) right, of those flagged", flagged,
               lambda one: one["outside"]["axis"] == one["outside"]["found"], "≥ 90 %", least=0.9),

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.stats import binomtest
 
 Result = dict[str, Any]
-CLEAR, SURE = 16.0, 0.95
+CLEAR, PLAIN, SURE = 16.0, 50.0, 0.95
 FOREIGN = ("unknown_force:", "sensor_drift:")
 
 
