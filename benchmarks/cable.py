@@ -105,7 +105,7 @@ CASES = {
         tow_30,
         2e-4,
         (
-            *((0.3, step, 0.0) for step in (1.0, 0.5, 0.25, 0.125, 0.1, 0.05)),
+            *((0.3, step, 0.0) for step in (1.0, 0.5, 0.25, 1.0 / 7.0, 0.125, 0.1, 0.05)),
             *((0.3, 0.5, rtol) for rtol in (1e-2, 3e-3, 1e-3)),
         ),
     ),
@@ -135,7 +135,7 @@ def manoeuvres():
             yield (
                 name,
                 f"{segment:g}",
-                f"{step:g}",
+                f"{step:.3g}",
                 f"{rtol:g}",
                 f"{steps}",
                 f"{cost:.3f}",

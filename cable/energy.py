@@ -36,8 +36,7 @@ FLOWS = 8
 def energy_flow(line: Line, c: CableNumbers, work: Load, out: np.ndarray) -> None:
     """Fill out (FLOWS,) with the powers and the stored energy of the cable at level NOW."""
     N, t, across, V, J = line.ends.count, work.tangent, work.across, work.velocity, work.water
-    for i in range(FLOWS):
-        out[i] = 0.0
+    loss, energy, sunk, added, strained, carried = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for j in range(1, N + 1):
         length = line.ends.last_length[NOW] if j == N else line.length[j]
         T = line.tension[NOW, j]
@@ -47,14 +46,16 @@ def energy_flow(line: Line, c: CableNumbers, work: Load, out: np.ndarray) -> Non
         for i in range(3):
             speed = V[i] - J[i]
             square += speed * speed
-            out[LOSS] += length * work.drag[i] * speed
+            loss += length * work.drag[i] * speed
             turn += across[i] * (line.velocity[NOW, j, i] - line.velocity[NOW, j - 1, i])
-            out[STRAINED] -= T * t[i] * (line.water[NOW, j, i] - line.water[NOW, j - 1, i])
+            strained -= T * t[i] * (line.water[NOW, j, i] - line.water[NOW, j - 1, i])
         stored = c.mass * square + c.added_mass * work.side * work.side + c.compliance * T * T
-        out[STORED] += 0.5 * length * stored
-        out[GRAVITY_WORK] += length * c.weight * (V[2] - J[2])
-        out[ADDED_MASS] -= c.added_mass * work.along * turn * length / work.chord_length
-        out[CARRIED] += length * c.mass * _carried(line, j)
+        energy += 0.5 * length * stored
+        sunk += length * c.weight * (V[2] - J[2])
+        added -= c.added_mass * work.along * turn * length / work.chord_length
+        carried += length * c.mass * _carried(line, j)
+    out[LOSS], out[STORED], out[GRAVITY_WORK], out[ADDED_MASS] = loss, energy, sunk, added
+    out[STRAINED], out[CARRIED], out[AT_DRUM], out[TOWED] = strained, carried, 0.0, 0.0
     out[STORED] += bending_energy(line, c)
     _flow_at_ends(line, c, out)
 

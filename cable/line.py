@@ -188,9 +188,14 @@ def spacing(line: Line) -> float:
 @inner
 def feel_water(line: Line, water: Water, time: float) -> None:
     """Fill the water's velocity at the nodes of level NEW."""
+    x, J, uniform = line.position[NEW], line.water[NEW], water.velocity
+    if uniform.shape[0] == 1:
+        for j in range(line.ends.count + 1):
+            for i in range(3):
+                J[j, i] = uniform[0, i]
+        return
     for j in range(line.ends.count + 1):
-        x, J = line.position[NEW, j], line.water[NEW, j]
-        J[0], J[1], J[2] = water_velocity(water, x[0], x[1], x[2], time)
+        J[j, 0], J[j, 1], J[j, 2] = water_velocity(water, x[j, 0], x[j, 1], x[j, 2], time)
 
 
 @inlined

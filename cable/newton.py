@@ -5,7 +5,9 @@ from __future__ import annotations
 from math import isfinite, sqrt
 from typing import NamedTuple
 
-from subzero.compiled import compiled, inner
+import numpy as np
+
+from subzero.compiled import compiled, inlined, inner
 
 from .assembly import assemble, assemble_residual
 from .bending import can_reuse, factor_step, solve_again
@@ -56,11 +58,11 @@ def solve_step(
     """
     rounding, reusable, fresh = ROUNDING * (c.mass + c.added_mass) * w.a0 * w.b0, can_reuse(line, c), True
     assemble(line, w, c, drum, work)
-    size, node, equation = _residual(line, rounding)
     merit = _merit(line)
     for iteration in range(MAX_ITERATIONS):
+        size = _size(line, rounding, merit)
         if size <= 1.0:
-            return Solved(True, iteration, size, node, equation)
+            return _solved(line, rounding, True, iteration)
         if fresh and not factor_step(line, c):
             break
         solve_again(line, c)
@@ -78,15 +80,14 @@ def solve_step(
             fraction *= 0.5
         if fresh and not isfinite(merit):
             break
-        size, node, equation = _residual(line, rounding)
         worse = not fresh and not merit <= before
         fresh = not reusable or not merit <= KEEP * before
-        if fresh and reusable and not size <= 1.0:
+        if fresh and reusable and not _size(line, rounding, merit) <= 1.0:
             if worse:
                 _update(line, last_length, 0.0)
             assemble(line, w, c, drum, work)
             merit = _merit(line)
-    return Solved(size <= 1.0, MAX_ITERATIONS, size, node, equation)
+    return _solved(line, rounding, _size(line, rounding, merit) <= 1.0, MAX_ITERATIONS)
 
 
 @compiled
@@ -115,22 +116,39 @@ def _update(line: Line, last_length: float, fraction: float) -> None:
     line.ends.last_length[NEW] = max(last_length - fraction * step[N, 1], 0.1 * last_length, SMALLEST_SEGMENT)
 
 
-@compiled
-def _residual(line: Line, rounding: float) -> tuple[float, int, int]:
-    """Return the largest residual as a multiple of its tolerance, and where it stands."""
-    N, x, tension, reach = line.ends.count, line.position, 0.0, 0.0
-    for j in range(1, N + 1):
+@inlined
+def _tolerances(line: Line, rounding: float) -> tuple[float, float]:
+    """Return by how much a length equation [-] and a balance [N] may be off."""
+    tension, reach, x = 0.0, 0.0, line.position
+    for j in range(1, line.ends.count + 1):
         tension = max(tension, abs(line.tension[NEW, j]))
         reach = max(reach, abs(x[NEW, j, 0]), abs(x[NEW, j, 1]), abs(x[NEW, j, 2]))
-    allowed = RELATIVE_TOLERANCE * tension + ABSOLUTE_TOLERANCE + rounding * line.length[1] * reach
     strain = LENGTH_TOLERANCE + 2.0 * ROUNDING / STRAIN_SCALE * reach / max(line.length[1], SMALLEST_SEGMENT)
-    worst, node, equation, per_strain, per_newton = 0.0, 0, 0, 1.0 / strain, 1.0 / allowed
-    for j in range(1, N + 1):
+    return strain, RELATIVE_TOLERANCE * tension + ABSOLUTE_TOLERANCE + rounding * line.length[1] * reach
+
+
+@compiled
+def _size(line: Line, rounding: float, merit: float) -> float:
+    """Return the largest residual as a multiple of its tolerance; infinite for one that is no number."""
+    strain, allowed = _tolerances(line, rounding)
+    length, balance, r = 0.0, 0.0, line.rows[RESIDUAL]
+    for j in range(1, line.ends.count + 1):
+        length = max(length, abs(r[j, 0]))
+        balance = max(balance, abs(r[j, 1]), abs(r[j, 2]), abs(r[j, 3]))
+    return max(length / strain, balance / allowed) if isfinite(merit) else np.inf
+
+
+@compiled
+def _solved(line: Line, rounding: float, converged: bool, iterations: int) -> Solved:
+    """Return how it ended, with the worst equation and where it stands."""
+    strain, allowed = _tolerances(line, rounding)
+    worst, node, equation = 0.0, 0, 0
+    for j in range(1, line.ends.count + 1):
         for i in range(4):
-            size = abs(line.rows[RESIDUAL, j, i]) * (per_strain if i == 0 else per_newton)
+            size = abs(line.rows[RESIDUAL, j, i]) / (strain if i == 0 else allowed)
             if worst == worst and not size <= worst:
                 worst, node, equation = size, j, i
-    return worst, node, equation
+    return Solved(converged, iterations, worst, node, equation)
 
 
 @compiled

@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from subzero.compiled import inlined, inner
+from subzero.compiled import inner
 
 WaterVelocity = Callable[[float, float, float, float], Sequence[float]]
 """Function of north, east, down [m] and time [s] that gives the water's velocity (3,). [m/s]"""
@@ -130,7 +130,7 @@ class Current:
         return Water(points, self.velocity.reshape(-1, 3).copy())
 
 
-@inlined
+@inner
 def water_velocity(
     water: Water, north: float, east: float, down: float, time: float
 ) -> tuple[float, float, float]:
