@@ -180,5 +180,5 @@ def _progress(trial: scenarios.Trial) -> ProgressBar:
 
     console = Console(stderr=True, highlight=False)
     if not is_warm():
-        console.print("Compiling the kernels (first use, about 25 s)…")
+        console.print("Compiling the kernels (first use, about 50 s)…")
     return ProgressBar(f"Simulating {trial.name}", console)

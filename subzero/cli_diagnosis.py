@@ -159,5 +159,5 @@ def _bar(words: str) -> Any:
 
     console = Console(stderr=True, highlight=False)
     if not is_warm():
-        console.print("Compiling the kernels (first use, about 25 s)…")
+        console.print("Compiling the kernels (first use, about 50 s)…")
     return ProgressBar(words, console)
