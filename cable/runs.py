@@ -21,8 +21,8 @@ TowVelocity = Callable[[float], Sequence[float] | np.ndarray]
 
 REST = 1e-12
 """Slower than this is at rest. [m/s]"""
-AT_ENDS, INSIDE = 1.0 / 12.0, ((-0.5 * np.sqrt(0.2), 5.0 / 12.0), (0.5 * np.sqrt(0.2), 5.0 / 12.0))
-"""Lobatto's quadrature on a step of length one: weight of both ends, and offsets and weights of two times inside."""
+GAUSS = ((-np.sqrt(0.15), 5.0 / 18.0), (0.0, 8.0 / 18.0), (np.sqrt(0.15), 5.0 / 18.0))
+"""Offsets and weights of three-point Gauss quadrature on a step of length one: no time at which a motion may jump."""
 MOMENT = 1e-9
 """Just before and just after, as a share of the step."""
 NEARLY_TAUT = 0.999
@@ -98,7 +98,7 @@ def too_short(time: float, line: Line, drum: DrumNumbers) -> str:
 
 
 def sample_path(velocity: TowVelocity, duration: float, step: float, name: str = "tow_velocity") -> TowPath:
-    """Return the way of a point that moves at `velocity`, from 0: places by Lobatto's quadrature of order six.
+    """Return the way of a point that moves at `velocity`, from 0: places by Gauss quadrature of order six.
 
     Velocities are taken just after and just before the times: the motion may change abruptly at a recorded time.
     """
@@ -108,11 +108,10 @@ def sample_path(velocity: TowVelocity, duration: float, step: float, name: str =
     def at(moments: np.ndarray) -> np.ndarray:
         return _three_numbers([velocity(t) for t in moments.tolist()], name, moments)
 
-    leaving, arriving = at(times[:-1] + MOMENT * h), at(times[1:] - MOMENT * h)
     place = np.zeros((steps + 1, 3))
-    place[1:] = AT_ENDS * h * (leaving + arriving)
-    for offset, weight in INSIDE:
+    for offset, weight in GAUSS:
         place[1:] += weight * h * at(times[:-1] + h * (0.5 + offset))
+    leaving, arriving = at(times[:-1] + MOMENT * h), at(times[1:] - MOMENT * h)
     leaving, arriving = np.vstack([leaving, arriving[-1:]]), np.vstack([leaving[:1], arriving])
     return TowPath(times, np.cumsum(place, axis=0), leaving, arriving)
 
