@@ -185,13 +185,13 @@ def _stiff_solve(line: Line, c: StiffCableNumbers) -> None:
 
 
 @inner
-def _can_reuse(line: Line, c: CableNumbers) -> bool:
+def _has_residual(line: Line, c: CableNumbers) -> bool:
     """Say whether a residual can be had without the matrix: not for a single segment, whose equations are its own."""
     return line.ends.count > 1
 
 
 @inner
-def _cannot_reuse(line: Line, c: StiffCableNumbers) -> bool:
+def _no_residual(line: Line, c: StiffCableNumbers) -> bool:
     """Say no: bending fills residual and matrix at once."""
     return False
 
@@ -206,6 +206,6 @@ def keep_tow_answer(line: Line) -> None:
 
 add_bending = by_field("bending_stiffness", _add_bending, _no_bending)
 factor_step = by_field("bending_stiffness", _stiff_factor, _factor)
-solve_again = by_field("bending_stiffness", _stiff_solve, _solve)
-can_reuse = by_field("bending_stiffness", _cannot_reuse, _can_reuse)
+solve_factored = by_field("bending_stiffness", _stiff_solve, _solve)
+has_residual = by_field("bending_stiffness", _no_residual, _has_residual)
 bending_energy = by_field("bending_stiffness", _energy, _no_energy)

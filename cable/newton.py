@@ -10,7 +10,7 @@ import numpy as np
 from subzero.compiled import compiled, inlined, inner
 
 from .assembly import assemble, assemble_residual
-from .bending import can_reuse, factor_step, solve_again
+from .bending import has_residual, factor_step, solve_factored
 from .differences import Weights
 from .element import Load
 from .line import GUESS, NEW, RESIDUAL, STEP, Line, held_node
@@ -23,8 +23,6 @@ RELATIVE_TOLERANCE = 1e-9
 """Balances hold to this fraction of the largest tension in the cable."""
 ABSOLUTE_TOLERANCE = 1e-13
 """Balances of a cable without tension hold to this. [N]"""
-KEEP = 0.1
-"""A matrix is kept while a step with it leaves at most this share of what was wrong."""
 ROUNDING = 1e-15
 """Positions x are known to this fraction; inertia m1 ℓ a₀ b₀ x and strain x/ℓ of a segment cannot be known better."""
 LENGTH_TOLERANCE = 1e-9
@@ -53,24 +51,24 @@ def solve_step(
 ) -> Solved:
     """Solve the equations of `assembly` for level NEW, from the guess that stands there.
 
-    The matrix and its factors serve as long as each step leaves little (`KEEP`) of what was wrong: a residual by itself
-    costs a quarter of both. Then they are made again, at the last guess that was better than the one before.
+    The matrix is made anew for every step: a kept one converges to the tolerance only, and what is left then differs
+    from run to run, which sensitivities by differences see. Whether a guess will do, the residual tells by itself.
     """
-    rounding, reusable, fresh = ROUNDING * (c.mass + c.added_mass) * w.a0 * w.b0, can_reuse(line, c), True
+    rounding, alone = ROUNDING * (c.mass + c.added_mass) * w.a0 * w.b0, has_residual(line, c)
     assemble(line, w, c, drum, work)
     merit = _merit(line)
     for iteration in range(MAX_ITERATIONS):
-        size = _size(line, rounding, merit)
-        if size <= 1.0:
+        if _size(line, rounding, merit) <= 1.0:
             return _solved(line, rounding, True, iteration)
-        if fresh and not factor_step(line, c):
+        if alone and iteration > 0:
+            assemble(line, w, c, drum, work)
+        if not factor_step(line, c):
             break
-        solve_again(line, c)
-        last_length = _save(line)
-        before, fraction = merit, 1.0
-        for _ in range(MAX_HALVINGS if fresh else 1):
+        solve_factored(line, c)
+        last_length, before, fraction = _save(line), merit, 1.0
+        for _ in range(MAX_HALVINGS):
             _update(line, last_length, fraction)
-            if reusable:
+            if alone:
                 assemble_residual(line, w, c, drum, work)
             else:
                 assemble(line, w, c, drum, work)
@@ -78,15 +76,8 @@ def solve_step(
             if isfinite(merit) and merit <= before * (1.0 - 0.1 * fraction) + 1e-30:
                 break
             fraction *= 0.5
-        if fresh and not isfinite(merit):
+        if not isfinite(merit):
             break
-        worse = not fresh and not merit <= before
-        fresh = not reusable or not merit <= KEEP * before
-        if fresh and reusable and not _size(line, rounding, merit) <= 1.0:
-            if worse:
-                _update(line, last_length, 0.0)
-            assemble(line, w, c, drum, work)
-            merit = _merit(line)
     return _solved(line, rounding, _size(line, rounding, merit) <= 1.0, MAX_ITERATIONS)
 
 
