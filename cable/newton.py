@@ -10,7 +10,7 @@ import numpy as np
 from subzero.compiled import compiled, inlined, inner
 
 from .assembly import assemble, assemble_residual
-from .bending import has_residual, factor_step, solve_factored
+from .bending import factor_step, has_residual, solve_factored
 from .differences import Weights
 from .element import Load
 from .line import GUESS, NEW, RESIDUAL, STEP, Line, held_node
