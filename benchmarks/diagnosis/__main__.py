@@ -13,7 +13,7 @@ from rich.console import Console
 
 from subzero.compiled import cache_directory
 
-from .cases import Case, cases
+from .cases import SEED, Case, cases
 from .results import read
 from .sharing import Shared, share
 from .times import keep, kept, timed
@@ -32,7 +32,7 @@ def benchmark(
     count: int | None = None,
     workers: int = 2,
     resume: bool = False,
-    seed: int = 5,
+    seed: int = SEED,
     results: Path | None = None,
     page: bool = True,
 ) -> None:

@@ -25,7 +25,7 @@ from subzero.diagnosis.trial_library import LIBRARY, flown
 from subzero.diagnosis.verdict import UNDECIDED, NextTrial
 from subzero.diagnosis.work import Work
 
-from .cases import AFTER, Case, Made, cases
+from .cases import AFTER, SEED, Case, Made, cases
 from .draws import with_values
 from .held_out import STARTS
 from .manoeuvres import CHANNELS, times
@@ -42,7 +42,7 @@ _shared: list[Shared] = []
 
 
 @app.default
-def benchmark(*, count: int = 20, workers: int = 2, seed: int = 5, results: Path | None = None) -> None:
+def benchmark(*, count: int = 20, workers: int = 2, seed: int = SEED, results: Path | None = None) -> None:
     """Take the advice, and keep what came of it for the page of the benchmark; an interrupted run goes on.
 
     Args:

@@ -23,6 +23,8 @@ from .truth import NoRunError, noisy, shown_by
 
 SHARES = {"single": 400, "healthy": 200, "pair": 100, "outside": 60, "twin": 20, "degraded": 20}
 """How many of each make the whole benchmark."""
+SEED = 11
+"""Of all cases; the choices of the engine were made with the cases of seeds 1 to 7."""
 DEGRADED = ("noise", "channels", "short", "wide", "narrow")
 AFTER = 4.0
 """The trial goes on behind its record, for sensors whose clock runs ahead. [s]"""
@@ -72,7 +74,7 @@ class Made:
     dropped: int = field(default=0)
 
 
-def cases(seed: int = 5, scale: float = 1.0) -> list[Case]:
+def cases(seed: int = SEED, scale: float = 1.0) -> list[Case]:
     """Return the cases of a benchmark, all kinds in turn; fewer or more of them by a factor."""
     counts = {kind: max(round(scale * count), 1) for kind, count in SHARES.items()}
     order = sorted(((i + 0.5) / n, kind, i) for kind, n in counts.items() for i in range(n))

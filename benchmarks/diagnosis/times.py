@@ -8,7 +8,7 @@ from time import perf_counter
 
 from subzero.diagnosis.diagnose import diagnose
 
-from .cases import Case, make
+from .cases import SEED, Case, make
 
 LIMITS = {"fig6": (3.0, 15.0), "rich": (3.0, 30.0)}
 """Manoeuvre → how long the first screen and the verdict may take. [s]"""
@@ -16,7 +16,7 @@ CAUSES = {"healthy": (), "one hidden": ("roll_stiffness",), "two hidden": ("roll
 Row = tuple[str, str, float, float]
 
 
-def timed(seed: int = 5) -> list[Row]:
+def timed(seed: int = SEED) -> list[Row]:
     """Return (manoeuvre, what is hidden, seconds to the screen, to the verdict); the compiler's time is left out."""
     _diagnosed(seed, "fig6", ())
     return [(manoeuvre, words, *_diagnosed(seed, manoeuvre, causes)) for manoeuvre in LIMITS

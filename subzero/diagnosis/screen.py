@@ -20,6 +20,8 @@ from subzero.diagnosis.refit import Fit
 
 FAR = 1.08
 """A wide fit that leaves a greater mean square, in noise, is not close to the records."""
+BENT, MANY = 5.0, 6
+"""Nor is one that bends so many parameters of the model by more than BENT tolerances: it is close by chance."""
 SWEEP = (0.25, 0.5, 1.0, 2.0)
 """Sizes, in effect scales, that causes are tried at by real runs, either way."""
 FELT = 1.0
@@ -55,9 +57,11 @@ class Screen:
         return [ids for ids in ranked if self.log_posterior[ids] > self.log_posterior[ranked[0]] - keep]
 
 
-def is_close(wide: Fit) -> bool:
-    """Say whether a wide fit leaves nothing but noise."""
-    return float(wide.r @ wide.r) < FAR * wide.r.size
+def is_close(problem: Problem, wide: Fit) -> bool:
+    """Say whether a wide fit leaves nothing but noise, and bends little."""
+    bent = np.abs(wide.z) > BENT * np.array([entry.parameter.tolerance for entry in problem.entries])
+    model = np.array([entry.record < 0 for entry in problem.entries])
+    return bool(wide.r @ wide.r < FAR * wide.r.size and np.count_nonzero(bent & model) < MANY)
 
 
 def look(problem: Problem, wide: Fit, nominal: tuple[np.ndarray, np.ndarray]) -> Screen:
@@ -68,7 +72,7 @@ def look(problem: Problem, wide: Fit, nominal: tuple[np.ndarray, np.ndarray]) ->
         wide: the fit with wide tolerances.
         nominal: residual (m,) and sensitivities (m, k) of the nominal model.
     """
-    if not is_close(wide):
+    if not is_close(problem, wide):
         return _from_afar(problem, *nominal)
     names = named(problem)
     found = Screen(count=len(names))

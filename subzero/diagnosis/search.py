@@ -189,7 +189,7 @@ class Search:
         """Return the causes that are fitted by themselves: those that the wide fit bends most, of which the linear
         problem says little; and if it is not close to the records, the best of those that were swept.
         """
-        if not is_close(self.wide):
+        if not is_close(self.problem, self.wide):
             return self.screen.best(1, SWEPT, np.inf)
         bent: dict[Ids, float] = {}
         for z, entry in zip(self.wide.z, self.problem.entries, strict=True):
