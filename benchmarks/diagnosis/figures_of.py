@@ -11,6 +11,7 @@ from .scores import (
     Score,
     calibration,
     errors,
+    expected,
     first,
     gain_of,
     is_foreign,
@@ -112,10 +113,14 @@ def _outside(results: Sequence[Result]) -> list[Score]:
 
 
 def _numbers(results: Sequence[Result]) -> list[Score]:
-    off, covered = errors(of(results, "single", "twin"))
+    off, stated, covered = errors(of(results, "single", "twin"))
     inside = share("… 95 % interval covers the truth", [{"in": x} for x in covered], lambda one: one["in"],
                    "93 … 97 %", least=0.93, most=0.97)  # fmt: skip
-    return [number("parameter of the named cause: error", off, "median ≤ 4 %", "{:.1%}", most=0.04), inside]
+    return [
+        number("parameter of the named cause: error", off, "median ≤ 4 %", "{:.1%}", most=0.04),
+        number("… that its stated standard deviation lets expect", expected(stated), "–", "{:.1%}"),
+        inside,
+    ]
 
 
 def _gains(results: Sequence[Result]) -> list[Score]:

@@ -7,7 +7,7 @@ from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.stats import binomtest
+from scipy.stats import binomtest, norm
 
 Result = dict[str, Any]
 CLEAR, PLAIN, SURE = 16.0, 50.0, 0.95
@@ -122,17 +122,26 @@ def calibration(results: Sequence[Result]) -> tuple[list[tuple[float, float, int
     return found, float(error)
 
 
-def errors(results: Sequence[Result]) -> tuple[list[float], list[bool]]:
-    """Return relative errors of the parameters of rightly named causes, and whether their intervals cover the truth."""
-    off, covered = [], []
+def errors(results: Sequence[Result]) -> tuple[list[float], list[float], list[bool]]:
+    """Return the parameters of rightly named causes: relative errors, the relative standard deviations that are stated
+    with them, and whether their intervals cover the truth.
+    """
+    off, stated, covered = [], [], []
     for one in results:
         for cause in one["causes"]:
-            for (value, low, high, _), true in zip(cause["parameters"].values(), one["truth"].get(cause["id"], ()),
-                                                   strict=False):  # fmt: skip
+            for (value, low, high, sd), true in zip(cause["parameters"].values(), one["truth"].get(cause["id"], ()),
+                                                    strict=False):  # fmt: skip
                 if cause["id"] in one["truth"] and true:
                     off.append(abs(value - true) / abs(true))
+                    stated.append(sd / abs(true))
                     covered.append(low <= true <= high)
-    return off, covered
+    return off, stated, covered
+
+
+def expected(stated: Sequence[float]) -> list[float]:
+    """Return the errors that standard deviations let expect: ten quantiles of the size of a normal one for each."""
+    sizes = norm.ppf(0.5 + 0.5 * (np.arange(10) + 0.5) / 10)
+    return list(np.outer(stated, sizes).ravel())
 
 
 def gain_of(one: Result, model: str) -> float:

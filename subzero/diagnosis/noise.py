@@ -68,10 +68,15 @@ def estimate(time: np.ndarray, difference: np.ndarray, spec: float, known: float
 
 
 def spikes(values: np.ndarray, spec: float) -> np.ndarray:
-    """Say which samples stand alone, far from the median of seven around them."""
+    """Say which samples stand alone, far from the median of seven around them; at the ends, of the first or last five.
+
+    A record mirrored at its ends would show an outlier there twice, and two of them as a majority.
+    """
     if values.size < 7:
         return np.zeros(values.size, dtype=bool)
-    around = np.median(np.lib.stride_tricks.sliding_window_view(np.pad(values, 3, mode="reflect"), 7), axis=1)
+    inside = np.median(np.lib.stride_tricks.sliding_window_view(values, 7), axis=1)
+    first, last = np.median(values[:5]), np.median(values[-5:])
+    around = np.concatenate([np.full(3, first), inside, np.full(3, last)])
     off = np.abs(values - around)
     level = max(1.4826 * float(np.median(off)) * 1.2, 0.5 * spec)
     return off > SPIKE * level

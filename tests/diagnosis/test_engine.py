@@ -126,6 +126,16 @@ def test_spikes_are_those_that_stand_alone():
     assert np.flatnonzero(spikes(values, 0.02)).tolist() == [20, 77, 150], "a step is no spike"
 
 
+def test_two_spikes_at_the_end_of_a_record_are_no_majority():
+    values = 0.02 * np.random.default_rng(3).standard_normal(200)
+    for first, second in ((-1, -2), (-1, -3), (-2, -3), (0, 1), (1, 2)):
+        spoilt = values.copy()
+        spoilt[[first, second]] += 0.25
+        assert np.flatnonzero(spikes(spoilt, 0.02)).tolist() == sorted({first % 200, second % 200})
+    slope = values + 0.01 * np.arange(200)
+    assert not spikes(slope, 0.02).any(), "a slope of half a noise level a sample is none at the ends either"
+
+
 def test_whitening_makes_coloured_noise_white_across_gaps():
     random = np.random.default_rng(6)
     used = random.random(20000) > 0.1
