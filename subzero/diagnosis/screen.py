@@ -35,12 +35,14 @@ class Screen:
     Attributes:
         log_posterior: hypothesis → log (evidence, mixed over κ, times prior).
         secants: hypothesis → where its fit begins, for causes without a slope.
+        columns: place of an entry without a slope → its sensitivities, by the secant up to there (m,).
         count: of causes that can be named.
         far: the wide fit was not close to the records: sums of causes are no more than guesses.
     """
 
     log_posterior: dict[Ids, float] = field(default_factory=dict)
     secants: dict[Ids, np.ndarray] = field(default_factory=dict)
+    columns: dict[int, np.ndarray] = field(default_factory=dict)
     count: int = 1
     far: bool = False
 
@@ -79,7 +81,7 @@ def look(problem: Problem, wide: Fit, nominal: tuple[np.ndarray, np.ndarray]) ->
     base = {kappa: posterior(wide.quadratic, variances(problem.entries, (), kappa)) for kappa in KAPPAS}
     for ids in [(), *((one,) for one in names), *compatible(problem.entries, names)]:
         found.log_posterior[ids] = linear(problem, base, (), ids) + log_prior(ids, len(names))
-    _sweep(problem, wide.z, wide.J, _without_slope(problem, wide.J), found)
+    _sweep(problem, wide.z, wide.J, _without_slope(problem, wide.J), found, wide.r)
     return found
 
 
@@ -90,7 +92,7 @@ def _from_afar(problem: Problem, r: np.ndarray, J: np.ndarray) -> Screen:
     names, zero = named(problem), np.zeros(J.shape[1])
     found = Screen(count=len(names), far=True)
     found.log_posterior[()] = _mixed(problem, Quadratic.at(zero, r, J)) + log_prior((), len(names))
-    _sweep(problem, zero, J, [k for k, entry in enumerate(problem.entries) if entry.record < 0], found)
+    _sweep(problem, zero, J, [k for k, entry in enumerate(problem.entries) if entry.record < 0], found, r)
     for pair in compatible(problem.entries, names):
         better = max(found.log_posterior[(one,)] for one in pair)
         found.log_posterior[pair] = better + log_prior(pair, len(names)) - log_prior(pair[:1], len(names))
@@ -145,16 +147,20 @@ def _without_slope(problem: Problem, J: np.ndarray) -> list[int]:
             if entry.record < 0 and entry.parameter.low == 0.0 and felt[k] <= FELT]  # fmt: skip
 
 
-def _sweep(problem: Problem, z: np.ndarray, J: np.ndarray, places: list[int], found: Screen) -> None:
-    """Try sizes of entries about z, side by side; keep the best of every cause."""
+def _sweep(
+    problem: Problem, z: np.ndarray, J: np.ndarray, places: list[int], found: Screen, here: np.ndarray
+) -> None:
+    """Try sizes of entries about z, side by side, with the residual `here` there; keep the best of every cause."""
     jobs = [(k, size) for k in places for size in _sizes(problem.entries[k].parameter)]
     moved = [np.concatenate([z[:k], [size], z[k + 1 :]]) for k, size in jobs]
-    best: dict[Ids, float] = {}
+    best, dull = dict[Ids, float](), _without_slope(problem, J)
     for (k, size), there, r in zip(jobs, moved, problem.residuals(moved), strict=True):
         ids: Ids = (problem.entries[k].effect.id,)
         value = _at_size(problem, k, size, there, r, J)
         if value > best.get(ids, -np.inf) or ids not in best:
             best[ids], found.secants[ids] = value, there
+            if k in dull and np.isfinite(r).all():
+                found.columns[k] = (here - r) / (size - z[k])
     found.log_posterior.update({ids: best[ids] + log_prior(ids, len(named(problem))) for ids in best})
 
 

@@ -18,7 +18,7 @@ from subzero.diagnosis.pose import with_finer_steps
 from subzero.diagnosis.probability import Beliefs
 from subzero.diagnosis.problem import Problem, Progress
 from subzero.diagnosis.refit import Fit, refit
-from subzero.diagnosis.screen import Screen, beside, instead, is_close, look
+from subzero.diagnosis.screen import FELT, Screen, beside, instead, is_close, look
 from subzero.diagnosis.wide import fit_wide
 
 KEEP, SINGLES, PAIRS = 12.0, 7, 4
@@ -136,7 +136,8 @@ class Search:
             start = start or self.wide
             D, z = variances(self.problem.entries, ids, 1.0), self.screen.secants.get(ids)
             z = posterior(start.quadratic, D).z if z is None else z
-            self._keep(ids, refit(self.problem, z, start.J, D, most_fresh=0, made_at=start.made_at))
+            J = self._with_slopes(start.J, ids)
+            self._keep(ids, refit(self.problem, z, J, D, most_fresh=0, made_at=start.made_at))
 
     def race(self, most: int = RACERS, hopeless: float = HOPELESS) -> None:
         """Fit candidates again with sensitivities of their own, the best first, until the next is hopeless."""
@@ -259,6 +260,15 @@ class Search:
             self._keep(
                 one.ids, refit(self.problem, fit.z, fit.J, D, r=fit.r, most_fresh=0, made_at=fit.made_at)
             )
+
+    def _with_slopes(self, J: np.ndarray, ids: Ids) -> np.ndarray:
+        """Return sensitivities with secants for those causes of a hypothesis that do nothing when they are small."""
+        J = J.copy()
+        for k in places(self.problem.entries, ids):
+            scale = self.problem.entries[k].parameter.scale
+            if k in self.screen.columns and np.linalg.norm(J[:, k]) * scale <= FELT:
+                J[:, k] = self.screen.columns[k]
+        return J
 
     def _keep(self, ids: Ids, fit: Fit) -> Candidate:
         """Keep a fit and return its candidate."""

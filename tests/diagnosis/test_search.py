@@ -16,12 +16,13 @@ import subzero
 from subzero.diagnosis.candidate import Candidate
 from subzero.diagnosis.effect import Parameter
 from subzero.diagnosis.effects import START, catalogue
-from subzero.diagnosis.hypotheses import log_prior, named
+from subzero.diagnosis.hypotheses import log_prior, named, places
 from subzero.diagnosis.probability import FURTHER, UNTRIED, Beliefs, folded
 from subzero.diagnosis.problem import Problem, entries_of
 from subzero.diagnosis.refit import secant
 from subzero.diagnosis.rules import large
-from subzero.diagnosis.screen import Screen, look
+from subzero.diagnosis.screen import BENT, MANY, Screen, is_close, look
+from subzero.diagnosis.search import Search
 from subzero.diagnosis.setting import Setting
 
 
@@ -136,3 +137,32 @@ def test_several_residuals_are_those_of_each(plant):
     several = [np.where([one.parameter.low == 0.0 for one in problem.entries], abs(z), z) for z in several]
     for z, r in zip(several, problem.residuals(several), strict=True):
         assert np.array_equal(r, problem.residual(z))
+
+
+def test_a_cause_that_does_nothing_when_small_is_fitted_where_it_acts(plant):
+    """With its slope at the nominal model, 0, the prior alone would draw a slow servo back to nothing."""
+    slow = catalogue(("heading",))["rudder_rate_limit"]
+    planted = plant(lambda setting: slow.apply(setting, 0.16), duration=16.0)
+    search = Search(problem=planted.problem, progress=lambda share, words: None)
+    search.begin()
+    search.look()
+    search.fit(("rudder_rate_limit",))
+    fit = search.candidates[("rudder_rate_limit",)].fit
+    assert fit.z[places(planted.problem.entries, ("rudder_rate_limit",))] == pytest.approx(0.16, abs=0.03)
+
+
+def test_a_fit_that_bends_many_parameters_is_not_close():
+    effects = list(catalogue(("heading",)).values())
+    entries = [SimpleNamespace(record=-1, parameter=one.parameters[0]) for one in effects[: 2 * MANY]]
+    problem, tolerance = (
+        SimpleNamespace(entries=entries),
+        np.array([one.parameter.tolerance for one in entries]),
+    )
+    quiet = np.ones(50)
+
+    def bent(count):
+        return np.where(np.arange(tolerance.size) < count, -1.1 * BENT, 0.5) * tolerance
+
+    assert is_close(problem, SimpleNamespace(r=quiet, z=bent(MANY - 1)))
+    assert not is_close(problem, SimpleNamespace(r=quiet, z=bent(MANY)))
+    assert not is_close(problem, SimpleNamespace(r=1.1 * quiet, z=bent(0)))
