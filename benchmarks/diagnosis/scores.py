@@ -102,7 +102,7 @@ def number(words: str, values: Sequence[float], target: str, form: str, *, least
     if not values:
         return Score(words, "–", target, "–", 0, None)
     low, value, high = np.percentile(values, [25, 50, 75])
-    met = (least is None or value >= least) and (most is None or value <= most)
+    met = bool((least is None or value >= least) and (most is None or value <= most))
     judged = met if (least, most) != (None, None) else None
     return Score(words, form.format(value), target, f"{form.format(low)} … {form.format(high)} (quartiles)",
                  len(values), judged)  # fmt: skip
