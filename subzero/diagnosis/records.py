@@ -88,6 +88,8 @@ def _logged(path: Path, name: str, scenario: str | Path | None, commands: str | 
     _refuse(path, time_problems(record, trial, longer=commands == FROM_RECORD))
     trial = cut_to(commanded(trial, record, commands), record)
     values, notes = _channels(record, sidecar)
+    if scenario and sidecar.scenario and str(scenario) != sidecar.scenario:
+        notes += (f"Its sidecar names the trial {sidecar.scenario}, so {scenario} is not taken for it.",)
     if CONTINUOUS in values:
         values[CONTINUOUS] = beside(values[CONTINUOUS], math.degrees(trial.start.heading) % FULL_TURN)
     return Logged(

@@ -95,6 +95,15 @@ def test_a_folder_holds_several_trials_each_with_its_own_scenario(write, tmp_pat
     assert (first.setting.trial.name, second.setting.trial.name) == ("fig6", "zigzag")
 
 
+def test_a_sidecar_that_names_another_trial_is_followed_and_said(write):
+    file = write(columns("surge_speed"), 'scenario = "fig6"')
+    (one,) = read(file, scenario="zigzag")
+    assert one.setting.trial.name == "fig6"
+    assert any("zigzag is not taken" in note for note in one.notes)
+    (same,) = read(file, scenario="fig6")
+    assert not same.notes
+
+
 def test_the_sidecar_tells_noise_and_rates_and_what_the_speed_log_shows(write):
     sidecar = """
         source = "basin"
