@@ -15,17 +15,17 @@ from subzero.diagnosis.candidate import Candidate, possible
 from subzero.diagnosis.effect import Parameter
 from subzero.diagnosis.evidence import KAPPAS, Posterior, Quadratic, freed, log_sum, posterior
 from subzero.diagnosis.hypotheses import Ids, compatible, log_prior, named, places, variances
-from subzero.diagnosis.problem import Problem
+from subzero.diagnosis.problem import Entry, Problem
 from subzero.diagnosis.refit import Fit
 
 FAR = 1.08
 """A wide fit that leaves a greater mean square, in noise, is not close to the records."""
-BENT, MANY = 5.0, 6
-"""Nor is one that bends so many parameters of the model by more than BENT tolerances: it is close by chance."""
+STRAINED, MANY = 5.0, 6
+"""Nor is one that bends MANY parameters of the model by more than STRAINED tolerances: it is close by chance."""
 SWEEP = (0.25, 0.5, 1.0, 2.0)
 """Sizes, in effect scales, that causes are tried at by real runs, either way."""
 FELT = 1.0
-"""An effect of one scale that seems to do less than this, in noise, has no slope at the nominal model."""
+"""An effect of one scale that seems to do no more than this, in noise, has no slope there."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -61,7 +61,7 @@ class Screen:
 
 def is_close(problem: Problem, wide: Fit) -> bool:
     """Say whether a wide fit leaves nothing but noise, and bends little."""
-    bent = np.abs(wide.z) > BENT * np.array([entry.parameter.tolerance for entry in problem.entries])
+    bent = np.abs(wide.z) > STRAINED * np.array([entry.parameter.tolerance for entry in problem.entries])
     model = np.array([entry.record < 0 for entry in problem.entries])
     return bool(wide.r @ wide.r < FAR * wide.r.size and np.count_nonzero(bent & model) < MANY)
 
@@ -142,9 +142,13 @@ def instead(problem: Problem, one: Candidate, rest: Ids) -> dict[Ids, float]:
 
 def _without_slope(problem: Problem, J: np.ndarray) -> list[int]:
     """Return the entries that do nothing when they are small."""
-    felt = np.linalg.norm(J, axis=0) * [entry.parameter.scale for entry in problem.entries]
     return [k for k, entry in enumerate(problem.entries)
-            if entry.record < 0 and entry.parameter.low == 0.0 and felt[k] <= FELT]  # fmt: skip
+            if entry.record < 0 and entry.parameter.low == 0.0 and is_flat(entry, J[:, k])]  # fmt: skip
+
+
+def is_flat(entry: Entry, column: np.ndarray) -> bool:
+    """Say whether sensitivities to an entry (m,) are none."""
+    return bool(np.linalg.norm(column) * entry.parameter.scale <= FELT)
 
 
 def _sweep(

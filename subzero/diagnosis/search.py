@@ -18,7 +18,7 @@ from subzero.diagnosis.pose import with_finer_steps
 from subzero.diagnosis.probability import Beliefs
 from subzero.diagnosis.problem import Problem, Progress
 from subzero.diagnosis.refit import Fit, refit
-from subzero.diagnosis.screen import FELT, Screen, beside, instead, is_close, look
+from subzero.diagnosis.screen import Screen, beside, instead, is_flat, look
 from subzero.diagnosis.wide import fit_wide
 
 KEEP, SINGLES, PAIRS = 12.0, 7, 4
@@ -190,7 +190,7 @@ class Search:
         """Return the causes that are fitted by themselves: those that the wide fit bends most, of which the linear
         problem says little; and if it is not close to the records, the best of those that were swept.
         """
-        if not is_close(self.problem, self.wide):
+        if self.screen.far:
             return self.screen.best(1, SWEPT, np.inf)
         bent: dict[Ids, float] = {}
         for z, entry in zip(self.wide.z, self.problem.entries, strict=True):
@@ -265,8 +265,7 @@ class Search:
         """Return sensitivities with secants for those causes of a hypothesis that do nothing when they are small."""
         J = J.copy()
         for k in places(self.problem.entries, ids):
-            scale = self.problem.entries[k].parameter.scale
-            if k in self.screen.columns and np.linalg.norm(J[:, k]) * scale <= FELT:
+            if k in self.screen.columns and is_flat(self.problem.entries[k], J[:, k]):
                 J[:, k] = self.screen.columns[k]
         return J
 

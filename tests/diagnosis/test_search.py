@@ -21,7 +21,7 @@ from subzero.diagnosis.probability import FURTHER, UNTRIED, Beliefs, folded
 from subzero.diagnosis.problem import Problem, entries_of
 from subzero.diagnosis.refit import secant
 from subzero.diagnosis.rules import large
-from subzero.diagnosis.screen import BENT, MANY, Screen, is_close, look
+from subzero.diagnosis.screen import MANY, STRAINED, Screen, is_close, look
 from subzero.diagnosis.search import Search
 from subzero.diagnosis.setting import Setting
 
@@ -154,14 +154,11 @@ def test_a_cause_that_does_nothing_when_small_is_fitted_where_it_acts(plant):
 def test_a_fit_that_bends_many_parameters_is_not_close():
     effects = list(catalogue(("heading",)).values())
     entries = [SimpleNamespace(record=-1, parameter=one.parameters[0]) for one in effects[: 2 * MANY]]
-    problem, tolerance = (
-        SimpleNamespace(entries=entries),
-        np.array([one.parameter.tolerance for one in entries]),
-    )
-    quiet = np.ones(50)
+    problem, quiet = SimpleNamespace(entries=entries), np.ones(50)
+    tolerance = np.array([one.parameter.tolerance for one in entries])
 
     def bent(count):
-        return np.where(np.arange(tolerance.size) < count, -1.1 * BENT, 0.5) * tolerance
+        return np.where(np.arange(tolerance.size) < count, -1.1 * STRAINED, 0.5) * tolerance
 
     assert is_close(problem, SimpleNamespace(r=quiet, z=bent(MANY - 1)))
     assert not is_close(problem, SimpleNamespace(r=quiet, z=bent(MANY)))
