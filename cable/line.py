@@ -24,6 +24,8 @@ from .water import Water, water_velocity
 
 NEW, NOW, BEFORE = 0, 1, 2
 
+TOLERANCE = 1e-9
+"""How exactly a step is solved where nobody asks for less: this share of the largest tension, strains of 1e-12."""
 SPLIT_AT = 1.5
 """The last segment is split when it has grown to this many segment lengths."""
 
@@ -43,6 +45,7 @@ class Ends:
         drum_force: the cable's pull on it, with what acts across the last half segment (3,). [N]
         previous_step: t_now − t_before, 0 after a start. [s]
         smoothing: T₀ of the slack law in force. [N]
+        tolerance: how exactly a step is solved, see `newton`. [-]
         time: of level NOW. [s]
         segment_length, grading: new segments are `segment_length` + `grading` s long, s from the tow point. [m], [-]
         settled: length of all segments but the last. [m]
@@ -65,6 +68,7 @@ class Ends:
     drum_force: np.ndarray
     previous_step: float
     smoothing: float
+    tolerance: float
     time: float
     segment_length: float
     grading: float
@@ -136,6 +140,7 @@ def new_line(capacity: int) -> Line:
         drum_force=np.zeros(3),
         previous_step=0.0,
         smoothing=SMOOTHING,
+        tolerance=TOLERANCE,
         time=0.0,
         segment_length=1.0,
         grading=0.0,

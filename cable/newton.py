@@ -19,14 +19,10 @@ from .slack import STRAIN_SCALE
 
 MAX_ITERATIONS = 40
 MAX_HALVINGS = 8
-RELATIVE_TOLERANCE = 1e-9
-"""Balances hold to this fraction of the largest tension in the cable."""
 ABSOLUTE_TOLERANCE = 1e-13
 """Balances of a cable without tension hold to this. [N]"""
 ROUNDING = 1e-15
 """Positions x are known to this fraction; inertia m1 ℓ a₀ b₀ x and strain x/ℓ of a segment cannot be known better."""
-LENGTH_TOLERANCE = 1e-9
-"""The length equation, in units of `slack.STRAIN_SCALE`: a strain of 1e-12."""
 SMALLEST_SEGMENT = 1e-9
 """The growing segment never gets shorter than this while iterating. [m]"""
 
@@ -109,13 +105,18 @@ def _update(line: Line, last_length: float, fraction: float) -> None:
 
 @inlined
 def _tolerances(line: Line, rounding: float) -> tuple[float, float]:
-    """Return by how much a length equation [-] and a balance [N] may be off."""
+    """Return by how much a length equation [-] and a balance [N] may be off.
+
+    `ends.tolerance` is the share of the largest tension in the cable for balances, and of `slack.STRAIN_SCALE` for
+    lengths: 1e-9 is a strain of 1e-12.
+    """
     tension, reach, x = 0.0, 0.0, line.position
     for j in range(1, line.ends.count + 1):
         tension = max(tension, abs(line.tension[NEW, j]))
         reach = max(reach, abs(x[NEW, j, 0]), abs(x[NEW, j, 1]), abs(x[NEW, j, 2]))
-    strain = LENGTH_TOLERANCE + 2.0 * ROUNDING / STRAIN_SCALE * reach / max(line.length[1], SMALLEST_SEGMENT)
-    return strain, RELATIVE_TOLERANCE * tension + ABSOLUTE_TOLERANCE + rounding * line.length[1] * reach
+    known = 2.0 * ROUNDING / STRAIN_SCALE * reach / max(line.length[1], SMALLEST_SEGMENT)
+    strain = line.ends.tolerance + known
+    return strain, line.ends.tolerance * tension + ABSOLUTE_TOLERANCE + rounding * line.length[1] * reach
 
 
 @compiled

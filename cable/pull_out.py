@@ -10,9 +10,9 @@ from .drum_path import PLACE, SETPOINT, VELOCITY, drum_path, resting
 from .element import new_load
 from .history import History
 from .laying import lay_straight
-from .line import new_line
+from .line import TOLERANCE, new_line
 from .properties import CableProperties, DrumProperties
-from .runs import TowVelocity, current_of, first_direction, run, sample_path, segments_needed
+from .runs import TowVelocity, check_tolerance, current_of, first_direction, run, sample_path, segments_needed
 from .water import Current
 from .winch import Brake, PayOutRate, Winch
 
@@ -35,6 +35,7 @@ def pull_out(
     drum_velocity: TowVelocity | None = None,
     rtol: float = 0.0,
     grading: float = 0.0,
+    tolerance: float = TOLERANCE,
 ) -> History:
     """Pull a cable off a drum, starting with no cable in the water and the tow point at the drum.
 
@@ -69,6 +70,9 @@ def pull_out(
         rtol: with a positive value, steps are made as small as needed for an error of the tow force of about this share
             of its largest (`cable.step_size`), but for jolts; 0 takes every step as it is.
         grading: new segments are Δs + grading · s long, s from the tow point: far from the vehicle a cable is coarser.
+        tolerance: how exactly the default scheme solves a step: balances of forces to this share of the largest
+            tension, strains to a thousandth of it. With 1e-5 most steps take one Newton iteration, not two, and what
+            that leaves is far below the error of the step; what compares runs with one another wants the 1e-9.
 
     Returns:
         the history from t = 0 on. Look at `history.outcome`: a run that could not go on keeps what it has.
@@ -82,6 +86,7 @@ def pull_out(
     """
     cable, drum = cable or CableProperties(), drum or DrumProperties()
     _check(duration, step, segment_length, scheme, rtol, grading)
+    check_tolerance(tolerance)
     water = current_of(current)
     if scheme == "lumped" and rtol == 0.0 and grading == 0.0:
         from .lumped_history import pull_out_lumped
@@ -117,7 +122,7 @@ def pull_out(
     longest = led[:, SETPOINT].max() if isinstance(drum, PayOutRate | Brake) else 2.0 * reach + 5.0
     capacity = segments_needed(float(longest), segment_length, grading)
     line, work, c, turning = new_line(capacity), new_load(), cable.numbers(), drum.numbers()
-    line.ends.segment_length, line.ends.grading = segment_length, grading
+    line.ends.segment_length, line.ends.grading, line.ends.tolerance = segment_length, grading, tolerance
     turning.velocity[:] = led[0, VELOCITY:SETPOINT]
     lay_straight(line, wet, direction, path.leaving[0], turning, c)
     return run(line, path, led, water.numbers(), c, turning, rtol, work, capacity)

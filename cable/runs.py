@@ -25,6 +25,8 @@ GAUSS = ((-np.sqrt(0.15), 5.0 / 18.0), (0.0, 8.0 / 18.0), (np.sqrt(0.15), 5.0 / 
 """Offsets and weights of three-point Gauss quadrature on a step of length one: no time at which a motion may jump."""
 MOMENT = 1e-9
 """Just before and just after, as a share of the step."""
+FINEST, COARSEST = 1e-12, 1e-3
+"""Between these a tolerance makes sense: rounding is below, and the error of a step above."""
 NEARLY_TAUT = 0.999
 """A cable whose ends are this share of its length apart, or more, and that has no solution, is too short."""
 EQUATIONS = ("length", "northward balance", "eastward balance", "downward balance")
@@ -130,6 +132,13 @@ def segments_needed(length: float, segment_length: float, grading: float) -> int
     if grading * length < segment_length:
         return int(length / segment_length) + 8
     return int(np.log1p(grading * length / segment_length) / np.log1p(grading)) + 12
+
+
+def check_tolerance(tolerance: float) -> None:
+    """Raise a ValueError if a step cannot be solved as exactly as that."""
+    if not FINEST <= tolerance <= COARSEST:
+        message = f"tolerance is {tolerance!r}; it must be from {FINEST:g} to {COARSEST:g}."
+        raise ValueError(message)
 
 
 def current_of(current: Sequence[float] | np.ndarray | Current | None) -> Current:

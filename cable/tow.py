@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import sqrt
+from math import inf, sqrt
 
 import numpy as np
 
@@ -11,9 +11,9 @@ from .drum_path import resting
 from .element import new_load
 from .history import History
 from .laying import lay_straight
-from .line import NOW, Line, new_line
+from .line import NOW, TOLERANCE, Line, new_line
 from .properties import CableProperties, DrumProperties
-from .runs import TowVelocity, current_of, first_direction, run, sample_path
+from .runs import TowVelocity, check_tolerance, current_of, first_direction, run, sample_path
 from .water import Current
 
 
@@ -28,6 +28,7 @@ def tow(
     current: Sequence[float] | np.ndarray | Current | None = None,
     drogue_drag_area: float = 0.0,
     rtol: float = 0.0,
+    tolerance: float = TOLERANCE,
     scheme: str = "moving_end",
 ) -> History:
     """Tow a cable of fixed length, starting from the exact steady straight tow.
@@ -46,6 +47,7 @@ def tow(
             time (places relative to the tow point at the start); still water when not given.
         drogue_drag_area: C_d A of a drogue at the free end; 0 is a free tail. [m²]
         rtol: as in `cable.pull_out`.
+        tolerance: as in `cable.pull_out`.
         scheme: "moving_end" or "lumped", as in `cable.pull_out`.
 
     Returns:
@@ -61,6 +63,7 @@ def tow(
         if not (np.isfinite(value) and value > 0.0):
             message = f"{name} is {value!r}; it must be a positive number."
             raise ValueError(message)
+    check_tolerance(tolerance)
     cable, water = cable or CableProperties(), current_of(current)
     if scheme == "lumped":
         from .lumped_history import tow_lumped
@@ -85,7 +88,7 @@ def tow(
     uphill = _steady_direction(path.leaving, J, cable, tail_drag)
     line.ends.segment_length = length / count
     lay_straight(line, length, uphill, path.leaving[0], idle, c)
-    line.ends.free_end, line.ends.tail_drag = True, tail_drag
+    line.ends.free_end, line.ends.tail_drag, line.ends.tolerance = True, tail_drag, tolerance
     _set_steady_tow(line, path.leaving[0], J, cable, tail_drag)
     path.place[:] += line.position[NOW, 0]
     origin = -line.position[NOW, 0]
@@ -115,21 +118,21 @@ def _set_steady_tow(
     drag, weight = cable.tangential_drag * abs(U @ t) * -(U @ t), cable.weight_in_water * t[2]
     line.velocity[:, : N + 1] = velocity
     line.ends.payout[:] = 0.0
-    pull = at_tail = tail_drag * float(U @ U)
-    line.node_tension[N] = at_tail
-    for j in range(N, 0, -1):
-        length = line.ends.last_length[NOW] if j == N else line.length[j]
-        middle = _grown(pull, 0.5 * length, drag, weight, cable.compliance)
-        pull = _grown(middle, 0.5 * length, drag, weight, cable.compliance)
-        line.tension[:, j], line.node_tension[j - 1] = middle, pull
-        chord = length * (1.0 + cable.compliance * middle)
-        line.position[:, j - 1] = line.position[NOW, j] - chord * t
-    line.ends.tow_force[:], line.ends.drum_pull = line.node_tension[0] * t, at_tail
+    pulls, middles = [tail_drag * float(U @ U)], []
+    lengths = [*line.length[1:N].tolist(), line.ends.last_length[NOW]]
+    for length in reversed(lengths):
+        middles.append(_grown(pulls[-1], 0.5 * length, drag, weight, cable.compliance))
+        pulls.append(_grown(middles[-1], 0.5 * length, drag, weight, cable.compliance))
+    line.tension[:, 1 : N + 1], line.node_tension[: N + 1] = middles[::-1], pulls[::-1]
+    chords = np.array(lengths) * (1.0 + cable.compliance * np.array(middles[::-1]))
+    behind = np.cumsum(chords[::-1])[::-1]
+    line.position[:, :N] = line.position[NOW, N] - behind[:, None] * t
+    line.ends.tow_force[:], line.ends.drum_pull = pulls[-1] * t, pulls[0]
 
 
 def _grown(T: float, length: float, drag: float, weight: float, e: float) -> float:
     """Return the tension `length` further up, dT/ds = drag √(1 + eT) + weight; none where it would push. [N]."""
-    end, before = T, np.inf
+    end, before = T, inf
     while abs(end - before) > 1e-15 * abs(end):
         before, end = end, T + length * (drag * sqrt(1.0 + e * 0.5 * (T + end)) + weight)
     return max(end, 0.0)

@@ -116,6 +116,25 @@ def test_a_kink_at_a_recorded_time_does_not_stop_it(angle):
     assert run.outcome.steps < 100, "of the 640 of small steps: none is cut for ever"
 
 
+@every_manoeuvre
+def test_steps_that_are_solved_less_exactly_take_fewer_iterations_and_err_no_more(name):
+    """A hundredth of what a step of this length errs by is lost, and a fifth of the iterations saved, or more."""
+    fine, exact, rough = (
+        cable.pull_out(MANOEUVRES[name], DURATION, step, drum=DRUM, tolerance=tolerance)
+        for step, tolerance in ((ROW / 32, 1e-9), (ROW / 8, 1e-9), (ROW / 8, 1e-5))
+    )
+    error = np.linalg.norm(exact.tow_force - fine.tow_force[::4], axis=1).max()
+    assert 0.0 < np.linalg.norm(rough.tow_force - exact.tow_force, axis=1).max() < 0.01 * error
+    assert rough.outcome.iterations < 0.8 * exact.outcome.iterations
+
+
+@pytest.mark.parametrize("value", [0.0, 1e-13, 0.1, -1e-9, np.nan])
+def test_a_tolerance_without_sense_is_refused(value):
+    for run in (cable.pull_out, lambda v, t, **k: cable.tow(v, 10.0, t, **k)):
+        with pytest.raises(ValueError, match=r"tolerance is .*; it must be from 1e-12 to 0.001"):
+            run(dive, 1.0, tolerance=value)
+
+
 @pytest.mark.parametrize("name", ["rtol", "grading"])
 @pytest.mark.parametrize("value", [-0.1, 1.0, np.nan, np.inf])
 def test_what_cannot_be_allowed_is_refused(name, value):
