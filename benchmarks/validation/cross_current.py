@@ -25,12 +25,6 @@ LOAD = NO_SKIN.normal_drag * CURRENT**2
 """½ρdC_n J². [N/m]"""
 WINCH_TENSION = 8.0
 SOURCE = "closed form for C_t = 0"
-STANDING = (
-    "the correction for bent segments (`cable.arc`) is made for a cable that slides along its own curve. In one that "
-    "stands in a current the velocity past it is the same all along, and the drag across a segment comes out by θ²/4 "
-    "too small (θ, its turn; 0.014 here). The error falls with the square: 2.8e-5 with 200 segments."
-)
-MISSED = {"length held: tow force": STANDING, "length held: T at any node": STANDING}
 
 
 def force(a: float, length: float) -> np.ndarray:
