@@ -7,9 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from subzero.diagnosis.candidate import Candidate
+from subzero.diagnosis.closer import closer, linear
 from subzero.diagnosis.evidence import KAPPAS, log_sum
 from subzero.diagnosis.hypotheses import PRIOR, Ids
 from subzero.diagnosis.one_term import one_terms
+from subzero.diagnosis.problem import Problem
 from subzero.diagnosis.search import Search
 from subzero.diagnosis.sudden import Begun, scan
 from subzero.diagnosis.unknown import (
@@ -26,6 +28,8 @@ from subzero.missing_force import AXES
 
 ALIKE = 10.0
 """Forces whose log posteriors differ by less are told apart with finer knots."""
+FAR = 20.0
+"""No force is looked at around a fit of its own that is further behind the best, in log posterior."""
 WORTH = 2.0
 """A force that is no further behind the best, in log posterior, is worth a closer look, and one for sudden changes."""
 
@@ -52,30 +56,57 @@ class Foreign:
 
 def foreigners(search: Search) -> list[Foreign]:
     """Return what lies outside, most probable first: beside nothing, and beside the best causes."""
-    problem, knots = search.problem, knots_of(search.problem)
-    found = _suspected(search, all_columns(problem, search.best().fit.z, knots), knots)
-    if max(one.log_posterior for one in found) < search.best().log_posterior - WORTH:
-        return sorted(found, key=lambda one: -one.log_posterior)
-    alike = {one.id.removeprefix(FORCE) for one in _close(found) if one.id.startswith(FORCE)}
+    problem, knots, best = search.problem, knots_of(search.problem), search.best()
+    columns = all_columns(problem, best.fit.z, knots)
+    found = _suspected(search, columns, knots)
+    own = _around_itself(search, found, columns, knots)
+    if max(one.log_posterior for one in found + own) < best.log_posterior - WORTH:
+        return _sorted(found, own)
+    alike = {one.id.removeprefix(FORCE) for one in _close(found + own) if one.id.startswith(FORCE)}
     if len(alike) > 1:
         finer = knots_of(problem, FINE)
-        columns = {
-            FORCE + axis: C for axis, C in force_columns(problem, search.best().fit.z, alike, finer).items()
-        }
+        columns = {FORCE + axis: C for axis, C in force_columns(problem, best.fit.z, alike, finer).items()}
         found = [one for one in found if one.id not in columns] + _suspected(search, columns, finer)
-    return sorted(found + _sudden(search), key=lambda one: -one.log_posterior)
+    return _sorted(found + _sudden(search), own)
+
+
+def _sorted(found: list[Foreign], own: list[Foreign]) -> list[Foreign]:
+    """Return it all, the most probable first: what was found around a fit of its own as it is there."""
+    known = {(one.id, one.beside) for one in own}
+    kept = [one for one in found if (one.id, one.beside) not in known]
+    return sorted(kept + own, key=lambda one: -one.log_posterior)
 
 
 def _suspected(search: Search, columns: dict[str, np.ndarray], knots: Knots) -> list[Foreign]:
     """Return the forces and drifts of columns, beside nothing and beside the best causes."""
-    problem, count = search.problem, len(AXES) + len(search.problem.records[0].noise)
-    terms, prior = one_terms(problem, search.best().fit.z, knots), np.log(PRIOR["unknown"] / count)
+    problem = search.problem
+    terms, prior = one_terms(problem, search.best().fit.z, knots), _log_prior(problem)
     found: list[Foreign] = []
     for candidate in _bases(search):
         scales = candidate.scales(problem)
         found += [Foreign(beside=candidate.ids, what=one, log_posterior=candidate.log_posterior + one.log_gain + prior)
                   for one in suspects(problem, columns, candidate.fit, scales, knots, terms)]  # fmt: skip
     return found
+
+
+def _around_itself(
+    search: Search, found: list[Foreign], columns: dict[str, np.ndarray], knots: Knots
+) -> list[Foreign]:
+    """Return the most probable force beside nothing as it is around a fit of its own, if it has any hope."""
+    problem, best, prior = search.problem, search.best(), _log_prior(search.problem)
+    forces = {name: C for name, C in columns.items() if name.startswith(FORCE)}
+    terms = one_terms(problem, best.fit.z, knots)
+    log, what = max(linear(problem, best.fit, forces, knots, terms), key=lambda pair: pair[0])
+    known = [one.log_posterior for one in found if (one.id, one.beside) == (what.id, ())]
+    if max(log + prior, *known) < best.log_posterior - FAR:
+        return []
+    log, what = closer(problem, best.fit, what.id.removeprefix(FORCE), 1.0, knots, terms)
+    return [Foreign(beside=(), what=what, log_posterior=log + prior)]
+
+
+def _log_prior(problem: Problem) -> float:
+    """Return how probable a force on some axis, or the drift of some sensor, is beforehand, beside a hypothesis."""
+    return float(np.log(PRIOR["unknown"] / (len(AXES) + len(problem.records[0].noise))))
 
 
 def _close(found: list[Foreign]) -> list[Foreign]:

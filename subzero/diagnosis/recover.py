@@ -47,7 +47,8 @@ class Recovered:
         knots: of the history, all records.
         force: at the knots (n,). [N, N m]
         covariance: of these (n, n).
-        data: what the data alone say of the force at the knots, around the fit.
+        columns: sensitivities to the force at the knots, around the fit (m, n).
+        data: what the data alone say of it there.
     """
 
     unknown: Unknown
@@ -58,6 +59,7 @@ class Recovered:
     knots: Knots
     force: np.ndarray
     covariance: np.ndarray
+    columns: np.ndarray
     data: Seen
 
 
@@ -85,8 +87,8 @@ def recover(
     found = posterior(done.quadratic, whole)
     k = D.size
     force, covariance = L @ done.z[k:], L @ found.M[k:, k:] @ L.T
-    data = _at_knots(done, D, L)
-    return _recovered(axis, more, done, knots, force, covariance, data)
+    at_knots = np.linalg.solve(L.T, done.J[:, k:].T).T
+    return _recovered(axis, more, done, knots, force, covariance, at_knots, D)
 
 
 def drifted(problem: Problem, fit: Fit, channel: str, scale: float, D: np.ndarray | None = None) -> Recovered:
@@ -98,20 +100,13 @@ def drifted(problem: Problem, fit: Fit, channel: str, scale: float, D: np.ndarra
     whole, J = np.concatenate([D, np.ones(L.shape[1])]), np.hstack([fit.J, C @ L])
     found, k = _linear(fit, J, whole), D.size
     force, covariance = L @ found.z[k:], L @ found.M[k:, k:] @ L.T
-    return _recovered(channel, problem, fit, knots, force, covariance, _seen(fit, D, C))
+    return _recovered(channel, problem, fit, knots, force, covariance, C, D)
 
 
 def _seen(fit: Fit, D: np.ndarray, columns: np.ndarray) -> Seen:
-    q = fit.quadratic
-    return seen(q.A, q.b, D, fit.J, columns, fit.r + fit.J @ fit.z)
-
-
-def _at_knots(fit: Fit, D: np.ndarray, L: np.ndarray) -> Seen:
-    """Return what data say of the force at the knots, around a fit of its modes."""
-    k = D.size
-    J, C = fit.J[:, :k], np.linalg.solve(L.T, fit.J[:, k:].T).T
-    whole = fit.r + fit.J @ fit.z
-    return seen(J.T @ J, J.T @ whole, D, J, C, whole)
+    """Return what data say of columns around a fit of the entries before them, or of those and the columns' modes."""
+    J, whole = fit.J[:, : D.size], fit.r + fit.J @ fit.z
+    return seen(J.T @ J, J.T @ whole, D, J, columns, whole)
 
 
 def _linear(fit: Fit, J: np.ndarray, D: np.ndarray) -> Posterior:
@@ -129,7 +124,14 @@ def _best_modes(data: Seen, knots: Knots, size: float) -> np.ndarray:
 
 
 def _recovered(
-    axis: str, problem: Problem, fit: Fit, knots: Knots, force: np.ndarray, covariance: np.ndarray, data: Seen
+    axis: str,
+    problem: Problem,
+    fit: Fit,
+    knots: Knots,
+    force: np.ndarray,
+    covariance: np.ndarray,
+    columns: np.ndarray,
+    D: np.ndarray,
 ) -> Recovered:
     """Return it all, told for the record where the force is largest."""
     size = [float(np.sqrt(np.mean(force[knots.record == i] ** 2))) for i in range(len(problem.records))]
@@ -139,4 +141,4 @@ def _recovered(
     unknown = Unknown(axis=axis, time=knots.time[own], force=force[own], band=band)
     missing = None if axis in BY_NAME else history(axis, knots.time[own], force[own])
     return Recovered(unknown=unknown, record=record, missing=missing, problem=problem, fit=fit, knots=knots,
-                     force=force, covariance=covariance, data=data)  # fmt: skip
+                     force=force, covariance=covariance, columns=columns, data=_seen(fit, D, columns))  # fmt: skip

@@ -150,7 +150,7 @@ class Suspect:
 
 def suspects(
     problem: Problem,
-    columns: dict[str, np.ndarray],
+    columns: Mapping[str, np.ndarray],
     fit: Fit,
     scales: Scales,
     knots: Knots,
