@@ -28,7 +28,7 @@ SEED = 11
 DEGRADED = ("noise", "channels", "short", "wide", "narrow")
 AFTER = 4.0
 """The trial goes on behind its record, for sensors whose clock runs ahead. [s]"""
-TWINS = (("sway_damping", 0), ("munk_moment", 0), ("hull_drag", 0), ("propeller_thrust_slope", 0),
+TWINS = (("sensor_scale:depth", 0), ("munk_moment", 0), ("hull_drag", 0), ("propeller_thrust_slope", 0),
          ("sensor_bias:depth", 0), ("sensor_scale:heading", 0), ("rudder_lift_slope", 0))  # fmt: skip
 """Effect, and its parameter, that have rivals on `fig6`."""
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from functools import cache
+from hashlib import sha256
+from pathlib import Path
 from time import perf_counter, process_time
 from typing import Any
 
@@ -49,7 +52,7 @@ def _asked(case: Case, budget: str) -> tuple[Made, Problem, Verdict, Result]:
     start, cpu = perf_counter(), process_time()
     verdict = diagnose([made.logged], seed=case.index, budget=budget)
     taken = {"wall": perf_counter() - start, "cpu": process_time() - cpu, "parts": dict(verdict.seconds)}
-    found = {**_truth(case, made), "D": D, "rival": rival, "seconds": taken, **_said(verdict)}
+    found = {**_truth(case, made), "code": code(), "D": D, "rival": rival, "seconds": taken, **_said(verdict)}
     if made.strange:
         found["outside"] = judged(made, verdict)
     return made, problem, verdict, found
@@ -64,6 +67,16 @@ def posed(case: Case) -> tuple[Made, Problem, dict[str, float], dict[str, str]]:
         if fits:
             break
     return made, problem, D, rival
+
+
+@cache
+def code() -> str:
+    """Return eight digits that change with any edit of what diagnoses."""
+    root, digest = Path(__file__).resolve().parents[2], sha256()
+    for package in ("cable", "vehicle", "scenarios", "subzero"):
+        for path in sorted((root / package).rglob("*.py")):
+            digest.update(path.read_bytes())
+    return digest.hexdigest()[:8]
 
 
 def _measured(case: Case, made: Made, problem: Problem) -> tuple[dict[str, float], dict[str, str], bool]:

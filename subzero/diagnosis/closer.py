@@ -67,5 +67,5 @@ def _without(found: Recovered, count: int) -> Fit:
 def _possible(problem: Problem, found: Recovered) -> float:
     """Return what is added to the log evidence because some values cannot be below 0."""
     count, done = len(problem.entries), found.fit
-    sd = np.sqrt(np.diag(posterior(done.quadratic, done.D).M)[:count])
-    return possible(problem.entries, range(count), done.z[:count], sd, held=True)
+    free = posterior(done.quadratic, done.D)
+    return possible(problem.entries, range(count), free.z[:count], np.sqrt(np.diag(free.M)[:count]))

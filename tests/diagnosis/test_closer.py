@@ -1,0 +1,46 @@
+"""A missing force is as probable as it is around a fit of its own, not where the model bends to do without it.
+
+Configuration: fig6, 30 s, six channels with coloured noise, all parameters nominal but free within their tolerances.
+"""
+
+import numpy as np
+import pytest
+
+from subzero.diagnosis.candidate import candidate_of
+from subzero.diagnosis.closer import closer
+from subzero.diagnosis.hypotheses import variances
+from subzero.diagnosis.one_term import one_terms
+from subzero.diagnosis.refit import refit
+from subzero.diagnosis.unknown import force_columns, knots_of, lacking, suspects
+from subzero.missing_force import MissingForce, Term
+
+
+def weed(coefficient):
+    """Drag that grows all the time: as the drag of a cable does that gets longer."""
+    return lambda setting: lacking(setting, MissingForce(terms=(Term("X", "time*u2", coefficient),)))
+
+
+def both_ways(planted):
+    """Return the log posterior of a force on X where nothing else is bent, and from the best fit without it."""
+    problem, D = planted.problem, {}
+    for kappa in (1.0, 4.0):
+        D[kappa] = variances(problem.entries, (), kappa)
+    fit = refit(problem, np.zeros(D[4.0].size), planted.J, D[4.0], most_fresh=2)
+    none = candidate_of(problem, (), refit(problem, fit.z, fit.J, D[1.0], most_fresh=1))
+    none = max(none, candidate_of(problem, (), fit), key=lambda one: one.log_posterior)
+    knots = knots_of(problem)
+    terms = one_terms(problem, fit.z, knots)
+    here, _ = closer(problem, fit, "X", 1.0, knots, terms)
+    columns = {"unknown_force:X": force_columns(problem, none.fit.z, ("X",), knots)["X"]}
+    (there,) = suspects(problem, columns, none.fit, none.scales(problem), knots, terms)
+    return here, none.log_posterior + there.log_gain
+
+
+def test_both_ways_agree_where_the_model_hardly_bends(plant):
+    here, there = both_ways(plant(weed(-0.004)))
+    assert here == pytest.approx(there, abs=1.0), "a nat: what is not linear in so small a force"
+
+
+def test_weed_is_far_more_probable_where_the_model_is_not_bent_to_do_without_it(plant):
+    here, there = both_ways(plant(weed(-0.08)))
+    assert here > there + 5.0
