@@ -56,8 +56,16 @@ def _head(results: Sequence[Result], broken: Sequence[Result]) -> str:
     return HEAD.format(
         cases=len(results), whole=sum(SHARES.values()), kinds=kinds, fig6=where["fig6"] + where["short"],
         rich=where["rich"], other=source["other"], fine=source["fine"], broken=len(broken),
-        dropped=sum(one["dropped"] for one in results), seed=results[0]["seed"],
+        dropped=sum(one["dropped"] for one in results), seed=results[0]["seed"], versions=_versions(results),
     )  # fmt: skip
+
+
+def _versions(results: Sequence[Result]) -> str:
+    """Return by how many versions of the code the results were made; the last result is one of the newest."""
+    newest = Counter(one.get("code", "") for one in results)[results[-1].get("code", "")]
+    if newest == len(results):
+        return "All cases were diagnosed by the same code."
+    return f"{newest} cases were diagnosed by the newest code, the others by the one before."
 
 
 def _scores(found: Sequence[Score]) -> str:

@@ -11,10 +11,8 @@ This page rests on **{cases} of {whole} cases**; kinds come in turn, so that any
 speed through the water, heading, yaw rate, pitch, roll, depth. Cases that ended in an error: {broken}.
 
 The cases are those of seed {seed}. The engine's choices were made with the cases of seeds 1 to 7. Those of seed 11
-showed two errors of it, which were put right on the way: two outliers at the very end of a record (case 41), and causes
-that do nothing when they are small, which their prior drew back to nothing (case 217). When the page was first
-written, the 24 of the cases before that this touches were diagnosed anew: records whose outliers change, and those
-where such a cause had 2 %.
+showed two errors of it, which were put right: two outliers at the very end of a record (case 41), and causes that do
+nothing when they are small, which their prior drew back to nothing (case 217). {versions}
 
 {kinds}
 

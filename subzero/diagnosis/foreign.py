@@ -28,8 +28,8 @@ from subzero.missing_force import AXES
 
 ALIKE = 10.0
 """Forces whose log posteriors differ by less are told apart with finer knots."""
-FAR = 20.0
-"""No force is looked at around a fit of its own that is further behind the best, in log posterior."""
+FAR, MOST = 45.0, 2
+"""No force is looked at around a fit of its own that is further behind the best, in log posterior, and so many."""
 WORTH = 2.0
 """A force that is no further behind the best, in log posterior, is worth a closer look, and one for sudden changes."""
 
@@ -59,7 +59,7 @@ def foreigners(search: Search) -> list[Foreign]:
     problem, knots, best = search.problem, knots_of(search.problem), search.best()
     columns = all_columns(problem, best.fit.z, knots)
     found = _suspected(search, columns, knots)
-    own = _around_itself(search, found, columns, knots)
+    own = _around_themselves(search, found, columns, knots)
     if max(one.log_posterior for one in found + own) < best.log_posterior - WORTH:
         return _sorted(found, own)
     alike = {one.id.removeprefix(FORCE) for one in _close(found + own) if one.id.startswith(FORCE)}
@@ -71,7 +71,7 @@ def foreigners(search: Search) -> list[Foreign]:
 
 
 def _sorted(found: list[Foreign], own: list[Foreign]) -> list[Foreign]:
-    """Return it all, the most probable first: what was found around a fit of its own as it is there."""
+    """Return it all, the most probable first: forces that were fitted as they are there."""
     known = {(one.id, one.beside) for one in own}
     kept = [one for one in found if (one.id, one.beside) not in known]
     return sorted(kept + own, key=lambda one: -one.log_posterior)
@@ -89,19 +89,27 @@ def _suspected(search: Search, columns: dict[str, np.ndarray], knots: Knots) -> 
     return found
 
 
-def _around_itself(
+def _around_themselves(
     search: Search, found: list[Foreign], columns: dict[str, np.ndarray], knots: Knots
 ) -> list[Foreign]:
-    """Return the most probable force beside nothing as it is around a fit of its own, if it has any hope."""
+    """Return the most probable forces beside nothing as they are around fits of their own, if they have any hope; none
+    where nothing has to bend.
+    """
     problem, best, prior = search.problem, search.best(), _log_prior(search.problem)
-    forces = {name: C for name, C in columns.items() if name.startswith(FORCE)}
-    terms = one_terms(problem, best.fit.z, knots)
-    log, what = max(linear(problem, best.fit, forces, knots, terms), key=lambda pair: pair[0])
-    known = [one.log_posterior for one in found if (one.id, one.beside) == (what.id, ())]
-    if max(log + prior, *known) < best.log_posterior - FAR:
+    if not best.ids and best.kappa == min(KAPPAS):
         return []
-    log, what = closer(problem, best.fit, what.id.removeprefix(FORCE), 1.0, knots, terms)
-    return [Foreign(beside=(), what=what, log_posterior=log + prior)]
+    forces = {name: C for name, C in columns.items() if name.startswith(FORCE)}
+    hope = {one.id: one.log_posterior for one in found if one.id in forces and not one.beside}
+    for log, what in linear(problem, best.fit, forces, knots, one_terms(problem, best.fit.z, knots)):
+        hope[what.id] = max(hope[what.id], log + prior)
+    ranked = sorted(hope, key=lambda name: -hope[name])[:MOST]
+    least = max(best.log_posterior - FAR, hope[ranked[0]] - ALIKE)
+    finer, own = knots_of(problem, FINE), []
+    terms = one_terms(problem, best.fit.z, finer)
+    for name in [one for one in ranked if hope[one] > least]:
+        log, what = closer(problem, best.fit, name.removeprefix(FORCE), 1.0, finer, terms)
+        own.append(Foreign(beside=(), what=what, log_posterior=log + prior))
+    return own
 
 
 def _log_prior(problem: Problem) -> float:
