@@ -28,8 +28,8 @@ from subzero.missing_force import AXES
 
 ALIKE = 10.0
 """Forces whose log posteriors differ by less are told apart with finer knots."""
-FAR, MOST = 45.0, 2
-"""No force is looked at around a fit of its own that is further behind the best, in log posterior, and so many."""
+FAR, MOST = 45.0, 3
+"""No force that is further behind the best, in log posterior, is looked at around its own fit, and at most so many."""
 WORTH = 2.0
 """A force that is no further behind the best, in log posterior, is worth a closer look, and one for sudden changes."""
 
@@ -71,10 +71,11 @@ def foreigners(search: Search) -> list[Foreign]:
 
 
 def _sorted(found: list[Foreign], own: list[Foreign]) -> list[Foreign]:
-    """Return it all, the most probable first: forces that were fitted as they are there."""
-    known = {(one.id, one.beside) for one in own}
-    kept = [one for one in found if (one.id, one.beside) not in known]
-    return sorted(kept + own, key=lambda one: -one.log_posterior)
+    """Return it all, the most probable first; of what was asked in two places, the more probable."""
+    kept: dict[tuple[str, Ids], Foreign] = {}
+    for one in sorted(found + own, key=lambda one: -one.log_posterior):
+        kept.setdefault((one.id, one.beside), one)
+    return list(kept.values())
 
 
 def _suspected(search: Search, columns: dict[str, np.ndarray], knots: Knots) -> list[Foreign]:
@@ -92,22 +93,22 @@ def _suspected(search: Search, columns: dict[str, np.ndarray], knots: Knots) -> 
 def _around_themselves(
     search: Search, found: list[Foreign], columns: dict[str, np.ndarray], knots: Knots
 ) -> list[Foreign]:
-    """Return the most probable forces beside nothing as they are around fits of their own, if they have any hope; none
-    where nothing has to bend.
+    """Return the most probable forces and drifts beside nothing as they are around fits of their own, if they have any
+    hope; none where nothing has to bend.
     """
     problem, best, prior = search.problem, search.best(), _log_prior(search.problem)
     if not best.ids and best.kappa == min(KAPPAS):
         return []
-    forces = {name: C for name, C in columns.items() if name.startswith(FORCE)}
-    hope = {one.id: one.log_posterior for one in found if one.id in forces and not one.beside}
-    for log, what in linear(problem, best.fit, forces, knots, one_terms(problem, best.fit.z, knots)):
+    hope = {one.id: one.log_posterior for one in found if not one.beside}
+    terms = one_terms(problem, best.fit.z, knots)
+    for log, what in linear(problem, best.fit, columns, knots, terms, list(KAPPAS)):
         hope[what.id] = max(hope[what.id], log + prior)
     ranked = sorted(hope, key=lambda name: -hope[name])[:MOST]
     least = max(best.log_posterior - FAR, hope[ranked[0]] - ALIKE)
     finer, own = knots_of(problem, FINE), []
     terms = one_terms(problem, best.fit.z, finer)
     for name in [one for one in ranked if hope[one] > least]:
-        log, what = closer(problem, best.fit, name.removeprefix(FORCE), 1.0, finer, terms)
+        log, what = closer(problem, best.fit, name, 1.0, finer, terms)
         own.append(Foreign(beside=(), what=what, log_posterior=log + prior))
     return own
 

@@ -64,7 +64,13 @@ class Recovered:
 
 
 def recover(
-    problem: Problem, fit: Fit, axis: str, D: np.ndarray | None = None, *, spacing: float = FINE
+    problem: Problem,
+    fit: Fit,
+    axis: str,
+    D: np.ndarray | None = None,
+    *,
+    spacing: float = FINE,
+    most_fresh: int = 2,
 ) -> Recovered:
     """Return the history of a force on an axis.
 
@@ -74,6 +80,7 @@ def recover(
         axis: X, Y, Z, K, M or N.
         D: prior variances of the problem's entries (k,); those of the fit if None.
         spacing: of the knots. [s]
+        most_fresh: how many times sensitivities may be made again on the way.
     """
     D = fit.D if D is None else D
     knots = knots_of(problem, spacing)
@@ -82,7 +89,7 @@ def recover(
     more = with_force(problem, axis, knots, L, 1.0)
     whole, J = np.concatenate([D, np.ones(L.shape[1])]), np.hstack([fit.J, C @ L])
     start = _linear(fit, J, whole)
-    done = refit(more, start.z, J, whole, most_fresh=2)
+    done = refit(more, start.z, J, whole, most_fresh=most_fresh)
     done = refit(more, done.z, more.jacobian(done.z), whole, r=done.r, most_fresh=0)
     found = posterior(done.quadratic, whole)
     k = D.size

@@ -30,7 +30,7 @@ def both_ways(planted):
     none = max(none, candidate_of(problem, (), fit), key=lambda one: one.log_posterior)
     knots = knots_of(problem)
     terms = one_terms(problem, fit.z, knots)
-    here, _ = closer(problem, fit, "X", 1.0, knots, terms)
+    here, _ = closer(problem, fit, "unknown_force:X", 1.0, knots, terms)
     columns = {"unknown_force:X": force_columns(problem, none.fit.z, ("X",), knots)["X"]}
     (there,) = suspects(problem, columns, none.fit, none.scales(problem), knots, terms)
     return here, none.log_posterior + there.log_gain
