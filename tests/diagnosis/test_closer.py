@@ -44,3 +44,16 @@ def test_both_ways_agree_where_the_model_hardly_bends(plant):
 def test_weed_is_far_more_probable_where_the_model_is_not_bent_to_do_without_it(plant):
     here, there = both_ways(plant(weed(-0.08)))
     assert here > there + 5.0
+
+
+def test_a_compass_that_wanders_is_more_probable_than_any_force_that_turns_the_vehicle(plant):
+    planted = plant(
+        drift={"heading": lambda time: 4.0 * np.sin(np.pi * np.clip((time - 5.0) / 15.0, 0.0, 1.0)) ** 2}
+    )
+    problem = planted.problem
+    fit = refit(problem, np.zeros(planted.J.shape[1]), planted.J, variances(problem.entries, (), 4.0))
+    knots = knots_of(problem)
+    terms = one_terms(problem, fit.z, knots)
+    log = {name: closer(problem, fit, name, 1.0, knots, terms)[0]
+           for name in ("sensor_drift:heading", "unknown_force:N", "unknown_force:Y")}  # fmt: skip
+    assert log["sensor_drift:heading"] > max(log["unknown_force:N"], log["unknown_force:Y"]) + 10.0
