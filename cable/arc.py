@@ -16,7 +16,9 @@ of the normal drag that lies in the plane of the curve wants a `normal_gain` of
 
     1 + θ²/12 (1 + 2(1 − λ) − 2(1 − λ)² U_t²/U_n²) − ¼λθ²
 
-which is 1 − θ²/6 for a cable that is pulled along its own curve, and 1 + ¼θ² where one stands square to a current.
+which is 1 − θ²/6 for a cable that is pulled along its own curve, and 1 + ¼θ² where one stands square to a current. A
+cable on a free drum, or with a free end, is taken to slide, λ = 1: in the slack bight behind a vehicle that stops, λ
+jumps about, and runs would no longer be smooth in their parameters.
 
 θ comes from the neighbours' tangents, in the prediction of a step, and is held while the step is solved: an error of
 higher order, and the equations keep their three-node blocks.
@@ -43,8 +45,10 @@ STILL = 1e-12
 
 
 @inner
-def correct_for_arc(line: Line, work: Load) -> None:
-    """Fill line.slip and line.normal_gain from the prediction on level NEW and the velocities of level NOW."""
+def correct_for_arc(line: Line, led: bool, work: Load) -> None:
+    """Fill line.slip and line.normal_gain from the prediction on level NEW and the velocities of level NOW; `led` by a
+    winch, a cable need not slide.
+    """
     for j in range(1, line.ends.count + 1):
         square = _turning_angle(line, j, work)
         theta, t, U = work.across, work.tangent, work.velocity
@@ -59,7 +63,8 @@ def correct_for_arc(line: Line, work: Load) -> None:
             speed += U[i] * U[i]
         line.slip[j] = 0.25 * slide
         in_plane = min(side * side / max(square * (speed - along * along), STILL), 1.0)
-        sliding = min(max(slide / (square * along), 0.0), 1.0) if square * abs(along) > STILL else 1.0
+        told = led and square * abs(along) > STILL
+        sliding = min(max(slide / (square * along), 0.0), 1.0) if told else 1.0
         oblique = along * along * square / max(side * side, STILL * STILL)
         line.normal_gain[j] = 1.0 + square * in_plane * _missing_gain(sliding, oblique)
 

@@ -136,7 +136,7 @@ def _predict(
         pull = max(line.node_tension[N], 0.0)
         line.tension[NEW, N] = max(pull + (line.tension[NOW, N] - pull) * last[NEW] / last[NOW], KNOWN)
     feel_water(line, water, line.ends.time + step)
-    correct_for_arc(line, work)
+    correct_for_arc(line, drum.control != FREE, work)
 
 
 @compiled

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
+from math import inf
 from pathlib import Path
 
 import numpy as np
@@ -65,7 +66,7 @@ def _versions(results: Sequence[Result]) -> str:
     newest = Counter(one.get("code", "") for one in results)[results[-1].get("code", "")]
     if newest == len(results):
         return "All cases were diagnosed by the same code."
-    return f"{newest} cases were diagnosed by the newest code, the others by the one before."
+    return f"{newest} cases were diagnosed by a newer version of the code than the others."
 
 
 def _scores(found: Sequence[Score]) -> str:
@@ -186,7 +187,10 @@ def _times(results: Sequence[Result], alone: Sequence[Row]) -> str:
 
 
 def _within(seconds: float, limit: float) -> str:
-    return f"{seconds:.1f} s (≤ {limit:.0f} s: {MARK[seconds <= limit]})"
+    """Return a time, and whether it is within what is asked, if anything is."""
+    return (
+        f"{seconds:.1f} s" if limit == inf else f"{seconds:.1f} s (≤ {limit:.0f} s: {MARK[seconds <= limit]})"
+    )
 
 
 def _all_cases(results: Sequence[Result]) -> str:

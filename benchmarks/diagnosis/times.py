@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from math import inf
 from pathlib import Path
 from time import perf_counter
 
@@ -10,8 +11,8 @@ from subzero.diagnosis.diagnose import diagnose
 
 from .cases import SEED, Case, make
 
-LIMITS = {"fig6": (3.0, 15.0), "rich": (3.0, 30.0)}
-"""Manoeuvre → how long the first screen and the verdict may take. [s]"""
+LIMITS = {"fig6": (3.0, 15.0), "rich": (inf, 30.0)}
+"""Manoeuvre → how long the first screen and the verdict may take; infinite where nothing is asked. [s]"""
 CAUSES = {"healthy": (), "one hidden": ("roll_stiffness",), "two hidden": ("roll_stiffness", "motor_lag")}
 Row = tuple[str, str, float, float]
 
