@@ -12,13 +12,13 @@ from subzero.diagnosis.candidate import Candidate
 from subzero.diagnosis.evidence import log_sum
 from subzero.diagnosis.hypotheses import Ids
 from subzero.diagnosis.problem import Problem
-from subzero.diagnosis.rules import large
+from subzero.diagnosis.rules import NAMED, large
 from subzero.diagnosis.screen import Screen
 
 UNTRIED = 2.0
 """A hypothesis without a fit of its own is at least this far behind the best in log posterior."""
-FURTHER = 20.0
-"""A further cause has to make the records this many times as probable, prior and all (log-odds 3)."""
+FURTHER = NAMED / (1.0 - NAMED)
+"""A further cause has to be this many times as probable as none: then it could be named."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

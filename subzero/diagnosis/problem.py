@@ -20,6 +20,8 @@ from subzero.diagnosis.setting import Setting
 
 STEP = 0.2
 """Step of a sensitivity, in tolerances; a whole one from a state of rest (a play, a friction), where slopes jump."""
+SHARE = 0.03
+"""... and at least this share of what is there: far from the nominal model runs are rougher."""
 LATE = ("sensors", "clock")
 """Slots that act on a finished run."""
 
@@ -122,6 +124,7 @@ class Problem:
         parameter, moved = self.entries[k].parameter, z.copy()
         at_rest = parameter.low == 0.0 and z[k] < parameter.tolerance
         step = parameter.step or (1.0 if at_rest else STEP) * parameter.tolerance
+        step = max(step, SHARE * abs(z[k]))
         moved[k] += step if z[k] + step <= parameter.high else -step
         return moved
 

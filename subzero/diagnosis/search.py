@@ -7,7 +7,7 @@ all tolerances wide → a point close to the data → linear evidence of everyth
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from itertools import chain, combinations
+from itertools import chain
 
 import numpy as np
 
@@ -32,13 +32,13 @@ RACERS, HOPELESS = 6, 6.0
 NEAR = 4.0
 """Sensitivities hold as far as this from where they were made, in tolerances."""
 MOST_RUNS = 800
-"""No further race after so many runs."""
+"""After so many runs only what hopes to be the best is fitted again."""
 BESIDE, INSTEAD, WORTH = 2, 3, -4.0
 """At most so many with a cause more, of a log posterior that adds at least WORTH; so many with another cause."""
 MOST_CAUSES, ROUNDS = 3, 4
 """Causes of a hypothesis, and rounds of growing."""
 LAST, CLOSE = 3, 6.0
-"""Rounds of settling the best; so far behind it, in log posterior, a part of it counts no more."""
+"""Rounds of settling the best; so far behind it, in log posterior, what has a cause more or less counts no more."""
 
 
 @dataclass(kw_only=True, eq=False)
@@ -115,15 +115,14 @@ class Search:
             self.sharpen()
 
     def settle(self) -> None:
-        """Fit the best candidate again until it has converged, so that its numbers can be told; and what it has over
-        the same with a cause less, if that might still catch up.
+        """Fit the best candidate again until it has converged, so that its numbers can be told; and those with a cause
+        more or less, if they might still catch up.
         """
         tried: set[Ids] = set()
         for _ in range(LAST):
             best = self.best()
-            parts = combinations(best.ids, max(len(best.ids) - 1, 0))
-            open_ = [one for ids in (best.ids, *parts) if (one := self.candidates.get(ids)) and ids not in tried
-                     and not one.fit.converged and one.hope > best.log_posterior - CLOSE]  # fmt: skip
+            open_ = [one for ids, one in self.candidates.items() if ids not in tried and not one.fit.converged
+                     and one.hope > best.log_posterior - CLOSE and _akin(ids, best.ids)]  # fmt: skip
             for one in open_:
                 tried.add(one.ids)
                 self._say(0.75, "settling", one.ids)
@@ -144,11 +143,12 @@ class Search:
         for _ in range(most):
             self.raced |= {one.ids for one in self.candidates.values() if self._settled(one.fit)}
             waiting = [one for one in self.candidates.values() if one.ids not in self.raced]
-            if not waiting or self.problem.runs[0] > MOST_RUNS:
+            if not waiting:
                 return
             now = max(waiting, key=lambda one: one.hope)
             done = [self.candidates[ids].log_posterior for ids in self.raced]
-            if len(done) >= 2 and now.hope < max(done) - hopeless:
+            behind = 0.0 if self.problem.runs[0] > MOST_RUNS else hopeless
+            if len(done) >= 2 and now.hope < max(done) - behind:
                 return
             self._say(0.5, "fitting again", now.ids)
             self._again(now)
@@ -273,3 +273,8 @@ class Search:
         """Keep a fit and return its candidate."""
         self.candidates[ids] = candidate_of(self.problem, ids, fit)
         return self.candidates[ids]
+
+
+def _akin(ids: Ids, others: Ids) -> bool:
+    """Say whether hypotheses are the same but for at most one cause more in one of them."""
+    return len(set(ids) ^ set(others)) <= 1

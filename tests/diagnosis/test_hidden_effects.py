@@ -26,10 +26,12 @@ CLEAR = 25.0
 IDS = sorted(catalogue(manoeuvres.CHANNELS))
 
 
-def drawn(kind, number, **changes):
+def drawn(kind, number, marks=(), **changes):
     """Return a case of a kind on fig6."""
     found = next(one for one in cases(SEED) if (one.kind, one.number) == (kind, number))
-    return pytest.param(dataclasses.replace(found, manoeuvre="fig6", **changes), id=f"{kind}_{number}")
+    return pytest.param(
+        dataclasses.replace(found, manoeuvre="fig6", **changes), id=f"{kind}_{number}", marks=marks
+    )
 
 
 def both_signs():
@@ -68,10 +70,11 @@ def words(result):
     return f"{truth}, D {result['D']}: {result['verdict']}, {', '.join(first)}"
 
 
-SINGLES = [drawn("single", number) for number in (5, 8, 9, 11, 12, 13, 18, 19, 20, 25)]
+SINGLES = [drawn("single", number) for number in (5, 8, 9, 12, 18, 20)]
+MORE = [drawn("single", number, marks=pytest.mark.slow) for number in (11, 13, 19, 25)]
 
 
-@pytest.mark.parametrize("case", SINGLES)
+@pytest.mark.parametrize("case", SINGLES + MORE)
 def test_a_hidden_effect_gets_no_wrong_name(told, case):
     """And what is true is never ruled out."""
     result = told[case].result()

@@ -18,11 +18,11 @@ from subzero.diagnosis.effect import Parameter
 from subzero.diagnosis.effects import START, catalogue
 from subzero.diagnosis.hypotheses import log_prior, named, places
 from subzero.diagnosis.probability import FURTHER, UNTRIED, Beliefs, folded
-from subzero.diagnosis.problem import Problem, entries_of
+from subzero.diagnosis.problem import SHARE, STEP, Problem, entries_of
 from subzero.diagnosis.refit import secant
 from subzero.diagnosis.rules import large
 from subzero.diagnosis.screen import MANY, STRAINED, Screen, is_close, look
-from subzero.diagnosis.search import Search
+from subzero.diagnosis.search import HOPELESS, MOST_RUNS, Search
 from subzero.diagnosis.setting import Setting
 
 
@@ -51,6 +51,45 @@ def test_secants_explain_the_step_and_leave_other_directions():
     other = np.array([step[1] * D[0], -step[0] * D[1], 0.0, 0.0])
     assert abs(step @ (other / D)) < 1e-12
     assert_allclose(new @ other, J @ other, atol=1e-12)
+
+
+def racing(runs, **hopes):
+    """Return the hypotheses that a race fits again, in turn: those with a hope above their log posterior of -9."""
+    search = Search(problem=SimpleNamespace(runs=[runs]), progress=lambda share, words: None)
+    again = []
+
+    def fit_again(one):
+        again.append(one.ids[0])
+        search.raced.add(one.ids)
+
+    search._again = fit_again
+    for name, hope in hopes.items():
+        fit = SimpleNamespace(converged=hope is None, made_at=None, promise=(hope or -9.0) + 9.0)
+        search.candidates[(name,)] = Candidate(ids=(name,), fit=fit, log_evidence={}, log_posterior=-9.0)
+    search.raced |= {("best",), ("second",)}
+    search.race()
+    return again
+
+
+def test_a_race_ends_with_the_first_that_is_hopeless():
+    hopes = {"best": None, "second": None, "near": -9.0, "far": -8.0}
+    assert racing(0, **hopes) == ["far", "near"]
+    assert HOPELESS > 0.0
+
+
+def test_after_many_runs_what_hopes_to_be_the_best_is_still_fitted_again():
+    """A right pair whose first fit went nowhere is not lost because others have used up the runs."""
+    hopes = {"best": None, "second": None, "hopes": 30.0}
+    assert racing(MOST_RUNS + 1, **hopes) == ["hopes"]
+
+
+def test_steps_of_sensitivities_grow_with_what_is_there(plant):
+    problem = plant(duration=6.0).problem
+    k = next(k for k, one in enumerate(problem.entries) if one.effect.id == "rudder_offset")
+    z, tolerance = np.zeros(len(problem.entries)), problem.entries[k].parameter.tolerance
+    assert problem._moved(z, k)[k] == pytest.approx(STEP * tolerance)
+    z[k] = -20.0 * tolerance
+    assert abs(problem._moved(z, k)[k] - z[k]) == pytest.approx(20.0 * SHARE * tolerance)
 
 
 def test_a_further_cause_is_told_only_if_it_is_needed():
