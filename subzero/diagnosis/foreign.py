@@ -28,8 +28,10 @@ from subzero.missing_force import AXES
 
 ALIKE = 10.0
 """Forces whose log posteriors differ by less are told apart with finer knots."""
-FAR, MOST = 45.0, 3
-"""No force that is further behind the best, in log posterior, is looked at around its own fit, and at most so many."""
+NEAR, FAR, MOST = 6.0, 45.0, 3
+"""No force that is further behind the best, in log posterior, is looked at around its own fit, and at most so many: FAR
+where tolerances bend more than declared, or two causes are asked for; NEAR where one explains it all, as what is linear
+is true there."""
 WORTH = 2.0
 """A force that is no further behind the best, in log posterior, is worth a closer look, and one for sudden changes."""
 
@@ -104,7 +106,8 @@ def _around_themselves(
     for log, what in linear(problem, best.fit, columns, knots, terms, list(KAPPAS)):
         hope[what.id] = max(hope[what.id], log + prior)
     ranked = sorted(hope, key=lambda name: -hope[name])[:MOST]
-    least = max(best.log_posterior - FAR, hope[ranked[0]] - ALIKE)
+    far = NEAR if best.kappa == min(KAPPAS) and len(best.ids) == 1 else FAR
+    least = max(best.log_posterior - far, hope[ranked[0]] - ALIKE)
     finer, own = knots_of(problem, FINE), []
     terms = one_terms(problem, best.fit.z, finer)
     for name in [one for one in ranked if hope[one] > least]:
