@@ -35,6 +35,8 @@ MOST_RUNS = 800
 """After so many runs only what hopes to be the best is fitted again."""
 BESIDE, INSTEAD, WORTH = 2, 3, -4.0
 """At most so many with a cause more, of a log posterior that adds at least WORTH; so many with another cause."""
+ASTRAY = 6.0
+"""A fit with so much less log posterior than the linear problem at another promises may have gone astray."""
 MOST_CAUSES, ROUNDS = 3, 4
 """Causes of a hypothesis, and rounds of growing."""
 LAST, CLOSE = 3, 6.0
@@ -130,13 +132,20 @@ class Search:
         self._nothing()
 
     def fit(self, ids: Ids, start: Fit | None = None) -> None:
-        """Fit a hypothesis with real runs and the sensitivities of another fit, unless it was fitted."""
-        if ids not in self.candidates:
-            start = start or self.wide
-            D, z = variances(self.problem.entries, ids, 1.0), self.screen.secants.get(ids)
-            z = posterior(start.quadratic, D).z if z is None else z
-            J = self._with_slopes(start.J, ids)
-            self._keep(ids, refit(self.problem, z, J, D, most_fresh=0, made_at=start.made_at))
+        """Fit a hypothesis with real runs and the sensitivities of the wide fit, unless it was fitted; or from another
+        fit, and keep what is better.
+        """
+        known = self.candidates.get(ids)
+        if known and start is None:
+            return
+        D, z = variances(self.problem.entries, ids, 1.0), None if start else self.screen.secants.get(ids)
+        start = start or self.wide
+        z = posterior(start.quadratic, D).z if z is None else z
+        fit = refit(self.problem, z, self._with_slopes(start.J, ids), D, most_fresh=0, made_at=start.made_at)
+        found = candidate_of(self.problem, ids, fit)
+        if known is None or found.log_posterior > known.log_posterior:
+            self.candidates[ids] = found
+            self.raced.discard(ids)
 
     def race(self, most: int = RACERS, hopeless: float = HOPELESS) -> None:
         """Fit candidates again with sensitivities of their own, the best first, until the next is hopeless."""
@@ -208,7 +217,7 @@ class Search:
 
     def _more(self, best: Candidate) -> list[Ids]:
         """Return the hypotheses with one cause more that the linear problem at the best fit finds best."""
-        found = {ids: log for ids, log in beside(self.problem, best).items() if ids not in self.candidates}
+        found = self._unknown(beside(self.problem, best))
         self.beside |= found
         ranked = sorted(found, key=lambda ids: -found[ids])[:BESIDE]
         return [ids for ids in ranked if found[ids] > best.log_posterior + WORTH]
@@ -217,11 +226,14 @@ class Search:
         """Fit the best hypothesis without one of its causes, and with others in its place."""
         rest = tuple(one for one in best.ids if one != without)
         self._below(rest, best.fit)
-        found = {
-            ids: log for ids, log in instead(self.problem, best, rest).items() if ids not in self.candidates
-        }
+        found = self._unknown(instead(self.problem, best, rest))
         for ids in sorted(found, key=lambda ids: -found[ids])[:INSTEAD]:
             self.fit(ids, best.fit)
+
+    def _unknown(self, found: dict[Ids, float]) -> dict[Ids, float]:
+        """Return those of estimated log posteriors that no fit is known of, or only one that went astray from afar."""
+        known = {ids: one.log_posterior for ids, one in self.candidates.items()}
+        return {ids: log for ids, log in found.items() if known.get(ids, -np.inf) < log - ASTRAY}
 
     def _below(self, ids: Ids, fit: Fit) -> None:
         """Fit a part of a hypothesis from its fit, if that is better than what is known of the part."""
