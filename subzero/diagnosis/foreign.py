@@ -29,9 +29,9 @@ from subzero.missing_force import AXES
 ALIKE = 10.0
 """Forces whose log posteriors differ by less are told apart with finer knots."""
 NEAR, FAR, MOST = 6.0, 45.0, 3
-"""No force that is further behind the best, in log posterior, is looked at around its own fit, and at most so many: FAR
-where tolerances bend more than declared, or two causes are asked for; NEAR where one explains it all, as what is linear
-is true there."""
+"""No force that is further behind the best than FAR, in log posterior, is looked at around its own fit, and at most so
+many; where one cause explains the record within declared tolerances, what is linear is nearly true there: besides the
+most probable force only those that are as close as NEAR."""
 WORTH = 2.0
 """A force that is no further behind the best, in log posterior, is worth a closer look, and one for sudden changes."""
 
@@ -105,15 +105,21 @@ def _around_themselves(
     terms = one_terms(problem, best.fit.z, knots)
     for log, what in linear(problem, best.fit, columns, knots, terms, list(KAPPAS)):
         hope[what.id] = max(hope[what.id], log + prior)
-    ranked = sorted(hope, key=lambda name: -hope[name])[:MOST]
-    far = NEAR if best.kappa == min(KAPPAS) and len(best.ids) == 1 else FAR
-    least = max(best.log_posterior - far, hope[ranked[0]] - ALIKE)
     finer, own = knots_of(problem, FINE), []
     terms = one_terms(problem, best.fit.z, finer)
-    for name in [one for one in ranked if hope[one] > least]:
+    for name in _worth_a_look(hope, best):
         log, what = closer(problem, best.fit, name, 1.0, finer, terms)
         own.append(Foreign(beside=(), what=what, log_posterior=log + prior))
     return own
+
+
+def _worth_a_look(hope: dict[str, float], best: Candidate) -> list[str]:
+    """Return the forces and drifts that are looked at around their own fits, of hoped-for log posteriors."""
+    ranked = sorted(hope, key=lambda name: -hope[name])[:MOST]
+    least = max(best.log_posterior - FAR, hope[ranked[0]] - ALIKE)
+    plain = best.kappa == min(KAPPAS) and len(best.ids) == 1
+    further = max(least, best.log_posterior - NEAR) if plain else least
+    return [name for i, name in enumerate(ranked) if hope[name] > (further if i else least)]
 
 
 def _log_prior(problem: Problem) -> float:
