@@ -93,11 +93,11 @@ def test_steps_of_sensitivities_grow_with_what_is_there(plant):
 
 
 def test_a_further_cause_is_told_only_if_it_is_needed():
-    half = folded({("a",): 0.4, ("a", "b"): 0.6})
-    assert half == {("a",): 1.0}
-    needed = folded({("a",): 0.01, ("a", "b"): 0.01 * FURTHER + 0.79})
-    assert next(iter(needed)) == ("a", "b")
+    assert folded({("a",): 0.21, ("a", "b"): 0.79}) == {("a",): 1.0}
+    needed = folded({("a",): 0.19, ("a", "b"): 0.81})
+    assert list(needed) == [("a", "b"), ("a",)]
     assert sum(needed.values()) == pytest.approx(1.0)
+    assert pytest.approx(4.0) == FURTHER, "from the probability of 0.8 that a cause is named at"
 
 
 def test_what_was_given_up_stays_behind():
