@@ -6,8 +6,10 @@ Configuration: fig6, 30 s, six channels with coloured noise, all parameters nomi
 import numpy as np
 import pytest
 
-from subzero.diagnosis.candidate import candidate_of
+from subzero.diagnosis.candidate import Candidate, candidate_of
 from subzero.diagnosis.closer import closer
+from subzero.diagnosis.evidence import KAPPAS
+from subzero.diagnosis.foreign import FAR, MOST, NEAR, _worth_a_look
 from subzero.diagnosis.hypotheses import variances
 from subzero.diagnosis.one_term import one_terms
 from subzero.diagnosis.refit import refit
@@ -57,3 +59,24 @@ def test_a_compass_that_wanders_is_more_probable_than_any_force_that_turns_the_v
     log = {name: closer(problem, fit, name, 1.0, knots, terms)[0]
            for name in ("sensor_drift:heading", "unknown_force:N", "unknown_force:Y")}  # fmt: skip
     assert log["sensor_drift:heading"] > max(log["unknown_force:N"], log["unknown_force:Y"]) + 10.0
+
+
+def best_with(ids, kappa):
+    """Return a candidate with log posterior 0, under a scale of the tolerances."""
+    evidence = {one: 0.0 if one == kappa else -50.0 for one in KAPPAS}
+    return Candidate(ids=ids, fit=None, log_evidence=evidence, log_posterior=0.0)
+
+
+def test_where_one_cause_explains_it_all_only_the_first_force_is_looked_at_from_afar():
+    hope = {
+        "unknown_force:X": -9.0,
+        "unknown_force:N": -12.0,
+        "sensor_drift:roll": -14.0,
+        "unknown_force:Y": -15.0,
+    }
+    assert _worth_a_look(hope, best_with(("a",), 1.0)) == ["unknown_force:X"]
+    assert _worth_a_look(hope, best_with(("a", "b"), 1.0)) == list(hope)[:MOST]
+    assert _worth_a_look(hope, best_with(("a",), 4.0)) == list(hope)[:MOST]
+    near = {**hope, "unknown_force:N": 1.0 - NEAR, "unknown_force:X": 3.0}
+    assert _worth_a_look(near, best_with(("a",), 1.0)) == ["unknown_force:X", "unknown_force:N"]
+    assert _worth_a_look({"unknown_force:X": -1.0 - FAR}, best_with(("a",), 4.0)) == []

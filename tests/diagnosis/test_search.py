@@ -190,6 +190,30 @@ def test_a_cause_that_does_nothing_when_small_is_fitted_where_it_acts(plant):
     assert fit.z[places(planted.problem.entries, ("rudder_rate_limit",))] == pytest.approx(0.16, abs=0.03)
 
 
+def test_a_fit_that_went_astray_is_made_again_from_where_another_is(plant):
+    """What was tried from afar may have ended anywhere: the linear problem at a good fit says when to begin again."""
+    planted = plant(
+        lambda setting: catalogue(("heading",))["rudder_offset"].apply(setting, 0.5), duration=8.0
+    )
+    search = Search(problem=planted.problem, progress=lambda share, words: None)
+    search.begin()
+    ids = ("rudder_offset",)
+    search.fit(ids)
+    good = search.candidates[ids]
+    search.candidates[ids] = dataclasses.replace(good, log_posterior=good.log_posterior - 600.0)
+    search.raced.add(ids)
+    search.screen.secants[ids] = np.full(len(planted.problem.entries), np.nan)
+    assert search._unknown({ids: good.log_posterior}) == {ids: good.log_posterior}
+    search.fit(ids, good.fit)
+    assert search.candidates[ids].log_posterior == pytest.approx(good.log_posterior, abs=0.5)
+    assert ids not in search.raced
+    assert search._unknown({ids: good.log_posterior}) == {}
+    better = dataclasses.replace(good, log_posterior=good.log_posterior + 600.0)
+    search.candidates[ids] = better
+    search.fit(ids, good.fit)
+    assert search.candidates[ids] is better, "what is better is kept"
+
+
 def test_a_fit_that_bends_many_parameters_is_not_close():
     effects = list(catalogue(("heading",)).values())
     entries = [SimpleNamespace(record=-1, parameter=one.parameters[0]) for one in effects[: 2 * MANY]]
