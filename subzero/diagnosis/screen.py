@@ -128,15 +128,14 @@ def beside(problem: Problem, one: Candidate) -> dict[Ids, float]:
 
 
 def instead(problem: Problem, one: Candidate, rest: Ids) -> dict[Ids, float]:
-    """Return hypothesis → log evidence of all with another cause beside the rest of a candidate, likewise."""
-    q, found = one.fit.quadratic, {}
-    for other in named(problem):
+    """Return hypothesis → log posterior of all with another cause beside the rest of a candidate, likewise."""
+    q, names, found = one.fit.quadratic, named(problem), {}
+    for other in names:
         ids = tuple(sorted({*rest, other}))
         if len(ids) > len(rest) and ids != one.ids:
             under = {kappa: posterior(q, variances(problem.entries, ids, kappa)) for kappa in KAPPAS}
-            found[ids] = log_sum(
-                [np.log(prior) + under[kappa].log_evidence for kappa, prior in KAPPAS.items()]
-            )
+            mixed = log_sum([np.log(prior) + under[kappa].log_evidence for kappa, prior in KAPPAS.items()])
+            found[ids] = mixed + log_prior(ids, len(names))
     return found
 
 

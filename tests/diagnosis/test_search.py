@@ -21,7 +21,7 @@ from subzero.diagnosis.probability import FURTHER, UNTRIED, Beliefs, folded
 from subzero.diagnosis.problem import SHARE, STEP, Problem, entries_of
 from subzero.diagnosis.refit import secant
 from subzero.diagnosis.rules import large
-from subzero.diagnosis.screen import MANY, STRAINED, Screen, is_close, look
+from subzero.diagnosis.screen import MANY, STRAINED, Screen, instead, is_close, look
 from subzero.diagnosis.search import HOPELESS, MOST_RUNS, Search
 from subzero.diagnosis.setting import Setting
 
@@ -212,6 +212,20 @@ def test_a_fit_that_went_astray_is_made_again_from_where_another_is(plant):
     search.candidates[ids] = better
     search.fit(ids, good.fit)
     assert search.candidates[ids] is better, "what is better is kept"
+
+
+def test_what_another_cause_would_do_instead_is_on_the_scale_of_real_fits(plant):
+    """Prior and all: a fit is taken for astray by comparing the two. A healthy record is linear enough for 2 nats; the
+    prior of a cause is worth 3.
+    """
+    search = Search(problem=plant(duration=8.0).problem, progress=lambda share, words: None)
+    search.begin()
+    search.fit(("rudder_offset",))
+    one = search.candidates[("rudder_offset",)]
+    for other in ("rudder_lift_slope", "hull_drag", "yaw_inertia"):
+        search.fit((other,), one.fit)
+        real = search.candidates[(other,)].log_posterior
+        assert instead(search.problem, one, ())[(other,)] == pytest.approx(real, abs=2.0), other
 
 
 def test_a_fit_that_bends_many_parameters_is_not_close():
