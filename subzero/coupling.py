@@ -24,7 +24,7 @@ from cable.line import NOW
 from cable.newton import Solved
 from cable.stepping import accept, try_step
 from cable.tow_point import impedance
-from subzero.compiled import compiled, inner
+from subzero.compiled import compiled, inlined, inner
 from subzero.energy import book
 from subzero.hull import advance_hull, follow_track, tow_point
 from subzero.run_state import Live, Now, Setup
@@ -68,7 +68,7 @@ def hull_steps(setup: Setup, span: float) -> int:
     return max(1, int(np.ceil(span / setup.fixed.hull_step - 1e-6)))
 
 
-@compiled
+@inlined
 def _agree(setup: Setup, live: Live, start: float, span: float) -> tuple[int, Solved]:
     """Find the force at the end of an exchange with which hull and cable agree; nothing is made real yet."""
     solved = Solved(True, 0, 0.0, 0, 0)
@@ -98,7 +98,7 @@ def _agree(setup: Setup, live: Live, start: float, span: float) -> tuple[int, So
     return DISAGREED, solved
 
 
-@compiled
+@inlined
 def _move(setup: Setup, live: Live, start: float, span: float) -> bool:
     """Move the hull through an exchange; fill the tow point, relative to the drum; False if the speed is absurd."""
     steps = hull_steps(setup, span)
@@ -194,7 +194,7 @@ def _solve_three(M: np.ndarray, b: np.ndarray) -> None:
         b[k] /= M[k, k]
 
 
-@compiled
+@inlined
 def _accept(setup: Setup, live: Live, start: float, span: float) -> None:
     """Make the exchange real: state, forces, cable, energies."""
     steps = hull_steps(setup, span)
@@ -209,7 +209,9 @@ def _accept(setup: Setup, live: Live, start: float, span: float) -> None:
     live.now.last_step = span
     if setup.fixed.tethered:
         accept(live.line, span, setup.fixed.cable, live.load)
-        energy_flow(live.line, setup.fixed.cable, live.load, live.now.ledger.cable_new)
-    book(setup, live, start, span, steps)
+    if setup.fixed.booked:
+        if setup.fixed.tethered:
+            energy_flow(live.line, setup.fixed.cable, live.load, live.now.ledger.cable_new)
+        book(setup, live, start, span, steps)
     if setup.fixed.tethered:
         live.now.length = live.line.ends.settled + live.line.ends.last_length[NOW]

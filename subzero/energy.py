@@ -16,7 +16,7 @@ import numpy as np
 
 import vehicle
 from cable.energy import ADDED_MASS, AT_DRUM, CARRIED, FLOWS, GRAVITY_WORK, LOSS, STORED, STRAINED, TOWED
-from subzero.compiled import compiled, inner
+from subzero.compiled import inlined
 from subzero.hull import feel_current, row_at, tow_wrench
 from subzero.missing_wrench import add_missing
 from subzero.run_state import Live, Setup
@@ -28,7 +28,7 @@ P_PROPELLER, P_LOSS, P_RESTORING, P_EXTERNAL = range(4)
 """Places in `vehicle.POWERS`."""
 
 
-@inner
+@inlined
 def book(setup: Setup, live: Live, start: float, span: float, steps: int) -> None:
     """Add an accepted exchange, whose hull states stand in live.path, to the ledger."""
     ledger = live.now.ledger
@@ -50,15 +50,16 @@ def book(setup: Setup, live: Live, start: float, span: float, steps: int) -> Non
         total[RESIDUAL] -= total[i]
 
 
-@compiled
+@inlined
 def _book_hull(setup: Setup, live: Live, start: float, span: float, steps: int) -> None:
     """Add the hull's share of an exchange."""
     ledger = live.now.ledger
     h, old, new, total = span / steps, ledger.hull_old, ledger.hull_new, ledger.total
     for n in range(steps):
         command = setup.orders.values[row_at(setup.orders.time, start + n * h)]
-        _hull_power(setup, live, n, start + n * h, n / steps, command, old)
-        _hull_power(setup, live, n + 1, start + (n + 1) * h, (n + 1) / steps, command, new)
+        for end in range(2):
+            row = n + end
+            _hull_power(setup, live, row, start + row * h, row / steps, command, new if end else old)
         if setup.fixed.prescribed:
             total[PROPELLER] -= 0.5 * h * (old[P_EXTERNAL] + new[P_EXTERNAL])
             continue
@@ -73,7 +74,7 @@ def _book_hull(setup: Setup, live: Live, start: float, span: float, steps: int) 
     ledger.kinetic = kinetic
 
 
-@compiled
+@inlined
 def _hull_power(
     setup: Setup, live: Live, row: int, time: float, x: float, command: np.ndarray, out: np.ndarray
 ) -> None:
@@ -89,5 +90,6 @@ def _hull_power(
     if not setup.fixed.prescribed:
         for i in range(6):
             hull.wrench[i] = 0.0
-        add_missing(setup, live, live.path[row], command, time, hull)
+        if setup.fixed.lacking:
+            add_missing(setup, live, live.path[row], command, time, hull)
     vehicle.power(live.path[row], command, hull.current, hull.wrench, setup.fixed.vehicle, out)

@@ -14,7 +14,7 @@ import numpy as np
 
 import vehicle
 from cable.water import water_velocity
-from subzero.compiled import compiled, inner
+from subzero.compiled import compiled, inlined, inner
 from subzero.missing_wrench import add_missing
 from subzero.run_state import HEADING, PITCH, SPEED, TIME, HullWork, Live, Setup
 from vehicle import STATE_SIZE
@@ -48,7 +48,7 @@ def tow_wrench(state: np.ndarray, F: np.ndarray, r_c: np.ndarray, work: HullWork
     w[5] = r_c[0] * w[1] - r_c[1] * w[0]
 
 
-@inner
+@inlined
 def feel_current(setup: Setup, state: np.ndarray, time: float, work: HullWork) -> None:
     """Fill work.current (3,) with the water's velocity at the hull's centre. [m/s].
 
@@ -68,7 +68,7 @@ def tow_point(state: np.ndarray, r_c: np.ndarray, R: np.ndarray, out: np.ndarray
         out[i] = state[i] + R[i, 0] * r_c[0] + R[i, 1] * r_c[1] + R[i, 2] * r_c[2]
 
 
-@inner
+@inlined
 def advance_hull(setup: Setup, live: Live, start: float, span: float, steps: int) -> None:
     """Fill live.path[1 … steps] from path[0], pulled by F(t) = F_{n+1} + (t − t_{n+1}) (F_n − F_{n−1})/h_n.
 
@@ -95,7 +95,8 @@ def advance_hull(setup: Setup, live: Live, start: float, span: float, steps: int
                 work.pull[i] = now.guess[i] + (along - 1.0) * ratio * (now.force[i] - now.force_before[i])
             tow_wrench(stage, work.pull, setup.fixed.r_c, work)
             feel_current(setup, stage, start + n * h + part, work)
-            add_missing(setup, live, stage, command, start + n * h + part, work)
+            if setup.fixed.lacking:
+                add_missing(setup, live, stage, command, start + n * h + part, work)
             vehicle.derivative(stage, command, work.current, work.wrench, setup.fixed.vehicle, k[s])
         for i in range(STATE_SIZE):
             new[i] = state[i] + h / 6.0 * (k[0, i] + 2.0 * k[1, i] + 2.0 * k[2, i] + k[3, i])

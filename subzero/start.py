@@ -51,7 +51,7 @@ def setup_of(trial: scenarios.Trial, model: Model, tethered: bool) -> Setup:
     """Return what stays in a run; where its drum is, is still to be filled in."""
     added, terms = (model.missing or MissingForce()).numbers()
     return Setup(
-        fixed=_fixed(trial, model, tethered),
+        fixed=_fixed(trial, model, tethered, bool(added.size or terms.size)),
         orders=_orders(trial),
         track=_track(trial),
         water=water_of(model).numbers(),
@@ -99,7 +99,7 @@ def _hang(line: Line, weight: float) -> None:
     line.node_tension[1 : N + 1] += max(weight, 0.0) * along
 
 
-def _fixed(trial: scenarios.Trial, model: Model, tethered: bool) -> Fixed:
+def _fixed(trial: scenarios.Trial, model: Model, tethered: bool, lacking: bool) -> Fixed:
     """Return the numbers of a run; the drum's place is still to be filled in."""
     fixed = Fixed(
         vehicle=model.vehicle.numbers(),
@@ -111,6 +111,8 @@ def _fixed(trial: scenarios.Trial, model: Model, tethered: bool) -> Fixed:
         agreement=FORCE_TOLERANCE,
         tethered=tethered,
         prescribed=trial.motion is not None,
+        booked=True,
+        lacking=lacking,
     )
     return packed(fixed)
 
