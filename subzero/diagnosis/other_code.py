@@ -54,7 +54,7 @@ def simulate_otherwise(
     times: np.ndarray,
     channels: Iterable[str],
     *,
-    cable_step: float = 0.05,
+    cable_step: float = 0.025,
     segment_length: float = 0.25,
     hull_step: float = 0.01,
 ) -> dict[str, np.ndarray]:
