@@ -14,7 +14,7 @@ from scipy.optimize import lsq_linear
 from scipy.stats import multivariate_normal
 
 import subzero
-from subzero.diagnosis import effects
+from subzero.diagnosis import effects, response
 from subzero.diagnosis.effects.sensors import NOISE
 from subzero.diagnosis.evidence import Quadratic, freed, posterior
 from subzero.diagnosis.noise import Noise, estimate, spikes
@@ -22,6 +22,7 @@ from subzero.diagnosis.problem import Observed, Problem, entries_of
 from subzero.diagnosis.refit import quadratic_step
 from subzero.diagnosis.response import TRUTHS, economical, respond, tracked
 from subzero.diagnosis.setting import Setting
+from subzero.missing_force import MissingForce, Term
 
 BASIC = ("surge_speed", "heading", "yaw_rate", "pitch", "roll", "depth")
 KINDS = ("scale", "bias", "lag")
@@ -165,6 +166,22 @@ def test_economical_steps_cost_less_than_a_tenth_of_the_noise():
     exact, cheap = respond(FIG6, times, BASIC), respond(economical(FIG6, 30.0), times, BASIC)
     for name in BASIC:
         assert np.abs(exact[name] - cheap[name]).max() < 0.1 * NOISE[name], name
+
+
+def test_a_run_without_its_energies_is_the_same_run(monkeypatch):
+    """Bit for bit, with forces that depend on the wet length: nothing in the loop reads what the ledger fills."""
+    force = MissingForce(terms=(Term("X", "wet_length*u2", -0.02), Term("N", "time*u2", 0.01)))
+    trial = dataclasses.replace(TRIAL, duration=4.0)
+    setting = economical(Setting(trial=trial, model=dataclasses.replace(FIG6.model, missing=force)), 4.0)
+    without, eased = tracked(setting)[1], response._ease
+
+    def ease(setup):
+        eased(setup)
+        assert not setup.fixed.booked
+        setup.fixed.booked = True
+
+    monkeypatch.setattr(response, "_ease", ease)
+    assert np.array_equal(tracked(setting)[1], without)
 
 
 def test_the_catalogue_has_the_ids_that_are_promised():
