@@ -21,7 +21,7 @@ def test_two_lines_do_everything_each_with_its_own_environment():
     lines = [line for line in SHELL if line.startswith("python3 -m venv ")]
     assert lines == [
         "python3 -m venv .venv && .venv/bin/pip install . && .venv/bin/subzero compare fig6",
-        'python3 -m venv .venv && .venv/bin/pip install ".[test]" && .venv/bin/pytest',
+        'python3 -m venv .venv && .venv/bin/pip install ".[test]" && .venv/bin/pytest -n 2 --dist loadfile',
     ]
 
 
@@ -30,7 +30,7 @@ def test_ci_takes_its_test_line_from_the_readme():
     pattern = re.search(r"grep -E '(.*)' README\.md", script)
     assert pattern is not None
     found = [line for line in README.splitlines() if re.search(pattern[1], line)]
-    assert found == ['python3 -m venv .venv && .venv/bin/pip install ".[test]" && .venv/bin/pytest']
+    assert found == ['python3 -m venv .venv && .venv/bin/pip install ".[test]" && .venv/bin/pytest -n 2 --dist loadfile']
     assert all(step in script for step in ("ruff check", "ruff format --check", "mypy", "lint-imports"))
 
 
