@@ -13,6 +13,9 @@ from subzero.cli import app
 
 ROOT = Path(__file__).resolve().parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
+TEST_LINE = (
+    'python3 -m venv .venv && .venv/bin/pip install ".[test]" && .venv/bin/pytest -n 2 --dist loadfile'
+)
 SHELL = [line for block in re.findall(r"```sh\n(.*?)```", README, re.DOTALL) for line in block.splitlines()]
 COMMANDS = [line.partition("#")[0].strip() for line in SHELL if line.startswith("subzero ")]
 
@@ -21,7 +24,7 @@ def test_two_lines_do_everything_each_with_its_own_environment():
     lines = [line for line in SHELL if line.startswith("python3 -m venv ")]
     assert lines == [
         "python3 -m venv .venv && .venv/bin/pip install . && .venv/bin/subzero compare fig6",
-        'python3 -m venv .venv && .venv/bin/pip install ".[test]" && .venv/bin/pytest -n 2 --dist loadfile',
+        TEST_LINE,
     ]
 
 
@@ -30,7 +33,7 @@ def test_ci_takes_its_test_line_from_the_readme():
     pattern = re.search(r"grep -E '(.*)' README\.md", script)
     assert pattern is not None
     found = [line for line in README.splitlines() if re.search(pattern[1], line)]
-    assert found == ['python3 -m venv .venv && .venv/bin/pip install ".[test]" && .venv/bin/pytest -n 2 --dist loadfile']
+    assert found == [TEST_LINE]
     assert all(step in script for step in ("ruff check", "ruff format --check", "mypy", "lint-imports"))
 
 
