@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import multiprocessing
 import os
 import sys
@@ -11,10 +10,8 @@ from pathlib import Path
 import cyclopts
 from rich.console import Console
 
-from subzero.compiled import cache_directory
-
 from .cases import SEED, Case, cases
-from .results import read
+from .results import line, place, read
 from .sharing import Shared, share
 from .times import keep, kept, timed
 from .trial_of import Result, result_of
@@ -44,10 +41,10 @@ def benchmark(
         workers: processes.
         resume: keep the results of an interrupted run, and go on behind them.
         seed: of all cases.
-        results: where they are kept, one JSON object a line; in the user's cache if not given.
+        results: where they are kept, one JSON object a line; beside the code if not given.
         page: write the page.
     """
-    path = results or cache_directory().parent / "diagnosis_benchmark.jsonl"
+    path = results or place(seed, "quick" if quick else "")
     path.parent.mkdir(parents=True, exist_ok=True)
     if not resume:
         path.unlink(missing_ok=True)
@@ -68,7 +65,7 @@ def measure(wanted: list[Case], path: Path, workers: int) -> None:
     context = multiprocessing.get_context("fork")
     with context.Pool(workers, initializer=_begin) as pool, path.open("a") as file:
         for one in pool.imap_unordered(_measured, wanted):
-            file.write(json.dumps(one) + "\n")
+            file.write(line(one))
             file.flush()
             console.print(line_of(one))
 

@@ -16,7 +16,6 @@ from pathlib import Path
 
 import cyclopts
 
-from subzero.compiled import cache_directory
 from subzero.diagnosis.diagnose import diagnose
 from subzero.diagnosis.logged import Logged
 from subzero.diagnosis.next_trial import ENOUGH, next_trial, outlooks
@@ -29,7 +28,7 @@ from .cases import AFTER, SEED, Case, Made, cases
 from .draws import with_values
 from .held_out import STARTS
 from .manoeuvres import CHANNELS, times
-from .results import read
+from .results import place, read
 from .sharing import Shared, share
 from .trial_of import Result, posed
 from .truth import NoRunError, noisy, shown_by
@@ -51,7 +50,7 @@ def benchmark(*, count: int = 20, workers: int = 2, seed: int = SEED, results: P
         seed: of all cases.
         results: the benchmark's results; the advice is kept beside them.
     """
-    known = results or cache_directory().parent / "diagnosis_benchmark.jsonl"
+    known = results or place(seed)
     path, undecided = beside(known), {one["index"] for one in read(known) if _is_open(one)}
     done = {one["index"] for one in kept(known)}
     asked = [case for case in cases(seed) if case.index in undecided][:count]

@@ -24,6 +24,8 @@ from .strange_found import judged
 
 Result = dict[str, Any]
 ATTEMPTS, LISTED = 12, 12
+SHOWN = 12
+"""Of the first so many cases what they could show is kept: of every manoeuvre one is among them."""
 CONFOUNDED, CLEAR = 4.0, 16.0
 """A twin has D below the first against its rival, and above the second against nothing."""
 
@@ -36,7 +38,7 @@ def result_of(case: Case, shared: Shared, budget: str = "verdict") -> Result:
     found["selection"] = baselines.selection(plain, r, J)
     if case.kind in ("single", "pair") and case.number % 2 == 0 and shared.work is not None:
         found["gain"] = gains(case, made, verdict, shared.work)
-    if case.kind == "healthy" or case.index < 3:
+    if case.index < SHOWN:
         found["detectable"] = _detectable(verdict)
     return found
 

@@ -11,7 +11,7 @@ This page rests on **{cases} of {whole} cases**; kinds come in turn, so that any
 speed through the water, heading, yaw rate, pitch, roll, depth. Cases that ended in an error: {broken}.
 
 The cases are those of seed {seed}, which no choice of the engine was made with: those were made with seeds 1 to 13.
-{versions}
+What was said of each is kept in `benchmarks/diagnosis/kept/`. {versions}
 
 {kinds}
 
