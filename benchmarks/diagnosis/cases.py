@@ -28,8 +28,8 @@ SEED = 17
 DEGRADED = ("noise", "channels", "short", "wide", "narrow")
 AFTER = 4.0
 """The trial goes on behind its record, for sensors whose clock runs ahead. [s]"""
-TWINS = (("sensor_scale:depth", 0), ("munk_moment", 0), ("hull_drag", 0), ("propeller_thrust_slope", 0),
-         ("sensor_bias:depth", 0), ("sensor_scale:heading", 0), ("rudder_lift_slope", 0))  # fmt: skip
+TWINS = (("sensor_scale:depth", 0), ("sensor_bias:heading", 0), ("hull_drag", 0), ("propeller_thrust_slope", 0),
+         ("sensor_bias:depth", 0), ("sensor_scale:heading", 0))  # fmt: skip
 """Effect, and its parameter, that have rivals on `fig6`."""
 
 
