@@ -108,7 +108,7 @@ def _measured(case: Case, made: Made, problem: Problem) -> tuple[dict[str, float
 
 
 def _there(problem: Problem, made: Made) -> float:
-    """Return D of what is hidden where the truth flies: a trim that makes it dive tells scale and bias of depth apart."""
+    """Return D of what is hidden where the truth flies: a vehicle that dives tells scale and bias of depth apart."""
     z = np.array([made.values[entry.effect.id][entry.place] for entry in problem.entries])
     return separation(problem, problem.jacobian(z), z, tuple(made.hidden))[0]
 
