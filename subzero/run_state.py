@@ -59,8 +59,8 @@ class Fixed(NamedTuple):
     """The numbers that do not change during a run.
 
     `drum_place` is the drum at the start, earth axes (3,) [m]; hull and cable agree when their forces differ by less
-    than the fraction `agreement`; energies are summed up if the run is `booked`, and
-    the model is `lacking` if something is to be added to it, see `Setup`.
+    than the fraction `agreement`; energies are summed up if the run is `booked`; the model is `lacking` if something is
+    to be added to it, see `Setup`.
     """
 
     vehicle: VehicleNumbers

@@ -44,7 +44,7 @@ def benchmark(
         results: where they are kept, one JSON object a line; beside the code if not given.
         page: write the page.
     """
-    path = results or place(seed, "quick" if quick else "")
+    path = results or place(seed, "quick_" if quick else "")
     path.parent.mkdir(parents=True, exist_ok=True)
     if not resume:
         path.unlink(missing_ok=True)

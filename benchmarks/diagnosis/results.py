@@ -14,7 +14,7 @@ DIGITS = 6
 
 def place(seed: int, which: str = "") -> Path:
     """Return where the results of a seed are kept, or some of them that the page does not rest on."""
-    return Path(__file__).parent / "kept" / f"{which}_seed_{seed}.jsonl".lstrip("_")
+    return Path(__file__).parent / "kept" / f"{which}seed_{seed}.jsonl"
 
 
 def line(one: Result) -> str:
