@@ -6,7 +6,7 @@ moment of inertia I_d is not printed there: 0 makes the tension at a frictionles
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from math import isfinite, sqrt
 from typing import Any, NamedTuple
 
@@ -172,7 +172,7 @@ def _check_range(
     thing: CableProperties | DrumProperties, names: tuple[str, ...], *, minimum: float, inclusive: bool
 ) -> None:
     """Raise a ValueError that names the first field of `names` that is outside its range."""
-    known = {field.name for field in fields(thing)}
+    known = vars(thing)
     for name in names:
         value = getattr(thing, name)
         fine = isfinite(value) and (value >= minimum if inclusive else value > minimum)

@@ -129,11 +129,18 @@ def packed(values: Numbers) -> Numbers:
     return out
 
 
+@cache
+def _names(kind: type) -> tuple[str, ...] | None:
+    """Return the names of the fields of a kind of named tuple or dataclass; None for anything else."""
+    if dataclasses.is_dataclass(kind):
+        return tuple(field.name for field in dataclasses.fields(kind))
+    return getattr(kind, "_fields", None)
+
+
 def _parts(value: Any) -> dict[str, Any] | None:
     """Return the fields of a named tuple or dataclass by name; None for anything else."""
-    if dataclasses.is_dataclass(value):
-        return {field.name: getattr(value, field.name) for field in dataclasses.fields(value)}
-    return value._asdict() if hasattr(value, "_asdict") else None
+    names = _names(type(value))
+    return None if names is None else {name: getattr(value, name) for name in names}
 
 
 def _layout(value: Any) -> np.dtype[Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +11,7 @@ from subzero.diagnosis.candidate import Candidate
 from subzero.diagnosis.closer import closer, linear
 from subzero.diagnosis.evidence import KAPPAS, log_sum
 from subzero.diagnosis.hypotheses import PRIOR, Ids
+from subzero.diagnosis.latent import Terms
 from subzero.diagnosis.one_term import one_terms
 from subzero.diagnosis.problem import Problem
 from subzero.diagnosis.search import Search
@@ -59,16 +61,17 @@ class Foreign:
 def foreigners(search: Search) -> list[Foreign]:
     """Return what lies outside, most probable first: beside nothing, and beside the best causes."""
     problem, knots, best = search.problem, knots_of(search.problem), search.best()
-    columns = all_columns(problem, best.fit.z, knots)
-    found = _suspected(search, columns, knots)
-    own = _around_themselves(search, found, columns, knots)
+    columns, terms = all_columns(problem, best.fit.z, knots), one_terms(problem, best.fit.z, knots)
+    found = _suspected(search, columns, knots, terms)
+    own = _around_themselves(search, found, columns, knots, terms)
     if max(one.log_posterior for one in found + own) < best.log_posterior - WORTH:
         return _sorted(found, own)
     alike = {one.id.removeprefix(FORCE) for one in _close(found + own) if one.id.startswith(FORCE)}
     if len(alike) > 1:
         finer = knots_of(problem, FINE)
         columns = {FORCE + axis: C for axis, C in force_columns(problem, best.fit.z, alike, finer).items()}
-        found = [one for one in found if one.id not in columns] + _suspected(search, columns, finer)
+        terms = one_terms(problem, best.fit.z, finer)
+        found = [one for one in found if one.id not in columns] + _suspected(search, columns, finer, terms)
     return _sorted(found + _sudden(search), own)
 
 
@@ -80,10 +83,11 @@ def _sorted(found: list[Foreign], own: list[Foreign]) -> list[Foreign]:
     return list(kept.values())
 
 
-def _suspected(search: Search, columns: dict[str, np.ndarray], knots: Knots) -> list[Foreign]:
+def _suspected(
+    search: Search, columns: dict[str, np.ndarray], knots: Knots, terms: Mapping[str, Terms]
+) -> list[Foreign]:
     """Return the forces and drifts of columns, beside nothing and beside the best causes."""
-    problem = search.problem
-    terms, prior = one_terms(problem, search.best().fit.z, knots), _log_prior(problem)
+    problem, prior = search.problem, _log_prior(search.problem)
     found: list[Foreign] = []
     for candidate in _bases(search):
         scales = candidate.scales(problem)
@@ -93,7 +97,11 @@ def _suspected(search: Search, columns: dict[str, np.ndarray], knots: Knots) -> 
 
 
 def _around_themselves(
-    search: Search, found: list[Foreign], columns: dict[str, np.ndarray], knots: Knots
+    search: Search,
+    found: list[Foreign],
+    columns: dict[str, np.ndarray],
+    knots: Knots,
+    terms: Mapping[str, Terms],
 ) -> list[Foreign]:
     """Return the most probable forces and drifts beside nothing as they are around fits of their own, if they have any
     hope; none where nothing has to bend.
@@ -102,7 +110,6 @@ def _around_themselves(
     if not best.ids and best.kappa == min(KAPPAS):
         return []
     hope = {one.id: one.log_posterior for one in found if not one.beside}
-    terms = one_terms(problem, best.fit.z, knots)
     for log, what in linear(problem, best.fit, columns, knots, terms, list(KAPPAS)):
         hope[what.id] = max(hope[what.id], log + prior)
     finer, own = knots_of(problem, FINE), []

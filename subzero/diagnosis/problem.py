@@ -5,7 +5,7 @@ r(z) = W (y − h(z)),    J = ∂(W h)/∂z
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from os import cpu_count
@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from subzero.diagnosis.effect import Effect, Parameter
+from subzero.diagnosis.kept_runs import KeptRuns, Track
 from subzero.diagnosis.noise import Noise
 from subzero.diagnosis.response import TRUTHS, sensed, tracked
 from subzero.diagnosis.setting import Setting
@@ -67,13 +68,15 @@ class Problem:
         records: what was measured.
         entries: what z holds, in order.
         pool: threads for runs side by side; compiled code runs in them freely.
-        runs: how many runs were made, for reports.
+        runs: how many runs were asked for, for reports.
+        kept: those that were made last.
     """
 
     records: tuple[Observed, ...]
     entries: tuple[Entry, ...]
     pool: ThreadPoolExecutor = field(default_factory=lambda: ThreadPoolExecutor(cpu_count() or 1))
     runs: list[int] = field(default_factory=lambda: [0])
+    kept: KeptRuns = field(default_factory=KeptRuns)
 
     def setting(self, record: int, z: np.ndarray, *, late: bool = True) -> Setting:
         """Return the setting of a record with deviations z (k,); without those of the sensors if not `late`."""
@@ -128,17 +131,31 @@ class Problem:
         moved[k] += step if z[k] + step <= parameter.high else -step
         return moved
 
-    def tracks(self, jobs: list[tuple[int, np.ndarray]]) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Return the track of each (record, z), side by side."""
+    def tracks(self, jobs: Sequence[tuple[int, np.ndarray]]) -> list[Track]:
+        """Return the track of each (record, z), side by side; none is run twice."""
         self.runs[0] += len(jobs)
+        early = np.array([not self._late(k) for k in range(len(self.entries))])
+        asked = [(i, np.where(early, z, 0.0)) for i, z in jobs]
+        names, found = [(i, z.tobytes()) for i, z in asked], dict[tuple[int, bytes], Track]()
+        for name, (i, z) in zip(names, asked, strict=True):
+            if track := self.kept.get(self.records[i].setting, self.entries, z):
+                found[name] = track
+        new = {name: job for name, job in zip(names, asked, strict=True) if name not in found}
+        for (name, (i, z)), track in zip(new.items(), self._run(list(new.values())), strict=True):
+            found[name] = track
+            self.kept.keep(self.records[i].setting, self.entries, z, track)
+        return [found[name] for name in names]
 
-        def run(job: tuple[int, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    def _run(self, jobs: list[tuple[int, np.ndarray]]) -> Iterable[Track]:
+        """Return the track of each (record, z), side by side."""
+
+        def run(job: tuple[int, np.ndarray]) -> Track:
             return tracked(self.setting(*job, late=False))
 
-        return list(self.pool.map(run, jobs)) if len(jobs) > 1 else [run(job) for job in jobs]
+        return self.pool.map(run, jobs) if len(jobs) > 1 else map(run, jobs)
 
     def whitened(
-        self, record: int, setting: Setting, track: tuple[np.ndarray, np.ndarray], *, measured: bool = False
+        self, record: int, setting: Setting, track: Track, *, measured: bool = False
     ) -> np.ndarray:
         """Return W h of a record, or W (y − h)."""
         seen, grid, parts = self.records[record], track[0], []

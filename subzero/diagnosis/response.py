@@ -134,14 +134,21 @@ def _lagged(truth: np.ndarray, lag: float) -> np.ndarray:
     return lfilter([new, old], [1.0, -keep], truth, zi=[truth[0] * (1.0 - new)])[0]
 
 
-def _angles(track: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return roll, pitch and continuous heading. [degree]"""
+def _roll(track: np.ndarray) -> np.ndarray:
     w, x, y, z = track[:, QUATERNION : QUATERNION + 4].T
-    roll = np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
-    pitch = np.arcsin(np.clip(2.0 * (w * y - z * x), -1.0, 1.0))
+    return DEGREE * np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
+
+
+def _pitch(track: np.ndarray) -> np.ndarray:
+    w, x, y, z = track[:, QUATERNION : QUATERNION + 4].T
+    return DEGREE * np.arcsin(np.clip(2.0 * (w * y - z * x), -1.0, 1.0))
+
+
+def _heading(track: np.ndarray) -> np.ndarray:
+    """Return the heading without its jumps at north. [degree]"""
+    w, x, y, z = track[:, QUATERNION : QUATERNION + 4].T
     heading = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
-    first = DEGREE * heading[0] % 360.0
-    return DEGREE * roll, DEGREE * pitch, DEGREE * (np.unwrap(heading) - heading[0]) + first
+    return DEGREE * (np.unwrap(heading) - heading[0]) + DEGREE * heading[0] % 360.0
 
 
 def _surge_through_water(track: np.ndarray) -> np.ndarray:
@@ -163,9 +170,9 @@ TRUTHS: Mapping[str, Callable[[np.ndarray], np.ndarray]] = {
     "north": _column(0),
     "east": _column(1),
     "depth": _column(2),
-    "roll": lambda track: _angles(track)[0],
-    "pitch": lambda track: _angles(track)[1],
-    "heading": lambda track: _angles(track)[2],
+    "roll": _roll,
+    "pitch": _pitch,
+    "heading": _heading,
     "surge_speed": _surge_through_water,
     "sway_speed": _column(VELOCITY + 1),
     "heave_speed": _column(VELOCITY + 2),

@@ -6,8 +6,13 @@ all tolerances wide → a point close to the data → linear evidence of everyth
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
+from functools import partial
 from itertools import chain
+from os import cpu_count
+from typing import TypeVar
 
 import numpy as np
 
@@ -21,6 +26,7 @@ from subzero.diagnosis.refit import Fit, refit
 from subzero.diagnosis.screen import Screen, beside, instead, is_flat, look
 from subzero.diagnosis.wide import fit_wide
 
+Made = TypeVar("Made")
 KEEP, SINGLES, PAIRS = 12.0, 7, 4
 """Refit hypotheses whose log evidence is this close to the best of their kind, and at most so many."""
 BENT, LEAST_BENT = 2, 10.0
@@ -59,6 +65,7 @@ class Search:
         behind: hypothesis → how far its fit was behind the best when it was given up, in log posterior.
         economical: the problem before what economical steps get wrong was taken from its records.
         sharp_at: the hypothesis at whose fit that was done.
+        side: threads for fits side by side, whose runs may use those of the problem.
     """
 
     problem: Problem
@@ -72,6 +79,7 @@ class Search:
     behind: dict[Ids, float] = field(default_factory=dict)
     economical: Problem = field(init=False)
     sharp_at: Ids | None = None
+    side: ThreadPoolExecutor = field(default_factory=lambda: ThreadPoolExecutor(cpu_count() or 1))
 
     def begin(self) -> None:
         """Make the sensitivities at the nominal model, and the fit with wide tolerances."""
@@ -87,13 +95,11 @@ class Search:
         then those that come out best with their own.
         """
         first = self._first()
-        for ids in first:
+        for ids, fit in zip(first, self._aside(self._alone, first), strict=True):
             self._say(0.3, "fitting", ids, " by itself")
-            self._alone(ids)
+            self._keep(ids, fit)
         best = self.screen.best(1, SINGLES, KEEP), self.screen.best(2, PAIRS, KEEP)
-        for ids in chain([()], first, *best):
-            self._say(0.3, "fitting", ids)
-            self.fit(ids)
+        self.fit_all(list(chain([()], *best)), words="fitting")
         self.race(2)
         self.sharpen()
         self.race()
@@ -109,8 +115,7 @@ class Search:
                 return
             looked.add(best.ids)
             self._say(0.7, "a further cause beside", best.ids)
-            for ids in self._more(best) if len(best.ids) < MOST_CAUSES else []:
-                self.fit(ids, best.fit)
+            self.fit_all(self._more(best) if len(best.ids) < MOST_CAUSES else [], best.fit)
             for without in best.ids:
                 self._without(best, without)
             self.race(2, 2.0)
@@ -132,20 +137,35 @@ class Search:
         self._nothing()
 
     def fit(self, ids: Ids, start: Fit | None = None) -> None:
-        """Fit a hypothesis with real runs and the sensitivities of the wide fit, unless it was fitted; or from another
-        fit, and keep what is better.
+        """Fit a hypothesis as `fit_all` does."""
+        self.fit_all([ids], start)
+
+    def fit_all(self, several: Sequence[Ids], start: Fit | None = None, words: str = "") -> None:
+        """Fit hypotheses with real runs, side by side: with the sensitivities of the wide fit, those that no fit is
+        known of; or from another fit, and keep what is better.
         """
-        known = self.candidates.get(ids)
-        if known and start is None:
-            return
+        wanted = [ids for ids in dict.fromkeys(several) if start or ids not in self.candidates]
+        for ids, found in zip(wanted, self._aside(partial(self._fitted, start), wanted), strict=True):
+            if words:
+                self._say(0.3, words, ids)
+            known = self.candidates.get(ids)
+            if known is None or found.log_posterior > known.log_posterior:
+                self.candidates[ids] = found
+                self.raced.discard(ids)
+
+    def _fitted(self, start: Fit | None, ids: Ids) -> Candidate:
+        """Return a hypothesis with its fit from another, or from the wide one."""
         D, z = variances(self.problem.entries, ids, 1.0), None if start else self.screen.secants.get(ids)
         start = start or self.wide
         z = posterior(start.quadratic, D).z if z is None else z
-        fit = refit(self.problem, z, self._with_slopes(start.J, ids), D, most_fresh=0, made_at=start.made_at)
-        found = candidate_of(self.problem, ids, fit)
-        if known is None or found.log_posterior > known.log_posterior:
-            self.candidates[ids] = found
-            self.raced.discard(ids)
+        J = self._with_slopes(start.J, ids)
+        return candidate_of(
+            self.problem, ids, refit(self.problem, z, J, D, most_fresh=0, made_at=start.made_at)
+        )
+
+    def _aside(self, make: Callable[[Ids], Made], several: Sequence[Ids]) -> Iterator[Made]:
+        """Return what is made of each hypothesis, side by side: the runs of one fit come one after the other."""
+        return self.side.map(make, several)
 
     def race(self, most: int = RACERS, hopeless: float = HOPELESS) -> None:
         """Fit candidates again with sensitivities of their own, the best first, until the next is hopeless."""
@@ -177,11 +197,16 @@ class Search:
         self.behind |= {ids: one.log_posterior - best.log_posterior for ids, one in self.candidates.items()
                         if ids not in kept}  # fmt: skip
         self.candidates = kept
-        for ids, one in list(self.candidates.items()):
-            fit = one.fit
-            now = self._keep(ids, refit(self.problem, fit.z, fit.J, fit.D, most_fresh=0, made_at=fit.made_at))
-            self.raced -= set() if now.fit.converged else {ids}
+        ids_of = list(self.candidates)
+        for ids, fit in zip(ids_of, self._aside(self._going_on, ids_of), strict=True):
+            self._keep(ids, fit)
+            self.raced -= set() if fit.converged else {ids}
         self.raced &= set(self.candidates)
+
+    def _going_on(self, ids: Ids) -> Fit:
+        """Return the fit of a candidate from where it is, with the sensitivities at hand."""
+        fit = self.candidates[ids].fit
+        return refit(self.problem, fit.z, fit.J, fit.D, most_fresh=0, made_at=fit.made_at)
 
     def best(self) -> Candidate:
         """Return the most probable candidate."""
@@ -208,12 +233,12 @@ class Search:
                 bent[ids] = max(size, bent.get(ids, 0.0))
         return [ids for ids in sorted(bent, key=lambda ids: -bent[ids])[:BENT] if bent[ids] > LEAST_BENT]
 
-    def _alone(self, ids: Ids) -> None:
-        """Fit a cause from where the wide fit has it, all else nominal, with the sensitivities there."""
+    def _alone(self, ids: Ids) -> Fit:
+        """Return the fit of a cause from where the wide fit has it, all else nominal, with the sensitivities there."""
         z, at = np.zeros(len(self.problem.entries)), places(self.problem.entries, ids)
         z[at] = self.screen.secants.get(ids, self.wide.z)[at]
         D = variances(self.problem.entries, ids, 1.0)
-        self._keep(ids, refit(self.problem, z, self.problem.jacobian(z), D, most_fresh=2, made_at=z))
+        return refit(self.problem, z, self.problem.jacobian(z), D, most_fresh=2, made_at=z)
 
     def _more(self, best: Candidate) -> list[Ids]:
         """Return the hypotheses with one cause more that the linear problem at the best fit finds best."""
@@ -227,8 +252,7 @@ class Search:
         rest = tuple(one for one in best.ids if one != without)
         self._below(rest, best.fit)
         found = self._unknown(instead(self.problem, best, rest))
-        for ids in sorted(found, key=lambda ids: -found[ids])[:INSTEAD]:
-            self.fit(ids, best.fit)
+        self.fit_all(sorted(found, key=lambda ids: -found[ids])[:INSTEAD], best.fit)
 
     def _unknown(self, found: dict[Ids, float]) -> dict[Ids, float]:
         """Return those of estimated log posteriors that no fit is known of, or only one that went astray from afar."""
