@@ -130,7 +130,7 @@ def packed(values: Numbers) -> Numbers:
 
 
 @cache
-def _names(kind: type) -> tuple[str, ...] | None:
+def _names(kind: Any) -> tuple[str, ...] | None:
     """Return the names of the fields of a kind of named tuple or dataclass; None for anything else."""
     if dataclasses.is_dataclass(kind):
         return tuple(field.name for field in dataclasses.fields(kind))

@@ -8,6 +8,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from time import perf_counter
 
+from threadpoolctl import threadpool_limits
+
 from subzero.diagnosis.detect import detectability, with_secants
 from subzero.diagnosis.effect import Effect
 from subzero.diagnosis.foreign import foreigners
@@ -53,7 +55,8 @@ def diagnose(
     search = Search(problem=problem, progress=progress or (lambda share, words: None))
     work = Work(search=search, seed=seed, budget=budget)
     try:
-        _work(work, seen or (lambda table: None))
+        with threadpool_limits(limits=1, user_api="blas"):  # runs have the cores; matrices are small
+            _work(work, seen or (lambda table: None))
     except KeyboardInterrupt:
         work.complete = False
         if () not in search.candidates:

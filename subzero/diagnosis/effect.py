@@ -32,6 +32,7 @@ class Parameter:
         nominal: what the nominal model has, so that the value can be named as a whole. [unit]
         step: of a sensitivity, if not a share of the tolerance. [unit]
         least: the whole value cannot be less, or not less than the nominal model's if that is less already. [unit]
+        begins: nothing is any different before this time of the trial. [s]
     """
 
     name: str
@@ -43,6 +44,7 @@ class Parameter:
     nominal: Callable[[Setting], float] = nothing
     step: float = 0.0
     least: float = -float("inf")
+    begins: float = 0.0
 
     def within(self, setting: Setting) -> Parameter:
         """Return the parameter with the bounds that a nominal model leaves it."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -112,12 +113,11 @@ def _around_themselves(
     hope = {one.id: one.log_posterior for one in found if not one.beside}
     for log, what in linear(problem, best.fit, columns, knots, terms, list(KAPPAS)):
         hope[what.id] = max(hope[what.id], log + prior)
-    finer, own = knots_of(problem, FINE), []
+    finer = knots_of(problem, FINE)
     terms = one_terms(problem, best.fit.z, finer)
-    for name in _worth_a_look(hope, best):
-        log, what = closer(problem, best.fit, name, 1.0, finer, terms)
-        own.append(Foreign(beside=(), what=what, log_posterior=log + prior))
-    return own
+    look = partial(closer, problem, best.fit, kappa=1.0, knots=finer, terms=terms)
+    found_there = search.side.map(look, _worth_a_look(hope, best))
+    return [Foreign(beside=(), what=what, log_posterior=log + prior) for log, what in found_there]
 
 
 def _worth_a_look(hope: dict[str, float], best: Candidate) -> list[str]:

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from subzero.diagnosis.tracked import Track
+
 ROOM = 64_000_000
 """Runs are kept until they take more memory than this; the oldest go first. [byte]"""
-Track = tuple[np.ndarray, np.ndarray]
-"""Times (m,) [s] and what `response.tracked` has at them (m, columns)."""
 
 
 class KeptRuns:

@@ -14,10 +14,11 @@ from typing import NamedTuple
 import numpy as np
 
 from subzero.diagnosis.effect import Effect, Parameter
-from subzero.diagnosis.kept_runs import KeptRuns, Track
+from subzero.diagnosis.kept_runs import KeptRuns
 from subzero.diagnosis.noise import Noise
-from subzero.diagnosis.response import TRUTHS, sensed, tracked
+from subzero.diagnosis.response import TRUTHS, sensed
 from subzero.diagnosis.setting import Setting
+from subzero.diagnosis.tracked import Stop, Track, on_from, tracked, with_stops
 
 STEP = 0.2
 """Step of a sensitivity, in tolerances; a whole one from a state of rest (a play, a friction), where slopes jump."""
@@ -25,6 +26,8 @@ SHARE = 0.03
 """... and at least this share of what is there: far from the nominal model runs are rougher."""
 LATE = ("sensors", "clock")
 """Slots that act on a finished run."""
+Job = tuple[int, np.ndarray, Stop | None]
+"""A run to be made: of a record, with deviations, from a stop on if there is one."""
 
 
 class Entry(NamedTuple):
@@ -106,7 +109,10 @@ class Problem:
         shown = [self.whitened(i, self.setting(i, z), track) for i, track in enumerate(base)]
         jobs = [(k, i, self._moved(z, k)) for k in wanted for i in range(len(self.records))
                 if self.entries[k].record in (-1, i)]  # fmt: skip
-        runs = iter(self.tracks([(i, moved) for k, i, moved in jobs if not self._late(k)]))
+        stops = [self._stops(i, z, wanted) for i in range(len(self.records))]
+        early = [(k, i, moved) for k, i, moved in jobs if not self._late(k)]
+        from_ = [stops[i].get(self.entries[k].parameter.begins) for k, i, _ in early]
+        runs = iter(self.tracks([(i, moved) for _, i, moved in early], from_))
         J = np.zeros((sum(part.size for part in shown), len(self.entries)))
         first = np.cumsum([0, *(part.size for part in shown)])
         for k, i, moved in jobs:
@@ -131,8 +137,12 @@ class Problem:
         moved[k] += step if z[k] + step <= parameter.high else -step
         return moved
 
-    def tracks(self, jobs: Sequence[tuple[int, np.ndarray]]) -> list[Track]:
-        """Return the track of each (record, z), side by side; none is run twice."""
+    def tracks(
+        self, jobs: Sequence[tuple[int, np.ndarray]], stops: Sequence[Stop | None] | None = None
+    ) -> list[Track]:
+        """Return the track of each (record, z), side by side; none is run twice, and each only from its stop on, where
+        it has one.
+        """
         self.runs[0] += len(jobs)
         early = np.array([not self._late(k) for k in range(len(self.entries))])
         asked = [(i, np.where(early, z, 0.0)) for i, z in jobs]
@@ -140,23 +150,29 @@ class Problem:
         for name, (i, z) in zip(names, asked, strict=True):
             if track := self.kept.get(self.records[i].setting, self.entries, z):
                 found[name] = track
-        new = {name: job for name, job in zip(names, asked, strict=True) if name not in found}
-        for (name, (i, z)), track in zip(new.items(), self._run(list(new.values())), strict=True):
+        new = {name: (*job, stop) for name, job, stop in zip(names, asked, stops or [None] * len(jobs), strict=True)
+               if name not in found}  # fmt: skip
+        for (name, (i, z, _)), track in zip(new.items(), self._run(list(new.values())), strict=True):
             found[name] = track
             self.kept.keep(self.records[i].setting, self.entries, z, track)
         return [found[name] for name in names]
 
-    def _run(self, jobs: list[tuple[int, np.ndarray]]) -> Iterable[Track]:
-        """Return the track of each (record, z), side by side."""
+    def _stops(self, record: int, z: np.ndarray, columns: Iterable[int]) -> dict[float, Stop]:
+        """Return the run of a record as it was when columns begin: begin [s] → stop, none for those at the start."""
+        begins = {self.entries[k].parameter.begins for k in columns} - {0.0}
+        return with_stops(self.setting(record, z, late=False), begins)[1] if begins else {}
 
-        def run(job: tuple[int, np.ndarray]) -> Track:
-            return tracked(self.setting(*job, late=False))
+    def _run(self, jobs: list[Job]) -> Iterable[Track]:
+        """Return the track of each job, side by side."""
+
+        def run(job: Job) -> Track:
+            record, z, stop = job
+            setting = self.setting(record, z, late=False)
+            return on_from(setting, stop) if stop else tracked(setting)
 
         return self.pool.map(run, jobs) if len(jobs) > 1 else map(run, jobs)
 
-    def whitened(
-        self, record: int, setting: Setting, track: Track, *, measured: bool = False
-    ) -> np.ndarray:
+    def whitened(self, record: int, setting: Setting, track: Track, *, measured: bool = False) -> np.ndarray:
         """Return W h of a record, or W (y − h)."""
         seen, grid, parts = self.records[record], track[0], []
         earlier = seen.time - setting.clock_offset

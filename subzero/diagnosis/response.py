@@ -7,19 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
-from cable.line import enlarged
-from subzero import coupling
 from subzero.channels import DEGREE
 from subzero.diagnosis.setting import Sensing, Setting
-from subzero.diagnosis.track import COLUMNS, LENGTH, RUDDER, TENSION, VOLTAGE, WATER, follow
-from subzero.later import go_on_with
-from subzero.loop import NO_ROOM
-from subzero.run_state import Live, Setup
-from subzero.start import prepare
+from subzero.diagnosis.track import LENGTH, RUDDER, TENSION, VOLTAGE, WATER
+from subzero.diagnosis.tracked import tracked
 from vehicle.state import QUATERNION, SHAFT, VELOCITY
 
 HULL_STEP, CABLE_STEP, SEGMENT = 0.05, 0.2, 1.0
@@ -27,12 +21,6 @@ HULL_STEP, CABLE_STEP, SEGMENT = 0.05, 0.2, 1.0
 the time."""
 FINE = (0.025, 0.1, 0.25)
 """Hull step, cable step [s] and segment length [m] to measure their errors with."""
-AGREEMENT = 1e-6
-"""Fraction within which the forces of hull and cable agree, in the place of 1e-9: a quarter faster, nothing seen."""
-LEAST_FRICTION = 1e-3
-"""Every drum rubs as much as this: without any friction a drum with inertia chatters, and slopes are lost. [N]"""
-FASTEST_PAY_OUT = 2.0
-"""Room for nodes is made for this speed, and doubled when that is not enough. [m/s]"""
 
 
 def economical(setting: Setting, duration: float) -> Setting:
@@ -78,43 +66,6 @@ def respond(setting: Setting, times: np.ndarray, channels: Iterable[str]) -> dic
         name: np.interp(earlier, grid, sensed(setting.sensing.get(name), grid, TRUTHS[name](track)))
         for name in channels
     }
-
-
-def tracked(setting: Setting) -> tuple[np.ndarray, np.ndarray]:
-    """Return times (m,) [s] and track (m, COLUMNS) of a setting, NaN from where it could not go on."""
-    trial = setting.trial
-    times = np.linspace(0.0, trial.duration, round(trial.duration / trial.cable_step) + 1)
-    setup, live = prepare(trial, setting.model, setting.tethered)
-    _ease(setup)
-    live = _roomy(live, trial.start.wet_length + FASTEST_PAY_OUT * trial.duration, trial.segment_length)
-    steps = max(1, int(np.ceil(trial.cable_step / trial.hull_step - 1e-6)))
-    track = np.full((1 + (times.size - 1) * steps, COLUMNS), np.nan)
-    changes = {round(time / trial.cable_step): model for time, model in setting.later}
-    row, ending = 1, coupling.FINE
-    while row < times.size and ending in (coupling.FINE, NO_ROOM):
-        if row - 1 in changes:
-            setup = go_on_with(
-                changes.pop(row - 1), setup, live, trial, setting.tethered, float(times[row - 1])
-            )
-            _ease(setup)
-        last = min([times.size, *(change + 1 for change in changes)])
-        row, ending = follow(setup, live, times, row, last, track)
-        if ending == NO_ROOM:
-            live = live._replace(line=enlarged(live.line, 2 * live.line.length.size))
-    return np.linspace(0.0, times[-1], track.shape[0]), track
-
-
-def _ease(setup: Setup) -> None:
-    """Let a run be quicker and smoother than a simulation needs to be: forces agree less, nobody asks for energies."""
-    fixed: Any = setup.fixed  # a record in memory
-    fixed.agreement, fixed.booked = AGREEMENT, False
-    fixed.drum.friction = max(fixed.drum.friction, LEAST_FRICTION)
-
-
-def _roomy(live: Live, length: float, segment: float) -> Live:
-    """Return the same run with room for a length of cable."""
-    needed = int(length / segment) + 16
-    return live if needed <= live.line.length.size else live._replace(line=enlarged(live.line, needed))
 
 
 def sensed(sensor: Sensing | None, grid: np.ndarray, truth: np.ndarray) -> np.ndarray:

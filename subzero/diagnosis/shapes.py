@@ -12,10 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 
 import vehicle
-from subzero.diagnosis.response import tracked
 from subzero.diagnosis.setting import Setting
 from subzero.diagnosis.told import held
 from subzero.diagnosis.track import LENGTH, RUDDER, WATER
+from subzero.diagnosis.tracked import tracked
 from subzero.missing_force import FACTORS, FEATURES, feature_value, fill_factors
 from vehicle.dynamics import relative_velocity
 from vehicle.kinematics import rotation

@@ -8,7 +8,7 @@ again on a finer grid. What is left out: effects that end again, and two that be
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -19,8 +19,8 @@ from subzero.diagnosis.evidence import Scales, mixed
 from subzero.diagnosis.latent import Seen, seen
 from subzero.diagnosis.problem import Entry, Problem
 from subzero.diagnosis.refit import Fit
-from subzero.diagnosis.response import tracked
 from subzero.diagnosis.setting import Setting
+from subzero.diagnosis.tracked import Stop, Track, on_from, tracked, with_stops
 
 COARSE, FINE = 2.0, 0.5
 """Grids of times to begin at. [s]"""
@@ -148,11 +148,13 @@ def columns(
 ) -> list[np.ndarray]:
     """Return whitened sensitivities (m, parameters) to each (effect, time) in one record; secants of a small step."""
     base, steps = _plain(problem, record, z), [np.diag(_steps(effect)) for effect, _ in pairs]
-    jobs = [base] + [begun_at(effect, time).apply(base, *row.tolist())
-                     for (effect, time), rows in zip(pairs, steps, strict=True) for row in rows]  # fmt: skip
-    problem.runs[0] += len(jobs)
+    jobs = [(begun_at(effect, time).apply(base, *row.tolist()), time)
+            for (effect, time), rows in zip(pairs, steps, strict=True) for row in rows]  # fmt: skip
+    problem.runs[0] += 1 + len(jobs)
+    plain, stops = with_stops(base, {time for _, time in jobs})
+    tracks = [plain, *problem.pool.map(partial(_run, stops), jobs)]
     shown = problem.setting(record, z)
-    seen_of = [problem.whitened(record, shown, track) for track in problem.pool.map(_run, jobs)]
+    seen_of = [problem.whitened(record, shown, track) for track in tracks]
     first, size = _rows(problem, record)
     changes, at = np.array(seen_of[1:]) - seen_of[0], 0
     found: list[np.ndarray] = []
@@ -174,8 +176,10 @@ def _plain(problem: Problem, record: int, z: np.ndarray) -> Setting:
     return problem.setting(record, z, late=False)
 
 
-def _run(setting: Setting) -> tuple[np.ndarray, np.ndarray]:
-    return tracked(setting)
+def _run(stops: Mapping[float, Stop], job: tuple[Setting, float]) -> Track:
+    """Return the track of a setting that differs from a time on; from there, if the run before it went as far."""
+    setting, time = job
+    return on_from(setting, stops[time]) if time in stops else tracked(setting)
 
 
 def _rows(problem: Problem, record: int) -> tuple[int, int]:

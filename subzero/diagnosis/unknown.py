@@ -91,9 +91,11 @@ def _push(axis: str, times: np.ndarray, L: np.ndarray, setting: Setting, *amount
 
 
 def force_effect(axis: str, times: np.ndarray, L: np.ndarray, size: float) -> Effect:
-    """Return the effect of a force with history L x at knots; parameters x (n,), of a size."""
+    """Return the effect of a force with history L x at knots, L lower triangular; parameters x (n,), of a size."""
+    begins = [0.0, *times[:-1].tolist()]
     parameters = tuple(
-        Parameter(name=f"knot_{i}", unit="1", tolerance=size, scale=size) for i in range(L.shape[1])
+        Parameter(name=f"knot_{i}", unit="1", tolerance=size, scale=size, begins=begins[i])
+        for i in range(L.shape[1])
     )
     sentence = f"a {WORDS[axis]} acts that no cause explains"
     return Effect(id=FORCE + axis, sentence=sentence, slot="hull", parameters=parameters,
@@ -114,12 +116,12 @@ def force_columns(
     problem: Problem, z: np.ndarray, axes: Iterable[str], knots: Knots
 ) -> dict[str, np.ndarray]:
     """Return axis → whitened sensitivities (m, n) of what is simulated to a force of 1 N (1 N m) at each knot."""
-    found, eye = {}, np.eye(knots.time.size)
+    axes, more, eye = list(axes), problem, np.eye(knots.time.size)
     for axis in axes:
-        more = with_force(problem, axis, knots, eye, 0.5 * usual(problem.records[0].setting, axis))
-        there = np.concatenate([z, np.zeros(knots.time.size)])
-        found[axis] = more.jacobian(there, range(z.size, there.size))[:, z.size :]
-    return found
+        more = with_force(more, axis, knots, eye, 0.5 * usual(problem.records[0].setting, axis))
+    there = np.concatenate([z, np.zeros(len(axes) * knots.time.size)])
+    J = more.jacobian(there, range(z.size, there.size))[:, z.size :]
+    return dict(zip(axes, np.split(J, len(axes), axis=1), strict=True))
 
 
 def drift_columns(problem: Problem, channel: str, knots: Knots) -> np.ndarray:
