@@ -130,7 +130,7 @@ def packed(values: Numbers) -> Numbers:
 
 
 @cache
-def _names(kind: Any) -> tuple[str, ...] | None:
+def _names(kind: type) -> tuple[str, ...] | None:
     """Return the names of the fields of a kind of named tuple or dataclass; None for anything else."""
     if dataclasses.is_dataclass(kind):
         return tuple(field.name for field in dataclasses.fields(kind))
@@ -139,7 +139,8 @@ def _names(kind: Any) -> tuple[str, ...] | None:
 
 def _parts(value: Any) -> dict[str, Any] | None:
     """Return the fields of a named tuple or dataclass by name; None for anything else."""
-    names = _names(type(value))
+    kind: Any = type(value)
+    names = _names(kind)
     return None if names is None else {name: getattr(value, name) for name in names}
 
 

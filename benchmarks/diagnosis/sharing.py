@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from subzero.diagnosis import diagnose as engine
-from subzero.diagnosis import problem, response
+from subzero.diagnosis import problem, response, search
 from subzero.diagnosis.setting import Setting
 from subzero.diagnosis.verdict import Verdict
 from subzero.diagnosis.work import Work
@@ -51,7 +51,7 @@ def share(threads: int | None = None) -> Shared:
         patch.tracked = shared.tracked
     patch = engine
     patch.tell = shared.told
-    if threads is not None:
-        patch = problem
+    for module in (problem, search) if threads is not None else ():
+        patch = module
         patch.cpu_count = lambda: threads
     return shared

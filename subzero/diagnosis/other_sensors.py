@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 STATE = {"north": 0, "east": 1, "depth": 2, "sway_speed": 8, "heave_speed": 9,
          "roll_rate": 10, "pitch_rate": 11, "yaw_rate": 12, "propeller_speed": 13}  # fmt: skip
 """Channel → its place in the state of the hull."""
+SHORT = 0.01
+"""A lag of less than this share of a step leaves nothing of the step before. [-]"""
 
 
 def seen(setting: Setting, truth: Truth, times: np.ndarray, channels: Iterable[str]) -> dict[str, np.ndarray]:
@@ -67,9 +69,13 @@ def _water(setting: Setting, truth: Truth) -> np.ndarray:
 
 
 def _sensor(sensor: Sensing, grid: np.ndarray, truth: np.ndarray) -> np.ndarray:
-    """Return what a sensor shows of a truth (n,) on an even grid: Heun's method in tenths of a step for the lag."""
-    shown = truth.copy()
-    if sensor.lag > 0.0:
+    """Return what a sensor shows of a truth (n,) on an even grid: Heun's method in tenths of a step for the lag; for a
+    lag far shorter than a step, what was true that much earlier.
+    """
+    shown, short = truth.copy(), SHORT * (grid[1] - grid[0])
+    if 0.0 < sensor.lag < short:
+        shown = np.interp(grid - sensor.lag, grid, truth)
+    elif sensor.lag > 0.0:
         parts = int(np.ceil(10.0 * max(1.0, (grid[1] - grid[0]) / sensor.lag)))
         h = (grid[1] - grid[0]) / parts / sensor.lag
         y = truth[0]

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
+from functools import cached_property
 from os import cpu_count
 from typing import NamedTuple
 
@@ -83,12 +84,16 @@ class Problem:
 
     def setting(self, record: int, z: np.ndarray, *, late: bool = True) -> Setting:
         """Return the setting of a record with deviations z (k,); without those of the sensors if not `late`."""
-        setting = self.records[record].setting
-        for effect, own, where in _grouped(self.entries):
-            values = z[own]
-            if where in (-1, record) and np.any(values != 0.0) and (late or effect.slot not in LATE):
-                setting = effect.apply(setting, *values.tolist())
+        setting, numbers = self.records[record].setting, z.tolist()
+        for effect, own, where in self._groups:
+            values = [numbers[k] for k in own]
+            if where in (-1, record) and any(values) and (late or effect.slot not in LATE):
+                setting = effect.apply(setting, *values)
         return setting
+
+    @cached_property
+    def _groups(self) -> list[tuple[Effect, list[int], int]]:
+        return _grouped(self.entries)
 
     def residual(self, z: np.ndarray) -> np.ndarray:
         """Return r(z) (m,); NaN if a run could not go on."""

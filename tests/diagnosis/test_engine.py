@@ -14,14 +14,16 @@ from scipy.optimize import lsq_linear
 from scipy.stats import multivariate_normal
 
 import subzero
-from subzero.diagnosis import effects, response
+from subzero.diagnosis import effects
+from subzero.diagnosis import tracked as tracks
 from subzero.diagnosis.effects.sensors import NOISE
 from subzero.diagnosis.evidence import Quadratic, freed, posterior
 from subzero.diagnosis.noise import Noise, estimate, spikes
 from subzero.diagnosis.problem import Observed, Problem, entries_of
 from subzero.diagnosis.refit import quadratic_step
-from subzero.diagnosis.response import TRUTHS, economical, respond, tracked
+from subzero.diagnosis.response import TRUTHS, economical, respond
 from subzero.diagnosis.setting import Setting
+from subzero.diagnosis.tracked import tracked
 from subzero.missing_force import MissingForce, Term
 
 BASIC = ("surge_speed", "heading", "yaw_rate", "pitch", "roll", "depth")
@@ -173,14 +175,14 @@ def test_a_run_without_its_energies_is_the_same_run(monkeypatch):
     force = MissingForce(terms=(Term("X", "wet_length*u2", -0.02), Term("N", "time*u2", 0.01)))
     trial = dataclasses.replace(TRIAL, duration=4.0)
     setting = economical(Setting(trial=trial, model=dataclasses.replace(FIG6.model, missing=force)), 4.0)
-    without, eased = tracked(setting)[1], response._ease
+    without, eased = tracked(setting)[1], tracks._ease
 
     def ease(setup):
         eased(setup)
         assert not setup.fixed.booked
         setup.fixed.booked = True
 
-    monkeypatch.setattr(response, "_ease", ease)
+    monkeypatch.setattr(tracks, "_ease", ease)
     assert np.array_equal(tracked(setting)[1], without)
 
 

@@ -7,7 +7,6 @@ cable hangs slack, whose shape is nobody's (heavy and unheld, overrun by its dru
 """
 
 import dataclasses
-import time
 
 import numpy as np
 import pytest
@@ -83,18 +82,12 @@ def test_the_sensors_are_those_of_the_diagnosis():
     from subzero.diagnosis.response import respond
 
     setting = PLAIN.with_sensor("heading", scale=0.02, bias=1.5, lag=0.4).with_sensor("surge_speed", lag=0.05)
+    setting = setting.with_sensor("roll", lag=1e-9)  # a drawn tolerance may be that small
     setting = dataclasses.replace(setting, clock_offset=0.23)
     other, own = (ask(setting, TIMES, CHANNELS) for ask in (simulate_otherwise, respond))
     for channel in CHANNELS:
         gap = np.nanmax(np.abs(other[channel] - own[channel]))
         assert gap < 0.25 * NOISE[channel], f"{channel}: {gap:.2g}"
-
-
-def test_a_truth_takes_less_than_two_seconds():
-    simulate_otherwise(PLAIN, TIMES, CHANNELS)
-    start = time.perf_counter()
-    simulate_otherwise(PLAIN, TIMES, CHANNELS)
-    assert time.perf_counter() - start < 2.0
 
 
 def test_a_prescribed_motion_has_no_other_truth():

@@ -96,7 +96,7 @@ def test_columns_add_up_to_what_a_force_does(healthy):
     columns = force_columns(problem, zero, ("X",), knots)["X"].sum(axis=1)
     small = lacking(problem.records[0].setting, history("X", np.array([0.0, 30.0]), np.full(2, 0.05)))
     tracks = problem.tracks([(0, zero)])[0]
-    from subzero.diagnosis.response import tracked
+    from subzero.diagnosis.tracked import tracked
 
     change = problem.whitened(0, small, tracked(small)) - problem.whitened(
         0, problem.setting(0, zero), tracks

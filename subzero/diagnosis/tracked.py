@@ -1,0 +1,126 @@
+"""One run as sensors see it, from its start, or on from where another run, the same until then, has been.
+
+A force that begins at 20 s changes nothing before: its sensitivity needs the last 10 of 30 s only.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from cable.line import enlarged
+from subzero import coupling
+from subzero.diagnosis.setting import Setting
+from subzero.diagnosis.track import COLUMNS, follow
+from subzero.later import go_on_with
+from subzero.loop import NO_ROOM
+from subzero.model import Model
+from subzero.run_state import Live, Setup
+from subzero.start import prepare
+
+AGREEMENT, EXACTLY = 1e-5, 1e-6
+"""Fractions within which the forces of hull and cable agree and the cable's balances hold, in the place of 1e-9: nearly
+twice as fast; all that a sensor shows in a minute changes by less than 0.002 of its noise."""
+LEAST_FRICTION = 1e-3
+"""Every drum rubs as much as this: without any friction a drum with inertia chatters, and slopes are lost. [N]"""
+FASTEST_PAY_OUT = 2.0
+"""Room for nodes is made for this speed, and doubled when that is not enough. [m/s]"""
+Track = tuple[np.ndarray, np.ndarray]
+"""Times (m,) [s] and what is tracked at them (m, COLUMNS), NaN from where the run could not go on."""
+
+
+class Stop(NamedTuple):
+    """A run as it was after some exchanges; `track` is what it had by then (rows, COLUMNS)."""
+
+    exchanges: int
+    setup: Setup
+    live: Live
+    track: np.ndarray
+
+
+def tracked(setting: Setting) -> Track:
+    """Return the track of a setting."""
+    return with_stops(setting, ())[0]
+
+
+def with_stops(setting: Setting, times: Collection[float]) -> tuple[Track, dict[float, Stop]]:
+    """Return the track of a setting, and the run as it was at times [s], or at the last exchange before each."""
+    trial = setting.trial
+    setup, live = prepare(trial, setting.model, setting.tethered)
+    _ease(setup)
+    live = _roomy(live, trial.start.wet_length + FASTEST_PAY_OUT * trial.duration, trial.segment_length)
+    live.line.ends.tolerance = EXACTLY
+    grid, steps = _exchanges(setting)
+    track = np.full((1 + (grid.size - 1) * steps, COLUMNS), np.nan)
+    done = {time: int(time / trial.cable_step + 1e-6) for time in times}
+    stops = _run(setting, Stop(0, setup, live, track), grid, steps, set(done.values()))
+    kept = {time: stops[count] for time, count in done.items() if count in stops}
+    return (np.linspace(0.0, grid[-1], track.shape[0]), track), kept
+
+
+def on_from(setting: Setting, stop: Stop) -> Track:
+    """Return the track of a setting that is the same as another until a stop of that one's run."""
+    grid, steps = _exchanges(setting)
+    time, track = grid[stop.exchanges], np.full((1 + (grid.size - 1) * steps, COLUMNS), np.nan)
+    track[: stop.track.shape[0]] = stop.track
+    live = _copied(stop.live)
+    setup = go_on_with(
+        _model_at(setting, time), stop.setup, live, setting.trial, setting.tethered, float(time)
+    )
+    _ease(setup)
+    _run(setting, Stop(stop.exchanges, setup, live, track), grid, steps, ())
+    return np.linspace(0.0, grid[-1], track.shape[0]), track
+
+
+def _run(
+    setting: Setting, begin: Stop, times: np.ndarray, steps: int, wanted: Collection[int]
+) -> Mapping[int, Stop]:
+    """Fill the rows of a track from where it begins, and return the run as it was after the wanted exchanges."""
+    trial, (done, setup, live, track), stops = setting.trial, begin, dict[int, Stop]()
+    changes = {round(time / trial.cable_step): model for time, model in setting.later}
+    row, ending = done + 1, coupling.FINE
+    while row < times.size and ending in (coupling.FINE, NO_ROOM):
+        if row - 1 in wanted and row - 1 not in stops:
+            stops[row - 1] = Stop(row - 1, setup, _copied(live), track[: 1 + (row - 1) * steps])
+        if row - 1 in changes:
+            setup = go_on_with(
+                changes.pop(row - 1), setup, live, trial, setting.tethered, float(times[row - 1])
+            )
+            _ease(setup)
+        ahead = (count + 1 for count in (*changes, *wanted) if count + 1 > row)
+        row, ending = follow(setup, live, times, row, min([times.size, *ahead]), track)
+        if ending == NO_ROOM:
+            live = live._replace(line=enlarged(live.line, 2 * live.line.length.size))
+    return stops
+
+
+def _exchanges(setting: Setting) -> tuple[np.ndarray, int]:
+    """Return the times of the exchanges (n,) [s], and the hull's steps between two of them."""
+    trial = setting.trial
+    times = np.linspace(0.0, trial.duration, round(trial.duration / trial.cable_step) + 1)
+    return times, max(1, int(np.ceil(trial.cable_step / trial.hull_step - 1e-6)))
+
+
+def _model_at(setting: Setting, time: float) -> Model:
+    """Return the model that holds just before a time."""
+    return [setting.model, *(model for begin, model in setting.later if begin < time - 1e-9)][-1]
+
+
+def _ease(setup: Setup) -> None:
+    """Let a run be quicker and smoother than a simulation needs to be: forces agree less, nobody asks for energies."""
+    fixed: Any = setup.fixed  # a record in memory
+    fixed.agreement, fixed.booked = AGREEMENT, False
+    fixed.drum.friction = max(fixed.drum.friction, LEAST_FRICTION)
+
+
+def _roomy(live: Live, length: float, segment: float) -> Live:
+    """Return the same run with room for a length of cable."""
+    needed = int(length / segment) + 16
+    return live if needed <= live.line.length.size else live._replace(line=enlarged(live.line, needed))
+
+
+def _copied(value: Any) -> Any:
+    """Return arrays and records, in named tuples or not, as they are now."""
+    return type(value)(*map(_copied, value)) if hasattr(value, "_fields") else value.copy()
