@@ -1,0 +1,131 @@
+"""Runs that go on from where another was, and runs that are not made twice: nothing may be any different."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from subzero.diagnosis import kept_runs
+from subzero.diagnosis import problem as problem_module
+from subzero.diagnosis.effects import catalogue
+from subzero.diagnosis.search import Search
+from subzero.diagnosis.sudden import begun_at
+from subzero.diagnosis.tracked import on_from, tracked, with_stops
+from subzero.diagnosis.unknown import history, lacking
+
+from .conftest import CHANNELS, nominal
+
+SETTING, CATALOGUE = nominal(6.0), catalogue(CHANNELS)
+
+
+def pushed(size, knots=(0.0, 2.0, 4.0, 6.0), at=2):
+    """Return the setting with a force that begins at the knot before `at`."""
+    force = np.zeros(len(knots))
+    force[at] = size
+    return lacking(SETTING, history("N", np.array(knots), force))
+
+
+def test_a_run_that_goes_on_is_the_run_from_the_start_bit_for_bit():
+    (_, plain), stops = with_stops(SETTING, [2.0])
+    whole, part = tracked(pushed(0.05))[1], on_from(pushed(0.05), stops[2.0])[1]
+    assert np.array_equal(plain, tracked(SETTING)[1]), "stops change nothing"
+    assert np.array_equal(part, whole)
+    assert not np.array_equal(plain, whole), "the force does something"
+
+
+def test_a_stop_can_be_gone_on_from_again_and_again():
+    stop = with_stops(SETTING, [2.0])[1][2.0]
+    first = on_from(pushed(0.05), stop)[1]
+    on_from(pushed(-0.3), stop)
+    assert np.array_equal(on_from(pushed(0.05), stop)[1], first)
+
+
+@pytest.mark.parametrize("time", [2.0, 2.5, 3.7])
+def test_a_cause_that_begins_between_exchanges_begins_where_it_does_from_the_start(time):
+    later = begun_at(CATALOGUE["rudder_offset"], time).apply(SETTING, 3.0)
+    stop = with_stops(SETTING, [time])[1][time]
+    assert np.array_equal(on_from(later, stop)[1], tracked(later)[1])
+
+
+def test_a_cause_goes_on_beside_one_that_began_before():
+    """The run that is gone on from has changed already: what holds at the stop is what had begun by then."""
+    bent = begun_at(CATALOGUE["rudder_offset"], 1.0).apply(SETTING, 3.0)
+    both = begun_at(CATALOGUE["hull_drag"], 3.0).apply(bent, 0.5)
+    stop = with_stops(bent, [3.0])[1][3.0]
+    assert np.array_equal(on_from(both, stop)[1], tracked(both)[1])
+
+
+def test_a_time_behind_the_end_has_no_stop():
+    assert with_stops(SETTING, [5.0, 60.0])[1].keys() == {5.0}
+
+
+@pytest.fixture
+def counted(monkeypatch):
+    """Return a list that grows with every run that is really made."""
+    runs = []
+
+    def count(setting):
+        runs.append(setting)
+        return tracked(setting)
+
+    monkeypatch.setattr(problem_module, "tracked", count)
+    return runs
+
+
+def test_no_run_is_made_twice_and_sensors_need_none(plant, counted):
+    problem = dataclasses.replace(plant(duration=6.0).problem, kept=kept_runs.KeptRuns())
+    counted.clear()
+    z = np.zeros(len(problem.entries))
+    bias = next(k for k, entry in enumerate(problem.entries) if entry.effect.id == "sensor_bias:heading")
+    drag = next(k for k, entry in enumerate(problem.entries) if entry.effect.id == "hull_drag")
+    moved, other = z.copy(), z.copy()
+    moved[bias], other[drag] = 2.0, 0.1
+    plain, shifted, again = problem.residuals([z, moved, z])
+    assert len(counted) == 1
+    assert not np.array_equal(plain, shifted), "the sensor shows another value"
+    assert np.array_equal(plain, again)
+    problem.residual(other)
+    assert len(counted) == 2, "another drag is another run"
+
+
+def test_runs_of_another_setting_are_others(plant):
+    """The same deviations from another nominal model: identities must not be mistaken."""
+    problem = plant(duration=6.0).problem
+    z = np.zeros(len(problem.entries))
+    here = problem.residual(z)
+    record = dataclasses.replace(problem.records[0], setting=pushed(0.05))
+    there = dataclasses.replace(problem, records=(record,)).residual(z)
+    assert not np.array_equal(here, there)
+
+
+def test_old_runs_are_forgotten_when_there_is_no_room(plant, counted, monkeypatch):
+    problem = dataclasses.replace(plant(duration=6.0).problem, kept=kept_runs.KeptRuns())
+    counted.clear()
+    z = np.zeros(len(problem.entries))
+    monkeypatch.setattr(kept_runs, "ROOM", tracked(SETTING)[1].nbytes)
+    other = z.copy()
+    other[0] = 0.01
+    for deviations in (z, other, z):
+        problem.residual(deviations)
+    assert len(counted) == 3
+
+
+def test_fits_side_by_side_are_those_that_come_one_after_the_other(plant):
+    planted = plant(lambda setting: CATALOGUE["rudder_offset"].apply(setting, 2.0), duration=6.0)
+    several = [(), ("rudder_offset",), ("hull_drag",), ("hull_drag", "rudder_offset")]
+    found = []
+    for alone in (False, True):
+        search = Search(problem=planted.problem, progress=lambda share, words: None)
+        search.begin()
+        if alone:
+            for ids in several:
+                search.fit(ids)
+        else:
+            search.fit_all(several)
+        found.append({ids: one.log_posterior for ids, one in search.candidates.items()})
+    assert found[0] == found[1]
+
+
+def test_a_setting_refuses_what_a_model_does_not_have():
+    with pytest.raises(TypeError, match="Model has no vehicel; it has vehicle"):
+        SETTING.with_model(vehicel=None)
