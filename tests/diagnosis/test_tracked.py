@@ -18,11 +18,9 @@ from .conftest import CHANNELS, nominal
 SETTING, CATALOGUE = nominal(6.0), catalogue(CHANNELS)
 
 
-def pushed(size, knots=(0.0, 2.0, 4.0, 6.0), at=2):
-    """Return the setting with a force that begins at the knot before `at`."""
-    force = np.zeros(len(knots))
-    force[at] = size
-    return lacking(SETTING, history("N", np.array(knots), force))
+def pushed(size, setting=SETTING):
+    """Return a setting with a force that begins at 2 s."""
+    return lacking(setting, history("N", np.array([0.0, 2.0, 4.0, 6.0]), np.array([0.0, 0.0, size, 0.0])))
 
 
 def test_a_run_that_goes_on_is_the_run_from_the_start_bit_for_bit():
@@ -50,9 +48,9 @@ def test_a_cause_that_begins_between_exchanges_begins_where_it_does_from_the_sta
 def test_a_cause_goes_on_beside_one_that_began_before():
     """The run that is gone on from has changed already: what holds at the stop is what had begun by then."""
     bent = begun_at(CATALOGUE["rudder_offset"], 1.0).apply(SETTING, 3.0)
-    both = begun_at(CATALOGUE["hull_drag"], 3.0).apply(bent, 0.5)
-    stop = with_stops(bent, [3.0])[1][3.0]
-    assert np.array_equal(on_from(both, stop)[1], tracked(both)[1])
+    stop = with_stops(bent, [2.0])[1][2.0]
+    for more in (begun_at(CATALOGUE["hull_drag"], 2.0).apply(bent, 0.5), pushed(0.05, bent)):
+        assert np.array_equal(on_from(more, stop)[1], tracked(more)[1])
 
 
 def test_a_time_behind_the_end_has_no_stop():
