@@ -52,17 +52,19 @@ def marginal(problem: Problem, J: np.ndarray, kappa: float = 1.0) -> np.ndarray:
     return tolerance[:, None] * np.linalg.inv(scaled) * tolerance
 
 
-def information(problem: Problem, M: np.ndarray, at: list[int]) -> np.ndarray:
-    """Return what the data alone say of some entries, all others within tolerance (n, n)."""
-    tolerance = np.array([problem.entries[k].parameter.tolerance for k in at])
+def information(problem: Problem, M: np.ndarray, at: list[int], kappa: float = 1.0) -> np.ndarray:
+    """Return what the data alone say of some entries, all others within tolerance (n, n), from the covariance M of all
+    under the same κ.
+    """
+    tolerance = np.array([kappa * problem.entries[k].parameter.tolerance for k in at])
     return np.linalg.inv(M[np.ix_(at, at)]) - np.diag(1.0 / tolerance**2)
 
 
 def against(
-    problem: Problem, M: np.ndarray, own: list[int], step: np.ndarray, other: list[int]
+    problem: Problem, M: np.ndarray, own: list[int], step: np.ndarray, other: list[int], kappa: float = 1.0
 ) -> tuple[float, float]:
     """Return D of a step (n,) of its own entries against other entries, and how much alike they are (0 to 1)."""
-    G = information(problem, M, own + other)
+    G = information(problem, M, own + other, kappa)
     n = len(own)
     scale = np.array([problem.entries[k].parameter.scale for k in other])
     cross = step @ G[:n, n:]
@@ -123,10 +125,10 @@ def separation(
     """Return D of causes as they are in z against their closest rival, and that rival ("none": the tolerances)."""
     M = marginal(problem, J, kappa)
     own = places(problem.entries, ids)
-    whole = float(z[own] @ information(problem, M, own) @ z[own])
+    whole = float(z[own] @ information(problem, M, own, kappa) @ z[own])
     best, who = whole, "none"
     for other in named(problem):
         if other not in ids:
-            D = against(problem, M, own, z[own], places(problem.entries, (other,)))[0]
+            D = against(problem, M, own, z[own], places(problem.entries, (other,)), kappa)[0]
             best, who = (D, other) if best > D else (best, who)
     return best, who

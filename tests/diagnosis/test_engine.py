@@ -16,8 +16,10 @@ from scipy.stats import multivariate_normal
 import subzero
 from subzero.diagnosis import effects
 from subzero.diagnosis import tracked as tracks
+from subzero.diagnosis.detect import separation
 from subzero.diagnosis.effects.sensors import NOISE
 from subzero.diagnosis.evidence import Quadratic, freed, posterior
+from subzero.diagnosis.hypotheses import places
 from subzero.diagnosis.noise import Noise, estimate, spikes
 from subzero.diagnosis.problem import Observed, Problem, entries_of
 from subzero.diagnosis.refit import quadratic_step
@@ -260,3 +262,20 @@ def test_a_run_that_cannot_go_on_is_told_by_nan():
     shown = respond(economical(broken, 30.0), np.array([0.0, 30.0]), ["surge_speed"])["surge_speed"]
     assert np.isfinite(shown[0])
     assert np.isfinite(track[-1]).all() == np.isfinite(shown[1])
+
+
+def test_D_under_wide_tolerances_is_that_of_a_model_with_such_tolerances(plant):
+    """κ = 2 is nothing but tolerances twice as wide; a cause far beyond them is told apart under each."""
+    planted = plant(duration=12.0)
+    problem, J = planted.problem, planted.J
+    wide = [
+        entry._replace(effect=dataclasses.replace(entry.effect, parameters=tuple(
+            dataclasses.replace(p, tolerance=2.0 * p.tolerance) for p in entry.effect.parameters)))
+        for entry in problem.entries
+    ]  # fmt: skip
+    doubled = dataclasses.replace(problem, entries=tuple(wide))
+    z = np.zeros(len(problem.entries))
+    z[places(problem.entries, ("rudder_offset",))] = 2.5
+    found, who = separation(problem, J, z, ("rudder_offset",), 2.0)
+    assert (found, who) == (pytest.approx(separation(doubled, J, z, ("rudder_offset",))[0]), who)
+    assert 9.0 < found < separation(problem, J, z, ("rudder_offset",))[0]
