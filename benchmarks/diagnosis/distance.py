@@ -48,11 +48,6 @@ def discriminations(problem: Problem, J: np.ndarray, hidden: Hidden) -> dict[str
     return {one: _of(problem, J, z, one, hidden) for one in hidden}
 
 
-def where_it_flies(problem: Problem, J: np.ndarray, z: np.ndarray, hidden: Hidden) -> dict[str, float]:
-    """Return D of each cause by the sensitivities J at the truth z, which tolerances have moved from the nominal."""
-    return {one: _of(problem, J, z, one, hidden)[0] for one in hidden}
-
-
 def signals(problem: Problem, J: np.ndarray, hidden: Hidden) -> dict[str, float]:
     """Return cause → squared distance from what the tolerances of all others could do."""
     M, found = marginal(problem, J), {}

@@ -57,8 +57,7 @@ def _head(results: Sequence[Result], broken: Sequence[Result]) -> str:
     return HEAD.format(
         cases=len(results), whole=sum(SHARES.values()), kinds=kinds, fig6=where["fig6"] + where["short"],
         rich=where["rich"], other=source["other"], fine=source["fine"], broken=len(broken),
-        dropped=sum(one["dropped"] for one in results),
-        unknown=sum(one["unknown"] for one in results), seed=results[0]["seed"], versions=_versions(results),
+        dropped=sum(one["dropped"] for one in results), seed=results[0]["seed"], versions=_versions(results),
     )  # fmt: skip
 
 

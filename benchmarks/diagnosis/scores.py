@@ -61,11 +61,6 @@ def smallest_D(one: Result) -> float:
     return min(one["D"].values(), default=0.0)
 
 
-def clear_there(one: Result) -> bool:
-    """Say whether each of its causes has D ≥ 16 where the truth flies, and not only around the nominal model."""
-    return min(one.get("there", {}).values(), default=0.0) >= CLEAR
-
-
 def names(one: Result) -> set[str]:
     """Return the causes that are named, without when they began."""
     return {cause["id"].partition("@")[0] for cause in one["causes"]}

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from subzero.diagnosis.detect import separation
 from subzero.diagnosis.diagnose import diagnose
 from subzero.diagnosis.pose import pose
 from subzero.diagnosis.problem import Problem
@@ -17,7 +18,7 @@ from subzero.diagnosis.verdict import Verdict
 
 from . import baselines
 from .cases import Case, Made, make
-from .distance import change_by, discriminations, sensitivities, signals, strangeness, where_it_flies
+from .distance import change_by, discriminations, sensitivities, signals, strangeness
 from .held_out import gains
 from .sharing import Shared
 from .strange_found import judged
@@ -58,8 +59,6 @@ def _asked(case: Case, budget: str) -> tuple[Made, Problem, Verdict, Result]:
     found = {**_truth(case, made), "code": code(), "D": D, "rival": rival, "seconds": taken, **_said(verdict)}
     if made.strange:
         found["outside"] = judged(made, verdict)
-    elif made.hidden:
-        found["there"] = _there(problem, made)
     return made, problem, verdict, found
 
 
@@ -105,14 +104,13 @@ def _measured(case: Case, made: Made, problem: Problem) -> tuple[dict[str, float
         return D, rivals, True
     clear = min(signals(problem, J, made.hidden).values()) >= CLEAR
     close = all(d < CONFOUNDED for d in D.values())
-    return D, rivals, clear and close and max(_there(problem, made).values()) < CONFOUNDED
+    return D, rivals, clear and close and _there(problem, made) < CONFOUNDED
 
 
-def _there(problem: Problem, made: Made) -> dict[str, float]:
-    """Return D of each cause where the truth flies: a vehicle that dives tells scale and bias of depth apart."""
+def _there(problem: Problem, made: Made) -> float:
+    """Return D of what is hidden where the truth flies: a vehicle that dives tells scale and bias of depth apart."""
     z = np.array([made.values[entry.effect.id][entry.place] for entry in problem.entries])
-    hidden = {one: values for one, values in made.hidden.items() if _known(problem, one)}
-    return where_it_flies(problem, problem.jacobian(z), z, hidden)
+    return separation(problem, problem.jacobian(z), z, tuple(made.hidden))[0]
 
 
 def _known(problem: Problem, one: str) -> bool:
@@ -136,7 +134,7 @@ def _truth(case: Case, made: Made) -> Result:
     return {"seed": case.seed, "index": case.index, "kind": case.kind, "manoeuvre": case.manoeuvre, "how": case.how,
             "number": case.number, "truth": {one: list(values) for one, values in made.hidden.items()},
             "strange": made.strange.kind if made.strange else "", "source": made.source,
-            "dropped": made.dropped, "unknown": made.unknown}  # fmt: skip
+            "dropped": made.dropped}  # fmt: skip
 
 
 def _said(verdict: Verdict) -> Result:

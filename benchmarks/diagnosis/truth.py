@@ -8,24 +8,18 @@ import numpy as np
 
 from subzero.diagnosis.effects.sensors import SPECS
 from subzero.diagnosis.other_code import NoTruthError, simulate_otherwise
-from subzero.diagnosis.response import finer, respond
+from subzero.diagnosis.response import respond
 from subzero.diagnosis.setting import Setting
 from subzero.measured import Record
 
 RHO, OUTLIERS, GAPS, FAR = 0.5, 0.01, 0.02, 15.0
 """Of the noise: correlation from sample to sample, shares of outliers and gaps; size of an outlier in noise levels."""
 FINE = {"hull_step": 0.01, "cable_step": 0.05, "segment_length": 0.25}
-UNKNOWN = 16.0
-"""What both formulations, in fine steps, say so differently is not known: squared distance in noise levels."""
 Shown = dict[str, np.ndarray]
 
 
 class NoRunError(RuntimeError):
     """A truth that cannot be run at all."""
-
-
-class NotKnownError(NoRunError):
-    """A truth of which two formulations do not agree: a cable that is slack and taut by turns, behind a heavy drum."""
 
 
 def shown_by(setting: Setting, times: np.ndarray, channels: tuple[str, ...]) -> tuple[Shown, str]:
@@ -37,13 +31,6 @@ def shown_by(setting: Setting, times: np.ndarray, channels: tuple[str, ...]) -> 
     if not all(np.isfinite(values).all() for values in shown.values()):
         raise NoRunError(setting.trial.name)
     return shown, who
-
-
-def is_known(setting: Setting, times: np.ndarray, shown: Shown) -> bool:
-    """Say whether the usual formulation, in fine steps, shows the same; where it finds no run it has no say."""
-    other = respond(finer(setting), times, shown)
-    gap = sum(np.sum(((shown[name] - other[name]) / SPECS[name].noise) ** 2) for name in shown)
-    return not gap > UNKNOWN
 
 
 def noisy(shown: Shown, times: np.ndarray, rng: np.random.Generator, level: float = 1.0) -> Record:

@@ -10,16 +10,18 @@ This page rests on **{cases} of {whole} cases**; kinds come in turn, so that any
 `fig6` (30 s), {rich} on `rich` (a minute with doublets of all fins, speed steps, a coast-down); six channels at 10 Hz:
 speed through the water, heading, yaw rate, pitch, roll, depth. Cases that ended in an error: {broken}.
 
-The cases are those of seed {seed}, which no choice of the engine was made with: those were made with seeds 1 to 17
-(the prior of "nothing is wrong" with the probabilities of seed 17, where 0.5 was too modest).
+The cases are those of seed {seed}, which no choice of the engine was made with: those were made with seeds 1 to 13.
 What was said of each is kept in `benchmarks/diagnosis/kept/`. {versions}
+Which draws pass for **twins** was changed after the first twins of seed 17 had been seen: case 61 had no close rival
+(D 223), and in case 21 the tolerances made the vehicle dive, which tells the two apart. All twins here were drawn anew.
+By the old rule 8 of the first 12 were sets. Cases 21, 61, 301 and 341 were named; 301 and 341 (`munk_moment`, no longer
+drawn) had D 3.9 and 3.7. So this line is less clean than the others.
 
 {kinds}
 
 * **Truth** comes from the other cable formulation (lumped masses and springs, coupled in another way, at finer steps):
   {other} cases; from the usual one at finer steps, where the other found no run: {fine}. Draws that no formulation
-  could run, and that were drawn again: {dropped}; whose truth is not known, because the two formulations in fine steps
-  differ by more than 16 squared noise levels (heavy drums behind slack cables): {unknown}.
+  could run, and that were drawn again: {dropped}.
 * **Every** parameter of the catalogue and of the start is drawn from its tolerance (a half normal distribution where
   only one side is possible), in healthy records too. Hidden effects have 0.6 to 1.8 effect scales and at least 5
   tolerances, either sign where there is room, every effect in turn.
@@ -27,9 +29,7 @@ What was said of each is kept in `benchmarks/diagnosis/kept/`. {versions}
   is told none of it.
 * **D** is the squared, noise-scaled distance to the best rival with all tolerances free, from sensitivities of the
   nominal model and secants of the hidden effect; of each cause of a pair with the other of any size; of what is outside
-  against everything in the catalogue. Tolerances move the truth to where D is another: a figure is told for cases that
-  have D ≥ 16 there as well.
-* **Twins** have D < 4 around the nominal model and where the truth flies, and a signal of 16 against nothing.
+  against everything in the catalogue.
 * **Outside**: a snagged cable, waves, a knock in yaw, a shifting weight (histories); gathering weed, a hatch that
   opens, a part that drags when it turns (formulas); a compass that wanders. None is in the catalogue, alone or from
   some time on.
