@@ -240,3 +240,16 @@ def test_a_fit_that_bends_many_parameters_is_not_close():
     assert is_close(problem, SimpleNamespace(r=quiet, z=bent(MANY - 1)))
     assert not is_close(problem, SimpleNamespace(r=quiet, z=bent(MANY)))
     assert not is_close(problem, SimpleNamespace(r=1.1 * quiet, z=bent(0)))
+
+
+def test_a_fit_has_settled_only_close_to_where_its_sensitivities_were_made(plant):
+    """Two tolerances away slopes are others; what is flagged as settled is not fitted again, so it would stay astray."""
+    search = Search(problem=plant(duration=6.0).problem, progress=lambda share, words: None)
+    search.begin()
+    search.fit(())
+    fit = dataclasses.replace(search.candidates[()].fit, converged=True)
+    tolerance = np.array([entry.parameter.tolerance for entry in search.problem.entries])
+    for away, settled in ((0.5, True), (2.0, False)):
+        assert search._settled(dataclasses.replace(fit, made_at=fit.z + away * tolerance)) is settled
+    assert not search._settled(dataclasses.replace(fit, made_at=fit.z, converged=False))
+    assert not search._settled(dataclasses.replace(fit, made_at=None))
