@@ -243,7 +243,7 @@ def test_a_fit_that_bends_many_parameters_is_not_close():
 
 
 def test_a_fit_has_settled_only_close_to_where_its_sensitivities_were_made(plant):
-    """Two tolerances away slopes are others; what is flagged as settled is not fitted again, so it would stay astray."""
+    """Two tolerances away slopes are others, and what counts as settled is not fitted again."""
     search = Search(problem=plant(duration=6.0).problem, progress=lambda share, words: None)
     search.begin()
     search.fit(())
