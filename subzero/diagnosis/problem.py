@@ -72,14 +72,12 @@ class Problem:
         records: what was measured.
         entries: what z holds, in order.
         pool: threads for runs side by side; compiled code runs in them freely.
-        runs: how many runs were asked for, for reports.
-        kept: those that were made last.
+        kept: how many runs were asked for, and those that were made last.
     """
 
     records: tuple[Observed, ...]
     entries: tuple[Entry, ...]
     pool: ThreadPoolExecutor = field(default_factory=lambda: ThreadPoolExecutor(cpu_count() or 1))
-    runs: list[int] = field(default_factory=lambda: [0])
     kept: KeptRuns = field(default_factory=KeptRuns)
 
     def setting(self, record: int, z: np.ndarray, *, late: bool = True) -> Setting:
@@ -116,8 +114,8 @@ class Problem:
                 if self.entries[k].record in (-1, i)]  # fmt: skip
         stops = [self._stops(i, z, wanted) for i in range(len(self.records))]
         early = [(k, i, moved) for k, i, moved in jobs if not self._late(k)]
-        from_ = [stops[i].get(self.entries[k].parameter.begins) for k, i, _ in early]
-        runs = iter(self.tracks([(i, moved) for _, i, moved in early], from_))
+        begun = [stops[i].get(self.entries[k].parameter.begins) for k, i, _ in early]
+        runs = iter(self.tracks([(i, moved) for _, i, moved in early], begun))
         J = np.zeros((sum(part.size for part in shown), len(self.entries)))
         first = np.cumsum([0, *(part.size for part in shown)])
         for k, i, moved in jobs:
@@ -148,7 +146,7 @@ class Problem:
         """Return the track of each (record, z), side by side; none is run twice, and each only from its stop on, where
         it has one.
         """
-        self.runs[0] += len(jobs)
+        self.kept.count(len(jobs))
         early = np.array([not self._late(k) for k in range(len(self.entries))])
         asked = [(i, np.where(early, z, 0.0)) for i, z in jobs]
         names, found = [(i, z.tobytes()) for i, z in asked], dict[tuple[int, bytes], Track]()

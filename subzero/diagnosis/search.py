@@ -176,7 +176,7 @@ class Search:
                 return
             now = max(waiting, key=lambda one: one.hope)
             done = [self.candidates[ids].log_posterior for ids in self.raced]
-            behind = 0.0 if self.problem.runs[0] > MOST_RUNS else hopeless
+            behind = 0.0 if self.problem.kept.asked > MOST_RUNS else hopeless
             if len(done) >= 2 and now.hope < max(done) - behind:
                 return
             self._say(0.5, "fitting again", now.ids)

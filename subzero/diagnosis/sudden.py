@@ -150,7 +150,7 @@ def columns(
     base, steps = _plain(problem, record, z), [np.diag(_steps(effect)) for effect, _ in pairs]
     jobs = [(begun_at(effect, time).apply(base, *row.tolist()), time)
             for (effect, time), rows in zip(pairs, steps, strict=True) for row in rows]  # fmt: skip
-    problem.runs[0] += 1 + len(jobs)
+    problem.kept.count(1 + len(jobs))
     plain, stops = with_stops(base, {time for _, time in jobs})
     tracks = [plain, *problem.pool.map(partial(_run, stops), jobs)]
     shown = problem.setting(record, z)
