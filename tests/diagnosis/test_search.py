@@ -55,7 +55,9 @@ def test_secants_explain_the_step_and_leave_other_directions():
 
 def racing(runs, **hopes):
     """Return the hypotheses that a race fits again, in turn: those with a hope above their log posterior of -9."""
-    search = Search(problem=SimpleNamespace(kept=SimpleNamespace(asked=runs)), progress=lambda share, words: None)
+    search = Search(
+        problem=SimpleNamespace(kept=SimpleNamespace(asked=runs)), progress=lambda share, words: None
+    )
     again = []
 
     def fit_again(one):
