@@ -22,7 +22,7 @@ from subzero.diagnosis.hypotheses import Ids, places, variances
 from subzero.diagnosis.pose import with_finer_steps
 from subzero.diagnosis.probability import Beliefs
 from subzero.diagnosis.problem import Problem, Progress
-from subzero.diagnosis.refit import Fit, refit
+from subzero.diagnosis.refit import ENOUGH, Fit, refit
 from subzero.diagnosis.screen import Screen, beside, instead, is_flat, look
 from subzero.diagnosis.wide import fit_wide
 
@@ -35,18 +35,20 @@ SWEPT = 4
 """So many causes are fitted by themselves if the wide fit is not close."""
 RACERS, HOPELESS = 6, 6.0
 """At most so many fits with sensitivities of their own in a race; none for what is this far behind in log posterior."""
-NEAR = 4.0
+NEAR = 1.0
 """Sensitivities hold as far as this from where they were made, in tolerances."""
 MOST_RUNS = 800
 """After so many runs only what hopes to be the best is fitted again."""
 BESIDE, INSTEAD, WORTH = 2, 3, -4.0
 """At most so many with a cause more, of a log posterior that adds at least WORTH; so many with another cause."""
+CROSSED = 2
+"""So often close rivals are fitted from where the others are."""
 ASTRAY = 6.0
 """A fit with so much less log posterior than the linear problem at another promises may have gone astray."""
 MOST_CAUSES, ROUNDS = 3, 4
 """Causes of a hypothesis, and rounds of growing."""
-LAST, CLOSE = 3, 6.0
-"""Rounds of settling the best; so far behind it, in log posterior, what has a cause more or less counts no more."""
+LAST, CLOSE, RIVALS = 3, 6.0, 3.0
+"""Rounds of settling; so far behind the best, in log posterior, what has a cause more or less, or a rival, counts."""
 
 
 @dataclass(kw_only=True, eq=False)
@@ -103,6 +105,7 @@ class Search:
         self.race(2)
         self.sharpen()
         self.race()
+        self.cross()
 
     def grow(self) -> None:
         """Look beside the best candidate for one more cause, in the place of each for another, and below it for one
@@ -118,23 +121,44 @@ class Search:
             self.fit_all(self._more(best) if len(best.ids) < MOST_CAUSES else [], best.fit)
             for without in best.ids:
                 self._without(best, without)
+            self._aside_of(best)
             self.race(2, 2.0)
+            self.cross()
             self.sharpen()
 
-    def settle(self) -> None:
-        """Fit the best candidate again until it has converged, so that its numbers can be told; and those with a cause
-        more or less, if they might still catch up.
+    def cross(self) -> None:
+        """Fit the close rivals of the best candidate from where that is, and the best from where they are, and keep what
+        is better: where a drum stops or a cable falls slack runs have kinks, and a fit may end in a hollow of its own.
         """
-        tried: set[Ids] = set()
+        for _ in range(CROSSED):
+            best = self.best()
+            close = [one.ids for one in self.candidates.values()
+                     if one is not best and one.log_posterior > best.log_posterior - HOPELESS]  # fmt: skip
+            self.fit_all(close, best.fit)
+            starts = [self.candidates[ids].fit for ids in close]
+            for found in self._aside(partial(self._fitted, ids=best.ids), starts):
+                self._take(found)
+            if self.best().log_posterior < best.log_posterior + ENOUGH:
+                return
+
+    def settle(self) -> None:
+        """Fit the best candidate again until it has settled, so that its numbers can be told; and what is so close that
+        it hangs on the last fit which of them comes first.
+        """
+        stuck: set[Ids] = set()
         for _ in range(LAST):
             best = self.best()
-            open_ = [one for ids, one in self.candidates.items() if ids not in tried and not one.fit.converged
-                     and one.hope > best.log_posterior - CLOSE and _akin(ids, best.ids)]  # fmt: skip
-            for one in open_:
-                tried.add(one.ids)
+            for one in [one for one in self.candidates.values() if one.ids not in stuck and self._is_open(one, best)]:
                 self._say(0.75, "settling", one.ids)
                 self._again(one)
+                if self.candidates[one.ids].log_posterior < one.log_posterior + ENOUGH:
+                    stuck.add(one.ids)
         self._nothing()
+
+    def _is_open(self, one: Candidate, best: Candidate) -> bool:
+        """Say whether a candidate that has not settled might still catch up with the best."""
+        behind = CLOSE if _akin(one.ids, best.ids) else RIVALS
+        return not self._settled(one.fit) and one.hope > best.log_posterior - behind
 
     def fit(self, ids: Ids, start: Fit | None = None) -> None:
         """Fit a hypothesis as `fit_all` does."""
@@ -148,10 +172,14 @@ class Search:
         for ids, found in zip(wanted, self._aside(partial(self._fitted, start), wanted), strict=True):
             if words:
                 self._say(0.3, words, ids)
-            known = self.candidates.get(ids)
-            if known is None or found.log_posterior > known.log_posterior:
-                self.candidates[ids] = found
-                self.raced.discard(ids)
+            self._take(found)
+
+    def _take(self, found: Candidate) -> None:
+        """Keep a candidate if it is better than what is known of it."""
+        known = self.candidates.get(found.ids)
+        if known is None or found.log_posterior > known.log_posterior:
+            self.candidates[found.ids] = found
+            self.raced.discard(found.ids)
 
     def _fitted(self, start: Fit | None, ids: Ids) -> Candidate:
         """Return a hypothesis with its fit from another, or from the wide one."""
@@ -246,6 +274,18 @@ class Search:
         self.beside |= found
         ranked = sorted(found, key=lambda ids: -found[ids])[:BESIDE]
         return [ids for ids in ranked if found[ids] > best.log_posterior + WORTH]
+
+    def _aside_of(self, best: Candidate) -> None:
+        """Fit what comes out best beside the other candidates, if the linear problem there has it before the best: a
+        right pair may be far from a wrong cause that is as good as any by itself.
+        """
+        found: dict[Ids, tuple[float, Fit]] = {}
+        for one in [one for one in self.candidates.values() if len(one.ids) < MOST_CAUSES and one is not best]:
+            for ids, log in self._unknown(beside(self.problem, one)).items():
+                if log > max(best.log_posterior, found.get(ids, (-np.inf,))[0]):
+                    found[ids] = log, one.fit
+        for ids in sorted(found, key=lambda ids: -found[ids][0])[:BESIDE]:
+            self.fit(ids, found[ids][1])
 
     def _without(self, best: Candidate, without: str) -> None:
         """Fit the best hypothesis without one of its causes, and with others in its place."""
