@@ -74,21 +74,24 @@ def refit(
     low, high = bounds(problem)
     z = np.clip(z, low, high)
     z, r = _runnable(problem, z, r)
-    now, fresh, converged, promised = _objective(r, z, D), 0, False, 0.0
+    now, fresh, converged, left = _objective(r, z, D), 0, False, 0.0
     for _ in range(MOST_STEPS):
-        step = bounded_step(J, r, z, D, low, high)
-        promised = now - _objective(r - J @ step, z + step, D)
-        if promised < ENOUGH:
+        step, left = _promised(J, r, z, D, low, high)
+        if left < ENOUGH:
             converged = True
             break
-        share, there, r_there, now = _walk(problem, z, r, now, step, promised, D)
+        promised, (share, there, r_there, now) = left, _walk(problem, z, r, now, step, left, D)
+        if share <= 0.0:
+            step, left = _promised(J, r, z, D, *_held(z, low, high))
+            if left >= ENOUGH:
+                share, there, r_there, now = _walk(problem, z, r, now, step, left, D)
         if share > 0.0:
             J = secant(J, there - z, r_there - r, D)
         z, r = there, r_there
         if share < POOR and promised > NEARLY and fresh < most_fresh:
             J, fresh, made_at = problem.jacobian(z), fresh + 1, z.copy()
         elif share <= 0.0:
-            converged = promised < NEARLY
+            converged = left < NEARLY
             break
     return Fit(
         z=z,
@@ -97,10 +100,26 @@ def refit(
         D=D,
         objective=now,
         converged=converged,
-        promise=0.0 if converged else promised,
+        promise=0.0 if converged else left,
         fresh=fresh,
         made_at=made_at,
     )
+
+
+def _promised(
+    J: np.ndarray, r: np.ndarray, z: np.ndarray, D: np.ndarray, low: np.ndarray, high: np.ndarray
+) -> tuple[np.ndarray, float]:
+    """Return the step that is best for the linear model within bounds, and what it would gain there."""
+    step = bounded_step(J, r, z, D, low, high)
+    return step, _objective(r, z, D) - _objective(r - J @ step, z + step, D)
+
+
+def _held(z: np.ndarray, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return bounds that hold where they are all entries that are possible on one side only: where a drum stops, a
+    cable falls slack or a gear has play, runs have kinks, and a step across one spoils what the others would gain.
+    """
+    kinked = low == 0.0
+    return np.where(kinked, z, low), np.where(kinked, z, high)
 
 
 def secant(J: np.ndarray, step: np.ndarray, change: np.ndarray, D: np.ndarray) -> np.ndarray:

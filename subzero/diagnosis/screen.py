@@ -139,6 +139,38 @@ def instead(problem: Problem, one: Candidate, rest: Ids) -> dict[Ids, float]:
     return found
 
 
+def swept(problem: Problem, one: Candidate, rest: Ids) -> dict[Ids, tuple[float, np.ndarray, np.ndarray]]:
+    """Return hypothesis → log posterior, where its fit begins, and sensitivities there, of causes beside the rest of a
+    candidate that runs have kinks in, by real runs at some sizes: a slope on one side of a kink says nothing of the
+    other.
+    """
+    entries, names, J = problem.entries, named(problem), one.fit.J
+    z = np.maximum(posterior(one.fit.quadratic, variances(entries, rest, one.kappa)).z, _lowest(problem))
+    jobs = [(k, size) for k in _kinked(problem, rest) for size in _sizes(entries[k].parameter)]
+    moved = [np.concatenate([z[:k], [size], z[k + 1 :]]) for k, size in jobs]
+    found: dict[Ids, tuple[float, np.ndarray, np.ndarray]] = {}
+    here, *runs = problem.residuals([z, *moved])
+    for (k, size), there, r in zip(jobs, moved, runs, strict=True):
+        ids = tuple(sorted({*rest, entries[k].effect.id}))
+        slopes = np.column_stack([J[:, :k], (here - r) / (size - z[k]), J[:, k + 1 :]])
+        if np.isfinite(slopes).all():
+            log = _mixed(problem, Quadratic.at(there, r, slopes), ids) + log_prior(ids, len(names))
+            found[ids] = max(
+                found.get(ids, (-np.inf, there, slopes)), (log, there, slopes), key=lambda it: it[0]
+            )
+    return found
+
+
+def _kinked(problem: Problem, rest: Ids) -> list[int]:
+    """Return the entries of causes on one side only, but for sensors': drums stop, cables go slack, gears have play."""
+    return [k for k, entry in enumerate(problem.entries) if entry.record < 0 and entry.parameter.low == 0.0
+            and entry.effect.slot != "sensors" and entry.effect.id not in rest]  # fmt: skip
+
+
+def _lowest(problem: Problem) -> np.ndarray:
+    return np.array([entry.parameter.low for entry in problem.entries])
+
+
 def _without_slope(problem: Problem, J: np.ndarray) -> list[int]:
     """Return the entries that do nothing when they are small."""
     return [k for k, entry in enumerate(problem.entries)
@@ -183,7 +215,7 @@ def _at_size(problem: Problem, k: int, size: float, z: np.ndarray, r: np.ndarray
     return _mixed(problem, Quadratic.at(others, r, J)) - far - 1.0
 
 
-def _mixed(problem: Problem, q: Quadratic) -> float:
-    """Return the log evidence with nothing but tolerances, mixed over κ."""
-    return log_sum([np.log(prior) + posterior(q, variances(problem.entries, (), kappa)).log_evidence
+def _mixed(problem: Problem, q: Quadratic, ids: Ids = ()) -> float:
+    """Return the log evidence of some causes, or with nothing but tolerances, mixed over κ."""
+    return log_sum([np.log(prior) + posterior(q, variances(problem.entries, ids, kappa)).log_evidence
                     for kappa, prior in KAPPAS.items()])  # fmt: skip

@@ -22,8 +22,8 @@ from subzero.diagnosis.hypotheses import Ids, places, variances
 from subzero.diagnosis.pose import with_finer_steps
 from subzero.diagnosis.probability import Beliefs
 from subzero.diagnosis.problem import Problem, Progress
-from subzero.diagnosis.refit import ENOUGH, Fit, refit
-from subzero.diagnosis.screen import Screen, beside, instead, is_flat, look
+from subzero.diagnosis.refit import ENOUGH, NEARLY, Fit, refit
+from subzero.diagnosis.screen import Screen, beside, instead, is_flat, look, swept
 from subzero.diagnosis.wide import fit_wide
 
 Made = TypeVar("Made")
@@ -122,23 +122,24 @@ class Search:
             for without in best.ids:
                 self._without(best, without)
             self._aside_of(best)
+            self._kinked(best)
             self.race(2, 2.0)
             self.cross()
             self.sharpen()
 
     def cross(self) -> None:
-        """Fit the close rivals of the best candidate from where that is, and the best from where they are, and keep what
-        is better: where a drum stops or a cable falls slack runs have kinks, and a fit may end in a hollow of its own.
+        """Fit the close rivals of the best candidate from where that is, and it from where they are, and keep what is
+        better: where a drum stops or a cable falls slack runs have kinks, and a fit may end in a hollow of its own.
         """
         for _ in range(CROSSED):
             best = self.best()
-            close = [one.ids for one in self.candidates.values()
-                     if one is not best and one.log_posterior > best.log_posterior - HOPELESS]  # fmt: skip
+            close = [ids for ids in self._ranked()[1:RACERS]
+                     if self.candidates[ids].log_posterior > best.log_posterior - HOPELESS]  # fmt: skip
             self.fit_all(close, best.fit)
             starts = [self.candidates[ids].fit for ids in close]
             for found in self._aside(partial(self._fitted, ids=best.ids), starts):
                 self._take(found)
-            if self.best().log_posterior < best.log_posterior + ENOUGH:
+            if self.best().log_posterior < best.log_posterior + NEARLY:
                 return
 
     def settle(self) -> None:
@@ -148,7 +149,9 @@ class Search:
         stuck: set[Ids] = set()
         for _ in range(LAST):
             best = self.best()
-            for one in [one for one in self.candidates.values() if one.ids not in stuck and self._is_open(one, best)]:
+            for one in [
+                one for one in self.candidates.values() if one.ids not in stuck and self._is_open(one, best)
+            ]:
                 self._say(0.75, "settling", one.ids)
                 self._again(one)
                 if self.candidates[one.ids].log_posterior < one.log_posterior + ENOUGH:
@@ -240,6 +243,10 @@ class Search:
         """Return the most probable candidate."""
         return max(self.candidates.values(), key=lambda candidate: candidate.log_posterior)
 
+    def _ranked(self) -> list[Ids]:
+        """Return the candidates, the most probable first."""
+        return sorted(self.candidates, key=lambda ids: -self.candidates[ids].log_posterior)
+
     @property
     def beliefs(self) -> Beliefs:
         """What is known of all hypotheses by now."""
@@ -280,12 +287,28 @@ class Search:
         right pair may be far from a wrong cause that is as good as any by itself.
         """
         found: dict[Ids, tuple[float, Fit]] = {}
-        for one in [one for one in self.candidates.values() if len(one.ids) < MOST_CAUSES and one is not best]:
+        for one in [
+            one for one in self.candidates.values() if len(one.ids) < MOST_CAUSES and one is not best
+        ]:
             for ids, log in self._unknown(beside(self.problem, one)).items():
                 if log > max(best.log_posterior, found.get(ids, (-np.inf,))[0]):
                     found[ids] = log, one.fit
         for ids in sorted(found, key=lambda ids: -found[ids][0])[:BESIDE]:
             self.fit(ids, found[ids][1])
+
+    def _kinked(self, best: Candidate) -> None:
+        """Fit causes that runs have kinks in beside the best, or in the place of one of the same kind."""
+        found = dict[Ids, tuple[float, np.ndarray, np.ndarray]]()
+        few = best.ids if len(best.ids) < MOST_CAUSES else None
+        for rest in (few, *(tuple(one for one in best.ids if one != without) for without in best.ids)):
+            for ids, one in swept(self.problem, best, rest).items() if rest is not None else ():
+                found[ids] = max(found.get(ids, one), one, key=lambda it: it[0])
+        new = self._unknown({ids: log for ids, (log, _, _) in found.items() if ids != best.ids})
+        for ids in sorted(new, key=lambda ids: -new[ids])[:BESIDE]:
+            if new[ids] > best.log_posterior + WORTH:
+                _, z, J = found[ids]
+                D = variances(self.problem.entries, ids, best.kappa)
+                self._take(candidate_of(self.problem, ids, refit(self.problem, z, J, D, most_fresh=0)))
 
     def _without(self, best: Candidate, without: str) -> None:
         """Fit the best hypothesis without one of its causes, and with others in its place."""
@@ -319,11 +342,12 @@ class Search:
                 self._keep((), fit)
 
     def _settled(self, fit: Fit) -> bool:
-        """Say whether a fit has converged, close to where its sensitivities were made."""
-        if not fit.converged or fit.made_at is None:
+        """Say whether a fit has converged close to where its sensitivities were made, or has not left from there."""
+        if fit.made_at is None:
             return False
         tolerance = np.array([entry.parameter.tolerance for entry in self.problem.entries])
-        return bool(np.max(np.abs(fit.z - fit.made_at) / tolerance) < NEAR)
+        moved = float(np.max(np.abs(fit.z - fit.made_at) / tolerance))
+        return moved == 0.0 or (fit.converged and moved < NEAR)
 
     def _again(self, one: Candidate) -> None:
         """Fit a candidate with sensitivities of its own, under its most probable κ; again if that turns out another."""

@@ -253,5 +253,6 @@ def test_a_fit_has_settled_only_close_to_where_its_sensitivities_were_made(plant
     tolerance = np.array([entry.parameter.tolerance for entry in search.problem.entries])
     for away, settled in ((0.5, True), (5.0, False)):
         assert search._settled(dataclasses.replace(fit, made_at=fit.z + away * tolerance)) is settled
-    assert not search._settled(dataclasses.replace(fit, made_at=fit.z, converged=False))
+    assert not search._settled(dataclasses.replace(fit, made_at=fit.z + 0.5 * tolerance, converged=False))
+    assert search._settled(dataclasses.replace(fit, made_at=fit.z, converged=False)), "the same would come out"
     assert not search._settled(dataclasses.replace(fit, made_at=None))
