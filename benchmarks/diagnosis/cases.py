@@ -23,7 +23,7 @@ from .truth import NoRunError, noisy, shown_by
 
 SHARES = {"single": 400, "healthy": 200, "pair": 100, "outside": 60, "twin": 20, "degraded": 20}
 """How many of each make the whole benchmark."""
-SEED = 17
+SEED = 23
 """Of all cases; the choices of the engine were made with the cases of seeds 1 to 13."""
 DEGRADED = ("noise", "channels", "short", "wide", "narrow")
 AFTER = 4.0

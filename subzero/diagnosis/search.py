@@ -26,7 +26,7 @@ from subzero.diagnosis.refit import ENOUGH, NEARLY, Fit, refit
 from subzero.diagnosis.screen import Screen, beside, instead, is_flat, look, swept
 from subzero.diagnosis.wide import fit_wide
 
-Made = TypeVar("Made")
+Asked, Made = TypeVar("Asked"), TypeVar("Made")
 KEEP, SINGLES, PAIRS = 12.0, 7, 4
 """Refit hypotheses whose log evidence is this close to the best of their kind, and at most so many."""
 BENT, LEAST_BENT = 2, 10.0
@@ -35,8 +35,8 @@ SWEPT = 4
 """So many causes are fitted by themselves if the wide fit is not close."""
 RACERS, HOPELESS = 6, 6.0
 """At most so many fits with sensitivities of their own in a race; none for what is this far behind in log posterior."""
-NEAR = 1.0
-"""Sensitivities hold as far as this from where they were made, in tolerances."""
+NEAR, NEARER = 4.0, 1.0
+"""Sensitivities hold as far as this from where they were made, in tolerances; those of what is told."""
 MOST_RUNS = 800
 """After so many runs only what hopes to be the best is fitted again."""
 BESIDE, INSTEAD, WORTH = 2, 3, -4.0
@@ -47,8 +47,9 @@ ASTRAY = 6.0
 """A fit with so much less log posterior than the linear problem at another promises may have gone astray."""
 MOST_CAUSES, ROUNDS = 3, 4
 """Causes of a hypothesis, and rounds of growing."""
-LAST, CLOSE, RIVALS = 3, 6.0, 3.0
-"""Rounds of settling; so far behind the best, in log posterior, what has a cause more or less, or a rival, counts."""
+LAST, RIVALS, CLOSE = 3, 2.0, 6.0
+"""Rounds of settling the best and what is so close to it in log posterior; what has a cause more or less may catch up
+from farther behind."""
 
 
 @dataclass(kw_only=True, eq=False)
@@ -105,7 +106,6 @@ class Search:
         self.race(2)
         self.sharpen()
         self.race()
-        self.cross()
 
     def grow(self) -> None:
         """Look beside the best candidate for one more cause, in the place of each for another, and below it for one
@@ -137,14 +137,14 @@ class Search:
                      if self.candidates[ids].log_posterior > best.log_posterior - HOPELESS]  # fmt: skip
             self.fit_all(close, best.fit)
             starts = [self.candidates[ids].fit for ids in close]
-            for found in self._aside(partial(self._fitted, ids=best.ids), starts):
+            for found in self._aside(partial(self._fitted, best.ids), starts):
                 self._take(found)
             if self.best().log_posterior < best.log_posterior + NEARLY:
                 return
 
     def settle(self) -> None:
-        """Fit the best candidate again until it has settled, so that its numbers can be told; and what is so close that
-        it hangs on the last fit which of them comes first.
+        """Fit the best candidate again until it has settled, so that its numbers can be told, and what might still
+        catch up with it; then its rivals from where it is.
         """
         stuck: set[Ids] = set()
         for _ in range(LAST):
@@ -156,12 +156,17 @@ class Search:
                 self._again(one)
                 if self.candidates[one.ids].log_posterior < one.log_posterior + ENOUGH:
                     stuck.add(one.ids)
+        self.cross()
         self._nothing()
 
     def _is_open(self, one: Candidate, best: Candidate) -> bool:
-        """Say whether a candidate that has not settled might still catch up with the best."""
-        behind = CLOSE if _akin(one.ids, best.ids) else RIVALS
-        return not self._settled(one.fit) and one.hope > best.log_posterior - behind
+        """Say whether a candidate that is as good as the best, or might still catch up with it, has not settled."""
+        behind = best.log_posterior - one.hope
+        if behind < RIVALS:
+            return not self._settled(one.fit, NEARER)
+        return (
+            behind < CLOSE and _akin(one.ids, best.ids) and not (one.fit.converged or self._settled(one.fit))
+        )
 
     def fit(self, ids: Ids, start: Fit | None = None) -> None:
         """Fit a hypothesis as `fit_all` does."""
@@ -172,7 +177,7 @@ class Search:
         known of; or from another fit, and keep what is better.
         """
         wanted = [ids for ids in dict.fromkeys(several) if start or ids not in self.candidates]
-        for ids, found in zip(wanted, self._aside(partial(self._fitted, start), wanted), strict=True):
+        for ids, found in zip(wanted, self._aside(partial(self._fitted, start=start), wanted), strict=True):
             if words:
                 self._say(0.3, words, ids)
             self._take(found)
@@ -184,7 +189,7 @@ class Search:
             self.candidates[found.ids] = found
             self.raced.discard(found.ids)
 
-    def _fitted(self, start: Fit | None, ids: Ids) -> Candidate:
+    def _fitted(self, ids: Ids, start: Fit | None) -> Candidate:
         """Return a hypothesis with its fit from another, or from the wide one."""
         D, z = variances(self.problem.entries, ids, 1.0), None if start else self.screen.secants.get(ids)
         start = start or self.wide
@@ -194,8 +199,8 @@ class Search:
             self.problem, ids, refit(self.problem, z, J, D, most_fresh=0, made_at=start.made_at)
         )
 
-    def _aside(self, make: Callable[[Ids], Made], several: Sequence[Ids]) -> Iterator[Made]:
-        """Return what is made of each hypothesis, side by side: the runs of one fit come one after the other."""
+    def _aside(self, make: Callable[[Asked], Made], several: Sequence[Asked]) -> Iterator[Made]:
+        """Return what is made of each of several, side by side: the runs of one fit come one after the other."""
         return self.side.map(make, several)
 
     def race(self, most: int = RACERS, hopeless: float = HOPELESS) -> None:
@@ -341,13 +346,13 @@ class Search:
             if candidate_of(self.problem, (), fit).log_posterior > self.candidates[()].log_posterior:
                 self._keep((), fit)
 
-    def _settled(self, fit: Fit) -> bool:
+    def _settled(self, fit: Fit, near: float = NEAR) -> bool:
         """Say whether a fit has converged close to where its sensitivities were made, or has not left from there."""
         if fit.made_at is None:
             return False
         tolerance = np.array([entry.parameter.tolerance for entry in self.problem.entries])
         moved = float(np.max(np.abs(fit.z - fit.made_at) / tolerance))
-        return moved == 0.0 or (fit.converged and moved < NEAR)
+        return moved == 0.0 or (fit.converged and moved < near)
 
     def _again(self, one: Candidate) -> None:
         """Fit a candidate with sensitivities of its own, under its most probable κ; again if that turns out another."""

@@ -254,5 +254,7 @@ def test_a_fit_has_settled_only_close_to_where_its_sensitivities_were_made(plant
     for away, settled in ((0.5, True), (5.0, False)):
         assert search._settled(dataclasses.replace(fit, made_at=fit.z + away * tolerance)) is settled
     assert not search._settled(dataclasses.replace(fit, made_at=fit.z + 0.5 * tolerance, converged=False))
-    assert search._settled(dataclasses.replace(fit, made_at=fit.z, converged=False)), "the same would come out"
+    assert search._settled(dataclasses.replace(fit, made_at=fit.z, converged=False)), (
+        "the same would come out"
+    )
     assert not search._settled(dataclasses.replace(fit, made_at=None))
