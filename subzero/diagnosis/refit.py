@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -71,26 +72,16 @@ def refit(
         most_fresh: how many times sensitivities may be made again.
         made_at: where J was made (k,).
     """
-    low, high = bounds(problem)
-    z = np.clip(z, low, high)
-    z, r = _runnable(problem, z, r)
+    z, r = _runnable(problem, np.clip(z, *bounds(problem)), r)
     now, fresh, converged, left = _objective(r, z, D), 0, False, 0.0
     for _ in range(MOST_STEPS):
-        step, left = _promised(J, r, z, D, low, high)
-        if left < ENOUGH:
-            converged = True
-            break
-        promised, (share, there, r_there, now) = left, _walk(problem, z, r, now, step, left, D)
-        if share <= 0.0:
-            step, left = _promised(J, r, z, D, *_held(z, low, high))
-            if left >= ENOUGH:
-                share, there, r_there, now = _walk(problem, z, r, now, step, left, D)
-        if share > 0.0:
-            J = secant(J, there - z, r_there - r, D)
-        z, r = there, r_there
-        if share < POOR and promised > NEARLY and fresh < most_fresh:
+        one = _stride(problem, z, r, now, J, D)
+        if one.share > 0.0:
+            J = secant(J, one.z - z, one.r - r, D)
+        z, r, now, left = one.z, one.r, one.now, one.left
+        if one.share < POOR and one.promised > NEARLY and fresh < most_fresh:
             J, fresh, made_at = problem.jacobian(z), fresh + 1, z.copy()
-        elif share <= 0.0:
+        elif one.share <= 0.0:
             converged = left < NEARLY
             break
     return Fit(
@@ -106,12 +97,37 @@ def refit(
     )
 
 
-def _promised(
-    J: np.ndarray, r: np.ndarray, z: np.ndarray, D: np.ndarray, low: np.ndarray, high: np.ndarray
-) -> tuple[np.ndarray, float]:
-    """Return the step that is best for the linear model within bounds, and what it would gain there."""
-    step = bounded_step(J, r, z, D, low, high)
-    return step, _objective(r, z, D) - _objective(r - J @ step, z + step, D)
+class _Stride(NamedTuple):
+    """A step: what the linear model promised, and promises of what is left; the share of it that was gained; where it
+    leads, the residual and the objective there.
+    """
+
+    promised: float
+    left: float
+    share: float
+    z: np.ndarray
+    r: np.ndarray
+    now: float
+
+
+def _stride(
+    problem: Problem, z: np.ndarray, r: np.ndarray, now: float, J: np.ndarray, D: np.ndarray
+) -> _Stride:
+    """Return the step that is best for the linear model within bounds; if that gains nothing, the one that holds what
+    has kinks; none where no more than ENOUGH is promised.
+    """
+    low, high = bounds(problem)
+    promised = 0.0
+    for bound in ((low, high), _held(z, low, high)):
+        step = bounded_step(J, r, z, D, *bound)
+        left = now - _objective(r - J @ step, z + step, D)
+        promised = max(promised, left)
+        if left < ENOUGH:
+            break
+        share, there, r_there, then = _walk(problem, z, r, now, step, left, D)
+        if share > 0.0:
+            return _Stride(promised, left, share, there, r_there, then)
+    return _Stride(promised, left, 0.0, z, r, now)
 
 
 def _held(z: np.ndarray, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from subzero.diagnosis.candidate import Candidate, possible
+from subzero.diagnosis.candidate import possible
 from subzero.diagnosis.effect import Parameter
 from subzero.diagnosis.evidence import KAPPAS, Posterior, Quadratic, freed, log_sum, posterior
 from subzero.diagnosis.hypotheses import Ids, compatible, log_prior, named, places, variances
@@ -91,7 +91,7 @@ def _from_afar(problem: Problem, r: np.ndarray, J: np.ndarray) -> Screen:
     """
     names, zero = named(problem), np.zeros(J.shape[1])
     found = Screen(count=len(names), far=True)
-    found.log_posterior[()] = _mixed(problem, Quadratic.at(zero, r, J)) + log_prior((), len(names))
+    found.log_posterior[()] = with_tolerances(problem, Quadratic.at(zero, r, J)) + log_prior((), len(names))
     _sweep(problem, zero, J, [k for k, entry in enumerate(problem.entries) if entry.record < 0], found, r)
     for pair in compatible(problem.entries, names):
         better = max(found.log_posterior[(one,)] for one in pair)
@@ -112,65 +112,6 @@ def linear(problem: Problem, base: Mapping[float, Posterior], held: Ids, more: I
     return log_sum(found)
 
 
-def beside(problem: Problem, one: Candidate) -> dict[Ids, float]:
-    """Return hypothesis → log posterior of all with one cause more than a candidate, in the linear problem there."""
-    names, found = named(problem), {}
-    base = {
-        kappa: posterior(one.fit.quadratic, variances(problem.entries, one.ids, kappa)) for kappa in KAPPAS
-    }
-    here = linear(problem, base, one.ids, one.ids) + log_prior(one.ids, len(names))
-    for more in names:
-        ids = tuple(sorted({*one.ids, more}))
-        if len(ids) > len(one.ids):
-            there = linear(problem, base, one.ids, ids) + log_prior(ids, len(names))
-            found[ids] = one.log_posterior + there - here
-    return found
-
-
-def instead(problem: Problem, one: Candidate, rest: Ids) -> dict[Ids, float]:
-    """Return hypothesis → log posterior of all with another cause beside the rest of a candidate, likewise."""
-    q, names, found = one.fit.quadratic, named(problem), {}
-    for other in names:
-        ids = tuple(sorted({*rest, other}))
-        if len(ids) > len(rest) and ids != one.ids:
-            under = {kappa: posterior(q, variances(problem.entries, ids, kappa)) for kappa in KAPPAS}
-            mixed = log_sum([np.log(prior) + under[kappa].log_evidence for kappa, prior in KAPPAS.items()])
-            found[ids] = mixed + log_prior(ids, len(names))
-    return found
-
-
-def swept(problem: Problem, one: Candidate, rest: Ids) -> dict[Ids, tuple[float, np.ndarray, np.ndarray]]:
-    """Return hypothesis → log posterior, where its fit begins, and sensitivities there, of causes beside the rest of a
-    candidate that runs have kinks in, by real runs at some sizes: a slope on one side of a kink says nothing of the
-    other.
-    """
-    entries, names, J = problem.entries, named(problem), one.fit.J
-    z = np.maximum(posterior(one.fit.quadratic, variances(entries, rest, one.kappa)).z, _lowest(problem))
-    jobs = [(k, size) for k in _kinked(problem, rest) for size in _sizes(entries[k].parameter)]
-    moved = [np.concatenate([z[:k], [size], z[k + 1 :]]) for k, size in jobs]
-    found: dict[Ids, tuple[float, np.ndarray, np.ndarray]] = {}
-    here, *runs = problem.residuals([z, *moved])
-    for (k, size), there, r in zip(jobs, moved, runs, strict=True):
-        ids = tuple(sorted({*rest, entries[k].effect.id}))
-        slopes = np.column_stack([J[:, :k], (here - r) / (size - z[k]), J[:, k + 1 :]])
-        if np.isfinite(slopes).all():
-            log = _mixed(problem, Quadratic.at(there, r, slopes), ids) + log_prior(ids, len(names))
-            found[ids] = max(
-                found.get(ids, (-np.inf, there, slopes)), (log, there, slopes), key=lambda it: it[0]
-            )
-    return found
-
-
-def _kinked(problem: Problem, rest: Ids) -> list[int]:
-    """Return the entries of causes on one side only, but for sensors': drums stop, cables go slack, gears have play."""
-    return [k for k, entry in enumerate(problem.entries) if entry.record < 0 and entry.parameter.low == 0.0
-            and entry.effect.slot != "sensors" and entry.effect.id not in rest]  # fmt: skip
-
-
-def _lowest(problem: Problem) -> np.ndarray:
-    return np.array([entry.parameter.low for entry in problem.entries])
-
-
 def _without_slope(problem: Problem, J: np.ndarray) -> list[int]:
     """Return the entries that do nothing when they are small."""
     return [k for k, entry in enumerate(problem.entries)
@@ -186,7 +127,7 @@ def _sweep(
     problem: Problem, z: np.ndarray, J: np.ndarray, places: list[int], found: Screen, here: np.ndarray
 ) -> None:
     """Try sizes of entries about z, side by side, with the residual `here` there; keep the best of every cause."""
-    jobs = [(k, size) for k in places for size in _sizes(problem.entries[k].parameter)]
+    jobs = [(k, size) for k in places for size in sizes(problem.entries[k].parameter)]
     moved = [np.concatenate([z[:k], [size], z[k + 1 :]]) for k, size in jobs]
     best, dull = dict[Ids, float](), _without_slope(problem, J)
     for (k, size), there, r in zip(jobs, moved, problem.residuals(moved), strict=True):
@@ -199,7 +140,7 @@ def _sweep(
     found.log_posterior.update({ids: best[ids] + log_prior(ids, len(named(problem))) for ids in best})
 
 
-def _sizes(parameter: Parameter) -> list[float]:
+def sizes(parameter: Parameter) -> list[float]:
     """Return the deviations that are tried."""
     both = [side * size * parameter.scale for size in SWEEP for side in (1.0, -1.0)]
     return [size for size in both if parameter.low <= size <= parameter.high]
@@ -212,10 +153,10 @@ def _at_size(problem: Problem, k: int, size: float, z: np.ndarray, r: np.ndarray
     others = z.copy()
     others[k] = 0.0
     far = 0.5 * (size / problem.entries[k].parameter.scale) ** 2
-    return _mixed(problem, Quadratic.at(others, r, J)) - far - 1.0
+    return with_tolerances(problem, Quadratic.at(others, r, J)) - far - 1.0
 
 
-def _mixed(problem: Problem, q: Quadratic, ids: Ids = ()) -> float:
+def with_tolerances(problem: Problem, q: Quadratic, ids: Ids = ()) -> float:
     """Return the log evidence of some causes, or with nothing but tolerances, mixed over κ."""
     return log_sum([np.log(prior) + posterior(q, variances(problem.entries, ids, kappa)).log_evidence
                     for kappa, prior in KAPPAS.items()])  # fmt: skip

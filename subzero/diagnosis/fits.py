@@ -1,0 +1,176 @@
+"""Real fits of hypotheses, each kept if it is better than what is known: from afar, again, and from each other's place.
+
+Where a drum stops, a cable falls slack or a gear has play, runs have kinks, and a fit may end in a hollow of its own.
+So what is close to the best is fitted again with sensitivities of its own, and rivals from where the others are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from functools import partial
+from os import cpu_count
+from typing import TypeVar
+
+import numpy as np
+
+from subzero.diagnosis.candidate import Candidate, candidate_of
+from subzero.diagnosis.evidence import posterior
+from subzero.diagnosis.hypotheses import Ids, places, variances
+from subzero.diagnosis.problem import Problem, Progress
+from subzero.diagnosis.refit import NEARLY, Fit, refit
+from subzero.diagnosis.screen import Screen, is_flat
+
+Asked = TypeVar("Asked")
+Made = TypeVar("Made")
+RACERS, HOPELESS = 6, 6.0
+"""At most so many fits with sensitivities of their own in a race; none for what is this far behind in log posterior."""
+NEAR = 4.0
+"""Sensitivities hold as far as this from where they were made, in tolerances."""
+MOST_RUNS = 800
+"""After so many runs only what hopes to be the best is fitted again."""
+CROSSED = 2
+"""So often close rivals are fitted from where the others are."""
+
+
+@dataclass(kw_only=True, eq=False)
+class Fits:
+    """The fits of hypotheses, which get better and more.
+
+    Attributes:
+        problem: records and parameters.
+        progress: told what is being tried.
+        wide: the fit with wide tolerances.
+        screen: what the linear problem at the wide fit says.
+        candidates: hypothesis → its real fit.
+        raced: hypotheses that were fitted with sensitivities of their own.
+        side: threads for fits side by side, whose runs may use those of the problem.
+    """
+
+    problem: Problem
+    progress: Progress
+    wide: Fit = field(init=False)
+    screen: Screen = field(default_factory=Screen)
+    candidates: dict[Ids, Candidate] = field(default_factory=dict)
+    raced: set[Ids] = field(default_factory=set)
+    side: ThreadPoolExecutor = field(default_factory=lambda: ThreadPoolExecutor(cpu_count() or 1))
+
+    def best(self) -> Candidate:
+        """Return the most probable candidate."""
+        return max(self.candidates.values(), key=lambda candidate: candidate.log_posterior)
+
+    def _ranked(self) -> list[Ids]:
+        """Return the candidates, the most probable first."""
+        return sorted(self.candidates, key=lambda ids: -self.candidates[ids].log_posterior)
+
+    def fit(self, ids: Ids, start: Fit | None = None) -> None:
+        """Fit a hypothesis as `fit_all` does."""
+        self.fit_all([ids], start)
+
+    def fit_all(self, several: Sequence[Ids], start: Fit | None = None, words: str = "") -> None:
+        """Fit hypotheses with real runs, side by side: with the sensitivities of the wide fit, those that no fit is
+        known of; or from another fit, and keep what is better.
+        """
+        wanted = [ids for ids in dict.fromkeys(several) if start or ids not in self.candidates]
+        for ids, found in zip(wanted, self._aside(partial(self._fitted, start=start), wanted), strict=True):
+            if words:
+                self._say(0.3, words, ids)
+            self._take(found)
+
+    def _take(self, found: Candidate) -> None:
+        """Keep a candidate if it is better than what is known of it."""
+        known = self.candidates.get(found.ids)
+        if known is None or found.log_posterior > known.log_posterior:
+            self.candidates[found.ids] = found
+            self.raced.discard(found.ids)
+
+    def _fitted(self, ids: Ids, start: Fit | None) -> Candidate:
+        """Return a hypothesis with its fit from another, or from the wide one."""
+        D, z = variances(self.problem.entries, ids, 1.0), None if start else self.screen.secants.get(ids)
+        start = start or self.wide
+        z = posterior(start.quadratic, D).z if z is None else z
+        J = self._with_slopes(start.J, ids)
+        return candidate_of(
+            self.problem, ids, refit(self.problem, z, J, D, most_fresh=0, made_at=start.made_at)
+        )
+
+    def race(self, most: int = RACERS, hopeless: float = HOPELESS) -> None:
+        """Fit candidates again with sensitivities of their own, the best first, until the next is hopeless."""
+        for _ in range(most):
+            self.raced |= {one.ids for one in self.candidates.values() if self._settled(one.fit)}
+            waiting = [one for one in self.candidates.values() if one.ids not in self.raced]
+            if not waiting:
+                return
+            now = max(waiting, key=lambda one: one.hope)
+            done = [self.candidates[ids].log_posterior for ids in self.raced]
+            behind = 0.0 if self.problem.kept.asked > MOST_RUNS else hopeless
+            if len(done) >= 2 and now.hope < max(done) - behind:
+                return
+            self._say(0.5, "fitting again", now.ids)
+            self._again(now)
+
+    def cross(self) -> None:
+        """Fit the close rivals of the best candidate from where that is, and it from where they are, and keep what is
+        better: where a drum stops or a cable falls slack runs have kinks, and a fit may end in a hollow of its own.
+        """
+        for _ in range(CROSSED):
+            best = self.best()
+            close = [ids for ids in self._ranked()[1:RACERS]
+                     if self.candidates[ids].log_posterior > best.log_posterior - HOPELESS]  # fmt: skip
+            self.fit_all(close, best.fit)
+            starts = [self.candidates[ids].fit for ids in close]
+            for found in self._aside(partial(self._fitted, best.ids), starts):
+                self._take(found)
+            if self.best().log_posterior < best.log_posterior + NEARLY:
+                return
+
+    def _again(self, one: Candidate) -> None:
+        """Fit a candidate with sensitivities of its own, under its most probable κ; again if that turns out another."""
+        self.raced.add(one.ids)
+        J, D = self.problem.jacobian(one.fit.z), variances(self.problem.entries, one.ids, one.kappa)
+        fit = refit(self.problem, one.fit.z, J, D, r=one.fit.r, most_fresh=1, made_at=one.fit.z)
+        now = self._keep(one.ids, fit)
+        if now.kappa != one.kappa:
+            D = variances(self.problem.entries, one.ids, now.kappa)
+            self._keep(
+                one.ids, refit(self.problem, fit.z, fit.J, D, r=fit.r, most_fresh=0, made_at=fit.made_at)
+            )
+
+    def _keep(self, ids: Ids, fit: Fit) -> Candidate:
+        """Keep a fit and return its candidate."""
+        self.candidates[ids] = candidate_of(self.problem, ids, fit)
+        return self.candidates[ids]
+
+    def _below(self, ids: Ids, fit: Fit) -> None:
+        """Fit a part of a hypothesis from its fit, if that is better than what is known of the part."""
+        known = self.candidates.get(ids)
+        D = variances(self.problem.entries, ids, known.kappa if known else 1.0)
+        z = posterior(fit.quadratic, D).z
+        found = refit(self.problem, z, fit.J, D, most_fresh=0, made_at=fit.made_at)
+        if known is None or found.objective < known.fit.objective - 0.1:
+            self._keep(ids, found)
+            self.raced.discard(ids)
+
+    def _settled(self, fit: Fit, near: float = NEAR) -> bool:
+        """Say whether a fit has converged close to where its sensitivities were made, or has not left from there."""
+        if fit.made_at is None:
+            return False
+        tolerance = np.array([entry.parameter.tolerance for entry in self.problem.entries])
+        moved = float(np.max(np.abs(fit.z - fit.made_at) / tolerance))
+        return moved == 0.0 or (fit.converged and moved < near)
+
+    def _with_slopes(self, J: np.ndarray, ids: Ids) -> np.ndarray:
+        """Return sensitivities with secants for those causes of a hypothesis that do nothing when they are small."""
+        J = J.copy()
+        for k in places(self.problem.entries, ids):
+            if k in self.screen.columns and is_flat(self.problem.entries[k], J[:, k]):
+                J[:, k] = self.screen.columns[k]
+        return J
+
+    def _aside(self, make: Callable[[Asked], Made], several: Sequence[Asked]) -> Iterator[Made]:
+        """Return what is made of each of several, side by side: the runs of one fit come one after the other."""
+        return self.side.map(make, several)
+
+    def _say(self, share: float, words: str, ids: Ids, more: str = "") -> None:
+        self.progress(share, f"{words} {' + '.join(ids) or 'nothing wrong'}{more}")
