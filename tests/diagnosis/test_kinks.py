@@ -1,0 +1,110 @@
+"""Where a drum stops, a cable falls slack or a gear has play, runs have kinks, and slopes say little.
+
+Verifies: a fit goes on beside a kink; causes without a slope are found by real runs at some sizes; a fit that ended in
+a hollow is made again from where its rival is; a pair is found beside a cause that is not the best by itself.
+"""
+
+import dataclasses
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from subzero.diagnosis import search as searching
+from subzero.diagnosis.around import beside, swept
+from subzero.diagnosis.candidate import Candidate
+from subzero.diagnosis.effects import catalogue
+from subzero.diagnosis.fits import HOPELESS
+from subzero.diagnosis.hypotheses import places
+from subzero.diagnosis.refit import refit
+from subzero.diagnosis.search import Search
+
+SLACK = ("cable_initial_length",)
+
+
+def begun(planted):
+    """Return a search with its first fits."""
+    search = Search(problem=planted.problem, progress=lambda share, words: None)
+    search.begin()
+    return search
+
+
+@pytest.mark.parametrize("low", [0.0, -9.0])
+def test_a_fit_goes_on_beside_a_kink(low):
+    """Of r = (3 − x, 5 + 40 |y − 0.1|) and the prior the least is at x = 1.5 and y = 0.1, a kink, where the slope to the
+    left promises more of a larger y. Only what is possible on one side has kinks: otherwise the step is spoiled.
+    """
+    problem = SimpleNamespace(
+        entries=[SimpleNamespace(parameter=SimpleNamespace(low=bound, high=9.0)) for bound in (-9.0, low)],
+        residual=lambda z: np.array([3.0 - z[0], 5.0 + 40.0 * abs(z[1] - 0.1)]),
+    )
+    J = np.array([[1.0, 0.0], [0.0, 40.0]])
+    fit = refit(problem, np.array([0.0, 0.1]), J, np.ones(2), most_fresh=0)
+    assert fit.z[0] == pytest.approx(1.5 if low == 0.0 else 0.0)
+    assert fit.converged is (low == 0.0)
+    assert fit.z[1] == 0.1
+
+
+def test_a_slack_cable_is_found_by_real_runs(plant):
+    """As long as the model has none, the slope at nothing says nothing of it."""
+    search = begun(
+        plant(lambda setting: catalogue(("heading",))[SLACK[0]].apply(setting, 9.0), duration=16.0)
+    )
+    search.fit(())
+    nothing = search.best()
+    sizes = swept(search.problem, nothing, ())
+    best = max(sizes, key=lambda ids: sizes[ids].log_posterior)
+    assert best == SLACK
+    assert sizes[SLACK].log_posterior > beside(search.problem, nothing)[SLACK] + 10.0
+    search._kinked(nothing)
+    fit = search.candidates[SLACK].fit
+    assert fit.z[places(search.problem.entries, SLACK)] == pytest.approx(9.0, abs=2.0)
+    assert search.best().ids == SLACK
+
+
+def test_sizes_are_tried_of_what_has_kinks_and_is_not_there(plant):
+    search = begun(plant(duration=6.0))
+    search.fit(SLACK)
+    tried = swept(search.problem, search.candidates[SLACK], SLACK)
+    assert all(set(SLACK) < set(ids) for ids in tried)
+    more = {one for ids in tried for one in ids} - set(SLACK)
+    assert more == {"drum_friction", "drum_inertia", "rudder_backlash", "rudder_rate_limit", "battery_sag"}
+
+
+def test_a_fit_in_a_hollow_is_made_again_from_where_its_rival_is(plant):
+    search, ids, rival = begun(plant(duration=8.0)), ("rudder_offset",), ("hull_drag",)
+    search.fit_all([ids, rival])
+    good = search.candidates[ids]
+    z = good.fit.z + 0.5 * np.array([entry.parameter.tolerance for entry in search.problem.entries])
+    behind = search.candidates[rival].log_posterior - HOPELESS / 2
+    hollow = dataclasses.replace(good, fit=dataclasses.replace(good.fit, z=z), log_posterior=behind)
+    search.candidates[ids] = hollow
+    search.cross()
+    assert search.candidates[ids].log_posterior == pytest.approx(good.log_posterior, abs=0.3)
+
+
+def test_the_best_gets_the_chances_of_its_rivals_too(plant):
+    search, ids, rival = begun(plant(duration=8.0)), ("rudder_offset",), ("hull_drag",)
+    search.fit_all([ids, rival])
+    good = search.candidates[rival]
+    search.candidates[ids] = dataclasses.replace(
+        search.candidates[ids], log_posterior=good.log_posterior - 1.0
+    )
+    search.candidates[rival] = dataclasses.replace(good, log_posterior=good.log_posterior - 0.9)
+    search.cross()
+    assert search.candidates[rival].log_posterior == pytest.approx(good.log_posterior, abs=0.3)
+
+
+def test_a_pair_is_looked_for_beside_what_is_not_the_best(monkeypatch):
+    """A wrong cause may be better than either of two right ones by itself."""
+    search, fits = Search(problem=None, progress=lambda share, words: None), {}
+    for name, log in (("wrong", -50.0), ("right", -60.0), ("other", -61.0)):
+        search.candidates[(name,)] = Candidate(ids=(name,), fit=name, log_evidence={}, log_posterior=log)
+    found = {
+        "right": {("other", "right"): -41.0},
+        "other": {("other", "right"): -44.0, ("other", "wrong"): -51.0},
+    }
+    monkeypatch.setattr(searching, "beside", lambda problem, one: found.get(one.ids[0], {}))
+    monkeypatch.setattr(search, "fit", lambda ids, start: fits.setdefault(ids, start))
+    search._aside_of(search.best())
+    assert fits == {("other", "right"): "right"}, "from the better of the two; not what is behind the best"
