@@ -31,8 +31,8 @@ def begun(planted):
 
 @pytest.mark.parametrize("low", [0.0, -9.0])
 def test_a_fit_goes_on_beside_a_kink(low):
-    """Of r = (3 − x, 5 + 40 |y − 0.1|) and the prior the least is at x = 1.5 and y = 0.1, a kink, where the slope to the
-    left promises more of a larger y. Only what is possible on one side has kinks: otherwise the step is spoiled.
+    """Of r = (3 − x, 5 + 40 |y − 0.1|) and the prior the least is at x = 1.5 and y = 0.1, a kink, where the slope to
+    the left promises more of a larger y. Only what is possible on one side has kinks: otherwise the step is spoiled.
     """
     problem = SimpleNamespace(
         entries=[SimpleNamespace(parameter=SimpleNamespace(low=bound, high=9.0)) for bound in (-9.0, low)],
