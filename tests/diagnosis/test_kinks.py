@@ -56,7 +56,7 @@ def test_a_slack_cable_is_found_by_real_runs(plant):
     best = max(sizes, key=lambda ids: sizes[ids].log_posterior)
     assert best == SLACK
     assert sizes[SLACK].log_posterior > beside(search.problem, nothing)[SLACK] + 10.0
-    search._kinked(nothing)
+    search.grow()
     fit = search.candidates[SLACK].fit
     assert fit.z[places(search.problem.entries, SLACK)] == pytest.approx(9.0, abs=2.0)
     assert search.best().ids == SLACK
