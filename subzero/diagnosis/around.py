@@ -11,10 +11,10 @@ from typing import NamedTuple
 import numpy as np
 
 from subzero.diagnosis.candidate import Candidate
-from subzero.diagnosis.evidence import KAPPAS, Quadratic, log_sum, posterior
+from subzero.diagnosis.evidence import KAPPAS, Quadratic, posterior
 from subzero.diagnosis.hypotheses import Ids, log_prior, named, variances
 from subzero.diagnosis.problem import Problem
-from subzero.diagnosis.screen import linear, sizes, with_tolerances
+from subzero.diagnosis.screen import linear, mixed_evidence, sizes
 
 
 def beside(problem: Problem, one: Candidate) -> dict[Ids, float]:
@@ -38,9 +38,7 @@ def instead(problem: Problem, one: Candidate, rest: Ids) -> dict[Ids, float]:
     for other in names:
         ids = tuple(sorted({*rest, other}))
         if len(ids) > len(rest) and ids != one.ids:
-            under = {kappa: posterior(q, variances(problem.entries, ids, kappa)) for kappa in KAPPAS}
-            mixed = log_sum([np.log(prior) + under[kappa].log_evidence for kappa, prior in KAPPAS.items()])
-            found[ids] = mixed + log_prior(ids, len(names))
+            found[ids] = mixed_evidence(problem, q, ids) + log_prior(ids, len(names))
     return found
 
 
@@ -64,7 +62,7 @@ def swept(problem: Problem, one: Candidate, rest: Ids) -> dict[Ids, Tried]:
         ids = tuple(sorted({*rest, entries[k].effect.id}))
         slopes = np.column_stack([J[:, :k], (here - r) / (size - z[k]), J[:, k + 1 :]])
         if np.isfinite(slopes).all():
-            log = with_tolerances(problem, Quadratic.at(there, r, slopes), ids) + log_prior(ids, len(names))
+            log = mixed_evidence(problem, Quadratic.at(there, r, slopes), ids) + log_prior(ids, len(names))
             if ids not in found or log > found[ids].log_posterior:
                 found[ids] = Tried(log, there, slopes)
     return found

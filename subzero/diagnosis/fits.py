@@ -19,7 +19,7 @@ from subzero.diagnosis.candidate import Candidate, candidate_of
 from subzero.diagnosis.evidence import posterior
 from subzero.diagnosis.hypotheses import Ids, places, variances
 from subzero.diagnosis.problem import Problem, Progress
-from subzero.diagnosis.refit import NEARLY, Fit, refit
+from subzero.diagnosis.refit import ENOUGH, NEARLY, Fit, refit
 from subzero.diagnosis.screen import Screen, is_flat
 
 Asked = TypeVar("Asked")
@@ -148,7 +148,7 @@ class Fits:
         D = variances(self.problem.entries, ids, known.kappa if known else 1.0)
         z = posterior(fit.quadratic, D).z
         found = refit(self.problem, z, fit.J, D, most_fresh=0, made_at=fit.made_at)
-        if known is None or found.objective < known.fit.objective - 0.1:
+        if known is None or found.objective < known.fit.objective - ENOUGH:
             self._keep(ids, found)
             self.raced.discard(ids)
 

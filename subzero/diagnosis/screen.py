@@ -91,7 +91,7 @@ def _from_afar(problem: Problem, r: np.ndarray, J: np.ndarray) -> Screen:
     """
     names, zero = named(problem), np.zeros(J.shape[1])
     found = Screen(count=len(names), far=True)
-    found.log_posterior[()] = with_tolerances(problem, Quadratic.at(zero, r, J)) + log_prior((), len(names))
+    found.log_posterior[()] = mixed_evidence(problem, Quadratic.at(zero, r, J)) + log_prior((), len(names))
     _sweep(problem, zero, J, [k for k, entry in enumerate(problem.entries) if entry.record < 0], found, r)
     for pair in compatible(problem.entries, names):
         better = max(found.log_posterior[(one,)] for one in pair)
@@ -153,10 +153,10 @@ def _at_size(problem: Problem, k: int, size: float, z: np.ndarray, r: np.ndarray
     others = z.copy()
     others[k] = 0.0
     far = 0.5 * (size / problem.entries[k].parameter.scale) ** 2
-    return with_tolerances(problem, Quadratic.at(others, r, J)) - far - 1.0
+    return mixed_evidence(problem, Quadratic.at(others, r, J)) - far - 1.0
 
 
-def with_tolerances(problem: Problem, q: Quadratic, ids: Ids = ()) -> float:
+def mixed_evidence(problem: Problem, q: Quadratic, ids: Ids = ()) -> float:
     """Return the log evidence of some causes, or with nothing but tolerances, mixed over κ."""
     return log_sum([np.log(prior) + posterior(q, variances(problem.entries, ids, kappa)).log_evidence
                     for kappa, prior in KAPPAS.items()])  # fmt: skip
