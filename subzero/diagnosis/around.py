@@ -15,6 +15,7 @@ from subzero.diagnosis.evidence import KAPPAS, Quadratic, posterior
 from subzero.diagnosis.hypotheses import Ids, log_prior, named, variances
 from subzero.diagnosis.problem import Problem
 from subzero.diagnosis.screen import linear, mixed_evidence, sizes
+from subzero.diagnosis.straight import kinked
 
 
 def beside(problem: Problem, one: Candidate) -> dict[Ids, float]:
@@ -54,7 +55,7 @@ def swept(problem: Problem, one: Candidate, rest: Ids) -> dict[Ids, Tried]:
     """Return hypothesis → its best size, for causes beside the rest of a candidate that runs have kinks in."""
     entries, names, J = problem.entries, named(problem), one.fit.J
     z = np.maximum(posterior(one.fit.quadratic, variances(entries, rest, one.kappa)).z, _lowest(problem))
-    jobs = [(k, size) for k in _kinked(problem, rest) for size in sizes(entries[k].parameter)]
+    jobs = [(k, size) for k in kinked(problem, rest) for size in sizes(entries[k].parameter)]
     moved = [np.concatenate([z[:k], [size], z[k + 1 :]]) for k, size in jobs]
     found = dict[Ids, Tried]()
     here, *runs = problem.residuals([z, *moved])
@@ -66,12 +67,6 @@ def swept(problem: Problem, one: Candidate, rest: Ids) -> dict[Ids, Tried]:
             if ids not in found or log > found[ids].log_posterior:
                 found[ids] = Tried(log, there, slopes)
     return found
-
-
-def _kinked(problem: Problem, rest: Ids) -> list[int]:
-    """Return the entries of causes on one side only, but for sensors': drums stop, cables go slack, gears have play."""
-    return [k for k, entry in enumerate(problem.entries) if entry.record < 0 and entry.parameter.low == 0.0
-            and entry.effect.slot != "sensors" and entry.effect.id not in rest]  # fmt: skip
 
 
 def _lowest(problem: Problem) -> np.ndarray:

@@ -19,7 +19,7 @@ from subzero.diagnosis.hypotheses import log_prior, named, variances
 from subzero.diagnosis.latent import Terms
 from subzero.diagnosis.problem import Problem
 from subzero.diagnosis.recover import Recovered, drifted, recover
-from subzero.diagnosis.refit import Fit, refit
+from subzero.diagnosis.refit import Fit, refit, with_own_slopes
 from subzero.diagnosis.unknown import DRIFTS, FORCE, Knots, Suspect, suspects
 
 
@@ -81,8 +81,8 @@ def _beside_drift(problem: Problem, start: Fit, channel: str, found: Recovered) 
     cleared = replace(problem, records=tuple(records))
     J, left = start.J, start.r + start.J @ start.z - found.columns @ found.force
     there = posterior(Quadratic(A=J.T @ J, b=J.T @ left, rr=float(left @ left)), D).z
-    done = refit(cleared, there, J, D, most_fresh=1)
-    return refit(cleared, done.z, cleared.jacobian(done.z), D, r=done.r, most_fresh=0)
+    done = refit(cleared, there, J, D, most_fresh=1, made_at=start.made_at)
+    return with_own_slopes(cleared, done)
 
 
 def _without(found: Recovered, done: Fit, count: int) -> Fit:

@@ -29,7 +29,7 @@ RACERS, HOPELESS = 6, 6.0
 NEAR = 4.0
 """Sensitivities hold as far as this from where they were made, in tolerances."""
 MOST_RUNS = 800
-"""After so many runs only what hopes to be the best is fitted again."""
+"""After so many runs of each record only what hopes to be the best is fitted again."""
 CROSSED = 2
 """So often close rivals are fitted from where the others are."""
 
@@ -104,7 +104,8 @@ class Fits:
                 return
             now = max(waiting, key=lambda one: one.hope)
             done = [self.candidates[ids].log_posterior for ids in self.raced]
-            behind = 0.0 if self.problem.kept.asked > MOST_RUNS else hopeless
+            most = MOST_RUNS * len(self.problem.records)
+            behind = 0.0 if self.problem.kept.asked > most else hopeless
             if len(done) >= 2 and now.hope < max(done) - behind:
                 return
             self._say(0.5, "fitting again", now.ids)
@@ -154,10 +155,7 @@ class Fits:
 
     def _settled(self, fit: Fit, near: float = NEAR) -> bool:
         """Say whether a fit has converged close to where its sensitivities were made, or has not left from there."""
-        if fit.made_at is None:
-            return False
-        tolerance = np.array([entry.parameter.tolerance for entry in self.problem.entries])
-        moved = float(np.max(np.abs(fit.z - fit.made_at) / tolerance))
+        moved = fit.moved(self.problem)
         return moved == 0.0 or (fit.converged and moved < near)
 
     def _with_slopes(self, J: np.ndarray, ids: Ids) -> np.ndarray:

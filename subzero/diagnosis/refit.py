@@ -14,6 +14,8 @@ ENOUGH = 0.1
 """A step that would gain less than this in the objective is not taken: no evidence hangs on it."""
 NEARLY = 0.5
 """A fit that no step improves although the linear model promises less than this has converged, too."""
+CLOSE = 1.0
+"""Sensitivities are a fit's own if they were made so close to it, in tolerances."""
 MOST_STEPS = 8
 POOR = 0.5
 """A step that gains less than this share of what the linear model promised has old sensitivities."""
@@ -49,6 +51,20 @@ class Fit:
     def quadratic(self) -> Quadratic:
         """The linear problem around the fit."""
         return Quadratic.at(self.z, self.r, self.J)
+
+    def moved(self, problem: Problem) -> float:
+        """Return how far it is from where its sensitivities were made, in tolerances; infinite if that is not known."""
+        if self.made_at is None:
+            return np.inf
+        tolerance = np.array([entry.parameter.tolerance for entry in problem.entries])
+        return float(np.max(np.abs(self.z - self.made_at) / tolerance))
+
+
+def with_own_slopes(problem: Problem, fit: Fit) -> Fit:
+    """Return a fit again with sensitivities of its own, if it has moved from where its sensitivities were made."""
+    if fit.moved(problem) < CLOSE:
+        return fit
+    return refit(problem, fit.z, problem.jacobian(fit.z), fit.D, r=fit.r, most_fresh=0, made_at=fit.z)
 
 
 def refit(

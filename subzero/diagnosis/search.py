@@ -20,6 +20,7 @@ from subzero.diagnosis.probability import Beliefs
 from subzero.diagnosis.problem import Problem
 from subzero.diagnosis.refit import ENOUGH, Fit, refit
 from subzero.diagnosis.screen import look
+from subzero.diagnosis.straight import straightened
 from subzero.diagnosis.wide import fit_wide
 
 KEEP, SINGLES, PAIRS = 12.0, 7, 4
@@ -97,6 +98,7 @@ class Search(Fits):
                 self._without(best, without)
             self._aside_of(best)
             self._kinked(best)
+            self._straighten(best)
             self.race(2, 2.0)
             self.cross()
             self.sharpen()
@@ -211,6 +213,14 @@ class Search(Fits):
                 D = variances(self.problem.entries, ids, best.kappa)
                 fit = refit(self.problem, found[ids].z, found[ids].J, D, most_fresh=0)
                 self._take(candidate_of(self.problem, ids, fit))
+
+    def _straighten(self, best: Candidate) -> None:
+        """Fit the best candidate, and it without one of its causes, from the smooth side of their kinks."""
+        rests = [tuple(one for one in best.ids if one != without) for without in best.ids]
+        for ids in [best.ids, *rests]:
+            fit, D = self.candidates[ids].fit, variances(self.problem.entries, ids, 1.0)
+            if found := straightened(self.problem, fit, ids, D):
+                self._take(candidate_of(self.problem, ids, found))
 
     def _without(self, best: Candidate, without: str) -> None:
         """Fit the best hypothesis without one of its causes, and with others in its place."""
