@@ -31,7 +31,7 @@ from .manoeuvres import CHANNELS, times
 from .results import place, read
 from .sharing import Shared, share
 from .trial_of import Result, posed
-from .truth import NoRunError, noisy, shown_by
+from .truth import NoRunError, agreed, noisy
 
 DECIDED = 0.95
 OPTIMISED = 40.0
@@ -105,7 +105,7 @@ def _measured(case: Case) -> Result:
     try:
         second = _flown(case, made, advice)
     except NoRunError:
-        return {**found, "skipped": "the truth cannot be run there"}
+        return {**found, "skipped": "there is no one truth there"}
     after = diagnose([made.logged, second], seed=case.index, budget="verdict")
     return {**found, **_judged(case, after.probabilities, found["rival"]), "after": after.verdict}
 
@@ -124,7 +124,7 @@ def _flown(case: Case, made: Made, advice: NextTrial) -> Logged:
     values = {name: one for name, one in made.values.items() if not name.startswith(STARTS)}
     true = with_values(setting, values)
     true = replace(true, trial=replace(true.trial, duration=true.trial.duration + AFTER))
-    shown, _ = shown_by(true, times(setting), channels)
+    shown = agreed(true, times(setting), channels)
     record = noisy(shown, times(setting), case.rng(attempt=999))
     return Logged(record=record, setting=setting, name="advised")
 

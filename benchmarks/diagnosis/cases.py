@@ -19,15 +19,17 @@ from . import outside
 from .draws import Values, hidden, nuisances, with_values
 from .manoeuvres import CHANNELS, FEW, ids, nominal, times
 from .outside import Strange
-from .truth import NoRunError, noisy, shown_by
+from .truth import NoRunError, agreed, noisy
 
 SHARES = {"single": 400, "healthy": 200, "pair": 100, "outside": 60, "twin": 20, "degraded": 20}
 """How many of each make the whole benchmark."""
-SEED = 23
+SEED = 29
 """Of all cases; the choices of the engine were made with the cases of seeds 1 to 13."""
 DEGRADED = ("noise", "channels", "short", "wide", "narrow")
 AFTER = 4.0
 """The trial goes on behind its record, for sensors whose clock runs ahead. [s]"""
+HEAVY = "drum_inertia"
+"""Hidden on `fig6` only: on `rich` slack cable jerks taut behind a heavy drum, and no two runs of that agree."""
 TWINS = (("sensor_scale:depth", 0), ("sensor_bias:heading", 0), ("hull_drag", 0), ("propeller_thrust_slope", 0),
          ("sensor_bias:depth", 0), ("sensor_scale:heading", 0))  # fmt: skip
 """Effect, and its parameter, that have rivals on `fig6`."""
@@ -63,13 +65,14 @@ class Case:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Made:
-    """A case with its record: what is hidden, all deviations, what is strange, who ran it, and the true setting."""
+    """A case with its record: what is hidden, all deviations, what is strange, the true setting, and how many draws
+    were dropped before it.
+    """
 
     logged: Logged
     hidden: Values
     values: Values
     strange: Strange | None
-    source: str
     true: Setting
     dropped: int = field(default=0)
 
@@ -86,17 +89,17 @@ def _case(seed: int, index: int, kind: str, number: int) -> Case:
     rng = np.random.default_rng([seed, 1 + list(SHARES).index(kind), number // len(ids())])
     names = rng.permutation(ids()).tolist()
     one, other = names[number % len(names)], names[(number + 7) % len(names)]
-    on_rich = kind not in ("twin", "degraded") and number % 5 == 1
     how = DEGRADED[number % len(DEGRADED)] if kind == "degraded" else ""
     alone = kind == "single" or (kind == "degraded" and (number // len(DEGRADED)) % 2 == 1)
     causes = (one,) if alone else (one, other) if kind == "pair" else ()
     causes = (TWINS[number % len(TWINS)][0],) if kind == "twin" else causes
+    on_rich = kind not in ("twin", "degraded") and number % 5 == 1 and HEAVY not in causes
     manoeuvre = "short" if how == "short" else "rich" if on_rich else "fig6"
     return Case(seed=seed, index=index, kind=kind, number=number, manoeuvre=manoeuvre, how=how, causes=causes)
 
 
 def make(case: Case, attempt: int = 0, size: float = 1.0) -> Made:
-    """Return a case with its record; drawn again as long as its truth cannot be run.
+    """Return a case with its record; drawn again as long as its truth cannot be run, or is no one truth.
 
     Args:
         case: what it is to be.
@@ -108,7 +111,7 @@ def make(case: Case, attempt: int = 0, size: float = 1.0) -> Made:
             return replace(_made(case, case.rng(attempt * 20 + again), size), dropped=again)
         except NoRunError:
             continue
-    message = f"Case {case.index} ({case.causes}) has no truth that can be run."
+    message = f"Case {case.index} ({case.causes}) has no truth."
     raise NoRunError(message)
 
 
@@ -124,9 +127,9 @@ def _made(case: Case, rng: np.random.Generator, size: float) -> Made:
     true = with_values(setting, values)
     channels = FEW if case.how == "channels" else CHANNELS
     flown = replace(true, trial=replace(true.trial, duration=true.trial.duration + AFTER))
-    shown, source = shown_by(strange.on(flown) if strange else flown, times(setting), channels)
+    shown = agreed(strange.on(flown) if strange else flown, times(setting), channels)
     if strange and strange.drift:
         shown[strange.axis] = shown[strange.axis] + strange.drift(times(setting))
     record = noisy(shown, times(setting), rng, 3.0 if case.how == "noise" else 1.0)
     logged = Logged(record=record, setting=setting, name=case.manoeuvre)
-    return Made(logged=logged, hidden=found, values=values, strange=strange, source=source, true=true)
+    return Made(logged=logged, hidden=found, values=values, strange=strange, true=true)

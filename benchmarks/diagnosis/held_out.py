@@ -33,7 +33,7 @@ def gains(case: Case, made: Made, verdict: Verdict, work: Work) -> dict[str, Any
     flown = {name: values for name, values in made.values.items() if not name.startswith(STARTS)}
     at = times(setting)
     try:
-        truth = shown_by(with_values(setting, flown), at, CHANNELS)[0]
+        truth = shown_by(with_values(setting, flown), at, CHANNELS)
     except (NoRunError, ArithmeticError):
         truth = respond(economical(with_values(setting, flown), at[-1]), at, CHANNELS)
     models = {"nominal": {}, **{name: _shared(work, fit) for name, fit in _fits(verdict, work).items()}}

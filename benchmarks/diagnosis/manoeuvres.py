@@ -54,6 +54,7 @@ def effects() -> Mapping[str, Effect]:
     return {**catalogue(CHANNELS), **{effect.id: effect for effect in START}}
 
 
-def ids() -> list[str]:
+@cache
+def ids() -> tuple[str, ...]:
     """Return all causes that can be named."""
-    return list(catalogue(CHANNELS))
+    return tuple(catalogue(CHANNELS))

@@ -10,11 +10,12 @@ from pathlib import Path
 import numpy as np
 
 from .advice import decided
-from .cases import SHARES
+from .cases import HEAVY, SHARES
 from .figures_of import rows
 from .pictures import FIGURES, draw
 from .scores import CLEAR, Result, Score, first, is_right, names, of, smallest_D, truth, wrongly_sure
 from .times import LIMITS, Row
+from .truth import SAME
 from .words import (
     ADVICE_WORDS,
     ALONE_WORDS,
@@ -53,11 +54,11 @@ def _head(results: Sequence[Result], broken: Sequence[Result]) -> str:
     kinds = _table(["kind", "cases here", "of the whole benchmark"],
                    [[kind, str(count[kind]), str(whole)] for kind, whole in SHARES.items()])  # fmt: skip
     where = Counter(one["manoeuvre"] for one in results)
-    source = Counter(one["source"] for one in results)
     return HEAD.format(
         cases=len(results), whole=sum(SHARES.values()), kinds=kinds, fig6=where["fig6"] + where["short"],
-        rich=where["rich"], other=source["other"], fine=source["fine"], broken=len(broken),
-        dropped=sum(one["dropped"] for one in results), seed=results[0]["seed"], versions=_versions(results),
+        rich=where["rich"], broken=len(broken), seed=results[0]["seed"], versions=_versions(results), same=SAME,
+        dropped=sum(one["dropped"] for one in results), redrawn=sum(one["dropped"] > 0 for one in results),
+        heavy=sum(one["dropped"] > 0 and HEAVY in one["truth"] for one in results),
     )  # fmt: skip
 
 

@@ -133,8 +133,7 @@ def _truth(case: Case, made: Made) -> Result:
     """Return what is true."""
     return {"seed": case.seed, "index": case.index, "kind": case.kind, "manoeuvre": case.manoeuvre, "how": case.how,
             "number": case.number, "truth": {one: list(values) for one, values in made.hidden.items()},
-            "strange": made.strange.kind if made.strange else "", "source": made.source,
-            "dropped": made.dropped}  # fmt: skip
+            "strange": made.strange.kind if made.strange else "", "dropped": made.dropped}  # fmt: skip
 
 
 def _said(verdict: Verdict) -> Result:

@@ -2,35 +2,47 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from subzero.diagnosis.effects.sensors import SPECS
 from subzero.diagnosis.other_code import NoTruthError, simulate_otherwise
-from subzero.diagnosis.response import respond
 from subzero.diagnosis.setting import Setting
 from subzero.measured import Record
 
 RHO, OUTLIERS, GAPS, FAR = 0.5, 0.01, 0.02, 15.0
 """Of the noise: correlation from sample to sample, shares of outliers and gaps; size of an outlier in noise levels."""
-FINE = {"hull_step": 0.01, "cable_step": 0.05, "segment_length": 0.25}
+SEGMENTS = (0.5, 0.25, 0.125)
+"""Of the cable in runs of the truth, whose time steps go with them. [m]"""
+SAME = 4.0
+"""Runs with two of them are one truth if they differ by less than this, squared, in noise levels."""
 Shown = dict[str, np.ndarray]
 
 
 class NoRunError(RuntimeError):
-    """A truth that cannot be run at all."""
+    """A truth that cannot be run at all, or that is another with every step."""
 
 
-def shown_by(setting: Setting, times: np.ndarray, channels: tuple[str, ...]) -> tuple[Shown, str]:
-    """Return what the sensors show without noise, and who says so: "other", or "fine" where that finds no run."""
+def shown_by(setting: Setting, times: np.ndarray, channels: tuple[str, ...], segment: float = 0.25) -> Shown:
+    """Return what the sensors show without noise, by the other formulation with segments of a length [m]."""
     try:
-        shown, who = simulate_otherwise(setting, times, channels), "other"
-    except NoTruthError:
-        shown, who = respond(replace(setting, trial=replace(setting.trial, **FINE)), times, channels), "fine"
+        shown = simulate_otherwise(setting, times, channels, segment_length=segment, cable_step=0.1 * segment,
+                                   hull_step=0.04 * segment)  # fmt: skip
+    except NoTruthError as none:
+        raise NoRunError(setting.trial.name) from none
     if not all(np.isfinite(values).all() for values in shown.values()):
         raise NoRunError(setting.trial.name)
-    return shown, who
+    return shown
+
+
+def agreed(setting: Setting, times: np.ndarray, channels: tuple[str, ...]) -> Shown:
+    """Return what the first run shows that a coarser one agrees with: where slack cable jerks taut none may."""
+    shown = shown_by(setting, times, channels, SEGMENTS[0])
+    for segment in SEGMENTS[1:]:
+        coarser, shown = shown, shown_by(setting, times, channels, segment)
+        apart = [(shown[name] - coarser[name]) / SPECS[name].noise for name in channels]
+        if float(np.sum(np.square(apart))) < SAME:
+            return shown
+    raise NoRunError(setting.trial.name)
 
 
 def noisy(shown: Shown, times: np.ndarray, rng: np.random.Generator, level: float = 1.0) -> Record:

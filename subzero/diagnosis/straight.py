@@ -12,7 +12,7 @@ import numpy as np
 from subzero.diagnosis.evidence import posterior
 from subzero.diagnosis.hypotheses import Ids
 from subzero.diagnosis.problem import Problem
-from subzero.diagnosis.refit import Fit, refit
+from subzero.diagnosis.refit import Fit, bounds, refit
 
 STRAYED = 2.0
 """What has kinks is begun again if a fit bends it by so many tolerances."""
@@ -41,6 +41,6 @@ def straightened(problem: Problem, fit: Fit, ids: Ids, D: np.ndarray | None = No
         return None
     held = D.copy()
     held[at] = (1e-6 * tolerance) ** 2
-    z = posterior(fit.quadratic, held).z
+    z = np.clip(posterior(fit.quadratic, held).z, *bounds(problem))
     z[at] = 0.0
     return refit(problem, z, problem.jacobian(z), D, most_fresh=1, made_at=z)
