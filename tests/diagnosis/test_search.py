@@ -58,7 +58,8 @@ def test_secants_explain_the_step_and_leave_other_directions():
 def racing(runs, **hopes):
     """Return the hypotheses that a race fits again, in turn: those with a hope above their log posterior of -9."""
     search = Search(
-        problem=SimpleNamespace(kept=SimpleNamespace(asked=runs)), progress=lambda share, words: None
+        problem=SimpleNamespace(kept=SimpleNamespace(asked=runs), records=[None]),
+        progress=lambda share, words: None,
     )
     again = []
 
@@ -68,7 +69,9 @@ def racing(runs, **hopes):
 
     search._again = fit_again
     for name, hope in hopes.items():
-        fit = SimpleNamespace(converged=hope is None, made_at=None, promise=(hope or -9.0) + 9.0)
+        fit = SimpleNamespace(
+            converged=hope is None, moved=lambda problem: np.inf, promise=(hope or -9.0) + 9.0
+        )
         search.candidates[(name,)] = Candidate(ids=(name,), fit=fit, log_evidence={}, log_posterior=-9.0)
     search.raced |= {("best",), ("second",)}
     search.race()
