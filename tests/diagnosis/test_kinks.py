@@ -17,7 +17,7 @@ from subzero.diagnosis.candidate import Candidate, candidate_of
 from subzero.diagnosis.effects import catalogue
 from subzero.diagnosis.fits import HOPELESS
 from subzero.diagnosis.hypotheses import places, variances
-from subzero.diagnosis.refit import Fit, refit
+from subzero.diagnosis.refit import Fit, refit, with_own_slopes
 from subzero.diagnosis.search import Search
 from subzero.diagnosis.straight import straightened
 
@@ -104,6 +104,27 @@ def test_a_fit_astray_is_begun_again_where_nothing_with_kinks_is_bent(plant):
     assert straight.z[places(problem.entries, DRUM)] < 2.0 * DRUM_TOLERANCE
     assert straightened(problem, straight, (), D) is None, "nothing is bent any more"
     assert straightened(problem, fit, DRUM) is None, "a cause may be as large as it is"
+
+
+def test_a_fit_is_begun_again_within_bounds(plant):
+    """What the linear problem makes of a record that nothing fits: less than no drag, which cannot be run."""
+    problem = plant(duration=8.0).problem
+    fit, (k,) = strayed(problem), places(problem.entries, ("cable_normal_drag",))
+    fit = dataclasses.replace(fit, r=fit.r - 1e4 * fit.J[:, k])
+    straight = straightened(problem, fit, ())
+    assert straight.z[k] >= problem.entries[k].parameter.low
+
+
+@pytest.mark.parametrize(("away", "same"), [(0.0, True), (0.9, True), (1.1, False), (None, False)])
+def test_sensitivities_are_made_again_where_a_fit_has_moved(plant, away, same):
+    problem = plant(duration=4.0).problem
+    tolerance = np.array([entry.parameter.tolerance for entry in problem.entries])
+    z, r = np.zeros(tolerance.size), problem.residual(np.zeros(tolerance.size))
+    fit = Fit(z=z, r=r, J=np.zeros((r.size, z.size)), D=tolerance**2, objective=0.5 * float(r @ r), converged=True,
+              promise=0.0, fresh=0, made_at=None if away is None else z + away * tolerance)  # fmt: skip
+    again = with_own_slopes(problem, fit)
+    assert (again is fit) is same
+    assert np.any(again.J) == (not same)
 
 
 def test_the_wide_fit_comes_back_from_astray(plant, monkeypatch):

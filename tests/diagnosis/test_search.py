@@ -55,10 +55,10 @@ def test_secants_explain_the_step_and_leave_other_directions():
     assert_allclose(new @ other, J @ other, atol=1e-12)
 
 
-def racing(runs, **hopes):
+def racing(runs, records=1, **hopes):
     """Return the hypotheses that a race fits again, in turn: those with a hope above their log posterior of -9."""
     search = Search(
-        problem=SimpleNamespace(kept=SimpleNamespace(asked=runs), records=[None]),
+        problem=SimpleNamespace(kept=SimpleNamespace(asked=runs), records=records * [None]),
         progress=lambda share, words: None,
     )
     again = []
@@ -88,6 +88,12 @@ def test_after_many_runs_what_hopes_to_be_the_best_is_still_fitted_again():
     """A right pair whose first fit went nowhere is not lost because others have used up the runs."""
     hopes = {"best": None, "second": None, "hopes": 30.0}
     assert racing(MOST_RUNS + 1, **hopes) == ["hopes"]
+
+
+def test_two_records_have_twice_the_runs():
+    hopes = {"best": None, "second": None, "near": -12.0}
+    assert racing(MOST_RUNS + 1, **hopes) == []
+    assert racing(MOST_RUNS + 1, records=2, **hopes) == ["near"]
 
 
 def test_steps_of_sensitivities_grow_with_what_is_there(plant):
