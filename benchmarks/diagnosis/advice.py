@@ -98,7 +98,7 @@ def _measured(case: Case) -> Result:
         return {**found, "skipped": "nothing else was fitted"}
     best = {name: view.discrimination() for name, view in outlooks(work.problem, pair)}
     if not best:
-        return {**found, "skipped": "no trial of the library can be run with both"}
+        return {**found, "skipped": "no trial of the library stays at safe depths with both"}
     found |= {"rival": " + ".join(pair[1].ids) or "none", "library": max(best.values()),
               "able": max(best, key=lambda name: best[name])}  # fmt: skip
     advice = next_trial(work.problem, pair, seed=case.index)

@@ -169,7 +169,9 @@ def _advice(results: Sequence[Result]) -> str:
         "truth : both, afterwards",
     ]
     share = f"**{len(good)} of {len(able)}** pairs that a trial of the library can decide are decided (target: 80 %)."
-    return f"## The next trial\n\n{ADVICE_WORDS}\n\n{share}\n\n" + _table(header, body)
+    left = [f"{one['index']} ({one['skipped']})" for one in results if "skipped" in one]
+    told = f"\n\nNot counted: {', '.join(left)}." if left else ""
+    return f"## The next trial\n\n{ADVICE_WORDS}\n\n{share}\n\n" + _table(header, body) + told
 
 
 def _times(results: Sequence[Result], alone: Sequence[Row]) -> str:

@@ -20,7 +20,7 @@ seeds 1 to 23 before the first of them was drawn. {versions} What was said of ea
   the first run, with segments of 25 or 12.5 cm, that differs from one with twice of that by less than {same:g}
   squared noise levels. Where slack cable jerks taut there may be no such run, and so no one truth: {dropped} draws,
   made again, in {redrawn} cases; in {heavy} of these a heavy drum is hidden.
-  Heavy drums are hidden on `fig6` only: none of 20 draws of one on `rich` had a truth.
+  Heavy drums are hidden on `fig6` only: none of 20 draws of a pair with one on `rich` had a truth.
 * **Every** parameter of the catalogue and of the start is drawn from its tolerance (a half normal distribution where
   only one side is possible), in healthy records too. Hidden effects have 0.6 to 1.8 effect scales and at least 5
   tolerances, either sign where there is room, every effect in turn.
