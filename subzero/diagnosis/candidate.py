@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import norm
 
+from subzero.diagnosis.entries import Entry
 from subzero.diagnosis.evidence import KAPPAS, Scale, Scales, log_sum, posterior
 from subzero.diagnosis.hypotheses import Ids, log_prior, named, variances
-from subzero.diagnosis.problem import Entry, Problem
+from subzero.diagnosis.problem import Problem
 from subzero.diagnosis.refit import Fit
 
 MOST_HOPE = 300.0

@@ -11,8 +11,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from subzero.diagnosis.entries import Entry
 from subzero.diagnosis.hypotheses import named, places
-from subzero.diagnosis.problem import Entry, Problem
+from subzero.diagnosis.problem import Problem
 from subzero.diagnosis.verdict import Detectability
 
 WEAK = 1.0

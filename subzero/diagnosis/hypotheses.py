@@ -7,7 +7,8 @@ from itertools import combinations
 
 import numpy as np
 
-from subzero.diagnosis.problem import Entry, Problem
+from subzero.diagnosis.entries import Entry
+from subzero.diagnosis.problem import Problem
 
 Ids = tuple[str, ...]
 """The causes of a hypothesis, in the order of the alphabet; () is "nothing is wrong"."""

@@ -17,9 +17,10 @@ import numpy as np
 
 from subzero.diagnosis.effects import START
 from subzero.diagnosis.effects.sensors import NOISE
+from subzero.diagnosis.entries import entries_of
 from subzero.diagnosis.evidence import posterior
 from subzero.diagnosis.noise import Noise
-from subzero.diagnosis.problem import Observed, Problem, entries_of
+from subzero.diagnosis.problem import Observed, Problem
 from subzero.diagnosis.refit import Fit
 from subzero.diagnosis.response import economical
 from subzero.diagnosis.setting import Setting

@@ -10,9 +10,10 @@ import numpy as np
 from subzero.diagnosis.effect import Effect
 from subzero.diagnosis.effects import START, catalogue
 from subzero.diagnosis.effects.sensors import SPECS
+from subzero.diagnosis.entries import entries_of
 from subzero.diagnosis.logged import Logged
 from subzero.diagnosis.noise import Noise, estimate
-from subzero.diagnosis.problem import Observed, Problem, entries_of
+from subzero.diagnosis.problem import Observed, Problem
 from subzero.diagnosis.response import economical, finer, respond
 from subzero.errors import UserError
 

@@ -10,11 +10,11 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import cached_property
 from os import cpu_count
-from typing import NamedTuple
 
 import numpy as np
 
-from subzero.diagnosis.effect import Effect, Parameter
+from subzero.diagnosis.effect import Effect
+from subzero.diagnosis.entries import Entry, grouped
 from subzero.diagnosis.kept_runs import KeptRuns
 from subzero.diagnosis.noise import Noise
 from subzero.diagnosis.response import TRUTHS, sensed
@@ -29,25 +29,6 @@ LATE = ("sensors", "clock")
 """Slots that act on a finished run."""
 Job = tuple[int, np.ndarray, Stop | None]
 """A run to be made: of a record, with deviations, from a stop on if there is one."""
-
-
-class Entry(NamedTuple):
-    """A number of z: a parameter of an effect; of one record only, for a start (else −1)."""
-
-    effect: Effect
-    place: int
-    record: int
-
-    @property
-    def parameter(self) -> Parameter:
-        """The parameter."""
-        return self.effect.parameters[self.place]
-
-    @property
-    def name(self) -> str:
-        """The parameter's name, unique."""
-        where = f"@{self.record}" if self.record >= 0 else ""
-        return f"{self.effect.id}.{self.parameter.name}{where}"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -91,7 +72,7 @@ class Problem:
 
     @cached_property
     def _groups(self) -> list[tuple[Effect, list[int], int]]:
-        return _grouped(self.entries)
+        return grouped(self.entries)
 
     def residual(self, z: np.ndarray) -> np.ndarray:
         """Return r(z) (m,); NaN if a run could not go on."""
@@ -184,26 +165,6 @@ class Problem:
             values = np.interp(earlier, grid, shown)
             parts.append(noise.whiten(seen.values[channel] - values if measured else values))
         return np.concatenate(parts)
-
-
-def _grouped(entries: tuple[Entry, ...]) -> list[tuple[Effect, list[int], int]]:
-    """Return (effect, its places in z, its record), in order."""
-    found: dict[tuple[str, int], tuple[Effect, list[int], int]] = {}
-    for k, entry in enumerate(entries):
-        found.setdefault((entry.effect.id, entry.record), (entry.effect, [], entry.record))[1].append(k)
-    return list(found.values())
-
-
-def entries_of(effects: Sequence[Effect], start: Sequence[Effect], records: int) -> tuple[Entry, ...]:
-    """Return the entries of z: effects that all records share, and the start of each record."""
-    shared = [Entry(effect, i, -1) for effect in effects for i in range(len(effect.parameters))]
-    own = [
-        Entry(effect, i, record)
-        for record in range(records)
-        for effect in start
-        for i in range(len(effect.parameters))
-    ]
-    return (*shared, *own)
 
 
 Progress = Callable[[float, str], None]

@@ -12,8 +12,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from subzero.diagnosis.entries import Entry
 from subzero.diagnosis.hypotheses import Ids, places
-from subzero.diagnosis.problem import Entry
 from subzero.diagnosis.verdict import CAUSE_NAMED, NOTHING_WRONG, OUTSIDE, UNDECIDED
 
 NAMED, HEALTHY, FOREIGN, SET = 0.8, 0.5, 0.8, 0.95

@@ -13,9 +13,10 @@ import numpy as np
 
 from subzero.diagnosis.candidate import possible
 from subzero.diagnosis.effect import Parameter
+from subzero.diagnosis.entries import Entry
 from subzero.diagnosis.evidence import KAPPAS, Posterior, Quadratic, freed, log_sum, posterior
 from subzero.diagnosis.hypotheses import Ids, compatible, log_prior, named, places, variances
-from subzero.diagnosis.problem import Entry, Problem
+from subzero.diagnosis.problem import Problem
 from subzero.diagnosis.refit import Fit
 
 FAR = 1.08

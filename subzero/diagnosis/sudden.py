@@ -15,9 +15,10 @@ from functools import partial
 import numpy as np
 
 from subzero.diagnosis.effect import Effect
+from subzero.diagnosis.entries import Entry
 from subzero.diagnosis.evidence import Scales, mixed
 from subzero.diagnosis.latent import Seen, seen
-from subzero.diagnosis.problem import Entry, Problem
+from subzero.diagnosis.problem import Problem
 from subzero.diagnosis.refit import Fit
 from subzero.diagnosis.setting import Setting
 from subzero.diagnosis.tracked import Stop, Track, on_from, tracked, with_stops

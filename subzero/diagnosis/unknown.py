@@ -18,6 +18,7 @@ import numpy as np
 
 from subzero.diagnosis.effect import Effect, Parameter
 from subzero.diagnosis.effects.sensors import SPECS
+from subzero.diagnosis.entries import Entry
 from subzero.diagnosis.evidence import Scales, log_sum, mixed
 from subzero.diagnosis.latent import (
     SHARES,
@@ -27,7 +28,7 @@ from subzero.diagnosis.latent import (
     log_evidence_term,
     seen,
 )
-from subzero.diagnosis.problem import Entry, Problem
+from subzero.diagnosis.problem import Problem
 from subzero.diagnosis.refit import Fit
 from subzero.diagnosis.setting import Setting
 from subzero.missing_force import AXES, MissingForce

@@ -9,9 +9,10 @@ import pytest
 import subzero
 from subzero.diagnosis import effects
 from subzero.diagnosis.effects.sensors import NOISE
+from subzero.diagnosis.entries import entries_of
 from subzero.diagnosis.hypotheses import variances
 from subzero.diagnosis.noise import Noise
-from subzero.diagnosis.problem import Observed, Problem, entries_of
+from subzero.diagnosis.problem import Observed, Problem
 from subzero.diagnosis.refit import Fit, refit
 from subzero.diagnosis.response import economical, respond
 from subzero.diagnosis.setting import Setting

@@ -18,10 +18,11 @@ from subzero.diagnosis import effects
 from subzero.diagnosis import tracked as tracks
 from subzero.diagnosis.detect import separation
 from subzero.diagnosis.effects.sensors import NOISE
+from subzero.diagnosis.entries import entries_of
 from subzero.diagnosis.evidence import Quadratic, freed, posterior
 from subzero.diagnosis.hypotheses import places
 from subzero.diagnosis.noise import Noise, estimate, spikes
-from subzero.diagnosis.problem import Observed, Problem, entries_of
+from subzero.diagnosis.problem import Observed, Problem
 from subzero.diagnosis.refit import quadratic_step
 from subzero.diagnosis.response import TRUTHS, economical, respond
 from subzero.diagnosis.setting import Setting

@@ -10,8 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from subzero.diagnosis import search as searching
-from subzero.diagnosis import wide
+from subzero.diagnosis import growing, wide
 from subzero.diagnosis.around import beside, swept
 from subzero.diagnosis.candidate import Candidate, candidate_of
 from subzero.diagnosis.effects import catalogue
@@ -164,7 +163,7 @@ def test_a_pair_is_looked_for_beside_what_is_not_the_best(monkeypatch):
         "right": {("other", "right"): -41.0},
         "other": {("other", "right"): -44.0, ("other", "wrong"): -51.0},
     }
-    monkeypatch.setattr(searching, "beside", lambda problem, one: found.get(one.ids[0], {}))
+    monkeypatch.setattr(growing, "beside", lambda problem, one: found.get(one.ids[0], {}))
     monkeypatch.setattr(search, "fit", lambda ids, start: fits.setdefault(ids, start))
     search._aside_of(search.best())
     assert fits == {("other", "right"): "right"}, "from the better of the two; not what is behind the best"

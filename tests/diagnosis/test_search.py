@@ -17,10 +17,11 @@ from subzero.diagnosis.around import instead
 from subzero.diagnosis.candidate import Candidate
 from subzero.diagnosis.effect import Parameter
 from subzero.diagnosis.effects import START, catalogue
+from subzero.diagnosis.entries import entries_of
 from subzero.diagnosis.fits import HOPELESS, MOST_RUNS
 from subzero.diagnosis.hypotheses import log_prior, named, places
 from subzero.diagnosis.probability import FURTHER, UNTRIED, Beliefs, folded
-from subzero.diagnosis.problem import SHARE, STEP, Problem, entries_of
+from subzero.diagnosis.problem import SHARE, STEP, Problem
 from subzero.diagnosis.refit import secant
 from subzero.diagnosis.rules import large
 from subzero.diagnosis.screen import MANY, STRAINED, Screen, is_close, look

@@ -12,11 +12,12 @@ from numpy.testing import assert_allclose
 from subzero.diagnosis.candidate import Candidate
 from subzero.diagnosis.detect import detectability, with_secants
 from subzero.diagnosis.effects import START, catalogue
+from subzero.diagnosis.entries import entries_of
 from subzero.diagnosis.estimates import deviations
 from subzero.diagnosis.evidence import Quadratic, posterior
 from subzero.diagnosis.hypotheses import variances
 from subzero.diagnosis.noise import Noise
-from subzero.diagnosis.problem import Observed, Problem, entries_of
+from subzero.diagnosis.problem import Observed, Problem
 from subzero.diagnosis.response import respond
 from subzero.diagnosis.tables import detectable
 

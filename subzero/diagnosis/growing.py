@@ -1,0 +1,108 @@
+"""Growing: what is beside the best candidate, in the place of its causes, and below it, until the best stays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from subzero.diagnosis.around import Tried, beside, instead, swept
+from subzero.diagnosis.candidate import Candidate, candidate_of
+from subzero.diagnosis.hypotheses import Ids, variances
+from subzero.diagnosis.refit import Fit, refit
+from subzero.diagnosis.sharp import SharpFits
+from subzero.diagnosis.straight import straightened
+
+BESIDE, INSTEAD, WORTH = 2, 3, -4.0
+"""At most so many with a cause more, of a log posterior that adds at least WORTH; so many with another cause."""
+ASTRAY = 6.0
+"""A fit with so much less log posterior than the linear problem at another promises may have gone astray."""
+MOST_CAUSES, ROUNDS = 3, 4
+"""Causes of a hypothesis, and rounds of growing."""
+
+
+@dataclass(kw_only=True, eq=False)
+class GrowingFits(SharpFits):
+    """Fits that more are made around.
+
+    Attributes:
+        beside: hypothesis → log posterior, estimated at the fit of one with a cause less.
+    """
+
+    beside: dict[Ids, float] = field(default_factory=dict)
+
+    def grow(self) -> None:
+        """Look beside the best candidate for one more cause, in the place of each for another, and below it for one
+        less, until the best stays.
+        """
+        looked: set[Ids] = set()
+        for _ in range(ROUNDS):
+            best = self.best()
+            if best.ids in looked:
+                return
+            looked.add(best.ids)
+            self._say(0.7, "a further cause beside", best.ids)
+            self.fit_all(self._more(best) if len(best.ids) < MOST_CAUSES else [], best.fit)
+            for without in best.ids:
+                self._without(best, without)
+            self._aside_of(best)
+            self._kinked(best)
+            self._straighten(best)
+            self.race(2, 2.0)
+            self.cross()
+            self.sharpen()
+
+    def _more(self, best: Candidate) -> list[Ids]:
+        """Return the hypotheses with one cause more that the linear problem at the best fit finds best."""
+        found = self._unknown(beside(self.problem, best))
+        self.beside |= found
+        ranked = sorted(found, key=lambda ids: -found[ids])[:BESIDE]
+        return [ids for ids in ranked if found[ids] > best.log_posterior + WORTH]
+
+    def _without(self, best: Candidate, without: str) -> None:
+        """Fit the best hypothesis without one of its causes, and with others in its place."""
+        rest = tuple(one for one in best.ids if one != without)
+        self._below(rest, best.fit)
+        found = self._unknown(instead(self.problem, best, rest))
+        self.fit_all(sorted(found, key=lambda ids: -found[ids])[:INSTEAD], best.fit)
+
+    def _aside_of(self, best: Candidate) -> None:
+        """Fit what comes out best beside the other candidates, if the linear problem there has it before the best: a
+        right pair may be far from a wrong cause that is as good as any by itself.
+        """
+        found: dict[Ids, tuple[float, Fit]] = {}
+        for one in self.candidates.values():
+            if one is not best and len(one.ids) < MOST_CAUSES:
+                for ids, log in self._unknown(beside(self.problem, one)).items():
+                    if log > max(best.log_posterior, found.get(ids, (-np.inf,))[0]):
+                        found[ids] = log, one.fit
+        for ids in sorted(found, key=lambda ids: -found[ids][0])[:BESIDE]:
+            self.fit(ids, found[ids][1])
+
+    def _kinked(self, best: Candidate) -> None:
+        """Fit causes that runs have kinks in beside the best, or in the place of one of its causes."""
+        found = dict[Ids, Tried]()
+        rests = [tuple(one for one in best.ids if one != without) for without in best.ids]
+        for rest in [best.ids, *rests] if len(best.ids) < MOST_CAUSES else rests:
+            for ids, one in swept(self.problem, best, rest).items():
+                if ids not in found or one.log_posterior > found[ids].log_posterior:
+                    found[ids] = one
+        new = self._unknown({ids: one.log_posterior for ids, one in found.items() if ids != best.ids})
+        for ids in sorted(new, key=lambda ids: -new[ids])[:BESIDE]:
+            if new[ids] > best.log_posterior + WORTH:
+                D = variances(self.problem.entries, ids, best.kappa)
+                fit = refit(self.problem, found[ids].z, found[ids].J, D, most_fresh=0)
+                self._take(candidate_of(self.problem, ids, fit))
+
+    def _straighten(self, best: Candidate) -> None:
+        """Fit the best candidate, and it without one of its causes, from the smooth side of their kinks."""
+        rests = [tuple(one for one in best.ids if one != without) for without in best.ids]
+        for ids in [best.ids, *rests]:
+            fit, D = self.candidates[ids].fit, variances(self.problem.entries, ids, 1.0)
+            if found := straightened(self.problem, fit, ids, D):
+                self._take(candidate_of(self.problem, ids, found))
+
+    def _unknown(self, found: dict[Ids, float]) -> dict[Ids, float]:
+        """Return those of estimated log posteriors that no fit is known of, or only one that went astray from afar."""
+        known = {ids: one.log_posterior for ids, one in self.candidates.items()}
+        return {ids: log for ids, log in found.items() if known.get(ids, -np.inf) < log - ASTRAY}
