@@ -13,9 +13,9 @@ import numpy as np
 from subzero.diagnosis.candidate import Candidate
 from subzero.diagnosis.evidence import KAPPAS, Quadratic, posterior
 from subzero.diagnosis.hypotheses import Ids, log_prior, named, variances
+from subzero.diagnosis.kinks import kinked
 from subzero.diagnosis.problem import Problem
 from subzero.diagnosis.screen import linear, mixed_evidence, sizes
-from subzero.diagnosis.straight import kinked
 
 
 def beside(problem: Problem, one: Candidate) -> dict[Ids, float]:

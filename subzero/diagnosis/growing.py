@@ -9,9 +9,9 @@ import numpy as np
 from subzero.diagnosis.around import Tried, beside, instead, swept
 from subzero.diagnosis.candidate import Candidate, candidate_of
 from subzero.diagnosis.hypotheses import Ids, variances
+from subzero.diagnosis.kinks import begun_again, strayed
 from subzero.diagnosis.refit import Fit, refit
 from subzero.diagnosis.sharp import SharpFits
-from subzero.diagnosis.straight import straightened
 
 BESIDE, INSTEAD, WORTH = 2, 3, -4.0
 """At most so many with a cause more, of a log posterior that adds at least WORTH; so many with another cause."""
@@ -27,9 +27,11 @@ class GrowingFits(SharpFits):
 
     Attributes:
         beside: hypothesis → log posterior, estimated at the fit of one with a cause less.
+        begun: hypotheses that were fitted from off their kinks.
     """
 
     beside: dict[Ids, float] = field(default_factory=dict)
+    begun: set[Ids] = field(default_factory=set)
 
     def grow(self) -> None:
         """Look beside the best candidate for one more cause, in the place of each for another, and below it for one
@@ -37,7 +39,7 @@ class GrowingFits(SharpFits):
         """
         looked: set[Ids] = set()
         for _ in range(ROUNDS):
-            best = self.best()
+            best = self.begin_again(self.best())
             if best.ids in looked:
                 return
             looked.add(best.ids)
@@ -47,7 +49,7 @@ class GrowingFits(SharpFits):
                 self._without(best, without)
             self._aside_of(best)
             self._kinked(best)
-            self._straighten(best)
+            self._parts_again(best)
             self.race(2, 2.0)
             self.cross()
             self.sharpen()
@@ -94,13 +96,21 @@ class GrowingFits(SharpFits):
                 fit = refit(self.problem, found[ids].z, found[ids].J, D, most_fresh=0)
                 self._take(candidate_of(self.problem, ids, fit))
 
-    def _straighten(self, best: Candidate) -> None:
-        """Fit the best candidate, and it without one of its causes, from the smooth side of their kinks."""
-        rests = [tuple(one for one in best.ids if one != without) for without in best.ids]
-        for ids in [best.ids, *rests]:
+    def begin_again(self, one: Candidate) -> Candidate:
+        """Fit a candidate from off its kinks, once, and return what is best then."""
+        if one.ids not in self.begun:
+            self.begun.add(one.ids)
+            D = variances(self.problem.entries, one.ids, one.kappa)
+            self._take(candidate_of(self.problem, one.ids, begun_again(self.problem, one.fit, one.ids, D)))
+        return self.best()
+
+    def _parts_again(self, best: Candidate) -> None:
+        """Fit the best candidate without one of its causes from off its kinks, where that went astray."""
+        for without in best.ids:
+            ids = tuple(one for one in best.ids if one != without)
             fit, D = self.candidates[ids].fit, variances(self.problem.entries, ids, 1.0)
-            if found := straightened(self.problem, fit, ids, D):
-                self._take(candidate_of(self.problem, ids, found))
+            if strayed(self.problem, fit, ids):
+                self._take(candidate_of(self.problem, ids, begun_again(self.problem, fit, ids, D)))
 
     def _unknown(self, found: dict[Ids, float]) -> dict[Ids, float]:
         """Return those of estimated log posteriors that no fit is known of, or only one that went astray from afar."""

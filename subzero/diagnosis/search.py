@@ -25,10 +25,14 @@ BENT, LEAST_BENT = 2, 10.0
 """So many causes that the wide fit bends by at least so many tolerances are fitted by themselves."""
 SWEPT = 4
 """So many causes are fitted by themselves if the wide fit is not close."""
-LAST, NEARER = 3, 1.0
-"""Rounds of settling; so close, in tolerances, the sensitivities of what is told were made."""
+FIRST, LAST, NEARER = 3, 3, 1.0
+"""So many are fitted from off their kinks; rounds of settling; so close, in tolerances, the sensitivities of what is
+told were made.
+"""
 RIVALS, CLOSE = 2.0, 6.0
-"""What is so close to the best in log posterior is settled, too; what has a cause more or less, from farther behind."""
+"""What is so close to the best in log posterior is settled, too; what has a cause more or less, from farther behind;
+the first within CLOSE are fitted from off their kinks, too.
+"""
 
 
 @dataclass(kw_only=True, eq=False)
@@ -68,6 +72,7 @@ class Search(GrowingFits):
         """Fit the best candidate again until it has settled, so that its numbers can be told, and what might still
         catch up with it; then its rivals from where it is.
         """
+        self._once_more()
         stuck: set[Ids] = set()
         for _ in range(LAST):
             best = self.best()
@@ -80,6 +85,13 @@ class Search(GrowingFits):
                     stuck.add(one.ids)
         self.cross()
         self._nothing()
+
+    def _once_more(self) -> None:
+        """Fit the first candidates from off their kinks, if they are close to the best."""
+        for ids in self._ranked()[:FIRST]:
+            if self.candidates[ids].log_posterior > self.best().log_posterior - CLOSE:
+                self._say(0.75, "once more", ids)
+                self.begin_again(self.candidates[ids])
 
     def _is_open(self, one: Candidate, best: Candidate) -> bool:
         """Say whether a candidate that is as good as the best, or might still catch up with it, has not settled."""

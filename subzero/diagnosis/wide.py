@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from subzero.diagnosis.hypotheses import variances
+from subzero.diagnosis.kinks import begun_again, strayed
 from subzero.diagnosis.pose import with_noise_behind
 from subzero.diagnosis.problem import Problem, Progress
 from subzero.diagnosis.refit import Fit, refit
-from subzero.diagnosis.straight import straightened
 
 WIDE = 4.0
 """κ of the fit that the linear evidence is made at."""
@@ -34,8 +34,10 @@ def fit_wide(problem: Problem, progress: Progress) -> tuple[Problem, Fit, Nomina
 
 
 def _from(problem: Problem, z: np.ndarray, J: np.ndarray, progress: Progress) -> Fit:
-    """Return the fit from z, with the sensitivities there; or from the smooth side of its kinks, if that is better."""
+    """Return the fit from z, with the sensitivities there; or if it went astray, a better one from off its kinks."""
     progress(0.15, "fit within wide tolerances")
     fit = refit(problem, z, J, variances(problem.entries, (), WIDE), most_fresh=2, made_at=z)
-    straight = straightened(problem, fit, ())
-    return straight if straight and straight.objective < fit.objective else fit
+    if not strayed(problem, fit, ()):
+        return fit
+    again = begun_again(problem, fit, ())
+    return again if again.objective < fit.objective else fit

@@ -1,7 +1,8 @@
 """Where a drum stops, a cable falls slack or a gear has play, runs have kinks, and slopes say little.
 
 Verifies: a fit goes on beside a kink; causes without a slope are found by real runs at some sizes; a fit that ended in
-a hollow is made again from where its rival is; a pair is found beside a cause that is not the best by itself.
+a hollow is made again from where its rival is, or from off its kinks; a pair is found beside a cause that is not the
+best by itself.
 """
 
 import dataclasses
@@ -10,15 +11,16 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from subzero.diagnosis import growing, wide
+from subzero.diagnosis import growing, kinks, wide
+from subzero.diagnosis import search as searching
 from subzero.diagnosis.around import beside, swept
 from subzero.diagnosis.candidate import Candidate, candidate_of
 from subzero.diagnosis.effects import catalogue
 from subzero.diagnosis.fits import HOPELESS
 from subzero.diagnosis.hypotheses import places, variances
+from subzero.diagnosis.kinks import STRAYED, TYPICAL, begun_again, kinked, strayed
 from subzero.diagnosis.refit import Fit, refit, with_own_slopes
 from subzero.diagnosis.search import Search
-from subzero.diagnosis.straight import straightened
 
 SLACK, DRUM = ("cable_initial_length",), ("drum_inertia",)
 DRUM_TOLERANCE = 0.2
@@ -86,7 +88,7 @@ def test_a_fit_in_a_hollow_is_made_again_from_where_its_rival_is(plant):
     assert search.candidates[ids].log_posterior == pytest.approx(good.log_posterior, abs=0.3)
 
 
-def strayed(problem):
+def astray(problem):
     """Return a fit of "nothing is wrong" that a heavy drum has led astray."""
     z = np.zeros(len(problem.entries))
     z[places(problem.entries, DRUM)] = 5.0 * DRUM_TOLERANCE
@@ -95,23 +97,52 @@ def strayed(problem):
     return Fit(z=z, r=r, J=J, D=D, objective=objective, converged=False, promise=0.0, fresh=0)
 
 
-def test_a_fit_astray_is_begun_again_where_nothing_with_kinks_is_bent(plant):
+def test_a_fit_that_bends_a_kink_far_has_gone_astray(plant):
     problem = plant(duration=8.0).problem
-    fit, D = strayed(problem), variances(problem.entries, (), 1.0)
-    straight = straightened(problem, fit, (), D)
-    assert straight.objective < fit.objective
-    assert straight.z[places(problem.entries, DRUM)] < 2.0 * DRUM_TOLERANCE
-    assert straightened(problem, straight, (), D) is None, "nothing is bent any more"
-    assert straightened(problem, fit, DRUM) is None, "a cause may be as large as it is"
+    fit, (k,) = astray(problem), places(problem.entries, DRUM)
+    assert strayed(problem, fit, ())
+    assert not strayed(problem, fit, DRUM), "a cause may be as large as it is"
+    for bent, far in ((0.9, False), (1.1, True)):
+        fit.z[k] = bent * STRAYED * DRUM_TOLERANCE
+        assert strayed(problem, fit, ()) is far
+
+
+def test_a_fit_astray_is_begun_again_from_a_usual_drum(plant):
+    problem = plant(duration=8.0).problem
+    fit, D = astray(problem), variances(problem.entries, (), 1.0)
+    again = begun_again(problem, fit, (), D)
+    assert again.objective < fit.objective
+    assert not strayed(problem, again, ())
+
+
+@pytest.mark.parametrize("ids", [(), DRUM, ("hull_drag",)])
+def test_a_fit_is_begun_again_off_its_kinks_and_where_all_else_is_best_for_that(plant, monkeypatch, ids):
+    """Best in the linear problem: the slope of the objective is 0 in all that is neither held nor at a bound."""
+    problem, begins = plant(duration=8.0).problem, []
+    fit, D = astray(problem), variances(problem.entries, ids, 1.0)
+    monkeypatch.setattr(kinks, "refit", lambda problem, z, *others, **more: begins.append(z))
+    begun_again(problem, fit, ids, D)
+    (z,), at = begins, kinked(problem, ids)
+    tolerance = np.array([entry.parameter.tolerance for entry in problem.entries])
+    assert {"drum_friction", "cable_initial_length"} <= {problem.entries[k].effect.id for k in at}
+    assert ("drum_inertia" in {problem.entries[k].effect.id for k in at}) is (ids != DRUM)
+    assert z[at] == pytest.approx(TYPICAL * tolerance[at])
+    slope = fit.J.T @ (fit.r - fit.J @ (z - fit.z)) - z / D
+    free = [k for k, entry in enumerate(problem.entries)
+            if k not in at and entry.parameter.low < z[k] < entry.parameter.high]  # fmt: skip
+    assert len(free) > 20
+    assert slope[free] * tolerance[free] == pytest.approx(
+        0.0, abs=1e-6 * np.abs(fit.J.T @ fit.r * tolerance).max()
+    )
 
 
 def test_a_fit_is_begun_again_within_bounds(plant):
     """What the linear problem makes of a record that nothing fits: less than no drag, which cannot be run."""
     problem = plant(duration=8.0).problem
-    fit, (k,) = strayed(problem), places(problem.entries, ("cable_normal_drag",))
+    fit, (k,) = astray(problem), places(problem.entries, ("cable_normal_drag",))
     fit = dataclasses.replace(fit, r=fit.r - 1e4 * fit.J[:, k])
-    straight = straightened(problem, fit, ())
-    assert straight.z[k] >= problem.entries[k].parameter.low
+    again = begun_again(problem, fit, ())
+    assert again.z[k] >= problem.entries[k].parameter.low
 
 
 @pytest.mark.parametrize(("away", "same"), [(0.0, True), (0.9, True), (1.1, False), (None, False)])
@@ -128,18 +159,56 @@ def test_sensitivities_are_made_again_where_a_fit_has_moved(plant, away, same):
 
 def test_the_wide_fit_comes_back_from_astray(plant, monkeypatch):
     problem = plant(duration=8.0).problem
-    monkeypatch.setattr(wide, "refit", lambda problem, *others, **more: strayed(problem))
+    monkeypatch.setattr(wide, "refit", lambda problem, *others, **more: astray(problem))
     _, fit, _ = wide.fit_wide(problem, lambda share, words: None)
     assert fit.z[places(problem.entries, DRUM)] < 2.0 * DRUM_TOLERANCE
 
 
-@pytest.mark.parametrize("ids", [(), DRUM])
-def test_the_best_comes_back_from_astray_and_so_does_it_without_its_cause(plant, ids):
+def test_the_best_comes_back_from_astray_before_it_is_looked_beside_and_so_does_it_without_its_cause(plant):
     search = begun(plant(duration=8.0))
-    astray = candidate_of(search.problem, (), strayed(search.problem))
-    search.candidates = {(): astray, ids: candidate_of(search.problem, ids, astray.fit)}
-    search._straighten(search.candidates[ids])
-    assert search.candidates[()].log_posterior > astray.log_posterior + 5.0
+    lost = candidate_of(search.problem, (), astray(search.problem))
+    search.candidates = {(): lost}
+    assert search.begin_again(lost).log_posterior > lost.log_posterior + 5.0
+    search.candidates = {(): lost, DRUM: candidate_of(search.problem, DRUM, lost.fit)}
+    search._parts_again(search.candidates[DRUM])
+    assert search.candidates[()].log_posterior > lost.log_posterior + 5.0
+
+
+def test_growing_looks_beside_what_is_best_off_its_kinks(monkeypatch):
+    """... and each hypothesis is fitted from there once."""
+    level = dict.fromkeys((1.0, 2.0, 4.0), 0.0)
+    search, looked, made = (
+        Search(problem=SimpleNamespace(entries=()), progress=lambda share, words: None),
+        [],
+        [],
+    )
+    search.candidates = {ids: Candidate(ids=ids, fit=None, log_evidence=level, log_posterior=log)
+                         for ids, log in ((("a",), -10.0), (("b",), -12.0))}  # fmt: skip
+
+    def again(problem, ids, fit):
+        made.append(ids)
+        return Candidate(ids=ids, fit=fit, log_evidence=level, log_posterior=-5.0)
+
+    monkeypatch.setattr(growing, "begun_again", lambda *asked: "again")
+    monkeypatch.setattr(growing, "candidate_of", again)
+    monkeypatch.setattr(search, "_more", lambda best: looked.append((best.ids, best.log_posterior)) or [])
+    for name in ("_without", "_aside_of", "_kinked", "_parts_again", "race", "cross", "sharpen"):
+        monkeypatch.setattr(search, name, lambda *asked: None)
+    search.grow()
+    assert (looked, made) == ([(("a",), -5.0)], [("a",)])
+
+
+def test_the_first_that_are_close_are_fitted_from_off_their_kinks_before_they_are_told(monkeypatch):
+    search, again = Search(problem=None, progress=lambda share, words: None), []
+    for name, log in zip("abcde", (-10.0, -11.0, -15.9, -10.5, -17.0), strict=True):
+        search.candidates[(name,)] = Candidate(ids=(name,), fit=None, log_evidence={}, log_posterior=log)
+    monkeypatch.setattr(search, "begin_again", lambda one: again.append(one.ids[0]))
+    search._once_more()
+    assert again == ["a", "d", "b"], f"the first {searching.FIRST}"
+    again.clear()
+    search.candidates = {ids: one for ids, one in search.candidates.items() if ids[0] in "ace"}
+    search._once_more()
+    assert again == ["a", "c"], "no more than 6 behind"
 
 
 def test_the_best_gets_the_chances_of_its_rivals_too(plant):
