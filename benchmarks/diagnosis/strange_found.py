@@ -12,6 +12,7 @@ from subzero.missing_force import AXES, history_at
 from .cases import Made
 
 FIRST = 2
+"""Of the features, by their probability to belong to the formula."""
 
 
 def judged(made: Made, verdict: Verdict) -> dict[str, Any]:
@@ -22,7 +23,7 @@ def judged(made: Made, verdict: Verdict) -> dict[str, Any]:
                              "features": list(strange.features)}  # fmt: skip
     if unknown is None:
         return found
-    found["first"] = [feature for _, feature, *_ in unknown.formula][:FIRST]
+    found["first"] = list(unknown.features)[:FIRST]
     if unknown.axis == strange.axis and not strange.features:
         found["rms"] = _off(made, unknown)
     return found

@@ -26,6 +26,8 @@ from subzero.diagnosis.work import Work
 
 SURVIVORS = 4
 """At most so many hypotheses are to be told apart by the next trial."""
+MENTIONED = 0.01
+"""Features that are less probable in a formula are not mentioned."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -82,7 +84,8 @@ def _told(unknown: Unknown, formula: Formula) -> Unknown:
     times = samples_of(float(unknown.time[-1]))
     columns = np.column_stack([shape.columns for shape in formula.shapes])
     band = np.sqrt(np.maximum(np.sum(columns @ formula.covariance * columns, axis=1), 0.0))
-    return replace(unknown, time=times, force=formula.force(), band=band, formula=formula.terms())
+    return replace(unknown, time=times, force=formula.force(), band=band, formula=formula.terms(),
+                   features={one: p for one, p in formula.features.items() if p >= MENTIONED})  # fmt: skip
 
 
 def _recovered(work: Work, foreign: Foreign) -> Recovered:

@@ -109,7 +109,8 @@ def _unknown(verdict: Verdict) -> dict[str, Any] | None:
     names = ("words", "feature", "coefficient", "low", "high")
     return {"axis": one.axis, "unit": "N" if one.axis in "XYZ" else "N m", "time_s": one.time.tolist(),
             "force": one.force.tolist(), "band": one.band.tolist(),
-            "formula": [dict(zip(names, term, strict=True)) for term in one.formula]}  # fmt: skip
+            "formula": [dict(zip(names, term, strict=True)) for term in one.formula],
+            "features": dict(one.features)}  # fmt: skip
 
 
 def _extended(verdict: Verdict) -> dict[str, Any]:

@@ -204,6 +204,7 @@ class Unknown:
         force: body axes. [N, N m]
         band: its standard deviation. [N, N m]
         formula: terms in words with coefficient and interval: (words, feature, coefficient, low, high).
+        features: feature → probability that it belongs to the formula, most probable first.
     """
 
     axis: str
@@ -211,6 +212,7 @@ class Unknown:
     force: np.ndarray
     band: np.ndarray
     formula: tuple[tuple[str, str, float, float, float], ...] = ()
+    features: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, kw_only=True)

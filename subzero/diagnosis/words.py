@@ -29,6 +29,8 @@ NOTHING = "–"
 
 MOST = 5
 """So many explanations are named in a sentence."""
+INSTEAD = 0.1
+"""A feature that is as probable in a formula, and not in the one that is told, is told too."""
 
 
 def number(value: float, unit: str = "") -> str:
@@ -105,7 +107,19 @@ def unknown(one: Unknown) -> str:
     )
     if not one.formula:
         return what
-    return f"{what} It looks like {' + '.join(formula_term(term) for term in one.formula)}."
+    return f"{what} It looks like {' + '.join(formula_term(term) for term in one.formula)}.{_other_features(one)}"
+
+
+def _other_features(one: Unknown) -> str:
+    """Return what may be in the formula instead, in words; empty if nothing is as probable as that."""
+    told = {feature for _, feature, *_ in one.formula}
+    others = [f"{name} ({_described(name)}; probability {p:.2f})" for name, p in one.features.items()
+              if name not in told and p >= INSTEAD]  # fmt: skip
+    return f" What is not ruled out: {', '.join(others)}." if others else ""
+
+
+def _described(feature: str) -> str:
+    return FEATURES[feature].words if feature in FEATURES else "an oscillation of its own"
 
 
 def formula_term(term: tuple[str, str, float, float, float]) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import math
 
@@ -106,7 +107,8 @@ FORCE = Verdict(
     sentence="A force along X that no catalogued effect explains.",
     unknown=Unknown(axis="X", time=TIME[::20], force=-0.5 / (1 + np.exp(-(TIME[::20] - 12) / 0.8)),
                     band=np.full(16, 0.05),
-                    formula=(("the square of the speed through the water", "u|u|", -1.2, -1.5, -0.9),)),
+                    formula=(("the square of the speed through the water", "u|u|", -1.2, -1.5, -0.9),),
+                    features={"u|u|": 0.7, "wave": 0.2, "time*u2": 0.15, "u": 0.05}),
     probabilities={"unknown_force:X": 0.99},
 )  # fmt: skip
 
@@ -118,6 +120,16 @@ def test_a_cause_is_named_in_words_with_value_interval_unit_and_model():
         == "The rudder servo lags: time constant 0.31 s (95 %: 0.23 s to 0.39 s; model: 0.1 s). Probability 0.970."
     )
     assert "+35 % (95 %: +20 % to +50 %; model: +0 %)" in words.estimate("share", INERTIA)
+
+
+def test_a_force_is_told_with_what_else_it_may_be_made_of():
+    said = words.unknown(FORCE.unknown)
+    assert "It looks like -1.2 (-1.5 to -0.9) × u|u|, the square of the speed through the water." in said
+    assert (
+        "not ruled out: wave (an oscillation of its own; probability 0.20), time*u2 (the time since" in said
+    )
+    assert "0.05" not in said, "too improbable"
+    assert "ruled out" not in words.unknown(dataclasses.replace(FORCE.unknown, features={"u|u|": 1.0}))
 
 
 def test_the_story_ends_with_what_to_do_next():
@@ -170,6 +182,7 @@ def test_json_holds_a_force_and_an_empty_verdict():
     found = json.loads(json_file.text(FORCE))
     assert found["unknown"]["axis"] == "X"
     assert found["unknown"]["formula"][0]["feature"] == "u|u|"
+    assert list(found["unknown"]["features"]) == ["u|u|", "wave", "time*u2", "u"], "the most probable first"
     empty = json.loads(json_file.text(Verdict(verdict=NOTHING_WRONG, sentence="")))
     assert empty["gain"] == {}
     assert empty["next_trial"] is None
