@@ -23,6 +23,7 @@ from .words import (
     HEAD,
     LIMITS_WORDS,
     MISSED_WORDS,
+    SINCE_WORDS,
     TIMES_WORDS,
     WHY,
 )
@@ -32,13 +33,25 @@ CONFOUNDED = 9.0
 MARK = {True: "pass", False: "**FAIL**", None: ""}
 
 
-def write_page(results: Sequence[Result], alone: Sequence[Row] = (), advice: Sequence[Result] = ()) -> Path:
-    """Write the page and its figures, and return its path."""
+def write_page(
+    results: Sequence[Result],
+    alone: Sequence[Row] = (),
+    advice: Sequence[Result] = (),
+    since: Sequence[Result] = (),
+) -> Path:
+    """Write the page and its figures, and return its path.
+
+    Args:
+        results: that it rests on.
+        alone: times of single diagnoses.
+        advice: what came of it.
+        since: results of another seed with what the engine has become.
+    """
     broken = [one for one in results if "error" in one]
     sound = [one for one in results if "error" not in one]
     draw(sound)
-    parts = [_head(sound, broken), _scores(rows(sound)), _pictures(), _missed(sound), _confounded(sound),
-             _limits(sound), _advice(advice), _times(sound, alone), _all_cases(sound)]  # fmt: skip
+    parts = [_head(sound, broken), _scores(rows(sound)), *_since(since), _pictures(), _missed(sound),
+             _confounded(sound), _limits(sound), _advice(advice), _times(sound, alone), _all_cases(sound)]  # fmt: skip
     PAGE.write_text("\n\n".join(parts) + "\n")
     return PAGE
 
@@ -72,10 +85,21 @@ def _versions(results: Sequence[Result]) -> str:
 
 def _scores(found: Sequence[Score]) -> str:
     """Return the table of all figures."""
+    return f"## It is right when\n\n{_table_of(found)}"
+
+
+def _table_of(found: Sequence[Score]) -> str:
     body = [[s.words, s.value, s.interval, str(s.cases), s.target, MARK[s.met]] for s in found]
     met, judged = sum(s.met is True for s in found), sum(s.met is not None for s in found)
-    return (f"## It is right when\n\n**{met} of {judged} targets are met** on these cases.\n\n"
+    return (f"**{met} of {judged} targets are met** on these cases.\n\n"
             + _table(["figure", "value", "95 % interval", "cases", "target", ""], body))  # fmt: skip
+
+
+def _since(results: Sequence[Result]) -> list[str]:
+    """Return what the engine was changed by since then, and its figures so far."""
+    sound = [one for one in results if "error" not in one]
+    return [SINCE_WORDS.format(seed=sound[0]["seed"], cases=len(sound), broken=len(results) - len(sound))
+            + _table_of(rows(sound))] if sound else []  # fmt: skip
 
 
 def _pictures() -> str:

@@ -41,6 +41,15 @@ seeds 1 to 23 before the first of them was drawn. {versions} What was said of ea
 
 Intervals are exact binomial ones."""
 
+SINCE_WORDS = """## Since then
+
+What was missed above was looked at, and the engine changed: the best fit and its closest rivals are begun again from
+off the kinks of drum and cable, and all features that a missing force may be made of are told with their probabilities
+(the first two are those by probability here, the first terms of the formula above). So a fresh seed was begun: the
+first {cases} cases of seed {seed}, none of which was looked at before ({broken} ended in an error).
+
+"""
+
 MISSED_WORDS = """Every case with D ≥ 16 whose truth does not come first, every healthy record with a name, and every
 wrong name with p ≥ 0.95."""
 

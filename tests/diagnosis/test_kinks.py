@@ -115,6 +115,25 @@ def test_a_fit_astray_is_begun_again_from_a_usual_drum(plant):
     assert not strayed(problem, again, ())
 
 
+def test_a_fit_on_a_kink_comes_out_of_its_hollow():
+    """The residual is 1 at a resting drum, 2 behind its kink and 0 at the truth: no slope leads there from the kink."""
+    places, residuals = [0.0, 0.2, 0.8, 2.0], [1.0, 2.0, 0.0, 1.2]
+
+    def residual(z):
+        return np.interp(z, places, residuals)
+
+    entry = SimpleNamespace(record=-1, effect=SimpleNamespace(slot="drum", id="drum_friction"),
+                            parameter=SimpleNamespace(low=0.0, high=2.0, tolerance=1.0))  # fmt: skip
+    problem = SimpleNamespace(entries=[entry], residual=residual,
+                              jacobian=lambda z: (residual(z) - residual(z + 1e-6))[:, None] / 1e-6)  # fmt: skip
+    z = np.zeros(1)
+    fit = refit(problem, z, problem.jacobian(z), np.ones(1))
+    assert fit.z == 0.0
+    again = begun_again(problem, fit, ())
+    assert 0.6 < again.z[0] <= 0.8
+    assert again.objective < 0.4 < fit.objective
+
+
 @pytest.mark.parametrize("ids", [(), DRUM, ("hull_drag",)])
 def test_a_fit_is_begun_again_off_its_kinks_and_where_all_else_is_best_for_that(plant, monkeypatch, ids):
     """Best in the linear problem: the slope of the objective is 0 in all that is neither held nor at a bound."""
@@ -203,11 +222,13 @@ def test_the_first_that_are_close_are_fitted_from_off_their_kinks_before_they_ar
     for name, log in zip("abcde", (-10.0, -11.0, -15.9, -10.5, -17.0), strict=True):
         search.candidates[(name,)] = Candidate(ids=(name,), fit=None, log_evidence={}, log_posterior=log)
     monkeypatch.setattr(search, "begin_again", lambda one: again.append(one.ids[0]))
-    search._once_more()
+    for name in ("_is_open", "cross", "_nothing"):
+        monkeypatch.setattr(search, name, lambda *asked: None)
+    search.settle()
     assert again == ["a", "d", "b"], f"the first {searching.FIRST}"
     again.clear()
     search.candidates = {ids: one for ids, one in search.candidates.items() if ids[0] in "ace"}
-    search._once_more()
+    search.settle()
     assert again == ["a", "c"], "no more than 6 behind"
 
 
