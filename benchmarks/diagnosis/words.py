@@ -46,7 +46,8 @@ SINCE_WORDS = """## Since then
 What was missed above was looked at, and the engine changed: the best fit and its closest rivals are begun again from
 off the kinks of drum and cable, and all features that a missing force may be made of are told with their probabilities
 (the first two are those by probability here, the first terms of the formula above). So a fresh seed was begun: the
-first {cases} cases of seed {seed}, none of which was looked at before ({broken} ended in an error).
+first {cases} cases of seed {seed}, which no choice was made with ({broken} ended in an error). Times, below, are of the
+engine as it has become; all else is not.
 
 """
 
