@@ -70,14 +70,14 @@ def _section_of(figure: str) -> str:
 
 
 def _sections(verdict: Verdict, records: Mapping[str, str]) -> dict[str, list[str]]:
-    """Return the sections by title, in the order in which one reads them."""
+    """Return the sections by title, in the order in which one reads them: the long table behind what was found."""
     return {
-        "What these records could show": _detectable(verdict),
         "What is wrong": _misfit(verdict, records),
         "The cause": _cause(verdict),
         "The missing force": _missing(verdict),
         "The gain": _gain(verdict),
         "The extended model": _extended(verdict),
+        "What these records could show": _detectable(verdict),
         "How it was found": _how(verdict),
     }
 

@@ -206,6 +206,12 @@ def test_the_report_tells_all_of_it_and_its_page_stands_alone():
     assert "<td>hull" not in page  # no column is torn by a letter of ours
 
 
+def test_the_report_tells_what_is_wrong_before_the_long_table_of_what_could_be_seen():
+    text = report.markdown(NAMED, {"record": "record.csv, fig6"})
+    at = [line[3:] for line in text.splitlines() if line.startswith("## ")].index
+    assert at("What is wrong") < at("The gain") < at("What these records could show")
+
+
 def test_what_a_file_is_called_cannot_put_markup_into_the_page():
     text = report.markdown(NAMED, {"record": "<script>alert(1)</script>|*x*"})
     assert "<script>" not in report.page(text, {}, "<b>t</b>")
