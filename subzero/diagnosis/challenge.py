@@ -18,7 +18,7 @@ from subzero.diagnosis.effects import START, catalogue
 from subzero.diagnosis.hidden import Hidden, draw_deviations, draw_effect, hide
 from subzero.diagnosis.noisy_record import make_record
 from subzero.diagnosis.other_code import NoTruthError
-from subzero.diagnosis.outside import draw_outside
+from subzero.diagnosis.outside_kinds import draw_outside
 from subzero.diagnosis.setting import Setting
 from subzero.diagnosis.told import TOLD
 from subzero.errors import UserError

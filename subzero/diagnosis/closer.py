@@ -20,7 +20,8 @@ from subzero.diagnosis.latent import Terms
 from subzero.diagnosis.problem import Problem
 from subzero.diagnosis.recover import Recovered, drifted, recover
 from subzero.diagnosis.refit import Fit, refit, with_own_slopes
-from subzero.diagnosis.unknown import DRIFTS, FORCE, Knots, Suspect, suspects
+from subzero.diagnosis.suspects import Suspect, suspects
+from subzero.diagnosis.unknown import DRIFTS, FORCE, Knots
 
 
 def closer(

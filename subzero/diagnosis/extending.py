@@ -20,7 +20,8 @@ from subzero.diagnosis.problem import Problem
 from subzero.diagnosis.recover import Recovered, drifted, recover
 from subzero.diagnosis.refit import Fit, refit
 from subzero.diagnosis.sudden import Begun, with_begun
-from subzero.diagnosis.unknown import DRIFTS, FORCE, Suspect
+from subzero.diagnosis.suspects import Suspect
+from subzero.diagnosis.unknown import DRIFTS, FORCE
 from subzero.diagnosis.verdict import Cause, Extended, Gain, NextTrial, Unknown
 from subzero.diagnosis.work import Work
 

@@ -19,8 +19,9 @@ from subzero.diagnosis.candidate import Candidate, candidate_of
 from subzero.diagnosis.evidence import posterior
 from subzero.diagnosis.hypotheses import Ids, places, variances
 from subzero.diagnosis.problem import Problem, Progress
-from subzero.diagnosis.refit import ENOUGH, NEARLY, Fit, refit
+from subzero.diagnosis.refit import NEARLY, Fit, refit
 from subzero.diagnosis.screen import Screen, is_flat
+from subzero.diagnosis.stride import ENOUGH
 
 Asked = TypeVar("Asked")
 Made = TypeVar("Made")

@@ -17,16 +17,8 @@ from subzero.diagnosis.one_term import one_terms
 from subzero.diagnosis.problem import Problem
 from subzero.diagnosis.search import Search
 from subzero.diagnosis.sudden import Begun, scan
-from subzero.diagnosis.unknown import (
-    FINE,
-    FORCE,
-    Knots,
-    Suspect,
-    all_columns,
-    force_columns,
-    knots_of,
-    suspects,
-)
+from subzero.diagnosis.suspects import Suspect, suspects
+from subzero.diagnosis.unknown import FINE, FORCE, Knots, all_columns, force_columns, knots_of
 from subzero.missing_force import AXES
 
 ALIKE = 10.0

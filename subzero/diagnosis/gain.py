@@ -16,7 +16,8 @@ import numpy as np
 
 from subzero.diagnosis.noise import Noise
 from subzero.diagnosis.problem import Problem
-from subzero.diagnosis.refit import Fit, bounds
+from subzero.diagnosis.refit import Fit
+from subzero.diagnosis.stride import bounds
 from subzero.diagnosis.verdict import ChannelGain, Gain
 
 BLOCK, FOLDS = 2.0, 5

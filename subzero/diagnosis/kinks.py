@@ -11,7 +11,8 @@ import numpy as np
 
 from subzero.diagnosis.hypotheses import Ids
 from subzero.diagnosis.problem import Problem
-from subzero.diagnosis.refit import Fit, bounded_step, bounds, refit
+from subzero.diagnosis.refit import Fit, refit
+from subzero.diagnosis.stride import bounded_step, bounds
 
 STRAYED = 2.0
 """A fit that bends what has kinks by so many tolerances has gone astray."""

@@ -15,8 +15,9 @@ from subzero.diagnosis.candidate import Candidate, candidate_of
 from subzero.diagnosis.growing import GrowingFits
 from subzero.diagnosis.hypotheses import Ids, places, variances
 from subzero.diagnosis.probability import Beliefs
-from subzero.diagnosis.refit import ENOUGH, Fit, refit
+from subzero.diagnosis.refit import Fit, refit
 from subzero.diagnosis.screen import look
+from subzero.diagnosis.stride import ENOUGH
 from subzero.diagnosis.wide import fit_wide
 
 KEEP, SINGLES, PAIRS = 12.0, 7, 4

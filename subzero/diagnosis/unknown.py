@@ -1,4 +1,4 @@
-"""A force that no cause explains: is there one, on which axis, and what is it as a function of time?
+"""A force that no cause explains, as a function of time on one axis; how probable it is, `suspects` tells.
 
     w(t) = Σ f_k Λ((t − t_k)/Δ) on one axis,   f ~ a Gaussian process        (Λ: hat function)
 
@@ -9,27 +9,16 @@ drifts is the same in one channel, without a run.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterable
+from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
 from subzero.diagnosis.effect import Effect, Parameter
-from subzero.diagnosis.effects.sensors import SPECS
 from subzero.diagnosis.entries import Entry
-from subzero.diagnosis.evidence import Scales, log_sum, mixed
-from subzero.diagnosis.latent import (
-    SHARES,
-    Seen,
-    Terms,
-    log_evidence_process,
-    log_evidence_term,
-    seen,
-)
 from subzero.diagnosis.problem import Problem
-from subzero.diagnosis.refit import Fit
 from subzero.diagnosis.setting import Setting
 from subzero.missing_force import AXES, MissingForce
 
@@ -67,11 +56,6 @@ def usual(setting: Setting, axis: str) -> float:
     drag = setting.model.vehicle.numbers().axial_drag
     lever = {"K": 0.02, "M": 0.1, "N": 0.1}.get(axis, 1.0)
     return drag * lever
-
-
-def amplitude_grid(setting: Setting, axis: str) -> list[float]:
-    """Return the amplitudes that are mixed. [N, N m]"""
-    return [share * usual(setting, axis) for share in SHARES]
 
 
 def lacking(setting: Setting, force: MissingForce) -> Setting:
@@ -136,70 +120,8 @@ def drift_columns(problem: Problem, channel: str, knots: Knots) -> np.ndarray:
     return np.concatenate(rows)
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Suspect:
-    """A force or a drift in the linear problem.
-
-    Attributes:
-        id: "unknown_force:X", "sensor_drift:heading".
-        log_gain: log evidence over that of none; amplitudes, correlation times, formulas of one term and κ mixed.
-        kappa: the most probable κ.
-    """
-
-    id: str
-    log_gain: float
-    kappa: float
-
-
-def suspects(
-    problem: Problem,
-    columns: Mapping[str, np.ndarray],
-    fit: Fit,
-    scales: Scales,
-    knots: Knots,
-    terms: Mapping[str, Terms] | None = None,
-) -> list[Suspect]:
-    """Return every force and drift of `columns` (id → (m, n)), in the linear problem around a fit, most probable first.
-
-    Args:
-        problem: of the columns.
-        columns: as of `all_columns`.
-        fit: that the columns were made close to.
-        scales: κ → its log weight and the prior variances of the entries.
-        knots: of the columns.
-        terms: axis → what a force on it may look like beside a process.
-    """
-    q, whole = fit.quadratic, fit.r + fit.J @ fit.z
-    found = []
-    for name, C in columns.items():
-        gains = {
-            kappa: _log_gain(problem, name, seen(q.A, q.b, one.D, fit.J, C, whole), knots, terms or {})
-            for kappa, one in scales.items()
-        }
-        gain, kappa = mixed(scales, gains)
-        found.append(Suspect(id=name, log_gain=gain, kappa=kappa))
-    return sorted(found, key=lambda one: -one.log_gain)
-
-
-def _log_gain(problem: Problem, name: str, data: Seen, knots: Knots, terms: Mapping[str, Terms]) -> float:
-    """Return the log evidence of a force or a drift over that of none: a process, or as probably a formula."""
-    amplitudes, axis = _amplitudes(problem, name), name.partition(":")[2]
-    process = log_evidence_process(data, knots.time, knots.record, amplitudes, drift=name.startswith(DRIFT))
-    if name.startswith(DRIFT) or axis not in terms:
-        return process
-    return log_sum([process, log_evidence_term(data, terms[axis], amplitudes)]) - float(np.log(2.0))
-
-
 def all_columns(problem: Problem, z: np.ndarray, knots: Knots) -> dict[str, np.ndarray]:
     """Return id → columns of a force on every axis and of a drift of every channel."""
     forces = {FORCE + axis: C for axis, C in force_columns(problem, z, AXES, knots).items()}
     channels = problem.records[0].noise
     return {**forces, **{DRIFT + channel: drift_columns(problem, channel, knots) for channel in channels}}
-
-
-def _amplitudes(problem: Problem, name: str) -> list[float]:
-    """Return the amplitudes that are mixed for a force or a drift."""
-    kind, _, which = name.partition(":")
-    if kind + ":" == FORCE:
-        return amplitude_grid(problem.records[0].setting, which)
-    return [share * DRIFTS * SPECS[which].bias for share in SHARES]

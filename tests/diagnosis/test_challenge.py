@@ -18,7 +18,8 @@ from subzero.diagnosis.effects.sensors import NOISE
 from subzero.diagnosis.hidden import Hidden, apply_all, draw_deviations, draw_effect, hide
 from subzero.diagnosis.noisy_record import make_record
 from subzero.diagnosis.other_code import simulate_otherwise, truth_of
-from subzero.diagnosis.outside import KINDS, draw_outside, force_along
+from subzero.diagnosis.outside import force_along
+from subzero.diagnosis.outside_kinds import KINDS, draw_outside
 from subzero.diagnosis.setting import Setting
 from subzero.errors import UserError
 from subzero.measured import read_record

@@ -13,7 +13,8 @@ from subzero.diagnosis.foreign import FAR, MOST, NEAR, _worth_a_look
 from subzero.diagnosis.hypotheses import variances
 from subzero.diagnosis.one_term import one_terms
 from subzero.diagnosis.refit import refit
-from subzero.diagnosis.unknown import force_columns, knots_of, lacking, suspects
+from subzero.diagnosis.suspects import suspects
+from subzero.diagnosis.unknown import force_columns, knots_of, lacking
 from subzero.missing_force import MissingForce, Term
 
 

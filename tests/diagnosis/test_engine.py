@@ -23,9 +23,9 @@ from subzero.diagnosis.evidence import Quadratic, freed, posterior
 from subzero.diagnosis.hypotheses import places
 from subzero.diagnosis.noise import Noise, estimate, spikes
 from subzero.diagnosis.problem import Observed, Problem
-from subzero.diagnosis.refit import quadratic_step
 from subzero.diagnosis.response import TRUTHS, economical, respond
 from subzero.diagnosis.setting import Setting
+from subzero.diagnosis.stride import quadratic_step
 from subzero.diagnosis.tracked import tracked
 from subzero.missing_force import MissingForce, Term
 

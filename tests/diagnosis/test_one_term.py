@@ -14,7 +14,8 @@ from subzero.diagnosis.candidate import candidate_of
 from subzero.diagnosis.evidence import Scale, mixed
 from subzero.diagnosis.latent import Seen, Terms, log_evidence_term
 from subzero.diagnosis.one_term import one_terms
-from subzero.diagnosis.unknown import FORCE, force_columns, knots_of, suspects
+from subzero.diagnosis.suspects import suspects
+from subzero.diagnosis.unknown import FORCE, force_columns, knots_of
 from subzero.missing_force import AXES, MissingForce, Term
 
 

@@ -22,11 +22,11 @@ from subzero.diagnosis.fits import HOPELESS, MOST_RUNS
 from subzero.diagnosis.hypotheses import log_prior, named, places
 from subzero.diagnosis.probability import FURTHER, UNTRIED, Beliefs, folded
 from subzero.diagnosis.problem import SHARE, STEP, Problem
-from subzero.diagnosis.refit import secant
 from subzero.diagnosis.rules import large
 from subzero.diagnosis.screen import MANY, STRAINED, Screen, is_close, look
 from subzero.diagnosis.search import Search
 from subzero.diagnosis.setting import Setting
+from subzero.diagnosis.stride import secant
 
 
 def fitted(**log_posteriors):

@@ -11,6 +11,7 @@ from subzero.diagnosis.evidence import Scale
 from subzero.diagnosis.latent import Seen, log_evidence_process, log_gains
 from subzero.diagnosis.one_term import one_terms
 from subzero.diagnosis.recover import drifted, recover
+from subzero.diagnosis.suspects import suspects
 from subzero.diagnosis.unknown import (
     WORDS,
     all_columns,
@@ -18,7 +19,6 @@ from subzero.diagnosis.unknown import (
     history,
     knots_of,
     lacking,
-    suspects,
 )
 
 TIME = np.arange(0.0, 30.05, 0.1)
