@@ -103,11 +103,12 @@ def windowed(shape: Shape, times: np.ndarray, edges: np.ndarray) -> list[Shape]:
 
 
 def shifted(shape: Shape, plain: Shape, times: np.ndarray) -> list[Shape]:
-    """Return a windowed shape with its edges moved by less than the grid that they were found on. [s]"""
+    """Return a windowed shape with its edges moved by less than the grid that they were found on, where it is not 0."""
     if shape.start is None or shape.decay:
         return [shape]
     ends = [None] if shape.end is None else [shape.end + by for by in NUDGES]
-    return [_between(plain, times, shape.start + by, end, shape.log_prior) for by in NUDGES for end in ends]
+    found = [_between(plain, times, shape.start + by, end, shape.log_prior) for by in NUDGES for end in ends]
+    return [one for one in found if np.abs(one.columns).max() > 1e-9]
 
 
 def _between(shape: Shape, times: np.ndarray, start: float, end: float | None, log_prior: float) -> Shape:

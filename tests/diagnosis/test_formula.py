@@ -7,8 +7,8 @@ from subzero.diagnosis.formula import as_missing, at_knots, samples_of
 from subzero.diagnosis.formula_choice import choose, describe
 from subzero.diagnosis.latent import Seen
 from subzero.diagnosis.recover import recover
-from subzero.diagnosis.shape_prior import all_shapes
-from subzero.diagnosis.shapes import factors_along
+from subzero.diagnosis.shape_prior import all_shapes, size_of
+from subzero.diagnosis.shapes import Shape, factors_along, shifted, windowed
 from subzero.diagnosis.unknown import lacking
 from subzero.missing_force import FEATURES, MissingForce, Term, feature_value, history_at
 
@@ -63,6 +63,17 @@ def test_a_window_is_found(track):
     assert (found.shapes[0].start, found.shapes[0].end) == (9.0, 17.0)
     assert "from 9 to 17 s" in found.terms()[0][0]
     assert np.sqrt(np.mean((found.force() - force) ** 2)) < 0.1 * 0.6
+
+
+def test_a_short_window_is_moved_but_never_away_and_never_to_where_its_feature_does_nothing():
+    rudder = np.where((TIMES > 4.9) & (TIMES < 5.5), 0.1, 0.0)[:, None]  # out for half a second
+    plain = Shape(feature="rudder_angle*u2", words="the rudder", columns=rudder)
+    window = next(
+        one for one in windowed(plain, TIMES, np.arange(4.0, 7.0)) if (one.start, one.end) == (5.0, 6.0)
+    )
+    tried = shifted(window, plain, TIMES)
+    assert len(tried) > 10
+    assert all(np.isfinite(size_of(one)) and size_of(one) > 0.0 for one in tried)
 
 
 def test_a_wave_is_called_a_wave(track):
