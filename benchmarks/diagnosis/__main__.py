@@ -10,7 +10,7 @@ from pathlib import Path
 import cyclopts
 from rich.console import Console
 
-from .cases import SEED, SINCE, Case, cases
+from .cases import BEFORE, SEED, Case, cases
 from .results import line, place, read
 from .sharing import Shared, share
 from .times import keep, kept, timed
@@ -57,8 +57,8 @@ def benchmark(
 
         if not quick:
             keep(path, timed(seed))
-        since = read(place(SINCE)) if seed != SINCE else []
-        console.print(f"Written: {write_page(read(path), kept(path), advice.kept(path), since)}")
+        before = read(place(BEFORE)) if seed != BEFORE else []
+        console.print(f"Written: {write_page(read(path), kept(path), advice.kept(path), before)}")
 
 
 def measure(wanted: list[Case], path: Path, workers: int) -> None:

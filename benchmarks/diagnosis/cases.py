@@ -23,8 +23,8 @@ from .truth import NoRunError, agreed, noisy
 
 SHARES = {"single": 400, "healthy": 200, "pair": 100, "outside": 60, "twin": 20, "degraded": 20}
 """How many of each make the whole benchmark."""
-SEED, SINCE = 29, 31
-"""Of all cases; of those that were begun after the engine had changed."""
+SEED, BEFORE = 31, 29
+"""Of all cases; of those that the engine had before, when it was another."""
 DEGRADED = ("noise", "channels", "short", "wide", "narrow")
 AFTER = 4.0
 """The trial goes on behind its record, for sensors whose clock runs ahead. [s]"""

@@ -13,19 +13,18 @@ from .advice import decided
 from .cases import HEAVY, SHARES
 from .figures_of import rows
 from .pictures import FIGURES, draw
-from .scores import CLEAR, Result, Score, first, is_right, names, of, smallest_D, truth, wrongly_sure
+from .scores import CLEAR, Result, first, is_right, names, of, smallest_D, truth, wrongly_sure
 from .times import LIMITS, Row
 from .truth import SAME
 from .words import (
     ADVICE_WORDS,
     ALONE_WORDS,
+    BEFORE_WORDS,
     CONFOUNDED_WORDS,
     HEAD,
     LIMITS_WORDS,
     MISSED_WORDS,
-    SINCE_WORDS,
     TIMES_WORDS,
-    WHY,
 )
 
 PAGE = FIGURES.parent / "diagnosis_benchmark.md"
@@ -37,7 +36,7 @@ def write_page(
     results: Sequence[Result],
     alone: Sequence[Row] = (),
     advice: Sequence[Result] = (),
-    since: Sequence[Result] = (),
+    before: Sequence[Result] = (),
 ) -> Path:
     """Write the page and its figures, and return its path.
 
@@ -45,12 +44,12 @@ def write_page(
         results: that it rests on.
         alone: times of single diagnoses.
         advice: what came of it.
-        since: results of another seed with what the engine has become.
+        before: results of another seed, with what the engine was before.
     """
     broken = [one for one in results if "error" in one]
     sound = [one for one in results if "error" not in one]
     draw(sound)
-    parts = [_head(sound, broken), _scores(rows(sound)), *_since(since), _pictures(), _missed(sound),
+    parts = [_head(sound, broken), _scores(sound, before), _pictures(), _missed(sound),
              _confounded(sound), _limits(sound), _advice(advice), _times(sound, alone), _all_cases(sound)]  # fmt: skip
     PAGE.write_text("\n\n".join(parts) + "\n")
     return PAGE
@@ -83,23 +82,19 @@ def _versions(results: Sequence[Result]) -> str:
     return f"{newest} cases were diagnosed by a newer version of the code than the others."
 
 
-def _scores(found: Sequence[Score]) -> str:
-    """Return the table of all figures."""
-    return f"## It is right when\n\n{_table_of(found)}"
-
-
-def _table_of(found: Sequence[Score]) -> str:
-    body = [[s.words, s.value, s.interval, str(s.cases), s.target, MARK[s.met]] for s in found]
+def _scores(results: Sequence[Result], before: Sequence[Result]) -> str:
+    """Return the table of all figures, beside those that the engine had before."""
+    found, earlier = rows(results), rows([one for one in before if "error" not in one])
+    was = {s.words: f"{s.value} {MARK[s.met]}".strip() for s in earlier}
+    body = [
+        [s.words, s.value, s.interval, str(s.cases), s.target, MARK[s.met], was.get(s.words, "")]
+        for s in found
+    ]
     met, judged = sum(s.met is True for s in found), sum(s.met is not None for s in found)
-    return (f"**{met} of {judged} targets are met** on these cases.\n\n"
-            + _table(["figure", "value", "95 % interval", "cases", "target", ""], body))  # fmt: skip
-
-
-def _since(results: Sequence[Result]) -> list[str]:
-    """Return what the engine was changed by since then, and its figures so far."""
-    sound = [one for one in results if "error" not in one]
-    return [SINCE_WORDS.format(seed=sound[0]["seed"], cases=len(sound), broken=len(results) - len(sound))
-            + _table_of(rows(sound))] if sound else []  # fmt: skip
+    words = BEFORE_WORDS.format(seed=before[0]["seed"], cases=len(before)) if before else ""
+    header = ["figure", "value", "95 % interval", "cases", "target", "", "before"]
+    return (f"## It is right when\n\n**{met} of {judged} targets are met** on these cases. {words}\n\n"
+            + _table(header, body))  # fmt: skip
 
 
 def _pictures() -> str:
@@ -113,7 +108,7 @@ def _missed(results: Sequence[Result]) -> str:
     body = [[str(one["index"]), one["kind"], one["manoeuvre"] + (f" ({one['how']})" if one["how"] else ""), _true(one),
              *_said(one)] for one in results if _is_missed(one)]  # fmt: skip
     header = ["case", "kind", "manoeuvre", "truth (D, closest rival)", "verdict", "first hypothesis", "p"]
-    return f"## What was missed\n\n{MISSED_WORDS}\n\n" + _table(header, body) + f"\n\n{WHY}"
+    return f"## What was missed\n\n{MISSED_WORDS}\n\n" + _table(header, body)
 
 
 def _is_missed(one: Result) -> bool:
