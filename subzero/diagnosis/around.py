@@ -6,6 +6,7 @@ kink says nothing of the other, so that real runs try some sizes of them.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -13,9 +14,8 @@ import numpy as np
 from subzero.diagnosis.candidate import Candidate
 from subzero.diagnosis.evidence import KAPPAS, Quadratic, posterior
 from subzero.diagnosis.hypotheses import Ids, log_prior, named, variances
-from subzero.diagnosis.kinks import kinked
 from subzero.diagnosis.problem import Problem
-from subzero.diagnosis.screen import linear, mixed_evidence, sizes
+from subzero.diagnosis.screen import SWEEP, linear, mixed_evidence, sizes
 
 
 def beside(problem: Problem, one: Candidate) -> dict[Ids, float]:
@@ -51,11 +51,21 @@ class Tried(NamedTuple):
     J: np.ndarray
 
 
-def swept(problem: Problem, one: Candidate, rest: Ids) -> dict[Ids, Tried]:
-    """Return hypothesis → its best size, for causes beside the rest of a candidate that runs have kinks in."""
+def swept(
+    problem: Problem, one: Candidate, rest: Ids, at: Sequence[int], scales: Sequence[float] = SWEEP
+) -> dict[Ids, Tried]:
+    """Return hypothesis → its best size, for the causes of entries beside the rest of a candidate.
+
+    Args:
+        problem: records and parameters.
+        one: the candidate.
+        rest: those of its causes that are kept.
+        at: places of the entries that are tried.
+        scales: sizes that they are tried at, in effect scales, either way.
+    """
     entries, names, J = problem.entries, named(problem), one.fit.J
     z = np.maximum(posterior(one.fit.quadratic, variances(entries, rest, one.kappa)).z, _lowest(problem))
-    jobs = [(k, size) for k in kinked(problem, rest) for size in sizes(entries[k].parameter)]
+    jobs = [(k, size) for k in at for size in sizes(entries[k].parameter, scales)]
     moved = [np.concatenate([z[:k], [size], z[k + 1 :]]) for k, size in jobs]
     found = dict[Ids, Tried]()
     here, *runs = problem.residuals([z, *moved])

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from itertools import combinations
 
 import numpy as np
 
 from subzero.diagnosis.around import Tried, beside, instead, swept
 from subzero.diagnosis.candidate import Candidate, candidate_of
-from subzero.diagnosis.hypotheses import Ids, variances
-from subzero.diagnosis.kinks import begun_again, strayed
+from subzero.diagnosis.hypotheses import Ids, named, places, variances
+from subzero.diagnosis.kinks import begun_again, kinked, strayed
 from subzero.diagnosis.refit import Fit, refit
 from subzero.diagnosis.sharp import SharpFits
 
@@ -17,6 +18,8 @@ BESIDE, INSTEAD, WORTH = 2, 3, -4.0
 """At most so many with a cause more, of a log posterior that adds at least WORTH; so many with another cause."""
 ASTRAY = 6.0
 """A fit with so much less log posterior than the linear problem at another promises may have gone astray."""
+SIMPLER, COARSE = -15.0, (0.5, 1.5)
+"""One cause in the place of two is fitted if its log posterior adds at least that, at one of these effect scales."""
 MOST_CAUSES, ROUNDS = 3, 4
 """Causes of a hypothesis, and rounds of growing."""
 
@@ -53,6 +56,8 @@ class GrowingFits(SharpFits):
             self.race(2, 2.0)
             self.cross()
             self.sharpen()
+            if self.best().ids == best.ids:
+                self._simpler()
 
     def _more(self, best: Candidate) -> list[Ids]:
         """Return the hypotheses with one cause more that the linear problem at the best fit finds best."""
@@ -86,7 +91,7 @@ class GrowingFits(SharpFits):
         found = dict[Ids, Tried]()
         rests = [tuple(one for one in best.ids if one != without) for without in best.ids]
         for rest in [best.ids, *rests] if len(best.ids) < MOST_CAUSES else rests:
-            for ids, one in swept(self.problem, best, rest).items():
+            for ids, one in swept(self.problem, best, rest, kinked(self.problem, rest)).items():
                 if ids not in found or one.log_posterior > found[ids].log_posterior:
                     found[ids] = one
         new = self._unknown({ids: one.log_posterior for ids, one in found.items() if ids != best.ids})
@@ -95,6 +100,23 @@ class GrowingFits(SharpFits):
                 D = variances(self.problem.entries, ids, best.kappa)
                 fit = refit(self.problem, found[ids].z, found[ids].J, D, most_fresh=0)
                 self._take(candidate_of(self.problem, ids, fit))
+
+    def _simpler(self) -> None:
+        """Fit causes in the place of two of the best candidate's: what is one and large may look like two, and then the
+        linear problem there says little of it.
+        """
+        best, found, entries = self.best(), dict[Ids, Tried](), self.problem.entries
+        others = places(entries, tuple(one for one in named(self.problem) if one not in best.ids))
+        for rest in combinations(best.ids, len(best.ids) - 2) if len(best.ids) > 1 else ():
+            found |= swept(self.problem, best, rest, others, COARSE)
+        new = self._unknown({ids: one.log_posterior for ids, one in found.items()})
+        ranked = sorted(new, key=lambda ids: -new[ids])[:BESIDE]
+        worth = [ids for ids in ranked if new[ids] > best.log_posterior + SIMPLER]
+        for ids in worth:
+            z, D = found[ids].z, variances(entries, ids, best.kappa)
+            fit = refit(self.problem, z, self.problem.jacobian(z), D, most_fresh=2, made_at=z)
+            self._take(candidate_of(self.problem, ids, fit))
+        self.race(2 if worth else 0)
 
     def begin_again(self, one: Candidate) -> Candidate:
         """Fit a candidate from off its kinks, once, and return what is best then."""

@@ -6,7 +6,7 @@ wide tolerances do not come close to the records, that is done with all of them.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -141,9 +141,9 @@ def _sweep(
     found.log_posterior.update({ids: best[ids] + log_prior(ids, len(named(problem))) for ids in best})
 
 
-def sizes(parameter: Parameter) -> list[float]:
-    """Return the deviations that are tried."""
-    both = [side * size * parameter.scale for size in SWEEP for side in (1.0, -1.0)]
+def sizes(parameter: Parameter, scales: Sequence[float] = SWEEP) -> list[float]:
+    """Return the deviations that are tried, at some effect scales either way."""
+    both = [side * size * parameter.scale for size in scales for side in (1.0, -1.0)]
     return [size for size in both if parameter.low <= size <= parameter.high]
 
 

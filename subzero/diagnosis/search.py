@@ -30,6 +30,8 @@ FIRST, LAST, NEARER = 3, 3, 1.0
 """So many are fitted from off their kinks; rounds of settling; so close, in tolerances, the sensitivities of what is
 told were made.
 """
+LEGS, AFAR = 3, 30.0
+"""A cause by itself is fitted on, so often, while the linear problem where its fit stopped promises so much more."""
 RIVALS, CLOSE = 2.0, 6.0
 """What is so close to the best in log posterior is settled, too; what has a cause more or less, from farther behind;
 the first within CLOSE are fitted from off their kinks, too.
@@ -125,7 +127,13 @@ class Search(GrowingFits):
         z, at = np.zeros(len(self.problem.entries)), places(self.problem.entries, ids)
         z[at] = self.screen.secants.get(ids, self.wide.z)[at]
         D = variances(self.problem.entries, ids, 1.0)
-        return refit(self.problem, z, self.problem.jacobian(z), D, most_fresh=2, made_at=z)
+        fit = refit(self.problem, z, self.problem.jacobian(z), D, most_fresh=2, made_at=z)
+        for _ in range(LEGS):
+            if fit.promise < AFAR:
+                break
+            J = self.problem.jacobian(fit.z)
+            fit = refit(self.problem, fit.z, J, D, r=fit.r, most_fresh=2, made_at=fit.z)
+        return fit
 
     def _nothing(self) -> None:
         """Fit "nothing is wrong" from where the best fit is, if that explains more: what is outside is beside it."""

@@ -2,10 +2,11 @@
 
 Verifies: a fit goes on beside a kink; causes without a slope are found by real runs at some sizes; a fit that ended in
 a hollow is made again from where its rival is, or from off its kinks; a pair is found beside a cause that is not the
-best by itself.
+best by itself, and one cause that is far away in the place of two.
 """
 
 import dataclasses
+from itertools import pairwise
 from types import SimpleNamespace
 
 import numpy as np
@@ -57,7 +58,7 @@ def test_a_slack_cable_is_found_by_real_runs(plant):
     )
     search.fit(())
     nothing = search.best()
-    sizes = swept(search.problem, nothing, ())
+    sizes = swept(search.problem, nothing, (), kinked(search.problem, ()))
     best = max(sizes, key=lambda ids: sizes[ids].log_posterior)
     assert best == SLACK
     assert sizes[SLACK].log_posterior > beside(search.problem, nothing)[SLACK] + 5.0
@@ -70,7 +71,7 @@ def test_a_slack_cable_is_found_by_real_runs(plant):
 def test_sizes_are_tried_of_what_has_kinks_and_is_not_there(plant):
     search = begun(plant(duration=6.0))
     search.fit(SLACK)
-    tried = swept(search.problem, search.candidates[SLACK], SLACK)
+    tried = swept(search.problem, search.candidates[SLACK], SLACK, kinked(search.problem, SLACK))
     assert all(set(SLACK) < set(ids) for ids in tried)
     more = {one for ids in tried for one in ids} - set(SLACK)
     assert more == {"drum_friction", "drum_inertia", "rudder_backlash", "rudder_rate_limit", "battery_sag"}
@@ -211,10 +212,11 @@ def test_growing_looks_beside_what_is_best_off_its_kinks(monkeypatch):
     monkeypatch.setattr(growing, "begun_again", lambda *asked: "again")
     monkeypatch.setattr(growing, "candidate_of", again)
     monkeypatch.setattr(search, "_more", lambda best: looked.append((best.ids, best.log_posterior)) or [])
+    monkeypatch.setattr(search, "_simpler", lambda: looked.append("simpler"))
     for name in ("_without", "_aside_of", "_kinked", "_parts_again", "race", "cross", "sharpen"):
         monkeypatch.setattr(search, name, lambda *asked: None)
     search.grow()
-    assert (looked, made) == ([(("a",), -5.0)], [("a",)])
+    assert (looked, made) == ([(("a",), -5.0), "simpler"], [("a",)]), "what is simpler once the best stays"
 
 
 def test_the_first_that_are_close_are_fitted_from_off_their_kinks_before_they_are_told(monkeypatch):
@@ -257,3 +259,33 @@ def test_a_pair_is_looked_for_beside_what_is_not_the_best(monkeypatch):
     monkeypatch.setattr(search, "fit", lambda ids, start: fits.setdefault(ids, start))
     search._aside_of(search.best())
     assert fits == {("other", "right"): "right"}, "from the better of the two; not what is behind the best"
+
+
+def test_one_cause_that_is_far_away_is_found_in_the_place_of_two(plant):
+    """Clocks that differ by half a second look like a lag of the motor and one of the rudder."""
+    search = begun(
+        plant(lambda setting: catalogue(("heading",))["clock_offset"].apply(setting, 0.6), duration=16.0)
+    )
+    search.fit_all([(), ("motor_lag", "rudder_lag")])
+    assert search.best().ids == ("motor_lag", "rudder_lag")
+    search._simpler()
+    assert search.best().ids == ("clock_offset",)
+    (late,) = places(search.problem.entries, ("clock_offset",))
+    assert search.best().fit.z[late] == pytest.approx(0.6, abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("promises", "legs"), [([100.0, 50.0, 20.0], 2), ([100.0] * 9, searching.LEGS), ([5.0], 0)]
+)
+def test_a_cause_that_is_far_away_is_fitted_on_while_much_is_promised(plant, monkeypatch, promises, legs):
+    search, asked = begun(plant(duration=4.0)), []
+
+    def leg(problem, z, J, D, **more):
+        asked.append(z)
+        return SimpleNamespace(z=z + 1.0, r=None, promise=promises[len(asked) - 1])
+
+    monkeypatch.setattr(searching, "refit", leg)
+    monkeypatch.setattr(type(search.problem), "jacobian", lambda self, z: None)
+    search._alone(("hull_drag",))
+    assert len(asked) == 1 + legs
+    assert all(np.array_equal(after, before + 1.0) for before, after in pairwise(asked))
