@@ -213,10 +213,13 @@ def test_growing_looks_beside_what_is_best_off_its_kinks(monkeypatch):
     monkeypatch.setattr(growing, "candidate_of", again)
     monkeypatch.setattr(search, "_more", lambda best: looked.append((best.ids, best.log_posterior)) or [])
     monkeypatch.setattr(search, "_simpler", lambda: looked.append("simpler"))
-    for name in ("_without", "_aside_of", "_kinked", "_parts_again", "race", "cross", "sharpen"):
+    later = Candidate(ids=("c",), fit=None, log_evidence=level, log_posterior=-4.0)
+    monkeypatch.setattr(search, "cross", lambda: search.candidates.setdefault(("c",), later))
+    for name in ("_without", "_aside_of", "_kinked", "_parts_again", "race", "sharpen"):
         monkeypatch.setattr(search, name, lambda *asked: None)
     search.grow()
-    assert (looked, made) == ([(("a",), -5.0), "simpler"], [("a",)]), "what is simpler once the best stays"
+    assert looked == [(("a",), -5.0), (("c",), -4.0), "simpler"], "what is simpler once the best stays"
+    assert made == [("a",), ("c",)]
 
 
 def test_the_first_that_are_close_are_fitted_from_off_their_kinks_before_they_are_told(monkeypatch):
@@ -232,6 +235,10 @@ def test_the_first_that_are_close_are_fitted_from_off_their_kinks_before_they_ar
     search.candidates = {ids: one for ids, one in search.candidates.items() if ids[0] in "ace"}
     search.settle()
     assert again == ["a", "c"], "no more than 6 behind"
+    again.clear()
+    search.begun.add(("a",))
+    search.settle()
+    assert again == ["c"], "once"
 
 
 def test_the_best_gets_the_chances_of_its_rivals_too(plant):
@@ -261,15 +268,19 @@ def test_a_pair_is_looked_for_beside_what_is_not_the_best(monkeypatch):
     assert fits == {("other", "right"): "right"}, "from the better of the two; not what is behind the best"
 
 
-def test_one_cause_that_is_far_away_is_found_in_the_place_of_two(plant):
+def test_one_cause_that_is_far_away_is_found_in_the_place_of_two(plant, monkeypatch):
     """Clocks that differ by half a second look like a lag of the motor and one of the rudder."""
     search = begun(
         plant(lambda setting: catalogue(("heading",))["clock_offset"].apply(setting, 0.6), duration=16.0)
     )
     search.fit_all([(), ("motor_lag", "rudder_lag")])
     assert search.best().ids == ("motor_lag", "rudder_lag")
+    raced = []
+    monkeypatch.setattr(search, "race", raced.append)
     search._simpler()
     assert search.best().ids == ("clock_offset",)
+    assert search.best().fit.made_at is not None, "with sensitivities from out there"
+    assert raced == [2]
     (late,) = places(search.problem.entries, ("clock_offset",))
     assert search.best().fit.z[late] == pytest.approx(0.6, abs=0.1)
 
