@@ -7,6 +7,7 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
+from scipy.stats import binomtest
 
 from .manoeuvres import ids
 from .scores import CLEAR, Result, calibration, first, is_foreign, is_right, of, smallest_D, truth
@@ -54,14 +55,14 @@ def _confusion(results: Sequence[Result]) -> plt.Figure:
 def _calibration(results: Sequence[Result]) -> plt.Figure:
     """Draw how often the first hypothesis is right, over its probability."""
     found, error = calibration([one for one in results if one["kind"] != "degraded"])
-    stated, right, count = np.array(found).T
+    stated, right, _ = np.array(found).T
     figure, axes = plt.subplots(figsize=(5.5, 5.0))
     axes.plot([0.0, 1.0], [0.0, 1.0], color="0.6", linewidth=1.0)
-    axes.errorbar(
-        stated, right, yerr=np.sqrt(right * (1.0 - right) / count + 0.25 / count**2), fmt="o-", capsize=3
-    )
-    for x, y, n in found:
-        axes.annotate(f"{n}", (x, y), textcoords="offset points", xytext=(6, -10), fontsize=8)
+    bars = [binomtest(round(y * n), n).proportion_ci(0.68, "wilson") for _, y, n in found]
+    off = [[y - bar.low, bar.high - y] for y, bar in zip(right, bars, strict=True)]
+    axes.errorbar(stated, right, yerr=np.abs(off).T, fmt="o-", capsize=3)
+    for i, (x, y, n) in enumerate(found):
+        axes.annotate(f"{n}", (x, y), textcoords="offset points", xytext=(6, -10 - 10 * (i % 2)), fontsize=8)
     axes.set_xlabel("stated probability of the first hypothesis")
     axes.set_ylabel("share that is right")
     axes.set_title(f"expected calibration error {error:.3f}")
