@@ -92,8 +92,7 @@ class Search(GrowingFits):
     def _once_more(self) -> None:
         """Fit the first candidates from off their kinks, if they are close to the best."""
         for ids in self._ranked()[:FIRST]:
-            close = self.candidates[ids].log_posterior > self.best().log_posterior - CLOSE
-            if close and ids not in self.begun:
+            if self.candidates[ids].log_posterior > self.best().log_posterior - CLOSE:
                 self._say(0.75, "once more", ids)
                 self.begin_again(self.candidates[ids])
 
