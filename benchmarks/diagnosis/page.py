@@ -202,10 +202,20 @@ def _times(results: Sequence[Result], alone: Sequence[Row]) -> str:
             cells = [np.percentile([one[key] for one in own], [50, 90]) for key in ("cpu", "wall")]
             body.append([manoeuvre, str(len(own)), *(f"{a:.0f} s, {b:.0f} s" for a, b in cells)])
     header = ["manoeuvre", "cases", "processor time: median, nine in ten", "wall clock: median, nine in ten"]
-    own = [[manoeuvre, words, *(_within(*pair) for pair in zip((screen, verdict), LIMITS[manoeuvre], strict=True))]
-           for manoeuvre, words, screen, verdict in alone]  # fmt: skip
-    single = _table(["manoeuvre", "record", "to the first screen", "to the verdict"], own)
+    single = _table(["manoeuvre", "record", "records", "first screen: median, slowest", "verdict: median, slowest"],
+                    _alone(alone))  # fmt: skip
     return f"## Times\n\n{ALONE_WORDS}\n\n{single}\n\n{TIMES_WORDS}\n\n" + _table(header, body)
+
+
+def _alone(alone: Sequence[Row]) -> list[list[str]]:
+    """Return a line for each kind of record on each manoeuvre."""
+    body = []
+    for manoeuvre, words in dict.fromkeys(row[:2] for row in alone):
+        taken = np.array([row[2:] for row in alone if row[:2] == (manoeuvre, words)])
+        cells = [", ".join(_within(float(s), limit) for s in (np.median(part), np.max(part)))
+                 for part, limit in zip(taken.T, LIMITS[manoeuvre], strict=True)]  # fmt: skip
+        body.append([manoeuvre, words, str(len(taken)), *cells])
+    return body
 
 
 def _within(seconds: float, limit: float) -> str:

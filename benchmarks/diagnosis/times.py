@@ -9,27 +9,30 @@ from time import perf_counter
 
 from subzero.diagnosis.diagnose import diagnose
 
-from .cases import SEED, Case, make
+from .cases import SEED, Case, cases, make
 
 LIMITS = {"fig6": (3.0, 15.0), "rich": (inf, 30.0)}
 """Manoeuvre → how long the first screen and the verdict may take; infinite where nothing is asked. [s]"""
-CAUSES = {"healthy": (), "one hidden": ("roll_stiffness",), "two hidden": ("roll_stiffness", "motor_lag")}
+RECORDS = {"fig6": 9, "rich": 3}
+"""Manoeuvre → how many records of each kind are timed: the first ones of the seed."""
+KINDS = {"healthy": "healthy", "single": "one hidden", "pair": "two hidden"}
 Row = tuple[str, str, float, float]
 
 
 def timed(seed: int = SEED) -> list[Row]:
     """Return (manoeuvre, what is hidden, seconds to the screen, to the verdict); the compiler's time is left out."""
-    _diagnosed(seed, "fig6", ())
-    return [(manoeuvre, words, *_diagnosed(seed, manoeuvre, causes)) for manoeuvre in LIMITS
-            for words, causes in CAUSES.items()]  # fmt: skip
+    every = cases(seed)
+    _diagnosed(every[0])
+    return [(manoeuvre, words, *_diagnosed(case)) for manoeuvre, count in RECORDS.items()
+            for kind, words in KINDS.items()
+            for case in [one for one in every if (one.kind, one.manoeuvre) == (kind, manoeuvre)][:count]]  # fmt: skip
 
 
-def _diagnosed(seed: int, manoeuvre: str, causes: tuple[str, ...]) -> tuple[float, float]:
+def _diagnosed(case: Case) -> tuple[float, float]:
     """Return how long one diagnosis takes. [s]"""
-    kind = ("healthy", "single", "pair")[len(causes)]
-    made = make(Case(seed=seed, index=10_000, kind=kind, number=0, manoeuvre=manoeuvre, causes=causes))
+    made = make(case)
     start = perf_counter()
-    verdict = diagnose([made.logged], budget="verdict")
+    verdict = diagnose([made.logged], seed=case.index, budget="verdict")
     return verdict.seconds["screen"], perf_counter() - start
 
 

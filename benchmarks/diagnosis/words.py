@@ -67,4 +67,5 @@ TIMES_WORDS = """Of a diagnosis up to its verdict with one thread, two processes
 around the nominal model are shared between the cases of a process: a single diagnosis takes some seconds more."""
 
 ALONE_WORDS = """One record, the whole catalogue, six channels, both cores, nothing shared, without the
-compiler's time."""
+compiler's time: the first records of each kind among the cases. A record whose hidden effects carry it far from the
+nominal model takes longest."""
