@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from .scores import (
     CLEAR,
     PLAIN,
     Result,
     Score,
+    by_chance,
     calibration,
     errors,
     expected,
@@ -37,6 +40,13 @@ def _holds(one: Result) -> bool:
     return truth(one) in one["set"] or (bool(one["strange"]) and any(map(is_foreign, one["set"])))
 
 
+def _stated(cases: Sequence[Result]) -> float:
+    """Return the mean probability that is stated of all that is in a set."""
+    return sum(one["probabilities"].get(name, 0.0) for one in cases for name in one["set"]) / max(
+        len(cases), 1
+    )
+
+
 def _singles(results: Sequence[Result]) -> list[Score]:
     singles, twins = of(results, "single"), of(results, "twin")
     clear = [one for one in singles if smallest_D(one) >= CLEAR]
@@ -48,6 +58,8 @@ def _singles(results: Sequence[Result]) -> list[Score]:
         share("… with D ≥ 25: right name first", [one for one in clear if smallest_D(one) >= 25.0], is_right, "–"),
         share("all singles: right name first", singles, is_right, "–"),
         share("all singles: the 95 % set holds the truth", singles, _holds, "93 … 98 %", least=0.93, most=0.98),
+        Score("… that its stated probabilities let expect", f"{_stated(singles):.1%}".replace("%", " %"), "–", "–",
+              len(singles), None),
         number("… median size of that set", sizes, "≤ 2", "{:.0f}", most=2.0),
         share("twins: the verdict is a set that holds the truth", twins,
               lambda one: one["verdict"] == "undecided" and _holds(one), "all", least=0.9999),
@@ -57,7 +69,6 @@ def _singles(results: Sequence[Result]) -> list[Score]:
 def _healthy(results: Sequence[Result]) -> list[Score]:
     healthy = of(results, "healthy")
     sound = [one for one in results if one["kind"] != "degraded"]
-    _, error = calibration(sound)
     return [
         share("healthy: false names", healthy, lambda one: bool(one["causes"]), "≤ 1 %", most=0.01),
         share("healthy: `nothing_wrong`", healthy, lambda one: one["verdict"] == "nothing_wrong", "–"),
@@ -68,7 +79,7 @@ def _healthy(results: Sequence[Result]) -> list[Score]:
             "–",
         ),
         share("all cases: a wrong name with p ≥ 0.95", sound, wrongly_sure, "≤ 0.5 %", most=0.005),
-        Score("expected calibration error", f"{error:.3f}", "≤ 0.03", "–", len(sound), error <= 0.03),
+        *_calibrated(sound),
         Score(
             "… stated less right, on average (below 0: too modest)",
             f"{_overstated(sound):+.3f}",
@@ -78,6 +89,17 @@ def _healthy(results: Sequence[Result]) -> list[Score]:
             None,
         ),
     ]
+
+
+def _calibrated(sound: Sequence[Result]) -> list[Score]:
+    """Return the calibration error, and what chance alone makes of it."""
+    _, error = calibration(sound)
+    low, middle, high = np.percentile(by_chance(sound), [2.5, 50.0, 97.5]) if sound else (0.0, 0.0, 0.0)
+    return [
+        Score("expected calibration error", f"{error:.3f}", "≤ 0.03", "–", len(sound), error <= 0.03, error <= high),
+        Score("… of an engine that is right exactly as often as it states", f"{middle:.3f}", "–",
+              f"{low:.3f} … {high:.3f}", len(sound), None),
+    ]  # fmt: skip
 
 
 def _overstated(results: Sequence[Result]) -> float:

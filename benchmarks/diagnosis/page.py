@@ -13,7 +13,7 @@ from .advice import decided
 from .cases import HEAVY, SHARES
 from .figures_of import rows
 from .pictures import FIGURES, draw
-from .scores import CLEAR, Result, first, is_right, names, of, smallest_D, truth, wrongly_sure
+from .scores import CLEAR, Result, Score, first, is_right, names, of, smallest_D, truth, wrongly_sure
 from .times import LIMITS, Row
 from .truth import SAME
 from .words import (
@@ -24,6 +24,7 @@ from .words import (
     HEAD,
     LIMITS_WORDS,
     MISSED_WORDS,
+    NEAR_WORDS,
     TIMES_WORDS,
 )
 
@@ -87,14 +88,19 @@ def _scores(results: Sequence[Result], before: Sequence[Result]) -> str:
     found, earlier = rows(results), rows([one for one in before if "error" not in one])
     was = {s.words: f"{s.value} {MARK[s.met]}".strip() for s in earlier}
     body = [
-        [s.words, s.value, s.interval, str(s.cases), s.target, MARK[s.met], was.get(s.words, "")]
-        for s in found
+        [s.words, s.value, s.interval, str(s.cases), s.target, _mark(s), was.get(s.words, "")] for s in found
     ]
     met, judged = sum(s.met is True for s in found), sum(s.met is not None for s in found)
+    near = sum(s.met is False and s.near for s in found)
     words = BEFORE_WORDS.format(seed=before[0]["seed"], cases=len(before)) if before else ""
     header = ["figure", "value", "95 % interval", "cases", "target", "", "before"]
-    return (f"## It is right when\n\n**{met} of {judged} targets are met** on these cases. {words}\n\n"
-            + _table(header, body))  # fmt: skip
+    count = f"**{met} of {judged} targets are met** on these cases; {near} of the others are near."
+    return f"## It is right when\n\n{count} {NEAR_WORDS}\n\n{words}\n\n" + _table(header, body)
+
+
+def _mark(s: Score) -> str:
+    """Return whether a figure meets its target, if it is judged, or its interval reaches it."""
+    return MARK[s.met] + (" (near)" if s.met is False and s.near else "")
 
 
 def _pictures() -> str:

@@ -11,11 +11,15 @@ from scipy.stats import binomtest, norm
 
 Result = dict[str, Any]
 CLEAR, PLAIN, SURE = 16.0, 50.0, 0.95
+EDGES = (0.0, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9, 0.95, 0.99, 1.0 + 1e-9)
+"""Bins of stated probabilities."""
 FOREIGN = ("unknown_force:", "sensor_drift:")
 
 
 class Score(NamedTuple):
-    """A figure: words, value as text, target as text, 95 % interval as text, cases, met (None: not judged)."""
+    """A figure: words, value as text, target as text, 95 % interval as text, cases, met (None: not judged), and whether
+    its interval reaches the target if not.
+    """
 
     words: str
     value: str
@@ -23,6 +27,7 @@ class Score(NamedTuple):
     interval: str
     cases: int
     met: bool | None
+    near: bool = False
 
 
 def first(one: Result) -> tuple[str, float]:
@@ -93,7 +98,10 @@ def share(
     value = k / n
     met = (least is None or value >= least) and (most is None or value <= most)
     judged = met if (least, most) != (None, None) else None
-    return Score(words, f"{100 * value:.1f} %", target, f"{100 * low:.1f} … {100 * high:.1f} %", n, judged)
+    near = (least is None or high >= least) and (most is None or low <= most)
+    return Score(
+        words, f"{100 * value:.1f} %", target, f"{100 * low:.1f} … {100 * high:.1f} %", n, judged, near
+    )
 
 
 def number(words: str, values: Sequence[float], target: str, form: str, *, least: float | None = None,
@@ -110,15 +118,23 @@ def number(words: str, values: Sequence[float], target: str, form: str, *, least
 
 def calibration(results: Sequence[Result]) -> tuple[list[tuple[float, float, int]], float]:
     """Return (stated, right, cases) by bins of the first hypothesis' probability, and the expected error."""
-    edges = [0.0, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9, 0.95, 0.99, 1.0 + 1e-9]
     stated = np.array([first(one)[1] for one in results])
-    right = np.array([is_right_as_told(one) for one in results], dtype=float)
+    return _calibration(stated, np.array([is_right_as_told(one) for one in results], dtype=float))
+
+
+def by_chance(results: Sequence[Result], draws: int = 1000) -> np.ndarray:
+    """Return the calibration errors (draws,) of an engine that is right as often as it states, on such cases."""
+    stated, rng = np.array([first(one)[1] for one in results]), np.random.default_rng(0)
+    return np.array([_calibration(stated, 1.0 * (rng.random(stated.size) < stated))[1] for _ in range(draws)])
+
+
+def _calibration(stated: np.ndarray, right: np.ndarray) -> tuple[list[tuple[float, float, int]], float]:
     found = []
-    for low, high in pairwise(edges):
+    for low, high in pairwise(EDGES):
         own = (stated >= low) & (stated < high)
         if own.any():
             found.append((float(stated[own].mean()), float(right[own].mean()), int(own.sum())))
-    error = sum(n * abs(a - b) for a, b, n in found) / max(len(results), 1)
+    error = sum(n * abs(a - b) for a, b, n in found) / max(stated.size, 1)
     return found, float(error)
 
 

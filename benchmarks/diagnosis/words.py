@@ -48,6 +48,11 @@ one far cause is fitted in the place of two, and far fits go on; and all feature
 are told with their probabilities (the first two are those by probability here, the first terms of the formula
 there)."""
 
+NEAR_WORDS = """Near: so few cases cannot tell it from its
+target, as its 95 % interval reaches that, or, for the calibration, as an engine that is right exactly as often as it
+states has such an error by chance. Intervals and sets are wide on purpose: the engine allows declared tolerances to be
+wrong by a factor of two or four with a prior probability of 0.4, and here they are right but in some degraded cases."""
+
 MISSED_WORDS = """Every case with D ≥ 16 whose truth does not come first, every healthy record with a name, and every
 wrong name with p ≥ 0.95."""
 
