@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from itertools import combinations
 
@@ -63,8 +64,7 @@ class GrowingFits(SharpFits):
         """Return the hypotheses with one cause more that the linear problem at the best fit finds best."""
         found = self._unknown(beside(self.problem, best))
         self.beside |= found
-        ranked = sorted(found, key=lambda ids: -found[ids])[:BESIDE]
-        return [ids for ids in ranked if found[ids] > best.log_posterior + WORTH]
+        return _best_of(found, best.log_posterior + WORTH)
 
     def _without(self, best: Candidate, without: str) -> None:
         """Fit the best hypothesis without one of its causes, and with others in its place."""
@@ -94,12 +94,10 @@ class GrowingFits(SharpFits):
             for ids, one in swept(self.problem, best, rest, kinked(self.problem, rest)).items():
                 if ids not in found or one.log_posterior > found[ids].log_posterior:
                     found[ids] = one
-        new = self._unknown({ids: one.log_posterior for ids, one in found.items() if ids != best.ids})
-        for ids in sorted(new, key=lambda ids: -new[ids])[:BESIDE]:
-            if new[ids] > best.log_posterior + WORTH:
-                D = variances(self.problem.entries, ids, best.kappa)
-                fit = refit(self.problem, found[ids].z, found[ids].J, D, most_fresh=0)
-                self._take(candidate_of(self.problem, ids, fit))
+        for ids in self._worth_fitting(found, best, WORTH):
+            D = variances(self.problem.entries, ids, best.kappa)
+            fit = refit(self.problem, found[ids].z, found[ids].J, D, most_fresh=0)
+            self._take(candidate_of(self.problem, ids, fit))
 
     def _simpler(self) -> None:
         """Fit causes in the place of two of the best candidate's: what is one and large may look like two, and then the
@@ -109,14 +107,17 @@ class GrowingFits(SharpFits):
         others = places(entries, tuple(one for one in named(self.problem) if one not in best.ids))
         for rest in combinations(best.ids, len(best.ids) - 2) if len(best.ids) > 1 else ():
             found |= swept(self.problem, best, rest, others, COARSE)
-        new = self._unknown({ids: one.log_posterior for ids, one in found.items()})
-        ranked = sorted(new, key=lambda ids: -new[ids])[:BESIDE]
-        worth = [ids for ids in ranked if new[ids] > best.log_posterior + SIMPLER]
+        worth = self._worth_fitting(found, best, SIMPLER)
         for ids in worth:
             z, D = found[ids].z, variances(entries, ids, best.kappa)
             fit = refit(self.problem, z, self.problem.jacobian(z), D, most_fresh=2, made_at=z)
             self._take(candidate_of(self.problem, ids, fit))
         self.race(2 if worth else 0)
+
+    def _worth_fitting(self, found: Mapping[Ids, Tried], best: Candidate, least: float) -> list[Ids]:
+        """Return the best of what was tried that no fit is known of, if its log posterior adds `least` to the best."""
+        new = self._unknown({ids: one.log_posterior for ids, one in found.items() if ids != best.ids})
+        return _best_of(new, best.log_posterior + least)
 
     def begin_again(self, one: Candidate) -> Candidate:
         """Fit a candidate from off its kinks, once, and return what is best then."""
@@ -138,3 +139,9 @@ class GrowingFits(SharpFits):
         """Return those of estimated log posteriors that no fit is known of, or only one that went astray from afar."""
         known = {ids: one.log_posterior for ids, one in self.candidates.items()}
         return {ids: log for ids, log in found.items() if known.get(ids, -np.inf) < log - ASTRAY}
+
+
+def _best_of(found: Mapping[Ids, float], least: float) -> list[Ids]:
+    """Return the best hypotheses, at most BESIDE, of those whose log posterior is above the least."""
+    ranked = sorted(found, key=lambda ids: -found[ids])[:BESIDE]
+    return [ids for ids in ranked if found[ids] > least]

@@ -90,9 +90,10 @@ class Search(GrowingFits):
         self._nothing()
 
     def _once_more(self) -> None:
-        """Fit the first candidates from off their kinks, if they are close to the best."""
+        """Fit the first candidates from off their kinks, if they are close to the best and were not so begun before."""
         for ids in self._ranked()[:FIRST]:
-            if self.candidates[ids].log_posterior > self.best().log_posterior - CLOSE:
+            close = self.candidates[ids].log_posterior > self.best().log_posterior - CLOSE
+            if close and ids not in self.begun:
                 self._say(0.75, "once more", ids)
                 self.begin_again(self.candidates[ids])
 

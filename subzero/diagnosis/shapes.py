@@ -34,6 +34,8 @@ NUDGES = (-0.8, -0.6, -0.4, -0.2, 0.0, 0.2, 0.4, 0.6, 0.8)
 """By how much edges of windows are moved in the end. [s]"""
 FEWEST = 1.0
 """No window is shorter. [s]"""
+ZERO = 1e-9
+"""A shape that is nowhere larger is none."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -88,7 +90,7 @@ def plain_shapes(factors: np.ndarray) -> list[Shape]:
         Shape(feature=name, words=feature.words, columns=feature_value(name, factors)[:, None])
         for name, feature in FEATURES.items()
     ]
-    return [shape for shape in found if np.abs(shape.columns).max() > 1e-9]
+    return _acting(found)
 
 
 def windowed(shape: Shape, times: np.ndarray, edges: np.ndarray) -> list[Shape]:
@@ -99,7 +101,7 @@ def windowed(shape: Shape, times: np.ndarray, edges: np.ndarray) -> list[Shape]:
         _between(shape, times, a, None, log_prior + np.log(len(pairs) / edges.size)) for a in edges if a > 0.0
     ]
     found += [_between(shape, times, a, b, log_prior) for a, b in pairs]
-    return [one for one in found if np.abs(one.columns).max() > 1e-9]
+    return _acting(found)
 
 
 def shifted(shape: Shape, plain: Shape, times: np.ndarray) -> list[Shape]:
@@ -108,7 +110,12 @@ def shifted(shape: Shape, plain: Shape, times: np.ndarray) -> list[Shape]:
         return [shape]
     ends = [None] if shape.end is None else [shape.end + by for by in NUDGES]
     found = [_between(plain, times, shape.start + by, end, shape.log_prior) for by in NUDGES for end in ends]
-    return [one for one in found if np.abs(one.columns).max() > 1e-9]
+    return _acting(found)
+
+
+def _acting(shapes: list[Shape]) -> list[Shape]:
+    """Return the shapes that are not 0 throughout."""
+    return [one for one in shapes if np.abs(one.columns).max() > ZERO]
 
 
 def _between(shape: Shape, times: np.ndarray, start: float, end: float | None, log_prior: float) -> Shape:
@@ -126,7 +133,7 @@ def decaying(shape: Shape, times: np.ndarray, edges: np.ndarray) -> list[Shape]:
     found += [
         _dying(shape, times, edge, T, log_prior - np.log(edges.size)) for T in DECAYS for edge in edges[1:]
     ]
-    return [one for one in found if np.abs(one.columns).max() > 1e-9]
+    return _acting(found)
 
 
 def _dying(shape: Shape, times: np.ndarray, start: float, T: float, log_prior: float) -> Shape:
