@@ -13,7 +13,7 @@ from rich.console import Console
 from .cases import BEFORE, SEED, Case, cases
 from .results import line, place, read
 from .sharing import Shared, share
-from .times import keep, kept, timed
+from .times import keep, timed
 from .trial_of import Result, result_of
 
 app = cyclopts.App(name="python -m benchmarks.diagnosis", help_format="plaintext", version_flags=[])
@@ -52,13 +52,11 @@ def benchmark(
     wanted = cases(seed)[: QUICK if quick else count]
     measure([case for case in wanted if case.index not in known], path, workers)
     if page:
-        from . import advice
         from .page import write_page
 
         if not quick:
             keep(path, timed(seed))
-        before = read(place(BEFORE)) if seed != BEFORE else []
-        console.print(f"Written: {write_page(read(path), kept(path), advice.kept(path), before)}")
+        console.print(f"Written: {write_page(path, place(BEFORE))}")
 
 
 def measure(wanted: list[Case], path: Path, workers: int) -> None:

@@ -63,6 +63,9 @@ CONFOUNDED_WORDS = (
 LIMITS_WORDS = """The deviation that has a signal of 4, in its unit; the signal of one effect scale, and D against the
 closest rival. D grows with the square of the size."""
 
+DEGRADED_WORDS = """More records on `fig6`, by `python -m benchmarks.diagnosis.degraded`: three times the noise; speed
+and heading only; the first 10 s; and true spreads of twice ("wide") and half ("narrow") the declared tolerances."""
+
 ADVICE_WORDS = """Single causes left undecided on `fig6`, by `python -m benchmarks.diagnosis.advice`. The trial
 that is proposed for the truth and its best rival is flown by the truth, and both records are diagnosed together.
 Decided: the truth has at least 95 % of what both have. Where no trial of the library has D ≥ 16, nothing can be asked
