@@ -67,12 +67,12 @@ def degraded(seed: int) -> list[Case]:
 
 
 def rows(results: Sequence[Result]) -> list[tuple[str, Score, Score, Score]]:
-    """Return how → of healthy records, how many have names; of singles, how many are right first, how many are called
-    something wrong with certainty.
+    """Return how, or all → of healthy records, how many have names; of singles, how many are right first, how many are
+    called something wrong with certainty.
     """
     found = []
-    for how in DEGRADED:
-        own = [one for one in results if one["how"] == how and "error" not in one]
+    for how in (*DEGRADED, "all"):
+        own = [one for one in results if how in (one["how"], "all") and "error" not in one]
         healthy, single = [one for one in own if not one["truth"]], [one for one in own if one["truth"]]
         found.append((how, share("false names", healthy, lambda one: bool(names(one)), "≤ 5 %", most=0.05),
                       share("right first", single, lambda one: first(one)[0] == truth(one), "–"),
