@@ -18,9 +18,10 @@ from .manoeuvres import ids
 from .results import place, read
 from .scores import Result, Score, first, names, share, truth, wrongly_sure
 
-HEALTHY = {"wide": 60}
-"""How → healthy records; 20 where nothing else is said."""
+HEALTHY = {how: 60 if how == "wide" else 20 for how in DEGRADED}
+"""How → healthy records; most of those whose true spread is twice the declared one, as the target names them."""
 SINGLES = 10
+"""Records with one cause, of each."""
 FIRST = 20_000
 """Index of the first of these cases, behind all others."""
 app = cyclopts.App(name="python -m benchmarks.diagnosis.degraded", help_format="plaintext", version_flags=[])
@@ -53,7 +54,7 @@ def kept(results: Path) -> list[Result]:
 def degraded(seed: int) -> list[Case]:
     """Return the cases, all kinds in turn."""
     causes = np.random.default_rng([seed, FIRST]).permutation(ids()).tolist()
-    wanted = [(i / HEALTHY.get(how, 20), how, ()) for how in DEGRADED for i in range(HEALTHY.get(how, 20))]
+    wanted = [(i / count, how, ()) for how, count in HEALTHY.items() for i in range(count)]
     wanted += [
         ((i + 0.5) / SINGLES, how, (causes[(k + i * len(DEGRADED)) % len(causes)],))
         for k, how in enumerate(DEGRADED)

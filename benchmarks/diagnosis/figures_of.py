@@ -42,9 +42,8 @@ def _holds(one: Result) -> bool:
 
 def _stated(cases: Sequence[Result]) -> float:
     """Return the mean probability that is stated of all that is in a set."""
-    return sum(one["probabilities"].get(name, 0.0) for one in cases for name in one["set"]) / max(
-        len(cases), 1
-    )
+    stated = [one["probabilities"].get(name, 0.0) for one in cases for name in one["set"]]
+    return sum(stated) / max(len(cases), 1)
 
 
 def _singles(results: Sequence[Result]) -> list[Score]:
@@ -58,7 +57,7 @@ def _singles(results: Sequence[Result]) -> list[Score]:
         share("… with D ≥ 25: right name first", [one for one in clear if smallest_D(one) >= 25.0], is_right, "–"),
         share("all singles: right name first", singles, is_right, "–"),
         share("all singles: the 95 % set holds the truth", singles, _holds, "93 … 98 %", least=0.93, most=0.98),
-        Score("… that its stated probabilities let expect", f"{_stated(singles):.1%}".replace("%", " %"), "–", "–",
+        Score("… that its stated probabilities let expect", f"{100.0 * _stated(singles):.1f} %", "–", "–",
               len(singles), None),
         number("… median size of that set", sizes, "≤ 2", "{:.0f}", most=2.0),
         share("twins: the verdict is a set that holds the truth", twins,

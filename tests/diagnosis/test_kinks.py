@@ -235,6 +235,10 @@ def test_the_first_that_are_close_are_fitted_from_off_their_kinks_before_they_ar
     search.candidates = {ids: one for ids, one in search.candidates.items() if ids[0] in "ace"}
     search.settle()
     assert again == ["a", "c"], "no more than 6 behind"
+    again.clear()
+    search.begun.add(("a",))
+    search.settle()
+    assert again == ["c"], "once"
 
 
 def test_the_best_gets_the_chances_of_its_rivals_too(plant):
