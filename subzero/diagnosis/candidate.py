@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -74,11 +74,17 @@ def candidate_of(problem: Problem, ids: Ids, fit: Fit) -> Candidate:
 
 
 def _evidence(problem: Problem, ids: Ids, fit: Fit) -> dict[float, float]:
-    """Return κ → log evidence: that of the linear problem, moved to what the real run leaves under the fit's own κ."""
-    q, entries = fit.quadratic, problem.entries
-    under = {kappa: variances(entries, ids, kappa) for kappa in KAPPAS}
-    found = {kappa: posterior(q, under[kappa]) for kappa in KAPPAS}
-    nearest = min(KAPPAS, key=lambda kappa: float(np.sum(np.abs(np.log(under[kappa] / fit.D)))))
+    """Return κ → log evidence of a hypothesis."""
+    return laplace(problem.entries, fit, {kappa: variances(problem.entries, ids, kappa) for kappa in KAPPAS})
+
+
+def laplace(entries: Sequence[Entry], fit: Fit, under: Mapping[float, np.ndarray]) -> dict[float, float]:
+    """Return κ → log evidence under prior variances (k,): that of the linear problem, moved to what the real run leaves
+    under the fit's own κ.
+    """
+    q = fit.quadratic
+    found = {kappa: posterior(q, D) for kappa, D in under.items()}
+    nearest = min(under, key=lambda kappa: float(np.sum(np.abs(np.log(under[kappa] / fit.D)))))
     here = -fit.objective - found[nearest].log_evidence - 0.5 * found[nearest].log_det
     every = range(len(entries))
     return {

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,14 +21,31 @@ from subzero.diagnosis.latent import Terms
 from subzero.diagnosis.problem import Problem
 from subzero.diagnosis.recover import Recovered, drifted, recover
 from subzero.diagnosis.refit import Fit, refit, with_own_slopes
+from subzero.diagnosis.sudden import Along
 from subzero.diagnosis.suspects import Suspect, suspects
 from subzero.diagnosis.unknown import DRIFTS, FORCE, Knots
 
 
+class Close(NamedTuple):
+    """A force or a drift around its own fit.
+
+    Attributes:
+        log_posterior: of it beside nothing, but for its own prior.
+        what: it is.
+        fit: the linear problem there: what the records lack without it.
+        along: the run there, with it.
+    """
+
+    log_posterior: float
+    what: Suspect
+    fit: Fit
+    along: Along
+
+
 def closer(
     problem: Problem, start: Fit, name: str, kappa: float, knots: Knots, terms: Mapping[str, Terms]
-) -> tuple[float, Suspect]:
-    """Return the log posterior of a force or a drift beside nothing, but for its own prior; and what it is.
+) -> Close:
+    """Return a force or a drift beside nothing, around its own fit.
 
     Args:
         problem: records and parameters.
@@ -46,7 +64,7 @@ def closer(
         knots, done = found.knots, _beside_drift(problem, start, which, found)
     fit = _without(found, done, D.size)
     ((log, what),) = linear(problem, fit, {name: found.columns}, knots, terms, [kappa])
-    return log + _possible(problem, done), what
+    return Close(log + _possible(problem, done), what, fit, Along(found.problem, done.z))
 
 
 def linear(

@@ -1,6 +1,9 @@
 """From records to a verdict: the engine from end to end.
 
 pose → what could be seen → misfit → search → what is outside → rules → extended model → gain → next trial
+
+Where the first fits all fail, what is outside is asked before the search goes on: a cause that begins in mid-trial and
+explains the records ends it.
 """
 
 from __future__ import annotations
@@ -12,7 +15,7 @@ from threadpoolctl import threadpool_limits
 
 from subzero.diagnosis.detect import detectability, with_secants
 from subzero.diagnosis.effect import Effect
-from subzero.diagnosis.foreign import foreigners
+from subzero.diagnosis.foreign import foreigners, is_explained
 from subzero.diagnosis.logged import Logged
 from subzero.diagnosis.misfit import misfits
 from subzero.diagnosis.pose import pose
@@ -81,10 +84,15 @@ def _work(work: Work, seen: Seen) -> None:
     if work.budget == "screen":
         search.fit(())
         return
-    search.refit_best()
-    search.grow()
-    search.settle()
-    done("fits")
-    search.progress(0.8, "forces that no cause explains")
-    work.foreign = foreigners(search)
+    search.first_fits()
+    if search.is_lost():
+        search.progress(0.6, "forces, and causes that begin in mid-trial")
+        work.foreign = foreigners(search)
+    if not is_explained(search, work.foreign):
+        search.races()
+        search.grow()
+        search.settle()
+        done("fits")
+        search.progress(0.8, "forces that no cause explains")
+        work.foreign = foreigners(search)
     done("outside")

@@ -2,24 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from subzero.diagnosis.candidate import Candidate
 from subzero.diagnosis.effects.sensors import SPECS
-from subzero.diagnosis.estimates import estimate, name
-from subzero.diagnosis.evidence import posterior
+from subzero.diagnosis.estimates import name
 from subzero.diagnosis.foreign import Foreign
 from subzero.diagnosis.formula import Formula, samples_of
 from subzero.diagnosis.formula_choice import describe
 from subzero.diagnosis.gain import Fitted, gain
 from subzero.diagnosis.hypotheses import Ids, variances
 from subzero.diagnosis.next_trial import next_trial
+from subzero.diagnosis.outlook import Survivor
 from subzero.diagnosis.problem import Problem
 from subzero.diagnosis.recover import Recovered, drifted, recover
-from subzero.diagnosis.refit import Fit, refit
-from subzero.diagnosis.sudden import Begun, with_begun
+from subzero.diagnosis.refit import Fit
+from subzero.diagnosis.struck import Struck
 from subzero.diagnosis.suspects import Suspect
 from subzero.diagnosis.unknown import DRIFTS, FORCE
 from subzero.diagnosis.verdict import Cause, Extended, Gain, NextTrial, Unknown
@@ -48,6 +49,11 @@ class Extension:
     extended: Extended
     unknown: Unknown | None = None
     cause: Cause | None = None
+
+    @property
+    def id(self) -> str:
+        """Of the sudden cause, such as "rudder_offset@12"; "" if there is none."""
+        return f"{self.cause.id}@{self.cause.start_time:g}" if self.cause else ""
 
 
 def of_causes(work: Work, best: Candidate, ids: Ids) -> Extension:
@@ -92,6 +98,7 @@ def _told(unknown: Unknown, formula: Formula) -> Unknown:
 def _recovered(work: Work, foreign: Foreign) -> Recovered:
     """Return a force or a drift, fitted beside the causes that it stands beside."""
     base = work.search.candidates[foreign.beside]
+    assert isinstance(foreign.what, Suspect)
     D = variances(work.problem.entries, base.ids, foreign.what.kappa)
     kind, _, which = foreign.id.partition(":")
     if kind + ":" == FORCE:
@@ -99,32 +106,14 @@ def _recovered(work: Work, foreign: Foreign) -> Recovered:
     return drifted(work.problem, base.fit, which, DRIFTS * SPECS[which].bias, D)
 
 
-def of_sudden(work: Work, key: str, probability: float) -> Extension:
-    """Return the extension by a cause that begins in mid-trial, fitted with real runs."""
-    what = next(one.what for one in work.foreign if one.id == key)
-    assert isinstance(what, Begun)
-    none, more, parameters = (
-        work.search.candidates[()],
-        with_begun(work.problem, what),
-        what.effect.parameters,
-    )
-    D = np.concatenate([variances(work.problem.entries, (), what.kappa), [p.scale**2 for p in parameters]])
-    start = np.concatenate([none.fit.z, what.mean])
-    fit = refit(more, start, more.jacobian(start), D, most_fresh=2)
-    sd, k = np.sqrt(np.diag(posterior(fit.quadratic, D).M)), len(work.problem.entries)
-    setting = work.problem.records[0].setting
-    numbers = {
-        p.name: estimate(p, p.nominal(setting), float(fit.z[k + i]), float(sd[k + i]))
-        for i, p in enumerate(parameters)
-    }
-    cause = Cause(id=what.effect.id, sentence=what.effect.sentence, probability=probability, parameters=numbers,
-                  start_time=what.time)  # fmt: skip
+def of_sudden(work: Work, what: Struck, cause: Cause) -> Extension:
+    """Return the extension by a cause that begins in mid-trial, as it is fitted."""
     extended = Extended(
-        deviations={cause.id: {parameter: one.deviation for parameter, one in numbers.items()}},
-        start_times={cause.id: what.time},
-        calibration=by_effect(work.problem, fit.z, None, but=(cause.id,)),
+        deviations={cause.id: {parameter: one.deviation for parameter, one in cause.parameters.items()}},
+        start_times={cause.id: what.begun.time},
+        calibration=by_effect(work.problem, what.fit.z, None, but=(cause.id,)),
     )
-    return Extension(fit=fit, problem=more, extended=extended, cause=cause)
+    return Extension(fit=what.fit, problem=what.problem, extended=extended, cause=cause)
 
 
 def by_effect(problem: Problem, z: np.ndarray, ids: Ids | None, but: Ids = ()) -> dict[str, dict[str, float]]:
@@ -144,11 +133,10 @@ def gained(work: Work, new: Extension, rival: Fit | None) -> Gain:
     return gain(work.search.nominal[0], tolerance, Fitted(new.problem, new.fit), other, seed=work.seed)
 
 
-def ahead(work: Work, listed: list[Ids], inside: dict[Ids, float]) -> NextTrial | None:
-    """Return the trial that would best tell apart the hypotheses that are left."""
-    left = [ids for ids in listed if ids in work.search.candidates][:SURVIVORS]
-    work.search.progress(0.92, "the next trial, for " + ", ".join(name(ids) for ids in left))
-    survivors = [work.search.candidates[ids] for ids in left]
+def ahead(work: Work, survivors: Sequence[Survivor], probabilities: Mapping[Ids, float]) -> NextTrial | None:
+    """Return the trial that would best tell apart the most probable of what is left."""
+    left = sorted(survivors, key=lambda one: -probabilities.get(one.ids, 0.0))[:SURVIVORS]
+    work.search.progress(0.92, "the next trial, for " + ", ".join(name(one.ids) for one in left))
     return next_trial(
-        work.problem, survivors, probabilities=[inside.get(ids, 0.0) for ids in left], seed=work.seed
+        work.problem, left, probabilities=[probabilities.get(one.ids, 0.0) for one in left], seed=work.seed
     )

@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 
 from subzero.diagnosis.candidate import Candidate
-from subzero.diagnosis.closer import closer, linear
+from subzero.diagnosis.closer import Close, closer, linear
 from subzero.diagnosis.evidence import KAPPAS, log_sum
 from subzero.diagnosis.hypotheses import PRIOR, Ids
 from subzero.diagnosis.latent import Terms
 from subzero.diagnosis.one_term import one_terms
 from subzero.diagnosis.problem import Problem
+from subzero.diagnosis.refit import is_lost
 from subzero.diagnosis.search import Search
-from subzero.diagnosis.sudden import Begun, scan
+from subzero.diagnosis.struck import Place, Struck, struck
+from subzero.diagnosis.sudden import Along
 from subzero.diagnosis.suspects import Suspect, suspects
 from subzero.diagnosis.unknown import FINE, FORCE, Knots, all_columns, force_columns, knots_of
 from subzero.missing_force import AXES
@@ -27,6 +29,10 @@ NEAR, FAR, MOST = 6.0, 45.0, 3
 """No force that is further behind the best than FAR, in log posterior, is looked at around its own fit, and at most so
 many; where one cause explains the record within declared tolerances, what is linear is nearly true there: besides the
 most probable force only those that are as close as NEAR."""
+LOOKED = 1
+"""Around so many of them sudden causes are looked for."""
+SURE = 30.0
+"""No sum of causes gains more than this, in log posterior, over one cause that leaves nothing but noise."""
 WORTH = 2.0
 """A force that is no further behind the best, in log posterior, is worth a closer look, and one for sudden changes."""
 
@@ -42,13 +48,13 @@ class Foreign:
     """
 
     beside: Ids
-    what: Suspect | Begun
+    what: Suspect | Struck
     log_posterior: float
 
     @property
     def id(self) -> str:
         """Such as "unknown_force:X" or "rudder_offset@12"."""
-        return self.what.id if isinstance(self.what, Suspect) else self.what.begun.id
+        return self.what.id
 
 
 def foreigners(search: Search) -> list[Foreign]:
@@ -56,7 +62,11 @@ def foreigners(search: Search) -> list[Foreign]:
     problem, knots, best = search.problem, knots_of(search.problem), search.best()
     columns, terms = all_columns(problem, best.fit.z, knots), one_terms(problem, best.fit.z, knots)
     found = _suspected(search, columns, knots, terms)
-    own = _around_themselves(search, found, columns, knots, terms)
+    close = _around_themselves(search, found, columns, knots, terms)
+    own = [
+        Foreign(beside=(), what=one.what, log_posterior=one.log_posterior + _log_prior(problem))
+        for one in close
+    ]
     if max(one.log_posterior for one in found + own) < best.log_posterior - WORTH:
         return _sorted(found, own)
     alike = {one.id.removeprefix(FORCE) for one in _close(found + own) if one.id.startswith(FORCE)}
@@ -65,7 +75,18 @@ def foreigners(search: Search) -> list[Foreign]:
         columns = {FORCE + axis: C for axis, C in force_columns(problem, best.fit.z, alike, finer).items()}
         terms = one_terms(problem, best.fit.z, finer)
         found = [one for one in found if one.id not in columns] + _suspected(search, columns, finer, terms)
-    return _sorted(found + _sudden(search), own)
+    known = max(one.log_posterior for one in found + own)
+    return _sorted(found + _sudden(search, close, max(known, best.log_posterior)), own)
+
+
+def is_explained(search: Search, foreign: Sequence[Foreign]) -> bool:
+    """Say whether a sudden cause leaves nothing but noise, and is so far before the best hypothesis that no sum of
+    causes that hold throughout can come close.
+    """
+    best = max(foreign, key=lambda one: one.log_posterior, default=None)
+    if best is None or not isinstance(best.what, Struck) or is_lost(best.what.fit):
+        return False
+    return best.log_posterior > search.best().log_posterior + SURE
 
 
 def _sorted(found: list[Foreign], own: list[Foreign]) -> list[Foreign]:
@@ -95,7 +116,7 @@ def _around_themselves(
     columns: dict[str, np.ndarray],
     knots: Knots,
     terms: Mapping[str, Terms],
-) -> list[Foreign]:
+) -> list[Close]:
     """Return the most probable forces and drifts beside nothing as they are around fits of their own, if they have any
     hope; none where nothing has to bend.
     """
@@ -108,8 +129,7 @@ def _around_themselves(
     finer = knots_of(problem, FINE)
     terms = one_terms(problem, best.fit.z, finer)
     look = partial(closer, problem, best.fit, kappa=1.0, knots=finer, terms=terms)
-    found_there = search.side.map(look, _worth_a_look(hope, best))
-    return [Foreign(beside=(), what=what, log_posterior=log + prior) for log, what in found_there]
+    return sorted(search.side.map(look, _worth_a_look(hope, best)), key=lambda one: -one.log_posterior)
 
 
 def _worth_a_look(hope: dict[str, float], best: Candidate) -> list[str]:
@@ -138,18 +158,17 @@ def _bases(search: Search) -> list[Candidate]:
     return [search.candidates[()]] + ([best] if best.ids else [])
 
 
-def _sudden(search: Search) -> list[Foreign]:
-    """Return causes that begin in mid-trial, beside nothing else."""
-    problem, none = search.problem, search.candidates[()]
+def _sudden(search: Search, close: Sequence[Close], known: float) -> list[Foreign]:
+    """Return causes that begin in mid-trial, beside nothing else, that may be as probable as what is known."""
+    problem = search.problem
     effects = list({entry.effect.id: entry.effect for entry in problem.entries if entry.record < 0}.values())
     able = [effect for effect in effects if effect.sudden]
-    found = []
-    for record in range(len(problem.records)):
-        times = max(float(problem.records[record].time[-1]) / 2.0, 1.0)
-        prior = np.log(PRIOR["unknown"] / (len(able) * times * len(problem.records)))
-        found += [Foreign(beside=(), what=one, log_posterior=none.log_posterior + one.log_gain + prior)
-                  for one in scan(problem, none.fit, none.scales(problem), able, record)]  # fmt: skip
-    return found
+    prior = float(np.log(PRIOR["unknown"] / (len(able) * len(problem.records))))
+    places = [Place(one.fit, one.along) for one in close[:LOOKED]]
+    places = places or [Place(search.best().fit, Along(problem, search.best().fit.z))]
+    found = [one for record in range(len(problem.records))
+             for one in struck(problem, places, able, record, known - prior, search.side)]  # fmt: skip
+    return [Foreign(beside=(), what=one, log_posterior=one.log_posterior + prior) for one in found]
 
 
 def shares(search: Search, foreign: list[Foreign]) -> tuple[dict[Ids, float], dict[str, float]]:

@@ -14,6 +14,8 @@ NEARLY = 0.5
 """A fit that no step improves although the linear model promises less than this has converged, too."""
 CLOSE = 1.0
 """Sensitivities are a fit's own if they were made so close to it, in tolerances."""
+LOST = 2.0
+"""A fit whose square is this many of its standard deviations above that of noise leaves more than noise."""
 MOST_STEPS = 8
 POOR = 0.5
 """A step that gains less than this share of what the linear model promised has old sensitivities."""
@@ -56,6 +58,12 @@ class Fit:
             return np.inf
         tolerance = np.array([entry.parameter.tolerance for entry in problem.entries])
         return float(np.max(np.abs(self.z - self.made_at) / tolerance))
+
+
+def is_lost(fit: Fit) -> bool:
+    """Say whether a fit leaves more than noise."""
+    count = fit.r.size
+    return bool(fit.r @ fit.r > count + LOST * np.sqrt(2.0 * count))
 
 
 def with_own_slopes(problem: Problem, fit: Fit) -> Fit:

@@ -15,7 +15,7 @@ from subzero.diagnosis.candidate import Candidate, candidate_of
 from subzero.diagnosis.growing import GrowingFits
 from subzero.diagnosis.hypotheses import Ids, places, variances
 from subzero.diagnosis.probability import Beliefs
-from subzero.diagnosis.refit import Fit, refit
+from subzero.diagnosis.refit import Fit, is_lost, refit
 from subzero.diagnosis.screen import look
 from subzero.diagnosis.stride import ENOUGH
 from subzero.diagnosis.wide import fit_wide
@@ -57,19 +57,24 @@ class Search(GrowingFits):
         """Fill the screen: linear evidence of nothing, every cause, and every pair."""
         self.screen = look(self.problem, self.wide, self.nominal)
 
-    def refit_best(self) -> None:
-        """Fit nothing, and the best causes and pairs of the screen, with real runs: all with the sensitivities at hand,
-        then those that come out best with their own.
-        """
+    def first_fits(self) -> None:
+        """Fit nothing, and the best causes and pairs of the screen, with real runs and the sensitivities at hand."""
         first = self._first()
         for ids, fit in zip(first, self._aside(self._alone, first), strict=True):
             self._say(0.3, "fitting", ids, " by itself")
             self._keep(ids, fit)
         best = self.screen.best(1, SINGLES, KEEP), self.screen.best(2, PAIRS, KEEP)
         self.fit_all(list(chain([()], *best)), words="fitting")
+
+    def races(self) -> None:
+        """Fit what came out best again, with sensitivities of its own."""
         self.race(2)
         self.sharpen()
         self.race()
+
+    def is_lost(self) -> bool:
+        """Say whether nothing that was fitted so far explains the records."""
+        return is_lost(self.best().fit)
 
     def settle(self) -> None:
         """Fit the best candidate again until it has settled, so that its numbers can be told, and what might still

@@ -1,6 +1,4 @@
-"""Effects that begin in the middle of a trial: a fin struck at 12 s, the cable caught at 20 s.
-
-    θ(t) = θ₀ for t < t₀,  θ₀ + z from t₀ on
+"""Effects that begin in the middle of a trial, in a linear problem: which, and when?
 
 Every sudden effect is tried from every time of a grid, in the linear problem with all tolerances free; the best one
 again on a finer grid. What is left out: effects that end again, and two that begin at different times.
@@ -11,12 +9,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
+from subzero.diagnosis.begun import beginning, begun_at
+from subzero.diagnosis.candidate import possible
 from subzero.diagnosis.effect import Effect
 from subzero.diagnosis.entries import Entry
-from subzero.diagnosis.evidence import Scales, mixed
 from subzero.diagnosis.latent import Seen, seen
 from subzero.diagnosis.problem import Problem
 from subzero.diagnosis.refit import Fit
@@ -29,30 +29,6 @@ SECANT = 0.25
 """Step of a sensitivity, in effect scales."""
 
 
-def begun_at(effect: Effect, time: float) -> Effect:
-    """Return the effect as it begins at a time [s]: id "<id>@<time>". To be applied after all that hold throughout."""
-    return replace(
-        effect,
-        id=f"{effect.id}@{time:g}",
-        sentence=f"from {time:g} s on {effect.sentence}",
-        apply=partial(_from_then_on, effect, time),
-        sudden=False,
-    )
-
-
-def _from_then_on(effect: Effect, time: float, setting: Setting, *deviations: float) -> Setting:
-    """Return a setting that has an effect from a time on, beside all other changes in mid-trial."""
-    if time <= 0.0:
-        return effect.apply(setting, *deviations)
-    before = [pair for pair in setting.later if pair[0] < time]
-    base = before[-1][1] if before else setting.model
-    after = [(time, base), *(pair for pair in setting.later if pair[0] > time)]
-    changed = [
-        (when, effect.apply(replace(setting, model=model), *deviations).model) for when, model in after
-    ]
-    return replace(setting, later=(*before, *changed))
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Begun:
     """A sudden effect in the linear problem.
@@ -61,9 +37,9 @@ class Begun:
         effect: as it holds throughout.
         time: when it begins. [s]
         record: in which record; a sudden effect is an event of one trial.
-        log_gain: log evidence over that of no such effect, mixed over κ.
+        log_gain: log evidence over that of no such effect.
         mean: deviations of its parameters. [their unit]
-        kappa: the most probable κ; mean is under it.
+        kappa: the most probable scale of the tolerances.
     """
 
     effect: Effect
@@ -71,12 +47,24 @@ class Begun:
     record: int
     log_gain: float
     mean: np.ndarray
-    kappa: float
+    kappa: float = 1.0
 
     @property
     def begun(self) -> Effect:
         """The effect as it begins at that time."""
         return begun_at(self.effect, self.time)
+
+    @property
+    def id(self) -> str:
+        """Such as "rudder_offset@12"."""
+        return self.begun.id
+
+
+class Along(NamedTuple):
+    """A run to take sensitivities from: of a problem with deviations z of all its entries."""
+
+    problem: Problem
+    z: np.ndarray
 
 
 def times_of(problem: Problem, record: int, spacing: float = COARSE) -> list[float]:
@@ -86,23 +74,32 @@ def times_of(problem: Problem, record: int, spacing: float = COARSE) -> list[flo
 
 
 def scan(
-    problem: Problem, fit: Fit, scales: Scales, effects: Sequence[Effect], record: int = 0, *, best: int = 3
+    problem: Problem,
+    fit: Fit,
+    D: np.ndarray,
+    effects: Sequence[Effect],
+    record: int = 0,
+    *,
+    best: int = 3,
+    along: Along | None = None,
 ) -> list[Begun]:
     """Return every sudden effect at its best time, most probable first; the `best` of them with finer times.
 
     Args:
         problem: records and parameters.
         fit: close to the data.
-        scales: κ → its log weight and the prior variances of the entries.
+        D: prior variances of the entries (k,).
         effects: of the catalogue; those that are not sudden are left out.
         record: in which they begin.
         best: how many are tried on the finer grid.
+        along: the run whose sensitivities are taken, if not that of the fit.
     """
+    along = along or Along(problem, fit.z)
     able = [effect for effect in effects if effect.sudden]
     coarse = times_of(problem, record)
-    found = _strongest(_tried(problem, fit, scales, [(one, time) for one in able for time in coarse], record))
+    found = _strongest(_tried(along, fit, D, [(one, time) for one in able for time in coarse], record))
     finer = [(one.effect, time) for one in found[:best] for time in _around(one.time, coarse)]
-    return _strongest(found + _tried(problem, fit, scales, finer, record))
+    return _strongest(found + _tried(along, fit, D, finer, record))
 
 
 def _around(time: float, coarse: list[float]) -> list[float]:
@@ -119,29 +116,32 @@ def _strongest(found: list[Begun]) -> list[Begun]:
 
 
 def _tried(
-    problem: Problem, fit: Fit, scales: Scales, pairs: list[tuple[Effect, float]], record: int
+    along: Along, fit: Fit, D: np.ndarray, pairs: list[tuple[Effect, float]], record: int
 ) -> list[Begun]:
     """Return the linear evidence of effects that begin at times."""
     q, whole = fit.quadratic, fit.r + fit.J @ fit.z
-    made = columns(problem, fit.z, pairs, record)
-    sizes = np.cumsum([0, *(C.shape[1] for C in made)])
-    data = {kappa: seen(q.A, q.b, one.D, fit.J, np.hstack(made), whole) for kappa, one in scales.items()}
+    made = columns(*along, pairs, record)
+    sizes, data = (
+        np.cumsum([0, *(C.shape[1] for C in made)]),
+        seen(q.A, q.b, D, fit.J, np.hstack(made), whole),
+    )
     found = []
     for (effect, time), first, last in zip(pairs, sizes[:-1], sizes[1:], strict=True):
-        variance, own = np.array([parameter.scale**2 for parameter in effect.parameters]), slice(first, last)
-        gains = {kappa: _gain(Seen(all.M[own, own], all.q[own]), variance) for kappa, all in data.items()}
-        log, best = mixed(scales, {kappa: gain for kappa, (gain, _) in gains.items()})
-        found.append(
-            Begun(effect=effect, time=time, record=record, log_gain=log, mean=gains[best][1], kappa=best)
-        )
+        own = slice(first, last)
+        log, mean = _gain(Seen(data.M[own, own], data.q[own]), effect)
+        found.append(Begun(effect=effect, time=time, record=record, log_gain=log, mean=mean))
     return found
 
 
-def _gain(data: Seen, variance: np.ndarray) -> tuple[float, np.ndarray]:
-    """Return the log evidence over that of zero of coefficients with prior variances (n,), and their mean."""
+def _gain(data: Seen, effect: Effect) -> tuple[float, np.ndarray]:
+    """Return the log evidence of an effect over that of none, and the mean of its deviations."""
+    variance = np.array([parameter.scale**2 for parameter in effect.parameters])
     inner = np.eye(variance.size) + variance[:, None] * data.M
-    mean = np.linalg.solve(inner, variance * data.q)
-    return 0.5 * float(data.q @ mean) - 0.5 * float(np.linalg.slogdet(inner)[1]), mean
+    M = np.linalg.solve(inner, np.diag(variance))
+    mean = M @ data.q
+    log = 0.5 * float(data.q @ mean) - 0.5 * float(np.linalg.slogdet(inner)[1])
+    entries = [Entry(effect, i, -1) for i in range(variance.size)]
+    return log + possible(entries, range(variance.size), mean, np.sqrt(np.diag(M))), mean
 
 
 def columns(
@@ -190,7 +190,7 @@ def _rows(problem: Problem, record: int) -> tuple[int, int]:
 
 
 def with_begun(problem: Problem, begun: Begun) -> Problem:
-    """Return the problem with a sudden effect's parameters behind its entries."""
-    effect = begun.begun
+    """Return the problem with a sudden effect's parameters and its time behind its entries."""
+    effect = beginning(begun.effect, begun.time, float(problem.records[begun.record].time[-1]))
     more = tuple(Entry(effect, i, begun.record) for i in range(len(effect.parameters)))
     return replace(problem, entries=(*problem.entries, *more))

@@ -12,8 +12,10 @@ from subzero.diagnosis.estimates import causes, deviations, large, name, rivals
 from subzero.diagnosis.extending import Extension, ahead, gained, of_causes, of_nothing, of_sudden, of_unknown
 from subzero.diagnosis.foreign import shares, tolerance_scale
 from subzero.diagnosis.hypotheses import Ids
-from subzero.diagnosis.rules import HEALTHY, SET, decide, smallest_set
+from subzero.diagnosis.outlook import Survivor
+from subzero.diagnosis.rules import HEALTHY, Late, decide, smallest_set
 from subzero.diagnosis.showing import curves
+from subzero.diagnosis.sudden_told import apart, cause_of, fitted, from_now_on, is_large, rival_of
 from subzero.diagnosis.verdict import (
     CAUSE_NAMED,
     NOTHING_WRONG,
@@ -37,12 +39,15 @@ def tell(work: Work) -> Verdict:
     search = work.search
     inside, outside = shares(search, work.foreign)
     top = max((ids for ids in inside if ids in search.candidates), key=lambda ids: inside[ids])
-    best = search.candidates[top]
-    sudden = max((key for key in outside if "@" in key), key=lambda key: outside[key], default="")
-    if outside.get(sudden, 0.0) >= HEALTHY:
-        return _told(work, CAUSE_NAMED, best, inside, outside, of_sudden(work, sudden, outside[sudden]))
-    verdict = decide(inside, sum(p for key, p in outside.items() if "@" not in key), *_large(work, best))
-    return _told(work, verdict, best, inside, outside, _extension(work, verdict, best))
+    best, sudden = search.candidates[top], fitted(work)
+    late = Late(outside[sudden[0].id], is_large(sudden[0]), apart(work, sudden[0])) if sudden else Late()
+    forces = sum(p for key, p in outside.items() if "@" not in key)
+    verdict = decide(inside, forces, *_large(work, best), late)
+    if verdict == CAUSE_NAMED and late.is_named:
+        new = of_sudden(work, sudden[0], cause_of(work, sudden[0], late.probability))
+    else:
+        new = _extension(work, verdict, best)
+    return _told(work, verdict, best, inside, outside, new)
 
 
 def _large(work: Work, best: Candidate) -> tuple[bool, float]:
@@ -71,9 +76,13 @@ def _told(
 ) -> Verdict:
     """Return the verdict as a value."""
     candidates = work.search.candidates
-    left = smallest_set(inside, SET * sum(inside.values()))
-    left = _contenders(work, best, left) if verdict == UNDECIDED else left
-    others = rivals(work, best, inside, left)
+    everything = inside | {(key,): p for key, p in outside.items()}
+    whole = smallest_set(everything)
+    left = [ids for ids in whole if ids in inside] or [best.ids]
+    late = [one for one in fitted(work) if (one.id,) in whole and one.id != new.id]
+    left = _contenders(work, best, left) if verdict == UNDECIDED and not late else left
+    others = (*rivals(work, best, inside, left), *(rival_of(work, one, outside[one.id]) for one in late))
+    others = tuple(sorted(others, key=lambda one: -one.probability))
     named = (
         (new.cause,)
         if new.cause
@@ -86,6 +95,8 @@ def _told(
     fits = {"nominal": None, "tolerance": candidates[()].fit}
     fits |= {"extended": new.fit} if verdict in (CAUSE_NAMED, OUTSIDE) else {}
     fits |= {f"rival: {name(first)}": rival} if first else {}
+    survivors: list[Survivor] = [candidates[ids] for ids in left if ids in candidates]
+    survivors += [from_now_on(work, one) for one in late]
     full = work.budget == "full" and work.complete
     return Verdict(
         verdict=verdict,
@@ -95,11 +106,11 @@ def _told(
         unknown=new.unknown,
         extended=new.extended,
         gain=gained(work, new, rival) if full and verdict in (CAUSE_NAMED, OUTSIDE) else None,
-        next_trial=ahead(work, left, inside) if full and verdict == UNDECIDED else None,
+        next_trial=ahead(work, survivors, everything) if full and verdict == UNDECIDED else None,
         curves=curves(new.problem, fits),
         probabilities=_listed(inside, outside),
         tolerance_scale=tolerance_scale(work.search),
-        **_common(work, best),
+        **_common(work, best, sum(inside.values())),
     )
 
 
@@ -116,13 +127,13 @@ def _contenders(work: Work, best: Candidate, left: list[Ids]) -> list[Ids]:
     return [*left, closest]
 
 
-def _common(work: Work, best: Candidate) -> dict[str, Any]:
+def _common(work: Work, best: Candidate, inside: float) -> dict[str, Any]:
     """Return what every verdict has."""
     return {
         "detectable": work.detectable,
         "misfit": work.misfit,
         "deviations": deviations(work, best),
-        "notes": _notes(work, best),
+        "notes": _notes(work, best, inside),
         "seconds": work.seconds,
         "seed": work.seed,
         "complete": work.complete,
@@ -135,11 +146,11 @@ def _listed(inside: Mapping[Ids, float], outside: Mapping[str, float]) -> dict[s
     return {key: p for key, p in sorted(listed.items(), key=lambda pair: -pair[1]) if p > WORTH_TELLING}
 
 
-def _notes(work: Work, best: Candidate) -> tuple[str, ...]:
-    """Return what else a reader should know."""
+def _notes(work: Work, best: Candidate, inside: float) -> tuple[str, ...]:
+    """Return what else a reader should know; of the tolerances, if what holds throughout is probable."""
     found, scale = [], tolerance_scale(work.search)
     wide = max(scale, key=lambda kappa: scale[kappa])
-    if wide > 1.0:
+    if wide > 1.0 and inside > HEALTHY:
         found.append(
             f"The declared tolerances look too tight: {wide:g} times as wide explains the records best."
         )

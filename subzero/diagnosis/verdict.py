@@ -42,13 +42,16 @@ class Estimate:
 
 @dataclass(frozen=True, kw_only=True)
 class Cause:
-    """A cause with its probability, parameters, and when it began (None: before the trial) [s]."""
+    """A cause with its probability, parameters, and when it began (None: before the trial), give or take a standard
+    deviation. [s]
+    """
 
     id: str
     sentence: str
     probability: float
     parameters: Mapping[str, Estimate]
     start_time: float | None = None
+    start_sd: float = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)

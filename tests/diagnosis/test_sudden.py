@@ -5,10 +5,10 @@ import dataclasses
 import numpy as np
 import pytest
 
+from subzero.diagnosis.begun import begun_at
 from subzero.diagnosis.effects import catalogue
-from subzero.diagnosis.evidence import Scale
 from subzero.diagnosis.response import respond
-from subzero.diagnosis.sudden import begun_at, scan, times_of, with_begun
+from subzero.diagnosis.sudden import scan, times_of, with_begun
 
 EFFECTS = catalogue(("heading",))
 
@@ -51,7 +51,7 @@ def test_other_changes_in_mid_trial_are_kept(struck):
 def test_the_scan_finds_what_began_and_when(struck):
     fit = struck.fit()
     effects = [EFFECTS[name] for name in ("hull_drag", "rudder_offset", "net_buoyancy", "hull_drag")]
-    found = scan(struck.problem, fit, {1.0: Scale(0.0, fit.D)}, effects, best=1)
+    found = scan(struck.problem, fit, fit.D, effects, best=1)
     assert found[0].effect.id == "hull_drag"
     assert abs(found[0].time - 12.4) <= 1.0
     assert found[0].mean[0] == pytest.approx(0.9, abs=0.35)

@@ -1,0 +1,171 @@
+"""How probable a cause that begins in mid-trial is: each fitted by real runs, and when it began with it.
+
+Where much is wrong from some time on, a model without it has to bend, and what is linear there says little. But a force
+that nobody explains, fitted, takes the run along the true one: there every sudden cause is tried from every time, the
+best are fitted, and the others tried again in the place of the best, until none is left that might be better.
+
+    z ~ N(0, κ² τ²),   size ~ N(0, s²),   p(t₀) = 1/T          log p = −objective − ½ log det (D P)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+
+from subzero.diagnosis.candidate import laplace
+from subzero.diagnosis.effect import Effect
+from subzero.diagnosis.evidence import KAPPAS, Quadratic, log_sum, posterior
+from subzero.diagnosis.hypotheses import log_prior, named, variances
+from subzero.diagnosis.problem import Problem
+from subzero.diagnosis.refit import Fit, refit, with_own_slopes
+from subzero.diagnosis.sudden import Along, Begun, columns, scan, times_of, with_begun
+
+ROUNDS, MOST, HOPE = 3, 3, 10.0
+"""Rounds of trying; in each at most so many are fitted that the linear problem has this close to the best known."""
+BENT = 0.05
+"""Where a cause gains much, what is not linear may be this share of it."""
+BETTER = 2.0
+"""What was fitted is fitted again where the linear problem promises so much more, in log posterior."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Struck:
+    """A sudden cause with a fit of its own.
+
+    Attributes:
+        begun: what and when, as fitted.
+        log_posterior: of it beside nothing, but for its own prior.
+        problem: with its parameters and its time behind the entries.
+        fit: of that problem.
+    """
+
+    begun: Begun
+    log_posterior: float
+    problem: Problem
+    fit: Fit
+
+    @property
+    def id(self) -> str:
+        """Such as "rudder_offset@12"."""
+        return self.begun.id
+
+
+class Place(NamedTuple):
+    """A linear problem without any sudden cause, and the run that sensitivities are taken from."""
+
+    fit: Fit
+    along: Along
+
+
+class Hope(NamedTuple):
+    """A sudden cause in the linear problem of a place: log posterior, as of `Struck`."""
+
+    log_posterior: float
+    begun: Begun
+    place: Place
+
+    @property
+    def at_most(self) -> float:
+        """The log posterior that its fit may have."""
+        return self.log_posterior + BENT * max(self.begun.log_gain, 0.0)
+
+
+def struck(
+    problem: Problem,
+    places: Sequence[Place],
+    able: Sequence[Effect],
+    record: int,
+    least: float,
+    side: Executor,
+) -> list[Struck]:
+    """Return the sudden causes that are worth a fit of their own, fitted.
+
+    Args:
+        problem: records and parameters.
+        places: where they are tried at first.
+        able: effects that may begin in mid-trial.
+        record: in which they begin.
+        least: log posterior of what is known else, on the scale of `Struck`.
+        side: for fits side by side.
+    """
+    done: dict[str, Struck] = {}
+    for _ in range(ROUNDS):
+        hopes = [one for place in places for one in _hopes(problem, place, able, record)]
+        worth = _worth(hopes, done, least)
+        for one in side.map(partial(_fitted, problem), worth):
+            name = one.begun.effect.id
+            done[name] = max(one, done.get(name, one), key=lambda each: each.log_posterior)
+        best = max(done.values(), key=lambda one: one.log_posterior, default=None)
+        if not worth or best is None:
+            break
+        places = [_in_its_place(problem, best)]
+    return list(done.values())
+
+
+def _hopes(problem: Problem, place: Place, able: Sequence[Effect], record: int) -> list[Hope]:
+    """Return every sudden cause at its best time, in the linear problem of a place."""
+    D = variances(problem.entries, (), 1.0)
+    here = posterior(place.fit.quadratic, D).log_evidence + float(np.log(KAPPAS[1.0]))
+    here += log_prior((), len(named(problem))) - float(np.log(len(times_of(problem, record))))
+    found = scan(problem, place.fit, D, able, record, along=place.along)
+    return [Hope(here + one.log_gain, one, place) for one in found]
+
+
+def _worth(hopes: Sequence[Hope], done: dict[str, Struck], least: float) -> list[Hope]:
+    """Return what is worth a fit: each cause where it comes out best, if it may come close to the best known, and is
+    promised more than what is known of it.
+    """
+    ranked = sorted(hopes, key=lambda one: -one.log_posterior)
+    first = {one.begun.effect.id: one for one in reversed(ranked)}
+    known = {name: one.log_posterior for name, one in done.items()}
+    bar = max([least, *known.values()]) - HOPE
+    found = [one for name, one in first.items()
+             if one.at_most > bar and one.log_posterior > known.get(name, -np.inf) + BETTER]  # fmt: skip
+    return sorted(found, key=lambda one: -one.log_posterior)[:MOST]
+
+
+def _fitted(problem: Problem, hope: Hope) -> Struck:
+    """Return a sudden cause fitted by real runs, all else within declared tolerances."""
+    place, begun = hope.place, hope.begun
+    more, n = with_begun(problem, begun), len(problem.entries)
+    (C,) = columns(*place.along, [(begun.effect, begun.time)], begun.record)
+    start = _linear(place.fit, C, _prior(problem, more, 1.0)[:-1])
+    start = np.append(start, 0.0)
+    slopes = more.jacobian(start, range(n, start.size))[:, n:]
+    D, J = _prior(problem, more, 1.0), np.hstack([place.fit.J[:, :n], slopes])
+    fit = with_own_slopes(more, refit(more, start, J, D, most_fresh=1))
+    under = {kappa: _prior(problem, more, kappa) for kappa in KAPPAS}
+    log = laplace(more.entries, fit, under)
+    mixed = log_sum([float(np.log(prior)) + log[kappa] for kappa, prior in KAPPAS.items()])
+    kappa = max(KAPPAS, key=lambda kappa: np.log(KAPPAS[kappa]) + log[kappa])
+    begun = replace(begun, time=round(begun.time + float(fit.z[-1]), 2), mean=fit.z[n:-1], kappa=kappa)
+    total = mixed + log_prior((), len(named(problem)))
+    return Struck(
+        begun=begun, log_posterior=total if np.isfinite(fit.objective) else -np.inf, problem=more, fit=fit
+    )
+
+
+def _linear(fit: Fit, C: np.ndarray, D: np.ndarray) -> np.ndarray:
+    """Return the best deviations in the linear problem of a fit with further columns."""
+    n = D.size - C.shape[1]
+    J, whole = np.hstack([fit.J[:, :n], C]), fit.r + fit.J @ fit.z
+    return posterior(Quadratic(A=J.T @ J, b=J.T @ whole, rr=float(whole @ whole)), D).z
+
+
+def _prior(problem: Problem, more: Problem, kappa: float) -> np.ndarray:
+    """Return the prior variances of a problem's entries and of the sudden cause behind them."""
+    own = [entry.parameter.scale**2 for entry in more.entries[len(problem.entries) :]]
+    return np.concatenate([variances(problem.entries, (), kappa), own])
+
+
+def _in_its_place(problem: Problem, one: Struck) -> Place:
+    """Return the linear problem around a sudden cause's fit, of all but it."""
+    n, fit = len(problem.entries), one.fit
+    D, J = fit.D[:n], fit.J[:, :n]
+    r = fit.r + fit.J[:, n:-1] @ fit.z[n:-1]
+    return Place(replace(fit, z=fit.z[:n], r=r, J=J, D=D), Along(one.problem, fit.z))

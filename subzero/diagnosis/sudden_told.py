@@ -1,0 +1,81 @@
+"""What is told of causes that begin in mid-trial: how large, how far from rivals, as a rival, in a trial to come."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from subzero.diagnosis.detect import against, information, marginal
+from subzero.diagnosis.estimates import estimate
+from subzero.diagnosis.evidence import posterior
+from subzero.diagnosis.hypotheses import Ids, named, places
+from subzero.diagnosis.refit import Fit
+from subzero.diagnosis.rules import PRACTICAL
+from subzero.diagnosis.struck import Struck
+from subzero.diagnosis.verdict import Cause, Rival
+from subzero.diagnosis.work import Work
+
+
+def fitted(work: Work) -> list[Struck]:
+    """Return the sudden causes that have a fit of their own, the most probable first."""
+    ranked = sorted(work.foreign, key=lambda one: -one.log_posterior)
+    return [one.what for one in ranked if isinstance(one.what, Struck)]
+
+
+def is_large(one: Struck) -> bool:
+    """Say whether a sudden cause is of a practical size; calibration changes nothing in the middle of a trial, so that
+    half of what calibration may do is enough.
+    """
+    sizes = zip(one.begun.mean, one.begun.effect.parameters, strict=True)
+    return any(abs(float(z)) > 0.5 * PRACTICAL * one.begun.kappa * p.tolerance for z, p in sizes)
+
+
+def apart(work: Work, one: Struck) -> float:
+    """Return D of a sudden cause against the closest of those that hold throughout, and against the tolerances."""
+    n, more = len(work.problem.entries), one.problem
+    M, own = marginal(more, one.fit.J, one.begun.kappa), list(range(n, len(more.entries) - 1))
+    step = one.fit.z[own]
+    found = [float(step @ information(more, M, own, one.begun.kappa) @ step)]
+    found += [
+        against(more, M, own, step, places(more.entries, (other,)), one.begun.kappa)[0]
+        for other in named(more)
+    ]
+    return min(found)
+
+
+def cause_of(work: Work, what: Struck, probability: float) -> Cause:
+    """Return a sudden cause in words and numbers."""
+    fit, effect, n = what.fit, what.begun.effect, len(work.problem.entries)
+    sd = np.sqrt(np.diag(posterior(fit.quadratic, fit.D).M))
+    setting = what.problem.records[what.begun.record].setting
+    numbers = {
+        p.name: estimate(p, p.nominal(setting), float(fit.z[n + i]), float(sd[n + i]))
+        for i, p in enumerate(effect.parameters)
+    }
+    return Cause(id=effect.id, sentence=effect.sentence, probability=probability, parameters=numbers,
+                 start_time=what.begun.time, start_sd=float(sd[-1]))  # fmt: skip
+
+
+def rival_of(work: Work, what: Struck, probability: float) -> Rival:
+    """Return a sudden cause as a rival of what is told."""
+    cause = cause_of(work, what, probability)
+    return Rival(ids=(what.id,), sentence=what.begun.begun.sentence, probability=probability, discrimination=np.nan,
+                 parameters={what.id: cause.parameters})  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FromNowOn:
+    """A sudden cause as it will be in trials to come: throughout. As an `outlook.Survivor`."""
+
+    ids: Ids
+    fit: Fit
+
+
+def from_now_on(work: Work, what: Struck) -> FromNowOn:
+    """Return a sudden cause as one that holds throughout, as large, with what the records say of its size."""
+    n, fit = len(work.problem.entries), what.fit
+    at = places(work.problem.entries, (what.begun.effect.id,))
+    z, J, D = fit.z[:n].copy(), fit.J[:, :n].copy(), fit.D[:n].copy()
+    z[at], J[:, at], D[at] = fit.z[n:-1], fit.J[:, n:-1], fit.D[n:-1]
+    return FromNowOn(ids=(what.id,), fit=replace(fit, z=z, J=J, D=D))
