@@ -20,8 +20,8 @@ from subzero.diagnosis.hypotheses import log_prior, named, variances
 from subzero.diagnosis.latent import Terms
 from subzero.diagnosis.problem import Problem
 from subzero.diagnosis.recover import Recovered, drifted, recover
-from subzero.diagnosis.refit import Fit, refit, with_own_slopes
-from subzero.diagnosis.sudden import Along
+from subzero.diagnosis.refit import Fit, is_lost, refit, with_own_slopes
+from subzero.diagnosis.sudden import Along, Place
 from subzero.diagnosis.suspects import Suspect, suspects
 from subzero.diagnosis.unknown import DRIFTS, FORCE, Knots
 
@@ -32,14 +32,14 @@ class Close(NamedTuple):
     Attributes:
         log_posterior: of it beside nothing, but for its own prior.
         what: it is.
-        fit: the linear problem there: what the records lack without it.
-        along: the run there, with it.
+        place: the linear problem there, without it, and the run, with it.
+        is_lost: it does not explain the records.
     """
 
     log_posterior: float
     what: Suspect
-    fit: Fit
-    along: Along
+    place: Place
+    is_lost: bool
 
 
 def closer(
@@ -64,7 +64,8 @@ def closer(
         knots, done = found.knots, _beside_drift(problem, start, which, found)
     fit = _without(found, done, D.size)
     ((log, what),) = linear(problem, fit, {name: found.columns}, knots, terms, [kappa])
-    return Close(log + _possible(problem, done), what, fit, Along(found.problem, done.z))
+    place = Place(fit, Along(found.problem, done.z))
+    return Close(log + _possible(problem, done), what, place, is_lost(done))
 
 
 def linear(

@@ -2,8 +2,8 @@
 
 pose → what could be seen → misfit → search → what is outside → rules → extended model → gain → next trial
 
-Where the first fits all fail, what is outside is asked before the search goes on: a cause that begins in mid-trial and
-explains the records ends it.
+Where even wide tolerances do not come close, or the first fits all fail, what is outside is asked before: a force takes
+the run along the records, and a cause that begins in mid-trial and explains them ends the search.
 """
 
 from __future__ import annotations
@@ -79,13 +79,15 @@ def _work(work: Work, seen: Seen) -> None:
         work.misfit[one.name] = misfits(one, respond(one.setting, one.time, one.noise))
     work.detectable = detectability(work.problem, with_secants(work.problem, search.nominal[1]))
     seen(work.detectable)
+    if search.is_far and work.budget != "screen":
+        _from_afar(work)
     search.look()
     done("screen")
     if work.budget == "screen":
         search.fit(())
         return
     search.first_fits()
-    if search.is_lost():
+    if search.is_lost() and not work.foreign:
         search.progress(0.6, "forces, and causes that begin in mid-trial")
         work.foreign = foreigners(search)
     if not is_explained(search, work.foreign):
@@ -96,3 +98,12 @@ def _work(work: Work, seen: Seen) -> None:
         search.progress(0.8, "forces that no cause explains")
         work.foreign = foreigners(search)
     done("outside")
+
+
+def _from_afar(work: Work) -> None:
+    """Let a force, or a cause that begins in mid-trial, take the run along the records, and look from there."""
+    work.search.progress(0.2, "forces, and causes that begin in mid-trial")
+    work.search.only_nothing()
+    work.foreign = foreigners(work.search)
+    if work.foreign[0].place:
+        work.search.go_near(work.foreign[0].place.fit)

@@ -17,8 +17,8 @@ from subzero.diagnosis.one_term import one_terms
 from subzero.diagnosis.problem import Problem
 from subzero.diagnosis.refit import is_lost
 from subzero.diagnosis.search import Search
-from subzero.diagnosis.struck import Place, Struck, struck
-from subzero.diagnosis.sudden import Along
+from subzero.diagnosis.struck import Struck, in_its_place, struck
+from subzero.diagnosis.sudden import Along, Place
 from subzero.diagnosis.suspects import Suspect, suspects
 from subzero.diagnosis.unknown import FINE, FORCE, Knots, all_columns, force_columns, knots_of
 from subzero.missing_force import AXES
@@ -45,11 +45,13 @@ class Foreign:
         beside: the causes that hold as well.
         what: a force or a drift, or a cause that begins in mid-trial.
         log_posterior: on the scale of `Candidate.log_posterior`.
+        place: where it was fitted, if that explains the records.
     """
 
     beside: Ids
     what: Suspect | Struck
     log_posterior: float
+    place: Place | None = None
 
     @property
     def id(self) -> str:
@@ -63,10 +65,8 @@ def foreigners(search: Search) -> list[Foreign]:
     columns, terms = all_columns(problem, best.fit.z, knots), one_terms(problem, best.fit.z, knots)
     found = _suspected(search, columns, knots, terms)
     close = _around_themselves(search, found, columns, knots, terms)
-    own = [
-        Foreign(beside=(), what=one.what, log_posterior=one.log_posterior + _log_prior(problem))
-        for one in close
-    ]
+    own = [Foreign(beside=(), what=one.what, log_posterior=one.log_posterior + _log_prior(problem),
+                   place=None if one.is_lost else one.place) for one in close]  # fmt: skip
     if max(one.log_posterior for one in found + own) < best.log_posterior - WORTH:
         return _sorted(found, own)
     alike = {one.id.removeprefix(FORCE) for one in _close(found + own) if one.id.startswith(FORCE)}
@@ -164,11 +164,12 @@ def _sudden(search: Search, close: Sequence[Close], known: float) -> list[Foreig
     effects = list({entry.effect.id: entry.effect for entry in problem.entries if entry.record < 0}.values())
     able = [effect for effect in effects if effect.sudden]
     prior = float(np.log(PRIOR["unknown"] / (len(able) * len(problem.records))))
-    places = [Place(one.fit, one.along) for one in close[:LOOKED]]
+    places = [one.place for one in close[:LOOKED]]
     places = places or [Place(search.best().fit, Along(problem, search.best().fit.z))]
     found = [one for record in range(len(problem.records))
              for one in struck(problem, places, able, record, known - prior, search.side)]  # fmt: skip
-    return [Foreign(beside=(), what=one, log_posterior=one.log_posterior + prior) for one in found]
+    return [Foreign(beside=(), what=one, log_posterior=one.log_posterior + prior,
+                    place=None if is_lost(one.fit) else in_its_place(problem, one)) for one in found]  # fmt: skip
 
 
 def shares(search: Search, foreign: list[Foreign]) -> tuple[dict[Ids, float], dict[str, float]]:

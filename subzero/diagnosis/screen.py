@@ -67,15 +67,16 @@ def is_close(problem: Problem, wide: Fit) -> bool:
     return bool(wide.r @ wide.r < FAR * wide.r.size and np.count_nonzero(bent & model) < MANY)
 
 
-def look(problem: Problem, wide: Fit, nominal: tuple[np.ndarray, np.ndarray]) -> Screen:
+def look(problem: Problem, wide: Fit, nominal: tuple[np.ndarray, np.ndarray], *, far: bool) -> Screen:
     """Return the screen: nothing, every cause, and every pair.
 
     Args:
         problem: records and parameters.
         wide: the fit with wide tolerances.
         nominal: residual (m,) and sensitivities (m, k) of the nominal model.
+        far: the wide fit did not come close.
     """
-    if not is_close(problem, wide):
+    if far:
         return _from_afar(problem, *nominal)
     names = named(problem)
     found = Screen(count=len(names))

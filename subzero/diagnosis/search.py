@@ -16,7 +16,7 @@ from subzero.diagnosis.growing import GrowingFits
 from subzero.diagnosis.hypotheses import Ids, places, variances
 from subzero.diagnosis.probability import Beliefs
 from subzero.diagnosis.refit import Fit, is_lost, refit
-from subzero.diagnosis.screen import look
+from subzero.diagnosis.screen import is_close, look
 from subzero.diagnosis.stride import ENOUGH
 from subzero.diagnosis.wide import fit_wide
 
@@ -44,18 +44,28 @@ class Search(GrowingFits):
 
     Attributes:
         nominal: residual and sensitivities of the nominal model.
+        is_far: nothing came close to the records so far, not even within wide tolerances.
     """
 
     nominal: tuple[np.ndarray, np.ndarray] = field(init=False)
+    is_far: bool = False
 
     def begin(self) -> None:
         """Make the sensitivities at the nominal model, and the fit with wide tolerances."""
         self.problem, self.wide, self.nominal = fit_wide(self.problem, self.progress)
-        self.economical = self.problem
+        self.economical, self.is_far = self.problem, not is_close(self.problem, self.wide)
+
+    def only_nothing(self) -> None:
+        """Take the wide fit for that of "nothing is wrong", before anything else is known."""
+        self._take(candidate_of(self.problem, (), self.wide))
+
+    def go_near(self, fit: Fit) -> None:
+        """Make everything around a linear problem that is closer to the records than that of the wide fit."""
+        self.wide, self.is_far = fit, False
 
     def look(self) -> None:
         """Fill the screen: linear evidence of nothing, every cause, and every pair."""
-        self.screen = look(self.problem, self.wide, self.nominal)
+        self.screen = look(self.problem, self.wide, self.nominal, far=self.is_far)
 
     def first_fits(self) -> None:
         """Fit nothing, and the best causes and pairs of the screen, with real runs and the sensitivities at hand."""

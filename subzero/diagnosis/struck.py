@@ -23,7 +23,7 @@ from subzero.diagnosis.evidence import KAPPAS, Quadratic, log_sum, posterior
 from subzero.diagnosis.hypotheses import log_prior, named, variances
 from subzero.diagnosis.problem import Problem
 from subzero.diagnosis.refit import Fit, refit, with_own_slopes
-from subzero.diagnosis.sudden import Along, Begun, columns, scan, times_of, with_begun
+from subzero.diagnosis.sudden import Along, Begun, Place, columns, scan, times_of, with_begun
 
 ROUNDS, MOST, HOPE = 3, 3, 10.0
 """Rounds of trying; in each at most so many are fitted that the linear problem has this close to the best known."""
@@ -53,13 +53,6 @@ class Struck:
     def id(self) -> str:
         """Such as "rudder_offset@12"."""
         return self.begun.id
-
-
-class Place(NamedTuple):
-    """A linear problem without any sudden cause, and the run that sensitivities are taken from."""
-
-    fit: Fit
-    along: Along
 
 
 class Hope(NamedTuple):
@@ -103,7 +96,7 @@ def struck(
         best = max(done.values(), key=lambda one: one.log_posterior, default=None)
         if not worth or best is None:
             break
-        places = [_in_its_place(problem, best)]
+        places = [in_its_place(problem, best)]
     return list(done.values())
 
 
@@ -163,9 +156,9 @@ def _prior(problem: Problem, more: Problem, kappa: float) -> np.ndarray:
     return np.concatenate([variances(problem.entries, (), kappa), own])
 
 
-def _in_its_place(problem: Problem, one: Struck) -> Place:
+def in_its_place(problem: Problem, one: Struck) -> Place:
     """Return the linear problem around a sudden cause's fit, of all but it."""
     n, fit = len(problem.entries), one.fit
-    D, J = fit.D[:n], fit.J[:, :n]
     r = fit.r + fit.J[:, n:-1] @ fit.z[n:-1]
-    return Place(replace(fit, z=fit.z[:n], r=r, J=J, D=D), Along(one.problem, fit.z))
+    without = replace(fit, z=fit.z[:n], r=r, J=fit.J[:, :n], D=fit.D[:n], made_at=None)
+    return Place(without, Along(one.problem, fit.z))

@@ -67,6 +67,15 @@ class Along(NamedTuple):
     z: np.ndarray
 
 
+class Place(NamedTuple):
+    """A linear problem of all that holds throughout, and the run that sensitivities are taken from; what the run has
+    besides (a force, a sudden cause) is part of what the records show.
+    """
+
+    fit: Fit
+    along: Along
+
+
 def times_of(problem: Problem, record: int, spacing: float = COARSE) -> list[float]:
     """Return times to begin at: a grid within a record, without its first and last two seconds. [s]"""
     end = float(problem.records[record].time[-1])
