@@ -3,11 +3,13 @@
 single     one hidden effect                         pair      two of them
 healthy    only nuisances                            outside   what no effect of the catalogue is
 twin       one that the trial cannot tell from a rival (D < 4, though its signal is clear)
+sudden     one that begins in mid-trial
 degraded   3 × noise, two channels, 10 s, true spread 2 × or ½ × the declared one: healthy and single in turn
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -16,15 +18,17 @@ from subzero.diagnosis.logged import Logged
 from subzero.diagnosis.setting import Setting
 
 from . import outside
-from .draws import Values, hidden, nuisances, with_values
-from .manoeuvres import CHANNELS, FEW, ids, nominal, times
+from .draws import Values, hidden, nuisances, with_begun, with_values
+from .manoeuvres import CHANNELS, FEW, ids, nominal, sudden, times
 from .outside import Strange
 from .truth import NoRunError, agreed, noisy
 
-SHARES = {"single": 400, "healthy": 200, "pair": 100, "outside": 60, "twin": 20, "degraded": 20}
+SHARES = {"single": 400, "healthy": 200, "pair": 100, "outside": 60, "twin": 20, "degraded": 20, "sudden": 60}
 """How many of each make the whole benchmark."""
-SEED, BEFORE = 37, 29
+SEED, BEFORE = 41, 37
 """Of all cases; of those that the engine had before, when it was another."""
+BEGINS, GRID = (0.2, 0.7), 0.05
+"""When a sudden effect begins, as shares of the trial; at whole steps of the coarsest truth. [s]"""
 DEGRADED = ("noise", "channels", "short", "wide", "narrow")
 AFTER = 4.0
 """The trial goes on behind its record, for sensors whose clock runs ahead. [s]"""
@@ -65,12 +69,13 @@ class Case:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Made:
-    """A case with its record: what is hidden, all deviations, what is strange, the true setting, and how many draws
-    were dropped before it.
+    """A case with its record: what is hidden, when it begins [s] if that is in mid-trial, all deviations, what is
+    strange, the true setting, and how many draws were dropped before it.
     """
 
     logged: Logged
     hidden: Values
+    starts: Mapping[str, float]
     values: Values
     strange: Strange | None
     true: Setting
@@ -86,11 +91,12 @@ def cases(seed: int = SEED, scale: float = 1.0) -> list[Case]:
 
 def _case(seed: int, index: int, kind: str, number: int) -> Case:
     """Return a case: every effect in turn, four fifths of them on `fig6`, the others on `rich`."""
-    rng = np.random.default_rng([seed, 1 + list(SHARES).index(kind), number // len(ids())])
-    names = rng.permutation(ids()).tolist()
+    every = sudden() if kind == "sudden" else ids()
+    rng = np.random.default_rng([seed, 1 + list(SHARES).index(kind), number // len(every)])
+    names = rng.permutation(every).tolist()
     one, other = names[number % len(names)], names[(number + 7) % len(names)]
     how = DEGRADED[number % len(DEGRADED)] if kind == "degraded" else ""
-    alone = kind == "single" or (kind == "degraded" and (number // len(DEGRADED)) % 2 == 1)
+    alone = kind in ("single", "sudden") or (kind == "degraded" and (number // len(DEGRADED)) % 2 == 1)
     causes = (one,) if alone else (one, other) if kind == "pair" else ()
     causes = (TWINS[number % len(TWINS)][0],) if kind == "twin" else causes
     on_rich = kind not in ("twin", "degraded") and number % 5 == 1 and HEAVY not in causes
@@ -120,11 +126,12 @@ def _made(case: Case, rng: np.random.Generator, size: float) -> Made:
     spread = {"wide": 2.0, "narrow": 0.5}.get(case.how, 1.0)
     main = 0 if case.kind == "twin" else None
     found = {one: hidden(rng, one, case.sign, main) for one in case.causes}
-    values = {**nuisances(rng, spread), **found}
+    starts = _starts(case, rng, setting.trial.duration)
+    values = {**nuisances(rng, spread), **({} if starts else found)}
     strange = None
     if case.kind == "outside":
         strange = outside.KINDS[case.number % len(outside.KINDS)](rng, setting.trial.duration, size)
-    true = with_values(setting, values)
+    true = with_begun(setting, values, found, starts) if starts else with_values(setting, values)
     channels = FEW if case.how == "channels" else CHANNELS
     flown = replace(true, trial=replace(true.trial, duration=true.trial.duration + AFTER))
     shown = agreed(strange.on(flown) if strange else flown, times(setting), channels)
@@ -132,4 +139,11 @@ def _made(case: Case, rng: np.random.Generator, size: float) -> Made:
         shown[strange.axis] = shown[strange.axis] + strange.drift(times(setting))
     record = noisy(shown, times(setting), rng, 3.0 if case.how == "noise" else 1.0)
     logged = Logged(record=record, setting=setting, name=case.manoeuvre)
-    return Made(logged=logged, hidden=found, values=values, strange=strange, true=true)
+    return Made(logged=logged, hidden=found, starts=starts, values=values, strange=strange, true=true)
+
+
+def _starts(case: Case, rng: np.random.Generator, duration: float) -> dict[str, float]:
+    """Return when what begins in mid-trial begins. [s]"""
+    if case.kind != "sudden":
+        return {}
+    return {one: GRID * round(rng.uniform(*BEGINS) * duration / GRID) for one in case.causes}

@@ -11,12 +11,18 @@ from dataclasses import replace
 
 import numpy as np
 
+from subzero.diagnosis.begun import begun_at
 from subzero.diagnosis.detect import information, marginal, separation
+from subzero.diagnosis.effect import Effect
 from subzero.diagnosis.evidence import Quadratic, posterior
 from subzero.diagnosis.hypotheses import named, places, variances
+from subzero.diagnosis.latent import Seen, seen
 from subzero.diagnosis.problem import Problem
 from subzero.diagnosis.setting import Setting
+from subzero.diagnosis.sudden import columns
 
+ABOUT = (-4.0, -3.0, -2.0, -1.0, 0.0, 1.0, 2.0, 3.0, 4.0)
+"""Rivals of what begins in mid-trial begin about then. [s]"""
 Hidden = Mapping[str, tuple[float, ...]]
 
 
@@ -85,6 +91,35 @@ def strangeness(problem: Problem, J: np.ndarray, change: np.ndarray) -> tuple[fl
         found[one] = q.rr - float(q.b @ posterior(q, own).z)
     rival = min(found, key=lambda one: found[one])
     return max(found[rival], 0.0), rival
+
+
+def sudden_distance(
+    problem: Problem, J: np.ndarray, one: str, values: tuple[float, ...], time: float
+) -> tuple[float, str]:
+    """Return D of a cause that begins in mid-trial, and what comes closest: of what holds throughout, or of the other
+    sudden causes, each from the best time about then.
+    """
+    zero, setting = np.zeros(len(problem.entries)), problem.records[0].setting
+    effects = {entry.effect.id: entry.effect for entry in problem.entries if entry.record < 0}
+    begun = begun_at(effects[one], time).apply(setting, *values)
+    change, D = change_by(problem, setting, begun), variances(problem.entries, (), 1.0)
+    q = Quadratic(A=J.T @ J, b=J.T @ change, rr=float(change @ change))
+    base, found = posterior(q, D), dict([strangeness(problem, J, change)[::-1]])
+    others = [effect for effect in effects.values() if effect.sudden and effect.id != one]
+    pairs = [(effect, time + later) for effect in others for later in ABOUT]
+    for (effect, when), C in zip(pairs, columns(problem, zero, pairs), strict=True):
+        explained = _explained(seen(q.A, q.b, D, J, C, change), effect)
+        found[f"{effect.id}@{when:.3g}"] = max(-2.0 * base.log_evidence - base.log_det - explained, 0.0)
+    rival = min(found, key=lambda name: found[name])
+    return found[rival], rival
+
+
+def _explained(data: Seen, effect: Effect) -> float:
+    """Return what an effect explains of a squared distance, as large as it may be."""
+    scale = np.array([p.scale for p in effect.parameters])
+    size = np.linalg.solve(data.M + np.diag(1.0 / scale**2), data.q)
+    possible = all(p.low <= x <= p.high for x, p in zip(size, effect.parameters, strict=True))
+    return float(data.q @ size) if possible else 0.0
 
 
 def change_by(problem: Problem, plain: Setting, other: Setting) -> np.ndarray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -67,3 +68,13 @@ def with_values(setting: Setting, values: Values, table: Mapping[str, Effect] | 
         if any(numbers):
             setting = table[name].apply(setting, *numbers)
     return setting
+
+
+def with_begun(setting: Setting, values: Values, begun: Values, starts: Mapping[str, float]) -> Setting:
+    """Return a setting with deviations, and further ones on top of them, each from a time on. [s]"""
+    models = []
+    for name, time in starts.items():
+        total = [np.clip(a + b, p.low, p.high) for a, b, p in zip(values[name], begun[name],
+                                                                  effects()[name].parameters, strict=True)]  # fmt: skip
+        models.append((time, with_values(setting, {**values, name: tuple(map(float, total))}).model))
+    return replace(with_values(setting, values), later=tuple(models))

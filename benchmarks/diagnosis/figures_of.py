@@ -17,12 +17,14 @@ from .scores import (
     expected,
     first,
     gain_of,
+    hidden,
     is_foreign,
     is_right,
     is_right_as_told,
     names,
     number,
     of,
+    plain,
     share,
     smallest_D,
     truth,
@@ -32,12 +34,14 @@ from .scores import (
 
 def rows(results: Sequence[Result]) -> list[Score]:
     """Return all figures."""
-    return [*_singles(results), *_healthy(results), *_pairs(results), *_outside(results), *_numbers(results),
-            *_gains(results), *_degraded(results), *_baselines(results)]  # fmt: skip
+    return [*_singles(results), *_sudden(results), *_healthy(results), *_pairs(results), *_outside(results),
+            *_numbers(results), *_gains(results), *_degraded(results), *_baselines(results)]  # fmt: skip
 
 
 def _holds(one: Result) -> bool:
-    return truth(one) in one["set"] or (bool(one["strange"]) and any(map(is_foreign, one["set"])))
+    return truth(one) in set(map(plain, one["set"])) or (
+        bool(one["strange"]) and any(map(is_foreign, one["set"]))
+    )
 
 
 def _stated(cases: Sequence[Result]) -> float:
@@ -53,7 +57,7 @@ def _singles(results: Sequence[Result]) -> list[Score]:
     return [
         share("singles, D ≥ 16: right name first", clear, is_right, "≥ 97 %", least=0.97),
         share("… named outright (verdict `cause_named`, no other name)", clear,
-              lambda one: names(one) == set(one["truth"]), "–"),
+              lambda one: names(one) == hidden(one), "–"),
         share("… with D ≥ 25: right name first", [one for one in clear if smallest_D(one) >= 25.0], is_right, "–"),
         share("all singles: right name first", singles, is_right, "–"),
         share("all singles: the 95 % set holds the truth", singles, _holds, "93 … 98 %", least=0.93, most=0.98),
@@ -62,6 +66,24 @@ def _singles(results: Sequence[Result]) -> list[Score]:
         number("… median size of that set", sizes, "≤ 2", "{:.0f}", most=2.0),
         share("twins: the verdict is a set that holds the truth", twins,
               lambda one: one["verdict"] == "undecided" and _holds(one), "all", least=0.9999),
+    ]  # fmt: skip
+
+
+def _sudden(results: Sequence[Result]) -> list[Score]:
+    cases = of(results, "sudden")
+    clear = [one for one in cases if smallest_D(one) >= CLEAR]
+    right = [one for one in cases if names(one) == hidden(one)]
+    late = [abs(cause["start"] - one["starts"][cause["id"]]) for one in right for cause in one["causes"]]
+    off, _, covered = errors(cases)
+    return [
+        share("from mid-trial on, D ≥ 16: right name first", clear, is_right, "≥ 97 %", least=0.97),
+        share("… named outright", clear, lambda one: names(one) == hidden(one), "–"),
+        share("from mid-trial on: the 95 % set holds the truth", cases, _holds, "–"),
+        share("… a name that is wrong, or wrong in being from then on", cases,
+              lambda one: not names(one) <= hidden(one), "≤ 1 %", most=0.01),
+        number("… error of when it began", late, "–", "{:.2f} s"),
+        number("… error of its parameter", off, "–", "{:.1%}"),
+        share("… 95 % interval covers the truth", [{"in": x} for x in covered], lambda one: one["in"], "–"),
     ]  # fmt: skip
 
 
@@ -148,7 +170,7 @@ def _gains(results: Sequence[Result]) -> list[Score]:
     right = [
         one
         for one in of(results, "single")
-        if names(one) == set(one["truth"]) and "extended" in one.get("gain", {})
+        if names(one) == hidden(one) and "extended" in one.get("gain", {})
     ]
     named = [one for one in of(results, "single", "pair") if "extended" in one.get("gain", {})]
     found = [number("held-out gain on the other manoeuvre, right cause", [gain_of(one, "extended") for one in right],

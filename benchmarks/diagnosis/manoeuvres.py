@@ -58,3 +58,8 @@ def effects() -> Mapping[str, Effect]:
 def ids() -> tuple[str, ...]:
     """Return all causes that can be named."""
     return tuple(catalogue(CHANNELS))
+
+
+def sudden() -> tuple[str, ...]:
+    """Return all causes that may begin in mid-trial."""
+    return tuple(one for one, effect in catalogue(CHANNELS).items() if effect.sudden)

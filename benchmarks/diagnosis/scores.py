@@ -30,9 +30,16 @@ class Score(NamedTuple):
     near: bool = False
 
 
+def plain(name: str) -> str:
+    """Return a hypothesis without the time that it began at: "rudder_offset@" for "rudder_offset@12.3"."""
+    before, at, _ = name.partition("@")
+    return before + at
+
+
 def first(one: Result) -> tuple[str, float]:
-    """Return the most probable hypothesis and its probability."""
-    return max(one["probabilities"].items(), key=lambda pair: pair[1])
+    """Return the most probable hypothesis, without a time, and its probability."""
+    name, p = max(one["probabilities"].items(), key=lambda pair: pair[1])
+    return plain(name), p
 
 
 def is_foreign(name: str) -> bool:
@@ -42,7 +49,12 @@ def is_foreign(name: str) -> bool:
 
 def truth(one: Result) -> str:
     """Return the hypothesis that is true, "outside" for what is none."""
-    return "outside" if one["strange"] else " + ".join(sorted(one["truth"])) or "none"
+    return "outside" if one["strange"] else " + ".join(sorted(hidden(one))) or "none"
+
+
+def hidden(one: Result) -> set[str]:
+    """Return the causes that are true; with @ behind what begins in mid-trial."""
+    return {f"{name}@" if name in one.get("starts", {}) else name for name in one["truth"]}
 
 
 def is_right(one: Result) -> bool:
@@ -55,10 +67,8 @@ def is_right_as_told(one: Result) -> bool:
     causes that the record cannot show (`probability.folded`), so that true ones with D < 16 may be missing beside it.
     """
     told = set(first(one)[0].split(" + "))
-    hidden = {name for name, d in one["D"].items() if d >= CLEAR}
-    return is_right(one) or (
-        not one["strange"] and bool(told & set(one["truth"])) and hidden <= told <= set(one["truth"])
-    )
+    shown = {name for name, d in one["D"].items() if d >= CLEAR}
+    return is_right(one) or (not one["strange"] and bool(told & hidden(one)) and shown <= told <= hidden(one))
 
 
 def smallest_D(one: Result) -> float:
@@ -67,13 +77,18 @@ def smallest_D(one: Result) -> float:
 
 
 def names(one: Result) -> set[str]:
-    """Return the causes that are named, without when they began."""
-    return {cause["id"].partition("@")[0] for cause in one["causes"]}
+    """Return the causes that are named; with @ behind what begins in mid-trial."""
+    return {told(cause) for cause in one["causes"]}
+
+
+def told(cause: Result) -> str:
+    """Return the name of a cause; with @ behind it if it begins in mid-trial."""
+    return cause["id"] + ("@" if cause.get("start") is not None else "")
 
 
 def wrongly_sure(one: Result, sure: float = SURE) -> bool:
     """Say whether a wrong name is stated with certainty."""
-    return any(cause["p"] >= sure and cause["id"] not in one["truth"] for cause in one["causes"])
+    return any(cause["p"] >= sure and told(cause) not in hidden(one) for cause in one["causes"])
 
 
 def of(results: Iterable[Result], *kinds: str) -> list[Result]:
@@ -147,7 +162,7 @@ def errors(results: Sequence[Result]) -> tuple[list[float], list[float], list[bo
         for cause in one["causes"]:
             for (value, low, high, sd), true in zip(cause["parameters"].values(), one["truth"].get(cause["id"], ()),
                                                     strict=False):  # fmt: skip
-                if cause["id"] in one["truth"] and true:
+                if told(cause) in hidden(one) and true:
                     off.append(abs(value - true) / abs(true))
                     stated.append(sd / abs(true))
                     covered.append(low <= true <= high)

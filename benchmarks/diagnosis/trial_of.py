@@ -18,7 +18,7 @@ from subzero.diagnosis.verdict import Verdict
 
 from . import baselines
 from .cases import Case, Made, make
-from .distance import change_by, discriminations, sensitivities, signals, strangeness
+from .distance import change_by, discriminations, sensitivities, signals, strangeness, sudden_distance
 from .held_out import gains
 from .sharing import Shared
 from .strange_found import judged
@@ -92,9 +92,13 @@ def code() -> str:
 
 def _measured(case: Case, made: Made, problem: Problem) -> tuple[dict[str, float], dict[str, str], bool]:
     """Return D and rival of each cause, and whether the case is what its kind should be."""
-    if case.kind not in ("single", "pair", "twin", "outside", "degraded"):
+    if case.kind not in ("single", "pair", "twin", "outside", "degraded", "sudden"):
         return {}, {}, True
     J = sensitivities(problem)
+    if made.starts:
+        ((one, time),) = made.starts.items()
+        D, rival = sudden_distance(problem, J, one, made.hidden[one], time)
+        return {one: D}, {one: rival}, True
     if made.strange:
         D, rival = _strange(made, problem, J)
         return {made.strange.kind: D}, {made.strange.kind: rival}, D >= CLEAR
@@ -133,12 +137,13 @@ def _truth(case: Case, made: Made) -> Result:
     """Return what is true."""
     return {"seed": case.seed, "index": case.index, "kind": case.kind, "manoeuvre": case.manoeuvre, "how": case.how,
             "number": case.number, "truth": {one: list(values) for one, values in made.hidden.items()},
-            "strange": made.strange.kind if made.strange else "", "dropped": made.dropped}  # fmt: skip
+            "starts": dict(made.starts), "strange": made.strange.kind if made.strange else "",
+            "dropped": made.dropped}  # fmt: skip
 
 
 def _said(verdict: Verdict) -> Result:
     """Return what is said."""
-    causes = [{"id": cause.id, "p": cause.probability, "start": cause.start_time,
+    causes = [{"id": cause.id, "p": cause.probability, "start": cause.start_time, "start_sd": cause.start_sd,
                "parameters": {name: [one.deviation, one.low - one.nominal, one.high - one.nominal, one.deviation_sd]
                               for name, one in cause.parameters.items()}} for cause in verdict.causes]  # fmt: skip
     ranked = list(verdict.probabilities.items())

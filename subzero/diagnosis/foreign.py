@@ -29,12 +29,10 @@ NEAR, FAR, MOST = 6.0, 45.0, 3
 """No force that is further behind the best than FAR, in log posterior, is looked at around its own fit, and at most so
 many; where one cause explains the record within declared tolerances, what is linear is nearly true there: besides the
 most probable force only those that are as close as NEAR."""
-LOOKED = 1
-"""Around so many of them sudden causes are looked for."""
 SURE = 30.0
 """No sum of causes gains more than this, in log posterior, over one cause that leaves nothing but noise."""
 WORTH = 2.0
-"""A force that is no further behind the best, in log posterior, is worth a closer look, and one for sudden changes."""
+"""A force that is no further behind the best, in log posterior, is worth a closer look."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -67,16 +65,22 @@ def foreigners(search: Search) -> list[Foreign]:
     close = _around_themselves(search, found, columns, knots, terms)
     own = [Foreign(beside=(), what=one.what, log_posterior=one.log_posterior + _log_prior(problem),
                    place=None if one.is_lost else one.place) for one in close]  # fmt: skip
-    if max(one.log_posterior for one in found + own) < best.log_posterior - WORTH:
-        return _sorted(found, own)
+    sudden = _sudden(search, close, max(_most(found + own), best.log_posterior))
+    if _most(found + own) > max(_most(sudden), best.log_posterior) - WORTH:
+        found = _finer(search, found, own)
+    return _sorted(found, own + sudden)
+
+
+def _finer(search: Search, found: list[Foreign], own: list[Foreign]) -> list[Foreign]:
+    """Return forces and drifts, and again with finer knots forces that are about as probable as each other."""
+    problem, best = search.problem, search.best()
     alike = {one.id.removeprefix(FORCE) for one in _close(found + own) if one.id.startswith(FORCE)}
-    if len(alike) > 1:
-        finer = knots_of(problem, FINE)
-        columns = {FORCE + axis: C for axis, C in force_columns(problem, best.fit.z, alike, finer).items()}
-        terms = one_terms(problem, best.fit.z, finer)
-        found = [one for one in found if one.id not in columns] + _suspected(search, columns, finer, terms)
-    known = max(one.log_posterior for one in found + own)
-    return _sorted(found + _sudden(search, close, max(known, best.log_posterior)), own)
+    if len(alike) < 2:
+        return found
+    finer = knots_of(problem, FINE)
+    columns = {FORCE + axis: C for axis, C in force_columns(problem, best.fit.z, alike, finer).items()}
+    terms = one_terms(problem, best.fit.z, finer)
+    return [one for one in found if one.id not in columns] + _suspected(search, columns, finer, terms)
 
 
 def is_explained(search: Search, foreign: Sequence[Foreign]) -> bool:
@@ -146,9 +150,14 @@ def _log_prior(problem: Problem) -> float:
     return float(np.log(PRIOR["unknown"] / (len(AXES) + len(problem.records[0].noise))))
 
 
+def _most(found: Sequence[Foreign]) -> float:
+    """Return the log posterior of the most probable."""
+    return max((one.log_posterior for one in found), default=-np.inf)
+
+
 def _close(found: list[Foreign]) -> list[Foreign]:
     """Return what is about as probable as the best."""
-    best = max(one.log_posterior for one in found)
+    best = _most(found)
     return [one for one in found if one.log_posterior > best - ALIKE]
 
 
@@ -159,17 +168,20 @@ def _bases(search: Search) -> list[Candidate]:
 
 
 def _sudden(search: Search, close: Sequence[Close], known: float) -> list[Foreign]:
-    """Return causes that begin in mid-trial, beside nothing else, that may be as probable as what is known."""
-    problem = search.problem
+    """Return causes that begin in mid-trial, beside nothing else, that may be as probable as what is known; looked for
+    around the best hypothesis, or around a force that explains more.
+    """
+    problem, best = search.problem, search.best()
     effects = list({entry.effect.id: entry.effect for entry in problem.entries if entry.record < 0}.values())
     able = [effect for effect in effects if effect.sudden]
     prior = float(np.log(PRIOR["unknown"] / (len(able) * len(problem.records))))
-    places = [one.place for one in close[:LOOKED]]
-    places = places or [Place(search.best().fit, Along(problem, search.best().fit.z))]
-    found = [one for record in range(len(problem.records))
-             for one in struck(problem, places, able, record, known - prior, search.side)]  # fmt: skip
+    place = Place(best.fit, Along(problem, best.fit.z))
+    if close and close[0].log_posterior + _log_prior(problem) > best.log_posterior:
+        place = close[0].place
+    made = [one for record in range(len(problem.records))
+            for one in struck(problem, place, able, record, known - prior, search.side)]  # fmt: skip
     return [Foreign(beside=(), what=one, log_posterior=one.log_posterior + prior,
-                    place=None if is_lost(one.fit) else in_its_place(problem, one)) for one in found]  # fmt: skip
+                    place=None if is_lost(one.fit) else in_its_place(problem, one)) for one in made]  # fmt: skip
 
 
 def shares(search: Search, foreign: list[Foreign]) -> tuple[dict[Ids, float], dict[str, float]]:

@@ -25,8 +25,8 @@ from subzero.diagnosis.problem import Problem
 from subzero.diagnosis.refit import Fit, refit, with_own_slopes
 from subzero.diagnosis.sudden import Along, Begun, Place, columns, scan, times_of, with_begun
 
-ROUNDS, MOST, HOPE = 3, 3, 10.0
-"""Rounds of trying; in each at most so many are fitted that the linear problem has this close to the best known."""
+ROUNDS, MOST, HOPE = 3, 3, 6.0
+"""Rounds of trying; in each at most so many are fitted that the linear problem has this close to the best."""
 BENT = 0.05
 """Where a cause gains much, what is not linear may be this share of it."""
 BETTER = 2.0
@@ -70,7 +70,7 @@ class Hope(NamedTuple):
 
 def struck(
     problem: Problem,
-    places: Sequence[Place],
+    place: Place,
     able: Sequence[Effect],
     record: int,
     least: float,
@@ -80,7 +80,7 @@ def struck(
 
     Args:
         problem: records and parameters.
-        places: where they are tried at first.
+        place: where they are tried at first.
         able: effects that may begin in mid-trial.
         record: in which they begin.
         least: log posterior of what is known else, on the scale of `Struck`.
@@ -88,15 +88,14 @@ def struck(
     """
     done: dict[str, Struck] = {}
     for _ in range(ROUNDS):
-        hopes = [one for place in places for one in _hopes(problem, place, able, record)]
-        worth = _worth(hopes, done, least)
+        worth = _worth(_hopes(problem, place, able, record), done, least)
         for one in side.map(partial(_fitted, problem), worth):
             name = one.begun.effect.id
             done[name] = max(one, done.get(name, one), key=lambda each: each.log_posterior)
         best = max(done.values(), key=lambda one: one.log_posterior, default=None)
         if not worth or best is None:
             break
-        places = [in_its_place(problem, best)]
+        place = in_its_place(problem, best)
     return list(done.values())
 
 
@@ -110,13 +109,13 @@ def _hopes(problem: Problem, place: Place, able: Sequence[Effect], record: int) 
 
 
 def _worth(hopes: Sequence[Hope], done: dict[str, Struck], least: float) -> list[Hope]:
-    """Return what is worth a fit: each cause where it comes out best, if it may come close to the best known, and is
-    promised more than what is known of it.
+    """Return what is worth a fit: each cause where it comes out best, if it may come close to the best, known or hoped
+    for, and is promised more than what is known of it.
     """
     ranked = sorted(hopes, key=lambda one: -one.log_posterior)
     first = {one.begun.effect.id: one for one in reversed(ranked)}
     known = {name: one.log_posterior for name, one in done.items()}
-    bar = max([least, *known.values()]) - HOPE
+    bar = max([least, *known.values(), *(one.log_posterior for one in ranked[:1])]) - HOPE
     found = [one for name, one in first.items()
              if one.at_most > bar and one.log_posterior > known.get(name, -np.inf) + BETTER]  # fmt: skip
     return sorted(found, key=lambda one: -one.log_posterior)[:MOST]

@@ -23,8 +23,10 @@ from subzero.diagnosis.refit import Fit
 from subzero.diagnosis.setting import Setting
 from subzero.diagnosis.tracked import Stop, Track, on_from, tracked, with_stops
 
-COARSE, FINE = 2.0, 0.5
-"""Grids of times to begin at. [s]"""
+COARSE, FINE, LEAST = 15, 4, 1.0
+"""A record has so many steps of times to begin at, each so many finer ones, but none is shorter than the last. [s]"""
+SEEN = 3.0
+"""What gains less, in log evidence, is not tried on the finer grid."""
 SECANT = 0.25
 """Step of a sensitivity, in effect scales."""
 
@@ -76,10 +78,18 @@ class Place(NamedTuple):
     along: Along
 
 
-def times_of(problem: Problem, record: int, spacing: float = COARSE) -> list[float]:
-    """Return times to begin at: a grid within a record, without its first and last two seconds. [s]"""
-    end = float(problem.records[record].time[-1])
-    return [float(time) for time in np.arange(2.0, end - 1.0, spacing)]
+def spacing_of(problem: Problem, record: int) -> float:
+    """Return the steps of the times to begin at. [s]"""
+    return max(float(problem.records[record].time[-1]) / COARSE, LEAST)
+
+
+def times_of(problem: Problem, record: int) -> list[float]:
+    """Return times to begin at: a grid within a record, without its ends. [s]"""
+    spacing = spacing_of(problem, record)
+    return [
+        float(time)
+        for time in np.arange(spacing, float(problem.records[record].time[-1]) - 0.5 * spacing, spacing)
+    ]
 
 
 def scan(
@@ -107,14 +117,15 @@ def scan(
     able = [effect for effect in effects if effect.sudden]
     coarse = times_of(problem, record)
     found = _strongest(_tried(along, fit, D, [(one, time) for one in able for time in coarse], record))
-    finer = [(one.effect, time) for one in found[:best] for time in _around(one.time, coarse)]
-    return _strongest(found + _tried(along, fit, D, finer, record))
+    spacing = spacing_of(problem, record)
+    worth = [one for one in found[:best] if one.log_gain > SEEN]
+    finer = [(one.effect, time) for one in worth for time in _around(one.time, spacing)]
+    return _strongest(found + _tried(along, fit, D, finer, record)) if finer else found
 
 
-def _around(time: float, coarse: list[float]) -> list[float]:
+def _around(time: float, spacing: float) -> list[float]:
     """Return the finer times between a time of the grid and its neighbours."""
-    near = np.arange(time - COARSE + FINE, time + COARSE - 0.5 * FINE, FINE)
-    return [float(one) for one in near if coarse[0] <= one <= coarse[-1] + COARSE and abs(one - time) > 1e-9]
+    return [time + i * spacing / FINE for i in range(1 - FINE, FINE) if i]
 
 
 def _strongest(found: list[Begun]) -> list[Begun]:
