@@ -174,7 +174,7 @@ def _sudden(search: Search, close: Sequence[Close], known: float) -> list[Foreig
     problem, best = search.problem, search.best()
     effects = list({entry.effect.id: entry.effect for entry in problem.entries if entry.record < 0}.values())
     able = [effect for effect in effects if effect.sudden]
-    prior = float(np.log(PRIOR["unknown"] / (len(able) * len(problem.records))))
+    prior = float(np.log(PRIOR["sudden"] / (len(able) * len(problem.records))))
     place = Place(best.fit, Along(problem, best.fit.z))
     if close and close[0].log_posterior + _log_prior(problem) > best.log_posterior:
         place = close[0].place

@@ -13,7 +13,7 @@ from subzero.diagnosis.problem import Problem
 Ids = tuple[str, ...]
 """The causes of a hypothesis, in the order of the alphabet; () is "nothing is wrong"."""
 
-PRIOR = {"none": 0.50, "single": 0.40, "pair": 0.06, "unknown": 0.04, "more": 0.004}
+PRIOR = {"none": 0.50, "single": 0.40, "pair": 0.06, "unknown": 0.04, "sudden": 0.04, "more": 0.004}
 """Probability of each kind, shared by all hypotheses of the kind."""
 
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from subzero.diagnosis.detect import against, information, marginal
-from subzero.diagnosis.estimates import estimate
+from subzero.diagnosis.estimates import estimate, sentence_of
 from subzero.diagnosis.evidence import posterior
 from subzero.diagnosis.hypotheses import Ids, named, places
 from subzero.diagnosis.refit import Fit
@@ -31,17 +32,17 @@ def is_large(one: Struck) -> bool:
     return any(abs(float(z)) > 0.5 * PRACTICAL * one.begun.kappa * p.tolerance for z, p in sizes)
 
 
-def apart(work: Work, one: Struck) -> float:
-    """Return D of a sudden cause against the closest of those that hold throughout, and against the tolerances."""
+def closest(work: Work, one: Struck) -> tuple[float, Ids]:
+    """Return D of a sudden cause against the closest of those that hold throughout, or the tolerances; and which."""
     n, more = len(work.problem.entries), one.problem
     M, own = marginal(more, one.fit.J, one.begun.kappa), list(range(n, len(more.entries) - 1))
     step = one.fit.z[own]
-    found = [float(step @ information(more, M, own, one.begun.kappa) @ step)]
-    found += [
-        against(more, M, own, step, places(more.entries, (other,)), one.begun.kappa)[0]
-        for other in named(more)
-    ]
-    return min(found)
+    found: dict[Ids, float] = {(): float(step @ information(more, M, own, one.begun.kappa) @ step)}
+    for other in named(more):
+        at = places(more.entries, (other,))
+        found[(other,)] = against(more, M, own, step, at, one.begun.kappa)[0]
+    rival = min(found, key=lambda ids: found[ids])
+    return found[rival], rival
 
 
 def cause_of(work: Work, what: Struck, probability: float) -> Cause:
@@ -62,6 +63,13 @@ def rival_of(work: Work, what: Struck, probability: float) -> Rival:
     cause = cause_of(work, what, probability)
     return Rival(ids=(what.id,), sentence=what.begun.begun.sentence, probability=probability, discrimination=np.nan,
                  parameters={what.id: cause.parameters})  # fmt: skip
+
+
+def closest_rival(work: Work, inside: Mapping[Ids, float]) -> Rival:
+    """Return what comes closest to the most probable sudden cause, of all that holds throughout."""
+    D, ids = closest(work, fitted(work)[0])
+    words = " and ".join(sentence_of(work.problem, one) for one in ids) or "nothing is wrong"
+    return Rival(ids=ids, sentence=words, probability=inside.get(ids, 0.0), discrimination=D)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from subzero.diagnosis.candidate import Candidate
@@ -15,14 +15,21 @@ from subzero.diagnosis.hypotheses import Ids
 from subzero.diagnosis.outlook import Survivor
 from subzero.diagnosis.rules import HEALTHY, Late, decide, smallest_set
 from subzero.diagnosis.showing import curves
-from subzero.diagnosis.sudden_told import apart, cause_of, fitted, from_now_on, is_large, rival_of
+from subzero.diagnosis.sudden_told import (
+    cause_of,
+    closest,
+    closest_rival,
+    fitted,
+    from_now_on,
+    is_large,
+    rival_of,
+)
 from subzero.diagnosis.verdict import (
     CAUSE_NAMED,
     NOTHING_WRONG,
     OUTSIDE,
     UNDECIDED,
     Cause,
-    Rival,
     Unknown,
     Verdict,
 )
@@ -40,7 +47,7 @@ def tell(work: Work) -> Verdict:
     inside, outside = shares(search, work.foreign)
     top = max((ids for ids in inside if ids in search.candidates), key=lambda ids: inside[ids])
     best, sudden = search.candidates[top], fitted(work)
-    late = Late(outside[sudden[0].id], is_large(sudden[0]), apart(work, sudden[0])) if sudden else Late()
+    late = Late(outside[sudden[0].id], is_large(sudden[0]), closest(work, sudden[0])[0]) if sudden else Late()
     forces = sum(p for key, p in outside.items() if "@" not in key)
     verdict = decide(inside, forces, *_large(work, best), late)
     if verdict == CAUSE_NAMED and late.is_named:
@@ -81,8 +88,9 @@ def _told(
     left = [ids for ids in whole if ids in inside] or [best.ids]
     late = [one for one in fitted(work) if (one.id,) in whole and one.id != new.id]
     left = _contenders(work, best, left) if verdict == UNDECIDED and not late else left
-    others = (*rivals(work, best, inside, left), *(rival_of(work, one, outside[one.id]) for one in late))
-    others = tuple(sorted(others, key=lambda one: -one.probability))
+    throughout = (closest_rival(work, inside),) if new.cause else rivals(work, best, inside, left)
+    others = sorted([*throughout, *(rival_of(work, one, outside[one.id]) for one in late)],
+                    key=lambda one: -one.probability)  # fmt: skip
     named = (
         (new.cause,)
         if new.cause
@@ -100,9 +108,11 @@ def _told(
     full = work.budget == "full" and work.complete
     return Verdict(
         verdict=verdict,
-        sentence=_sentence(verdict, named, best, others, new.unknown),
+        sentence=_sentence(
+            verdict, named, best, [*map(name, whole), *(name(one.ids) for one in others)], new.unknown
+        ),
         causes=named,
-        rivals=others,
+        rivals=tuple(others),
         unknown=new.unknown,
         extended=new.extended,
         gain=gained(work, new, rival) if full and verdict in (CAUSE_NAMED, OUTSIDE) else None,
@@ -170,7 +180,7 @@ def _sentence(
     verdict: str,
     named: tuple[Cause, ...],
     best: Candidate,
-    others: tuple[Rival, ...],
+    left: Sequence[str],
     unknown: Unknown | None,
 ) -> str:
     """Return the verdict in a sentence."""
@@ -183,5 +193,4 @@ def _sentence(
         return f"{words[0].upper()}{words[1:]}."
     if verdict == OUTSIDE and unknown:
         return f"Something acts on {unknown.axis} that no cause of the catalogue explains."
-    names = [name(best.ids), *(name(one.ids) for one in others)]
-    return f"These records cannot tell apart: {', '.join(names)}."
+    return f"These records cannot tell apart: {', '.join(dict.fromkeys(left))}."

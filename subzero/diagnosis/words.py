@@ -50,7 +50,9 @@ def estimate(name: str, one: Estimate) -> str:
 
 def cause(one: Cause) -> str:
     """Return a cause in words, with its parameters and its probability."""
-    since = "" if one.start_time is None or "@" in one.id else f", since t = {one.start_time:.3g} s"
+    since = (
+        "" if one.start_time is None else f", since t = {one.start_time:.3g} ± {1.96 * one.start_sd:.2g} s"
+    )
     numbers = "; ".join(estimate(name, parameter) for name, parameter in one.parameters.items())
     return f"{_capital(one.sentence)}{since}: {numbers}. Probability {probability(one.probability)}."
 

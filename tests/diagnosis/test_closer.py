@@ -33,7 +33,7 @@ def both_ways(planted):
     none = max(none, candidate_of(problem, (), fit), key=lambda one: one.log_posterior)
     knots = knots_of(problem)
     terms = one_terms(problem, fit.z, knots)
-    here, _ = closer(problem, fit, "unknown_force:X", 1.0, knots, terms)
+    here = closer(problem, fit, "unknown_force:X", 1.0, knots, terms).log_posterior
     columns = {"unknown_force:X": force_columns(problem, none.fit.z, ("X",), knots)["X"]}
     (there,) = suspects(problem, columns, none.fit, none.scales(problem), knots, terms)
     return here, none.log_posterior + there.log_gain
@@ -57,7 +57,7 @@ def test_a_compass_that_wanders_is_more_probable_than_any_force_that_turns_the_v
     fit = refit(problem, np.zeros(planted.J.shape[1]), planted.J, variances(problem.entries, (), 4.0))
     knots = knots_of(problem)
     terms = one_terms(problem, fit.z, knots)
-    log = {name: closer(problem, fit, name, 1.0, knots, terms)[0]
+    log = {name: closer(problem, fit, name, 1.0, knots, terms).log_posterior
            for name in ("sensor_drift:heading", "unknown_force:N", "unknown_force:Y")}  # fmt: skip
     assert log["sensor_drift:heading"] > max(log["unknown_force:N"], log["unknown_force:Y"]) + 10.0
 

@@ -177,7 +177,7 @@ def test_a_large_effect_is_seen_from_afar_in_two_records(plant):
     both = Problem(records=planted.problem.records * 2, entries=entries_of(effects, START, 2))
     zero = np.zeros(len(both.entries))
     nominal = both.residual(zero), both.jacobian(zero)
-    seen = look(both, SimpleNamespace(r=nominal[0], z=zero, J=nominal[1]), nominal)
+    seen = look(both, SimpleNamespace(r=nominal[0], z=zero, J=nominal[1]), nominal, far=True)
     assert seen.far
     assert seen.best(1, 1, np.inf) == [("roll_stiffness",)]
     assert seen.count == len(named(both))

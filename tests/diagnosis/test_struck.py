@@ -1,0 +1,153 @@
+"""A cause that begins in mid-trial is as probable as its own fit says, found along the run of a force that nobody
+explains; and what is told of it.
+
+Configuration: fig6, 30 s, six channels with coloured noise; a rudder that is off its centre by 3 degrees from 13.1 s
+on, so far from the nominal model that nothing is linear between the two.
+"""
+
+from concurrent.futures import ThreadPoolExecutor
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from subzero.diagnosis.begun import begun_at
+from subzero.diagnosis.closer import closer
+from subzero.diagnosis.effects import catalogue
+from subzero.diagnosis.foreign import SURE, Foreign, is_explained
+from subzero.diagnosis.hypotheses import places, variances
+from subzero.diagnosis.one_term import one_terms
+from subzero.diagnosis.refit import is_lost, refit
+from subzero.diagnosis.rules import Late, decide
+from subzero.diagnosis.struck import in_its_place, struck
+from subzero.diagnosis.sudden_told import cause_of, closest, fitted, from_now_on, is_large, rival_of
+from subzero.diagnosis.unknown import FINE, history, knots_of, lacking
+from subzero.diagnosis.verdict import CAUSE_NAMED, NOTHING_WRONG, OUTSIDE, UNDECIDED
+
+EFFECTS = catalogue(("heading",))
+ABLE = [effect for effect in EFFECTS.values() if effect.sudden]
+BEGINS = 13.1
+
+
+def hit(plant, degrees):
+    """Return what is found when the rudder is hit."""
+    return asked(plant(lambda setting: begun_at(EFFECTS["rudder_offset"], BEGINS).apply(setting, degrees)))
+
+
+def asked(planted):
+    """Return a record's problem, the force that explains it, and the sudden causes that are fitted there."""
+    problem, D = planted.problem, variances(planted.problem.entries, (), 4.0)
+    wide = refit(problem, np.zeros(D.size), planted.J, D, most_fresh=2)
+    knots = knots_of(problem, FINE)
+    force = closer(problem, wide, "unknown_force:N", 1.0, knots, one_terms(problem, wide.z, knots))
+    with ThreadPoolExecutor(2) as side:
+        return problem, force, struck(problem, force.place, ABLE, 0, force.log_posterior, side)
+
+
+@pytest.fixture(scope="module")
+def found(plant):
+    return hit(plant, 3.0)
+
+
+@pytest.fixture(scope="module")
+def work(found):
+    problem, _, (one, *_) = found
+    foreign = [Foreign(beside=(), what=one, log_posterior=one.log_posterior)]
+    return SimpleNamespace(problem=problem, foreign=foreign)
+
+
+def test_what_began_is_found_with_its_size_and_its_time(found):
+    _, force, (one, *others) = found
+    assert one.begun.effect.id == "rudder_offset"
+    assert one.begun.time == pytest.approx(BEGINS, abs=0.2)
+    assert one.begun.mean[0] == pytest.approx(3.0, abs=0.3)
+    assert not is_lost(one.fit)
+    assert one.log_posterior > force.log_posterior + 5.0, (
+        "a cause of the catalogue explains more by less than a force"
+    )
+    assert all(other.log_posterior < one.log_posterior - 10.0 for other in others)
+
+
+def test_a_rudder_to_the_other_side_has_the_other_sign(plant):
+    _, _, (one, *_) = hit(plant, -3.0)
+    assert one.begun.effect.id == "rudder_offset"
+    assert one.begun.mean[0] == pytest.approx(-3.0, abs=0.3)
+
+
+def test_a_force_that_comes_and_goes_is_no_sudden_cause(plant):
+    """Nothing is fitted that has no hope to be as probable as the force."""
+    time = np.linspace(0.0, 30.0, 301)
+    bump = 0.05 * np.sin(np.pi * np.clip((time - 10.0) / 5.0, 0.0, 1.0)) ** 2
+    planted = plant(lambda setting: lacking(setting, history("N", time, bump)))
+    _, force, others = asked(planted)
+    assert all(one.log_posterior < force.log_posterior - 10.0 for one in others)
+
+
+def test_in_its_place_the_records_lack_what_it_explains(found):
+    problem, _, (one, *_) = found
+    n, place = len(problem.entries), in_its_place(problem, one)
+    assert place.fit.z.size == n
+    assert np.allclose(place.fit.r - one.fit.r, one.fit.J[:, n] * one.begun.mean[0])
+    assert np.linalg.norm(place.fit.r) > 5.0 * np.linalg.norm(one.fit.r)
+
+
+def test_it_ends_the_search_only_if_it_leaves_noise_and_is_far_before_the_rest(found):
+    _, force, (one, *_) = found
+    there = [Foreign(beside=(), what=one, log_posterior=0.0)]
+
+    def best(log):
+        return SimpleNamespace(best=lambda: SimpleNamespace(log_posterior=log))
+
+    assert is_explained(best(-SURE - 1.0), there)
+    assert not is_explained(best(-SURE + 1.0), there)
+    lost = SimpleNamespace(**{**vars(one), "fit": SimpleNamespace(r=2.0 * one.fit.r)})
+    assert not is_explained(best(-SURE - 1.0), [Foreign(beside=(), what=lost, log_posterior=0.0)])
+    assert not is_explained(best(-SURE - 1.0), [Foreign(beside=(), what=force.what, log_posterior=0.0)])
+    assert not is_explained(best(-SURE - 1.0), [])
+
+
+def test_it_is_told_in_words_and_numbers(work):
+    (one,) = fitted(work)
+    cause = cause_of(work, one, 0.9)
+    angle = cause.parameters["angle"]
+    assert (cause.id, cause.sentence, cause.probability) == (
+        "rudder_offset",
+        "the rudder is off its centre",
+        0.9,
+    )
+    assert cause.start_time == one.begun.time
+    assert 0.0 < cause.start_sd < 0.2
+    assert angle.low < 3.0 < angle.high
+    rival = rival_of(work, one, 0.3)
+    assert rival.ids == (f"rudder_offset@{one.begun.time:g}",)
+    assert rival.sentence == f"from {one.begun.time:g} s on the rudder is off its centre"
+    assert is_large(one)
+    D, rival = closest(work, one)
+    assert D > 100.0
+    assert rival[0] in EFFECTS
+
+
+def test_what_began_holds_throughout_in_trials_to_come(work):
+    (one,) = fitted(work)
+    (k,) = places(work.problem.entries, ("rudder_offset",))
+    to_come = from_now_on(work, one)
+    assert to_come.ids == (one.id,)
+    assert to_come.fit.z[k] == one.begun.mean[0]
+    assert np.array_equal(to_come.fit.J[:, k], one.fit.J[:, len(work.problem.entries)])
+    assert to_come.fit.D[k] == EFFECTS["rudder_offset"].parameters[0].scale ** 2
+
+
+@pytest.mark.parametrize(
+    ("late", "verdict"),
+    [
+        (Late(0.85, True, 20.0), CAUSE_NAMED),
+        (Late(0.75, True, 20.0), UNDECIDED),
+        (Late(0.85, False, 20.0), UNDECIDED),
+        (Late(0.85, True, 5.0), UNDECIDED),
+        (Late(0.3, True, 20.0), NOTHING_WRONG),
+    ],
+)
+def test_it_is_named_only_if_it_is_probable_large_and_apart(late, verdict):
+    inside = {(): 0.7 if late.probability < 0.5 else 0.1, ("a",): 0.05}
+    assert decide(inside, 0.0, True, 20.0, late) == verdict
+    assert decide(inside, 0.85, True, 20.0, late) == OUTSIDE
