@@ -27,8 +27,10 @@ from subzero.diagnosis.sudden import Along, Begun, Place, columns, scan, times_o
 
 ROUNDS, MOST, HOPE = 3, 3, 6.0
 """Rounds of trying; in each at most so many are fitted that the linear problem has this close to the best."""
-BENT = 0.05
-"""Where a cause gains much, what is not linear may be this share of it."""
+BENT, MUCH = 0.05, 0.5
+"""Where a cause gains much, what is not linear may be this share of it; of the cause that gains most, so much."""
+LEGS, AFAR = 2, 30.0
+"""A fit goes on, so often, while the linear problem where it stopped promises so much more."""
 BETTER = 2.0
 """What was fitted is fitted again where the linear problem promises so much more, in log posterior."""
 
@@ -62,10 +64,9 @@ class Hope(NamedTuple):
     begun: Begun
     place: Place
 
-    @property
-    def at_most(self) -> float:
-        """The log posterior that its fit may have."""
-        return self.log_posterior + BENT * max(self.begun.log_gain, 0.0)
+    def at_most(self, bent: float) -> float:
+        """Return the log posterior that its fit may have, if that share of what it gains is not linear."""
+        return self.log_posterior + self.begun.between + bent * max(self.begun.log_gain, 0.0)
 
 
 def struck(
@@ -117,7 +118,8 @@ def _worth(hopes: Sequence[Hope], done: dict[str, Struck], least: float) -> list
     known = {name: one.log_posterior for name, one in done.items()}
     bar = max([least, *known.values(), *(one.log_posterior for one in ranked[:1])]) - HOPE
     found = [one for name, one in first.items()
-             if one.at_most > bar and one.log_posterior > known.get(name, -np.inf) + BETTER]  # fmt: skip
+             if one.at_most(MUCH if one is ranked[0] else BENT) > bar
+             and one.log_posterior > known.get(name, -np.inf) + BETTER]  # fmt: skip
     return sorted(found, key=lambda one: -one.log_posterior)[:MOST]
 
 
@@ -131,6 +133,10 @@ def _fitted(problem: Problem, hope: Hope) -> Struck:
     slopes = more.jacobian(start, range(n, start.size))[:, n:]
     D, J = _prior(problem, more, 1.0), np.hstack([place.fit.J[:, :n], slopes])
     fit = with_own_slopes(more, refit(more, start, J, D, most_fresh=1))
+    for _ in range(LEGS):
+        if fit.promise < AFAR:
+            break
+        fit = refit(more, fit.z, more.jacobian(fit.z), D, r=fit.r, most_fresh=0, made_at=fit.z)
     under = {kappa: _prior(problem, more, kappa) for kappa in KAPPAS}
     log = laplace(more.entries, fit, under)
     mixed = log_sum([float(np.log(prior)) + log[kappa] for kappa, prior in KAPPAS.items()])

@@ -41,6 +41,7 @@ class Begun:
         record: in which record; a sudden effect is an event of one trial.
         log_gain: log evidence over that of no such effect.
         mean: deviations of its parameters. [their unit]
+        between: what a time between those that were tried may gain more.
         kappa: the most probable scale of the tolerances.
     """
 
@@ -49,6 +50,7 @@ class Begun:
     record: int
     log_gain: float
     mean: np.ndarray
+    between: float = 0.0
     kappa: float = 1.0
 
     @property
@@ -132,7 +134,21 @@ def _strongest(found: list[Begun]) -> list[Begun]:
     """Return the best time of every effect, most probable first."""
     ranked = sorted(found, key=lambda one: -one.log_gain)
     first = {one.effect.id: one for one in reversed(ranked)}
-    return sorted(first.values(), key=lambda one: -one.log_gain)
+    return [
+        replace(one, between=_between(one, found))
+        for one in sorted(first.values(), key=lambda one: -one.log_gain)
+    ]
+
+
+def _between(best: Begun, found: list[Begun]) -> float:
+    """Return how far a parabola through an effect's best time and its neighbours rises above it."""
+    own = sorted((one for one in found if one.effect.id == best.effect.id), key=lambda one: one.time)
+    k = next(k for k, one in enumerate(own) if one.time == best.time)
+    if not 0 < k < len(own) - 1:
+        return 0.0
+    times, gains = ([getattr(one, name) for one in own[k - 1 : k + 2]] for name in ("time", "log_gain"))
+    a, b, c = np.polyfit(np.array(times) - best.time, gains, 2)
+    return float(c - b * b / (4.0 * a) - best.log_gain) if a < 0.0 else 0.0
 
 
 def _tried(
