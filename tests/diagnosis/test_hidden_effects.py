@@ -71,7 +71,7 @@ def words(result):
 
 
 SINGLES = [drawn("single", number) for number in (5, 9, 12, 18)]
-MORE = [drawn("single", number, marks=pytest.mark.slow) for number in (8, 11, 13, 19, 20, 25)]
+MORE = [drawn("single", number, marks=pytest.mark.slow) for number in (8, 11, 13, 16, 19, 25)]
 
 
 @pytest.mark.parametrize("case", SINGLES + MORE)
@@ -101,6 +101,17 @@ def test_two_hidden_effects_are_named(told, case):
     result = told[case].result()
     assert min(result["D"].values()) >= CLEAR
     assert names(result) == set(result["truth"]), words(result)
+
+
+@pytest.mark.parametrize("case", [drawn("sudden", number) for number in (0, 4)])
+def test_what_begins_in_mid_trial_is_named_with_its_time(told, case):
+    result = told[case].result()
+    assert min(result["D"].values()) >= CLEAR
+    (cause,) = result["causes"] or ({"id": words(result), "start": 0.0},)
+    assert cause["id"] == case.causes[0]
+    assert cause["start"] == pytest.approx(result["starts"][cause["id"]], abs=1.0), (
+        "a second, for drawn sizes"
+    )
 
 
 @pytest.mark.parametrize("case", [drawn("outside", number) for number in (0, 3)])
