@@ -6,23 +6,20 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from subzero.diagnosis.candidate import Candidate
+from subzero.diagnosis.contenders import contenders, names_of, rivals_of, to_come
 from subzero.diagnosis.detect import separation, with_secants
 from subzero.diagnosis.effects.sensors import SPECS
-from subzero.diagnosis.estimates import causes, deviations, large, name, rivals
+from subzero.diagnosis.estimates import causes, deviations, large, name
 from subzero.diagnosis.extending import Extension, ahead, gained, of_causes, of_nothing, of_sudden, of_unknown
 from subzero.diagnosis.foreign import shares, tolerance_scale
 from subzero.diagnosis.hypotheses import Ids
-from subzero.diagnosis.outlook import Survivor
 from subzero.diagnosis.rules import HEALTHY, Late, decide, smallest_set
 from subzero.diagnosis.showing import curves
 from subzero.diagnosis.sudden_told import (
     cause_of,
     closest,
-    closest_rival,
     fitted,
-    from_now_on,
     is_large,
-    rival_of,
 )
 from subzero.diagnosis.verdict import (
     CAUSE_NAMED,
@@ -82,41 +79,28 @@ def _told(
     new: Extension,
 ) -> Verdict:
     """Return the verdict as a value."""
-    candidates = work.search.candidates
-    everything = inside | {(key,): p for key, p in outside.items()}
+    candidates, everything = work.search.candidates, inside | {(key,): p for key, p in outside.items()}
     whole = smallest_set(everything)
-    left = [ids for ids in whole if ids in inside] or [best.ids]
-    late = [one for one in fitted(work) if (one.id,) in whole and one.id != new.id]
-    left = _contenders(work, best, left) if verdict == UNDECIDED and not late else left
-    throughout = (closest_rival(work, inside),) if new.cause else rivals(work, best, inside, left)
-    others = sorted([*throughout, *(rival_of(work, one, outside[one.id]) for one in late)],
-                    key=lambda one: -one.probability)  # fmt: skip
-    named = (
-        (new.cause,)
-        if new.cause
-        else causes(work, best, inside, large(work, best))
-        if verdict == CAUSE_NAMED
-        else ()
-    )
+    left, late = contenders(work, verdict, best, inside, whole)
+    others = rivals_of(work, best, inside, outside, left, [one for one in late if one.id != new.id], new)
+    named = _named(work, verdict, best, inside, new)
     first = next((one.ids for one in others if one.ids and one.ids in candidates), None)
     rival = candidates[first].fit if first else None
     fits = {"nominal": None, "tolerance": candidates[()].fit}
     fits |= {"extended": new.fit} if verdict in (CAUSE_NAMED, OUTSIDE) else {}
     fits |= {f"rival: {name(first)}": rival} if first else {}
-    survivors: list[Survivor] = [candidates[ids] for ids in left if ids in candidates]
-    survivors += [from_now_on(work, one) for one in late]
     full = work.budget == "full" and work.complete
     return Verdict(
         verdict=verdict,
-        sentence=_sentence(
-            verdict, named, best, [*map(name, whole), *(name(one.ids) for one in others)], new.unknown
-        ),
+        sentence=_sentence(verdict, named, best, names_of(whole, others), new.unknown),
         causes=named,
-        rivals=tuple(others),
+        rivals=others,
         unknown=new.unknown,
         extended=new.extended,
         gain=gained(work, new, rival) if full and verdict in (CAUSE_NAMED, OUTSIDE) else None,
-        next_trial=ahead(work, survivors, everything) if full and verdict == UNDECIDED else None,
+        next_trial=ahead(work, to_come(work, left, late), everything)
+        if full and verdict == UNDECIDED
+        else None,
         curves=curves(new.problem, fits),
         probabilities=_listed(inside, outside),
         tolerance_scale=tolerance_scale(work.search),
@@ -124,17 +108,13 @@ def _told(
     )
 
 
-def _contenders(work: Work, best: Candidate, left: list[Ids]) -> list[Ids]:
-    """Return the hypotheses that the next trial is to tell apart: those that are left, or the best and its closest
-    rival, which may be improbable by luck alone.
-    """
-    if len(left) > 1 or not best.ids:
-        return left
-    J = with_secants(work.problem, best.fit.J, best.fit.z)
-    rival = separation(work.problem, J, best.fit.z, best.ids, best.kappa)[1]
-    closest = () if rival == "none" else (rival,)
-    work.search.fit(closest)
-    return [*left, closest]
+def _named(
+    work: Work, verdict: str, best: Candidate, inside: dict[Ids, float], new: Extension
+) -> tuple[Cause, ...]:
+    """Return the causes that are named."""
+    if new.cause:
+        return (new.cause,)
+    return causes(work, best, inside, large(work, best)) if verdict == CAUSE_NAMED else ()
 
 
 def _common(work: Work, best: Candidate, inside: float) -> dict[str, Any]:
@@ -193,4 +173,4 @@ def _sentence(
         return f"{words[0].upper()}{words[1:]}."
     if verdict == OUTSIDE and unknown:
         return f"Something acts on {unknown.axis} that no cause of the catalogue explains."
-    return f"These records cannot tell apart: {', '.join(dict.fromkeys(left))}."
+    return f"These records cannot tell apart: {', '.join(left)}."

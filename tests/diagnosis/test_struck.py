@@ -13,6 +13,7 @@ import pytest
 
 from subzero.diagnosis.begun import begun_at
 from subzero.diagnosis.closer import closer
+from subzero.diagnosis.contenders import contenders, names_of, to_come
 from subzero.diagnosis.effects import catalogue
 from subzero.diagnosis.foreign import SURE, Foreign, is_explained
 from subzero.diagnosis.hypotheses import places, variances
@@ -135,6 +136,24 @@ def test_what_began_holds_throughout_in_trials_to_come(work):
     assert to_come.fit.z[k] == one.begun.mean[0]
     assert np.array_equal(to_come.fit.J[:, k], one.fit.J[:, len(work.problem.entries)])
     assert to_come.fit.D[k] == EFFECTS["rudder_offset"].parameters[0].scale ** 2
+
+
+def test_the_next_trial_is_not_asked_whether_what_is_broken_broke_in_mid_trial(work):
+    """In a trial to come the two are one."""
+    (one,) = fitted(work)
+    throughout = {("rudder_offset",): "throughout", ("hull_drag",): "another"}
+    asked = SimpleNamespace(problem=work.problem, search=SimpleNamespace(candidates=throughout))
+    assert to_come(asked, [("rudder_offset",)], [one]) == ["throughout"]
+    (another, late) = to_come(asked, [("hull_drag",)], [one])
+    assert (another, late.ids) == ("another", (one.id,))
+
+
+def test_sudden_causes_that_are_left_are_rivals_and_need_no_others(work):
+    (one,) = fitted(work)
+    key, inside = (one.id,), {(): 0.3, ("hull_drag",): 0.01}
+    assert contenders(work, UNDECIDED, None, inside, [key, ()]) == ([()], [one])
+    assert contenders(work, UNDECIDED, None, inside, [key]) == ([], [one])
+    assert names_of([key, ()], [rival_of(work, one, 0.6)]) == [one.id, "none"]
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,67 @@
+"""What is left beside what is told: hypotheses and sudden causes as rivals, and for the next trial to tell apart."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from subzero.diagnosis.candidate import Candidate
+from subzero.diagnosis.detect import separation, with_secants
+from subzero.diagnosis.estimates import name, rivals
+from subzero.diagnosis.extending import Extension
+from subzero.diagnosis.hypotheses import Ids
+from subzero.diagnosis.outlook import Survivor
+from subzero.diagnosis.struck import Struck
+from subzero.diagnosis.sudden_told import closest_rival, fitted, from_now_on, rival_of
+from subzero.diagnosis.verdict import UNDECIDED, Rival
+from subzero.diagnosis.work import Work
+
+
+def contenders(
+    work: Work, verdict: str, best: Candidate, inside: dict[Ids, float], whole: Sequence[Ids]
+) -> tuple[list[Ids], list[Struck]]:
+    """Return which hypotheses and which sudden causes are left, of the smallest set of all."""
+    left = [ids for ids in whole if ids in inside]
+    late = [one for one in fitted(work) if (one.id,) in whole]
+    alone = all((one.begun.effect.id,) in left for one in late)
+    return _with_closest(work, best, left) if verdict == UNDECIDED and left and alone else left, late
+
+
+def rivals_of(
+    work: Work,
+    best: Candidate,
+    inside: dict[Ids, float],
+    outside: dict[str, float],
+    left: list[Ids],
+    late: list[Struck],
+    new: Extension,
+) -> tuple[Rival, ...]:
+    """Return the rivals of what is told, the most probable first."""
+    throughout = (closest_rival(work, inside),) if new.cause else rivals(work, best, inside, left)
+    sudden = [rival_of(work, one, outside[one.id]) for one in late]
+    return tuple(sorted([*throughout, *sudden], key=lambda one: -one.probability))
+
+
+def names_of(whole: Sequence[Ids], others: Sequence[Rival]) -> list[str]:
+    """Return the names of all that the records cannot tell apart."""
+    return list(dict.fromkeys([*map(name, whole), *(name(one.ids) for one in others)]))
+
+
+def to_come(work: Work, left: Sequence[Ids], late: Sequence[Struck]) -> list[Survivor]:
+    """Return what the next trial is to tell apart; what broke stays broken, so that it is the same as if it had always
+    been.
+    """
+    found: list[Survivor] = [work.search.candidates[ids] for ids in left if ids in work.search.candidates]
+    return found + [from_now_on(work, one) for one in late if (one.begun.effect.id,) not in left]
+
+
+def _with_closest(work: Work, best: Candidate, left: list[Ids]) -> list[Ids]:
+    """Return the hypotheses that the next trial is to tell apart: those that are left, or the best and its closest
+    rival, which may be improbable by luck alone.
+    """
+    if len(left) > 1 or not best.ids:
+        return left
+    J = with_secants(work.problem, best.fit.J, best.fit.z)
+    rival = separation(work.problem, J, best.fit.z, best.ids, best.kappa)[1]
+    closest = () if rival == "none" else (rival,)
+    work.search.fit(closest)
+    return [*left, closest]
