@@ -142,7 +142,8 @@ def _strongest(found: list[Begun]) -> list[Begun]:
 
 def _between(best: Begun, found: list[Begun]) -> float:
     """Return how far a parabola through an effect's best time and its neighbours rises above it."""
-    own = sorted((one for one in found if one.effect.id == best.effect.id), key=lambda one: one.time)
+    at = {one.time: one for one in found if one.effect.id == best.effect.id}
+    own = [at[time] for time in sorted(at)]
     k = next(k for k, one in enumerate(own) if one.time == best.time)
     if not 0 < k < len(own) - 1:
         return 0.0
