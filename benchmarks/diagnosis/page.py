@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
 from . import advice, degraded, sections, times
@@ -14,7 +15,7 @@ from .results import read
 from .scores import Result, Score
 from .sections import MARK, table
 from .truth import SAME
-from .words import BEFORE_WORDS, HEAD, NEAR_WORDS
+from .words import BEFORE_WORDS, HEAD, NEAR_WORDS, NOT_YET, UNFINISHED
 
 PAGE = FIGURES.parent / "diagnosis_benchmark.md"
 
@@ -32,11 +33,25 @@ def write_page(path: Path, earlier: Path | None = None) -> Path:
     sound = [one for one in results if "error" not in one]
     draw(sound)
     parts = [_head(sound, broken), _scores(sound, before), _pictures(), sections.missed(sound),
-             sections.confounded(sound), sections.limits(sound), sections.degraded(degraded.kept(path)),
-             sections.advice(advice.kept(path)), sections.times(sound, times.kept(path)),
-             sections.all_cases(sound)]  # fmt: skip
+             sections.confounded(sound), sections.limits(sound),
+             *_beside(sound, path, earlier), sections.all_cases(sound)]  # fmt: skip
     PAGE.write_text("\n\n".join(parts) + "\n")
     return PAGE
+
+
+def _beside(results: Sequence[Result], path: Path, earlier: Path | None) -> list[str]:
+    """Return the sections that rest on further records: of these results, or else of the earlier ones, which is said."""
+    parts = []
+    for module, section in (
+        (degraded, sections.degraded),
+        (advice, sections.advice),
+        (times, partial(sections.times, results)),
+    ):
+        here = module.kept(path)
+        found = here or (module.kept(earlier) if earlier else [])
+        part = section(found)
+        parts.append(part if here or not found else part.replace("\n\n", f"\n\n{NOT_YET}\n\n", 1))
+    return parts
 
 
 def _head(results: Sequence[Result], broken: Sequence[Result]) -> str:
@@ -47,10 +62,16 @@ def _head(results: Sequence[Result], broken: Sequence[Result]) -> str:
     where = Counter(one["manoeuvre"] for one in results)
     return HEAD.format(
         cases=len(results), whole=sum(SHARES.values()), kinds=kinds, fig6=where["fig6"] + where["short"],
-        rich=where["rich"], broken=len(broken), seed=results[0]["seed"], versions=_versions(results), same=SAME,
-        dropped=sum(one["dropped"] for one in results), redrawn=sum(one["dropped"] > 0 for one in results),
+        rich=where["rich"], broken=len(broken), seed=results[0]["seed"], versions=_versions(results), unfinished=_unfinished(count),
+        same=SAME, dropped=sum(one["dropped"] for one in results), redrawn=sum(one["dropped"] > 0 for one in results),
         heavy=sum(one["dropped"] > 0 and HEAVY in one["truth"] for one in results),
     )  # fmt: skip
+
+
+def _unfinished(count: Counter[str]) -> str:
+    """Return a warning if some kinds are further than others."""
+    shares = [count[kind] / whole for kind, whole in SHARES.items()]
+    return UNFINISHED if max(shares) > min(shares) + 0.1 else ""
 
 
 def _versions(results: Sequence[Result]) -> str:

@@ -15,7 +15,8 @@ LIMITS = {"fig6": (3.0, 15.0), "rich": (inf, 30.0)}
 """Manoeuvre → how long the first screen and the verdict may take; infinite where nothing is asked. [s]"""
 RECORDS = {"fig6": 9, "rich": 3}
 """Manoeuvre → how many records of each kind are timed: the first ones of the seed."""
-KINDS = {"healthy": "healthy", "single": "one hidden", "pair": "two hidden"}
+KINDS = {"healthy": "healthy", "single": "one hidden", "pair": "two hidden", "sudden": "one from mid-trial on",
+         "outside": "outside the catalogue"}  # fmt: skip
 Row = tuple[str, str, float, float]
 
 

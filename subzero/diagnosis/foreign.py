@@ -29,6 +29,8 @@ NEAR, FAR, MOST = 6.0, 45.0, 3
 """No force that is further behind the best than FAR, in log posterior, is looked at around its own fit, and at most so
 many; where one cause explains the record within declared tolerances, what is linear is nearly true there: besides the
 most probable force only those that are as close as NEAR."""
+LOOKED = 2
+"""Along the runs of at most so many of them sudden causes are looked for."""
 SURE = 30.0
 """No sum of causes gains more than this, in log posterior, over one cause that leaves nothing but noise."""
 WORTH = 2.0
@@ -169,17 +171,17 @@ def _bases(search: Search) -> list[Candidate]:
 
 def _sudden(search: Search, close: Sequence[Close], known: float) -> list[Foreign]:
     """Return causes that begin in mid-trial, beside nothing else, that may be as probable as what is known; looked for
-    around the best hypothesis, or around a force that explains more.
+    around the best hypothesis, or around forces that explain more.
     """
     problem, best = search.problem, search.best()
     effects = list({entry.effect.id: entry.effect for entry in problem.entries if entry.record < 0}.values())
     able = [effect for effect in effects if effect.sudden]
     prior = float(np.log(PRIOR["sudden"] / (len(able) * len(problem.records))))
-    place = Place(best.fit, Along(problem, best.fit.z))
-    if close and close[0].log_posterior + _log_prior(problem) > best.log_posterior:
-        place = close[0].place
+    places = [one.place for one in close if one.log_posterior > close[0].log_posterior - ALIKE][:LOOKED]
+    if not close or close[0].log_posterior + _log_prior(problem) < best.log_posterior:
+        places = [Place(best.fit, Along(problem, best.fit.z))]
     made = [one for record in range(len(problem.records))
-            for one in struck(problem, place, able, record, known - prior, search.side)]  # fmt: skip
+            for one in struck(problem, places, able, record, known - prior, search.side)]  # fmt: skip
     return [Foreign(beside=(), what=one, log_posterior=one.log_posterior + prior,
                     place=None if is_lost(one.fit) else in_its_place(problem, one)) for one in made]  # fmt: skip
 

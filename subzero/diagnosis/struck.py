@@ -22,7 +22,7 @@ from subzero.diagnosis.effect import Effect
 from subzero.diagnosis.evidence import KAPPAS, Quadratic, log_sum, posterior
 from subzero.diagnosis.hypotheses import log_prior, named, variances
 from subzero.diagnosis.problem import Problem
-from subzero.diagnosis.refit import Fit, refit, with_own_slopes
+from subzero.diagnosis.refit import Fit, is_lost, refit, with_own_slopes
 from subzero.diagnosis.sudden import Along, Begun, Place, columns, scan, times_of, with_begun
 
 ROUNDS, MOST, HOPE = 3, 3, 6.0
@@ -71,7 +71,7 @@ class Hope(NamedTuple):
 
 def struck(
     problem: Problem,
-    place: Place,
+    places: Sequence[Place],
     able: Sequence[Effect],
     record: int,
     least: float,
@@ -81,22 +81,25 @@ def struck(
 
     Args:
         problem: records and parameters.
-        place: where they are tried at first.
+        places: where they are tried at first.
         able: effects that may begin in mid-trial.
         record: in which they begin.
         least: log posterior of what is known else, on the scale of `Struck`.
         side: for fits side by side.
     """
     done: dict[str, Struck] = {}
+    hopes = [one for place in places for one in _hopes(problem, place, able, record)]
     for _ in range(ROUNDS):
-        worth = _worth(_hopes(problem, place, able, record), done, least)
+        worth = _worth(hopes, done, least)
+        if not worth:
+            break
         for one in side.map(partial(_fitted, problem), worth):
             name = one.begun.effect.id
             done[name] = max(one, done.get(name, one), key=lambda each: each.log_posterior)
-        best = max(done.values(), key=lambda one: one.log_posterior, default=None)
-        if not worth or best is None:
-            break
-        place = in_its_place(problem, best)
+        best = max(done.values(), key=lambda one: one.log_posterior)
+        hopes = [one for one in hopes if not any(one is each for each in worth)]
+        if not is_lost(best.fit):
+            hopes = _hopes(problem, in_its_place(problem, best), able, record)
     return list(done.values())
 
 

@@ -42,7 +42,7 @@ def asked(planted):
     knots = knots_of(problem, FINE)
     force = closer(problem, wide, "unknown_force:N", 1.0, knots, one_terms(problem, wide.z, knots))
     with ThreadPoolExecutor(2) as side:
-        return problem, force, struck(problem, force.place, ABLE, 0, force.log_posterior, side)
+        return problem, force, struck(problem, [force.place], ABLE, 0, force.log_posterior, side)
 
 
 @pytest.fixture(scope="module")
