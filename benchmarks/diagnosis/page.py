@@ -40,7 +40,7 @@ def write_page(path: Path, earlier: Path | None = None) -> Path:
 
 
 def _beside(results: Sequence[Result], path: Path, earlier: Path | None) -> list[str]:
-    """Return the sections that rest on further records: of these results, or else of the earlier ones, which is said."""
+    """Return the sections that rest on further records: those of these results, or else of the earlier ones."""
     parts = []
     for module, section in (
         (degraded, sections.degraded),
@@ -62,8 +62,8 @@ def _head(results: Sequence[Result], broken: Sequence[Result]) -> str:
     where = Counter(one["manoeuvre"] for one in results)
     return HEAD.format(
         cases=len(results), whole=sum(SHARES.values()), kinds=kinds, fig6=where["fig6"] + where["short"],
-        rich=where["rich"], broken=len(broken), seed=results[0]["seed"], versions=_versions(results), unfinished=_unfinished(count),
-        same=SAME, dropped=sum(one["dropped"] for one in results), redrawn=sum(one["dropped"] > 0 for one in results),
+        rich=where["rich"], broken=len(broken), seed=results[0]["seed"], versions=_versions(results),
+        unfinished=_unfinished(count), same=SAME, dropped=sum(one["dropped"] for one in results), redrawn=sum(one["dropped"] > 0 for one in results),
         heavy=sum(one["dropped"] > 0 and HEAVY in one["truth"] for one in results),
     )  # fmt: skip
 

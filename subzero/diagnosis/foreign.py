@@ -171,15 +171,14 @@ def _bases(search: Search) -> list[Candidate]:
 
 def _sudden(search: Search, close: Sequence[Close], known: float) -> list[Foreign]:
     """Return causes that begin in mid-trial, beside nothing else, that may be as probable as what is known; looked for
-    around the best hypothesis, or around forces that explain more.
+    around the best hypothesis, and along the runs of the best forces.
     """
     problem, best = search.problem, search.best()
     effects = list({entry.effect.id: entry.effect for entry in problem.entries if entry.record < 0}.values())
     able = [effect for effect in effects if effect.sudden]
     prior = float(np.log(PRIOR["sudden"] / (len(able) * len(problem.records))))
-    places = [one.place for one in close if one.log_posterior > close[0].log_posterior - ALIKE][:LOOKED]
-    if not close or close[0].log_posterior + _log_prior(problem) < best.log_posterior:
-        places = [Place(best.fit, Along(problem, best.fit.z))]
+    alike = [one for one in close[:LOOKED] if one.log_posterior > close[0].log_posterior - ALIKE]
+    places = [Place(best.fit, Along(problem, best.fit.z)), *(one.place for one in alike)]
     made = [one for record in range(len(problem.records))
             for one in struck(problem, places, able, record, known - prior, search.side)]  # fmt: skip
     return [Foreign(beside=(), what=one, log_posterior=one.log_posterior + prior,

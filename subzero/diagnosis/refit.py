@@ -16,6 +16,8 @@ CLOSE = 1.0
 """Sensitivities are a fit's own if they were made so close to it, in tolerances."""
 LOST = 2.0
 """A fit whose square is this many of its standard deviations above that of noise leaves more than noise."""
+LEGS, AFAR = 3, 30.0
+"""A fit goes on, so often, while the linear problem where it stopped promises so much more."""
 MOST_STEPS = 8
 POOR = 0.5
 """A step that gains less than this share of what the linear model promised has old sensitivities."""
@@ -71,6 +73,16 @@ def with_own_slopes(problem: Problem, fit: Fit) -> Fit:
     if fit.moved(problem) < CLOSE:
         return fit
     return refit(problem, fit.z, problem.jacobian(fit.z), fit.D, r=fit.r, most_fresh=0, made_at=fit.z)
+
+
+def gone_on(problem: Problem, fit: Fit) -> Fit:
+    """Return a fit that has gone on, with sensitivities of its own, while much is promised."""
+    for _ in range(LEGS):
+        if fit.promise < AFAR:
+            break
+        J = problem.jacobian(fit.z)
+        fit = refit(problem, fit.z, J, fit.D, r=fit.r, most_fresh=2, made_at=fit.z)
+    return fit
 
 
 def refit(

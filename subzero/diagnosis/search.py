@@ -15,7 +15,7 @@ from subzero.diagnosis.candidate import Candidate, candidate_of
 from subzero.diagnosis.growing import GrowingFits
 from subzero.diagnosis.hypotheses import Ids, places, variances
 from subzero.diagnosis.probability import Beliefs
-from subzero.diagnosis.refit import Fit, is_lost, refit
+from subzero.diagnosis.refit import Fit, gone_on, is_lost, refit
 from subzero.diagnosis.screen import is_close, look
 from subzero.diagnosis.stride import ENOUGH
 from subzero.diagnosis.wide import fit_wide
@@ -30,8 +30,6 @@ FIRST, LAST, NEARER = 3, 3, 1.0
 """So many are fitted from off their kinks; rounds of settling; so close, in tolerances, the sensitivities of what is
 told were made.
 """
-LEGS, AFAR = 3, 30.0
-"""A cause by itself is fitted on, so often, while the linear problem where its fit stopped promises so much more."""
 RIVALS, CLOSE = 2.0, 6.0
 """What is so close to the best in log posterior is settled, too; what has a cause more or less, from farther behind;
 the first within CLOSE are fitted from off their kinks, too.
@@ -143,13 +141,9 @@ class Search(GrowingFits):
         z, at = np.zeros(len(self.problem.entries)), places(self.problem.entries, ids)
         z[at] = self.screen.secants.get(ids, self.wide.z)[at]
         D = variances(self.problem.entries, ids, 1.0)
-        fit = refit(self.problem, z, self.problem.jacobian(z), D, most_fresh=2, made_at=z)
-        for _ in range(LEGS):
-            if fit.promise < AFAR:
-                break
-            J = self.problem.jacobian(fit.z)
-            fit = refit(self.problem, fit.z, J, D, r=fit.r, most_fresh=2, made_at=fit.z)
-        return fit
+        return gone_on(
+            self.problem, refit(self.problem, z, self.problem.jacobian(z), D, most_fresh=2, made_at=z)
+        )
 
     def _nothing(self) -> None:
         """Fit "nothing is wrong" from where the best fit is, if that explains more: what is outside is beside it."""

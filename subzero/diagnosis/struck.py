@@ -22,15 +22,14 @@ from subzero.diagnosis.effect import Effect
 from subzero.diagnosis.evidence import KAPPAS, Quadratic, log_sum, posterior
 from subzero.diagnosis.hypotheses import log_prior, named, variances
 from subzero.diagnosis.problem import Problem
-from subzero.diagnosis.refit import Fit, is_lost, refit, with_own_slopes
+from subzero.diagnosis.refit import Fit, gone_on, is_lost, refit, with_own_slopes
+from subzero.diagnosis.stride import bounds
 from subzero.diagnosis.sudden import Along, Begun, Place, columns, scan, times_of, with_begun
 
 ROUNDS, MOST, HOPE = 3, 3, 6.0
 """Rounds of trying; in each at most so many are fitted that the linear problem has this close to the best."""
 BENT, MUCH = 0.05, 0.5
 """Where a cause gains much, what is not linear may be this share of it; of the cause that gains most, so much."""
-LEGS, AFAR = 2, 30.0
-"""A fit goes on, so often, while the linear problem where it stopped promises so much more."""
 BETTER = 2.0
 """What was fitted is fitted again where the linear problem promises so much more, in log posterior."""
 
@@ -132,14 +131,10 @@ def _fitted(problem: Problem, hope: Hope) -> Struck:
     more, n = with_begun(problem, begun), len(problem.entries)
     (C,) = columns(*place.along, [(begun.effect, begun.time)], begun.record)
     start = _linear(place.fit, C, _prior(problem, more, 1.0)[:-1])
-    start = np.append(start, 0.0)
+    start = np.clip(np.append(start, 0.0), *bounds(more))
     slopes = more.jacobian(start, range(n, start.size))[:, n:]
     D, J = _prior(problem, more, 1.0), np.hstack([place.fit.J[:, :n], slopes])
-    fit = with_own_slopes(more, refit(more, start, J, D, most_fresh=1))
-    for _ in range(LEGS):
-        if fit.promise < AFAR:
-            break
-        fit = refit(more, fit.z, more.jacobian(fit.z), D, r=fit.r, most_fresh=0, made_at=fit.z)
+    fit = gone_on(more, with_own_slopes(more, refit(more, start, J, D, most_fresh=1)))
     under = {kappa: _prior(problem, more, kappa) for kappa in KAPPAS}
     log = laplace(more.entries, fit, under)
     mixed = log_sum([float(np.log(prior)) + log[kappa] for kappa, prior in KAPPAS.items()])
