@@ -60,11 +60,15 @@ def _head(results: Sequence[Result], broken: Sequence[Result]) -> str:
     kinds = table(["kind", "cases here", "of the whole benchmark"],
                    [[kind, str(count[kind]), str(whole)] for kind, whole in SHARES.items()])  # fmt: skip
     where = Counter(one["manoeuvre"] for one in results)
+    drawn = {
+        "dropped": sum(one["dropped"] for one in results),
+        "redrawn": sum(one["dropped"] > 0 for one in results),
+        "heavy": sum(one["dropped"] > 0 and HEAVY in one["truth"] for one in results),
+    }
     return HEAD.format(
         cases=len(results), whole=sum(SHARES.values()), kinds=kinds, fig6=where["fig6"] + where["short"],
         rich=where["rich"], broken=len(broken), seed=results[0]["seed"], versions=_versions(results),
-        unfinished=_unfinished(count), same=SAME, dropped=sum(one["dropped"] for one in results), redrawn=sum(one["dropped"] > 0 for one in results),
-        heavy=sum(one["dropped"] > 0 and HEAVY in one["truth"] for one in results),
+        unfinished=_unfinished(count), same=SAME, **drawn,
     )  # fmt: skip
 
 

@@ -94,3 +94,35 @@ def test_figures_tell_a_missed_single_from_a_false_alarm():
     assert found["healthy: false names"] == "50.0 %"
     assert found["all cases: a wrong name with p ≥ 0.95"] == "25.0 %"
     assert found["… that its stated probabilities let expect"] == "94.5 %"  # (0.99 + 0.9)/2
+
+
+def sudden(said, **more):
+    """Return the result of a cause `a` that begins at 12.3 s, with D 20."""
+    return a_result({"a": 20.0}, said, **{"kind": "sudden", "starts": {"a": 12.3}, **more})
+
+
+def test_what_begins_in_mid_trial_is_right_only_if_that_is_said_whenever_it_began():
+    assert scores.is_right(sudden({"a@12.41": 0.9}))
+    assert not scores.is_right(sudden({"a": 0.9}))
+    assert not scores.is_right(sudden({"b@12.3": 0.9}))
+    assert not scores.is_right(a_result({"a": 20.0}, {"a@2": 0.9}))
+
+
+def test_a_name_is_wrong_if_it_is_wrong_in_being_from_then_on():
+    late = {"causes": [{"id": "a", "p": 0.97, "start": 12.4, "parameters": {}}], "verdict": "cause_named"}
+    assert not scores.wrongly_sure(sudden({"a@12.4": 0.97}, **late))
+    assert scores.wrongly_sure(sudden({"a": 0.97}, **named("a", 0.97)))
+    assert scores.wrongly_sure(a_result({"a": 20.0}, {"a@12.4": 0.97}, **late))
+
+
+def test_figures_of_what_begins_in_mid_trial():
+    late = {"causes": [{"id": "a", "p": 0.97, "start": 12.8, "parameters": {"x": [1.1, 0.8, 1.4, 0.15]}}]}
+    told = [sudden({"a@12.8": 0.97}, **late), sudden({"b@3": 0.6, "a@12": 0.4}), sudden({"none": 0.9})]
+    found = {
+        score.words: score.value
+        for score in rows(told)
+        if "mid-trial" in score.words or "when it" in score.words
+    }
+    assert found["from mid-trial on, D ≥ 16: right name first"] == "33.3 %"
+    assert found["from mid-trial on: the 95 % set holds the truth"] == "66.7 %"
+    assert found["… error of when it began"] == "0.50 s"
