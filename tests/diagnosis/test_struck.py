@@ -20,7 +20,7 @@ from subzero.diagnosis.hypotheses import places, variances
 from subzero.diagnosis.one_term import one_terms
 from subzero.diagnosis.refit import is_lost, refit
 from subzero.diagnosis.rules import Late, decide
-from subzero.diagnosis.struck import in_its_place, struck
+from subzero.diagnosis.struck import Hope, _worth, in_its_place, struck
 from subzero.diagnosis.sudden_told import cause_of, closest, fitted, from_now_on, is_large, rival_of
 from subzero.diagnosis.unknown import FINE, history, knots_of, lacking
 from subzero.diagnosis.verdict import CAUSE_NAMED, NOTHING_WRONG, OUTSIDE, UNDECIDED
@@ -82,6 +82,26 @@ def test_a_force_that_comes_and_goes_is_no_sudden_cause(plant):
     planted = plant(lambda setting: lacking(setting, history("N", time, bump)))
     _, force, others = asked(planted)
     assert all(one.log_posterior < force.log_posterior - 10.0 for one in others)
+
+
+def a_hope(name, log_posterior, gain):
+    """Return a hope of a sudden cause, in no place."""
+    begun = SimpleNamespace(effect=EFFECTS[name], log_gain=gain, between=0.0)
+    return Hope(log_posterior, begun, None)
+
+
+def test_what_gains_most_is_fitted_whatever_it_hopes_and_others_if_they_are_close():
+    drag, rudder = a_hope("hull_drag", -60.0, 200.0), a_hope("rudder_offset", -90.0, 100.0)
+    assert _worth([rudder, drag], {}, least=0.0) == [drag], "0.5 × 200 may be more than 60"
+    near = a_hope("rudder_offset", -62.0, 100.0)
+    assert _worth([near, drag], {}, least=-70.0) == [drag, near]
+    assert _worth([drag], {}, least=-60.0 + 0.5 * 200.0 + 7.0) == []
+
+
+def test_what_is_known_is_fitted_again_only_for_a_better_promise():
+    drag = a_hope("hull_drag", -60.0, 20.0)
+    for known, asked in ((-70.0, [drag]), (-61.0, [])):
+        assert _worth([drag], {"hull_drag": SimpleNamespace(log_posterior=known)}, least=-70.0) == asked
 
 
 def test_in_its_place_the_records_lack_what_it_explains(found):

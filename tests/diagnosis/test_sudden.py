@@ -1,10 +1,11 @@
 """An effect that begins in mid-trial: it changes nothing before, stands beside other changes, and its time is found."""
 
+import numpy as np
 import pytest
 
 from subzero.diagnosis.begun import begun_at
 from subzero.diagnosis.effects import catalogue
-from subzero.diagnosis.sudden import scan, times_of, with_begun
+from subzero.diagnosis.sudden import Begun, _strongest, scan, times_of, with_begun
 
 EFFECTS = catalogue(("heading",))
 
@@ -30,3 +31,24 @@ def test_times_stay_clear_of_the_ends(struck):
     times = times_of(struck.problem, 0)
     assert times[0] == 2.0
     assert times[-1] == 28.0
+
+
+def test_what_would_have_to_be_negative_and_cannot_explains_nothing(plant):
+    """From 14 s on the hull drags less; a drum that rubs less than not at all would look like it."""
+    planted = plant(lambda setting: begun_at(EFFECTS["hull_drag"], 14.0).apply(setting, -0.4))
+    fit = planted.fit()
+    found = scan(planted.problem, fit, fit.D, [EFFECTS["hull_drag"], EFFECTS["drum_friction"]])
+    gains = {one.effect.id: one.log_gain for one in found}
+    assert gains["hull_drag"] > gains["drum_friction"] + 20.0
+
+
+def test_between_the_times_that_were_tried_a_parabola_says_what_more_there_is():
+    def tried(time):
+        return Begun(effect=EFFECTS["hull_drag"], time=time, record=0, mean=np.zeros(1),
+                     log_gain=50.0 - 8.0 * (time - 12.3) ** 2)  # fmt: skip
+
+    (best,) = _strongest([tried(time) for time in (10.0, 12.0, 14.0)])
+    assert best.time == 12.0
+    assert best.log_gain + best.between == pytest.approx(50.0)
+    (edge,) = _strongest([tried(time) for time in (12.0, 14.0)])
+    assert edge.between == 0.0
