@@ -12,6 +12,7 @@ from itertools import chain
 import numpy as np
 
 from subzero.diagnosis.candidate import Candidate, candidate_of
+from subzero.diagnosis.evidence import KAPPAS
 from subzero.diagnosis.growing import GrowingFits
 from subzero.diagnosis.hypotheses import Ids, places, variances
 from subzero.diagnosis.probability import Beliefs
@@ -81,8 +82,8 @@ class Search(GrowingFits):
         self.race()
 
     def is_lost(self) -> bool:
-        """Say whether nothing that was fitted so far explains the records."""
-        return is_lost(self.best().fit)
+        """Say whether nothing that was fitted so far explains the records, within declared tolerances."""
+        return is_lost(self.best().fit) or self.best().kappa > min(KAPPAS)
 
     def settle(self) -> None:
         """Fit the best candidate again until it has settled, so that its numbers can be told, and what might still
