@@ -171,13 +171,16 @@ def _bases(search: Search) -> list[Candidate]:
 
 def _sudden(search: Search, close: Sequence[Close], known: float) -> list[Foreign]:
     """Return causes that begin in mid-trial, beside nothing else, that may be as probable as what is known; looked for
-    around the best hypothesis, and along the runs of the best forces.
+    around the best hypothesis, and along the runs of the best forces if they are close to it or it does not explain.
     """
     problem, best = search.problem, search.best()
     effects = list({entry.effect.id: entry.effect for entry in problem.entries if entry.record < 0}.values())
     able = [effect for effect in effects if effect.sudden]
     prior = float(np.log(PRIOR["sudden"] / (len(able) * len(problem.records))))
-    alike = [one for one in close[:LOOKED] if one.log_posterior > close[0].log_posterior - ALIKE]
+    known_there = [one.log_posterior for one in close]
+    known_here = [] if search.is_lost() else [best.log_posterior - _log_prior(problem)]
+    least = max([*known_there, *known_here], default=0.0) - ALIKE
+    alike = [one for one in close[:LOOKED] if one.log_posterior > least]
     places = [Place(best.fit, Along(problem, best.fit.z)), *(one.place for one in alike)]
     made = [one for record in range(len(problem.records))
             for one in struck(problem, places, able, record, known - prior, search.side)]  # fmt: skip

@@ -14,7 +14,7 @@ from subzero.channels import BY_NAME
 from subzero.diagnosis.evidence import Posterior, Quadratic, posterior
 from subzero.diagnosis.latent import Seen, Shape, correlation, log_gains, modes, seen
 from subzero.diagnosis.problem import Problem
-from subzero.diagnosis.refit import Fit, gone_on, refit, with_own_slopes
+from subzero.diagnosis.refit import Fit, refit, with_own_slopes
 from subzero.diagnosis.unknown import (
     FINE,
     Knots,
@@ -90,8 +90,7 @@ def recover(
     whole, J = np.concatenate([D, np.ones(L.shape[1])]), np.hstack([fit.J, C @ L])
     start = _linear(fit, J, whole)
     made_at = None if fit.made_at is None else np.concatenate([fit.made_at, np.zeros(L.shape[1])])
-    done = refit(more, start.z, J, whole, most_fresh=most_fresh, made_at=made_at)
-    done = gone_on(more, with_own_slopes(more, done))
+    done = with_own_slopes(more, refit(more, start.z, J, whole, most_fresh=most_fresh, made_at=made_at))
     found = posterior(done.quadratic, whole)
     k = D.size
     force, covariance = L @ done.z[k:], L @ found.M[k:, k:] @ L.T
