@@ -6,6 +6,7 @@ on, so far from the nominal model that nothing is linear between the two.
 """
 
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -121,7 +122,7 @@ def test_it_ends_the_search_only_if_it_leaves_noise_and_is_far_before_the_rest(f
 
     assert is_explained(best(-SURE - 1.0), there)
     assert not is_explained(best(-SURE + 1.0), there)
-    lost = SimpleNamespace(**{**vars(one), "fit": SimpleNamespace(r=2.0 * one.fit.r)})
+    lost = replace(one, fit=replace(one.fit, r=2.0 * one.fit.r))
     assert not is_explained(best(-SURE - 1.0), [Foreign(beside=(), what=lost, log_posterior=0.0)])
     assert not is_explained(best(-SURE - 1.0), [Foreign(beside=(), what=force.what, log_posterior=0.0)])
     assert not is_explained(best(-SURE - 1.0), [])
