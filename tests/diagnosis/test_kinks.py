@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from subzero.diagnosis import growing, kinks, wide
+from subzero.diagnosis import refit as refitting
 from subzero.diagnosis import search as searching
 from subzero.diagnosis.around import beside, swept
 from subzero.diagnosis.candidate import Candidate, candidate_of
@@ -286,16 +287,17 @@ def test_one_cause_that_is_far_away_is_found_in_the_place_of_two(plant, monkeypa
 
 
 @pytest.mark.parametrize(
-    ("promises", "legs"), [([100.0, 50.0, 20.0], 2), ([100.0] * 9, searching.LEGS), ([5.0], 0)]
+    ("promises", "legs"), [([100.0, 50.0, 20.0], 2), ([100.0] * 9, refitting.LEGS), ([5.0], 0)]
 )
 def test_a_cause_that_is_far_away_is_fitted_on_while_much_is_promised(plant, monkeypatch, promises, legs):
     search, asked = begun(plant(duration=4.0)), []
 
     def leg(problem, z, J, D, **more):
         asked.append(z)
-        return SimpleNamespace(z=z + 1.0, r=None, promise=promises[len(asked) - 1])
+        return SimpleNamespace(z=z + 1.0, r=None, D=D, promise=promises[len(asked) - 1])
 
-    monkeypatch.setattr(searching, "refit", leg)
+    for module in (searching, refitting):
+        monkeypatch.setattr(module, "refit", leg)
     monkeypatch.setattr(type(search.problem), "jacobian", lambda self, z: None)
     search._alone(("hull_drag",))
     assert len(asked) == 1 + legs
