@@ -1,4 +1,7 @@
-"""The page docs/diagnosis_benchmark.md, from whatever results there are."""
+"""The page docs/diagnosis_benchmark.md, from whatever results there are.
+
+``python -m benchmarks.diagnosis.page`` writes it from the last run that was finished, and what there is of the next.
+"""
 
 from __future__ import annotations
 
@@ -8,10 +11,10 @@ from functools import partial
 from pathlib import Path
 
 from . import advice, degraded, sections, times
-from .cases import HEAVY, SHARES
+from .cases import BEFORE, HEAVY, SEED, SETTLED, SHARES
 from .figures_of import rows
 from .pictures import FIGURES, draw
-from .results import read
+from .results import place, read
 from .scores import Result, Score
 from .sections import MARK, table
 from .truth import SAME
@@ -20,12 +23,13 @@ from .words import BEFORE_WORDS, HEAD, NEAR_WORDS, NOT_YET, UNFINISHED
 PAGE = FIGURES.parent / "diagnosis_benchmark.md"
 
 
-def write_page(path: Path, earlier: Path | None = None) -> Path:
+def write_page(path: Path, earlier: Path | None = None, since: Path | None = None) -> Path:
     """Write the page and its figures, and return its path.
 
     Args:
         path: of the results that it rests on; times, advice and degraded records are beside them.
         earlier: of results of another seed, with what the engine was before.
+        since: of results of a seed that is not finished, with what the engine is now.
     """
     results = read(path)
     before = read(earlier) if earlier and earlier != path else []
@@ -34,7 +38,8 @@ def write_page(path: Path, earlier: Path | None = None) -> Path:
     draw(sound)
     parts = [_head(sound, broken), _scores(sound, before), _pictures(), sections.missed(sound),
              sections.confounded(sound), sections.limits(sound),
-             *_beside(sound, path, earlier), sections.all_cases(sound)]  # fmt: skip
+             *_beside(sound, path, earlier), *([sections.since(read(since))] if since else []),
+             sections.all_cases(sound)]  # fmt: skip
     PAGE.write_text("\n\n".join(parts) + "\n")
     return PAGE
 
@@ -65,9 +70,10 @@ def _head(results: Sequence[Result], broken: Sequence[Result]) -> str:
         "redrawn": sum(one["dropped"] > 0 for one in results),
         "heavy": sum(one["dropped"] > 0 and HEAVY in one["truth"] for one in results),
     }
+    seed = results[0]["seed"]
     return HEAD.format(
         cases=len(results), whole=sum(SHARES.values()), kinds=kinds, fig6=where["fig6"] + where["short"],
-        rich=where["rich"], broken=len(broken), seed=results[0]["seed"], versions=_versions(results),
+        rich=where["rich"], broken=len(broken), seed=seed, settled=SETTLED[seed], versions=_versions(results),
         unfinished=_unfinished(count), same=SAME, **drawn,
     )  # fmt: skip
 
@@ -88,7 +94,7 @@ def _versions(results: Sequence[Result]) -> str:
 
 def _scores(results: Sequence[Result], before: Sequence[Result]) -> str:
     """Return the table of all figures, beside those that the engine had before."""
-    found, earlier = rows(results), rows([one for one in before if "error" not in one])
+    found, earlier = rows(results), rows([one for one in before if "error" not in one]) if before else []
     was = {s.words: f"{s.value} {MARK[s.met]}".strip() for s in earlier}
     body = [
         [s.words, s.value, s.interval, str(s.cases), s.target, _mark(s), was.get(s.words, "")] for s in found
@@ -96,7 +102,8 @@ def _scores(results: Sequence[Result], before: Sequence[Result]) -> str:
     met, judged = sum(s.met is True for s in found), sum(s.met is not None for s in found)
     near = sum(s.met is False and s.near for s in found)
     words = BEFORE_WORDS.format(seed=before[0]["seed"], cases=len(before)) if before else ""
-    header = ["figure", "value", "95 % interval", "cases", "target", "", "before"]
+    header = ["figure", "value", "95 % interval", "cases", "target", "", *(["before"] if before else [])]
+    body = body if before else [line[:-1] for line in body]
     count = f"**{met} of {judged} targets are met** on these cases; {near} of the others are near."
     return f"## It is right when\n\n{count} {NEAR_WORDS}\n\n{words}\n\n" + table(header, body)
 
@@ -110,3 +117,7 @@ def _pictures() -> str:
     return ("## What is taken for what\n\n![confusion](figures/diagnosis_confusion.png)\n\n"
             "## How certain, and how right\n\n![calibration](figures/diagnosis_calibration.png)\n\n"
             "![success over D](figures/diagnosis_success.png)")  # fmt: skip
+
+
+if __name__ == "__main__":
+    print(write_page(place(BEFORE), since=place(SEED)))

@@ -7,6 +7,7 @@ from math import inf
 
 import numpy as np
 
+from . import figures_of
 from .advice import decided
 from .degraded import rows
 from .scores import CLEAR, Result, first, is_right, names, of, smallest_D, truth, wrongly_sure
@@ -18,6 +19,7 @@ from .words import (
     DEGRADED_WORDS,
     LIMITS_WORDS,
     MISSED_WORDS,
+    SINCE_WORDS,
     TIMES_WORDS,
 )
 
@@ -121,6 +123,18 @@ def degraded(results: Sequence[Result]) -> str:
         "wrong name with p ≥ 0.95",
     ]
     return f"## Degraded records\n\n{DEGRADED_WORDS}\n\n" + table(header, body)
+
+
+def since(results: Sequence[Result]) -> str:
+    """Return what the engine makes by now of causes that begin in mid-trial, and which it misses."""
+    body = [
+        [s.words, s.value, s.interval, str(s.cases), s.target, MARK[s.met]]
+        for s in figures_of.sudden(results)
+    ]
+    header = ["figure", "value", "95 % interval", "cases", "target", ""]
+    words = SINCE_WORDS.format(seed=results[0]["seed"])
+    lost = missed(of(results, "sudden")).replace("## ", "### ", 1)
+    return f"## Since then\n\n{words}\n\n{table(header, body)}\n\n{lost}"
 
 
 def advice(results: Sequence[Result]) -> str:

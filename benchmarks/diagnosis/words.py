@@ -11,7 +11,7 @@ This page rests on **{cases} of {whole} cases**.{unfinished} {fig6} on
 speed through the water, heading, yaw rate, pitch, roll, depth. Cases that ended in an error: {broken}.
 
 The cases are those of seed {seed}, which no choice was made with: engine, kinds of cases and rules were settled with
-seeds 1 to 41 before the first of them was drawn. {versions} What was said of each is kept in
+seeds 1 to {settled} before the first of them was drawn. {versions} What was said of each is kept in
 `benchmarks/diagnosis/kept/`.
 
 {kinds}
@@ -44,8 +44,8 @@ seeds 1 to 41 before the first of them was drawn. {versions} What was said of ea
 
 Intervals are exact binomial ones."""
 
-UNFINISHED = """ The run is not finished: some kinds were run first, so that figures over all
-cases, the calibration above all, are not those of the whole."""
+UNFINISHED = """ Not all kinds are here in their share (table below), so that figures
+over all cases are not those of the whole."""
 
 NOT_YET = "**Not measured yet on these cases: this is of the engine before, on the cases of the last column above.**"
 
@@ -54,6 +54,11 @@ change with the engine and with the luck of a seed. What changed before these ca
 mid-trial are fitted with real runs, their time as a parameter, along the run of a force that nobody explains; they are
 named from a probability of 0.8 on and are rivals below; and where even wide tolerances do not come close to a record,
 the search begins at such a run."""
+
+SINCE_WORDS = """The engine is another since: causes that begin in mid-trial are fitted with real runs, their time as a
+parameter, along the run of a force that nobody explains; they are named from a probability of 0.8 on and are rivals
+below; and where even wide tolerances do not come close to a record, the search begins at such a run. A run on a fresh
+seed, {seed}, is under way; the figures above are not those of this engine. So far, of what begins in mid-trial:"""
 
 NEAR_WORDS = """Near: so few cases cannot tell it from its
 target, as its 95 % interval reaches that, or, for the calibration, as an engine that is right exactly as often as it
