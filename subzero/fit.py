@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from subzero.measured import CONTINUOUS, FULL_TURN, Record
+from subzero.measured import Record
+from subzero.turns import HEADING, turned
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -57,9 +58,7 @@ def fits(runs: dict[str, xr.Dataset], record: Record) -> dict[str, dict[str, Fit
 
 def beside(record: Record, run: xr.Dataset) -> Record:
     """Return the record with its heading shifted by whole turns, so that it starts next to the run's."""
-    if CONTINUOUS not in record.values:
+    if HEADING not in record.values:
         return record
-    difference = modelled(run, CONTINUOUS, record.time) - record.values[CONTINUOUS]
-    known = difference[np.isfinite(difference)]
-    turns = FULL_TURN * np.round(known[0] / FULL_TURN) if known.size else 0.0
-    return replace(record, values={**record.values, CONTINUOUS: record.values[CONTINUOUS] + turns})
+    heading = turned(record.values[HEADING], modelled(run, HEADING, record.time))
+    return replace(record, values={**record.values, HEADING: heading})

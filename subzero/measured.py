@@ -19,12 +19,10 @@ import numpy as np
 
 from subzero.channels import BY_COLUMN, BY_NAME, TIME
 from subzero.errors import UserError, listed, suggestion
+from subzero.turns import HEADING, TURN
 
 Row = tuple[int, list[str]]
 """Line number in the file (from 1), and its cells."""
-
-FULL_TURN = 360.0
-CONTINUOUS = "heading"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,8 +60,8 @@ def read_record(path: str | Path) -> Record:
     problems += _empty_problems(columns)
     _refuse(path, problems)
     values = {BY_COLUMN[name].name: column for name, column in columns.items() if name != TIME.column}
-    if CONTINUOUS in values:
-        values[CONTINUOUS] = _continuous(values[CONTINUOUS])
+    if HEADING in values:
+        values[HEADING] = _continuous(values[HEADING])
     return Record(source=str(path), time=columns[TIME.column], values=values)
 
 
@@ -150,5 +148,5 @@ def _continuous(angle: np.ndarray) -> np.ndarray:
     """Return an angle without jumps of a whole turn; gaps stay gaps. [degree]"""
     known = np.isfinite(angle)
     smooth = angle.copy()
-    smooth[known] = np.unwrap(angle[known], period=FULL_TURN)
+    smooth[known] = np.unwrap(angle[known], period=TURN)
     return smooth

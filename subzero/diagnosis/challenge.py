@@ -25,6 +25,7 @@ from subzero.errors import UserError
 from subzero.measured import Record
 from subzero.model import Model
 from subzero.trials import load
+from subzero.turns import HEADING, TURN
 
 BASIC = ("surge_speed", "heading", "yaw_rate", "pitch", "roll", "depth")
 """Channels that a challenge measures."""
@@ -148,9 +149,10 @@ def write(made: Challenge, folder: Path, scenario: str | Path | scenarios.Trial)
 
 
 def _write_csv(made: Challenge, path: Path) -> None:
-    """Write channels and commands; a gap is an empty cell."""
+    """Write channels and commands; a gap is an empty cell, and a compass shows 0 to 360 degrees."""
     record, commands = made.record, made.nominal.trial.commands
-    columns = {column_name(TIME.name): record.time} | {column_name(k): v for k, v in record.values.items()}
+    shown = {**record.values, HEADING: record.values[HEADING] % TURN}
+    columns = {column_name(TIME.name): record.time} | {column_name(k): v for k, v in shown.items()}
     if commands is not None:
         rows = np.searchsorted(commands.time, record.time + 1e-9, side="right") - 1
         told = commands.values[rows]

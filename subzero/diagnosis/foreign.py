@@ -176,7 +176,7 @@ def _sudden(search: Search, close: Sequence[Close], known: float) -> list[Foreig
     problem, best = search.problem, search.best()
     effects = list({entry.effect.id: entry.effect for entry in problem.entries if entry.record < 0}.values())
     able = [effect for effect in effects if effect.sudden]
-    prior = float(np.log(PRIOR["sudden"] / (len(able) * len(problem.records))))
+    prior = float(np.log(PRIOR["sudden"] / (max(len(able), 1) * len(problem.records))))
     known_there = [one.log_posterior for one in close]
     known_here = [] if search.is_lost() else [best.log_posterior - _log_prior(problem)]
     least = max([*known_there, *known_here], default=0.0) - ALIKE

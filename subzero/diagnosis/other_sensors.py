@@ -43,7 +43,8 @@ def _true(name: str, setting: Setting, truth: Truth) -> np.ndarray:
         return scale * r.attitude[:, ("roll", "pitch").index(name)]
     if name == "heading":
         continuous = np.unwrap(r.attitude[:, 2])
-        return scale * (continuous + 2.0 * np.pi * (continuous[0] < 0.0))
+        whole = np.round((setting.trial.start.heading - continuous[0]) / (2.0 * np.pi))
+        return scale * (continuous + 2.0 * np.pi * whole)
     return {
         "surge_speed": lambda: r.state[:, 7] - _water(setting, truth)[:, 0],
         "speed_over_ground": lambda: np.sqrt(np.sum(r.state[:, 7:10] ** 2, axis=1)),

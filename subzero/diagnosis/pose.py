@@ -16,6 +16,7 @@ from subzero.diagnosis.noise import Noise, estimate
 from subzero.diagnosis.problem import Observed, Problem
 from subzero.diagnosis.response import economical, finer, respond
 from subzero.errors import UserError
+from subzero.turns import HEADING, turned
 
 VISIBLE = 1.0
 """Squared size, in noise, of an error of the steps that is worth correcting."""
@@ -61,10 +62,10 @@ def _observed(one: Logged) -> Observed:
         raise UserError(
             f"The nominal model cannot be run through '{one.name}'. Try `subzero simulate` on its scenario."
         )
+    if HEADING in values:
+        values[HEADING] = turned(values[HEADING], simulated[HEADING])
     noise = noise_of(time, values, simulated, one.noise)
-    return Observed(
-        name=one.name, time=time, values=dict(values), noise=noise, setting=setting, known=one.noise
-    )
+    return Observed(name=one.name, time=time, values=values, noise=noise, setting=setting, known=one.noise)
 
 
 def noise_of(

@@ -17,7 +17,7 @@ from subzero.diagnosis.effect import Effect
 from subzero.diagnosis.entries import Entry, grouped
 from subzero.diagnosis.kept_runs import KeptRuns
 from subzero.diagnosis.noise import Noise
-from subzero.diagnosis.response import TRUTHS, sensed
+from subzero.diagnosis.response import sensed, truth
 from subzero.diagnosis.setting import Setting
 from subzero.diagnosis.tracked import Stop, Track, on_from, tracked, with_stops
 
@@ -161,7 +161,7 @@ class Problem:
         seen, grid, parts = self.records[record], track[0], []
         earlier = seen.time - setting.clock_offset
         for channel, noise in seen.noise.items():
-            shown = sensed(setting.sensing.get(channel), grid, TRUTHS[channel](track[1]))
+            shown = sensed(setting.sensing.get(channel), grid, truth(setting, track[1], channel))
             values = np.interp(earlier, grid, shown)
             parts.append(noise.whiten(seen.values[channel] - values if measured else values))
         return np.concatenate(parts)

@@ -19,12 +19,13 @@ from subzero.diagnosis.logged import Logged
 from subzero.diagnosis.plausible import is_constant, repeating, stuck, unit_questions
 from subzero.diagnosis.setting import Setting
 from subzero.diagnosis.sidecar import Sidecar, read_sidecar
-from subzero.diagnosis.timing import beside, cut_to, time_problems, without_repeats
+from subzero.diagnosis.timing import cut_to, time_problems, without_repeats
 from subzero.diagnosis.told import FROM_RECORD, TOLD, commanded
 from subzero.errors import UserError, listed
-from subzero.measured import CONTINUOUS, FULL_TURN, Record, read_record
+from subzero.measured import Record, read_record
 from subzero.model import Model
 from subzero.trials import load
+from subzero.turns import HEADING, turned
 
 Simulated = Callable[[Setting, np.ndarray, Sequence[str]], Mapping[str, np.ndarray]]
 """(setting, times, channels) → channel → what the sensors would have measured."""
@@ -90,8 +91,8 @@ def _logged(path: Path, name: str, scenario: str | Path | None, commands: str | 
     values, notes = _channels(record, sidecar)
     if scenario and sidecar.scenario and str(scenario) != sidecar.scenario:
         notes += (f"Its sidecar names the trial {sidecar.scenario}, so {scenario} is not taken for it.",)
-    if CONTINUOUS in values:
-        values[CONTINUOUS] = beside(values[CONTINUOUS], math.degrees(trial.start.heading) % FULL_TURN)
+    if HEADING in values:
+        values[HEADING] = turned(values[HEADING], math.degrees(trial.start.heading))
     return Logged(
         record=Record(source=str(path), time=record.time, values=values),
         setting=Setting(trial=trial, model=Model.of(trial), tethered=sidecar.tethered),

@@ -14,6 +14,7 @@ from subzero.channels import DEGREE
 from subzero.diagnosis.setting import Sensing, Setting
 from subzero.diagnosis.track import LENGTH, RUDDER, TENSION, VOLTAGE, WATER
 from subzero.diagnosis.tracked import tracked
+from subzero.turns import HEADING, turned
 from vehicle.state import QUATERNION, SHAFT, VELOCITY
 
 HULL_STEP, CABLE_STEP, SEGMENT = 0.05, 0.2, 1.0
@@ -63,9 +64,15 @@ def respond(setting: Setting, times: np.ndarray, channels: Iterable[str]) -> dic
     grid, track = tracked(setting)
     earlier = times - setting.clock_offset
     return {
-        name: np.interp(earlier, grid, sensed(setting.sensing.get(name), grid, TRUTHS[name](track)))
+        name: np.interp(earlier, grid, sensed(setting.sensing.get(name), grid, truth(setting, track, name)))
         for name in channels
     }
+
+
+def truth(setting: Setting, track: np.ndarray, channel: str) -> np.ndarray:
+    """Return what is true of a channel along a setting's track (n,); a heading as it is counted from the start."""
+    found = TRUTHS[channel](track)
+    return turned(found, DEGREE * setting.trial.start.heading) if channel == HEADING else found
 
 
 def sensed(sensor: Sensing | None, grid: np.ndarray, truth: np.ndarray) -> np.ndarray:
@@ -96,10 +103,9 @@ def _pitch(track: np.ndarray) -> np.ndarray:
 
 
 def _heading(track: np.ndarray) -> np.ndarray:
-    """Return the heading without its jumps at north. [degree]"""
+    """Return the heading without its jumps at south, but for whole turns. [degree]"""
     w, x, y, z = track[:, QUATERNION : QUATERNION + 4].T
-    heading = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
-    return DEGREE * (np.unwrap(heading) - heading[0]) + DEGREE * heading[0] % 360.0
+    return DEGREE * np.unwrap(np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)))
 
 
 def _surge_through_water(track: np.ndarray) -> np.ndarray:
@@ -137,4 +143,4 @@ TRUTHS: Mapping[str, Callable[[np.ndarray], np.ndarray]] = {
     "cable_tension": _column(TENSION),
     "cable_length": _column(LENGTH),
 }
-"""Channel → what is true of it, from a track, in its display unit."""
+"""Channel → what is true of it, from a track, in its display unit; a heading but for whole turns."""

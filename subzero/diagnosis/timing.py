@@ -8,7 +8,7 @@ import math
 import numpy as np
 
 import scenarios
-from subzero.measured import FULL_TURN, Record
+from subzero.measured import Record
 
 SHORTEST, SLOWEST, FEWEST = 5.0, 1.0, 20
 """A record has to last so long [s], with a sample at least so often [s], and so many samples."""
@@ -56,9 +56,3 @@ def without_repeats(time: np.ndarray, column: np.ndarray, rate: float | None) ->
         return column
     turn = np.floor((time - time[0]) * rate + LATE)
     return np.where(np.r_[True, np.diff(turn) > 0], column, np.nan)
-
-
-def beside(heading: np.ndarray, start: float) -> np.ndarray:
-    """Return a heading shifted by whole turns to begin next to the trial's. [degree]"""
-    first = heading[np.isfinite(heading)][0]
-    return heading - FULL_TURN * np.round((first - start) / FULL_TURN)

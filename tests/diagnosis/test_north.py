@@ -1,0 +1,82 @@
+"""A vehicle that heads north has a compass that jumps from 360 to 0 degrees, and a diagnosis that does not.
+
+Verifies: `subzero.turns`, and what `response`, `problem`, `other_code` and `challenge` make of a heading about north.
+Configuration: the first seconds of zigzag, which starts at north. Tolerance: an angle at the start is there at the
+start, to the steps' error of 0.02 degrees.
+"""
+
+import dataclasses
+from math import degrees
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import subzero
+from subzero.diagnosis.answer import Answer
+from subzero.diagnosis.challenge import Challenge, write
+from subzero.diagnosis.effects import START
+from subzero.diagnosis.hidden import Hidden
+from subzero.diagnosis.logged import Logged
+from subzero.diagnosis.other_code import simulate_otherwise
+from subzero.diagnosis.pose import pose
+from subzero.diagnosis.response import respond
+from subzero.diagnosis.setting import Setting
+from subzero.measured import Record, read_record
+from subzero.turns import turned
+
+LONG = subzero.load_scenario("zigzag")
+TRIAL = dataclasses.replace(LONG, duration=4.0)
+NORTH = Setting(trial=TRIAL, model=subzero.Model.of(TRIAL))
+TIMES = np.linspace(0.0, 4.0, 41)
+(TURN,) = (effect for effect in START if effect.id == "start:heading")
+
+
+def headings(setting):
+    return respond(setting, TIMES, ["heading"])["heading"]
+
+
+@pytest.mark.parametrize("turns", [-2, -1, 0, 1, 3])
+def test_whole_turns_do_not_count_nor_do_an_outlier_or_a_gap(turns):
+    run = np.linspace(-1.0, 5.0, 30)
+    record = run + 360.0 * turns
+    record[[0, 4]] = np.nan, 360.0 * turns + 170.0
+    assert_allclose(turned(record, run)[5:], run[5:])
+
+
+def test_a_little_to_port_of_north_is_a_little_less_than_north():
+    change = headings(TURN.apply(NORTH, -0.2)) - headings(NORTH)
+    assert change[0] == pytest.approx(-0.2, abs=1e-9)
+    assert np.abs(change + 0.2).max() < 0.05
+
+
+def test_the_other_formulation_counts_a_heading_in_the_same_way():
+    shown = simulate_otherwise(TURN.apply(NORTH, -0.2), TIMES, ["heading"])["heading"]
+    assert shown[0] == pytest.approx(-0.2, abs=0.02)
+
+
+@pytest.mark.parametrize("counted", [0.0, 360.0, -720.0])
+def test_a_record_from_359_degrees_is_a_degree_from_north_for_the_engine(counted):
+    shown = headings(NORTH) - 1.0 + counted
+    noise = 0.1 * np.random.default_rng(5).standard_normal(TIMES.size)
+    record = Record(source="a compass", time=TIMES, values={"heading": shown + noise})
+    problem = pose([Logged(record=record, setting=NORTH, name="zigzag")])
+    z = np.zeros(len(problem.entries))
+    (at,) = (k for k, entry in enumerate(problem.entries) if entry.effect.id == "sensor_bias:heading")
+    z[at] = -1.0
+    seen = problem.records[0].noise["heading"].gap.size
+    assert problem.residual(z)[:seen] @ problem.residual(z)[:seen] < 2.0 * seen
+
+
+def test_a_challenge_writes_what_a_compass_shows_and_it_is_read_without_jumps(tmp_path):
+    heading = headings(NORTH) + np.linspace(-1.0, 1.0, TIMES.size)
+    record = Record(source="made", time=TIMES, values={"heading": heading})
+    answer = Answer(kind="none", names=(), sentences=(), deviations={}, starts={}, axis="", feature="", tolerances={},
+                    scenario="zigzag", seed=1)  # fmt: skip
+    made = Challenge(record=record, nominal=NORTH, true=NORTH, hidden=Hidden(), answer=answer)
+    write(made, tmp_path, "zigzag")
+    column = np.genfromtxt(tmp_path / "record.csv", delimiter=",", names=True)["heading_deg"]
+    assert column.min() >= 0.0
+    assert np.ptp(column) > 180.0
+    read = read_record(tmp_path / "record.csv").values["heading"]
+    assert_allclose(turned(read, degrees(TRIAL.start.heading)), heading, atol=1e-4)
