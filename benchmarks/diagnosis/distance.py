@@ -19,7 +19,7 @@ from subzero.diagnosis.hypotheses import named, places, variances
 from subzero.diagnosis.latent import Seen, seen
 from subzero.diagnosis.problem import Problem
 from subzero.diagnosis.setting import Setting
-from subzero.diagnosis.sudden import columns
+from subzero.diagnosis.sudden import Along, columns
 
 ABOUT = (-4.0, -3.0, -2.0, -1.0, 0.0, 1.0, 2.0, 3.0, 4.0)
 """Rivals of what begins in mid-trial begin about then. [s]"""
@@ -107,7 +107,7 @@ def sudden_distance(
     base, found = posterior(q, D), dict([strangeness(problem, J, change)[::-1]])
     others = [effect for effect in effects.values() if effect.sudden and effect.id != one]
     pairs = [(effect, time + later) for effect in others for later in ABOUT]
-    for (effect, when), C in zip(pairs, columns(problem, zero, pairs), strict=True):
+    for (effect, when), C in zip(pairs, columns(Along(problem, zero), pairs), strict=True):
         explained = _explained(seen(q.A, q.b, D, J, C, change), effect)
         found[f"{effect.id}@{when:.3g}"] = max(-2.0 * base.log_evidence - base.log_det - explained, 0.0)
     rival = min(found, key=lambda name: found[name])

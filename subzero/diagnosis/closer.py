@@ -64,7 +64,7 @@ def closer(
         knots, done = found.knots, _beside_drift(problem, start, which, found)
     fit = _without(found, done, D.size)
     ((log, what),) = linear(problem, fit, {name: found.columns}, knots, terms, [kappa])
-    place = Place(fit, Along(found.problem, done.z))
+    place = Place(fit=fit, along=Along(found.problem, done.z))
     return Close(log + _possible(problem, done), what, place, is_lost(done))
 
 

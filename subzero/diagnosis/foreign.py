@@ -12,13 +12,14 @@ from subzero.diagnosis.candidate import Candidate
 from subzero.diagnosis.closer import Close, closer, linear
 from subzero.diagnosis.evidence import KAPPAS, log_sum
 from subzero.diagnosis.hypotheses import PRIOR, Ids
+from subzero.diagnosis.late_places import largest, places_of
 from subzero.diagnosis.latent import Terms
 from subzero.diagnosis.one_term import one_terms
 from subzero.diagnosis.problem import Problem
 from subzero.diagnosis.refit import is_lost
 from subzero.diagnosis.search import Search
 from subzero.diagnosis.struck import Struck, in_its_place, struck
-from subzero.diagnosis.sudden import Along, Place
+from subzero.diagnosis.sudden import Place
 from subzero.diagnosis.suspects import Suspect, suspects
 from subzero.diagnosis.unknown import FINE, FORCE, Knots, all_columns, force_columns, knots_of
 from subzero.missing_force import AXES
@@ -29,8 +30,6 @@ NEAR, FAR, MOST = 6.0, 45.0, 3
 """No force that is further behind the best than FAR, in log posterior, is looked at around its own fit, and at most so
 many; where one cause explains the record within declared tolerances, what is linear is nearly true there: besides the
 most probable force only those that are as close as NEAR."""
-LOOKED = 2
-"""Along the runs of at most so many of them sudden causes are looked for."""
 SURE = 30.0
 """No sum of causes gains more than this, in log posterior, over one cause that leaves nothing but noise."""
 WORTH = 2.0
@@ -170,20 +169,16 @@ def _bases(search: Search) -> list[Candidate]:
 
 
 def _sudden(search: Search, close: Sequence[Close], known: float) -> list[Foreign]:
-    """Return causes that begin in mid-trial, beside nothing else, that may be as probable as what is known; looked for
-    around the best hypothesis, and along the runs of the best forces if they are close to it or it does not explain.
-    """
-    problem, best = search.problem, search.best()
+    """Return causes that begin in mid-trial, beside nothing else, that may be as probable as what is known."""
+    problem = search.problem
     effects = list({entry.effect.id: entry.effect for entry in problem.entries if entry.record < 0}.values())
     able = [effect for effect in effects if effect.sudden]
-    prior = float(np.log(PRIOR["sudden"] / (max(len(able), 1) * len(problem.records))))
-    known_there = [one.log_posterior for one in close]
-    known_here = [] if search.is_lost() else [best.log_posterior - _log_prior(problem)]
-    least = max([*known_there, *known_here], default=0.0) - ALIKE
-    alike = [one for one in close[:LOOKED] if one.log_posterior > least]
-    places = [Place(best.fit, Along(problem, best.fit.z)), *(one.place for one in alike)]
+    if not able:
+        return []
+    prior = float(np.log(PRIOR["sudden"] / (len(able) * len(problem.records))))
+    places, large = places_of(search, close, _log_prior(problem)), largest(search)
     made = [one for record in range(len(problem.records))
-            for one in struck(problem, places, able, record, known - prior, search.side)]  # fmt: skip
+            for one in struck(problem, places, able, record, known - prior, search.side, large)]  # fmt: skip
     return [Foreign(beside=(), what=one, log_posterior=one.log_posterior + prior,
                     place=None if is_lost(one.fit) else in_its_place(problem, one)) for one in made]  # fmt: skip
 

@@ -58,7 +58,7 @@ def text(verdict: Verdict, records: Mapping[str, Mapping[str, Any]] | None = Non
 def _cause(one: Cause) -> dict[str, Any]:
     parameters = {name: _plain(estimate) for name, estimate in one.parameters.items()}
     return {"id": one.id, "sentence": one.sentence, "probability": one.probability, "start_time_s": one.start_time,
-            "start_sd_s": one.start_sd, "parameters": parameters}  # fmt: skip
+            "start_sd_s": None if one.start_time is None else one.start_sd, "parameters": parameters}  # fmt: skip
 
 
 def _rival(one: Rival) -> dict[str, Any]:

@@ -13,18 +13,18 @@ from collections.abc import Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 
-from subzero.diagnosis.candidate import laplace
+from subzero.diagnosis.candidate import Candidate, laplace
 from subzero.diagnosis.effect import Effect
 from subzero.diagnosis.evidence import KAPPAS, Quadratic, log_sum, posterior
+from subzero.diagnosis.hopes import Hope, hopes_in, large_hopes
 from subzero.diagnosis.hypotheses import log_prior, named, variances
 from subzero.diagnosis.problem import Problem
 from subzero.diagnosis.refit import Fit, gone_on, is_lost, refit, with_own_slopes
 from subzero.diagnosis.stride import bounds
-from subzero.diagnosis.sudden import Along, Begun, Place, columns, scan, times_of, with_begun
+from subzero.diagnosis.sudden import Along, Begun, Place, columns, with_begun
 
 ROUNDS, MOST, HOPE = 3, 3, 6.0
 """Rounds of trying; in each at most so many are fitted that the linear problem has this close to the best."""
@@ -56,18 +56,6 @@ class Struck:
         return self.begun.id
 
 
-class Hope(NamedTuple):
-    """A sudden cause in the linear problem of a place: log posterior, as of `Struck`."""
-
-    log_posterior: float
-    begun: Begun
-    place: Place
-
-    def at_most(self, bent: float) -> float:
-        """Return the log posterior that its fit may have, if that share of what it gains is not linear."""
-        return self.log_posterior + self.begun.between + bent * max(self.begun.log_gain, 0.0)
-
-
 def struck(
     problem: Problem,
     places: Sequence[Place],
@@ -75,6 +63,7 @@ def struck(
     record: int,
     least: float,
     side: Executor,
+    large: Sequence[Candidate] = (),
 ) -> list[Struck]:
     """Return the sudden causes that are worth a fit of their own, fitted.
 
@@ -85,9 +74,11 @@ def struck(
         record: in which they begin.
         least: log posterior of what is known else, on the scale of `Struck`.
         side: for fits side by side.
+        large: hypotheses whose causes are tried as large as they are there.
     """
     done: dict[str, Struck] = {}
-    hopes = [one for place in places for one in _hopes(problem, place, able, record)]
+    hopes = [one for place in places for one in hopes_in(problem, place, able, record)]
+    hopes += [one for each in large for one in large_hopes(problem, each, able, record)]
     for _ in range(ROUNDS):
         worth = _worth(hopes, done, least)
         if not worth:
@@ -98,17 +89,8 @@ def struck(
         best = max(done.values(), key=lambda one: one.log_posterior)
         hopes = [one for one in hopes if not any(one is each for each in worth)]
         if not is_lost(best.fit):
-            hopes = _hopes(problem, in_its_place(problem, best), able, record)
+            hopes = hopes_in(problem, in_its_place(problem, best), able, record)
     return list(done.values())
-
-
-def _hopes(problem: Problem, place: Place, able: Sequence[Effect], record: int) -> list[Hope]:
-    """Return every sudden cause at its best time, in the linear problem of a place."""
-    D = variances(problem.entries, (), 1.0)
-    here = posterior(place.fit.quadratic, D).log_evidence + float(np.log(KAPPAS[1.0]))
-    here += log_prior((), len(named(problem))) - float(np.log(len(times_of(problem, record))))
-    found = scan(problem, place.fit, D, able, record, along=place.along)
-    return [Hope(here + one.log_gain, one, place) for one in found]
 
 
 def _worth(hopes: Sequence[Hope], done: dict[str, Struck], least: float) -> list[Hope]:
@@ -129,8 +111,7 @@ def _fitted(problem: Problem, hope: Hope) -> Struck:
     """Return a sudden cause fitted by real runs, all else within declared tolerances."""
     place, begun = hope.place, hope.begun
     more, n = with_begun(problem, begun), len(problem.entries)
-    (C,) = columns(*place.along, [(begun.effect, begun.time)], begun.record)
-    start = _linear(place.fit, C, _prior(problem, more, 1.0)[:-1])
+    start = _begin(problem, more, hope) if hope.start is None else hope.start
     start = np.clip(np.append(start, 0.0), *bounds(more))
     slopes = more.jacobian(start, range(n, start.size))[:, n:]
     D, J = _prior(problem, more, 1.0), np.hstack([place.fit.J[:, :n], slopes])
@@ -146,9 +127,11 @@ def _fitted(problem: Problem, hope: Hope) -> Struck:
     )
 
 
-def _linear(fit: Fit, C: np.ndarray, D: np.ndarray) -> np.ndarray:
-    """Return the best deviations in the linear problem of a fit with further columns."""
-    n = D.size - C.shape[1]
+def _begin(problem: Problem, more: Problem, hope: Hope) -> np.ndarray:
+    """Return the best deviations in the linear problem of a place with a sudden cause."""
+    fit, begun, D = hope.place.fit, hope.begun, _prior(problem, more, 1.0)[:-1]
+    (C,) = columns(hope.place.along, [(begun.effect, begun.time)], begun.record)
+    n = len(problem.entries)
     J, whole = np.hstack([fit.J[:, :n], C]), fit.r + fit.J @ fit.z
     return posterior(Quadratic(A=J.T @ J, b=J.T @ whole, rr=float(whole @ whole)), D).z
 
@@ -164,4 +147,4 @@ def in_its_place(problem: Problem, one: Struck) -> Place:
     n, fit = len(problem.entries), one.fit
     r = fit.r + fit.J[:, n:-1] @ fit.z[n:-1]
     without = replace(fit, z=fit.z[:n], r=r, J=fit.J[:, :n], D=fit.D[:n], made_at=None)
-    return Place(without, Along(one.problem, fit.z))
+    return Place(fit=without, along=Along(one.problem, fit.z))

@@ -95,34 +95,29 @@ def times_of(problem: Problem, record: int) -> list[float]:
 
 
 def scan(
-    problem: Problem,
-    fit: Fit,
+    place: Place,
     D: np.ndarray,
     effects: Sequence[Effect],
     record: int = 0,
     *,
     best: int = 3,
-    along: Along | None = None,
 ) -> list[Begun]:
     """Return every sudden effect at its best time, most probable first; the `best` of them with finer times.
 
     Args:
-        problem: records and parameters.
-        fit: close to the data.
+        place: close to the data.
         D: prior variances of the entries (k,).
         effects: of the catalogue; those that are not sudden are left out.
         record: in which they begin.
         best: how many are tried on the finer grid.
-        along: the run whose sensitivities are taken, if not that of the fit.
     """
-    along = along or Along(problem, fit.z)
     able = [effect for effect in effects if effect.sudden]
-    coarse = times_of(problem, record)
-    found = _strongest(_tried(along, fit, D, [(one, time) for one in able for time in coarse], record))
-    spacing = spacing_of(problem, record)
+    coarse = times_of(place.along.problem, record)
+    found = _strongest(_tried(place, D, [(one, time) for one in able for time in coarse], record))
+    spacing = spacing_of(place.along.problem, record)
     worth = [one for one in found[:best] if one.log_gain > SEEN]
     finer = [(one.effect, time) for one in worth for time in _around(one.time, spacing)]
-    return _strongest(found + _tried(along, fit, D, finer, record)) if finer else found
+    return _strongest(found + _tried(place, D, finer, record)) if finer else found
 
 
 def _around(time: float, spacing: float) -> list[float]:
@@ -152,12 +147,11 @@ def _between(best: Begun, found: list[Begun]) -> float:
     return float(c - b * b / (4.0 * a) - best.log_gain) if a < 0.0 else 0.0
 
 
-def _tried(
-    along: Along, fit: Fit, D: np.ndarray, pairs: list[tuple[Effect, float]], record: int
-) -> list[Begun]:
+def _tried(place: Place, D: np.ndarray, pairs: list[tuple[Effect, float]], record: int) -> list[Begun]:
     """Return the linear evidence of effects that begin at times."""
+    fit = place.fit
     q, whole = fit.quadratic, fit.r + fit.J @ fit.z
-    made = columns(*along, pairs, record)
+    made = columns(place.along, pairs, record)
     sizes, data = (
         np.cumsum([0, *(C.shape[1] for C in made)]),
         seen(q.A, q.b, D, fit.J, np.hstack(made), whole),
@@ -181,10 +175,9 @@ def _gain(data: Seen, effect: Effect) -> tuple[float, np.ndarray]:
     return log + possible(entries, range(variance.size), mean, np.sqrt(np.diag(M))), mean
 
 
-def columns(
-    problem: Problem, z: np.ndarray, pairs: Sequence[tuple[Effect, float]], record: int = 0
-) -> list[np.ndarray]:
+def columns(along: Along, pairs: Sequence[tuple[Effect, float]], record: int = 0) -> list[np.ndarray]:
     """Return whitened sensitivities (m, parameters) to each (effect, time) in one record; secants of a small step."""
+    problem, z = along
     base, steps = _plain(problem, record, z), [np.diag(_steps(effect)) for effect, _ in pairs]
     jobs = [(begun_at(effect, time).apply(base, *row.tolist()), time)
             for (effect, time), rows in zip(pairs, steps, strict=True) for row in rows]  # fmt: skip

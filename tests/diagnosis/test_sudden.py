@@ -5,7 +5,7 @@ import pytest
 
 from subzero.diagnosis.begun import begun_at
 from subzero.diagnosis.effects import catalogue
-from subzero.diagnosis.sudden import Begun, _strongest, scan, times_of, with_begun
+from subzero.diagnosis.sudden import Along, Begun, Place, _strongest, scan, times_of, with_begun
 
 EFFECTS = catalogue(("heading",))
 
@@ -15,10 +15,14 @@ def struck(plant):
     return plant(lambda setting: begun_at(EFFECTS["hull_drag"], 12.4).apply(setting, 0.9))
 
 
+def place_of(problem, fit):
+    return Place(fit=fit, along=Along(problem, fit.z))
+
+
 def test_the_scan_finds_what_began_and_when(struck):
     fit = struck.fit()
     effects = [EFFECTS[name] for name in ("hull_drag", "rudder_offset", "net_buoyancy", "hull_drag")]
-    found = scan(struck.problem, fit, fit.D, effects, best=1)
+    found = scan(place_of(struck.problem, fit), fit.D, effects, best=1)
     assert found[0].effect.id == "hull_drag"
     assert abs(found[0].time - 12.4) <= 1.0
     assert found[0].mean[0] == pytest.approx(0.9, abs=0.35)
@@ -37,7 +41,7 @@ def test_what_would_have_to_be_negative_and_cannot_explains_nothing(plant):
     """From 14 s on the hull drags less; a drum that rubs less than not at all would look like it."""
     planted = plant(lambda setting: begun_at(EFFECTS["hull_drag"], 14.0).apply(setting, -0.4))
     fit = planted.fit()
-    found = scan(planted.problem, fit, fit.D, [EFFECTS["hull_drag"], EFFECTS["drum_friction"]])
+    found = scan(place_of(planted.problem, fit), fit.D, [EFFECTS["hull_drag"], EFFECTS["drum_friction"]])
     gains = {one.effect.id: one.log_gain for one in found}
     assert gains["hull_drag"] > gains["drum_friction"] + 20.0
 
