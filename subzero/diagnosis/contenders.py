@@ -2,43 +2,72 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 from subzero.diagnosis.candidate import Candidate
 from subzero.diagnosis.detect import separation, with_secants
+from subzero.diagnosis.effects.sensors import SPECS
 from subzero.diagnosis.estimates import name, rivals
 from subzero.diagnosis.extending import Extension
 from subzero.diagnosis.hypotheses import Ids
 from subzero.diagnosis.outlook import Survivor
 from subzero.diagnosis.struck import Struck
 from subzero.diagnosis.sudden_told import closest_rival, fitted, from_now_on, rival_of
+from subzero.diagnosis.unknown import DRIFT, FORCE, WORDS
 from subzero.diagnosis.verdict import UNDECIDED, Rival
 from subzero.diagnosis.work import Work
+
+STRANGE = {
+    **{FORCE + axis: f"a {what} acts that no cause explains" for axis, what in WORDS.items()},
+    **{DRIFT + name: f"the sensor of the {name.replace('_', ' ')} drifts" for name in SPECS},
+}
+"""Forces and drifts in words."""
+
+
+class Left(NamedTuple):
+    """What the records leave: hypotheses, causes that begin in mid-trial, and ids of forces and drifts."""
+
+    hypotheses: list[Ids]
+    late: list[Struck]
+    strange: list[str]
 
 
 def contenders(
     work: Work, verdict: str, best: Candidate, inside: dict[Ids, float], whole: Sequence[Ids]
-) -> tuple[list[Ids], list[Struck]]:
-    """Return which hypotheses and which sudden causes are left, of the smallest set of all."""
+) -> Left:
+    """Return what is left, of the smallest set of all."""
     left = [ids for ids in whole if ids in inside]
     late = [one for one in fitted(work) if (one.id,) in whole]
+    strange = [ids[0] for ids in whole if ids and ids[0] in STRANGE]
     alone = all((one.begun.effect.id,) in left for one in late)
-    return _with_closest(work, best, left) if verdict == UNDECIDED and left and alone else left, late
+    return Left(
+        _with_closest(work, best, left) if verdict == UNDECIDED and left and alone else left, late, strange
+    )
 
 
 def rivals_of(
     work: Work,
+    verdict: str,
     best: Candidate,
     inside: dict[Ids, float],
     outside: dict[str, float],
-    left: list[Ids],
-    late: list[Struck],
+    left: Left,
     new: Extension,
 ) -> tuple[Rival, ...]:
-    """Return the rivals of what is told, the most probable first."""
-    throughout = (closest_rival(work, inside),) if new.cause else rivals(work, best, inside, left)
-    sudden = [rival_of(work, one, outside[one.id]) for one in late]
-    return tuple(sorted([*throughout, *sudden], key=lambda one: -one.probability))
+    """Return the rivals of what is told, the most probable first; where nothing is told, all that is left."""
+    undecided = verdict == UNDECIDED
+    found = rivals(work, best, inside, left.hypotheses, None if undecided else best.ids)
+    found = (closest_rival(work, inside),) if new.cause else found
+    late = [rival_of(work, one, outside[one.id]) for one in left.late if one.id != new.id]
+    strange = [strange_rival(key, outside[key]) for key in left.strange] if undecided else []
+    return tuple(sorted([*found, *late, *strange], key=lambda one: -one.probability))
+
+
+def strange_rival(key: str, probability: float) -> Rival:
+    """Return a force or a drift as a rival."""
+    return Rival(ids=(key,), sentence=STRANGE[key], probability=probability, discrimination=math.nan)
 
 
 def names_of(whole: Sequence[Ids], others: Sequence[Rival]) -> list[str]:

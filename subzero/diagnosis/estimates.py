@@ -100,12 +100,19 @@ def causes(work: Work, best: Candidate, inside: Mapping[Ids, float], ids: Ids) -
 
 
 def rivals(
-    work: Work, best: Candidate, inside: Mapping[Ids, float], left: Sequence[Ids], most: int = 8
+    work: Work,
+    best: Candidate,
+    inside: Mapping[Ids, float],
+    left: Sequence[Ids],
+    told: Ids | None,
+    most: int = 8,
 ) -> tuple[Rival, ...]:
-    """Return the other hypotheses that are left, at most so many, or else the runner-up."""
-    listed = [ids for ids in left if ids != best.ids][:most]
+    """Return the hypotheses that are left beside the one that is told, if one is, at most so many; or else the
+    runner-up.
+    """
+    listed = [ids for ids in left if ids != told][:most]
     ranked: Sequence[Ids] = sorted(inside, key=lambda ids: -inside[ids])
-    listed = listed or [ids for ids in ranked if ids != best.ids][:1]
+    listed = listed or [ids for ids in ranked if ids != told][:1]
     return tuple(_rival(work, best, ids, inside.get(ids, 0.0)) for ids in listed)
 
 
@@ -117,7 +124,7 @@ def _rival(work: Work, best: Candidate, ids: Ids, p: float) -> Rival:
         ids=ids,
         sentence=words or "nothing is wrong",
         probability=p,
-        discrimination=between(work.problem, best.fit, best.ids, ids),
+        discrimination=between(work.problem, best.fit, best.ids, ids) if ids != best.ids else np.nan,
         parameters=numbers,
     )
 

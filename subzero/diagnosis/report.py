@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from html import escape
 
 from subzero.diagnosis import tables, words
-from subzero.diagnosis.verdict import Gain, Misfit, Verdict
+from subzero.diagnosis.verdict import CAUSE_NAMED, OUTSIDE, UNDECIDED, Gain, Misfit, Verdict
 
 STYLE = """
 body { font: 15px/1.5 system-ui, sans-serif; color: #222; max-width: 60rem; margin: 2rem auto; padding: 0 1rem; }
@@ -114,11 +114,10 @@ def _noise(rows: Mapping[str, Misfit]) -> str:
 def _cause(verdict: Verdict) -> list[str]:
     lines = [line for one in verdict.causes for line in (_escaped(words.cause(one)), "")]
     if verdict.rivals:
-        lines += [
-            "What else the records allow (D: how far from the named cause):",
-            "",
-            *table(tables.rivals(verdict)),
-        ]
+        undecided = verdict.verdict == UNDECIDED
+        what = "What the records allow" if undecided else "What else the records allow"
+        beside = "what is most probable" if undecided else "what is told"
+        lines += [f"{what} (D: how far from {beside}):", "", *table(tables.rivals(verdict))]
     return lines
 
 
@@ -144,7 +143,13 @@ def _shares(gain: Gain) -> tuple[float, float, float]:
 
 
 def _extended(verdict: Verdict) -> list[str]:
-    return ["`extended.toml` is the extended model: `subzero simulate SCENARIO --with extended.toml`.", ""]
+    new = verdict.verdict in (CAUSE_NAMED, OUTSIDE)
+    what = (
+        "the extended model"
+        if new
+        else "the model as calibrated within its tolerances, with nothing new in it"
+    )
+    return [f"`extended.toml` is {what}: `subzero simulate SCENARIO --with extended.toml`.", ""]
 
 
 def _how(verdict: Verdict) -> list[str]:

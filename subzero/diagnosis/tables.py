@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
-from subzero.diagnosis.verdict import Detectability, Misfit, Rival, Verdict
+from subzero.diagnosis.verdict import UNDECIDED, Detectability, Misfit, Rival, Verdict
 from subzero.diagnosis.words import NOTHING, column, estimate, number, probability
 
 CONFUSED, CLEAR = 9.0, 16.0
@@ -79,10 +79,13 @@ def _when(one: Misfit) -> str:
 
 
 def rivals(verdict: Verdict, *, short: bool = False) -> Table:
-    """Return what else explains the records, and how far it is from the named cause; `short` without parameters."""
+    """Return what else explains the records, and how far it is from what is told; `short` without parameters."""
     if short:
         rows = [_short(one) for one in _worth(verdict.rivals)]
-        return Table(("what else explains the records", "probability", "D"), rows[:MOST_RIVALS])
+        words = (
+            "what explains the records" if verdict.verdict == UNDECIDED else "what else explains the records"
+        )
+        return Table((words, "probability", "D"), rows[:MOST_RIVALS])
     return Table(("explanation", "probability", "D", "parameters"),
                  [(rival_words(one), probability(one.probability), number(one.discrimination), _numbers(one))
                   for one in verdict.rivals])  # fmt: skip

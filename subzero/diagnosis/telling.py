@@ -34,6 +34,8 @@ from subzero.diagnosis.work import Work
 
 WORTH_TELLING = 1e-4
 """Hypotheses that are less probable than this are not listed."""
+DRAWN = {CAUSE_NAMED: 1, OUTSIDE: 1, UNDECIDED: 3, NOTHING_WRONG: 0}
+"""Verdict → so many rivals are drawn: of what is undecided, the best and two more."""
 USUAL = (0.6, 1.6)
 """Noise of a usual sensor, over its specification."""
 
@@ -81,14 +83,14 @@ def _told(
     """Return the verdict as a value."""
     candidates, everything = work.search.candidates, inside | {(key,): p for key, p in outside.items()}
     whole = smallest_set(everything)
-    left, late = contenders(work, verdict, best, inside, whole)
-    others = rivals_of(work, best, inside, outside, left, [one for one in late if one.id != new.id], new)
+    left = contenders(work, verdict, best, inside, whole)
+    others = rivals_of(work, verdict, best, inside, outside, left, new)
     named = _named(work, verdict, best, inside, new)
-    first = next((one.ids for one in others if one.ids and one.ids in candidates), None)
-    rival = candidates[first].fit if first else None
+    fitted_too = [one.ids for one in others if one.ids and one.ids in candidates]
+    rival = candidates[fitted_too[0]].fit if fitted_too else None
     fits = {"nominal": None, "tolerance": candidates[()].fit}
     fits |= {"extended": new.fit} if verdict in (CAUSE_NAMED, OUTSIDE) else {}
-    fits |= {f"rival: {name(first)}": rival} if first else {}
+    fits |= {f"rival: {name(ids)}": candidates[ids].fit for ids in fitted_too[: DRAWN[verdict]]}
     full = work.budget == "full" and work.complete
     return Verdict(
         verdict=verdict,
@@ -98,7 +100,7 @@ def _told(
         unknown=new.unknown,
         extended=new.extended,
         gain=gained(work, new, rival) if full and verdict in (CAUSE_NAMED, OUTSIDE) else None,
-        next_trial=ahead(work, to_come(work, left, late), everything)
+        next_trial=ahead(work, to_come(work, left.hypotheses, left.late), everything)
         if full and verdict == UNDECIDED
         else None,
         curves=curves(new.problem, fits),

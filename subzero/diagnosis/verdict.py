@@ -62,7 +62,8 @@ class Rival:
         ids: the causes it is made of; empty for "nothing is wrong".
         sentence: in words.
         probability: of it.
-        discrimination: D between it and the named cause: below 9 the records cannot tell them apart. [-]
+        discrimination: D between it and what is told, or what is most probable: below 9 the records cannot tell them
+            apart; NaN of that itself, and where it is not known. [-]
         parameters: cause id → name → estimate.
     """
 
@@ -243,7 +244,7 @@ class Verdict:
         verdict: one of the four.
         sentence: the verdict in words.
         causes: what is named.
-        rivals: what else the records allow, most probable first.
+        rivals: what else the records allow, most probable first; all of it where the records do not decide.
         probabilities: hypothesis ("none", "rudder_lag", "a + b", "unknown_force:X") → probability.
         tolerance_scale: κ → probability that the tolerances are κ times as declared.
         detectable: what could be seen at all.

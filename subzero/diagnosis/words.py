@@ -92,8 +92,8 @@ def _sentence(verdict: Verdict) -> str:
     ranked = sorted(verdict.probabilities.items(), key=lambda item: -item[1])
     shown = ", ".join(f"{name} ({probability(p)})" for name, p in ranked[:MOST])
     rest = (
-        f", and {len(verdict.rivals) + 1 - MOST} more that are less probable"
-        if len(verdict.rivals) >= MOST
+        f", and {len(verdict.rivals) - MOST} more that are less probable"
+        if len(verdict.rivals) > MOST
         else ""
     )
     return f"These records cannot tell apart: {shown}{rest}."

@@ -75,8 +75,9 @@ def misfit(curves: Curves, noise: Mapping[str, Misfit], title: Title, name: str)
 
 def rivals(curves: Curves, noise: Mapping[str, Misfit], title: Title, name: str) -> Figure | None:
     """Draw what it would have looked like if a rival were true: what was measured would lie on the rival's line."""
-    names = [model for model in curves.models if model.startswith(RIVAL)][:MOST_RIVALS]
-    if not names or "extended" not in curves.models:
+    best = _best(curves)
+    names = [model for model in curves.models if model.startswith(RIVAL) and model != best][:MOST_RIVALS]
+    if not names:
         return None
     worst = sorted(curves.measured, key=lambda channel: -_apart(curves, channel, names, noise.get(channel)))[
         :6
@@ -84,7 +85,8 @@ def rivals(curves: Curves, noise: Mapping[str, Misfit], title: Title, name: str)
     figure, panels = sheet((len(worst) + 1) // 2, 2, _named(title, f"{name}: if a rival were true"))
     for axes, channel in zip(panels, worst, strict=False):
         _beside(axes, curves, channel, noise.get(channel), names)
-        headline(axes, f"{BY_NAME[channel].name.replace('_', ' ').capitalize()} − extended model")
+        model = "extended model" if best == "extended" else best.removeprefix(RIVAL)
+        headline(axes, f"{BY_NAME[channel].name.replace('_', ' ').capitalize()} − {model}")
     legend(panels[0], columns=2)
     for axes in panels[len(worst) :]:
         axes.remove()
@@ -93,19 +95,19 @@ def rivals(curves: Curves, noise: Mapping[str, Misfit], title: Title, name: str)
 
 
 def _apart(curves: Curves, channel: str, names: list[str], misfit: Misfit | None) -> float:
-    """Return how far rivals and the extended model lie apart in a channel, in its noise."""
-    best = curves.models["extended"][channel]
+    """Return how far rivals and the best model lie apart in a channel, in its noise."""
+    best = curves.models[_best(curves)][channel]
     gaps = [np.sqrt(np.nanmean((curves.models[name][channel] - best) ** 2)) for name in names]
     return float(max(gaps)) / (misfit.noise_sd if misfit else 1.0)
 
 
 def _beside(axes: Axes, curves: Curves, channel: str, misfit: Misfit | None, names: list[str]) -> None:
-    """Draw rivals and what was measured, smoothed, less the extended model."""
-    best, used = curves.models["extended"][channel], _used(curves, channel)
+    """Draw rivals and what was measured, smoothed, less the best model."""
+    best, used = curves.models[_best(curves)][channel], _used(curves, channel)
     _band(axes, misfit)
     smooth = _smooth(curves.time[used], (curves.measured[channel] - best)[used])
     axes.plot(curves.time[used], smooth, color=style.INK, linewidth=0.9, alpha=0.6, label="measured")
-    axes.axhline(0.0, **MODELS["extended"], label="extended")
+    axes.axhline(0.0, **MODELS["extended"], label=_best(curves).removeprefix(RIVAL))
     looks = zip(names, (style.GREEN, style.PURPLE), style.DASHES[1:], strict=False)
     for name, colour, dash in looks:
         words = name.removeprefix(RIVAL)
@@ -114,10 +116,15 @@ def _beside(axes: Axes, curves: Curves, channel: str, misfit: Misfit | None, nam
     _in_time(axes, curves)
 
 
+def _best(curves: Curves) -> str:
+    """Return the extended model; without one the first rival, the most probable; or the calibrated one."""
+    rivals = [model for model in curves.models if model.startswith(RIVAL)]
+    return next((model for model in ("extended", *rivals) if model in curves.models), CALIBRATED[0])
+
+
 def _shown(curves: Curves) -> dict[str, dict[str, Any]]:
-    """Return the models that are drawn, and how: without an extended one, the calibrated."""
-    best = "extended" if "extended" in curves.models else CALIBRATED[0]
-    looks = {"nominal": MODELS["nominal"], best: MODELS["extended"]}
+    """Return the models that are drawn, and how."""
+    looks = {"nominal": MODELS["nominal"], _best(curves): MODELS["extended"]}
     return {name: look for name, look in looks.items() if name in curves.models}
 
 
@@ -132,7 +139,7 @@ def _overlay(axes: Axes, curves: Curves, channel: str) -> None:
             curves.time[left_out], values[left_out], "x", color=style.GREY, markersize=4, label="left out"
         )
     for name, look in _shown(curves).items():
-        words = CALIBRATED[1] if name == CALIBRATED[0] else name
+        words = CALIBRATED[1] if name == CALIBRATED[0] else name.removeprefix(RIVAL)
         axes.plot(curves.time, curves.models[name][channel], label=words, **look)
     label(axes, None, f"${BY_NAME[channel].symbol}$ [{BY_NAME[channel].unit}]")
     _in_time(axes, curves)

@@ -172,8 +172,13 @@ def test_the_next_trial_is_not_asked_whether_what_is_broken_broke_in_mid_trial(w
 def test_sudden_causes_that_are_left_are_rivals_and_need_no_others(work):
     (one,) = fitted(work)
     key, inside = (one.id,), {(): 0.3, ("hull_drag",): 0.01}
-    assert contenders(work, UNDECIDED, None, inside, [key, ()]) == ([()], [one])
-    assert contenders(work, UNDECIDED, None, inside, [key]) == ([], [one])
+    assert contenders(work, UNDECIDED, None, inside, [key, ()]) == ([()], [one], [])
+    assert contenders(work, UNDECIDED, None, inside, [key]) == ([], [one], [])
+    among = [key, ("unknown_force:N",), ("sensor_drift:heading",)]
+    assert contenders(work, UNDECIDED, None, inside, among).strange == [
+        "unknown_force:N",
+        "sensor_drift:heading",
+    ]
     assert names_of([key, ()], [rival_of(work, one, 0.6)]) == [one.id, "none"]
 
 
