@@ -61,7 +61,7 @@ def closer(
         done = found.fit
     else:
         found = drifted(problem, start, which, DRIFTS * SPECS[which].bias, D)
-        knots, done = found.knots, _beside_drift(problem, start, which, found)
+        knots, done = found.knots, beside_drift(problem, found)
     fit = _without(found, done, D.size)
     ((log, what),) = linear(problem, fit, {name: found.columns}, knots, terms, [kappa])
     place = Place(fit=fit, along=Along(found.problem, done.z))
@@ -91,8 +91,9 @@ def linear(
     return [(total + one.log_gain, one) for one in suspects(problem, columns, fit, scales, knots, terms)]
 
 
-def _beside_drift(problem: Problem, start: Fit, channel: str, found: Recovered) -> Fit:
+def beside_drift(problem: Problem, found: Recovered) -> Fit:
     """Return the fit of the records without a drift."""
+    start, channel = found.fit, found.unknown.axis
     records, D = [], found.fit.D
     for i, one in enumerate(problem.records):
         own = found.knots.record == i

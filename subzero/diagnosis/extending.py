@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from subzero.diagnosis.candidate import Candidate
+from subzero.diagnosis.closer import beside_drift
 from subzero.diagnosis.effects.sensors import SPECS
 from subzero.diagnosis.estimates import name
 from subzero.diagnosis.foreign import Foreign
@@ -55,6 +56,12 @@ class Extension:
         """Of the sudden cause, such as "rudder_offset@12"; "" if there is none."""
         return f"{self.cause.id}@{self.cause.start_time:g}" if self.cause else ""
 
+    @property
+    def is_new(self) -> bool:
+        """There is new physics in it that data may be explained by: no mere calibration, and no sensor that drifts."""
+        drifts = self.unknown is not None and self.unknown.is_drift
+        return bool(self.extended.deviations or self.extended.missing) and not drifts
+
 
 def of_causes(work: Work, best: Candidate, ids: Ids) -> Extension:
     """Return the extension by those causes of a candidate that are named."""
@@ -74,9 +81,11 @@ def of_nothing(work: Work, best: Candidate) -> Extension:
 
 
 def of_unknown(work: Work) -> Extension:
-    """Return the extension by the most probable force, or the drift of a sensor."""
+    """Return the extension by the most probable force; beside the drift of a sensor there is nothing new but causes."""
     foreign = next(one for one in work.foreign if isinstance(one.what, Suspect))
     found = _recovered(work, foreign)
+    if found.missing is None:
+        found = replace(found, fit=beside_drift(work.problem, found))
     deviations = by_effect(work.problem, found.fit.z, foreign.beside)
     calibration = by_effect(work.problem, found.fit.z, None, but=foreign.beside)
     extended = Extended(deviations=deviations, calibration=calibration, missing=found.missing)

@@ -107,7 +107,7 @@ def _unknown(verdict: Verdict) -> dict[str, Any] | None:
     if one is None:
         return None
     names = ("words", "feature", "coefficient", "low", "high")
-    return {"axis": one.axis, "unit": "N" if one.axis in "XYZ" else "N m", "time_s": one.time.tolist(),
+    return {"axis": one.axis, "unit": one.unit, "time_s": one.time.tolist(),
             "force": one.force.tolist(), "band": one.band.tolist(),
             "formula": [dict(zip(names, term, strict=True)) for term in one.formula],
             "features": dict(one.features)}  # fmt: skip

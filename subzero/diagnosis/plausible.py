@@ -12,6 +12,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from subzero.channels import BY_NAME
+from subzero.turns import HEADING, TURN, turned
 
 MISTAKEN: dict[str, dict[str, float]] = {
     "m/s": {"knots": 1.944, "km/h": 3.6, "feet per second": 3.281, "cm/s": 100.0},
@@ -99,11 +100,16 @@ def _other_unit(name: str, measured: np.ndarray, simulated: np.ndarray, noise: f
         return ""
     plain = _rms(measured - simulated) / size
     for words, factor in {**MISTAKEN.get(BY_NAME[name].unit, {}), "opposite": -1.0}.items():
-        error = _rms(measured / factor - simulated) / size
+        error = _rms(_converted(name, measured / factor, simulated) - simulated) / size
         is_far = max(abs(factor), 1.0 / abs(factor)) > FAR
         if error < (WIDE if is_far else CLEAR) and BETTER * error < plain:
             return _question(name, words, factor)
     return ""
+
+
+def _converted(name: str, values: np.ndarray, simulated: np.ndarray) -> np.ndarray:
+    """Return values in another unit; a heading without the jumps at north that it may have there."""
+    return turned(np.unwrap(values, period=TURN), simulated) if name == HEADING else values
 
 
 def _question(name: str, words: str, factor: float) -> str:

@@ -25,7 +25,7 @@ FIGURES = {
     "rivals": "The cause",
     "detectable": "What these records could show",
     "gain": "The gain",
-    "missing_force": "The missing force",
+    "missing_force": "What no cause explains",
 }
 """Start of a figure's name → the section it stands in."""
 
@@ -74,7 +74,7 @@ def _sections(verdict: Verdict, records: Mapping[str, str]) -> dict[str, list[st
     return {
         "What is wrong": _misfit(verdict, records),
         "The cause": _cause(verdict),
-        "The missing force": _missing(verdict),
+        "What no cause explains": _missing(verdict),
         "The gain": _gain(verdict),
         "The extended model": _extended(verdict),
         "What these records could show": _detectable(verdict),
@@ -143,7 +143,8 @@ def _shares(gain: Gain) -> tuple[float, float, float]:
 
 
 def _extended(verdict: Verdict) -> list[str]:
-    new = verdict.verdict in (CAUSE_NAMED, OUTSIDE)
+    drifts = verdict.unknown is not None and verdict.unknown.is_drift
+    new = verdict.verdict in (CAUSE_NAMED, OUTSIDE) and not drifts
     what = (
         "the extended model"
         if new

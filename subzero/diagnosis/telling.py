@@ -99,7 +99,7 @@ def _told(
         rivals=others,
         unknown=new.unknown,
         extended=new.extended,
-        gain=gained(work, new, rival) if full and verdict in (CAUSE_NAMED, OUTSIDE) else None,
+        gain=gained(work, new, rival) if full and new.is_new else None,
         next_trial=ahead(work, to_come(work, left.hypotheses, left.late), everything)
         if full and verdict == UNDECIDED
         else None,
@@ -173,6 +173,8 @@ def _sentence(
         since = f"From {named[0].start_time:g} s on, " if named[0].start_time is not None else ""
         words = since + ", and ".join(cause.sentence for cause in named)
         return f"{words[0].upper()}{words[1:]}."
+    if verdict == OUTSIDE and unknown and unknown.is_drift:
+        return f"The sensor of the {unknown.axis.replace('_', ' ')} drifts as no cause of the catalogue explains."
     if verdict == OUTSIDE and unknown:
         return f"Something acts on {unknown.axis} that no cause of the catalogue explains."
     return f"These records cannot tell apart: {', '.join(left)}."

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from subzero.channels import BY_NAME
 from subzero.missing_force import MissingForce
 
 NOTHING_WRONG, CAUSE_NAMED, UNDECIDED, OUTSIDE = (
@@ -200,13 +201,13 @@ class Extended:
 
 @dataclass(frozen=True, kw_only=True)
 class Unknown:
-    """The force or moment that no cause explains.
+    """The force or moment that no cause explains, or the drift of a sensor.
 
     Attributes:
-        axis: X, Y, Z, K, M or N.
+        axis: X, Y, Z, K, M or N; the channel of a sensor that drifts.
         time: [s]
-        force: body axes. [N, N m]
-        band: its standard deviation. [N, N m]
+        force: body axes; how far the sensor is off. [`unit`]
+        band: its standard deviation. [`unit`]
         formula: terms in words with coefficient and interval: (words, feature, coefficient, low, high).
         features: feature → probability that it belongs to the formula, most probable first.
     """
@@ -217,6 +218,16 @@ class Unknown:
     band: np.ndarray
     formula: tuple[tuple[str, str, float, float, float], ...] = ()
     features: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def is_drift(self) -> bool:
+        """It is the drift of a sensor."""
+        return self.axis not in "XYZKMN"
+
+    @property
+    def unit(self) -> str:
+        """N, N m, or that of the channel."""
+        return BY_NAME[self.axis].unit if self.is_drift else "N" if self.axis in "XYZ" else "N m"
 
 
 @dataclass(frozen=True, kw_only=True)

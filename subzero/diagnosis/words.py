@@ -100,12 +100,13 @@ def _sentence(verdict: Verdict) -> str:
 
 
 def unknown(one: Unknown) -> str:
-    """Return the force outside the catalogue in words: axis, size, formula."""
-    unit = "N" if one.axis in "XYZ" else "N m"
+    """Return the force outside the catalogue in words: axis, size, formula; or the drift of a sensor."""
     most = max(range(len(one.force)), key=lambda at: abs(one.force[at]))
+    kind = f"{'force' if one.unit == 'N' else 'moment'} along {one.axis}"
+    kind = f"drift of the {one.axis.replace('_', ' ')}'s sensor" if one.is_drift else kind
     what = (
-        f"A {'force' if unit == 'N' else 'moment'} along {one.axis} that no cause explains: {one.force[most]:.3g} ± "
-        f"{1.96 * one.band[most]:.2g} {unit} at t = {one.time[most]:.3g} s, where it is largest."
+        f"A {kind} that no cause explains: {one.force[most]:.3g} ± {1.96 * one.band[most]:.2g} {one.unit} "
+        f"at t = {one.time[most]:.3g} s, where it is largest."
     )
     if not one.formula:
         return what

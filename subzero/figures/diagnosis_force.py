@@ -5,7 +5,7 @@ from __future__ import annotations
 import textwrap
 from typing import TYPE_CHECKING
 
-from subzero.diagnosis.verdict import Verdict
+from subzero.diagnosis.verdict import Unknown, Verdict
 from subzero.diagnosis.words import formula_term
 
 from . import style
@@ -35,13 +35,19 @@ def missing_force(verdict: Verdict, title: Title) -> Figure | None:
     figure.subplots_adjust(bottom=0.13, top=0.87)
     low, high = unknown.force - 1.96 * unknown.band, unknown.force + 1.96 * unknown.band
     axes.fill_between(unknown.time, low, high, color=style.SKY, alpha=0.4, linewidth=0, label="95 %")
-    axes.plot(unknown.time, unknown.force, color=style.BLUE, linewidth=1.5, label="missing")
+    axes.plot(
+        unknown.time,
+        unknown.force,
+        color=style.BLUE,
+        linewidth=1.5,
+        label="drift" if unknown.is_drift else "missing",
+    )
     axes.axhline(0.0, color=style.GREY, linewidth=0.7)
     axes.set_xlim(float(unknown.time[0]), float(unknown.time[-1]))
-    label(axes, None, "[N]" if unknown.axis in "XYZ" else "[N m]")
+    label(axes, None, f"[{unknown.unit}]")
     axes.yaxis.set_label_coords(-0.07, 0.5)
     time_label([axes], 1)
-    headline(axes, f"{AXES[unknown.axis]}, that no cause explains, with its 95 % band")
+    headline(axes, f"{_what(unknown)}, that no cause explains, with its 95 % band")
     if unknown.formula:
         words = "Looks like " + " + ".join(formula_term(term) for term in unknown.formula)
         words = textwrap.fill(words, 110)
@@ -51,3 +57,10 @@ def missing_force(verdict: Verdict, title: Title) -> Figure | None:
         bottom, top = axes.get_ylim()
         axes.set_ylim(bottom, top + 0.2 * (top - bottom))
     return figure
+
+
+def _what(unknown: Unknown) -> str:
+    """Return what is drawn in words."""
+    return (
+        f"Drift of the {unknown.axis.replace('_', ' ')}'s sensor" if unknown.is_drift else AXES[unknown.axis]
+    )

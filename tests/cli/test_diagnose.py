@@ -14,11 +14,13 @@ from subzero.cli import FINE, INTERRUPTED, MISTAKE, main
 from subzero.diagnosis.verdict import (
     CAUSE_NAMED,
     NOTHING_WRONG,
+    OUTSIDE,
     Cause,
     Curves,
     Detectability,
     Estimate,
     Extended,
+    Unknown,
     Verdict,
 )
 
@@ -89,6 +91,17 @@ def test_a_diagnosis_tells_what_cannot_be_told_apart_then_the_verdict_and_leaves
     assert "time_constant_s = 0.21" in (tmp_path / "found/extended.toml").read_text()
     assert (engine["seed"], engine["budget"]) == (3, "full")
     assert engine["records"][0].setting.trial.duration == pytest.approx(10.0)
+
+
+@pytest.mark.parametrize(
+    ("axis", "unit"), [("X", "N"), ("N", "N m"), ("heading", "degree"), ("surge_speed", "m/s")]
+)
+def test_what_is_outside_the_catalogue_is_written_and_drawn_force_or_drift(engine, tmp_path, axis, unit):
+    unknown = Unknown(axis=axis, time=TIME, force=0.1 * TIME, band=0.05 + 0.0 * TIME)
+    engine["answer"] = replace(NAMED, verdict=OUTSIDE, causes=(), unknown=unknown, extended=Extended())
+    assert main(["diagnose", "record.csv", "--scenario", "fig6", "--out", "found"]) == FINE
+    assert json.loads((tmp_path / "found/diagnosis.json").read_text())["unknown"]["unit"] == unit
+    assert (tmp_path / "found/missing_force.png").stat().st_size > 1000
 
 
 def test_a_screen_is_the_first_look(engine):

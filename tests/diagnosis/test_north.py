@@ -19,6 +19,7 @@ from subzero.diagnosis.effects import START
 from subzero.diagnosis.hidden import Hidden
 from subzero.diagnosis.logged import Logged
 from subzero.diagnosis.other_code import simulate_otherwise
+from subzero.diagnosis.plausible import unit_questions
 from subzero.diagnosis.pose import pose
 from subzero.diagnosis.response import respond
 from subzero.diagnosis.setting import Setting
@@ -80,3 +81,11 @@ def test_a_challenge_writes_what_a_compass_shows_and_it_is_read_without_jumps(tm
     assert np.ptp(column) > 180.0
     read = read_record(tmp_path / "record.csv").values["heading"]
     assert_allclose(turned(read, degrees(TRIAL.start.heading)), heading, atol=1e-4)
+
+
+def test_a_compass_in_radians_is_asked_about_although_it_jumps_at_north():
+    heading = {"heading": 20.0 * np.sin(TIMES)}
+    radians = {"heading": np.radians(heading["heading"]) % (2.0 * np.pi)}
+    (question,) = unit_questions(radians, heading, {"heading": 0.4})
+    assert "heading_deg looks like radians" in question
+    assert unit_questions({"heading": heading["heading"] + 0.3}, heading, {"heading": 0.4}) == []

@@ -113,6 +113,14 @@ FORCE = Verdict(
 )  # fmt: skip
 
 
+DRIFT = dataclasses.replace(
+    FORCE,
+    sentence="The sensor of the heading drifts as no cause of the catalogue explains.",
+    unknown=Unknown(axis="heading", time=TIME[::20], force=0.2 * TIME[::20], band=np.full(16, 0.5)),
+    probabilities={"sensor_drift:heading": 0.99},
+)
+
+
 def test_a_cause_is_named_in_words_with_value_interval_unit_and_model():
     said = words.cause(NAMED.causes[0])
     assert (
@@ -223,3 +231,22 @@ def test_every_verdict_has_the_figures_that_belong_to_it():
     assert set(draw_diagnosis(NAMED, title)) == {"misfit", "rivals", "evidence", "detectable", "gain"}
     assert set(draw_diagnosis(FORCE, title)) == {"evidence", "missing_force"}
     assert draw_diagnosis(Verdict(verdict=NOTHING_WRONG, sentence=""), title) == {}
+
+
+def test_a_drift_has_the_unit_of_its_channel_in_words_figure_and_file():
+    assert words.unknown(DRIFT.unknown) == (
+        "A drift of the heading's sensor that no cause explains: 6 ± 0.98 degree at t = 30 s, where it is largest."
+    )
+    axes = draw_diagnosis(DRIFT, Title(words="a trial", scenario="fig6"))["missing_force"].axes[0]
+    assert "Drift of the heading's sensor" in axes.get_title(loc="left") + "".join(
+        t.get_text() for t in axes.texts
+    )
+    assert axes.get_ylabel() == "[degree]"
+    assert json.loads(json_file.text(DRIFT))["unknown"]["unit"] == "degree"
+    assert "nothing new in it" in report.markdown(DRIFT, {})
+    assert "nothing new in it" not in report.markdown(FORCE, {})
+
+
+def test_forces_and_moments_have_their_units():
+    units = [dataclasses.replace(FORCE.unknown, axis=axis).unit for axis in "XYZKMN"]
+    assert units == ["N"] * 3 + ["N m"] * 3
