@@ -81,9 +81,14 @@ def challenge(
         spread: of the true numbers, in tolerances.
 
     Raises:
-        UserError: there is no truth for anything that was drawn.
+        UserError: the motion is prescribed, or there is no truth for anything that was drawn.
     """
     trial = scenario if isinstance(scenario, scenarios.Trial) else load(scenario)
+    if trial.commands is None:
+        raise UserError(
+            f"The scenario {trial.name} prescribes the motion: whatever is wrong, the vehicle moves alike. Take a trial "
+            "with commands, such as fig6."
+        )
     nominal, effects = Setting(trial=trial, model=Model.of(trial)), catalogue(BASIC)
     both = (*effects.values(), *START)
     times = np.arange(0.0, trial.duration + 1e-9, SAMPLE)

@@ -157,3 +157,9 @@ def test_what_is_outside_the_catalogue_shows_on_its_axis(kind):
 def test_no_effect_at_all_leaves_the_setting_as_it_was():
     assert apply_all(NOMINAL, EFFECTS.values(), {}) == NOMINAL
     assert hide(NOMINAL, EFFECTS.values(), {}, Hidden()) == NOMINAL
+
+
+@pytest.mark.parametrize("scenario", ["fig4", "rov_umbilical"])
+def test_nothing_can_be_hidden_in_a_motion_that_is_prescribed(scenario):
+    with pytest.raises(UserError, match=f"{scenario} prescribes the motion.*such as fig6"):
+        challenge(scenario, 1)
