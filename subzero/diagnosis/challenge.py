@@ -86,8 +86,8 @@ def challenge(
     trial = scenario if isinstance(scenario, scenarios.Trial) else load(scenario)
     if trial.commands is None:
         raise UserError(
-            f"The scenario {trial.name} prescribes the motion: whatever is wrong, the vehicle moves alike. Take a trial "
-            "with commands, such as fig6."
+            f"The scenario {trial.name} prescribes the motion: whatever is wrong, the vehicle moves alike. "
+            "Take a trial with commands, such as fig6."
         )
     nominal, effects = Setting(trial=trial, model=Model.of(trial)), catalogue(BASIC)
     both = (*effects.values(), *START)
