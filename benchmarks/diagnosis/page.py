@@ -15,8 +15,8 @@ from .cases import BEFORE, HEAVY, SEED, SETTLED, SHARES
 from .figures_of import rows
 from .pictures import FIGURES, draw
 from .results import place, read
-from .scores import Result, Score
-from .sections import MARK, table
+from .scores import Result
+from .sections import MARK, counted, mark, table
 from .truth import SAME
 from .words import BEFORE_WORDS, HEAD, NEAR_WORDS, NOT_YET, UNFINISHED
 
@@ -97,20 +97,12 @@ def _scores(results: Sequence[Result], before: Sequence[Result]) -> str:
     found, earlier = rows(results), rows([one for one in before if "error" not in one]) if before else []
     was = {s.words: f"{s.value} {MARK[s.met]}".strip() for s in earlier}
     body = [
-        [s.words, s.value, s.interval, str(s.cases), s.target, _mark(s), was.get(s.words, "")] for s in found
+        [s.words, s.value, s.interval, str(s.cases), s.target, mark(s), was.get(s.words, "")] for s in found
     ]
-    met, judged = sum(s.met is True for s in found), sum(s.met is not None for s in found)
-    near = sum(s.met is False and s.near for s in found)
     words = BEFORE_WORDS.format(seed=before[0]["seed"], cases=len(before)) if before else ""
     header = ["figure", "value", "95 % interval", "cases", "target", "", *(["before"] if before else [])]
     body = body if before else [line[:-1] for line in body]
-    count = f"**{met} of {judged} targets are met** on these cases; {near} of the others are near."
-    return f"## It is right when\n\n{count} {NEAR_WORDS}\n\n{words}\n\n" + table(header, body)
-
-
-def _mark(s: Score) -> str:
-    """Return whether a figure meets its target, if it is judged, or its interval reaches it."""
-    return MARK[s.met] + (" (near)" if s.met is False and s.near else "")
+    return f"## It is right when\n\n{counted(found)} {NEAR_WORDS}\n\n{words}\n\n" + table(header, body)
 
 
 def _pictures() -> str:

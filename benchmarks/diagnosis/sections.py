@@ -9,8 +9,9 @@ import numpy as np
 
 from . import figures_of
 from .advice import decided
+from .cases import SHARES
 from .degraded import rows
-from .scores import CLEAR, Result, first, is_right, names, of, smallest_D, truth, wrongly_sure
+from .scores import CLEAR, Result, Score, first, is_right, names, of, smallest_D, truth, wrongly_sure
 from .times import LIMITS, Row
 from .words import (
     ADVICE_WORDS,
@@ -126,15 +127,27 @@ def degraded(results: Sequence[Result]) -> str:
 
 
 def since(results: Sequence[Result]) -> str:
-    """Return what the engine makes by now of causes that begin in mid-trial, and which it misses."""
-    body = [
-        [s.words, s.value, s.interval, str(s.cases), s.target, MARK[s.met]]
-        for s in figures_of.sudden(results)
-    ]
+    """Return what the engine makes by now of the first cases of another seed, and which it misses."""
+    sound = [one for one in results if "error" not in one]
+    found = [s for s in figures_of.rows(sound) if s.cases]
+    body = [[s.words, s.value, s.interval, str(s.cases), s.target, mark(s)] for s in found]
     header = ["figure", "value", "95 % interval", "cases", "target", ""]
-    words = SINCE_WORDS.format(seed=results[0]["seed"])
-    lost = missed(of(results, "sudden")).replace("## ", "### ", 1)
-    return f"## Since then\n\n{words}\n\n{table(header, body)}\n\n{lost}"
+    words = SINCE_WORDS.format(seed=sound[0]["seed"], cases=len(sound), whole=sum(SHARES.values()),
+                               broken=len(results) - len(sound))  # fmt: skip
+    lost = missed(sound).replace("## ", "### ", 1)
+    return f"## Since then\n\n{words}\n\n{counted(found)}\n\n{table(header, body)}\n\n{lost}"
+
+
+def mark(s: Score) -> str:
+    """Return whether a figure meets its target, if it is judged, or its interval reaches it."""
+    return MARK[s.met] + (" (near)" if s.met is False and s.near else "")
+
+
+def counted(found: Sequence[Score]) -> str:
+    """Return how many figures meet their targets, in a sentence."""
+    met, judged = sum(s.met is True for s in found), sum(s.met is not None for s in found)
+    near = sum(s.met is False and s.near for s in found)
+    return f"**{met} of {judged} targets are met** on these cases; {near} of the others are near."
 
 
 def advice(results: Sequence[Result]) -> str:

@@ -41,6 +41,8 @@ def test_it_has_hope_from_about_then_on(hanging):
     assert abs(hope.begun.time - BEGINS) <= 2.0
     assert hope.begun.mean[0] < -0.6
     assert hope.log_posterior > throughout.log_posterior
+    assert hope.start[-1] == hope.begun.mean[0], "its fit begins with it as large"
+    assert hope.start.size == len(problem.entries) + 1
 
 
 def test_a_small_change_promises_less(hanging):

@@ -15,8 +15,9 @@ from subzero.diagnosis.candidate import candidate_of
 from subzero.diagnosis.contenders import strange_rival
 from subzero.diagnosis.effects import catalogue
 from subzero.diagnosis.estimates import rivals
+from subzero.diagnosis.extending import Extension
 from subzero.diagnosis.showing import curves
-from subzero.diagnosis.verdict import CAUSE_NAMED, NOTHING_WRONG, UNDECIDED, Verdict
+from subzero.diagnosis.verdict import CAUSE_NAMED, NOTHING_WRONG, UNDECIDED, Extended, Unknown, Verdict
 from subzero.figures import Title
 from subzero.figures.diagnosis import draw_diagnosis
 
@@ -89,3 +90,14 @@ def test_one_alone_has_nothing_beside_it(work, everything):
     healthy = draw_diagnosis(undecided(work, everything, NOTHING_WRONG, drawn=0), title)
     overlay = [text.get_text() for text in healthy["misfit"].axes[0].get_legend().get_texts()]
     assert "within tolerances" in overlay
+
+
+def test_only_new_physics_has_a_gain(work):
+    def extension(deviations, **more):
+        new = Extended(deviations=deviations, calibration={"hull_drag": {"share": 0.01}})
+        return Extension(fit=work.search.candidates[()].fit, problem=work.problem, extended=new, **more)
+
+    drift = Unknown(axis="heading", time=np.arange(3.0), force=np.ones(3), band=np.ones(3))
+    assert extension({"hull_drag": {"share": 0.4}}).is_new
+    assert not extension({}).is_new
+    assert not extension({"hull_drag": {"share": 0.4}}, unknown=drift).is_new
