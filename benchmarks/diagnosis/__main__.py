@@ -37,7 +37,7 @@ def benchmark(
 
     Args:
         quick: the first 40 cases only.
-        count: the first so many of the 800 cases.
+        count: the first so many of all cases.
         workers: processes.
         resume: keep the results of an interrupted run, and go on behind them.
         seed: of all cases.

@@ -34,7 +34,7 @@ from .scores import (
 
 def rows(results: Sequence[Result]) -> list[Score]:
     """Return all figures."""
-    return [*_singles(results), *sudden(results), *_healthy(results), *_pairs(results), *_outside(results),
+    return [*_singles(results), *_sudden(results), *_healthy(results), *_pairs(results), *_outside(results),
             *_numbers(results), *_gains(results), *_degraded(results), *_baselines(results)]  # fmt: skip
 
 
@@ -69,8 +69,7 @@ def _singles(results: Sequence[Result]) -> list[Score]:
     ]  # fmt: skip
 
 
-def sudden(results: Sequence[Result]) -> list[Score]:
-    """Return the figures of causes that begin in mid-trial."""
+def _sudden(results: Sequence[Result]) -> list[Score]:
     cases = of(results, "sudden")
     clear = [one for one in cases if smallest_D(one) >= CLEAR]
     right = [one for one in cases if names(one) == hidden(one)]

@@ -54,11 +54,8 @@ def large_hopes(problem: Problem, one: Candidate, able: Sequence[Effect], record
 
 def _large(problem: Problem, fit: Fit, effect: Effect, record: int) -> Hope:
     """Return a cause at its best time and size, all else the best of the linear problem there."""
-    own, times, (low, high) = (
-        places(problem.entries, (effect.id,)),
-        times_of(problem, record),
-        bounds(problem),
-    )
+    own, times = places(problem.entries, (effect.id,)), times_of(problem, record)
+    low, high = bounds(problem)
     without = fit.z.copy()
     without[own] = 0.0
     first = Begun(effect=effect, time=times[0], record=record, log_gain=-np.inf, mean=fit.z[own])
@@ -81,17 +78,12 @@ def _at_size(problem: Problem, none: Hope, without: np.ndarray, r: np.ndarray) -
     far = 0.5 * float(np.sum((begun.mean / scale) ** 2)) + scale.size
     nothing = posterior(none.place.fit.quadratic, D).log_evidence
     gain = there.log_evidence - far - nothing
-    return Hope(
-        none.log_posterior + gain, replace(begun, log_gain=gain), none.place, np.append(there.z, begun.mean)
-    )
+    begun, start = replace(begun, log_gain=gain), np.append(there.z, begun.mean)
+    return Hope(none.log_posterior + gain, begun, none.place, start)
 
 
 def _log_none(problem: Problem, fit: Fit, record: int) -> float:
     """Return the log posterior of nothing in the linear problem of a fit, and of any time at which it might begin."""
     log = posterior(fit.quadratic, variances(problem.entries, (), 1.0)).log_evidence
-    return (
-        log
-        + float(np.log(KAPPAS[1.0]))
-        + log_prior((), len(named(problem)))
-        - float(np.log(len(times_of(problem, record))))
-    )
+    any_time = -float(np.log(len(times_of(problem, record))))
+    return log + float(np.log(KAPPAS[1.0])) + log_prior((), len(named(problem))) + any_time

@@ -38,7 +38,7 @@ def places_of(search: Search, close: Sequence[Close], prior: float) -> list[Plac
 
 
 def largest(search: Search) -> list[Candidate]:
-    """Return the hypotheses whose causes may be what begins in mid-trial: the best, each with a cause of its own."""
+    """Return the hypotheses whose causes may be what begins in mid-trial: the best that have any."""
     least = search.best().log_posterior - ALIKE
     ranked = sorted(search.candidates.values(), key=lambda one: -one.log_posterior)
     return [one for one in ranked if one.log_posterior > least and one.ids][:LARGE]

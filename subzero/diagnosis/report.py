@@ -144,7 +144,7 @@ def _shares(gain: Gain) -> tuple[float, float, float]:
 
 def _extended(verdict: Verdict) -> list[str]:
     drifts = verdict.unknown is not None and verdict.unknown.is_drift
-    new = verdict.verdict in (CAUSE_NAMED, OUTSIDE) and not drifts
+    new = verdict.verdict in (CAUSE_NAMED, OUTSIDE) and (not drifts or bool(verdict.extended.deviations))
     what = (
         "the extended model"
         if new

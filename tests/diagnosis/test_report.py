@@ -245,6 +245,8 @@ def test_a_drift_has_the_unit_of_its_channel_in_words_figure_and_file():
     assert json.loads(json_file.text(DRIFT))["unknown"]["unit"] == "degree"
     assert "nothing new in it" in report.markdown(DRIFT, {})
     assert "nothing new in it" not in report.markdown(FORCE, {})
+    beside = dataclasses.replace(DRIFT, extended=Extended(deviations={"hull_drag": {"share": 0.4}}))
+    assert "nothing new in it" not in report.markdown(beside, {}), "a cause stands beside the drift"
 
 
 def test_forces_and_moments_have_their_units():
