@@ -20,7 +20,7 @@ from math import sqrt
 
 import numpy as np
 
-from subzero.compiled import by_field, compiled, inner
+from subzero.compiled import allocating, by_field, compiled, inner
 
 from .blocks import factor, solve
 from .line import DIAGONAL, LOWER, LOWER2, NEW, NOW, RESIDUAL, UPPER, UPPER2, Line, held_node
@@ -31,6 +31,12 @@ from .wide_blocks import factor_wide, solve_wide
 @inner
 def _add_bending(line: Line, c: StiffCableNumbers) -> None:
     """Add the shear forces to the balances and the tow force, and their derivatives to the matrix."""
+    _bend(line, c.bending_stiffness)
+
+
+@allocating
+def _bend(line: Line, stiffness: float) -> None:
+    """Do that for all segments."""
     for j in range(1, line.ends.count + 1):
         for i in range(4):
             for k in range(4):
@@ -40,7 +46,7 @@ def _add_bending(line: Line, c: StiffCableNumbers) -> None:
     for j in range(1, line.ends.count + 1):
         for side in range(3):
             _tangent(line, j + side - 1, side, tangents, chords)
-        _add_shear(line, j, c.bending_stiffness, tangents, chords)
+        _add_shear(line, j, stiffness, tangents, chords)
 
 
 @compiled
@@ -66,7 +72,7 @@ def _spring(line: Line, j: int, stiffness: float) -> float:
     return 2.0 * stiffness / (line.length[j] + far)
 
 
-@compiled
+@allocating
 def _add_shear(line: Line, j: int, stiffness: float, t: np.ndarray, r: np.ndarray) -> None:
     """Add q_j to the nodes j and j−1; t and r are tangents and chords of segments j−1, j and j+1."""
     near, far = _spring(line, j - 1, stiffness), _spring(line, j, stiffness)

@@ -94,6 +94,12 @@ def solve(L: np.ndarray, D: np.ndarray, U: np.ndarray, pivots: np.ndarray, last:
                 for k in range(SIZE):
                     r[j, row] -= U[j, row, k] * r[j + 1, k]
         solve_block(D[j], pivots[j], r[j])
+    spread(L, last, r)
+
+
+@inlined
+def spread(L: np.ndarray, last: int, r: np.ndarray) -> None:
+    """Take what each block does to the next off r (blocks, 4), from the tow point to the drum: z_j −= W_j z_{j−1}."""
     for j in range(2, last + 1):
         for column in range(1, SIZE):
             for row in range(SIZE):

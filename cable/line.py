@@ -56,6 +56,7 @@ class Ends:
             unknowns of the first block (3, 4).
         tow_answer: minus the answer of the first block's unknowns (columns) to a displacement of the tow point
             (rows) (3, 4), from the last Newton matrix.
+        factored: whether the blocks hold the factors of that matrix.
     """
 
     count: int
@@ -80,6 +81,7 @@ class Ends:
     tow_by_tow: np.ndarray
     tow_by_block: np.ndarray
     tow_answer: np.ndarray
+    factored: bool
 
 
 class Line(NamedTuple):
@@ -152,6 +154,7 @@ def new_line(capacity: int) -> Line:
         tow_by_tow=np.zeros((3, 3)),
         tow_by_block=np.zeros((3, 4)),
         tow_answer=np.zeros((3, 4)),
+        factored=False,
     )
     per_node = {name: np.zeros((3, n, 3)) for name in ("position", "velocity", "momentum", "water")}
     return Line(

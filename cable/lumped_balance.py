@@ -13,7 +13,7 @@ from math import sqrt
 
 import numpy as np
 
-from subzero.compiled import compiled, inner
+from subzero.compiled import allocating, compiled, inner
 
 from .lumped_band import add
 from .lumped_load import evaluate_node, shorten
@@ -21,7 +21,7 @@ from .lumped_rope import NEW, PULL, REST, START_MOMENTUM, THINNING, WATER, Rope,
 from .properties import CableNumbers
 
 
-@compiled
+@allocating
 def balance_nodes(rope: Rope, g: float, c: CableNumbers) -> None:
     """Add momentum and loads of all free nodes to their balances."""
     s = np.zeros(3)

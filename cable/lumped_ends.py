@@ -17,7 +17,7 @@ from math import sqrt
 
 import numpy as np
 
-from subzero.compiled import compiled, inner
+from subzero.compiled import allocating, compiled, inner
 
 from .lumped_band import add
 from .lumped_load import evaluate_node
@@ -28,7 +28,7 @@ from .properties import CableNumbers, DrumNumbers
 from .winch import LENGTH, TENSION
 
 
-@compiled
+@allocating
 def hold_end(rope: Rope, g: float, c: CableNumbers, drum: DrumNumbers) -> None:
     """Write the equations of the far end."""
     if rope.ends.free_end:
@@ -41,7 +41,7 @@ def hold_end(rope: Rope, g: float, c: CableNumbers, drum: DrumNumbers) -> None:
     _drum_row(rope, g, c, drum, flow, flow_by_U)
 
 
-@compiled
+@allocating
 def _add_drogue(rope: Rope) -> None:
     """Add ½ρC_dA |U| U to the balance of the free end."""
     N, square = rope.ends.count, 0.0
@@ -110,7 +110,7 @@ def _cross_middle(rope: Rope, flow: np.ndarray, flow_by_U: np.ndarray) -> None:
             add(rope.band, row, 3 * (N - 2) + k, -flow[i, k])
 
 
-@compiled
+@allocating
 def _drum_row(
     rope: Rope, g: float, c: CableNumbers, drum: DrumNumbers, flow: np.ndarray, flow_by_U: np.ndarray
 ) -> None:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from subzero.compiled import compiled, inner
+from subzero.compiled import allocating, compiled, inner
 
 from .lumped_balance import load_node, neighbours
 from .lumped_rope import (
@@ -57,7 +57,7 @@ def mind_the_drum(rope: Rope, segment_length: float, c: CableNumbers) -> None:
         fill_momenta(rope, c)
 
 
-@compiled
+@allocating
 def _insert(rope: Rope, segment_length: float) -> None:
     """Insert a node into the last spring, a segment from its start."""
     N, whole, xi = rope.ends.count, rope.ends.last[OLD], rope.spring[STATE, rope.ends.count]
@@ -102,7 +102,7 @@ def _insert(rope: Rope, segment_length: float) -> None:
         settle(rope, j)
 
 
-@compiled
+@allocating
 def _weights(rope: Rope, segment_length: float) -> np.ndarray:
     """Return how nodes N − 2, N − 1 and N share in the new node (3,)."""
     N, far = rope.ends.count, rope.ends.last[OLD]
@@ -184,7 +184,7 @@ def settle(rope: Rope, j: int) -> None:
         rope.vector[DIRECTION, j, i] = (x[j, i] - x[j - 1, i]) / size
 
 
-@compiled
+@allocating
 def fill_momenta(rope: Rope, c: CableNumbers) -> None:
     """Fill the momenta of all lumps at level OLD from positions and velocities there; J is where it was."""
     N, s = rope.ends.count, np.zeros(3)

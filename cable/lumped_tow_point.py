@@ -10,14 +10,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from subzero.compiled import compiled
+from subzero.compiled import allocating, compiled
 
 from .lumped_balance import arm, load_node, neighbours
 from .lumped_rope import DIRECTION, NEW, PULL, REST, START_MOMENTUM, Rope
 from .properties import CableNumbers
 
 
-@compiled
+@allocating
 def tow_force(rope: Rope, g: float, c: CableNumbers) -> None:
     """Fill the force on the vehicle, and the momentum of the half spring at the tow point."""
     half, s, load = 0.5 * rope.spring[REST, 1], np.zeros(3), np.zeros(3)

@@ -11,9 +11,10 @@ from subzero.compiled import compiled, inlined, inner
 
 from .assembly import assemble, assemble_residual
 from .bending import factor_step, has_residual, solve_factored
+from .blocks import SIZE, spread
 from .differences import Weights
 from .element import Load
-from .line import GUESS, NEW, RESIDUAL, STEP, Line, held_node
+from .line import GUESS, LOWER, NEW, RESIDUAL, STEP, Line, held_node
 from .properties import CableNumbers, DrumNumbers
 from .slack import STRAIN_SCALE
 
@@ -44,37 +45,70 @@ def solve_step(
     c: CableNumbers,
     drum: DrumNumbers,
     work: Load,
+    near: bool,
 ) -> Solved:
-    """Solve the equations of `assembly` for level NEW, from the guess that stands there.
+    """Solve the equations of `assembly` for level NEW, from the guess that stands there. One that is as `near` as that
+    of `follow_tow` is likely to be right: no matrix is made until the residual says that it is not.
 
     The matrix is made anew for every step: a kept one converges to the tolerance only, and what is left then differs
     from run to run, which sensitivities by differences see. Whether a guess will do, the residual tells by itself.
     """
     rounding, alone = ROUNDING * (c.mass + c.added_mass) * w.a0 * w.b0, has_residual(line, c)
-    assemble(line, w, c, drum, work)
+    made = not (near and alone)
+    _residual(line, w, c, drum, work, not made)
     merit = _merit(line)
     for iteration in range(MAX_ITERATIONS):
         if _size(line, rounding, merit) <= 1.0:
             return _solved(line, rounding, True, iteration)
-        if alone and iteration > 0:
+        if not made:
             assemble(line, w, c, drum, work)
-        if not factor_step(line, c):
+        line.ends.factored = factor_step(line, c)
+        if not line.ends.factored:
             break
         solve_factored(line, c)
         last_length, before, fraction = _save(line), merit, 1.0
         for _ in range(MAX_HALVINGS):
             _update(line, last_length, fraction)
-            if alone:
-                assemble_residual(line, w, c, drum, work)
-            else:
-                assemble(line, w, c, drum, work)
-            merit = _merit(line)
+            _residual(line, w, c, drum, work, alone)
+            made, merit = not alone, _merit(line)
             if isfinite(merit) and merit <= before * (1.0 - 0.1 * fraction) + 1e-30:
                 break
             fraction *= 0.5
         if not isfinite(merit):
             break
     return _solved(line, rounding, _size(line, rounding, merit) <= 1.0, MAX_ITERATIONS)
+
+
+@inner
+def follow_tow(line: Line, tow: np.ndarray) -> bool:
+    """Move the tow point of the answer on level NEW, and all that moves with it by the factors of the last matrix.
+
+    False, and nothing has moved, if there are none.
+    """
+    step, at, L = line.rows[RESIDUAL], line.position[NEW, 0], line.blocks[LOWER]
+    if not line.ends.factored:
+        return False
+    for j in range(1, line.ends.count + 1):
+        for m in range(SIZE):
+            step[j, m] = 0.0
+    for m in range(SIZE):
+        for i in range(3):
+            step[1, m] += L[1, 1 + i, m] * (tow[i] - at[i])
+    spread(L, line.ends.count, step)
+    _update(line, _save(line), 1.0)
+    for i in range(3):
+        at[i] = tow[i]
+    return True
+
+
+@compiled
+def _residual(line: Line, w: Weights, c: CableNumbers, drum: DrumNumbers, work: Load, alone: bool) -> None:
+    """Fill the residual: `alone`, so that the factors of the last matrix stay, or with the matrix."""
+    if alone:
+        assemble_residual(line, w, c, drum, work)
+    else:
+        assemble(line, w, c, drum, work)
+        line.ends.factored = False
 
 
 @compiled

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from subzero.compiled import compiled
+from subzero.compiled import allocating, compiled
 
 from .drum_path import hermite, lead_drum
 from .element import Load
@@ -129,7 +129,7 @@ def follow_path(
     return rows, solved
 
 
-@compiled
+@allocating
 def _cover(
     line: Line,
     path: TowPath,

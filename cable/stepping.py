@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from subzero.compiled import compiled
+from subzero.compiled import compiled, inlined
 
 from .arc import correct_for_arc
 from .differences import backward_weights
@@ -20,7 +20,7 @@ from .drum import FREE, STANDING, next_mode
 from .element import Load
 from .growing import merge_last, split_last
 from .line import BEFORE, NEW, NOW, SPLIT_AT, Line, feel_water, held_node, spacing
-from .newton import Solved, solve_step
+from .newton import Solved, follow_tow, solve_step
 from .properties import CableNumbers, DrumNumbers
 from .slack import KNOWN, SMOOTHING
 from .tow_point import fill_node_tensions
@@ -47,6 +47,7 @@ def try_step(
     c: CableNumbers,
     drum: DrumNumbers,
     work: Load,
+    again: bool = False,
 ) -> Solved:
     """Solve for the cable `step` later, with the tow point at `tow` (relative to the drum), on level NEW.
 
@@ -58,10 +59,11 @@ def try_step(
         c: cable.
         drum: drum, with its place and velocity at the new time.
         work: work space.
+        again: level NEW holds the answer to another tow point, close by.
     """
     failed = 0
-    for _ in range(MOST_DRUM_CHANGES):
-        solved = _solve_softly(line, step, tow, water, c, drum, work)
+    for change in range(MOST_DRUM_CHANGES):
+        solved = _solve_softly(line, step, tow, water, c, drum, work, again and change == 0)
         if line.ends.count == 1 or drum.control != FREE or line.ends.free_end:
             break
         mode = next_mode(
@@ -72,10 +74,16 @@ def try_step(
         if mode == line.ends.drum_mode or (failed >> mode) & 1:
             break
         line.ends.drum_mode = mode
-    taken_up = line.ends.last_length[NOW] - line.ends.last_length[NEW] > TAKEN_UP
-    if solved.converged and taken_up and drum.control == FREE and not line.ends.free_end:
+    if solved.converged and _takes_up(line, drum):
         return Solved(False, solved.iterations, solved.residual, line.ends.count, 0)
     return solved
+
+
+@inlined
+def _takes_up(line: Line, drum: DrumNumbers) -> bool:
+    """Say whether a free drum would have taken up cable."""
+    taken_up = line.ends.last_length[NOW] - line.ends.last_length[NEW] > TAKEN_UP
+    return taken_up and drum.control == FREE and not line.ends.free_end
 
 
 @compiled
@@ -87,11 +95,18 @@ def _solve_softly(
     c: CableNumbers,
     drum: DrumNumbers,
     work: Load,
+    again: bool,
 ) -> Solved:
-    """Solve from a prediction; if that fails, with a slack law that is made sharp little by little."""
+    """Solve from the answer to a tow point close by, if there is one; else, or if that leads astray, from a prediction;
+    if that fails, with a slack law that is made sharp little by little.
+    """
     w = backward_weights(step, line.ends.previous_step)
+    if again and follow_tow(line, tow):
+        solved = solve_step(line, w, c, drum, work, True)
+        if solved.converged and not _takes_up(line, drum):
+            return solved
     _predict(line, step, tow, water, c, drum, work)
-    solved = solve_step(line, w, c, drum, work)
+    solved = solve_step(line, w, c, drum, work, False)
     if solved.converged:
         return solved
     _predict(line, step, tow, water, c, drum, work)
@@ -101,7 +116,7 @@ def _solve_softly(
     spent = solved.iterations
     line.ends.smoothing = SOFTEST
     while True:
-        solved = solve_step(line, w, c, drum, work)
+        solved = solve_step(line, w, c, drum, work, False)
         spent += solved.iterations
         if not solved.converged or line.ends.smoothing <= SMOOTHING:
             break
@@ -127,11 +142,9 @@ def _predict(
     for i in range(3):
         line.position[NEW, 0, i] = tow[i]
         line.ends.drum_velocity[i] = drum.velocity[i]
-    growth, last = (
-        0.0 if line.ends.drum_mode == STANDING else step * line.ends.payout[NOW],
-        line.ends.last_length,
-    )
-    last[NEW] = max(last[NOW] + growth, 0.5 * last[NOW])
+    rate, last = line.ends.payout, line.ends.last_length
+    growth = step * (rate[NOW] + 0.5 * ratio * (rate[NOW] - rate[BEFORE]))
+    last[NEW] = max(last[NOW] + (0.0 if line.ends.drum_mode == STANDING else growth), 0.5 * last[NOW])
     if not line.ends.free_end:
         pull = max(line.node_tension[N], 0.0)
         line.tension[NEW, N] = max(pull + (line.tension[NOW, N] - pull) * last[NEW] / last[NOW], KNOWN)

@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from subzero.compiled import inner
+from subzero.compiled import allocating, inlined, inner
 
 WaterVelocity = Callable[[float, float, float, float], Sequence[float]]
 """Function of north, east, down [m] and time [s] that gives the water's velocity (3,). [m/s]"""
@@ -130,7 +130,7 @@ class Current:
         return Water(points, self.velocity.reshape(-1, 3).copy())
 
 
-@inner
+@inlined
 def water_velocity(
     water: Water, north: float, east: float, down: float, time: float
 ) -> tuple[float, float, float]:
@@ -138,6 +138,13 @@ def water_velocity(
     J = water.velocity
     if J.shape[0] == 1:
         return J[0, 0], J[0, 1], J[0, 2]
+    return _between(water, north, east, down, time)
+
+
+@allocating
+def _between(water: Water, north: float, east: float, down: float, time: float) -> tuple[float, float, float]:
+    """Return the velocity between the points of the grid, linear along each axis. [m/s]."""
+    J = water.velocity
     place = (time, north + water.points[0], east + water.points[1], down + water.points[2])
     row, share, first = np.zeros(16, np.int64), np.ones(16), 7
     for axis in range(4):

@@ -24,7 +24,7 @@ from cable.line import NOW
 from cable.newton import Solved
 from cable.stepping import accept, try_step
 from cable.tow_point import impedance
-from subzero.compiled import compiled, inlined, inner
+from subzero.compiled import allocating, compiled, inlined, inner
 from subzero.energy import book
 from subzero.hull import advance_hull, follow_track, tow_point
 from subzero.run_state import Live, Now, Setup
@@ -77,13 +77,20 @@ def _agree(setup: Setup, live: Live, start: float, span: float) -> tuple[int, So
         live.now.guess[i] = live.now.force[i] + ratio * (live.now.force[i] - live.now.force_before[i])
     lead_drum(setup.led, start + span, setup.fixed.drum)
     size = np.inf
-    for _ in range(MOST_EXCHANGES):
+    for evaluation in range(MOST_EXCHANGES):
         if not _move(setup, live, start, span):
             return ABSURD, solved
         if not setup.fixed.tethered:
             return FINE, solved
         solved = try_step(
-            live.line, span, live.now.tow, setup.water, setup.fixed.cable, setup.fixed.drum, live.load
+            live.line,
+            span,
+            live.now.tow,
+            setup.water,
+            setup.fixed.cable,
+            setup.fixed.drum,
+            live.load,
+            evaluation > 0,
         )
         live.now.iterations += solved.iterations
         if not solved.converged:
@@ -131,7 +138,7 @@ def _forces_agree(now: Now, F: np.ndarray, agreement: float) -> bool:
     return gap <= agreement * size + 1e-11 + ROUNDING * stiffness * reach
 
 
-@compiled
+@allocating
 def _improve(span: float, now: Now, F: np.ndarray, last_size: float) -> float:
     """Take one Newton step on the force, (I − (h²/2) Z A) δ = F_cable − guess, or go back half of the last one.
 
@@ -155,7 +162,7 @@ def _improve(span: float, now: Now, F: np.ndarray, last_size: float) -> float:
     return last_size if too_far else size
 
 
-@compiled
+@allocating
 def _mobility(r: np.ndarray, R: np.ndarray, inverse: np.ndarray, out: np.ndarray) -> None:
     """Fill out (3, 3) with A = R [I, −r×] M⁻¹ [I, −r×]ᵀ Rᵀ, acceleration of the tow point per force. [1/kg]."""
     lever = np.zeros((3, 6))

@@ -14,7 +14,7 @@ from numba import types
 from numba.experimental import structref
 
 from cable.newton import Solved
-from subzero.compiled import compiled
+from subzero.compiled import allocating
 from subzero.loop import run_rows
 from subzero.recording import Recording, record_row
 from subzero.run_state import Live, Setup
@@ -49,13 +49,13 @@ structref.define_constructor(_Reference, _HandleType, FIELDS)
 Handle: Any = _Interpreted if numba.config.DISABLE_JIT else _Reference
 
 
-@compiled
+@allocating
 def hold(setup: Setup, live: Live, recording: Recording, times: np.ndarray) -> Any:
     """Return a handle of a run and the times of its rows (n,) [s]."""
     return Handle(setup, live, recording, times)
 
 
-@compiled
+@allocating
 def advance(
     handle: Any,
     row: int,
@@ -94,7 +94,7 @@ def advance(
     return after - 1, used, ending, solved
 
 
-@compiled
+@allocating
 def observe(handle: Any, row: int, used: int, seen: np.ndarray) -> None:
     """Fill `seen` with a row; the heading goes on from the one that stands there, without jumps."""
     r, before = handle.recording, seen[6]

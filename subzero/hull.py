@@ -14,7 +14,7 @@ import numpy as np
 
 import vehicle
 from cable.water import water_velocity
-from subzero.compiled import compiled, inlined, inner
+from subzero.compiled import allocating, compiled, inlined, inner
 from subzero.missing_wrench import add_missing
 from subzero.run_state import HEADING, PITCH, SPEED, TIME, HullWork, Live, Setup
 from vehicle import STATE_SIZE
@@ -125,7 +125,7 @@ def _move(track: np.ndarray, t: float, weight: float, state: np.ndarray) -> None
     state[2] -= weight * u * np.sin(pitch)
 
 
-@compiled
+@allocating
 def pose(track: np.ndarray, t: float, state: np.ndarray) -> None:
     """Write attitude and velocities of a prescribed motion at t into a state."""
     u, pitch, heading, dive, turn = _attitude(track, t)

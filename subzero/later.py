@@ -13,7 +13,7 @@ import numpy as np
 import scenarios
 import vehicle
 from cable.energy import FLOWS, STORED, energy_flow
-from subzero.compiled import compiled
+from subzero.compiled import allocating
 from subzero.errors import UserError
 from subzero.hull import feel_current
 from subzero.model import Model
@@ -62,7 +62,7 @@ def go_on_with(
     return other
 
 
-@compiled
+@allocating
 def begin_again(setup: Setup, live: Live, time: float) -> None:
     """Take the energies that are stored now, with the numbers that hold from now on, as those of the start."""
     ledger, flows = live.now.ledger, np.zeros(FLOWS)

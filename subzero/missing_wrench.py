@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 import vehicle
-from subzero.compiled import compiled, inner
+from subzero.compiled import allocating, compiled, inner
 from subzero.missing_force import FACTORS, fill_factors
 from subzero.run_state import HullWork, Live, Setup
 from vehicle.dynamics import relative_velocity
@@ -42,7 +42,7 @@ def _add_history(added: np.ndarray, time: float, wrench: np.ndarray) -> None:
         wrench[i] += added[1 + i, low] + x * (added[1 + i, high] - added[1 + i, low])
 
 
-@compiled
+@allocating
 def _add_terms(
     setup: Setup, live: Live, state: np.ndarray, command: np.ndarray, time: float, work: HullWork
 ) -> None:

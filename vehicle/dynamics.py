@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from subzero.compiled import compiled
+from subzero.compiled import allocating, compiled
 from vehicle.actuators import fin_angle, servo_rate, settle
 from vehicle.kinematics import motion, normalise, rotation
 from vehicle.motor import battery_current, shaft_goal, shaft_rate, shaft_speed, voltage
@@ -28,7 +28,7 @@ def relative_velocity(state: np.ndarray, R: np.ndarray, current_n: np.ndarray, n
         nu_r[3 + i] = state[10 + i]
 
 
-@compiled
+@allocating
 def surge_through_water(state: np.ndarray, current_n: np.ndarray) -> float:
     """Return u_r, the forward speed through the water [m/s]."""
     R = np.empty((3, 3))
@@ -67,7 +67,7 @@ def actuators(state, command, u, numbers, out):
     out[CHARGE] = battery_current(state[SHAFT], u, motor, propeller)
 
 
-@compiled
+@allocating
 def derivative(state, command, current_n, wrench_b, numbers, out):
     """Fill out (STATE_SIZE,) with the rate of the state.
 
@@ -95,7 +95,7 @@ def derivative(state, command, current_n, wrench_b, numbers, out):
     actuators(state, command, nu_r[0], numbers, out)
 
 
-@compiled
+@allocating
 def breakdown(state, command, current_n, wrench_b, numbers, out):
     """Fill out (len(BREAKDOWN), 6) with every named term [N, N m], M ν' in sum. Arguments: `derivative`."""
     evaluate(state, command, current_n, wrench_b, numbers, np.empty((3, 3)), np.empty(6), out)

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from subzero.compiled import compiled
+from subzero.compiled import allocating
 from vehicle.dynamics import evaluate, relative_velocity
 from vehicle.kinematics import rotation
 from vehicle.restoring import potential
@@ -22,7 +22,7 @@ POWERS = ("propeller", "loss", "restoring", "external")
 """What `power` fills: thrust and reaction torque; fins, lift and drag; weight and buoyancy; from outside."""
 
 
-@compiled
+@allocating
 def power(state, command, current_n, wrench_b, numbers, out):
     """Fill out (len(POWERS),) with the powers on the hull relative to the water [W].
 
@@ -45,7 +45,7 @@ def power(state, command, current_n, wrench_b, numbers, out):
                 out[which] += terms[i, j] * nu_r[j]
 
 
-@compiled
+@allocating
 def kinetic_energy(state, current_n, numbers):
     """Return ½ ν_rᵀ M ν_r, hull and added mass together [J]."""
     R, nu_r = np.empty((3, 3)), np.empty(6)
@@ -58,7 +58,7 @@ def kinetic_energy(state, current_n, numbers):
     return 0.5 * total
 
 
-@compiled
+@allocating
 def potential_energy(state, numbers):
     """Return the potential energy of weight and buoyancy [J]."""
     R = np.empty((3, 3))

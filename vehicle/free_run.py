@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from subzero.compiled import compiled
+from subzero.compiled import allocating, compiled
 from vehicle.dynamics import derivative, finish_step
 from vehicle.energy import POWERS, power
 from vehicle.state import STATE_SIZE
@@ -54,7 +54,7 @@ def rk4_step(y, step, command, current_n, wrench_b, numbers, k, stage, out):
     finish_step(out[:STATE_SIZE], command, numbers)
 
 
-@compiled
+@allocating
 def march(commands, step, current_n, wrench_b, numbers, history):
     """Fill history (n + 1, SIZE) from its first row on, one command of commands (n, 4) a step."""
     k, stage = np.empty((4, SIZE)), np.empty(SIZE)

@@ -14,7 +14,7 @@ import math
 
 import numpy as np
 
-from subzero.compiled import compiled
+from subzero.compiled import allocating, compiled
 
 
 @compiled
@@ -44,7 +44,7 @@ def euler_angles(quaternion: np.ndarray) -> tuple[float, float, float]:
     return roll, pitch, heading
 
 
-@compiled
+@allocating
 def quaternion_from_euler(roll: float, pitch: float, heading: float) -> np.ndarray:
     """Return the unit quaternion (w, x, y, z) of heading, then pitch, then roll [rad]."""
     cr, sr = math.cos(0.5 * roll), math.sin(0.5 * roll)

@@ -61,7 +61,7 @@ def closer(
         done = found.fit
     else:
         found = drifted(problem, start, which, DRIFTS * SPECS[which].bias, D)
-        knots, done = found.knots, beside_drift(problem, found)
+        knots, done = found.knots, beside_drift(problem, found, D)
     fit = _without(found, done, D.size)
     ((log, what),) = linear(problem, fit, {name: found.columns}, knots, terms, [kappa])
     place = Place(fit=fit, along=Along(found.problem, done.z))
@@ -91,10 +91,9 @@ def linear(
     return [(total + one.log_gain, one) for one in suspects(problem, columns, fit, scales, knots, terms)]
 
 
-def beside_drift(problem: Problem, found: Recovered) -> Fit:
-    """Return the fit of the records without a drift."""
-    start, channel = found.fit, found.unknown.axis
-    records, D = [], found.fit.D
+def beside_drift(problem: Problem, found: Recovered, D: np.ndarray) -> Fit:
+    """Return the fit of the records without a drift, under prior variances D (k,)."""
+    start, channel, records = found.fit, found.unknown.axis, []
     for i, one in enumerate(problem.records):
         own = found.knots.record == i
         drift = np.interp(one.time, found.knots.time[own], found.force[own])

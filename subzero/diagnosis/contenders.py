@@ -14,7 +14,7 @@ from subzero.diagnosis.extending import Extension
 from subzero.diagnosis.hypotheses import Ids
 from subzero.diagnosis.outlook import Survivor
 from subzero.diagnosis.struck import Struck
-from subzero.diagnosis.sudden_told import closest_rival, fitted, from_now_on, rival_of
+from subzero.diagnosis.sudden_told import closest_rival, fitted, from_now_on, rival_of, with_closest
 from subzero.diagnosis.unknown import DRIFT, FORCE, WORDS
 from subzero.diagnosis.verdict import UNDECIDED, Rival
 from subzero.diagnosis.work import Work
@@ -42,6 +42,8 @@ def contenders(
     late = [one for one in fitted(work) if (one.id,) in whole]
     strange = [ids[0] for ids in whole if ids and ids[0] in STRANGE]
     alone = all((one.begun.effect.id,) in left for one in late)
+    if verdict == UNDECIDED and len(late) == len(whole) == 1:
+        late = with_closest(work, late[0])
     return Left(
         _with_closest(work, best, left) if verdict == UNDECIDED and left and alone else left, late, strange
     )

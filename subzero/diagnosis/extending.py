@@ -85,7 +85,7 @@ def of_unknown(work: Work) -> Extension:
     foreign = next(one for one in work.foreign if isinstance(one.what, Suspect))
     found = _recovered(work, foreign)
     if found.missing is None:
-        found = replace(found, fit=beside_drift(work.problem, found))
+        found = replace(found, fit=beside_drift(work.problem, found, found.fit.D))
     deviations = by_effect(work.problem, found.fit.z, foreign.beside)
     calibration = by_effect(work.problem, found.fit.z, None, but=foreign.beside)
     extended = Extended(deviations=deviations, calibration=calibration, missing=found.missing)

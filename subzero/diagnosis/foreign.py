@@ -11,7 +11,7 @@ import numpy as np
 from subzero.diagnosis.candidate import Candidate
 from subzero.diagnosis.closer import Close, closer, linear
 from subzero.diagnosis.evidence import KAPPAS, log_sum
-from subzero.diagnosis.hypotheses import PRIOR, Ids
+from subzero.diagnosis.hypotheses import PRIOR, Ids, able
 from subzero.diagnosis.late_places import largest, places_of
 from subzero.diagnosis.latent import Terms
 from subzero.diagnosis.one_term import one_terms
@@ -170,15 +170,13 @@ def _bases(search: Search) -> list[Candidate]:
 
 def _sudden(search: Search, close: Sequence[Close], known: float) -> list[Foreign]:
     """Return causes that begin in mid-trial, beside nothing else, that may be as probable as what is known."""
-    problem = search.problem
-    effects = list({entry.effect.id: entry.effect for entry in problem.entries if entry.record < 0}.values())
-    able = [effect for effect in effects if effect.sudden]
-    if not able:
+    problem, effects = search.problem, able(search.problem)
+    if not effects:
         return []
-    prior = float(np.log(PRIOR["sudden"] / (len(able) * len(problem.records))))
+    prior = float(np.log(PRIOR["sudden"] / (len(effects) * len(problem.records))))
     places, large = places_of(search, close, _log_prior(problem)), largest(search)
     made = [one for record in range(len(problem.records))
-            for one in struck(problem, places, able, record, known - prior, search.side, large)]  # fmt: skip
+            for one in struck(problem, places, effects, record, known - prior, search.side, large)]  # fmt: skip
     return [Foreign(beside=(), what=one, log_posterior=one.log_posterior + prior,
                     place=None if is_lost(one.fit) else in_its_place(problem, one)) for one in made]  # fmt: skip
 

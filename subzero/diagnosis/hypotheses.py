@@ -7,6 +7,7 @@ from itertools import combinations
 
 import numpy as np
 
+from subzero.diagnosis.effect import Effect
 from subzero.diagnosis.entries import Entry
 from subzero.diagnosis.problem import Problem
 
@@ -21,6 +22,12 @@ def named(problem: Problem) -> list[str]:
     """Return the ids that can be named: all but those of the start."""
     found = dict.fromkeys(entry.effect.id for entry in problem.entries if entry.record < 0)
     return list(found)
+
+
+def able(problem: Problem) -> list[Effect]:
+    """Return the effects that may begin in mid-trial."""
+    effects = {entry.effect.id: entry.effect for entry in problem.entries if entry.record < 0}
+    return [effect for effect in effects.values() if effect.sudden]
 
 
 def places(entries: Sequence[Entry], ids: Ids) -> list[int]:

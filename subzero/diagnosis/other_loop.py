@@ -15,7 +15,7 @@ import numpy as np
 from cable.drum_path import lead_drum
 from cable.lumped_rope import REST, STATE, Rope
 from cable.lumped_step import GAMMA, accept_step, try_step
-from subzero.compiled import compiled
+from subzero.compiled import allocating, compiled
 from subzero.coupling import _move, _solve_three, hull_steps
 from subzero.recording import Recording, record_row
 from subzero.run_state import Live, Setup
@@ -86,7 +86,7 @@ def follow_rope(
     return last, FINE
 
 
-@compiled
+@allocating
 def _exchange(setup: Setup, live: Live, rope: Rope, led: Led, start: float, span: float, last: bool) -> int:
     """Find the pull at the end of an exchange; nothing is made real yet. The `last` try need not agree to the last."""
     now, fixed, F = live.now, setup.fixed, rope.ends.tow_force
@@ -137,7 +137,7 @@ def _learn(M: np.ndarray, gap: np.ndarray, before: np.ndarray, step: np.ndarray)
             M[i, k] += error * step[k] / max(square, 1e-300)
 
 
-@compiled
+@allocating
 def _newton(M: np.ndarray, gap: np.ndarray, step: np.ndarray) -> None:
     """Fill step = M⁻¹ gap; plainly the gap where M is of no use."""
     work = M.copy()

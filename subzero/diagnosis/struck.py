@@ -28,7 +28,7 @@ from subzero.diagnosis.sudden import Along, Begun, Place, columns, with_begun
 
 ROUNDS, MOST, HOPE = 3, 3, 6.0
 """Rounds of trying; in each at most so many are fitted that the linear problem has this close to the best."""
-BENT, MUCH = 0.05, 0.5
+BENT, MUCH = 0.05, 0.75
 """Where a cause gains much, what is not linear may be this share of it; of the cause that gains most, so much."""
 BETTER = 2.0
 """What was fitted is fitted again where the linear problem promises so much more, in log posterior."""

@@ -7,13 +7,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from subzero.diagnosis.begun import begun_at
 from subzero.diagnosis.detect import against, information, marginal
 from subzero.diagnosis.estimates import estimate, sentence_of
 from subzero.diagnosis.evidence import posterior
-from subzero.diagnosis.hypotheses import Ids, named, places
+from subzero.diagnosis.hypotheses import Ids, able, named, places
 from subzero.diagnosis.refit import Fit
 from subzero.diagnosis.rules import PRACTICAL
 from subzero.diagnosis.struck import Struck
+from subzero.diagnosis.sudden import Along, columns
 from subzero.diagnosis.verdict import Cause, Rival
 from subzero.diagnosis.work import Work
 
@@ -33,7 +35,9 @@ def is_large(one: Struck) -> bool:
 
 
 def closest(work: Work, one: Struck) -> tuple[float, Ids]:
-    """Return D of a sudden cause against the closest of those that hold throughout, or the tolerances; and which."""
+    """Return D of a sudden cause against the closest of the tolerances, those that hold throughout, and the others from
+    its time on; and which.
+    """
     n, more = len(work.problem.entries), one.problem
     M, own = marginal(more, one.fit.J, one.begun.kappa), list(range(n, len(more.entries) - 1))
     step = one.fit.z[own]
@@ -41,8 +45,29 @@ def closest(work: Work, one: Struck) -> tuple[float, Ids]:
     for other in named(more):
         at = places(more.entries, (other,))
         found[(other,)] = against(more, M, own, step, at, one.begun.kappa)[0]
+    found |= _from_its_time_on(work, one)
     rival = min(found, key=lambda ids: found[ids])
     return found[rival], rival
+
+
+def _from_its_time_on(work: Work, one: Struck) -> dict[Ids, float]:
+    """Return D against each other cause that would begin when it does: what no tolerance and no size of that explains,
+
+    D = sᵀ (I + B Bᵀ)⁻¹ s,    B = [J κτ, C s_b]
+    """
+    begun, fit, n = one.begun, one.fit, len(work.problem.entries)
+    others = [effect for effect in able(work.problem) if effect.id != begun.effect.id]
+    C = columns(Along(one.problem, fit.z), [(effect, begun.time) for effect in others], begun.record)
+    free = [*range(n), fit.z.size - 1]
+    tolerance = np.array([begun.kappa * one.problem.entries[k].parameter.tolerance for k in free])
+    shown, within = fit.J[:, n:-1] @ fit.z[n:-1], fit.J[:, free] * tolerance
+    found = dict[Ids, float]()
+    for effect, own in zip(others, C, strict=True):
+        B = np.hstack([within, own * np.array([p.scale for p in effect.parameters])])
+        b = B.T @ shown
+        rest = float(shown @ shown - b @ np.linalg.solve(np.eye(b.size) + B.T @ B, b))
+        found[(begun_at(effect, begun.time).id,)] = max(rest, 0.0)
+    return found
 
 
 def cause_of(work: Work, what: Struck, probability: float) -> Cause:
@@ -66,10 +91,27 @@ def rival_of(work: Work, what: Struck, probability: float) -> Rival:
 
 
 def closest_rival(work: Work, inside: Mapping[Ids, float]) -> Rival:
-    """Return what comes closest to the most probable sudden cause, of all that holds throughout."""
+    """Return what comes closest to the most probable sudden cause."""
     D, ids = closest(work, fitted(work)[0])
-    words = " and ".join(sentence_of(work.problem, one) for one in ids) or "nothing is wrong"
+    words = " and ".join(_words(work, one) for one in ids) or "nothing is wrong"
     return Rival(ids=ids, sentence=words, probability=inside.get(ids, 0.0), discrimination=D)
+
+
+def _words(work: Work, one: str) -> str:
+    """Return a cause in words, also one that begins in mid-trial."""
+    which, _, time = one.partition("@")
+    sentence = sentence_of(work.problem, which)
+    return f"from {time} s on {sentence}" if time else sentence
+
+
+def with_closest(work: Work, one: Struck) -> list[Struck]:
+    """Return a sudden cause, and beside it the one that comes closest if that has a fit of its own, which may be
+    improbable by luck alone.
+    """
+    ids = closest(work, one)[1]
+    close = [each for each in fitted(work) if ids and "@" in ids[0]
+             and each.begun.effect.id == ids[0].partition("@")[0]]  # fmt: skip
+    return [one, *close]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
