@@ -36,13 +36,17 @@ SEES = {"cable": ("cable",), "vehicle": ("vehicle",)}
 
 ALL = ("cable", "subzero", "vehicle")
 
+SHARED = ("compiled.py", "scratch.py")
+"""Files that all compiled code depends on."""
+
 
 @cache
 def source_digest(packages: tuple[str, ...] = ALL) -> str:
     """Return twelve hexadecimal digits that change with any edit of a compiled file of these packages."""
     root = Path(__file__).resolve().parent.parent
     digest = hashlib.sha256(numba.__version__.encode())
-    for path in sorted(path for package in packages for path in (root / package).rglob("*.py")):
+    shared = [root / "subzero" / name for name in SHARED]
+    for path in sorted({*shared, *(path for package in packages for path in (root / package).rglob("*.py"))}):
         source = path.read_bytes()
         if b"compiled" in source:
             digest.update(source)

@@ -24,10 +24,11 @@ from cable.line import NOW
 from cable.newton import Solved
 from cable.stepping import accept, try_step
 from cable.tow_point import impedance
-from subzero.compiled import allocating, compiled, inlined, inner
+from subzero.compiled import compiled, inlined, inner
 from subzero.energy import book
 from subzero.hull import advance_hull, follow_track, tow_point
 from subzero.run_state import Live, Now, Setup
+from subzero.scratch import scratch
 from vehicle import STATE_SIZE
 
 MOST_EXCHANGES = 60
@@ -138,14 +139,14 @@ def _forces_agree(now: Now, F: np.ndarray, agreement: float) -> bool:
     return gap <= agreement * size + 1e-11 + ROUNDING * stiffness * reach
 
 
-@allocating
+@compiled
 def _improve(span: float, now: Now, F: np.ndarray, last_size: float) -> float:
     """Take one Newton step on the force, (I − (h²/2) Z A) δ = F_cable − guess, or go back half of the last one.
 
     A cable between slack and taut is a stiff and bent spring: a step after which the next one would be longer than
     itself (`last_size`) went too far. Returns the size of the step that stands. [N]
     """
-    M, b, Z, A = np.empty((3, 3)), np.empty(3), now.Z, now.mobility
+    M, b, Z, A = scratch(3, 3), scratch(1, 3)[0], now.Z, now.mobility
     for i in range(3):
         b[i] = F[i] - now.guess[i]
         for k in range(3):
@@ -162,16 +163,16 @@ def _improve(span: float, now: Now, F: np.ndarray, last_size: float) -> float:
     return last_size if too_far else size
 
 
-@allocating
+@compiled
 def _mobility(r: np.ndarray, R: np.ndarray, inverse: np.ndarray, out: np.ndarray) -> None:
     """Fill out (3, 3) with A = R [I, −r×] M⁻¹ [I, −r×]ᵀ Rᵀ, acceleration of the tow point per force. [1/kg]."""
-    lever = np.zeros((3, 6))
+    lever, turned = scratch(3, 6), scratch(3, 6)
     for i in range(3):
-        lever[i, i] = 1.0
+        for k in range(6):
+            lever[i, k], turned[i, k] = (1.0 if i == k else 0.0), 0.0
     lever[0, 4], lever[0, 5] = r[2], -r[1]
     lever[1, 3], lever[1, 5] = -r[2], r[0]
     lever[2, 3], lever[2, 4] = r[1], -r[0]
-    turned = np.zeros((3, 6))
     for i in range(3):
         for k in range(6):
             for m in range(3):

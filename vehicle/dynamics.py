@@ -11,7 +11,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from subzero.compiled import allocating, compiled
+from subzero.compiled import compiled
+from subzero.scratch import scratch
 from vehicle.actuators import fin_angle, servo_rate, settle
 from vehicle.kinematics import motion, normalise, rotation
 from vehicle.motor import battery_current, shaft_goal, shaft_rate, shaft_speed, voltage
@@ -28,10 +29,10 @@ def relative_velocity(state: np.ndarray, R: np.ndarray, current_n: np.ndarray, n
         nu_r[3 + i] = state[10 + i]
 
 
-@allocating
+@compiled
 def surge_through_water(state: np.ndarray, current_n: np.ndarray) -> float:
     """Return u_r, the forward speed through the water [m/s]."""
-    R = np.empty((3, 3))
+    R = scratch(3, 3)
     rotation(state[3:7], R)
     return state[7] - (R[0, 0] * current_n[0] + R[1, 0] * current_n[1] + R[2, 0] * current_n[2])
 
@@ -67,7 +68,7 @@ def actuators(state, command, u, numbers, out):
     out[CHARGE] = battery_current(state[SHAFT], u, motor, propeller)
 
 
-@allocating
+@compiled
 def derivative(state, command, current_n, wrench_b, numbers, out):
     """Fill out (STATE_SIZE,) with the rate of the state.
 
@@ -79,7 +80,7 @@ def derivative(state, command, current_n, wrench_b, numbers, out):
         numbers: `Vehicle.numbers()`.
         out: the rates.
     """
-    R, nu_r, terms = np.empty((3, 3)), np.empty(6), np.empty((TERM_COUNT, 6))
+    R, nu_r, terms = scratch(3, 3), scratch(1, 6)[0], scratch(TERM_COUNT, 6)
     evaluate(state, command, current_n, wrench_b, numbers, R, nu_r, terms)
     motion(state, R, out)
     for j in range(6):
@@ -95,10 +96,10 @@ def derivative(state, command, current_n, wrench_b, numbers, out):
     actuators(state, command, nu_r[0], numbers, out)
 
 
-@allocating
+@compiled
 def breakdown(state, command, current_n, wrench_b, numbers, out):
     """Fill out (len(BREAKDOWN), 6) with every named term [N, N m], M ν' in sum. Arguments: `derivative`."""
-    evaluate(state, command, current_n, wrench_b, numbers, np.empty((3, 3)), np.empty(6), out)
+    evaluate(state, command, current_n, wrench_b, numbers, scratch(3, 3), scratch(1, 6)[0], out)
 
 
 @compiled

@@ -10,9 +10,8 @@ water, so use P_restoring, not V, there.
 
 from __future__ import annotations
 
-import numpy as np
-
-from subzero.compiled import allocating
+from subzero.compiled import compiled
+from subzero.scratch import scratch
 from vehicle.dynamics import evaluate, relative_velocity
 from vehicle.kinematics import rotation
 from vehicle.restoring import potential
@@ -22,7 +21,7 @@ POWERS = ("propeller", "loss", "restoring", "external")
 """What `power` fills: thrust and reaction torque; fins, lift and drag; weight and buoyancy; from outside."""
 
 
-@allocating
+@compiled
 def power(state, command, current_n, wrench_b, numbers, out):
     """Fill out (len(POWERS),) with the powers on the hull relative to the water [W].
 
@@ -34,7 +33,7 @@ def power(state, command, current_n, wrench_b, numbers, out):
         numbers: as for `derivative`.
         out: the powers; losses are negative, whatever the motion.
     """
-    R, nu_r, terms = np.empty((3, 3)), np.empty(6), np.empty((TERM_COUNT, 6))
+    R, nu_r, terms = scratch(3, 3), scratch(1, 6)[0], scratch(TERM_COUNT, 6)
     evaluate(state, command, current_n, wrench_b, numbers, R, nu_r, terms)
     for i in range(len(POWERS)):
         out[i] = 0.0
@@ -45,10 +44,10 @@ def power(state, command, current_n, wrench_b, numbers, out):
                 out[which] += terms[i, j] * nu_r[j]
 
 
-@allocating
+@compiled
 def kinetic_energy(state, current_n, numbers):
     """Return ½ ν_rᵀ M ν_r, hull and added mass together [J]."""
-    R, nu_r = np.empty((3, 3)), np.empty(6)
+    R, nu_r = scratch(3, 3), scratch(1, 6)[0]
     rotation(state[3:7], R)
     relative_velocity(state, R, current_n, nu_r)
     total = 0.0
@@ -58,9 +57,9 @@ def kinetic_energy(state, current_n, numbers):
     return 0.5 * total
 
 
-@allocating
+@compiled
 def potential_energy(state, numbers):
     """Return the potential energy of weight and buoyancy [J]."""
-    R = np.empty((3, 3))
+    R = scratch(3, 3)
     rotation(state[3:7], R)
     return potential(state[2], R, numbers.restoring)
