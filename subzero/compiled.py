@@ -137,9 +137,16 @@ def packed(values: Numbers) -> Numbers:
     Fields are read and written by the same names. Compiled functions take a record as a single pointer where
     they take a named tuple field by field: that halves the first compilation.
     """
-    out: Any = np.zeros(1, dtype=_layout(values))[0]
-    _fill(out, values)
-    return out
+    inside, shape = _read(values)
+    if shape not in _layouts:
+        _layouts[shape] = _layout(values)
+    out: Any = np.zeros(1, dtype=_layouts[shape])
+    out[0] = inside
+    return out[0]
+
+
+_layouts: dict[Any, np.dtype[Any]] = {}
+"""What a value of `packed` is made of → its dtype."""
 
 
 @cache
@@ -150,33 +157,32 @@ def _names(kind: type) -> tuple[str, ...] | None:
     return getattr(kind, "_fields", None)
 
 
-def _parts(value: Any) -> dict[str, Any] | None:
-    """Return the fields of a named tuple or dataclass by name; None for anything else."""
+def _fields(value: Any) -> tuple[str, ...] | None:
+    """Return the names of the fields of a named tuple or dataclass; None for anything else."""
     kind: Any = type(value)
-    names = _names(kind)
-    return None if names is None else {name: getattr(value, name) for name in names}
+    return _names(kind)
+
+
+def _read(value: Any) -> tuple[Any, Any]:
+    """Return a value of `packed` as numpy takes it (records as tuples, rows as lists), and what it is made of."""
+    if isinstance(value, np.record):
+        return value, value.dtype
+    names = _fields(value)
+    if names is None and not isinstance(value, tuple):
+        return value, (value.dtype, value.shape) if isinstance(value, np.ndarray) else type(value)
+    parts = [_read(part) for part in (value if names is None else [getattr(value, name) for name in names])]
+    inside = [part for part, _ in parts]
+    return inside if names is None else tuple(inside), (type(value), *(shape for _, shape in parts))
 
 
 def _layout(value: Any) -> np.dtype[Any]:
     """Return the dtype that holds a value of `packed`."""
     if isinstance(value, np.record):
         return value.dtype
-    parts = _parts(value)
-    if parts is not None:
-        return np.dtype((np.record, [(name, _layout(part)) for name, part in parts.items()]))
+    names = _fields(value)
+    if names is not None:
+        return np.dtype((np.record, [(name, _layout(getattr(value, name))) for name in names]))
     if isinstance(value, tuple):
         return np.dtype((_layout(value[0]), (len(value),)))
     array = np.asarray(value)
     return np.dtype((array.dtype, array.shape))
-
-
-def _fill(record: Any, value: Any) -> None:
-    """Copy the fields of a value into a record of its layout."""
-    for name, part in (_parts(value) or {}).items():
-        if _parts(part) is not None:
-            _fill(record[name], part)
-        elif isinstance(part, tuple):
-            for row, one in zip(record[name], part, strict=True):
-                _fill(row, one)
-        else:
-            record[name] = part

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -33,12 +34,18 @@ class CrossFlowDrag:
 
     def numbers(self, hull: Hull, density: float, strips: int = STRIPS) -> np.ndarray:
         """Return (strips, 2): centroid x from the hull centre [m], and ½ρ C_d ∫2R dx [kg/m]."""
-        step = hull.length / (strips * PARTS)
-        x = hull.nose_station - step * (np.arange(strips * PARTS) + 0.5)
-        part = hull_radius(hull, x) * step
-        area = part.reshape(strips, PARTS).sum(axis=1)
-        centroid = (part * x).reshape(strips, PARTS).sum(axis=1) / area
+        centroid, area = slices(hull, strips)
         return np.column_stack([centroid, density * self.drag_coefficient * area])
+
+
+@lru_cache(maxsize=64)
+def slices(hull: Hull, strips: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the centroids from the hull centre [m] and half the side areas [m2] of slices, (strips,) each."""
+    step = hull.length / (strips * PARTS)
+    x = hull.nose_station - step * (np.arange(strips * PARTS) + 0.5)
+    part = hull_radius(hull, x) * step
+    area = part.reshape(strips, PARTS).sum(axis=1)
+    return (part * x).reshape(strips, PARTS).sum(axis=1) / area, area
 
 
 @compiled
