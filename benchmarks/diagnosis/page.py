@@ -1,6 +1,6 @@
 """The page docs/diagnosis_benchmark.md, from whatever results there are.
 
-``python -m benchmarks.diagnosis.page`` writes it from the last run that was finished, and what there is of the next.
+``python -m benchmarks.diagnosis.page`` writes it from what there is of the run by now.
 """
 
 from __future__ import annotations
@@ -23,13 +23,12 @@ from .words import BEFORE_WORDS, HEAD, NEAR_WORDS, NOT_YET, UNFINISHED
 PAGE = FIGURES.parent / "diagnosis_benchmark.md"
 
 
-def write_page(path: Path, earlier: Path | None = None, since: Path | None = None) -> Path:
+def write_page(path: Path, earlier: Path | None = None) -> Path:
     """Write the page and its figures, and return its path.
 
     Args:
         path: of the results that it rests on; times, advice and degraded records are beside them.
         earlier: of results of another seed, with what the engine was before.
-        since: of results of a seed that is not finished, with what the engine is now.
     """
     results = read(path)
     before = read(earlier) if earlier and earlier != path else []
@@ -38,8 +37,7 @@ def write_page(path: Path, earlier: Path | None = None, since: Path | None = Non
     draw(sound)
     parts = [_head(sound, broken), _scores(sound, before), _pictures(), sections.missed(sound),
              sections.confounded(sound), sections.limits(sound),
-             *_beside(sound, path, earlier), *([sections.since(read(since))] if since else []),
-             sections.all_cases(sound)]  # fmt: skip
+             *_beside(sound, path, earlier), sections.all_cases(sound)]  # fmt: skip
     PAGE.write_text("\n\n".join(parts) + "\n")
     return PAGE
 
@@ -112,4 +110,4 @@ def _pictures() -> str:
 
 
 if __name__ == "__main__":
-    print(write_page(place(BEFORE), since=place(SEED)))
+    print(write_page(place(SEED), place(BEFORE)))

@@ -7,9 +7,7 @@ from math import inf
 
 import numpy as np
 
-from . import figures_of
 from .advice import decided
-from .cases import SHARES
 from .degraded import rows
 from .scores import CLEAR, Result, Score, first, is_right, names, of, smallest_D, truth, wrongly_sure
 from .times import LIMITS, Row
@@ -20,7 +18,6 @@ from .words import (
     DEGRADED_WORDS,
     LIMITS_WORDS,
     MISSED_WORDS,
-    SINCE_WORDS,
     TIMES_WORDS,
 )
 
@@ -124,18 +121,6 @@ def degraded(results: Sequence[Result]) -> str:
         "wrong name with p ≥ 0.95",
     ]
     return f"## Degraded records\n\n{DEGRADED_WORDS}\n\n" + table(header, body)
-
-
-def since(results: Sequence[Result]) -> str:
-    """Return what the engine makes by now of the first cases of another seed, and which it misses."""
-    sound = [one for one in results if "error" not in one]
-    found = [s for s in figures_of.rows(sound) if s.cases]
-    body = [[s.words, s.value, s.interval, str(s.cases), s.target, mark(s)] for s in found]
-    header = ["figure", "value", "95 % interval", "cases", "target", ""]
-    words = SINCE_WORDS.format(seed=sound[0]["seed"], cases=len(sound), whole=sum(SHARES.values()),
-                               broken=len(results) - len(sound))  # fmt: skip
-    lost = missed(sound).replace("## ", "### ", 1)
-    return f"## Since then\n\n{words}\n\n{counted(found)}\n\n{table(header, body)}\n\n{lost}"
 
 
 def mark(s: Score) -> str:

@@ -51,15 +51,10 @@ NOT_YET = "**Not measured yet on these cases: this is of the engine before, on t
 
 BEFORE_WORDS = """The last column is what the engine before had, on {cases} cases of seed {seed}: so much figures
 change with the engine and with the luck of a seed. What changed before these cases were drawn: causes that begin in
-mid-trial are fitted with real runs, their time as a parameter, along the run of a force that nobody explains; they are
-named from a probability of 0.8 on and are rivals below; and where even wide tolerances do not come close to a record,
-the search begins at such a run."""
-
-SINCE_WORDS = """The engine is another since: causes that begin in mid-trial are fitted with real runs, their time as a
-parameter, along the run of a force that nobody explains, or as large as the best hypotheses have them throughout; they
-are named from a probability of 0.8 on and are rivals below; and where even wide tolerances do not come close to a
-record, the search begins at such a run. A run on a fresh seed, {seed}, is under way; the figures above are not those of
-this engine. So far it has made {cases} of {whole} cases, every kind in its share, {broken} of them in error:"""
+mid-trial are fitted with real runs, their time as a parameter, along the run of a force that nobody explains, or as
+large as the best hypotheses have them throughout; they are named from a probability of 0.8 on, and apart from all that
+holds throughout or begins then, and are rivals below; where even wide tolerances do not come close to a record, the
+search begins at such a run. A run takes less than half the time."""
 
 NEAR_WORDS = """Near: so few cases cannot tell it from its
 target, as its 95 % interval reaches that, or, for the calibration, as an engine that is right exactly as often as it

@@ -50,6 +50,16 @@ def test_compiled_code_reads_and_writes_a_record_in_place():
     assert record.inner.matrix[0, 1] == 3.0
 
 
+def test_what_differs_in_kind_or_shape_has_a_layout_of_its_own():
+    one, two, whole = np.eye(1), np.eye(2), Inner(1, np.eye(2))
+    assert packed(Inner(1.5, one)).matrix.shape == (1, 1)
+    assert packed(Inner(2.5, two)).matrix.shape == (2, 2)
+    assert packed(Inner(1.5, two.astype(int))).matrix.dtype == int
+    assert packed(whole).gain.dtype == int
+    assert packed(Inner(1.5, two)).gain.dtype == float
+    assert packed(Outer(inner=whole, row=(Inner(1.0, one),), count=0)).row.shape == (1,)
+
+
 def test_packing_copies_and_a_packed_part_can_be_packed_again():
     matrix = np.eye(2)
     inner = packed(Inner(1.0, matrix))
