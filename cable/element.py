@@ -21,7 +21,8 @@ from typing import Any
 
 import numpy as np
 
-from subzero.compiled import inlined, inner, packed
+from subzero.compiled import inlined, inner
+from subzero.packed import packed
 
 from .properties import CableNumbers
 

@@ -14,7 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from subzero.compiled import inlined, inner, packed
+from subzero.compiled import inlined, inner
+from subzero.packed import packed
 
 from .drum import TURNING
 from .element import Load, chord_length, evaluate_momentum

@@ -18,7 +18,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from subzero.compiled import inner, packed
+from subzero.compiled import inner
+from subzero.packed import packed
 
 FOLD = 0.3
 """δ in `shorten`."""

@@ -16,7 +16,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from subzero.compiled import compiled, packed
+from subzero.compiled import compiled
+from subzero.packed import packed
 
 from .lumped_band import WIDTH
 from .lumped_load import NodeLoad, new_node_load

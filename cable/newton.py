@@ -11,10 +11,9 @@ from subzero.compiled import compiled, inlined, inner
 
 from .assembly import assemble, assemble_residual
 from .bending import factor_step, has_residual, solve_factored
-from .blocks import SIZE, spread
 from .differences import Weights
 from .element import Load
-from .line import GUESS, LOWER, NEW, RESIDUAL, STEP, Line, held_node
+from .line import GUESS, NEW, RESIDUAL, STEP, Line, held_node
 from .properties import CableNumbers, DrumNumbers
 from .slack import STRAIN_SCALE
 
@@ -54,8 +53,8 @@ def solve_step(
     from run to run, which sensitivities by differences see. Whether a guess will do, the residual tells by itself.
     """
     rounding, alone = ROUNDING * (c.mass + c.added_mass) * w.a0 * w.b0, has_residual(line, c)
-    made = not (near and alone)
-    _residual(line, w, c, drum, work, not made)
+    made = not near
+    _residual(line, w, c, drum, work, near)
     merit = _merit(line)
     for iteration in range(MAX_ITERATIONS):
         if _size(line, rounding, merit) <= 1.0:
@@ -66,9 +65,9 @@ def solve_step(
         if not line.ends.factored:
             break
         solve_factored(line, c)
-        last_length, before, fraction = _save(line), merit, 1.0
+        last_length, before, fraction = save_guess(line), merit, 1.0
         for _ in range(MAX_HALVINGS):
-            _update(line, last_length, fraction)
+            go_from_guess(line, last_length, fraction)
             _residual(line, w, c, drum, work, alone)
             made, merit = not alone, _merit(line)
             if isfinite(merit) and merit <= before * (1.0 - 0.1 * fraction) + 1e-30:
@@ -77,28 +76,6 @@ def solve_step(
         if not isfinite(merit):
             break
     return _solved(line, rounding, _size(line, rounding, merit) <= 1.0, MAX_ITERATIONS)
-
-
-@inner
-def follow_tow(line: Line, tow: np.ndarray) -> bool:
-    """Move the tow point of the answer on level NEW, and all that moves with it by the factors of the last matrix.
-
-    False, and nothing has moved, if there are none.
-    """
-    step, at, L = line.rows[RESIDUAL], line.position[NEW, 0], line.blocks[LOWER]
-    if not line.ends.factored:
-        return False
-    for j in range(1, line.ends.count + 1):
-        for m in range(SIZE):
-            step[j, m] = 0.0
-    for m in range(SIZE):
-        for i in range(3):
-            step[1, m] += L[1, 1 + i, m] * (tow[i] - at[i])
-    spread(L, line.ends.count, step)
-    _update(line, _save(line), 1.0)
-    for i in range(3):
-        at[i] = tow[i]
-    return True
 
 
 @compiled
@@ -112,7 +89,7 @@ def _residual(line: Line, w: Weights, c: CableNumbers, drum: DrumNumbers, work: 
 
 
 @compiled
-def _save(line: Line) -> float:
+def save_guess(line: Line) -> float:
     """Keep the guess and the Newton step; return the guess of the last segment's length. [m]."""
     for j in range(1, line.ends.count + 1):
         line.rows[GUESS, j, 0] = line.tension[NEW, j]
@@ -124,7 +101,7 @@ def _save(line: Line) -> float:
 
 
 @compiled
-def _update(line: Line, last_length: float, fraction: float) -> None:
+def go_from_guess(line: Line, last_length: float, fraction: float) -> None:
     """Write guess minus `fraction` of the Newton step to level NEW."""
     N, held, guess, step = line.ends.count, held_node(line), line.rows[GUESS], line.rows[STEP]
     for j in range(1, N + 1):

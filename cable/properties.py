@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from subzero.compiled import packed
+from subzero.packed import packed
 
 GRAVITY = 9.81
 """Gravitational acceleration g, as printed in section 2.2 of the source. [m/s²]"""

@@ -20,10 +20,10 @@ from .drum import FREE, STANDING, next_mode
 from .element import Load
 from .growing import merge_last, split_last
 from .line import BEFORE, NEW, NOW, SPLIT_AT, Line, feel_water, held_node, spacing
-from .newton import Solved, follow_tow, solve_step
+from .newton import Solved, solve_step
 from .properties import CableNumbers, DrumNumbers
 from .slack import KNOWN, SMOOTHING
-from .tow_point import fill_node_tensions
+from .tow_point import fill_node_tensions, follow_tow
 from .water import Water
 
 SOFTEST = 1e-4

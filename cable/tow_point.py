@@ -1,4 +1,4 @@
-"""The two ends of the cable: tensions there, and how the tow force answers to the tow point."""
+"""The two ends of the cable: tensions there, and how the tow force, and all the cable, answers to the tow point."""
 
 from __future__ import annotations
 
@@ -8,7 +8,9 @@ import numpy as np
 
 from subzero.compiled import inner
 
-from .line import NEW, Line
+from .blocks import SIZE, spread
+from .line import LOWER, NEW, RESIDUAL, Line
+from .newton import go_from_guess, save_guess
 
 
 @inner
@@ -47,3 +49,25 @@ def impedance(line: Line, Z: np.ndarray) -> None:
             Z[i, k] = line.ends.tow_by_tow[i, k]
             for m in range(4):
                 Z[i, k] -= line.ends.tow_by_block[i, m] * line.ends.tow_answer[k, m]
+
+
+@inner
+def follow_tow(line: Line, tow: np.ndarray) -> bool:
+    """Move the tow point of the answer on level NEW, and all that moves with it by the factors of the last matrix.
+
+    False, and nothing has moved, if there are none.
+    """
+    step, at, L = line.rows[RESIDUAL], line.position[NEW, 0], line.blocks[LOWER]
+    if not line.ends.factored:
+        return False
+    for j in range(1, line.ends.count + 1):
+        for m in range(SIZE):
+            step[j, m] = 0.0
+    for m in range(SIZE):
+        for i in range(3):
+            step[1, m] += L[1, 1 + i, m] * (tow[i] - at[i])
+    spread(L, line.ends.count, step)
+    go_from_guess(line, save_guess(line), 1.0)
+    for i in range(3):
+        at[i] = tow[i]
+    return True

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from subzero.compiled import packed
+from subzero.packed import packed
 
 from .drum import LENGTH, TENSION
 from .properties import DrumNumbers

@@ -11,7 +11,6 @@ Setting ``NUMBA_DISABLE_JIT=1`` runs the same code interpreted.
 
 from __future__ import annotations
 
-import dataclasses
 import hashlib
 import os
 from collections.abc import Callable
@@ -22,10 +21,8 @@ from typing import Any, TypeVar
 
 import numba
 import numba.extending
-import numpy as np
 
 Function = TypeVar("Function", bound=Callable[..., Any])
-Numbers = TypeVar("Numbers")
 
 numba.config.OPT = type(numba.config.OPT)(
     1
@@ -129,60 +126,3 @@ def by_field(field: str, yes: Function, no: Function) -> Function:
 
     numba.extending.overload(choose)(typed)
     return choose  # type: ignore[return-value]
-
-
-def packed(values: Numbers) -> Numbers:
-    """Return a named tuple or dataclass of numbers, arrays, and more of its kind as one record in memory.
-
-    Fields are read and written by the same names. Compiled functions take a record as a single pointer where
-    they take a named tuple field by field: that halves the first compilation.
-    """
-    inside, shape = _read(values)
-    if shape not in _layouts:
-        _layouts[shape] = _layout(values)
-    out: Any = np.zeros(1, dtype=_layouts[shape])
-    out[0] = inside
-    return out[0]
-
-
-_layouts: dict[Any, np.dtype[Any]] = {}
-"""What a value of `packed` is made of → its dtype."""
-
-
-@cache
-def _names(kind: type) -> tuple[str, ...] | None:
-    """Return the names of the fields of a kind of named tuple or dataclass; None for anything else."""
-    if dataclasses.is_dataclass(kind):
-        return tuple(field.name for field in dataclasses.fields(kind))
-    return getattr(kind, "_fields", None)
-
-
-def _fields(value: Any) -> tuple[str, ...] | None:
-    """Return the names of the fields of a named tuple or dataclass; None for anything else."""
-    kind: Any = type(value)
-    return _names(kind)
-
-
-def _read(value: Any) -> tuple[Any, Any]:
-    """Return a value of `packed` as numpy takes it (records as tuples, rows as lists), and what it is made of."""
-    if isinstance(value, np.record):
-        return value, value.dtype
-    names = _fields(value)
-    if names is None and not isinstance(value, tuple):
-        return value, (value.dtype, value.shape) if isinstance(value, np.ndarray) else type(value)
-    parts = [_read(part) for part in (value if names is None else [getattr(value, name) for name in names])]
-    inside = [part for part, _ in parts]
-    return inside if names is None else tuple(inside), (type(value), *(shape for _, shape in parts))
-
-
-def _layout(value: Any) -> np.dtype[Any]:
-    """Return the dtype that holds a value of `packed`."""
-    if isinstance(value, np.record):
-        return value.dtype
-    names = _fields(value)
-    if names is not None:
-        return np.dtype((np.record, [(name, _layout(getattr(value, name))) for name in names]))
-    if isinstance(value, tuple):
-        return np.dtype((_layout(value[0]), (len(value),)))
-    array = np.asarray(value)
-    return np.dtype((array.dtype, array.shape))

@@ -13,10 +13,11 @@ from cable.energy import FLOWS, energy_flow
 from cable.laying import lay_straight, start_in_water
 from cable.line import NOW, Line, new_line
 from cable.pull_out import START_LENGTH
-from subzero.compiled import compiled, packed
+from subzero.compiled import compiled
 from subzero.hull import feel_current, pose, tow_point
 from subzero.missing_force import MissingForce
 from subzero.model import Model
+from subzero.packed import packed
 from subzero.run_state import Fixed, Live, Orders, Setup, new_now
 from subzero.surroundings import drum_of, water_of, way_of_drum
 

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from subzero.compiled import packed
+from subzero.packed import packed
 from vehicle.actuators import Servo, Servos
 from vehicle.added_mass import AddedMass
 from vehicle.axial_drag import AxialDrag

@@ -5,7 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from subzero.compiled import cache_directory, compiled, packed, source_digest
+from subzero.compiled import cache_directory, compiled, source_digest
+from subzero.packed import packed
 
 
 class Inner(NamedTuple):
