@@ -25,9 +25,9 @@ from .truth import NoRunError, agreed, noisy
 
 SHARES = {"single": 400, "healthy": 200, "pair": 100, "outside": 60, "twin": 20, "degraded": 20, "sudden": 60}
 """How many of each make the whole benchmark."""
-SEED, BEFORE = 53, 37
+SEED, BEFORE = 59, 37
 """Of all cases; of those that the engine had before, when it was another."""
-SETTLED = {37: 31, 53: 47}
+SETTLED = {37: 31, 59: 53}
 """Seed → the last one that something was chosen with before."""
 BEGINS, GRID = (0.2, 0.7), 0.05
 """When a sudden effect begins, as shares of the trial; at whole steps of the coarsest truth. [s]"""

@@ -69,7 +69,17 @@ def foreigners(search: Search) -> list[Foreign]:
     sudden = _sudden(search, close, max(_most(found + own), best.log_posterior))
     if _most(found + own) > max(_most(sudden), best.log_posterior) - WORTH:
         found = _finer(search, found, own)
-    return _sorted(found, own + sudden)
+    ranked = _sorted(found, own + sudden)
+    _nothing_again(search, ranked[0])
+    return ranked
+
+
+def _nothing_again(search: Search, first: Foreign) -> None:
+    """Fit "nothing is wrong" from where what explains the records is, beside nothing, if that seems more probable than
+    every hypothesis: it may only have begun in a better place.
+    """
+    if first.place and first.log_posterior > search.best().log_posterior:
+        search.fit((), first.place.fit)
 
 
 def _finer(search: Search, found: list[Foreign], own: list[Foreign]) -> list[Foreign]:

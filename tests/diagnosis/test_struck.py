@@ -16,11 +16,12 @@ from subzero.diagnosis.begun import begun_at
 from subzero.diagnosis.closer import closer
 from subzero.diagnosis.contenders import contenders, names_of, to_come
 from subzero.diagnosis.effects import catalogue
-from subzero.diagnosis.foreign import SURE, Foreign, is_explained
+from subzero.diagnosis.foreign import SURE, Foreign, _nothing_again, is_explained
 from subzero.diagnosis.hypotheses import places, variances
 from subzero.diagnosis.one_term import one_terms
 from subzero.diagnosis.refit import is_lost, refit
 from subzero.diagnosis.rules import APART, Late, decide
+from subzero.diagnosis.search import Search
 from subzero.diagnosis.struck import Hope, _worth, in_its_place, struck
 from subzero.diagnosis.sudden_told import (
     cause_of,
@@ -135,6 +136,23 @@ def test_it_ends_the_search_only_if_it_leaves_noise_and_is_far_before_the_rest(f
     assert not is_explained(best(-SURE - 1.0), [Foreign(beside=(), what=lost, log_posterior=0.0)])
     assert not is_explained(best(-SURE - 1.0), [Foreign(beside=(), what=force.what, log_posterior=0.0)])
     assert not is_explained(best(-SURE - 1.0), [])
+
+
+def test_nothing_wrong_is_fitted_again_where_a_sudden_cause_of_no_size_explains_the_records(plant):
+    """Fits of a rough record may end in a hollow, and whatever begins elsewhere then explains more."""
+    problem, force, _ = asked(plant())
+    good = force.place
+    search = Search(problem=problem, progress=lambda share, words: None)
+    search.wide = good.fit
+    search.only_nothing()
+    right = search.best()
+    before = right.log_posterior - 40.0
+    search.candidates[()] = replace(right, log_posterior=before)
+    _nothing_again(search, Foreign(beside=(), what=force.what, log_posterior=before + 40.0))
+    _nothing_again(search, Foreign(beside=(), what=force.what, log_posterior=before - 1.0, place=good))
+    assert search.best().log_posterior == before, "only if it explains the records, and more"
+    _nothing_again(search, Foreign(beside=(), what=force.what, log_posterior=before + 40.0, place=good))
+    assert search.best().log_posterior == pytest.approx(right.log_posterior, abs=2.0)
 
 
 def test_it_is_told_in_words_and_numbers(work):
