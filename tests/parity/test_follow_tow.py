@@ -19,6 +19,7 @@ from cable.water import Current
 from subzero.compiled import compiled
 
 CABLE = CableProperties(mass_per_length=0.02, compliance=1e-4).numbers()
+STIFF = CableProperties(mass_per_length=0.02, compliance=1e-4, bending_stiffness=1e-3).numbers()
 DRUM = DrumProperties(friction_torque=0.01).numbers()
 WATER = Current.uniform([0.05, -0.1, 0.02]).numbers()
 STEP, LENGTH = 0.1, 8.0
@@ -30,9 +31,9 @@ def place(time):
     return np.array([LENGTH + 0.9 * time, 0.2 * time * time, 0.1 * np.sin(2.0 * time)])
 
 
-def asked(line, work, tow, again=False):
+def asked(line, work, tow, again=False, c=CABLE):
     """Return how the next step is solved for a tow point."""
-    return try_step(line, STEP, tow, WATER, CABLE, DRUM, work, again)
+    return try_step(line, STEP, tow, WATER, c, DRUM, work, again)
 
 
 @compiled
@@ -42,17 +43,21 @@ def follow(line, tow):
 
 @pytest.fixture
 def towed():
+    return pulled(CABLE)
+
+
+def pulled(c):
     """Return a cable with the answer to the next place of its tow point, work space, and that place."""
     line, work = new_line(60), new_load()
     line.ends.segment_length = 0.5
     north = np.array([1.0, 0.0, 0.0])
-    lay_straight(line, LENGTH, north, 0.9 * north, DRUM, CABLE)
-    start_in_water(line, WATER, CABLE, work)
+    lay_straight(line, LENGTH, north, 0.9 * north, DRUM, c)
+    start_in_water(line, WATER, c, work)
     for row in range(1, 26):
-        assert asked(line, work, place(row * STEP)).converged
-        accept(line, STEP, CABLE, work)
+        assert asked(line, work, place(row * STEP), c=c).converged
+        accept(line, STEP, c, work)
     tow = place(26 * STEP)
-    assert asked(line, work, tow).converged
+    assert asked(line, work, tow, c=c).converged
     return line, work, tow
 
 
@@ -102,3 +107,9 @@ def test_without_factors_nothing_moves_and_the_step_begins_with_a_prediction(tow
     assert not follow(line, tow + ASIDE)
     np.testing.assert_array_equal(before, state(line))
     assert asked(line, work, tow, again=True).iterations > 0
+
+
+def test_a_stiff_cable_has_a_matrix_but_no_factors_and_begins_with_a_prediction():
+    line, work, tow = pulled(STIFF)
+    assert not follow(line, tow + ASIDE)
+    assert asked(line, work, tow, again=True, c=STIFF).iterations > 0
