@@ -83,7 +83,8 @@ def _sudden(results: Sequence[Result]) -> list[Score]:
               lambda one: not names(one) <= hidden(one), "≤ 1 %", most=0.01),
         number("… error of when it began", late, "–", "{:.2f} s"),
         number("… error of its parameter", off, "–", "{:.1%}"),
-        share("… 95 % interval covers the truth", [{"in": x} for x in covered], lambda one: one["in"], "–"),
+        share("… 95 % interval of its parameter covers the truth", [{"in": x} for x in covered],
+              lambda one: one["in"], "–"),
     ]  # fmt: skip
 
 

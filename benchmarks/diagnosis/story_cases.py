@@ -90,8 +90,8 @@ STORIES = (
     Story(
         name="cable_drag_or_current",
         title="4. Drag along the cable, or a current?",
-        words="A straight run; the log begins at 8 s, under way, and shows the shaft's speed, too. A following current of "
-        "0.55 m/s pays out more cable, which reads as more drag along it: speed through the water hardly tells.",
+        words="A straight run; the log begins at 8 s, under way, and shows the shaft's speed, too. A following current "
+        "of 0.55 m/s pays out more cable, which reads as more drag along it: speed through the water hardly tells.",
         trial=straight_run,
         hidden={"current": (0.49, 0.25)},
         begins=8.0,
