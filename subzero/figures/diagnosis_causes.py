@@ -49,7 +49,7 @@ def evidence(verdict: Verdict, title: Title) -> Figure | None:
     for axes in (plain, logarithmic):
         axes.barh(range(len(ranked)), [p for _, p in ranked], color=colours, height=0.65)
         axes.set_xlabel("probability", fontsize=style.NORMAL)
-    _names(plain, [name for name, _ in ranked])
+    _names(plain, [name.replace(" + ", " +\n") for name, _ in ranked])
     plain.set_xlim(0.0, 1.0)
     headline(plain, "Probability of each")
     logarithmic.set_xscale("log")
