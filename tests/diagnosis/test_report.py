@@ -233,6 +233,13 @@ def test_every_verdict_has_the_figures_that_belong_to_it():
     assert draw_diagnosis(Verdict(verdict=NOTHING_WRONG, sentence=""), title) == {}
 
 
+def test_the_names_of_a_long_pair_are_within_their_figure():
+    pair = "propeller_thrust_slope + sensor_scale:surge_speed"
+    verdict = dataclasses.replace(NAMED, probabilities={"rudder_lag": 0.9, pair: 0.1})
+    box = draw_diagnosis(verdict, Title(words="a trial", scenario="fig6"))["evidence"].get_tightbbox()
+    assert box.x0 >= 0.0
+
+
 def test_a_drift_has_the_unit_of_its_channel_in_words_figure_and_file():
     assert words.unknown(DRIFT.unknown) == (
         "A drift of the heading's sensor that no cause explains: 6 ± 0.98 degree at t = 30 s, where it is largest."
