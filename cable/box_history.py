@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
@@ -10,6 +9,7 @@ import numpy as np
 
 from cable.box_newton import CONVERGED, OUTCOMES, ROW_NAMES, BoxWorkspace, NewtonReport
 from cable.equation7 import tangent
+from subzero.errors import BadValueError, checked, real, short
 
 TowVelocity = Callable[[float], Sequence[float] | np.ndarray]
 """Gives the tow point's velocity (north, east, down) [m/s] at a time [s]."""
@@ -128,13 +128,14 @@ def explain(report: NewtonReport, time: float, remedy: str) -> str:
 def check_positive(**values: float) -> None:
     """Refuse a value that is not a finite number above zero, by name."""
     for name, value in values.items():
-        if not (math.isfinite(value) and value > 0.0):
-            raise ValueError(f"{name} is {value!r}; it must be a finite number, more than 0.")
+        checked("", name, value, above=0.0)
 
 
 def velocity_at(tow_velocity: TowVelocity, time: float) -> tuple[float, float, float]:
     """Return the tow point's velocity as three floats, or refuse it. [m/s]."""
-    north, east, down = (float(x) for x in tow_velocity(time))
-    if not math.isfinite(north + east + down):
-        raise ValueError(f"tow_velocity({time:g}) is ({north}, {east}, {down}); it must be finite, in m/s.")
-    return north, east, down
+    given = tow_velocity(time)
+    numbers = [real(x) for x in given] if np.shape(given) == (3,) else [None]
+    if None in numbers:
+        raise BadValueError(f"tow_velocity({time:g}) is {short(given)}; it must be three finite numbers, in m/s.")
+    north, east, down = numbers
+    return north, east, down  # type: ignore[return-value]

@@ -25,7 +25,7 @@ from cable.box_equations import (
 )
 from cable.box_solver import CARRIED, RIGHT, SIZE, WINDOW, back_substitute, carry, eliminate
 from cable.equation7 import EQUATIONS, Equation7Numbers
-from subzero.compiled import compiled
+from subzero.compiled import compiled, inlined, inner
 
 CONVERGED, STALLED, SINGULAR, NOT_FINITE, FULL, SLACK = 0, 1, 2, 3, 4, 5
 OUTCOMES = (
@@ -59,6 +59,12 @@ class NewtonReport(NamedTuple):
     node: int
     row: int
     """Index into `ROW_NAMES`."""
+
+
+@inlined
+def told(report: NewtonReport) -> tuple[int, int, float, int, int]:
+    """Return a report as compiled code may hand it to Python: a plain tuple, see `subzero.compiled`."""
+    return report.outcome, report.iterations, report.residual, report.node, report.row
 
 
 class BoxWorkspace(NamedTuple):
@@ -137,7 +143,7 @@ def last_length(w: BoxWorkspace, rule: BoxRule) -> float:
     return rule.end_history - w.y[last, 1] / rule.rate if rule.moves else w.length[last]
 
 
-@compiled
+@inner
 def newton_pass(
     w: BoxWorkspace, rule: BoxRule, ends: Ends, c: Equation7Numbers, force: float, speed: float
 ) -> NewtonReport:
@@ -195,7 +201,7 @@ def move(w: BoxWorkspace, fraction: float) -> None:
             w.y[j, i] = w.base[j, i] + fraction * w.update[j, i]
 
 
-@compiled
+@inner
 def solve_boxes(w: BoxWorkspace, rule: BoxRule, ends: Ends, c: Equation7Numbers) -> NewtonReport:
     """Solve all box equations for ``w.y``, starting from what it holds; see the module's first words."""
     force, speed = scales(w, ends, c)

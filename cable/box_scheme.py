@@ -42,7 +42,7 @@ from cable.box_newton import (
 from cable.equation7 import Equation7Numbers, equation7_numbers
 from cable.paper_scheme import NOTHING
 from cable.properties import CableProperties, DrumNumbers, DrumProperties
-from subzero.compiled import compiled
+from subzero.compiled import compiled, inner
 
 GAMMA = 2.0 - math.sqrt(2.0)
 NEW_SHARE = 1.0 / (GAMMA * (2.0 - GAMMA))
@@ -54,7 +54,7 @@ MOST_HALVINGS = 6
 """A failing step is halved this often before the run stops."""
 
 
-@compiled
+@inner
 def solve_stage(
     w: BoxWorkspace, a: float, end_history: float, ends: Ends, c: Equation7Numbers
 ) -> NewtonReport:
@@ -68,7 +68,7 @@ def solve_stage(
     return report
 
 
-@compiled
+@inner
 def refuse_slack(w: BoxWorkspace, report: NewtonReport, ends: Ends, c: Equation7Numbers) -> NewtonReport:
     """Return the report, or one that names the node with the least tension when that is below zero."""
     worst = 0
@@ -118,8 +118,8 @@ def second_stage(b: MovingEnd, length: float, middle_length: float) -> float:
 @compiled
 def box_step(
     b: MovingEnd, step: float, middle: Ends, new: Ends, segment_length: float, c: Equation7Numbers
-) -> NewtonReport:
-    """Take one TR-BDF2 step; on failure ``b`` holds the cable before the step.
+) -> tuple[int, int, float, int, int]:
+    """Take one TR-BDF2 step, and return its `NewtonReport` as a tuple; on failure ``b`` holds the cable before the step.
 
     Args:
         b: the cable, started with `start_moving_end`.
@@ -131,7 +131,7 @@ def box_step(
     """
     w, a = b.boxes, 2.0 / (GAMMA * step)
     if not begin_step(b, middle):
-        return NewtonReport(CONVERGED, 0, 0.0, 0, 0)
+        return CONVERGED, 0, 0.0, 0, 0
     last, length = w.count[0] - 1, w.length[w.count[0] - 1]
     end_history = first_stage(b, a)
     report = solve_stage(w, a, end_history, middle, c)
@@ -145,13 +145,13 @@ def box_step(
         report = refuse_slack(w, report, new, c)
     if report.outcome != CONVERGED:
         copy_nodes(b.old, w.y, last + 1)
-        return NewtonReport(report.outcome, spent, report.residual, report.node, report.row)
+        return report.outcome, spent, report.residual, report.node, report.row
     for j in range(last + 1):
         for i in range(6):
             b.rate[j, i] = a * (w.y[j, i] - w.history[j, i])
     w.length[last] = end_history - w.y[last, 1] / a
     fits = fit_nodes(b, segment_length)
-    return NewtonReport(CONVERGED if fits else FULL, spent, report.residual, report.node, report.row)
+    return CONVERGED if fits else FULL, spent, report.residual, report.node, report.row
 
 
 def pull_out_boxes(
@@ -179,7 +179,7 @@ def pull_out_boxes(
         The history; a run that cannot go on is cut short and says so in `message`.
 
     Raises:
-        ValueError: a step, duration or segment length that is not positive, or a velocity that is not finite.
+        subzero.UserError: a step, duration or segment length that is not positive, or a velocity that is not finite.
     """
     check_positive(duration=duration, step=step, segment_length=segment_length)
     cable, drum = cable or CableProperties(), drum or DrumProperties()
@@ -215,7 +215,7 @@ def _advance(
         Ends(*velocity_at(tow_velocity, at), turning.inertia, turning.friction, False)
         for at in (time + GAMMA * step, time + step)
     )
-    report = box_step(b, step, middle, new, segment_length, c)
+    report = NewtonReport(*box_step(b, step, middle, new, segment_length, c))
     if report.outcome in (CONVERGED, FULL, SLACK) or halvings == 0:
         return report
     half = 0.5 * step

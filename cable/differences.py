@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from subzero.compiled import compiled
+from subzero.compiled import inner
 
 
 class Weights(NamedTuple):
@@ -37,7 +37,7 @@ class Weights(NamedTuple):
     b_now: float
 
 
-@compiled
+@inner
 def backward_weights(step: float, previous_step: float) -> Weights:
     """Return the weights for a step.
 

@@ -8,6 +8,8 @@ from math import nan
 
 import numpy as np
 
+from subzero.errors import BadValueError, real, short
+
 
 @dataclass(frozen=True, kw_only=True)
 class Outcome:
@@ -64,7 +66,7 @@ class History:
         """Return the node positions (nodes, 3) relative to the drum at the recorded time nearest to t. [m].
 
         Raises:
-            ValueError: t lies outside the run.
+            subzero.UserError: t lies outside the run.
         """
         return self.shapes[self._row(t)]
 
@@ -72,7 +74,7 @@ class History:
         """Return the tensions at the nodes (nodes,) at the recorded time nearest to t. [N].
 
         Raises:
-            ValueError: t lies outside the run.
+            subzero.UserError: t lies outside the run.
         """
         return self.tensions[self._row(t)]
 
@@ -98,7 +100,8 @@ class History:
     def _row(self, t: float) -> int:
         """Return the row whose time is nearest to t."""
         first, last = self.time[0], self.time[-1]
-        if not first - 1e-9 <= t <= last + 1e-9:
-            message = f"There is no shape at t = {t!r} s: the run covers {first:g} to {last:g} s."
-            raise ValueError(message)
+        time = real(t)
+        if time is None or not first - 1e-9 <= time <= last + 1e-9:
+            message = f"There is no shape at t = {short(t)} s: the run covers {first:g} to {last:g} s."
+            raise BadValueError(message)
         return int(np.abs(self.time - t).argmin())

@@ -32,6 +32,25 @@ SPLIT_AT = 1.5
 
 
 @dataclass(kw_only=True)
+class Solved:
+    """How the last iteration ended.
+
+    Attributes:
+        converged: whether it found a solution.
+        iterations: of Newton's method.
+        residual: the largest, as a multiple of its tolerance.
+        worst_node: block in which that stands.
+        worst_equation: which one it is: 0 length, 1 … 3 balance north, east, down.
+    """
+
+    converged: bool = True
+    iterations: int = 0
+    residual: float = 0.0
+    worst_node: int = 0
+    worst_equation: int = 0
+
+
+@dataclass(kw_only=True)
 class Ends:
     """What a cable has once: its growing end at the drum, its tow point, and how it is solved.
 
@@ -58,6 +77,7 @@ class Ends:
         tow_answer: minus the answer of the first block's unknowns (columns) to a displacement of the tow point
             (rows) (3, 4), from the last Newton matrix.
         factored: whether the blocks hold the factors of that matrix.
+        solved: how the last step that was tried was solved.
     """
 
     count: int
@@ -83,6 +103,7 @@ class Ends:
     tow_by_block: np.ndarray
     tow_answer: np.ndarray
     factored: bool
+    solved: Solved
 
 
 class Line(NamedTuple):
@@ -156,6 +177,7 @@ def new_line(capacity: int) -> Line:
         tow_by_block=np.zeros((3, 4)),
         tow_answer=np.zeros((3, 4)),
         factored=False,
+        solved=Solved(),
     )
     per_node = {name: np.zeros((3, n, 3)) for name in ("position", "velocity", "momentum", "water")}
     return Line(

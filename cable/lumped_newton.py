@@ -39,7 +39,7 @@ class StageSolved(NamedTuple):
     worst: int
 
 
-@compiled
+@inner
 def solve_stage(
     rope: Rope, g: float, time: float, c: CableNumbers, drum: DrumNumbers, water: Water
 ) -> StageSolved:

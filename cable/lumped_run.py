@@ -95,7 +95,7 @@ def _try(
     state = rope.spring[STATE].copy()
     h = float((end - done) * (course.times[k] - course.times[k - 1]))
     legs = np.array([_leg(course, k, done + GAMMA * (end - done)), _leg(course, k, end)])
-    solved = take_step(rope, h, legs, c, drum, water, segment_length)
+    solved = StageSolved(*take_step(rope, h, legs, c, drum, water, segment_length))
     if not solved.converged:
         rope.spring[STATE] = state
     return solved

@@ -50,12 +50,15 @@ def take_step(
     drum: DrumNumbers,
     water: Water,
     segment_length: float,
-) -> StageSolved:
-    """Take a step of length h; what the ends do at the end of both stages stands in `legs` (2, 15)."""
+) -> tuple[bool, int, float, int]:
+    """Take a step of length h; what the ends do at the end of both stages stands in `legs` (2, 15).
+
+    Return a `StageSolved` as a tuple, for Python.
+    """
     solved = try_step(rope, h, legs, c, drum, water)
     if solved.converged:
         accept_step(rope, h, segment_length, c)
-    return solved
+    return solved.converged, solved.iterations, solved.residual, solved.worst
 
 
 @inner

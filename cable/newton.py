@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from math import isfinite, sqrt
-from typing import NamedTuple
 
 import numpy as np
 
@@ -27,16 +26,6 @@ SMALLEST_SEGMENT = 1e-9
 """The growing segment never gets shorter than this while iterating. [m]"""
 
 
-class Solved(NamedTuple):
-    """How the iteration ended: `worst_equation` is 0 length, 1 … 3 balance north, east, down, in block `worst_node`."""
-
-    converged: bool
-    iterations: int
-    residual: float
-    worst_node: int
-    worst_equation: int
-
-
 @inner
 def solve_step(
     line: Line,
@@ -45,8 +34,9 @@ def solve_step(
     drum: DrumNumbers,
     work: Load,
     near: bool,
-) -> Solved:
-    """Solve the equations of `assembly` for level NEW, from the guess that stands there. One that is as `near` as that
+) -> bool:
+    """Solve the equations of `assembly` for level NEW, from the guess that stands there; return whether that went well,
+    and leave in `line.ends.solved` how. One that is as `near` as that
     of `follow_tow` is likely to be right: no matrix is made until the residual says that it is not.
 
     The matrix is made anew for every step: a kept one converges to the tolerance only, and what is left then differs
@@ -142,8 +132,8 @@ def _size(line: Line, rounding: float, merit: float) -> float:
 
 
 @compiled
-def _solved(line: Line, rounding: float, converged: bool, iterations: int) -> Solved:
-    """Return how it ended, with the worst equation and where it stands."""
+def _solved(line: Line, rounding: float, converged: bool, iterations: int) -> bool:
+    """Note how it ended, with the worst equation and where it stands; return whether it converged."""
     strain, allowed = _tolerances(line, rounding)
     worst, node, equation = 0.0, 0, 0
     for j in range(1, line.ends.count + 1):
@@ -151,7 +141,10 @@ def _solved(line: Line, rounding: float, converged: bool, iterations: int) -> So
             size = abs(line.rows[RESIDUAL, j, i]) / (strain if i == 0 else allowed)
             if worst == worst and not size <= worst:
                 worst, node, equation = size, j, i
-    return Solved(converged, iterations, worst, node, equation)
+    solved = line.ends.solved
+    solved.converged, solved.iterations, solved.residual = converged, iterations, worst
+    solved.worst_node, solved.worst_equation = node, equation
+    return converged
 
 
 @compiled

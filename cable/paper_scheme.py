@@ -32,10 +32,12 @@ from cable.box_newton import (
     box_workspace,
     copy_nodes,
     solve_boxes,
+    told,
 )
 from cable.equation7 import Equation7Numbers, angles_of, equation7_numbers, tangent
 from cable.properties import CableProperties, DrumProperties
-from subzero.compiled import compiled
+from subzero.compiled import compiled, inner
+from subzero.errors import BadValueError, short
 
 READINGS = ("tangent", "drum")
 NOTHING = 1e-9
@@ -84,8 +86,8 @@ def keep_old_time(w: BoxWorkspace, weight: float, c: Equation7Numbers) -> None:
         known_part(w.y[j - 1], w.y[j], w.length[j], weight, c, w.scratch, w.known[j])
 
 
-@compiled
-def paper_step(
+@inner
+def advance_paper(
     w: BoxWorkspace, step: float, ends: Ends, wound: float, implicit: bool, c: Equation7Numbers
 ) -> NewtonReport:
     """Take one step of the paper's scheme; on failure ``w`` holds the state before the step.
@@ -119,6 +121,14 @@ def paper_step(
     if report.outcome != CONVERGED:
         undo_paper_step(w)
     return report
+
+
+@compiled
+def paper_step(
+    w: BoxWorkspace, step: float, ends: Ends, wound: float, implicit: bool, c: Equation7Numbers
+) -> tuple[int, int, float, int, int]:
+    """Take one step as `advance_paper`, called from Python; return the `NewtonReport` as a tuple."""
+    return told(advance_paper(w, step, ends, wound, implicit, c))
 
 
 @compiled
@@ -163,11 +173,11 @@ def pull_out_paper(
         The history; a run that cannot go on is cut short and says so in `message`.
 
     Raises:
-        ValueError: a reading that is not one of `READINGS`, or a step or duration that is not positive.
+        subzero.UserError: a reading that is not one of `READINGS`, or a step or duration that is not positive.
     """
     check_positive(duration=duration, step=step)
     if reading not in READINGS:
-        raise ValueError(f"reading is {reading!r}; it must be one of {', '.join(READINGS)}.")
+        raise BadValueError(f"reading is {short(reading)}; it must be one of {', '.join(READINGS)}.")
     cable, drum = cable or CableProperties(), drum or DrumProperties()
     north, east, down = (0.0, 0.0, 0.0) if current is None else (float(x) for x in current)
     c, turning = equation7_numbers(cable, (north, east, down)), drum.numbers()
@@ -178,7 +188,7 @@ def pull_out_paper(
     record.add(0.0, w, START)
     for k in range(1, steps + 1):
         ends = Ends(*velocity_at(tow_velocity, k * step), turning.inertia, turning.friction, False)
-        report = paper_step(w, step, ends, wound, implicit, c)
+        report = NewtonReport(*paper_step(w, step, ends, wound, implicit, c))
         if report.outcome != CONVERGED:
             return record.history(explain(report, k * step, _remedy(reading, implicit)))
         record.add(k * step, w, report)

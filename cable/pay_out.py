@@ -12,7 +12,6 @@ from .drum_path import hermite, lead_drum
 from .element import Load
 from .energy import FLOWS, book_step, energy_flow
 from .line import NOW, Line
-from .newton import Solved
 from .properties import CableNumbers, DrumNumbers
 from .step_size import estimate_error, next_step, note_force
 from .stepping import accept, try_step
@@ -96,7 +95,7 @@ def follow_path(
     rtol: float,
     work: Load,
     record: Record,
-) -> tuple[int, Solved]:
+) -> int:
     """Pull the cable along a path of the tow point, recording after every step.
 
     Args:
@@ -111,22 +110,21 @@ def follow_path(
         record: filled from row 0 on, the start.
 
     Returns:
-        the number of rows that are filled (all, unless it failed) and how the last step was solved.
+        the number of rows that are filled (all, unless it failed; `line.ends.solved` tells how the last step was solved).
     """
     rows, used = path.times.size, line.ends.count + 1
     suggested = FIRST_STEP * (path.times[1] - path.times[0])
-    solved = Solved(True, 0, 0.0, 0, 0)
     note_force(line)
     energy_flow(line, c, work, record.ledger[1])
     write_row(line, record, 0, 0, c)
     for k in range(1, rows):
-        solved, suggested = _cover(line, path, k, led, water, c, drum, rtol, suggested, work, record)
-        if not solved.converged or used + line.ends.count + 1 > record.tension.size:
-            return k, solved
+        suggested = _cover(line, path, k, led, water, c, drum, rtol, suggested, work, record)
+        if not line.ends.solved.converged or used + line.ends.count + 1 > record.tension.size:
+            return k
         write_row(line, record, k, used, c)
-        record.iterations[k] = solved.iterations
+        record.iterations[k] = line.ends.solved.iterations
         used += line.ends.count + 1
-    return rows, solved
+    return rows
 
 
 @allocating
@@ -142,8 +140,8 @@ def _cover(
     suggested: float,
     work: Load,
     record: Record,
-) -> tuple[Solved, float]:
-    """Go from times[k−1] to times[k], in smaller steps where needed; return also the step to go on with."""
+) -> float:
+    """Go from times[k−1] to times[k], in smaller steps where needed; return the step to go on with."""
     whole = path.times[k] - path.times[k - 1]
     finest, done, spent, point = whole * 0.5**MOST_CUTS, 0.0, 0, np.zeros(3)
     step = min(suggested, whole) if rtol > 0.0 else whole
@@ -153,10 +151,10 @@ def _cover(
         hermite(near, far, path.leaving[k - 1], path.arriving[k], whole, x, point)
         lead_drum(led, path.times[k - 1] + done + step, drum)
         mode = line.ends.drum_mode
-        solved = try_step(line, step, point, water, c, drum, work)
-        spent += solved.iterations
-        error = estimate_error(line, step) if rtol > 0.0 and solved.converged else 0.0
-        if solved.converged and (error <= rtol or step <= finest * (1.0 + 1e-6)):
+        converged = try_step(line, step, point, water, c, drum, work)
+        spent += line.ends.solved.iterations
+        error = estimate_error(line, step) if rtol > 0.0 and converged else 0.0
+        if converged and (error <= rtol or step <= finest * (1.0 + 1e-6)):
             accept(line, step, c, work)
             note_force(line)
             book_step(line, step, c, work, record.ledger)
@@ -164,14 +162,14 @@ def _cover(
             done += step
             suggested = next_step(step, error, rtol) if error <= rtol else max(step, finest)
             if done >= whole * (1.0 - 1e-9):
-                result = Solved(True, spent, solved.residual, solved.worst_node, solved.worst_equation)
-                return result, suggested
+                line.ends.solved.iterations = spent
+                return suggested
             step = suggested
         else:
             line.ends.drum_mode = mode
-            step = max(next_step(step, error, rtol), finest) if solved.converged else 0.5 * step
+            step = max(next_step(step, error, rtol), finest) if converged else 0.5 * step
             if step < whole * 0.5**MOST_HALVINGS:
-                return solved, step
+                return step
 
 
 @compiled

@@ -6,12 +6,13 @@ moment of inertia I_d is not printed there: 0 makes the tension at a frictionles
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from math import isfinite, sqrt
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from subzero.errors import BadValueError, checked
 from subzero.packed import packed
 
 GRAVITY = 9.81
@@ -78,7 +79,7 @@ class CableProperties:
         bending_stiffness: E I; see `cable.bending`. [N m²]
 
     Raises:
-        ValueError: a value that is not a finite number, or not in its physical range.
+        subzero.UserError: a value that is not a finite number, or not in its physical range (a ValueError, too).
     """
 
     water_density: float = 1000.0
@@ -92,10 +93,7 @@ class CableProperties:
 
     def __post_init__(self) -> None:
         """Refuse what cannot be a cable."""
-        positive = ("water_density", "mass_per_length", "cross_section_area", "diameter")
-        _check_range(self, positive, minimum=0.0, inclusive=False)
-        drags = ("tangential_drag_coefficient", "normal_drag_coefficient", "compliance", "bending_stiffness")
-        _check_range(self, drags, minimum=0.0, inclusive=True)
+        _check(self, above_zero=("water_density", "mass_per_length", "cross_section_area", "diameter"))
 
     @property
     def virtual_mass_per_length(self) -> float:
@@ -128,16 +126,16 @@ class CableProperties:
     def numbers(self) -> Any:
         """Return the plain numbers that compiled code takes: `CableNumbers` or `StiffCableNumbers`."""
         numbers = CableNumbers(
-            mass=float(self.mass_per_length),
-            added_mass=float(self.water_density * self.cross_section_area),
-            weight=float(self.weight_in_water),
-            compliance=float(self.compliance),
-            tangential_drag=float(self.tangential_drag),
-            normal_drag=float(self.normal_drag),
+            mass=self.mass_per_length,
+            added_mass=self.water_density * self.cross_section_area,
+            weight=self.weight_in_water,
+            compliance=self.compliance,
+            tangential_drag=self.tangential_drag,
+            normal_drag=self.normal_drag,
         )
         if self.bending_stiffness > 0.0:
-            return packed(StiffCableNumbers(float(self.bending_stiffness), *numbers))
-        return packed(numbers)
+            return _finite("CableProperties", StiffCableNumbers(self.bending_stiffness, *numbers))
+        return _finite("CableProperties", numbers)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -151,7 +149,7 @@ class DrumProperties:
             holds the cable up to the tension C_f/R_d. [N m]
 
     Raises:
-        ValueError: a value that is not a finite number, or not in its physical range.
+        subzero.UserError: a value that is not a finite number, or not in its physical range (a ValueError, too).
     """
 
     radius: float = 0.1
@@ -160,23 +158,28 @@ class DrumProperties:
 
     def __post_init__(self) -> None:
         """Refuse what cannot be a drum."""
-        _check_range(self, ("radius",), minimum=0.0, inclusive=False)
-        _check_range(self, ("inertia", "friction_torque"), minimum=0.0, inclusive=True)
+        _check(self, above_zero=("radius",))
 
     def numbers(self) -> DrumNumbers:
         """Return the plain numbers that compiled code takes."""
-        return packed(DrumNumbers(self.inertia / self.radius**2, self.friction_torque / self.radius, 0, 0.0))
+        inertia, friction = self.inertia / max(self.radius**2, 5e-324), self.friction_torque / self.radius
+        if not isfinite(inertia + friction):
+            raise BadValueError(
+                f"DrumProperties: radius is {self.radius:g}; so small that inertia and friction are not finite."
+            )
+        return packed(DrumNumbers(inertia, friction, 0, 0.0))
 
 
-def _check_range(
-    thing: CableProperties | DrumProperties, names: tuple[str, ...], *, minimum: float, inclusive: bool
-) -> None:
-    """Raise a ValueError that names the first field of `names` that is outside its range."""
-    known = vars(thing)
-    for name in names:
-        value = getattr(thing, name)
-        fine = isfinite(value) and (value >= minimum if inclusive else value > minimum)
-        if name in known and not fine:
-            allowed = f"{'at least' if inclusive else 'more than'} {minimum:g}"
-            message = f"{type(thing).__name__}: {name} is {value!r}; it must be a finite number, {allowed}."
-            raise ValueError(message)
+def _check(thing: CableProperties | DrumProperties, above_zero: tuple[str, ...]) -> None:
+    """Keep every field as a float, or raise a `BadValueError` that names the first that cannot be; none is negative."""
+    for field in fields(thing):
+        limit: dict[str, float] = {"above": 0.0} if field.name in above_zero else {"least": 0.0}
+        value = checked(type(thing).__name__, field.name, getattr(thing, field.name), **limit)
+        object.__setattr__(thing, field.name, value)
+
+
+def _finite(name: str, numbers: Any) -> Any:
+    """Return what follows from the fields as compiled code takes it; refuse what is not finite."""
+    if all(isfinite(number) for number in numbers):
+        return packed(numbers)
+    raise BadValueError(f"{name}: its numbers are so large that masses, weights or drags are not finite.")

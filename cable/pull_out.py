@@ -6,15 +6,28 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from subzero.errors import BadValueError, checked, short, suggestion
+
 from .drum_path import PLACE, SETPOINT, VELOCITY, drum_path, resting
 from .element import new_load
 from .history import History
 from .laying import lay_straight
 from .line import TOLERANCE, new_line
 from .properties import CableProperties, DrumProperties
-from .runs import TowVelocity, check_tolerance, current_of, first_direction, run, sample_path, segments_needed
+from .runs import (
+    TowVelocity,
+    check_kinds,
+    check_memory,
+    check_motion,
+    check_tolerance,
+    current_of,
+    first_direction,
+    run,
+    sample_path,
+    segments_needed,
+)
 from .water import Current
-from .winch import Brake, PayOutRate, Winch
+from .winch import Brake, ConstantTension, PayOutRate, Winch
 
 START_LENGTH = 1e-6
 """A run "without cable" starts with this length in the water, so that there is a direction. [m]"""
@@ -78,16 +91,25 @@ def pull_out(
         the history from t = 0 on. Look at `history.outcome`: a run that could not go on keeps what it has.
 
     Raises:
-        ValueError: a duration, step or segment length that is not positive, an unknown scheme, a tow velocity or
-            current that is not three finite numbers.
+        subzero.UserError: a duration, step or segment length that is not positive, an unknown scheme, a tow velocity or
+            current that is not three finite numbers, a run that does not fit into memory. (Bad values are a ValueError,
+            too.)
 
     Good values: step 0.1 s and segments of 0.5 m give the tension of a 60° dive at 1 m/s within 2e-4 and the direction
     of the tow force within 4e-4 (`python -m benchmarks.cable` measures both together).
     """
     cable, drum = cable or CableProperties(), drum or DrumProperties()
-    _check(duration, step, segment_length, scheme, rtol, grading)
+    _check(duration, step, segment_length, scheme, rtol, grading, wet_length)
+    check_kinds(
+        cable=(cable, (CableProperties,)), drum=(drum, (DrumProperties, PayOutRate, Brake, ConstantTension))
+    )
+    check_motion("tow_velocity", tow_velocity)
+    if drum_velocity is not None:
+        check_motion("drum_velocity", drum_velocity)
     check_tolerance(tolerance)
     water = current_of(current)
+    if scheme == "lumped":
+        segments_needed(max(wet_length, segment_length), segment_length, 0.0)
     if scheme == "lumped" and rtol == 0.0 and grading == 0.0:
         from .lumped_history import pull_out_lumped
 
@@ -109,7 +131,7 @@ def pull_out(
                 f"scheme {scheme!r} knows a free drum on the shore and a uniform current, and no wet_length, rtol or "
                 "grading ('lumped' knows all but these two); use 'moving_end'."
             )
-            raise ValueError(message)
+            raise BadValueError(message)
         from .paper_history import pull_out_as_printed
 
         uniform = water.velocity.reshape(3)
@@ -121,6 +143,7 @@ def pull_out(
     reach = 1.5 * (_way(path.place) + _way(led[:, PLACE:VELOCITY]) + water.fastest * duration) + wet
     longest = led[:, SETPOINT].max() if isinstance(drum, PayOutRate | Brake) else 2.0 * reach + 5.0
     capacity = segments_needed(float(longest), segment_length, grading)
+    check_memory(path.times.size, capacity)
     line, work, c, turning = new_line(capacity), new_load(), cable.numbers(), drum.numbers()
     line.ends.segment_length, line.ends.grading, line.ends.tolerance = segment_length, grading, tolerance
     turning.velocity[:] = led[0, VELOCITY:SETPOINT]
@@ -145,17 +168,21 @@ def _way(place: np.ndarray) -> float:
 
 
 def _check(
-    duration: float, step: float, segment_length: float, scheme: str, rtol: float, grading: float
+    duration: float,
+    step: float,
+    segment_length: float,
+    scheme: str,
+    rtol: float,
+    grading: float,
+    wet_length: float,
 ) -> None:
-    """Raise a ValueError that names the first setting that cannot be used."""
+    """Refuse the first setting that cannot be used, by name."""
     for name, value in (("duration", duration), ("step", step), ("segment_length", segment_length)):
-        if not (np.isfinite(value) and value > 0.0):
-            message = f"{name} is {value!r}; it must be a positive number."
-            raise ValueError(message)
-    for name, value in (("rtol", rtol), ("grading", grading)):
-        if not 0.0 <= value < 1.0:
-            message = f"{name} is {value!r}; it must be at least 0 and less than 1."
-            raise ValueError(message)
+        checked("", name, value, above=0.0)
+    checked("", "rtol", rtol, least=0.0, most=0.5)
+    checked("", "grading", grading, least=0.0, most=0.5)
+    checked("", "wet_length", wet_length, least=0.0, unit="m")
     if scheme not in SCHEMES:
-        message = f"scheme {scheme!r} is unknown; choose one of {', '.join(SCHEMES)}."
-        raise ValueError(message)
+        raise BadValueError(
+            f"scheme {short(scheme)} is unknown; choose one of {', '.join(SCHEMES)}.{suggestion(str(scheme), SCHEMES)}"
+        )

@@ -6,13 +6,15 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from subzero.errors import BadValueError, checked, real, short
+from subzero.memory import refuse_unless_it_fits
+
 from .drum import LENGTH
 from .element import Load
 from .energy import LOSS, STORED
 from .history import History, Outcome
 from .laying import start_in_water
-from .line import NEW, Line
-from .newton import Solved
+from .line import NEW, Line, Solved
 from .pay_out import Record, TowPath, follow_path, new_record
 from .properties import CableNumbers, DrumNumbers
 from .water import Current, Water
@@ -46,7 +48,8 @@ def run(
     """Run a line that is laid out, and return its history."""
     start_in_water(line, water, c, work)
     record = new_record(path.times.size, capacity)
-    rows, solved = follow_path(line, path, led, water, c, drum, rtol, work, record)
+    rows = follow_path(line, path, led, water, c, drum, rtol, work, record)
+    solved = line.ends.solved
     trouble = too_short(path.times[rows - 1], line, drum) or describe_failure(solved, path.times[rows - 1])
     return as_history(path, record, rows, solved, trouble)
 
@@ -105,6 +108,7 @@ def sample_path(velocity: TowVelocity, duration: float, step: float, name: str =
     Velocities are taken just after and just before the times: the motion may change abruptly at a recorded time.
     """
     steps = max(1, round(duration / step))
+    check_memory(steps + 1, 1)
     times, h = np.linspace(0.0, duration, steps + 1), duration / steps
 
     def at(moments: np.ndarray) -> np.ndarray:
@@ -127,18 +131,58 @@ def first_direction(velocity: np.ndarray) -> np.ndarray:
     return velocity[moving[0]] / speeds[moving[0]]
 
 
+MOST_SEGMENTS = 10_000_000
+"""More segments than this are a slip of the pen: they need 14 gigabytes, and minutes a step."""
+
+
 def segments_needed(length: float, segment_length: float, grading: float) -> int:
     """Return how many segments a cable of some length [m] takes at most."""
+    count = _segments_needed(length, segment_length, grading)
+    if not count <= MOST_SEGMENTS:
+        raise BadValueError(
+            f"segment_length is {segment_length:g} m; a cable of up to {length:.3g} m would have more than"
+            f" {MOST_SEGMENTS} segments. Take longer ones, or grading."
+        )
+    return int(count)
+
+
+def _segments_needed(length: float, segment_length: float, grading: float) -> float:
     if grading * length < segment_length:
-        return int(length / segment_length) + 8
-    return int(np.log1p(grading * length / segment_length) / np.log1p(grading)) + 12
+        return length // segment_length + 8
+    return np.log1p(grading * length / segment_length) // np.log1p(grading) + 12
+
+
+BYTES_A_NODE = 32.0
+"""Of a shape that is kept: a place and a tension. [bytes]"""
+BYTES_A_SEGMENT = 1400.0
+"""Of a cable that is solved: three levels of time, and the blocks of the matrix. [bytes]"""
+SHORTEN = "Record less often (a longer step), or take longer segments (segment_length, grading)."
+
+
+def check_memory(rows: int, segments: int) -> None:
+    """Refuse a run of so many results with shapes of so many segments if it does not fit into memory."""
+    size = rows * (segments + 2.0) * BYTES_A_NODE + segments * BYTES_A_SEGMENT
+    what = f"A run of {rows} results with up to {segments} segments each"
+    refuse_unless_it_fits(size, what, SHORTEN)
+
+
+def check_kinds(**wanted: tuple[object, tuple[type, ...]]) -> None:
+    """Refuse an argument, name → (value, kinds), that is of none of its kinds."""
+    for name, (value, kinds) in wanted.items():
+        if not isinstance(value, kinds):
+            words = " or ".join(kind.__name__ for kind in kinds)
+            raise BadValueError(f"{name} is {short(value)}, of type {type(value).__name__}; it must be {words}.")
+
+
+def check_motion(name: str, velocity: object) -> None:
+    """Refuse a motion that is no function of time."""
+    if not callable(velocity):
+        raise BadValueError(f"{name} is {short(velocity)}; it must be a function of time that gives a velocity.")
 
 
 def check_tolerance(tolerance: float) -> None:
-    """Raise a ValueError if a step cannot be solved as exactly as that."""
-    if not FINEST <= tolerance <= COARSEST:
-        message = f"tolerance is {tolerance!r}; it must be from {FINEST:g} to {COARSEST:g}."
-        raise ValueError(message)
+    """Refuse a tolerance that a step cannot be solved to."""
+    checked("", "tolerance", tolerance, least=FINEST, most=COARSEST)
 
 
 def current_of(current: Sequence[float] | np.ndarray | Current | None) -> Current:
@@ -154,13 +198,13 @@ def _three_numbers(
     """Return velocities as an array (times, 3) of finite numbers, or say what is wrong with the first that is none."""
     try:
         array = np.array(values, dtype=float)
-    except ValueError:
-        array = np.empty(0)
-    if array.shape == (moments.size, 3) and np.isfinite(array).all():
-        return array
+        if array.shape == (moments.size, 3) and np.isfinite(array).all():
+            return array
+    except (ValueError, TypeError, OverflowError):
+        pass
     for t, value in zip(moments.tolist(), values, strict=True):
-        one = np.asarray(value, dtype=float)
-        if one.shape != (3,) or not np.isfinite(one).all():
-            message = f"{name}({t:g}) must be three finite numbers (north, east, down in m/s); got {value!r}."
-            raise ValueError(message)
-    return array
+        if np.shape(value) != (3,) or any(real(x) is None for x in value):
+            raise BadValueError(
+                f"{name}({t:g}) must be three finite numbers (north, east, down in m/s); got {short(value)}."
+            )
+    raise BadValueError(f"{name} must give three finite numbers (north, east, down in m/s) at every time.")

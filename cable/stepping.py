@@ -20,7 +20,7 @@ from .drum import FREE, STANDING, next_mode
 from .element import Load
 from .growing import merge_last, split_last
 from .line import BEFORE, NEW, NOW, SPLIT_AT, Line, feel_water, held_node, spacing
-from .newton import Solved, solve_step
+from .newton import solve_step
 from .properties import CableNumbers, DrumNumbers
 from .slack import KNOWN, SMOOTHING
 from .tow_point import fill_node_tensions, follow_tow
@@ -48,8 +48,10 @@ def try_step(
     drum: DrumNumbers,
     work: Load,
     again: bool = False,
-) -> Solved:
+) -> bool:
     """Solve for the cable `step` later, with the tow point at `tow` (relative to the drum), on level NEW.
+
+    Return whether there is a solution; `line.ends.solved` says how it was found.
 
     Args:
         line: the cable; levels NOW and BEFORE stay untouched.
@@ -61,22 +63,22 @@ def try_step(
         work: work space.
         again: level NEW holds the answer to another tow point, close by.
     """
-    failed = 0
+    failed, converged = 0, False
     for change in range(MOST_DRUM_CHANGES):
-        solved = _solve_softly(line, step, tow, water, c, drum, work, again and change == 0)
+        converged = _solve_softly(line, step, tow, water, c, drum, work, again and change == 0)
         if line.ends.count == 1 or drum.control != FREE or line.ends.free_end:
             break
-        mode = next_mode(
-            line.ends.drum_mode, solved.converged, line.ends.payout[NEW], line.ends.drum_pull, drum
-        )
-        if not solved.converged:
+        mode = next_mode(line.ends.drum_mode, converged, line.ends.payout[NEW], line.ends.drum_pull, drum)
+        if not converged:
             failed |= 1 << line.ends.drum_mode
         if mode == line.ends.drum_mode or (failed >> mode) & 1:
             break
         line.ends.drum_mode = mode
-    if solved.converged and _takes_up(line, drum):
-        return Solved(False, solved.iterations, solved.residual, line.ends.count, 0)
-    return solved
+    if converged and _takes_up(line, drum):
+        solved = line.ends.solved
+        solved.converged, solved.worst_node, solved.worst_equation = False, line.ends.count, 0
+        return False
+    return converged
 
 
 @inlined
@@ -96,33 +98,32 @@ def _solve_softly(
     drum: DrumNumbers,
     work: Load,
     again: bool,
-) -> Solved:
+) -> bool:
     """Solve from the answer to a tow point close by, if there is one; else, or if that leads astray, from a prediction;
     if that fails, with a slack law that is made sharp little by little.
     """
     w = backward_weights(step, line.ends.previous_step)
     if again and follow_tow(line, tow):
-        solved = solve_step(line, w, c, drum, work, True)
-        if solved.converged and not _takes_up(line, drum):
-            return solved
+        if solve_step(line, w, c, drum, work, True) and not _takes_up(line, drum):
+            return True
     _predict(line, step, tow, water, c, drum, work)
-    solved = solve_step(line, w, c, drum, work, False)
-    if solved.converged:
-        return solved
+    if solve_step(line, w, c, drum, work, False):
+        return True
     _predict(line, step, tow, water, c, drum, work)
     pull = drum.friction + abs(c.weight) * (line.ends.settled + line.ends.last_length[NOW])
     for j in range(1, line.ends.count + 1):
         line.tension[NEW, j] = max(line.tension[NEW, j], pull)
-    spent = solved.iterations
+    spent = line.ends.solved.iterations
     line.ends.smoothing = SOFTEST
     while True:
-        solved = solve_step(line, w, c, drum, work, False)
-        spent += solved.iterations
-        if not solved.converged or line.ends.smoothing <= SMOOTHING:
+        converged = solve_step(line, w, c, drum, work, False)
+        spent += line.ends.solved.iterations
+        if not converged or line.ends.smoothing <= SMOOTHING:
             break
         line.ends.smoothing = max(0.1 * line.ends.smoothing, SMOOTHING)
     line.ends.smoothing = SMOOTHING
-    return Solved(solved.converged, spent, solved.residual, solved.worst_node, solved.worst_equation)
+    line.ends.solved.iterations = spent
+    return converged
 
 
 @compiled

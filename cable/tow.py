@@ -7,13 +7,26 @@ from math import inf, sqrt
 
 import numpy as np
 
+from subzero.errors import BadValueError, checked, short
+
 from .drum_path import resting
 from .element import new_load
 from .history import History
 from .laying import lay_straight
 from .line import NOW, TOLERANCE, Line, new_line
 from .properties import CableProperties, DrumProperties
-from .runs import TowVelocity, check_tolerance, current_of, first_direction, run, sample_path
+from .runs import (
+    TowVelocity,
+    check_kinds,
+    check_memory,
+    check_motion,
+    check_tolerance,
+    current_of,
+    first_direction,
+    run,
+    sample_path,
+    segments_needed,
+)
 from .water import Current
 
 
@@ -54,17 +67,19 @@ def tow(
         the history; positions are relative to where the tail is at the start, `drum_tension` is the one at the tail.
 
     Raises:
-        ValueError: a length, duration, step or segment length that is not positive, or a scheme that cannot tow.
+        subzero.UserError: a length, duration, step or segment length that is not positive, or a scheme that cannot tow.
 
     Checked by: tests/exact/test_tow.py
     """
     lengths = {"length": length, "duration": duration, "step": step, "segment_length": segment_length}
     for name, value in lengths.items():
-        if not (np.isfinite(value) and value > 0.0):
-            message = f"{name} is {value!r}; it must be a positive number."
-            raise ValueError(message)
+        checked("", name, value, above=0.0)
+    checked("", "drogue_drag_area", drogue_drag_area, least=0.0)
+    checked("", "rtol", rtol, least=0.0, most=0.5)
+    check_motion("tow_velocity", tow_velocity)
     check_tolerance(tolerance)
     cable, water = cable or CableProperties(), current_of(current)
+    check_kinds(cable=(cable, (CableProperties,)))
     if scheme == "lumped":
         from .lumped_history import tow_lumped
 
@@ -79,10 +94,11 @@ def tow(
             drogue_drag_area=drogue_drag_area,
         )
     if scheme != "moving_end":
-        message = f"scheme {scheme!r} cannot tow a free end; choose 'moving_end' or 'lumped'."
-        raise ValueError(message)
+        raise BadValueError(f"scheme {short(scheme)} cannot tow a free end; choose 'moving_end' or 'lumped'.")
     path = sample_path(tow_velocity, duration, step)
+    segments_needed(length, segment_length, 0.0)  # refuses a cable of countless ones
     count = max(1, int(np.ceil(length / segment_length - 1e-9)))
+    check_memory(path.times.size, count)
     line, work, c, idle = new_line(count), new_load(), cable.numbers(), DrumProperties().numbers()
     tail_drag, J = 0.5 * cable.water_density * drogue_drag_area, water.at((0.0, 0.0, 0.0))
     uphill = _steady_direction(path.leaving, J, cable, tail_drag)

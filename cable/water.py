@@ -15,11 +15,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from subzero.compiled import allocating, inlined, inner
+from subzero.errors import BadValueError, short
 
 WaterVelocity = Callable[[float, float, float, float], Sequence[float]]
 """Function of north, east, down [m] and time [s] that gives the water's velocity (3,). [m/s]"""
@@ -48,7 +49,7 @@ class Current:
         velocity: north, east, down at the grid points (time, north, east, down, 3). [m/s]
 
     Raises:
-        ValueError: grid points that do not increase, or velocities that are not finite or do not fit the grid.
+        subzero.UserError: grid points that do not increase, or velocities that are not finite or do not fit the grid.
     """
 
     velocity: np.ndarray
@@ -60,33 +61,32 @@ class Current:
     def __post_init__(self) -> None:
         """Refuse what is no grid."""
         for name in ("time", "north", "east", "down"):
-            points = np.atleast_1d(np.asarray(getattr(self, name), dtype=float))
-            if points.ndim != 1 or not np.isfinite(points).all() or not (np.diff(points) > 0.0).all():
-                message = f"Current: {name} must be finite and increase; got {getattr(self, name)!r}."
-                raise ValueError(message)
+            points = np.atleast_1d(_numbers(name, getattr(self, name)))
+            if points.ndim != 1 or points.size == 0 or not (np.diff(points) > 0.0).all():
+                raise BadValueError(f"Current: {name} must be numbers that increase; got {short(getattr(self, name))}.")
             object.__setattr__(self, name, points)
-        velocity = np.ascontiguousarray(self.velocity, dtype=float)
+        velocity = np.ascontiguousarray(_numbers("velocity", self.velocity))
         shape = (self.time.size, self.north.size, self.east.size, self.down.size, 3)
-        if velocity.shape != shape or not np.isfinite(velocity).all():
-            message = (
-                f"Current: velocity must be finite numbers of shape {shape} (time, north, east, down, 3)."
+        if velocity.shape != shape:
+            raise BadValueError(
+                f"Current: the shape of velocity is {velocity.shape}; it must be {shape} (time, north, east, down, 3)."
             )
-            raise ValueError(message)
         object.__setattr__(self, "velocity", velocity)
 
     @classmethod
     def uniform(cls, velocity: Sequence[float] | np.ndarray) -> Current:
         """Return the same current everywhere and always: north, east, down (3,). [m/s]."""
-        numbers = np.asarray(velocity, dtype=float)
-        if numbers.shape != (3,) or not np.isfinite(numbers).all():
-            message = f"current must be three finite numbers (north, east, down in m/s); got {velocity!r}."
-            raise ValueError(message)
+        numbers = _numbers("velocity", velocity)
+        if numbers.shape != (3,):
+            raise BadValueError(
+                f"current must be three finite numbers (north, east, down in m/s); got {short(velocity)}."
+            )
         return cls(velocity=numbers.reshape(1, 1, 1, 1, 3))
 
     @classmethod
     def profile(cls, down: Sequence[float], velocity: Sequence[Sequence[float]]) -> Current:
         """Return a current that changes with depth: velocities (n, 3) [m/s] at n depths [m]."""
-        return cls(down=np.asarray(down, dtype=float), velocity=np.asarray(velocity)[None, None, None])
+        return cls(down=_numbers("down", down), velocity=_numbers("velocity", velocity)[None, None, None])
 
     @classmethod
     def sampled(
@@ -128,6 +128,17 @@ class Current:
         sizes = [float(axis.size) for axis in axes]
         points = np.concatenate([np.asarray(origin, dtype=float), sizes, *axes])
         return Water(points, self.velocity.reshape(-1, 3).copy())
+
+
+def _numbers(name: str, values: Any) -> np.ndarray:
+    """Return finite numbers as an array, or refuse them."""
+    try:
+        array = np.array(values)
+        if array.dtype.kind in "iuf" and np.isfinite(array).all():
+            return array.astype(float)
+    except (ValueError, TypeError, OverflowError):
+        pass
+    raise BadValueError(f"Current: {name} must be finite numbers; got {short(values)}.")
 
 
 @inlined

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from subzero.errors import BadValueError, checked, real, short
 from subzero.packed import packed
 
 from .drum import LENGTH, TENSION
@@ -36,6 +37,10 @@ class PayOutRate:
     """
 
     rate: Schedule
+
+    def __post_init__(self) -> None:
+        """Refuse what is no rate."""
+        _check_schedule(self, "rate", self.rate)
 
     def numbers(self) -> DrumNumbers:
         """Return the plain numbers that compiled code takes."""
@@ -75,6 +80,10 @@ class ConstantTension:
 
     tension: Schedule
 
+    def __post_init__(self) -> None:
+        """Refuse what is no tension."""
+        _check_schedule(self, "tension", self.tension, above=0.0)
+
     def numbers(self) -> DrumNumbers:
         """Return the plain numbers that compiled code takes."""
         return packed(DrumNumbers(0.0, 0.0, TENSION, 0.0))
@@ -83,24 +92,33 @@ class ConstantTension:
         """Return the tension asked for at `times` (n,). [N].
 
         Raises:
-            ValueError: a tension that is not positive: a winch cannot push.
+            subzero.UserError: a tension that is not positive: a winch cannot push.
         """
         wanted = _sampled(self.tension, times)
         if not (wanted > 0.0).all():
             message = (
                 f"ConstantTension: the tension must be positive at all times; it falls to {wanted.min():g} N."
             )
-            raise ValueError(message)
+            raise BadValueError(message)
         return wanted
 
 
 Winch = PayOutRate | Brake | ConstantTension
 
 
+def _check_schedule(winch: Winch, name: str, schedule: object, above: float | None = None) -> None:
+    """Refuse what is neither a function nor a number."""
+    if not callable(schedule):
+        checked(type(winch).__name__, name, schedule, above=above)
+
+
 def _sampled(schedule: Schedule, times: np.ndarray) -> np.ndarray:
     """Return a schedule at times, as finite numbers."""
-    values = np.array([schedule(float(t)) if callable(schedule) else schedule for t in times], dtype=float)
-    if not np.isfinite(values).all():
-        message = f"A winch was asked for {values[~np.isfinite(values)][0]!r}; it needs finite numbers."
-        raise ValueError(message)
-    return values
+    values = [schedule(float(t)) if callable(schedule) else schedule for t in times]
+    numbers = [real(value) for value in values]
+    if None in numbers:
+        at = numbers.index(None)
+        raise BadValueError(
+            f"A winch was asked for {short(values[at])} at {times[at]:g} s; it needs finite numbers."
+        )
+    return np.array(numbers, dtype=float)

@@ -9,12 +9,11 @@ import difflib
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from subzero.errors import SHOWN_CHARACTERS, UserError
+from subzero.errors import short as shown
+
 SHOWN_PROBLEMS = 40
 """So many problems are spelt out in a message: enough to repair a file; more would only repeat themselves."""
-
-SHOWN_CHARACTERS = 60
-"""Longer values are cut, so that a message stays readable whatever is in the file."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class Problem:
@@ -44,8 +43,8 @@ class Problem:
         return f"{place}: {said}. {self.remedy}".rstrip()
 
 
-class ScenarioError(Exception):
-    """A scenario, or a file it needs, cannot be used; carries every problem, and its text says them.
+class ScenarioError(UserError, ValueError):
+    """A scenario, a file it needs, or a value of a trial cannot be used; carries every problem, and its text says them.
 
     Attributes:
         problems: all that is wrong, in the order of the files.
@@ -63,15 +62,6 @@ class ScenarioError(Exception):
         headline = f"The scenario cannot be used ({count} problem{'s' if count > 1 else ''}):"
         lines = [headline, *(f"  {problem}" for problem in self.problems[:SHOWN_PROBLEMS])]
         return "\n".join([*lines, f"  ... and {rest} more."] if rest > 0 else lines)
-
-
-def shown(value: object) -> str:
-    """Return a value as it is shown in a message: `repr`, on one line, cut when long."""
-    try:
-        text = repr(value)
-    except ValueError:  # an integer of thousands of digits has no text
-        return "a number far too long"
-    return text if len(text) <= SHOWN_CHARACTERS else text[:SHOWN_CHARACTERS] + "..."
 
 
 def nearest(word: str, allowed: Iterable[str]) -> str | None:

@@ -69,7 +69,7 @@ grading          | 1 | 0      | 0.5   | 0    | how much longer segments get per 
 """)
 
 START = _read("""
-heading_deg     | degree | -36000 | 36000 | 0 | heading, clockwise from north
+heading_deg     | degree | -360   | 360   | 0 | heading, clockwise from north
 pitch_deg       | degree | -89    | 89    | 0 | pitch, positive nose up
 roll_deg        | degree | -180   | 180   | 0 | roll, positive starboard side down
 depth_m         | m      | 0      | 11000 | 0 | depth of the hull centre, positive down
@@ -132,6 +132,12 @@ heading_deg     | degree | -36000 | 36000 |  | heading, clockwise from north
 """,
     many=True,
 )
+
+def by_field(quantities: tuple[Quantity, ...]) -> dict[str, Quantity]:
+    """Return quantities by the names of the fields that hold them, ``hull_step_s`` → ``hull_step``."""
+    suffixes = {"1": "", "m/s": "_m_s", "degree": "_deg", "rev/s": "_rps"}
+    return {q.name.removesuffix(suffixes.get(q.unit, f"_{q.unit}")): q for q in quantities}
+
 
 SECTIONS = {
     "run": RUN,

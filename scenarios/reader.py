@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
-from math import radians
+from math import radians, remainder, tau
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -137,7 +137,7 @@ def _start(start: Mapping[str, float], prescribed: Motion | None) -> Start:
     """Return the start; a prescribed motion starts where it says."""
     if prescribed is not None:
         return Start(
-            heading=float(prescribed.heading[0]),
+            heading=remainder(float(prescribed.heading[0]), tau),
             pitch=float(prescribed.pitch[0]),
             depth=start["depth_m"],
             surge_speed=float(prescribed.surge_speed[0]),

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
+from typing import NamedTuple
 
 from scenarios.errors import Problem
 from scenarios.files import Source
+from scenarios.quantities import RUN, START, by_field
 
 MOST_STEPS = 10_000_000
 """A run of more hull steps than this is a slip of the pen: it takes minutes to hours, and gigabytes."""
@@ -16,6 +19,18 @@ MOST_SEGMENTS = 100_000
 TOLERANCE = 1e-9
 """Ratios of decimal fractions are whole numbers to within this, relatively."""
 
+Numbers = Mapping[str, float]
+"""Fields of a trial and its start → value, as far as they are good by themselves."""
+
+
+class Misfit(NamedTuple):
+    """A number that does not fit the others: its field, the value, why, and what to do."""
+
+    field: str
+    found: float
+    why: str
+    remedy: str
+
 
 def check_steps(source: Source, run: Mapping[str, float], start: Mapping[str, float]) -> list[Problem]:
     """Return what does not fit in [run] and [start], as far as their numbers are good by themselves.
@@ -25,45 +40,58 @@ def check_steps(source: Source, run: Mapping[str, float], start: Mapping[str, fl
         run: numbers of the section [run], without those that are wrong.
         start: numbers of the section [start], likewise.
     """
-    numbers = {**run, **start}
-
-    def known(*names: str) -> bool:
-        return all(name in numbers for name in names)
-
-    problems = []
-    for name, step in (("cable_step_s", "hull_step_s"), ("duration_s", "cable_step_s")):
-        if known(name, step):
-            problems += _whole(source, name, numbers[name], step, numbers[step])
-    if known("duration_s", "hull_step_s"):
-        problems += _not_endless(source, numbers["duration_s"], numbers["hull_step_s"])
-    if known("wet_length_m", "segment_length_m"):
-        problems += _not_countless(source, numbers["wet_length_m"], numbers["segment_length_m"])
-    return problems
+    keys = {field: quantity.name for field, quantity in by_field(RUN + START).items()}
+    given = {**run, **start}
+    numbers = {field: given[key] for field, key in keys.items() if key in given}
+    return [
+        source.problem(f"run.{keys[field]}", why, remedy, found=found)
+        for field, found, why, remedy in misfits(numbers, keys)
+    ]
 
 
-def _whole(source: Source, name: str, value: float, step_name: str, step: float) -> list[Problem]:
-    """Return the problem that a time is not a whole number of steps, with the nearest that are."""
+def misfits(numbers: Numbers, words: Mapping[str, str] | None = None) -> list[Misfit]:
+    """Return what does not fit; `words` says how messages call the fields."""
+    words = words or {name: name for name in numbers}
+    checks = {
+        ("cable_step", "hull_step"): _not_whole,
+        ("hull_step", "duration"): _endless,
+        ("segment_length", "wet_length"): _countless,
+    }
+    known = [(names, check) for names, check in checks.items() if set(names) <= set(numbers)]
+    found = [check(*names, numbers, words) for names, check in known]
+    return [misfit for misfit in found if misfit]
+
+
+def fitting_step(span: float, longest: float) -> float:
+    """Return the largest step, no longer than `longest`, of which a span is a whole number. [s]."""
+    return span / max(1, math.ceil(span / longest - TOLERANCE))
+
+
+def _not_whole(name: str, step_name: str, numbers: Numbers, words: Mapping[str, str]) -> Misfit | None:
+    """Return that a time is not a whole number of steps, with the nearest that are."""
+    value, step = numbers[name], numbers[step_name]
     ratio = value / step
-    if abs(ratio - round(ratio)) <= TOLERANCE * ratio:
-        return []
+    if ratio > 0.5 and abs(ratio - round(ratio)) <= TOLERANCE * ratio:
+        return None
     below, above = int(ratio) * step, (int(ratio) + 1) * step
     near = f"{below:.9g} or {above:.9g}" if below > 0.0 else f"{above:.9g}"
-    why = f"it must be a whole number of steps {step_name} = {step:g}"
-    return [source.problem(f"run.{name}", why, f"Nearest: {near}.", found=value)]
+    why = f"it must be a whole number of steps {words[step_name]} = {step:g}"
+    return Misfit(name, value, why, f"Nearest: {near}.")
 
 
-def _not_endless(source: Source, duration: float, step: float) -> list[Problem]:
-    """Return the problem that a run has far too many steps."""
+def _endless(name: str, duration_name: str, numbers: Numbers, words: Mapping[str, str]) -> Misfit | None:
+    """Return that a run has far too many steps."""
+    step, duration = numbers[name], numbers[duration_name]
     if duration / step <= MOST_STEPS:
-        return []
+        return None
     why = f"a run of {duration:g} s would take {duration / step:.3g} steps, more than {MOST_STEPS:g}"
-    return [source.problem("run.hull_step_s", why, f"At least {duration / MOST_STEPS:.3g} s.", found=step)]
+    return Misfit(name, step, why, f"At least {duration / MOST_STEPS:.3g} s.")
 
 
-def _not_countless(source: Source, length: float, segment: float) -> list[Problem]:
-    """Return the problem that the cable in the water at the start has far too many segments."""
+def _countless(name: str, length_name: str, numbers: Numbers, words: Mapping[str, str]) -> Misfit | None:
+    """Return that the cable in the water at the start has far too many segments."""
+    segment, length = numbers[name], numbers[length_name]
     if length <= MOST_SEGMENTS * segment:
-        return []
+        return None
     why = f"a cable of {length:g} m at the start would have more than {MOST_SEGMENTS} segments"
-    key, remedy = "run.segment_length_m", f"At least {length / MOST_SEGMENTS:g} m."
-    return [source.problem(key, why, remedy, found=segment)]
+    return Misfit(name, segment, why, f"At least {length / MOST_SEGMENTS:g} m.")

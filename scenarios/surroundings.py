@@ -15,7 +15,7 @@ from scenarios.files import Source
 from scenarios.quantities import PROFILE, SECTIONS, WINCH
 from scenarios.samples import check_times, inline
 from scenarios.schema import check_section
-from scenarios.trial import SCHEMES, Profile, Vessel, Winch
+from scenarios.trial import ONLY_DEFAULT, SCHEMES, Profile, Vessel, Winch, only_default
 
 CURRENT = ("current_north_m_s", "current_east_m_s", "current_down_m_s")
 SETPOINT = {"pay_out_rate": "pay_out_rate_m_s", "constant_tension": "tension_N", "brake": ""}
@@ -156,6 +156,4 @@ def check_scheme(source: Source, run: Mapping[str, Any], cable: Mapping[str, flo
         asked.append("grading")
     if cable.get("bending_stiffness", 0.0) > 0.0:
         asked.append("the cable's bending_stiffness")
-    why = "the paper's scheme knows a limp cable on a free drum on the shore, and a uniform current"
-    remedy = f'Set scheme = "{SCHEMES[0]}", or leave out {" and ".join(asked)}.'
-    return [source.problem("run.scheme", why, remedy, found=scheme)] if asked else []
+    return [source.problem("run.scheme", ONLY_DEFAULT, only_default(asked), found=scheme)] if asked else []

@@ -1,8 +1,9 @@
 """What a trial is, as values: everything a run needs, checked, in SI units and radians.
 
 A `Trial` comes from `scenarios.load`. To change one, make a new one, as in
-``dataclasses.replace(trial, duration=60.0)``. Propeller speeds are in revolutions per second, the one
-unit here that is not SI.
+``dataclasses.replace(trial, duration=60.0)``: values are checked where they are made, with the limits of the files, and
+a `ScenarioError` tells all that is wrong. Propeller speeds are in revolutions per second, the one unit here that is not
+SI.
 
 Signs: axes are north-east-down; depth is positive down; heading runs clockwise from north; a positive rudder
 turns the heading to starboard (it increases); positive stern-planes (both) pitch the nose up.
@@ -16,12 +17,35 @@ from typing import Any
 
 import numpy as np
 
+from scenarios.checks import Checks
+from scenarios.quantities import COMMANDS, MOTION, PROFILE, RUN, START, VESSEL, WATER, WINCH, by_field
+from scenarios.steps import misfits
+
 SCHEMES = ("moving_end", "paper", "paper_tangent", "paper_drum")
 """How the cable is solved: our moving end, or the paper's scheme, with either reading of its new node
 ("paper" is the usable one, "paper_tangent")."""
 
 CONTROLS = ("pay_out_rate", "constant_tension", "brake")
 """What a winch does; without a winch the drum is free, and the cable is pulled off it."""
+
+SETPOINT = dict(zip(CONTROLS, (*WINCH[1:], None), strict=True))
+"""Control of a winch → the quantity that it follows."""
+
+ONLY_DEFAULT = (
+    "the paper's scheme knows a limp cable on a free drum on the shore, and a uniform current"
+)
+
+
+def only_default(asked: list[str]) -> str:
+    """Return what to do about things that only the default scheme knows."""
+    return f'Set scheme = "{SCHEMES[0]}", or leave out {" and ".join(asked)}.'
+
+
+RUN_FIELDS = tuple(by_field(RUN))
+"""Fields of a trial that hold the numbers of [run]."""
+
+SHORTEST_LAST_STEP = 0.1
+"""Where a run does not last a whole number of cable steps, its last step is from this to this and 1 of them. [-]"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,6 +68,12 @@ class Start:
     surge_speed: float = 0.0
     wet_length: float = 0.0
 
+    def __post_init__(self) -> None:
+        """Refuse what is no start."""
+        check = Checks(self)
+        check.numbers(by_field(START))
+        check.refuse()
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Commands:
@@ -56,6 +86,18 @@ class Commands:
 
     time: np.ndarray
     values: np.ndarray
+
+    def __post_init__(self) -> None:
+        """Refuse what are no commands; keep arrays of their own that cannot be changed."""
+        check = Checks(self)
+        time = check.rows("time", COMMANDS[:1])
+        values = check.rows("values", COMMANDS[1:], None if time is None else time.size)
+        if time is not None:
+            check.increasing("time", time)
+        check.refuse()
+        assert time is not None and values is not None  # noqa: S101, PT018  # `refuse` has seen to it
+        check.freeze("time", time)
+        check.freeze("values", values)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -77,6 +119,19 @@ class Motion:
     pitch: np.ndarray
     heading: np.ndarray
 
+    def __post_init__(self) -> None:
+        """Refuse what is no motion; keep arrays of their own that cannot be changed."""
+        check, columns = Checks(self), by_field(MOTION)
+        time = check.rows("time", MOTION[:1])
+        count = None if time is None else time.size
+        arrays = {name: check.rows(name, (quantity,), count) for name, quantity in columns.items()}
+        if time is not None:
+            check.increasing("time", time)
+        check.refuse()
+        for name, array in arrays.items():
+            if array is not None:
+                check.freeze(name, array)
+
 
 @dataclass(frozen=True, kw_only=True)
 class Profile:
@@ -89,6 +144,16 @@ class Profile:
 
     depth: tuple[float, ...]
     velocity: tuple[tuple[float, float, float], ...]
+
+    def __post_init__(self) -> None:
+        """Refuse what is no profile."""
+        check = Checks(self)
+        depth = check.rows("depth", PROFILE[:1])
+        velocity = check.rows("velocity", PROFILE[1:], None if depth is None else depth.size)
+        if depth is not None:
+            check.increasing("depth", depth, "Depths", None)
+        check.refuse()
+        _keep(self, depth=_tuples(depth), velocity=_tuples(velocity))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -105,6 +170,23 @@ class Winch:
     time: tuple[float, ...] = ()
     setpoint: tuple[float, ...] = ()
 
+    def __post_init__(self) -> None:
+        """Refuse what is no winch."""
+        check = Checks(self)
+        if self.control not in CONTROLS:
+            check.say("control", "a winch cannot do this", f"Allowed: {', '.join(CONTROLS)}.", self.control)
+            check.refuse()
+        quantity = SETPOINT[self.control]
+        if quantity is None:
+            _keep(self, time=(), setpoint=())
+            return
+        time = check.rows("time", WINCH[:1])
+        setpoint = check.rows("setpoint", (quantity,), None if time is None else time.size)
+        if time is not None:
+            check.increasing("time", time)
+        check.refuse()
+        _keep(self, time=_tuples(time), setpoint=_tuples(setpoint))
+
 
 @dataclass(frozen=True, kw_only=True)
 class Vessel:
@@ -118,6 +200,28 @@ class Vessel:
     time: tuple[float, ...]
     velocity: tuple[tuple[float, float, float], ...]
 
+    def __post_init__(self) -> None:
+        """Refuse what is no vessel."""
+        check = Checks(self)
+        time = check.rows("time", VESSEL[:1])
+        velocity = check.rows("velocity", VESSEL[1:], None if time is None else time.size)
+        if time is not None:
+            check.increasing("time", time)
+        check.refuse()
+        _keep(self, time=_tuples(time), velocity=_tuples(velocity))
+
+
+def _tuples(array: np.ndarray | None) -> Any:
+    """Return an array as a tuple, of tuples if it has two axes."""
+    rows = [] if array is None else array.tolist()
+    return tuple(tuple(row) if isinstance(row, list) else row for row in rows)
+
+
+def _keep(value: Any, **fields: Any) -> None:
+    """Set fields of a frozen value that is being made."""
+    for name, field in fields.items():
+        object.__setattr__(value, name, field)
+
 
 @dataclass(frozen=True, kw_only=True)
 class Trial:
@@ -128,7 +232,7 @@ class Trial:
         description: one line.
         text: the TOML source, for the record.
         source: the scenario as the user named it, name or path.
-        duration: how long the run lasts, a whole number of cable steps. [s]
+        duration: how long the run lasts; where it is no whole number of cable steps, the last step is another. [s]
         hull_step: time step of the vehicle. [s]
         cable_step: time step of the cable and of the exchange, a whole number of hull steps. [s]
         segment_length: length of a cable segment, at the vehicle. [m]
@@ -166,3 +270,37 @@ class Trial:
     vessel: Vessel | None = None
     commands: Commands | None = None
     motion: Motion | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse what is no trial."""
+        check = Checks(self)
+        for name in ("name", "description", "text", "source"):
+            check.kind(name, (str,))
+        check.numbers(by_field(RUN))
+        if self.scheme not in SCHEMES:
+            check.say("scheme", "this is not a scheme", f"Allowed: {', '.join(SCHEMES)}.", self.scheme)
+        check.vector("current", WATER)
+        check.kind("start", (Start,))
+        parts = {"commands": Commands, "motion": Motion, "profile": Profile, "winch": Winch, "vessel": Vessel}
+        there = {name for name, kind in parts.items() if check.kind(name, (kind,), optional=True)}
+        if {"commands", "motion"} <= there:
+            check.say("motion", "commands are given too", "Keep one of commands and motion.")
+        for name in ("vehicle", "cable", "drum"):
+            check.mapping(name)
+        check.refuse()
+        for name, found, why, remedy in misfits({n: getattr(self, n) for n in RUN_FIELDS} | vars(self.start)):
+            check.say(name, why, remedy, found)
+        asked = [name for name in ("profile", "winch", "vessel", "grading") if getattr(self, name)]
+        asked += ["bending_stiffness"] if self.cable.get("bending_stiffness", 0.0) > 0.0 else []
+        if self.scheme != SCHEMES[0] and asked:
+            check.say("scheme", ONLY_DEFAULT, only_default(asked), self.scheme)
+        check.refuse()
+
+    def times(self) -> np.ndarray:
+        """Return the times of the results (n,): whole cable steps from 0, and a last step that ends the run. [s]."""
+        steps = self.duration / self.cable_step
+        whole = max(round(steps), 1)
+        if abs(steps - whole) <= 1e-9 * steps:
+            return np.linspace(0.0, self.duration, whole + 1)
+        full = max(int(steps - SHORTEST_LAST_STEP), 0)
+        return np.append(self.cable_step * np.arange(full + 1), self.duration)

@@ -21,7 +21,6 @@ import numpy as np
 from cable.drum_path import lead_drum
 from cable.energy import energy_flow
 from cable.line import NOW
-from cable.newton import Solved
 from cable.stepping import accept, try_step
 from cable.tow_point import impedance
 from subzero.compiled import compiled, inlined, inner
@@ -43,24 +42,24 @@ FINE, CABLE_FAILED, DISAGREED, ABSURD = range(4)
 
 
 @inner
-def exchange(setup: Setup, live: Live, start: float, span: float) -> tuple[int, Solved]:
+def exchange(setup: Setup, live: Live, start: float, span: float) -> int:
     """Take one exchange from `start`, in halves where needed; the live state moves on only as far as it went well."""
     done, step = 0.0, span
     while True:
         last = done + step >= span * (1.0 - 1e-9)
         mode = live.line.ends.drum_mode
-        ending, solved = _agree(setup, live, start + done, step)
+        ending = _agree(setup, live, start + done, step)
         if ending == FINE:
             _accept(setup, live, start + done, step)
             done += step
             if last:
-                return FINE, solved
+                return FINE
             step = min(2.0 * step, span - done)
         else:
             live.line.ends.drum_mode = mode
             step *= 0.5
             if step < span * 0.5**MOST_HALVINGS or ending == ABSURD:
-                return ending, solved
+                return ending
 
 
 @inner
@@ -70,9 +69,8 @@ def hull_steps(setup: Setup, span: float) -> int:
 
 
 @inlined
-def _agree(setup: Setup, live: Live, start: float, span: float) -> tuple[int, Solved]:
+def _agree(setup: Setup, live: Live, start: float, span: float) -> int:
     """Find the force at the end of an exchange with which hull and cable agree; nothing is made real yet."""
-    solved = Solved(True, 0, 0.0, 0, 0)
     ratio = span / live.now.last_step if live.now.last_step > 0.0 else 0.0
     for i in range(3):
         live.now.guess[i] = live.now.force[i] + ratio * (live.now.force[i] - live.now.force_before[i])
@@ -80,10 +78,10 @@ def _agree(setup: Setup, live: Live, start: float, span: float) -> tuple[int, So
     size = np.inf
     for evaluation in range(MOST_EXCHANGES):
         if not _move(setup, live, start, span):
-            return ABSURD, solved
+            return ABSURD
         if not setup.fixed.tethered:
-            return FINE, solved
-        solved = try_step(
+            return FINE
+        converged = try_step(
             live.line,
             span,
             live.now.tow,
@@ -93,17 +91,17 @@ def _agree(setup: Setup, live: Live, start: float, span: float) -> tuple[int, So
             live.load,
             evaluation > 0,
         )
-        live.now.iterations += solved.iterations
-        if not solved.converged:
-            return CABLE_FAILED, solved
+        live.now.iterations += live.line.ends.solved.iterations
+        if not converged:
+            return CABLE_FAILED
         impedance(live.line, live.now.Z)
         if setup.fixed.prescribed or _forces_agree(live.now, live.line.ends.tow_force, setup.fixed.agreement):
-            return FINE, solved
+            return FINE
         _mobility(
             setup.fixed.r_c, live.now.hull.rotation, setup.fixed.vehicle.inverse_mass, live.now.mobility
         )
         size = _improve(span, live.now, live.line.ends.tow_force, size)
-    return DISAGREED, solved
+    return DISAGREED
 
 
 @inlined

@@ -2,13 +2,16 @@
 
 A message has three parts: *what* was found (file, line or name, value), *why* it cannot be, and *what to do*.
 Only the command line catches `UserError`; anything else that is raised is a bug of ours and keeps its
-traceback. Problems inside scenario files are `scenarios.ScenarioError`, which the command line treats alike.
+traceback. Every refusal of every package is one: `scenarios.ScenarioError` for files and trials,
+`vehicle.VehicleError`, and `BadValueError` for values that are refused where they are made.
 """
 
 from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
+from math import inf, isfinite
+from numbers import Real
 
 SHOWN_PROBLEMS = 12
 """So many problems of one file are spelt out: enough to repair it, few enough to read on one screen."""
@@ -16,6 +19,69 @@ SHOWN_PROBLEMS = 12
 
 class UserError(Exception):
     """Something in the request or in a file of the user cannot be used; the message says what to do."""
+
+
+class BadValueError(UserError, ValueError):
+    """A value that cannot be used, refused where it is made; a `ValueError` too, as Python has it."""
+
+
+def real(value: object) -> float | None:
+    """Return a value as a float if it is a finite real number (not a truth value, not a text); else None."""
+    if isinstance(value, bool) or not isinstance(value, Real):
+        return None
+    try:
+        number = float(value)
+    except (OverflowError, ValueError, TypeError):
+        return None
+    return number if isfinite(number) else None
+
+
+def checked(
+    owner: str,
+    name: str,
+    value: object,
+    *,
+    least: float = -inf,
+    most: float = inf,
+    above: float | None = None,
+    unit: str = "",
+) -> float:
+    """Return a value as a float, or refuse it in one sentence.
+
+    Args:
+        owner: whose value, such as ``CableProperties``; empty for an argument of a function.
+        name: its name.
+        value: what was given.
+        least, most: limits, allowed themselves.
+        above: a lower limit that is not allowed itself.
+        unit: for the message.
+
+    Raises:
+        BadValueError: not a finite real number within its limits.
+    """
+    number = real(value)
+    low = least if above is None else above
+    if number is not None and low <= number <= most and number != above:
+        return number
+    bounds = [f"{'at least' if above is None else 'more than'} {low:g}"] if low > -inf else []
+    bounds += [f"at most {most:g}"] if most < inf else []
+    allowed = ", ".join(["a finite number", *([" and ".join(bounds)] if bounds else [])]) + f" {unit}".rstrip()
+    place = f"{owner}: {name}" if owner else name
+    raise BadValueError(f"{place} is {short(value)}; it must be {allowed}.")
+
+
+SHOWN_CHARACTERS = 60
+"""Longer values are cut, so that a message stays readable whatever was given."""
+
+
+def short(value: object) -> str:
+    """Return a value as it is shown in a message: `repr`, on one line, cut when long."""
+    try:
+        text = repr(value)
+    except Exception:  # whatever somebody's __repr__ does, also an integer of thousands of digits
+        return f"a value of type {type(value).__name__}"
+    text = " ".join(text.split())
+    return text if len(text) <= SHOWN_CHARACTERS else text[:SHOWN_CHARACTERS] + "..."
 
 
 def nearest(word: str, allowed: Iterable[str], count: int = 1) -> list[str]:

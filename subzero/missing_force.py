@@ -11,12 +11,11 @@ To add a feature, add a row to FEATURES; to add a factor, one to FACTORS and one
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import isfinite
 
 import numpy as np
 
 from subzero.compiled import compiled
-from subzero.errors import suggestion
+from subzero.errors import BadValueError, real, short, suggestion
 
 AXES = ("X", "Y", "Z", "K", "M", "N")
 """Forward, to starboard, down [N]; roll, pitch and yaw moment [N m]."""
@@ -88,7 +87,7 @@ class Term:
         coefficient: in `unit`.
 
     Raises:
-        ValueError: an axis or a feature that is not known, or a coefficient that is no finite number.
+        UserError: an axis or a feature that is not known, or a coefficient that is no finite number.
     """
 
     axis: str
@@ -99,11 +98,15 @@ class Term:
         """Refuse what is not in the tables."""
         for word, known in ((self.axis, AXES), (self.feature, tuple(FEATURES))):
             if word not in known:
-                message = f"A missing force has the term {word!r}.{suggestion(word, known)} Known: {', '.join(known)}."
-                raise ValueError(message)
-        if not isfinite(self.coefficient):
-            message = f"The coefficient of {self.feature!r} on {self.axis} is {self.coefficient!r}; it must be finite."
-            raise ValueError(message)
+                raise BadValueError(
+                    f"A missing force has the term {short(word)}.{suggestion(str(word), known)}"
+                    f" Known: {', '.join(known)}."
+                )
+        if real(self.coefficient) is None:
+            message = (
+                f"The coefficient of {self.feature!r} on {self.axis} is {short(self.coefficient)}; it must be finite."
+            )
+            raise BadValueError(message)
 
     @property
     def unit(self) -> str:
@@ -122,7 +125,7 @@ class MissingForce:
         terms: the formula.
 
     Raises:
-        ValueError: a history that is no history.
+        UserError: a history that is no history.
     """
 
     time: tuple[float, ...] = ()
@@ -131,17 +134,20 @@ class MissingForce:
 
     def __post_init__(self) -> None:
         """Refuse a history that cannot be one."""
-        shape = np.shape(self.wrench)
-        if shape != (len(self.time), 6) and (self.time or self.wrench):
-            message = (
-                f"A missing force has {len(self.time)} times and a wrench of shape {shape}; "
-                "allowed: six numbers a time."
+        try:
+            time, wrench = np.array(self.time, dtype=float), np.array(self.wrench, dtype=float)
+        except (ValueError, TypeError, OverflowError):
+            raise BadValueError("A missing force has a history of what are no numbers.") from None
+        if wrench.shape != (*time.shape, 6) and (time.size or wrench.size):
+            raise BadValueError(
+                f"A missing force has {time.size} times and a wrench of shape {wrench.shape}; allowed: six numbers a time."
             )
-            raise ValueError(message)
-        if not (np.isfinite(self.time).all() and np.isfinite(self.wrench).all()):
-            raise ValueError("A missing force has a history with numbers that are not finite.")
-        if np.any(np.diff(self.time) < 0.0):
-            raise ValueError("A missing force has times that decrease; they must be in order.")
+        if not (np.isfinite(time).all() and np.isfinite(wrench).all()):
+            raise BadValueError("A missing force has a history with numbers that are not finite.")
+        if np.any(np.diff(time) < 0.0):
+            raise BadValueError("A missing force has times that decrease; they must be in order.")
+        if not all(isinstance(term, Term) for term in self.terms):
+            raise BadValueError("A missing force has terms that are none; each must be a Term.")
 
     def __add__(self, other: MissingForce | None) -> MissingForce:
         """Return both forces together."""

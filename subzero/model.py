@@ -8,13 +8,17 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import scenarios
 from cable.properties import CableProperties, DrumProperties
+from subzero.errors import BadValueError, real, short, suggestion
 from subzero.missing_force import MissingForce
 from vehicle import Vehicle, from_mapping, to_mapping
+
+Part = TypeVar("Part", CableProperties, DrumProperties)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,18 +45,34 @@ class Model:
     vessel: scenarios.Vessel | None = None
     missing: MissingForce | None = None
 
+    def __post_init__(self) -> None:
+        """Refuse parts that are none."""
+        for name, kind in PARTS.items():
+            part, optional = getattr(self, name), name in OPTIONAL
+            if not isinstance(part, kind) and not (optional and part is None):
+                words = kind.__name__ + (" or None" if optional else "")
+                raise BadValueError(f"Model: {name} is {short(part)}; it must be a {words}.")
+        try:
+            current = tuple(real(one) for one in self.current)
+        except TypeError:
+            current = ()
+        if len(current) != 3 or None in current:
+            raise BadValueError(
+                f"Model: current is {short(self.current)}; it must be three finite numbers, north, east, down in m/s."
+            )
+        object.__setattr__(self, "current", current)
+
     @classmethod
     def of(cls, trial: scenarios.Trial) -> Model:
         """Return the model that a trial describes.
 
         Raises:
-            vehicle.VehicleError: its numbers do not make a vehicle (`subzero.load_scenario` has checked them).
-            ValueError: its numbers do not make a cable or a drum.
+            UserError: its numbers do not make a vehicle, a cable or a drum (`subzero.load_scenario` has checked them).
         """
         return cls(
             vehicle=from_mapping(trial.vehicle),
-            cable=CableProperties(**trial.cable),
-            drum=DrumProperties(**trial.drum),
+            cable=_made(CableProperties, trial.cable),
+            drum=_made(DrumProperties, trial.drum),
             current=trial.current,
             profile=trial.profile,
             winch=trial.winch,
@@ -69,6 +89,29 @@ class Model:
             **{name: _plain(getattr(self, name)) for name in ("profile", "winch", "vessel")},
             **({"missing": _plain(self.missing)} if self.missing else {}),
         }
+
+
+PARTS = {
+    "vehicle": Vehicle,
+    "cable": CableProperties,
+    "drum": DrumProperties,
+    "profile": scenarios.Profile,
+    "winch": scenarios.Winch,
+    "vessel": scenarios.Vessel,
+    "missing": MissingForce,
+}
+"""Field of a model → what it must be."""
+OPTIONAL = ("profile", "winch", "vessel", "missing")
+
+
+def _made(kind: type[Part], numbers: Mapping[str, Any]) -> Part:
+    """Return a cable or a drum from numbers by name; refuse names that it does not have."""
+    known = [field.name for field in dataclasses.fields(kind)]
+    for name in numbers:
+        if name not in known:
+            hint = suggestion(str(name), known) or f" It has {', '.join(known)}."
+            raise BadValueError(f"{kind.__name__} has no {short(name)}.{hint}")
+    return kind(**numbers)
 
 
 def _plain(value: Any) -> dict[str, Any] | None:

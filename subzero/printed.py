@@ -38,7 +38,7 @@ def run_as_printed(
     trial: scenarios.Trial, model: Model, progress: Callable[[float], None] | None = None
 ) -> Run:
     """Run a trial with the paper's scheme, in plain arrays."""
-    times = np.linspace(0.0, trial.duration, round(trial.duration / trial.cable_step) + 1)
+    times = trial.times()
     setup, live = prepare(trial, model, tethered=False)  # without the default scheme's cable, that is
     line = lay_cable(trial, model, setup, live, times.size)
     recording = new_recording(times.size, times.size * len(line.w.y))
@@ -46,7 +46,8 @@ def run_as_printed(
     row, ending, report = 1, FINE, START
     while row < times.size and ending == FINE:
         last = min(times.size, row + 1 + times.size // CHUNKS)
-        row, used, ending, report = run_printed_rows(setup, live, line, recording, times, row, last, used)
+        row, used, ending, told = run_printed_rows(setup, live, line, recording, times, row, last, used)
+        report = NewtonReport(*told)
         if progress is not None:
             progress(row / times.size)
     message = "The run reached its end." if ending == FINE else in_words(trial, ending, report, times[row])

@@ -17,9 +17,9 @@ from typing import NamedTuple
 import numpy as np
 
 from cable.box_equations import Ends
-from cable.box_newton import CONVERGED, BoxWorkspace, NewtonReport
+from cable.box_newton import CONVERGED, BoxWorkspace, NewtonReport, told
 from cable.equation7 import Equation7Numbers, tangent
-from cable.paper_scheme import NOTHING, node_force, paper_step, start_paper
+from cable.paper_scheme import NOTHING, advance_paper, node_force, start_paper
 from subzero.compiled import compiled
 from subzero.coupling import ABSURD, CABLE_FAILED, FINE, _move, hull_steps
 from subzero.energy import CABLE_LOSS, book
@@ -46,15 +46,19 @@ def run_printed_rows(
     first: int,
     last: int,
     used: int,
-) -> tuple[int, int, int, NewtonReport]:
-    """Fill rows first … last − 1 of a recording; arguments and result as `subzero.loop.run_rows`."""
+) -> tuple[int, int, int, tuple[int, int, float, int, int]]:
+    """Fill rows first … last − 1 of a recording; arguments as `subzero.loop.run_rows`.
+
+    Returns:
+        rows that are filled, nodes in use, how it ended, and the cable's last `NewtonReport` as a tuple.
+    """
     report = NewtonReport(CONVERGED, 0, 0.0, 0, 0)
     for row in range(first, last):
         ending, report = _exchange(setup, live, line, times[row - 1], times[row] - times[row - 1])
         if ending != FINE:
-            return row, used, ending, report
+            return row, used, ending, told(report)
         used = record_printed(setup, live, line, recording, row, times[row], used)
-    return last, used, FINE, report
+    return last, used, FINE, told(report)
 
 
 @compiled
@@ -67,7 +71,7 @@ def _exchange(setup: Setup, live: Live, line: Printed, start: float, span: float
     if not _move(setup, live, start, span):
         return ABSURD, NewtonReport(CONVERGED, 0, 0.0, 0, 0)
     ends = _ends_of(setup, live.path[steps], now.hull.rotation)
-    report = paper_step(line.w, span, ends, line.wound, False, line.c)
+    report = advance_paper(line.w, span, ends, line.wound, False, line.c)
     now.iterations += report.iterations
     if report.outcome != CONVERGED:
         return CABLE_FAILED, report

@@ -74,7 +74,7 @@ def run_trial(
     later: Later = (),
 ) -> Run:
     """Run a trial with a model, and with others from later times on, in plain arrays."""
-    times = np.linspace(0.0, trial.duration, round(trial.duration / trial.cable_step) + 1)
+    times = trial.times()
     changes = rows_of_changes(trial, tethered, times, later)
     if tethered and trial.scheme != "moving_end":
         from subzero.printed import run_as_printed

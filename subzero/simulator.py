@@ -224,8 +224,10 @@ class Simulator:
 
 
 def _times(trial: scenarios.Trial) -> np.ndarray:
-    """Return the times of the rows (n,), those of `subzero.simulate` [s]."""
-    return np.linspace(0.0, trial.duration, round(trial.duration / trial.cable_step) + 1)
+    """Return the times of the rows (n,), whole cable steps: as far as the trial goes, those of `subzero.simulate` [s]."""
+    times = trial.times()
+    even = np.allclose(np.diff(times), trial.cable_step, rtol=0.0, atol=1e-9)
+    return times if even else trial.cable_step * np.arange(times.size + 1)
 
 
 def _exchanges(trial: scenarios.Trial, sample_time: float | None, tethered: bool) -> int:

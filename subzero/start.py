@@ -30,7 +30,8 @@ FIRST_ROOM = 16
 def prepare(trial: scenarios.Trial, model: Model, tethered: bool) -> tuple[Setup, Live]:
     """Return what stays and what changes in a run, at its start: the cable laid straight behind the vehicle."""
     wet, size = _wet_length(trial), vehicle.STATE_SIZE
-    steps = int(np.ceil(trial.cable_step / trial.hull_step - 1e-6))
+    longest = max(trial.cable_step, float(np.diff(trial.times()).max()))
+    steps = most_hull_steps(longest, trial.hull_step)
     setup = setup_of(trial, model, tethered)
     live = Live(
         now=new_now(),
@@ -60,6 +61,11 @@ def setup_of(trial: scenarios.Trial, model: Model, tethered: bool) -> Setup:
         added=added,
         terms=terms,
     )
+
+
+def most_hull_steps(span: float, hull_step: float) -> int:
+    """Return how many hull steps an exchange of length `span` [s] takes at most, as `coupling.hull_steps` counts them."""
+    return max(1, int(np.ceil(span / hull_step - 1e-6)))
 
 
 def _wet_length(trial: scenarios.Trial) -> float:

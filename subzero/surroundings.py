@@ -56,10 +56,10 @@ def way_of_drum(trial: scenarios.Trial, model: Model, wet: float) -> np.ndarray:
 
 def _times(trial: scenarios.Trial, model: Model) -> np.ndarray:
     """Return the times of the exchanges and of the changes of winch and vessel, increasing. [s]."""
-    steps = max(1, round(trial.duration / trial.cable_step))
+    rows = trial.times()
     changes = [thing.time for thing in (model.winch, model.vessel) if thing is not None]
-    times = np.concatenate([np.linspace(0.0, steps * trial.cable_step, steps + 1), *changes])
-    times = np.unique(times[times <= steps * trial.cable_step])
+    times = np.concatenate([rows, *changes])
+    times = np.unique(times[times <= rows[-1]])
     return times[np.diff(times, prepend=-np.inf) > 1e-9]  # decimal fractions are not exact in binary
 
 

@@ -23,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 
 from subzero.compiled import compiled
-from vehicle.parameters import parameter
+from vehicle.parameters import parameter, Section
 from vehicle.state import LINKAGE, SERVO
 
 QUICKEST = 0.01
@@ -46,14 +46,14 @@ Servos = tuple[ServoNumbers, ServoNumbers, ServoNumbers]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Servo:
+class Servo(Section):
     """One servo with its linkage."""
 
     dead_band: float = parameter("half-width of commands that do nothing", "rad", low=0.0)
     offset: float = parameter("fin angle at zero command", "rad")
     lag: float = parameter("time constant", "s", low=0.0)
-    rate_limit: float = parameter("fastest turn of the servo", "rad/s", above=0.0)
-    deflection_limit: float = parameter("largest angle either way", "rad", low=0.0)
+    rate_limit: float = parameter("fastest turn of the servo", "rad/s", above=0.0, unlimited=True)
+    deflection_limit: float = parameter("largest angle either way", "rad", low=0.0, unlimited=True)
     half_backlash: float = parameter("half the play of the linkage", "rad", low=0.0)
 
     def numbers(self) -> ServoNumbers:

@@ -19,11 +19,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from subzero.compiled import compiled
-from vehicle.parameters import parameter
+from vehicle.parameters import parameter, Section
 
 
 @dataclass(frozen=True, kw_only=True)
-class AddedMass:
+class AddedMass(Section):
     """Added masses A_ij = −(SNAME acceleration derivatives) about the hull centre."""
 
     surge: float = parameter("axial added mass, A11 = -X_udot", "kg", low=0.0)

@@ -13,11 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from subzero.compiled import compiled
-from vehicle.parameters import parameter
+from vehicle.parameters import parameter, Section
 
 
 @dataclass(frozen=True, kw_only=True)
-class AxialDrag:
+class AxialDrag(Section):
     """Axial drag of the hull without fins."""
 
     drag_coefficient: float = parameter("axial drag coefficient on frontal area, C_D", "1", low=0.0)

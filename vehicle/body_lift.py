@@ -16,11 +16,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from subzero.compiled import compiled
-from vehicle.parameters import parameter
+from vehicle.parameters import parameter, Section
 
 
 @dataclass(frozen=True, kw_only=True)
-class BodyLift:
+class BodyLift(Section):
     """Derivatives of the bare hull per metre a second of surge; force_per_velocity, SNAME signs."""
 
     sway_per_sway: float = parameter("Y_uv", "kg/m", high=0.0)

@@ -17,7 +17,7 @@ import numpy as np
 
 from subzero.compiled import compiled
 from vehicle.geometry import Hull, hull_radius
-from vehicle.parameters import parameter
+from vehicle.parameters import parameter, Section
 
 STRIPS = 20
 """Slices over the length; force and moment differ by less than 0.7 % from those of 2 000 (tests/hull)."""
@@ -27,7 +27,7 @@ PARTS = 50
 
 
 @dataclass(frozen=True, kw_only=True)
-class CrossFlowDrag:
+class CrossFlowDrag(Section):
     """Drag of the hull in flow across its axis."""
 
     drag_coefficient: float = parameter("cross-flow drag coefficient of a slice, C_d", "1", low=0.0)

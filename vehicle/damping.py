@@ -14,11 +14,11 @@ from dataclasses import astuple, dataclass
 import numpy as np
 
 from subzero.compiled import compiled
-from vehicle.parameters import parameter
+from vehicle.parameters import parameter, Section
 
 
 @dataclass(frozen=True, kw_only=True)
-class LinearDamping:
+class LinearDamping(Section):
     """Force per velocity of the same direction; negative brakes."""
 
     surge: float = parameter("X_u", "kg/s", high=0.0)
@@ -34,7 +34,7 @@ class LinearDamping:
 
 
 @dataclass(frozen=True, kw_only=True)
-class QuadraticDamping:
+class QuadraticDamping(Section):
     """Force per velocity times its size; force_per_velocity, SNAME signs."""
 
     sway_per_sway: float = parameter("Y_vv", "kg/m", high=0.0)

@@ -25,7 +25,7 @@ from typing import NamedTuple
 import numpy as np
 
 from subzero.compiled import compiled
-from vehicle.parameters import parameter
+from vehicle.parameters import parameter, Section
 
 STILL = 1e-16
 """Square of a speed below which a fin feels nothing [m2/s2]: forces there are under 1e-16 N."""
@@ -45,7 +45,7 @@ class FinNumbers(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Fins:
+class Fins(Section):
     """One of two equal fins on opposite sides of the hull."""
 
     area: float = parameter("plan area of one exposed fin, S", "m2", low=0.0)

@@ -17,14 +17,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vehicle.parameters import parameter
+from vehicle.parameters import parameter, Section
 
 SLICES = 20_000
 """Midpoint slices of the integrals below: relative errors under 1e-6, at a millisecond each."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Hull:
+class Hull(Section):
     """A Myring hull: nose, cylinder, tail."""
 
     length: float = parameter("length over all, L", "m", above=0.0)

@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 from subzero.compiled import compiled
 from vehicle.actuators import QUICKEST
-from vehicle.parameters import parameter
+from vehicle.parameters import parameter, Section
 from vehicle.propeller import PropellerNumbers, torque
 
 
@@ -37,17 +37,17 @@ class MotorNumbers(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Motor:
+class Motor(Section):
     """The propeller's motor and its speed loop."""
 
     lag: float = parameter("time constant of the shaft speed", "s", low=0.0)
-    speed_per_volt: float = parameter("highest shaft speed per volt, c", "rev/(s V)", above=0.0)
+    speed_per_volt: float = parameter("highest shaft speed per volt, c", "rev/(s V)", above=0.0, unlimited=True)
     voltage_sensitivity: float = parameter("share of a voltage loss that shows in the speed, s", "1", low=0.0)
     efficiency: float = parameter("shaft power over electric power", "1", above=0.0, high=1.0)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Battery:
+class Battery(Section):
     """The battery pack."""
 
     full_voltage: float = parameter("voltage when full, unloaded", "V", above=0.0)

@@ -1,9 +1,9 @@
 """What a parameter of the vehicle is, and how a set of them is checked.
 
-Every number of a vehicle is a field of a frozen dataclass, made by `parameter`: it carries its meaning, its
-unit and its hard limits (outside of which the equations make no sense; plausible ranges and provenance live
-with the values, in the vehicle's file). `read_section` turns a plain mapping into such a dataclass and
-collects what is wrong instead of stopping at the first mistake.
+Every number of a vehicle is a field of a frozen dataclass, a `Section`, made by `parameter`: it carries its meaning,
+its unit and its hard limits (outside of which the equations make no sense; plausible ranges and provenance live
+with the values, in the vehicle's file). A section checks its numbers when it is made; `read_section` turns a plain
+mapping into one and collects what is wrong instead of stopping at the first mistake.
 """
 
 from __future__ import annotations
@@ -12,7 +12,10 @@ import dataclasses
 import math
 from collections.abc import Mapping
 from difflib import get_close_matches
+from numbers import Real
 from typing import Any
+
+from subzero.errors import UserError, real, short
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -28,7 +31,7 @@ class Problem:
         return f"{self.key}: found {self.found}; {self.why}. Allowed: {self.allowed}."
 
 
-class VehicleError(ValueError):
+class VehicleError(UserError, ValueError):
     """The numbers given do not make a vehicle; `problems` lists everything that is wrong with them."""
 
     def __init__(self, problems: tuple[Problem, ...]) -> None:
@@ -36,12 +39,38 @@ class VehicleError(ValueError):
         super().__init__("\n".join(str(problem) for problem in problems))
 
 
+class Section:
+    """A part of a vehicle: a frozen dataclass of `parameter` fields, checked when it is made."""
+
+    def __post_init__(self) -> None:
+        """Refuse numbers that cannot be; raises VehicleError."""
+        problems = []
+        for field in dataclasses.fields(self):  # type: ignore[arg-type]
+            value = getattr(self, field.name)
+            problem = check_value(f"{type(self).__name__}.{field.name}", value, field)
+            if problem:
+                problems.append(problem)
+            elif type(value) is not float:
+                object.__setattr__(self, field.name, float(value))
+        if problems:
+            raise VehicleError(tuple(problems))
+
+
 def parameter(
-    meaning: str, unit: str, *, low: float = -math.inf, high: float = math.inf, above: float | None = None
+    meaning: str,
+    unit: str,
+    *,
+    low: float = -math.inf,
+    high: float = math.inf,
+    above: float | None = None,
+    unlimited: bool = False,
 ) -> Any:
-    """Declare a field with its meaning, unit and hard limits; `above` is a lower limit itself excluded."""
+    """Declare a field with its meaning, unit and hard limits.
+
+    `above` is a lower limit itself excluded; an `unlimited` one may be infinite, which switches it off.
+    """
     limits = {"low": low if above is None else above, "high": high, "strict": above is not None}
-    return dataclasses.field(metadata={"meaning": meaning, "unit": unit, **limits})
+    return dataclasses.field(metadata={"meaning": meaning, "unit": unit, "unlimited": unlimited, **limits})
 
 
 def allowed_values(field: dataclasses.Field[Any]) -> str:
@@ -57,18 +86,17 @@ def allowed_values(field: dataclasses.Field[Any]) -> str:
 
 def check_value(key: str, value: object, field: dataclasses.Field[Any]) -> Problem | None:
     """Return what is wrong with one value, or None."""
-    allowed, found = allowed_values(field), f"{value!r}"
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        return Problem(key=key, found=found, why="this is not a number", allowed=allowed)
     low, high, strict = (field.metadata[name] for name in ("low", "high", "strict"))
-    if math.isnan(value):
-        return Problem(key=key, found=found, why="NaN is not a value", allowed=allowed)
-    if value < low or value > high or (strict and value == low):
+    if isinstance(value, float) and value == math.inf and field.metadata["unlimited"]:
+        return None
+    number = real(value)
+    if number is None:
+        why = "this is not a finite number" if isinstance(value, Real) else "this is not a number"
+    elif number < low or number > high or (strict and number == low):
         why = f"{field.metadata['meaning']} cannot be that"
-        return Problem(key=key, found=found, why=why, allowed=allowed)
-    if math.isinf(value) and high < math.inf:
-        return Problem(key=key, found=found, why="an infinite value has no meaning here", allowed=allowed)
-    return None
+    else:
+        return None
+    return Problem(key=key, found=short(value), why=why, allowed=allowed_values(field))
 
 
 def nearest(name: str, valid: list[str]) -> str:

@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from subzero.compiled import compiled
-from vehicle.parameters import parameter
+from vehicle.parameters import parameter, Section
 
 
 class PropellerNumbers(NamedTuple):
@@ -35,7 +35,7 @@ class PropellerNumbers(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Propeller:
+class Propeller(Section):
     """Diameter, open-water curves and the interaction with the hull."""
 
     diameter: float = parameter("diameter, D", "m", above=0.0)

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from subzero.compiled import compiled
-from vehicle.parameters import parameter
+from vehicle.parameters import parameter, Section
 from vehicle.rigid_body import RigidBody
 
 
@@ -29,7 +29,7 @@ class RestoringNumbers(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Buoyancy:
+class Buoyancy(Section):
     """Buoyancy in excess of weight, and where it acts, from the hull centre."""
 
     net_buoyancy: float = parameter("buoyancy minus weight, B - W", "N")

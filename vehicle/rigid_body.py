@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vehicle.parameters import parameter
+from vehicle.parameters import parameter, Section
 
 
 def skew(vector: np.ndarray) -> np.ndarray:
@@ -23,7 +23,7 @@ def skew(vector: np.ndarray) -> np.ndarray:
 
 
 @dataclass(frozen=True, kw_only=True)
-class RigidBody:
+class RigidBody(Section):
     """Mass, centre of gravity from the hull centre, and inertias about the centre of gravity."""
 
     mass: float = parameter("mass with everything inside, m", "kg", above=0.0)

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vehicle.parameters import parameter
+from vehicle.parameters import parameter, Section
 
 
 @dataclass(frozen=True, kw_only=True)
-class TowPoint:
+class TowPoint(Section):
     """The point of the hull that a cable is fastened to, from the hull centre in body axes."""
 
     x: float = parameter("forward", "m")

@@ -9,10 +9,11 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from subzero.errors import short
 from subzero.packed import packed
 from vehicle.actuators import Servo, Servos
 from vehicle.added_mass import AddedMass
@@ -23,7 +24,7 @@ from vehicle.damping import LinearDamping, QuadraticDamping
 from vehicle.fins import FinNumbers, Fins
 from vehicle.geometry import Hull
 from vehicle.motor import Battery, Motor, MotorNumbers, motor_numbers
-from vehicle.parameters import Problem, VehicleError, nearest, parameter, read_section
+from vehicle.parameters import nearest, parameter, Problem, read_section, Section, VehicleError
 from vehicle.propeller import Propeller, PropellerNumbers
 from vehicle.restoring import Buoyancy, RestoringNumbers
 from vehicle.rigid_body import RigidBody
@@ -52,7 +53,7 @@ class VehicleNumbers(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Water:
+class Water(Section):
     """The water and the gravity it lies in."""
 
     density: float = parameter("density, rho", "kg/m3", above=0.0)
@@ -83,11 +84,41 @@ class Vehicle:
     stern_plane_starboard_servo: Servo
     tow_point: TowPoint
 
+    def __post_init__(self) -> None:
+        """Refuse parts that are none, or do not fit; raises VehicleError."""
+        problems = [
+            Problem(
+                key=name, found=short(getattr(self, name)), why="this is no such part", allowed=kind.__name__
+            )
+            for name, kind in SECTIONS.items()
+            if not isinstance(getattr(self, name), kind)
+        ]
+        problems = problems or inconsistencies(self.hull, self.added_mass)
+        if problems:
+            raise VehicleError(tuple(problems))
+
     def numbers(self) -> VehicleNumbers:
-        """Return what the compiled equations take."""
+        """Return what the compiled equations take.
+
+        Raises:
+            VehicleError: numbers so large or so small that what follows from them is not finite.
+        """
+        try:
+            with np.errstate(all="ignore"):
+                numbers = self._numbers()
+            plain = all(np.isfinite(part).all() for part in _arrays(numbers))
+        except (ArithmeticError, ValueError, np.linalg.LinAlgError):
+            plain = False
+        if not plain:
+            why = "some are so large or so small that masses, areas or forces are not finite"
+            problem = Problem(key="vehicle", found="its numbers", why=why, allowed="those of a real vehicle")
+            raise VehicleError((problem,))
+        return packed(numbers)
+
+    def _numbers(self) -> VehicleNumbers:
         density = self.water.density
         mass_matrix = self.rigid_body.matrix() + self.added_mass.matrix()
-        numbers = VehicleNumbers(
+        return VehicleNumbers(
             mass_matrix=mass_matrix,
             inverse_mass=np.linalg.inv(mass_matrix),
             rigid_body=self.rigid_body.matrix(),
@@ -109,7 +140,6 @@ class Vehicle:
             ),
             motor=motor_numbers(self.motor, self.battery),
         )
-        return packed(numbers)
 
     def with_parameter(self, key: str, value: float) -> Vehicle:
         """Return a new vehicle with one number changed, named "section.parameter"; raises VehicleError."""
@@ -117,6 +147,16 @@ class Vehicle:
         mapping = {s: dict(values) for s, values in to_mapping(self).items()}
         mapping.setdefault(section, {})[name] = value
         return from_mapping(mapping)
+
+
+def _arrays(numbers: VehicleNumbers) -> list[Any]:
+    """Return the parts that follow from several numbers and have no infinite value that means something."""
+    return [part for part in numbers if isinstance(part, float | np.ndarray)] + [
+        *numbers.restoring,
+        *numbers.propeller,
+        *numbers.rudder,
+        *numbers.stern_planes,
+    ]
 
 
 SECTIONS: dict[str, type] = {
@@ -170,8 +210,6 @@ def from_mapping(mapping: Mapping[str, object]) -> Vehicle:
             problems.append(
                 Problem(key=name, found="nothing", why="this table is missing", allowed=f"a table [{name}]")
             )
-    if not problems:
-        problems += inconsistencies(sections["hull"], sections["added_mass"])
     if problems:
         raise VehicleError(tuple(problems))
     return Vehicle(**sections)

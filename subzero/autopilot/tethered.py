@@ -5,6 +5,7 @@ The vector of its state starts with the hull's 16 states and goes on with everyt
 
 from __future__ import annotations
 
+from math import remainder, tau
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -46,7 +47,8 @@ HULL_SIZE = len(STATE_NAMES) + len(HIDDEN)
 
 def _blank_trial(model: Model, x: np.ndarray, wet_length: float, steps: dict[str, float]) -> Trial:
     """Return a trial that says only how the hull lies, how much cable is out, and the steps."""
-    start = Start(roll=x[3], pitch=x[4], heading=x[5], depth=x[2], surge_speed=x[6], wet_length=wet_length)
+    heading = remainder(float(x[5]), tau)
+    start = Start(roll=x[3], pitch=x[4], heading=heading, depth=x[2], surge_speed=x[6], wet_length=wet_length)
     nothing: dict[str, Any] = {
         "vehicle": {},
         "cable": {},
@@ -55,7 +57,8 @@ def _blank_trial(model: Model, x: np.ndarray, wet_length: float, steps: dict[str
         "source": "",
         "description": "",
     }
-    return Trial(name="plant", duration=0.0, start=start, current=model.current, **(nothing | steps))
+    duration = steps["cable_step"]
+    return Trial(name="plant", duration=duration, start=start, current=model.current, **(nothing | steps))
 
 
 class Tethered:

@@ -20,6 +20,7 @@ from cable.lumped_run import Course
 from cable.lumped_start import winch_rows
 from cable.lumped_step import begin
 from cable.pull_out import START_LENGTH
+from scenarios.steps import fitting_step
 from subzero.diagnosis.other_loop import FINE, Led, follow_rope
 from subzero.diagnosis.other_sensors import seen
 from subzero.diagnosis.setting import Setting
@@ -76,8 +77,8 @@ def simulate_otherwise(
     """
     last = float(np.max(times)) + max(-setting.clock_offset, 0.0)
     steps = int(np.ceil(min(last, setting.trial.duration) / cable_step - 1e-6))
-    trial = replace(setting.trial, cable_step=cable_step, segment_length=segment_length, hull_step=hull_step,
-                    grading=0.0, duration=max(steps, 1) * cable_step)  # fmt: skip
+    trial = replace(setting.trial, cable_step=cable_step, segment_length=segment_length,
+                    hull_step=fitting_step(cable_step, hull_step), grading=0.0, duration=max(steps, 1) * cable_step)  # fmt: skip
     fine = replace(setting, trial=trial, later=_within(setting, trial))
     return seen(fine, truth_of(fine), times, channels)
 
@@ -91,7 +92,7 @@ def truth_of(setting: Setting) -> Truth:
     trial, model = setting.trial, setting.model
     if trial.motion is not None:
         raise NoTruthError(f"'{trial.name}' has a prescribed motion; the other formulation knows none.")
-    times = np.linspace(0.0, trial.duration, round(trial.duration / trial.cable_step) + 1)
+    times = trial.times()
     if not setting.tethered:
         return _alone(setting, times.size)
     changes = rows_of_changes(trial, True, times, setting.later)

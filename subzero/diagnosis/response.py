@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from scenarios.steps import fitting_step
 from subzero.channels import DEGREE
 from subzero.diagnosis.setting import Sensing, Setting
 from subzero.diagnosis.track import LENGTH, RUDDER, TENSION, VOLTAGE, WATER
@@ -31,7 +32,7 @@ def economical(setting: Setting, duration: float) -> Setting:
     hull_step = max(trial.hull_step, HULL_STEP) if on_grid else trial.hull_step
     cable_step = max(trial.cable_step, CABLE_STEP)
     steps = int(np.ceil(min(duration, trial.duration) / cable_step - 1e-9))
-    made = replace(trial, hull_step=hull_step, cable_step=cable_step, duration=steps * cable_step,
+    made = replace(trial, hull_step=fitting_step(cable_step, hull_step), cable_step=cable_step, duration=steps * cable_step,
                    segment_length=max(trial.segment_length, SEGMENT))  # fmt: skip
     return replace(setting, trial=made)
 
@@ -40,7 +41,8 @@ def finer(setting: Setting) -> Setting:
     """Return a setting in steps that are fine, to see what economical ones get wrong."""
     hull_step, cable_step, segment = FINE
     trial = setting.trial
-    made = replace(trial, hull_step=min(trial.hull_step, hull_step), cable_step=min(trial.cable_step, cable_step),
+    cable_step = min(trial.cable_step, cable_step)
+    made = replace(trial, hull_step=fitting_step(cable_step, min(trial.hull_step, hull_step)), cable_step=cable_step,
                    segment_length=min(trial.segment_length, segment))  # fmt: skip
     return replace(setting, trial=made)
 

@@ -46,7 +46,7 @@ def follow(
         if live.line.ends.count + 1 + SPARE > live.line.length.size:
             return row, NO_ROOM
         span = times[row] - times[row - 1]
-        ending, _ = exchange(setup, live, times[row - 1], span)
+        ending = exchange(setup, live, times[row - 1], span)
         if ending != FINE:
             return row, ending
         whole, pull, length = (

@@ -5,6 +5,7 @@ A force that begins at 20 s changes nothing before: its sensitivity needs the la
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Mapping
 from typing import Any, NamedTuple
 
@@ -18,7 +19,7 @@ from subzero.later import go_on_with
 from subzero.loop import NO_ROOM
 from subzero.model import Model
 from subzero.run_state import Live, Setup
-from subzero.start import prepare
+from subzero.start import most_hull_steps, prepare
 
 AGREEMENT = 1e-6
 """Fraction within which the forces of hull and cable agree, in the place of 1e-9: a quarter faster, nothing seen. With
@@ -96,10 +97,13 @@ def _run(
 
 
 def _exchanges(setting: Setting) -> tuple[np.ndarray, int]:
-    """Return the times of the exchanges (n,) [s], and the hull's steps between two of them."""
+    """Return the times of the exchanges (n,), evenly spaced to the end of the trial or beyond [s], and the hull's steps
+    between two of them.
+    """
     trial = setting.trial
-    times = np.linspace(0.0, trial.duration, round(trial.duration / trial.cable_step) + 1)
-    return times, max(1, int(np.ceil(trial.cable_step / trial.hull_step - 1e-6)))
+    count = max(1, math.ceil(trial.duration / trial.cable_step - 1e-6))
+    end = trial.duration if abs(count * trial.cable_step - trial.duration) < 1e-6 else count * trial.cable_step
+    return np.linspace(0.0, end, count + 1), most_hull_steps(trial.cable_step, trial.hull_step)
 
 
 def _model_at(setting: Setting, time: float) -> Model:

@@ -1,0 +1,35 @@
+"""Whether what a run will keep fits into memory, before it is asked for: a refusal, not a process that is killed."""
+
+from __future__ import annotations
+
+from subzero.errors import UserError
+
+SHARE = 0.8
+"""A run may ask for this share of the memory that is free. [-]"""
+GIB = 1024.0**3
+
+
+def free_memory() -> float:
+    """Return how much memory can be had without swapping, within the limit of this process. [bytes]."""
+    import resource
+
+    import psutil
+
+    free = float(psutil.virtual_memory().available)
+    limit, _ = resource.getrlimit(resource.RLIMIT_AS)
+    if limit != resource.RLIM_INFINITY:
+        free = min(free, float(limit) - psutil.Process().memory_info().vms)
+    return max(free, 0.0)
+
+
+def fits(size: float) -> bool:
+    """Say whether so many bytes can be had."""
+    return size <= SHARE * free_memory()
+
+
+def refuse_unless_it_fits(size: float, what: str, remedy: str) -> None:
+    """Raise a UserError if so many bytes cannot be had: what needs them, and what to change."""
+    if not fits(size):
+        raise UserError(
+            f"{what} needs {size / GIB:.3g} GiB of memory, and {free_memory() / GIB:.3g} GiB are free. {remedy}"
+        )
