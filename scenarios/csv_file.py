@@ -16,6 +16,7 @@ from scenarios.errors import Problem, ScenarioError, nearest_or_all, shown
 from scenarios.files import read_text
 from scenarios.quantities import SECTIONS, Quantity
 from scenarios.samples import Samples
+from subzero.user_file import MOST_OF_A_CSV, printable
 
 Row = tuple[int, list[str]]
 """Line in the file, from 1, and the cells."""
@@ -32,8 +33,9 @@ def read_csv(path: Path, name: str, section: str) -> tuple[Samples | None, list[
     Returns:
         the samples, None if there are no times to speak of; and the problems.
     """
+    name = printable(name)
     try:
-        header, rows = _table(read_text(path, name), name)
+        header, rows = _table(read_text(path, name, MOST_OF_A_CSV), name)
     except ScenarioError as error:
         return None, list(error.problems)
     columns, problems = _columns(name, header[1], rows, SECTIONS[section])

@@ -9,6 +9,8 @@ import difflib
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from subzero.user_file import printable
+
 SHOWN_PROBLEMS = 40
 """So many problems are spelt out in a message: enough to repair a file; more would only repeat themselves."""
 
@@ -41,7 +43,7 @@ class Problem:
         line = f"line {self.line}" if self.line else ""
         place = ", ".join(part for part in (self.file, line, self.key) if part)
         said = f"found {self.found}, but {self.why}" if self.found else self.why
-        return f"{place}: {said}. {self.remedy}".rstrip()
+        return printable(f"{place}: {said}. {self.remedy}".rstrip())
 
 
 class ScenarioError(Exception):

@@ -14,6 +14,8 @@ from pathlib import Path
 from typing import Any
 
 from scenarios.errors import Problem, ScenarioError, nearest, nearest_or_all, shown
+from subzero import user_file
+from subzero.user_file import MOST_OF_A_TOML, UnreadableFileError, printable
 
 ROOT = Path(__file__).parent
 
@@ -79,27 +81,23 @@ def find(name_or_path: str | Path) -> Source:
     if named and (path.suffix == ".toml" or len(path.parts) > 1 or os.path.exists(named)):
         return read_toml(path, named)
     remedy = nearest_or_all(named, shipped("trials")) + " Or give the path of a TOML file."
-    raise ScenarioError([Problem(file=named or "''", why="there is no such scenario", remedy=remedy)])
+    raise ScenarioError(
+        [Problem(file=printable(named) or "''", why="there is no such scenario", remedy=remedy)]
+    )
 
 
-def read_text(path: Path, name: str) -> str:
+def read_text(path: Path, name: str, most: int = MOST_OF_A_TOML) -> str:
     """Return the text of a file, whatever its line ends; `name` is what messages call it.
 
     Raises:
-        ScenarioError: it is not there, is a folder, cannot be read, or is not text.
+        ScenarioError: it is not there, is no plain file, holds more than `most` bytes, cannot be read, or is not text.
     """
     try:
-        return path.read_bytes().decode("utf-8-sig").replace("\r\n", "\n")
-    except FileNotFoundError:
-        why, remedy = "there is no such file", _neighbour(path)
-    except IsADirectoryError:
-        why, remedy = "this is a folder, not a file", "Name a file in it."
-    except UnicodeDecodeError:
-        why, remedy = "this is not a text file in UTF-8", "Save it as plain text, encoding UTF-8."
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        why, remedy = f"it cannot be read ({reason})", "Name a file that you may read."
-    raise ScenarioError([Problem(file=name, why=why, remedy=remedy)])
+        return user_file.read_text(path, most).replace("\r\n", "\n")
+    except UnreadableFileError as error:
+        remedy = _neighbour(path) if error.is_missing else error.remedy
+        problem = Problem(file=printable(name), why=error.why, remedy=remedy)
+    raise ScenarioError([problem])
 
 
 def _neighbour(path: Path) -> str:
@@ -109,7 +107,7 @@ def _neighbour(path: Path) -> str:
     except OSError:
         return "Its folder does not exist either: check the path."
     close = nearest(path.stem, names)
-    return f"Did you mean '{names[close]}'?" if close else "Check the path."
+    return f"Did you mean '{printable(names[close])}'?" if close else "Check the path."
 
 
 def read_toml(path: Path, name: str) -> Source:
@@ -118,7 +116,7 @@ def read_toml(path: Path, name: str) -> Source:
     Raises:
         ScenarioError: it cannot be read, or is not TOML; with line and column.
     """
-    text = read_text(path, name)
+    text, name = read_text(path, name), printable(name)
     try:
         table = tomllib.loads(text)
     except (ValueError, RecursionError) as error:

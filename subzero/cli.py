@@ -143,7 +143,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (UserError, scenarios.ScenarioError) as error:
         return _refuse(str(error))
     except KeyboardInterrupt:
-        print("Interrupted; nothing was written.", file=sys.stderr)
+        from subzero.stage import interruption
+
+        print(f"Interrupted; {interruption()}.", file=sys.stderr)
         return INTERRUPTED
 
 
@@ -155,7 +157,9 @@ def _never_choke(*streams: Any) -> None:
 
 
 def _refuse(message: str) -> int:
-    print(message, file=sys.stderr)
+    from subzero.user_file import printable
+
+    print("\n".join(map(printable, message.split("\n"))), file=sys.stderr)
     return MISTAKE
 
 
