@@ -22,6 +22,15 @@ ROOT = Path(__file__).parent
 MOST_LEVELS = 16
 """Tables deeper than this inside one another are refused, so that no walk through them runs out of stack."""
 
+MOST_KEYS = 5000
+"""A vehicle has some hundred numbers with four keys each; of every unknown key the nearest known one is looked for."""
+
+LONGEST_KEY = 500
+"""So much of a line is looked at to find its key. [characters]"""
+
+LONG_KEY = re.compile(r"""(?<![\w.\-"'])(?:(?:[\w\-]+|"[^"\n]*"|'[^'\n]*')[ \t]*\.[ \t]*){32}""")
+"""A key of so many names would keep the TOML parser busy for a time that grows with their square."""
+
 HEADER = re.compile(r"""\s*\[\s*([^\[\]]+?)\s*\]""")
 KEY = re.compile(r"""\s*("[^"]*"|'[^']*'|[\w.\-]+)\s*=""")
 AT = re.compile(r"\s*\(at (?:line (\d+), column (\d+)|end of document)\)$")
@@ -117,6 +126,9 @@ def read_toml(path: Path, name: str) -> Source:
         ScenarioError: it cannot be read, or is not TOML; with line and column.
     """
     text, name = read_text(path, name), printable(name)
+    if LONG_KEY.search(text):
+        why = f"it has a key of more than {2 * MOST_LEVELS} names with dots between"
+        raise ScenarioError([Problem(file=name, why=why, remedy="Two names are enough.")])
     try:
         table = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
@@ -124,6 +136,9 @@ def read_toml(path: Path, name: str) -> Source:
     if _is_deep(table):
         why = f"it has tables inside tables more than {MOST_LEVELS} levels deep"
         raise ScenarioError([Problem(file=name, why=why, remedy="Remove them; two levels are enough.")])
+    if _keys(table) > MOST_KEYS:
+        why = f"it has more than {MOST_KEYS} keys"
+        raise ScenarioError([Problem(file=name, why=why, remedy="Remove those that say nothing here.")])
     return Source(name=name, folder=path.parent, text=text, table=table, lines=_key_lines(text))
 
 
@@ -134,6 +149,13 @@ def _is_deep(table: dict[str, Any]) -> bool:
         inside = [each for thing in level for each in (thing.values() if isinstance(thing, dict) else thing)]
         level = [each for each in inside if isinstance(each, dict | list)]
     return bool(level)
+
+
+def _keys(thing: Any) -> int:
+    """Return how many keys a file has; tables in a list count too."""
+    if isinstance(thing, dict):
+        return len(thing) + sum(map(_keys, thing.values()))
+    return sum(map(_keys, thing)) if isinstance(thing, list) else 0
 
 
 def _syntax_problem(name: str, text: str, message: str) -> Problem:
@@ -155,7 +177,8 @@ def _key_lines(text: str) -> dict[str, int]:
     """Return dotted key → line, from 1, of each key at the start of a line; good enough for a message."""
     lines: dict[str, int] = {}
     section = ""
-    for number, line in enumerate(text.split("\n"), start=1):
+    for number, whole in enumerate(text.split("\n"), start=1):
+        line = whole[:LONGEST_KEY]  # a pattern may look at each of n blanks n times
         if header := HEADER.match(line):
             section = header[1] + "."
             lines.setdefault(header[1], number)

@@ -21,7 +21,7 @@ class UserError(Exception):
 def nearest(word: str, allowed: Iterable[str], count: int = 1) -> list[str]:
     """Return the allowed words most like `word` (case does not matter), best first; none if none is near."""
     by_lower = {candidate.lower(): candidate for candidate in allowed}
-    close = difflib.get_close_matches(word.lower(), by_lower, n=count, cutoff=0.5)
+    close = difflib.get_close_matches(word.lower()[:80], by_lower, n=count, cutoff=0.5)
     return [by_lower[match] for match in close]
 
 

@@ -37,7 +37,12 @@ def load(path: str | Path) -> tuple[Effect, ...]:
     """
     if not Path(path).is_file():
         raise UserError(f"There is no effects file '{path}'. Allowed: the path of a Python file.")
-    found = runpy.run_path(str(path)).get("EFFECTS")
+    try:
+        found = runpy.run_path(str(path)).get("EFFECTS")
+    except Exception as error:
+        raise UserError(
+            f"'{path}' cannot be run: {type(error).__name__}: {error}. Allowed: a Python file that runs by itself."
+        ) from error
     if not isinstance(found, (list, tuple)) or not all(isinstance(one, Effect) for one in found):
         raise UserError(f"'{path}' has no list EFFECTS of effects. Allowed: EFFECTS = [Effect(...)].")
     return tuple(found)
