@@ -16,7 +16,7 @@ from scenarios.errors import Problem, ScenarioError, nearest_or_all, shown
 from scenarios.files import read_text
 from scenarios.quantities import SECTIONS, Quantity
 from scenarios.samples import Samples
-from subzero.user_file import MOST_OF_A_CSV, printable
+from subzero.user_file import MOST_COLUMNS, MOST_OF_A_CSV, printable
 
 Row = tuple[int, list[str]]
 """Line in the file, from 1, and the cells."""
@@ -82,6 +82,9 @@ def _table(text: str, name: str) -> tuple[Row, list[Row]]:
     if not rows:
         remedy = "Write a header line and one row for each sample."
         raise ScenarioError([Problem(file=name, why="the file is empty", remedy=remedy)])
+    if len(rows[0][1]) > MOST_COLUMNS:
+        why = f"it has more than {MOST_COLUMNS} columns"
+        raise ScenarioError([Problem(file=name, why=why, remedy="Leave out those that say nothing here.")])
     return rows[0], rows[1:]
 
 

@@ -22,7 +22,7 @@ from scenarios.errors import shown
 from subzero.channels import BY_COLUMN, BY_NAME, TIME
 from subzero.errors import UserError, listed, suggestion
 from subzero.turns import HEADING, TURN
-from subzero.user_file import MOST_OF_A_CSV, UnreadableFileError, printable, read_text
+from subzero.user_file import MOST_COLUMNS, MOST_OF_A_CSV, UnreadableFileError, printable, read_text
 
 GAPS = ("", "nan", "+nan", "-nan")
 """Cells that hold no measurement; numerical libraries write a NaN with either sign."""
@@ -107,6 +107,11 @@ def _table(path: str | Path) -> tuple[list[str], list[Row]]:
     if len(rows) < 2:
         raise UserError(
             f"The measured record {_name(path)} holds no samples: it needs a header and at least one row."
+        )
+    if len(rows[0][1]) > MOST_COLUMNS:
+        raise UserError(
+            f"The measured record {_name(path)} has {len(rows[0][1])} columns; at most {MOST_COLUMNS} are read. "
+            "Leave out those that are no channels."
         )
     return rows[0][1], rows[1:]
 

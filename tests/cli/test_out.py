@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import os
 import resource
@@ -188,3 +189,17 @@ def test_an_interrupt_after_the_last_move_is_told_as_it_is(tmp_path, rails, monk
     monkeypatch.setattr("subzero.delivery.tell", interrupted)
     assert simulate(tmp_path) == INTERRUPTED
     assert capsys.readouterr().err.endswith(f"Interrupted; all files were written to {tmp_path}.\n")
+
+
+def test_control_characters_of_a_description_are_shown_escaped(tmp_path):
+    import scenarios
+    import subzero
+
+    text = scenarios.path("fig6").read_text(encoding="utf-8")
+    lines = [r'description = "\u001b[31mred\u0007"' if line.startswith("description") else line
+             for line in text.splitlines()]  # fmt: skip
+    (tmp_path / "mine.toml").write_text("\n".join(lines), encoding="utf-8")
+    trial = scenarios.load(tmp_path / "mine.toml")
+    assert trial.description == "\x1b[31mred\x07"
+    run = subzero.simulate(dataclasses.replace(trial, duration=0.5), tethered=False)
+    assert run.attrs["title"] == r"\x1b[31mred\x07"
