@@ -423,12 +423,12 @@ def _force(path: Path) -> None:
 
 def _would_lose(folder: Path, names: list[str]) -> bool:
     """Say whether files of these names in a folder are of a run that is not known to have failed."""
-    return any(os.path.lexists(folder / name) for name in names) and not _is_failure(folder)
+    return any(os.path.lexists(folder / name) for name in names) and not _is_failure(folder, names)
 
 
-def _is_failure(folder: Path) -> bool:
-    """Say whether what a folder holds calls itself a failure."""
-    for name in ("summary.json", "diagnosis.json"):
+def _is_failure(folder: Path, names: list[str]) -> bool:
+    """Say whether the summary in a folder that one of these files would replace calls itself a failure."""
+    for name in {"summary.json", "diagnosis.json"} & set(names):
         with suppress(UserError, ValueError, RecursionError):
             said = json.loads(read_bytes(folder / name, MOST_OF_AN_ANSWER * 16))
             if isinstance(said, dict) and _says_failure(said):

@@ -28,6 +28,9 @@ MOST_OF_A_CSV = 128 * MEGABYTE
 MOST_OF_AN_ANSWER = MEGABYTE
 """A sealed answer has 2 kB, and 8 kB unpacked. [byte]"""
 
+MOST_OF_A_PROGRAM = MEGABYTE
+"""Nobody writes an autopilot or a list of effects of a thousand pages. [byte]"""
+
 MOST_COLUMNS = 1000
 """Of a table; a run has fifty channels. Of every unknown column the nearest known one is looked for."""
 

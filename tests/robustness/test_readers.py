@@ -114,7 +114,7 @@ def test_what_is_no_plain_file_is_refused_at_once(name, make, tmp_path):
     readers.check_message(str(caught.value))
 
 
-@pytest.mark.parametrize("make", [zero, pipe, connection, folder, loop, nowhere, binary])
+@pytest.mark.parametrize("make", [zero, pipe, connection, folder, loop, nowhere, huge, binary])
 @pytest.mark.parametrize("read", [from_file, effects.load])
 def test_a_file_that_would_be_run_is_refused_if_it_is_none(read, make, tmp_path):
     make(tmp_path / "mine.py")

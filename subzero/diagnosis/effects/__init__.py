@@ -14,6 +14,7 @@ from pathlib import Path
 from subzero.diagnosis.effect import Effect
 from subzero.diagnosis.effects import cable, fins, hull, propulsion, sensors, start
 from subzero.errors import UserError
+from subzero.user_file import MOST_OF_A_PROGRAM, read_bytes
 
 START = start.EFFECTS
 """What is free at the start of every trial, and never named."""
@@ -37,6 +38,7 @@ def load(path: str | Path) -> tuple[Effect, ...]:
     """
     if not Path(path).is_file():
         raise UserError(f"There is no effects file '{path}'. Allowed: the path of a Python file.")
+    read_bytes(path, MOST_OF_A_PROGRAM)
     try:
         found = runpy.run_path(str(path)).get("EFFECTS")
     except Exception as error:
