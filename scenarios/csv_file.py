@@ -16,7 +16,8 @@ from scenarios.errors import Problem, ScenarioError, nearest_or_all, shown
 from scenarios.files import read_text
 from scenarios.quantities import SECTIONS, Quantity
 from scenarios.samples import Samples
-from subzero.user_file import MOST_COLUMNS, MOST_OF_A_CSV, printable
+from subzero.errors import printable
+from subzero.user_file import MOST_COLUMNS, MOST_OF_A_CSV
 
 Row = tuple[int, list[str]]
 """Line in the file, from 1, and the cells."""

@@ -9,7 +9,7 @@ import difflib
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from subzero.user_file import printable
+from subzero.errors import printable
 
 SHOWN_PROBLEMS = 40
 """So many problems are spelt out in a message: enough to repair a file; more would only repeat themselves."""

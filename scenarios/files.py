@@ -15,7 +15,8 @@ from typing import Any
 
 from scenarios.errors import Problem, ScenarioError, nearest, nearest_or_all, shown
 from subzero import user_file
-from subzero.user_file import MOST_OF_A_TOML, UnreadableFileError, printable
+from subzero.errors import printable
+from subzero.user_file import MOST_OF_A_TOML, UnreadableFileError
 
 ROOT = Path(__file__).parent
 

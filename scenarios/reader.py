@@ -22,7 +22,7 @@ from scenarios.schema import check_page, check_section
 from scenarios.steps import check_steps
 from scenarios.surroundings import check_scheme, read_surroundings
 from scenarios.trial import Motion, Start, Trial
-from subzero.user_file import printable
+from subzero.errors import printable
 
 Found = TypeVar("Found")
 

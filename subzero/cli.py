@@ -21,7 +21,7 @@ from rich.console import Console
 
 import scenarios
 from subzero import cli_autopilot, cli_diagnosis
-from subzero.errors import UserError
+from subzero.errors import UserError, printable
 
 if TYPE_CHECKING:
     from subzero.progress import ProgressBar
@@ -157,7 +157,6 @@ def _never_choke(*streams: Any) -> None:
 
 
 def _refuse(message: str) -> int:
-    from subzero.user_file import printable
 
     print("\n".join(map(printable, message.split("\n"))), file=sys.stderr)
     return MISTAKE

@@ -12,8 +12,8 @@ import xarray as xr
 import scenarios
 import vehicle
 from subzero.channels import BY_NAME, CHANNELS, TIME
+from subzero.errors import printable
 from subzero.model import Model
-from subzero.user_file import printable
 
 if TYPE_CHECKING:
     from subzero.recording import Recording, Run

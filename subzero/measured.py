@@ -20,9 +20,9 @@ import numpy as np
 
 from scenarios.errors import shown
 from subzero.channels import BY_COLUMN, BY_NAME, TIME
-from subzero.errors import UserError, listed, suggestion
+from subzero.errors import UserError, listed, printable, suggestion
 from subzero.turns import HEADING, TURN
-from subzero.user_file import MOST_COLUMNS, MOST_OF_A_CSV, UnreadableFileError, printable, read_text
+from subzero.user_file import MOST_COLUMNS, MOST_OF_A_CSV, UnreadableFileError, read_text
 
 GAPS = ("", "nan", "+nan", "-nan")
 """Cells that hold no measurement; numerical libraries write a NaN with either sign."""

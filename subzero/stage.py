@@ -28,8 +28,8 @@ from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from subzero.errors import UserError
-from subzero.user_file import INCOMPLETE, MOST_OF_AN_ANSWER, printable, read_bytes
+from subzero.errors import UserError, printable
+from subzero.user_file import INCOMPLETE, MOST_OF_AN_ANSWER, read_bytes
 
 HIDDEN = ".subzero-"
 """How the names of hidden folders begin."""

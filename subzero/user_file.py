@@ -4,7 +4,7 @@ Every reader of scenarios, records, sidecars, models and answers opens its file 
 a device, a pipe, a socket) is refused before it is opened, so that no read waits for somebody else. A file that is
 larger than anything of its kind has reason to be is refused before it fills the memory. And a result of ours whose
 folder was left in the middle of a write (`subzero.stage`) is refused, because its neighbours may be of another run.
-What a file says is shown to people through `printable`.
+What a file says is shown to people through `errors.printable`.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import os
 import stat
 from pathlib import Path
 
-from subzero.errors import UserError
+from subzero.errors import UserError, printable
 
 MEGABYTE = 1 << 20
 """[byte]"""
@@ -144,22 +144,3 @@ def _names_in(folder: Path) -> list[str]:
         return os.listdir(folder)
     except OSError:
         return []
-
-
-def printable(text: str) -> str:
-    """Return a text that any terminal, file and figure can take: what does not print becomes an escape.
-
-    Control characters could move the cursor or recolour a terminal; bytes of a file name that are not UTF-8 cannot be
-    written into a file.
-    """
-    if text.isprintable():
-        return text
-    return "".join(one if one.isprintable() else _escape(one) for one in text)
-
-
-def _escape(one: str) -> str:
-    r"""Return ``\x1b`` for a control character; the bytes of a file name that is not UTF-8 as they are, ``\xff``."""
-    code = ord(one)
-    if 0xDC80 <= code <= 0xDCFF:  # where Python keeps such bytes
-        return f"\\x{code - 0xDC00:02x}"
-    return one.encode("unicode_escape").decode("ascii")

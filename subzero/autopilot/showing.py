@@ -10,8 +10,8 @@ from rich.console import Console
 from rich.table import Table
 
 from subzero import output
+from subzero.errors import printable
 from subzero.report import NOTHING
-from subzero.user_file import printable
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -12,8 +12,8 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from subzero.errors import UserError
-from subzero.user_file import MOST_OF_AN_ANSWER, UnreadableFileError, printable, read_bytes
+from subzero.errors import UserError, printable
+from subzero.user_file import MOST_OF_AN_ANSWER, UnreadableFileError, read_bytes
 
 SEALED = "answer.sealed"
 
@@ -96,7 +96,7 @@ def _unsealed(data: bytes) -> Answer:
     text = unpacking.decompress(base64.b64decode(sealed["sealed"]), MOST_OF_AN_ANSWER)
     if unpacking.unconsumed_tail or hashlib.sha256(text).hexdigest() != sealed["sha256"]:
         raise ValueError("not what was sealed")
-    said: dict[str, Any] = json.loads(text, parse_constant=_refused, parse_float=_finite)
+    said: dict[str, Any] = json.loads(text, parse_constant=_refused, parse_float=_finite, parse_int=_whole)
     said |= {key: tuple(map(str, said[key])) for key in ("names", "sentences")}
     answer = Answer(**said)
     str(answer)  # what cannot be told is no answer
@@ -107,6 +107,11 @@ def _finite(text: str) -> float:
     """Return a number; JSON may hold some that no float can."""
     value = float(text)
     return value if math.isfinite(value) else _refused(text)
+
+
+def _whole(text: str) -> int:
+    """Return a whole number; Python reads some that no float can be."""
+    return int(text) if math.isfinite(float(text)) else int(_refused(text))
 
 
 def _refused(text: str) -> float:

@@ -21,12 +21,11 @@ from subzero.diagnosis.other_code import NoTruthError
 from subzero.diagnosis.outside_kinds import draw_outside
 from subzero.diagnosis.setting import Setting
 from subzero.diagnosis.told import TOLD
-from subzero.errors import UserError
+from subzero.errors import UserError, printable
 from subzero.measured import Record
 from subzero.model import Model
 from subzero.trials import load
 from subzero.turns import HEADING, TURN
-from subzero.user_file import printable
 
 BASIC = ("surge_speed", "heading", "yaw_rate", "pitch", "roll", "depth")
 """Channels that a challenge measures."""

@@ -16,9 +16,8 @@ from subzero.diagnosis.effect import Effect, Parameter
 from subzero.diagnosis.effects import load
 from subzero.diagnosis.extended import STARTS, ExtendedFile, all_effects, force_key, key_of, plain_id
 from subzero.diagnosis.verdict import Extended
-from subzero.errors import UserError, listed, suggestion
+from subzero.errors import UserError, listed, printable, suggestion
 from subzero.missing_force import AXES, MissingForce, Term
-from subzero.user_file import printable
 
 KEYS = ("scenario", "source", "effects_file", "effects", "calibration", "missing_force", "missing_term")
 
@@ -46,6 +45,11 @@ def read_extended(path: str | Path) -> ExtendedFile:
         for key in table
         if key not in KEYS
     ]
+    problems += [
+        f"{_at(source, key)}: found {shown(table[key])}, but this is not a text in quotes"
+        for key in ("scenario", "source")
+        if not isinstance(table.get(key, ""), str)
+    ]
     starts: dict[str, float] = {}
     deviations = _effects(source, "effects", known, starts, problems)
     calibration = _effects(source, "calibration", known, None, problems)
@@ -53,7 +57,7 @@ def read_extended(path: str | Path) -> ExtendedFile:
     if problems:
         raise UserError(listed(f"The extended model {printable(str(path))} cannot be used:", problems))
     extended = Extended(deviations=deviations, start_times=starts, calibration=calibration, missing=missing)
-    named = str(table.get("scenario", ""))
+    named = table.get("scenario", "")
     return ExtendedFile(extended=extended, effects=known, scenario=named)
 
 

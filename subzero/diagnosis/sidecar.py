@@ -23,8 +23,7 @@ from scenarios import ScenarioError
 from scenarios.errors import shown
 from scenarios.files import Source, read_toml
 from subzero.channels import BY_COLUMN, TIME
-from subzero.errors import UserError, listed, suggestion
-from subzero.user_file import printable
+from subzero.errors import UserError, listed, printable, suggestion
 
 WORDS = {"source": str, "scenario": str, "tethered": bool, "surge_speed": str}
 LIMITS = {"noise": (1e-6, 1e6), "rate_hz": (1e-4, 1e5)}

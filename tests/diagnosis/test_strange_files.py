@@ -34,6 +34,7 @@ EXTENDED = {
     HISTORY.format("1" + "0" * 400): "is not a list of numbers",
     HISTORY.format("1e200"): "is not a list of numbers",
     HISTORY.format("1").replace('"X"', "12:30:00"): "axis is datetime.time(12, 30). Allowed: X, Y",
+    "scenario = 0x" + "f" * 9999 + "\n": "but this is not a text in quotes",
     HISTORY.format("1") * 101: "there are 101 of them; at most 100 are read",
 }
 
@@ -84,6 +85,7 @@ CHANGED = {
     "as many words as names": sealed(json.dumps(ANSWER | {"names": ["a", "b"]}).encode()),
     "no numbers": sealed(json.dumps(ANSWER | {"deviations": {"a": {"b": "c"}}}).encode()),
     "not finite": sealed(json.dumps(ANSWER | {"deviations": {"a": {"b": float("nan")}}}).encode()),
+    "a seed that is too large": sealed(json.dumps(ANSWER | {"seed": 10**400}).encode()),
     "too large": sealed(json.dumps(ANSWER | {"deviations": {"a": {"b": 10**400}}}).encode()),
 }
 
@@ -106,3 +108,10 @@ def test_a_huge_sealed_answer_is_refused(tmp_path):
 def test_control_characters_of_an_answer_are_shown_escaped(tmp_path):
     (tmp_path / SEALED).write_text(seal(Answer(kind="single", names=("a",), sentences=("\x1b[2J",))))
     assert str(reveal(tmp_path)) == "a: \\x1b[2J"
+
+
+def test_a_key_that_does_not_print_is_shown_escaped(tmp_path):
+    (tmp_path / "extended.toml").write_text('[effects."\\u001b[2J"]\nshare = 1\n')
+    with pytest.raises(UserError, match=r"there is no effect '\\x1b\[2J'") as caught:
+        read_extended(tmp_path / "extended.toml")
+    assert str(caught.value).replace("\n", "").isprintable()
