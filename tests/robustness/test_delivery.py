@@ -8,6 +8,7 @@ be all old or all new after the next command with that folder.
 
 from __future__ import annotations
 
+import functools
 import json
 import subprocess
 import sys
@@ -122,6 +123,7 @@ print(json.dumps([last, [[spot, *broken(k, spot)] for k, spot in enumerate(spots
 
 @pytest.fixture(scope="module")
 def broken(tmp_path_factory):
+    @functools.cache
     def run(how, kind, twice="once"):
         top = tmp_path_factory.mktemp("broken")
         done = subprocess.run([sys.executable, "-c", BREAKER, how, kind, twice, str(top)],
