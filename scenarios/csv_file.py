@@ -16,6 +16,8 @@ from scenarios.errors import Problem, ScenarioError, nearest_or_all, shown
 from scenarios.files import read_text
 from scenarios.quantities import SECTIONS, Quantity
 from scenarios.samples import Samples
+from subzero.errors import printable
+from subzero.user_file import MOST_COLUMNS, MOST_OF_A_CSV
 
 Row = tuple[int, list[str]]
 """Line in the file, from 1, and the cells."""
@@ -32,8 +34,9 @@ def read_csv(path: Path, name: str, section: str) -> tuple[Samples | None, list[
     Returns:
         the samples, None if there are no times to speak of; and the problems.
     """
+    name = printable(name)
     try:
-        header, rows = _table(read_text(path, name), name)
+        header, rows = _table(read_text(path, name, MOST_OF_A_CSV), name)
     except ScenarioError as error:
         return None, list(error.problems)
     columns, problems = _columns(name, header[1], rows, SECTIONS[section])
@@ -80,6 +83,9 @@ def _table(text: str, name: str) -> tuple[Row, list[Row]]:
     if not rows:
         remedy = "Write a header line and one row for each sample."
         raise ScenarioError([Problem(file=name, why="the file is empty", remedy=remedy)])
+    if len(rows[0][1]) > MOST_COLUMNS:
+        why = f"it has more than {MOST_COLUMNS} columns"
+        raise ScenarioError([Problem(file=name, why=why, remedy="Leave out those that say nothing here.")])
     return rows[0], rows[1:]
 
 

@@ -9,7 +9,7 @@ import difflib
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from subzero.errors import SHOWN_CHARACTERS, UserError
+from subzero.errors import SHOWN_CHARACTERS, UserError, printable
 from subzero.errors import short as shown
 
 SHOWN_PROBLEMS = 40
@@ -40,7 +40,7 @@ class Problem:
         line = f"line {self.line}" if self.line else ""
         place = ", ".join(part for part in (self.file, line, self.key) if part)
         said = f"found {self.found}, but {self.why}" if self.found else self.why
-        return f"{place}: {said}. {self.remedy}".rstrip()
+        return printable(f"{place}: {said}. {self.remedy}".rstrip())
 
 
 class ScenarioError(UserError, ValueError):

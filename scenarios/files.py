@@ -14,11 +14,23 @@ from pathlib import Path
 from typing import Any
 
 from scenarios.errors import Problem, ScenarioError, nearest, nearest_or_all, shown
+from subzero import user_file
+from subzero.errors import printable
+from subzero.user_file import MOST_OF_A_TOML, UnreadableFileError
 
 ROOT = Path(__file__).parent
 
 MOST_LEVELS = 16
 """Tables deeper than this inside one another are refused, so that no walk through them runs out of stack."""
+
+MOST_KEYS = 5000
+"""A vehicle has some hundred numbers with four keys each; of every unknown key the nearest known one is looked for."""
+
+LONGEST_KEY = 500
+"""So much of a line is looked at to find its key. [characters]"""
+
+LONG_KEY = re.compile(r"""(?<![\w.\-"'])(?:(?:[\w\-]+|"[^"\n]*"|'[^'\n]*')[ \t]*\.[ \t]*){32}""")
+"""A key of so many names would keep the TOML parser busy for a time that grows with their square."""
 
 HEADER = re.compile(r"""\s*\[\s*([^\[\]]+?)\s*\]""")
 KEY = re.compile(r"""\s*("[^"]*"|'[^']*'|[\w.\-]+)\s*=""")
@@ -79,27 +91,23 @@ def find(name_or_path: str | Path) -> Source:
     if named and (path.suffix == ".toml" or len(path.parts) > 1 or os.path.exists(named)):
         return read_toml(path, named)
     remedy = nearest_or_all(named, shipped("trials")) + " Or give the path of a TOML file."
-    raise ScenarioError([Problem(file=named or "''", why="there is no such scenario", remedy=remedy)])
+    raise ScenarioError(
+        [Problem(file=printable(named) or "''", why="there is no such scenario", remedy=remedy)]
+    )
 
 
-def read_text(path: Path, name: str) -> str:
+def read_text(path: Path, name: str, most: int = MOST_OF_A_TOML) -> str:
     """Return the text of a file, whatever its line ends; `name` is what messages call it.
 
     Raises:
-        ScenarioError: it is not there, is a folder, cannot be read, or is not text.
+        ScenarioError: it is not there, is no plain file, holds more than `most` bytes, cannot be read, or is not text.
     """
     try:
-        return path.read_bytes().decode("utf-8-sig").replace("\r\n", "\n")
-    except FileNotFoundError:
-        why, remedy = "there is no such file", _neighbour(path)
-    except IsADirectoryError:
-        why, remedy = "this is a folder, not a file", "Name a file in it."
-    except UnicodeDecodeError:
-        why, remedy = "this is not a text file in UTF-8", "Save it as plain text, encoding UTF-8."
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        why, remedy = f"it cannot be read ({reason})", "Name a file that you may read."
-    raise ScenarioError([Problem(file=name, why=why, remedy=remedy)])
+        return user_file.read_text(path, most).replace("\r\n", "\n")
+    except UnreadableFileError as error:
+        remedy = _neighbour(path) if error.is_missing else error.remedy
+        problem = Problem(file=printable(name), why=error.why, remedy=remedy)
+    raise ScenarioError([problem])
 
 
 def _neighbour(path: Path) -> str:
@@ -109,7 +117,7 @@ def _neighbour(path: Path) -> str:
     except OSError:
         return "Its folder does not exist either: check the path."
     close = nearest(path.stem, names)
-    return f"Did you mean '{names[close]}'?" if close else "Check the path."
+    return f"Did you mean '{printable(names[close])}'?" if close else "Check the path."
 
 
 def read_toml(path: Path, name: str) -> Source:
@@ -118,7 +126,10 @@ def read_toml(path: Path, name: str) -> Source:
     Raises:
         ScenarioError: it cannot be read, or is not TOML; with line and column.
     """
-    text = read_text(path, name)
+    text, name = read_text(path, name), printable(name)
+    if LONG_KEY.search(text):
+        why = f"it has a key of more than {2 * MOST_LEVELS} names with dots between"
+        raise ScenarioError([Problem(file=name, why=why, remedy="Two names are enough.")])
     try:
         table = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
@@ -126,6 +137,9 @@ def read_toml(path: Path, name: str) -> Source:
     if _is_deep(table):
         why = f"it has tables inside tables more than {MOST_LEVELS} levels deep"
         raise ScenarioError([Problem(file=name, why=why, remedy="Remove them; two levels are enough.")])
+    if _keys(table) > MOST_KEYS:
+        why = f"it has more than {MOST_KEYS} keys"
+        raise ScenarioError([Problem(file=name, why=why, remedy="Remove those that say nothing here.")])
     return Source(name=name, folder=path.parent, text=text, table=table, lines=_key_lines(text))
 
 
@@ -136,6 +150,13 @@ def _is_deep(table: dict[str, Any]) -> bool:
         inside = [each for thing in level for each in (thing.values() if isinstance(thing, dict) else thing)]
         level = [each for each in inside if isinstance(each, dict | list)]
     return bool(level)
+
+
+def _keys(thing: Any) -> int:
+    """Return how many keys a file has; tables in a list count too."""
+    if isinstance(thing, dict):
+        return len(thing) + sum(map(_keys, thing.values()))
+    return sum(map(_keys, thing)) if isinstance(thing, list) else 0
 
 
 def _syntax_problem(name: str, text: str, message: str) -> Problem:
@@ -157,7 +178,8 @@ def _key_lines(text: str) -> dict[str, int]:
     """Return dotted key → line, from 1, of each key at the start of a line; good enough for a message."""
     lines: dict[str, int] = {}
     section = ""
-    for number, line in enumerate(text.split("\n"), start=1):
+    for number, whole in enumerate(text.split("\n"), start=1):
+        line = whole[:LONGEST_KEY]  # a pattern may look at each of n blanks n times
         if header := HEADER.match(line):
             section = header[1] + "."
             lines.setdefault(header[1], number)

@@ -22,6 +22,7 @@ from scenarios.schema import check_page, check_section
 from scenarios.steps import check_steps
 from scenarios.surroundings import check_scheme, read_surroundings
 from scenarios.trial import Motion, Start, Trial
+from subzero.errors import printable
 
 Found = TypeVar("Found")
 
@@ -75,10 +76,10 @@ def load(
         raise ScenarioError(_in_order(reading.problems))
     prescribed = motion(samples["motion"]) if "motion" in samples else None
     return Trial(
-        name=Path(name_or_path).stem,
+        name=printable(Path(name_or_path).stem),
         description=reading.source.table["description"],
         text=reading.source.text,
-        source=str(name_or_path),
+        source=printable(str(name_or_path)),
         duration=run["duration_s"],
         hull_step=run["hull_step_s"],
         cable_step=run["cable_step_s"],

@@ -21,7 +21,7 @@ from rich.console import Console
 
 import scenarios
 from subzero import cli_autopilot, cli_diagnosis
-from subzero.errors import UserError
+from subzero.errors import UserError, printable
 
 if TYPE_CHECKING:
     from subzero.progress import ProgressBar
@@ -143,7 +143,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (UserError, scenarios.ScenarioError) as error:
         return _refuse(str(error))
     except KeyboardInterrupt:
-        print("Interrupted; nothing was written.", file=sys.stderr)
+        from subzero.stage import interruption
+
+        print(f"Interrupted; {interruption()}.", file=sys.stderr)
         return INTERRUPTED
 
 
@@ -155,7 +157,8 @@ def _never_choke(*streams: Any) -> None:
 
 
 def _refuse(message: str) -> int:
-    print(message, file=sys.stderr)
+
+    print("\n".join(map(printable, message.split("\n"))), file=sys.stderr)
     return MISTAKE
 
 

@@ -87,7 +87,7 @@ def challenge(
 
     with staged(out) as stage, _bar("Hiding an effect"):
         hide(scenario, seed, stage.path)
-    print(f"Wrote {out}: {', '.join(stage.written)}")
+    print(stage.words())
     print(f"Find it: subzero diagnose {out / 'record.csv'} --scenario {scenario}")
     print(f"Be told: subzero challenge --reveal {out}")
     return FINE

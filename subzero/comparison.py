@@ -72,15 +72,29 @@ def compare(
 
     Raises:
         scenarios.ScenarioError: if the scenario cannot be used.
-        UserError: if the measured record cannot be used.
+        UserError: if the measured record cannot be used, or does not look like this trial.
     """
     trial = scenario if isinstance(scenario, scenarios.Trial) else load(scenario)
     record = read_record(measured) if isinstance(measured, str | Path) else measured
+    sidecar = _checked(record, trial)
     other: dict[str, Any] = {"model": model, "later": later} if model or later else {}
     tethered = simulate(trial, tethered=True, **other, progress=_half(progress, 0.0))
     untethered = simulate(trial, tethered=False, **other, progress=_half(progress, 0.5))
     record = beside(record, tethered) if record is not None else None
+    if record is not None:
+        from subzero.diagnosis.record_checks import check_beside
+
+        check_beside(record, {"tethered": tethered, "untethered": untethered}, sidecar)
     return Comparison(tethered=tethered, untethered=untethered, trial=trial, measured=record)
+
+
+def _checked(record: Record | None, trial: scenarios.Trial) -> Any:
+    """Check before the runs that a record belongs to them; return its sidecar, None if there is no record."""
+    if record is None:
+        return None
+    from subzero.diagnosis.record_checks import check_epoch
+
+    return check_epoch(record, trial)
 
 
 def _half(progress: Progress | None, start: float) -> Progress | None:

@@ -12,6 +12,7 @@ import xarray as xr
 import scenarios
 import vehicle
 from subzero.channels import BY_NAME, CHANNELS, TIME
+from subzero.errors import printable
 from subzero.model import Model
 
 if TYPE_CHECKING:
@@ -178,7 +179,7 @@ def _provenance(trial: scenarios.Trial, model: Model, tethered: bool, run: Run) 
     """Return what the result came from; no clock, so that two runs are alike to the last bit."""
     return {
         "scenario": trial.name,
-        "title": trial.description,
+        "title": printable(trial.description),
         "scenario_text": trial.text,
         "parameters": json.dumps(model.parameters()),
         "subzero_version": version("subzero"),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 import sys
 from pathlib import Path
@@ -31,6 +30,7 @@ def write_all(runs: dict[str, xr.Dataset], record: Record | None, stage: Stage) 
     from subzero.summary import summary_of
 
     summary = summary_of(runs, record)
+    stage.failed = any(run.attrs["outcome"] != "completed" for run in runs.values())
     for label, run in runs.items():
         output.write_run(run, stage, label)
     output.write_summary(summary, stage)
@@ -44,7 +44,7 @@ def tell(summary: dict[str, Any], stage: Stage) -> list[str]:
 
     console = Console()
     show(summary, console)
-    console.print(f"Wrote {stage.folder}{os.sep}: {', '.join(stage.written)}", highlight=False, markup=False)
+    console.print(stage.words(), highlight=False, markup=False)
     stopped = [label for label in RUNS if summary.get(label, {}).get("outcome") == "stopped"]
     for label in stopped:
         print(f"The {label} run stopped: {summary[label]['outcome_message']}", file=sys.stderr)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import os
 import shutil
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -56,7 +55,7 @@ def tell(verdict: Verdict, stage: Stage, console: Console | None = None) -> None
     for name, table in tables.gain(verdict).items():
         console.print(f"Root mean square error, {name}:", highlight=False, markup=False)
         console.print(_rich(table), highlight=False)
-    console.print(f"Wrote {stage.folder}{os.sep}: {', '.join(stage.written)}", highlight=False, markup=False)
+    console.print(stage.words(), highlight=False, markup=False)
 
 
 def _rich(table: tables.Table) -> Table:
@@ -81,6 +80,7 @@ def write_all(
     from subzero.diagnosis.extended import all_effects
     from subzero.diagnosis.extended_text import text_of
 
+    stage.failed = not verdict.complete
     if effects_file is not None:
         shutil.copyfile(effects_file, stage.path / effects_file.name)
     sources = ", ".join(one.record.source for one in logged)

@@ -16,6 +16,9 @@ from numbers import Real
 SHOWN_PROBLEMS = 12
 """So many problems of one file are spelt out: enough to repair it, few enough to read on one screen."""
 
+LONGEST_PROBLEM = 1000
+"""A problem is cut behind so many characters: a file may hold a key of any length."""
+
 
 class UserError(Exception):
     """Something in the request or in a file of the user cannot be used; the message says what to do."""
@@ -87,7 +90,7 @@ def short(value: object) -> str:
 def nearest(word: str, allowed: Iterable[str], count: int = 1) -> list[str]:
     """Return the allowed words most like `word` (case does not matter), best first; none if none is near."""
     by_lower = {candidate.lower(): candidate for candidate in allowed}
-    close = difflib.get_close_matches(word.lower(), by_lower, n=count, cutoff=0.5)
+    close = difflib.get_close_matches(word.lower()[:80], by_lower, n=count, cutoff=0.5)
     return [by_lower[match] for match in close]
 
 
@@ -101,5 +104,24 @@ def listed(title: str, problems: list[str]) -> str:
     """Return one message that lists all problems of a file, each on its own line."""
     shown = problems[:SHOWN_PROBLEMS]
     rest = len(problems) - len(shown)
-    lines = [title, *(f"  {problem}" for problem in shown)]
+    lines = [title, *(f"  {printable(problem[:LONGEST_PROBLEM])}" for problem in shown)]
     return "\n".join([*lines, f"  ... and {rest} more."] if rest else lines)
+
+
+def printable(text: str) -> str:
+    """Return a text that any terminal, file and figure can take: what does not print becomes an escape.
+
+    Control characters could move the cursor or recolour a terminal; bytes of a file name that are not UTF-8 cannot be
+    written into a file.
+    """
+    if text.isprintable():
+        return text
+    return "".join(one if one.isprintable() else _escape(one) for one in text)
+
+
+def _escape(one: str) -> str:
+    r"""Return ``\x1b`` for a control character; the bytes of a file name that is not UTF-8 as they are, ``\xff``."""
+    code = ord(one)
+    if 0xDC80 <= code <= 0xDCFF:  # where Python keeps such bytes
+        return f"\\x{code - 0xDC00:02x}"
+    return one.encode("unicode_escape").decode("ascii")

@@ -1,72 +1,60 @@
-"""Write what a command leaves behind: all of it, or nothing.
-
-Files are written into a hidden folder on the same disk, and moved to their place when all of them are
-complete, so a run that is interrupted, or a disk that is full, leaves no half-written file. The hidden
-folder is made *before* anything is simulated: a folder that cannot be written is told at once, not after
-the run.
-"""
+"""Write what a command leaves behind: runs, summaries and figures, to a stage that delivers all of them or none."""
 
 from __future__ import annotations
 
 import csv
 import json
-import os
-import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from subzero import stage as stages
 from subzero.channels import CHANNELS, TIME
-from subzero.errors import UserError
+from subzero.stage import Stage
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
+RUN_FILES = (*("tethered.nc", "tethered.csv", "untethered.nc", "untethered.csv", "summary.json"),
+             *("fig4.png", "fig5.png", "fig6.png", "attitude.png", "cable.png", "forces.png"),
+             *("deployment.png", "measured.png", "manoeuvre.png"))  # fmt: skip
+"""Files of runs; `subzero.figures.draw` names the figures."""
 
-@dataclass(frozen=True)
-class Stage:
-    """Where files are written before all of them move to the output folder.
-
-    Args:
-        path: the hidden folder.
-        folder: the output folder, as the user named it.
-        written: names of the files that have been moved to the output folder.
-    """
-
-    path: Path
-    folder: Path
-    written: list[str] = field(default_factory=list)
+DIAGNOSIS_FILES = ("diagnosis.json", "extended.toml", "report.md", "report.html", "record.csv", "record.toml",
+                   "answer.sealed")  # fmt: skip
+"""Files of diagnoses and challenges."""
 
 
 @contextmanager
 def staged(folder: Path) -> Iterator[Stage]:
-    """Give a stage to write to; its files appear in `folder` when the block ends without an error.
-
-    Files of the same name are replaced, others stay.
+    """Give a stage to write to, as `subzero.stage.staged`; what commands write must not be names of folders there.
 
     Raises:
         UserError: at once, if `folder` cannot be made or written.
     """
-    stage = Stage(_hidden_folder(folder), folder)
-    try:
+    with stages.staged(folder, (*RUN_FILES, *DIAGNOSIS_FILES)) as stage:
         yield stage
-        with _told(folder):
-            folder.mkdir(parents=True, exist_ok=True)
-            for path in sorted(stage.path.iterdir()):
-                os.replace(path, folder / path.name)
-                stage.written.append(path.name)
-    finally:
-        shutil.rmtree(stage.path, ignore_errors=True)
 
 
 def write_run(run: xr.Dataset, stage: Stage, name: str) -> None:
     """Write a run as ``name.nc`` (everything, with units and provenance) and ``name.csv`` (the channels)."""
-    with _told(stage.folder):
-        run.to_netcdf(stage.path / f"{name}.nc", engine="netcdf4")
+    with stages.told(stage.folder):
+        _write_netcdf(run, stage.path / f"{name}.nc")
         write_csv(run, stage.path / f"{name}.csv")
+
+
+def _write_netcdf(run: xr.Dataset, path: Path) -> None:
+    """Write a run as netCDF; its library says a full disk as it says everything else."""
+    try:
+        run.to_netcdf(path, engine="netcdf4")
+    except RuntimeError as error:
+        if "HDF error" not in str(error):
+            raise
+        raise OSError(
+            0, f"{path.name} could not be written, perhaps because the disk is full ({error})"
+        ) from error
 
 
 def write_csv(run: xr.Dataset, path: Path) -> None:
@@ -82,13 +70,13 @@ def write_csv(run: xr.Dataset, path: Path) -> None:
 def write_summary(summary: dict[str, Any], stage: Stage) -> None:
     """Write ``summary.json``."""
     text = json.dumps(summary, indent=2, ensure_ascii=False, allow_nan=False)
-    with _told(stage.folder):
+    with stages.told(stage.folder):
         (stage.path / "summary.json").write_text(text + "\n", encoding="utf-8")
 
 
 def write_figures(figures: dict[str, Figure], stage: Stage) -> None:
     """Write each figure as ``name.png``."""
-    with _told(stage.folder):
+    with stages.told(stage.folder):
         for name, figure in figures.items():
             figure.savefig(stage.path / f"{name}.png", pil_kwargs={"compress_level": 3})
 
@@ -96,34 +84,3 @@ def write_figures(figures: dict[str, Figure], stage: Stage) -> None:
 def _cell(value: float) -> str:
     """Ten digits are more than any of these numbers is good for; a gap is an empty cell."""
     return "" if value != value else format(value, ".10g")
-
-
-def _hidden_folder(folder: Path) -> Path:
-    """Make the hidden folder next to where the files will be, on the same disk."""
-    with _told(folder):
-        home = folder.absolute()
-        while not home.exists():
-            home = home.parent
-        if not home.is_dir():
-            raise NotADirectoryError(0, f"{_shown(home)} is a file, not a folder")
-        stage = home / f".subzero-{os.getpid()}-{os.urandom(4).hex()}"
-        stage.mkdir()
-        return stage
-
-
-def _shown(path: Path) -> Path:
-    """Return a path as a user would write it: relative to here if it is inside."""
-    here = Path.cwd()
-    return path.relative_to(here) if path.is_relative_to(here) else path
-
-
-@contextmanager
-def _told(folder: Path) -> Iterator[None]:
-    """Turn a refusal of the disk into a clean message."""
-    try:
-        yield
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise UserError(
-            f"The output folder {folder} cannot be written: {reason}. Give another one with --out DIR."
-        ) from error

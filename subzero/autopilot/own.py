@@ -17,6 +17,7 @@ from subzero.autopilot.feed_forward import CableModel
 from subzero.autopilot.flight import Autopilot
 from subzero.autopilot.tuning import Tuning
 from subzero.errors import UserError
+from subzero.user_file import MOST_OF_A_PROGRAM, read_bytes
 
 Build = Callable[[Tuning, float, CableModel], Autopilot]
 """What makes an autopilot, from a tuning, a sample time [s] and a cable model."""
@@ -30,6 +31,7 @@ def from_file(path: str | Path) -> Build:
     """
     if not Path(path).is_file():
         raise UserError(f"There is no autopilot file '{path}'. Allowed: the path of a Python file.")
+    read_bytes(path, MOST_OF_A_PROGRAM)
     try:
         build = runpy.run_path(str(path)).get("make")
     except Exception as error:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from typing import TYPE_CHECKING, Any
 
 from rich import box
@@ -11,6 +10,7 @@ from rich.console import Console
 from rich.table import Table
 
 from subzero import output
+from subzero.errors import printable
 from subzero.report import NOTHING
 
 if TYPE_CHECKING:
@@ -37,7 +37,8 @@ def write(measured: Measured, title: str, answer: str, command: str, stage: Stag
 
     runs = {name: run for name, (run, _) in measured.items()}
     summary = summary_of(runs, None)
-    summary["title"] = title
+    summary["title"] = title = printable(title)
+    stage.failed = any(run.attrs["outcome"] != "completed" for run in runs.values())
     for name, (run, indices) in measured.items():
         output.write_run(run, stage, name)
         summary[name]["indices"] = {key: _number(value) for key, value in indices.items()}
@@ -58,7 +59,7 @@ def tell(summary: dict[str, Any], names: list[str], stage: Stage) -> list[str]:
     console = Console()
     console.print(f"{summary['scenario']}: {summary['title']}", highlight=False, markup=False)
     console.print(table, highlight=False)
-    console.print(f"Wrote {stage.folder}{os.sep}: {', '.join(stage.written)}", highlight=False, markup=False)
+    console.print(stage.words(), highlight=False, markup=False)
     return [
         f"The {name} run stopped: {summary[name]['outcome_message']}"
         for name in names

@@ -5,13 +5,15 @@ from __future__ import annotations
 import base64
 import hashlib
 import json
+import math
 import zlib
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from subzero.errors import UserError
+from subzero.errors import UserError, printable
+from subzero.user_file import MOST_OF_AN_ANSWER, UnreadableFileError, read_bytes
 
 SEALED = "answer.sealed"
 
@@ -53,7 +55,7 @@ class Answer:
             lines.append(f"  {key} differs from the model by {sizes}{at}")
         if self.axis:
             lines.append(f"  on the axis {self.axis}" + (f", with {self.feature}" if self.feature else ""))
-        return "\n".join(lines)
+        return "\n".join(map(printable, lines))
 
 
 def seal(answer: Answer) -> str:
@@ -70,20 +72,47 @@ def reveal(folder: str | Path) -> Answer:
         UserError: there is no sealed answer, or it has been changed.
     """
     path = Path(folder) / SEALED
-    if not path.is_file():
-        raise UserError(
-            f"There is no sealed answer '{path}'. Allowed: a folder made by subzero challenge --out FOLDER."
-        )
+    shown = printable(str(path))
     try:
-        sealed: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-        text = zlib.decompress(base64.b64decode(sealed["sealed"]))
-        intact = hashlib.sha256(text).hexdigest() == sealed["sha256"]
-    except (ValueError, KeyError, TypeError, zlib.error):
-        intact = False
-    if not intact:
+        data = read_bytes(path, MOST_OF_AN_ANSWER)
+    except UnreadableFileError as error:
+        if not error.is_missing:
+            raise
         raise UserError(
-            f"The sealed answer '{path}' has been changed. Make the challenge again from its seed."
-        )
-    said: dict[str, Any] = json.loads(text)
-    said |= {key: tuple(said[key]) for key in ("names", "sentences")}
-    return Answer(**said)
+            f"There is no sealed answer '{shown}'. Allowed: a folder made by subzero challenge --out FOLDER."
+        ) from None
+    try:
+        return _unsealed(data)
+    except (ValueError, LookupError, TypeError, AttributeError, OverflowError, RecursionError, zlib.error):
+        raise UserError(
+            f"The sealed answer '{shown}' has been changed. Make the challenge again from its seed."
+        ) from None
+
+
+def _unsealed(data: bytes) -> Answer:
+    """Return the answer in a sealed file; any error says that it is not as it was sealed."""
+    sealed: dict[str, Any] = json.loads(data)
+    unpacking = zlib.decompressobj()
+    text = unpacking.decompress(base64.b64decode(sealed["sealed"]), MOST_OF_AN_ANSWER)
+    if unpacking.unconsumed_tail or hashlib.sha256(text).hexdigest() != sealed["sha256"]:
+        raise ValueError("not what was sealed")
+    said: dict[str, Any] = json.loads(text, parse_constant=_refused, parse_float=_finite, parse_int=_whole)
+    said |= {key: tuple(map(str, said[key])) for key in ("names", "sentences")}
+    answer = Answer(**said)
+    str(answer)  # what cannot be told is no answer
+    return answer
+
+
+def _finite(text: str) -> float:
+    """Return a number; JSON may hold some that no float can."""
+    value = float(text)
+    return value if math.isfinite(value) else _refused(text)
+
+
+def _whole(text: str) -> int:
+    """Return a whole number; Python reads some that no float can be."""
+    return int(text) if math.isfinite(float(text)) else int(_refused(text))
+
+
+def _refused(text: str) -> float:
+    raise ValueError(f"{text} is no number")

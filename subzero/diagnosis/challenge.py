@@ -21,7 +21,7 @@ from subzero.diagnosis.other_code import NoTruthError
 from subzero.diagnosis.outside_kinds import draw_outside
 from subzero.diagnosis.setting import Setting
 from subzero.diagnosis.told import TOLD
-from subzero.errors import UserError
+from subzero.errors import UserError, printable
 from subzero.measured import Record
 from subzero.model import Model
 from subzero.trials import load
@@ -145,10 +145,14 @@ def write(made: Challenge, folder: Path, scenario: str | Path | scenarios.Trial)
     """Write the record with its commands, what is known of it, and the sealed answer."""
     folder.mkdir(parents=True, exist_ok=True)
     _write_csv(made, folder / "record.csv")
-    lines = [f'source = "{made.record.source}"', 'surge_speed = "water"']
+    lines = [f"source = {json.dumps(made.record.source, ensure_ascii=False)}", 'surge_speed = "water"']
     if not isinstance(scenario, scenarios.Trial):
         where = str(Path(scenario).resolve()) if Path(scenario).suffix == ".toml" else str(scenario)
-        lines.append(f"scenario = {json.dumps(where)}")
+        if printable(where) != where:
+            raise UserError(
+                f"A sidecar cannot name the scenario {printable(where)}. Give the file a plain name."
+            )
+        lines.append(f"scenario = {json.dumps(where, ensure_ascii=False)}")
     (folder / "record.toml").write_text("\n".join(lines) + "\n", encoding="utf-8")
     (folder / SEALED).write_text(seal(made.answer), encoding="utf-8")
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import math
+import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -10,15 +10,23 @@ from typing import Any
 import numpy as np
 
 from scenarios import ScenarioError
+from scenarios.errors import shown
 from scenarios.files import Source, read_toml
 from subzero.diagnosis.effect import Effect, Parameter
 from subzero.diagnosis.effects import load
 from subzero.diagnosis.extended import STARTS, ExtendedFile, all_effects, force_key, key_of, plain_id
 from subzero.diagnosis.verdict import Extended
-from subzero.errors import UserError, listed, suggestion
+from subzero.errors import UserError, listed, printable, suggestion
 from subzero.missing_force import AXES, MissingForce, Term
 
 KEYS = ("scenario", "source", "effects_file", "effects", "calibration", "missing_force", "missing_term")
+
+
+LARGEST = 1e9
+"""No deviation, time [s], force [N] or coefficient is larger; sums and squares of such numbers stay finite."""
+
+MOST_PARTS = 100
+"""So many forces are read of one kind: a dozen for each axis and more; each costs in every step of a run."""
 
 
 def read_extended(path: str | Path) -> ExtendedFile:
@@ -37,14 +45,19 @@ def read_extended(path: str | Path) -> ExtendedFile:
         for key in table
         if key not in KEYS
     ]
+    problems += [
+        f"{_at(source, key)}: found {shown(table[key])}, but this is not a text in quotes"
+        for key in ("scenario", "source")
+        if not isinstance(table.get(key, ""), str)
+    ]
     starts: dict[str, float] = {}
     deviations = _effects(source, "effects", known, starts, problems)
     calibration = _effects(source, "calibration", known, None, problems)
     missing = _missing(source, problems)
     if problems:
-        raise UserError(listed(f"The extended model {path} cannot be used:", problems))
+        raise UserError(listed(f"The extended model {printable(str(path))} cannot be used:", problems))
     extended = Extended(deviations=deviations, start_times=starts, calibration=calibration, missing=missing)
-    named = str(table.get("scenario", ""))
+    named = table.get("scenario", "")
     return ExtendedFile(extended=extended, effects=known, scenario=named)
 
 
@@ -53,7 +66,9 @@ def _toml(path: Path) -> Source:
         return read_toml(path, str(path))
     except ScenarioError as error:
         problems = [str(problem) for problem in error.problems]
-        raise UserError(listed(f"The extended model {path} cannot be used:", problems)) from None
+        raise UserError(
+            listed(f"The extended model {printable(str(path))} cannot be used:", problems)
+        ) from None
 
 
 def _at(source: Source, key: str) -> str:
@@ -101,7 +116,7 @@ def _numbers(
     found: dict[str, float] = {}
     for key, value in numbers.items():
         if not _is_number(value):
-            problems.append(f"{at}: {key} is {value!r}, which is not a finite number")
+            problems.append(f"{at}: {key} is {shown(value)}, which is not a finite number")
         elif key == STARTS:
             problems += _start_problems(at, effect, value)
             starts[name] = float(value)
@@ -130,11 +145,11 @@ def _range_problems(at: str, key: str, parameter: Parameter, value: float) -> li
 
 
 def _is_time(text: str) -> bool:
-    return text.replace(".", "", 1).isdigit()
+    return re.fullmatch(r"[0-9]{1,6}(\.[0-9]{0,12})?", text) is not None
 
 
 def _is_number(value: object) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) <= LARGEST
 
 
 def _missing(source: Source, problems: list[str]) -> MissingForce | None:
@@ -164,6 +179,11 @@ def _parts(
     if not isinstance(entries, list) or not all(isinstance(entry, Mapping) for entry in entries):
         problems.append(f"{_at(source, key)}: write [[{key}]] and its keys below")
         return []
+    if len(entries) > MOST_PARTS:
+        problems.append(
+            f"{_at(source, key)}: there are {len(entries)} of them; at most {MOST_PARTS} are read"
+        )
+        return []
     found = []
     for at, entry in enumerate(entries, start=1):
         try:
@@ -177,7 +197,7 @@ def _parts(
 def _history(entry: Mapping[str, Any]) -> MissingForce:
     axis = entry["axis"]
     if axis not in AXES:
-        raise ValueError(f"axis is {axis!r}. Allowed: {', '.join(AXES)}.")
+        raise ValueError(f"axis is {shown(axis)}. Allowed: {', '.join(AXES)}.")
     time, force = entry["time_s"], entry[force_key(axis)]
     for name, values in (("time_s", time), (force_key(axis), force)):
         if not isinstance(values, list) or not all(map(_is_number, values)):
@@ -193,5 +213,8 @@ def _history(entry: Mapping[str, Any]) -> MissingForce:
 
 def _term(entry: Mapping[str, Any]) -> MissingForce:
     if not _is_number(entry["coefficient"]):
-        raise ValueError(f"coefficient is {entry['coefficient']!r}, which is not a finite number")
+        raise ValueError(f"coefficient is {shown(entry['coefficient'])}, which is not a finite number")
+    for key in ("axis", "feature"):
+        if not isinstance(entry[key], str):
+            raise TypeError(f"{key} is {shown(entry[key])}, which is not a text in quotes")
     return MissingForce(terms=(Term(entry["axis"], entry["feature"], float(entry["coefficient"])),))

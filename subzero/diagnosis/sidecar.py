@@ -13,18 +13,23 @@ surge_speed_m_s = 2.0
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from scenarios import ScenarioError
+from scenarios.errors import shown
 from scenarios.files import Source, read_toml
 from subzero.channels import BY_COLUMN, TIME
-from subzero.errors import UserError, listed, suggestion
+from subzero.errors import UserError, listed, printable, suggestion
 
 WORDS = {"source": str, "scenario": str, "tethered": bool, "surge_speed": str}
-TABLES = ("noise", "rate_hz")
+LIMITS = {"noise": (1e-6, 1e6), "rate_hz": (1e-4, 1e5)}
+"""Standard deviations finer than any sensor resolves or wider than any channel is, in whatever unit, are slips of the
+pen (their squares divide residuals); so are sensors slower than three hours or faster than any. [display unit, 1/s]"""
+TABLES = tuple(LIMITS)
 KEYS = (*WORDS, "units_checked", *TABLES)
 OVER = ("water", "ground")
 
@@ -62,16 +67,16 @@ def read_sidecar(path: Path) -> Sidecar:
     Raises:
         UserError: it cannot be used; names every problem with its line.
     """
-    if not path.exists():
+    if not os.path.lexists(path):
         return Sidecar()
     source = _toml(path)
     problems = [*_keys(source), *_words(source), *_checked(source)]
     problems += [said for table in TABLES for said in _table(source, table)]
     if problems:
-        raise UserError(listed(f"The sidecar {path} cannot be used:", problems))
+        raise UserError(listed(f"The sidecar {printable(str(path))} cannot be used:", problems))
     said = source.table
     return Sidecar(
-        source=said.get("source", ""),
+        source=printable(said.get("source", "")),
         scenario=_scenario(said.get("scenario", ""), path.parent),
         tethered=said.get("tethered", True),
         over_ground=said.get("surge_speed", "water") == "ground",
@@ -86,7 +91,7 @@ def _toml(path: Path) -> Source:
         return read_toml(path, str(path))
     except ScenarioError as error:
         problems = [str(problem) for problem in error.problems]
-        raise UserError(listed(f"The sidecar {path} cannot be used:", problems)) from None
+        raise UserError(listed(f"The sidecar {printable(str(path))} cannot be used:", problems)) from None
 
 
 def _scenario(name: str, folder: Path) -> str:
@@ -110,13 +115,13 @@ def _keys(source: Source) -> list[str]:
 def _words(source: Source) -> list[str]:
     kinds = {str: "a text in quotes", bool: "true or false"}
     problems = [
-        f"{_at(source, key)}: found {source.table[key]!r}, but this is not {kinds[kind]}"
+        f"{_at(source, key)}: found {shown(source.table[key])}, but this is not {kinds[kind]}"
         for key, kind in WORDS.items()
         if key in source.table and not isinstance(source.table[key], kind)
     ]
     over = source.table.get("surge_speed", "water")
     if isinstance(over, str) and over not in OVER:
-        problems.append(f"{_at(source, 'surge_speed')}: found '{over}'. Allowed: 'water' or 'ground'.")
+        problems.append(f"{_at(source, 'surge_speed')}: found {shown(over)}. Allowed: 'water' or 'ground'.")
     return problems
 
 
@@ -125,8 +130,12 @@ def _checked(source: Source) -> list[str]:
     if isinstance(said, bool):
         return []
     if not isinstance(said, list):
-        return [f"{_at(source, 'units_checked')}: found {said!r}. Allowed: true, or a list of columns."]
-    return [_unknown(source, "units_checked", column) for column in said if column not in BY_COLUMN]
+        return [f"{_at(source, 'units_checked')}: found {shown(said)}. Allowed: true, or a list of columns."]
+    return [
+        _unknown(source, "units_checked", column)
+        for column in said
+        if not isinstance(column, str) or column not in BY_COLUMN
+    ]
 
 
 def _table(source: Source, name: str) -> list[str]:
@@ -134,18 +143,20 @@ def _table(source: Source, name: str) -> list[str]:
     table = source.table.get(name, {})
     if not isinstance(table, Mapping):
         return [f"{_at(source, name)}: this is not a section; write [{name}] and a line for each column"]
-    problems = []
+    problems, (low, high) = [], LIMITS[name]
     for column, value in table.items():
         key = f"{name}.{column}"
         if column not in BY_COLUMN or column == TIME.column:
             problems.append(_unknown(source, key, column))
-        elif isinstance(value, bool) or not isinstance(value, (int, float)) or not 0.0 < value < float("inf"):
-            problems.append(f"{_at(source, key)}: found {value!r}, but this is not a number above 0")
+        elif isinstance(value, bool) or not isinstance(value, (int, float)) or not value > 0.0:
+            problems.append(f"{_at(source, key)}: found {shown(value)}, but this is not a number above 0")
+        elif not low <= value <= high:
+            problems.append(f"{_at(source, key)}: found {shown(value)}. Allowed: {low:g} to {high:g}")
     return problems
 
 
 def _unknown(source: Source, key: str, column: object) -> str:
-    return f"{_at(source, key)}: there is no column {column!r}.{suggestion(str(column), BY_COLUMN)}"
+    return f"{_at(source, key)}: there is no column {shown(column)}.{suggestion(str(column), BY_COLUMN)}"
 
 
 def _trusted(said: bool | list[str]) -> frozenset[str] | None:

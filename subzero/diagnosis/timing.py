@@ -17,16 +17,23 @@ LATE = 1e-6
 """Times that differ by less are the same. [s]"""
 
 
+def epoch_problems(record: Record, trial: scenarios.Trial) -> list[str]:
+    """Return what is wrong if a record begins outside its trial."""
+    first = record.time[0]
+    if 0.0 <= first < trial.duration:
+        return []
+    return [
+        f"the first time is {first:g} s, but time_s counts from the start of the trial, which lasts "
+        f"{trial.duration:g} s: subtract the time of the start"
+    ]
+
+
 def time_problems(record: Record, trial: scenarios.Trial, *, longer: bool) -> list[str]:
     """Return what is wrong with the times of a record; it may be `longer` than its trial if it has its own commands."""
-    time, problems = record.time, []
-    step = float(np.median(np.diff(time))) if time.size > 1 else 0.0
-    if time[0] < 0.0 or time[0] >= trial.duration:
-        problems.append(
-            f"the first time is {time[0]:g} s, but time_s counts from the start of the trial, which lasts "
-            f"{trial.duration:g} s: subtract the time of the start"
-        )
+    time, problems = record.time, epoch_problems(record, trial)
+    if problems:
         return problems
+    step = float(np.median(np.diff(time))) if time.size > 1 else 0.0
     if time.size < FEWEST:
         problems.append(f"it has {time.size} samples; a diagnosis needs at least {FEWEST}")
     if step > SLOWEST:

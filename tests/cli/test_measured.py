@@ -137,3 +137,68 @@ def test_compare_prints_and_stores_the_error_of_each_model(file, rails, capsys, 
     assert fits["tethered"]["rmse"] < 1e-9  # ten digits are written
     assert fits["untethered"]["rmse"] > 0.05
     assert set(fits["tethered"]) == {"samples", "rmse", "bias", "fit_percent"}
+
+
+def test_a_gap_is_a_gap_with_either_sign_but_not_in_time(file):
+    assert_allclose(
+        read_record(file("time_s,depth_m\n0,-nan\n1,+NaN\n2,3\n")).values["depth"], [np.nan, np.nan, 3.0]
+    )
+    for time in ("-nan", "+nan", "NAN", ""):
+        with pytest.raises(UserError, match=r"line 3: the time is missing; every sample needs one$"):
+            read_record(file(f"time_s,depth_m\n0,1\n{time},2\n2,3\n"))
+
+
+@pytest.mark.parametrize("cell", ["1e300", "-1e10", "1e999", "9" * 400])
+def test_a_number_that_no_sensor_shows_is_refused(cell, file):
+    with pytest.raises(
+        UserError, match=r"line 2, column 'depth_m': '.* is (outside ±1e\+09|not finite); leave"
+    ):
+        read_record(file(f"time_s,depth_m\n0,{cell}\n1,2\n"))
+
+
+def record_of(run, **changed):
+    """Write a few channels of a run as a record, some changed, at times from `start` on."""
+    start = changed.pop("start", 0.0)
+    values = {name: run[name].values for name in ("surge_speed", "heading")}
+    values |= {name: change(values[name]) for name, change in changed.items()}
+    rows = zip(start + run["time"].values, *values.values(), strict=True)
+    return "time_s,surge_speed_m_s,heading_deg\n" + "".join(
+        f"{t:.1f},{u:.6f},{psi:.6f}\n" for t, u, psi in rows
+    )
+
+
+QUESTIONABLE = {
+    "unit": (
+        {"surge_speed": lambda u: 1.944 * u},
+        "surge_speed_m_s looks like knots (1.94 times the simulation)",
+    ),
+    "radians": ({"heading": np.radians}, "heading_deg looks like radians"),
+    "sign": ({"surge_speed": lambda u: -u}, "surge_speed_m_s has the opposite sign of the simulation"),
+    "stuck": ({"surge_speed": lambda u: 0.0 * u + 1.0}, "surge_speed_m_s is 1 in every sample"),
+    "clock": (
+        {"start": 1.7e9 - 1.0e9},
+        "the first time is 7e+08 s, but time_s counts from the start of the trial",
+    ),
+}
+
+
+@pytest.mark.parametrize("what", QUESTIONABLE)
+def test_a_comparison_asks_what_a_diagnosis_asks(what, file, rails, make_run, capsys):
+    changed, said = QUESTIONABLE[what]
+    assert main(["compare", "fig6", "--measured", file(record_of(make_run(), **changed))]) == MISTAKE
+    message = capsys.readouterr().err
+    assert message.startswith("The measured record record.csv cannot be compared:\n  ")
+    assert said in message
+    assert len(rails) == (0 if what == "clock" else 2)
+
+
+def test_what_the_sidecar_says_is_checked_is_not_asked(file, rails, make_run, tmp_path):
+    (tmp_path / "record.toml").write_text('units_checked = ["surge_speed_m_s"]\n')
+    record = file(record_of(make_run(), surge_speed=lambda u: 1.944 * u))
+    assert main(["compare", "fig6", "--measured", record]) == FINE
+
+
+def test_a_comparison_of_no_sample_is_refused(file, rails, capsys):
+    text = "time_s,surge_speed_m_s\n0,\n29,\n31,1\n32,1\n"
+    assert main(["compare", "fig6", "--measured", file(text)]) == MISTAKE
+    assert "none of its samples can be compared: where the runs are, it has gaps" in capsys.readouterr().err

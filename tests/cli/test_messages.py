@@ -21,7 +21,8 @@ MESSAGES = {
     "compare fig66": "The scenario cannot be used (1 problem):\n"
     "  fig66: there is no such scenario. Did you mean 'fig6'? Or give the path of a TOML file.",
     "compare fig6 --measured no.csv": "There is no measured record no.csv. Give the path of a CSV file.",
-    "compare fig6 --measured here": "The measured record here cannot be read: Is a directory.",
+    "compare fig6 --measured here": "The measured record here cannot be read: "
+    "this is a folder, not a file. Name a file in it.",
     "simulate fig6 --commands no.csv": "The scenario cannot be used (1 problem):\n"
     "  no.csv: there is no such file. Check the path.",
     "simulate fig6 --out file": "The output folder file cannot be written: file is a file, not a folder. "

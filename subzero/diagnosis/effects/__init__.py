@@ -14,6 +14,7 @@ from pathlib import Path
 from subzero.diagnosis.effect import Effect
 from subzero.diagnosis.effects import cable, fins, hull, propulsion, sensors, start
 from subzero.errors import UserError
+from subzero.user_file import MOST_OF_A_PROGRAM, read_bytes
 
 START = start.EFFECTS
 """What is free at the start of every trial, and never named."""
@@ -37,7 +38,13 @@ def load(path: str | Path) -> tuple[Effect, ...]:
     """
     if not Path(path).is_file():
         raise UserError(f"There is no effects file '{path}'. Allowed: the path of a Python file.")
-    found = runpy.run_path(str(path)).get("EFFECTS")
+    read_bytes(path, MOST_OF_A_PROGRAM)
+    try:
+        found = runpy.run_path(str(path)).get("EFFECTS")
+    except Exception as error:
+        raise UserError(
+            f"'{path}' cannot be run: {type(error).__name__}: {error}. Allowed: a Python file that runs by itself."
+        ) from error
     if not isinstance(found, (list, tuple)) or not all(isinstance(one, Effect) for one in found):
         raise UserError(f"'{path}' has no list EFFECTS of effects. Allowed: EFFECTS = [Effect(...)].")
     return tuple(found)
