@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from subzero.compiled import compiled
+from subzero.compiled import compiled, inner
 
 from .lumped_balance import balance_nodes, bend_nodes
 from .lumped_band import WIDTH, solve_band

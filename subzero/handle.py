@@ -6,6 +6,7 @@ costs more than the step itself. A `Handle` is taken apart once and then passed 
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any, NamedTuple
 
 import numba
@@ -13,7 +14,6 @@ import numpy as np
 from numba import types
 from numba.experimental import structref
 
-from cable.newton import Solved
 from subzero.compiled import allocating
 from subzero.loop import run_rows
 from subzero.recording import Recording, record_row
@@ -49,31 +49,46 @@ structref.define_constructor(_Reference, _HandleType, FIELDS)
 Handle: Any = _Interpreted if numba.config.DISABLE_JIT else _Reference
 
 
-@allocating
+ROW, USED, ENDING = range(3)
+"""Where a held run stands (3,): the present row, nodes of the recording in use, and how the last step ended.
+
+Compiled code writes it, so that it is true whenever Python code runs, an interrupt's handler among it.
+"""
+
+
 def hold(setup: Setup, live: Live, recording: Recording, times: np.ndarray) -> Any:
-    """Return a handle of a run and the times of its rows (n,) [s]."""
+    """Return a handle of a run and the times of its rows (n,) [s].
+
+    It is made in a thread of its own: numba builds the object by Python code and dies of an interrupt in there, and
+    signals reach the main thread only.
+    """
+    with ThreadPoolExecutor(1) as aside:
+        return aside.submit(make_handle, setup, live, recording, times).result()
+
+
+@allocating
+def make_handle(setup: Setup, live: Live, recording: Recording, times: np.ndarray) -> Any:
+    """Return a handle of a run; `hold` makes it safely."""
     return Handle(setup, live, recording, times)
 
 
 @allocating
 def advance(
     handle: Any,
-    row: int,
+    at: np.ndarray,
     count: int,
-    used: int,
     n: float,
     rudder: float,
     port: float,
     starboard: float,
     seen: np.ndarray,
-) -> tuple[int, int, int, Solved]:
+) -> int:
     """Take some exchanges under one command, from a row that is written anew with that command.
 
     Args:
         handle: the run; its orders have one row.
-        row: the present row.
+        at: where the run stands (ROW, USED, ENDING); changed.
         count: how many exchanges.
-        used: nodes of the recording in use, those of the present row included.
         n: propeller command. [rev/s]
         rudder: rudder command. [rad]
         port: command of the port plane. [rad]
@@ -81,21 +96,23 @@ def advance(
         seen: filled with the new present row, in the order of `subzero.simulator.Observation`.
 
     Returns:
-        the new present row, nodes in use, how it ended, and the cable's last solution.
+        how it ended, which at[ENDING] says, too.
     """
     command = handle.setup.orders.values
     command[0, 0], command[0, 1], command[0, 2], command[0, 3] = n, rudder, port, starboard
-    before = used - handle.recording.nodes[row]
+    row = at[ROW]
+    before = at[USED] - handle.recording.nodes[row]
     used = record_row(handle.setup, handle.live, handle.recording, row, handle.times[row], before)
-    after, used, ending, solved = run_rows(
+    after, used, ending = run_rows(
         handle.setup, handle.live, handle.recording, handle.times, row + 1, row + 1 + count, used
     )
-    observe(handle, after - 1, used, seen)
-    return after - 1, used, ending, solved
+    at[ROW], at[USED], at[ENDING] = after - 1, used, ending
+    observe(handle, after - 1, seen)
+    return ending
 
 
 @allocating
-def observe(handle: Any, row: int, used: int, seen: np.ndarray) -> None:
+def observe(handle: Any, row: int, seen: np.ndarray) -> None:
     """Fill `seen` with a row; the heading goes on from the one that stands there, without jumps."""
     r, before = handle.recording, seen[6]
     seen[0] = handle.times[row]

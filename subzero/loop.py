@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from cable.newton import Solved
 from subzero.compiled import compiled
 from subzero.coupling import FINE, exchange
 from subzero.recording import Recording, record_row
@@ -19,7 +18,7 @@ SPARE = 8
 @compiled
 def run_rows(
     setup: Setup, live: Live, recording: Recording, times: np.ndarray, first: int, last: int, used: int
-) -> tuple[int, int, int, Solved]:
+) -> tuple[int, int, int]:
     """Fill rows first … last − 1 of a recording.
 
     Args:
@@ -32,15 +31,15 @@ def run_rows(
         used: nodes of the recording in use.
 
     Returns:
-        rows that are filled, nodes in use, how it ended (`coupling.FINE` …), and the cable's last solution.
+        rows that are filled, nodes in use, and how it ended (`coupling.FINE` …); `line.ends.solved` tells how the
+        cable's last step was solved.
     """
-    solved = Solved(True, 0, 0.0, 0, 0)
     for row in range(first, last):
         nodes = live.line.ends.count + 1 + SPARE
         if nodes > live.line.length.size or used + nodes > recording.tension.size:
-            return row, used, NO_ROOM, solved
-        ending, solved = exchange(setup, live, times[row - 1], times[row] - times[row - 1])
+            return row, used, NO_ROOM
+        ending = exchange(setup, live, times[row - 1], times[row] - times[row - 1])
         if ending != FINE:
-            return row, used, ending, solved
+            return row, used, ending
         used = record_row(setup, live, recording, row, times[row], used)
-    return last, used, FINE, solved
+    return last, used, FINE

@@ -11,7 +11,6 @@ import numpy as np
 
 import scenarios
 from cable.line import enlarged
-from cable.newton import Solved
 from cable.runs import describe_failure, too_short
 from subzero import coupling
 from subzero.later import Later, go_on_with, rows_of_changes
@@ -83,12 +82,12 @@ def run_trial(
     setup, live = prepare(trial, model, tethered)
     recording = new_recording(times.size, 4 * times.size * live.line.length.size if tethered else 0)
     used = record_row(setup, live, recording, 0, 0.0, 0)
-    row, ending, solved = 1, coupling.FINE, Solved(True, 0, 0.0, 0, 0)
+    row, ending = 1, coupling.FINE
     while row < times.size and ending in (coupling.FINE, NO_ROOM):
         if row - 1 in changes:
             setup = go_on_with(changes.pop(row - 1), setup, live, trial, tethered, float(times[row - 1]))
         last = min(times.size, row + 1 + times.size // CHUNKS, *(change + 1 for change in changes))
-        row, used, ending, solved = run_rows(setup, live, recording, times, row, last, used)
+        row, used, ending = run_rows(setup, live, recording, times, row, last, used)
         if ending == NO_ROOM:
             live, recording = more_room(live, recording, used)
         if progress is not None:
@@ -97,7 +96,7 @@ def run_trial(
         times=times[:row],
         recording=cut(recording, row, used),
         completed=ending == coupling.FINE,
-        message=in_words(ending, solved, float(times[row - 1]), setup, live),
+        message=in_words(ending, float(times[row - 1]), setup, live),
     )
 
 
@@ -112,15 +111,16 @@ def more_room(live: Live, recording: Recording, used: int) -> tuple[Live, Record
     )
 
 
-def in_words(
-    ending: int, solved: Solved, time: float, setup: Setup | None = None, live: Live | None = None
-) -> str:
-    """Say how a run ended: when, where, and what to try; `setup` and `live` tell of a winch that fell behind."""
+WENT_WELL = "The run reached its end."
+
+
+def in_words(ending: int, time: float, setup: Setup, live: Live) -> str:
+    """Say how a run ended: when, where, and what to try."""
     if ending == coupling.FINE:
-        return "The run reached its end."
+        return WENT_WELL
     if ending == coupling.CABLE_FAILED:
-        behind = too_short(time, live.line, setup.fixed.drum) if setup and live else ""
-        return behind or describe_failure(solved, time)
+        behind = too_short(time, live.line, setup.fixed.drum)
+        return behind or describe_failure(live.line.ends.solved, time)
     if ending == coupling.DISAGREED:
         return (
             f"Vehicle and cable found no common tow force beyond t = {time:g} s, even in the smallest steps. "

@@ -15,20 +15,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import isfinite, pi
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 import scenarios
-from cable.newton import Solved
 from subzero import coupling
 from subzero.errors import UserError
-from subzero.handle import advance, hold, observe
+from subzero.handle import ENDING, ROW, USED, advance, hold, observe
 from subzero.loop import NO_ROOM
 from subzero.model import Model
 from subzero.recording import Recording, Run, cut, new_recording, record_row
-from subzero.run_state import Orders
-from subzero.simulation import in_words, more_room
+from subzero.run_state import Live, Orders
+from subzero.simulation import WENT_WELL, in_words, more_room
 from subzero.start import prepare
 from subzero.trials import load
 
@@ -38,7 +37,6 @@ if TYPE_CHECKING:
 Command = Sequence[float] | np.ndarray
 """Propeller [rev/s], rudder, port and starboard stern-plane [rad]."""
 
-WENT_WELL = in_words(coupling.FINE, Solved(True, 0, 0.0, 0, 0), 0.0)
 COMMANDED = ("propeller [rev/s]", "rudder [rad]", "port stern-plane [rad]", "starboard stern-plane [rad]")
 
 
@@ -75,6 +73,19 @@ class Observation(NamedTuple):
     cable_moment_roll: float
     cable_moment_pitch: float
     cable_moment_yaw: float
+
+
+WELL = (coupling.FINE, NO_ROOM)
+"""Endings of a step from which a run can go on."""
+
+
+class Held(NamedTuple):
+    """The arrays of a run, times of its rows (n,) [s], and the handle that compiled code knows them by."""
+
+    live: Live
+    recording: Recording
+    times: np.ndarray
+    handle: Any
 
 
 class RunStoppedError(UserError):
@@ -119,24 +130,28 @@ class Simulator:
 
     def reset(self) -> Observation:
         """Go back to the start, and return what is true there."""
-        setup, self._live = prepare(self.trial, self.model, self._tethered)
+        setup, live = prepare(self.trial, self.model, self._tethered)
         self._setup = setup._replace(orders=Orders(np.zeros(1), np.zeros((1, 4))))
-        self._times = _times(self.trial)
-        self._recording: Recording = new_recording(self._times.size, self._first_nodes())
-        self._row, self._ending, self._message = 0, coupling.FINE, WENT_WELL
-        self._setup.orders.values[0] = self._own_command()
-        self._used = record_row(self._setup, self._live, self._recording, 0, 0.0, 0)
+        self._setup.orders.values[0] = self._command_at(0.0)
+        times = _times(self.trial)
+        recording = new_recording(times.size, 4 * times.size * live.line.length.size if self._tethered else 0)
+        used = record_row(self._setup, live, recording, 0, 0.0, 0)
+        self._at = np.array([0, used, coupling.FINE])
         self._seen = np.zeros(len(Observation._fields))
         self._seen[6] = pi - 1e-12  # headings begin in [0, 2π), as in `subzero.dataset`
-        self._grip()
-        observe(self._handle, 0, self._used, self._seen)
-        self.observation = Observation(*self._seen.tolist())
+        self._hold(live, recording, times)
+        observe(self._held.handle, 0, self._seen)
         return self.observation
+
+    @property
+    def observation(self) -> Observation:
+        """What is true now."""
+        return Observation(*self._seen.tolist())
 
     @property
     def time(self) -> float:
         """Time since the start [s]."""
-        return self.observation.time
+        return float(self._seen[0])
 
     def step(self, command: Command | None = None) -> Observation:
         """Hold a command for one sample time, and return what is true then.
@@ -149,36 +164,30 @@ class Simulator:
             UserError: the command is not four finite numbers; the run stands where it was.
             RunStoppedError: the simulation cannot go on.
         """
-        n, rudder, port, starboard = self._own_command() if command is None else self._checked(command)
-        if self._ending != coupling.FINE:
-            raise RunStoppedError(self._message)
-        goal = self._row + self._exchanges
-        if goal >= self._times.size:
+        n, rudder, port, starboard = self._command_at(self.time) if command is None else self._checked(command)
+        self._check_on()
+        goal = int(self._at[ROW]) + self._exchanges
+        if goal >= self._held.times.size:
             self._more_rows(goal)
         while True:
-            self._row, self._used, ending, solved = advance(
-                self._handle, self._row, goal - self._row, self._used, n, rudder, port, starboard, self._seen
-            )
+            count = goal - int(self._at[ROW])
+            ending = advance(self._held.handle, self._at, count, n, rudder, port, starboard, self._seen)
             if ending != NO_ROOM:
                 break
-            self._live, self._recording = more_room(self._live, self._recording, self._used)
-            self._grip()
-        self.observation = Observation(*self._seen.tolist())
-        if ending != coupling.FINE:
-            words = in_words(ending, solved, self.time, self._setup, self._live)
-            self._ending, self._message = ending, words
-            raise RunStoppedError(self._message)
+            self._hold(*more_room(self._held.live, self._held.recording, int(self._at[USED])), self._held.times)
+        self._check_on()
         return self.observation
 
     def result(self) -> xr.Dataset:
         """Return the run so far as `subzero.simulate` does: channels with units, forces, the cable's shape."""
         from subzero.dataset import dataset_of
 
+        rows, used, ending = (int(one) for one in self._at + (1, 0, 0))
         run = Run(
-            times=self._times[: self._row + 1].copy(),
-            recording=cut(self._recording, self._row + 1, self._used),
-            completed=self._ending == coupling.FINE,
-            message=self._message,
+            times=self._held.times[:rows].copy(),
+            recording=cut(self._held.recording, rows, used),
+            completed=ending in WELL,
+            message=self._message(),
         )
         return dataset_of(self.trial, self.model, self._tethered, run)
 
@@ -194,33 +203,38 @@ class Simulator:
             f"At t = {self.time:g} s the command is {command!r}. Allowed: four finite numbers, {', '.join(COMMANDED)}."
         )
 
-    def _own_command(self) -> tuple[float, float, float, float]:
-        """Return what the scenario commands at the present time."""
+    def _command_at(self, time: float) -> tuple[float, float, float, float]:
+        """Return what the scenario commands at a time [s]."""
         commands = self.trial.commands
         if commands is None:
             return 0.0, 0.0, 0.0, 0.0
-        row = int(np.searchsorted(commands.time, self._times[self._row] + 1e-9, side="right")) - 1
+        row = int(np.searchsorted(commands.time, time + 1e-9, side="right")) - 1
         n, rudder, port, starboard = commands.values[row].tolist()
         return n, rudder, port, starboard
 
-    def _grip(self) -> None:
-        """Take hold of the run's arrays again, after they were replaced."""
-        self._handle = hold(self._setup, self._live, self._recording, self._times)
+    def _message(self) -> str:
+        """Say how the last step ended."""
+        ending = int(self._at[ENDING])
+        return WENT_WELL if ending in WELL else in_words(ending, self.time, self._setup, self._held.live)
 
-    def _first_nodes(self) -> int:
-        """Return the room for nodes that a recording begins with."""
-        return 4 * self._times.size * self._live.line.length.size if self._tethered else 0
+    def _check_on(self) -> None:
+        """Refuse to go on where a step has failed."""
+        if self._at[ENDING] not in WELL:
+            raise RunStoppedError(self._message())
+
+    def _hold(self, live: Live, recording: Recording, times: np.ndarray) -> None:
+        """Take hold of a run's arrays, all at once: an interrupt finds the old ones or the new ones."""
+        self._held = Held(live, recording, times, hold(self._setup, live, recording, times))
 
     def _more_rows(self, goal: int) -> None:
         """Make room for rows up to `goal`, and twice as many as there were."""
-        rows = max(2 * self._times.size, goal + 1)
-        step = self._times[1]
-        self._times = np.concatenate([self._times, step * np.arange(self._times.size, rows)])
-        old, new = self._recording, new_recording(rows, self._recording.tension.size)
+        live, old, times, _ = self._held
+        rows = max(2 * times.size, goal + 1)
+        new = new_recording(rows, old.tension.size)
         for name, values in old._asdict().items():
             getattr(new, name)[: values.shape[0]] = values
-        self._recording = new
-        self._grip()
+        later = times[1] * np.arange(times.size, rows)
+        self._hold(live, new, np.concatenate([times, later]))
 
 
 def _times(trial: scenarios.Trial) -> np.ndarray:

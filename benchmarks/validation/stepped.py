@@ -75,8 +75,9 @@ class Stepped:
     def step(self, step: float, tow: np.ndarray) -> None:
         """Go on by one step [s], with the tow point at `tow` (3,) [m] at its end."""
         c = self.cable.numbers()
-        solved = try_step(self.line, step, tow, self.water, c, self.drum, self.work)
-        if not solved.converged:
+        converged = try_step(self.line, step, tow, self.water, c, self.drum, self.work)
+        solved = self.line.ends.solved
+        if not converged:
             message = f"Not solved: {solved.residual:.1e} tolerances at node {solved.worst_node}."
             raise RuntimeError(message)
         accept(self.line, step, c, self.work)

@@ -103,9 +103,9 @@ class Tethered:
         self._memory.write(x[HULL_SIZE:])
         self._setup.orders.values[0] = u
         times = np.array([t, t + self._step])
-        _, _, ending, solved = run_rows(self._setup, live, self._recording, times, 1, 2, 0)
+        _, _, ending = run_rows(self._setup, live, self._recording, times, 1, 2, 0)
         if ending != FINE:
-            raise UserError(self._trouble(ending, solved, t))
+            raise UserError(self._trouble(ending, t))
         hull = from_vehicle(live.state, heading_near=float(x[5]))
         hidden = (live.state[CHARGE], *live.state[LINKAGE : LINKAGE + 3])
         return np.concatenate([hull, hidden, self._memory.read()])
@@ -122,8 +122,8 @@ class Tethered:
         tensions = (np.linalg.norm(F), flat[places["node_tension"]][count])
         return np.concatenate([x[: len(STATE_NAMES)], [length, *tensions], pull, np.cross(self._r_c, pull)])
 
-    def _trouble(self, ending: int, solved: Any, time: float) -> str:
+    def _trouble(self, ending: int, time: float) -> str:
         """Say why there is no next state."""
         if ending == NO_ROOM:
             return f"plant: at t = {time:g} s there is no room for more than longest = {self._longest:g} m of cable."
-        return in_words(ending, solved, time, self._setup, self._live)
+        return in_words(ending, time, self._setup, self._live)

@@ -49,7 +49,7 @@ def test_pulls_that_are_held_or_linear_are_unstable_for_a_heavy_cable():
 
 @pytest.mark.parametrize("r", [0.2, 1.0, 10.0, 1000.0])
 def test_the_recurrence_with_the_codes_own_weights_decays_as_its_largest_root_says(r):
-    w = backward_weights(1.0, 1.0)
+    w = backward_weights.py_func(1.0, 1.0)
     weights = np.array([w.a0, w.a1, w.a2])
     twice = np.convolve(weights, weights)  # of x_{n+1} … x_{n−3}
     x, v, F = [0.0, 0.0, 0.0, 0.0], 1.0, [0.0, 0.0]

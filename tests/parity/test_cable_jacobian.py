@@ -132,7 +132,7 @@ def differences(line, work, weights, c=CABLE):
 def test_the_analytic_jacobian_is_that_of_the_residual(mode, segments, previous_step):
     for seed in range(3):
         line, work = bent_line(segments, mode, seed)
-        weights = backward_weights(0.1, previous_step)
+        weights = backward_weights.py_func(0.1, previous_step)
         numeric, _ = differences(line, work, weights)
         analytic = dense(line)
         # The last two unknowns of the last block do not exist; their rows keep the matrix regular.
@@ -145,7 +145,7 @@ def test_the_analytic_jacobian_is_that_of_the_residual(mode, segments, previous_
 @pytest.mark.parametrize("segments", [2, 3, 4, 6])
 def test_bending_has_its_jacobian_right_too(segments):
     line, work = bent_line(segments, TURNING, 2, c=STIFF)
-    weights = backward_weights(0.1, 0.1)
+    weights = backward_weights.py_func(0.1, 0.1)
     numeric, _ = differences(line, work, weights, STIFF)
     analytic = dense(line)
     numeric[-2:] = analytic[-2:]
@@ -157,7 +157,7 @@ def test_bending_has_its_jacobian_right_too(segments):
 def test_the_wide_elimination_solves_what_a_dense_one_solves(segments):
     """Verifies `cable.wide_blocks` against LAPACK; round-off only."""
     line, work = bent_line(segments, TURNING, 3, c=STIFF)
-    residual(line, work, unknowns(line), backward_weights(0.1, 0.1), STIFF)
+    residual(line, work, unknowns(line), backward_weights.py_func(0.1, 0.1), STIFF)
     expected = np.linalg.solve(dense(line), line.rows[RESIDUAL, 1 : segments + 1].ravel())
     factor_and_solve(line.blocks, line.pivots, segments, line.rows[RESIDUAL])
     found = line.rows[RESIDUAL, 1 : segments + 1].ravel()
@@ -169,7 +169,7 @@ def test_a_slack_line_has_its_jacobian_right_too():
     line, work = bent_line(4, TURNING, 5, slackness=0.0)
     line.length[1:4] *= 1.02
     line.ends.last_length[NEW] *= 1.02
-    weights = backward_weights(0.1, 0.1)
+    weights = backward_weights.py_func(0.1, 0.1)
     numeric, _ = differences(line, work, weights)
     analytic = dense(line)
     numeric[-2:] = analytic[-2:]
@@ -183,6 +183,6 @@ def test_the_tow_force_answers_to_the_first_block_as_told(segments):
     segment (a tenth of the load's own derivative), so a tenth of the largest entry is allowed.
     """
     line, work = bent_line(segments, TURNING, 1)
-    _, pulls = differences(line, work, backward_weights(0.1, 0.1))
+    _, pulls = differences(line, work, backward_weights.py_func(0.1, 0.1))
     told = line.ends.tow_by_block.copy()
     assert_allclose(told, pulls[:, :4], rtol=0, atol=0.1 * np.abs(told).max())
