@@ -136,6 +136,8 @@ def velocity_at(tow_velocity: TowVelocity, time: float) -> tuple[float, float, f
     given = tow_velocity(time)
     numbers = [real(x) for x in given] if np.shape(given) == (3,) else [None]
     if None in numbers:
-        raise BadValueError(f"tow_velocity({time:g}) is {short(given)}; it must be three finite numbers, in m/s.")
+        raise BadValueError(
+            f"tow_velocity({time:g}) is {short(given)}; it must be three finite numbers, in m/s."
+        )
     north, east, down = numbers
     return north, east, down  # type: ignore[return-value]

@@ -119,7 +119,7 @@ def second_stage(b: MovingEnd, length: float, middle_length: float) -> float:
 def box_step(
     b: MovingEnd, step: float, middle: Ends, new: Ends, segment_length: float, c: Equation7Numbers
 ) -> tuple[int, int, float, int, int]:
-    """Take one TR-BDF2 step, and return its `NewtonReport` as a tuple; on failure ``b`` holds the cable before the step.
+    """Take one TR-BDF2 step; return its `NewtonReport` as a tuple. On failure ``b`` holds the cable before the step.
 
     Args:
         b: the cable, started with `start_moving_end`.

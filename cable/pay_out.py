@@ -110,7 +110,7 @@ def follow_path(
         record: filled from row 0 on, the start.
 
     Returns:
-        the number of rows that are filled (all, unless it failed; `line.ends.solved` tells how the last step was solved).
+        how many rows are filled: all, unless it failed; `line.ends.solved` tells how the last step was solved.
     """
     rows, used = path.times.size, line.ends.count + 1
     suggested = FIRST_STEP * (path.times[1] - path.times[0])

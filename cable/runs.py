@@ -171,13 +171,17 @@ def check_kinds(**wanted: tuple[object, tuple[type, ...]]) -> None:
     for name, (value, kinds) in wanted.items():
         if not isinstance(value, kinds):
             words = " or ".join(kind.__name__ for kind in kinds)
-            raise BadValueError(f"{name} is {short(value)}, of type {type(value).__name__}; it must be {words}.")
+            raise BadValueError(
+                f"{name} is {short(value)}, of type {type(value).__name__}; it must be {words}."
+            )
 
 
 def check_motion(name: str, velocity: object) -> None:
     """Refuse a motion that is no function of time."""
     if not callable(velocity):
-        raise BadValueError(f"{name} is {short(velocity)}; it must be a function of time that gives a velocity.")
+        raise BadValueError(
+            f"{name} is {short(velocity)}; it must be a function of time that gives a velocity."
+        )
 
 
 def check_tolerance(tolerance: float) -> None:

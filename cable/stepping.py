@@ -103,9 +103,13 @@ def _solve_softly(
     if that fails, with a slack law that is made sharp little by little.
     """
     w = backward_weights(step, line.ends.previous_step)
-    if again and follow_tow(line, tow):
-        if solve_step(line, w, c, drum, work, True) and not _takes_up(line, drum):
-            return True
+    if (
+        again
+        and follow_tow(line, tow)
+        and solve_step(line, w, c, drum, work, True)
+        and not _takes_up(line, drum)
+    ):
+        return True
     _predict(line, step, tow, water, c, drum, work)
     if solve_step(line, w, c, drum, work, False):
         return True

@@ -63,7 +63,9 @@ class Current:
         for name in ("time", "north", "east", "down"):
             points = np.atleast_1d(_numbers(name, getattr(self, name)))
             if points.ndim != 1 or points.size == 0 or not (np.diff(points) > 0.0).all():
-                raise BadValueError(f"Current: {name} must be numbers that increase; got {short(getattr(self, name))}.")
+                raise BadValueError(
+                    f"Current: {name} must be numbers that increase; got {short(getattr(self, name))}."
+                )
             object.__setattr__(self, name, points)
         velocity = np.ascontiguousarray(_numbers("velocity", self.velocity))
         shape = (self.time.size, self.north.size, self.east.size, self.down.size, 3)

@@ -1,8 +1,8 @@
-"""Refuse values where they are made, whoever makes them, a file or Python: with the limits of `quantities`, in its words.
+"""Refuse values where they are made, whoever makes them, a file or Python: by the limits of `quantities`.
 
-    >>> scenarios.Start(heading=27.0)
-    ScenarioError: The scenario cannot be used (1 problem):
-      Start, heading: found 27 rad (1546.99 degree), but this is outside its limits. Allowed: -360 to 360 degree ...
+>>> scenarios.Start(heading=27.0)
+ScenarioError: The scenario cannot be used (1 problem):
+Start, heading: found 27 rad (1546.99 degree), but this is outside its limits. Allowed: -360 to 360 degree ...
 """
 
 from __future__ import annotations
@@ -12,9 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from scenarios.errors import Problem, ScenarioError, shown
+from scenarios.errors import Problem, ScenarioError
 from scenarios.quantities import Quantity
 from subzero.errors import real
+from subzero.errors import short as shown
 
 OUTSIDE = "this is outside its limits"
 NO_NUMBER = "this is not a finite number"
@@ -63,7 +64,9 @@ class Checks:
             self._column(f"{name}[{i}]", array[i : i + 1], quantity)
         self._keep(name, tuple(array.tolist()))
 
-    def rows(self, name: str, quantities: tuple[Quantity, ...], count: int | None = None) -> np.ndarray | None:
+    def rows(
+        self, name: str, quantities: tuple[Quantity, ...], count: int | None = None
+    ) -> np.ndarray | None:
         """Check a field of one number (one quantity) or several a sample; return it as an array, None if it is bad."""
         shape = (count,) if len(quantities) == 1 else (count, len(quantities))
         array = self._array(name, shape)
@@ -74,7 +77,9 @@ class Checks:
             self._column(name, column, quantity)
         return array
 
-    def increasing(self, name: str, values: np.ndarray, what: str = "Times", first: float | None = 0.0) -> None:
+    def increasing(
+        self, name: str, values: np.ndarray, what: str = "Times", first: float | None = 0.0
+    ) -> None:
         """Check that values increase, from `first` on if that is given."""
         if first is not None and values.size and values[0] != first:
             self.say(f"{name}[0]", f"{what} start at {first:g}", f"The first must be {first:g}.", values[0])
@@ -154,7 +159,9 @@ class Checks:
             self.say(name, f"its shape is {found}", f"Allowed: {words}.")
             return None
         if not np.isfinite(array).all():
-            self.say(name, NO_NUMBER, f"Allowed: finite numbers, {words}.", array[~np.isfinite(array)][0].item())
+            self.say(
+                name, NO_NUMBER, f"Allowed: finite numbers, {words}.", array[~np.isfinite(array)][0].item()
+            )
             return None
         return np.ascontiguousarray(array)
 

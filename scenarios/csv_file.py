@@ -12,11 +12,12 @@ import math
 from collections.abc import Iterable
 from pathlib import Path
 
-from scenarios.errors import Problem, ScenarioError, nearest_or_all, shown
+from scenarios.errors import Problem, ScenarioError, nearest_or_all
 from scenarios.files import read_text
 from scenarios.quantities import SECTIONS, Quantity
 from scenarios.samples import Samples
 from subzero.errors import printable
+from subzero.errors import short as shown
 from subzero.user_file import MOST_COLUMNS, MOST_OF_A_CSV
 
 Row = tuple[int, list[str]]

@@ -10,10 +10,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from subzero.errors import SHOWN_CHARACTERS, UserError, printable
-from subzero.errors import short as shown
 
 SHOWN_PROBLEMS = 40
 """So many problems are spelt out in a message: enough to repair a file; more would only repeat themselves."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Problem:

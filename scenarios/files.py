@@ -13,9 +13,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from scenarios.errors import Problem, ScenarioError, nearest, nearest_or_all, shown
+from scenarios.errors import Problem, ScenarioError, nearest, nearest_or_all
 from subzero import user_file
 from subzero.errors import printable
+from subzero.errors import short as shown
 from subzero.user_file import MOST_OF_A_TOML, UnreadableFileError
 
 ROOT = Path(__file__).parent

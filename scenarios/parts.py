@@ -14,8 +14,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from scenarios.errors import Problem, ScenarioError, nearest_or_all, shown
+from scenarios.errors import Problem, ScenarioError, nearest_or_all
 from scenarios.files import Source, read_toml, shipped, shipped_path
+from subzero.errors import short as shown
 
 PATTERNS = {"vehicle": ("vehicles", "subzero2"), "cable": ("cables", "table1")}
 """Kind of part → the folder of its files, and the file that is the pattern."""

@@ -133,6 +133,7 @@ heading_deg     | degree | -36000 | 36000 |  | heading, clockwise from north
     many=True,
 )
 
+
 def by_field(quantities: tuple[Quantity, ...]) -> dict[str, Quantity]:
     """Return quantities by the names of the fields that hold them, ``hull_step_s`` → ``hull_step``."""
     suffixes = {"1": "", "m/s": "_m_s", "degree": "_deg", "rev/s": "_rps"}

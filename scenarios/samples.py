@@ -14,10 +14,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from scenarios.errors import Problem, shown
+from scenarios.errors import Problem
 from scenarios.files import Source
 from scenarios.quantities import COMMANDS, MOTION, Quantity
 from scenarios.trial import Commands, Motion
+from subzero.errors import short as shown
 
 LONGEST_HOLD = 1.0
 """The last row of a log is believed for no longer than this: a vehicle turns by tens of degrees in it. [s]"""

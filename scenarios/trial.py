@@ -31,9 +31,7 @@ CONTROLS = ("pay_out_rate", "constant_tension", "brake")
 SETPOINT = dict(zip(CONTROLS, (*WINCH[1:], None), strict=True))
 """Control of a winch → the quantity that it follows."""
 
-ONLY_DEFAULT = (
-    "the paper's scheme knows a limp cable on a free drum on the shore, and a uniform current"
-)
+ONLY_DEFAULT = "the paper's scheme knows a limp cable on a free drum on the shore, and a uniform current"
 
 
 def only_default(asked: list[str]) -> str:
@@ -95,7 +93,7 @@ class Commands:
         if time is not None:
             check.increasing("time", time)
         check.refuse()
-        assert time is not None and values is not None  # noqa: S101, PT018  # `refuse` has seen to it
+        assert time is not None and values is not None  # noqa: PT018  # `refuse` has seen to it
         check.freeze("time", time)
         check.freeze("values", values)
 

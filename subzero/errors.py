@@ -68,7 +68,9 @@ def checked(
         return number
     bounds = [f"{'at least' if above is None else 'more than'} {low:g}"] if low > -inf else []
     bounds += [f"at most {most:g}"] if most < inf else []
-    allowed = ", ".join(["a finite number", *([" and ".join(bounds)] if bounds else [])]) + f" {unit}".rstrip()
+    allowed = (
+        ", ".join(["a finite number", *([" and ".join(bounds)] if bounds else [])]) + f" {unit}".rstrip()
+    )
     place = f"{owner}: {name}" if owner else name
     raise BadValueError(f"{place} is {short(value)}; it must be {allowed}.")
 

@@ -103,9 +103,7 @@ class Term:
                     f" Known: {', '.join(known)}."
                 )
         if real(self.coefficient) is None:
-            message = (
-                f"The coefficient of {self.feature!r} on {self.axis} is {short(self.coefficient)}; it must be finite."
-            )
+            message = f"The coefficient of {self.feature!r} on {self.axis} is {short(self.coefficient)}; it must be finite."
             raise BadValueError(message)
 
     @property

@@ -164,7 +164,9 @@ class Simulator:
             UserError: the command is not four finite numbers; the run stands where it was.
             RunStoppedError: the simulation cannot go on.
         """
-        n, rudder, port, starboard = self._command_at(self.time) if command is None else self._checked(command)
+        n, rudder, port, starboard = (
+            self._command_at(self.time) if command is None else self._checked(command)
+        )
         self._check_on()
         goal = int(self._at[ROW]) + self._exchanges
         if goal >= self._held.times.size:
@@ -174,7 +176,9 @@ class Simulator:
             ending = advance(self._held.handle, self._at, count, n, rudder, port, starboard, self._seen)
             if ending != NO_ROOM:
                 break
-            self._hold(*more_room(self._held.live, self._held.recording, int(self._at[USED])), self._held.times)
+            self._hold(
+                *more_room(self._held.live, self._held.recording, int(self._at[USED])), self._held.times
+            )
         self._check_on()
         return self.observation
 
@@ -182,10 +186,10 @@ class Simulator:
         """Return the run so far as `subzero.simulate` does: channels with units, forces, the cable's shape."""
         from subzero.dataset import dataset_of
 
-        rows, used, ending = (int(one) for one in self._at + (1, 0, 0))
+        row, used, ending = self._at.tolist()
         run = Run(
-            times=self._held.times[:rows].copy(),
-            recording=cut(self._held.recording, rows, used),
+            times=self._held.times[: row + 1].copy(),
+            recording=cut(self._held.recording, row + 1, used),
             completed=ending in WELL,
             message=self._message(),
         )
@@ -238,7 +242,7 @@ class Simulator:
 
 
 def _times(trial: scenarios.Trial) -> np.ndarray:
-    """Return the times of the rows (n,), whole cable steps: as far as the trial goes, those of `subzero.simulate` [s]."""
+    """Return times of rows (n,), whole cable steps; as far as the trial goes, those of `subzero.simulate` [s]."""
     times = trial.times()
     even = np.allclose(np.diff(times), trial.cable_step, rtol=0.0, atol=1e-9)
     return times if even else trial.cable_step * np.arange(times.size + 1)

@@ -64,7 +64,7 @@ def setup_of(trial: scenarios.Trial, model: Model, tethered: bool) -> Setup:
 
 
 def most_hull_steps(span: float, hull_step: float) -> int:
-    """Return how many hull steps an exchange of length `span` [s] takes at most, as `coupling.hull_steps` counts them."""
+    """Return how many hull steps an exchange of `span` [s] takes at most, as `coupling.hull_steps` counts."""
     return max(1, int(np.ceil(span / hull_step - 1e-6)))
 
 

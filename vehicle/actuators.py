@@ -23,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 
 from subzero.compiled import compiled
-from vehicle.parameters import parameter, Section
+from vehicle.parameters import Section, parameter
 from vehicle.state import LINKAGE, SERVO
 
 QUICKEST = 0.01

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from subzero.compiled import compiled
-from vehicle.parameters import parameter, Section
+from vehicle.parameters import Section, parameter
 
 
 @dataclass(frozen=True, kw_only=True)

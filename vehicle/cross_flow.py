@@ -17,7 +17,7 @@ import numpy as np
 
 from subzero.compiled import compiled
 from vehicle.geometry import Hull, hull_radius
-from vehicle.parameters import parameter, Section
+from vehicle.parameters import Section, parameter
 
 STRIPS = 20
 """Slices over the length; force and moment differ by less than 0.7 % from those of 2 000 (tests/hull)."""

@@ -25,7 +25,7 @@ from typing import NamedTuple
 import numpy as np
 
 from subzero.compiled import compiled
-from vehicle.parameters import parameter, Section
+from vehicle.parameters import Section, parameter
 
 STILL = 1e-16
 """Square of a speed below which a fin feels nothing [m2/s2]: forces there are under 1e-16 N."""

@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vehicle.parameters import parameter, Section
+from vehicle.parameters import Section, parameter
 
 SLICES = 20_000
 """Midpoint slices of the integrals below: relative errors under 1e-6, at a millisecond each."""

@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 from subzero.compiled import compiled
 from vehicle.actuators import QUICKEST
-from vehicle.parameters import parameter, Section
+from vehicle.parameters import Section, parameter
 from vehicle.propeller import PropellerNumbers, torque
 
 
@@ -41,7 +41,9 @@ class Motor(Section):
     """The propeller's motor and its speed loop."""
 
     lag: float = parameter("time constant of the shaft speed", "s", low=0.0)
-    speed_per_volt: float = parameter("highest shaft speed per volt, c", "rev/(s V)", above=0.0, unlimited=True)
+    speed_per_volt: float = parameter(
+        "highest shaft speed per volt, c", "rev/(s V)", above=0.0, unlimited=True
+    )
     voltage_sensitivity: float = parameter("share of a voltage loss that shows in the speed, s", "1", low=0.0)
     efficiency: float = parameter("shaft power over electric power", "1", above=0.0, high=1.0)
 

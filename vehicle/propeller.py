@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from subzero.compiled import compiled
-from vehicle.parameters import parameter, Section
+from vehicle.parameters import Section, parameter
 
 
 class PropellerNumbers(NamedTuple):

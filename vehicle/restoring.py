@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from subzero.compiled import compiled
-from vehicle.parameters import parameter, Section
+from vehicle.parameters import Section, parameter
 from vehicle.rigid_body import RigidBody
 
 

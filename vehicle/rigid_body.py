@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vehicle.parameters import parameter, Section
+from vehicle.parameters import Section, parameter
 
 
 def skew(vector: np.ndarray) -> np.ndarray:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vehicle.parameters import parameter, Section
+from vehicle.parameters import Section, parameter
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -24,7 +24,7 @@ from vehicle.damping import LinearDamping, QuadraticDamping
 from vehicle.fins import FinNumbers, Fins
 from vehicle.geometry import Hull
 from vehicle.motor import Battery, Motor, MotorNumbers, motor_numbers
-from vehicle.parameters import nearest, parameter, Problem, read_section, Section, VehicleError
+from vehicle.parameters import Problem, Section, VehicleError, nearest, parameter, read_section
 from vehicle.propeller import Propeller, PropellerNumbers
 from vehicle.restoring import Buoyancy, RestoringNumbers
 from vehicle.rigid_body import RigidBody

@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 
 from scenarios import ScenarioError
-from scenarios.errors import shown
 from scenarios.files import Source, read_toml
 from subzero.diagnosis.effect import Effect, Parameter
 from subzero.diagnosis.effects import load
 from subzero.diagnosis.extended import STARTS, ExtendedFile, all_effects, force_key, key_of, plain_id
 from subzero.diagnosis.verdict import Extended
 from subzero.errors import UserError, listed, printable, suggestion
+from subzero.errors import short as shown
 from subzero.missing_force import AXES, MissingForce, Term
 
 KEYS = ("scenario", "source", "effects_file", "effects", "calibration", "missing_force", "missing_term")

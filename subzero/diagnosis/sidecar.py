@@ -20,10 +20,10 @@ from pathlib import Path
 from typing import Any
 
 from scenarios import ScenarioError
-from scenarios.errors import shown
 from scenarios.files import Source, read_toml
 from subzero.channels import BY_COLUMN, TIME
 from subzero.errors import UserError, listed, printable, suggestion
+from subzero.errors import short as shown
 
 WORDS = {"source": str, "scenario": str, "tethered": bool, "surge_speed": str}
 LIMITS = {"noise": (1e-6, 1e6), "rate_hz": (1e-4, 1e5)}

@@ -102,7 +102,9 @@ def _exchanges(setting: Setting) -> tuple[np.ndarray, int]:
     """
     trial = setting.trial
     count = max(1, math.ceil(trial.duration / trial.cable_step - 1e-6))
-    end = trial.duration if abs(count * trial.cable_step - trial.duration) < 1e-6 else count * trial.cable_step
+    end = (
+        trial.duration if abs(count * trial.cable_step - trial.duration) < 1e-6 else count * trial.cable_step
+    )
     return np.linspace(0.0, end, count + 1), most_hull_steps(trial.cable_step, trial.hull_step)
 
 
