@@ -172,10 +172,10 @@ class DrumProperties:
 
 def _check(thing: CableProperties | DrumProperties, above_zero: tuple[str, ...]) -> None:
     """Keep every field as a float, or raise a `BadValueError` that names the first that cannot be; none is negative."""
-    for field in fields(thing):
-        limit: dict[str, float] = {"above": 0.0} if field.name in above_zero else {"least": 0.0}
-        value = checked(type(thing).__name__, field.name, getattr(thing, field.name), **limit)
-        object.__setattr__(thing, field.name, value)
+    for each in fields(thing):
+        above = 0.0 if each.name in above_zero else None
+        value = checked(type(thing).__name__, each.name, getattr(thing, each.name), least=0.0, above=above)
+        object.__setattr__(thing, each.name, value)
 
 
 def _finite(name: str, numbers: Any) -> Any:

@@ -55,7 +55,8 @@ def checked(
         owner: whose value, such as ``CableProperties``; empty for an argument of a function.
         name: its name.
         value: what was given.
-        least, most: limits, allowed themselves.
+        least: lower limit, allowed itself.
+        most: upper limit, allowed itself.
         above: a lower limit that is not allowed itself.
         unit: for the message.
 

@@ -103,8 +103,8 @@ class Term:
                     f" Known: {', '.join(known)}."
                 )
         if real(self.coefficient) is None:
-            message = f"The coefficient of {self.feature!r} on {self.axis} is {short(self.coefficient)}; it must be finite."
-            raise BadValueError(message)
+            name = f"The coefficient of {self.feature!r} on {self.axis}"
+            raise BadValueError(f"{name} is {short(self.coefficient)}; it must be finite.")
 
     @property
     def unit(self) -> str:
@@ -138,7 +138,8 @@ class MissingForce:
             raise BadValueError("A missing force has a history of what are no numbers.") from None
         if wrench.shape != (*time.shape, 6) and (time.size or wrench.size):
             raise BadValueError(
-                f"A missing force has {time.size} times and a wrench of shape {wrench.shape}; allowed: six numbers a time."
+                f"A missing force has {time.size} times and a wrench of shape {wrench.shape};"
+                " allowed: six numbers a time."
             )
         if not (np.isfinite(time).all() and np.isfinite(wrench).all()):
             raise BadValueError("A missing force has a history with numbers that are not finite.")

@@ -32,8 +32,8 @@ def economical(setting: Setting, duration: float) -> Setting:
     hull_step = max(trial.hull_step, HULL_STEP) if on_grid else trial.hull_step
     cable_step = max(trial.cable_step, CABLE_STEP)
     steps = int(np.ceil(min(duration, trial.duration) / cable_step - 1e-9))
-    made = replace(trial, hull_step=fitting_step(cable_step, hull_step), cable_step=cable_step, duration=steps * cable_step,
-                   segment_length=max(trial.segment_length, SEGMENT))  # fmt: skip
+    made = replace(trial, hull_step=fitting_step(cable_step, hull_step), cable_step=cable_step,
+                   duration=steps * cable_step, segment_length=max(trial.segment_length, SEGMENT))  # fmt: skip
     return replace(setting, trial=made)
 
 
