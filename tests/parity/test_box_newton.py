@@ -19,6 +19,7 @@ from cable.box_solver import back_substitute
 from cable.equation7 import equation7_numbers
 from cable.paper_scheme import add_node, keep_old_time, pull_out_paper
 from cable.properties import CableProperties
+from subzero.compiled import compiled
 
 HEAVY = equation7_numbers(CableProperties(mass_per_length=0.02, compliance=0.05), (0.2, 0.1, -0.1))
 TABLE_1 = equation7_numbers(CableProperties())
@@ -98,12 +99,17 @@ def dense_system(w, rule, ends):
     return matrix, right
 
 
+@compiled
+def one_pass(w, rule, ends):
+    newton_pass(w, rule, ends, TABLE_1, 1.0, 1.0)
+
+
 @pytest.mark.parametrize(("segments", "length"), [(1, 1.0), (30, 1.0), (150, 0.1)])
 def test_the_staircase_solver_finds_what_a_dense_solver_finds(segments, length):
     """150 nodes 0.1 m apart: elimination by rows alone has lost all digits there."""
     w, rule, ends = diving_cable(segments, length)
     matrix, right = dense_system(w, rule, ends)
-    newton_pass(w, rule, ends, TABLE_1, 1.0, 1.0)
+    one_pass(w, rule, ends)
     back_substitute(w.factors, w.orders, w.count[0], w.update)
     exact = np.linalg.solve(matrix, right).reshape(-1, 6)
     np.testing.assert_allclose(w.update[: w.count[0]], exact, atol=1e-11 * np.abs(exact).max())
@@ -121,6 +127,6 @@ def test_interpreted_and_compiled_scheme_agree():
     environment = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
     done = subprocess.run([sys.executable, "-c", RUN], capture_output=True, check=True, env=environment)
     message, *forces = json.loads(done.stdout)
-    compiled = pull_out_paper(lambda t: (1.0, 0.1 * t, -0.1 * t), 5.0, 1.0)
-    assert message == compiled.message == "completed"
-    np.testing.assert_allclose(compiled.tow_force.ravel(), forces, atol=1e-13)  # rounding of a sum
+    here = pull_out_paper(lambda t: (1.0, 0.1 * t, -0.1 * t), 5.0, 1.0)
+    assert message == here.message == "completed"
+    np.testing.assert_allclose(here.tow_force.ravel(), forces, atol=1e-13)  # rounding of a sum
