@@ -3,9 +3,9 @@
 
 Exit codes: 0 all is well; 2 the user has to change something (one clean message on standard error,
 nothing is written); 3 a run could not go on (what it has is written, the message says when, where and
-what to try). A bug of ours keeps its traceback. Everything heavy (numba, xarray, matplotlib, pydantic) is
-imported inside the commands, after the request has been checked, so that help and mistakes answer at
-once.
+what to try); 130 it was interrupted (`subzero.interrupts`). A bug of ours keeps its traceback. Everything
+heavy (numba, xarray, matplotlib, pydantic) is imported inside the commands, after the request has been
+checked, so that help and mistakes answer at once.
 """
 
 from __future__ import annotations
@@ -22,11 +22,12 @@ from rich.console import Console
 import scenarios
 from subzero import cli_autopilot, cli_diagnosis
 from subzero.errors import UserError, printable
+from subzero.interrupts import INTERRUPTED, words
 
 if TYPE_CHECKING:
     from subzero.progress import ProgressBar
 
-FINE, MISTAKE, STOPPED, INTERRUPTED = 0, 2, 3, 130
+FINE, MISTAKE, STOPPED = 0, 2, 3
 
 
 def _version() -> str:
@@ -140,12 +141,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return command(*bound.args, **bound.kwargs) or FINE
     except cyclopts.CycloptsError as error:
         return _refuse(f"{_in_words(error)}\nTry 'subzero --help'.")
-    except (UserError, scenarios.ScenarioError) as error:
+    except UserError as error:
         return _refuse(str(error))
     except KeyboardInterrupt:
-        from subzero.stage import interruption
-
-        print(f"Interrupted; {interruption()}.", file=sys.stderr)
+        print(words(), file=sys.stderr)
         return INTERRUPTED
 
 
@@ -157,7 +156,7 @@ def _never_choke(*streams: Any) -> None:
 
 
 def _refuse(message: str) -> int:
-
+    """Print a message, and return the exit code of a mistake."""
     print("\n".join(map(printable, message.split("\n"))), file=sys.stderr)
     return MISTAKE
 

@@ -12,13 +12,16 @@ from cyclopts import Parameter
 from rich.console import Console
 
 import scenarios
+from subzero.interrupts import INTERRUPTED, patience
 
 if TYPE_CHECKING:
     from subzero.diagnosis.effect import Effect
     from subzero.diagnosis.logged import Logged
     from subzero.diagnosis.verdict import Verdict
 
-FINE, INTERRUPTED = 0, 130
+FINE = 0
+LAST_WORDS_S = 60.0
+"""An interrupted diagnosis has so long to tell and write what it has. [s]"""
 
 Flag = Annotated[bool, Parameter(negative=())]
 With = Annotated[Path | None, Parameter(name="--with")]
@@ -55,8 +58,9 @@ def diagnose(
         logged = _read(records, scenario, commands)
         from subzero import delivery_diagnosis
 
-        verdict = _ask(logged, own, seed, "screen" if screen else "full")
-        delivery_diagnosis.write_all(verdict, logged, stage, effects=own, effects_file=effects)
+        with patience(LAST_WORDS_S):
+            verdict = _ask(logged, own, seed, "screen" if screen else "full")
+            delivery_diagnosis.write_all(verdict, logged, stage, effects=own, effects_file=effects)
     delivery_diagnosis.tell(verdict, stage)
     return FINE if verdict.complete else INTERRUPTED
 
@@ -141,7 +145,7 @@ def _read(paths: list[Path], scenario: str | None, commands: str | None) -> list
 
 
 def _ask(logged: list[Logged], own: tuple[Effect, ...], seed: int, budget: str) -> Verdict:
-    """Diagnose under a progress bar; Ctrl-C ends it with what it has, if it has anything."""
+    """Diagnose under a progress bar; an interrupt ends it with what it has, if it has anything."""
     from subzero.delivery_diagnosis import tell_before
     from subzero.diagnosis.entrance import diagnose as run
 

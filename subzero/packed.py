@@ -10,6 +10,28 @@ import numpy as np
 
 Numbers = TypeVar("Numbers")
 
+class Packed(np.void):
+    """A record in memory whose fields are attributes.
+
+    ``numpy.record`` is the same but for a lookup of attributes in Python, through which numba, too, asks for the
+    record's memory: an interrupt in there ends the interpreter.
+    """
+
+    def __getattr__(self, name: str) -> Any:
+        """Return a field; what every record has is found before this is asked."""
+        try:
+            return self[name]
+        except ValueError:
+            raise AttributeError(f"This record has no field {name!r}; it has {', '.join(self.dtype.names)}.") from None
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        """Set a field."""
+        try:
+            self[name] = value
+        except ValueError:
+            raise AttributeError(f"This record has no field {name!r}; it has {', '.join(self.dtype.names)}.") from None
+
+
 _layouts: dict[Any, np.dtype[Any]] = {}
 """What a value of `packed` is made of → its dtype."""
 
@@ -44,7 +66,7 @@ def _fields(value: Any) -> tuple[str, ...] | None:
 
 def _read(value: Any) -> tuple[Any, Any]:
     """Return a value of `packed` as numpy takes it (records as tuples, rows as lists), and what it is made of."""
-    if isinstance(value, np.record):
+    if isinstance(value, Packed):
         return value, value.dtype
     names = _fields(value)
     if names is None and not isinstance(value, tuple):
@@ -56,11 +78,11 @@ def _read(value: Any) -> tuple[Any, Any]:
 
 def _layout(value: Any) -> np.dtype[Any]:
     """Return the dtype that holds a value of `packed`."""
-    if isinstance(value, np.record):
+    if isinstance(value, Packed):
         return value.dtype
     names = _fields(value)
     if names is not None:
-        return np.dtype((np.record, [(name, _layout(getattr(value, name))) for name in names]))
+        return np.dtype((Packed, [(name, _layout(getattr(value, name))) for name in names]))
     if isinstance(value, tuple):
         return np.dtype((_layout(value[0]), (len(value),)))
     array = np.asarray(value)

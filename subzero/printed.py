@@ -22,7 +22,7 @@ from subzero.coupling import CABLE_FAILED, FASTEST, FINE
 from subzero.hull import tow_point
 from subzero.model import Model
 from subzero.printed_loop import Printed, pull_of, record_printed, run_printed_rows, start_at_drum
-from subzero.recording import CHUNKS, Run, cut, new_recording
+from subzero.recording import Pace, Run, cut, new_recording
 from subzero.run_state import Live, Setup
 from subzero.start import prepare
 
@@ -43,10 +43,11 @@ def run_as_printed(
     line = lay_cable(trial, model, setup, live, times.size)
     recording = new_recording(times.size, times.size * len(line.w.y))
     used = record_printed(setup, live, line, recording, 0, 0.0, 0)
-    row, ending, report = 1, FINE, START
+    row, ending, report, pace = 1, FINE, START, Pace()
     while row < times.size and ending == FINE:
-        last = min(times.size, row + 1 + times.size // CHUNKS)
-        row, used, ending, told = run_printed_rows(setup, live, line, recording, times, row, last, used)
+        last = min(times.size, row + pace.rows)
+        with pace:
+            row, used, ending, told = run_printed_rows(setup, live, line, recording, times, row, last, used)
         report = NewtonReport(*told)
         if progress is not None:
             progress(row / times.size)

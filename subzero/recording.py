@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from time import perf_counter
 from typing import NamedTuple
 
 import numpy as np
@@ -14,8 +15,8 @@ from subzero.hull import feel_current, row_at, tow_wrench
 from subzero.run_state import Live, Setup
 from vehicle import BREAKDOWN, STATE_SIZE
 
-CHUNKS = 50
-"""How often a run comes up for air, to move the progress bar."""
+BREATH_S = 0.1
+"""Compiled code computes for about so long before Python moves the progress bar and heeds an interrupt. [s]"""
 
 
 class Recording(NamedTuple):
@@ -66,6 +67,27 @@ class Run:
     recording: Recording
     completed: bool
     message: str
+
+
+class Pace:
+    """How many rows compiled code fills at a time, from one on to as many as it fills within `BREATH_S`.
+
+    Attributes:
+        rows: how many; measured anew each time that it is entered and left.
+    """
+
+    def __init__(self) -> None:
+        """Begin with one row."""
+        self.rows, self._begin = 1, 0.0
+
+    def __enter__(self) -> None:
+        """Begin to fill rows."""
+        self._begin = perf_counter()
+
+    def __exit__(self, *_: object) -> None:
+        """See how long it took."""
+        share = BREATH_S / max(perf_counter() - self._begin, 1e-6)
+        self.rows = max(1, int(self.rows * min(share, 4.0)))
 
 
 def new_recording(rows: int, nodes: int) -> Recording:

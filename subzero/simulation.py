@@ -16,7 +16,8 @@ from subzero import coupling
 from subzero.later import Later, go_on_with, rows_of_changes
 from subzero.loop import NO_ROOM, run_rows
 from subzero.model import Model
-from subzero.recording import CHUNKS, Recording, Run, cut, new_recording, record_row
+from subzero.recording import Pace, Recording, Run, cut, new_recording, record_row
+from subzero.room import REMEDY, has_room, refuse_what_cannot_fit
 from subzero.run_state import Live, Setup
 from subzero.start import prepare
 from subzero.trials import load
@@ -73,6 +74,7 @@ def run_trial(
     later: Later = (),
 ) -> Run:
     """Run a trial with a model, and with others from later times on, in plain arrays."""
+    refuse_what_cannot_fit(trial, model, tethered)
     times = trial.times()
     changes = rows_of_changes(trial, tethered, times, later)
     if tethered and trial.scheme != "moving_end":
@@ -82,13 +84,16 @@ def run_trial(
     setup, live = prepare(trial, model, tethered)
     recording = new_recording(times.size, 4 * times.size * live.line.length.size if tethered else 0)
     used = record_row(setup, live, recording, 0, 0.0, 0)
-    row, ending = 1, coupling.FINE
+    row, ending, pace = 1, coupling.FINE, Pace()
     while row < times.size and ending in (coupling.FINE, NO_ROOM):
         if row - 1 in changes:
             setup = go_on_with(changes.pop(row - 1), setup, live, trial, tethered, float(times[row - 1]))
-        last = min(times.size, row + 1 + times.size // CHUNKS, *(change + 1 for change in changes))
-        row, used, ending = run_rows(setup, live, recording, times, row, last, used)
+        last = min(times.size, row + pace.rows, *(change + 1 for change in changes))
+        with pace:
+            row, used, ending = run_rows(setup, live, recording, times, row, last, used)
         if ending == NO_ROOM:
+            if not has_room(4 * max(recording.tension.size, used)):
+                break
             live, recording = more_room(live, recording, used)
         if progress is not None:
             progress(row / times.size)
@@ -121,6 +126,8 @@ def in_words(ending: int, time: float, setup: Setup, live: Live) -> str:
     if ending == coupling.CABLE_FAILED:
         behind = too_short(time, live.line, setup.fixed.drum)
         return behind or describe_failure(live.line.ends.solved, time)
+    if ending == NO_ROOM:
+        return f"The cable's shapes until t = {time:g} s fill the memory that is free. {REMEDY}"
     if ending == coupling.DISAGREED:
         return (
             f"Vehicle and cable found no common tow force beyond t = {time:g} s, even in the smallest steps. "

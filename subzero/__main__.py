@@ -1,0 +1,24 @@
+"""``subzero`` and ``python -m subzero``: the command line, which an interrupt may end at any time."""
+
+from __future__ import annotations
+
+import sys
+
+from subzero import interrupts
+
+
+def run() -> None:
+    """Run the command line with the words of this process, and end it with its exit code."""
+    interrupts.watch()
+    try:
+        from subzero.cli import main
+
+        code = main()
+    except KeyboardInterrupt:  # before the command line was ready, or while it said so
+        print(interrupts.words(), file=sys.stderr)
+        code = interrupts.INTERRUPTED
+    interrupts.leave(code)
+
+
+if __name__ == "__main__":
+    run()

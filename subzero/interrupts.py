@@ -1,0 +1,89 @@
+"""What SIGINT (Ctrl-C) and SIGTERM do to a command: it ends with exit code 130, within two seconds, whatever it does.
+
+A signal raises `KeyboardInterrupt` as soon as Python code runs again, so that files are put right and the command says
+what it left. Compiled code may not come back that soon: so a thread, which the operating system's signal wakes at once,
+ends the process when its patience is over. Only commands do so; a session of Python keeps its own habits.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
+from typing import Never
+
+INTERRUPTED = 130
+"""Exit code: 128 and the number of SIGINT, as shells have it."""
+PATIENCE_S = 1.5
+"""A command has so long to end by itself. [s]"""
+SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+_patience = [PATIENCE_S]
+
+
+def watch() -> None:
+    """Let signals end this process; a signal that is ignored (``nohup``) stays so."""
+    heeded = [each for each in SIGNALS if signal.getsignal(each) is not signal.SIG_IGN]
+    woken, waker = socket.socketpair()
+    waker.setblocking(False)
+    signal.set_wakeup_fd(waker.fileno(), warn_on_full_buffer=False)
+    for each in heeded:
+        signal.signal(each, _interrupt)
+    threading.Thread(target=_end_late, args=(woken, waker), daemon=True).start()
+
+
+@contextmanager
+def patience(seconds: float) -> Iterator[None]:
+    """Let a command go on for so long after a signal, to write what it has [s]; a second signal ends it as usual."""
+    before, _patience[0] = _patience[0], seconds
+    try:
+        yield
+    finally:
+        _patience[0] = before
+
+
+def leave(code: int) -> Never:
+    """End the process; after an interrupt at once, without waiting for threads that still compute."""
+    if code != INTERRUPTED:
+        sys.exit(code)
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            stream.flush()
+        except (OSError, ValueError):  # nobody reads it any more
+            continue
+    os._exit(code)
+
+
+def words() -> str:
+    """Return what an interrupted command says: what became of its files."""
+    stage = sys.modules.get("subzero.stage")
+    left = stage.interruption() if hasattr(stage, "interruption") else "nothing was written"
+    return f"Interrupted; {left}."
+
+
+def _interrupt(number: int, frame: FrameType | None) -> Never:
+    """Raise what Ctrl-C raises."""
+    raise KeyboardInterrupt
+
+
+def _end_late(woken: socket.socket, waker: socket.socket) -> None:
+    """Wait for a signal, then for the process to end; end it when its patience is over, or by a second signal."""
+    woken.recv(1)
+    if _patience[0] > PATIENCE_S:
+        os.write(2, b"\nInterrupted; what it has is being written. Interrupt again to end it at once.\n")
+    until = time.monotonic() + _patience[0]
+    woken.settimeout(_patience[0])
+    try:
+        woken.recv(1)
+        until = min(until, time.monotonic() + PATIENCE_S)
+    except TimeoutError:
+        pass
+    time.sleep(max(until - time.monotonic(), 0.0))
+    os.write(2, f"\n{words()}\n".encode(errors="replace"))
+    os._exit(INTERRUPTED)

@@ -1,0 +1,67 @@
+"""How much memory a run will need, told before it is asked for.
+
+What grows is the cable's shape, kept at every step: the way that the tow point goes is estimated from below, so that
+only runs are refused that cannot fit; one that nevertheless outgrows the memory stops and keeps what it has.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+import scenarios
+from cable.runs import segments_needed
+from subzero.memory import fits, refuse_unless_it_fits
+from subzero.model import Model
+from subzero.recording import new_recording
+
+BYTES_A_NODE = 4 * 8
+"""Place and tension."""
+COPIES = 2
+"""The recording, and the labelled result that is made of it."""
+SHARE_OF_FREE_RUNNING = 0.3
+"""A vehicle goes at no less than about this share of the speed at which its propeller has no thrust. [-]"""
+REMEDY = "Try a longer cable_step_s or segment_length_m, a grading, or a shorter duration_s."
+
+
+def refuse_what_cannot_fit(trial: scenarios.Trial, model: Model, tethered: bool) -> None:
+    """Raise a UserError if a run will not fit into memory."""
+    rows = trial.duration / trial.cable_step + 2.0
+    size = COPIES * rows * bytes_a_row()
+    if tethered:
+        lengths = (trial.start.wet_length, _last_length(trial, model))
+        nodes = [1 + segments_needed(length, trial.segment_length, trial.grading) for length in lengths]
+        size += rows * BYTES_A_NODE * (0.5 * sum(nodes) + max(nodes))  # the result has room for the most at all times
+    refuse_unless_it_fits(size, f"'{trial.name}', {trial.duration:g} s in steps of {trial.cable_step:g} s,", REMEDY)
+
+
+def bytes_a_row() -> float:
+    """Return what a recording keeps of the vehicle at one time."""
+    return float(sum(values.nbytes for values in new_recording(1, 0)))
+
+
+def has_room(nodes: int) -> bool:
+    """Say whether shapes of so many nodes in all can be kept, and made into a result."""
+    return fits(COPIES * BYTES_A_NODE * nodes)
+
+
+def _last_length(trial: scenarios.Trial, model: Model) -> float:
+    """Return how much cable is in the water at the end, at least [m]."""
+    wet = trial.start.wet_length
+    if model.winch is not None and model.winch.control == "pay_out_rate":
+        time, rate = np.array(model.winch.time), np.array(model.winch.setpoint)
+        grid = np.linspace(0.0, trial.duration, 1001)
+        return max(wet + float(np.trapezoid(np.interp(grid, time, rate), grid)), 0.0)
+    return wet if model.winch is not None else wet + _way(trial, model)
+
+
+def _way(trial: scenarios.Trial, model: Model) -> float:
+    """Return how far the vehicle goes through the water, about, and rather too little [m]."""
+    if trial.motion is not None:
+        return float(np.trapezoid(np.abs(trial.motion.surge_speed), trial.motion.time))
+    if trial.commands is None:
+        return 0.0
+    times = np.append(trial.commands.time, trial.duration)
+    spans = np.clip(np.diff(np.minimum(times, trial.duration)), 0.0, None)
+    propeller = model.vehicle.propeller
+    advance = propeller.thrust_constant / max(propeller.thrust_slope, 1e-6) * propeller.diameter
+    return SHARE_OF_FREE_RUNNING * advance * float(np.abs(trial.commands.values[:, 0]) @ spans)
