@@ -10,6 +10,7 @@ import numpy as np
 
 Numbers = TypeVar("Numbers")
 
+
 class Packed(np.void):
     """A record in memory whose fields are attributes.
 
@@ -22,14 +23,18 @@ class Packed(np.void):
         try:
             return self[name]
         except ValueError:
-            raise AttributeError(f"This record has no field {name!r}; it has {', '.join(self.dtype.names)}.") from None
+            raise AttributeError(
+                f"This record has no field {name!r}; it has {', '.join(self.dtype.names)}."
+            ) from None
 
     def __setattr__(self, name: str, value: Any) -> None:
         """Set a field."""
         try:
             self[name] = value
         except ValueError:
-            raise AttributeError(f"This record has no field {name!r}; it has {', '.join(self.dtype.names)}.") from None
+            raise AttributeError(
+                f"This record has no field {name!r}; it has {', '.join(self.dtype.names)}."
+            ) from None
 
 
 _layouts: dict[Any, np.dtype[Any]] = {}

@@ -30,8 +30,12 @@ def refuse_what_cannot_fit(trial: scenarios.Trial, model: Model, tethered: bool)
     if tethered:
         lengths = (trial.start.wet_length, _last_length(trial, model))
         nodes = [1 + segments_needed(length, trial.segment_length, trial.grading) for length in lengths]
-        size += rows * BYTES_A_NODE * (0.5 * sum(nodes) + max(nodes))  # the result has room for the most at all times
-    refuse_unless_it_fits(size, f"'{trial.name}', {trial.duration:g} s in steps of {trial.cable_step:g} s,", REMEDY)
+        size += (
+            rows * BYTES_A_NODE * (0.5 * sum(nodes) + max(nodes))
+        )  # the result has room for the most at all times
+    refuse_unless_it_fits(
+        size, f"'{trial.name}', {trial.duration:g} s in steps of {trial.cable_step:g} s,", REMEDY
+    )
 
 
 def bytes_a_row() -> float:

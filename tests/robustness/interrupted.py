@@ -27,7 +27,6 @@ def fig6() -> None:
     subzero.simulate("fig6")
 
 
-
 def untethered() -> None:
     subzero.simulate("fig6", tethered=False)
 
