@@ -21,10 +21,11 @@ F_c            force on the vehicle                  N         (12), f_1 − ½Q
 The balances are vectors, `element` and `assembly` (their equivalence with the paper's six scalar equations, whose
 signs are derived anew, is in `equation7` and tested); time is differenced backward, `differences`; a step is solved by
 Newton's method, `newton`, on a block tridiagonal system, `blocks`, and made real by `stepping`. The paper's own scheme
-(20)-(26) stands beside it as `paper_scheme`.
+(20)-(26) stands beside it as `paper_scheme`. Where a cable comes to rest is `hold`; what a jolt does to it, `jolt`.
 """
 
 from cable.history import History, Outcome
+from cable.hold import Equilibrium, HoldError, hold
 from cable.properties import CableProperties, DrumProperties
 from cable.pull_out import SCHEMES, pull_out
 from cable.tow import tow
@@ -38,9 +39,12 @@ __all__ = [
     "ConstantTension",
     "Current",
     "DrumProperties",
+    "Equilibrium",
     "History",
+    "HoldError",
     "Outcome",
     "PayOutRate",
+    "hold",
     "pull_out",
     "tow",
 ]

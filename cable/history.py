@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import nan
 
 import numpy as np
@@ -49,6 +49,9 @@ class History:
         tensions: tensions at the nodes, one array (nodes,) per time. [N]
         outcome: how the run ended; a stopped run keeps what it has.
         scheme: the scheme that was used.
+        tow_impulse: impulse of the cable on the vehicle just after each time, where the tow point changes its
+            velocity at once (n, 3), zero elsewhere; the tow forces do not show it (`cable.jolt`). Empty for other
+            schemes. [N s]
     """
 
     time: np.ndarray
@@ -61,6 +64,7 @@ class History:
     tensions: tuple[np.ndarray, ...]
     outcome: Outcome
     scheme: str
+    tow_impulse: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
 
     def shape(self, t: float) -> np.ndarray:
         """Return the node positions (nodes, 3) relative to the drum at the recorded time nearest to t. [m].

@@ -12,7 +12,7 @@ from .assembly import assemble, assemble_residual
 from .bending import factor_step, has_residual, solve_factored
 from .differences import Weights
 from .element import Load
-from .line import GUESS, NEW, RESIDUAL, STEP, Line, held_node
+from .line import GUESS, NEW, NOW, RESIDUAL, STEP, Line, held_node
 from .properties import CableNumbers, DrumNumbers
 from .slack import STRAIN_SCALE
 
@@ -22,6 +22,8 @@ ABSOLUTE_TOLERANCE = 1e-13
 """Balances of a cable without tension hold to this. [N]"""
 ROUNDING = 1e-15
 """Positions x are known to this fraction; inertia m1 ℓ a₀ b₀ x and strain x/ℓ of a segment cannot be known better."""
+NEARLY = 1e-5
+"""Below this merit a step is taken whole: Newton's method ends there by itself; rounding could hide its progress."""
 SMALLEST_SEGMENT = 1e-9
 """The growing segment never gets shorter than this while iterating. [m]"""
 
@@ -60,7 +62,7 @@ def solve_step(
             go_from_guess(line, last_length, fraction)
             _residual(line, w, c, drum, work, alone)
             made, merit = not alone, _merit(line)
-            if isfinite(merit) and merit <= before * (1.0 - 0.1 * fraction) + 1e-30:
+            if isfinite(merit) and merit <= max(before * (1.0 - 0.1 * fraction), NEARLY):
                 break
             fraction *= 0.5
         if not isfinite(merit):
@@ -149,10 +151,16 @@ def _solved(line: Line, rounding: float, converged: bool, iterations: int) -> bo
 
 @compiled
 def _merit(line: Line) -> float:
-    """Return the root of the sum of squares of all residuals, lengths in `STRAIN_SCALE`, balances in millinewtons."""
-    total = 0.0
+    """Return the root of the sum of squares of all residuals, lengths in `STRAIN_SCALE`, balances in millinewtons.
+
+    Where the cable pulls with more than 1 N, balances count in thousandths of its pull: the rounding of theirs, which
+    grows with it, would hide the lengths, and no step would seem to help.
+    """
+    total, pull = 0.0, 1.0
+    for j in range(1, line.ends.count + 1):
+        pull = max(pull, line.tension[NOW, j])
     for j in range(1, line.ends.count + 1):
         total += line.rows[RESIDUAL, j, 0] ** 2
         for i in range(1, 4):
-            total += (1e3 * line.rows[RESIDUAL, j, i]) ** 2
+            total += (1e3 / pull * line.rows[RESIDUAL, j, i]) ** 2
     return sqrt(total)

@@ -11,6 +11,7 @@ from subzero.compiled import allocating, compiled
 from .drum_path import hermite, lead_drum
 from .element import Load
 from .energy import FLOWS, book_step, energy_flow
+from .jolt import take_jolt
 from .line import NOW, Line
 from .properties import CableNumbers, DrumNumbers
 from .step_size import estimate_error, next_step, note_force
@@ -24,7 +25,7 @@ MOST_CUTS = 6
 """A step that errs too much is made smaller by this many halvings at most, and so are those behind it: a jolt has no
 accurate step, and in ever smaller ones it only rings louder."""
 FIRST_STEP = 0.1
-"""With an error allowed, a run begins with this share of the first row: it cannot tell its error yet."""
+"""With an error allowed, a run begins, and goes on after a jolt, with this share of a row: it cannot tell its error."""
 
 
 class TowPath(NamedTuple):
@@ -54,6 +55,7 @@ class Record(NamedTuple):
         position: node positions relative to the drum (all nodes of all rows, 3). [m]
         tension: tensions at the nodes (all nodes of all rows,). [N]
         ledger: of the energies, see `cable.energy.book_step` (3, FLOWS).
+        impulse: of the cable on the vehicle just after a row, where the tow point jolts, earth axes (n, 3). [N s]
     """
 
     tow_force: np.ndarray
@@ -67,6 +69,7 @@ class Record(NamedTuple):
     position: np.ndarray
     tension: np.ndarray
     ledger: np.ndarray
+    impulse: np.ndarray
 
 
 def new_record(rows: int, capacity: int) -> Record:
@@ -81,6 +84,7 @@ def new_record(rows: int, capacity: int) -> Record:
         position=np.zeros((nodes, 3)),
         tension=np.zeros(nodes),
         ledger=np.zeros((3, FLOWS)),
+        impulse=np.zeros((rows, 3)),
     )
 
 
@@ -144,6 +148,10 @@ def _cover(
     """Go from times[k−1] to times[k], in smaller steps where needed; return the step to go on with."""
     whole = path.times[k] - path.times[k - 1]
     finest, done, spent, point = whole * 0.5**MOST_CUTS, 0.0, 0, np.zeros(3)
+    jump = path.leaving[k - 1] - path.arriving[k - 1]
+    if k > 1 and take_jolt(line, jump, c, drum, work, record.impulse[k - 1]):
+        energy_flow(line, c, work, record.ledger[1])
+        suggested = min(suggested, FIRST_STEP * whole)
     step = min(suggested, whole) if rtol > 0.0 else whole
     while True:
         step = (whole - done) / np.ceil((whole - done) / step - 1e-9)

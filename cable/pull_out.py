@@ -8,9 +8,11 @@ import numpy as np
 
 from subzero.errors import BadValueError, checked, short, suggestion
 
+from .drum import LENGTH
 from .drum_path import PLACE, SETPOINT, VELOCITY, drum_path, resting
 from .element import new_load
 from .history import History
+from .hold import Equilibrium, lay_held
 from .laying import lay_straight
 from .line import TOLERANCE, new_line
 from .properties import CableProperties, DrumProperties
@@ -49,6 +51,7 @@ def pull_out(
     rtol: float = 0.0,
     grading: float = 0.0,
     tolerance: float = TOLERANCE,
+    start: Equilibrium | None = None,
 ) -> History:
     """Pull a cable off a drum, starting with no cable in the water and the tow point at the drum.
 
@@ -86,6 +89,8 @@ def pull_out(
         tolerance: how exactly the default scheme solves a step: balances of forces to this share of the largest
             tension, strains to a thousandth of it. With 1e-5 most steps take one Newton iteration, not two, and what
             that leaves is far below the error of the step; what compares runs with one another wants the 1e-9.
+        start: a cable that hangs or streams between vehicle and drum, from `cable.hold`: the default scheme begins with
+            it, its cable and its current (unless others are given), its length and its segments.
 
     Returns:
         the history from t = 0 on. Look at `history.outcome`: a run that could not go on keeps what it has.
@@ -98,6 +103,12 @@ def pull_out(
     Good values: step 0.1 s and segments of 0.5 m give the tension of a 60° dive at 1 m/s within 2e-4 and the direction
     of the tow force within 4e-4 (`python -m benchmarks.cable` measures both together).
     """
+    origin = np.zeros(3)
+    if start is not None:
+        _check_start(start, scheme, wet_length)
+        wet_length, segment_length = start.length, float(start.segment_lengths[0])
+        cable, origin = cable or start.cable, start.shape[-1] if current is None else origin
+        current = start.current if current is None else current
     cable, drum = cable or CableProperties(), drum or DrumProperties()
     _check(duration, step, segment_length, scheme, rtol, grading, wet_length)
     check_kinds(
@@ -139,16 +150,31 @@ def pull_out(
     path, wet = sample_path(tow_velocity, duration, step), max(wet_length, START_LENGTH)
     led = _led_drum(drum, drum_velocity, path.times, wet)
     direction = first_direction(path.leaving - led[:, VELOCITY:SETPOINT])
-    path.place[:] += wet * direction
+    path.place[:] += wet * direction if start is None else start.shape[0] - start.shape[-1]
     reach = 1.5 * (_way(path.place) + _way(led[:, PLACE:VELOCITY]) + water.fastest * duration) + wet
     longest = led[:, SETPOINT].max() if isinstance(drum, PayOutRate | Brake) else 2.0 * reach + 5.0
     capacity = segments_needed(float(longest), segment_length, grading)
+    capacity += 0 if start is None else start.segment_lengths.size
     check_memory(path.times.size, capacity)
     line, work, c, turning = new_line(capacity), new_load(), cable.numbers(), drum.numbers()
     line.ends.segment_length, line.ends.grading, line.ends.tolerance = segment_length, grading, tolerance
     turning.velocity[:] = led[0, VELOCITY:SETPOINT]
-    lay_straight(line, wet, direction, path.leaving[0], turning, c)
-    return run(line, path, led, water.numbers(), c, turning, rtol, work, capacity)
+    if start is None:
+        lay_straight(line, wet, direction, path.leaving[0], turning, c)
+    else:
+        rate = (led[1, SETPOINT] - led[0, SETPOINT]) / path.times[1] if turning.control == LENGTH else 0.0
+        lay_held(line, start, path.leaving[0], turning.velocity, rate)
+    return run(line, path, led, water.numbers(origin), c, turning, rtol, work, capacity)
+
+
+def _check_start(start: object, scheme: str, wet_length: float) -> None:
+    """Refuse a start that is none, and what does not go together with one."""
+    check_kinds(start=(start, (Equilibrium,)))
+    if scheme != "moving_end" or wet_length != 0.0:
+        raise BadValueError(
+            f"start goes with scheme 'moving_end' and without wet_length; got scheme {short(scheme)} and wet_length "
+            f"{short(wet_length)}. The length is the start's own."
+        )
 
 
 def _led_drum(

@@ -79,6 +79,7 @@ def as_history(path: TowPath, record: Record, rows: int, solved: Solved, trouble
             energy_residual=float(abs(record.ledger[2, STORED]) / max(record.ledger[2, LOSS], 1e-30)),
         ),
         scheme="moving_end",
+        tow_impulse=record.impulse[:rows],
     )
 
 

@@ -75,6 +75,9 @@ roll_deg        | degree | -180   | 180   | 0 | roll, positive starboard side do
 depth_m         | m      | 0      | 11000 | 0 | depth of the hull centre, positive down
 surge_speed_m_s | m/s    | -20    | 20    | 0 | forward speed over ground
 wet_length_m    | m      | 0      | 10000 | 0 | cable already in the water, laid straight
+drum_north_m    | m      | -10000 | 10000 | 0 | drum from the tow point, northwards; the cable hangs between them
+drum_east_m     | m      | -10000 | 10000 | 0 | the same, eastwards
+drum_down_m     | m      | -10000 | 10000 | 0 | the same, downwards; all three 0: the cable is laid straight
 """)
 
 WATER = _read("""

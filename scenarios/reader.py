@@ -143,6 +143,7 @@ def _start(start: Mapping[str, float], prescribed: Motion | None) -> Start:
             depth=start["depth_m"],
             surge_speed=float(prescribed.surge_speed[0]),
             wet_length=start["wet_length_m"],
+            **_drum(start),
         )
     return Start(
         heading=radians(start["heading_deg"]),
@@ -151,4 +152,10 @@ def _start(start: Mapping[str, float], prescribed: Motion | None) -> Start:
         depth=start["depth_m"],
         surge_speed=start["surge_speed_m_s"],
         wet_length=start["wet_length_m"],
+        **_drum(start),
     )
+
+
+def _drum(start: Mapping[str, float]) -> dict[str, float]:
+    """Return where the drum is from the tow point."""
+    return {name: start[f"{name}_m"] for name in ("drum_north", "drum_east", "drum_down")}

@@ -57,6 +57,9 @@ class Start:
         depth: of the hull centre, positive down. [m]
         surge_speed: u, forward speed over ground. [m/s]
         wet_length: cable already in the water, laid straight behind the vehicle. [m]
+        drum_north: where the drum is from the tow point, northwards: the cable then hangs at rest between them. [m]
+        drum_east: the same, eastwards. [m]
+        drum_down: the same, downwards; all three 0: the cable is laid straight. [m]
     """
 
     heading: float = 0.0
@@ -65,12 +68,21 @@ class Start:
     depth: float = 0.0
     surge_speed: float = 0.0
     wet_length: float = 0.0
+    drum_north: float = 0.0
+    drum_east: float = 0.0
+    drum_down: float = 0.0
 
     def __post_init__(self) -> None:
         """Refuse what is no start."""
         check = Checks(self)
         check.numbers(by_field(START))
         check.refuse()
+
+    @property
+    def drum(self) -> tuple[float, float, float] | None:
+        """Where the drum is from the tow point, north, east, down; None where a straight cable says so. [m]."""
+        place = self.drum_north, self.drum_east, self.drum_down
+        return place if any(place) else None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -26,6 +26,7 @@ from cable.tow_point import impedance
 from subzero.compiled import compiled, inlined, inner
 from subzero.energy import book
 from subzero.hull import advance_hull, follow_track, tow_point
+from subzero.jolt import take_jolt_of_motion
 from subzero.run_state import Live, Now, Setup
 from subzero.scratch import scratch
 from vehicle import STATE_SIZE
@@ -45,6 +46,8 @@ FINE, CABLE_FAILED, DISAGREED, ABSURD = range(4)
 def exchange(setup: Setup, live: Live, start: float, span: float) -> int:
     """Take one exchange from `start`, in halves where needed; the live state moves on only as far as it went well."""
     done, step = 0.0, span
+    if setup.fixed.prescribed and setup.fixed.tethered:
+        take_jolt_of_motion(setup, live, start)
     while True:
         last = done + step >= span * (1.0 - 1e-9)
         mode = live.line.ends.drum_mode

@@ -63,7 +63,7 @@ def leave(code: int) -> Never:
 def words() -> str:
     """Return what an interrupted command says: what became of its files."""
     stage = sys.modules.get("subzero.stage")
-    left = stage.interruption() if hasattr(stage, "interruption") else "nothing was written"
+    left = stage.interruption() if stage and hasattr(stage, "interruption") else "nothing was written"
     return f"Interrupted; {left}."
 
 

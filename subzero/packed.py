@@ -11,7 +11,7 @@ import numpy as np
 Numbers = TypeVar("Numbers")
 
 
-class Packed(np.void):
+class Packed(np.void):  # type: ignore[misc]  # final in numpy's stubs only
     """A record in memory whose fields are attributes.
 
     ``numpy.record`` is the same but for a lookup of attributes in Python, through which numba, too, asks for the
@@ -23,18 +23,18 @@ class Packed(np.void):
         try:
             return self[name]
         except ValueError:
-            raise AttributeError(
-                f"This record has no field {name!r}; it has {', '.join(self.dtype.names)}."
-            ) from None
+            raise AttributeError(self._unknown(name)) from None
 
     def __setattr__(self, name: str, value: Any) -> None:
         """Set a field."""
         try:
             self[name] = value
         except ValueError:
-            raise AttributeError(
-                f"This record has no field {name!r}; it has {', '.join(self.dtype.names)}."
-            ) from None
+            raise AttributeError(self._unknown(name)) from None
+
+    def _unknown(self, name: str) -> str:
+        """Return what is wrong with the name of a field."""
+        return f"This record has no field {name!r}; it has {', '.join(self.dtype.names or ())}."
 
 
 _layouts: dict[Any, np.dtype[Any]] = {}

@@ -14,6 +14,7 @@ from cable.laying import lay_straight, start_in_water
 from cable.line import NOW, Line, new_line
 from cable.pull_out import START_LENGTH
 from subzero.compiled import compiled
+from subzero.hanging import hang_between
 from subzero.hull import feel_current, pose, tow_point
 from subzero.missing_force import MissingForce
 from subzero.model import Model
@@ -44,7 +45,9 @@ def prepare(trial: scenarios.Trial, model: Model, tethered: bool) -> tuple[Setup
     live.now.length = wet if tethered else 0.0
     live.line.ends.segment_length, live.line.ends.grading = trial.segment_length, trial.grading
     lay_out(setup, live, wet)
-    if setup.fixed.drum.control != FREE:
+    if trial.start.drum is not None:
+        hang_between(setup, live, trial, model)
+    elif setup.fixed.drum.control != FREE:
         _hang(live.line, float(live.now.guess[2] * setup.fixed.cable.weight))
     return setup, live
 

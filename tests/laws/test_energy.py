@@ -124,8 +124,9 @@ def test_straight_ahead_the_added_mass_gives_and_takes_nothing():
 def test_in_a_turn_the_balance_does_not_close_without_the_added_mass_term():
     """−(m1 − m)∫V_tV_nβ̇ds: the paper's added mass is not the gradient of an energy.
 
-    Seen with a thick cable, m = ρA = 0.1 kg/m, in the dive of Fig. 5. With Table 1's thin one the term is small, but
-    still the larger part of what would be left.
+    Seen with a thick cable, m = ρA = 0.1 kg/m, in the dive of Fig. 5. With Table 1's thin one the term is small,
+    but still the larger part of what would be left, seven times what is: the step behind the jolt at 20 s is booked
+    with the force before it.
     """
     thick = variant("fig5", cable={"mass_per_length": 0.1, "cross_section_area": 1e-4})
     assert unexplained(thick) <= CLOSED
@@ -134,7 +135,7 @@ def test_in_a_turn_the_balance_does_not_close_without_the_added_mass_term():
         > 5.0 * CLOSED * thick["propeller_work"][-1]
     )
     thin = energy("fig5", "residual")
-    assert np.abs(thin + energy("fig5", "added_mass_term")).max() > 8.0 * np.abs(thin).max()
+    assert np.abs(thin + energy("fig5", "added_mass_term")).max() > 7.0 * np.abs(thin).max()
 
 
 def test_an_untethered_run_has_no_cable_in_its_ledger_and_closes_to_rounding_of_the_steps():

@@ -1,0 +1,297 @@
+"""The equilibrium of a cable between two ends: where it hangs, streams or floats, and how it pulls at them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from subzero.errors import UserError
+
+from .drum import TURNING
+from .element import new_load
+from .equilibrium import hang, relax
+from .line import NOW, Line, new_line
+from .properties import CableProperties
+from .runs import current_of
+from .water import Current, Water
+from .winch import Brake
+
+Place = Sequence[float] | np.ndarray
+"""North, east, down. [m]"""
+
+SEGMENTS = 100
+"""So many where nobody asks for a segment length: a catenary's force is then right within about 1e-4."""
+MOST_SEGMENTS = 100_000
+MOST_STRAIN = 1.0
+"""A cable that is pulled to more than twice its length is a mistake."""
+SHARPEST = 0.7
+"""Cosine of the largest angle between two segments of a stiff cable."""
+RESCALINGS = 3
+"""How often the unit of force is corrected where the first guess of the tension was far off."""
+WEIGHTLESS = 1e-9
+"""A cable with less tension than this has no load at all. [N]"""
+TAUT = 1.0 - 1e-9
+"""An unstretchable cable whose ends are this share of its length apart has no tension that weight could tell."""
+
+
+class HoldError(UserError, ValueError):
+    """A cable that cannot be held so, or whose equilibrium was not found; the message says what to change."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Equilibrium:
+    """A cable at rest between two ends.
+
+    Attributes:
+        cable: what it is made of.
+        current: how the water moves.
+        length: unstretched. [m]
+        shape: node positions from the first end to the second, in the axes of `ends` (nodes, 3). [m]
+        tensions: at the nodes (nodes,). [N]
+        tow_force: force of the cable on the first end, north, east, down (3,). [N]
+        drum_force: force of the cable on the second end (3,). [N]
+        segment_lengths: unstretched (nodes − 1,). [m]
+        segment_tensions: in the segments (nodes − 1,). [N]
+        steps: how many steps the search took; 2 or 3 where Newton's method came through at once.
+    """
+
+    cable: CableProperties
+    current: Current
+    length: float
+    shape: np.ndarray
+    tensions: np.ndarray
+    tow_force: np.ndarray
+    drum_force: np.ndarray
+    segment_lengths: np.ndarray
+    segment_tensions: np.ndarray
+    steps: int
+
+    @property
+    def slack_length(self) -> float:
+        """How much of the cable is folded up without tension: its shape there means nothing. [m]."""
+        chords = np.linalg.norm(np.diff(self.shape, axis=0), axis=1)
+        stretched = self.segment_lengths * (1.0 + self.cable.compliance * self.segment_tensions)
+        return float(self.segment_lengths[chords < (1.0 - 1e-6) * stretched].sum())
+
+
+def hold(
+    ends: Sequence[Place] | np.ndarray,
+    length: float,
+    current: Place | Current | None = None,
+    *,
+    cable: CableProperties | None = None,
+    segment_length: float | None = None,
+    start: Place | None = None,
+) -> Equilibrium:
+    """Return the equilibrium of a cable that is held at two ends.
+
+        ∂(T t)/∂s = D − w_c k,   |∂x/∂s| = 1 + eT                                        (7), without motion
+
+    It sags below its ends if it is heavy, arches above them if it is buoyant, and a current bows it downstream. The
+    equations are those of a run (`cable.pull_out`), in segments as there, so that a run with `start=` this begins
+    at rest; the error is of second order in the segments. Cables may stretch, hang straight down or be nearly taut;
+    they may be stiff, but not so stiff that they would push. In a sheared current there can be several equilibria;
+    `start` chooses. A neutral cable in still water that is longer than the way has no shape: it is laid straight,
+    without force, and all of it is `slack_length`.
+
+    Args:
+        ends: where it is held (2, 3): the vehicle or first end, then the drum or second end. [m]
+        length: unstretched length between them. [m]
+        current: velocity of the water north, east, down (3,) [m/s], or a `cable.Current` in the axes of `ends`, as it
+            is at time 0; still water when not given.
+        cable: the cable; Table 1 of the source when not given.
+        segment_length: Δs; a hundredth of the length when not given. [m]
+        start: node positions (any number, 3) to start the search from; a catenary under weight and drag when not given.
+
+    Raises:
+        HoldError: ends, length or segments that make no sense; an unstretchable cable that is too short; no
+            equilibrium found.
+    """
+    cable, water = cable or CableProperties(), current_of(current)
+    places = _checked_ends(ends)
+    _check_length(places, length, cable)
+    line = _between(places, length, _segments(length, segment_length))
+    starts = [None] if start is None else [_checked_start(start, places), None]
+    for nodes in starts:
+        steps, scale = _search(line, nodes, water.numbers(places[1]), cable)
+        if steps > 0:
+            found = _found(line, places, length, cable, water, steps, scale)
+            _check_bends(found)
+            return found
+    message = (
+        f"No equilibrium was found of {length:g} m of cable between ends {np.linalg.norm(places[0] - places[1]):g} m "
+        "apart: forces and lengths would not balance. Try other segments (segment_length), a little compliance or "
+        "bending stiffness, or begin from a shape that is near (start)."
+    )
+    raise HoldError(message)
+
+
+def _search(line: Line, nodes: np.ndarray | None, water: Water, cable: CableProperties) -> tuple[int, float]:
+    """Bring a line to rest from node positions, or from a catenary; return steps (−1: none) and the unit of force."""
+    c, work, brake = cable.numbers(), new_load(), Brake().numbers()
+    brake.setpoint = line.ends.settled + line.ends.last_length[NOW]
+    scale = hang(line, water, c, work)
+    if nodes is not None:
+        _lay_along(line, nodes)
+    for _ in range(RESCALINGS):
+        scale = scale if scale > WEIGHTLESS else 1.0
+        line.tension[:] /= scale
+        steps = relax(line, water, _in_units_of(scale, cable), brake, work)
+        largest = float(line.tension[NOW].max())
+        if steps < 0 or largest * scale < WEIGHTLESS or 0.01 < largest < 100.0:
+            break
+        line.tension[:] *= scale
+        scale *= largest
+    return steps, scale
+
+
+def _in_units_of(scale: float, cable: CableProperties) -> Any:
+    """Return the cable's numbers for forces in units of `scale` newtons."""
+    c = cable.numbers()
+    for name in c.dtype.names:
+        c[name] = c[name] * scale if name == "compliance" else c[name] / scale
+    return c
+
+
+def _check_bends(found: Equilibrium) -> None:
+    """Raise an error if a stiff cable is folded at single nodes: there its stiffness is not felt."""
+    d = np.diff(found.shape, axis=0)
+    d /= np.maximum(np.linalg.norm(d, axis=1), 1e-30)[:, None]
+    sharpest = float((d[1:] * d[:-1]).sum(axis=1).min())
+    if found.cable.bending_stiffness > 0.0 and sharpest < SHARPEST:
+        message = (
+            f"hold: the cable, with a bending stiffness of {found.cable.bending_stiffness:g} N m², was only found "
+            f"folded, by {np.degrees(np.arccos(max(sharpest, -1.0))):.0f} degrees from one segment to the next. It "
+            "would have to push, which is not modelled, or its segments are too long: take shorter ones, move its "
+            "ends apart, or take less stiffness."
+        )
+        raise HoldError(message)
+
+
+def lay_held(line: Line, held: Equilibrium, tow: np.ndarray, drum: np.ndarray, payout: float) -> None:
+    """Lay a line as it hangs, at all levels of time: at rest, or carried along by ends that move at `tow` and `drum`.
+
+    Args:
+        line: with room for its segments; filled, relative to the second end.
+        held: the equilibrium.
+        tow: velocity of its first end (3,); even along the cable to the other. [m/s]
+        drum: velocity of its second end (3,). [m/s]
+        payout: rate at which cable enters at the second end. [m/s]
+    """
+    ends, N = line.ends, held.segment_lengths.size
+    ends.count, ends.time, ends.previous_step, ends.drum_mode = N, 0.0, 0.0, TURNING
+    line.length[1 : N + 1] = held.segment_lengths
+    ends.settled, ends.last_length[:] = held.segment_lengths[:-1].sum(), held.segment_lengths[-1]
+    ends.payout[:] = payout
+    along = np.concatenate([[0.0], np.cumsum(held.segment_lengths)]) / held.length
+    line.position[:, : N + 1] = held.shape - held.shape[-1]
+    line.velocity[:, : N + 1] = tow + along[:, None] * (np.asarray(drum) - tow)
+    line.tension[:, 1 : N + 1], line.node_tension[: N + 1] = held.segment_tensions, held.tensions
+    ends.tow_force[:], ends.drum_pull = held.tow_force, held.tensions[-1]
+
+
+def _checked_ends(ends: Sequence[Place] | np.ndarray) -> np.ndarray:
+    """Return the ends as finite numbers (2, 3)."""
+    try:
+        places = np.array(ends, dtype=float)
+    except (TypeError, ValueError):
+        places = np.empty(0)
+    if places.shape != (2, 3) or not np.isfinite(places).all():
+        message = (
+            f"hold: ends must be two places of three finite numbers (north, east, down in m); got {ends!r}."
+        )
+        raise HoldError(message)
+    return places
+
+
+def _check_length(places: np.ndarray, length: float, cable: CableProperties) -> None:
+    """Raise an error if no cable of that length reaches, or if it is none."""
+    if not (np.isfinite(length) and length > 0.0):
+        message = f"hold: length is {length!r}; it must be a positive number of metres."
+        raise HoldError(message)
+    apart = float(np.linalg.norm(places[0] - places[1]))
+    if cable.compliance == 0.0 and apart >= TAUT * length:
+        message = (
+            f"hold: the ends are {apart:.10g} m apart and the cable, which does not stretch, is {length:.10g} m long. "
+            "Give more length, or a compliance (1/EA)."
+        )
+        raise HoldError(message)
+    if apart > (1.0 + MOST_STRAIN) * length:
+        message = (
+            f"hold: the ends are {apart:.10g} m apart and the cable is {length:.10g} m long: it would stretch by "
+            f"{100.0 * (apart / length - 1.0):.0f} %, and at most {100.0 * MOST_STRAIN:g} % is taken for a cable. Give "
+            "more length."
+        )
+        raise HoldError(message)
+
+
+def _segments(length: float, segment_length: float | None) -> int:
+    """Return how many segments a cable is divided into."""
+    if segment_length is None:
+        return SEGMENTS
+    if not (np.isfinite(segment_length) and segment_length > 0.0):
+        message = f"hold: segment_length is {segment_length!r}; it must be a positive number of metres."
+        raise HoldError(message)
+    if length / segment_length > MOST_SEGMENTS:
+        message = (
+            f"hold: {length:g} m in segments of {segment_length:g} m are more than {MOST_SEGMENTS} segments. Take "
+            "longer ones."
+        )
+        raise HoldError(message)
+    return max(2, int(np.ceil(length / segment_length - 1e-9)))
+
+
+def _checked_start(start: Place, places: np.ndarray) -> np.ndarray:
+    """Return node positions relative to the second end."""
+    nodes = np.array(start, dtype=float)
+    if nodes.ndim != 2 or nodes.shape[0] < 2 or nodes.shape[1] != 3 or not np.isfinite(nodes).all():
+        message = f"hold: start must be finite node positions (n, 3), two at least; got shape {nodes.shape}."
+        raise HoldError(message)
+    return nodes - places[1]
+
+
+def _between(places: np.ndarray, length: float, count: int) -> Line:
+    """Return a line of even segments, with its ends where they are held."""
+    line = new_line(count)
+    line.ends.count = count
+    line.length[1 : count + 1] = line.ends.segment_length = length / count
+    line.ends.last_length[:] = length / count
+    line.ends.settled = length - length / count
+    line.position[:, 0] = places[0] - places[1]
+    return line
+
+
+def _lay_along(line: Line, nodes: np.ndarray) -> None:
+    """Lay a line along node positions (n, 3), evenly by the length of their way."""
+    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(nodes, axis=0), axis=1))])
+    at = np.linspace(0.0, way[-1], line.ends.count + 1)
+    inside = np.column_stack([np.interp(at, way, nodes[:, i]) for i in range(3)])[1:-1]
+    line.position[:, 1 : line.ends.count] = inside
+
+
+def _found(
+    line: Line,
+    places: np.ndarray,
+    length: float,
+    cable: CableProperties,
+    current: Current,
+    steps: int,
+    scale: float,
+) -> Equilibrium:
+    """Return what a line at rest says; its forces are in units of `scale`."""
+    N = line.ends.count
+    return Equilibrium(
+        cable=cable,
+        current=current,
+        length=float(length),
+        shape=line.position[NOW, : N + 1] + places[1],
+        tensions=scale * line.node_tension[: N + 1],
+        tow_force=scale * line.ends.tow_force,
+        drum_force=-scale * line.ends.drum_force,
+        segment_lengths=np.append(line.length[1:N], line.ends.last_length[NOW]),
+        segment_tensions=scale * line.tension[NOW, 1 : N + 1],
+        steps=steps,
+    )
