@@ -82,12 +82,13 @@ class Checks:
     ) -> None:
         """Check that values increase, from `first` on if that is given."""
         if first is not None and values.size and values[0] != first:
-            self.say(f"{name}[0]", f"{what} start at {first:g}", f"The first must be {first:g}.", values[0])
+            why = f"{what.lower()} start at {first:g}"
+            self.say(f"{name}[0]", why, f"The first must be {first:g}.", values[0].item())
         steps = np.flatnonzero(~(np.diff(values) > 0.0))
         if steps.size:
             at = int(steps[0]) + 1
             why = f"the one before it is {values[at - 1]:g}"
-            self.say(f"{name}[{at}]", why, f"{what} must increase.", values[at])
+            self.say(f"{name}[{at}]", why, f"{what} must increase.", values[at].item())
 
     def kind(self, name: str, kinds: tuple[type, ...], optional: bool = False) -> bool:
         """Check what a field is; return whether it is there and right."""

@@ -56,12 +56,12 @@ def _read_water(source: Source) -> Read:
     if not lists:
         return {"current": current}, problems
     problems += _check_profile(source, lists)
+    if problems:
+        return {"current": current}, problems
     names = [quantity.name for quantity in PROFILE[1:]]
-    depth = tuple(float(x) for x in lists.get("depth_m", []))
-    return {
-        "current": current,
-        "profile": Profile(depth=depth, velocity=_vectors(lists, names, len(depth))),
-    }, problems
+    depth = tuple(float(x) for x in lists["depth_m"])
+    profile = Profile(depth=depth, velocity=_vectors(lists, names, len(depth)))
+    return {"current": current, "profile": profile}, []
 
 
 def _check_profile(source: Source, lists: Mapping[str, list[float]]) -> list[Problem]:
@@ -106,8 +106,10 @@ def _read_winch(source: Source) -> Read:
     problems += wrong
     if samples:
         problems += check_times(samples, None)
+    if problems:
+        return {}, problems
     time, setpoint = (tuple(float(x) for x in lists.get(name, [])) for name in ("time_s", SETPOINT[control]))
-    return {"winch": Winch(control=control, time=time, setpoint=setpoint)}, problems
+    return {"winch": Winch(control=control, time=time, setpoint=setpoint)}, []
 
 
 def _check_control(source: Source, control: str, lists: Mapping[str, list[float]]) -> list[Problem]:
@@ -137,10 +139,12 @@ def _read_vessel(source: Source) -> Read:
     samples, wrong = inline(source, "vessel", lists)
     if samples is None:
         return {}, problems + wrong
+    problems += wrong + check_times(samples, None)
+    if problems:
+        return {}, problems
     names = ["velocity_north_m_s", "velocity_east_m_s", "velocity_down_m_s"]
     time = tuple(float(x) for x in samples.time)
-    vessel = Vessel(time=time, velocity=_vectors(lists, names, len(time)))
-    return {"vessel": vessel}, problems + wrong + check_times(samples, None)
+    return {"vessel": Vessel(time=time, velocity=_vectors(lists, names, len(time)))}, []
 
 
 def check_scheme(source: Source, run: Mapping[str, Any], cable: Mapping[str, float]) -> list[Problem]:

@@ -85,7 +85,9 @@ def short(value: object) -> str:
     try:
         text = repr(value)
     except Exception:  # whatever somebody's __repr__ does, also an integer of thousands of digits
-        return f"a value of type {type(value).__name__}"
+        return (
+            "a number far too long" if isinstance(value, int) else f"a value of type {type(value).__name__}"
+        )
     text = " ".join(text.split())
     return text if len(text) <= SHOWN_CHARACTERS else text[:SHOWN_CHARACTERS] + "..."
 

@@ -95,10 +95,11 @@ def test_a_controller_that_returns_nonsense_is_told_and_the_run_keeps_what_it_ha
 
 
 def test_a_run_that_cannot_go_on_stops_with_what_it_has():
-    trial = subzero.load_scenario("fig6")
-    sim = subzero.Simulator(
-        dataclasses.replace(trial, start=dataclasses.replace(trial.start, surge_speed=80.0))
-    )
+    """A propeller a hundred thousand times as strong drives the hull beyond any sense in a step."""
+    model = subzero.Model.of(subzero.load_scenario("fig6"))
+    thrust = model.vehicle.propeller.thrust_constant
+    strong = model.vehicle.with_parameter("propeller.thrust_constant", 1e5 * thrust)
+    sim = subzero.Simulator("fig6", model=dataclasses.replace(model, vehicle=strong))
     with pytest.raises(subzero.RunStoppedError, match="absurd"):
         sim.step()
     with pytest.raises(subzero.RunStoppedError, match="absurd"):

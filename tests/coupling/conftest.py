@@ -33,6 +33,9 @@ def trial_of():
         trial = subzero.load_scenario(name)
         if held is not None:
             fields["commands"] = scenarios.Commands(time=np.zeros(1), values=np.array([held], dtype=float))
+        if "cable_step" in fields:
+            step = fields["cable_step"]
+            fields.setdefault("hull_step", step / np.ceil(step / trial.hull_step - 1e-9))
         return dataclasses.replace(
             trial,
             cable=dict(trial.cable) | (cable or {}),
