@@ -132,7 +132,7 @@ def test_steps_that_are_solved_less_exactly_take_fewer_iterations_and_err_no_mor
 def test_a_tolerance_without_sense_is_refused(value):
     for run in (cable.pull_out, lambda v, t, **k: cable.tow(v, 10.0, t, **k)):
         with pytest.raises(
-            ValueError, match=r"tolerance is .*; it must be a finite number, at least 1e-12 and at most 0.001"
+            ValueError, match=r"tolerance is .*; it must be .* at least 1e-12 and at most 0.001"
         ):
             run(dive, 1.0, tolerance=value)
 
@@ -140,9 +140,7 @@ def test_a_tolerance_without_sense_is_refused(value):
 @pytest.mark.parametrize("name", ["rtol", "grading"])
 @pytest.mark.parametrize("value", [-0.1, 1.0, np.nan, np.inf])
 def test_what_cannot_be_allowed_is_refused(name, value):
-    with pytest.raises(
-        ValueError, match=rf"{name} is {value!r}; it must be a finite number, at least 0 and at most 0.5"
-    ):
+    with pytest.raises(ValueError, match=rf"{name} is {value!r}; it must be .* at least 0 and at most 0.5"):
         cable.pull_out(dive, 1.0, **{name: value})
 
 
