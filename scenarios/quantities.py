@@ -66,6 +66,7 @@ hull_step_s      | s | 0.0001 | 1     | 0.02 | time step of the vehicle
 cable_step_s     | s | 0.0001 | 10    | 0.1  | time step of the cable
 segment_length_m | m | 0.001  | 100   | 0.5  | length of a cable segment
 grading          | 1 | 0      | 0.5   | 0    | how much longer segments get per metre of cable from the vehicle
+rtol             | 1 | 0      | 0.5   | 0.02 | error of the tow force that is allowed, as a share of its largest; 0: any
 """)
 
 START = _read("""

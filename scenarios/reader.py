@@ -85,6 +85,7 @@ def load(
         cable_step=run["cable_step_s"],
         segment_length=run["segment_length_m"],
         grading=run["grading"],
+        rtol=run["rtol"],
         scheme=run["scheme"],
         start=_start(start, prescribed),
         vehicle=vehicle,

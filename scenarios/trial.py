@@ -247,6 +247,8 @@ class Trial:
         cable_step: time step of the cable and of the exchange, a whole number of hull steps. [s]
         segment_length: length of a cable segment, at the vehicle. [m]
         grading: segments get longer by this much per metre of cable from the vehicle. [-]
+        rtol: error of the tow force that is allowed, as a share of its largest: where the run and a coarser one differ
+            by more, steps and segments are halved (`subzero.convergence`); 0 takes them as they are. [-]
         scheme: one of `SCHEMES`.
         start: how the vehicle lies at t = 0.
         vehicle: section → key → SI value; sections may hold sections.
@@ -269,6 +271,7 @@ class Trial:
     cable_step: float = 0.1
     segment_length: float = 0.5
     grading: float = 0.0
+    rtol: float = 0.02
     scheme: str = "moving_end"
     start: Start
     vehicle: Mapping[str, Any]

@@ -12,6 +12,7 @@ import xarray as xr
 import scenarios
 import vehicle
 from subzero.channels import BY_NAME, CHANNELS, TIME
+from subzero.convergence import Accuracy, as_numbers
 from subzero.errors import printable
 from subzero.model import Model
 
@@ -40,7 +41,9 @@ AXES = {
 LIBRARIES = ("numpy", "numba", "xarray")
 
 
-def dataset_of(trial: scenarios.Trial, model: Model, tethered: bool, run: Run) -> xr.Dataset:
+def dataset_of(
+    trial: scenarios.Trial, model: Model, tethered: bool, run: Run, accuracy: Accuracy | None = None
+) -> xr.Dataset:
     """Return a run as a labelled dataset; angles in degrees, all other channels in SI and rev/s."""
     values = channel_values(run, model)
     data: dict[str, Any] = {
@@ -49,7 +52,8 @@ def dataset_of(trial: scenarios.Trial, model: Model, tethered: bool, run: Run) -
     }
     data |= _arrays(run) | _diagnostics(run, values, model)
     coordinates = {TIME.name: ("time", run.times, TIME.attributes)} | AXES
-    return xr.Dataset(data, coords=coordinates, attrs=_provenance(trial, model, tethered, run))
+    attributes = _provenance(trial, model, tethered, run) | {"accuracy": json.dumps(as_numbers(accuracy))}
+    return xr.Dataset(data, coords=coordinates, attrs=attributes)
 
 
 def channel_values(run: Run, model: Model) -> dict[str, np.ndarray]:

@@ -104,7 +104,7 @@ def advance(
     before = at[USED] - handle.recording.nodes[row]
     used = record_row(handle.setup, handle.live, handle.recording, row, handle.times[row], before)
     after, used, ending = run_rows(
-        handle.setup, handle.live, handle.recording, handle.times, row + 1, row + 1 + count, used
+        handle.setup, handle.live, handle.recording, handle.times, row + 1, row + 1 + count, used, 1
     )
     at[ROW], at[USED], at[ENDING] = after - 1, used, ending
     observe(handle, after - 1, seen)

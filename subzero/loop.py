@@ -17,7 +17,14 @@ SPARE = 8
 
 @compiled
 def run_rows(
-    setup: Setup, live: Live, recording: Recording, times: np.ndarray, first: int, last: int, used: int
+    setup: Setup,
+    live: Live,
+    recording: Recording,
+    times: np.ndarray,
+    first: int,
+    last: int,
+    used: int,
+    parts: int,
 ) -> tuple[int, int, int]:
     """Fill rows first … last − 1 of a recording.
 
@@ -29,17 +36,20 @@ def run_rows(
         first: row to begin with.
         last: row to end before.
         used: nodes of the recording in use.
+        parts: exchanges from a row to the next.
 
     Returns:
         rows that are filled, nodes in use, and how it ended (`coupling.FINE` …); `line.ends.solved` tells how the
         cable's last step was solved.
     """
     for row in range(first, last):
-        nodes = live.line.ends.count + 1 + SPARE
+        nodes = live.line.ends.count + 1 + SPARE * parts
         if nodes > live.line.length.size or used + nodes > recording.tension.size:
             return row, used, NO_ROOM
-        ending = exchange(setup, live, times[row - 1], times[row] - times[row - 1])
-        if ending != FINE:
-            return row, used, ending
+        span = (times[row] - times[row - 1]) / parts
+        for part in range(parts):
+            ending = exchange(setup, live, times[row - 1] + part * span, span)
+            if ending != FINE:
+                return row, used, ending
         used = record_row(setup, live, recording, row, times[row], used)
     return last, used, FINE

@@ -13,6 +13,7 @@ import scenarios
 from cable.line import enlarged
 from cable.runs import describe_failure, too_short
 from subzero import coupling
+from subzero.convergence import Accuracy, run_converged
 from subzero.later import Later, go_on_with, rows_of_changes
 from subzero.loop import NO_ROOM, run_rows
 from subzero.model import Model
@@ -59,10 +60,24 @@ def simulate(
     model = model or Model.of(trial)
     from subzero.dataset import dataset_of
 
-    result = dataset_of(trial, model, tethered, run_trial(trial, model, tethered, progress, later=later))
+    run, accuracy = _as_fine_as_asked(trial, model, tethered, progress, later)
+    result = dataset_of(trial, model, tethered, run, accuracy)
     if later:
         result.attrs["later"] = json.dumps([[time, changed.parameters()] for time, changed in later])
     return result
+
+
+def _as_fine_as_asked(
+    trial: scenarios.Trial, model: Model, tethered: bool, progress: Progress | None, later: Later
+) -> tuple[Run, Accuracy | None]:
+    """Run a trial, and finer where its `rtol` asks for it: a tethered one of the default scheme and of one model."""
+    if not tethered or trial.scheme != "moving_end" or trial.rtol == 0.0 or later:
+        return run_trial(trial, model, tethered, progress, later=later), None
+    return run_converged(
+        trial,
+        lambda one, times, parts, told: run_trial(one, model, True, told, times=times, parts=parts),
+        progress,
+    )
 
 
 def run_trial(
@@ -72,16 +87,28 @@ def run_trial(
     progress: Progress | None = None,
     *,
     later: Later = (),
+    times: np.ndarray | None = None,
+    parts: int = 1,
 ) -> Run:
-    """Run a trial with a model, and with others from later times on, in plain arrays."""
+    """Run a trial with steps and segments as they are, in plain arrays.
+
+    Args:
+        trial: what is run.
+        model: vehicle, cable, drum and water.
+        tethered: with the cable.
+        progress: told the fraction that is done.
+        later: times of rows and the models that hold from them on.
+        times: of the rows (n,); those of the trial when not given. [s]
+        parts: exchanges of hull and cable from a row to the next.
+    """
     refuse_what_cannot_fit(trial, model, tethered)
-    times = trial.times()
+    times = trial.times() if times is None else times
     changes = rows_of_changes(trial, tethered, times, later)
     if tethered and trial.scheme != "moving_end":
         from subzero.printed import run_as_printed
 
         return run_as_printed(trial, model, progress)
-    setup, live = prepare(trial, model, tethered)
+    setup, live = prepare(trial, model, tethered, float(np.diff(times).max()) / parts)
     recording = new_recording(times.size, 4 * times.size * live.line.length.size if tethered else 0)
     used = record_row(setup, live, recording, 0, 0.0, 0)
     row, ending, pace = 1, coupling.FINE, Pace()
@@ -90,7 +117,7 @@ def run_trial(
             setup = go_on_with(changes.pop(row - 1), setup, live, trial, tethered, float(times[row - 1]))
         last = min(times.size, row + pace.rows, *(change + 1 for change in changes))
         with pace:
-            row, used, ending = run_rows(setup, live, recording, times, row, last, used)
+            row, used, ending = run_rows(setup, live, recording, times, row, last, used, parts)
         if ending == NO_ROOM:
             if not has_room(4 * max(recording.tension.size, used)):
                 break

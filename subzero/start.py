@@ -28,10 +28,15 @@ FIRST_ROOM = 16
 """Segments that a new cable has room for, beyond those that are in the water."""
 
 
-def prepare(trial: scenarios.Trial, model: Model, tethered: bool) -> tuple[Setup, Live]:
-    """Return what stays and what changes in a run, at its start: the cable laid straight behind the vehicle."""
+def prepare(
+    trial: scenarios.Trial, model: Model, tethered: bool, longest_exchange: float | None = None
+) -> tuple[Setup, Live]:
+    """Return what stays and what changes in a run, at its start: the cable laid straight behind the vehicle.
+
+    There is room for the hull's steps in an exchange of `longest_exchange`; that of the trial when not given. [s]
+    """
     wet, size = _wet_length(trial), vehicle.STATE_SIZE
-    longest = max(trial.cable_step, float(np.diff(trial.times()).max()))
+    longest = longest_exchange or max(trial.cable_step, float(np.diff(trial.times()).max()))
     steps = most_hull_steps(longest, trial.hull_step)
     setup = setup_of(trial, model, tethered)
     live = Live(

@@ -103,7 +103,7 @@ class Tethered:
         self._memory.write(x[HULL_SIZE:])
         self._setup.orders.values[0] = u
         times = np.array([t, t + self._step])
-        _, _, ending = run_rows(self._setup, live, self._recording, times, 1, 2, 0)
+        _, _, ending = run_rows(self._setup, live, self._recording, times, 1, 2, 0, 1)
         if ending != FINE:
             raise UserError(self._trouble(ending, t))
         hull = from_vehicle(live.state, heading_near=float(x[5]))

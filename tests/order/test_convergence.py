@@ -1,0 +1,126 @@
+"""Coupled runs say how far their force can be trusted, and are taken finer where that is not far enough.
+
+Verifies: `subzero.convergence` against runs with steps and segments an eighth as long, and the criterion of the theory
+page for a free drum: the direction in which a cable leaves it is only determined if it pulls there with T(S) > m₁U².
+Configuration: shipped trials and changes of them. Tolerance: the estimate must bound the true error, with a tenth to
+spare for what the fine run itself errs by. (Segments of 3 cm are too fine on a free drum: within 2m₁/ρπdC_t = 0.25 m of
+it a cable has less tension than m₁U², and what is undetermined there begins to grow when eight segments resolve it.)
+"""
+
+import dataclasses
+import json
+
+import numpy as np
+import pytest
+
+import subzero
+
+BODY = ("cable_force_forward", "cable_force_starboard", "cable_force_down")
+
+
+def force(run):
+    return np.stack([run[name].values for name in BODY], axis=1)
+
+
+def accuracy(run):
+    return json.loads(run.attrs["accuracy"])
+
+
+def finer(trial, factor, **changes):
+    """Return a trial with all steps and segments shorter by a factor, taken as they are."""
+    steps = {name: getattr(trial, name) / factor for name in ("cable_step", "hull_step", "segment_length")}
+    return dataclasses.replace(trial, rtol=0.0, **steps | changes)
+
+
+def true_error(trial, run):
+    """Return the largest error of the force at the rows of a run, as a share of the largest force."""
+    fine = force(subzero.simulate(finer(trial, 8)))[::8]
+    return np.linalg.norm(force(run) - fine, axis=1)[1:].max() / np.linalg.norm(fine, axis=1).max()
+
+
+def changed(name, *, cable=None, drum=None, start=None, **fields):
+    trial = subzero.load_scenario(name)
+    return dataclasses.replace(
+        trial,
+        cable={**trial.cable, **(cable or {})},
+        drum={**trial.drum, **(drum or {})},
+        start=dataclasses.replace(trial.start, **(start or {})),
+        **fields,
+    )
+
+
+TRIALS = {
+    "a pull that stops": changed("stop_and_drift", duration=24.0),
+    "a zigzag": changed("zigzag", duration=12.0),
+    "a heavy drum, slack and taut": changed("stop_and_drift", duration=24.0, drum={"inertia": 1e-3}),
+    "a turn with coarse segments": changed("turning_circle", duration=12.0, segment_length=2.0),
+    "a heavy cable on a drum that holds it": changed(
+        "fig6", duration=8.0, cable={"mass_per_length": 0.02}, drum={"friction_torque": 0.02}
+    ),
+}
+
+
+@pytest.mark.parametrize("name", TRIALS)
+def test_the_error_that_a_run_states_bounds_its_true_error(name):
+    run = subzero.simulate(TRIALS[name])
+    stated = accuracy(run)["force_error"]
+    assert true_error(TRIALS[name], run) <= 1.1 * stated + 1e-3
+
+
+def test_a_run_that_is_fine_enough_is_left_as_it_is():
+    trial = changed("fig6", duration=6.0)
+    run, plain = subzero.simulate(trial), subzero.simulate(dataclasses.replace(trial, rtol=0.0))
+    assert accuracy(run)["halvings"] == 0
+    assert accuracy(plain) == {}
+    np.testing.assert_array_equal(force(run), force(plain))
+
+
+def test_a_run_that_is_too_coarse_is_taken_finer_at_the_same_times():
+    trial = changed("stop_and_drift", duration=21.0)
+    run, plain = subzero.simulate(trial), subzero.simulate(dataclasses.replace(trial, rtol=0.0))
+    assert accuracy(run)["halvings"] > 0
+    assert accuracy(run)["force_error"] <= trial.rtol
+    np.testing.assert_array_equal(run["time"], plain["time"])
+    assert true_error(trial, run) < 0.3 * true_error(trial, plain)
+
+
+def test_a_last_step_that_is_no_whole_one_is_covered_too():
+    run = subzero.simulate(changed("fig6", duration=3.05))
+    assert float(run["time"][-1]) == 3.05
+    assert 0.0 < accuracy(run)["force_error"] < 0.02
+
+
+def test_a_heavy_cable_on_a_free_drum_never_settles_and_says_so():
+    run = subzero.simulate(changed("fig6", duration=10.0, cable={"mass_per_length": 0.02}))
+    assert accuracy(run)["force_error"] > 0.05
+
+
+@pytest.mark.parametrize("friction", [0.2, 0.4])
+def test_a_drum_that_holds_its_cable_with_more_than_its_momentum_determines_it(friction):
+    """T(S) = 0.2 N beside m₁U² = 0.04 N: the length of cable out settles at the second order, at least 1.5."""
+    trial = changed(
+        "fig6", duration=10.0, cable={"mass_per_length": 0.02}, drum={"friction_torque": 0.1 * friction}
+    )
+    runs = [subzero.simulate(finer(trial, factor)) for factor in (1, 2, 4, 8)]
+    lengths = np.array([float(run["cable_length"][-1]) for run in runs])
+    speed = np.gradient(runs[-1]["cable_length"].values, runs[-1]["time"].values)[-1]
+    m1 = 0.02 + 1000.0 * trial.cable["cross_section_area"]
+    assert friction > 2.0 * m1 * speed**2
+    gaps = np.abs(np.diff(lengths))
+    assert np.log2(gaps[:-1] / gaps[1:]).min() > 1.5
+
+
+def test_on_the_shipped_current_length_and_force_settle_as_steps_shrink():
+    """Its drum rubs with twice the momentum of the cable; on a free one the length moves on by as much each time."""
+    trial = changed("current", duration=12.0)
+    rubbing, free = (
+        [subzero.simulate(finer(one, factor)) for factor in (1, 2, 4, 8)]
+        for one in (trial, dataclasses.replace(trial, drum={**trial.drum, "friction_torque": 0.0}))
+    )
+    spread = [np.ptp([float(run["cable_length"][-1]) for run in runs[1:]]) for runs in (rubbing, free)]
+    assert spread[0] < 0.2 * spread[1]
+    fine = force(rubbing[-1])[::8]
+    errors = [
+        np.abs(force(run)[::factor] - fine).max() for run, factor in zip(rubbing, (1, 2, 4), strict=False)
+    ]
+    assert errors[2] < 0.35 * errors[0], errors
