@@ -74,7 +74,7 @@ def test_backlash_leaves_the_fin_standing_until_the_slack_is_taken_up(angles):
 def test_neutral_values_switch_every_stage_off_exactly(angles):
     commands = 0.3 * np.sin(np.arange(100))
     neutral = {"dead_band": 0.0, "offset": 0.0, "lag": 0.0, "rate_limit": math.inf,
-               "deflection_limit": math.inf, "half_backlash": 0.0}  # fmt: skip
+               "deflection_limit": math.inf, "half_backlash": 0.0, "position_feedback": 0.0}  # fmt: skip
     assert np.array_equal(angles(commands, **neutral), commands)
     assert servo_target(0.123, Servo(**neutral).numbers()) == 0.123
 
