@@ -75,11 +75,12 @@ def load(
     around = reading.keep(read_surroundings(reading.source))
     vehicle, cable = _parts(reading, check_vehicle)
     reading.problems.extend(check_scheme(reading.source, run, cable.get("cable", {})))
-    reading.problems.extend(check_trim(reading.source, start))
     given = {
         kind: path for kind, path in zip(LISTS, (commands_csv, motion_csv), strict=True) if path is not None
     }
     samples = reading.keep(read_instructions(reading.source, given, run.get("duration_s")))
+    if "motion" not in samples:
+        reading.problems.extend(check_trim(reading.source, start))
     if reading.problems:
         raise ScenarioError(_in_order(reading.problems))
     prescribed = motion(samples["motion"]) if "motion" in samples else None

@@ -79,6 +79,43 @@ def test_neutral_values_switch_every_stage_off_exactly(angles):
     assert servo_target(0.123, Servo(**neutral).numbers()) == 0.123
 
 
+CROOKED = {"dead_band": DEGREE, "offset": DEGREE, "half_backlash": 0.5 * DEGREE}
+
+
+@pytest.mark.parametrize("command", [5.0, 0.5, -0.5, -5.0])
+def test_position_feedback_brings_a_crooked_fin_where_it_is_commanded(angles, command):
+    """To starboard and back: without feedback, dead band, offset and play of a degree stand in between."""
+    commands = np.repeat([8.0 * DEGREE, command * DEGREE], 300)
+    fed_back = angles(commands, **CROOKED, position_feedback=1.0)
+    assert_allclose(fed_back[[299, 599]], commands[[299, 599]], rtol=0, atol=1e-4 * DEGREE)
+    alone = angles(commands, **CROOKED)
+    assert abs(alone[599] - command * DEGREE) > 0.4 * DEGREE
+
+
+def test_without_position_feedback_an_offset_stays_and_half_of_it_leaves_half(angles):
+    """A positive offset turns to starboard: the fin stands to starboard of its command."""
+    for feedback in (0.0, 0.5, 1.0):
+        found = angles(np.full(300, 0.1), offset=0.01, position_feedback=feedback)[-1]
+        assert found == pytest.approx(0.1 + (1.0 - feedback) * 0.01, abs=1e-8)
+
+
+def test_position_feedback_makes_a_servo_neither_faster_nor_stronger(angles):
+    time = 0.01 * np.arange(1, 61)
+    lagging = angles(np.full(60, 0.1), lag=0.15, rate_limit=math.inf, offset=0.01, position_feedback=1.0)
+    assert_allclose(lagging, 0.1 * (1 - np.exp(-time / 0.15)), rtol=0, atol=1e-8)
+    ramp = angles(np.full(10, 0.3), lag=0.01, rate_limit=1.0, position_feedback=1.0)
+    assert_allclose(ramp, 0.01 * np.arange(1, 11), rtol=0, atol=1e-12)
+    assert angles(np.full(300, 2.0), offset=0.1, position_feedback=1.0)[-1] == pytest.approx(0.3491, abs=1e-8)
+
+
+def test_a_servo_that_obeys_at_once_rests_where_one_that_lags_ends(angles):
+    commands = np.repeat([8.0, 3.0, -1.0, 0.4], 400) * DEGREE
+    for feedback in (0.0, 0.5, 1.0):
+        slow = angles(commands, **CROOKED, lag=0.05, rate_limit=math.inf, position_feedback=feedback)
+        at_once = angles(commands, **CROOKED, lag=0.0, rate_limit=math.inf, position_feedback=feedback)
+        assert_allclose(slow[399::400], at_once[399::400], rtol=0, atol=1e-3 * DEGREE)
+
+
 def test_the_shaft_follows_with_its_lag_and_stops_at_the_ceiling_of_the_battery(subzero2):
     run = vehicle.free_run(subzero2, vehicle.initial_state(), (24, 0, 0, 0), 1.5, 0.01)
     assert_allclose(run.states[:, 13], 24 * (1 - np.exp(-run.time / 0.3)), rtol=0, atol=1e-6)
