@@ -151,6 +151,31 @@ def test_a_smooth_motion_goes_around_the_circle_that_was_measured(simulate, with
     assert_allclose(run["depth"], 3.0 if with_places else 1.0, atol=1e-12)
 
 
+def test_a_banked_turn_has_the_rates_and_the_way_of_its_angles_and_speeds(simulate):
+    """Heeled and nose down, turning at ψ': p = −ψ' sin θ, q = ψ' cos θ sin φ, r = ψ' cos θ cos φ; R V turns with ψ."""
+    time, roll, pitch = np.linspace(0.0, 30.0, 61), 0.3, -0.2
+    one, body = np.ones(time.size), np.array([1.0, 0.2, -0.1])
+    names = ("surge_speed", "sway_speed", "heave_speed")
+    motion = scenarios.Motion(
+        time=time, pitch=pitch * one, roll=roll * one, heading=TURN * time,
+        **{name: value * one for name, value in zip(names, body, strict=True)},
+    )  # fmt: skip
+    trial = dataclasses.replace(subzero.load_scenario("fig5"), motion=motion)
+    run = simulate(trial, tethered=False).isel(time=slice(None, None, 5))  # at the samples
+    bank = np.array([[1.0, 0.0, 0.0], [0.0, cos(roll), -sin(roll)], [0.0, sin(roll), cos(roll)]])
+    dive = np.array([[cos(pitch), 0.0, sin(pitch)], [0.0, 1.0, 0.0], [-sin(pitch), 0.0, cos(pitch)]])
+    ahead, aside, down = dive @ bank @ body
+    s, c = np.sin(TURN * time) / TURN, (1.0 - np.cos(TURN * time)) / TURN
+    assert_allclose(run["north"], ahead * s - aside * c, atol=2e-3)
+    assert_allclose(run["east"], ahead * c + aside * s, atol=2e-3)
+    assert_allclose(run["depth"], 1.0 + down * time, atol=1e-9)
+    for name, value in zip(names, body, strict=True):
+        assert_allclose(run[name], value, rtol=1e-9, err_msg=name)
+    rates = (-sin(pitch), cos(pitch) * sin(roll), cos(pitch) * cos(roll))
+    for name, value in zip(("roll_rate", "pitch_rate", "yaw_rate"), rates, strict=True):
+        assert_allclose(run[name], 12.0 * value, rtol=1e-9, err_msg=name)
+
+
 def test_the_samples_of_a_smooth_motion_do_not_jolt_the_cable(simulate):
     """Sampled twice and four times as finely, the pull is the same: a jolt at every sample would come as often."""
     trial = subzero.load_scenario("fig5")

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+import scenarios
+import subzero
 import vehicle
 from vehicle.actuators import Servo, servo_target
 
@@ -114,6 +116,19 @@ def test_a_servo_that_obeys_at_once_rests_where_one_that_lags_ends(angles):
         slow = angles(commands, **CROOKED, lag=0.05, rate_limit=math.inf, position_feedback=feedback)
         at_once = angles(commands, **CROOKED, lag=0.0, rate_limit=math.inf, position_feedback=feedback)
         assert_allclose(slow[399::400], at_once[399::400], rtol=0, atol=1e-3 * DEGREE)
+
+
+def test_a_vehicle_file_from_before_there_was_position_feedback_has_none(tmp_path):
+    root = scenarios.path("fig6").parent.parent
+    old = (root / "vehicles" / "subzero2.toml").read_text(encoding="utf-8").splitlines()
+    old = [one for one in old if not one.startswith("position_feedback")]
+    (tmp_path / "old.toml").write_text("\n".join(old), encoding="utf-8")
+    text = (root / "trials" / "fig6.toml").read_text(encoding="utf-8").replace('"subzero2"', '"old.toml"')
+    fed_back = text + '"vehicle.rudder_servo.position_feedback" = 1.0\n'
+    for name, trial, expected in (("mine", text, 0.0), ("fed_back", fed_back, 1.0)):
+        (tmp_path / f"{name}.toml").write_text(trial, encoding="utf-8")
+        found = subzero.load_scenario(tmp_path / f"{name}.toml").vehicle["rudder_servo"]["position_feedback"]
+        assert found == expected
 
 
 def test_the_shaft_follows_with_its_lag_and_stops_at_the_ceiling_of_the_battery(subzero2):

@@ -12,7 +12,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import scenarios
-from subzero.channels import CHANNELS
+from subzero.channels import BY_COLUMN, CHANNELS
 
 DEGREE = math.pi / 180.0
 HEAD = """\
@@ -103,6 +103,10 @@ def log(count=101, **columns):
 
 
 FROM_FILE = '[motion]\nfile = "log.csv"\n'
+
+
+def test_states_are_called_as_the_channels_of_a_run_are():
+    assert set(START) | set(MOTION) <= set(BY_COLUMN)
 
 
 def test_every_state_of_a_start_arrives_in_its_field_and_unit(write):
