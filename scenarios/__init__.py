@@ -17,10 +17,10 @@ Signs, here and everywhere: depth is positive down, heading runs clockwise from 
 the heading to starboard (it increases), positive stern-planes (both) pitch the nose up. Files speak of
 degrees and revolutions per second; a `Trial` of radians and revolutions per second.
 
-Stories: `trial` what a trial is; `quantities` the one table of numbers, units and limits; `schema` what a
-file may say; `files` opening and parsing; `csv_file`, `samples` columns over time; `instructions` commands or
-motion; `surroundings` water, winch and vessel; `parts`, `changes` vehicles and cables; `steps` what must fit;
-`reader` all together; `errors` what a problem is.
+Stories: `trial` what a trial is; `motion` one that is prescribed or was measured; `quantities` the one table of
+numbers, units and limits; `schema` what a file may say; `files` opening and parsing; `csv_file`, `samples` columns
+over time; `instructions` commands or motion; `surroundings` water, winch and vessel; `parts`, `changes` vehicles and
+cables; `steps` what must fit; `reader` all together; `errors` what a problem is.
 """
 
 from __future__ import annotations
@@ -57,6 +57,7 @@ def load(
     name_or_path: str | Path,
     *,
     commands_csv: str | Path | None = None,
+    motion_csv: str | Path | None = None,
     check_vehicle: VehicleCheck | None = None,
 ) -> Trial:
     """Return a shipped or a user's scenario, checked.
@@ -64,6 +65,8 @@ def load(
     Args:
         name_or_path: a name of `names`, or the path of a TOML file.
         commands_csv: a CSV file of commands that replaces those of the scenario.
+        motion_csv: a CSV file of a motion that replaces the commands or the motion of the scenario, and what its start
+            says besides the cable.
         check_vehicle: takes the numbers of the vehicle and gives what its own equations find wrong with them,
             as objects with the attributes key, found, why, allowed. (This package knows no vehicle.)
 
@@ -72,7 +75,7 @@ def load(
     """
     from scenarios.reader import load as read  # pydantic comes only with the first file
 
-    return read(name_or_path, commands_csv=commands_csv, check_vehicle=check_vehicle)
+    return read(name_or_path, commands_csv=commands_csv, motion_csv=motion_csv, check_vehicle=check_vehicle)
 
 
 def names() -> list[str]:

@@ -126,7 +126,7 @@ class Checks:
 
     def _outside(self, name: str, number: float, quantity: Quantity) -> None:
         """Note a number outside its limits, in inner units and in those of the files."""
-        unit = {"degree": " rad", "1": ""}.get(quantity.unit, f" {quantity.unit}")
+        unit = {"degree": " rad", "degree/s": " rad/s", "1": ""}.get(quantity.unit, f" {quantity.unit}")
         file = f" ({number / quantity.scale:g} {quantity.unit})" if quantity.scale != 1.0 else ""
         found = f"{number:g}{unit}{file}"
         problem = Problem(file=self._owner, key=name, found=found, why=OUTSIDE, remedy=quantity.allowed)

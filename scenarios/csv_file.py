@@ -1,7 +1,8 @@
 """Read columns of numbers from a CSV file, and say of every wrong cell where it stands.
 
 One header line with the columns of `scenarios.quantities`, in any order, then one row a sample. Empty lines
-and lines that start with ``#`` are remarks. Whether the times make sense is checked in `scenarios.samples`.
+and lines that start with ``#`` are remarks. A motion may stand in the file that a run writes: the channels that say
+nothing of the motion are passed over. Whether the times make sense is checked in `scenarios.samples`.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from scenarios.errors import Problem, ScenarioError, nearest_or_all
 from scenarios.files import read_text
 from scenarios.quantities import SECTIONS, Quantity
 from scenarios.samples import Samples
+from subzero.channels import BY_COLUMN
 from subzero.errors import printable
 from subzero.errors import short as shown
 from subzero.user_file import MOST_COLUMNS, MOST_OF_A_CSV
@@ -41,7 +43,7 @@ def read_csv(path: Path, name: str, section: str) -> tuple[Samples | None, list[
     except ScenarioError as error:
         return None, list(error.problems)
     columns, problems = _columns(name, header[1], rows, SECTIONS[section])
-    problems += _header_problems(name, header, [quantity.name for quantity in SECTIONS[section]])
+    problems += _header_problems(name, header, SECTIONS[section], BY_COLUMN if section == "motion" else ())
     problems += _shape_problems(name, header[1], rows)
     problems.sort(key=lambda problem: problem.line or 0)
     whole = _whole(header[1], rows)
@@ -90,11 +92,17 @@ def _table(text: str, name: str) -> tuple[Row, list[Row]]:
     return rows[0], rows[1:]
 
 
-def _header_problems(name: str, header: Row, allowed: list[str]) -> list[Problem]:
+def _header_problems(
+    name: str, header: Row, quantities: Iterable[Quantity], passed_over: Iterable[str]
+) -> list[Problem]:
     """Return the columns that are unknown, doubled or missing."""
     line, columns = header
     problems = []
+    allowed = [quantity.name for quantity in quantities]
+    needed = [quantity.name for quantity in quantities if quantity.default is None]
     for at, column in enumerate(columns):
+        if column not in allowed and column in passed_over:
+            continue
         if column not in allowed:
             why, remedy = "there is no such column", nearest_or_all(column, allowed)
         elif column in columns[:at]:
@@ -104,8 +112,8 @@ def _header_problems(name: str, header: Row, allowed: list[str]) -> list[Problem
         problems.append(
             Problem(file=name, line=line, key="header", found=shown(column), why=why, remedy=remedy)
         )
-    remedy = f"Needed: {', '.join(allowed)}."
-    missing = [column for column in allowed if column not in columns]
+    remedy = f"Needed: {', '.join(needed)}."
+    missing = [column for column in needed if column not in columns]
     why = "this column is missing"
     return problems + [Problem(file=name, line=line, key=key, why=why, remedy=remedy) for key in missing]
 

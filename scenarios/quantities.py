@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-INNER = {"degree": math.pi / 180.0}
+INNER = {"degree": math.pi / 180.0, "degree/s": math.pi / 180.0}
 """Inner units per unit of a file: radians inside; all other units are kept."""
 
 
@@ -75,6 +75,15 @@ pitch_deg       | degree | -89    | 89    | 0 | pitch, positive nose up
 roll_deg        | degree | -180   | 180   | 0 | roll, positive starboard side down
 depth_m         | m      | 0      | 11000 | 0 | depth of the hull centre, positive down
 surge_speed_m_s | m/s    | -20    | 20    | 0 | forward speed over ground
+sway_speed_m_s  | m/s    | -20    | 20    | 0 | speed over ground to starboard
+heave_speed_m_s | m/s    | -20    | 20    | 0 | speed over ground along the body's down axis
+roll_rate_deg_s  | degree/s | -720 | 720 | 0 | roll rate, positive: the starboard side goes down
+pitch_rate_deg_s | degree/s | -720 | 720 | 0 | pitch rate, positive: the nose goes up
+yaw_rate_deg_s   | degree/s | -720 | 720 | 0 | yaw rate, positive to starboard
+propeller_speed_rps | rev/s | -200 | 200 | 0 | propeller speed, positive drives forward
+rudder_angle_deg | degree | -90 | 90 | 0 | where the rudder stands, positive turns to starboard
+stern_plane_port_angle_deg | degree | -90 | 90 | 0 | where the port stern-plane stands, positive raises the nose
+stern_plane_starboard_angle_deg | degree | -90 | 90 | 0 | where the starboard one stands, positive raises the nose
 wet_length_m    | m      | 0      | 10000 | 0 | cable already in the water, laid straight
 drum_north_m    | m      | -10000 | 10000 | 0 | drum from the tow point, northwards; the cable hangs between them
 drum_east_m     | m      | -10000 | 10000 | 0 | the same, eastwards
@@ -133,6 +142,15 @@ time_s          | s      | 0      | 86400 |  | time since the start
 surge_speed_m_s | m/s    | -20    | 20    |  | forward speed
 pitch_deg       | degree | -89    | 89    |  | pitch, positive nose up
 heading_deg     | degree | -36000 | 36000 |  | heading, clockwise from north
+sway_speed_m_s  | m/s    | -20    | 20    | 0 | speed to starboard
+heave_speed_m_s | m/s    | -20    | 20    | 0 | speed along the body's down axis
+roll_deg        | degree | -36000 | 36000 | 0 | roll, positive starboard side down
+roll_rate_deg_s  | degree/s | -720 | 720 | 0 | roll rate, positive: the starboard side goes down
+pitch_rate_deg_s | degree/s | -720 | 720 | 0 | pitch rate, positive: the nose goes up
+yaw_rate_deg_s   | degree/s | -720 | 720 | 0 | yaw rate, positive to starboard
+north_m         | m      | -1e6   | 1e6   | 0 | place of the hull centre, northwards
+east_m          | m      | -1e6   | 1e6   | 0 | place of the hull centre, eastwards
+depth_m         | m      | -100   | 11000 | 0 | depth of the hull centre, positive down
 """,
     many=True,
 )
@@ -140,7 +158,7 @@ heading_deg     | degree | -36000 | 36000 |  | heading, clockwise from north
 
 def by_field(quantities: tuple[Quantity, ...]) -> dict[str, Quantity]:
     """Return quantities by the names of the fields that hold them, ``hull_step_s`` → ``hull_step``."""
-    suffixes = {"1": "", "m/s": "_m_s", "degree": "_deg", "rev/s": "_rps"}
+    suffixes = {"1": "", "m/s": "_m_s", "degree": "_deg", "degree/s": "_deg_s", "rev/s": "_rps"}
     return {q.name.removesuffix(suffixes.get(q.unit, f"_{q.unit}")): q for q in quantities}
 
 

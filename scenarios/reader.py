@@ -8,20 +8,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
-from math import radians, remainder, tau
+from math import remainder, tau
 from pathlib import Path
 from typing import Any, TypeVar
 
 from scenarios.changes import read_changes
 from scenarios.errors import Problem, ScenarioError
 from scenarios.files import Source, find
-from scenarios.instructions import read_instructions
+from scenarios.instructions import LEFT_OPEN, read_instructions
 from scenarios.parts import Part, nested, read_part
+from scenarios.quantities import START, by_field
 from scenarios.samples import commands, motion
-from scenarios.schema import check_page, check_section
+from scenarios.schema import LISTS, check_page, check_section
 from scenarios.steps import check_steps
 from scenarios.surroundings import check_scheme, read_surroundings
-from scenarios.trial import Motion, Start, Trial
+from scenarios.trial import FOUND_BY_TRIM, FOUND_WHY, TRIM_NEEDS_SPEED, Motion, Start, Trial
 from subzero.errors import printable
 
 Found = TypeVar("Found")
@@ -51,6 +52,7 @@ def load(
     name_or_path: str | Path,
     *,
     commands_csv: str | Path | None = None,
+    motion_csv: str | Path | None = None,
     check_vehicle: VehicleCheck | None = None,
 ) -> Trial:
     """Return a shipped or a user's scenario, checked.
@@ -58,6 +60,8 @@ def load(
     Args:
         name_or_path: a name of `names`, or the path of a TOML file.
         commands_csv: a CSV file of commands that replaces those of the scenario.
+        motion_csv: a CSV file of a motion that replaces the commands or the motion of the scenario, and what its start
+            says besides the cable.
         check_vehicle: takes the numbers of the vehicle and gives what its own equations find wrong with them,
             as objects with the attributes key, found, why, allowed. (This package knows no vehicle.)
 
@@ -71,7 +75,12 @@ def load(
     around = reading.keep(read_surroundings(reading.source))
     vehicle, cable = _parts(reading, check_vehicle)
     reading.problems.extend(check_scheme(reading.source, run, cable.get("cable", {})))
-    samples = reading.keep(read_instructions(reading.source, commands_csv, run.get("duration_s")))
+    given = {
+        kind: path for kind, path in zip(LISTS, (commands_csv, motion_csv), strict=True) if path is not None
+    }
+    samples = reading.keep(read_instructions(reading.source, given, run.get("duration_s")))
+    if "motion" not in samples:
+        reading.problems.extend(check_trim(reading.source, start))
     if reading.problems:
         raise ScenarioError(_in_order(reading.problems))
     prescribed = motion(samples["motion"]) if "motion" in samples else None
@@ -135,28 +144,32 @@ def _complaint(reading: Reading, part: Part, changed: Mapping[str, float], said:
     return Problem(file=source.name, line=line, key=key, found=said.found, why=said.why, remedy=remedy)
 
 
-def _start(start: Mapping[str, float], prescribed: Motion | None) -> Start:
-    """Return the start; a prescribed motion starts where it says."""
-    if prescribed is not None:
-        return Start(
-            heading=remainder(float(prescribed.heading[0]), tau),
-            pitch=float(prescribed.pitch[0]),
-            depth=start["depth_m"],
-            surge_speed=float(prescribed.surge_speed[0]),
-            wet_length=start["wet_length_m"],
-            **_drum(start),
+def check_trim(source: Source, start: Mapping[str, Any]) -> list[Problem]:
+    """Return what [start] says beside at_trim, though that finds it, or does not say, though that needs it."""
+    table = source.table.get("start", {})
+    if not start.get("at_trim", False) or not isinstance(table, Mapping):
+        return []
+    names = [by_field(START)[name].name for name in FOUND_BY_TRIM]
+    problems = [
+        source.problem(f"start.{name}", FOUND_WHY, "Leave it out.", found=table[name])
+        for name in names
+        if name in table
+    ]
+    speed = start.get("surge_speed_m_s", 1.0)
+    if not speed > 0.0:
+        problems.append(
+            source.problem("start.surge_speed_m_s", TRIM_NEEDS_SPEED, "Above 0 m/s.", found=speed)
         )
-    return Start(
-        heading=radians(start["heading_deg"]),
-        pitch=radians(start["pitch_deg"]),
-        roll=radians(start["roll_deg"]),
-        depth=start["depth_m"],
-        surge_speed=start["surge_speed_m_s"],
-        wet_length=start["wet_length_m"],
-        **_drum(start),
-    )
+    return problems
 
 
-def _drum(start: Mapping[str, float]) -> dict[str, float]:
-    """Return where the drum is from the tow point."""
-    return {name: start[f"{name}_m"] for name in ("drum_north", "drum_east", "drum_down")}
+def _start(start: Mapping[str, Any], prescribed: Motion | None) -> Start:
+    """Return the start; a prescribed motion starts where it says."""
+    fields = {name: start[quantity.name] * quantity.scale for name, quantity in by_field(START).items()}
+    if prescribed is None:
+        return Start(**fields, at_trim=start["at_trim"])
+    left_open = {name: value for name, value in fields.items() if by_field(START)[name].name in LEFT_OPEN}
+    said = {name: float(getattr(prescribed, name)[0]) for name in prescribed.given if name in fields}
+    for angle in ("heading", "roll"):
+        said[angle] = remainder(said.get(angle, 0.0), tau)
+    return Start(**left_open | said)

@@ -3,7 +3,7 @@
 Inline lists are *switch points*: the last value holds to the end of the run. The rows of a CSV file are
 *samples of a log*: a row holds until the next, and the last for one sampling interval more, at most
 `LONGEST_HOLD`. A log that ends before the run does is refused, because what was commanded after it is not
-known.
+known. A smooth motion is known only as far as its last sample, and not where samples are missing, inline or not.
 """
 
 from __future__ import annotations
@@ -16,8 +16,18 @@ import numpy as np
 
 from scenarios.errors import Problem
 from scenarios.files import Source
-from scenarios.quantities import COMMANDS, MOTION, Quantity
-from scenarios.trial import Commands, Motion
+from scenarios.motion import (
+    REACH_THE_END,
+    SMOOTH,
+    Motion,
+    ends_early,
+    gap_at,
+    gap_words,
+    interpolation_of,
+    motion_faults,
+)  # fmt: skip
+from scenarios.quantities import COMMANDS, MOTION, Quantity, by_field
+from scenarios.trial import Commands
 from subzero.errors import short as shown
 
 LONGEST_HOLD = 1.0
@@ -37,6 +47,7 @@ class Samples:
         columns: column → values, in the units of the file.
         lines: the line of each sample in a CSV file; None in an inline list, where `key_line` is meant.
         key_line: line of the list of times in a trial file.
+        interpolation: what a motion asks for, see `Motion`.
     """
 
     file: str
@@ -44,6 +55,14 @@ class Samples:
     columns: Mapping[str, Sequence[float]]
     lines: Sequence[int] | None = None
     key_line: int | None = None
+    interpolation: str | None = None
+
+    @property
+    def is_smooth(self) -> bool:
+        """Whether these are the samples of a motion that is smooth between them."""
+        given = [name for name, q in by_field(MOTION).items() if q.name in self.columns]
+        is_motion = "surge_speed" in given
+        return is_motion and interpolation_of(given, self.interpolation) == SMOOTH
 
     @property
     def time(self) -> Sequence[float]:
@@ -92,8 +111,33 @@ def check_times(samples: Samples, duration: float | None) -> list[Problem]:
         if not now > before:
             why = f"the time before it is {before:g}"
             problems.append(samples.problem(at, why, "Times must increase from sample to sample."))
+    if not problems and samples.is_smooth:
+        return _check_smooth(samples, duration)
     if not problems and samples.lines and duration is not None:
         problems += _check_end(samples, duration)
+    return problems
+
+
+def check_motion(samples: Samples) -> list[Problem]:
+    """Return what does not fit in the columns of a motion, each by itself right."""
+    names = {name: quantity.name for name, quantity in by_field(MOTION).items()}
+    given = [name for name, column in names.items() if column in samples.columns]
+    section = "" if samples.lines else "motion."
+    return [
+        Problem(
+            file=samples.file, line=samples.key_line, key=f"{section}{names.get(name, name)}", why=why, remedy=remedy
+        )
+        for name, why, remedy in motion_faults(given, samples.interpolation)
+    ]  # fmt: skip
+
+
+def _check_smooth(samples: Samples, duration: float | None) -> list[Problem]:
+    """Return what is not known of a smooth motion: a gap, and what comes behind its last sample."""
+    time = np.asarray(samples.time, dtype=float)
+    at = gap_at(time)
+    problems = [] if at is None else [samples.problem(at, *gap_words(time, at))]
+    if duration is not None and time[-1] < duration - NUMERICAL:
+        problems.append(samples.problem(time.size - 1, ends_early(duration), REACH_THE_END))
     return problems
 
 
@@ -116,9 +160,11 @@ def commands(samples: Samples) -> Commands:
 
 
 def motion(samples: Samples) -> Motion:
-    """Return checked samples as a prescribed motion: m/s and radians."""
-    time, surge_speed, pitch, heading = (_inner(samples, quantity) for quantity in MOTION)
-    return Motion(time=time, surge_speed=surge_speed, pitch=pitch, heading=heading)
+    """Return checked samples as a prescribed motion: m/s and radians. A compass in a log may jump by whole turns."""
+    given = {name: _inner(samples, q) for name, q in by_field(MOTION).items() if q.name in samples.columns}
+    if samples.lines:
+        given["heading"] = np.unwrap(given["heading"])
+    return Motion(**given, interpolation=samples.interpolation)
 
 
 def _inner(samples: Samples, quantity: Quantity) -> np.ndarray:

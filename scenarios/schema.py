@@ -14,6 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
 from scenarios.errors import Problem, nearest_or_all
 from scenarios.files import Source
+from scenarios.motion import INTERPOLATIONS
 from scenarios.quantities import SECTIONS, Quantity
 from scenarios.trial import CONTROLS, SCHEMES
 
@@ -22,7 +23,8 @@ STRICT = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
 LISTS = ("commands", "motion")
 """Sections that may stand in a CSV file: one value a sample."""
 
-CHOICES = {"scheme": ("this is not a scheme", SCHEMES), "control": ("a winch cannot do this", CONTROLS)}
+CHOICES = {"scheme": ("this is not a scheme", SCHEMES), "control": ("a winch cannot do this", CONTROLS),
+           "interpolation": ("a motion is not interpolated so", INTERPOLATIONS)}  # fmt: skip
 """Keys that hold one of some words → why another cannot be, and the words."""
 
 
@@ -52,6 +54,12 @@ class FileReference(BaseModel):
     file: str
 
 
+class MotionReference(FileReference):
+    """A motion that stands in a CSV file."""
+
+    interpolation: Literal["linear", "smooth"] | None = None
+
+
 @cache
 def section_model(name: str) -> type[BaseModel]:
     """Return the model of one section, made from its rows in the table of quantities."""
@@ -67,6 +75,10 @@ def section_model(name: str) -> type[BaseModel]:
         fields["scheme"] = (Literal[SCHEMES], SCHEMES[0])
     if name == "winch":
         fields["control"] = (Literal[CONTROLS], ...)
+    if name == "start":
+        fields["at_trim"] = (bool, False)
+    if name == "motion":
+        fields["interpolation"] = (Literal[INTERPOLATIONS] | None, None)
     return create_model(name, __config__=STRICT, **fields)
 
 
@@ -90,7 +102,8 @@ def check_section(source: Source, name: str, raw: object) -> tuple[dict[str, Any
     if not isinstance(raw, Mapping):
         return {}, []  # `check_page` has said so
     if name in LISTS and "file" in raw:
-        return _validate(FileReference, source, name, raw, {})
+        reference = MotionReference if name == "motion" else FileReference
+        return _validate(reference, source, name, raw, {})
     quantities = {quantity.name: quantity for quantity in SECTIONS[name]}
     return _validate(section_model(name), source, name, raw, quantities)
 
@@ -142,6 +155,7 @@ def _explain(
         "list_type": "this is not a list of numbers",
         "string_type": "this is not a text in quotes",
         "dict_type": "this is not a section",
+        "bool_type": "this is neither true nor false",
         "finite_number": "this is not a finite number",
         "greater_than_equal": "this is outside its limits",
         "less_than_equal": "this is outside its limits",

@@ -18,7 +18,8 @@ from typing import Any
 import numpy as np
 
 from scenarios.checks import Checks
-from scenarios.quantities import COMMANDS, MOTION, PROFILE, RUN, START, VESSEL, WATER, WINCH, by_field
+from scenarios.motion import REACH_THE_END, Motion, ends_early
+from scenarios.quantities import COMMANDS, PROFILE, RUN, START, VESSEL, WATER, WINCH, by_field
 from scenarios.steps import misfits
 
 SCHEMES = ("moving_end", "paper", "paper_tangent", "paper_drum")
@@ -42,6 +43,14 @@ def only_default(asked: list[str]) -> str:
 RUN_FIELDS = tuple(by_field(RUN))
 """Fields of a trial that hold the numbers of [run]."""
 
+FOUND_BY_TRIM = (
+    "pitch", "sway_speed", "heave_speed", "roll_rate", "pitch_rate", "yaw_rate", "propeller_speed",
+    "rudder_angle", "stern_plane_port_angle", "stern_plane_starboard_angle",
+)  # fmt: skip
+"""Fields of a start that a start in trim leaves no room for."""
+FOUND_WHY = "a start with at_trim finds it"
+TRIM_NEEDS_SPEED = "a start with at_trim holds a forward speed: fins need a flow"
+
 SHORTEST_LAST_STEP = 0.1
 """Where a run does not last a whole number of cable steps, its last step is from this to this and 1 of them. [-]"""
 
@@ -56,6 +65,17 @@ class Start:
         roll: φ, positive starboard side down. [rad]
         depth: of the hull centre, positive down. [m]
         surge_speed: u, forward speed over ground. [m/s]
+        sway_speed: v, to starboard. [m/s]
+        heave_speed: w, along the body's down axis. [m/s]
+        roll_rate: p. [rad/s]
+        pitch_rate: q, positive: the nose goes up. [rad/s]
+        yaw_rate: r, positive to starboard. [rad/s]
+        propeller_speed: n; a motor without lag runs as commanded from the first instant. [rev/s]
+        rudder_angle: where the rudder stands; a servo without lag and rate limit stands as commanded. [rad]
+        stern_plane_port_angle: the same of the port stern-plane. [rad]
+        stern_plane_starboard_angle: the same of the starboard stern-plane. [rad]
+        at_trim: begin in the steady level motion at this surge speed, depth and wet length, which says the pitch, the
+            other speeds and what actuators hold it; commands stay those of the trial.
         wet_length: cable already in the water, laid straight behind the vehicle. [m]
         drum_north: where the drum is from the tow point, northwards: the cable then hangs at rest between them. [m]
         drum_east: the same, eastwards. [m]
@@ -67,6 +87,16 @@ class Start:
     roll: float = 0.0
     depth: float = 0.0
     surge_speed: float = 0.0
+    sway_speed: float = 0.0
+    heave_speed: float = 0.0
+    roll_rate: float = 0.0
+    pitch_rate: float = 0.0
+    yaw_rate: float = 0.0
+    propeller_speed: float = 0.0
+    rudder_angle: float = 0.0
+    stern_plane_port_angle: float = 0.0
+    stern_plane_starboard_angle: float = 0.0
+    at_trim: bool = False
     wet_length: float = 0.0
     drum_north: float = 0.0
     drum_east: float = 0.0
@@ -76,7 +106,26 @@ class Start:
         """Refuse what is no start."""
         check = Checks(self)
         check.numbers(by_field(START))
+        if check.kind("at_trim", (bool,)) and self.at_trim:
+            for name in FOUND_BY_TRIM:
+                if getattr(self, name):
+                    check.say(name, FOUND_WHY, "Leave it at 0.", getattr(self, name))
         check.refuse()
+        if self.at_trim and not self.surge_speed > 0.0:
+            check.say("surge_speed", TRIM_NEEDS_SPEED, "Above 0 m/s.", self.surge_speed)
+        check.refuse()
+
+    @property
+    def velocity(self) -> tuple[float, float, float, float, float, float]:
+        """u, v, w, p, q, r over ground, body axes. [m/s, rad/s]."""
+        return (
+            self.surge_speed, self.sway_speed, self.heave_speed, self.roll_rate, self.pitch_rate, self.yaw_rate
+        )  # fmt: skip
+
+    @property
+    def fins(self) -> tuple[float, float, float]:
+        """Where rudder, port and starboard stern-plane stand. [rad]."""
+        return self.rudder_angle, self.stern_plane_port_angle, self.stern_plane_starboard_angle
 
     @property
     def drum(self) -> tuple[float, float, float] | None:
@@ -108,39 +157,6 @@ class Commands:
         assert time is not None and values is not None  # noqa: PT018  # `refuse` has seen to it
         check.freeze("time", time)
         check.freeze("values", values)
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Motion:
-    """A prescribed motion of an idealised vehicle (section 4.1 of the paper), linear between the samples.
-
-    Sway, heave and roll are zero; pitch and yaw rates are the slopes of pitch and heading. After the last
-    sample the last values hold.
-
-    Attributes:
-        time: starts at 0 and increases. Shape (samples,). [s]
-        surge_speed: u. Shape (samples,). [m/s]
-        pitch: θ, positive nose up. Shape (samples,). [rad]
-        heading: ψ, clockwise from north. Shape (samples,). [rad]
-    """
-
-    time: np.ndarray
-    surge_speed: np.ndarray
-    pitch: np.ndarray
-    heading: np.ndarray
-
-    def __post_init__(self) -> None:
-        """Refuse what is no motion; keep arrays of their own that cannot be changed."""
-        check, columns = Checks(self), by_field(MOTION)
-        time = check.rows("time", MOTION[:1])
-        count = None if time is None else time.size
-        arrays = {name: check.rows(name, (quantity,), count) for name, quantity in columns.items()}
-        if time is not None:
-            check.increasing("time", time)
-        check.refuse()
-        for name, array in arrays.items():
-            if array is not None:
-                check.freeze(name, array)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -301,6 +317,10 @@ class Trial:
         for name in ("vehicle", "cable", "drum"):
             check.mapping(name)
         check.refuse()
+        if self.motion is not None and self.motion.is_smooth and self.motion.time[-1] < self.duration - 1e-9:
+            check.say("motion", ends_early(self.duration), REACH_THE_END, float(self.motion.time[-1]))
+        if self.motion is not None and self.start.at_trim:
+            check.say("start", "a prescribed motion says how it starts", "Leave out at_trim.")
         for name, found, why, remedy in misfits({n: getattr(self, n) for n in RUN_FIELDS} | vars(self.start)):
             check.say(name, why, remedy, found)
         asked = [name for name in ("profile", "winch", "vessel", "grading") if getattr(self, name)]

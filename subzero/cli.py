@@ -65,6 +65,7 @@ def simulate(
     untethered: Annotated[bool, Parameter(negative=())] = False,
     with_: cli_diagnosis.With = None,
     commands: Path | None = None,
+    motion: Path | None = None,
     out: Path | None = None,
 ) -> int:
     """Simulate one run, and write its channels, a summary and figures.
@@ -74,14 +75,15 @@ def simulate(
         untethered: leave the cable away.
         with_: extended model that a diagnosis has written (extended.toml).
         commands: CSV file of commands, instead of those of the scenario.
+        motion: CSV file of the vehicle's measured states, such as a run's own tethered.csv, which it then follows.
         out: folder for the files; by default one named after the scenario, here.
     """
     from subzero import delivery
     from subzero.output import staged
 
-    trial = scenarios.load(scenario, commands_csv=commands)
+    trial = scenarios.load(scenario, commands_csv=commands, motion_csv=motion)
     with staged(out or delivery.default_folder(trial)) as stage:
-        trial, extended = cli_diagnosis.extended_run(_checked(scenario, commands), with_)
+        trial, extended = cli_diagnosis.extended_run(_checked(scenario, commands, motion), with_)
         with _progress(trial) as progress:
             from subzero.simulation import simulate as run
 
@@ -98,6 +100,7 @@ def compare(
     measured: Path | None = None,
     with_: cli_diagnosis.With = None,
     commands: Path | None = None,
+    motion: Path | None = None,
     out: Path | None = None,
 ) -> int:
     """Simulate with the cable and without, and set both side by side.
@@ -107,16 +110,17 @@ def compare(
         measured: CSV file of measured channels, to set beside both runs.
         with_: extended model that a diagnosis has written (extended.toml).
         commands: CSV file of commands, instead of those of the scenario.
+        motion: CSV file of the vehicle's measured states, such as a run's own tethered.csv, which it then follows.
         out: folder for the files; by default one named after the scenario, here.
     """
     from subzero import delivery
     from subzero.measured import read_record
     from subzero.output import staged
 
-    trial = scenarios.load(scenario, commands_csv=commands)
+    trial = scenarios.load(scenario, commands_csv=commands, motion_csv=motion)
     record = read_record(measured) if measured is not None else None
     with staged(out or delivery.default_folder(trial)) as stage:
-        trial, extended = cli_diagnosis.extended_run(_checked(scenario, commands), with_)
+        trial, extended = cli_diagnosis.extended_run(_checked(scenario, commands, motion), with_)
         with _progress(trial) as progress:
             from subzero.comparison import compare as run
 
@@ -168,11 +172,11 @@ def _in_words(error: cyclopts.CycloptsError) -> str:
     return str(error)
 
 
-def _checked(scenario: str, commands: Path | None) -> scenarios.Trial:
+def _checked(scenario: str, commands: Path | None, motion: Path | None) -> scenarios.Trial:
     """Read the scenario again with the vehicle's own check, which needs the compiler and so comes late."""
     from subzero.trials import load
 
-    return load(scenario, commands_csv=commands)
+    return load(scenario, commands_csv=commands, motion_csv=motion)
 
 
 def _progress(trial: scenarios.Trial) -> ProgressBar:

@@ -181,6 +181,7 @@ def _closure_error(run: Run, values: dict[str, np.ndarray], model: Model) -> np.
 
 def _provenance(trial: scenarios.Trial, model: Model, tethered: bool, run: Run) -> dict[str, Any]:
     """Return what the result came from; no clock, so that two runs are alike to the last bit."""
+    motion = trial.motion
     return {
         "scenario": trial.name,
         "title": printable(trial.description),
@@ -189,7 +190,12 @@ def _provenance(trial: scenarios.Trial, model: Model, tethered: bool, run: Run) 
         "subzero_version": version("subzero"),
         "versions": json.dumps({name: version(name) for name in LIBRARIES}),
         "tethered": int(tethered),
-        "prescribed": int(trial.motion is not None),
+        "prescribed": int(motion is not None),
+        **(
+            {"motion": f"smooth, from {', '.join(motion.given)}"}
+            if motion is not None and motion.is_smooth
+            else {}
+        ),
         "scheme": trial.scheme,
         "outcome": "completed" if run.completed else "stopped",
         "outcome_message": run.message,

@@ -5,7 +5,8 @@ turned into the body's axes with the attitude of that stage, equations (12)-(13)
 
     F_c = Rᵀ F,    M_c = r_c × F_c
 
-A prescribed run (section 4.1 of the paper, an "idealised vehicle" without dynamics) follows its motion instead.
+A prescribed run follows its motion instead: that of an "idealised vehicle" without dynamics (section 4.1 of the paper),
+linear between its samples, or one that was measured (section 3, step 2), smooth between them (`subzero.knots`).
 """
 
 from __future__ import annotations
@@ -16,7 +17,8 @@ import vehicle
 from cable.water import water_velocity
 from subzero.compiled import allocating, compiled, inlined, inner
 from subzero.missing_wrench import add_missing
-from subzero.run_state import HEADING, PITCH, SPEED, TIME, HullWork, Live, Setup
+from subzero.run_state import HEADING, LINEAR_ROWS, PITCH, PLACE, SLOPE, SPEED, TIME, HullWork, Live, Setup
+from subzero.scratch import scratch
 from vehicle import STATE_SIZE
 
 GAUSS_OFFSET = 0.5 * np.sqrt(0.6)
@@ -66,6 +68,26 @@ def tow_point(state: np.ndarray, r_c: np.ndarray, R: np.ndarray, out: np.ndarray
     vehicle.rotation(state[3:7], R)
     for i in range(3):
         out[i] = state[i] + R[i, 0] * r_c[0] + R[i, 1] * r_c[1] + R[i, 2] * r_c[2]
+
+
+@compiled
+def way_of_tow_point(state: np.ndarray, r_c: np.ndarray, R: np.ndarray, out: np.ndarray) -> float:
+    """Fill out (3,) with the unit vector along which the tow point goes, forward where it goes straight or rests.
+
+    R is R_nb of the state. Returns its speed along that vector, negative astern. [m/s]
+    """
+    x = state[7] + state[11] * r_c[2] - state[12] * r_c[1]
+    y = state[8] + state[12] * r_c[0] - state[10] * r_c[2]
+    z = state[9] + state[10] * r_c[1] - state[11] * r_c[0]
+    if y == 0.0 and z == 0.0:
+        for i in range(3):
+            out[i] = R[i, 0]
+        return x
+    speed = np.sqrt(x * x + y * y + z * z)
+    speed = -speed if x < 0.0 else speed
+    for i in range(3):
+        out[i] = (R[i, 0] * x + R[i, 1] * y + R[i, 2] * z) / speed
+    return speed
 
 
 @inlined
@@ -127,7 +149,10 @@ def _move(track: np.ndarray, t: float, weight: float, state: np.ndarray) -> None
 
 @allocating
 def pose(track: np.ndarray, t: float, state: np.ndarray) -> None:
-    """Write attitude and velocities of a prescribed motion at t into a state."""
+    """Write attitude and velocities of a prescribed motion at t into a state; of a smooth one its place too."""
+    if track.shape[0] != LINEAR_ROWS:
+        _pose_between_knots(track, t, state)
+        return
     u, pitch, heading, dive, turn = _attitude(track, t)
     q = vehicle.quaternion_from_euler(0.0, pitch, heading)
     for i in range(4):
@@ -140,15 +165,42 @@ def pose(track: np.ndarray, t: float, state: np.ndarray) -> None:
     state[12] = turn * np.cos(pitch)
 
 
+@allocating
+def _pose_between_knots(track: np.ndarray, t: float, state: np.ndarray) -> None:
+    """Write place, attitude and velocities of a smooth motion at t into a state: cubics and their derivatives."""
+    row = min(row_at(track[TIME], t), track.shape[1] - 2)
+    h = track[TIME, row + 1] - track[TIME, row]
+    x = (t - track[TIME, row]) / h
+    place, rate, R = scratch(1, 6)[0], scratch(1, 6)[0], scratch(3, 3)
+    for i in range(6):
+        first, rise = track[PLACE + i, row], track[PLACE + i, row + 1] - track[PLACE + i, row]
+        a, end = h * track[SLOPE + i, row], h * track[SLOPE + i, row + 1]
+        b, c = 3.0 * rise - 2.0 * a - end, a + end - 2.0 * rise
+        place[i] = first + x * (a + x * (b + x * c))
+        rate[i] = (a + x * (2.0 * b + x * 3.0 * c)) / h
+    q = vehicle.quaternion_from_euler(place[3], place[4], place[5])
+    vehicle.rotation(q, R)
+    for i in range(4):
+        state[3 + i] = q[i]
+    for i in range(3):
+        state[i] = place[i]
+        state[7 + i] = R[0, i] * rate[0] + R[1, i] * rate[1] + R[2, i] * rate[2]
+    sr, cr, sp, cp = np.sin(place[3]), np.cos(place[3]), np.sin(place[4]), np.cos(place[4])
+    state[10] = rate[3] - rate[5] * sp
+    state[11] = rate[4] * cr + rate[5] * cp * sr
+    state[12] = rate[5] * cp * cr - rate[4] * sr
+
+
 @inner
 def follow_track(start: float, span: float, steps: int, track: np.ndarray, path: np.ndarray) -> None:
-    """Fill path[1 … steps] with a prescribed motion, positions by three-point Gauss quadrature."""
+    """Fill path[1 … steps] with a prescribed motion; positions of a linear one by three-point Gauss quadrature."""
     h = span / steps
     for n in range(steps):
         new, t = path[n + 1], start + n * h
         for i in range(STATE_SIZE):
             new[i] = path[n, i]
-        _move(track, t + h * (0.5 - GAUSS_OFFSET), h * 5.0 / 18.0, new)
-        _move(track, t + h * 0.5, h * 8.0 / 18.0, new)
-        _move(track, t + h * (0.5 + GAUSS_OFFSET), h * 5.0 / 18.0, new)
+        if track.shape[0] == LINEAR_ROWS:
+            _move(track, t + h * (0.5 - GAUSS_OFFSET), h * 5.0 / 18.0, new)
+            _move(track, t + h * 0.5, h * 8.0 / 18.0, new)
+            _move(track, t + h * (0.5 + GAUSS_OFFSET), h * 5.0 / 18.0, new)
         pose(track, t + h, new)

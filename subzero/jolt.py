@@ -1,7 +1,7 @@
 """A prescribed motion whose rates change at once jolts its tow point: the cable takes that as an impulse.
 
 The motion is linear between its times, so speed and attitude have kinks there, and the rates of pitch and heading jump:
-the tow point, r_c from the centre, changes its velocity by R (ΔΩ × r_c). See `cable.jolt`.
+the tow point, r_c from the centre, changes its velocity by R (ΔΩ × r_c). See `cable.jolt`. A smooth motion has none.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from cable.jolt import take_jolt
 from subzero.compiled import allocating, inner
 from subzero.energy import KINETIC, PROPELLER
 from subzero.hull import row_at
-from subzero.run_state import HEADING, PITCH, TIME, Live, Setup
+from subzero.run_state import HEADING, LINEAR_ROWS, PITCH, TIME, Live, Setup
 
 AT_KNOT = 1e-9
 """A time this near to one of the motion's is that time. [s]"""
@@ -24,6 +24,8 @@ AT_KNOT = 1e-9
 def take_jolt_of_motion(setup: Setup, live: Live, start: float) -> None:
     """Give the cable the velocities just after `start`, if the motion jolts there; its work goes into the ledger."""
     row, track = row_at(setup.track[TIME], start), setup.track
+    if track.shape[0] != LINEAR_ROWS:
+        return
     if row == 0 or abs(track[TIME, row] - start) > AT_KNOT or live.now.last_step <= 0.0:
         return
     change, impulse, ledger = np.zeros(3), np.zeros(3), live.now.ledger

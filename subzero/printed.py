@@ -19,12 +19,13 @@ from cable.box_history import START
 from cable.box_newton import OUTCOMES, ROW_NAMES, NewtonReport, box_workspace
 from cable.equation7 import angles_of, equation7_numbers
 from subzero.coupling import CABLE_FAILED, FASTEST, FINE
-from subzero.hull import tow_point
+from subzero.hull import tow_point, way_of_tow_point
 from subzero.model import Model
 from subzero.printed_loop import Printed, pull_of, record_printed, run_printed_rows, start_at_drum
 from subzero.recording import Pace, Run, cut, new_recording
 from subzero.run_state import Live, Setup
 from subzero.start import prepare
+from subzero.steady_start import first_state
 
 REMEDIES = {
     "paper": 'a longer cable_step_s, or scheme = "moving_end", the default',
@@ -39,7 +40,10 @@ def run_as_printed(
 ) -> Run:
     """Run a trial with the paper's scheme, in plain arrays."""
     times = trial.times()
-    setup, live = prepare(trial, model, tethered=False)  # without the default scheme's cable, that is
+    state = first_state(trial, model, tethered=True)
+    setup, live = prepare(
+        trial, model, tethered=False, state=state
+    )  # without the default scheme's cable, that is
     line = lay_cable(trial, model, setup, live, times.size)
     recording = new_recording(times.size, times.size * len(line.w.y))
     used = record_printed(setup, live, line, recording, 0, 0.0, 0)
@@ -65,10 +69,11 @@ def lay_cable(trial: scenarios.Trial, model: Model, setup: Setup, live: Live, ro
     tow_point(live.state, setup.fixed.r_c, hull.rotation, np.zeros(3))  # for the rotation
     start_at_drum(setup, live, w)
     if boxes:
-        speed = float(live.state[7])
+        way = np.zeros(3)
+        speed = way_of_tow_point(live.state, setup.fixed.r_c, hull.rotation, way)
         w.count[0] = boxes + 1
         w.length[1 : boxes + 1] = wet / boxes
-        w.y[: boxes + 1] = (0.0, -speed, 0.0, 0.0, *angles_of(*-hull.rotation[:, 0]))
+        w.y[: boxes + 1] = (0.0, -speed, 0.0, 0.0, *angles_of(*-way))
         w.y[: boxes + 1, 0] = c.tangential * speed * abs(speed) * np.linspace(wet, 0.0, boxes + 1)
     live.now.force[:] = pull_of(w)
     return Printed(w, c, 1.0 / model.drum.radius if trial.scheme == "paper_drum" else 0.0)

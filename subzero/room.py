@@ -61,7 +61,10 @@ def _last_length(trial: scenarios.Trial, model: Model) -> float:
 def _way(trial: scenarios.Trial, model: Model) -> float:
     """Return how far the vehicle goes through the water, about, and rather too little [m]."""
     if trial.motion is not None:
-        return float(np.trapezoid(np.abs(trial.motion.surge_speed), trial.motion.time))
+        motion = trial.motion
+        speeds = (motion.surge_speed, motion.sway_speed, motion.heave_speed)
+        speed = np.sqrt(sum(one**2 for one in speeds if one is not None))
+        return float(np.trapezoid(speed, motion.time))
     if trial.commands is None:
         return 0.0
     times = np.append(trial.commands.time, trial.duration)

@@ -26,6 +26,10 @@ class Orders(NamedTuple):
 TIME, SPEED, PITCH, HEADING = range(4)
 """Rows of a prescribed motion (4, n), linear between samples: time [s], surge speed [m/s], pitch, heading [rad]."""
 
+LINEAR_ROWS = 4
+PLACE, SLOPE, KNOT_ROWS = 1, 7, 13
+"""Rows of a smooth one (13, n), behind that of time: x, y, z [m], φ, θ, ψ [rad], and how fast each of them changes."""
+
 
 class HullWork(NamedTuple):
     """Work space of the hull: rotation R_nb, pull of the cable in earth axes and its wrench, the water around it."""
@@ -113,7 +117,7 @@ class Setup(NamedTuple):
 
     Attributes:
         fixed: numbers; `drum` in it is where the drum is at the end of the step that is being tried.
-        orders, track: what the vehicle is told, or how it moves (4, n).
+        orders, track: what the vehicle is told, or how it moves (LINEAR_ROWS or KNOT_ROWS, n).
         water: how the water moves; its origin is the drum's place at the start.
         led: how the drum moves, and what its winch is asked for, see `cable.drum_path` (n, 8).
         added, terms: what the model lacks, see `MissingForce.numbers` (7, n), (m, 5); empty for nothing.

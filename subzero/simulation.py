@@ -108,7 +108,7 @@ def run_trial(
         from subzero.printed import run_as_printed
 
         return run_as_printed(trial, model, progress)
-    setup, live = prepare(trial, model, tethered, float(np.diff(times).max()) / parts)
+    setup, live = prepare(trial, model, tethered, longest_exchange=float(np.diff(times).max()) / parts)
     recording = new_recording(times.size, 4 * times.size * live.line.length.size if tethered else 0)
     used = record_row(setup, live, recording, 0, 0.0, 0)
     row, ending, pace = 1, coupling.FINE, Pace()

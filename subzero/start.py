@@ -15,11 +15,13 @@ from cable.line import NOW, Line, new_line
 from cable.pull_out import START_LENGTH
 from subzero.compiled import compiled
 from subzero.hanging import hang_between
-from subzero.hull import feel_current, pose, tow_point
+from subzero.hull import feel_current, pose, tow_point, way_of_tow_point
+from subzero.knots import knots
 from subzero.missing_force import MissingForce
 from subzero.model import Model
 from subzero.packed import packed
-from subzero.run_state import Fixed, Live, Orders, Setup, new_now
+from subzero.run_state import LINEAR_ROWS, Fixed, Live, Orders, Setup, new_now
+from subzero.steady_start import first_state
 from subzero.surroundings import drum_of, water_of, way_of_drum
 
 FORCE_TOLERANCE = 1e-9
@@ -29,11 +31,23 @@ FIRST_ROOM = 16
 
 
 def prepare(
-    trial: scenarios.Trial, model: Model, tethered: bool, longest_exchange: float | None = None
+    trial: scenarios.Trial,
+    model: Model,
+    tethered: bool,
+    state: np.ndarray | None = None,
+    longest_exchange: float | None = None,
 ) -> tuple[Setup, Live]:
     """Return what stays and what changes in a run, at its start: the cable laid straight behind the vehicle.
 
-    There is room for the hull's steps in an exchange of `longest_exchange`; that of the trial when not given. [s]
+    Args:
+        trial: what is simulated.
+        model: vehicle, cable, drum and water.
+        tethered: with the cable of the default scheme.
+        state: another first state than that of the trial.
+        longest_exchange: there is room for the hull's steps in so long an exchange; that of the trial by default. [s]
+
+    Raises:
+        UserError: a start that cannot be.
     """
     wet, size = _wet_length(trial), vehicle.STATE_SIZE
     longest = longest_exchange or max(trial.cable_step, float(np.diff(trial.times()).max()))
@@ -41,7 +55,7 @@ def prepare(
     setup = setup_of(trial, model, tethered)
     live = Live(
         now=new_now(),
-        state=_first_state(trial),
+        state=first_state(trial, model, tethered) if state is None else state,
         path=np.zeros((steps + 1, size)),
         stages=np.zeros((5, size)),
         line=new_line(int(wet / trial.segment_length) + FIRST_ROOM),
@@ -83,14 +97,13 @@ def _wet_length(trial: scenarios.Trial) -> float:
 
 @compiled
 def lay_out(setup: Setup, live: Live, wet: float) -> None:
-    """Lay `wet` metres of cable straight behind the vehicle, and put the drum at their end."""
+    """Lay `wet` metres of cable straight behind the tow point, on its way, and put the drum at their end."""
     fixed, now, state = setup.fixed, live.now, live.state
     if setup.fixed.prescribed:
         pose(setup.track, 0.0, state)
     tow_point(state, fixed.r_c, now.hull.rotation, now.tow)
-    speed = state[7]
+    speed = way_of_tow_point(state, fixed.r_c, now.hull.rotation, now.guess)
     for i in range(3):
-        now.guess[i] = now.hull.rotation[i, 0]
         fixed.drum_place[i] = now.tow[i] - wet * now.guess[i]
         setup.water.points[i] = fixed.drum_place[i]
         pull = fixed.cable.tangential_drag * speed * abs(speed) * wet if fixed.tethered else 0.0
@@ -132,18 +145,6 @@ def _fixed(trial: scenarios.Trial, model: Model, tethered: bool, lacking: bool) 
     return packed(fixed)
 
 
-def _first_state(trial: scenarios.Trial) -> np.ndarray:
-    """Return the vehicle's state at t = 0 (of a prescribed run, its place only)."""
-    start = trial.start
-    return vehicle.initial_state(
-        depth=start.depth,
-        roll=start.roll,
-        pitch=start.pitch,
-        heading=start.heading,
-        velocity=(start.surge_speed, 0.0, 0.0, 0.0, 0.0, 0.0),
-    )
-
-
 def _orders(trial: scenarios.Trial) -> Orders:
     """Return the commands, none for a prescribed motion."""
     if trial.commands is None:
@@ -155,6 +156,8 @@ def _track(trial: scenarios.Trial) -> np.ndarray:
     """Return the prescribed motion, of one resting sample for a run with commands."""
     motion = trial.motion
     if motion is None:
-        return np.zeros((4, 1))
+        return np.zeros((LINEAR_ROWS, 1))
+    if motion.is_smooth:
+        return knots(motion, trial.start.depth)
     columns = (motion.time, motion.surge_speed, motion.pitch, motion.heading)
     return np.array(columns, dtype=float)

@@ -14,17 +14,26 @@ import scenarios
 import vehicle
 
 
-def load(name_or_path: str | Path, *, commands_csv: str | Path | None = None) -> scenarios.Trial:
+def load(
+    name_or_path: str | Path,
+    *,
+    commands_csv: str | Path | None = None,
+    motion_csv: str | Path | None = None,
+) -> scenarios.Trial:
     """Return a shipped scenario or a user's, checked against the equations of the vehicle too.
 
     Args:
         name_or_path: a name of ``scenarios.names()``, or the path of a TOML file.
         commands_csv: a CSV file of commands that replaces those of the scenario.
+        motion_csv: a CSV file of a motion, such as a run's own, that replaces the commands or the motion of the
+            scenario, and what its start says besides the cable.
 
     Raises:
         scenarios.ScenarioError: with every problem of every file.
     """
-    return scenarios.load(name_or_path, commands_csv=commands_csv, check_vehicle=_complaints)
+    return scenarios.load(
+        name_or_path, commands_csv=commands_csv, motion_csv=motion_csv, check_vehicle=_complaints
+    )
 
 
 def _complaints(numbers: Mapping[str, Any]) -> Iterable[Any]:

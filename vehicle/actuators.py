@@ -1,13 +1,20 @@
 """Servos: from a command to the angle of a fin.
 
-    target = clip(dead zone(command) + offset, ± deflection limit)
-    δ'     = clip((target − δ)/lag, ± rate limit)
+    target = (1 − k) clip(dead zone(command) + offset, ± deflection limit) + k clip(command, ± deflection limit)
+    seen   = (1 − k) δ + k fin
+    δ'     = clip((target − seen)/lag, ± rate limit)
     fin    = δ, dragged behind by half the backlash of the linkage
+
+The servo turns until it sees the angle that it is told. Without position feedback, k = 0, it sees its own shaft, and
+dead band, offset and play stand between the command and the fin. With k = 1 it sees the fin itself, which ends where it
+was commanded: "feeding back the actual positions of the control fins to their servo's" (Feng and Allen, section 4.2,
+their remedy for what Fig. 6 (d) leaves unexplained). Between the two, k is the share of the error that is taken at the
+fin, and 1 − k of dead band, offset and play stays. The fin's own sensor is taken as perfect, and as fast as the servo.
 
 Each stage has a neutral value that switches it off exactly: dead band 0, offset 0, lag 0 with an infinite
 rate limit (the fin then *is* at its target and the state merely follows), rate and deflection limit infinite,
-backlash 0. With a finite rate limit a servo still has to stop somewhere: lags shorter than `QUICKEST` count
-as `QUICKEST`.
+backlash 0, position feedback 0. With a finite rate limit a servo still has to stop somewhere: lags shorter than
+`QUICKEST` count as `QUICKEST`.
 
 Backlash is a play between servo and fin: the linkage stays where it is until the servo has taken up the
 slack. Inside a step the fin is the linkage clipped into the play around the servo; `settle` moves the linkage
@@ -39,6 +46,7 @@ class ServoNumbers(NamedTuple):
     rate_limit: float
     deflection_limit: float
     half_backlash: float
+    position_feedback: float
 
 
 Servos = tuple[ServoNumbers, ServoNumbers, ServoNumbers]
@@ -55,6 +63,7 @@ class Servo(Section):
     rate_limit: float = parameter("fastest turn of the servo", "rad/s", above=0.0, unlimited=True)
     deflection_limit: float = parameter("largest angle either way", "rad", low=0.0, unlimited=True)
     half_backlash: float = parameter("half the play of the linkage", "rad", low=0.0)
+    position_feedback: float = parameter("share of the error taken at the fin, k", "1", low=0.0, high=1.0)
 
     def numbers(self) -> ServoNumbers:
         """Return what the compiled servo needs."""
@@ -63,31 +72,40 @@ class Servo(Section):
 
 @compiled
 def servo_target(command: float, servo: ServoNumbers) -> float:
-    """Return the angle that a commanded angle leads to in the end [rad]."""
+    """Return the angle that a commanded angle leads to in the end, but for the play [rad]."""
     moved = max(0.0, command - servo.dead_band) + min(0.0, command + servo.dead_band)
-    return max(-servo.deflection_limit, min(servo.deflection_limit, moved + servo.offset))
+    most, k = servo.deflection_limit, servo.position_feedback
+    own = max(-most, min(most, moved + servo.offset))
+    return (1.0 - k) * own + k * max(-most, min(most, command))
 
 
 @compiled
-def servo_rate(angle: float, command: float, servo: ServoNumbers) -> float:
-    """Return how fast a servo at `angle` turns under a commanded angle [rad/s]."""
-    rate = (servo_target(command, servo) - angle) / max(servo.lag, QUICKEST)
+def servo_rate(angle: float, linkage: float, command: float, servo: ServoNumbers) -> float:
+    """Return how fast a servo at `angle`, with its linkage at `linkage`, turns under a commanded angle [rad/s]."""
+    k = servo.position_feedback
+    seen = (1.0 - k) * angle + k * _dragged(linkage, angle, servo.half_backlash)
+    rate = (servo_target(command, servo) - seen) / max(servo.lag, QUICKEST)
     return max(-servo.rate_limit, min(servo.rate_limit, rate))
 
 
 @compiled
-def servo_angle(angle: float, command: float, servo: ServoNumbers) -> float:
-    """Return where the servo is [rad]: at its state, or at its target without any lag or rate limit."""
+def fin_angle(angle: float, linkage: float, command: float, servo: ServoNumbers) -> float:
+    """Return the angle of a fin in the water, from the angles of servo, linkage and command [rad].
+
+    A servo without any lag or rate limit is where it comes to rest: what it sees is its target, so of the play, too,
+    the share 1 − k stays.
+    """
     if servo.lag == 0.0 and math.isinf(servo.rate_limit):
-        return servo_target(command, servo)
-    return angle
+        return _dragged(
+            linkage, servo_target(command, servo), (1.0 - servo.position_feedback) * servo.half_backlash
+        )
+    return _dragged(linkage, angle, servo.half_backlash)
 
 
 @compiled
-def fin_angle(angle: float, linkage: float, command: float, servo: ServoNumbers) -> float:
-    """Return the angle of a fin in the water, from the angles of servo, linkage and command [rad]."""
-    where = servo_angle(angle, command, servo)
-    return max(where - servo.half_backlash, min(where + servo.half_backlash, linkage))
+def _dragged(linkage: float, servo: float, half_backlash: float) -> float:
+    """Return the angle of a linkage whose servo has turned within, or beyond, its play [rad]."""
+    return max(servo - half_backlash, min(servo + half_backlash, linkage))
 
 
 @compiled

@@ -63,7 +63,7 @@ def actuators(state, command, u, numbers, out):
     goal = shaft_goal(state[SHAFT], state[CHARGE], command[0], u, motor, propeller)
     out[SHAFT] = shaft_rate(state[SHAFT], goal, motor)
     for i in range(3):
-        out[SERVO + i] = servo_rate(state[SERVO + i], command[1 + i], numbers.servos[i])
+        out[SERVO + i] = servo_rate(state[SERVO + i], state[LINKAGE + i], command[1 + i], numbers.servos[i])
         out[LINKAGE + i] = 0.0
     out[CHARGE] = battery_current(state[SHAFT], u, motor, propeller)
 

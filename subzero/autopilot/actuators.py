@@ -27,7 +27,7 @@ def ideal(hull: Vehicle) -> Vehicle:
     """Return a vehicle whose actuators know no limit, dead band, offset, play or sag; lags stay (none: `QUICKEST`)."""
 
     def servo(one: Servo) -> Servo:
-        free = {"dead_band": 0.0, "offset": 0.0, "half_backlash": 0.0}
+        free = {"dead_band": 0.0, "offset": 0.0, "half_backlash": 0.0, "position_feedback": 0.0}
         return replace(one, **free, lag=max(one.lag, QUICKEST), rate_limit=inf, deflection_limit=inf)
 
     lag = max(hull.motor.lag, QUICKEST)
@@ -59,12 +59,17 @@ def commands(hull: Vehicle, x: np.ndarray) -> np.ndarray:
     """Return the commands (4,) that lead to the actuators of a state: offset, dead band and sag undone."""
     volts = _loaded_voltage(hull, float(x[12]), float(x[SURGE]))
     sag = hull.motor.voltage_sensitivity * (1.0 - volts / hull.battery.full_voltage)
-    moved = [float(angle) - servo.offset for angle, servo in zip(x[13:], servos(hull), strict=True)]
-    fins = [
-        angle + np.sign(angle) * servo.dead_band if abs(angle) > 1e-12 else 0.0
-        for angle, servo in zip(moved, servos(hull), strict=True)
-    ]
+    fins = [_command(float(angle), servo) for angle, servo in zip(x[13:], servos(hull), strict=True)]
     return np.array([float(x[12]) / (1.0 - sag), *fins])
+
+
+def _command(angle: float, servo: Servo) -> float:
+    """Return the command that leads a fin to an angle [rad]: offset and dead band undone where no feedback does."""
+    k = servo.position_feedback
+    moved = angle - (1.0 - k) * servo.offset
+    if abs(moved) > max(k * servo.dead_band, 1e-12):
+        return moved + float(np.sign(moved)) * (1.0 - k) * servo.dead_band
+    return moved / k if k > 0.0 else 0.0
 
 
 def fastest_propeller(hull: Vehicle, u: float) -> float:

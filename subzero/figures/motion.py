@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import json
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -36,7 +37,11 @@ SEEN = 1e-3
 
 
 def figure_6(runs: Runs, record: Record | None, title: Title) -> Figure:
-    """Draw Fig. 6 of Feng and Allen (2004): propeller command, forward speed, rudder command, heading."""
+    """Draw Fig. 6 of Feng and Allen (2004): propeller command, forward speed, rudder command, heading.
+
+    Beside the command of the rudder stands where it is: what its servo makes of it, with feedback of its position or
+    without, which is what the paper names as the improvement.
+    """
     figure, panels = sheet(2, 2, title)
     propeller, speed, rudder, heading = panels
     longest = max(runs.values(), key=lambda run: run.sizes["time"])
@@ -45,8 +50,8 @@ def figure_6(runs: Runs, record: Record | None, title: Title) -> Figure:
     channel_panel(speed, runs, "surge_speed", record)
     headline(speed, "Forward speed")
     legend(speed)
-    _command(rudder, longest, "rudder_command", r"$\delta_{rc}$ [degree]")
-    headline(rudder, "Rudder command, positive to starboard")
+    _rudder(rudder, runs, longest)
+    headline(rudder, "Rudder, positive to starboard")
     channel_panel(heading, runs, "heading", record)
     headline(heading, "Heading, clockwise from north")
     time_label(panels, 2)
@@ -94,9 +99,34 @@ def _starboard_plane(runs: Runs, axes: Axes) -> None:
     label(axes, None, r"$\delta_p$, $\delta_s$ [degree]")
 
 
-def _command(axes: Axes, run: xr.Dataset, name: str, unit: str) -> None:
+def _rudder(axes: Axes, runs: Runs, longest: xr.Dataset) -> None:
+    """Draw what the rudder is commanded, and where it is; a run in which it does the same has no line of its own."""
+    _command(axes, longest, "rudder_command", r"$\delta_{rc}$, $\delta_r$ [degree]", label="commanded")
+    drawn: list[np.ndarray] = []
+    for which, run in runs.items():
+        angle = run["rudder_angle"].values
+        if all(_differ(angle, other) for other in drawn):
+            words = _feedback(run) + (f", {which}" if drawn else "")
+            axes.plot(run["time"].values, angle, label=f"actual, {words}", **style.LINES[which])
+            drawn.append(angle)
+    legend(axes, columns=2)
+
+
+def _differ(a: np.ndarray, b: np.ndarray) -> bool:
+    """Say whether two angles can be told apart as long as both are known."""
+    both = min(a.size, b.size)
+    return float(np.abs(a[:both] - b[:both]).max()) > SEEN
+
+
+def _feedback(run: xr.Dataset) -> str:
+    """Say whether the rudder's servo is told where the rudder is."""
+    servo = json.loads(run.attrs["parameters"]).get("vehicle", {}).get("rudder_servo", {})
+    return "with feedback" if servo.get("position_feedback", 0.0) > 0.0 else "without feedback"
+
+
+def _command(axes: Axes, run: xr.Dataset, name: str, unit: str, **more: Any) -> None:
     """Draw a command as the steps it is, with zero in view."""
-    axes.step(run["time"].values, run[name].values, where="post", **style.COMMAND)
+    axes.step(run["time"].values, run[name].values, where="post", **style.COMMAND, **more)
     label(axes, None, unit)
     in_time(axes, {"": run})
     axes.update_datalim([(0.0, 0.0)])

@@ -25,7 +25,7 @@ SHAPE_TIMES = [10.0, 15.0, 20.0, 25.0, 30.0]
 """The times of Fig. 5 (b), for runs that last no longer. [s]"""
 
 ROUNDING = 1e-9
-"""An angle that moves less than this is a straight course. [degree]"""
+"""An angle [degree] that moves less than this, and a speed across [m/s] below it, are a straight course."""
 
 NEUTRAL = 1e-6
 """A cable whose mass is that of the water it displaces, to within this share, neither sinks nor floats."""
@@ -36,12 +36,13 @@ DOTS_SHOWN = 61
 def is_straight(run: xr.Dataset) -> bool:
     """Say whether the run pulls a neutral cable straight off a free drum in still water: that has an exact solution."""
     turns = max(float(np.ptp(run[name].values)) for name in ("pitch", "heading", "roll"))
+    slides = max(float(np.abs(run[name].values).max()) for name in ("sway_speed", "heave_speed"))
     told = json.loads(run.attrs["parameters"])
     cable = told["cable"]
     displaced = cable["water_density"] * cable.get("cross_section_area", np.inf)
     heavy = np.isfinite(displaced) and abs(cable["mass_per_length"] - displaced) > NEUTRAL * displaced
     moved = any(told.get("current", ())) or any(told.get(name) for name in ("profile", "winch", "vessel"))
-    return turns < ROUNDING and not heavy and not moved
+    return turns < ROUNDING and slides < ROUNDING and not heavy and not moved
 
 
 def exact_tension(run: xr.Dataset) -> np.ndarray:

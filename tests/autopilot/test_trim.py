@@ -96,9 +96,12 @@ def test_the_coupled_run_starts_in_the_steady_motion(model):
     assert float(run["surge_speed"][-1]) < 1.0
 
 
-def test_commands_undo_offset_dead_band_and_sag(model):
+@pytest.mark.parametrize("feedback", [0.0, 0.5, 1.0])
+def test_commands_undo_offset_dead_band_and_sag(model, feedback):
     crooked = changed(
         model,
+        rudder_servo__position_feedback=feedback,
+        stern_plane_port_servo__position_feedback=feedback,
         rudder_servo__offset=0.02,
         stern_plane_port_servo__dead_band=0.01,
         motor__voltage_sensitivity=1.0,

@@ -30,9 +30,24 @@ def line(axes, label):
 
 def test_figure_6_has_the_four_panels_of_the_paper(comparison):
     assert texts(draw(comparison)["fig6"]) == [
-        "(a) Propeller command", "(b) Forward speed", "(c) Rudder command, positive to starboard",
+        "(a) Propeller command", "(b) Forward speed", "(c) Rudder, positive to starboard",
         "(d) Heading, clockwise from north",
     ]  # fmt: skip
+
+
+def test_figure_6_shows_where_the_rudder_is_beside_its_command_and_whether_that_is_fed_back(make_run):
+    """An offset of a degree to starboard, without feedback of the fin's position and with it."""
+    crooked, fed_back = make_run(), make_run(tethered=False)
+    crooked["rudder_angle"] = crooked["rudder_command"] + 1.0
+    fed_back["rudder_angle"] = fed_back["rudder_command"]
+    told = '"vehicle": {"rudder_servo": {"position_feedback": 1.0}}'
+    fed_back.attrs["parameters"] = fed_back.attrs["parameters"].replace('"vehicle": {}', told)
+    panel = draw({"tethered": crooked, "untethered": fed_back})["fig6"].axes[2]
+    commanded = line(panel, "commanded").get_ydata()
+    assert_allclose(line(panel, "actual, without feedback").get_ydata(), commanded + 1.0)
+    assert_allclose(line(panel, "actual, with feedback, untethered").get_ydata(), commanded)
+    alike = draw({"tethered": crooked, "untethered": crooked})["fig6"].axes[2]
+    assert [one.get_label() for one in alike.get_lines()] == ["commanded", "actual, without feedback"]
 
 
 def test_tethered_is_solid_untethered_dashed_and_measured_are_dots(comparison):

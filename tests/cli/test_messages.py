@@ -25,6 +25,8 @@ MESSAGES = {
     "this is a folder, not a file. Name a file in it.",
     "simulate fig6 --commands no.csv": "The scenario cannot be used (1 problem):\n"
     "  no.csv: there is no such file. Check the path.",
+    "simulate fig6 --motion no.csv": "The scenario cannot be used (1 problem):\n"
+    "  no.csv: there is no such file. Check the path.",
     "simulate fig6 --out file": "The output folder file cannot be written: file is a file, not a folder. "
     "Give another one with --out DIR.",
     "simulate fig6 --out file/deep/er": "The output folder file/deep/er cannot be written: file is a file, "

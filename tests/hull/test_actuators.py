@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+import scenarios
+import subzero
 import vehicle
 from vehicle.actuators import Servo, servo_target
 
@@ -74,9 +76,59 @@ def test_backlash_leaves_the_fin_standing_until_the_slack_is_taken_up(angles):
 def test_neutral_values_switch_every_stage_off_exactly(angles):
     commands = 0.3 * np.sin(np.arange(100))
     neutral = {"dead_band": 0.0, "offset": 0.0, "lag": 0.0, "rate_limit": math.inf,
-               "deflection_limit": math.inf, "half_backlash": 0.0}  # fmt: skip
+               "deflection_limit": math.inf, "half_backlash": 0.0, "position_feedback": 0.0}  # fmt: skip
     assert np.array_equal(angles(commands, **neutral), commands)
     assert servo_target(0.123, Servo(**neutral).numbers()) == 0.123
+
+
+CROOKED = {"dead_band": DEGREE, "offset": DEGREE, "half_backlash": 0.5 * DEGREE}
+
+
+@pytest.mark.parametrize("command", [5.0, 0.5, -0.5, -5.0])
+def test_position_feedback_brings_a_crooked_fin_where_it_is_commanded(angles, command):
+    """To starboard and back: without feedback, dead band, offset and play of a degree stand in between."""
+    commands = np.repeat([8.0 * DEGREE, command * DEGREE], 300)
+    fed_back = angles(commands, **CROOKED, position_feedback=1.0)
+    assert_allclose(fed_back[[299, 599]], commands[[299, 599]], rtol=0, atol=1e-4 * DEGREE)
+    alone = angles(commands, **CROOKED)
+    assert abs(alone[599] - command * DEGREE) > 0.4 * DEGREE
+
+
+def test_without_position_feedback_an_offset_stays_and_half_of_it_leaves_half(angles):
+    """A positive offset turns to starboard: the fin stands to starboard of its command."""
+    for feedback in (0.0, 0.5, 1.0):
+        found = angles(np.full(300, 0.1), offset=0.01, position_feedback=feedback)[-1]
+        assert found == pytest.approx(0.1 + (1.0 - feedback) * 0.01, abs=1e-8)
+
+
+def test_position_feedback_makes_a_servo_neither_faster_nor_stronger(angles):
+    time = 0.01 * np.arange(1, 61)
+    lagging = angles(np.full(60, 0.1), lag=0.15, rate_limit=math.inf, offset=0.01, position_feedback=1.0)
+    assert_allclose(lagging, 0.1 * (1 - np.exp(-time / 0.15)), rtol=0, atol=1e-8)
+    ramp = angles(np.full(10, 0.3), lag=0.01, rate_limit=1.0, position_feedback=1.0)
+    assert_allclose(ramp, 0.01 * np.arange(1, 11), rtol=0, atol=1e-12)
+    assert angles(np.full(300, 2.0), offset=0.1, position_feedback=1.0)[-1] == pytest.approx(0.3491, abs=1e-8)
+
+
+def test_a_servo_that_obeys_at_once_rests_where_one_that_lags_ends(angles):
+    commands = np.repeat([8.0, 3.0, -1.0, 0.4], 400) * DEGREE
+    for feedback in (0.0, 0.5, 1.0):
+        slow = angles(commands, **CROOKED, lag=0.05, rate_limit=math.inf, position_feedback=feedback)
+        at_once = angles(commands, **CROOKED, lag=0.0, rate_limit=math.inf, position_feedback=feedback)
+        assert_allclose(slow[399::400], at_once[399::400], rtol=0, atol=1e-3 * DEGREE)
+
+
+def test_a_vehicle_file_from_before_there_was_position_feedback_has_none(tmp_path):
+    root = scenarios.path("fig6").parent.parent
+    old = (root / "vehicles" / "subzero2.toml").read_text(encoding="utf-8").splitlines()
+    old = [one for one in old if not one.startswith("position_feedback")]
+    (tmp_path / "old.toml").write_text("\n".join(old), encoding="utf-8")
+    text = (root / "trials" / "fig6.toml").read_text(encoding="utf-8").replace('"subzero2"', '"old.toml"')
+    fed_back = text + '"vehicle.rudder_servo.position_feedback" = 1.0\n'
+    for name, trial, expected in (("mine", text, 0.0), ("fed_back", fed_back, 1.0)):
+        (tmp_path / f"{name}.toml").write_text(trial, encoding="utf-8")
+        found = subzero.load_scenario(tmp_path / f"{name}.toml").vehicle["rudder_servo"]["position_feedback"]
+        assert found == expected
 
 
 def test_the_shaft_follows_with_its_lag_and_stops_at_the_ceiling_of_the_battery(subzero2):

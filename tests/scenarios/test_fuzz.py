@@ -14,6 +14,10 @@ UMBILICAL = scenarios.path("rov_umbilical").read_text(encoding="utf-8")
 CABLE = (scenarios.path("fig6").parent.parent / "cables" / "table1.toml").read_text(encoding="utf-8")
 HEADER = "time_s,propeller_rps,rudder_deg,stern_plane_port_deg,stern_plane_starboard_deg\n"
 LOG = HEADER + "".join(f"{time},27,0,0.5,-0.5\n" for time in range(31))
+RECORD = (
+    "time_s,surge_speed_m_s,pitch_deg,heading_deg,roll_deg,roll_rate_deg_s,depth_m,cable_tension_N\n"
+    + "".join(f"{time},1,-2,{(355 + time) % 360},0.5,0.1,3,0.2\n" for time in range(31))
+)
 
 SPICES = (
     *(
@@ -121,6 +125,8 @@ def is_usable(trial):
             assert isinstance(values, str) or np.isfinite(np.array(values)).all()
     for samples in (trial.commands, trial.motion):
         for values in vars(samples).values() if samples else ():
+            if values is None or isinstance(values, str):
+                continue
             assert values.dtype == float
             assert np.isfinite(values).all()
     times = (trial.commands or trial.motion).time
@@ -158,6 +164,15 @@ def test_a_spoiled_trial_with_winch_and_vessel_is_a_trial_or_a_scenario_error(tm
 def test_a_spoiled_log_is_a_trial_or_a_scenario_error(tmp_path, text):
     (tmp_path / "log.csv").write_text(text, encoding="utf-8", newline="")
     trial = outcome("fig6", commands_csv=tmp_path / "log.csv")
+    if trial:
+        is_usable(trial)
+
+
+@QUIET
+@given(text=spoiled(RECORD))
+def test_a_spoiled_record_is_a_motion_or_a_scenario_error(tmp_path, text):
+    (tmp_path / "record.csv").write_text(text, encoding="utf-8", newline="")
+    trial = outcome("fig6", motion_csv=tmp_path / "record.csv")
     if trial:
         is_usable(trial)
 

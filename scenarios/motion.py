@@ -1,0 +1,147 @@
+"""A prescribed motion as a value: which vehicle states it holds over time, and what it does between its samples.
+
+The paper evaluates the cable from the states (u, v, w, p, q, r, φ, θ, ψ) of the vehicle, "measured by the on-board
+sensors or predicted by the dynamical model" (section 3, step 2), and shows it on an idealised vehicle (section 4.1),
+whose motion is linear between a few times. Both are a `Motion`. `subzero.knots` makes a smooth one of its samples.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+
+import numpy as np
+
+from scenarios.checks import Checks
+from scenarios.quantities import MOTION, by_field
+from subzero.errors import short as shown
+
+REQUIRED = tuple(by_field(tuple(q for q in MOTION if q.default is None)))
+"""Fields of every motion; those of a motion of the paper's idealised vehicle."""
+LINEAR, SMOOTH = INTERPOLATIONS = ("linear", "smooth")
+"""What a motion does between its samples: straight lines with kinks, or curves without."""
+LONGEST_GAP = 1.0
+"""A smooth motion is not known where samples are further apart than this … [s]"""
+GAP_RATIO = 5.0
+"""… and than so many of its usual (median) sampling intervals. [-]"""
+
+REACH_THE_END = "Give samples to the end of the run, or shorten the duration to the last of them."
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Motion:
+    """A prescribed motion: of the paper's idealised vehicle (section 4.1), or one that was measured (section 3).
+
+    *Linear* between the samples, with kinks that jolt the cable, and after the last sample the last values hold: so is
+    a motion of speed, pitch and heading alone, unless it asks for the other. Sway, heave and roll are zero; pitch and
+    yaw rates are the slopes of pitch and heading.
+
+    *Smooth* between the samples, and known as far as the last one: so is a motion that says more. Its angles and its
+    place are cubics through the samples with the rates and speeds given as slopes (`subzero.knots`). What is not given:
+    sway, heave and roll are zero, rates the slopes of the angles, and the place is where the speeds lead. A place that
+    is given is believed: its noise is noise in the speed of the tow point. Heading and roll may jump by whole turns.
+
+    Attributes:
+        time: starts at 0 and increases. Shape (samples,). [s]
+        surge_speed: u. Shape (samples,). [m/s]
+        pitch: θ, positive nose up. Shape (samples,). [rad]
+        heading: ψ, clockwise from north. Shape (samples,). [rad]
+        sway_speed: v, to starboard; None if it is not known, as all that follow. Shape (samples,). [m/s]
+        heave_speed: w, along the body's down axis. Shape (samples,). [m/s]
+        roll: φ, positive starboard side down. Shape (samples,). [rad]
+        roll_rate: p; only beside a roll. Shape (samples,). [rad/s]
+        pitch_rate: q. Shape (samples,). [rad/s]
+        yaw_rate: r. Shape (samples,). [rad/s]
+        north: place of the hull centre. Shape (samples,). [m]
+        east: place of the hull centre. Shape (samples,). [m]
+        depth: place of the hull centre, positive down; counts before the start's depth. Shape (samples,). [m]
+        interpolation: one of `INTERPOLATIONS`; None: as said above.
+    """
+
+    time: np.ndarray
+    surge_speed: np.ndarray
+    pitch: np.ndarray
+    heading: np.ndarray
+    sway_speed: np.ndarray | None = None
+    heave_speed: np.ndarray | None = None
+    roll: np.ndarray | None = None
+    roll_rate: np.ndarray | None = None
+    pitch_rate: np.ndarray | None = None
+    yaw_rate: np.ndarray | None = None
+    north: np.ndarray | None = None
+    east: np.ndarray | None = None
+    depth: np.ndarray | None = None
+    interpolation: str | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse what is no motion; keep arrays of their own that cannot be changed."""
+        check, columns = Checks(self), by_field(MOTION)
+        given = [name for name in columns if name in REQUIRED or getattr(self, name) is not None]
+        time = check.rows("time", MOTION[:1])
+        count = None if time is None else time.size
+        arrays = {name: check.rows(name, (columns[name],), count) for name in given}
+        if time is not None:
+            check.increasing("time", time)
+        for name, why, remedy in motion_faults(given, self.interpolation):
+            check.say(name, why, remedy)
+        check.refuse()
+        object.__setattr__(self, "interpolation", interpolation_of(given, self.interpolation))
+        for name, array in arrays.items():
+            if array is not None:
+                turns = self.is_smooth and name in ("heading", "roll")
+                check.freeze(name, np.unwrap(array) if turns else array)
+        at = gap_at(self.time) if self.is_smooth else None
+        if at is not None:
+            check.say(f"time[{at}]", *gap_words(self.time, at), self.time[at])
+        check.refuse()
+
+    @property
+    def is_smooth(self) -> bool:
+        """Whether it is smooth between its samples."""
+        return self.interpolation == SMOOTH
+
+    @property
+    def given(self) -> tuple[str, ...]:
+        """Names of what is given over time."""
+        return tuple(name for name in by_field(MOTION) if name != "time" and getattr(self, name) is not None)
+
+
+def interpolation_of(given: Collection[str], asked: str | None) -> str:
+    """Return how a motion that gives some fields goes on between its samples."""
+    return asked or (SMOOTH if set(given) - set(REQUIRED) else LINEAR)
+
+
+def motion_faults(given: Collection[str], asked: str | None) -> list[tuple[str, str, str]]:
+    """Return what does not fit in a motion that gives some fields: the field, why, and what to do."""
+    faults = []
+    more = [name for name in given if name not in REQUIRED]
+    if asked not in (None, *INTERPOLATIONS):
+        allowed = f"Allowed: {', '.join(INTERPOLATIONS)}."
+        faults.append(("interpolation", f"a motion knows no interpolation {shown(asked)}", allowed))
+    elif asked == LINEAR and more:
+        why = f"a linear motion has speed, pitch and heading alone, and here is {', '.join(more)} too"
+        faults.append(("interpolation", why, f'Leave out the others, or take "{SMOOTH}".'))
+    if "roll_rate" in given and "roll" not in given:
+        faults.append(("roll_rate", "a roll rate is given, and no roll", "Give both, or neither."))
+    return faults
+
+
+def gap_at(time: np.ndarray) -> int | None:
+    """Return the first sample of a smooth motion that comes too late after the one before it; None if none does."""
+    intervals = np.diff(time)
+    if not intervals.size:
+        return None
+    late = np.flatnonzero(intervals > max(LONGEST_GAP, GAP_RATIO * float(np.median(intervals))))
+    return int(late[0]) + 1 if late.size else None
+
+
+def gap_words(time: np.ndarray, at: int) -> tuple[str, str]:
+    """Return why a gap before sample `at` cannot be, and what to do."""
+    gap, usual = time[at] - time[at - 1], float(np.median(np.diff(time)))
+    why = f"nothing is known for {gap:g} s before it, in a record with a sample every {usual:g} s"
+    return why, "Fill the gap, or end the run before it."
+
+
+def ends_early(duration: float) -> str:
+    """Return why the last sample of a smooth motion comes too soon."""
+    return f"the motion is known until then, and the run lasts {duration:g} s"
