@@ -190,7 +190,7 @@ def _water(rng: np.random.Generator) -> dict[str, object]:
     kind = rng.choice(["still", "uniform", "sheared"], p=[0.4, 0.3, 0.3])
     if kind == "still":
         return {}
-    current = tuple(rng.uniform(-0.4, 0.4, 2).tolist()) + (0.0,)
+    current = (*rng.uniform(-0.4, 0.4, 2).tolist(), 0.0)
     if kind == "uniform":
         return {"current": current}
     velocity = np.column_stack([rng.uniform(-0.3, 0.3, (3, 2)), np.zeros(3)])
@@ -218,11 +218,17 @@ def tags_of(trial: scenarios.Trial) -> tuple[str, ...]:
     cable, drum = trial.cable, trial.drum
     heavy = cable["mass_per_length"] / (WATER * cable["cross_section_area"])
     propeller, moving = trial.commands.values[:, 0], trial.vessel is not None
-    tags = [f"winch, {trial.winch.control}" if trial.winch else "free drum, " + ("heavy" if heavy > 1.4 else "light")]
+    tags = [
+        f"winch, {trial.winch.control}"
+        if trial.winch
+        else "free drum, " + ("heavy" if heavy > 1.4 else "light")
+    ]
     if trial.winch is None:
         tags += ["drum with inertia"] if drum["inertia"] else ["drum without inertia"]
         tags += ["drum with friction"] if drum["friction_torque"] else ["drum without friction"]
-    tags += ["sheared current" if trial.profile else "uniform current" if any(trial.current) else "still water"]
+    tags += [
+        "sheared current" if trial.profile else "uniform current" if any(trial.current) else "still water"
+    ]
     tags += ["vessel"] if moving else []
     tags += ["stretch"] if cable["compliance"] else []
     tags += ["reversal"] if propeller.min() < 0.0 else ["stop"] if propeller.min() == 0.0 else []
@@ -275,13 +281,21 @@ def judge(seed: int) -> Verdict:
         return Verdict(seed=seed, tags=tags, outcome="stopped", warnings=warned(run))
     fine = subzero.simulate(refined(trial))
     seconds = (middle - begin, perf_counter() - middle)
-    found = {"seed": seed, "tags": tags, "warnings": warned(run), "seconds": seconds, "residual": residual_of(run)}
+    found = {
+        "seed": seed,
+        "tags": tags,
+        "warnings": warned(run),
+        "seconds": seconds,
+        "residual": residual_of(run),
+    }
     if fine.attrs["outcome"] != "completed":
         return Verdict(**found, outcome="no reference")
     error, smooth, largest = force_errors(run, fine)
     if largest < NO_PULL:
         return Verdict(**found, outcome="no pull")
-    return Verdict(**found, outcome="completed", force_error=error, smooth_error=smooth, largest_force=largest)
+    return Verdict(
+        **found, outcome="completed", force_error=error, smooth_error=smooth, largest_force=largest
+    )
 
 
 def report(verdicts: list[Verdict]) -> str:

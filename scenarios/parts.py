@@ -23,7 +23,7 @@ PATTERNS = {"vehicle": ("vehicles", "subzero2"), "cable": ("cables", "table1")}
 
 LEAF_KEYS = ("value", "unit", "range", "limits", "source")
 
-OPTIONAL = {"cable.bending_stiffness": 0.0}
+OPTIONAL = {"cable.bending_stiffness": 0.0, "cable.strength": 0.0, "cable.minimum_bend_radius": 0.0}
 """Keys of the pattern that a file need not have → the value that is taken then."""
 
 ABOVE_ZERO = ("mass", "density", "diameter", "radius", "area", "inertia")

@@ -14,6 +14,7 @@ import vehicle
 from subzero.channels import BY_NAME, CHANNELS, TIME
 from subzero.errors import printable
 from subzero.model import Model
+from subzero.validity import as_json, check_run
 
 if TYPE_CHECKING:
     from subzero.recording import Recording, Run
@@ -49,7 +50,9 @@ def dataset_of(trial: scenarios.Trial, model: Model, tethered: bool, run: Run) -
     }
     data |= _arrays(run) | _diagnostics(run, values, model)
     coordinates = {TIME.name: ("time", run.times, TIME.attributes)} | AXES
-    return xr.Dataset(data, coords=coordinates, attrs=_provenance(trial, model, tethered, run))
+    result = xr.Dataset(data, coords=coordinates, attrs=_provenance(trial, model, tethered, run))
+    result.attrs["warnings"] = as_json(check_run(result, trial, model))
+    return result
 
 
 def channel_values(run: Run, model: Model) -> dict[str, np.ndarray]:
