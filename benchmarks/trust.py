@@ -43,7 +43,7 @@ NO_PULL = 1e-3
 REFINEMENT = 4.0
 WATER = 1000.0
 """Density of the water. [kg/m³]"""
-NUMERICAL = ("energy_residual", "ill_posed_drum", "slack", "refinement")
+NUMERICAL = ("energy_residual", "tow_force", "ill_posed_drum", "slack", "closure", "push", "refinement")
 """Checks that say that numbers are wrong; all others say what happened."""
 PULL = ("cable_force_forward", "cable_force_starboard", "cable_force_down")
 ENERGIES = ("propeller_work", "hull_loss", "cable_loss", "kinetic_change", "drum", "added_mass_term")

@@ -21,7 +21,7 @@ from subzero.channels import BY_NAME, CHANNELS
 from subzero.later import Later
 from subzero.model import Model
 from subzero.simulation import simulate
-from subzero.summary import FORCE
+from subzero.summary import FORCE, MOMENT
 from subzero.trials import load
 from subzero.validity import RunWarning, as_json, warnings_of
 
@@ -33,6 +33,16 @@ TOW_FORCE = "tow_force"
 """Row of the table for the force of the cable as a vector, beside the channels."""
 MOST = 0.01
 """A tow force that changes by more than this share of its largest value is warned of. [-]"""
+VECTORS = (
+    FORCE,
+    MOMENT,
+    ("surge_speed", "sway_speed", "heave_speed"),
+    ("roll_rate", "pitch_rate", "yaw_rate"),
+    ("tow_velocity_tangential", "tow_velocity_normal", "tow_velocity_binormal"),
+    tuple(c.name for c in CHANNELS if c.name.startswith("energy_")),
+)
+"""Channels that are parts of one thing: each is held against the largest of them, for a change of a part that hardly
+matters is none of the whole."""
 NOTHING = {"m": 1e-6, "m/s": 1e-6, "degree": 1e-4, "degree/s": 1e-4, "rev/s": 1e-6, "V": 1e-6, "N": 1e-6,
            "N m": 1e-7, "J": 1e-6}  # fmt: skip
 """A channel that never gets larger than this, by unit, is zero, and a share of it means nothing."""
@@ -45,8 +55,9 @@ class Refinement:
     Attributes:
         run: at the trial's own steps.
         finer: with half of them.
-        table: by channel, worst first: `change` [-], the largest change of the channel as a share of its largest value;
-            `difference` and `largest`, both in the unit of the channel; `time` of the largest change [s]; `unit`.
+        table: by channel, worst first: `change` [-], the largest change of the channel as a share of its largest value,
+            or that of the largest part of its vector (`VECTORS`); `difference` and `largest`, both in the unit of the
+            channel; `time` of the largest change [s]; `unit`.
     """
 
     run: xr.Dataset
@@ -150,41 +161,36 @@ def table_of(run: xr.Dataset, finer: xr.Dataset) -> xr.Dataset:
 
     Compared at the times of the first run that both reach; what stays zero and what is commanded is left out.
     """
-    time, there = run["time"].values, finer["time"].values
-    time = time[time <= there[-1] + 1e-9]
-    rows = [_row(name, unit, time, *two) for name, unit, two in _pairs(run, finer, time, there)]
-    known = sorted((row for row in rows if row is not None), key=lambda row: -row[1])
-    names, *columns = zip(*known, strict=True) if known else ((), (), (), (), (), ())
-    keys = ("change", "difference", "largest", "time", "unit")
-    data = {key: ("channel", list(column)) for key, column in zip(keys, columns, strict=True)}
-    return xr.Dataset(data, coords={"channel": list(names)})
-
-
-def _pairs(run: xr.Dataset, finer: xr.Dataset, time: np.ndarray, there: np.ndarray) -> list[Any]:
-    """Return name, unit, and both runs' values at the same times (components, samples), for all that is compared."""
     names: dict[str, tuple[str, ...]] = {
         c.name: (c.name,) for c in CHANNELS if not c.name.endswith("_command")
     }
     if run.attrs["tethered"]:
         names[TOW_FORCE] = FORCE
-    found = []
-    for name, parts in names.items():
-        ours = np.array([run[part].values[: time.size] for part in parts])
-        theirs = np.array([np.interp(time, there, finer[part].values) for part in parts])
-        found.append((name, BY_NAME[parts[0]].unit, (ours, theirs)))
-    return found
+    rows = (_row(name, parts, run, finer) for name, parts in names.items())
+    known = sorted((row for row in rows if row is not None), key=lambda row: -row["change"])
+    keys = ("change", "difference", "largest", "time", "unit")
+    data = {key: ("channel", [row[key] for row in known]) for key in keys}
+    return xr.Dataset(data, coords={"channel": [row["channel"] for row in known]})
 
 
-def _row(
-    name: str, unit: str, time: np.ndarray, ours: np.ndarray, theirs: np.ndarray
-) -> tuple[Any, ...] | None:
-    """Return name, share, largest change, largest value, time of the change, unit; None for what stays zero."""
-    difference, size = np.linalg.norm(ours - theirs, axis=0), np.linalg.norm(theirs, axis=0)
-    if not np.isfinite(difference).all() or size.max() < NOTHING[unit]:
+def _row(name: str, parts: tuple[str, ...], run: xr.Dataset, finer: xr.Dataset) -> dict[str, Any] | None:
+    """Return the row of a channel, or of a vector with these parts; None for what stays zero or is unknown."""
+    time, there = run["time"].values, finer["time"].values
+    time = time[time <= there[-1] + 1e-9]
+    ours = np.array([run[part].values[: time.size] for part in parts])
+    theirs = np.array([np.interp(time, there, finer[part].values) for part in parts])
+    difference, unit = np.linalg.norm(ours - theirs, axis=0), BY_NAME[parts[0]].unit
+    if name == TOW_FORCE:
+        largest = float(np.linalg.norm(theirs, axis=0).max())
+    else:
+        whole = next((vector for vector in VECTORS if name in vector), parts)
+        largest = max(float(np.abs(finer[part].values).max()) for part in whole)
+    if not np.isfinite(difference).all() or not largest >= NOTHING[unit]:
         return None
     worst = int(difference.argmax())
-    change, largest = float(difference[worst]), float(size.max())
-    return name, change / largest, change, largest, float(time[worst]), unit
+    change = float(difference[worst])
+    row = {"channel": name, "change": change / largest, "difference": change, "largest": largest}
+    return {**row, "time": float(time[worst]), "unit": unit}
 
 
 def _part(progress: Progress | None, begin: float, end: float) -> Progress | None:

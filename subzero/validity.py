@@ -19,18 +19,22 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-import scenarios
-from cable.properties import CableProperties, DrumProperties
 from subzero.channels import DEGREE
-from subzero.model import Model
 
 if TYPE_CHECKING:
     import xarray as xr
 
+    import scenarios
+    from cable.properties import CableProperties, DrumProperties
+    from subzero.model import Model
+
+    Check = Callable[[xr.Dataset, scenarios.Trial, Model], list[str]]
+
 RESIDUAL = 0.01
 """A residual above this share of the largest energy so far is too much. [-]"""
-STARTING = 0.05
-"""Energies below this share of the run's largest are those of a start, too small to hold a residual against. [-]"""
+STARTING = 0.3
+"""Energies below this share of the run's largest are those of a start, too small to hold a residual against: a cable
+that begins with a jolt loses some millijoules in it, which is all the energy that there is at first. [-]"""
 NO_ENERGY, NO_FORCE = 1e-9, 1e-6
 """Below this nothing has happened yet. [J], [N]"""
 
@@ -66,8 +70,6 @@ FINS = {"rudder": "rudder_servo", "stern_plane_port": "stern_plane_port_servo",
         "stern_plane_starboard": "stern_plane_starboard_servo"}  # fmt: skip
 """Fin → its servo in the vehicle."""
 ENERGIES = ("propeller_work", "hull_loss", "cable_loss", "kinetic_change", "drum", "added_mass_term")
-
-Check = Callable[["xr.Dataset", scenarios.Trial, Model], list[str]]
 
 
 class RunWarning(NamedTuple):
