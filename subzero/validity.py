@@ -191,11 +191,14 @@ def drum_is_ill_posed(
     return weighs & free & (payout > SLOWEST) & (payout > OVERRUN * tow_speed)
 
 
-def slack(run: xr.Dataset, _: scenarios.Trial, __: Model) -> list[str]:
+def slack(run: xr.Dataset, trial: scenarios.Trial, _: Model) -> list[str]:
     """Part of the cable is folded: its ends, its drag and its inertia mean something, its shape does not."""
     if not run.attrs["tethered"]:
         return []
     time, share = run["time"].values, slack_share(run)
+    share = np.where(
+        run["cable_length"].values < trial.segment_length, 0.0, share
+    )  # hardly any cable, no shape
     longest = _longest(time, share > 0.0)[0]
     if share.max() <= SLACK_SHARE and longest <= SLACK_TIME:
         return []
