@@ -12,8 +12,11 @@ with F the force of the cable on the vehicle in body axes, at the times of the c
 a cable that goes taut in one sample is a force that somebody will read. Where the fine run stops, or the pull of the
 cable never reaches `NO_PULL`, there is nothing to judge by.
 
-    silent     completed, no numerical warning, and the force is off by more than 3 % or the residual above 5 %
-    false      a numerical warning on a run that is right within 1 %
+    wrong      completed, and the force is off by more than 3 %, or the residual of the energies above 5 %
+    silent     wrong, without a numerical warning
+    unchecked  silent, and not even `subzero.check`, with half the steps, changes the tow force by more than 1 %
+    right      within 1 %, force and energies
+    false      right, with a numerical warning
 """
 
 from __future__ import annotations
@@ -33,6 +36,7 @@ import xarray as xr
 import scenarios
 import subzero
 from scenarios.trial import CONTROLS
+from subzero.refinement import MOST, refine
 
 WRONG, RIGHT = 0.03, 0.01
 """Error of the force from which a run is wrong, and up to which it is right. [-]"""
@@ -43,7 +47,7 @@ NO_PULL = 1e-3
 REFINEMENT = 4.0
 WATER = 1000.0
 """Density of the water. [kg/m³]"""
-NUMERICAL = ("energy_residual", "tow_force", "ill_posed_drum", "slack", "closure", "push", "refinement")
+NUMERICAL = ("energy_residual", "tow_force", "ill_posed_drum", "slack", "closure", "push")
 """Checks that say that numbers are wrong; all others say what happened."""
 PULL = ("cable_force_forward", "cable_force_starboard", "cable_force_down")
 ENERGIES = ("propeller_work", "hull_loss", "cable_loss", "kinetic_change", "drum", "added_mass_term")
@@ -59,6 +63,7 @@ class Verdict:
         outcome: of the run at its own steps; "no reference" where the fine run stopped.
         force_error, smooth_error: of the tow force; and without jolts of a single sample. [-]
         largest_force: of the fine run. [N]
+        check: by which share half the steps change the tow force. [-]
         residual: largest residual of the energies, as a share of the largest term of the run. [-]
         warnings: check → how many sentences.
         seconds: of the run and of the fine one.
@@ -70,6 +75,7 @@ class Verdict:
     force_error: float = np.nan
     smooth_error: float = np.nan
     largest_force: float = 0.0
+    check: float = np.nan
     residual: float = np.nan
     warnings: tuple[str, ...] = ()
     seconds: tuple[float, float] = (0.0, 0.0)
@@ -95,9 +101,19 @@ class Verdict:
         return self.wrong and not self.numerical
 
     @property
+    def unchecked(self) -> bool:
+        """Whether not even half the steps would tell."""
+        return self.silent and self.check <= MOST
+
+    @property
+    def right(self) -> bool:
+        """Whether force and energies are right."""
+        return self.judged and self.force_error < RIGHT and self.residual < RIGHT
+
+    @property
     def false(self) -> bool:
         """Whether it is right, and warns."""
-        return self.judged and self.numerical and self.force_error < RIGHT and self.residual < RIGHT
+        return self.right and self.numerical
 
 
 def draw(seed: int) -> scenarios.Trial:
@@ -279,6 +295,7 @@ def judge(seed: int) -> Verdict:
     middle = perf_counter()
     if run.attrs["outcome"] != "completed":
         return Verdict(seed=seed, tags=tags, outcome="stopped", warnings=warned(run))
+    check = refine(run, trial).tow_force
     fine = subzero.simulate(refined(trial))
     seconds = (middle - begin, perf_counter() - middle)
     found = {
@@ -293,19 +310,22 @@ def judge(seed: int) -> Verdict:
     error, smooth, largest = force_errors(run, fine)
     if largest < NO_PULL:
         return Verdict(**found, outcome="no pull")
-    return Verdict(
-        **found, outcome="completed", force_error=error, smooth_error=smooth, largest_force=largest
-    )
+    errors = {"force_error": error, "smooth_error": smooth, "check": check}
+    return Verdict(**found, **errors, outcome="completed", largest_force=largest)
 
 
 def report(verdicts: list[Verdict]) -> str:
     """Return the tables."""
     judged = [one for one in verdicts if one.judged]
-    lines = [_counts(verdicts, judged), "", "by what there is in a trial        runs  wrong  silent  false"]
+    lines = [
+        _counts(verdicts, judged),
+        "",
+        "by what there is in a trial        runs  right  wrong  silent  false",
+    ]
     for tag in sorted({tag for one in judged for tag in one.tags}):
         some = [one for one in judged if tag in one.tags]
-        numbers = [sum(map(test, some)) for test in (_is("wrong"), _is("silent"), _is("false"))]
-        lines.append(f"{tag:32s} {len(some):6d} {numbers[0]:6d} {numbers[1]:7d} {numbers[2]:6d}")
+        right, *others = (sum(map(_is(name), some)) for name in ("right", "wrong", "silent", "false"))
+        lines.append(f"{tag:32s} {len(some):6d} {right:6d} {others[0]:6d} {others[1]:7d} {others[2]:6d}")
     for words, test in (("silent and wrong", _is("silent")), ("false warnings", _is("false"))):
         lines += ["", f"{words}:", *(_line(one) for one in judged if test(one))]
     lines += ["", "without an end or a reference:"]
@@ -319,13 +339,14 @@ def _is(name: str) -> Callable[[Verdict], bool]:
 
 def _counts(verdicts: list[Verdict], judged: list[Verdict]) -> str:
     """Return the sums."""
-    wrong, silent, false = (sum(map(_is(name), judged)) for name in ("wrong", "silent", "false"))
-    right = sum(one.force_error < RIGHT and one.residual < RIGHT for one in judged)
+    names = ("wrong", "silent", "unchecked", "right", "false")
+    wrong, silent, unchecked, right, false = (sum(map(_is(name), judged)) for name in names)
     others = len(verdicts) - len(judged)
     share = 100.0 * false / max(right, 1)
     return (
         f"{len(verdicts)} trials, {len(judged)} judged, {others} stopped or without a reference\n"
-        f"wrong (force off by > 3 % or residual > 5 %): {wrong}; of them silent: {silent}\n"
+        f"wrong (force off by > 3 % or residual > 5 %): {wrong}; of them silent: {silent}, and silent under --check: "
+        f"{unchecked}\n"
         f"right within 1 %: {right}; of them with a numerical warning: {false} ({share:.1f} %)"
     )
 
@@ -335,7 +356,8 @@ def _line(one: Verdict) -> str:
     checks = ", ".join(dict.fromkeys(one.warnings)) or "no warning"
     return (
         f"  {one.seed:6d}  force {100 * one.force_error:7.2f} % (without jolts {100 * one.smooth_error:7.2f} %), "
-        f"residual {100 * one.residual:6.2f} %, {one.largest_force:7.3f} N; {checks}; {'; '.join(one.tags)}"
+        f"half the steps {100 * one.check:6.2f} %, residual {100 * one.residual:6.2f} %, {one.largest_force:7.3f} N; "
+        f"{checks}; {'; '.join(one.tags)}"
     )
 
 

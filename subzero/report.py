@@ -136,7 +136,7 @@ def _refinement_table(label: str, channels: Summary) -> Table:
     table.title_justify, table.title_style = "left", ""
     table.add_column("channel", overflow="fold")
     for what in ("change", "of at most", "share", "at [s]"):
-        table.add_column(what, justify="right", no_wrap=True)
+        table.add_column(escape(what), justify="right", no_wrap=True)
     for name, row in list(channels.items())[:SHOWN_CHANNELS]:
         numbers = (f"{row['difference']:.2g}", f"{row['largest']:.3g}", f"{100.0 * row['change']:.2g} %")
         table.add_row(escape(f"{name} [{row['unit']}]"), *numbers, f"{row['time_s']:g}")

@@ -44,4 +44,4 @@ def warnings_in_short(runs: Runs) -> str:
         for label, checks in names.items()
         if checks
     ]
-    return f"{count} warning{'s' if count > 1 else ''}: {'; '.join(parts)} (see summary.json)"
+    return f"{count} warning{'s' if count > 1 else ''} ({'; '.join(parts)}), see summary.json"
