@@ -262,7 +262,7 @@ def below_sea_bed(run: xr.Dataset, trial: scenarios.Trial, model: Model) -> list
     """Vehicle or cable below the sea bed that the trial tells."""
     if trial.sea_bed <= 0.0:
         return []
-    words = "which no equation knows: nothing holds them up there. Change the trial, or water.sea_bed_m."
+    words = "which no equation knows: nothing holds it up there. Change the trial, or water.sea_bed_m."
     where = f"below the sea bed at {trial.sea_bed:g} m"
     return _outside(run, model, lambda depth: depth - trial.sea_bed, where, words)
 
