@@ -57,6 +57,8 @@ FOLDED = 1e-3
 
 TAUT = 1e-4
 """A bend counts where the cable pulls harder than this. [N]"""
+STRAIGHT = 1e-6
+"""Two segments with less than this between their directions are straight: rounding says no more. [rad]"""
 CLOSED = 0.01
 """A cable that ends farther from the tow point than this share of its length is not the cable of this vehicle. [-]"""
 PUSHED = 1e-3
@@ -322,18 +324,21 @@ def bend_radius(run: xr.Dataset, _: scenarios.Trial, model: Model) -> list[str]:
 def bend_radii(run: xr.Dataset) -> np.ndarray:
     """Return the radius of the circle through three neighbouring nodes, ∞ in slack parts (samples, nodes − 2). [m].
 
-    R = abc/4A, with 4A = 2 |a × b|.
+    R = abc/4A of a triangle with the sides a, b, c; 4A = 2 |a × b| = 2 √(a²b² − (a·b)²).
     """
     P, T = run["cable_position"].values, run["cable_node_tension"].values
     if P.shape[1] < 3:
         return np.full((P.shape[0], 1), np.inf)
-    a, b = P[:, 1:-1] - P[:, :-2], P[:, 2:] - P[:, 1:-1]
-    sizes = [np.linalg.norm(one, axis=2) for one in (a, b, a + b)]
-    area = 2.0 * np.linalg.norm(np.cross(a, b), axis=2)
+    side = np.diff(P, axis=1)
+    a, b = side[:, :-1], side[:, 1:]
+    aa, bb, ab = (np.einsum("tni,tni->tn", one, two) for one, two in ((a, a), (b, b), (a, b)))
+    product = np.sqrt(aa * bb * (aa + bb + 2.0 * ab))
+    square = aa * bb - ab * ab
     pulls = np.minimum(np.minimum(T[:, :-2], T[:, 1:-1]), T[:, 2:]) > TAUT
-    product = sizes[0] * sizes[1] * sizes[2]
-    straight = area <= 1e-9 * product  # also where nodes coincide, or are none: NaN compares as false
-    return np.where(pulls & ~straight, product / np.where(area > 0.0, area, 1.0), np.inf)
+    bent = (
+        square > STRAIGHT**2 * aa * bb
+    )  # also false where nodes coincide, or are none: NaN compares as false
+    return np.where(pulls & bent, product / (2.0 * np.sqrt(np.where(bent, square, 1.0))), np.inf)
 
 
 # ---- what was asked for ----
@@ -437,7 +442,8 @@ def _finer(trial: scenarios.Trial) -> str:
 
 def _chords(run: xr.Dataset) -> np.ndarray:
     """Return the distances between neighbouring nodes, NaN behind the last (samples, nodes − 1). [m]."""
-    return np.linalg.norm(np.diff(run["cable_position"].values, axis=1), axis=2)
+    side = np.diff(run["cable_position"].values, axis=1)
+    return np.sqrt(np.einsum("tni,tni->tn", side, side))
 
 
 def _tow_speed(run: xr.Dataset, time: np.ndarray) -> np.ndarray:
