@@ -120,15 +120,19 @@ def energy_residual(run: xr.Dataset, trial: scenarios.Trial, _: Model) -> list[s
     ]
 
 
-def tow_force(run: xr.Dataset, trial: scenarios.Trial, _: Model) -> list[str]:
-    """The tow force jumps from sample to sample: what it does between them, nobody knows."""
+def tow_force(run: xr.Dataset, trial: scenarios.Trial, model: Model) -> list[str]:
+    """The tow force jumps from sample to sample: what it does between them, nobody knows.
+
+    A kink that a winch was asked for is none: where its setpoint changes its slope, a right force has one too.
+    """
     if not run.attrs["tethered"]:
         return []
-    jump = roughness(run)
+    jump, time = roughness(run), run["time"].values[2:-1]
+    for kink in model.winch.time[1:] if model.winch is not None and jump.size else ():
+        jump = np.where(np.abs(time - kink) <= trial.cable_step * (1.0 + 1e-6), 0.0, jump)
     rough = jump > ROUGH
     if not rough.any():
         return []
-    time = run["time"].values[2:-1]
     return [
         f"The tow force jumps from sample to sample, by up to {_percent(jump.max())} of its largest value "
         f"(at {time[jump.argmax()]:g} s; by more than {_percent(ROUGH)} in {rough.sum()} of {jump.size} samples, "

@@ -118,6 +118,22 @@ def test_a_jump_between_samples_is_seen_and_its_size_told():
     assert "up to 20 % of its largest value (at 20 s" in said
 
 
+def test_a_kink_that_a_winch_was_asked_for_is_none():
+    """A force that rises by a twentieth of its largest value each sample until 2 s, and no more: a kink of 5 %."""
+    run = plain()
+    time = run["time"].values
+    silent = {f"cable_force_{axis}": ("time", 0.0 * time) for axis in ("starboard", "down")}
+    run = run.assign(cable_force_forward=("time", -np.minimum(0.5 * time, 1.0)), **silent)
+    (said,) = checked(run, check="tow_force")
+    assert "up to 5 % of its largest value (at 2 s; by more than 3 % in 1 of 298 samples" in said
+    asked = {
+        at: scenarios.Winch(control="constant_tension", time=(0.0, at), setpoint=(1.0, 2.0))
+        for at in (2.0, 9.0)
+    }
+    assert not checked(run, trial_of(winch=asked[2.0]), check="tow_force")
+    assert checked(run, trial_of(winch=asked[9.0]), check="tow_force")
+
+
 def test_the_roughness_of_a_sine_is_that_of_its_second_difference():
     """|F(t−h) − 2F + F(t+h)| = 4 sin²(ωh/2) |F| ."""
     run = plain()
