@@ -77,6 +77,8 @@ class CableProperties:
         normal_drag_coefficient: C_n, on the projected area d. [-]
         compliance: e = 1/(E A); 0 is an inextensible cable. [1/N]
         bending_stiffness: E I; see `cable.bending`. [N m²]
+        strength: the load that it may carry, working or breaking; 0 is not known. Nothing is computed with it. [N]
+        minimum_bend_radius: the tightest bend that it may take; 0 is not known. Nothing is computed with it. [m]
 
     Raises:
         subzero.UserError: a value that is not a finite number, or not in its physical range (a ValueError, too).
@@ -90,6 +92,8 @@ class CableProperties:
     normal_drag_coefficient: float = 1.0
     compliance: float = 0.0
     bending_stiffness: float = 0.0
+    strength: float = 0.0
+    minimum_bend_radius: float = 0.0
 
     def __post_init__(self) -> None:
         """Refuse what cannot be a cable."""

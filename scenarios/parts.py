@@ -24,7 +24,12 @@ PATTERNS = {"vehicle": ("vehicles", "subzero2"), "cable": ("cables", "table1")}
 LEAF_KEYS = ("value", "unit", "range", "limits", "source")
 
 SERVOS = ("rudder_servo", "stern_plane_port_servo", "stern_plane_starboard_servo")
-OPTIONAL = {"cable.bending_stiffness": 0.0, **{f"{servo}.position_feedback": 0.0 for servo in SERVOS}}
+OPTIONAL = {
+    "cable.bending_stiffness": 0.0,
+    "cable.strength": 0.0,
+    "cable.minimum_bend_radius": 0.0,
+    **{f"{servo}.position_feedback": 0.0 for servo in SERVOS},
+}
 """Keys of the pattern that a file need not have → the value that is taken then."""
 
 ABOVE_ZERO = ("mass", "density", "diameter", "radius", "area", "inertia")

@@ -96,6 +96,10 @@ current_east_m_s  | m/s | -5 | 5 | 0 | velocity of the water to the east
 current_down_m_s  | m/s | -5 | 5 | 0 | velocity of the water downwards
 """)
 
+BED = _read("""
+sea_bed_m | m | 0 | 11000 | 0 | depth of a flat sea bed, positive down; 0: not known
+""")
+
 PROFILE = _read(
     """
 depth_m             | m   | 0  | 11000 | 0 | depths of a profile that is added to the current, positive down
@@ -165,7 +169,7 @@ def by_field(quantities: tuple[Quantity, ...]) -> dict[str, Quantity]:
 SECTIONS = {
     "run": RUN,
     "start": START,
-    "water": WATER + PROFILE,
+    "water": WATER + BED + PROFILE,
     "winch": WINCH,
     "vessel": VESSEL,
     "commands": COMMANDS,

@@ -52,16 +52,16 @@ def _read_water(source: Source) -> Read:
     """Return the uniform current, and what is added to it by depth."""
     values, problems = check_section(source, "water", source.table.get("water", {}))
     current = tuple(float(values.get(name, 0.0)) for name in CURRENT)
+    fields = {"current": current, "sea_bed": float(values.get("sea_bed_m", 0.0))}
     lists = _lists(values, "water")
     if not lists:
-        return {"current": current}, problems
+        return fields, problems
     problems += _check_profile(source, lists)
     if problems:
-        return {"current": current}, problems
+        return fields, problems
     names = [quantity.name for quantity in PROFILE[1:]]
     depth = tuple(float(x) for x in lists["depth_m"])
-    profile = Profile(depth=depth, velocity=_vectors(lists, names, len(depth)))
-    return {"current": current, "profile": profile}, []
+    return fields | {"profile": Profile(depth=depth, velocity=_vectors(lists, names, len(depth)))}, []
 
 
 def _check_profile(source: Source, lists: Mapping[str, list[float]]) -> list[Problem]:

@@ -19,7 +19,7 @@ import numpy as np
 
 from scenarios.checks import Checks
 from scenarios.motion import REACH_THE_END, Motion, ends_early
-from scenarios.quantities import COMMANDS, PROFILE, RUN, START, VESSEL, WATER, WINCH, by_field
+from scenarios.quantities import BED, COMMANDS, PROFILE, RUN, START, VESSEL, WATER, WINCH, by_field
 from scenarios.steps import misfits
 
 SCHEMES = ("moving_end", "paper", "paper_tangent", "paper_drum")
@@ -272,6 +272,7 @@ class Trial:
         drum: key → SI value, the fields of ``cable.DrumProperties``.
         current: velocity of the water, north, east, down, the same everywhere. [m/s]
         profile: what is added to it by depth.
+        sea_bed: depth of a flat sea bed, which a run that goes below it warns of; 0 is not known. [m]
         winch: what turns the drum; None for a free drum.
         vessel: how the drum moves; None for a drum on the shore.
         commands: what the actuators are told.
@@ -295,6 +296,7 @@ class Trial:
     drum: Mapping[str, float]
     current: tuple[float, float, float] = (0.0, 0.0, 0.0)
     profile: Profile | None = None
+    sea_bed: float = 0.0
     winch: Winch | None = None
     vessel: Vessel | None = None
     commands: Commands | None = None
@@ -309,6 +311,7 @@ class Trial:
         if self.scheme not in SCHEMES:
             check.say("scheme", "this is not a scheme", f"Allowed: {', '.join(SCHEMES)}.", self.scheme)
         check.vector("current", WATER)
+        check.number("sea_bed", BED[0])
         check.kind("start", (Start,))
         parts = {"commands": Commands, "motion": Motion, "profile": Profile, "winch": Winch, "vessel": Vessel}
         there = {name for name, kind in parts.items() if check.kind(name, (kind,), optional=True)}

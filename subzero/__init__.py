@@ -7,6 +7,7 @@
 
 Names come from their modules when they are first used, so that ``import subzero`` costs nothing:
 `simulate` and `compare` run a trial, `Comparison` holds two runs, `load_scenario` reads a trial,
+`warnings_of` says what may be wrong with a run, `check` how much it changes with half the steps,
 `read_record` a measured record, `draw` makes the figures, `Simulator` steps a run for a controller of your own,
 `diagnose` says what a simulation gets wrong in measured records, `read_trials` reads those as `Logged`,
 `autopilot` leads to linear models and controllers, `CHANNELS` is the table of everything that a run gives.
@@ -22,9 +23,12 @@ _HOME = {
     "Model": ("subzero.model", "Model"),
     "Observation": ("subzero.simulator", "Observation"),
     "Record": ("subzero.measured", "Record"),
+    "Refinement": ("subzero.refinement", "Refinement"),
+    "RunWarning": ("subzero.validity", "RunWarning"),
     "RunStoppedError": ("subzero.simulator", "RunStoppedError"),
     "Simulator": ("subzero.simulator", "Simulator"),
     "UserError": ("subzero.errors", "UserError"),
+    "check": ("subzero.refinement", "check"),
     "compare": ("subzero.comparison", "compare"),
     "diagnose": ("subzero.diagnosis.entrance", "diagnose"),
     "draw": ("subzero.figures", "draw"),
@@ -32,6 +36,7 @@ _HOME = {
     "read_record": ("subzero.measured", "read_record"),
     "read_trials": ("subzero.diagnosis.records", "read_trials"),
     "simulate": ("subzero.simulation", "simulate"),
+    "warnings_of": ("subzero.validity", "warnings_of"),
 }
 """Public name → (module, name there)."""
 

@@ -3,9 +3,9 @@
 
 Exit codes: 0 all is well; 2 the user has to change something (one clean message on standard error,
 nothing is written); 3 a run could not go on (what it has is written, the message says when, where and
-what to try); 130 it was interrupted (`subzero.interrupts`). A bug of ours keeps its traceback. Everything
-heavy (numba, xarray, matplotlib, pydantic) is imported inside the commands, after the request has been
-checked, so that help and mistakes answer at once.
+what to try), or ends with warnings under --strict (all is written); 130 it was interrupted
+(`subzero.interrupts`). A bug of ours keeps its traceback. Everything heavy (numba, xarray, matplotlib, pydantic)
+is imported inside the commands, after the request has been checked, so that help and mistakes answer at once.
 """
 
 from __future__ import annotations
@@ -25,8 +25,13 @@ from subzero.errors import UserError, printable
 from subzero.interrupts import INTERRUPTED, words
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from subzero.progress import ProgressBar
 
+    Runs = dict[str, xr.Dataset]
+
+Flag = cli_autopilot.Flag
 FINE, MISTAKE, STOPPED = 0, 2, 3
 
 
@@ -67,6 +72,8 @@ def simulate(
     commands: Path | None = None,
     motion: Path | None = None,
     out: Path | None = None,
+    check: Flag = False,
+    strict: Flag = False,
 ) -> int:
     """Simulate one run, and write its channels, a summary and figures.
 
@@ -77,6 +84,8 @@ def simulate(
         commands: CSV file of commands, instead of those of the scenario.
         motion: CSV file of the vehicle's measured states, such as a run's own tethered.csv, which it then follows.
         out: folder for the files; by default one named after the scenario, here.
+        check: run it once more with half the steps and half the segment length, and say what changes.
+        strict: end with exit code 3 if the run ends with warnings.
     """
     from subzero import delivery
     from subzero.output import staged
@@ -88,8 +97,10 @@ def simulate(
             from subzero.simulation import simulate as run
 
             result = run(trial, tethered=not untethered, **extended, progress=progress)
-        summary = delivery.write_all({"untethered" if untethered else "tethered": result}, None, stage)
-    return STOPPED if delivery.tell(summary, stage) else FINE
+        runs = {"untethered" if untethered else "tethered": result}
+        runs = _refined(runs, trial, extended) if check else runs
+        summary = delivery.write_all(runs, None, stage)
+    return FINE if delivery.tell(summary, stage, strict=strict) else STOPPED
 
 
 @app.command
@@ -102,6 +113,8 @@ def compare(
     commands: Path | None = None,
     motion: Path | None = None,
     out: Path | None = None,
+    check: Flag = False,
+    strict: Flag = False,
 ) -> int:
     """Simulate with the cable and without, and set both side by side.
 
@@ -112,6 +125,8 @@ def compare(
         commands: CSV file of commands, instead of those of the scenario.
         motion: CSV file of the vehicle's measured states, such as a run's own tethered.csv, which it then follows.
         out: folder for the files; by default one named after the scenario, here.
+        check: run both once more with half the steps and half the segment length, and say what changes.
+        strict: end with exit code 3 if a run ends with warnings.
     """
     from subzero import delivery
     from subzero.measured import read_record
@@ -125,8 +140,9 @@ def compare(
             from subzero.comparison import compare as run
 
             result = run(trial, measured=record, **extended, progress=progress)
-        summary = delivery.write_all(result.runs, result.measured, stage)
-    return STOPPED if delivery.tell(summary, stage) else FINE
+        runs = _refined(result.runs, trial, extended) if check else result.runs
+        summary = delivery.write_all(runs, result.measured, stage)
+    return FINE if delivery.tell(summary, stage, strict=strict) else STOPPED
 
 
 cli_autopilot.add_to(app)
@@ -179,7 +195,18 @@ def _checked(scenario: str, commands: Path | None, motion: Path | None) -> scena
     return load(scenario, commands_csv=commands, motion_csv=motion)
 
 
-def _progress(trial: scenarios.Trial) -> ProgressBar:
+def _refined(runs: Runs, trial: scenarios.Trial, extended: dict[str, Any]) -> Runs:
+    """Return runs that know how much they change with half the steps."""
+    from subzero.refinement import refine
+
+    marked = {}
+    for label, run in runs.items():
+        with _progress(trial, f"Checking the {label} run of {trial.name}") as progress:
+            marked[label] = refine(run, trial, **extended, progress=progress).marked_run()
+    return marked
+
+
+def _progress(trial: scenarios.Trial, words: str = "") -> ProgressBar:
     """Return a progress bar, after saying why the first run of all takes long."""
     from subzero.compiled import is_warm
     from subzero.progress import ProgressBar
@@ -187,4 +214,4 @@ def _progress(trial: scenarios.Trial) -> ProgressBar:
     console = Console(stderr=True, highlight=False)
     if not is_warm():
         console.print("Compiling the kernels (first use, about 50 s)…")
-    return ProgressBar(f"Simulating {trial.name}", console)
+    return ProgressBar(words or f"Simulating {trial.name}", console)

@@ -42,6 +42,7 @@ def manoeuvre(
     planes: float | None = None,
     speed: float = 1.0,
     out: Path | None = None,
+    strict: Flag = False,
 ) -> int:
     """Fly a manoeuvre with the cable and without, and measure it.
 
@@ -52,6 +53,7 @@ def manoeuvre(
         planes: size of a manoeuvre with the stern-planes, in degrees.
         speed: of the bare hull before it, in m/s.
         out: folder for the files; by default one named after the manoeuvre, here.
+        strict: end with exit code 3 if a run ends with warnings.
     """
     scenarios.load(scenario)  # a mistake in it answers at once
     from subzero.autopilot.manoeuvres import MANOEUVRES
@@ -66,7 +68,7 @@ def manoeuvre(
 
     meaning = f": {MANOEUVRES[name].meaning}" if name in MANOEUVRES else ""
     shown = MANOEUVRE_COMMANDS.get(name, ("heading", "rudder_command"))
-    return _deliver(fly, out or Path(name), f"{name}{meaning}", shown)
+    return _deliver(fly, out or Path(name), f"{name}{meaning}", shown, strict)
 
 
 def fly_step(
@@ -81,6 +83,7 @@ def fly_step(
     noisy: Flag = False,
     seed: int = 0,
     out: Path | None = None,
+    strict: Flag = False,
 ) -> int:
     """Let an autopilot follow a step, with the cable and without, and measure it.
 
@@ -94,6 +97,7 @@ def fly_step(
         noisy: through estimated sensors instead of perfect ones.
         seed: of the sensors.
         out: folder for the files; by default one named after the step, here.
+        strict: end with exit code 3 if a run ends with warnings.
     """
     scenarios.load(scenario)  # a mistake in it answers at once
     from subzero.autopilot import ESTIMATED, PERFECT
@@ -110,7 +114,8 @@ def fly_step(
         }  # fmt: skip
 
     title = f"{name}: autopilot {autopilot}, fed forward of the cable: {feed_forward}"
-    return _deliver(fly, out or Path(name), title, STEP_COMMANDS.get(name, ("heading", "rudder_command")))
+    shown = STEP_COMMANDS.get(name, ("heading", "rudder_command"))
+    return _deliver(fly, out or Path(name), title, shown, strict)
 
 
 def add_to(app: cyclopts.App) -> None:
@@ -130,9 +135,12 @@ def _size(name: str, rudder: float | None, planes: float | None) -> float | None
     return planes if rudder is None else rudder
 
 
-def _deliver(fly: Callable[[], Measured], folder: Path, title: str, shown: tuple[str, str]) -> int:
+def _deliver(
+    fly: Callable[[], Measured], folder: Path, title: str, shown: tuple[str, str], strict: bool
+) -> int:
     """Fly, write and tell; return the exit code."""
     from subzero.autopilot import showing
+    from subzero.delivery import refuse_warnings
     from subzero.output import staged
 
     with staged(folder) as stage:
@@ -141,4 +149,4 @@ def _deliver(fly: Callable[[], Measured], folder: Path, title: str, shown: tuple
     stopped = showing.tell(summary, list(measured), stage)
     for message in stopped:
         print(message, file=sys.stderr)
-    return STOPPED if stopped else FINE
+    return STOPPED if stopped or (strict and refuse_warnings(summary)) else FINE

@@ -15,6 +15,7 @@ from subzero.channels import BY_NAME, CHANNELS, TIME
 from subzero.convergence import Accuracy, as_numbers
 from subzero.errors import printable
 from subzero.model import Model
+from subzero.validity import as_json, check_run
 
 if TYPE_CHECKING:
     from subzero.recording import Recording, Run
@@ -53,7 +54,9 @@ def dataset_of(
     data |= _arrays(run) | _diagnostics(run, values, model)
     coordinates = {TIME.name: ("time", run.times, TIME.attributes)} | AXES
     attributes = _provenance(trial, model, tethered, run) | {"accuracy": json.dumps(as_numbers(accuracy))}
-    return xr.Dataset(data, coords=coordinates, attrs=attributes)
+    result = xr.Dataset(data, coords=coordinates, attrs=attributes)
+    result.attrs["warnings"] = as_json(check_run(result, trial, model))
+    return result
 
 
 def channel_values(run: Run, model: Model) -> dict[str, np.ndarray]:

@@ -38,8 +38,12 @@ def write_all(runs: dict[str, xr.Dataset], record: Record | None, stage: Stage) 
     return summary
 
 
-def tell(summary: dict[str, Any], stage: Stage) -> list[str]:
-    """Print the summary and where the files are; return which runs could not go on, after saying why."""
+def tell(summary: dict[str, Any], stage: Stage, *, strict: bool = False) -> bool:
+    """Print the summary and where the files are; say why runs could not go on, and if `strict`, that some warn.
+
+    Returns:
+        whether all is well.
+    """
     from subzero.report import RUNS, show
 
     console = Console()
@@ -48,4 +52,15 @@ def tell(summary: dict[str, Any], stage: Stage) -> list[str]:
     stopped = [label for label in RUNS if summary.get(label, {}).get("outcome") == "stopped"]
     for label in stopped:
         print(f"The {label} run stopped: {summary[label]['outcome_message']}", file=sys.stderr)
-    return stopped
+    return not (stopped or (strict and refuse_warnings(summary)))
+
+
+def refuse_warnings(summary: dict[str, Any]) -> bool:
+    """Say on standard error which runs end with warnings, as --strict wants it; return whether there are some."""
+    from subzero.report import RUNS
+
+    counts = {label: len(summary[label]["warnings"]) for label in RUNS if label in summary}
+    warned = [f"{count} of the {label} run" for label, count in counts.items() if count]
+    if warned:
+        print(f"Warnings under --strict: {', '.join(warned)}. All files are written.", file=sys.stderr)
+    return bool(warned)

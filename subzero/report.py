@@ -14,6 +14,8 @@ Summary = dict[str, Any]
 """The summary of one run, as `subzero.summary.summarise` gives it."""
 
 NOTHING = "–"
+SHOWN_CHANNELS = 12
+"""So many channels are shown of those that change by finer steps; ``summary.json`` has all."""
 RUNS = ("tethered", "untethered")
 
 ENERGY_ROWS = {
@@ -40,8 +42,24 @@ def show(summary: Summary, console: Console) -> None:
     """Print a summary, as `subzero.comparison.summary_of` gives it."""
     console.print(f"[bold]{escape(summary['scenario'])}[/bold]: {escape(summary['title'])}", highlight=False)
     console.print(_runs_table(summary), highlight=False)
+    runs = {label: summary[label] for label in RUNS if label in summary}
+    for label, run in runs.items():
+        if run["refinement"] is not None:
+            console.print(_refinement_table(label, run["refinement"]), highlight=False)
     if summary["measured"] is not None:
         console.print(_fit_table(summary["measured"]), highlight=False)
+    show_warnings(runs, console)
+
+
+def show_warnings(runs: dict[str, Summary], console: Console) -> None:
+    """Print what may be wrong with each run, sentence by sentence; nothing if nothing is."""
+    for label, run in runs.items():
+        if run["warnings"]:
+            console.print(f"Warnings, {label} run:", highlight=False, markup=False)
+        for one in run["warnings"]:
+            row = Table.grid(padding=(0, 1))
+            row.add_row("  •", escape(one["message"]))
+            console.print(row, highlight=False)
 
 
 def _runs_table(summary: Summary) -> Table:
@@ -64,6 +82,7 @@ def _rows(is_prescribed: bool) -> dict[str, Callable[[Summary], str]]:
     """Return the rows of the table: words → how to read the cell from a summary."""
     rows: dict[str, Callable[[Summary], str]] = {
         "outcome": lambda run: f"{run['outcome']}, {run['time_at_end_s']:g} s",
+        "warnings": lambda run: str(len(run["warnings"])),
         "peak speed [m/s]": lambda run: _peak(run, "peak_speed_m_s", "time_of_peak_speed_s", 3),
         "speed at the end [m/s]": lambda run: _plain(run["speed_at_end_m_s"], 3),
         "heading at the end [degree]": lambda run: _plain(run["heading_at_end_deg"], 2),
@@ -107,6 +126,21 @@ def _add_diagnostics(table: Table, found: list[Summary]) -> None:
     for key, (words, form) in DIAGNOSTIC_ROWS.items():
         values = [one.get(key) for one in found]
         table.add_row(escape(words), *(NOTHING if x is None else form.format(x) for x in values))
+
+
+def _refinement_table(label: str, channels: Summary) -> Table:
+    """Return the table of what changes with half the steps and segments, the worst channels first."""
+    table = Table(
+        title=f"Change of the {label} run by half the steps and segments", box=box.SIMPLE_HEAD, pad_edge=False
+    )
+    table.title_justify, table.title_style = "left", ""
+    table.add_column("channel", overflow="fold")
+    for what in ("change", "of at most", "share", "at [s]"):
+        table.add_column(escape(what), justify="right", no_wrap=True)
+    for name, row in list(channels.items())[:SHOWN_CHANNELS]:
+        numbers = (f"{row['difference']:.2g}", f"{row['largest']:.3g}", f"{100.0 * row['change']:.2g} %")
+        table.add_row(escape(f"{name} [{row['unit']}]"), *numbers, f"{row['time_s']:g}")
+    return table
 
 
 def _fit_table(measured: Summary) -> Table:

@@ -6,6 +6,7 @@ that does not exist (the heading of a run without samples, the balance of a pres
 
 from __future__ import annotations
 
+import json
 import math
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
@@ -14,6 +15,7 @@ import numpy as np
 
 from subzero.channels import BY_NAME
 from subzero.fit import Fit, fits
+from subzero.validity import warnings_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -35,6 +37,7 @@ def summarise(run: xr.Dataset) -> dict[str, Any]:
     return {
         "outcome": run.attrs["outcome"],
         "outcome_message": run.attrs["outcome_message"],
+        "warnings": [one._asdict() for one in warnings_of(run)],
         "time_at_end_s": number(time[-1]),
         "peak_speed_m_s": number(speed[peak]),
         "time_of_peak_speed_s": number(time[peak]),
@@ -49,6 +52,7 @@ def summarise(run: xr.Dataset) -> dict[str, Any]:
         "time_of_largest_cable_moment_s": number(time[twist]),
         "energy": energy_balance(run),
         "diagnostics": diagnostics(run),
+        "refinement": json.loads(run.attrs["refinement"]) if "refinement" in run.attrs else None,
     }
 
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from subzero.figures.panel import channel_panel, headline, label, legend, time_label
 from subzero.figures.sheet import Title, sheet
-from subzero.figures.style import LINES, Runs
+from subzero.figures.style import LINES, Runs, warnings_in_short
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -33,7 +33,9 @@ def picture(runs: Runs, title: str, answer: str, command: str) -> Figure:
         command: the channel that was commanded.
     """
     first = next(iter(runs.values()))
-    figure, panels = sheet(2, 2, Title(words=title, scenario=first.attrs["scenario"]))
+    figure, panels = sheet(
+        2, 2, Title(words=title, scenario=first.attrs["scenario"], warnings=warnings_in_short(runs))
+    )
     _track(panels[0], runs)
     for axes, name in zip(panels[1:], (answer, "surge_speed", command), strict=True):
         channel_panel(axes, runs, name)

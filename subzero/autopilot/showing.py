@@ -11,7 +11,7 @@ from rich.table import Table
 
 from subzero import output
 from subzero.errors import printable
-from subzero.report import NOTHING
+from subzero.report import NOTHING, show_warnings
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -48,7 +48,7 @@ def write(measured: Measured, title: str, answer: str, command: str, stage: Stag
 
 
 def tell(summary: dict[str, Any], names: list[str], stage: Stage) -> list[str]:
-    """Print the table of indices and where the files are; return the messages of runs that could not go on."""
+    """Print indices, warnings and where the files are; return the messages of runs that could not go on."""
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     table.add_column("")
     for name in names:
@@ -59,6 +59,7 @@ def tell(summary: dict[str, Any], names: list[str], stage: Stage) -> list[str]:
     console = Console()
     console.print(f"{summary['scenario']}: {summary['title']}", highlight=False, markup=False)
     console.print(table, highlight=False)
+    show_warnings({name: summary[name] for name in names}, console)
     console.print(stage.words(), highlight=False, markup=False)
     return [
         f"The {name} run stopped: {summary[name]['outcome_message']}"

@@ -16,7 +16,7 @@ from .forces import forces
 from .motion import attitude, figure_6, measured
 from .prescribed import exact_tension, figure_4, figure_5, is_straight
 from .sheet import Title
-from .style import Runs
+from .style import Runs, warnings_in_short
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -45,7 +45,9 @@ def draw(runs: Runs, record: Record | None = None) -> dict[str, Figure]:
         record: what was measured, drawn as dots.
     """
     first = next(iter(runs.values()))
-    title = Title(words=first.attrs["title"], scenario=first.attrs["scenario"])
+    title = Title(
+        words=first.attrs["title"], scenario=first.attrs["scenario"], warnings=warnings_in_short(runs)
+    )
     figures = _prescribed(runs, title) if first.attrs["prescribed"] else _commanded(runs, record, title)
     if "tethered" in runs and is_deployed(runs["tethered"]):
         figures["deployment"] = deployment(runs["tethered"], title)

@@ -14,7 +14,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from .style import DPI, GREY, LARGE, NORMAL, PALE, SMALL
+from .style import DPI, GREY, LARGE, NORMAL, ORANGE, PALE, SMALL
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,6 +28,9 @@ LEFT, RIGHT = 0.1, 0.985
 BOTTOM, TOP, TITLE_LINE = 0.42, 0.31, 0.16
 """Below the panels; above them without the title; one line of the title. [inch]"""
 
+FOOTER, FOOTER_LENGTH = 0.16, 110
+"""Height of the line of warnings below the panels [inch], and how many letters fit on it."""
+
 TITLE_LENGTH = 86
 """So many letters of a title fit on a line, with the scenario's name to its right."""
 
@@ -37,25 +40,30 @@ LETTERS = 26
 
 @dataclass(frozen=True, kw_only=True)
 class Title:
-    """What stands above a figure: the trial in words, and the name of its scenario."""
+    """What stands above a figure: the trial in words, and the name of its scenario; and what warns of it, below."""
 
     words: str
     scenario: str
+    warnings: str = ""
 
 
 def sheet(rows: int, columns: int, title: Title) -> tuple[Figure, list[Axes]]:
     """Return a figure and its empty, styled panels in reading order, lettered if there are several."""
     words = textwrap.wrap(title.words, TITLE_LENGTH)[:2]
     top = TOP + TITLE_LINE * len(words)
-    height = rows * ROW_HEIGHT + BOTTOM + top
+    bottom = BOTTOM + (FOOTER if title.warnings else 0.0)
+    height = rows * ROW_HEIGHT + bottom + top
     figure = Figure(figsize=(WIDTH, height), dpi=DPI, facecolor="white")
     FigureCanvasAgg(figure)
-    figure.subplots_adjust(left=LEFT, right=RIGHT, bottom=BOTTOM / height, top=1.0 - top / height)
+    figure.subplots_adjust(left=LEFT, right=RIGHT, bottom=bottom / height, top=1.0 - top / height)
     figure.subplots_adjust(wspace=0.28, hspace=0.36)
     y = 1.0 - 0.09 / height
     figure.text(LEFT, y, "\n".join(words), va="top", fontsize=LARGE, parse_math=False)
     corner: dict[str, Any] = {"ha": "right", "fontsize": SMALL, "color": GREY}
     figure.text(RIGHT, y, title.scenario, va="top", parse_math=False, **corner)
+    if title.warnings:
+        footer = textwrap.shorten(title.warnings, FOOTER_LENGTH, placeholder=" …")
+        figure.text(LEFT, 0.06 / height, footer, fontsize=SMALL, color=ORANGE, parse_math=False)
     panels = [figure.add_subplot(rows, columns, at + 1) for at in range(rows * columns)]
     for at, axes in enumerate(panels):
         _style(axes)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from subzero.validity import warnings_of
+
 if TYPE_CHECKING:
     import xarray as xr
 
@@ -28,3 +30,18 @@ DOTS: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 2.6, "
 DPI = 150
 TINY, SMALL, NORMAL, LARGE = 6.8, 7.5, 8.5, 9.5
 """Font sizes. [pt]"""
+
+
+def warnings_in_short(runs: Runs) -> str:
+    """Return how many warnings some runs end with, and which checks have them, for a line of a figure; or nothing."""
+    names = {label: [one.check.replace("_", " ") for one in warnings_of(run)] for label, run in runs.items()}
+    count = sum(map(len, names.values()))
+    if not count:
+        return ""
+    several = len(runs) > 1
+    parts = [
+        (f"{label}: " if several else "") + ", ".join(dict.fromkeys(checks))
+        for label, checks in names.items()
+        if checks
+    ]
+    return f"{count} warning{'s' if count > 1 else ''} ({'; '.join(parts)}), see summary.json"

@@ -9,8 +9,9 @@ import sys
 
 import pytest
 
+import scenarios
 from subzero import autopilot
-from subzero.cli import FINE, MISTAKE, main
+from subzero.cli import FINE, MISTAKE, STOPPED, main
 
 FILES = {"manoeuvre.png", "summary.json", "tethered.csv", "tethered.nc", "untethered.csv", "untethered.nc"}
 
@@ -24,6 +25,18 @@ def test_a_manoeuvre_delivers_both_runs_and_their_indices(tmp_path, capsys):
     told = capsys.readouterr().out
     assert "overshoot_1_deg" in told
     assert "tethered" in told
+
+
+def test_a_manoeuvre_below_the_sea_bed_warns_and_under_strict_exits_with_3(tmp_path, capsys):
+    """A bed half a metre deep below a vehicle that starts at one metre."""
+    text = scenarios.path("fig6").read_text(encoding="utf-8").replace("sea_bed_m = 0.0", "sea_bed_m = 0.5")
+    (tmp_path / "mine.toml").write_text(text, encoding="utf-8")
+    words = ["manoeuvre", "zigzag", "--scenario", str(tmp_path / "mine.toml"), "--out", str(tmp_path / "z")]
+    assert main([*words, "--strict"]) == STOPPED
+    said = capsys.readouterr()
+    assert " ".join(said.out.split()).count("The vehicle is below the sea bed at 0.5 m from 0 s on") == 2
+    assert "Warnings under --strict: " in said.err
+    assert {path.name for path in (tmp_path / "z").iterdir()} == FILES
 
 
 @pytest.mark.slow

@@ -183,7 +183,7 @@ def test_a_full_disk_is_told_whoever_writes(tmp_path):
 
 
 def test_an_interrupt_after_the_last_move_is_told_as_it_is(tmp_path, rails, monkeypatch, capsys):
-    def interrupted(*_):
+    def interrupted(*_, **__):
         raise KeyboardInterrupt
 
     monkeypatch.setattr("subzero.delivery.tell", interrupted)

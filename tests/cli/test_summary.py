@@ -67,6 +67,7 @@ def test_the_table_shows_the_runs_side_by_side(run):
     assert "tethered untethered" in rows
     for row in (
         "outcome completed, 0.2 s completed, 0.2 s",
+        "warnings 0 0",
         "peak speed [m/s] 2.000 at 0.1 s 1.000 at 0.1 s",
         "speed at the end [m/s] 1.000 0.500",
         "heading at the end [degree] 370.00 370.00",

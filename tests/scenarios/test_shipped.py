@@ -113,6 +113,8 @@ def test_the_cable_is_table_1_and_the_drum_that_of_section_4():
         "normal_drag_coefficient": 1.0,
         "compliance": 0.0,
         "bending_stiffness": 0.0,
+        "strength": 0.0,
+        "minimum_bend_radius": 0.0,
     }
     assert trial.drum == {"radius": 0.1, "inertia": 0.0, "friction_torque": 0.0}
 

@@ -68,6 +68,29 @@ def test_the_other_winches_and_grading_are_read(read):
     assert read(BASE.replace("[motion]", "grading = 0.02\n[motion]")).grading == 0.02
 
 
+def test_a_sea_bed_is_read_and_is_not_known_by_default(read):
+    assert read(BASE + AROUND.replace("[water]", "[water]\nsea_bed_m = 35.5")).sea_bed == 35.5
+    assert read(BASE + AROUND).sea_bed == 0.0
+    with pytest.raises(
+        scenarios.ScenarioError, match=r"sea_bed_m: found -3\.0, but this is outside its limits"
+    ):
+        read(BASE + AROUND.replace("[water]", "[water]\nsea_bed_m = -3.0"))
+
+
+@pytest.mark.parametrize("key", ["strength", "minimum_bend_radius"])
+def test_a_cable_file_may_leave_out_what_the_cable_may_bear(key, read, tmp_path):
+    table1 = scenarios.path("fig6").parent.parent / "cables" / "table1.toml"
+    lines = [line for line in table1.read_text().splitlines() if not line.startswith(key)]
+    (tmp_path / "own.toml").write_text("\n".join(lines))
+    own = BASE.replace('"table1"', '"own.toml"')
+    assert read(own).cable[key] == 0.0
+    assert read(f'{own}[changes]\n"cable.{key}" = 2.5\n').cable[key] == 2.5
+    with pytest.raises(
+        scenarios.ScenarioError, match=rf"cable\.{key}: found -1\.0, but this is outside its limits"
+    ):
+        read(f'{own}[changes]\n"cable.{key}" = -1.0\n')
+
+
 def test_a_cable_file_may_leave_out_the_bending_stiffness(read, tmp_path):
     table1 = scenarios.path("fig6").parent.parent / "cables" / "table1.toml"
     lines = [line for line in table1.read_text().splitlines() if not line.startswith("bending_stiffness")]

@@ -1,0 +1,391 @@
+"""Does a run that is wrong say so? Random coupled trials, each held against a fourfold refinement of itself.
+
+    python -m benchmarks.trust 60 --seed 0 --jobs 2          # trials 0 … 59; prints the tables
+    python -m benchmarks.trust 1 --seed 17 --show            # one of them, in full
+
+Trial n is drawn from the generator of seed n alone, so an offender is reproduced by its number, `draw(n)`. Each is run
+at its own steps and with all steps and segments a quarter as long. The error of the force is
+
+    max over t of |F(t) − F_fine(t)| / max over t of |F_fine(t)|
+
+with F the force of the cable on the vehicle in body axes, at the times of the coarse run, single-sample jolts included:
+a cable that goes taut in one sample is a force that somebody will read. Where the fine run stops, or the pull of the
+cable never reaches `NO_PULL`, there is nothing to judge by.
+
+    wrong      completed, and the force is off by more than 3 %, or the residual of the energies above 5 %
+    silent     wrong, without a numerical warning
+    unchecked  silent, and not even `subzero.check`, with half the steps, changes the tow force by more than 1 %
+    right      within 1 %, force and energies
+    false      right, with a numerical warning
+"""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import json
+from collections.abc import Callable, Iterable
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+import xarray as xr
+
+import scenarios
+import subzero
+from scenarios.trial import CONTROLS
+from subzero.refinement import MOST, refine
+
+WRONG, RIGHT = 0.03, 0.01
+"""Error of the force from which a run is wrong, and up to which it is right. [-]"""
+LARGEST_RESIDUAL = 0.05
+"""Residual of the energy balance, as a share of its largest term, from which a run is wrong. [-]"""
+NO_PULL = 1e-3
+"""A cable that never pulls harder than this has no force to judge. [N]"""
+REFINEMENT = 4.0
+WATER = 1000.0
+"""Density of the water. [kg/m³]"""
+NUMERICAL = ("energy_residual", "tow_force", "ill_posed_drum", "slack", "closure", "push")
+"""Checks that say that numbers are wrong; all others say what happened."""
+PULL = ("cable_force_forward", "cable_force_starboard", "cable_force_down")
+ENERGIES = ("propeller_work", "hull_loss", "cable_loss", "kinetic_change", "drum", "added_mass_term")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Verdict:
+    """What a trial came to.
+
+    Attributes:
+        seed: of the trial.
+        tags: what there is in it.
+        outcome: of the run at its own steps; "no reference" where the fine run stopped.
+        force_error, smooth_error: of the tow force; and without jolts of a single sample. [-]
+        largest_force: of the fine run. [N]
+        check: by which share half the steps change the tow force. [-]
+        residual: largest residual of the energies, as a share of the largest term of the run. [-]
+        warnings: check → how many sentences.
+        seconds: of the run and of the fine one.
+    """
+
+    seed: int
+    tags: tuple[str, ...]
+    outcome: str
+    force_error: float = np.nan
+    smooth_error: float = np.nan
+    largest_force: float = 0.0
+    check: float = np.nan
+    residual: float = np.nan
+    warnings: tuple[str, ...] = ()
+    seconds: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def numerical(self) -> bool:
+        """Whether a warning says that numbers may be wrong."""
+        return any(name in NUMERICAL for name in self.warnings)
+
+    @property
+    def judged(self) -> bool:
+        """Whether the run ended well, and so did its reference."""
+        return self.outcome == "completed"
+
+    @property
+    def wrong(self) -> bool:
+        """Whether force or energies are wrong."""
+        return self.judged and (self.force_error > WRONG or self.residual > LARGEST_RESIDUAL)
+
+    @property
+    def silent(self) -> bool:
+        """Whether it is wrong without a word."""
+        return self.wrong and not self.numerical
+
+    @property
+    def unchecked(self) -> bool:
+        """Whether not even half the steps would tell."""
+        return self.silent and self.check <= MOST
+
+    @property
+    def right(self) -> bool:
+        """Whether force and energies are right."""
+        return self.judged and self.force_error < RIGHT and self.residual < RIGHT
+
+    @property
+    def false(self) -> bool:
+        """Whether it is right, and warns."""
+        return self.right and self.numerical
+
+
+def draw(seed: int) -> scenarios.Trial:
+    """Return random trial number `seed`."""
+    rng, base = np.random.default_rng(seed), subzero.load_scenario("fig6")
+    kind = rng.choice(["light", "heavy", "umbilical"], p=[0.45, 0.2, 0.35])
+    duration = round(float(rng.uniform(5.0, 20.0)), 1)
+    on_winch = kind == "umbilical" or rng.random() < 0.1
+    winch = _winch(rng, duration) if on_winch else None
+    return dataclasses.replace(
+        base,
+        name=f"trust-{seed}",
+        duration=duration,
+        cable_step=float(rng.choice([0.1, 0.1, 0.1, 0.04, 0.2])),
+        segment_length=float(rng.choice([0.5, 0.5, 0.5, 0.25, 1.0])),
+        start=_start(rng, winch),
+        cable=base.cable | _cable(rng, kind),
+        drum=base.drum | _drum(rng),
+        winch=winch,
+        vessel=_vessel(rng, duration) if rng.random() < 0.3 else None,
+        commands=_commands(rng, duration),
+        **_water(rng),
+    )
+
+
+def _cable(rng: np.random.Generator, kind: str) -> dict[str, float]:
+    """Return a cable: about that of Table 1, several times heavier than water, or a small umbilical that stretches."""
+    low, high = {"light": (0.0015, 0.004), "heavy": (0.0015, 0.004), "umbilical": (0.004, 0.012)}[kind]
+    d = float(rng.uniform(low, high))
+    area = 0.25 * np.pi * d * d
+    ratio = rng.uniform(*{"light": (0.95, 1.25), "heavy": (1.5, 4.0), "umbilical": (1.0, 1.5)}[kind])
+    stretch = 10.0 ** rng.uniform(-6.0, -3.0) if kind == "umbilical" or rng.random() < 0.3 else 0.0
+    return {
+        "diameter": d,
+        "cross_section_area": area,
+        "mass_per_length": float(ratio * WATER * area),
+        "normal_drag_coefficient": float(rng.uniform(1.0, 1.5)),
+        "tangential_drag_coefficient": float(rng.uniform(0.005, 0.02)),
+        "compliance": float(stretch),
+    }
+
+
+def _drum(rng: np.random.Generator) -> dict[str, float]:
+    """Return the inertia and friction of a drum, each of which half of them have."""
+    inertia = 10.0 ** rng.uniform(-5.0, -2.0) if rng.random() < 0.5 else 0.0
+    friction = rng.uniform(0.0, 0.02) if rng.random() < 0.5 else 0.0
+    return {"inertia": float(inertia), "friction_torque": float(friction)}
+
+
+def _winch(rng: np.random.Generator, duration: float) -> scenarios.Winch:
+    """Return a winch of one of the three controls, with one to three setpoints."""
+    control = str(rng.choice(CONTROLS))
+    count = int(rng.integers(1, 4))
+    time = tuple(np.linspace(0.0, 0.7 * duration, count).round(1).tolist())
+    if control == "brake":
+        return scenarios.Winch(control=control)
+    low, high = (0.1, 1.4) if control == "pay_out_rate" else (0.1, 4.0)
+    return scenarios.Winch(control=control, time=time, setpoint=tuple(rng.uniform(low, high, count).tolist()))
+
+
+def _start(rng: np.random.Generator, winch: scenarios.Winch | None) -> scenarios.Start:
+    """Return a start: the cable laid straight, or, where a winch holds it, hanging with 2 to 50 % to spare."""
+    depth, heading = float(rng.uniform(2.0, 20.0)), float(rng.uniform(-np.pi, np.pi))
+    speed = float(rng.choice([0.0, 0.0, rng.uniform(0.2, 1.0)]))
+    wet = float(rng.choice([0.0, rng.uniform(2.0, 30.0)]))
+    place = {}
+    if winch is not None:
+        wet, speed = float(rng.uniform(5.0, 30.0)), 0.0
+        azimuth, way = rng.uniform(-np.pi, np.pi), wet / rng.uniform(1.02, 1.5)
+        down = -min(depth, way * rng.uniform(0.1, 0.9))
+        flat = np.sqrt(way * way - down * down)
+        place = {
+            "drum_north": float(flat * np.cos(azimuth)),
+            "drum_east": float(flat * np.sin(azimuth)),
+            "drum_down": float(down),
+        }
+    return scenarios.Start(heading=heading, depth=depth, surge_speed=speed, wet_length=wet, **place)
+
+
+def _vessel(rng: np.random.Generator, duration: float) -> scenarios.Vessel:
+    """Return a vessel that changes its velocity smoothly, up to half a metre a second."""
+    time = np.linspace(0.0, duration, 4)
+    velocity = np.column_stack([rng.uniform(-0.35, 0.35, (4, 2)), np.zeros(4)])
+    velocity[0] = 0.0
+    return scenarios.Vessel(time=tuple(time.tolist()), velocity=tuple(map(tuple, velocity.tolist())))
+
+
+def _water(rng: np.random.Generator) -> dict[str, object]:
+    """Return still water, a uniform current, or one that changes with depth."""
+    kind = rng.choice(["still", "uniform", "sheared"], p=[0.4, 0.3, 0.3])
+    if kind == "still":
+        return {}
+    current = (*rng.uniform(-0.4, 0.4, 2).tolist(), 0.0)
+    if kind == "uniform":
+        return {"current": current}
+    velocity = np.column_stack([rng.uniform(-0.3, 0.3, (3, 2)), np.zeros(3)])
+    profile = scenarios.Profile(depth=(0.0, 10.0, 30.0), velocity=tuple(map(tuple, velocity.tolist())))
+    return {"current": current, "profile": profile}
+
+
+def _commands(rng: np.random.Generator, duration: float) -> scenarios.Commands:
+    """Return one to five commands: ahead, sometimes a stop or a reversal; rudder and planes as a pilot moves them."""
+    count = int(rng.integers(1, 6))
+    values = np.zeros((count, 4))
+    values[:, 0] = rng.uniform(12.0, 35.0, count)
+    values[:, 1] = np.radians(rng.uniform(-15.0, 15.0, count)) * (rng.random(count) < 0.7)
+    planes = np.radians(rng.uniform(-8.0, 8.0, count)) * (rng.random(count) < 0.5)
+    values[:, 2] = values[:, 3] = planes
+    if count > 1 and rng.random() < 0.25:
+        values[-1, 0] = rng.choice([0.0, -rng.uniform(5.0, 25.0)])
+    time = np.concatenate([[0.0], np.sort(rng.uniform(0.5, 0.9 * duration, count - 1)).round(1)])
+    keep = np.concatenate([[True], np.diff(time) > 0.05])
+    return scenarios.Commands(time=time[keep], values=values[keep])
+
+
+def tags_of(trial: scenarios.Trial) -> tuple[str, ...]:
+    """Return what there is in a trial, for the table."""
+    cable, drum = trial.cable, trial.drum
+    heavy = cable["mass_per_length"] / (WATER * cable["cross_section_area"])
+    propeller, moving = trial.commands.values[:, 0], trial.vessel is not None
+    tags = [
+        f"winch, {trial.winch.control}"
+        if trial.winch
+        else "free drum, " + ("heavy" if heavy > 1.4 else "light")
+    ]
+    if trial.winch is None:
+        tags += ["drum with inertia"] if drum["inertia"] else ["drum without inertia"]
+        tags += ["drum with friction"] if drum["friction_torque"] else ["drum without friction"]
+    tags += [
+        "sheared current" if trial.profile else "uniform current" if any(trial.current) else "still water"
+    ]
+    tags += ["vessel"] if moving else []
+    tags += ["stretch"] if cable["compliance"] else []
+    tags += ["reversal"] if propeller.min() < 0.0 else ["stop"] if propeller.min() == 0.0 else []
+    return tuple(tags)
+
+
+def refined(trial: scenarios.Trial, factor: float = REFINEMENT) -> scenarios.Trial:
+    """Return a trial with all steps and segments so many times shorter."""
+    names = ("hull_step", "cable_step", "segment_length", "grading")
+    return dataclasses.replace(trial, **{name: getattr(trial, name) / factor for name in names})
+
+
+def pull_of(run: xr.Dataset) -> np.ndarray:
+    """Return the force of the cable on the vehicle, body axes (n, 3). [N]."""
+    return np.stack([run[name].values for name in PULL], axis=1)
+
+
+def force_errors(run: xr.Dataset, fine: xr.Dataset) -> tuple[float, float, float]:
+    """Return the error of the tow force, the same without jolts of one sample, and the largest force. [-], [N]."""
+    time, there = run["time"].values, fine["time"].values
+    F = pull_of(fine)
+    reference = np.stack([np.interp(time, there, one) for one in F.T], axis=1)
+    largest = float(np.linalg.norm(F, axis=1).max())
+    error = np.linalg.norm(pull_of(run) - reference, axis=1)
+    calm = np.minimum.reduce([error[:-1], error[1:]]) if error.size > 1 else error
+    return float(error.max()) / largest, float(calm.max()) / largest, largest
+
+
+def residual_of(run: xr.Dataset) -> float:
+    """Return the largest residual of the energies, as a share of the largest term. [-]."""
+    largest = max(float(np.abs(run[f"energy_{name}"].values).max()) for name in ENERGIES)
+    return float(np.abs(run["energy_residual"].values).max()) / max(largest, 1e-12)
+
+
+def warned(run: xr.Dataset) -> tuple[str, ...]:
+    """Return the checks that warn."""
+    return tuple(one["check"] for one in json.loads(run.attrs.get("warnings", "[]")))
+
+
+def judge(seed: int) -> Verdict:
+    """Run a trial and its refinement, and compare."""
+    trial = draw(seed)
+    tags, begin = tags_of(trial), perf_counter()
+    try:
+        run = subzero.simulate(trial)
+    except subzero.UserError as error:  # a cable that does not reach its drum in this current
+        return Verdict(seed=seed, tags=tags, outcome=f"refused: {str(error)[:60]}")
+    middle = perf_counter()
+    if run.attrs["outcome"] != "completed":
+        return Verdict(seed=seed, tags=tags, outcome="stopped", warnings=warned(run))
+    check = refine(run, trial).tow_force
+    fine = subzero.simulate(refined(trial))
+    seconds = (middle - begin, perf_counter() - middle)
+    found = {
+        "seed": seed,
+        "tags": tags,
+        "warnings": warned(run),
+        "seconds": seconds,
+        "residual": residual_of(run),
+    }
+    if fine.attrs["outcome"] != "completed":
+        return Verdict(**found, outcome="no reference")
+    error, smooth, largest = force_errors(run, fine)
+    if largest < NO_PULL:
+        return Verdict(**found, outcome="no pull")
+    errors = {"force_error": error, "smooth_error": smooth, "check": check}
+    return Verdict(**found, **errors, outcome="completed", largest_force=largest)
+
+
+def report(verdicts: list[Verdict]) -> str:
+    """Return the tables."""
+    judged = [one for one in verdicts if one.judged]
+    lines = [
+        _counts(verdicts, judged),
+        "",
+        "by what there is in a trial        runs  right  wrong  silent  false",
+    ]
+    for tag in sorted({tag for one in judged for tag in one.tags}):
+        some = [one for one in judged if tag in one.tags]
+        right, *others = (sum(map(_is(name), some)) for name in ("right", "wrong", "silent", "false"))
+        lines.append(f"{tag:32s} {len(some):6d} {right:6d} {others[0]:6d} {others[1]:7d} {others[2]:6d}")
+    for words, test in (("silent and wrong", _is("silent")), ("false warnings", _is("false"))):
+        lines += ["", f"{words}:", *(_line(one) for one in judged if test(one))]
+    lines += ["", "without an end or a reference:"]
+    lines += [f"  {one.seed:6d}  {one.outcome}: {'; '.join(one.tags)}" for one in verdicts if not one.judged]
+    return "\n".join(lines)
+
+
+def _is(name: str) -> Callable[[Verdict], bool]:
+    return lambda verdict: bool(getattr(verdict, name))
+
+
+def _counts(verdicts: list[Verdict], judged: list[Verdict]) -> str:
+    """Return the sums."""
+    names = ("wrong", "silent", "unchecked", "right", "false")
+    wrong, silent, unchecked, right, false = (sum(map(_is(name), judged)) for name in names)
+    others = len(verdicts) - len(judged)
+    share = 100.0 * false / max(right, 1)
+    return (
+        f"{len(verdicts)} trials, {len(judged)} judged, {others} stopped or without a reference\n"
+        f"wrong (force off by > 3 % or residual > 5 %): {wrong}; of them silent: {silent}, and silent under --check: "
+        f"{unchecked}\n"
+        f"right within 1 %: {right}; of them with a numerical warning: {false} ({share:.1f} %)"
+    )
+
+
+def _line(one: Verdict) -> str:
+    """Return a line about an offender."""
+    checks = ", ".join(dict.fromkeys(one.warnings)) or "no warning"
+    return (
+        f"  {one.seed:6d}  force {100 * one.force_error:7.2f} % (without jolts {100 * one.smooth_error:7.2f} %), "
+        f"half the steps {100 * one.check:6.2f} %, residual {100 * one.residual:6.2f} %, {one.largest_force:7.3f} N; "
+        f"{checks}; {'; '.join(one.tags)}"
+    )
+
+
+def judged_all(seeds: Iterable[int], jobs: int) -> list[Verdict]:
+    """Judge trials, in so many processes."""
+    seeds = list(seeds)
+    if jobs <= 1:
+        return [judge(seed) for seed in seeds]
+    with ProcessPoolExecutor(jobs) as pool:
+        return list(pool.map(judge, seeds, chunksize=4))
+
+
+def main() -> None:
+    """Judge, print, and keep the verdicts."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.trust", description=__doc__.splitlines()[0])
+    parser.add_argument("count", type=int, nargs="?", default=60)
+    parser.add_argument("--seed", type=int, default=0, help="of the first trial")
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--show", action="store_true", help="one line for every trial")
+    parser.add_argument("--json", type=Path, help="file for all verdicts")
+    asked = parser.parse_args()
+    verdicts = judged_all(range(asked.seed, asked.seed + asked.count), asked.jobs)
+    if asked.show:
+        print(*(_line(one) for one in verdicts), sep="\n")
+    if asked.json:
+        asked.json.write_text(json.dumps([asdict(one) for one in verdicts], indent=1), encoding="utf-8")
+    print(report(verdicts))
+
+
+if __name__ == "__main__":
+    main()

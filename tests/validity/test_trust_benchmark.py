@@ -1,0 +1,87 @@
+"""The judge of `benchmarks.trust`: same trials from same seeds, errors as it says, verdicts that follow from them."""
+
+import numpy as np
+import pytest
+
+import subzero
+from benchmarks.trust import Verdict, draw, force_errors, judge, refined, residual_of, tags_of
+
+
+def test_a_trial_is_drawn_from_its_seed_alone():
+    one, again, other = draw(7), draw(7), draw(8)
+    np.testing.assert_array_equal(one.commands.values, again.commands.values)
+    assert (one.cable, one.drum, one.start, one.winch) == (again.cable, again.drum, again.start, again.winch)
+    assert one.cable != other.cable
+
+
+def test_sixty_trials_hold_everything_that_can_go_wrong():
+    tags = {tag for seed in range(60) for tag in tags_of(draw(seed))}
+    assert tags >= {
+        "free drum, light", "free drum, heavy", "winch, pay_out_rate", "winch, constant_tension", "winch, brake",
+        "drum with inertia", "drum with friction", "still water", "uniform current", "sheared current", "vessel",
+        "stretch", "reversal", "stop",
+    }  # fmt: skip
+
+
+def test_the_refinement_has_a_quarter_of_all_steps_and_segments():
+    trial = draw(7)
+    fine = refined(trial)
+    for name in ("hull_step", "cable_step", "segment_length"):
+        assert getattr(fine, name) == 0.25 * getattr(trial, name)
+
+
+@pytest.fixture(scope="module")
+def run():
+    return subzero.simulate("fig6")
+
+
+def test_the_error_of_a_force_is_its_largest_difference_as_a_share_of_the_largest_force(run):
+    assert force_errors(run, run)[:2] == (0.0, 0.0)
+    larger = run.assign(
+        {f"cable_force_{axis}": 1.1 * run[f"cable_force_{axis}"] for axis in ("forward", "starboard", "down")}
+    )
+    error, smooth, largest = force_errors(larger, run)
+    assert error == pytest.approx(0.1, rel=1e-9)
+    assert smooth == pytest.approx(0.1, rel=0.02)
+    assert largest == pytest.approx(float(run["cable_tension"].max()), rel=1e-9)
+
+
+def test_a_jolt_of_one_sample_counts_but_not_in_the_error_without_jolts(run):
+    force = run["cable_force_forward"].values.copy()
+    force[100] *= 3.0
+    error, smooth, largest = force_errors(run.assign(cable_force_forward=("time", force)), run)
+    assert error == pytest.approx(2.0 * abs(force[99]) / largest, rel=0.02)
+    assert smooth == 0.0
+
+
+def test_the_residual_is_the_largest_of_the_run(run):
+    work = run["energy_propeller_work"].values
+    bump = np.where(np.arange(work.size) == 50, 0.06 * work[-1], 0.0)
+    assert residual_of(run.assign(energy_residual=("time", bump))) == pytest.approx(0.06, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    "force_error, residual, warnings, verdicts",
+    [
+        (0.05, 0.0, (), ("wrong", "silent")),
+        (0.005, 0.06, (), ("wrong", "silent")),
+        (0.05, 0.0, ("above_surface",), ("wrong", "silent")),
+        (0.05, 0.0, ("tow_force",), ("wrong",)),
+        (0.005, 0.0, ("slack",), ("right", "false")),
+        (0.005, 0.0, ("above_surface",), ("right",)),
+        (0.02, 0.0, ("slack",), ()),
+    ],
+)
+def test_verdicts_follow_from_errors_and_warnings(force_error, residual, warnings, verdicts):
+    numbers = {"force_error": force_error, "residual": residual, "warnings": warnings, "check": 0.02}
+    verdict = Verdict(seed=0, tags=(), outcome="completed", **numbers)
+    for name in ("wrong", "silent", "right", "false"):
+        assert getattr(verdict, name) is (name in verdicts), name
+    assert not verdict.unchecked  # half the steps change the force by 2 %: the check would have told
+
+
+@pytest.mark.slow
+def test_of_thirty_trials_none_is_wrong_without_a_word():
+    verdicts = [judge(seed) for seed in range(30)]
+    assert sum(one.judged for one in verdicts) >= 28
+    assert [one.seed for one in verdicts if one.silent] == []

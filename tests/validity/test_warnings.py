@@ -1,0 +1,383 @@
+"""A run that may be wrong says so: each check of `subzero.validity` warns where it must, and only there.
+
+Configuration: fig6, shortened or with one thing changed, so that a check warns for a reason that is known beforehand.
+The numbers in a sentence (how much, since when) are held against what was asked for, or against the run itself.
+"""
+
+import dataclasses
+import json
+from functools import cache
+
+import numpy as np
+import pytest
+
+import scenarios
+import subzero
+from subzero.validity import CHECKS, bend_radii, drum_is_ill_posed, roughness
+
+FIG6 = subzero.load_scenario("fig6")
+HEAVY = {"mass_per_length": 0.02}
+"""0.15 N a metre in the water, on a vehicle that pulls with some 3 N."""
+
+
+def trial_of(*, held=None, start=None, cable=None, drum=None, **fields):
+    """Return fig6 with other things; `held` is one command for the whole run, rev/s and degrees."""
+    if held is not None:
+        values = np.array([[held[0], *np.radians(held[1:])]])
+        fields["commands"] = scenarios.Commands(time=np.zeros(1), values=values)
+    return dataclasses.replace(
+        FIG6,
+        start=dataclasses.replace(FIG6.start, **(start or {})),
+        cable=FIG6.cable | (cable or {}),
+        drum=FIG6.drum | (drum or {}),
+        **fields,
+    )
+
+
+def warned(trial, *, tethered=True, model=None):
+    """Return check → sentences of a run that reaches its end."""
+    run = subzero.simulate(trial, tethered=tethered, model=model)
+    assert run.attrs["outcome"] == "completed", run.attrs["outcome_message"]
+    found = {}
+    for check, message in subzero.warnings_of(run):
+        found.setdefault(check, []).append(message)
+    return found
+
+
+@cache
+def plain():
+    return subzero.simulate(FIG6)
+
+
+def checked(run, trial=FIG6, *, check):
+    """Return what one check says of a run."""
+    return CHECKS[check](run, trial, subzero.Model.of(trial))
+
+
+SHIPPED = {
+    "current": {"tow_force"},
+    "rov_umbilical": {"slack", "bend_radius"},
+    "stop_and_drift": {"tow_force"},
+}
+"""Scenarios that end with warnings, and why: half the steps change the tow force of `current` and `stop_and_drift` by
+2 %; the umbilical begins with some centimetres of cable at a vehicle at rest."""
+
+
+@pytest.mark.parametrize("tethered", [True, False], ids=["tethered", "untethered"])
+@pytest.mark.parametrize("name", scenarios.names())
+def test_shipped_scenarios_warn_of_what_is_known_and_of_nothing_else(name, tethered):
+    run = subzero.simulate(name, tethered=tethered)
+    assert {one.check for one in subzero.warnings_of(run)} == (
+        SHIPPED.get(name, set()) if tethered else set()
+    )
+
+
+# ---- the numbers ----
+
+
+def residual_of(size):
+    """Return fig6 with a residual as given, as a share of the propeller's work at the end (samples,)."""
+    run = plain()
+    work = float(run["energy_propeller_work"].values[-1])
+    return run.assign(energy_residual=("time", size * work))
+
+
+def test_a_residual_that_cancels_later_is_seen():
+    """3 % of the work from 15 to 20 s, nothing at the end."""
+    time = plain()["time"].values
+    (said,) = checked(residual_of(0.03 * ((time > 15.0) & (time < 20.0))), check="energy_residual")
+    assert "since 15.1 s" in said
+    assert "Halve cable_step_s (0.1 s)" in said
+
+
+def test_a_residual_of_a_start_with_hardly_any_energy_is_none():
+    """At 0.5 s the propeller has done 0.2 % of its work; a tenth of that is missing."""
+    time = plain()["time"].values
+    assert not checked(residual_of(2e-4 * (time < 0.5)), check="energy_residual")
+
+
+def test_a_taut_cable_on_a_brake_leaves_energy_unexplained():
+    """Twenty kilograms of cable are stopped by a brake in one step of 0.2 s."""
+    trial = trial_of(
+        held=(30.0, 0.0, 0.0, 0.0),
+        start={"wet_length": 8.0, "drum_north": -4.0, "drum_down": -1.0, "heading": 0.0, "depth": 5.0},
+        winch=scenarios.Winch(control="brake"),
+        cable=HEAVY,
+        cable_step=0.2,
+        duration=20.0,
+    )
+    assert {"energy_residual", "tow_force"} & set(warned(trial))
+
+
+def test_a_jump_between_samples_is_seen_and_its_size_told():
+    """A triangle of one sample and of a tenth of the largest force: a second difference of twice that."""
+    run = plain()
+    force = run["cable_force_forward"].values.copy()
+    force[200] -= 0.1 * np.abs(force).max()
+    (said,) = checked(run.assign(cable_force_forward=("time", force)), check="tow_force")
+    assert "up to 20 % of its largest value (at 20 s" in said
+
+
+def test_a_kink_that_a_winch_was_asked_for_is_none():
+    """A force that rises by a twentieth of its largest value each sample until 2 s, and no more: a kink of 5 %."""
+    run = plain()
+    time = run["time"].values
+    silent = {f"cable_force_{axis}": ("time", 0.0 * time) for axis in ("starboard", "down")}
+    run = run.assign(cable_force_forward=("time", -np.minimum(0.5 * time, 1.0)), **silent)
+    (said,) = checked(run, check="tow_force")
+    assert "up to 5 % of its largest value (at 2 s; by more than 3 % in 1 of 298 samples" in said
+    asked = {
+        at: scenarios.Winch(control="constant_tension", time=(0.0, at), setpoint=(1.0, 2.0))
+        for at in (2.0, 9.0)
+    }
+    assert not checked(run, trial_of(winch=asked[2.0]), check="tow_force")
+    assert checked(run, trial_of(winch=asked[9.0]), check="tow_force")
+
+
+def test_the_roughness_of_a_sine_is_that_of_its_second_difference():
+    """|F(t−h) − 2F + F(t+h)| = 4 sin²(ωh/2) |F| ."""
+    run = plain()
+    time, omega = run["time"].values, 2.0
+    silent = {f"cable_force_{axis}": ("time", 0.0 * time) for axis in ("starboard", "down")}
+    run = run.assign(cable_force_forward=("time", np.sin(omega * time)), **silent)
+    expected = 4.0 * np.sin(0.05 * omega) ** 2
+    assert roughness(run).max() == pytest.approx(expected, rel=1e-3)
+
+
+def test_a_run_in_whose_tow_force_jumps_changes_when_its_steps_are_halved():
+    """`current` warns of its tow force, fig6 does not; halves change the one by 2 %, the other by 0.03 %."""
+    assert subzero.check("current").tow_force > 0.01
+    assert subzero.check("fig6").tow_force < 0.001
+
+
+def test_a_heavy_cable_on_a_free_drum_unwinds_itself():
+    slow = trial_of(held=(8.0, 0.0, 0.0, 0.0), cable=HEAVY, duration=15.0, start={"depth": 5.0})
+    (said,) = warned(slow)["ill_posed_drum"]
+    assert "The cable pulls itself off the free drum: from " in said
+    assert "friction_torque" in said
+
+
+def test_a_drum_that_holds_the_weight_does_not_unwind_itself():
+    """Twenty metres of it would weigh 3 N; a newton of friction holds more than comes off."""
+    held = trial_of(
+        held=(25.0, 0.0, 0.0, 0.0),
+        cable=HEAVY,
+        drum={"friction_torque": 0.1},
+        duration=10.0,
+        start={"depth": 5.0},
+    )
+    assert "ill_posed_drum" not in warned(held)
+
+
+def test_a_drum_is_ill_posed_where_cable_comes_off_faster_than_it_is_pulled_and_nothing_holds_it():
+    """Three samples: pulled, overrunning, and overrunning against a tension; a neutral cable never."""
+    heavy, neutral = (subzero.Model.of(trial_of(cable=cable)) for cable in (HEAVY, {}))
+    tension, payout, away = np.array([0.0, 0.0, 0.5]), np.array([0.5, 0.7, 0.7]), np.full(3, 0.5)
+    ill = drum_is_ill_posed(tension, payout, away, heavy.cable, heavy.drum)
+    assert ill.tolist() == [False, True, False]
+    assert not drum_is_ill_posed(tension, payout, away, neutral.cable, neutral.drum).any()
+
+
+def test_a_winch_that_pays_out_faster_than_the_vehicle_goes_leaves_slack():
+    """1.5 m/s for 5 s and a vehicle of 1 m/s at most: a third and more of the cable is not pulled."""
+    winch = scenarios.Winch(control="pay_out_rate", time=(0.0,), setpoint=(1.5,))
+    (said,) = warned(trial_of(winch=winch, duration=5.0))["slack"]
+    assert float(said.split("Up to ")[1].split(" %")[0]) > 33.0
+
+
+def test_a_cable_that_is_pulled_is_not_slack():
+    assert not checked(plain(), check="slack")
+
+
+def test_the_papers_cable_pushes_and_does_not_close_and_says_so():
+    """A vehicle that is driven backwards pushes the printed cable, until the run stops; ours goes slack."""
+    commands = scenarios.Commands(
+        time=np.array([0.0, 8.0]), values=np.array([[25.0, 0, 0, 0], [-25.0, 0, 0, 0]])
+    )
+    ours = trial_of(commands=commands, duration=9.7)
+    found = warned(dataclasses.replace(ours, scheme="paper"))
+    assert 'Use scheme = "moving_end"' in found["push"][0]
+    assert "ends 0.0" in found["closure"][0]
+    assert not {"push", "closure"} & set(warned(ours))
+
+
+def test_a_cable_that_ends_elsewhere_than_at_the_tow_point_says_so():
+    run = plain()
+    gap = np.where(run["time"].values > 20.0, 0.5, 0.0)
+    (said,) = checked(run.assign(closure_error=("time", gap)), check="closure")
+    assert "ends 0.5 m from the tow point" in said
+    assert "since 20.1 s" in said
+    assert not checked(run, check="closure")
+
+
+# ---- where the equations do not hold ----
+
+
+def test_a_vehicle_that_flies_out_of_the_water_says_when_and_how_far():
+    trial = trial_of(held=(30.0, 0.0, 6.0, 6.0), duration=20.0)
+    run = subzero.simulate(trial)
+    said = checked(run, trial, check="above_surface")
+    depth, time = run["depth"].values, run["time"].values
+    first = time[np.argmax(depth < -0.05)]
+    assert said[0].startswith(
+        f"The vehicle is above the surface from {first:g} s on, and at a depth of {depth.min():.3g} m"
+    )
+    assert said[1].startswith("The cable is above the surface from ")
+
+
+def test_a_vehicle_that_starts_at_the_surface_is_not_above_it():
+    trial = trial_of(held=(20.0, 0.0, 0.0, 0.0), start={"depth": 0.0}, duration=5.0)
+    assert "above_surface" not in warned(trial)
+
+
+def test_a_cable_that_floats_up_says_so_though_the_vehicle_stays_below():
+    """Half as heavy as water, 25 m of it laid half a metre deep."""
+    trial = trial_of(
+        held=(25.0, 0.0, 0.0, 0.0),
+        cable={"mass_per_length": 0.0025},
+        start={"depth": 0.3, "wet_length": 25.0},
+        duration=15.0,
+    )
+    said = warned(trial)["above_surface"]
+    assert [one.split(" is ")[0] for one in said] == ["The cable"]
+
+
+@pytest.mark.parametrize("tethered", [True, False])
+def test_a_dive_below_the_sea_bed_says_when(tethered):
+    dive = subzero.load_scenario("dive")
+    run = subzero.simulate(dive, tethered=tethered)
+    depth = run["depth"].values
+    bed = 0.5 * float(depth[0] + depth.max())
+    said = checked(run, dataclasses.replace(dive, sea_bed=bed), check="below_sea_bed")
+    first = run["time"].values[np.argmax(depth > bed)]
+    assert said[0].startswith(f"The vehicle is below the sea bed at {bed:g} m from {first:g} s on")
+    assert not checked(run, dataclasses.replace(dive, sea_bed=depth.max() + 1.0), check="below_sea_bed")
+    assert not checked(run, dataclasses.replace(dive, sea_bed=0.0), check="below_sea_bed")
+
+
+def test_a_heavy_cable_sinks_into_the_sea_bed_though_the_vehicle_stays_above():
+    trial = trial_of(
+        held=(25.0, 0.0, 0.0, 0.0),
+        cable=HEAVY,
+        start={"depth": 2.0, "wet_length": 20.0},
+        duration=6.0,
+        sea_bed=2.5,
+    )
+    assert [one.split(" is ")[0] for one in warned(trial)["below_sea_bed"]] == ["The cable"]
+
+
+@pytest.mark.parametrize("share, warns", [(0.9, True), (1.1, False)])
+def test_a_cable_that_pulls_harder_than_it_may_says_so(share, warns):
+    most = share * float(np.nanmax(plain()["cable_node_tension"].values))
+    said = checked(plain(), trial_of(cable={"strength": most}), check="strength")
+    assert bool(said) is warns
+    assert all(f"may carry {most:g} N" in one for one in said)
+
+
+def ring(radius):
+    """Return fig6 whose cable is a taut circle at all times: ten nodes, 10 degrees apart."""
+    run, angle = plain(), np.radians(10.0 * np.arange(10))
+    circle = radius * np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=1)
+    place = np.broadcast_to(circle, (run.sizes["time"], 10, 3))
+    run = run.drop_vars(["cable_position", "cable_node_tension"])
+    return run.assign(
+        cable_position=(("time", "node", "earth_axis"), place),
+        cable_node_tension=(("time", "node"), np.ones(place.shape[:2])),
+    )
+
+
+def test_the_bend_radius_of_a_circle_is_its_radius():
+    np.testing.assert_allclose(bend_radii(ring(2.0)), 2.0, rtol=1e-12)
+
+
+@pytest.mark.parametrize("least, warns", [(2.1, True), (1.9, False)])
+def test_a_cable_that_is_bent_too_tightly_says_so(least, warns):
+    said = checked(ring(2.0), trial_of(cable={"minimum_bend_radius": least}), check="bend_radius")
+    assert bool(said) is warns
+    assert all("The cable is bent to a radius of 2 m at " in one for one in said)
+    assert all(f"may be bent to {least:g} m" in one for one in said)
+
+
+def test_a_bend_where_nothing_pulls_is_none():
+    run = ring(2.0)
+    run["cable_node_tension"] = 0.0 * run["cable_node_tension"]
+    assert np.isinf(bend_radii(run)).all()
+
+
+# ---- what was asked for ----
+
+
+@pytest.mark.parametrize("tethered", [True, False])
+def test_a_rudder_command_beyond_its_limit_says_how_much_is_cut_off(tethered):
+    trial = trial_of(held=(20.0, 40.0, 0.0, 0.0), duration=3.0)
+    (said,) = warned(trial, tethered=tethered)["actuators"]
+    limit = np.degrees(0.3491)
+    assert f"The rudder is commanded to 40° and goes to {limit:.4g}°" in said
+    assert f"up to {40.0 - limit:.3g}° are cut off, first at 0 s" in said
+
+
+def test_a_rudder_command_within_its_limit_is_fine():
+    assert "actuators" not in warned(trial_of(held=(20.0, 19.0, 0.0, 0.0), duration=3.0))
+
+
+def test_a_rudder_that_stays_at_its_limit_has_nothing_left_to_steer_with():
+    trial = trial_of(held=(20.0, 20.0, 0.0, 0.0), duration=12.0)
+    (said,) = warned(trial, tethered=False)["actuators"]
+    assert "The rudder is at its limit of 20" in said
+
+
+def test_a_propeller_that_is_asked_for_more_than_a_full_battery_gives():
+    """5 rev/s per volt and 9.6 V are 48 rev/s."""
+    (said,) = warned(trial_of(held=(60.0, 0.0, 0.0, 0.0), duration=2.0), tethered=False)["actuators"]
+    assert "commanded to 60 rev/s, and the full battery drives it at 48 rev/s at most" in said
+
+
+def test_a_propeller_that_the_battery_leaves_behind_its_command():
+    model = subzero.Model.of(FIG6)
+    weak = dataclasses.replace(
+        model, vehicle=model.vehicle.with_parameter("battery.voltage_drop_per_charge", 0.5)
+    )
+    (said,) = warned(FIG6, tethered=False, model=weak)["actuators"]
+    assert "behind its command" in said
+    assert "actuators" not in warned(FIG6, tethered=False)
+
+
+def test_a_servo_that_is_too_slow_for_its_commands_says_so():
+    """A degree a second, and commands that swing by 20 degrees every 5 s."""
+    model = subzero.Model.of(FIG6)
+    slow = model.vehicle.with_parameter("rudder_servo.rate_limit", np.radians(1.0))
+    time = np.arange(0.0, 30.0, 5.0)
+    values = np.stack(
+        [0.0 * time + 20.0, np.radians(10.0) * (-1.0) ** np.arange(6), 0.0 * time, 0.0 * time], axis=1
+    )
+    trial = dataclasses.replace(FIG6, commands=scenarios.Commands(time=time, values=values))
+    (said,) = warned(trial, tethered=False, model=dataclasses.replace(model, vehicle=slow))["actuators"]
+    assert "The rudder turns as fast as it can, 1°/s, " in said
+    assert "actuators" not in warned(trial, tethered=False)
+
+
+# ---- where they stand ----
+
+
+def test_warnings_stand_in_the_attributes_as_json_and_survive_a_file(tmp_path):
+    import xarray as xr
+
+    run = subzero.simulate(trial_of(held=(60.0, 40.0, 0.0, 0.0), duration=1.0), tethered=False)
+    assert [one["check"] for one in json.loads(run.attrs["warnings"])] == ["actuators", "actuators"]
+    run.to_netcdf(tmp_path / "run.nc")
+    with xr.open_dataset(tmp_path / "run.nc") as again:
+        assert subzero.warnings_of(again) == subzero.warnings_of(run)
+
+
+def test_a_run_of_an_older_version_carries_none():
+    run = plain().copy()
+    del run.attrs["warnings"]
+    assert subzero.warnings_of(run) == ()
+
+
+def test_a_stepped_run_ends_with_the_same_warnings():
+    sim = subzero.Simulator(trial_of(duration=3.0), tethered=False)
+    while sim.time < 3.0 - 1e-6:
+        sim.step((20.0, np.radians(40.0), 0.0, 0.0))
+    (one,) = subzero.warnings_of(sim.result())
+    assert "The rudder is commanded to 40°" in one.message
