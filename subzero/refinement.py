@@ -1,5 +1,7 @@
 """How much a run changes when it is computed more finely: with half the steps and half the segment length.
 
+That is half of what the run was taken with, which is finer than its trial says where its `rtol` asked for it.
+
 What the halves change is about as large as the error that is left, for a scheme of first order, and three times as
 large for one of second order: a measure of the numbers, not of the physics, and no proof: both may miss the same.
 """
@@ -147,13 +149,17 @@ def refine(
 ) -> Refinement:
     """Set a run of a trial beside a finer one; arguments as `check`."""
     other: dict[str, Any] = {"model": model, "later": later} if model or later else {}
-    finer = simulate(halved(trial), tethered=bool(run.attrs["tethered"]), **other, progress=progress)
+    halvings = json.loads(run.attrs.get("accuracy", "{}")).get("halvings", 0)
+    finer = simulate(
+        halved(trial, halvings + 1), tethered=bool(run.attrs["tethered"]), **other, progress=progress
+    )
     return Refinement(run=run, finer=finer, table=table_of(run, finer))
 
 
-def halved(trial: scenarios.Trial) -> scenarios.Trial:
-    """Return a trial with half the steps and half the segment length."""
-    return dataclasses.replace(trial, **{name: 0.5 * getattr(trial, name) for name in HALVED})
+def halved(trial: scenarios.Trial, times: int = 1) -> scenarios.Trial:
+    """Return a trial with steps and segments halved so many times, taken as they are."""
+    finer = {name: 0.5**times * getattr(trial, name) for name in HALVED}
+    return dataclasses.replace(trial, rtol=0.0, **finer)
 
 
 def table_of(run: xr.Dataset, finer: xr.Dataset) -> xr.Dataset:

@@ -4,7 +4,7 @@ A check takes a run, its trial and its model, and answers with sentences, none i
 much, since when, and what to do. They stand in ``attrs["warnings"]`` of the run (`warnings_of` reads them), in
 ``summary.json``, on the terminal and in the footer of figures.
 
-The first five checks doubt the numbers; the others say that what was asked for cannot be, or that an equation does not
+The first seven checks doubt the numbers; the others say that what was asked for cannot be, or that an equation does not
 hold where the run went: there is no air and no sea bed in them, and nothing breaks. A check that has no say, such as
 that of the energies under the paper's scheme, which keeps no balance, is silent.
 
@@ -120,12 +120,34 @@ def energy_residual(run: xr.Dataset, trial: scenarios.Trial, _: Model) -> list[s
     ]
 
 
+def resolution(run: xr.Dataset, trial: scenarios.Trial, _: Model) -> list[str]:
+    """Steps and segments twice as long give another tow force, however fine they are: `subzero.convergence`."""
+    accuracy = json.loads(run.attrs.get("accuracy", "{}"))
+    if not accuracy or is_resolved(run):
+        return []
+    error, finer = accuracy["force_error"], 2 ** accuracy["halvings"]
+    how = f"by {_percent(error)} of its largest value" if error is not None else "beyond where that can go on"
+    return [
+        f"The tow force depends on steps and segments: from twice as long ones to these ({finer} times as fine as "
+        f"given) it changes {how} (at {accuracy['time']:g} s; run.rtol allows {_percent(trial.rtol)}). Either they are "
+        "still too long, or the problem is ill-posed: a heavy cable, or one in a cross current, on a drum that does not hold it, "
+        "or a cable that snaps taut. Give the drum friction_torque or a [winch], or the cable bending_stiffness."
+    ]
+
+
+def is_resolved(run: xr.Dataset) -> bool:
+    """Say whether a coarser run has confirmed the tow force of this one within its trial's rtol."""
+    accuracy = json.loads(run.attrs.get("accuracy", "{}"))
+    error = accuracy.get("force_error")
+    return error is not None and error <= accuracy["rtol"]
+
+
 def tow_force(run: xr.Dataset, trial: scenarios.Trial, model: Model) -> list[str]:
-    """The tow force jumps from sample to sample: what it does between them, nobody knows.
+    """The tow force jumps from sample to sample, and no coarser run has confirmed it.
 
     A kink that a winch was asked for is none: where its setpoint changes its slope, a right force has one too.
     """
-    if not run.attrs["tethered"]:
+    if not run.attrs["tethered"] or is_resolved(run):
         return []
     jump, time = roughness(run), run["time"].values[2:-1]
     for kink in model.winch.time[1:] if model.winch is not None and jump.size else ():
@@ -468,6 +490,7 @@ def _node_depths(run: xr.Dataset, model: Model) -> np.ndarray:
 
 CHECKS: dict[str, Check] = {
     "energy_residual": energy_residual,
+    "resolution": resolution,
     "tow_force": tow_force,
     "ill_posed_drum": ill_posed_drum,
     "slack": slack,
