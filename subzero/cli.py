@@ -176,11 +176,7 @@ def _checked(scenario: str, commands: Path | None) -> scenarios.Trial:
 
 
 def _progress(trial: scenarios.Trial) -> ProgressBar:
-    """Return a progress bar, after saying why the first run of all takes long."""
-    from subzero.compiled import is_warm
-    from subzero.progress import ProgressBar
+    """Return a progress bar for the simulation of a trial."""
+    from subzero.progress import progress_bar
 
-    console = Console(stderr=True, highlight=False)
-    if not is_warm():
-        console.print("Compiling the kernels (first use, about 50 s)…")
-    return ProgressBar(f"Simulating {trial.name}", console)
+    return progress_bar(f"Simulating {trial.name}")

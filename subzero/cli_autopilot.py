@@ -134,8 +134,9 @@ def _deliver(fly: Callable[[], Measured], folder: Path, title: str, shown: tuple
     """Fly, write and tell; return the exit code."""
     from subzero.autopilot import showing
     from subzero.output import staged
+    from subzero.progress import progress_bar
 
-    with staged(folder) as stage:
+    with staged(folder) as stage, progress_bar("Flying"):
         measured = fly()
         summary = showing.write(measured, title, *shown, stage)
     stopped = showing.tell(summary, list(measured), stage)

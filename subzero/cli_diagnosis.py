@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import cyclopts
 from cyclopts import Parameter
-from rich.console import Console
 
 import scenarios
 from subzero.interrupts import INTERRUPTED, patience
+from subzero.progress import progress_bar
 
 if TYPE_CHECKING:
     from subzero.diagnosis.effect import Effect
@@ -89,7 +89,7 @@ def challenge(
     from subzero.diagnosis.challenge import challenge as hide
     from subzero.output import staged
 
-    with staged(out) as stage, _bar("Hiding an effect"):
+    with staged(out) as stage, progress_bar("Hiding an effect"):
         hide(scenario, seed, stage.path)
     print(stage.words())
     print(f"Find it: subzero diagnose {out / 'record.csv'} --scenario {scenario}")
@@ -140,7 +140,7 @@ def _read(paths: list[Path], scenario: str | None, commands: str | None) -> list
     """Read the records; the compiler is needed to see whether their units are plausible."""
     from subzero.diagnosis.records import read_trials
 
-    with _bar("Reading"):
+    with progress_bar("Reading"):
         return read_trials(paths, scenario=scenario, commands=commands)
 
 
@@ -149,19 +149,8 @@ def _ask(logged: list[Logged], own: tuple[Effect, ...], seed: int, budget: str) 
     from subzero.delivery_diagnosis import tell_before
     from subzero.diagnosis.entrance import diagnose as run
 
-    with _bar("Diagnosing") as progress:
+    with progress_bar("Diagnosing") as progress:
         verdict = run(logged, effects=own, progress=progress, seed=seed, budget=budget, seen=tell_before)
     if not verdict.complete:
         print("Interrupted; what it has is written.", file=sys.stderr)
     return verdict
-
-
-def _bar(words: str) -> Any:
-    """Return a progress bar, after saying why the first run of all takes long."""
-    from subzero.compiled import is_warm
-    from subzero.progress import ProgressBar
-
-    console = Console(stderr=True, highlight=False)
-    if not is_warm():
-        console.print("Compiling the kernels (first use, about 50 s)…")
-    return ProgressBar(words, console)
