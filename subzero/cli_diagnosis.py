@@ -11,6 +11,7 @@ import cyclopts
 from cyclopts import Parameter
 
 import scenarios
+from subzero.errors import UserError
 from subzero.interrupts import INTERRUPTED, patience
 from subzero.progress import progress_bar
 
@@ -25,6 +26,7 @@ LAST_WORDS_S = 60.0
 
 Flag = Annotated[bool, Parameter(negative=())]
 With = Annotated[Path | None, Parameter(name="--with")]
+Own = Annotated[Path | None, Parameter(name="--effects")]
 
 
 def diagnose(
@@ -103,16 +105,20 @@ def add_to(app: cyclopts.App) -> None:
     app.command(challenge)
 
 
-def extended_run(trial: scenarios.Trial, path: Path | None) -> tuple[scenarios.Trial, dict[str, Any]]:
-    """Return a trial and what to run it with, as an extended model says (``--with``)."""
+def extended_run(
+    trial: scenarios.Trial, path: Path | None, own: Path | None
+) -> tuple[scenarios.Trial, dict[str, Any]]:
+    """Return a trial and what to run it with, as an extended model says (``--with``), and the user's own causes."""
     if path is None:
+        if own is not None:
+            raise UserError("--effects says what an extended model is made of. Give the model too: --with FILE.")
         return trial, {}
     from subzero.diagnosis.extended import apply, unseen
     from subzero.diagnosis.extended_reading import read_extended
     from subzero.diagnosis.setting import Setting
     from subzero.model import Model
 
-    found = read_extended(path)
+    found = read_extended(path, _own(own))
     setting = apply(found.extended, Setting(trial=trial, model=Model.of(trial)), found.effects)
     hidden = unseen(found.extended, found.effects)
     if hidden:
