@@ -111,7 +111,9 @@ def extended_run(
     """Return a trial and what to run it with, as an extended model says (``--with``), and the user's own causes."""
     if path is None:
         if own is not None:
-            raise UserError("--effects says what an extended model is made of. Give the model too: --with FILE.")
+            raise UserError(
+                "--effects says what an extended model is made of. Give the model too: --with FILE."
+            )
         return trial, {}
     from subzero.diagnosis.extended import apply, unseen
     from subzero.diagnosis.extended_reading import read_extended

@@ -232,11 +232,13 @@ def compiler() -> str:
     return repr((versions, sorted((name, str(value)) for name, value in settings.items())))
 
 
+_tree = Tree()
+
+
 @cache
 def home_of(package: str, file: Path | None = None) -> Home:
     """Return the folder of the machine code of a package of ours, or of a file outside."""
-    tree = Tree()
-    digest = tree.digest(tree.made_of(package, file), compiler())
+    digest = _tree.digest(_tree.made_of(package, file), compiler())
     return Home(base_folder(), f"{package}-{digest}")
 
 

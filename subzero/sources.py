@@ -12,7 +12,6 @@ from __future__ import annotations
 import hashlib
 import re
 from collections.abc import Iterable, Iterator
-from functools import cache
 from pathlib import Path
 
 PACKAGES = ("cable", "scenarios", "subzero", "vehicle")
@@ -23,8 +22,8 @@ COMPILER = b"subzero.compiled"
 
 _COMMENT = re.compile(rb"#[^\n]*")
 _IMPORT = re.compile(
-    rb"^[ \t]*from\s+([.\w]+)\s+import\s*(\([^)]*\)|(?:[^\n\\]|\\\n)*)"  # from a.b import c as d, e
-    rb"|^[ \t]*import\s+((?:[^\n\\]|\\\n)*)",  # import a.b as c, d.e
+    rb"^[ \t]*from\s+([.\w]+)\s+import\s*(\([^)]*\)|[^\n]*)"  # from a.b import c as d, e
+    rb"|^[ \t]*import\s+([^\n]*)",  # import a.b as c, d.e
     re.MULTILINE,
 )
 
@@ -38,6 +37,7 @@ class Tree:
 
     def __init__(self, root: Path | None = None) -> None:
         self.root = root or Path(__file__).resolve().parent.parent
+        self._texts: dict[Path, bytes] = {}
 
     def made_of(self, package: str, file: Path | None = None) -> frozenset[Path]:
         """Return the files that the machine code of a package is made of.
@@ -51,7 +51,7 @@ class Tree:
             return self._led_to([file] if file else [])
         inside = sorted((self.root / package).rglob("*.py"))
         return self._led_to(
-            inside if package != "subzero" else [path for path in inside if COMPILER in _text(path)]
+            inside if package != "subzero" else [path for path in inside if COMPILER in self._text(path)]
         )
 
     def _led_to(self, start: Iterable[Path]) -> frozenset[Path]:
@@ -67,7 +67,7 @@ class Tree:
 
     def _imports(self, path: Path) -> Iterator[Path]:
         """Give the files that one file imports."""
-        for name in _imported(_text(path), self._package(path)):
+        for name in _imported(self._text(path), self._package(path)):
             parts = name.split(".")
             if parts[0] not in PACKAGES:
                 continue
@@ -89,6 +89,11 @@ class Tree:
                 return file
         return None
 
+    def _text(self, path: Path) -> bytes:
+        if path not in self._texts:
+            self._texts[path] = path.read_bytes()
+        return self._texts[path]
+
     def digest(self, files: Iterable[Path], also: str = "") -> str:
         """Return twelve hexadecimal digits that change with the name or the text of any of these files.
 
@@ -99,19 +104,14 @@ class Tree:
         found = hashlib.sha256(also.encode())
         for path in sorted(files):
             name = path.relative_to(self.root) if path.is_relative_to(self.root) else path
-            for part in (str(name).encode("utf-8", "surrogateescape"), _text(path)):
+            for part in (str(name).encode("utf-8", "surrogateescape"), self._text(path)):
                 found.update(b"%d:" % len(part) + part)
         return found.hexdigest()[:12]
 
 
-@cache
-def _text(path: Path) -> bytes:
-    return path.read_bytes()
-
-
 def _imported(source: bytes, package: str) -> Iterator[str]:
     """Give the dotted names of what a source may import."""
-    for found in _IMPORT.finditer(_COMMENT.sub(b"", source)):
+    for found in _IMPORT.finditer(_COMMENT.sub(b"", source).replace(b"\\\n", b" ")):
         origin, names, plain = (part.decode("utf-8", "replace") if part else "" for part in found.groups())
         if plain:
             yield from re.findall(r"[\w.]+", plain)

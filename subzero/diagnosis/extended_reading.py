@@ -113,7 +113,9 @@ def _of_whom(source: Source) -> str:
     own = source.table.get("effects_file")
     if not own:
         return ""
-    return f" If it is in {shown(own)}, give that file with --effects; no file is run because another names it."
+    return (
+        f" If it is in {shown(own)}, give that file with --effects; no file is run because another names it."
+    )
 
 
 def _numbers(
