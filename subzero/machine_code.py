@@ -48,6 +48,10 @@ CODE, HALF, FORMER = ".code", ".half", (".nbi", ".nbc")
 OTHERS = "others"
 """Functions outside `PACKAGES` (tests, a user's own) have folders of this name."""
 
+ANEW = "This run compiles what it needs and forgets it (up to a minute)."
+ANOTHER = "Give another folder with SUBZERO_CACHE_DIR."
+OF_YOUR_OWN = "Give a folder of your own with SUBZERO_CACHE_DIR, or keep others out of this one (chmod go-w)."
+
 DAY_S = 86400.0
 OUT_OF_USE_S, KEPT = 30 * DAY_S, 8
 """A folder is removed that was not used for so long [s], or for a day if so many of its package are newer."""
@@ -63,24 +67,24 @@ class Home:
     Args:
         base: the folder that it is in; None if there is none.
         name: its own name.
+        is_current: says whether the sources are still those that it is named by.
     """
 
-    def __init__(self, base: Path | None, name: str) -> None:
+    def __init__(self, base: Path | None, name: str, is_current: Callable[[], bool]) -> None:
         self._base = base
         self.path = base / name if base else None
+        self._is_current = is_current
         self._keeps = True
-        self._trusted = self._looked_at()
+        self._trusted: bool | None = None
 
     def read(self, name: str) -> bytes | None:
         """Return the code in a file; None if it has none that can be used."""
-        if self.path is None or not self._trusted:
+        if self.path is None or not self._is_trusted():
             return None
         path = self.path / name
         try:
             data = _own_bytes(path)
-        except (
-            OSError
-        ):  # there is none, or nothing that can be read; if it cannot be replaced either, `keep` says so
+        except OSError:  # none, or none that can be read; if it cannot be replaced either, `keep` says so
             return None
         start = len(MARK) + hashlib.sha256().digest_size
         if data[:start] != MARK + _digest(name, data[start:]):
@@ -90,15 +94,15 @@ class Home:
 
     def keep(self, name: str, code: bytes) -> None:
         """Put code into a file, as far as that is possible."""
-        if not self._keeps:
+        if not self._keeps or not self._is_current():
             return
         try:
             self._write(name, MARK + _digest(name, code) + code)
         except OSError as error:
             self._keeps = False
-            if self._trusted:
-                where = printable(str(self.path or "a home folder"))
-                tell("not kept", f"Compiled code cannot be kept in {where}: {error.strerror}. {ANEW}")
+            if self._is_trusted():
+                where, why = printable(str(self._base or "a home folder")), error.strerror or error
+                tell("not kept", f"Compiled code cannot be kept in {where}: {why}. {ANOTHER} {ANEW}")
 
     def _write(self, name: str, data: bytes) -> None:
         """Let a file appear with this in it."""
@@ -106,10 +110,10 @@ class Home:
             raise FileNotFoundError(0, "this user has none")
         if not self.path.is_dir():
             _make(self.path)
-            self._trusted = self._looked_at()
-            if self._trusted:
+            self._trusted = None
+            if self._is_trusted():
                 sweep(self._base, self.path.name)
-        if not self._trusted:
+        if not self._is_trusted():
             raise PermissionError(0, "others may write there")
         handle, half = tempfile.mkstemp(suffix=HALF, dir=self.path)
         try:
@@ -120,6 +124,12 @@ class Home:
             with suppress(OSError):
                 os.unlink(half)
             raise
+
+    def _is_trusted(self) -> bool:
+        """Say whether the folder may be used, and look at it once."""
+        if self._trusted is None:
+            self._trusted = self._looked_at()
+        return self._trusted
 
     def _looked_at(self) -> bool:
         """Say whether the folder may be used, as far as it is there; mark it as in use."""
@@ -132,18 +142,12 @@ class Home:
                 return True  # there is none, which a write finds out
             why = _distrust(about)
             if why:
-                remedy = (
-                    "Give a folder of your own with SUBZERO_CACHE_DIR, or remove what others may do there."
-                )
                 where = printable(str(folder))
-                tell("not trusted", f"Compiled code in {where} is not used, for {why}. {remedy} {ANEW}")
+                tell("not trusted", f"Compiled code in {where} is not used, for {why}. {OF_YOUR_OWN} {ANEW}")
                 return False
         with suppress(OSError):
             os.utime(self.path or "")
         return True
-
-
-ANEW = "So this run compiles what it needs and forgets it (up to a minute)."
 
 
 def _digest(name: str, code: bytes) -> bytes:
@@ -238,8 +242,18 @@ _tree = Tree()
 @cache
 def home_of(package: str, file: Path | None = None) -> Home:
     """Return the folder of the machine code of a package of ours, or of a file outside."""
-    digest = _tree.digest(_tree.made_of(package, file), compiler())
-    return Home(base_folder(), f"{package}-{digest}")
+    files = _tree.made_of(package, file)
+    digest = _tree.digest(files, compiler())
+    return Home(base_folder(), f"{package}-{digest}", lambda: _tree.are_as_read(files))
+
+
+def _home_for(function: Any) -> Home:
+    """Return the folder for a function; one that keeps nothing for what was typed in and stands in no file."""
+    package = function.__module__.partition(".")[0]
+    if package in PACKAGES:
+        return home_of(package)
+    file = Path(function.__code__.co_filename)
+    return home_of(OTHERS, file.absolute()) if file.is_file() else Home(None, OTHERS, lambda: False)
 
 
 class MachineCode(_Cache):
@@ -251,16 +265,17 @@ class MachineCode(_Cache):
 
     def __init__(self, function: Any) -> None:
         self._function = function
+        self._home = _home_for(function)
 
     @property
     def cache_path(self) -> str | None:
         """Return the folder, for numba's statistics."""
-        return str(self._home().path)
+        return str(self._home.path)
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Return what was kept for a signature; None if it has to be compiled."""
         target_context.refresh()
-        code = self._home().read(self._name(sig, target_context.codegen()))
+        code = self._home.read(self._name(sig, target_context.codegen()))
         if code is not None:
             found = CompileResult._rebuild(target_context, *pickle.loads(code))
             if found.signature.args == tuple(normalize_signature(sig)[0]):
@@ -271,14 +286,7 @@ class MachineCode(_Cache):
     def save_overload(self, sig: Any, data: Any) -> None:
         """Keep what was compiled for a signature; not what holds addresses of this process."""
         if self._function.__closure__ is None and not data.lifted and not data.library.has_dynamic_globals:
-            self._home().keep(self._name(sig, data.codegen), dumps(data._reduce()))
-
-    def _home(self) -> Home:
-        package = self._function.__module__.partition(".")[0]
-        if package in PACKAGES:
-            return home_of(package)
-        file = Path(self._function.__code__.co_filename)
-        return home_of(OTHERS, file.absolute()) if file.is_file() else Home(None, OTHERS)
+            self._home.keep(self._name(sig, data.codegen), dumps(data._reduce()))
 
     def _name(self, sig: Any, codegen: Any) -> str:
         """Return the name of a file: of the function, for these arguments, on this processor."""

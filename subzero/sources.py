@@ -37,7 +37,7 @@ class Tree:
 
     def __init__(self, root: Path | None = None) -> None:
         self.root = root or Path(__file__).resolve().parent.parent
-        self._texts: dict[Path, bytes] = {}
+        self._texts: dict[Path, tuple[bytes, tuple[int, int]]] = {}
 
     def made_of(self, package: str, file: Path | None = None) -> frozenset[Path]:
         """Return the files that the machine code of a package is made of.
@@ -89,10 +89,15 @@ class Tree:
                 return file
         return None
 
+    def are_as_read(self, files: Iterable[Path]) -> bool:
+        """Say whether these files are still what the digest was made of; an edit may come while a program runs."""
+        return all(self._texts[path][1] == _stamp(path) for path in files)
+
     def _text(self, path: Path) -> bytes:
         if path not in self._texts:
-            self._texts[path] = path.read_bytes()
-        return self._texts[path]
+            stamp = _stamp(path)
+            self._texts[path] = path.read_bytes(), stamp
+        return self._texts[path][0]
 
     def digest(self, files: Iterable[Path], also: str = "") -> str:
         """Return twelve hexadecimal digits that change with the name or the text of any of these files.
@@ -107,6 +112,14 @@ class Tree:
             for part in (str(name).encode("utf-8", "surrogateescape"), self._text(path)):
                 found.update(b"%d:" % len(part) + part)
         return found.hexdigest()[:12]
+
+
+def _stamp(path: Path) -> tuple[int, int]:
+    try:
+        about = path.stat()
+    except OSError:  # it is gone
+        return -1, -1
+    return about.st_mtime_ns, about.st_size
 
 
 def _imported(source: bytes, package: str) -> Iterator[str]:
