@@ -69,6 +69,7 @@ def simulate(
     *,
     untethered: Annotated[bool, Parameter(negative=())] = False,
     with_: cli_diagnosis.With = None,
+    effects: cli_diagnosis.Own = None,
     commands: Path | None = None,
     motion: Path | None = None,
     out: Path | None = None,
@@ -81,6 +82,7 @@ def simulate(
         scenario: name of a scenario (see "subzero list"), or path of a scenario file.
         untethered: leave the cable away.
         with_: extended model that a diagnosis has written (extended.toml).
+        effects: Python file with causes of your own that the extended model names; it is run.
         commands: CSV file of commands, instead of those of the scenario.
         motion: CSV file of the vehicle's measured states, such as a run's own tethered.csv, which it then follows.
         out: folder for the files; by default one named after the scenario, here.
@@ -92,7 +94,7 @@ def simulate(
 
     trial = scenarios.load(scenario, commands_csv=commands, motion_csv=motion)
     with staged(out or delivery.default_folder(trial)) as stage:
-        trial, extended = cli_diagnosis.extended_run(_checked(scenario, commands, motion), with_)
+        trial, extended = cli_diagnosis.extended_run(_checked(scenario, commands, motion), with_, effects)
         with _progress(trial) as progress:
             from subzero.simulation import simulate as run
 
@@ -110,6 +112,7 @@ def compare(
     *,
     measured: Path | None = None,
     with_: cli_diagnosis.With = None,
+    effects: cli_diagnosis.Own = None,
     commands: Path | None = None,
     motion: Path | None = None,
     out: Path | None = None,
@@ -122,6 +125,7 @@ def compare(
         scenario: name of a scenario (see "subzero list"), or path of a scenario file.
         measured: CSV file of measured channels, to set beside both runs.
         with_: extended model that a diagnosis has written (extended.toml).
+        effects: Python file with causes of your own that the extended model names; it is run.
         commands: CSV file of commands, instead of those of the scenario.
         motion: CSV file of the vehicle's measured states, such as a run's own tethered.csv, which it then follows.
         out: folder for the files; by default one named after the scenario, here.
@@ -135,7 +139,7 @@ def compare(
     trial = scenarios.load(scenario, commands_csv=commands, motion_csv=motion)
     record = read_record(measured) if measured is not None else None
     with staged(out or delivery.default_folder(trial)) as stage:
-        trial, extended = cli_diagnosis.extended_run(_checked(scenario, commands, motion), with_)
+        trial, extended = cli_diagnosis.extended_run(_checked(scenario, commands, motion), with_, effects)
         with _progress(trial) as progress:
             from subzero.comparison import compare as run
 

@@ -142,8 +142,9 @@ def _deliver(
     from subzero.autopilot import showing
     from subzero.delivery import refuse_warnings
     from subzero.output import staged
+    from subzero.progress import progress_bar
 
-    with staged(folder) as stage:
+    with staged(folder) as stage, progress_bar("Flying"):
         measured = fly()
         summary = showing.write(measured, title, *shown, stage)
     stopped = showing.tell(summary, list(measured), stage)

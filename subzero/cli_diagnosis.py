@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import cyclopts
 from cyclopts import Parameter
-from rich.console import Console
 
 import scenarios
+from subzero.errors import UserError
 from subzero.interrupts import INTERRUPTED, patience
+from subzero.progress import progress_bar
 
 if TYPE_CHECKING:
     from subzero.diagnosis.effect import Effect
@@ -25,6 +26,7 @@ LAST_WORDS_S = 60.0
 
 Flag = Annotated[bool, Parameter(negative=())]
 With = Annotated[Path | None, Parameter(name="--with")]
+Own = Annotated[Path | None, Parameter(name="--effects")]
 
 
 def diagnose(
@@ -89,7 +91,7 @@ def challenge(
     from subzero.diagnosis.challenge import challenge as hide
     from subzero.output import staged
 
-    with staged(out) as stage, _bar("Hiding an effect"):
+    with staged(out) as stage, progress_bar("Hiding an effect"):
         hide(scenario, seed, stage.path)
     print(stage.words())
     print(f"Find it: subzero diagnose {out / 'record.csv'} --scenario {scenario}")
@@ -103,16 +105,22 @@ def add_to(app: cyclopts.App) -> None:
     app.command(challenge)
 
 
-def extended_run(trial: scenarios.Trial, path: Path | None) -> tuple[scenarios.Trial, dict[str, Any]]:
-    """Return a trial and what to run it with, as an extended model says (``--with``)."""
+def extended_run(
+    trial: scenarios.Trial, path: Path | None, own: Path | None
+) -> tuple[scenarios.Trial, dict[str, Any]]:
+    """Return a trial and what to run it with, as an extended model says (``--with``), and the user's own causes."""
     if path is None:
+        if own is not None:
+            raise UserError(
+                "--effects says what an extended model is made of. Give the model too: --with FILE."
+            )
         return trial, {}
     from subzero.diagnosis.extended import apply, unseen
     from subzero.diagnosis.extended_reading import read_extended
     from subzero.diagnosis.setting import Setting
     from subzero.model import Model
 
-    found = read_extended(path)
+    found = read_extended(path, _own(own))
     setting = apply(found.extended, Setting(trial=trial, model=Model.of(trial)), found.effects)
     hidden = unseen(found.extended, found.effects)
     if hidden:
@@ -140,7 +148,7 @@ def _read(paths: list[Path], scenario: str | None, commands: str | None) -> list
     """Read the records; the compiler is needed to see whether their units are plausible."""
     from subzero.diagnosis.records import read_trials
 
-    with _bar("Reading"):
+    with progress_bar("Reading"):
         return read_trials(paths, scenario=scenario, commands=commands)
 
 
@@ -149,19 +157,8 @@ def _ask(logged: list[Logged], own: tuple[Effect, ...], seed: int, budget: str) 
     from subzero.delivery_diagnosis import tell_before
     from subzero.diagnosis.entrance import diagnose as run
 
-    with _bar("Diagnosing") as progress:
+    with progress_bar("Diagnosing") as progress:
         verdict = run(logged, effects=own, progress=progress, seed=seed, budget=budget, seen=tell_before)
     if not verdict.complete:
         print("Interrupted; what it has is written.", file=sys.stderr)
     return verdict
-
-
-def _bar(words: str) -> Any:
-    """Return a progress bar, after saying why the first run of all takes long."""
-    from subzero.compiled import is_warm
-    from subzero.progress import ProgressBar
-
-    console = Console(stderr=True, highlight=False)
-    if not is_warm():
-        console.print("Compiling the kernels (first use, about 50 s)…")
-    return ProgressBar(words, console)

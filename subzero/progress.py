@@ -11,8 +11,19 @@ from rich.console import Console
 if TYPE_CHECKING:
     from rich.progress import Progress
 
+COMPILING = "Compiling what is not compiled yet (all of it takes about 50 s, once)…"
+
 PATIENCE = 1.0
 """What takes less needs no bar. [s]"""
+
+
+def progress_bar(words: str) -> ProgressBar:
+    """Return a progress bar on standard error, above which it is said should something have to be compiled first."""
+    from subzero.machine_code import before_compiling
+
+    console = Console(stderr=True, highlight=False)
+    before_compiling(lambda: console.print(COMPILING))
+    return ProgressBar(words, console)
 
 
 class ProgressBar:

@@ -130,8 +130,9 @@ def resolution(run: xr.Dataset, trial: scenarios.Trial, _: Model) -> list[str]:
     return [
         f"The tow force depends on steps and segments: from twice as long ones to these ({finer} times as fine as "
         f"given) it changes {how} (at {accuracy['time']:g} s; run.rtol allows {_percent(trial.rtol)}). Either they are "
-        "still too long, or the problem is ill-posed: a heavy cable, or one in a cross current, on a drum that does not "
-        "hold it, or a cable that snaps taut. Give the drum friction_torque or a [winch], or the cable bending_stiffness."
+        "still too long, or the problem is ill-posed: a heavy cable, or one in a cross current, on a drum that does "
+        "not hold it, or a cable that snaps taut. Give the drum friction_torque or a [winch], or the cable "
+        "bending_stiffness."
     ]
 
 

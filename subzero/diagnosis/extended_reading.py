@@ -1,9 +1,13 @@
-"""Read an extended model, as `subzero.diagnosis.extended` explains it, and say all that is wrong with it."""
+"""Read an extended model, as `subzero.diagnosis.extended` explains it, and say all that is wrong with it.
+
+An extended model may name the Python file that its effects came from. That file is never run from here, for reading
+data must not run code: whoever trusts it says so on the command line (``--effects FILE``).
+"""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +16,6 @@ import numpy as np
 from scenarios import ScenarioError
 from scenarios.files import Source, read_toml
 from subzero.diagnosis.effect import Effect, Parameter
-from subzero.diagnosis.effects import load
 from subzero.diagnosis.extended import STARTS, ExtendedFile, all_effects, force_key, key_of, plain_id
 from subzero.diagnosis.verdict import Extended
 from subzero.errors import UserError, listed, printable, suggestion
@@ -29,17 +32,19 @@ MOST_PARTS = 100
 """So many forces are read of one kind: a dozen for each axis and more; each costs in every step of a run."""
 
 
-def read_extended(path: str | Path) -> ExtendedFile:
+def read_extended(path: str | Path, effects: Iterable[Effect] = ()) -> ExtendedFile:
     """Read an extended model.
+
+    Args:
+        path: the file.
+        effects: those that it may name besides the catalogue.
 
     Raises:
         UserError: it cannot be used; names every problem with its line.
     """
     source = _toml(Path(path))
     table = source.table
-    own = table.get("effects_file", "")
-    more = load(source.folder / own) if isinstance(own, str) and own else ()
-    known = all_effects(more)
+    known = all_effects(effects)
     problems = [
         f"{_at(source, key)}: there is no such key.{suggestion(key, KEYS)} Allowed: {', '.join(KEYS)}."
         for key in table
@@ -47,7 +52,7 @@ def read_extended(path: str | Path) -> ExtendedFile:
     ]
     problems += [
         f"{_at(source, key)}: found {shown(table[key])}, but this is not a text in quotes"
-        for key in ("scenario", "source")
+        for key in ("scenario", "source", "effects_file")
         if not isinstance(table.get(key, ""), str)
     ]
     starts: dict[str, float] = {}
@@ -92,7 +97,7 @@ def _effects(
     for name, numbers in table.items():
         at = _at(source, f"{section}.{name}")
         if plain_id(name) not in known:
-            problems.append(f"{at}: there is no effect '{name}'.{suggestion(name, known)}")
+            problems.append(f"{at}: there is no effect '{name}'.{suggestion(name, known)}{_of_whom(source)}")
         elif "@" in name and not _is_time(name.partition("@")[2]):
             problems.append(f"{at}: behind the @ stands when it begins, in seconds: {plain_id(name)}@12")
         elif not isinstance(numbers, Mapping):
@@ -101,6 +106,16 @@ def _effects(
             began = {} if starts is None else starts
             found[name] = _numbers(at, name, known[plain_id(name)], numbers, began, problems)
     return found
+
+
+def _of_whom(source: Source) -> str:
+    """Return where an effect that is in no catalogue may be, as far as the file says it."""
+    own = source.table.get("effects_file")
+    if not own:
+        return ""
+    return (
+        f" If it is in {shown(own)}, give that file with --effects; no file is run because another names it."
+    )
 
 
 def _numbers(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
@@ -10,6 +11,7 @@ from subzero.diagnosis.effect import Effect
 from subzero.diagnosis.extended import STARTS, all_effects, force_key, key_of, plain_id, starts_of
 from subzero.diagnosis.setting import Setting
 from subzero.diagnosis.verdict import Extended
+from subzero.errors import printable
 from subzero.missing_force import AXES, FEATURES, MissingForce
 
 DIGITS = 8
@@ -34,9 +36,10 @@ def text_of(
         source: what it was found from.
     """
     known = effects or all_effects()
+    own = f" --effects {shlex.quote(printable(str(effects_file)))}" if effects_file else ""
     lines = [
         "# The model extended by what a diagnosis found. Numbers are deviations from the nominal model.",
-        f"# Run it:  subzero simulate {setting.trial.source} --with extended.toml",
+        f"# Run it:  subzero simulate {setting.trial.source} --with extended.toml{own}",
         f"scenario = {_text(setting.trial.source)}",
     ]
     lines += [f"source = {_text(source)}"] if source else []

@@ -9,6 +9,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import subzero
+from subzero.diagnosis import effects
 from subzero.diagnosis.extended import all_effects, apply, unseen
 from subzero.diagnosis.extended_reading import read_extended
 from subzero.diagnosis.extended_text import text_of
@@ -108,8 +109,7 @@ def test_effects_of_sensors_are_told_apart_for_a_run_does_not_show_them():
     assert unseen(FOUND, all_effects()) == ["sensor_bias:heading"]
 
 
-def test_effects_of_the_users_own_are_found_through_the_file_that_holds_them(setting, tmp_path):
-    own = """
+OWN = """
 from subzero.diagnosis.effect import Effect, Parameter
 
 def lost(setting, mass):
@@ -118,9 +118,12 @@ def lost(setting, mass):
 EFFECTS = [Effect(id="lost_ballast", sentence="ballast was lost", slot="hull", apply=lost,
                   parameters=(Parameter(name="mass", unit="kg", tolerance=0.01, scale=0.5),))]
 """
-    (tmp_path / "mine.py").write_text(own)
-    path = written(tmp_path, 'effects_file = "mine.py"\n[effects.lost_ballast]\nmass_kg = 0.4\n')
-    found = read_extended(path)
+LOST = 'effects_file = "mine.py"\n[effects.lost_ballast]\nmass_kg = 0.4\n'
+
+
+def test_effects_of_the_users_own_are_those_that_are_given(setting, tmp_path):
+    (tmp_path / "mine.py").write_text(OWN)
+    found = read_extended(written(tmp_path, LOST), effects.load(tmp_path / "mine.py"))
     changed = apply(found.extended, setting, found.effects)
     assert_allclose(changed.model.vehicle.rigid_body.mass, setting.model.vehicle.rigid_body.mass - 0.4)
 
@@ -143,7 +146,8 @@ EFFECTS = [Effect(id="lost_ballast", sentence="ballast was lost", slot="hull", a
         ('[[missing_force]]\naxis = "N"\ntime_s = [0.0]\nforce_N = [1.0]', "moment_N_m is missing"),
         ('[[missing_force]]\naxis = "X"\ntime_s = [2.0, 1.0]\nforce_N = [1.0, 2.0]', "times that decrease"),
         ('[[missing_term]]\naxis = "X"\nfeature = "uu"\ncoefficient = 1.0', "Known:"),
-        ('effects_file = "nowhere.py"', "There is no effects file"),
+        ("effects_file = 3", "line 1, effects_file: found 3, but this is not a text in quotes"),
+        (LOST, "If it is in 'mine.py', give that file with --effects"),
         ("[effects", "this is not valid TOML"),
     ],
 )  # fmt: skip
