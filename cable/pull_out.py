@@ -107,9 +107,12 @@ def pull_out(
     if start is not None:
         _check_start(start, scheme, wet_length)
         wet_length, segment_length = start.length, float(start.segment_lengths[0])
-        cable, origin = cable or start.cable, start.shape[-1] if current is None else origin
+        cable, origin = (
+            start.cable if cable is None else cable,
+            start.shape[-1] if current is None else origin,
+        )
         current = start.current if current is None else current
-    cable, drum = cable or CableProperties(), drum or DrumProperties()
+    cable, drum = CableProperties() if cable is None else cable, DrumProperties() if drum is None else drum
     _check(duration, step, segment_length, scheme, rtol, grading, wet_length)
     check_kinds(
         cable=(cable, (CableProperties,)), drum=(drum, (DrumProperties, PayOutRate, Brake, ConstantTension))

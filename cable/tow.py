@@ -78,7 +78,7 @@ def tow(
     checked("", "rtol", rtol, least=0.0, most=0.5)
     check_motion("tow_velocity", tow_velocity)
     check_tolerance(tolerance)
-    cable, water = cable or CableProperties(), current_of(current)
+    cable, water = CableProperties() if cable is None else cable, current_of(current)
     check_kinds(cable=(cable, (CableProperties,)))
     if scheme == "lumped":
         from .lumped_history import tow_lumped

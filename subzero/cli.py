@@ -178,9 +178,9 @@ def _checked(scenario: str, commands: Path | None) -> scenarios.Trial:
 def _progress(trial: scenarios.Trial) -> ProgressBar:
     """Return a progress bar, after saying why the first run of all takes long."""
     from subzero.compiled import is_warm
-    from subzero.progress import ProgressBar
+    from subzero.progress import ProgressBar, costs_of
 
     console = Console(stderr=True, highlight=False)
     if not is_warm():
         console.print("Compiling the kernels (first use, about 50 s)…")
-    return ProgressBar(f"Simulating {trial.name}", console)
+    return ProgressBar(f"Simulating {trial.name}", console, lambda: costs_of(trial))

@@ -3,18 +3,25 @@
 from __future__ import annotations
 
 import sys
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import cyclopts
 from cyclopts import Parameter
+from rich.console import Console
 
 import scenarios
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    import xarray as xr
+
     from subzero.autopilot.showing import Measured
+    from subzero.simulation import Progress
+
+    Fly = Callable[[str, Progress], tuple[xr.Dataset, dict[str, float]]]
 
 RUNS = ("tethered", "untethered")
 FINE, STOPPED = 0, 3
@@ -53,20 +60,18 @@ def manoeuvre(
         speed: of the bare hull before it, in m/s.
         out: folder for the files; by default one named after the manoeuvre, here.
     """
-    scenarios.load(scenario)  # a mistake in it answers at once
+    trial = scenarios.load(scenario)  # a mistake in it answers at once
     from subzero.autopilot.manoeuvres import MANOEUVRES
     from subzero.autopilot.manoeuvres import manoeuvre as run
 
     size = _size(name, rudder, planes)
 
-    def fly() -> Measured:
-        return {
-            label: run(name, scenario, size=size, speed=speed, tethered=label == "tethered") for label in RUNS
-        }
+    def fly(label: str, progress: Progress) -> tuple[xr.Dataset, dict[str, float]]:
+        return run(name, scenario, size=size, speed=speed, tethered=label == "tethered", progress=progress)
 
     meaning = f": {MANOEUVRES[name].meaning}" if name in MANOEUVRES else ""
     shown = MANOEUVRE_COMMANDS.get(name, ("heading", "rudder_command"))
-    return _deliver(fly, out or Path(name), f"{name}{meaning}", shown)
+    return _deliver(trial, fly, out or Path(name), f"{name}{meaning}", shown)
 
 
 def fly_step(
@@ -95,22 +100,21 @@ def fly_step(
         seed: of the sensors.
         out: folder for the files; by default one named after the step, here.
     """
-    scenarios.load(scenario)  # a mistake in it answers at once
+    trial = scenarios.load(scenario)  # a mistake in it answers at once
     from subzero.autopilot import ESTIMATED, PERFECT
     from subzero.autopilot.steps import step as run
 
-    def fly() -> Measured:
-        return {
-            label: run(
-                name, scenario, autopilot=autopilot, feed_forward=feed_forward if label == "tethered" else "none",
-                size=size, speed=speed, tethered=label == "tethered", seed=seed,
-                sensors=ESTIMATED if noisy else PERFECT,
-            )
-            for label in RUNS
-        }  # fmt: skip
+    def fly(label: str, progress: Progress) -> tuple[xr.Dataset, dict[str, float]]:
+        return run(
+            name, scenario, autopilot=autopilot, feed_forward=feed_forward if label == "tethered" else "none",
+            size=size, speed=speed, tethered=label == "tethered", seed=seed,
+            sensors=ESTIMATED if noisy else PERFECT, progress=progress,
+        )  # fmt: skip
 
     title = f"{name}: autopilot {autopilot}, fed forward of the cable: {feed_forward}"
-    return _deliver(fly, out or Path(name), title, STEP_COMMANDS.get(name, ("heading", "rudder_command")))
+    return _deliver(
+        trial, fly, out or Path(name), title, STEP_COMMANDS.get(name, ("heading", "rudder_command"))
+    )
 
 
 def add_to(app: cyclopts.App) -> None:
@@ -130,13 +134,21 @@ def _size(name: str, rudder: float | None, planes: float | None) -> float | None
     return planes if rudder is None else rudder
 
 
-def _deliver(fly: Callable[[], Measured], folder: Path, title: str, shown: tuple[str, str]) -> int:
-    """Fly, write and tell; return the exit code."""
-    from subzero.autopilot import showing
+def _deliver(trial: scenarios.Trial, fly: Fly, folder: Path, title: str, shown: tuple[str, str]) -> int:
+    """Fly with the cable and without, write and tell; return the exit code."""
+    from subzero.autopilot import AutopilotWarning, showing
     from subzero.output import staged
+    from subzero.progress import ProgressBar, costs_of
 
+    console = Console(stderr=True, highlight=False)
     with staged(folder) as stage:
-        measured = fly()
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", AutopilotWarning)  # the outcome tells it, below
+            measured: Measured = {}
+            for label in RUNS:
+                bar = ProgressBar(f"Flying {trial.name}, {label}", console, lambda: costs_of(trial))
+                with bar as progress:
+                    measured[label] = fly(label, progress)
         summary = showing.write(measured, title, *shown, stage)
     stopped = showing.tell(summary, list(measured), stage)
     for message in stopped:

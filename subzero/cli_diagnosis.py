@@ -23,6 +23,12 @@ FINE = 0
 LAST_WORDS_S = 60.0
 """An interrupted diagnosis has so long to tell and write what it has. [s]"""
 
+COSTS = (
+    "What costs are the simulations of the trial. Try --screen, a shorter record, or a longer cable_step_s and "
+    "segment_length_m in the scenario."
+)
+"""What is told where a diagnosis stands still."""
+
 Flag = Annotated[bool, Parameter(negative=())]
 With = Annotated[Path | None, Parameter(name="--with")]
 
@@ -164,4 +170,4 @@ def _bar(words: str) -> Any:
     console = Console(stderr=True, highlight=False)
     if not is_warm():
         console.print("Compiling the kernels (first use, about 50 s)…")
-    return ProgressBar(words, console)
+    return ProgressBar(words, console, lambda: COSTS)

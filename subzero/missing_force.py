@@ -145,8 +145,8 @@ class MissingForce:
             raise BadValueError("A missing force has a history with numbers that are not finite.")
         if np.any(np.diff(time) < 0.0):
             raise BadValueError("A missing force has times that decrease; they must be in order.")
-        if not all(isinstance(term, Term) for term in self.terms):
-            raise BadValueError("A missing force has terms that are none; each must be a Term.")
+        if not isinstance(self.terms, tuple) or not all(isinstance(term, Term) for term in self.terms):
+            raise BadValueError("A missing force has terms that are none; they must be a tuple of Term.")
 
     def __add__(self, other: MissingForce | None) -> MissingForce:
         """Return both forces together."""

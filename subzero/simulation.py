@@ -13,9 +13,10 @@ import scenarios
 from cable.line import enlarged
 from cable.runs import describe_failure, too_short
 from subzero import coupling
-from subzero.later import Later, go_on_with, rows_of_changes
+from subzero.errors import truth
+from subzero.later import Later, checked_later, go_on_with, rows_of_changes
 from subzero.loop import NO_ROOM, run_rows
-from subzero.model import Model
+from subzero.model import Model, model_of
 from subzero.recording import Pace, Recording, Run, cut, new_recording, record_row
 from subzero.room import REMEDY, has_room, refuse_what_cannot_fit
 from subzero.run_state import Live, Setup
@@ -56,7 +57,7 @@ def simulate(
         UserError: a time of `later` is none of the run.
     """
     trial = scenario if isinstance(scenario, scenarios.Trial) else load(scenario)
-    model = model or Model.of(trial)
+    model, tethered, later = model_of(trial, model), truth("tethered", tethered), checked_later(later)
     from subzero.dataset import dataset_of
 
     result = dataset_of(trial, model, tethered, run_trial(trial, model, tethered, progress, later=later))
