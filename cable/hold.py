@@ -197,9 +197,10 @@ def lay_held(line: Line, held: Equilibrium, tow: np.ndarray, drum: np.ndarray, p
 def _checked_ends(ends: Sequence[Place] | np.ndarray) -> np.ndarray:
     """Return the ends as finite numbers (2, 3)."""
     try:
-        places = np.array(ends, dtype=float)
+        places = np.array(ends)
     except (TypeError, ValueError, OverflowError):
         places = np.empty(0)
+    places = places.astype(float) if places.dtype.kind in "iuf" else np.empty(0)
     if places.shape != (2, 3) or not np.isfinite(places).all():
         message = f"hold: ends must be two places of three finite numbers (north, east, down in m); got {short(ends)}."
         raise HoldError(message)
@@ -252,9 +253,10 @@ def _segments(length: float, given: float | None) -> int:
 def _checked_start(start: Place, places: np.ndarray) -> np.ndarray:
     """Return node positions relative to the second end."""
     try:
-        nodes = np.array(start, dtype=float)
+        nodes = np.array(start)
     except (TypeError, ValueError, OverflowError):
         nodes = np.empty(0)
+    nodes = nodes.astype(float) if nodes.dtype.kind in "iuf" else np.empty(0)
     if nodes.ndim != 2 or nodes.shape[0] < 2 or nodes.shape[1] != 3 or not np.isfinite(nodes).all():
         message = f"hold: start must be finite node positions (n, 3), two at least; got shape {nodes.shape}."
         raise HoldError(message)

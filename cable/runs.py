@@ -202,9 +202,9 @@ def _three_numbers(
 ) -> np.ndarray:
     """Return velocities as an array (times, 3) of finite numbers, or say what is wrong with the first that is none."""
     try:
-        array = np.array(values, dtype=float)
-        if array.shape == (moments.size, 3) and np.isfinite(array).all():
-            return array
+        array = np.array(values)
+        if array.shape == (moments.size, 3) and array.dtype.kind in "iuf" and np.isfinite(array).all():
+            return array.astype(float)
     except (ValueError, TypeError, OverflowError):
         pass
     for t, value in zip(moments.tolist(), values, strict=True):

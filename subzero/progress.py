@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 PATIENCE_S = 1.0
 """What takes less needs no bar. [s]"""
 STANDSTILL_S = 20.0
-"""Work that has not moved for so long is told to stand still; and for so long a rate is watched before it counts. [s]"""
+"""Work that has not moved for so long is told to stand still; so long is a rate watched before it counts. [s]"""
 LONG_S = 3600.0
 """Work that will take longer than this is told. [s]"""
 LOOK_S = 1.0

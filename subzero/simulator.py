@@ -222,7 +222,7 @@ class Simulator:
     def _checked(self, command: Command) -> tuple[float, float, float, float]:
         """Return a command as four floats."""
         try:
-            n, rudder, port, starboard = (float(value) for value in command)
+            n, rudder, port, starboard = (float(value + 0.0) for value in command)  # no text is a number
             if isfinite(n) and isfinite(rudder) and isfinite(port) and isfinite(starboard):
                 return n, rudder, port, starboard
         except (TypeError, ValueError, OverflowError):

@@ -1,6 +1,6 @@
 """Interrupt calculations at random times, many times over, in this process: run as a child process by the tests.
 
-    python tests/robustness/interrupted.py SEED COUNT [diagnose]
+    python tests/robustness/interrupted.py SEED COUNT [few | all | diagnose]
 
 A timer raises `KeyboardInterrupt` wherever Python code runs then, as Ctrl-C does. After each interrupt another
 calculation is done in the same process, and has to give what it gave before any interrupt, to the last bit; the same
@@ -134,6 +134,7 @@ def diagnosed() -> str:
     return f"{verdict.verdict} {sorted(verdict.probabilities.items())}"
 
 
+FEW = (fig6, driven, pulled_out, towed, held)
 QUICK = (fig6, untethered, stepped, result, driven, pulled_out, lumped, printed, towed, held)
 
 
@@ -173,7 +174,5 @@ def main(seed: int, count: int, calculations: tuple[Calculation, ...], longest: 
 
 
 if __name__ == "__main__":
-    if sys.argv[3:] == ["diagnose"]:
-        main(int(sys.argv[1]), int(sys.argv[2]), (diagnosed,), 3.0)
-    else:
-        main(int(sys.argv[1]), int(sys.argv[2]), QUICK, 0.2)
+    asked, longest = {"few": (FEW, 0.2), "all": (QUICK, 0.2), "diagnose": ((diagnosed,), 3.0)}[sys.argv[3]]
+    main(int(sys.argv[1]), int(sys.argv[2]), asked, longest)
