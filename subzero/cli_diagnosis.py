@@ -68,6 +68,8 @@ def diagnose(
             verdict = _ask(logged, own, seed, "screen" if screen else "full")
             delivery_diagnosis.write_all(verdict, logged, stage, effects=own, effects_file=effects)
     delivery_diagnosis.tell(verdict, stage)
+    if not verdict.complete:
+        print("Interrupted; what it has is written.", file=sys.stderr)
     return FINE if verdict.complete else INTERRUPTED
 
 
@@ -157,8 +159,6 @@ def _ask(logged: list[Logged], own: tuple[Effect, ...], seed: int, budget: str) 
 
     with _bar("Diagnosing") as progress:
         verdict = run(logged, effects=own, progress=progress, seed=seed, budget=budget, seen=tell_before)
-    if not verdict.complete:
-        print("Interrupted; what it has is written.", file=sys.stderr)
     return verdict
 
 
