@@ -158,8 +158,7 @@ def _ask(logged: list[Logged], own: tuple[Effect, ...], seed: int, budget: str) 
     from subzero.diagnosis.entrance import diagnose as run
 
     with _bar("Diagnosing") as progress:
-        verdict = run(logged, effects=own, progress=progress, seed=seed, budget=budget, seen=tell_before)
-    return verdict
+        return run(logged, effects=own, progress=progress, seed=seed, budget=budget, seen=tell_before)
 
 
 def _bar(words: str) -> Any:

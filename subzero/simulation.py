@@ -11,7 +11,7 @@ import numpy as np
 
 import scenarios
 from cable.line import enlarged
-from cable.runs import describe_failure, too_short
+from cable.stops import Names, describe_stop
 from subzero import coupling
 from subzero.errors import truth
 from subzero.later import Later, checked_later, go_on_with, rows_of_changes
@@ -117,6 +117,14 @@ def more_room(live: Live, recording: Recording, used: int) -> tuple[Live, Record
     )
 
 
+NAMES = Names(
+    step="cable_step_s",
+    segment="segment_length_m",
+    wet="wet_length_m",
+    rate="pay_out_rate_m_s",
+    yielding='control = "constant_tension"',
+)
+"""What the settings of a cable are called in a trial file."""
 WENT_WELL = "The run reached its end."
 
 
@@ -125,8 +133,7 @@ def in_words(ending: int, time: float, setup: Setup, live: Live) -> str:
     if ending == coupling.FINE:
         return WENT_WELL
     if ending == coupling.CABLE_FAILED:
-        behind = too_short(time, live.line, setup.fixed.drum)
-        return behind or describe_failure(live.line.ends.solved, time)
+        return describe_stop(time, live.line, setup.fixed.drum, setup.fixed.cable, NAMES)
     if ending == NO_ROOM:
         return f"The cable's shapes until t = {time:g} s fill the memory that is free. {REMEDY}"
     if ending == coupling.DISAGREED:
@@ -136,5 +143,6 @@ def in_words(ending: int, time: float, setup: Setup, live: Live) -> str:
         )
     return (
         f"The vehicle's speed beyond t = {time:g} s is absurd (more than {coupling.FASTEST:g} m/s, or not a number). "
-        "Look at the commands and the vehicle's numbers, or try a shorter hull_step_s."
+        f"Try a shorter hull_step_s (it is {setup.fixed.hull_step:g}), or look at the commands and the vehicle's "
+        "numbers."
     )
