@@ -21,7 +21,7 @@ import numpy as np
 
 import scenarios
 from subzero import coupling
-from subzero.errors import UserError, checked, short, truth
+from subzero.errors import UserError, real, short, truth
 from subzero.handle import ENDING, ROW, USED, advance, hold, observe
 from subzero.loop import NO_ROOM
 from subzero.model import Model, model_of
@@ -278,12 +278,10 @@ def _exchanges(trial: scenarios.Trial, sample_time: float | None, tethered: bool
         )
     if tethered and trial.scheme != "moving_end":
         raise UserError(f"'{trial.name}' has the scheme '{trial.scheme}'; only 'moving_end' can be stepped.")
-    if sample_time is None:
-        return 1
-    count = checked("", "sample_time", sample_time, above=0.0, unit="s") / trial.cable_step
+    count = 1.0 if sample_time is None else (real(sample_time) or 0.0) / trial.cable_step
     if not (0.5 < count < MOST_EXCHANGES and abs(count - round(count)) < 1e-6):
         raise UserError(
-            f"A sample time of {sample_time:g} s does not fit. Allowed: a whole number of cable steps,"
+            f"A sample time of {short(sample_time)} s does not fit. Allowed: a whole number of cable steps,"
             f" {trial.cable_step:g} s each."
         )
     return round(count)
