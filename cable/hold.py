@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from subzero.errors import UserError
+from subzero.errors import UserError, real, short
 
 from .drum import TURNING
 from .element import new_load
 from .equilibrium import hang, relax
 from .line import NOW, Line, new_line
 from .properties import CableProperties
-from .runs import current_of
+from .runs import check_kinds, current_of
 from .water import Current, Water
 from .winch import Brake
 
@@ -110,9 +110,10 @@ def hold(
         HoldError: ends, length or segments that make no sense; an unstretchable cable that is too short; no
             equilibrium found.
     """
-    cable, water = cable or CableProperties(), current_of(current)
+    cable, water = CableProperties() if cable is None else cable, current_of(current)
+    check_kinds(cable=(cable, (CableProperties,)))
     places = _checked_ends(ends)
-    _check_length(places, length, cable)
+    length = _checked_length(places, length, cable)
     line = _between(places, length, _segments(length, segment_length))
     starts = [None] if start is None else [_checked_start(start, places), None]
     for nodes in starts:
@@ -196,22 +197,28 @@ def lay_held(line: Line, held: Equilibrium, tow: np.ndarray, drum: np.ndarray, p
 def _checked_ends(ends: Sequence[Place] | np.ndarray) -> np.ndarray:
     """Return the ends as finite numbers (2, 3)."""
     try:
-        places = np.array(ends, dtype=float)
-    except (TypeError, ValueError):
+        places = np.array(ends)
+    except (TypeError, ValueError, OverflowError):
         places = np.empty(0)
+    places = places.astype(float) if places.dtype.kind in "iuf" else np.empty(0)
     if places.shape != (2, 3) or not np.isfinite(places).all():
-        message = (
-            f"hold: ends must be two places of three finite numbers (north, east, down in m); got {ends!r}."
-        )
+        message = f"hold: ends must be two places of three finite numbers (north, east, down in m); got {short(ends)}."
         raise HoldError(message)
     return places
 
 
-def _check_length(places: np.ndarray, length: float, cable: CableProperties) -> None:
-    """Raise an error if no cable of that length reaches, or if it is none."""
-    if not (np.isfinite(length) and length > 0.0):
-        message = f"hold: length is {length!r}; it must be a positive number of metres."
+def _positive(name: str, given: object) -> float:
+    """Return a length as a float, or refuse what is none [m]."""
+    length = real(given)
+    if length is None or length <= 0.0:
+        message = f"hold: {name} is {short(given)}; it must be a positive number of metres."
         raise HoldError(message)
+    return length
+
+
+def _checked_length(places: np.ndarray, given: float, cable: CableProperties) -> float:
+    """Return the length; raise an error if no cable of that length reaches, or if it is none. [m]."""
+    length = _positive("length", given)
     apart = float(np.linalg.norm(places[0] - places[1]))
     if cable.compliance == 0.0 and apart >= TAUT * length:
         message = (
@@ -226,15 +233,14 @@ def _check_length(places: np.ndarray, length: float, cable: CableProperties) -> 
             "more length."
         )
         raise HoldError(message)
+    return length
 
 
-def _segments(length: float, segment_length: float | None) -> int:
+def _segments(length: float, given: float | None) -> int:
     """Return how many segments a cable is divided into."""
-    if segment_length is None:
+    if given is None:
         return SEGMENTS
-    if not (np.isfinite(segment_length) and segment_length > 0.0):
-        message = f"hold: segment_length is {segment_length!r}; it must be a positive number of metres."
-        raise HoldError(message)
+    segment_length = _positive("segment_length", given)
     if length / segment_length > MOST_SEGMENTS:
         message = (
             f"hold: {length:g} m in segments of {segment_length:g} m are more than {MOST_SEGMENTS} segments. Take "
@@ -246,7 +252,11 @@ def _segments(length: float, segment_length: float | None) -> int:
 
 def _checked_start(start: Place, places: np.ndarray) -> np.ndarray:
     """Return node positions relative to the second end."""
-    nodes = np.array(start, dtype=float)
+    try:
+        nodes = np.array(start)
+    except (TypeError, ValueError, OverflowError):
+        nodes = np.empty(0)
+    nodes = nodes.astype(float) if nodes.dtype.kind in "iuf" else np.empty(0)
     if nodes.ndim != 2 or nodes.shape[0] < 2 or nodes.shape[1] != 3 or not np.isfinite(nodes).all():
         message = f"hold: start must be finite node positions (n, 3), two at least; got shape {nodes.shape}."
         raise HoldError(message)

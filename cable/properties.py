@@ -166,7 +166,7 @@ class DrumProperties:
 
     def numbers(self) -> DrumNumbers:
         """Return the plain numbers that compiled code takes."""
-        inertia, friction = self.inertia / max(self.radius**2, 5e-324), self.friction_torque / self.radius
+        inertia, friction = self.inertia / self.radius / self.radius, self.friction_torque / self.radius
         if not isfinite(inertia + friction):
             raise BadValueError(
                 f"DrumProperties: radius is {self.radius:g}; so small that inertia and friction are not finite."

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from subzero.errors import BadValueError, checked, short, suggestion
+from subzero.errors import BadValueError, checked, real, short, suggestion
 
 from .drum import LENGTH
 from .drum_path import PLACE, SETPOINT, VELOCITY, drum_path, resting
@@ -107,9 +107,12 @@ def pull_out(
     if start is not None:
         _check_start(start, scheme, wet_length)
         wet_length, segment_length = start.length, float(start.segment_lengths[0])
-        cable, origin = cable or start.cable, start.shape[-1] if current is None else origin
+        cable, origin = (
+            start.cable if cable is None else cable,
+            start.shape[-1] if current is None else origin,
+        )
         current = start.current if current is None else current
-    cable, drum = cable or CableProperties(), drum or DrumProperties()
+    cable, drum = CableProperties() if cable is None else cable, DrumProperties() if drum is None else drum
     _check(duration, step, segment_length, scheme, rtol, grading, wet_length)
     check_kinds(
         cable=(cable, (CableProperties,)), drum=(drum, (DrumProperties, PayOutRate, Brake, ConstantTension))
@@ -170,7 +173,7 @@ def pull_out(
 def _check_start(start: object, scheme: str, wet_length: float) -> None:
     """Refuse a start that is none, and what does not go together with one."""
     check_kinds(start=(start, (Equilibrium,)))
-    if scheme != "moving_end" or wet_length != 0.0:
+    if not isinstance(scheme, str) or scheme != "moving_end" or real(wet_length) != 0.0:
         raise BadValueError(
             f"start goes with scheme 'moving_end' and without wet_length; got scheme {short(scheme)} and wet_length "
             f"{short(wet_length)}. The length is the start's own."
@@ -208,7 +211,7 @@ def _check(
     checked("", "rtol", rtol, least=0.0, most=0.5)
     checked("", "grading", grading, least=0.0, most=0.5)
     checked("", "wet_length", wet_length, least=0.0, unit="m")
-    if scheme not in SCHEMES:
+    if not isinstance(scheme, str) or scheme not in SCHEMES:
         raise BadValueError(
             f"scheme {short(scheme)} is unknown; choose one of {', '.join(SCHEMES)}.{suggestion(str(scheme), SCHEMES)}"
         )

@@ -9,14 +9,14 @@ import numpy as np
 from subzero.errors import BadValueError, checked, real, short
 from subzero.memory import refuse_unless_it_fits
 
-from .drum import LENGTH
 from .element import Load
 from .energy import LOSS, STORED
 from .history import History, Outcome
 from .laying import start_in_water
-from .line import NEW, Line, Solved
+from .line import Line, Solved
 from .pay_out import Record, TowPath, follow_path, new_record
 from .properties import CableNumbers, DrumNumbers
+from .stops import describe_stop
 from .water import Current, Water
 
 TowVelocity = Callable[[float], Sequence[float] | np.ndarray]
@@ -29,9 +29,6 @@ MOMENT = 1e-9
 """Just before and just after, as a share of the step."""
 FINEST, COARSEST = 1e-12, 1e-3
 """Between these a tolerance makes sense: rounding is below, and the error of a step above."""
-NEARLY_TAUT = 0.999
-"""A cable whose ends are this share of its length apart, or more, and that has no solution, is too short."""
-EQUATIONS = ("length", "northward balance", "eastward balance", "downward balance")
 
 
 def run(
@@ -50,7 +47,7 @@ def run(
     record = new_record(path.times.size, capacity)
     rows = follow_path(line, path, led, water, c, drum, rtol, work, record)
     solved = line.ends.solved
-    trouble = too_short(path.times[rows - 1], line, drum) or describe_failure(solved, path.times[rows - 1])
+    trouble = "" if rows == path.times.size else describe_stop(float(path.times[rows - 1]), line, drum, c)
     return as_history(path, record, rows, solved, trouble)
 
 
@@ -80,26 +77,6 @@ def as_history(path: TowPath, record: Record, rows: int, solved: Solved, trouble
         ),
         scheme="moving_end",
         tow_impulse=record.impulse[:rows],
-    )
-
-
-def describe_failure(solved: Solved, time: float) -> str:
-    """Return what went wrong in a step that starts at `time`, where, and what to try."""
-    return (
-        f"The cable could not be solved beyond t = {time:g} s: after {solved.iterations} Newton iterations the "
-        f"{EQUATIONS[solved.worst_equation]} at node {solved.worst_node} is off by {solved.residual:.1e} times its "
-        "tolerance. Try a shorter step, other segments, or a smoother motion of the tow point."
-    )
-
-
-def too_short(time: float, line: Line, drum: DrumNumbers) -> str:
-    """Return that a step from `time` asks for more cable than a winch has paid out; empty if it does not."""
-    way = float(np.linalg.norm(line.position[NEW, 0] - drum.place))
-    if drum.control != LENGTH or way < NEARLY_TAUT * drum.setpoint:
-        return ""
-    return (
-        f"The cable is too short beyond t = {time:g} s: the winch has paid out {drum.setpoint:.5g} m, the vehicle is "
-        f"{way:.5g} m away. Pay out faster, or start with more cable in the water."
     )
 
 
@@ -202,9 +179,9 @@ def _three_numbers(
 ) -> np.ndarray:
     """Return velocities as an array (times, 3) of finite numbers, or say what is wrong with the first that is none."""
     try:
-        array = np.array(values, dtype=float)
-        if array.shape == (moments.size, 3) and np.isfinite(array).all():
-            return array
+        array = np.array(values)
+        if array.shape == (moments.size, 3) and array.dtype.kind in "iuf" and np.isfinite(array).all():
+            return array.astype(float)
     except (ValueError, TypeError, OverflowError):
         pass
     for t, value in zip(moments.tolist(), values, strict=True):

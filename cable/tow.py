@@ -78,8 +78,10 @@ def tow(
     checked("", "rtol", rtol, least=0.0, most=0.5)
     check_motion("tow_velocity", tow_velocity)
     check_tolerance(tolerance)
-    cable, water = cable or CableProperties(), current_of(current)
+    cable, water = CableProperties() if cable is None else cable, current_of(current)
     check_kinds(cable=(cable, (CableProperties,)))
+    if not isinstance(scheme, str) or scheme not in ("moving_end", "lumped"):
+        raise BadValueError(f"scheme {short(scheme)} cannot tow a free end; choose 'moving_end' or 'lumped'.")
     if scheme == "lumped":
         from .lumped_history import tow_lumped
 
@@ -93,8 +95,6 @@ def tow(
             current=water,
             drogue_drag_area=drogue_drag_area,
         )
-    if scheme != "moving_end":
-        raise BadValueError(f"scheme {short(scheme)} cannot tow a free end; choose 'moving_end' or 'lumped'.")
     path = sample_path(tow_velocity, duration, step)
     segments_needed(length, segment_length, 0.0)  # refuses a cable of countless ones
     count = max(1, int(np.ceil(length / segment_length - 1e-9)))

@@ -101,14 +101,17 @@ class Current:
         time: Sequence[float] = (0.0,),
     ) -> Current:
         """Return the current that a function of (north, east, down, time) describes, sampled on a grid."""
-        values = [[[[function(n, e, d, t) for d in down] for e in east] for n in north] for t in time]
-        return cls(
-            north=np.asarray(north),
-            east=np.asarray(east),
-            down=np.asarray(down),
-            time=np.asarray(time),
-            velocity=np.asarray(values, dtype=float),
-        )
+        given = {"north": north, "east": east, "down": down, "time": time}
+        grid = {name: np.atleast_1d(_numbers(name, points)) for name, points in given.items()}
+        if any(points.ndim != 1 for points in grid.values()) or not callable(function):
+            raise BadValueError(
+                "Current.sampled: give a function, and grid points as plain sequences of numbers."
+            )
+        axes = [grid[name].tolist() for name in ("time", "north", "east", "down")]
+        values = [
+            [[[function(n, e, d, t) for d in axes[3]] for e in axes[2]] for n in axes[1]] for t in axes[0]
+        ]
+        return cls(velocity=_numbers("velocity", values), **grid)
 
     @property
     def fastest(self) -> float:

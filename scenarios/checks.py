@@ -146,12 +146,12 @@ class Checks:
         try:
             array = np.array(given)
             good = array.dtype.kind in "iuf"
-            array = array.astype(float)
         except (ValueError, TypeError, OverflowError):
             good = False
         if not good:
             self.say(name, "these are not numbers", f"Allowed: finite numbers, {words}.", given)
             return None
+        array = array.astype(float)
         fits = len(array.shape) == len(shape) and all(
             n == size if n is not None else size > 0 for n, size in zip(shape, array.shape, strict=True)
         )

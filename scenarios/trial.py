@@ -199,7 +199,7 @@ class Winch:
     def __post_init__(self) -> None:
         """Refuse what is no winch."""
         check = Checks(self)
-        if self.control not in CONTROLS:
+        if not isinstance(self.control, str) or self.control not in CONTROLS:
             check.say("control", "a winch cannot do this", f"Allowed: {', '.join(CONTROLS)}.", self.control)
             check.refuse()
         quantity = SETPOINT[self.control]
@@ -308,7 +308,7 @@ class Trial:
         for name in ("name", "description", "text", "source"):
             check.kind(name, (str,))
         check.numbers(by_field(RUN))
-        if self.scheme not in SCHEMES:
+        if not isinstance(self.scheme, str) or self.scheme not in SCHEMES:
             check.say("scheme", "this is not a scheme", f"Allowed: {', '.join(SCHEMES)}.", self.scheme)
         check.vector("current", WATER)
         check.number("sea_bed", BED[0])

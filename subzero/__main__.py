@@ -14,7 +14,9 @@ def run() -> None:
         from subzero.cli import main
 
         code = main()
+        interrupts.ignore()  # all is done: what comes now cannot change it
     except KeyboardInterrupt:  # before the command line was ready, or while it said so
+        interrupts.ignore()
         print(interrupts.words(), file=sys.stderr)
         code = interrupts.INTERRUPTED
     interrupts.leave(code)

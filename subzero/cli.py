@@ -211,11 +211,7 @@ def _refined(runs: Runs, trial: scenarios.Trial, extended: dict[str, Any]) -> Ru
 
 
 def _progress(trial: scenarios.Trial, words: str = "") -> ProgressBar:
-    """Return a progress bar, after saying why the first run of all takes long."""
-    from subzero.compiled import is_warm
-    from subzero.progress import ProgressBar
+    """Return a progress bar that says what costs in this trial where it stands still."""
+    from subzero.progress import costs_of, progress_bar
 
-    console = Console(stderr=True, highlight=False)
-    if not is_warm():
-        console.print("Compiling the kernels (first use, about 50 s)…")
-    return ProgressBar(words or f"Simulating {trial.name}", console)
+    return progress_bar(words or f"Simulating {trial.name}", lambda: costs_of(trial))

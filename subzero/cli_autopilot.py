@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -14,7 +15,12 @@ import scenarios
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    import xarray as xr
+
     from subzero.autopilot.showing import Measured
+    from subzero.simulation import Progress
+
+    Fly = Callable[[str, Progress], tuple[xr.Dataset, dict[str, float]]]
 
 RUNS = ("tethered", "untethered")
 FINE, STOPPED = 0, 3
@@ -55,20 +61,18 @@ def manoeuvre(
         out: folder for the files; by default one named after the manoeuvre, here.
         strict: end with exit code 3 if a run ends with warnings.
     """
-    scenarios.load(scenario)  # a mistake in it answers at once
+    trial = scenarios.load(scenario)  # a mistake in it answers at once
     from subzero.autopilot.manoeuvres import MANOEUVRES
     from subzero.autopilot.manoeuvres import manoeuvre as run
 
     size = _size(name, rudder, planes)
 
-    def fly() -> Measured:
-        return {
-            label: run(name, scenario, size=size, speed=speed, tethered=label == "tethered") for label in RUNS
-        }
+    def fly(label: str, progress: Progress) -> tuple[xr.Dataset, dict[str, float]]:
+        return run(name, scenario, size=size, speed=speed, tethered=label == "tethered", progress=progress)
 
     meaning = f": {MANOEUVRES[name].meaning}" if name in MANOEUVRES else ""
     shown = MANOEUVRE_COMMANDS.get(name, ("heading", "rudder_command"))
-    return _deliver(fly, out or Path(name), f"{name}{meaning}", shown, strict)
+    return _deliver(trial, fly, out or Path(name), f"{name}{meaning}", shown, strict)
 
 
 def fly_step(
@@ -99,23 +103,20 @@ def fly_step(
         out: folder for the files; by default one named after the step, here.
         strict: end with exit code 3 if a run ends with warnings.
     """
-    scenarios.load(scenario)  # a mistake in it answers at once
+    trial = scenarios.load(scenario)  # a mistake in it answers at once
     from subzero.autopilot import ESTIMATED, PERFECT
     from subzero.autopilot.steps import step as run
 
-    def fly() -> Measured:
-        return {
-            label: run(
-                name, scenario, autopilot=autopilot, feed_forward=feed_forward if label == "tethered" else "none",
-                size=size, speed=speed, tethered=label == "tethered", seed=seed,
-                sensors=ESTIMATED if noisy else PERFECT,
-            )
-            for label in RUNS
-        }  # fmt: skip
+    def fly(label: str, progress: Progress) -> tuple[xr.Dataset, dict[str, float]]:
+        return run(
+            name, scenario, autopilot=autopilot, feed_forward=feed_forward if label == "tethered" else "none",
+            size=size, speed=speed, tethered=label == "tethered", seed=seed,
+            sensors=ESTIMATED if noisy else PERFECT, progress=progress,
+        )  # fmt: skip
 
     title = f"{name}: autopilot {autopilot}, fed forward of the cable: {feed_forward}"
     shown = STEP_COMMANDS.get(name, ("heading", "rudder_command"))
-    return _deliver(fly, out or Path(name), title, shown, strict)
+    return _deliver(trial, fly, out or Path(name), title, shown, strict)
 
 
 def add_to(app: cyclopts.App) -> None:
@@ -136,16 +137,21 @@ def _size(name: str, rudder: float | None, planes: float | None) -> float | None
 
 
 def _deliver(
-    fly: Callable[[], Measured], folder: Path, title: str, shown: tuple[str, str], strict: bool
+    trial: scenarios.Trial, fly: Fly, folder: Path, title: str, shown: tuple[str, str], strict: bool
 ) -> int:
-    """Fly, write and tell; return the exit code."""
-    from subzero.autopilot import showing
+    """Fly with the cable and without, write and tell; return the exit code."""
+    from subzero.autopilot import AutopilotWarning, showing
     from subzero.delivery import refuse_warnings
     from subzero.output import staged
-    from subzero.progress import progress_bar
+    from subzero.progress import costs_of, progress_bar
 
-    with staged(folder) as stage, progress_bar("Flying"):
-        measured = fly()
+    with staged(folder) as stage:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", AutopilotWarning)  # the outcome tells it, below
+            measured: Measured = {}
+            for label in RUNS:
+                with progress_bar(f"Flying {trial.name}, {label}", lambda: costs_of(trial)) as progress:
+                    measured[label] = fly(label, progress)
         summary = showing.write(measured, title, *shown, stage)
     stopped = showing.tell(summary, list(measured), stage)
     for message in stopped:

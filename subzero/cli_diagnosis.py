@@ -24,6 +24,12 @@ FINE = 0
 LAST_WORDS_S = 60.0
 """An interrupted diagnosis has so long to tell and write what it has. [s]"""
 
+COSTS = (
+    "What costs are the simulations of the trial. Try --screen, a shorter record, or a longer cable_step_s and "
+    "segment_length_m in the scenario."
+)
+"""What is told where a diagnosis stands still."""
+
 Flag = Annotated[bool, Parameter(negative=())]
 With = Annotated[Path | None, Parameter(name="--with")]
 Own = Annotated[Path | None, Parameter(name="--effects")]
@@ -64,6 +70,8 @@ def diagnose(
             verdict = _ask(logged, own, seed, "screen" if screen else "full")
             delivery_diagnosis.write_all(verdict, logged, stage, effects=own, effects_file=effects)
     delivery_diagnosis.tell(verdict, stage)
+    if not verdict.complete:
+        print("Interrupted; what it has is written.", file=sys.stderr)
     return FINE if verdict.complete else INTERRUPTED
 
 
@@ -157,8 +165,5 @@ def _ask(logged: list[Logged], own: tuple[Effect, ...], seed: int, budget: str) 
     from subzero.delivery_diagnosis import tell_before
     from subzero.diagnosis.entrance import diagnose as run
 
-    with progress_bar("Diagnosing") as progress:
-        verdict = run(logged, effects=own, progress=progress, seed=seed, budget=budget, seen=tell_before)
-    if not verdict.complete:
-        print("Interrupted; what it has is written.", file=sys.stderr)
-    return verdict
+    with progress_bar("Diagnosing", lambda: COSTS) as progress:
+        return run(logged, effects=own, progress=progress, seed=seed, budget=budget, seen=tell_before)

@@ -9,9 +9,12 @@ traceback. Every refusal of every package is one: `scenarios.ScenarioError` for 
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from math import inf, isfinite
-from numbers import Real
+from numbers import Integral, Real
+from typing import TypeVar
+
+Line = TypeVar("Line")
 
 SHOWN_PROBLEMS = 12
 """So many problems of one file are spelt out: enough to repair it, few enough to read on one screen."""
@@ -74,6 +77,40 @@ def checked(
     )
     place = f"{owner}: {name}" if owner else name
     raise BadValueError(f"{place} is {short(value)}; it must be {allowed}.")
+
+
+def truth(name: str, value: object) -> bool:
+    """Return a truth value, Python's or numpy's, or refuse what is none: what is meant by 0.5 nobody can know.
+
+    Raises:
+        BadValueError: neither True nor False.
+    """
+    if isinstance(value, bool) or type(value).__name__ in ("bool_", "bool"):  # numpy's, without importing it
+        return bool(value)
+    raise BadValueError(f"{name} is {short(value)}; it must be True or False.")
+
+
+def whole(name: str, value: object, *, least: int = 0) -> int:
+    """Return a whole number, such as a seed, or refuse what is none.
+
+    Raises:
+        BadValueError: no whole number, or one below `least`.
+    """
+    if isinstance(value, Integral) and not isinstance(value, bool) and int(value) >= least:
+        return int(value)
+    raise BadValueError(f"{name} is {short(value)}; it must be a whole number of at least {least}.")
+
+
+def chosen(table: Mapping[str, Line], name: object, what: str) -> Line:
+    """Return a line of a table by its name, or say what there is.
+
+    Raises:
+        UserError: the table has no such line.
+    """
+    if isinstance(name, str) and name in table:
+        return table[name]
+    hint = suggestion(name, table) if isinstance(name, str) else ""
+    raise UserError(f"There is no {what} {short(name)}.{hint} Allowed: {', '.join(table)}.")
 
 
 SHOWN_CHARACTERS = 60

@@ -38,6 +38,12 @@ def watch() -> None:
     threading.Thread(target=_end_late, args=(woken, waker), daemon=True).start()
 
 
+def ignore() -> None:
+    """Let signals do nothing any more: Python, while it ends, would leave them to the system, which kills."""
+    for each in SIGNALS:
+        signal.signal(each, signal.SIG_IGN)
+
+
 @contextmanager
 def patience(seconds: float) -> Iterator[None]:
     """Let a command go on for so long after a signal, to write what it has [s]; a second signal ends it as usual."""

@@ -7,6 +7,7 @@ sudden change of a mass would take is not booked.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -14,7 +15,7 @@ import scenarios
 import vehicle
 from cable.energy import FLOWS, STORED, energy_flow
 from subzero.compiled import allocating
-from subzero.errors import UserError
+from subzero.errors import BadValueError, UserError, real, short
 from subzero.hull import feel_current
 from subzero.model import Model
 from subzero.run_state import Live, Setup
@@ -25,6 +26,16 @@ Later = Sequence[tuple[float, Model]]
 
 CLOSE = 1e-6
 """A time of a change is that of a row if it is as near as this. [s]"""
+
+
+def checked_later(later: object) -> Later:
+    """Return times and models; refuse what are none."""
+    pairs: list[Any] = list(later) if isinstance(later, Sequence) else [later]
+    for pair in pairs:
+        good = isinstance(pair, Sequence) and len(pair) == 2
+        if not (good and real(pair[0]) is not None and isinstance(pair[1], Model)):
+            raise BadValueError(f"later holds {short(pair)}; it must hold pairs of a time [s] and a Model.")
+    return pairs
 
 
 def rows_of_changes(
@@ -40,7 +51,7 @@ def rows_of_changes(
             f"'{trial.name}' has the scheme '{trial.scheme}'; only 'moving_end' can go on with another model."
         )
     changes = {}
-    for time, model in later:
+    for time, model in checked_later(later):
         row = int(np.argmin(np.abs(times - time)))
         if not abs(times[row] - time) < CLOSE:
             raise UserError(

@@ -97,14 +97,16 @@ class Term:
     def __post_init__(self) -> None:
         """Refuse what is not in the tables."""
         for word, known in ((self.axis, AXES), (self.feature, tuple(FEATURES))):
-            if word not in known:
+            if not isinstance(word, str) or word not in known:
                 raise BadValueError(
                     f"A missing force has the term {short(word)}.{suggestion(str(word), known)}"
                     f" Known: {', '.join(known)}."
                 )
-        if real(self.coefficient) is None:
+        coefficient = real(self.coefficient)
+        if coefficient is None:
             name = f"The coefficient of {self.feature!r} on {self.axis}"
             raise BadValueError(f"{name} is {short(self.coefficient)}; it must be finite.")
+        object.__setattr__(self, "coefficient", coefficient)
 
     @property
     def unit(self) -> str:
@@ -133,9 +135,11 @@ class MissingForce:
     def __post_init__(self) -> None:
         """Refuse a history that cannot be one."""
         try:
-            time, wrench = np.array(self.time, dtype=float), np.array(self.wrench, dtype=float)
+            time, wrench = np.array(self.time), np.array(self.wrench)
         except (ValueError, TypeError, OverflowError):
-            raise BadValueError("A missing force has a history of what are no numbers.") from None
+            time = wrench = np.array(None)
+        if not {time.dtype.kind, wrench.dtype.kind} <= set("iuf"):
+            raise BadValueError("A missing force has a history of what are no numbers.")
         if wrench.shape != (*time.shape, 6) and (time.size or wrench.size):
             raise BadValueError(
                 f"A missing force has {time.size} times and a wrench of shape {wrench.shape};"
@@ -145,8 +149,8 @@ class MissingForce:
             raise BadValueError("A missing force has a history with numbers that are not finite.")
         if np.any(np.diff(time) < 0.0):
             raise BadValueError("A missing force has times that decrease; they must be in order.")
-        if not all(isinstance(term, Term) for term in self.terms):
-            raise BadValueError("A missing force has terms that are none; each must be a Term.")
+        if not isinstance(self.terms, tuple) or not all(isinstance(term, Term) for term in self.terms):
+            raise BadValueError("A missing force has terms that are none; they must be a tuple of Term.")
 
     def __add__(self, other: MissingForce | None) -> MissingForce:
         """Return both forces together."""

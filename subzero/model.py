@@ -91,6 +91,19 @@ class Model:
         }
 
 
+def model_of(trial: scenarios.Trial, model: object = None) -> Model:
+    """Return the model that a trial describes, or another one that is given.
+
+    Raises:
+        UserError: what is given is no model.
+    """
+    if model is None:
+        return Model.of(trial)
+    if not isinstance(model, Model):
+        raise BadValueError(f"model is {short(model)}; it must be a Model or None.")
+    return model
+
+
 PARTS = {
     "vehicle": Vehicle,
     "cable": CableProperties,

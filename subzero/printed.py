@@ -28,9 +28,9 @@ from subzero.start import prepare
 from subzero.steady_start import first_state
 
 REMEDIES = {
-    "paper": 'a longer cable_step_s, or scheme = "moving_end", the default',
-    "paper_tangent": 'a longer cable_step_s, or scheme = "moving_end", the default',
-    "paper_drum": 'scheme = "paper_tangent", whose new node is not turned around the drum, or "moving_end"',
+    "paper": 'scheme = "moving_end", the default, or a longer cable_step_s',
+    "paper_tangent": 'scheme = "moving_end", the default, or a longer cable_step_s',
+    "paper_drum": 'scheme = "moving_end", or scheme = "paper_tangent", whose new node is not turned around the drum',
 }
 """What to try; a free drum lets segments shorter than m1/(½ρπdC_t) ring, a quarter of a metre for Table 1."""
 

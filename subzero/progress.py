@@ -1,50 +1,99 @@
-"""Tell a waiting user how far a command is: a bar on the terminal for anything that takes over a second."""
+"""Tell a waiting user how far a command is: a bar on the terminal for anything that takes over a second, and one line
+where the work stands still, or will take hours: where it stands, what costs, what to change.
+
+A thread looks after the work, so that it is told even while machine code does not come back. Compiling is no standing
+still.
+"""
 
 from __future__ import annotations
 
-import time
+import threading
+from collections.abc import Callable
+from time import monotonic
 from types import TracebackType
 from typing import TYPE_CHECKING
 
 from rich.console import Console
 
+from subzero.errors import printable
+
 if TYPE_CHECKING:
     from rich.progress import Progress
 
+    import scenarios
+
 COMPILING = "Compiling what is not compiled yet (all of it takes about 50 s, once)…"
 
-PATIENCE = 1.0
+PATIENCE_S = 1.0
 """What takes less needs no bar. [s]"""
+STANDSTILL_S = 20.0
+"""Work that has not moved for so long is told to stand still; so long is a rate watched before it counts. [s]"""
+LONG_S = 3600.0
+"""Work that will take longer than this is told. [s]"""
+LOOK_S = 1.0
+"""So often the thread looks. [s]"""
 
 
-def progress_bar(words: str) -> ProgressBar:
-    """Return a progress bar on standard error, above which it is said should something have to be compiled first."""
+def progress_bar(words: str, costs: Callable[[], str] = str) -> ProgressBar:
+    """Return a progress bar on standard error, above which it is said should something have to be compiled first.
+
+    Arguments as of `ProgressBar`.
+    """
     from subzero.machine_code import before_compiling
 
     console = Console(stderr=True, highlight=False)
     before_compiling(lambda: console.print(COMPILING))
-    return ProgressBar(words, console)
+    return ProgressBar(words, console, costs)
 
 
 class ProgressBar:
     """Called with the fraction that is done, shows a bar once the work has taken a while.
 
-    Nothing is shown where nobody looks: the bar needs a terminal.
+    The bar needs a terminal; that the work stands still is told anywhere, once, and so is that it will take hours.
+
+    Args:
+        words: what is done.
+        console: where to.
+        costs: what costs time in this work, and what to change, in a sentence or two.
     """
 
-    def __init__(self, words: str, console: Console) -> None:
-        self._words = words
-        self._console = console
+    def __init__(self, words: str, console: Console, costs: Callable[[], str] = str) -> None:
+        self._words, self._console, self._costs = words, console, costs
         self._bar: Progress | None = None
-        self._started = time.monotonic()
+        self._fraction, self._begun, self._moved = 0.0, monotonic(), monotonic()
+        self._told: set[str] = set()
+        self._ended = threading.Event()
 
     def __call__(self, fraction: float, words: str = "") -> None:
         """Show that this fraction, 0 to 1, is done, and what is being done."""
-        self._words = words or self._words
-        if self._bar is None and time.monotonic() - self._started > PATIENCE and self._console.is_terminal:
+        if fraction != self._fraction or (words and words != self._words):
+            self._moved = monotonic()
+        self._words, self._fraction = words or self._words, fraction
+        if self._bar is None and monotonic() - self._begun > PATIENCE_S and self._console.is_terminal:
             self._open()
         if self._bar is not None:
             self._bar.update(self._bar.task_ids[0], completed=fraction, description=self._words)
+
+    def look(self) -> None:
+        """Tell if the work stands still, or if its rate so far means hours; each once."""
+        now = monotonic()
+        if _compiling():
+            self._begun, self._moved = self._begun + LOOK_S, now
+            return
+        ran = now - self._begun
+        left = ran * (1.0 / self._fraction - 1.0) if self._fraction > 0.0 else 0.0
+        if now - self._moved >= STANDSTILL_S:
+            self._tell("still", f"has not moved on for {now - self._moved:.0f} s")
+        elif ran >= STANDSTILL_S and left > LONG_S:
+            self._tell("long", f"will take about {left / 3600.0:.2g} hours more at this rate")
+
+    def _tell(self, what: str, news: str) -> None:
+        if what not in self._told:
+            self._told.add(what)
+            line = f"{self._words} stands at {100.0 * self._fraction:.3g} % and {news}. {self._costs()}"
+            self._console.print(
+                printable(line.rstrip()), soft_wrap=True, highlight=False, markup=False, emoji=False
+            )
 
     def _open(self) -> None:
         from rich.progress import Progress
@@ -53,11 +102,61 @@ class ProgressBar:
         self._bar.add_task(self._words, total=1.0)
         self._bar.start()
 
+    def _watch(self) -> None:
+        while not self._ended.wait(LOOK_S):
+            self.look()
+
     def __enter__(self) -> ProgressBar:
+        _listen()
+        threading.Thread(target=self._watch, daemon=True).start()
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        self._ended.set()
         if self._bar is not None:
             self._bar.stop()
+
+
+_compilations = [0]
+"""How many functions are being compiled now, one inside another."""
+
+
+def _compiling() -> bool:
+    """Say whether numba is at work."""
+    return _compilations[0] > 0
+
+
+def _listen() -> None:
+    """Let numba say when it compiles, from now on."""
+    from numba.core import event
+
+    class Count(event.Listener):
+        def on_start(self, event: object) -> None:
+            _compilations[0] += 1
+
+        def on_end(self, event: object) -> None:
+            _compilations[0] -= 1
+
+    if not _listening:
+        _listening.append(Count())
+        event.register("numba:compile", _listening[0])
+
+
+_listening: list[object] = []
+
+
+def costs_of(trial: scenarios.Trial, tethered: bool = True) -> str:
+    """Return what costs time in a run of a trial, the vehicle's steps or the cable's, and what to change."""
+    from subzero.model import Model
+    from subzero.room import work_of
+
+    work = work_of(trial, Model.of(trial), tethered)
+    span = f"{trial.duration:g} s in steps of"
+    if work.cable > work.hull:
+        return (
+            f"What costs is the cable, up to {work.segments} segments, {span} {trial.cable_step:g} s. Try a longer "
+            "segment_length_m, a grading, a longer cable_step_s, or a shorter duration_s."
+        )
+    return f"What costs is the vehicle, {span} {trial.hull_step:g} s. Try a longer hull_step_s or a shorter duration_s."

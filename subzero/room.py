@@ -6,6 +6,8 @@ only runs are refused that cannot fit; one that nevertheless outgrows the memory
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 import scenarios
@@ -21,6 +23,32 @@ COPIES = 2
 SHARE_OF_FREE_RUNNING = 0.3
 """A vehicle goes at no less than about this share of the speed at which its propeller has no thrust. [-]"""
 REMEDY = "Try a longer cable_step_s or segment_length_m, a grading, or a shorter duration_s."
+
+
+class Work(NamedTuple):
+    """What a run has to do, about: segments at most, and how long vehicle and cable take in all [µs]."""
+
+    segments: int
+    hull: float
+    cable: float
+
+
+MICROSECONDS_A_HULL_STEP = 2.0
+MICROSECONDS_A_SEGMENT = 10.0
+"""Of an exchange: a handful of Newton iterations, 1.4 µs a segment each."""
+
+
+def work_of(trial: scenarios.Trial, model: Model, tethered: bool) -> Work:
+    """Return what a run has to do, about."""
+    segments, rows = most_segments(trial, model) if tethered else 0, trial.duration / trial.cable_step
+    hull = MICROSECONDS_A_HULL_STEP * trial.duration / trial.hull_step
+    return Work(segments, hull, MICROSECONDS_A_SEGMENT * rows * segments)
+
+
+def most_segments(trial: scenarios.Trial, model: Model) -> int:
+    """Return how many segments the cable has at most, about."""
+    longest = max(trial.start.wet_length, _last_length(trial, model))
+    return segments_needed(longest, trial.segment_length, trial.grading)
 
 
 def refuse_what_cannot_fit(trial: scenarios.Trial, model: Model, tethered: bool) -> None:

@@ -5,18 +5,19 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 import scenarios
 from cable.line import enlarged
-from cable.runs import describe_failure, too_short
+from cable.stops import Names, describe_stop
 from subzero import coupling
 from subzero.convergence import Accuracy, run_converged
-from subzero.later import Later, go_on_with, rows_of_changes
+from subzero.errors import truth
+from subzero.later import Later, checked_later, go_on_with, rows_of_changes
 from subzero.loop import NO_ROOM, run_rows
-from subzero.model import Model
+from subzero.model import Model, model_of
 from subzero.recording import Pace, Recording, Run, cut, new_recording, record_row
 from subzero.room import REMEDY, has_room, refuse_what_cannot_fit
 from subzero.run_state import Live, Setup
@@ -57,7 +58,7 @@ def simulate(
         UserError: a time of `later` is none of the run.
     """
     trial = scenario if isinstance(scenario, scenarios.Trial) else load(scenario)
-    model = model or Model.of(trial)
+    model, tethered, later = model_of(trial, model), truth("tethered", tethered), checked_later(later)
     from subzero.dataset import dataset_of
 
     run, accuracy = _as_fine_as_asked(trial, model, tethered, progress, later)
@@ -143,6 +144,14 @@ def more_room(live: Live, recording: Recording, used: int) -> tuple[Live, Record
     )
 
 
+NAMES = Names(
+    step="cable_step_s",
+    segment="segment_length_m",
+    wet="wet_length_m",
+    rate="pay_out_rate_m_s",
+    yielding='control = "constant_tension"',
+)
+"""What the settings of a cable are called in a trial file."""
 WENT_WELL = "The run reached its end."
 
 
@@ -151,8 +160,7 @@ def in_words(ending: int, time: float, setup: Setup, live: Live) -> str:
     if ending == coupling.FINE:
         return WENT_WELL
     if ending == coupling.CABLE_FAILED:
-        behind = too_short(time, live.line, setup.fixed.drum)
-        return behind or describe_failure(live.line.ends.solved, time)
+        return describe_stop(time, live.line, setup.fixed.drum, setup.fixed.cable, NAMES)
     if ending == NO_ROOM:
         return f"The cable's shapes until t = {time:g} s fill the memory that is free. {REMEDY}"
     if ending == coupling.DISAGREED:
@@ -160,7 +168,11 @@ def in_words(ending: int, time: float, setup: Setup, live: Live) -> str:
             f"Vehicle and cable found no common tow force beyond t = {time:g} s, even in the smallest steps. "
             "Try a shorter cable_step_s and hull_step_s."
         )
+    cable: Any = setup.fixed.cable  # a packed record
+    stiff = "bending_stiffness" in cable.dtype.names
+    longer = ", or a longer segment_length_m for the stiff cable" if setup.fixed.tethered and stiff else ""
     return (
         f"The vehicle's speed beyond t = {time:g} s is absurd (more than {coupling.FASTEST:g} m/s, or not a number). "
-        "Look at the commands and the vehicle's numbers, or try a shorter hull_step_s."
+        f"Try a shorter hull_step_s (it is {setup.fixed.hull_step:g}){longer}, or look at the commands and the "
+        "vehicle's numbers."
     )

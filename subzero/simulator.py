@@ -21,12 +21,12 @@ import numpy as np
 
 import scenarios
 from subzero import coupling
-from subzero.errors import UserError
+from subzero.errors import UserError, real, short, truth
 from subzero.handle import ENDING, ROW, USED, advance, hold, observe
 from subzero.loop import NO_ROOM
-from subzero.model import Model
+from subzero.model import Model, model_of
 from subzero.recording import Recording, Run, cut, new_recording, record_row
-from subzero.run_state import Live, Orders
+from subzero.run_state import Live, Orders, Setup
 from subzero.simulation import WENT_WELL, in_words, more_room
 from subzero.start import prepare
 from subzero.trials import load
@@ -75,17 +75,41 @@ class Observation(NamedTuple):
     cable_moment_yaw: float
 
 
+MOST_EXCHANGES = 1e6
+"""A sample of more cable steps than this is a slip of the pen."""
 WELL = (coupling.FINE, NO_ROOM)
 """Endings of a step from which a run can go on."""
 
 
 class Held(NamedTuple):
-    """The arrays of a run, times of its rows (n,) [s], and the handle that compiled code knows them by."""
+    """A run: its arrays, times of its rows (n,) [s], where it stands (`subzero.handle`), what is seen, and the handle
+    that machine code knows the arrays by. It is exchanged as a whole: an interrupt finds the old one or the new one.
+    """
 
+    setup: Setup
     live: Live
     recording: Recording
     times: np.ndarray
+    at: np.ndarray
+    seen: np.ndarray
     handle: Any
+
+    @classmethod
+    def of(
+        cls,
+        setup: Setup,
+        live: Live,
+        recording: Recording,
+        times: np.ndarray,
+        at: np.ndarray,
+        seen: np.ndarray,
+    ) -> Held:
+        """Return a run with its handle."""
+        return cls(setup, live, recording, times, at, seen, hold(setup, live, recording, times))
+
+
+class CommandError(UserError, ValueError):
+    """A command that is not four finite numbers; the run stands where it was."""
 
 
 class RunStoppedError(UserError):
@@ -122,36 +146,36 @@ class Simulator:
             UserError: a prescribed motion, a scheme that cannot be stepped, a sample time that does not fit.
         """
         self.trial = scenario if isinstance(scenario, scenarios.Trial) else load(scenario)
-        self.model = model or Model.of(self.trial)
-        self._tethered = tethered
-        self._exchanges = _exchanges(self.trial, sample_time, tethered)
+        self.model = model_of(self.trial, model)
+        self._tethered = truth("tethered", tethered)
+        self._exchanges = _exchanges(self.trial, sample_time, self._tethered)
         self.sample_time = self._exchanges * self.trial.cable_step
         self.reset()
 
     def reset(self) -> Observation:
         """Go back to the start, and return what is true there."""
         setup, live = prepare(self.trial, self.model, self._tethered)
-        self._setup = setup._replace(orders=Orders(np.zeros(1), np.zeros((1, 4))))
-        self._setup.orders.values[0] = self._command_at(0.0)
+        setup = setup._replace(orders=Orders(np.zeros(1), np.zeros((1, 4))))
+        setup.orders.values[0] = self._command_at(0.0)
         times = _times(self.trial)
         recording = new_recording(times.size, 4 * times.size * live.line.length.size if self._tethered else 0)
-        used = record_row(self._setup, live, recording, 0, 0.0, 0)
-        self._at = np.array([0, used, coupling.FINE])
-        self._seen = np.zeros(len(Observation._fields))
-        self._seen[6] = pi - 1e-12  # headings begin in [0, 2π), as in `subzero.dataset`
-        self._hold(live, recording, times)
-        observe(self._held.handle, 0, self._seen)
+        used = record_row(setup, live, recording, 0, 0.0, 0)
+        at, seen = np.array([0, used, coupling.FINE]), np.zeros(len(Observation._fields))
+        seen[6] = pi - 1e-12  # headings begin in [0, 2π), as in `subzero.dataset`
+        held = Held.of(setup, live, recording, times, at, seen)
+        observe(held.handle, 0, seen)
+        self._held = held
         return self.observation
 
     @property
     def observation(self) -> Observation:
         """What is true now."""
-        return Observation(*self._seen.tolist())
+        return Observation(*self._held.seen.tolist())
 
     @property
     def time(self) -> float:
         """Time since the start [s]."""
-        return float(self._seen[0])
+        return float(self._held.seen[0])
 
     def step(self, command: Command | None = None) -> Observation:
         """Hold a command for one sample time, and return what is true then.
@@ -161,24 +185,24 @@ class Simulator:
                 at this time.
 
         Raises:
-            UserError: the command is not four finite numbers; the run stands where it was.
+            CommandError: the command is not four finite numbers (a UserError); the run stands where it was.
             RunStoppedError: the simulation cannot go on.
         """
         n, rudder, port, starboard = (
             self._command_at(self.time) if command is None else self._checked(command)
         )
         self._check_on()
-        goal = int(self._at[ROW]) + self._exchanges
+        goal = int(self._held.at[ROW]) + self._exchanges
         if goal >= self._held.times.size:
-            self._more_rows(goal)
+            self._held = _with_rows(self._held, goal)
         while True:
-            count = goal - int(self._at[ROW])
-            ending = advance(self._held.handle, self._at, count, n, rudder, port, starboard, self._seen)
+            held = self._held
+            count = goal - int(held.at[ROW])
+            ending = advance(held.handle, held.at, count, n, rudder, port, starboard, held.seen)
             if ending != NO_ROOM:
                 break
-            self._hold(
-                *more_room(self._held.live, self._held.recording, int(self._at[USED])), self._held.times
-            )
+            live, recording = more_room(held.live, held.recording, int(held.at[USED]))
+            self._held = Held.of(held.setup, live, recording, held.times, held.at, held.seen)
         self._check_on()
         return self.observation
 
@@ -186,7 +210,7 @@ class Simulator:
         """Return the run so far as `subzero.simulate` does: channels with units, forces, the cable's shape."""
         from subzero.dataset import dataset_of
 
-        row, used, ending = self._at.tolist()
+        row, used, ending = self._held.at.tolist()
         run = Run(
             times=self._held.times[: row + 1].copy(),
             recording=cut(self._held.recording, row + 1, used),
@@ -198,13 +222,14 @@ class Simulator:
     def _checked(self, command: Command) -> tuple[float, float, float, float]:
         """Return a command as four floats."""
         try:
-            n, rudder, port, starboard = (float(value) for value in command)
+            n, rudder, port, starboard = (float(value + 0.0) for value in command)  # no text is a number
             if isfinite(n) and isfinite(rudder) and isfinite(port) and isfinite(starboard):
                 return n, rudder, port, starboard
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             pass
-        raise UserError(
-            f"At t = {self.time:g} s the command is {command!r}. Allowed: four finite numbers, {', '.join(COMMANDED)}."
+        raise CommandError(
+            f"At t = {self.time:g} s the command is {short(command)}. Allowed: four finite numbers,"
+            f" {', '.join(COMMANDED)}."
         )
 
     def _command_at(self, time: float) -> tuple[float, float, float, float]:
@@ -218,27 +243,24 @@ class Simulator:
 
     def _message(self) -> str:
         """Say how the last step ended."""
-        ending = int(self._at[ENDING])
-        return WENT_WELL if ending in WELL else in_words(ending, self.time, self._setup, self._held.live)
+        ending = int(self._held.at[ENDING])
+        return WENT_WELL if ending in WELL else in_words(ending, self.time, self._held.setup, self._held.live)
 
     def _check_on(self) -> None:
         """Refuse to go on where a step has failed."""
-        if self._at[ENDING] not in WELL:
+        if self._held.at[ENDING] not in WELL:
             raise RunStoppedError(self._message())
 
-    def _hold(self, live: Live, recording: Recording, times: np.ndarray) -> None:
-        """Take hold of a run's arrays, all at once: an interrupt finds the old ones or the new ones."""
-        self._held = Held(live, recording, times, hold(self._setup, live, recording, times))
 
-    def _more_rows(self, goal: int) -> None:
-        """Make room for rows up to `goal`, and twice as many as there were."""
-        live, old, times, _ = self._held
-        rows = max(2 * times.size, goal + 1)
-        new = new_recording(rows, old.tension.size)
-        for name, values in old._asdict().items():
-            getattr(new, name)[: values.shape[0]] = values
-        later = times[1] * np.arange(times.size, rows)
-        self._hold(live, new, np.concatenate([times, later]))
+def _with_rows(held: Held, goal: int) -> Held:
+    """Return a run with room for rows up to `goal`, and for twice as many as there were."""
+    old, times = held.recording, held.times
+    rows = max(2 * times.size, goal + 1)
+    new = new_recording(rows, old.tension.size)
+    for name, values in old._asdict().items():
+        getattr(new, name)[: values.shape[0]] = values
+    later = times[1] * np.arange(times.size, rows)
+    return Held.of(held.setup, held.live, new, np.concatenate([times, later]), held.at, held.seen)
 
 
 def _times(trial: scenarios.Trial) -> np.ndarray:
@@ -256,10 +278,10 @@ def _exchanges(trial: scenarios.Trial, sample_time: float | None, tethered: bool
         )
     if tethered and trial.scheme != "moving_end":
         raise UserError(f"'{trial.name}' has the scheme '{trial.scheme}'; only 'moving_end' can be stepped.")
-    count = 1.0 if sample_time is None else sample_time / trial.cable_step
-    if not (isfinite(count) and round(count) >= 1 and abs(count - round(count)) < 1e-6):
+    count = 1.0 if sample_time is None else (real(sample_time) or 0.0) / trial.cable_step
+    if not (0.5 < count < MOST_EXCHANGES and abs(count - round(count)) < 1e-6):
         raise UserError(
-            f"A sample time of {sample_time:g} s does not fit. Allowed: a whole number of cable steps,"
+            f"A sample time of {short(sample_time)} s does not fit. Allowed: a whole number of cable steps,"
             f" {trial.cable_step:g} s each."
         )
     return round(count)

@@ -228,7 +228,7 @@ def inconsistencies(hull: Hull, added_mass: AddedMass) -> list[Problem]:
         ("sway_yaw", added_mass.sway_yaw, added_mass.sway, added_mass.yaw),
         ("heave_pitch", added_mass.heave_pitch, added_mass.heave, added_mass.pitch),
     ):
-        if coupling**2 > mass * inertia:
+        if coupling * coupling > mass * inertia:  # a power would raise where this overflows
             limit = (mass * inertia) ** 0.5
             why = "the added mass would give negative kinetic energy"
             problems.append(

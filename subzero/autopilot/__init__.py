@@ -34,6 +34,8 @@ from typing import Any
 _HOME = {
     "AUTOPILOTS": "table",
     "Autopilot": "flight",
+    "AutopilotError": "flight",
+    "AutopilotWarning": "flight",
     "CableModel": "feed_forward",
     "ESTIMATED": "sensors",
     "EstimatorLoop": "estimator",

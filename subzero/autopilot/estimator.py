@@ -17,12 +17,14 @@ import numpy as np
 
 from subzero.autopilot.design import Gains, design_gains
 from subzero.autopilot.linear import linearise, subsystem
+from subzero.autopilot.loops import refuse_unknown
 from subzero.autopilot.schedule import Schedule
 from subzero.autopilot.steady import trim
 from subzero.autopilot.tuning import Tuning
 from subzero.simulator import Observation
 
 STATES = ("sway_speed", "yaw_rate", "heading", "rudder_angle")
+TRACKED = ("yaw_rate", "heading")
 MEASURED = np.array([[0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]])
 LARGEST = {"yaw_rate": radians(20.0), "heading": radians(8.0), "integral": radians(16.0)}
 LARGEST_COMMAND = radians(10.0)
@@ -122,6 +124,7 @@ class EstimatorLoop:
         rate: float = 0.0,
     ) -> None:
         """Take over from a command without a jump: the next command, unlimited, is this one."""
+        refuse_unknown(reading, TRACKED, wanted=wanted, command=command, feed_forward=feed_forward)
         self.estimate = np.array([0.0, reading.yaw_rate, reading.heading, command - feed_forward])
         self.integral = command - feed_forward - self._feedback(wanted, speed, rate)[0]
         self._wanted = wanted
@@ -137,6 +140,7 @@ class EstimatorLoop:
         rate: float = 0.0,
     ) -> float:
         """Return the rudder command for the next sample [rad]; arguments as of `loops.Loop.update`."""
+        refuse_unknown(reading, TRACKED, wanted=wanted, rate=rate, feed_forward=feed_forward)
         if self.estimate is None:
             self.estimate = np.array([0.0, reading.yaw_rate, reading.heading, 0.0])
         self.integral -= self._jump(wanted, speed, rate)

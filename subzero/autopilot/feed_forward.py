@@ -17,6 +17,7 @@ import scenarios
 from subzero.autopilot.behind import Behind
 from subzero.autopilot.sensors import UNKNOWN
 from subzero.autopilot.tuning import Tuning
+from subzero.errors import UserError
 from subzero.model import Model
 from subzero.simulator import Observation, RunStoppedError, Simulator
 
@@ -44,6 +45,14 @@ class CableModel(ABC):
     @abstractmethod
     def wrench(self, reading: Observation, last_command: np.ndarray | None) -> np.ndarray:
         """Return the cable's pull now; `last_command` is None at the first sample."""
+
+
+def _refuse_unknown_length(reading: Observation) -> None:
+    """Refuse a length that no sensor measures: nothing would be fed forward, unseen."""
+    if reading.cable_length != reading.cable_length:
+        raise UserError(
+            f"at t = {reading.time:g} s no sensor measures the cable's length (cable_length), which feed-forward needs."
+        )
 
 
 class NoCable(CableModel):
@@ -81,6 +90,7 @@ class FormulaCable(CableModel):
 
     def wrench(self, reading: Observation, last_command: np.ndarray | None) -> np.ndarray:
         """Return the pull of a cable that lies behind the tow point."""
+        _refuse_unknown_length(reading)
         u, r = reading.surge_speed, reading.yaw_rate
         nu = np.array([u, float(self._tuning.sway_per_yaw.at(u)) * r, 0.0, 0.0, reading.pitch_rate, r])
         V = nu[:3] + np.cross(nu[3:], self._tow_point)
@@ -123,6 +133,7 @@ class TwinCable(CableModel):
 
     def wrench(self, reading: Observation, last_command: np.ndarray | None) -> np.ndarray:
         """Return the twin's pull, in proportion to the length that is out."""
+        _refuse_unknown_length(reading)
         if last_command is not None and not self._lost:
             try:
                 self._twin.step(last_command)

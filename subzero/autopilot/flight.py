@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Sequence
+from math import ceil, isinf
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
@@ -12,9 +14,10 @@ import scenarios
 from subzero.autopilot.sensors import PERFECT, Sensor, Sensors
 from subzero.autopilot.standard import Wanted
 from subzero.channels import DEGREE
-from subzero.errors import UserError
+from subzero.errors import BadValueError, UserError, real, short
 from subzero.model import Model
-from subzero.simulator import COMMANDED, Observation, Simulator
+from subzero.simulation import Progress
+from subzero.simulator import COMMANDED, CommandError, Observation, RunStoppedError, Simulator
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -39,6 +42,18 @@ class Autopilot(Protocol):
         """Return the command for the next sample."""
 
 
+class AutopilotError(UserError):
+    """An autopilot that broke: it raised an error of its own, which is this one's cause."""
+
+
+class AutopilotWarning(UserWarning):
+    """A flight that its autopilot ended early: it had no command, or one that is none."""
+
+
+LONGEST = 86400.0
+"""A flight lasts a day at most, as a trial does. [s]"""
+
+
 def fly(
     scenario: str | Path | scenarios.Trial,
     autopilot: Autopilot,
@@ -49,6 +64,7 @@ def fly(
     duration: float | None = None,
     sensors: Sequence[Sensor] = PERFECT,
     seed: int = 0,
+    progress: Progress | None = None,
 ) -> xr.Dataset:
     """Return a run of a scenario whose commands come from an autopilot.
 
@@ -58,34 +74,83 @@ def fly(
         wanted: what to hold, at a time [s].
         tethered: with the cable.
         model: another model than the scenario's: what is true, whatever the autopilot believes.
-        duration: how long; the scenario's by default. [s]
+        duration: how long, to the first sample that reaches it; the scenario's by default. [s]
         sensors: what the autopilot is told.
         seed: of the sensors.
+        progress: told the fraction that is done.
 
     Returns:
         the run as `subzero.simulate` gives it, with wanted_speed [m/s], wanted_heading [degree], wanted_depth [m]. A
-        run that could not go on, or whose autopilot returned nonsense, ends early and says so in
-        ``attrs["outcome_message"]``.
+        run that could not go on ends early and says so in ``attrs["outcome_message"]``; so does one whose autopilot
+        has no command or one that is none, with an `AutopilotWarning`.
 
     Raises:
-        UserError: a sample time that does not fit the trial's cable step, what is no autopilot, a duration of nothing.
+        AutopilotError: the autopilot raised an error of its own.
+        UserError: a sample time that does not fit the trial's cable step, what is no autopilot, a duration of nothing,
+            a goal that is none.
     """
     _check(autopilot, duration)
     sim = Simulator(scenario, tethered=tethered, model=model, sample_time=autopilot.sample_time)
     told = Sensors(sensors, seed=seed)
     autopilot.reset()
     end = sim.trial.duration if duration is None else duration
-    goals, trouble, seen = [(0.0, *wanted(0.0)[:3])], "", sim.observation
-    for _ in range(round(end / autopilot.sample_time)):
-        goal = wanted(seen.time)
+    goals, trouble, seen = [(0.0, *_goal(wanted, 0.0)[:3])], "", sim.observation
+    samples = max(1, ceil(end / sim.sample_time - 1e-9))
+    for sample in range(samples):
+        goal = _goal(wanted, seen.time)
         goals.append((seen.time, *goal[:3]))
         try:
-            command = autopilot.update(told.read(seen), goal)
-            seen = sim.step(_given(command, seen.time))
+            seen = sim.step(_command(autopilot, told.read(seen), goal))
+        except RunStoppedError:
+            break  # the result tells it
+        except AutopilotError:
+            raise
         except UserError as error:
             trouble = f"Autopilot '{autopilot.name}': {error}"
+            warnings.warn(
+                f"The flight ended at t = {seen.time:g} s. {trouble}", AutopilotWarning, stacklevel=2
+            )
             break
+        if progress is not None:
+            progress((sample + 1) / samples)
     return _with_goals(sim.result(), np.array(goals), trouble)
+
+
+def _goal(wanted: Callable[[float], Wanted], time: float) -> Wanted:
+    """Return what is wanted at a time, in plain numbers, or refuse what is none; NaN is for who wants nothing."""
+    given = wanted(time)
+    try:
+        goal = Wanted(*map(float, given))
+    except (TypeError, ValueError, OverflowError):
+        goal = None
+    if goal is None or any(map(isinf, goal)):
+        raise BadValueError(
+            f"fly: what is wanted at t = {time:g} s is {short(given)}. Allowed: a Wanted with numbers that are finite,"
+            " or NaN for nothing."
+        )
+    return goal
+
+
+def _command(autopilot: Autopilot, reading: Observation, goal: Wanted) -> Sequence[float]:
+    """Return the autopilot's command; what it raises is told with its name and the time.
+
+    Raises:
+        CommandError: none, which the simulator would take for the scenario's own.
+        AutopilotError: it raised something.
+    """
+    try:
+        command = autopilot.update(reading, goal)
+    except UserError:
+        raise
+    except Exception as error:
+        raise AutopilotError(
+            f"Autopilot '{autopilot.name}' broke at t = {reading.time:g} s: {type(error).__name__}: {error}"
+        ) from error
+    if command is None:
+        raise CommandError(
+            f"At t = {reading.time:g} s the command is None. Allowed: four finite numbers, {', '.join(COMMANDED)}."
+        )
+    return command
 
 
 def _check(autopilot: Autopilot, duration: float | None) -> None:
@@ -95,17 +160,11 @@ def _check(autopilot: Autopilot, duration: float | None) -> None:
         raise UserError(
             f"{type(autopilot).__name__} has no {', '.join(missing)}. Allowed: an object as `Autopilot` says."
         )
-    if duration is not None and not (np.isfinite(duration) and duration > 0.0):
-        raise UserError(f"fly: the duration is {duration!r}. Allowed: a time above 0 s.")
-
-
-def _given(command: Sequence[float] | None, time: float) -> Sequence[float]:
-    """Return a command, or refuse none: the simulator would take it for the scenario's own."""
-    if command is None:
+    time = 1.0 if duration is None else real(duration)
+    if time is None or not 0.0 < time <= LONGEST:
         raise UserError(
-            f"At t = {time:g} s the command is None. Allowed: four finite numbers, {', '.join(COMMANDED)}."
+            f"fly: the duration is {short(duration)}. Allowed: a time above 0 s, up to {LONGEST:g} s."
         )
-    return command
 
 
 def _with_goals(run: xr.Dataset, goals: np.ndarray, trouble: str) -> xr.Dataset:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from math import degrees, isfinite, radians, sin
+from math import degrees, radians, sin
 from typing import NoReturn
 
 import numpy as np
 
 from subzero.autopilot.actuators import demands
-from subzero.errors import UserError
+from subzero.errors import UserError, real, short
 from vehicle import Vehicle
 
 CABLES = ("formula", "model")
@@ -22,23 +22,32 @@ class NoTrimError(UserError):
 
 def check_request(
     speed: float, depth_rate: float, turn_rate: float, wet_length: float, roll: float, cable: str
-) -> None:
-    """Refuse what cannot be asked for."""
-    asked = {"speed": speed, "depth_rate": depth_rate, "turn_rate": turn_rate, "wet_length": wet_length}
-    for name, value in (asked | {"roll": roll}).items():
-        if not isfinite(value):
-            raise UserError(f"trim: {name} is {value!r}; it must be a finite number.")
+) -> tuple[float, float, float, float, float]:
+    """Return the numbers of a request as floats; refuse what cannot be asked for."""
+    asked = {
+        "speed": speed,
+        "depth_rate": depth_rate,
+        "turn_rate": turn_rate,
+        "wet_length": wet_length,
+        "roll": roll,
+    }
+    numbers = {name: real(value) for name, value in asked.items()}
+    for name, number in numbers.items():
+        if number is None:
+            raise UserError(f"trim: {name} is {short(asked[name])}; it must be a finite number.")
+    speed, depth_rate, turn_rate, wet_length, roll = (number or 0.0 for number in numbers.values())
     if speed <= 0.0:
         raise UserError(f"trim: speed is {speed:g} m/s; fins need a flow, so it must be above 0.")
     if wet_length < 0.0:
         raise UserError(f"trim: wet_length is {wet_length:g} m; it must be 0 or more.")
-    if cable not in CABLES:
-        raise UserError(f"trim: cable is {cable!r}; it must be one of {', '.join(CABLES)}.")
+    if not isinstance(cable, str) or cable not in CABLES:
+        raise UserError(f"trim: cable is {short(cable)}; it must be one of {', '.join(CABLES)}.")
     if abs(depth_rate) > speed * sin(STEEPEST):
         raise NoTrimError(
             f"There is no steady motion at {speed:g} m/s with a depth rate of {depth_rate:g} m/s: the pitch angle would"
             f" pass {degrees(STEEPEST):.0f} degrees. At this speed ±{speed * sin(STEEPEST):.2g} m/s is the most."
         )
+    return speed, depth_rate, turn_rate, wet_length, roll
 
 
 def check_limits(hull: Vehicle, x: np.ndarray) -> None:

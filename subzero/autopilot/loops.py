@@ -11,7 +11,7 @@ over from any command without a jump (`engage`).
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import inf
+from math import inf, isfinite
 
 from subzero.autopilot.schedule import Schedule
 from subzero.errors import UserError
@@ -42,6 +42,26 @@ class Law:
             )
 
 
+def refuse_unknown(reading: Observation, measured: tuple[str, ...], **given: float) -> None:
+    """Refuse what is not a finite number: the limits of a command would make a full deflection of it, unseen.
+
+    Args:
+        reading: what the sensors tell.
+        measured: channels that the loop feeds back, the tracked one last.
+        given: what else it takes, by name.
+
+    Raises:
+        UserError: names what is no number.
+    """
+    values = {name: getattr(reading, name) for name in measured} | given
+    unknown = [name for name, value in values.items() if not isfinite(value)]
+    if unknown:
+        raise UserError(
+            f"at t = {reading.time:g} s the loop of the {measured[-1]} has no number for {', '.join(unknown)}: no"
+            " sensor measures it, or nothing is wanted."
+        )
+
+
 class Loop:
     """A law at work.
 
@@ -69,6 +89,7 @@ class Loop:
         rate: float = 0.0,
     ) -> None:
         """Take over from a command without a jump: the next command, unlimited, is this one."""
+        refuse_unknown(reading, self.law.measured, wanted=wanted, command=command, feed_forward=feed_forward)
         feedback, _ = self._feedback(reading, wanted, speed, rate)
         self.integral = command - feed_forward - feedback
         self._wanted = wanted
@@ -93,7 +114,11 @@ class Loop:
             limits: of the command; the integral does not wind up beyond them.
             integrate: whether to; a fin without flow has nothing to learn from its error.
             rate: y_w', how fast what is wanted moves on.
+
+        Raises:
+            UserError: something of this is not a finite number.
         """
+        refuse_unknown(reading, self.law.measured, wanted=wanted, rate=rate, feed_forward=feed_forward)
         self.integral -= self._jump(reading, wanted, speed, rate)
         feedback, growth = self._feedback(reading, wanted, speed, rate)
         low, high = limits

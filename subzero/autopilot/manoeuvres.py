@@ -31,8 +31,9 @@ from subzero.autopilot.programs import (
 from subzero.autopilot.standard import Wanted
 from subzero.autopilot.states import INPUT_NAMES
 from subzero.autopilot.steady import trim
-from subzero.errors import UserError, suggestion
-from subzero.model import Model
+from subzero.errors import UserError, checked, chosen
+from subzero.model import Model, model_of
+from subzero.simulation import Progress
 from subzero.trials import load
 
 if TYPE_CHECKING:
@@ -128,6 +129,7 @@ def manoeuvre(
     speed: float = 1.0,
     tethered: bool = True,
     model: Model | None = None,
+    progress: Progress | None = None,
 ) -> tuple[xr.Dataset, dict[str, float]]:
     """Return the run of a manoeuvre, and its indices (units in their names).
 
@@ -138,24 +140,23 @@ def manoeuvre(
         speed: of the bare hull in the straight run, which the propeller is set for. [m/s]
         tethered: with the cable.
         model: another model than the scenario's.
+        progress: told the fraction that is done.
 
     Raises:
         UserError: there is no such manoeuvre, a size of nothing or beyond the fins, no steady motion at this speed.
     """
-    if name not in MANOEUVRES:
-        allowed = ", ".join(MANOEUVRES)
-        raise UserError(f"There is no manoeuvre '{name}'.{suggestion(name, MANOEUVRES)} Allowed: {allowed}.")
-    line = MANOEUVRES[name]
+    line = chosen(MANOEUVRES, name, "manoeuvre")
     trial = scenario if isinstance(scenario, scenarios.Trial) else load(scenario)
-    model = model or Model.of(trial)
+    model = model_of(trial, model)
     asked = line.size if size is None else size
     inner = _checked_size(line, asked, model)
     straight = tuple(trim(model, speed=speed).command.tolist())
     program = line.program(straight=straight, size=inner, name=name, sample_time=trial.cable_step)
     begin = replace(trial, start=replace(trial.start, surge_speed=speed))
     run = fly(
-        begin, program, lambda t: _NOTHING, tethered=tethered, model=model, duration=RUN_IN + line.duration
-    )
+        begin, program, lambda t: _NOTHING, tethered=tethered, model=model, duration=RUN_IN + line.duration,
+        progress=progress,
+    )  # fmt: skip
     run = run.drop_vars(["wanted_speed", "wanted_heading", "wanted_depth"])
     return run, line.measure(_inner(run), inner)
 
@@ -163,8 +164,9 @@ def manoeuvre(
 _NOTHING = Wanted(float("nan"), float("nan"))
 
 
-def _checked_size(line: Manoeuvre, size: float, model: Model) -> float:
+def _checked_size(line: Manoeuvre, asked: float, model: Model) -> float:
     """Return a size in radians (or as a share), if fins can do it."""
+    size = checked("", "size", asked)
     most = 5.0 if line.unit == "1" else degrees(model.vehicle.rudder_servo.deflection_limit)
     if not 0.0 < abs(size) <= most:
         unit = "" if line.unit == "1" else " degrees"

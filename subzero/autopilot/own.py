@@ -44,3 +44,20 @@ def from_file(path: str | Path) -> Build:
             " autopilot."
         )
     return build
+
+
+def built(path: str | Path, build: Build, tuning: Tuning, sample_time: float, cable: CableModel) -> Autopilot:
+    """Return what the function `make` of a file makes.
+
+    Raises:
+        UserError: it raised an error of its own.
+    """
+    try:
+        return build(tuning, sample_time, cable)
+    except UserError:
+        raise
+    except Exception as error:
+        raise UserError(
+            f"'{path}': its function 'make' broke: {type(error).__name__}: {error}. Allowed: one that"
+            " returns an autopilot."
+        ) from error

@@ -10,6 +10,7 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 
 from subzero.autopilot.standard import Wanted
+from subzero.errors import UserError
 from subzero.simulator import Observation
 
 RUN_IN = 12.0
@@ -51,6 +52,13 @@ class Program(ABC):
     def after(self, now: Observation, begun: Observation) -> Command:
         """Return the command once the manoeuvre has begun."""
 
+    def turned(self, channel: str, now: Observation, begun: Observation) -> float:
+        """Return how far an angle has changed, to the side of the rudder or planes [rad]; refuse an unknown one."""
+        change = self.side * (getattr(now, channel) - getattr(begun, channel))
+        if change != change:
+            raise UserError(f"at t = {now.time:g} s the {channel} is not a number: no sensor measures it.")
+        return change
+
     def with_rudder(self, angle: float) -> Command:
         """Return the straight command with a rudder [rad]."""
         n, _, port, starboard = self.straight
@@ -75,7 +83,7 @@ class ZigZag(Program):
 
     def after(self, now: Observation, begun: Observation) -> Command:
         """Return the rudder on its present side."""
-        if self.side * (now.heading - begun.heading) >= abs(self.size):
+        if self.turned("heading", now, begun) >= abs(self.size):
             self.side = -self.side
         return self.with_rudder(self.side * self.size)
 
@@ -85,7 +93,7 @@ class VerticalZigZag(Program):
 
     def after(self, now: Observation, begun: Observation) -> Command:
         """Return the planes on their present side."""
-        if self.side * (now.pitch - begun.pitch) >= abs(self.size):
+        if self.turned("pitch", now, begun) >= abs(self.size):
             self.side = -self.side
         return self.with_planes(self.side * self.size)
 

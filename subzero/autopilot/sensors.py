@@ -16,7 +16,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from subzero.errors import UserError, suggestion
+from subzero.errors import UserError, real, short, suggestion, whole
 from subzero.simulator import Observation
 
 GRACE = 1e-9
@@ -55,18 +55,20 @@ class Sensor:
     def __post_init__(self) -> None:
         """Refuse what cannot be a sensor."""
         allowed = Observation._fields[1:]
-        if self.channel not in allowed:
+        if not isinstance(self.channel, str) or self.channel not in allowed:
             raise UserError(
-                f"Sensor: there is no channel '{self.channel}'.{suggestion(self.channel, allowed)}"
+                f"Sensor: there is no channel {short(self.channel)}.{suggestion(str(self.channel), allowed)}"
                 f" Allowed: {', '.join(allowed)}."
             )
         for field in fields(self)[1:]:
             value = getattr(self, field.name)
             least = -math.inf if field.name == "bias" else 0.0
             most = 1.0 if field.name == "drop_out" else math.inf
-            if not (math.isfinite(value) and least <= value <= most):
+            number = real(value)
+            if number is None or not least <= number <= most:
                 said = "a finite number" if field.name == "bias" else f"{least:g} to {most:g}"
-                raise UserError(f"Sensor of {self.channel}: {field.name} is {value!r}. Allowed: {said}.")
+                raise UserError(f"Sensor of {self.channel}: {field.name} is {short(value)}. Allowed: {said}.")
+            object.__setattr__(self, field.name, number)
 
 
 DEGREE = math.pi / 180.0
@@ -102,11 +104,13 @@ class Sensors:
     """
 
     def __init__(self, sensors: Sequence[Sensor] = PERFECT, *, seed: int = 0) -> None:
+        if not all(isinstance(sensor, Sensor) for sensor in sensors):
+            raise UserError("Sensors: each must be a Sensor.")
         names = [sensor.channel for sensor in sensors]
         twice = sorted({name for name in names if names.count(name) > 1})
         if twice:
             raise UserError(f"Sensors: there are two of {', '.join(twice)}. Allowed: one for a channel.")
-        self.sensors, self.seed = tuple(sensors), seed
+        self.sensors, self.seed = tuple(sensors), whole("seed", seed)
         self.reset()
 
     def reset(self) -> None:

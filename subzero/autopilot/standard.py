@@ -19,6 +19,7 @@ from subzero.autopilot.feed_forward import CableModel, NoCable
 from subzero.autopilot.loops import Law, Loop
 from subzero.autopilot.tuning import Tuning
 from subzero.autopilot.weighting import WEIGHTS
+from subzero.errors import UserError
 from subzero.simulator import Observation
 from vehicle import Servo
 
@@ -173,6 +174,8 @@ class StandardAutopilot:
         """Return the pitch that takes the hull to its depth [rad]; level without one."""
         if wanted.depth != wanted.depth:
             return 0.0
+        if reading.depth != reading.depth:
+            raise UserError(f"at t = {reading.time:g} s a depth is wanted, and no sensor measures it.")
         climb = -(wanted.depth - reading.depth) / (DEPTH_TIME * max(reading.surge_speed, SLOWEST))
         return max(-STEEPEST, min(STEEPEST, climb))
 

@@ -11,13 +11,13 @@ only carries the track.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import cos, sin
+from math import cos, floor, sin
 
 import numpy as np
 
 from subzero.autopilot.actuators import commands, ideal
 from subzero.autopilot.balance import Motion, level_propeller
-from subzero.autopilot.limits import check_limits, check_request, say_how_far
+from subzero.autopilot.limits import NoTrimError, check_limits, check_request, say_how_far
 from subzero.autopilot.pull import SteadyPull, from_cable_model
 from subzero.autopilot.states import STATE_NAMES, VELOCITY, to_vehicle
 from subzero.model import Model
@@ -25,6 +25,8 @@ from vehicle import Vehicle, rotation
 
 STEPS = 20
 """A motion that is not found at once is approached in so many steps."""
+SLOWEST = 1e-2
+"""The largest speed that can be held is not looked for below this. [m/s]"""
 PASSES = 6
 """How often hull and cable model are solved in turn: the pull hardly changes the attitude, three digits a pass."""
 
@@ -99,7 +101,50 @@ def trim(
         NoTrimError: there is none: which limit is hit, and how far one can go.
         UserError: a number that means nothing here.
     """
-    check_request(speed, depth_rate, turn_rate, wet_length, roll, cable)
+    speed, depth_rate, turn_rate, wet_length, roll = check_request(
+        speed, depth_rate, turn_rate, wet_length, roll, cable
+    )
+    try:
+        return _trim(model, speed, depth_rate, turn_rate, wet_length, roll, cable)
+    except NoTrimError as error:
+        most = 0.0 if depth_rate or turn_rate or roll else fastest(model, speed, wet_length)
+        if not most:
+            raise
+        behind = f" on {wet_length:g} m of cable" if wet_length else ""
+        raise NoTrimError(
+            f"{error} Straight ahead{behind} the hull holds {floor(1e3 * most) / 1e3:g} m/s at most."
+        ) from None
+
+
+def fastest(model: Model, above: float, wet_length: float = 0.0) -> float:
+    """Return the largest speed below another that can be held straight and level, by halving; 0 if there is none. [m/s]
+
+    Args:
+        model: vehicle and cable.
+        above: a speed that cannot be held. [m/s]
+        wet_length: of cable. [m]
+    """
+    low, high = 0.0, above
+    while high - low > 1e-3 * high and high > SLOWEST:
+        middle = 0.5 * (low + high)
+        try:
+            _trim(model, middle, 0.0, 0.0, wet_length, 0.0, "formula")
+            low = middle
+        except NoTrimError:
+            high = middle
+    return low
+
+
+def _trim(
+    model: Model,
+    speed: float,
+    depth_rate: float,
+    turn_rate: float,
+    wet_length: float,
+    roll: float,
+    cable: str,
+) -> Trim:
+    """Return the steady motion of a checked request."""
     hull, pull = model.vehicle, SteadyPull.of(model, wet_length)
     motion = Motion(
         numbers=ideal(hull).numbers(),

@@ -6,17 +6,17 @@ from dataclasses import dataclass, replace
 from math import radians
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 import scenarios
 from subzero.autopilot.flight import fly
 from subzero.autopilot.indices import step_response
 from subzero.autopilot.sensors import PERFECT, Sensor
 from subzero.autopilot.standard import Wanted
+from subzero.autopilot.steady import trim
 from subzero.autopilot.table import make
 from subzero.autopilot.tuning import Tuning
-from subzero.errors import UserError, suggestion
-from subzero.model import Model
+from subzero.errors import UserError, chosen, real, short
+from subzero.model import Model, model_of
+from subzero.simulation import Progress
 from subzero.trials import load
 
 if TYPE_CHECKING:
@@ -59,6 +59,7 @@ def step(
     tuning: Tuning | None = None,
     sensors: Sequence[Sensor] = PERFECT,
     seed: int = 0,
+    progress: Progress | None = None,
 ) -> tuple[xr.Dataset, dict[str, float]]:
     """Return the run of a step and its indices: rise, overshoot, settling, steady error (in the channel's unit).
 
@@ -74,24 +75,26 @@ def step(
         tuning: gains.
         sensors: what the autopilot is told.
         seed: of the sensors.
+        progress: told the fraction that is done.
 
     Raises:
+        NoTrimError: the bare hull cannot hold a speed that is asked for; the message says which it can.
         UserError: there is no such step, autopilot or feed-forward, or a step of nothing.
     """
-    if name not in STEPS:
-        raise UserError(f"There is no step '{name}'.{suggestion(name, STEPS)} Allowed: {', '.join(STEPS)}.")
-    line = STEPS[name]
+    line = chosen(STEPS, name, "step")
     size = line.size if size is None else size
-    if not np.isfinite(size) or size == 0.0:
-        raise UserError(f"A step of {size!r} is none. Allowed: a finite number, not 0.")
+    if not real(size):
+        raise UserError(f"A step of {short(size)} is none. Allowed: a finite number, not 0.")
     trial = scenario if isinstance(scenario, scenarios.Trial) else load(scenario)
     before = Wanted(speed, trial.start.heading, trial.start.depth)
     goal = before._replace(**{line.field: getattr(before, line.field) + size * line.scale})
+    for fast in sorted({before.speed, goal.speed}):
+        trim(model_of(trial, model), speed=fast)  # refuses a speed that the bare hull does not reach
     pilot = make(autopilot, trial, feed_forward=feed_forward, sample_time=trial.cable_step, tuning=tuning)
     begin = replace(trial, start=replace(trial.start, surge_speed=speed))
     run = fly(
         begin, pilot, lambda t: goal if t >= STEP_AT - 1e-9 else before,
-        tethered=tethered, model=model, duration=DURATION, sensors=sensors, seed=seed,
+        tethered=tethered, model=model, duration=DURATION, sensors=sensors, seed=seed, progress=progress,
     )  # fmt: skip
     values = run[line.channel].values
     wanted = getattr(goal, line.field) / line.scale

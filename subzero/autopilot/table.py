@@ -6,22 +6,18 @@ To add one of your own: a small file with a class as `flight.Autopilot` says, an
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from math import isfinite
-from typing import TypeVar
+from collections.abc import Callable
 
 import scenarios
 from subzero.autopilot.estimator import EstimatorLoop, estimates
 from subzero.autopilot.feed_forward import CableModel, FormulaCable, NoCable, TwinCable
 from subzero.autopilot.flight import Autopilot
-from subzero.autopilot.own import Build, from_file
+from subzero.autopilot.own import Build, built, from_file
 from subzero.autopilot.robustness import check_stable
 from subzero.autopilot.standard import StandardAutopilot
 from subzero.autopilot.tuning import Tuning, tune
-from subzero.errors import UserError, suggestion
-from subzero.model import Model
-
-Line = TypeVar("Line")
+from subzero.errors import UserError, chosen, real, short
+from subzero.model import Model, model_of
 
 
 def _pid(tuning: Tuning, sample_time: float, cable: CableModel) -> StandardAutopilot:
@@ -70,17 +66,13 @@ def make(
         UserError: there is no such autopilot or feed-forward; a sample time of nothing; with these gains and this
             sample time the hull is unstable.
     """
-    if not (isfinite(sample_time) and sample_time > 0.0):
-        raise UserError(f"make: the sample time is {sample_time!r}. Allowed: a time above 0 s.")
-    build = from_file(name) if name.endswith(".py") else _named(AUTOPILOTS, name, "autopilot")
-    cable = _named(FEED_FORWARD, feed_forward, "feed-forward")
-    believed = believed or Model.of(trial)
+    time = real(sample_time)
+    if time is None or time <= 0.0:
+        raise UserError(f"make: the sample time is {short(sample_time)}. Allowed: a time above 0 s.")
+    is_path = isinstance(name, str) and name.endswith(".py")
+    build = from_file(name) if is_path else chosen(AUTOPILOTS, name, "autopilot")
+    cable = chosen(FEED_FORWARD, feed_forward, "feed-forward")
+    believed = model_of(trial, believed)
     tuning = tuning or tune(believed)
-    return build(tuning, sample_time, cable(tuning, trial, sample_time, believed))
-
-
-def _named(table: Mapping[str, Line], name: str, what: str) -> Line:
-    """Return a line of a table, or say what there is."""
-    if name not in table:
-        raise UserError(f"There is no {what} '{name}'.{suggestion(name, table)} Allowed: {', '.join(table)}.")
-    return table[name]
+    ahead = cable(tuning, trial, time, believed)
+    return built(name, build, tuning, time, ahead) if is_path else build(tuning, time, ahead)

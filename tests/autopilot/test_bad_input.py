@@ -4,6 +4,8 @@ Verifies: designs that are improper or unstable, an autopilot that is none, file
 durations; what a run has by then is kept. Tolerance: none, messages.
 """
 
+import re
+
 import control
 import numpy as np
 import pytest
@@ -11,6 +13,7 @@ import pytest
 import subzero
 from subzero import autopilot
 from subzero.autopilot import Wanted
+from subzero.autopilot.programs import VerticalZigZag, ZigZag
 from subzero.autopilot.robustness import check_stable
 from subzero.cli import MISTAKE, main
 from subzero.cli_autopilot import STOPPED
@@ -100,12 +103,138 @@ def test_what_is_no_autopilot_is_told_what_it_lacks(fig6):
 
 def test_a_goal_that_is_no_number_ends_the_run_and_is_told(fig6, tuning):
     pilot = autopilot.make("pid", fig6, tuning=tuning)
-    run = autopilot.fly(
-        fig6, pilot, lambda t: Wanted(1.0 if t < 1.0 else float("nan"), 0.0), tethered=False, duration=5.0
-    )
+    with pytest.warns(autopilot.AutopilotWarning, match="a speed that is not a number"):
+        run = autopilot.fly(
+            fig6, pilot, lambda t: Wanted(1.0 if t < 1.0 else float("nan"), 0.0), tethered=False, duration=5.0
+        )
     assert run.attrs["outcome"] == "stopped"
     assert "a speed that is not a number" in run.attrs["outcome_message"]
     assert float(run["time"][-1]) == pytest.approx(1.0)
+
+
+class Own:
+    """An autopilot that gives what it is told to, and breaks after a second."""
+
+    name, sample_time = "own", 0.1
+
+    def __init__(self, broken):
+        self.broken = broken
+
+    def reset(self):
+        pass
+
+    def update(self, reading, wanted):
+        return self.broken() if reading.time > 0.95 else (25.0, 0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        None,
+        (25.0, np.nan, 0.0, 0.0),
+        (25.0, 0.0),
+        (25.0, 0.0, 0.0, 0.0, 0.0),
+        "full",
+        25.0,
+        (10**400, 0, 0, 0),
+    ],
+)
+def test_a_flight_whose_autopilot_has_no_command_warns_and_is_not_completed(fig6, command):
+    with pytest.warns(
+        autopilot.AutopilotWarning, match=r"ended at t = 1 s\. Autopilot 'own': At t = 1 s the command is"
+    ):
+        run = autopilot.fly(fig6, Own(lambda: command), forward, tethered=False, duration=3.0)
+    assert run.attrs["outcome"] == "stopped"
+    assert "four finite numbers" in run.attrs["outcome_message"]
+    assert float(run["time"][-1]) == pytest.approx(1.0)
+
+
+def test_an_autopilot_that_raises_is_told_with_its_time_and_its_own_error(fig6):
+    with pytest.raises(
+        autopilot.AutopilotError, match="'own' broke at t = 1 s: ZeroDivisionError: division"
+    ) as caught:
+        autopilot.fly(fig6, Own(lambda: 1 / 0), forward, tethered=False, duration=3.0)
+    assert isinstance(caught.value.__cause__, ZeroDivisionError)
+
+
+@pytest.mark.parametrize("channel", ["surge_speed", "heading", "yaw_rate", "pitch", "roll", "depth"])
+@pytest.mark.parametrize("kind", ["pid", "lqr"])
+def test_a_channel_that_no_sensor_measures_is_no_full_rudder(fig6, tuning, kind, channel):
+    """min(limit, max(-limit, nan)) is the limit: the flight went on in circles, completed."""
+    sensors = [sensor for sensor in autopilot.PERFECT if sensor.channel != channel]
+    pilot = autopilot.make(kind, fig6, tuning=tuning)
+    with pytest.warns(autopilot.AutopilotWarning, match="no sensor measures|not a number"):
+        run = autopilot.fly(
+            fig6, pilot, lambda t: Wanted(1.0, 0.0, 1.0), sensors=sensors, tethered=False, duration=2.0
+        )
+    assert run.attrs["outcome"] == "stopped"
+
+
+@pytest.mark.parametrize("ahead", ["formula", "model"])
+def test_a_cable_that_nobody_measures_is_not_left_out_unseen(fig6, tuning, ahead):
+    sensors = [sensor for sensor in autopilot.PERFECT if sensor.channel != "cable_length"]
+    pilot = autopilot.make("pid", fig6, tuning=tuning, feed_forward=ahead)
+    with pytest.warns(autopilot.AutopilotWarning, match="no sensor measures the cable's length"):
+        autopilot.fly(fig6, pilot, forward, sensors=sensors, duration=2.0)
+
+
+@pytest.mark.parametrize("program, channel", [(ZigZag, "heading"), (VerticalZigZag, "pitch")])
+def test_a_zigzag_that_does_not_see_its_angle_is_told(fig6, program, channel):
+    sensors = [sensor for sensor in autopilot.PERFECT if sensor.channel != channel]
+    pilot = program(straight=(25.0, 0.0, 0.0, 0.0), size=0.2)
+    with pytest.warns(
+        autopilot.AutopilotWarning, match=f"the {channel} is not a number: no sensor measures it"
+    ):
+        run = autopilot.fly(fig6, pilot, forward, sensors=sensors, tethered=False, duration=20.0)
+    assert float(run["time"][-1]) == pytest.approx(12.0)
+
+
+@pytest.mark.parametrize(
+    "goal", [None, (1.0,), ("fast", 0.0), Wanted(1.0, np.inf), Wanted(10**400, 0.0), 3.0]
+)
+def test_a_goal_that_is_none_is_refused(fig6, goal):
+    with pytest.raises(subzero.UserError, match=r"what is wanted at t = 0 s is .* Allowed: a Wanted"):
+        autopilot.fly(fig6, Own(lambda: None), lambda t: goal, tethered=False, duration=1.0)
+
+
+def test_a_flight_lasts_as_long_as_it_is_asked_to(fig6):
+    run = autopilot.fly(fig6, Own(lambda: (25.0, 0.0, 0.0, 0.0)), forward, tethered=False, duration=1.25)
+    assert float(run["time"][-1]) == pytest.approx(1.3)
+
+
+@pytest.mark.parametrize("step, speed", [("heading_step", 9.0), ("speed_step", 1.85), ("depth_step", 2.5)])
+def test_a_speed_that_the_hull_does_not_reach_is_refused_with_the_one_it_does(fig6, tuning, step, speed):
+    with pytest.raises(
+        autopilot.NoTrimError, match=r"propeller would need .* it holds|the hull holds [0-9.]+ m/s"
+    ) as caught:
+        autopilot.step(step, fig6, speed=speed, tuning=tuning)
+    most = float(re.search(r"holds ([0-9.]+) m/s at most", str(caught.value)).group(1))
+    model = subzero.Model.of(fig6)
+    autopilot.trim(model, speed=most)
+    with pytest.raises(autopilot.NoTrimError):
+        autopilot.trim(model, speed=1.01 * most)
+
+
+def test_the_command_line_refuses_a_speed_out_of_reach(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["autopilot", "heading_step", "--speed", "9"]) == MISTAKE
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert re.search(r"Straight ahead the hull holds 1\.\d+ m/s at most\.$", said)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_command_line_tells_of_an_autopilot_that_breaks(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    path = written(tmp_path, GOOD.format(answer="1 / 0"))
+    assert main(["autopilot", "heading_step", "--autopilot", path]) == MISTAKE
+    assert (
+        capsys.readouterr().err == "Autopilot 'mine' broke at t = 0 s: ZeroDivisionError: division by zero\n"
+    )
+    (tmp_path / "mine.py").write_text("def make(tuning, sample_time, cable):\n    return gains\n")
+    assert main(["autopilot", "heading_step", "--autopilot", path]) == MISTAKE
+    assert "its function 'make' broke: NameError: name 'gains' is not defined" in capsys.readouterr().err
+    assert [one.name for one in tmp_path.iterdir()] == ["mine.py"]
 
 
 def test_loops_that_there_are_not_and_weights_that_are_none_are_refused(fig6):

@@ -95,11 +95,9 @@ def test_a_controller_that_returns_nonsense_is_told_and_the_run_keeps_what_it_ha
 
 
 def test_a_run_that_cannot_go_on_stops_with_what_it_has():
-    """A propeller a hundred thousand times as strong drives the hull beyond any sense in a step."""
-    model = subzero.Model.of(subzero.load_scenario("fig6"))
-    thrust = model.vehicle.propeller.thrust_constant
-    strong = model.vehicle.with_parameter("propeller.thrust_constant", 1e5 * thrust)
-    sim = subzero.Simulator("fig6", model=dataclasses.replace(model, vehicle=strong))
+    trial = subzero.load_scenario("fig6")
+    fast = dataclasses.replace(trial.start, surge_speed=20.0)
+    sim = subzero.Simulator(dataclasses.replace(trial, start=fast, hull_step=1.0, cable_step=1.0))
     with pytest.raises(subzero.RunStoppedError, match="absurd"):
         sim.step()
     with pytest.raises(subzero.RunStoppedError, match="absurd"):
@@ -118,6 +116,24 @@ def test_a_run_that_cannot_go_on_stops_with_what_it_has():
 def test_what_cannot_be_stepped_is_refused(scenario, options, told):
     with pytest.raises(subzero.UserError, match=told):
         subzero.Simulator(scenario, **options)
+
+
+def test_a_simulator_that_was_interrupted_while_it_began_again_stands_where_it_stood(monkeypatch):
+    """All of a run is exchanged at once: it went on from the end of the old run, at the time 0 of the new one."""
+    sim, other = subzero.Simulator("fig6"), subzero.Simulator("fig6")
+    for _ in range(50):
+        before = sim.step()
+        other.step()
+
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr("subzero.simulator.observe", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            sim.reset()
+    assert sim.observation == before
+    assert sim.step() == other.step()
 
 
 def test_a_step_costs_little_beside_the_physics():

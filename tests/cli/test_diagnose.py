@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import re
+import resource
 import sys
 import types
 from dataclasses import replace
@@ -201,3 +203,34 @@ def test_a_challenge_is_written_with_what_to_do_next_and_its_answer_is_told_when
 def test_nothing_to_reveal_is_a_mistake(engine, capsys):
     assert main(["challenge", "--reveal", "nowhere"]) == MISTAKE
     assert "There is no sealed answer" in capsys.readouterr().err
+
+
+@pytest.fixture
+def full_disk():
+    """Give what lets no file grow beyond so many bytes, as on a full disk, until the test ends."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    yield lambda most: resource.setrlimit(resource.RLIMIT_FSIZE, (most, hard))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+
+
+@pytest.mark.parametrize("most", [10, 1_000, 20_000])
+def test_a_full_disk_stops_a_diagnosis_with_one_message_and_no_files(
+    most, engine, full_disk, tmp_path, capsys
+):
+    full_disk(most)
+    assert main(["diagnose", "record.csv", "--scenario", "fig6", "--out", "found"]) == MISTAKE
+    said = capsys.readouterr().err
+    assert re.fullmatch(r"The output folder found cannot be written: .*\n", said), said
+    assert not (tmp_path / "found").exists()
+
+
+@pytest.mark.parametrize("most", [10, 1_000])
+def test_a_full_disk_stops_a_challenge_with_one_message_and_no_files(
+    most, full_disk, tmp_path, monkeypatch, capsys
+):
+    monkeypatch.chdir(tmp_path)
+    full_disk(most)
+    assert main(["challenge", "--seed", "7", "--out", "hidden"]) == MISTAKE
+    said = capsys.readouterr().err
+    assert re.fullmatch(r"The output folder hidden cannot be written: .*\n", said), said
+    assert list(tmp_path.iterdir()) == []

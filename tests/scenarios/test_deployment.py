@@ -156,7 +156,7 @@ def test_a_winch_that_is_too_slow_is_told_in_its_own_words(trial_of):
     assert run.attrs["outcome"] == "stopped"
     told = re.fullmatch(
         r"The cable is too short beyond t = 3\.6 s: the winch has paid out ([0-9.]+) m, "
-        r"the vehicle is ([0-9.]+) m away\. Pay out faster, or start with more cable in the water\.",
+        r"the vehicle is ([0-9.]+) m away\. Try control = \"constant_tension\", or a higher pay_out_rate_m_s\.",
         run.attrs["outcome_message"],
     )
     assert told, run.attrs["outcome_message"]

@@ -1,0 +1,227 @@
+"""An interrupt ends what runs and nothing else: the next call gives the same numbers, a command leaves no half files.
+
+Verifies: in process, `KeyboardInterrupt` at random moments of simulations, steps of a simulator, cables that are pulled
+out, towed and held, and results (`interrupted.py`); on the command line, SIGINT and SIGTERM at random moments, from the
+first import to the last file, and while kernels are compiled. Tolerance: none; the next numbers are the same to the
+last bit. (Before a command's first line, about 50 ms, Python's own habits hold.)
+
+The long form is 1000 interrupts in process and 200 of commands:  pytest -m slow tests/robustness/test_interrupts.py -s
+"""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+from subzero.cli import INTERRUPTED
+from subzero.stage import HIDDEN
+from subzero.user_file import INCOMPLETE
+
+DRIVER = Path(__file__).with_name("interrupted.py")
+SHORT, LONG, LONG_DIAGNOSES = 20, 940, 60
+SHORT_COMMANDS, LONG_COMMANDS, COLD_COMMANDS = 6, 185, 15
+WITHIN_S = 2.0
+"""So soon a command has to be gone after a signal. [s]"""
+LONG_COMPILATION_S = 40.0
+"""Kernels take longer than this to compile. [s]"""
+
+
+def interrupted_in_process(seed, count, what):
+    """Interrupt so often in a child process; return what it says."""
+    done = subprocess.run(
+        [sys.executable, str(DRIVER), str(seed), str(count), what],
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr[-3000:]
+    found = json.loads(done.stdout)
+    assert found["wrong"] == []
+    assert found["interrupts"] == count
+    return found
+
+
+def test_after_an_interrupt_the_next_call_gives_the_same_numbers():
+    assert len(interrupted_in_process(1, SHORT, "few")["where"]) > 3
+
+
+@pytest.mark.slow
+def test_after_any_of_a_thousand_interrupts_the_next_call_gives_the_same_numbers():
+    print("\n", interrupted_in_process(2, LONG, "all"))
+    print(interrupted_in_process(3, LONG_DIAGNOSES, "diagnose"))
+
+
+COMMANDS = {
+    "list": ["list"],
+    "simulate": ["simulate", "fig6", "--out", "out"],
+    "compare": ["compare", "fig6", "--out", "out"],
+    "autopilot": ["autopilot", "heading_step", "--out", "out"],
+    "manoeuvre": ["manoeuvre", "zigzag", "--out", "out"],
+    "challenge": ["challenge", "--seed", "4", "--out", "out"],
+    "diagnose": ["diagnose", "record.csv", "--scenario", "fig6", "--screen", "--out", "out"],
+}
+SLOW_COMMANDS = COMMANDS | {"full": ["diagnose", "record.csv", "--scenario", "fig6", "--out", "out"]}
+
+
+def started(words, folder, cache=None):
+    """Start a command; return it when it heeds signals."""
+    environment = os.environ | ({"SUBZERO_CACHE_DIR": str(cache)} if cache else {})
+    command = subprocess.Popen(
+        [sys.executable, "-m", "subzero", *words], cwd=folder, env=environment, text=True,
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+    )  # fmt: skip
+    while command.poll() is None and not heeds(command.pid):
+        time.sleep(0.001)
+    return command
+
+
+def heeds(pid):
+    """Say whether a process has set a handler for SIGTERM."""
+    try:
+        status = Path(f"/proc/{pid}/status").read_text(encoding="utf-8")
+    except FileNotFoundError:
+        return False
+    caught = int(status.split("SigCgt:")[1].split()[0], 16)
+    return bool(caught & 1 << (signal.SIGTERM - 1))
+
+
+@functools.cache
+def seconds(name, folder):
+    """Return how long a command takes that nobody interrupts; None where the folder of its outputs is whole."""
+    begun = time.monotonic()
+    command = started(SLOW_COMMANDS[name], folder)
+    out, err = command.communicate()
+    assert command.returncode == 0, (out, err)
+    return time.monotonic() - begun
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """A folder in which each command has been run: how long it took, and which files it left."""
+    top, took, files = tmp_path_factory.mktemp("whole"), {}, {}
+
+    def run(name):
+        if name not in took:
+            folder = top / name
+            folder.mkdir()
+            record(folder)
+            took[name] = seconds(name, folder)
+            files[name] = listing(folder)
+        return took[name], files[name]
+
+    return run
+
+
+def record(folder):
+    """Write a record to diagnose, in which the vehicle is slower than it should be."""
+    rows = "".join(f"{0.5 * k},{0.9 * min(1.0, 0.25 * k):.3f},{27 + 0.01 * k:.2f}\n" for k in range(40))
+    (folder / "record.csv").write_text("time_s,surge_speed_m_s,heading_deg\n" + rows)
+
+
+def listing(folder):
+    """Return the names of all files in a folder and below, without the caches of libraries."""
+    return sorted(str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file())
+
+
+def interrupted(name, folder, after, number, whole, cache=None):
+    """Interrupt a command after a time [s]; return how long it took to end, None if it had ended before. [s]"""
+    record(folder)
+    command = started(SLOW_COMMANDS[name], folder, cache)
+    with contextlib.suppress(subprocess.TimeoutExpired):
+        command.wait(after)
+        command.communicate()
+        return None
+    sent = time.monotonic()
+    command.send_signal(number)
+    try:
+        out, err = command.communicate(timeout=WITHIN_S if "diagnose" in SLOW_COMMANDS[name] else 60.0)
+    except subprocess.TimeoutExpired:  # a diagnosis writes what it has, unless it is told again
+        sent = time.monotonic()
+        command.send_signal(number)
+        out, err = command.communicate(timeout=60.0)
+    lasted = time.monotonic() - sent
+    check(command.returncode, out, err, folder, whole)
+    return lasted if command.returncode == INTERRUPTED else None
+
+
+def check(code, out, err, folder, whole):
+    """An interrupted command says so once, and leaves all of its files or none."""
+    assert "Traceback" not in out + err, err
+    left = [one for one in listing(folder) if one != "record.csv"]
+    assert not any(HIDDEN in one or INCOMPLETE in one for one in left), left
+    if code == 0:  # the signal came behind its last line
+        return
+    assert code == INTERRUPTED, (code, out, err)
+    said = [line for line in err.splitlines() if line.startswith("Interrupted; ") and "being" not in line]
+    assert len(said) == 1, err
+    assert left in ([], [one for one in whole if one != "record.csv"]), (left, err)
+    if "nothing was written" in err:
+        assert left == []
+
+
+def interrupt_commands(seed, count, names, made, folder, cold=False):
+    """Interrupt so many commands; return how often which, and the longest time that one took to end [s]."""
+    draw, came, slowest = random.Random(seed), Counter(), 0.0
+    while came.total() < count:
+        name, number = draw.choice(sorted(names)), draw.choice([signal.SIGINT, signal.SIGTERM])
+        took, whole = made(name)
+        place = folder / str(draw.random())
+        place.mkdir()
+        after = draw.uniform(0.0, LONG_COMPILATION_S if cold else took)
+        lasted = interrupted(
+            name, place, after, number, whole, folder / f"cold-{draw.random()}" if cold else None
+        )
+        if lasted is not None:
+            came[name] += 1
+            slowest = max(slowest, lasted)
+    return came, slowest
+
+
+def short(name):
+    """Return how long a short command lasts at least, and the files that it leaves."""
+    figures = ("attitude", "cable", "fig6", "forces")
+    files = ["summary.json", "tethered.csv", "tethered.nc", *(f"{figure}.png" for figure in figures)]
+    return {"list": (0.2, []), "simulate": (1.5, sorted(f"out/{file}" for file in files))}[name]
+
+
+def test_an_interrupted_command_says_so_and_leaves_all_or_nothing(tmp_path):
+    came, _ = interrupt_commands(1, SHORT_COMMANDS, ("simulate", "list"), short, tmp_path)
+    assert came.total() == SHORT_COMMANDS
+
+
+def test_a_signal_behind_the_last_line_of_a_command_changes_nothing(tmp_path):
+    """Python, once it ends, would leave signals to the system: a command that was done was killed, exit code -2."""
+    command = started(["simulate", "fig6", "--out", "out"], tmp_path)
+    line = ""
+    while "tethered.nc" not in line:
+        line = command.stdout.readline()
+    while command.poll() is None:
+        command.send_signal(signal.SIGINT)
+        time.sleep(0.001)
+    _, err = command.communicate()
+    assert command.returncode in (0, INTERRUPTED), (command.returncode, err)
+    assert "Traceback" not in err
+    assert listing(tmp_path) == short("simulate")[1]
+
+
+@pytest.mark.slow
+def test_two_hundred_interrupted_commands_are_gone_within_two_seconds(made, tmp_path):
+    came, slowest = interrupt_commands(2, LONG_COMMANDS, SLOW_COMMANDS, made, tmp_path)
+    print(f"\n{dict(came)}, gone within {slowest:.2f} s")
+    assert slowest < WITHIN_S
+
+
+@pytest.mark.slow
+def test_an_interrupted_compilation_is_gone_within_two_seconds(made, tmp_path):
+    came, slowest = interrupt_commands(3, COLD_COMMANDS, ("simulate",), made, tmp_path, cold=True)
+    print(f"\n{dict(came)} while compiling, gone within {slowest:.2f} s")
+    assert slowest < WITHIN_S
