@@ -12,8 +12,8 @@ import numpy as np
 
 from subzero.run_state import Live
 
-NOT_KEPT = ("blocks", "pivots", "rows", "load", "slip", "normal_gain", "forcing")
-"""Fields of `cable.line.Line` that a step fills before it reads them, or that stay zero."""
+NOT_KEPT = ("blocks", "pivots", "rows", "load", "slip", "normal_gain", "forcing", "solved")
+"""Fields of `cable.line.Line` and its ends that a step fills before it reads them, or that stay zero."""
 OF_NOW = ("force", "force_before", "last_step")
 """Fields of `subzero.run_state.Now` that a step leaves for the next."""
 
@@ -51,7 +51,8 @@ def _views(live: Live) -> Iterator[tuple[str, np.ndarray]]:
     for name in OF_NOW:
         yield name, live.now.base[name]  # type: ignore[attr-defined]  # a packed record
     for name in live.line.ends.base.dtype.names:  # type: ignore[attr-defined]
-        yield name, live.line.ends.base[name]  # type: ignore[attr-defined]
+        if name not in NOT_KEPT:
+            yield name, live.line.ends.base[name]  # type: ignore[attr-defined]
     for name, values in zip(live.line._fields[1:], live.line[1:], strict=True):
         if name not in NOT_KEPT:
             yield name, values
