@@ -1,159 +1,53 @@
 """The linear models of a vehicle on its cable do what the coupled simulation does when it is disturbed a little.
 
 Verifies: `autopilot.linearise_along` (the cable grows) and `autopilot.linearise` (frozen at the length in the middle of
-the run) against half the difference of two runs of `subzero.simulate` that are disturbed by as much either way. The
-disturbance is a hundredth of a degree, or a hundredth of a revolution a second: what is quadratic is then 0.5 %.
-Tolerance: 5 % of the largest deviation over 12 s along the run; 25 % frozen; of the answer to a sine 10 % and 10
-degrees, where the cable grows by less than two fifths of its length in a period.
+the run) against half the difference of two runs of `subzero.simulate` that are disturbed by as much either way, a
+hundredth of a degree or of a revolution a second (`benchmarks.autopilot.disturbed`); margins against flights whose
+gain is raised (`benchmarks.autopilot.raised`). Tolerance: along a run 5 % of the largest deviation over 12 s, frozen
+25 %; of the answer to a sine 10 % and 10 degrees, where the cable grows by less than two fifths of its length in a
+period; 10 % of a gain margin; 15 % for a motion of many degrees with the drag across the cable made linear.
 """
 
 import dataclasses
-from functools import cache
 
-import control
 import numpy as np
 import pytest
 
 import subzero
+from benchmarks.autopilot import disturbed
+from benchmarks.autopilot.disturbed import INPUTS, SEEN, STEP, deviations, error, frozen, held, pulse
+from benchmarks.autopilot.raised import Raised
+from benchmarks.autopilot.trials import tuning
 from scenarios.trial import Commands
 from subzero import autopilot
 
-SETTLED, STEP = 3.0, 0.1
-"""So long a run is left alone, for its propeller to speed up [s]; step of the cable [s]."""
-SMALL = np.array([1e-2, *np.radians([1e-2, 1e-2, 1e-2])])
-LOOPS = {
-    "surge": (np.array([1.0, 0.0, 0.0, 0.0]), "surge_speed"),
-    "yaw_sway": (np.array([0.0, 1.0, 0.0, 0.0]), "heading"),
-    "pitch_heave": (np.array([0.0, 0.0, 1.0, 1.0]), "pitch"),
-}
-SEEN = {
-    "surge": ("surge_speed",),
-    "yaw_sway": ("heading", "yaw_rate"),
-    "pitch_heave": ("pitch", "pitch_rate"),
-}
-
-
-@cache
-def model():
-    return subzero.Model.of(subzero.load_scenario("fig6"))
-
-
-def trial(speed, wet_length, command, deviation, sign):
-    """Return a run that begins at a speed with cable behind, its command disturbed at every cable step (n, 4)."""
-    fig6 = subzero.load_scenario("fig6")
-    commands = Commands(time=STEP * np.arange(len(deviation)), values=command + sign * deviation)
-    start = dataclasses.replace(fig6.start, surge_speed=speed, wet_length=wet_length, heading=0.0)
-    return dataclasses.replace(fig6, start=start, commands=commands, duration=STEP * len(deviation))
-
-
-def simulated(speed, wet_length, command, deviation):
-    """Return half the difference of two runs by channel, in SI units and rad."""
-    ends = [
-        subzero.simulate(trial(speed, wet_length, command, deviation, sign), model=model())
-        for sign in (1.0, -1.0)
-    ]
-
-    def channel(name):
-        scale = np.radians(1.0) if ends[0][name].attrs["units"].startswith("degree") else 1.0
-        either = [one[name].values * scale for one in ends]
-        if name == "heading":
-            either = [np.unwrap(one) for one in either]
-            either[1] += 2.0 * np.pi * np.round((either[0][0] - either[1][0]) / (2.0 * np.pi))
-        return 0.5 * (either[0] - either[1])
-
-    return channel
-
-
-def pulse(loop):
-    """Return a pulse of 2 s on a loop's input, after the run has settled, and 10 s more (n, 4)."""
-    deviation = np.zeros((round((SETTLED + 12.0) / STEP), 4))
-    deviation[round(SETTLED / STEP) : round((SETTLED + 2.0) / STEP)] = LOOPS[loop][0] * SMALL
-    return deviation
-
-
-def error(found, expected):
-    return np.max(np.abs(found - expected)) / np.max(np.abs(expected))
-
 
 def cases(*quick, slow):
-    """Return cable lengths and speeds, those that take long marked."""
+    """Return cases, those beyond the quick ones marked."""
     return [*quick, *(pytest.param(*one, marks=pytest.mark.slow) for one in slow)]
 
 
-@pytest.mark.parametrize("loop", LOOPS)
-@pytest.mark.parametrize(
-    "wet_length,speed",
-    cases(
-        (10.0, 1.5),
-        (20.0, 1.0),
-        slow=[(10.0, 0.5), (10.0, 1.0), (20.0, 0.5), (20.0, 1.5), (40.0, 0.5), (40.0, 1.0), (40.0, 1.5)],
-    ),
-)
-def test_a_pulse_moves_the_linear_model_along_a_run_like_the_run(loop, wet_length, speed):
-    command = autopilot.trim(
-        model(), speed=speed, wet_length=min(wet_length, 20.0)
-    ).command  # 40 m: slower than 1.5
-    deviation = pulse(loop)
-    expected = simulated(speed, wet_length, command, deviation)
-    along = autopilot.linearise_along(trial(speed, wet_length, command, deviation, 0.0), model=model())
-    found = along.respond(deviation)
-    for name in SEEN[loop]:
-        assert error(found[name].values, expected(name)) < 0.05, name
+PULSED = cases(
+    (10.0, 1.5), (20.0, 1.0),
+    slow=[(10.0, 0.5), (10.0, 1.0), (20.0, 0.5), (20.0, 1.5), (40.0, 0.5), (40.0, 1.0), (40.0, 1.5)],
+)  # fmt: skip
 
 
-@pytest.mark.parametrize("loop", LOOPS)
-@pytest.mark.parametrize(
-    "wet_length,speed",
-    cases(
-        (10.0, 1.5),
-        (20.0, 1.0),
-        slow=[(10.0, 0.5), (10.0, 1.0), (20.0, 0.5), (20.0, 1.5), (40.0, 0.5), (40.0, 1.0), (40.0, 1.5)],
-    ),
-)
-def test_a_pulse_moves_the_linear_model_of_the_middle_length_like_the_run(loop, wet_length, speed):
+@pytest.mark.parametrize("part", INPUTS)
+@pytest.mark.parametrize("wet_length,speed", PULSED)
+def test_a_pulse_moves_both_linear_models_like_the_run(part, wet_length, speed):
     """The run that the model was wrong for: after 2 s of rudder the cable pulls the heading back."""
-    command = autopilot.trim(
-        model(), speed=speed, wet_length=min(wet_length, 20.0)
-    ).command  # 40 m: slower than 1.5
-    deviation = pulse(loop)
-    expected = simulated(speed, wet_length, command, deviation)
-    run = subzero.simulate(trial(speed, wet_length, command, deviation, 0.0), model=model())
-    there = run.sel(time=SETTLED + 6.0, method="nearest")
-    middle = autopilot.trim(
-        model(), speed=float(there["surge_speed"]), wet_length=float(there["cable_length"])
-    )
-    part = autopilot.subsystem(autopilot.linearise(model(), middle), loop)
-    held = np.append(deviation @ LOOPS[loop][0] / np.sum(LOOPS[loop][0]), 0.0)
-    response = control.forced_response(control.c2d(part, STEP), STEP * np.arange(held.size), held)
-    for name in SEEN[loop]:
-        found = response.states[part.state_labels.index(name)]
-        assert error(found, expected(name)) < 0.25, name
+    command, change = held(speed, wet_length), pulse(part)
+    expected = deviations(speed, wet_length, command, change)
+    nominal = disturbed.run_with(speed, wet_length, np.tile(command, (len(change), 1)))
+    along = autopilot.linearise_along(nominal).respond(change)
+    middle = frozen(part, disturbed.in_the_middle(speed, wet_length, command), change)
+    for name in SEEN[part]:
+        assert error(along[name].values, expected(name)) < 0.05, name
+        assert error(middle[name], expected(name)) < 0.25, name
 
 
-def answer(speed, wet_length, loop, frequency):
-    """Return the answer to a sine as a complex gain, while the cable grows through `wet_length` in its middle.
-
-    A sine whose amplitude changes evenly, and a slow change, are fitted to 1.1 periods; the command is held over a
-    step, which is taken out.
-    """
-    half, lead = 1.1 * np.pi / frequency, 12.0
-    lead = min(lead, (wet_length - 1.0) / speed - half)
-    start = wet_length - speed * (lead + half)
-    time = STEP * np.arange(int((lead + 2.0 * half) / STEP) + 1)
-    phase = frequency * (time - lead - half)
-    sine = np.cos(phase) * np.clip((time - SETTLED / 2.0) / 3.0, 0.0, 1.0)
-    command = autopilot.trim(model(), speed=speed, wet_length=wet_length).command
-    deviation = np.outer(sine[:-1], LOOPS[loop][0] * SMALL)
-    seen = simulated(speed, start, command, deviation)(LOOPS[loop][1]) / np.max(LOOPS[loop][0] * SMALL)
-    late = time >= lead
-    tau, c, s = (time[late] - lead - half) / half, np.cos(phase[late]), np.sin(phase[late])
-    basis = np.stack([c, s, tau * c, tau * s, np.ones_like(tau), tau, tau**2], axis=1)
-    fitted = np.linalg.lstsq(basis, seen[late], rcond=None)[0]
-    held = np.exp(-0.5j * frequency * STEP) * np.sinc(0.5 * frequency * STEP / np.pi)
-    return (fitted[0] - 1j * fitted[1]) / held
-
-
-@pytest.mark.parametrize("loop", LOOPS)
+@pytest.mark.parametrize("part", INPUTS)
 @pytest.mark.parametrize(
     "speed,wet_length,frequency",
     cases(
@@ -164,12 +58,132 @@ def answer(speed, wet_length, loop, frequency):
         ],
     ),
 )  # fmt: skip
-def test_a_sine_moves_the_linear_model_like_the_run(loop, speed, wet_length, frequency):
+def test_a_sine_moves_the_linear_model_like_the_run(part, speed, wet_length, frequency):
     assert 2.0 * np.pi * speed / frequency < 0.4 * wet_length
-    part = autopilot.subsystem(
-        autopilot.linearise(model(), autopilot.trim(model(), speed=speed, wet_length=wet_length)), loop
-    )
-    row = part.state_labels.index(LOOPS[loop][1])
-    ratio = np.squeeze(part(1j * frequency))[row] / answer(speed, wet_length, loop, frequency)
+    expected = disturbed.answer(speed, wet_length, part, frequency)
+    ratio = disturbed.frozen_answer(speed, wet_length, part, frequency) / expected
     assert abs(ratio) == pytest.approx(1.0, abs=0.1)
     assert abs(np.degrees(np.angle(ratio))) < 10.0
+
+
+def test_with_its_drag_made_linear_the_model_turns_by_degrees_like_the_run():
+    """5 degrees of rudder for 2 s: 13 degrees of heading, for which the cable's drag is half of a tenth of U."""
+    size = np.radians([0.0, 5.0, 0.0, 0.0])
+    command, change = held(1.0, 20.0), pulse("yaw_sway", size)
+    expected = deviations(1.0, 20.0, command, change)("heading")
+    assert np.degrees(np.max(expected)) == pytest.approx(13.0, abs=1.0)
+    steady = disturbed.in_the_middle(1.0, 20.0, command)
+    drag = 0.5 * steady.speed * np.max(expected)
+    assert error(frozen("yaw_sway", steady, change, cross_flow=drag)["heading"], expected) < 0.15
+    assert error(frozen("yaw_sway", steady, change)["heading"], expected) > 0.25, (
+        "a motion this large needs it"
+    )
+
+
+@pytest.mark.parametrize(
+    "name", cases("wide_turn", slow=[("current",), ("zigzag",), ("dive",), ("stop_and_drift",)])
+)
+def test_any_scenario_can_be_linearised_along(name):
+    """Turning, in a current, diving, with a cable that has gone slack: what no steady motion stands for."""
+    trial = dataclasses.replace(subzero.load_scenario(name), duration=15.0)
+    time = STEP * np.arange(150)
+    rows = np.searchsorted(trial.commands.time, time + 1e-9, side="right") - 1
+    values, change = np.asarray(trial.commands.values)[rows], np.zeros((150, 4))
+    change[30:50] = disturbed.SMALL
+    ends = [
+        subzero.simulate(
+            dataclasses.replace(trial, commands=Commands(time=time, values=values + sign * change))
+        )
+        for sign in (1.0, -1.0)
+    ]
+    found = autopilot.linearise_along(trial).respond(change)
+    for channel in (
+        "yaw_rate",
+        "surge_speed",
+        "pitch_rate",
+        "depth",
+        "cable_length",
+        "cable_force_starboard",
+    ):
+        half = 0.5 * (ends[0][channel].values - ends[1][channel].values)
+        expected = np.radians(half) if ends[0][channel].attrs["units"].startswith("degree") else half
+        assert error(found[channel].values, expected) < 0.05, channel
+
+
+def test_a_deviation_at_the_start_goes_on_like_that_of_the_run():
+    """A hundredth of a degree of heading and a centimetre a second of speed, on 20 m of cable."""
+    start = autopilot.trim(tuning().model, speed=1.0, wet_length=20.0)
+    off = np.zeros(16)
+    off[5], off[6] = np.radians(0.01), 0.01
+    found = autopilot.linearise_along("fig6", start=start, duration=8.0).respond(np.zeros((80, 4)), off)
+    fig6 = subzero.load_scenario("fig6").start
+    plant = autopilot.plant(
+        tuning().model, tethered=True, start=start, depth=fig6.depth, heading=fig6.heading, longest=40.0
+    )
+    ends = []
+    for sign in (1.0, -1.0):
+        x = plant.initial_state.copy()
+        x[:16] += sign * off
+        for k in range(80):
+            x = plant.dynamics(STEP * k, x, start.command)
+        ends.append(x[:16])
+    expected = 0.5 * (ends[0] - ends[1])
+    for i, name in ((5, "heading"), (6, "surge_speed"), (7, "sway_speed"), (11, "yaw_rate")):
+        assert float(found[name][-1]) == pytest.approx(expected[i], rel=0.02, abs=2e-6), name
+
+
+def test_the_heading_is_pulled_back_and_only_the_whole_picture_may_be_turned():
+    """No pole at 0 belongs to the heading: it does when cable and bearing from the drum turn with it."""
+    model = tuning().model
+    part = autopilot.subsystem(
+        autopilot.linearise(model, autopilot.trim(model, speed=1.0, wet_length=20.0)), "yaw_sway"
+    )
+    labels, A = list(part.state_labels), np.asarray(part.A)
+    turned, bearing = (labels.index(name) for name in ("heading", "cable_bearing"))
+    assert np.max(np.abs(A[:, turned] + A[:, bearing])) < 1e-6
+    assert A[labels.index("yaw_rate"), turned] < -0.3, "with the bearing held the heading has a stiffness"
+    assert np.max(np.linalg.eigvals(A).real) < 1e-6
+
+
+@pytest.mark.parametrize(
+    "loop,pilot,wet_length",
+    cases(
+        ("heading", "pid", 20.0),
+        slow=[
+            ("heading", "pid", 40.0), ("heading", "lqr", 20.0), ("pitch", "pid", 40.0), ("speed", "pid", 20.0),
+            ("roll", "pid", 40.0),
+        ],
+    ),
+)  # fmt: skip
+def test_a_flight_grows_with_a_tenth_more_than_its_gain_margin_and_not_with_a_tenth_less(
+    loop, pilot, wet_length
+):
+    matrices = autopilot.estimates(tuning(), 0.1) if pilot == "lqr" else None
+    found = autopilot.loop_margins(tuning(), loop, speed=1.0, wet_length=wet_length, estimates=matrices)
+    flight = Raised(loop=loop, pilot=pilot, speed=1.0, wet_length=wet_length)
+    assert not flight.grows(0.9 * found.gain)
+    assert flight.grows(1.1 * found.gain)
+
+
+def test_a_cable_that_does_not_lie_straight_is_refused():
+    model = tuning().model
+    heavy = dataclasses.replace(model, cable=dataclasses.replace(model.cable, mass_per_length=0.02))
+    turning = autopilot.trim(model, speed=1.0, wet_length=10.0, turn_rate=0.1)
+    straight = autopilot.trim(model, speed=1.0, wet_length=10.0)
+    for other, steady, words in ((model, turning, "the vehicle turns"), (heavy, straight, "weight")):
+        with pytest.raises(subzero.UserError, match=f"{words}.*Use linearise_along"):
+            autopilot.linearise(other, steady)
+    with pytest.raises(subzero.UserError, match="cross_flow is -1"):
+        autopilot.linearise(model, straight, cross_flow=-1.0)
+
+
+def test_deviations_that_mean_nothing_are_refused():
+    along = autopilot.linearise_along("fig6", duration=1.0)
+    with pytest.raises(subzero.UserError, match=r"commands of shape \(3, 4\).*\(10, 4\)"):
+        along.respond(np.zeros((3, 4)))
+    with pytest.raises(subzero.UserError, match="finite"):
+        along.respond(np.full((10, 4), np.nan))
+    with pytest.raises(subzero.UserError, match="duration is 0"):
+        autopilot.linearise_along("fig6", duration=0)
+    with pytest.raises(subzero.UserError, match="prescribes its motion"):
+        autopilot.linearise_along("fig4")
