@@ -8,6 +8,7 @@
     >>> linear = autopilot.linearise(model, steady)     # a control.StateSpace with names
     >>> yaw = autopilot.subsystem(linear, "yaw_sway")
     >>> autopilot.modes(yaw, steady)                    # poles, damping, in the time scale L/U
+    >>> along = autopilot.linearise_along("fig6")       # about a run, the cable growing: along.respond(deviations)
 
 Everything is SI and radians, propeller speeds are in rev/s; names and signs are those of `subzero.channels`. Speeds
 are through the water. Names come from their modules when they are first used: python-control loads only then.
@@ -22,7 +23,8 @@ symbol       name                                    unit        file
 x, u         states and inputs of a plant            SI          states
 F_c          pull of the cable in steady motion      N           pull
 x₀, u₀       trim: steady state and its command      SI          steady
-A, B, C, D   linear model about it                   SI          linear
+A, B, C, D   linear model about it                   SI          linear, cable_modes
+A_k, B_k     linear model along a run                SI          along
 λ L/U, ζ     poles in the vehicle's time scale       1           poles
 k, k_I       feedback and integral gains             SI          design, weighting
 δ_ff         feed-forward, against hull and cable    SI          standard
@@ -33,6 +35,7 @@ from typing import Any
 
 _HOME = {
     "AUTOPILOTS": "table",
+    "Along": "along",
     "Autopilot": "flight",
     "AutopilotError": "flight",
     "AutopilotWarning": "flight",
@@ -69,6 +72,7 @@ _HOME = {
     "estimates": "estimator",
     "fly": "flight",
     "linearise": "linear",
+    "linearise_along": "along",
     "loop_margins": "robustness",
     "make": "table",
     "manoeuvre": "manoeuvres",

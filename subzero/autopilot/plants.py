@@ -13,7 +13,7 @@ import numpy as np
 
 from subzero.autopilot.states import INPUT_NAMES, PLACE, STATE_NAMES, rate
 from subzero.autopilot.steady import Trim
-from subzero.autopilot.tethered import Tethered
+from subzero.autopilot.tethered import Tethered, blank_trial
 from subzero.errors import UserError
 from subzero.model import Model
 
@@ -66,7 +66,7 @@ def plant(
     if wet > longest:
         raise UserError(f"plant: {wet:g} m of cable to begin with are more than longest = {longest:g} m.")
     steps = {"cable_step": sample_time, "hull_step": hull_step, "segment_length": segment_length}
-    return Tethered(model, x, wet, steps, longest).system()
+    return Tethered(blank_trial(model, x, wet, steps), model, longest, x=x).system()
 
 
 def _hull(model: Model, initial: np.ndarray) -> control.NonlinearIOSystem:

@@ -19,7 +19,6 @@ import numpy as np
 
 import cable
 from subzero.model import Model
-from vehicle.rigid_body import skew
 
 SLOWEST = 1e-9
 """Below this speed of the tow point there is no direction to pull against. [m/s]"""
@@ -60,15 +59,6 @@ class SteadyPull:
             return np.zeros(6)
         F = -(self.drag * speed + self.friction / speed) * V
         return np.concatenate([F, np.cross(self.tow_point, F)])
-
-    def added_mass(self, nu: np.ndarray) -> np.ndarray:
-        """Return the matrix (6, 6) [kg …] of the cable's mass, m S t tᵀ at the tow point."""
-        V = nu[:3] + np.cross(nu[3:], self.tow_point)
-        speed = float(np.linalg.norm(V))
-        if speed < SLOWEST:
-            return np.zeros((6, 6))
-        along = np.hstack([np.eye(3), -skew(self.tow_point)]).T @ (V / speed)
-        return self.mass * np.outer(along, along)
 
 
 def from_cable_model(

@@ -20,6 +20,7 @@ from subzero.errors import UserError
 from subzero.loop import NO_ROOM, SPARE, run_rows
 from subzero.model import Model
 from subzero.recording import new_recording
+from subzero.run_state import Orders
 from subzero.simulation import in_words
 from subzero.start import prepare
 from vehicle.state import CHARGE, LINKAGE
@@ -43,9 +44,11 @@ CABLE_OUTPUTS = (
 HIDDEN = ("battery_charge", "rudder_linkage", "stern_plane_port_linkage", "stern_plane_starboard_linkage")
 """States of the hull that only the tethered plant has [C, rad]."""
 HULL_SIZE = len(STATE_NAMES) + len(HIDDEN)
+EXACT = 1e-12
+"""How exactly a step is solved for differences of it: what is left of cable forces, and between hull and cable. [-]"""
 
 
-def _blank_trial(model: Model, x: np.ndarray, wet_length: float, steps: dict[str, float]) -> Trial:
+def blank_trial(model: Model, x: np.ndarray, wet_length: float, steps: dict[str, float]) -> Trial:
     """Return a trial that says only how the hull lies, how much cable is out, and the steps."""
     heading = remainder(float(x[5]), tau)
     start = Start(roll=x[3], pitch=x[4], heading=heading, depth=x[2], surge_speed=x[6], wet_length=wet_length)
@@ -61,22 +64,41 @@ def _blank_trial(model: Model, x: np.ndarray, wet_length: float, steps: dict[str
     return Trial(name="plant", duration=duration, start=start, current=model.current, **(nothing | steps))
 
 
+class NoRoomError(UserError):
+    """More cable than there is room for."""
+
+
 class Tethered:
-    """The coupled simulation as a function from state and command to the next state."""
+    """The coupled simulation as a function from state and command to the next state.
+
+    Args:
+        trial: where it starts, and its steps; its commands are not used.
+        model: vehicle, cable, drum and water.
+        longest: length of cable that there is room for. [m]
+        x: state of the hull to start with (16,), other than the trial's.
+        exact: solve every step to rounding, for derivatives by differences.
+
+    Attributes:
+        initial: the state to start with, `HULL_SIZE` numbers of the hull and those of `memory.Memory`.
+        sample_time: of a step. [s]
+    """
 
     def __init__(
-        self, model: Model, x: np.ndarray, wet_length: float, steps: dict[str, float], longest: float
+        self, trial: Trial, model: Model, longest: float, *, x: np.ndarray | None = None, exact: bool = False
     ) -> None:
-        trial = _blank_trial(model, x, wet_length, steps)
         self._setup, live = prepare(trial, model, True)
+        self._setup = self._setup._replace(orders=Orders(np.zeros(1), np.zeros((1, 4))))
+        if exact:
+            live.line.ends.tolerance, self._setup.fixed.agreement = EXACT, EXACT  # type: ignore[misc]  # a record
         room = int(longest / trial.segment_length) + SPARE + 4
         self._live = live._replace(line=enlarged(live.line, max(room, live.line.length.size)))
         self._memory = Memory(self._live)
         self._recording = new_recording(2, 4 * self._live.line.length.size)
         self._r_c = model.vehicle.tow_point.position()
-        self._step, self._longest = trial.cable_step, longest
-        self._initial = np.concatenate([x, np.zeros(len(HIDDEN)), self._memory.read()])
-        self._initial[len(STATE_NAMES) + 1 : HULL_SIZE] = x[13:]
+        self.sample_time, self._longest = trial.cable_step, longest
+        x = from_vehicle(live.state, heading_near=trial.start.heading) if x is None else x
+        self.initial = np.concatenate([x, np.zeros(len(HIDDEN)), self._memory.read()])
+        self.initial[len(STATE_NAMES) + 1 : HULL_SIZE] = x[13:]
 
     def system(self) -> control.NonlinearIOSystem:
         """Return the discrete-time system."""
@@ -89,10 +111,10 @@ class Tethered:
             inputs=list(INPUT_NAMES),
             outputs=[*STATE_NAMES, *CABLE_OUTPUTS],
             states=[*STATE_NAMES, *HIDDEN, *cable],
-            dt=self._step,
+            dt=self.sample_time,
             name="tethered",
         )
-        system.initial_state = self._initial
+        system.initial_state = self.initial
         return system
 
     def update(self, t: float, x: np.ndarray, u: np.ndarray, params: dict[str, Any]) -> np.ndarray:
@@ -102,13 +124,22 @@ class Tethered:
         live.state[CHARGE], live.state[LINKAGE : LINKAGE + 3] = x[16], x[17:HULL_SIZE]
         self._memory.write(x[HULL_SIZE:])
         self._setup.orders.values[0] = u
-        times = np.array([t, t + self._step])
+        times = np.array([t, t + self.sample_time])
         _, _, ending = run_rows(self._setup, live, self._recording, times, 1, 2, 0, 1)
+        if ending == NO_ROOM:
+            raise NoRoomError(
+                f"plant: at t = {t:g} s there is no room for more than longest = {self._longest:g} m of cable."
+            )
         if ending != FINE:
-            raise UserError(self._trouble(ending, t))
+            raise UserError(in_words(ending, t, self._setup, self._live))
         hull = from_vehicle(live.state, heading_near=float(x[5]))
         hidden = (live.state[CHARGE], *live.state[LINKAGE : LINKAGE + 3])
         return np.concatenate([hull, hidden, self._memory.read()])
+
+    def events(self, x: np.ndarray) -> tuple[float, float]:
+        """Return what changes at once in a cable: the number of its segments, and what its drum does."""
+        flat, places = x[HULL_SIZE:], self._memory.places
+        return float(flat[places["count"]][0]), float(flat[places["drum_mode"]][0])
 
     def output(self, t: float, x: np.ndarray, u: np.ndarray, params: dict[str, Any]) -> np.ndarray:
         """Return hull states and cable channels of a state."""
@@ -121,9 +152,3 @@ class Tethered:
         pull = R.T @ F
         tensions = (np.linalg.norm(F), flat[places["node_tension"]][count])
         return np.concatenate([x[: len(STATE_NAMES)], [length, *tensions], pull, np.cross(self._r_c, pull)])
-
-    def _trouble(self, ending: int, time: float) -> str:
-        """Say why there is no next state."""
-        if ending == NO_ROOM:
-            return f"plant: at t = {time:g} s there is no room for more than longest = {self._longest:g} m of cable."
-        return in_words(ending, time, self._setup, self._live)
