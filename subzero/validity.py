@@ -55,6 +55,8 @@ SLACK_SHARE, SLACK_TIME = 0.05, 1.0
 FOLDED = 1e-3
 """A cable whose segments are shorter than their cable by more than this share is folded somewhere. [-]"""
 
+ROUNDING = 1e-6
+"""What is beyond surface or bed by less than this is at it. [m]"""
 TAUT = 1e-4
 """A bend counts where the cable pulls harder than this. [N]"""
 STRAIGHT = 1e-6
@@ -64,8 +66,9 @@ CLOSED = 0.01
 PUSHED = 1e-3
 """A cable that pushes harder than this share of its hardest pull is none. [-]"""
 
-MOST_OF_THE_RUN, LONG = 0.9, 10.0
-"""At a limit throughout: for more than this share of the run, or for longer than this at a stretch. [-], [s]"""
+MOST_OF_THE_RUN, LONG, SHORT = 0.9, 10.0, 2.0
+"""At a limit throughout: for more than this share of the run, or for longer than this at a stretch; a shorter stretch
+than the last is none: an actuator takes its time. [-], [s], [s]"""
 BEHIND = 0.95
 """A propeller slower than this share of its command is behind it. [-]"""
 FINS = {"rudder": "rudder_servo", "stern_plane_port": "stern_plane_port_servo",
@@ -305,12 +308,13 @@ def _outside(
     if run.attrs["tethered"] and run["node_count"].values.any():
         places["cable"] = _node_depths(run, model)
     for name, depth in places.items():
-        out = np.nan_to_num(beyond(depth), nan=-1.0).max(axis=1)
-        if out.max() > 1e-6:
-            at, worst = _first(time, out > 1e-6), int(out.argmax())
-            far = float(np.nanmin(depth[worst]) if "above" in where else np.nanmax(depth[worst]))
+        out = np.nan_to_num(beyond(depth), nan=-np.inf)
+        row, node = np.unravel_index(int(out.argmax()), out.shape)
+        if out[row, node] > ROUNDING:
+            first = _first(time, out.max(axis=1) > ROUNDING)
             said.append(
-                f"The {name} is {where} from {at:g} s on, and at a depth of {far:.3g} m at {time[worst]:g} s, {words}"
+                f"The {name} is {where} from {first:g} s on, and at a depth of {depth[row, node]:.3g} m at "
+                f"{time[row]:g} s, {words}"
             )
     return said
 
@@ -362,9 +366,7 @@ def bend_radii(run: xr.Dataset) -> np.ndarray:
     product = np.sqrt(aa * bb * (aa + bb + 2.0 * ab))
     square = aa * bb - ab * ab
     pulls = np.minimum(np.minimum(T[:, :-2], T[:, 1:-1]), T[:, 2:]) > TAUT
-    bent = (
-        square > STRAIGHT**2 * aa * bb
-    )  # also false where nodes coincide, or are none: NaN compares as false
+    bent = square > STRAIGHT**2 * aa * bb  # false where nodes coincide, and where there are none: NaN
     return np.where(pulls & bent, product / (2.0 * np.sqrt(np.where(bent, square, 1.0))), np.inf)
 
 
@@ -393,7 +395,7 @@ def _fin(run: xr.Dataset, model: Model, fin: str) -> list[str]:
             f"The {name} is commanded to {command[worst]:.4g}° and goes to {limit:.4g}° ({key}.deflection_limit): up "
             f"to {cut[worst]:.3g}° are cut off, first at {_first(time, cut > 1e-6):g} s. Command less."
         )
-    elif throughout := _throughout(time, np.abs(angle) >= limit - 1e-3 * max(limit, 1e-9)):
+    elif throughout := _throughout(time, (0.0 < limit < np.inf) & (np.abs(angle) >= 0.999 * limit)):
         said.append(
             f"The {name} is at its limit of {limit:.4g}° {throughout}: it has nothing left to steer with."
         )
@@ -417,8 +419,8 @@ def _propeller(run: xr.Dataset, model: Model) -> list[str]:
             f"{most:.4g} rev/s at most (first at {_first(time, np.abs(command) > most):g} s). Command less."
         ]
     behind = np.sign(command) * speed < BEHIND * np.abs(command)
-    long = max(LONG, 10.0 * model.vehicle.motor.lag)
-    if throughout := _throughout(time, behind, long):
+    spun_up = 10.0 * model.vehicle.motor.lag
+    if throughout := _throughout(time, behind, max(SHORT, spun_up)):
         lack = np.where(behind, np.abs(command) - np.abs(speed), 0.0)
         return [
             f"The propeller is up to {lack.max():.3g} rev/s behind its command {throughout}: the battery does not "
@@ -430,14 +432,13 @@ def _propeller(run: xr.Dataset, model: Model) -> list[str]:
 # ---- helpers ----
 
 
-def _throughout(time: np.ndarray, at_limit: np.ndarray, long: float = LONG) -> str:
-    """Say for how long a limit holds, if it is most of the run or a long stretch; else nothing."""
+def _throughout(time: np.ndarray, at_limit: np.ndarray, short: float = SHORT) -> str:
+    """Say for how long a limit holds, if it is most of the run or a long stretch, and not a short one [s]."""
     longest, begin = _longest(time, at_limit)
-    if not at_limit.any() or time[-1] <= 0.0:
-        return ""
-    if longest > long:
+    if longest > max(LONG, short):
         return f"from {begin:g} s on for {longest:.3g} s"
-    return f"for {_percent(at_limit.mean())} of the run" if at_limit.mean() > MOST_OF_THE_RUN else ""
+    most = longest > short and at_limit.mean() > MOST_OF_THE_RUN
+    return f"for {_percent(at_limit.mean())} of the run" if most else ""
 
 
 def _longest(time: np.ndarray, holds: np.ndarray) -> tuple[float, float]:

@@ -332,6 +332,19 @@ def test_a_propeller_that_is_asked_for_more_than_a_full_battery_gives():
     assert "commanded to 60 rev/s, and the full battery drives it at 48 rev/s at most" in said
 
 
+def test_a_short_run_is_too_short_for_an_actuator_to_be_at_its_limit_throughout():
+    """A second of a propeller that spins up, and of a rudder that turns."""
+    assert "actuators" not in warned(trial_of(held=(25.0, 15.0, 0.0, 0.0), duration=1.0), tethered=False)
+
+
+def test_a_fin_that_is_fixed_by_its_limit_and_not_commanded_is_fine():
+    model = subzero.Model.of(FIG6)
+    fixed = model.vehicle.with_parameter("rudder_servo.deflection_limit", 0.0)
+    model = dataclasses.replace(model, vehicle=fixed)
+    ahead = trial_of(held=(20.0, 0.0, 0.0, 0.0), duration=12.0)
+    assert "actuators" not in warned(ahead, tethered=False, model=model)
+
+
 def test_a_propeller_that_the_battery_leaves_behind_its_command():
     model = subzero.Model.of(FIG6)
     weak = dataclasses.replace(
