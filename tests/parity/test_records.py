@@ -1,11 +1,11 @@
-"""Records in memory: `subzero.compiled.packed` reads and writes like the named tuple or dataclass it was made of."""
+"""Records in memory: `subzero.packed.packed` reads and writes like the named tuple or dataclass it was made of."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from subzero.compiled import cache_directory, compiled, source_digest
+from subzero.compiled import compiled
 from subzero.packed import packed
 
 
@@ -67,8 +67,3 @@ def test_packing_copies_and_a_packed_part_can_be_packed_again():
     again = packed(Outer(inner=inner, row=(inner, inner), count=0))
     matrix[:] = 7.0
     assert again.inner.matrix.tolist() == [[1.0, 0.0], [0.0, 1.0]]
-
-
-def test_every_package_keeps_its_machine_code_under_a_digest_of_its_own_sources():
-    assert source_digest(("cable",)) != source_digest(("vehicle",)) != source_digest()
-    assert cache_directory("cable").name == f"cable-{source_digest(('cable',))}"

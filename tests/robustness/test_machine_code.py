@@ -391,6 +391,46 @@ def test_a_folder_that_is_a_link_is_not_used_but_the_one_above_may_be(run, base,
     assert run() == (True, "")
 
 
+NOBODY = 65534
+
+
+def as_nobody(what):
+    """Return what a function gives in a child process of a user without rights."""
+    read, write = os.pipe()
+    child = os.fork()
+    if child == 0:
+        code = 1
+        try:
+            os.setgroups([])
+            os.setgid(NOBODY)
+            os.setuid(NOBODY)
+            os.write(write, repr(what()).encode())
+            code = 0
+        finally:
+            os._exit(code)
+    os.close(write)
+    said = os.read(read, 9999).decode()
+    os.close(read)
+    assert os.waitpid(child, 0)[1] == 0
+    return said
+
+
+@needs_root
+def test_a_cache_of_root_is_read_by_others_and_a_closed_one_is_done_without(run, base, tiny):
+    run()
+    for folder in (base, *base.parents):  # pytest's own are closed, too
+        if folder in (base, base.parent) or folder.name.startswith(("test_", "pytest-")):
+            folder.chmod(0o755)
+    kept(base).parent.chmod(0o755)
+    kept(base).chmod(0o644)
+    assert as_nobody(run) == repr((True, ""))
+    base.chmod(0o700)
+    said = as_nobody(run)
+    assert said.startswith("(False")
+    assert NOT_KEPT in said
+    assert said.count("\\n") == 1
+
+
 # What is out of use.
 
 
