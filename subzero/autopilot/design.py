@@ -70,6 +70,9 @@ class Gains:
 def reduced(part: control.StateSpace, keep: Sequence[str]) -> control.StateSpace:
     """Return a linear model of fewer states, the others following at once: exact at rest, good for slow motions.
 
+    The bearing of a cable follows at once in nothing: it takes a length of the cable. Leave it in, or leave the cable out
+    of the model (`trim` without one).
+
     Args:
         part: from `subsystem`.
         keep: names of the states that stay.
