@@ -93,7 +93,7 @@ def main() -> None:
     unknown = [name for name in chosen if name not in SECTIONS]
     if unknown:
         sys.exit(f"There is no section '{unknown[0]}'. Allowed: {', '.join(SECTIONS)}.")
-    kept = _sections(PAGE.read_text(encoding="utf-8"))
+    kept = parts_of(PAGE.read_text(encoding="utf-8"))
     for name in chosen:
         begin = time.perf_counter()
         text = SECTIONS[name]().strip() + "\n"
@@ -107,7 +107,7 @@ def main() -> None:
         )
 
 
-def _sections(page: str) -> dict[str, str]:
+def parts_of(page: str) -> dict[str, str]:
     """Return the sections of a page by name, in their places."""
     parts = ["## " + part.strip() + "\n" for part in page.split("\n## ")[1:]]
     headlines = {headline: name for name, headline in HEADLINES.items()}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -166,12 +166,12 @@ def large_motions() -> str:
     )
 
 
-def all_margins() -> str:
+def all_margins(speeds: Sequence[float] = SPEEDS, lengths: Sequence[float] = LENGTHS) -> str:
     """Margins of every loop."""
     estimates, rows = autopilot.estimates(tuning(), 0.1), []
     for loop in ("speed", "heading", "heading, LQR", "pitch", "roll"):
-        for speed in SPEEDS:
-            for length in LENGTHS:
+        for speed in speeds:
+            for length in lengths:
                 name, pilot = loop.partition(",")[0], "lqr" if "LQR" in loop else "pid"
                 found = autopilot.loop_margins(
                     tuning(), name, speed=speed, wet_length=length,
