@@ -70,12 +70,14 @@ class Gains:
 def reduced(part: control.StateSpace, keep: Sequence[str]) -> control.StateSpace:
     """Return a linear model of fewer states, the others following at once: exact at rest, good for slow motions.
 
+    A cable's bearing from the drum follows over a whole length of the cable: it is never left out.
+
     Args:
         part: from `subsystem`.
         keep: names of the states that stay.
 
     Raises:
-        UserError: there is no such state, or the others cannot follow (they integrate).
+        UserError: there is no such state, or the others cannot follow (they integrate, or are a cable's bearing).
     """
     import control
 
@@ -83,6 +85,12 @@ def reduced(part: control.StateSpace, keep: Sequence[str]) -> control.StateSpace
     missing = [name for name in keep if name not in labels]
     if missing:
         raise UserError(f"There is no state '{missing[0]}' in '{part.name}'. Allowed: {', '.join(labels)}.")
+    slow = [name for name in labels if name in ("cable_bearing", "cable_dip") and name not in keep]
+    if slow:
+        raise UserError(
+            f"'{part.name}' without {slow[0]} is wrong for slow motions: it follows over a whole length of the cable."
+            f" Keep {slow[0]} too, or linearise the hull alone (trim with wet_length=0)."
+        )
     A, B = np.asarray(part.A), np.asarray(part.B)
     k = [labels.index(name) for name in keep]
     f = [i for i in range(len(labels)) if i not in k and np.any(A[:, i])]  # depth, say, moves nothing

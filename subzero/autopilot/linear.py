@@ -9,8 +9,9 @@ and is left out; on a cable the bearing from the drum takes its place.
 
 A cable pulls the heading back to the line from the drum. Only the whole picture, cable and all, may be turned about the
 drum, which is the pole at 0 that is left: it stands for the bearing, which moves on over a length S of way, not for
-the heading. What this model promises: 10 % of gain and 10° of phase from 0.3 to 4 rad/s, and no slower than the cable
-grows by half in a period; see docs/autopilot.md. For anything else than a straight way there is `linearise_along`.
+the heading. What this model promises: 10 % of gain and 10° of phase from 0.3 to 4 rad/s, while the cable grows by less
+than two fifths of its length in a period (docs/autopilot.md). For anything else than a straight way there is
+`linearise_along`.
 """
 
 from __future__ import annotations
@@ -72,10 +73,10 @@ def linearise(model: Model, steady: Trim, *, cross_flow: float = 0.0) -> control
     """Return the linear model about a steady motion, deviations from `steady.state` and `steady.command`.
 
     Args:
-        model: vehicle and cable that were trimmed.
+        model: vehicle and cable that were trimmed; a uniform current is left out, as it is of `trim`.
         steady: from `trim`. For a run in which the cable grows from S₁ to S₂, its middle length approximates best.
         cross_flow: how fast the water typically moves across the cable, the amplitude W of `cable_modes`; 0 for the
-            smallest motions. A heading that swings by ε makes about U ε. [m/s]
+            smallest motions, a tenth of a degree. For a heading that swings by ε half of U ε is right. [m/s]
 
     Returns:
         14 states (`STATES` without north and east), with a cable those of `cable_states` behind them; all are outputs

@@ -177,6 +177,15 @@ def test_a_cable_that_does_not_lie_straight_is_refused():
         autopilot.linearise(model, straight, cross_flow=-1.0)
 
 
+def test_a_cable_cannot_be_left_to_follow_at_once():
+    """That was the model before: heading off by a factor of five after 12 s."""
+    steady = autopilot.trim(tuning().model, speed=1.0, wet_length=20.0)
+    part = autopilot.subsystem(autopilot.linearise(tuning().model, steady), "yaw_sway")
+    with pytest.raises(subzero.UserError, match="without cable_bearing is wrong for slow motions"):
+        autopilot.reduced(part, ["yaw_rate", "heading"])
+    assert autopilot.reduced(part, ["yaw_rate", "heading", "cable_bearing"]).nstates == 3
+
+
 def test_deviations_that_mean_nothing_are_refused():
     along = autopilot.linearise_along("fig6", duration=1.0)
     with pytest.raises(subzero.UserError, match=r"commands of shape \(3, 4\).*\(10, 4\)"):
