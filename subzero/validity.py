@@ -173,8 +173,8 @@ def ill_posed_drum(run: xr.Dataset, _: scenarios.Trial, model: Model) -> list[st
     worst = int(np.where(ill, momentum - T, -np.inf).argmax())
     return [
         f"The free drum does not hold the cable against its weight, from {begin:g} s on for {longest:.3g} s: at "
-        f"{time[worst]:g} s it comes off at U = {payout[worst]:.3g} m/s (the vehicle goes away at {away[worst]:.3g} m/s) "
-        f"with a tension of {T[worst]:.2g} N (m1 U2 is {momentum[worst]:.2g} N). How it leaves the drum is ill-posed: "
+        f"{time[worst]:g} s it comes off at U = {payout[worst]:.3g} m/s (the vehicle goes away at {away[worst]:.3g} "
+        f"m/s) with a tension of {T[worst]:.2g} N (m1 U2 is {momentum[worst]:.2g} N). How it leaves the drum is ill-posed: "
         "shorter segments give another answer, not a better one. Give the drum a friction_torque well above "
         f"{max(momentum[worst], T[worst]) * model.drum.radius:.1g} N m, or a [winch]."
     ]
