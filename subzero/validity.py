@@ -170,12 +170,13 @@ def ill_posed_drum(run: xr.Dataset, _: scenarios.Trial, model: Model) -> list[st
     if longest <= ILL_POSED_TIME:
         return []
     momentum = model.cable.virtual_mass_per_length * payout**2
-    worst = int(np.where(ill, momentum - T, -np.inf).argmax())
+    here = ill & (time >= begin) & (time <= begin + longest)
+    worst = int(np.where(here, payout, -np.inf).argmax())
     return [
         f"The free drum does not hold the cable against its weight, from {begin:g} s on for {longest:.3g} s: at "
         f"{time[worst]:g} s it comes off at U = {payout[worst]:.3g} m/s (the vehicle goes away at {away[worst]:.3g} "
-        f"m/s) with a tension of {T[worst]:.2g} N (m1 U2 is {momentum[worst]:.2g} N). How it leaves the drum is ill-posed: "
-        "shorter segments give another answer, not a better one. Give the drum a friction_torque well above "
+        f"m/s) with a tension of {T[worst]:.2g} N (m1 U2 is {momentum[worst]:.2g} N). How it leaves the drum is "
+        "ill-posed: shorter segments give another answer, not a better one. Give the drum a friction_torque well above "
         f"{max(momentum[worst], T[worst]) * model.drum.radius:.1g} N m, or a [winch]."
     ]
 
