@@ -56,6 +56,8 @@ def _read_water(source: Source) -> Read:
     if not lists:
         return {"current": current}, problems
     problems += _check_profile(source, lists)
+    if problems:  # a profile is made of good numbers only
+        return {"current": current}, problems
     names = [quantity.name for quantity in PROFILE[1:]]
     depth = tuple(float(x) for x in lists.get("depth_m", []))
     return {
@@ -106,6 +108,8 @@ def _read_winch(source: Source) -> Read:
     problems += wrong
     if samples:
         problems += check_times(samples, None)
+    if problems:
+        return {}, problems
     time, setpoint = (tuple(float(x) for x in lists.get(name, [])) for name in ("time_s", SETPOINT[control]))
     return {"winch": Winch(control=control, time=time, setpoint=setpoint)}, problems
 
@@ -135,12 +139,13 @@ def _read_vessel(source: Source) -> Read:
     values, problems = check_section(source, "vessel", source.table["vessel"])
     lists = _lists(values, "vessel")
     samples, wrong = inline(source, "vessel", lists)
-    if samples is None:
-        return {}, problems + wrong
+    problems += wrong + (check_times(samples, None) if samples else [])
+    if samples is None or problems:
+        return {}, problems
     names = ["velocity_north_m_s", "velocity_east_m_s", "velocity_down_m_s"]
     time = tuple(float(x) for x in samples.time)
     vessel = Vessel(time=time, velocity=_vectors(lists, names, len(time)))
-    return {"vessel": vessel}, problems + wrong + check_times(samples, None)
+    return {"vessel": vessel}, problems
 
 
 def check_scheme(source: Source, run: Mapping[str, Any], cable: Mapping[str, float]) -> list[Problem]:

@@ -159,11 +159,6 @@ ONE_EDIT = {
         "mine.toml, line 7, run.cable_step_s: found 0.1, but it must be a whole number of steps "
         "hull_step_s = 0.03. Nearest: 0.09 or 0.12.",
     ),
-    "duration not a whole number of cable steps": (
-        "10.0", "10.05",
-        "mine.toml, line 5, run.duration_s: found 10.05, but it must be a whole number of steps "
-        "cable_step_s = 0.1. Nearest: 10 or 10.1.",
-    ),
     "no duration": (
         "10.0", "0",
         "mine.toml, line 5, run.duration_s: found 0, but this is outside its limits. "
