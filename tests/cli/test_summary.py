@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-import subzero.progress
 from subzero.output import Stage, write_csv, write_summary
 from subzero.progress import ProgressBar
 from subzero.report import show

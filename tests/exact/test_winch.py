@@ -105,7 +105,7 @@ def test_a_drum_cannot_pay_out_less_than_the_vehicle_takes():
 
 
 def test_a_winch_cannot_push_and_needs_numbers():
-    with pytest.raises(ValueError, match="tension is -1.0; it must be a finite number, more than 0"):
+    with pytest.raises(ValueError, match=r"tension is -1\.0; it must be a finite number, more than 0"):
         cable.ConstantTension(tension=-1.0)
     with pytest.raises(ValueError, match="must be positive at all times; it falls to -1 N"):
         cable.pull_out(lambda t: (1.0, 0.0, 0.0), 1.0, drum=cable.ConstantTension(tension=lambda t: -1.0))
