@@ -113,14 +113,17 @@ def pull_out(
         )
         current = start.current if current is None else current
     cable, drum = CableProperties() if cable is None else cable, DrumProperties() if drum is None else drum
-    _check(duration, step, segment_length, scheme, rtol, grading, wet_length)
+    duration, step, segment_length, rtol, grading, wet_length = _checked(
+        duration, step, segment_length, rtol, grading, wet_length
+    )
+    _check_scheme(scheme)
     check_kinds(
         cable=(cable, (CableProperties,)), drum=(drum, (DrumProperties, PayOutRate, Brake, ConstantTension))
     )
     check_motion("tow_velocity", tow_velocity)
     if drum_velocity is not None:
         check_motion("drum_velocity", drum_velocity)
-    check_tolerance(tolerance)
+    tolerance = check_tolerance(tolerance)
     water = current_of(current)
     if scheme == "lumped":
         segments_needed(max(wet_length, segment_length), segment_length, 0.0)
@@ -196,21 +199,22 @@ def _way(place: np.ndarray) -> float:
     return float(np.linalg.norm(np.diff(place, axis=0), axis=1).sum())
 
 
-def _check(
-    duration: float,
-    step: float,
-    segment_length: float,
-    scheme: str,
-    rtol: float,
-    grading: float,
-    wet_length: float,
-) -> None:
-    """Refuse the first setting that cannot be used, by name."""
-    for name, value in (("duration", duration), ("step", step), ("segment_length", segment_length)):
-        checked("", name, value, above=0.0)
-    checked("", "rtol", rtol, least=0.0, most=0.5)
-    checked("", "grading", grading, least=0.0, most=0.5)
-    checked("", "wet_length", wet_length, least=0.0, unit="m")
+def _checked(
+    duration: float, step: float, segment_length: float, rtol: float, grading: float, wet_length: float
+) -> tuple[float, ...]:
+    """Return the numbers as floats; refuse the first that cannot be used, by name."""
+    return (
+        checked("", "duration", duration, above=0.0),
+        checked("", "step", step, above=0.0),
+        checked("", "segment_length", segment_length, above=0.0),
+        checked("", "rtol", rtol, least=0.0, most=0.5),
+        checked("", "grading", grading, least=0.0, most=0.5),
+        checked("", "wet_length", wet_length, least=0.0, unit="m"),
+    )
+
+
+def _check_scheme(scheme: str) -> None:
+    """Refuse a scheme that there is not."""
     if not isinstance(scheme, str) or scheme not in SCHEMES:
         raise BadValueError(
             f"scheme {short(scheme)} is unknown; choose one of {', '.join(SCHEMES)}.{suggestion(str(scheme), SCHEMES)}"

@@ -162,9 +162,9 @@ def check_motion(name: str, velocity: object) -> None:
         )
 
 
-def check_tolerance(tolerance: float) -> None:
-    """Refuse a tolerance that a step cannot be solved to."""
-    checked("", "tolerance", tolerance, least=FINEST, most=COARSEST)
+def check_tolerance(tolerance: float) -> float:
+    """Return a tolerance as a float; refuse one that a step cannot be solved to."""
+    return checked("", "tolerance", tolerance, least=FINEST, most=COARSEST)
 
 
 def current_of(current: Sequence[float] | np.ndarray | Current | None) -> Current:

@@ -8,13 +8,13 @@ how to change them, in words that a program can follow: "a shorter step", "more 
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from .drum import FREE, LENGTH, TENSION
 from .line import NEW, NOW, Line
-from .properties import DrumNumbers
+from .properties import CableNumbers, DrumNumbers
 
 EQUATIONS = ("length", "northward balance", "eastward balance", "downward balance")
 NEARLY_TAUT = 0.999
@@ -33,7 +33,9 @@ class Names(NamedTuple):
     yielding: str = "a cable.ConstantTension"
 
 
-def describe_stop(time: float, line: Line, drum: DrumNumbers, c: Any, names: Names | None = None) -> str:
+def describe_stop(
+    time: float, line: Line, drum: DrumNumbers, c: CableNumbers, names: Names | None = None
+) -> str:
     """Return why a run could not go on beyond `time` [s], where, and what to try.
 
     Args:
@@ -75,9 +77,9 @@ def _worst(line: Line) -> str:
     return f"{place} is off by {max(solved.residual, 1.0):.1e} times its tolerance"
 
 
-def _remedy(line: Line, drum: DrumNumbers, c: Any, words: Names) -> str:
+def _remedy(line: Line, drum: DrumNumbers, c: CableNumbers, words: Names) -> str:
     """Return what cures most stops of this kind, the surest first."""
-    if "bending_stiffness" in c.dtype.names:
+    if hasattr(c, "bending_stiffness"):
         return f"a longer {words.segment}, or bending_stiffness = 0"
     length = float(line.ends.settled + line.ends.last_length[NOW])
     if drum.control == TENSION and length < SHORT_SEGMENTS * float(line.ends.segment_length):

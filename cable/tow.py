@@ -72,12 +72,11 @@ def tow(
     Checked by: tests/exact/test_tow.py
     """
     lengths = {"length": length, "duration": duration, "step": step, "segment_length": segment_length}
-    for name, value in lengths.items():
-        checked("", name, value, above=0.0)
-    checked("", "drogue_drag_area", drogue_drag_area, least=0.0)
-    checked("", "rtol", rtol, least=0.0, most=0.5)
+    length, duration, step, segment_length = (checked("", *each, above=0.0) for each in lengths.items())
+    drogue_drag_area = checked("", "drogue_drag_area", drogue_drag_area, least=0.0)
+    rtol = checked("", "rtol", rtol, least=0.0, most=0.5)
     check_motion("tow_velocity", tow_velocity)
-    check_tolerance(tolerance)
+    tolerance = check_tolerance(tolerance)
     cable, water = CableProperties() if cable is None else cable, current_of(current)
     check_kinds(cable=(cable, (CableProperties,)))
     if not isinstance(scheme, str) or scheme not in ("moving_end", "lumped"):

@@ -121,10 +121,9 @@ def short(value: object) -> str:
     """Return a value as it is shown in a message: `repr`, on one line, cut when long."""
     try:
         text = repr(value)
-    except Exception:  # whatever somebody's __repr__ does, also an integer of thousands of digits
-        return (
-            "a number far too long" if isinstance(value, int) else f"a value of type {type(value).__name__}"
-        )
+    except Exception:  # whatever somebody's __repr__ does
+        is_number = isinstance(value, Integral)  # one of thousands of digits has no text
+        return "a number far too long" if is_number else f"a value of type {type(value).__name__}"
     text = " ".join(text.split())
     return text if len(text) <= SHOWN_CHARACTERS else text[:SHOWN_CHARACTERS] + "..."
 

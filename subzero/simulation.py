@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -168,8 +168,7 @@ def in_words(ending: int, time: float, setup: Setup, live: Live) -> str:
             f"Vehicle and cable found no common tow force beyond t = {time:g} s, even in the smallest steps. "
             "Try a shorter cable_step_s and hull_step_s."
         )
-    cable: Any = setup.fixed.cable  # a packed record
-    stiff = "bending_stiffness" in cable.dtype.names
+    stiff = hasattr(setup.fixed.cable, "bending_stiffness")
     longer = ", or a longer segment_length_m for the stiff cable" if setup.fixed.tethered and stiff else ""
     return (
         f"The vehicle's speed beyond t = {time:g} s is absurd (more than {coupling.FASTEST:g} m/s, or not a number). "

@@ -91,7 +91,9 @@ def check_value(key: str, value: object, field: dataclasses.Field[Any]) -> Probl
         return None
     number = real(value)
     if number is None:
-        why = "this is not a finite number" if isinstance(value, Real) else "this is not a number"
+        why = "this is not a number"
+        if isinstance(value, Real) and not isinstance(value, bool):
+            why = "NaN is not a number" if value != value else "this is not a finite number"
     elif number < low or number > high or (strict and number == low):
         why = f"{field.metadata['meaning']} cannot be that"
     else:

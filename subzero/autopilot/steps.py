@@ -14,7 +14,7 @@ from subzero.autopilot.standard import Wanted
 from subzero.autopilot.steady import trim
 from subzero.autopilot.table import make
 from subzero.autopilot.tuning import Tuning
-from subzero.errors import UserError, chosen, real, short
+from subzero.errors import UserError, checked, chosen, real, short
 from subzero.model import Model, model_of
 from subzero.simulation import Progress
 from subzero.trials import load
@@ -85,6 +85,7 @@ def step(
     size = line.size if size is None else size
     if not real(size):
         raise UserError(f"A step of {short(size)} is none. Allowed: a finite number, not 0.")
+    speed = checked("", "speed", speed, unit="m/s")
     trial = scenario if isinstance(scenario, scenarios.Trial) else load(scenario)
     before = Wanted(speed, trial.start.heading, trial.start.depth)
     goal = before._replace(**{line.field: getattr(before, line.field) + size * line.scale})

@@ -32,6 +32,9 @@ def _lqr(tuning: Tuning, sample_time: float, cable: CableModel) -> StandardAutop
     return StandardAutopilot(tuning, sample_time, cable=cable, heading=heading, name="lqr")
 
 
+LONGEST_SAMPLE_S = 60.0
+"""A controller that sleeps longer holds nothing. [s]"""
+
 AUTOPILOTS: dict[str, Build] = {"pid": _pid, "lqr": _lqr}
 """Name → what makes one, from a tuning, a sample time [s] and a cable model."""
 
@@ -67,8 +70,10 @@ def make(
             sample time the hull is unstable.
     """
     time = real(sample_time)
-    if time is None or time <= 0.0:
-        raise UserError(f"make: the sample time is {short(sample_time)}. Allowed: a time above 0 s.")
+    if time is None or not 0.0 < time <= LONGEST_SAMPLE_S:
+        raise UserError(
+            f"make: the sample time is {short(sample_time)}. Allowed: a time above 0 s, up to {LONGEST_SAMPLE_S:g} s."
+        )
     is_path = isinstance(name, str) and name.endswith(".py")
     build = from_file(name) if is_path else chosen(AUTOPILOTS, name, "autopilot")
     cable = chosen(FEED_FORWARD, feed_forward, "feed-forward")

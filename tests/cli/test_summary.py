@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-import subzero.progress
 from subzero.output import Stage, write_csv, write_summary
 from subzero.progress import ProgressBar
 from subzero.report import show
@@ -116,7 +115,7 @@ def test_a_comparison_tells_its_progress_once_from_0_to_1(rails, make_run, monke
 )
 def test_a_bar_is_shown_on_a_terminal_for_what_takes_over_a_second(seconds, is_terminal, shown, monkeypatch):
     now = [0.0]
-    monkeypatch.setattr(subzero.progress.time, "monotonic", lambda: now[0])
+    monkeypatch.setattr("subzero.progress.monotonic", lambda: now[0])
     out = io.StringIO()
     with ProgressBar("Simulating fig6", Console(file=out, force_terminal=is_terminal)) as progress:
         now[0] = seconds

@@ -106,8 +106,12 @@ def test_a_drum_cannot_pay_out_less_than_the_vehicle_takes():
 
 def test_a_winch_cannot_push_and_needs_numbers():
     with pytest.raises(ValueError, match=r"tension is -1\.0; it must be a finite number, more than 0"):
-        cable.pull_out(lambda t: (1.0, 0.0, 0.0), 1.0, drum=cable.ConstantTension(tension=-1.0))
+        cable.ConstantTension(tension=-1.0)
+    with pytest.raises(ValueError, match="must be positive at all times; it falls to -1 N"):
+        cable.pull_out(lambda t: (1.0, 0.0, 0.0), 1.0, drum=cable.ConstantTension(tension=lambda t: -1.0))
     with pytest.raises(ValueError, match="rate is nan; it must be a finite number"):
-        cable.pull_out(lambda t: (1.0, 0.0, 0.0), 1.0, drum=cable.PayOutRate(rate=float("nan")))
+        cable.PayOutRate(rate=float("nan"))
+    with pytest.raises(ValueError, match="needs finite numbers"):
+        cable.pull_out(lambda t: (1.0, 0.0, 0.0), 1.0, drum=cable.PayOutRate(rate=lambda t: float("nan")))
     with pytest.raises(ValueError, match="knows a free drum"):
         cable.pull_out(lambda t: (1.0, 0.0, 0.0), 1.0, drum=cable.Brake(), scheme="paper")

@@ -33,6 +33,8 @@ SHORT, LONG, LONG_DIAGNOSES = 20, 940, 60
 SHORT_COMMANDS, LONG_COMMANDS, COLD_COMMANDS = 6, 185, 15
 WITHIN_S = 2.0
 """So soon a command has to be gone after a signal. [s]"""
+LONGEST_WAIT_S = 25.0
+"""Commands are interrupted within this. [s]"""
 LONG_COMPILATION_S = 40.0
 """Kernels take longer than this to compile. [s]"""
 
@@ -77,11 +79,16 @@ def started(words, folder, cache=None):
     environment = os.environ | ({"SUBZERO_CACHE_DIR": str(cache)} if cache else {})
     command = subprocess.Popen(
         [sys.executable, "-m", "subzero", *words], cwd=folder, env=environment, text=True,
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, preexec_fn=heed_again,
     )  # fmt: skip
     while command.poll() is None and not heeds(command.pid):
         time.sleep(0.001)
     return command
+
+
+def heed_again():
+    """Let a command heed SIGINT though this process was started with it ignored, as jobs in the background are."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 def heeds(pid):
@@ -176,7 +183,7 @@ def interrupt_commands(seed, count, names, made, folder, cold=False):
         took, whole = made(name)
         place = folder / str(draw.random())
         place.mkdir()
-        after = draw.uniform(0.0, LONG_COMPILATION_S if cold else took)
+        after = draw.uniform(0.0, LONG_COMPILATION_S if cold else min(took, LONGEST_WAIT_S))
         lasted = interrupted(
             name, place, after, number, whole, folder / f"cold-{draw.random()}" if cold else None
         )
