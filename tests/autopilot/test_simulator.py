@@ -25,7 +25,12 @@ def identical(one, other):
     assert set(one.variables) == set(other.variables)
     for name in one.variables:
         assert one[name].values.tobytes() == other[name].values.tobytes(), name
-    assert one.attrs == other.attrs
+    assert described(one) == described(other)
+
+
+def described(run):
+    """Return the attributes of a run, but for the accuracy: nobody runs what is stepped from outside twice."""
+    return {name: value for name, value in run.attrs.items() if name != "accuracy"}
 
 
 @pytest.mark.parametrize("tethered", [True, False])
