@@ -14,7 +14,9 @@ import pytest
 import scenarios
 import subzero
 from subzero.refinement import halved
-from subzero.validity import CHECKS, bend_radii, drum_is_ill_posed, roughness
+from subzero.validity import CHECKS
+from subzero.validity.limits import bend_radii
+from subzero.validity.numerics import drum_is_ill_posed, roughness
 
 FIG6 = dataclasses.replace(subzero.load_scenario("fig6"), rtol=0.0)
 """With steps and segments as they are: no coarser run confirms it, and none is taken finer."""
@@ -57,7 +59,7 @@ def checked(run, trial=FIG6, *, check):
 
 
 SHIPPED = {"rov_umbilical": {"slack", "bend_radius"}}
-"""Scenarios that end with warnings, and why: the umbilical begins with some centimetres of cable at a vehicle at rest."""
+"""Scenarios that end with warnings, and why: the umbilical begins with centimetres of cable at a vehicle at rest."""
 
 
 @pytest.mark.parametrize("tethered", [True, False], ids=["tethered", "untethered"])

@@ -1,0 +1,77 @@
+"""What may be wrong with a run that has reached its end: `CHECKS`, each a pure function of the labelled result.
+
+A check takes a run, its trial and its model, and answers with sentences, none if all is well. A sentence says what, how
+much, since when, and what to do. They stand in ``attrs["warnings"]`` of the run (`warnings_of` reads them), in
+``summary.json``, on the terminal and in the footer of figures.
+
+The first seven checks doubt the numbers; the others say that what was asked for cannot be, or that an equation does not
+hold where the run went: there is no air and no sea bed in them, and nothing breaks. A check that has no say, such as
+that of the energies under the paper's scheme, which keeps no balance, is silent.
+
+To add a check, add a row to `CHECKS`, and a test that it warns and one that it does not (`tests/validity`).
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from typing import TYPE_CHECKING, NamedTuple
+
+from subzero.validity.limits import above_surface, actuators, below_sea_bed, bend_radius, strength
+from subzero.validity.numerics import (
+    closure,
+    energy_residual,
+    ill_posed_drum,
+    push,
+    resolution,
+    slack,
+    tow_force,
+)
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    import scenarios
+    from subzero.model import Model
+
+    Check = Callable[[xr.Dataset, scenarios.Trial, Model], list[str]]
+
+
+class RunWarning(NamedTuple):
+    """A doubt about a run: the check that has it, and a sentence."""
+
+    check: str
+    message: str
+
+
+def check_run(run: xr.Dataset, trial: scenarios.Trial, model: Model) -> list[RunWarning]:
+    """Return everything that may be wrong with a run of a trial with a model, in the order of `CHECKS`."""
+    return [RunWarning(name, words) for name, check in CHECKS.items() for words in check(run, trial, model)]
+
+
+def warnings_of(run: xr.Dataset) -> tuple[RunWarning, ...]:
+    """Return the warnings that a run carries in its attributes; none from a version that did not know them."""
+    told = json.loads(run.attrs.get("warnings", "[]"))
+    return tuple(RunWarning(one["check"], one["message"]) for one in told)
+
+
+def as_json(warnings: list[RunWarning]) -> str:
+    """Return warnings as they stand in the attributes of a run."""
+    return json.dumps([one._asdict() for one in warnings], ensure_ascii=False)
+
+
+CHECKS: dict[str, Check] = {
+    "energy_residual": energy_residual,
+    "resolution": resolution,
+    "tow_force": tow_force,
+    "ill_posed_drum": ill_posed_drum,
+    "slack": slack,
+    "closure": closure,
+    "push": push,
+    "above_surface": above_surface,
+    "below_sea_bed": below_sea_bed,
+    "strength": strength,
+    "bend_radius": bend_radius,
+    "actuators": actuators,
+}
+"""Name → check; the names stand in ``summary.json`` and in the attributes of a run."""

@@ -1,0 +1,194 @@
+"""Where the equations do not hold, or what was asked for cannot be: air, sea bed, strength, bends and actuators."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from subzero.channels import DEGREE
+from subzero.validity.spans import first_time, longest_span, percent
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    import scenarios
+    from subzero.model import Model
+
+ROUNDING = 1e-6
+"""What is beyond surface or bed by less than this is at it. [m]"""
+TAUT = 1e-4
+"""A bend counts where the cable pulls harder than this. [N]"""
+STRAIGHT = 1e-6
+"""Two segments with less than this between their directions are straight: rounding says no more. [rad]"""
+
+MOST_OF_THE_RUN, LONG, SHORT = 0.9, 10.0, 2.0
+"""At a limit throughout: for more than this share of the run, or for longer than this at a stretch; a shorter stretch
+than the last is none: an actuator takes its time. [-], [s], [s]"""
+BEHIND = 0.95
+"""A propeller slower than this share of its command is behind it. [-]"""
+FINS = {"rudder": "rudder_servo", "stern_plane_port": "stern_plane_port_servo",
+        "stern_plane_starboard": "stern_plane_starboard_servo"}  # fmt: skip
+"""Fin → its servo in the vehicle."""
+
+
+def above_surface(run: xr.Dataset, _: scenarios.Trial, model: Model) -> list[str]:
+    """Vehicle or cable in the air, where the equations know only water."""
+    radius = 0.5 * model.vehicle.hull.diameter
+    words = "though the equations know only water: what follows is wrong. Start deeper, or command less."
+    return _outside(run, model, lambda depth: -depth - radius, "above the surface", words)
+
+
+def below_sea_bed(run: xr.Dataset, trial: scenarios.Trial, model: Model) -> list[str]:
+    """Vehicle or cable below the sea bed that the trial tells."""
+    if trial.sea_bed <= 0.0:
+        return []
+    words = "which no equation knows: nothing holds it up there. Change the trial, or water.sea_bed_m."
+    where = f"below the sea bed at {trial.sea_bed:g} m"
+    return _outside(run, model, lambda depth: depth - trial.sea_bed, where, words)
+
+
+def _outside(
+    run: xr.Dataset, model: Model, beyond: Callable[[np.ndarray], np.ndarray], where: str, words: str
+) -> list[str]:
+    """Return sentences about vehicle and cable where `beyond` of their depth is above zero [m]."""
+    time, said = run["time"].values, []
+    places = {"vehicle": run["depth"].values[:, None]}
+    if run.attrs["tethered"] and run["node_count"].values.any():
+        places["cable"] = _node_depths(run, model)
+    for name, depth in places.items():
+        out = np.nan_to_num(beyond(depth), nan=-np.inf)
+        row, node = np.unravel_index(int(out.argmax()), out.shape)
+        if out[row, node] > ROUNDING:
+            first = first_time(time, out.max(axis=1) > ROUNDING)
+            said.append(
+                f"The {name} is {where} from {first:g} s on, and at a depth of {depth[row, node]:.3g} m at "
+                f"{time[row]:g} s, {words}"
+            )
+    return said
+
+
+def strength(run: xr.Dataset, _: scenarios.Trial, model: Model) -> list[str]:
+    """The cable pulls harder than it may."""
+    most = model.cable.strength
+    if most <= 0.0 or not run.attrs["tethered"]:
+        return []
+    time, T = run["time"].values, np.nan_to_num(run["cable_node_tension"].values).max(axis=1)
+    if T.max() <= most:
+        return []
+    worst, since = int(T.argmax()), first_time(time, most < T)
+    return [
+        f"The cable pulls with {T[worst]:.4g} N at {time[worst]:g} s, and may carry {most:g} N (cable.strength; above "
+        f"it since {since:g} s): a real one might part. Go slower, or take a stronger cable."
+    ]
+
+
+def bend_radius(run: xr.Dataset, _: scenarios.Trial, model: Model) -> list[str]:
+    """The cable is bent tighter than it may be."""
+    least = model.cable.minimum_bend_radius
+    if least <= 0.0 or not run.attrs["tethered"]:
+        return []
+    time, radius = run["time"].values, bend_radii(run)
+    if not radius.size or radius.min() >= least:
+        return []
+    tightest = radius.min(axis=1)
+    worst = int(tightest.argmin())
+    node, since = int(radius[worst].argmin()) + 1, first_time(time, tightest < least)
+    return [
+        f"The cable is bent to a radius of {tightest[worst]:.2g} m at {time[worst]:g} s, node {node} from the vehicle, "
+        f"and may be bent to {least:g} m (cable.minimum_bend_radius; below it since {since:g} s). "
+        "Turn more gently, or give the cable its bending_stiffness."
+    ]
+
+
+def bend_radii(run: xr.Dataset) -> np.ndarray:
+    """Return the radius of the circle through three neighbouring nodes, ∞ in slack parts (samples, nodes − 2). [m].
+
+    R = abc/4A of a triangle with the sides a, b, c; 4A = 2 |a × b| = 2 √(a²b² − (a·b)²).
+    """
+    P, T = run["cable_position"].values, run["cable_node_tension"].values
+    if P.shape[1] < 3:
+        return np.full((P.shape[0], 1), np.inf)
+    side = np.diff(P, axis=1)
+    a, b = side[:, :-1], side[:, 1:]
+    aa, bb, ab = (np.einsum("tni,tni->tn", one, two) for one, two in ((a, a), (b, b), (a, b)))
+    product = np.sqrt(aa * bb * (aa + bb + 2.0 * ab))
+    square = aa * bb - ab * ab
+    pulls = np.minimum(np.minimum(T[:, :-2], T[:, 1:-1]), T[:, 2:]) > TAUT
+    bent = square > STRAIGHT**2 * aa * bb  # false where nodes coincide, and where there are none: NaN
+    return np.where(pulls & bent, product / (2.0 * np.sqrt(np.where(bent, square, 1.0))), np.inf)
+
+
+def actuators(run: xr.Dataset, _: scenarios.Trial, model: Model) -> list[str]:
+    """A command beyond what the vehicle can do, or an actuator at its limit throughout."""
+    if run.attrs["prescribed"]:
+        return []
+    said = [sentence for fin in FINS for sentence in _fin(run, model, fin)]
+    return said + _propeller(run, model)
+
+
+def _fin(run: xr.Dataset, model: Model, fin: str) -> list[str]:
+    """Return what is wrong with a fin: cut off, at its limit, or turning as fast as it can all the time."""
+    time, servo = run["time"].values, getattr(model.vehicle, FINS[fin])
+    command, angle = run[f"{fin}_command"].values, run[f"{fin}_angle"].values
+    name, limit = fin.replace("_", " "), servo.deflection_limit * DEGREE
+    moved = np.sign(command) * np.maximum(np.abs(command) - servo.dead_band * DEGREE, 0.0)
+    cut = np.abs(moved + servo.offset * DEGREE) - limit
+    said, key = [], f"vehicle.{FINS[fin]}"
+    if cut.max() > 1e-6:
+        worst = int(cut.argmax())
+        said.append(
+            f"The {name} is commanded to {command[worst]:.4g}° and goes to {limit:.4g}° ({key}.deflection_limit): up "
+            f"to {cut[worst]:.3g}° are cut off, first at {first_time(time, cut > 1e-6):g} s. Command less."
+        )
+    elif throughout := _throughout(time, (0.0 < limit < np.inf) & (np.abs(angle) >= 0.999 * limit)):
+        said.append(
+            f"The {name} is at its limit of {limit:.4g}° {throughout}: it has nothing left to steer with."
+        )
+    if time.size > 1 and np.isfinite(servo.rate_limit):
+        rate = np.abs(np.diff(angle)) / np.diff(time)
+        if throughout := _throughout(time[1:], rate >= 0.98 * servo.rate_limit * DEGREE):
+            most = servo.rate_limit * DEGREE
+            said.append(f"The {name} turns as fast as it can, {most:.4g}°/s, {throughout}: it cannot follow.")
+    return said
+
+
+def _propeller(run: xr.Dataset, model: Model) -> list[str]:
+    """Return what is wrong with the propeller: asked for too much, or behind its command."""
+    time, c = run["time"].values, model.vehicle.motor.speed_per_volt
+    command, speed = run["propeller_command"].values, run["propeller_speed"].values
+    most = c * model.vehicle.battery.full_voltage
+    if np.abs(command).max() > most * (1.0 + 1e-9):
+        worst = int(np.abs(command).argmax())
+        return [
+            f"The propeller is commanded to {command[worst]:.4g} rev/s, and the full battery drives it at "
+            f"{most:.4g} rev/s at most (first at {first_time(time, np.abs(command) > most):g} s). Command less."
+        ]
+    behind = np.sign(command) * speed < BEHIND * np.abs(command)
+    spun_up = 10.0 * model.vehicle.motor.lag
+    if throughout := _throughout(time, behind, max(SHORT, spun_up)):
+        lack = np.where(behind, np.abs(command) - np.abs(speed), 0.0)
+        return [
+            f"The propeller is up to {lack.max():.3g} rev/s behind its command {throughout}: the battery does not "
+            "give more. Command less, or give it a stronger battery."
+        ]
+    return []
+
+
+def _throughout(time: np.ndarray, at_limit: np.ndarray, short: float = SHORT) -> str:
+    """Say for how long a limit holds, if it is most of the run or a long stretch, and not a short one [s]."""
+    longest, begin = longest_span(time, at_limit)
+    if longest > max(LONG, short):
+        return f"from {begin:g} s on for {longest:.3g} s"
+    most = longest > short and at_limit.mean() > MOST_OF_THE_RUN
+    return f"for {percent(at_limit.mean())} of the run" if most else ""
+
+
+def _node_depths(run: xr.Dataset, model: Model) -> np.ndarray:
+    """Return the depths of the cable's nodes (samples, nodes). [m]."""
+    pitch, roll = (np.radians(float(run[name].values[0])) for name in ("pitch", "roll"))
+    x, y, z = model.vehicle.tow_point.position()
+    tow = -np.sin(pitch) * x + np.cos(pitch) * (np.sin(roll) * y + np.cos(roll) * z)
+    down = run["cable_position"].values[:, :, 2]
+    return down + (float(run["depth"].values[0]) + tow - down[0, 0])

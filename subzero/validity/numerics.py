@@ -1,0 +1,260 @@
+"""Doubts about the numbers of a run: what the steps, the segments or an ill-posed drum may have spoiled."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from subzero.validity.spans import first_time, longest_span, percent
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    import scenarios
+    from cable.properties import CableProperties, DrumProperties
+    from subzero.model import Model
+
+RESIDUAL = 0.01
+"""A residual above this share of the largest energy so far is too much. [-]"""
+STARTING = 0.3
+"""Energies below this share of the run's largest are those of a start, too small to hold a residual against: a cable
+that begins with a jolt loses some millijoules in it, which is all the energy that there is at first. [-]"""
+NO_ENERGY, NO_FORCE = 1e-9, 1e-6
+"""Below this nothing has happened yet. [J], [N]"""
+
+ROUGH = 0.03
+"""A tow force whose second difference from sample to sample exceeds this share of the largest force is not resolved by
+the steps. Of 160 trials of `benchmarks.trust` all 117 that were wrong by more than 3 % had more, and none of the 13
+that were right within 1 % (0.2 to 2.5 %). [-]"""
+
+OVERRUN, SAGGING, ILL_POSED_TIME = 1.2, 0.2, 2.0
+"""A drum that runs so many times faster than the tow point goes away feeds itself; a cable whose weight is more than
+this share of its drag hangs off the drum at an angle; both count when they last longer than this. Of 171 trials of
+`benchmarks.trust` on drums without friction that were wrong, 112 had it, and none of the 5 that were right.
+[-], [-], [s]"""
+SLOWEST = 0.02
+"""Pay-out rates below this are none. [m/s]"""
+
+LIMP = 1e-6
+"""A cable with less tension than this at both ends of a segment does not pull there. [N]"""
+SLACK_SHARE, SLACK_TIME = 0.05, 1.0
+"""Slack is warned of from this share of the length on, and when it lasts longer than this. [-], [s]"""
+FOLDED = 1e-3
+"""A cable whose segments are shorter than their cable by more than this share is folded somewhere. [-]"""
+
+CLOSED = 0.01
+"""A cable that ends farther from the tow point than this share of its length is not the cable of this vehicle. [-]"""
+PUSHED = 1e-3
+"""A cable that pushes harder than this share of its hardest pull is none. [-]"""
+ENERGIES = ("propeller_work", "hull_loss", "cable_loss", "kinetic_change", "drum", "added_mass_term")
+
+
+def energy_residual(run: xr.Dataset, trial: scenarios.Trial, _: Model) -> list[str]:
+    """The balance of all energies does not close, at any time: a residual that cancels later counts too."""
+    if run.attrs["prescribed"] and not run.attrs["tethered"]:
+        return []  # whatever moves the vehicle does unknown work
+    residual = np.abs(run["energy_residual"].values)
+    terms = np.abs([run[f"energy_{name}"].values for name in ENERGIES]).max(axis=0)
+    if not (np.isfinite(residual).all() and np.isfinite(terms).all()) or terms.max() < NO_ENERGY:
+        return []
+    largest = np.maximum(np.maximum.accumulate(terms), STARTING * terms.max())
+    share = residual / largest
+    if share.max() <= RESIDUAL:
+        return []
+    time, worst = run["time"].values, int(share.argmax())
+    return [
+        f"The energy balance leaves up to {percent(share.max())} of the largest term unexplained "
+        f"({residual[worst]:.3g} J of {largest[worst]:.3g} J at {time[worst]:g} s; above {percent(RESIDUAL)} "
+        f"since {first_time(time, share > RESIDUAL):g} s): the steps do not follow what happens. {_finer(trial)}"
+    ]
+
+
+def resolution(run: xr.Dataset, trial: scenarios.Trial, _: Model) -> list[str]:
+    """Steps and segments twice as long give another tow force, however fine they are: `subzero.convergence`."""
+    accuracy = json.loads(run.attrs.get("accuracy", "{}"))
+    if not accuracy or is_resolved(run):
+        return []
+    error, finer = accuracy["force_error"], 2 ** accuracy["halvings"]
+    how = f"by {percent(error)} of its largest value" if error is not None else "beyond where that can go on"
+    return [
+        f"The tow force depends on steps and segments: from twice as long ones to these ({finer} times as fine as "
+        f"given) it changes {how} (at {accuracy['time']:g} s; run.rtol allows {percent(trial.rtol)}). Either they are "
+        "still too long, or the problem is ill-posed: a heavy cable, or one in a cross current, on a drum that does "
+        "not hold it, or a cable that snaps taut. Give the drum friction_torque or a [winch], or the cable "
+        "bending_stiffness."
+    ]
+
+
+def is_resolved(run: xr.Dataset) -> bool:
+    """Say whether a coarser run has confirmed the tow force of this one within its trial's rtol."""
+    accuracy = json.loads(run.attrs.get("accuracy", "{}"))
+    error = accuracy.get("force_error")
+    return error is not None and error <= accuracy["rtol"]
+
+
+def tow_force(run: xr.Dataset, trial: scenarios.Trial, model: Model) -> list[str]:
+    """The tow force jumps from sample to sample, and no coarser run has confirmed it.
+
+    A kink that a winch was asked for is none: where its setpoint changes its slope, a right force has one too.
+    """
+    if not run.attrs["tethered"] or is_resolved(run):
+        return []
+    jump, time = roughness(run), run["time"].values[2:-1]
+    for kink in model.winch.time[1:] if model.winch is not None and jump.size else ():
+        jump = np.where(np.abs(time - kink) <= trial.cable_step * (1.0 + 1e-6), 0.0, jump)
+    rough = jump > ROUGH
+    if not rough.any():
+        return []
+    return [
+        f"The tow force jumps from sample to sample, by up to {percent(jump.max())} of its largest value "
+        f"(at {time[jump.argmax()]:g} s; by more than {percent(ROUGH)} in {rough.sum()} of {jump.size} samples, "
+        f"first at {first_time(time, rough):g} s): the steps do not resolve it. {_finer(trial)}"
+    ]
+
+
+def roughness(run: xr.Dataset) -> np.ndarray:
+    """Return |F(t−h) − 2F(t) + F(t+h)| of the tow force, as a share of its largest value (samples − 3,). [-].
+
+    Between evenly spaced samples an eighth of it is what a straight line misses. The first sample is left out: the
+    force at the start is a guess.
+    """
+    F = np.array([run[f"cable_force_{axis}"].values for axis in ("forward", "starboard", "down")])
+    largest = np.linalg.norm(F, axis=0).max()
+    if largest < NO_FORCE or F.shape[1] < 4:
+        return np.zeros(0)
+    return np.linalg.norm(F[:, 3:] - 2.0 * F[:, 2:-1] + F[:, 1:-2], axis=0) / largest
+
+
+def ill_posed_drum(run: xr.Dataset, _: scenarios.Trial, model: Model) -> list[str]:
+    """A free drum that does not hold its cable: nothing in the equations says how the cable leaves it."""
+    time, S = run["time"].values, run["cable_length"].values
+    if not run.attrs["tethered"] or model.winch is not None or time.size < 3:
+        return []
+    T, payout, away = run["drum_tension"].values, np.gradient(S, time), _tow_speed(run, time)
+    ill = drum_is_ill_posed(T, payout, away, model.cable, model.drum)
+    longest, begin = longest_span(time, ill)
+    if longest <= ILL_POSED_TIME:
+        return []
+    momentum = model.cable.virtual_mass_per_length * payout**2
+    here = ill & (time >= begin) & (time <= begin + longest)
+    worst = int(np.where(here, payout, -np.inf).argmax())
+    return [
+        f"The free drum does not hold the cable against its weight, from {begin:g} s on for {longest:.3g} s: at "
+        f"{time[worst]:g} s it comes off at U = {payout[worst]:.3g} m/s (the vehicle goes away at {away[worst]:.3g} "
+        f"m/s) with a tension of {T[worst]:.2g} N (m1 U2 is {momentum[worst]:.2g} N). How it leaves the drum is "
+        "ill-posed: shorter segments give another answer, not a better one. Give the drum a friction_torque well above "
+        f"{max(momentum[worst], T[worst]) * model.drum.radius:.1g} N m, or a [winch]."
+    ]
+
+
+def drum_is_ill_posed(
+    tension: np.ndarray,
+    payout: np.ndarray,
+    tow_speed: np.ndarray,
+    cable: CableProperties,
+    drum: DrumProperties,
+) -> np.ndarray:
+    """Say when a free drum does not hold its cable: it unwinds itself, or nothing says in which direction it goes.
+
+        T(S) ≤ C_f/R_d,  U > 1.2 V                     it unwinds: its weight pulls, not the tow point
+        T(S) < m1 U²,    |w_c| > 0.2 ½ρπdC_t U²        it swings: it is faster than its own waves
+
+    In the second case all waves along the cable go away from the drum, so that nothing tells the direction in which it
+    leaves; its weight turns it, unless its drag straightens it within the first m1/(½ρπdC_t) metres. Segments as long
+    as that hide it: then a finer run is worse.
+
+    Args:
+        tension: T(S) at the drum (samples,). [N]
+        payout: U = dS/dt (samples,). [m/s]
+        tow_speed: V, speed of the tow point relative to the drum (samples,). [m/s]
+        cable: the cable, with its weight in the water.
+        drum: the drum, with its friction.
+    """
+    held = drum.friction_torque / drum.radius
+    unwinds = (cable.weight_in_water > 0.0) & (tension <= held * (1.0 + 1e-3) + LIMP)
+    unwinds &= payout > OVERRUN * tow_speed
+    square = payout * payout
+    swings = (tension < cable.virtual_mass_per_length * square) & (
+        abs(cable.weight_in_water) > SAGGING * cable.tangential_drag * square
+    )
+    return (payout > SLOWEST) & (unwinds | swings)
+
+
+def slack(run: xr.Dataset, trial: scenarios.Trial, _: Model) -> list[str]:
+    """Part of the cable is folded: its ends, its drag and its inertia mean something, its shape does not."""
+    if not run.attrs["tethered"]:
+        return []
+    time, share = run["time"].values, slack_share(run)
+    share = np.where(
+        run["cable_length"].values < trial.segment_length, 0.0, share
+    )  # hardly any cable, no shape
+    longest = longest_span(time, share > 0.0)[0]
+    if share.max() <= SLACK_SHARE and longest <= SLACK_TIME:
+        return []
+    worst = int(share.argmax())
+    return [
+        f"Up to {percent(share[worst])} of the cable in the water is slack (at {time[worst]:g} s; first at "
+        f"{first_time(time, share > 0.0):g} s, {longest:.3g} s at a stretch): there its shape means nothing, and the "
+        "tow force jumps when it comes taut. Pay out less, or give the drum friction, or the cable bending_stiffness."
+    ]
+
+
+def slack_share(run: xr.Dataset) -> np.ndarray:
+    """Return which share of the cable is slack, or folded away in segments that are too short (samples,). [-]."""
+    S, chord, T = run["cable_length"].values, _chords(run), run["cable_node_tension"].values
+    S = np.maximum(S, 1e-9)
+    folded = 1.0 - np.nansum(chord, axis=1) / S
+    limp = (T[:, 1:] < LIMP) & (T[:, :-1] < LIMP)
+    share = np.nansum(np.where(limp, chord, 0.0), axis=1) / S + folded
+    return np.where(folded > FOLDED, np.clip(share, 0.0, 1.0), 0.0)
+
+
+def closure(run: xr.Dataset, trial: scenarios.Trial, _: Model) -> list[str]:
+    """The cable does not end at the tow point."""
+    gap, S = run["closure_error"].values, np.maximum.accumulate(run["cable_length"].values)
+    open_ = gap > CLOSED * np.maximum(S, trial.segment_length)
+    if not open_.any():
+        return []
+    time, worst = run["time"].values, int(gap.argmax())
+    return [
+        f"The cable, summed up from the drum, ends {gap[worst]:.3g} m from the tow point at {time[worst]:g} s, with "
+        f"{S[worst]:.3g} m in the water (more than {percent(CLOSED)} since {first_time(time, open_):g} s): its shape "
+        f'is not that of a cable between both. Use scheme = "moving_end", which closes it, or a shorter cable_step_s.'
+    ]
+
+
+def push(run: xr.Dataset, _: scenarios.Trial, __: Model) -> list[str]:
+    """The cable pushes, which no cable can."""
+    T = run["cable_node_tension"].values
+    if not np.isfinite(T).any() or np.nanmin(T) >= -PUSHED * max(np.nanmax(T), NO_FORCE):
+        return []
+    time, least = run["time"].values, np.nanmin(np.where(np.isnan(T), np.inf, T), axis=1)
+    worst = int(least.argmin())
+    return [
+        f"The cable pushes, by up to {-least[worst]:.3g} N (at {time[worst]:g} s; first at "
+        f"{first_time(time, least < 0.0):g} s), which no cable can: the paper's scheme has nothing that keeps it from "
+        'it. Use scheme = "moving_end".'
+    ]
+
+
+def _finer(trial: scenarios.Trial) -> str:
+    """Say what to do about steps that are too long."""
+    return (
+        f"Halve cable_step_s ({trial.cable_step:g} s), hull_step_s ({trial.hull_step:g} s) and segment_length_m "
+        f"({trial.segment_length:g} m), and see what changes (--check)."
+    )
+
+
+def _chords(run: xr.Dataset) -> np.ndarray:
+    """Return the distances between neighbouring nodes, NaN behind the last (samples, nodes − 1). [m]."""
+    side = np.diff(run["cable_position"].values, axis=1)
+    return np.sqrt(np.einsum("tni,tni->tn", side, side))
+
+
+def _tow_speed(run: xr.Dataset, time: np.ndarray) -> np.ndarray:
+    """Return the speed of the tow point relative to the drum (samples,). [m/s]."""
+    P, nodes = run["cable_position"].values, run["node_count"].values
+    drum = P[np.arange(time.size), np.maximum(nodes - 1, 0)]
+    return np.linalg.norm(np.gradient(P[:, 0] - drum, time, axis=0), axis=1)
