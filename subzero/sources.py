@@ -10,6 +10,7 @@ parser. What is left out: modules outside `PACKAGES`, and a name that somebody p
 from __future__ import annotations
 
 import hashlib
+import os
 import re
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -38,6 +39,8 @@ class Tree:
     def __init__(self, root: Path | None = None) -> None:
         self.root = root or Path(__file__).resolve().parent.parent
         self._texts: dict[Path, tuple[bytes, tuple[int, int]]] = {}
+        self._led: dict[Path, frozenset[Path]] = {}
+        self._files: dict[str, Path | None] = {}
 
     def made_of(self, package: str, file: Path | None = None) -> frozenset[Path]:
         """Return the files that the machine code of a package is made of.
@@ -62,7 +65,9 @@ class Tree:
             path = ahead.pop()
             if path not in found:
                 found.add(path)
-                ahead += self._imports(path)
+                if path not in self._led:
+                    self._led[path] = frozenset(self._imports(path))
+                ahead += self._led[path]
         return frozenset(found)
 
     def _imports(self, path: Path) -> Iterator[Path]:
@@ -83,11 +88,13 @@ class Tree:
 
     def _file(self, name: str) -> Path | None:
         """Return the file of a module, if there is such a module."""
-        path = self.root.joinpath(*name.split("."))
-        for file in (path.with_suffix(".py"), path / "__init__.py"):
-            if file.is_file():
-                return file
-        return None
+        if name not in self._files:
+            path = os.path.join(self.root, *name.split("."))
+            found = [
+                file for file in (f"{path}.py", os.path.join(path, "__init__.py")) if os.path.isfile(file)
+            ]
+            self._files[name] = Path(found[0]) if found else None
+        return self._files[name]
 
     def are_as_read(self, files: Iterable[Path]) -> bool:
         """Say whether these files are still what the digest was made of; an edit may come while a program runs."""
