@@ -217,5 +217,5 @@ def _check_scheme(scheme: str) -> None:
     """Refuse a scheme that there is not."""
     if not isinstance(scheme, str) or scheme not in SCHEMES:
         raise BadValueError(
-            f"scheme {short(scheme)} is unknown; choose one of {', '.join(SCHEMES)}.{suggestion(str(scheme), SCHEMES)}"
+            f"scheme {short(scheme)} is unknown; choose one of {', '.join(SCHEMES)}.{suggestion(scheme, SCHEMES)}"
         )
