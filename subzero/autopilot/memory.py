@@ -50,8 +50,10 @@ def _views(live: Live) -> Iterator[tuple[str, np.ndarray]]:
     """Walk through what is kept: name, view of the memory."""
     for name in OF_NOW:
         yield name, live.now.base[name]  # type: ignore[attr-defined]  # a packed record
-    for name in live.line.ends.base.dtype.names:  # type: ignore[attr-defined]
-        yield name, live.line.ends.base[name]  # type: ignore[attr-defined]
+    ends = live.line.ends.base  # type: ignore[attr-defined]
+    for name in ends.dtype.names:
+        if ends[name].dtype.names is None:  # how the last step was solved decides nothing
+            yield name, ends[name]
     for name, values in zip(live.line._fields[1:], live.line[1:], strict=True):
         if name not in NOT_KEPT:
             yield name, values

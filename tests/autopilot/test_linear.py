@@ -183,7 +183,8 @@ def test_on_the_cable_a_small_change_of_the_propeller_acts_like_in_the_coupled_r
     def speed(extra):
         values = np.array([steady.command + np.array([extra, 0.0, 0.0, 0.0])])
         commands = dataclasses.replace(trial.commands, time=np.zeros(1), values=values)
-        one = dataclasses.replace(trial, start=start, commands=commands, duration=3.0, cable_step=0.05)
+        steps = {"cable_step": 0.05, "hull_step": 0.05 / 3.0}
+        one = dataclasses.replace(trial, start=start, commands=commands, duration=3.0, **steps)
         return subzero.simulate(one, model=model)["surge_speed"]
 
     difference = speed(0.5) - speed(0.0)

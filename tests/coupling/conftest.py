@@ -11,6 +11,7 @@ from scipy.integrate import solve_ivp
 import scenarios
 import subzero
 import vehicle
+from scenarios.steps import fitting_step
 
 
 @pytest.fixture(scope="session")
@@ -33,6 +34,8 @@ def trial_of():
         trial = subzero.load_scenario(name)
         if held is not None:
             fields["commands"] = scenarios.Commands(time=np.zeros(1), values=np.array([held], dtype=float))
+        if "cable_step" in fields:
+            fields = {"hull_step": fitting_step(fields["cable_step"], trial.hull_step)} | fields
         return dataclasses.replace(
             trial,
             cable=dict(trial.cable) | (cable or {}),

@@ -225,6 +225,33 @@ def test_a_signal_behind_the_last_line_of_a_command_changes_nothing(name):
     assert "fig6" in done.stdout
 
 
+SWALLOWED = """
+import ctypes, os, signal, sys, time
+from subzero import interrupts
+interrupts.watch()
+
+@ctypes.CFUNCTYPE(None)
+def called_back():
+    os.kill(os.getpid(), signal.SIGINT)
+    for _ in range(100):
+        pass
+
+try:
+    called_back()
+    time.sleep(60.0)
+except KeyboardInterrupt:
+    print("heard")
+"""
+
+
+def test_an_interrupt_that_machine_code_would_swallow_is_heard():
+    """A call back from LLVM lost it, and a traceback was told; the command went on until its patience was over."""
+    done = subprocess.run(
+        [sys.executable, "-c", SWALLOWED], capture_output=True, text=True, check=False, preexec_fn=heed_again
+    )
+    assert (done.stdout, done.stderr) == ("heard\n", "")
+
+
 @pytest.mark.slow
 def test_two_hundred_interrupted_commands_are_gone_within_two_seconds(made, tmp_path):
     came, slowest = interrupt_commands(2, LONG_COMMANDS, SLOW_COMMANDS, made, tmp_path)
