@@ -25,8 +25,6 @@ from vehicle import Vehicle, rotation
 
 STEPS = 20
 """A motion that is not found at once is approached in so many steps."""
-FASTEST = 50.0
-"""Nor above this: a run that is faster is stopped as absurd. [m/s]"""
 SLOWEST = 1e-2
 """The largest speed that can be held is not looked for below this. [m/s]"""
 PASSES = 6
@@ -126,7 +124,7 @@ def fastest(model: Model, above: float, wet_length: float = 0.0) -> float:
         above: a speed that cannot be held. [m/s]
         wet_length: of cable. [m]
     """
-    low, high = 0.0, min(above, FASTEST)
+    low, high = 0.0, above
     while high - low > 1e-3 * high and high > SLOWEST:
         middle = 0.5 * (low + high)
         try:
