@@ -117,5 +117,8 @@ def _end_late(woken: socket.socket, waker: socket.socket) -> None:
     except TimeoutError:
         pass
     time.sleep(max(until - time.monotonic(), 0.0))
+    stage = sys.modules.get("subzero.stage")
+    if stage and hasattr(stage, "sweep_own"):
+        stage.sweep_own()
     os.write(2, f"\n{words()}\n".encode(errors="replace"))
     os._exit(INTERRUPTED)

@@ -264,3 +264,37 @@ def test_an_interrupted_compilation_is_gone_within_two_seconds(made, tmp_path):
     came, slowest = interrupt_commands(3, COLD_COMMANDS, ("simulate",), made, tmp_path, cold=True)
     print(f"\n{dict(came)} while compiling, gone within {slowest:.2f} s")
     assert slowest < WITHIN_S
+
+
+FORCED = """
+import sys, time
+from pathlib import Path
+from subzero import interrupts
+from subzero.stage import staged
+interrupts.watch()
+with staged(Path("out")) as stage:
+    (stage.path / "file").write_text("half")
+    print("begun", flush=True)
+    while True:  # as machine code that does not come back
+        try:
+            time.sleep(60.0)
+        except KeyboardInterrupt:
+            continue
+"""
+
+
+def test_a_command_that_has_to_be_ended_leaves_no_hidden_files(tmp_path):
+    command = subprocess.Popen(
+        [sys.executable, "-c", FORCED],
+        cwd=tmp_path,
+        text=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    )
+    while "begun" not in command.stdout.readline():
+        pass
+    assert len(listing(tmp_path)) > 0
+    command.send_signal(signal.SIGTERM)
+    _, err = command.communicate()
+    assert (command.returncode, err) == (INTERRUPTED, "\nInterrupted; nothing was written.\n")
+    assert list(tmp_path.iterdir()) == []
