@@ -22,6 +22,7 @@ from .runs import (
     check_memory,
     check_motion,
     check_tolerance,
+    checked_time,
     current_of,
     first_direction,
     run,
@@ -204,8 +205,8 @@ def _checked(
 ) -> tuple[float, ...]:
     """Return the numbers as floats; refuse the first that cannot be used, by name."""
     return (
-        checked("", "duration", duration, above=0.0),
-        checked("", "step", step, above=0.0),
+        checked_time("duration", duration),
+        checked_time("step", step),
         checked("", "segment_length", segment_length, above=0.0),
         checked("", "rtol", rtol, least=0.0, most=0.5),
         checked("", "grading", grading, least=0.0, most=0.5),
@@ -217,5 +218,5 @@ def _check_scheme(scheme: str) -> None:
     """Refuse a scheme that there is not."""
     if not isinstance(scheme, str) or scheme not in SCHEMES:
         raise BadValueError(
-            f"scheme {short(scheme)} is unknown; choose one of {', '.join(SCHEMES)}.{suggestion(str(scheme), SCHEMES)}"
+            f"scheme {short(scheme)} is unknown; choose one of {', '.join(SCHEMES)}.{suggestion(scheme, SCHEMES)}"
         )

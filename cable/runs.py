@@ -162,6 +162,15 @@ def check_motion(name: str, velocity: object) -> None:
         )
 
 
+SHORTEST_S = 1e-9
+"""A run or a step that is shorter cannot be halved where it is difficult: what it is halved to is rounded away. [s]"""
+
+
+def checked_time(name: str, value: float) -> float:
+    """Return a duration or a step as a float; refuse one that is too short to be halved."""
+    return checked("", name, value, least=SHORTEST_S, unit="s")
+
+
 def check_tolerance(tolerance: float) -> float:
     """Return a tolerance as a float; refuse one that a step cannot be solved to."""
     return checked("", "tolerance", tolerance, least=FINEST, most=COARSEST)

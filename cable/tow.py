@@ -21,6 +21,7 @@ from .runs import (
     check_memory,
     check_motion,
     check_tolerance,
+    checked_time,
     current_of,
     first_direction,
     run,
@@ -71,8 +72,10 @@ def tow(
 
     Checked by: tests/exact/test_tow.py
     """
-    lengths = {"length": length, "duration": duration, "step": step, "segment_length": segment_length}
-    length, duration, step, segment_length = (checked("", *each, above=0.0) for each in lengths.items())
+    length, segment_length = (
+        checked("", *each, above=0.0) for each in (("length", length), ("segment_length", segment_length))
+    )
+    duration, step = checked_time("duration", duration), checked_time("step", step)
     drogue_drag_area = checked("", "drogue_drag_area", drogue_drag_area, least=0.0)
     rtol = checked("", "rtol", rtol, least=0.0, most=0.5)
     check_motion("tow_velocity", tow_velocity)

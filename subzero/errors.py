@@ -109,8 +109,9 @@ def chosen(table: Mapping[str, Line], name: object, what: str) -> Line:
     """
     if isinstance(name, str) and name in table:
         return table[name]
-    hint = suggestion(name, table) if isinstance(name, str) else ""
-    raise UserError(f"There is no {what} {short(name)}.{hint} Allowed: {', '.join(table)}.")
+    raise UserError(
+        f"There is no {what} {short(name)}.{suggestion(name, table)} Allowed: {', '.join(table)}."
+    )
 
 
 SHOWN_CHARACTERS = 60
@@ -135,9 +136,9 @@ def nearest(word: str, allowed: Iterable[str], count: int = 1) -> list[str]:
     return [by_lower[match] for match in close]
 
 
-def suggestion(word: str, allowed: Iterable[str]) -> str:
-    """Return `` Did you mean 'x'?`` with the nearest allowed word, or nothing if none is near."""
-    close = nearest(word, allowed)
+def suggestion(word: object, allowed: Iterable[str]) -> str:
+    """Return `` Did you mean 'x'?`` with the nearest allowed word, or nothing if none is near, or if it is no word."""
+    close = nearest(word, allowed) if isinstance(word, str) else []
     return f" Did you mean '{close[0]}'?" if close else ""
 
 

@@ -24,7 +24,12 @@ PATIENCE_S = 1.5
 """A command has so long to end by itself. [s]"""
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
+AGAIN_S = 0.02
+"""An interrupt that was lost comes again after this. [s]"""
+
 _patience = [PATIENCE_S]
+_lost = [0]
+"""How many signals were lost and have been sent again, and not been heard by the thread yet."""
 
 
 def watch() -> None:
@@ -35,6 +40,7 @@ def watch() -> None:
     signal.set_wakeup_fd(waker.fileno(), warn_on_full_buffer=False)
     for each in heeded:
         signal.signal(each, _interrupt)
+    sys.unraisablehook = _send_again
     threading.Thread(target=_end_late, args=(woken, waker), daemon=True).start()
 
 
@@ -78,18 +84,41 @@ def _interrupt(number: int, frame: FrameType | None) -> Never:
     raise KeyboardInterrupt
 
 
+def _send_again(lost: sys.UnraisableHookArgs) -> None:
+    """Interrupt once more where Python swallowed it, in a call back from machine code or while an object is deleted."""
+    if not isinstance(lost.exc_value, KeyboardInterrupt):
+        sys.__unraisablehook__(lost)
+        return
+    _lost[0] += 1
+    main = threading.main_thread().ident or 0
+    again = threading.Timer(AGAIN_S, signal.pthread_kill, (main, signal.SIGINT))
+    again.daemon = True
+    again.start()
+
+
+def _hear(woken: socket.socket) -> None:
+    """Wait for a signal that somebody sent."""
+    woken.recv(1)
+    while _lost[0] > 0:
+        _lost[0] -= 1
+        woken.recv(1)
+
+
 def _end_late(woken: socket.socket, waker: socket.socket) -> None:
     """Wait for a signal, then for the process to end; end it when its patience is over, or by a second signal."""
-    woken.recv(1)
+    _hear(woken)
     if _patience[0] > PATIENCE_S:
         os.write(2, b"\nInterrupted; what it has is being written. Interrupt again to end it at once.\n")
     until = time.monotonic() + _patience[0]
     woken.settimeout(_patience[0])
     try:
-        woken.recv(1)
+        _hear(woken)
         until = min(until, time.monotonic() + PATIENCE_S)
     except TimeoutError:
         pass
     time.sleep(max(until - time.monotonic(), 0.0))
+    stage = sys.modules.get("subzero.stage")
+    if stage and hasattr(stage, "sweep_own"):
+        stage.sweep_own()
     os.write(2, f"\n{words()}\n".encode(errors="replace"))
     os._exit(INTERRUPTED)

@@ -99,7 +99,7 @@ class Term:
         for word, known in ((self.axis, AXES), (self.feature, tuple(FEATURES))):
             if not isinstance(word, str) or word not in known:
                 raise BadValueError(
-                    f"A missing force has the term {short(word)}.{suggestion(str(word), known)}"
+                    f"A missing force has the term {short(word)}.{suggestion(word, known)}"
                     f" Known: {', '.join(known)}."
                 )
         coefficient = real(self.coefficient)

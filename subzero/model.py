@@ -122,7 +122,7 @@ def _made(kind: type[Part], numbers: Mapping[str, Any]) -> Part:
     known = [field.name for field in dataclasses.fields(kind)]
     for name in numbers:
         if name not in known:
-            hint = suggestion(str(name), known) or f" It has {', '.join(known)}."
+            hint = suggestion(name, known) or f" It has {', '.join(known)}."
             raise BadValueError(f"{kind.__name__} has no {short(name)}.{hint}")
     return kind(**numbers)
 

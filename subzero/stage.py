@@ -52,6 +52,9 @@ FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EIO)
 _delivered: list[Path] = []
 """Folders that this process has delivered to since the last `staged` began, for `interruption`."""
 
+_hidden: dict[Path, Path] = {}
+"""Hidden folders that this process works with, and the output folders that they are for."""
+
 
 @dataclass
 class Stage:
@@ -189,11 +192,26 @@ def _hidden_folder(home: Path, folder: Path) -> Iterator[Path]:
                 _sweep(home)
             root = home / f"{HIDDEN}{os.getpid()}-{os.urandom(4).hex()}"
             root.mkdir(mode=0o700)
+            _hidden[root] = folder
+            held.callback(_hidden.pop, root, None)
             held.callback(_remove, root, folder)
             for inner in (NEW, OLD):
                 (root / inner).mkdir()
             held.enter_context(_locked(root / LOCK))
         yield root
+
+
+def sweep_own() -> None:
+    """Remove what this process has hidden, before it ends at once; what a folder needs to be finished stays.
+
+    Renamed first: a delivery that goes on meanwhile finds all of its files, or none.
+    """
+    for root, folder in list(_hidden.items()):
+        if not any(marker and marker.root == root for marker in map(_marker, (folder, folder / STOPPED))):
+            gone = root.with_name(f"{root.name}-gone")
+            with suppress(OSError):
+                os.rename(root, gone)
+            shutil.rmtree(gone, ignore_errors=True)
 
 
 def _remove(root: Path, folder: Path) -> None:

@@ -101,9 +101,9 @@ def check_value(key: str, value: object, field: dataclasses.Field[Any]) -> Probl
     return Problem(key=key, found=short(value), why=why, allowed=allowed_values(field))
 
 
-def nearest(name: str, valid: list[str]) -> str:
+def nearest(name: object, valid: list[str]) -> str:
     """Suggest the nearest valid name, or list them all."""
-    close = get_close_matches(name, valid, n=1, cutoff=0.5)
+    close = get_close_matches(name, valid, n=1, cutoff=0.5) if isinstance(name, str) else []
     return f"did you mean '{close[0]}'" if close else "one of " + ", ".join(valid)
 
 
@@ -117,7 +117,7 @@ def read_section(kind: type, section: str, values: object, problems: list[Proble
     before = len(problems)
     for name in values:
         if name not in fields:
-            allowed = nearest(str(name), list(fields))
+            allowed = nearest(name, list(fields))
             problems.append(
                 Problem(key=f"{section}.{name}", found="this key", why="no such parameter", allowed=allowed)
             )

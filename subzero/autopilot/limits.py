@@ -12,6 +12,8 @@ from subzero.errors import UserError, real, short
 from vehicle import Vehicle
 
 CABLES = ("formula", "model")
+FASTEST = 50.0
+"""A run that is faster is stopped as absurd, `subzero.coupling.FASTEST`. [m/s]"""
 STEEPEST = radians(80.0)
 """Pitch beyond which Euler angles are no use any more. [rad]"""
 
@@ -38,6 +40,10 @@ def check_request(
     speed, depth_rate, turn_rate, wet_length, roll = (number or 0.0 for number in numbers.values())
     if speed <= 0.0:
         raise UserError(f"trim: speed is {speed:g} m/s; fins need a flow, so it must be above 0.")
+    if speed > FASTEST:
+        raise UserError(
+            f"trim: speed is {speed:g} m/s; it must be at most {FASTEST:g}, as runs are stopped beyond."
+        )
     if wet_length < 0.0:
         raise UserError(f"trim: wet_length is {wet_length:g} m; it must be 0 or more.")
     if not isinstance(cable, str) or cable not in CABLES:

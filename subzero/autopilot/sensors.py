@@ -57,7 +57,7 @@ class Sensor:
         allowed = Observation._fields[1:]
         if not isinstance(self.channel, str) or self.channel not in allowed:
             raise UserError(
-                f"Sensor: there is no channel {short(self.channel)}.{suggestion(str(self.channel), allowed)}"
+                f"Sensor: there is no channel {short(self.channel)}.{suggestion(self.channel, allowed)}"
                 f" Allowed: {', '.join(allowed)}."
             )
         for field in fields(self)[1:]:

@@ -228,7 +228,8 @@ class Broken:
 
 @pytest.mark.parametrize("answer", [(25.0, float("nan"), 0.0, 0.0), (25.0,), None])
 def test_an_autopilot_that_returns_nonsense_ends_the_run_which_keeps_what_it_has(fig6, answer):
-    run = autopilot.fly(fig6, Broken(answer), straight(fig6))
+    with pytest.warns(autopilot.AutopilotWarning, match="four finite numbers"):
+        run = autopilot.fly(fig6, Broken(answer), straight(fig6))
     assert run.attrs["outcome"] == "stopped"
     assert "Autopilot 'broken': At t = 1 s" in run.attrs["outcome_message"]
     assert "four finite numbers" in run.attrs["outcome_message"]

@@ -11,6 +11,7 @@ from scipy.integrate import solve_ivp
 import scenarios
 import subzero
 import vehicle
+from scenarios.steps import fitting_step
 
 
 @pytest.fixture(scope="session")
@@ -34,8 +35,7 @@ def trial_of():
         if held is not None:
             fields["commands"] = scenarios.Commands(time=np.zeros(1), values=np.array([held], dtype=float))
         if "cable_step" in fields:
-            step = fields["cable_step"]
-            fields.setdefault("hull_step", step / np.ceil(step / trial.hull_step - 1e-9))
+            fields = {"hull_step": fitting_step(fields["cable_step"], trial.hull_step)} | fields
         return dataclasses.replace(
             trial,
             cable=dict(trial.cable) | (cable or {}),

@@ -205,19 +205,51 @@ def test_an_interrupted_command_says_so_and_leaves_all_or_nothing(tmp_path):
     assert came.total() == SHORT_COMMANDS
 
 
-def test_a_signal_behind_the_last_line_of_a_command_changes_nothing(tmp_path):
-    """Python, once it ends, would leave signals to the system: a command that was done was killed, exit code -2."""
-    command = started(["simulate", "fig6", "--out", "out"], tmp_path)
-    line = ""
-    while "tethered.nc" not in line:
-        line = command.stdout.readline()
-    while command.poll() is None:
-        command.send_signal(signal.SIGINT)
-        time.sleep(0.001)
-    _, err = command.communicate()
-    assert command.returncode in (0, INTERRUPTED), (command.returncode, err)
-    assert "Traceback" not in err
-    assert listing(tmp_path) == short("simulate")[1]
+BEHIND = """
+import atexit, os, signal, sys
+atexit.register(os.kill, os.getpid(), signal.{})
+sys.argv = ["subzero", "list"]
+from subzero.__main__ import run
+run()
+"""
+
+
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
+def test_a_signal_behind_the_last_line_of_a_command_changes_nothing(name):
+    """Python, while it ends, told a traceback or died of a signal though the command was done."""
+    done = subprocess.run(
+        [sys.executable, "-c", BEHIND.format(name)], capture_output=True, text=True, check=False,
+        preexec_fn=heed_again,
+    )  # fmt: skip
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "fig6" in done.stdout
+
+
+SWALLOWED = """
+import ctypes, os, signal, sys, time
+from subzero import interrupts
+interrupts.watch()
+
+@ctypes.CFUNCTYPE(None)
+def called_back():
+    os.kill(os.getpid(), signal.SIGINT)
+    for _ in range(100):
+        pass
+
+try:
+    called_back()
+    time.sleep(60.0)
+except KeyboardInterrupt:
+    print("heard")
+"""
+
+
+def test_an_interrupt_that_machine_code_would_swallow_is_heard():
+    """A call back from LLVM lost it, and a traceback was told; the command went on until its patience was over."""
+    done = subprocess.run(
+        [sys.executable, "-c", SWALLOWED], capture_output=True, text=True, check=False, preexec_fn=heed_again
+    )
+    assert (done.stdout, done.stderr) == ("heard\n", "")
 
 
 @pytest.mark.slow
@@ -232,3 +264,37 @@ def test_an_interrupted_compilation_is_gone_within_two_seconds(made, tmp_path):
     came, slowest = interrupt_commands(3, COLD_COMMANDS, ("simulate",), made, tmp_path, cold=True)
     print(f"\n{dict(came)} while compiling, gone within {slowest:.2f} s")
     assert slowest < WITHIN_S
+
+
+FORCED = """
+import sys, time
+from pathlib import Path
+from subzero import interrupts
+from subzero.stage import staged
+interrupts.watch()
+with staged(Path("out")) as stage:
+    (stage.path / "file").write_text("half")
+    print("begun", flush=True)
+    while True:  # as machine code that does not come back
+        try:
+            time.sleep(60.0)
+        except KeyboardInterrupt:
+            continue
+"""
+
+
+def test_a_command_that_has_to_be_ended_leaves_no_hidden_files(tmp_path):
+    command = subprocess.Popen(
+        [sys.executable, "-c", FORCED],
+        cwd=tmp_path,
+        text=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    )
+    while "begun" not in command.stdout.readline():
+        pass
+    assert len(listing(tmp_path)) > 0
+    command.send_signal(signal.SIGTERM)
+    _, err = command.communicate()
+    assert (command.returncode, err) == (INTERRUPTED, "\nInterrupted; nothing was written.\n")
+    assert list(tmp_path.iterdir()) == []
