@@ -93,15 +93,16 @@ def main() -> None:
     unknown = [name for name in chosen if name not in SECTIONS]
     if unknown:
         sys.exit(f"There is no section '{unknown[0]}'. Allowed: {', '.join(SECTIONS)}.")
-    kept = parts_of(PAGE.read_text(encoding="utf-8"))
+    measured = {}
     for name in chosen:
         begin = time.perf_counter()
         text = SECTIONS[name]().strip() + "\n"
-        kept[name] = text
+        measured[name] = text
         print(f"{text.splitlines()[0]}: {time.perf_counter() - begin:.0f} s", file=sys.stderr)
     if "--quick" in sys.argv:
-        print("\n".join(kept[name] for name in chosen))
+        print("\n".join(measured.values()))
     else:
+        kept = parts_of(PAGE.read_text(encoding="utf-8")) | measured
         PAGE.write_text(
             "\n".join([HEAD, *(kept[name] for name in SECTIONS if name in kept)]), encoding="utf-8"
         )

@@ -17,9 +17,11 @@ in which a cable that points from the drum in another direction, b, is at rest. 
 functions gives M η'' + C η' + K η = −F e_0: the bends q_k, and the force F across the cable on the vehicle. Only then
 S and U are frozen. Both sideways directions obey the same equations.
 
-Where the tension has fallen so low that waves are slower than the drum runs away from them, a few decimetres before it,
-they pile up and get shorter without end; a little viscosity, m₁ U `LOST_OVER`, takes them there, as segments do in the
-simulation. Between a half and four times as much changes the answer at the tow point by less than 0.3 % up to 4 rad/s.
+Where the tension has fallen so low that waves are slower than the drum runs away from them, a quarter of a metre before
+it, they pile up and get shorter without end. In the simulation segments and time steps take them; here a little
+viscosity does, m₁ U `LOST_OVER`, and a tension of m₁ U² within `NEAR_DRUM` of the drum, below which the viscosity would
+feed them. Neither is felt at the tow point: with half or twice of both, and with 6, 8 or 12 bends, heading and pitch
+answer a sine of up to 4 rad/s with a gain within 9.5 % and a phase within 8.8° of the simulation's.
 """
 
 from __future__ import annotations
@@ -33,9 +35,11 @@ from numpy.polynomial import Legendre, Polynomial
 from subzero.model import Model
 
 BENDS = 6
-"""Shapes beside the straight line; with 4 or 12 the answer up to 4 rad/s is the same to 1 %."""
-LOST_OVER = 0.5
+"""Shapes beside the straight line."""
+LOST_OVER = 1.0
 """Waves shorter than about this are lost in their own length. [m]"""
+NEAR_DRUM = 0.5
+"""The cable is kept taut over about this length before the drum, a segment of the simulation. [m]"""
 HARMONIC = 8.0 / (3.0 * pi)
 """What |v| v of a sine is worth as W v, W its amplitude. [-]"""
 
@@ -86,7 +90,7 @@ def _matrices(
     cable, friction = model.cable, model.drum.friction_torque / model.drum.radius
     m1, drag, c = cable.virtual_mass_per_length, cable.tangential_drag, HARMONIC * cable.normal_drag * W
     added = cable.water_density * cable.cross_section_area
-    node, weight = np.polynomial.legendre.leggauss(bends + 4)
+    node, weight = np.polynomial.legendre.leggauss(bends + 30)  # the last decimetres are steep
     sigma, weight = 0.5 * (node + 1.0), 0.5 * weight
     f, g, h = (np.array([shape.deriv(n)(sigma) for shape in _shapes(bends)]) for n in (0, 1, 2))
 
@@ -99,6 +103,7 @@ def _matrices(
     C[:, 1:] += m1 * U * LOST_OVER * integral(g, g)[:, 1:]
     K = integral(g, g, drag * U * U * S * (1.0 - sigma) + friction) - drag * U * U * S * integral(f, g)
     K += U * U * (m1 * integral(f, h, sigma * sigma) - added * integral(f, h, sigma))
+    K[:, 1:] += integral(g, g, m1 * U * U * np.exp((sigma - 1.0) * S / NEAR_DRUM))[:, 1:]
     K += S * U * c * (integral(f, f) + integral(f, g, 1.0 - sigma))
     return M, C, K
 
