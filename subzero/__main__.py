@@ -9,8 +9,8 @@ from subzero import interrupts
 
 def run() -> None:
     """Run the command line with the words of this process, and end it with its exit code."""
-    interrupts.watch()
     try:
+        interrupts.watch()
         from subzero.cli import main
 
         code = main()

@@ -38,10 +38,10 @@ def watch() -> None:
     woken, waker = socket.socketpair()
     waker.setblocking(False)
     signal.set_wakeup_fd(waker.fileno(), warn_on_full_buffer=False)
-    for each in heeded:
-        signal.signal(each, _interrupt)
     sys.unraisablehook = _send_again
     threading.Thread(target=_end_late, args=(woken, waker), daemon=True).start()
+    for each in heeded:  # last: an interrupt finds all that it needs
+        signal.signal(each, _interrupt)
 
 
 def ignore() -> None:

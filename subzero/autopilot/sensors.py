@@ -162,4 +162,5 @@ class _Running:
         s = self.sensor
         self._walk += s.drift * math.sqrt(passed) * self._rng.standard_normal()
         value = truth + s.bias + self._walk + s.noise * self._rng.standard_normal()
-        return s.quantum * round(value / s.quantum) if s.quantum > 0.0 else value
+        steps = value / s.quantum if s.quantum > 0.0 else math.inf
+        return s.quantum * round(steps) if math.isfinite(steps) else value

@@ -107,3 +107,8 @@ def test_what_no_sensor_measures_is_not_a_number():
 def test_impossible_sensors_are_refused(make, words):
     with pytest.raises(subzero.UserError, match=words):
         make()
+
+
+def test_a_sample_of_more_steps_than_can_be_counted_stays_as_it_is():
+    sensors = Sensors([Sensor(channel="depth", quantum=1e-2, bias=1e308)])
+    assert sensors.read(UNKNOWN._replace(time=0.0, depth=1.0)).depth == 1e308

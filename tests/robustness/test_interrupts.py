@@ -274,9 +274,9 @@ from subzero.stage import staged
 interrupts.watch()
 with staged(Path("out")) as stage:
     (stage.path / "file").write_text("half")
-    print("begun", flush=True)
     while True:  # as machine code that does not come back
         try:
+            print("begun", flush=True)
             time.sleep(60.0)
         except KeyboardInterrupt:
             continue
@@ -295,6 +295,6 @@ def test_a_command_that_has_to_be_ended_leaves_no_hidden_files(tmp_path):
         pass
     assert len(listing(tmp_path)) > 0
     command.send_signal(signal.SIGTERM)
-    _, err = command.communicate()
+    _, err = command.communicate(timeout=60.0)
     assert (command.returncode, err) == (INTERRUPTED, "\nInterrupted; nothing was written.\n")
     assert list(tmp_path.iterdir()) == []
