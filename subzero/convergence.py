@@ -1,11 +1,12 @@
 """Is a run fine enough? Each tethered run is set beside a coarser one, and taken again finer where the two disagree.
 
-    e = max |F_h − F_2h| / max |F_h|,    F the cable's force on the hull (12), steps and segments h and 2h
+    e_h = max |F_h − F_2h| / max |F_h|,    F the cable's force on the hull (12), steps and segments h and 2h
 
-An error of second order in h is a third of e, one of first order is e: so e bounds the error of the force wherever
-halving pays at all. The coarse run costs a quarter of the run itself. Where e is above `rtol`, the run is repeated with
-steps and segments halved, `MOST_HALVINGS` times at most; what was the run is then the coarse one. Where e stays above
-it, the answer depends on the resolution, and the run says so: a jolt, or an ill-posed drum (`docs/theory.md`).
+If each halving divides the change by r, what is left is e_h/(r − 1) (Richardson): a third of e_h at second order, e_h
+at first. Of one pair r is not known, and `FIRST_GAIN` is supposed. The coarse run costs a quarter of the run itself.
+Where the error is above `rtol`, the run is repeated with steps and segments halved, `MOST_HALVINGS` times at most; what
+was the run is then the coarse one, and r = e_2h/e_h. Where it stays above `rtol`, the answer depends on the resolution,
+and the run says so: a jolt, or an ill-posed drum (`docs/theory.md`).
 
 That looks at the whole error, of segments, steps, slack and coupling alike, which an estimate inside a step does not: a
 cable that is bent sharply beside the drum errs in its segments only, and its steps look perfect.
@@ -31,6 +32,11 @@ MOST_HALVINGS = 2
 """Steps and segments a quarter as long cost sixteen times as much; what they do not settle, is not settled by more."""
 MOST_WORK = 1e7
 """Nodes times exchanges that a repeated run may take: half a minute or so. [-]"""
+FIRST_GAIN = 1.5
+"""Gain of a halving that nobody has seen yet, below that of first order, 2: starts and jolts have less. [-]"""
+LEAST_GAIN, MOST_GAIN = 1.25, 4.0
+"""A halving that gains less than the first has hardly begun to converge; more than the scheme's second order gives is
+not believed. [-]"""
 SMALLEST_FORCE = 1e-6
 """Forces are compared with at least this: what is smaller means nothing. [N]"""
 
@@ -44,14 +50,15 @@ class Accuracy:
     """How far the cable's force can be trusted.
 
     Attributes:
-        force_error: largest change of the force from the resolution before to this one, as a share of the largest
-            force; infinite where the coarser run could not go on. [-]
-        time: when. [s]
+        force_error: of the force, as a share of its largest; infinite where the coarser run could not go on. [-]
+        change: largest change of the force from the resolution before to this one, as the same share. [-]
+        time: when it changes most. [s]
         halvings: how often steps and segments were halved.
         rtol: what was asked for. [-]
     """
 
     force_error: float
+    change: float
     time: float
     halvings: int
     rtol: float
@@ -90,7 +97,7 @@ def run_converged(
         fine = take(finer, times, 2**halvings, progress)
         if run.completed and not fine.completed:
             break
-        run, accuracy = fine, _compare(run, fine, trial.rtol, halvings)
+        run, accuracy = fine, _compare(run, fine, trial.rtol, halvings, accuracy.change)
     return run, accuracy
 
 
@@ -112,8 +119,11 @@ def _every_other(times: np.ndarray) -> np.ndarray:
     return times[::2] if times.size % 2 else np.append(times[::2], times[-1])
 
 
-def _compare(coarse: Run, fine: Run, rtol: float, halvings: int) -> Accuracy:
-    """Return the accuracy of a run beside one with steps and segments twice as long."""
+def _compare(coarse: Run, fine: Run, rtol: float, halvings: int, before: float | None = None) -> Accuracy:
+    """Return the accuracy of a run beside one with steps and segments twice as long.
+
+    `before` is what the halving before this one changed, if there was one. [-]
+    """
     rows = np.searchsorted(fine.times, coarse.times - 1e-9)
     here = rows < fine.times.size
     force = fine.recording.wrench[:, :3]
@@ -122,8 +132,11 @@ def _compare(coarse: Run, fine: Run, rtol: float, halvings: int) -> Accuracy:
     size = max(float(np.linalg.norm(force, axis=1).max()), SMALLEST_FORCE)
     worst = int(np.argmax(gap))
     stopped_early = fine.completed and not coarse.completed
+    change = inf if stopped_early else float(gap[worst]) / size
+    gain = FIRST_GAIN if before is None or not isfinite(before) else before / max(change, 1e-12)
     return Accuracy(
-        force_error=inf if stopped_early else float(gap[worst]) / size,
+        force_error=change / (min(max(gain, LEAST_GAIN), MOST_GAIN) - 1.0),
+        change=change,
         time=float(coarse.times[-1 if stopped_early else worst]),
         halvings=halvings,
         rtol=rtol,
@@ -144,5 +157,5 @@ def as_numbers(accuracy: Accuracy | None) -> dict[str, float | int | None]:
     """Return an accuracy ready for JSON: an infinite error as None."""
     if accuracy is None:
         return {}
-    error = accuracy.force_error
-    return dataclasses.asdict(accuracy) | {"force_error": error if isfinite(error) else None}
+    numbers = dataclasses.asdict(accuracy)
+    return {name: value if isfinite(value) else None for name, value in numbers.items()}

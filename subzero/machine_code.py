@@ -242,9 +242,10 @@ _tree = Tree()
 @cache
 def home_of(package: str, file: Path | None = None) -> Home:
     """Return the folder of the machine code of a package of ours, or of a file outside."""
-    files = _tree.made_of(package, file)
-    digest = _tree.digest(files, compiler())
-    return Home(base_folder(), f"{package}-{digest}", lambda: _tree.are_as_read(files))
+    tree = _tree
+    files = tree.made_of(package, file)
+    digest = tree.digest(files, compiler())
+    return Home(base_folder(), f"{package}-{digest}", lambda: tree.are_as_read(files))
 
 
 def _home_for(function: Any) -> Home:

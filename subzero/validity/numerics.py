@@ -77,7 +77,11 @@ def resolution(run: xr.Dataset, trial: scenarios.Trial, _: Model) -> list[str]:
     if not accuracy or is_resolved(run):
         return []
     error, finer = accuracy["force_error"], 2 ** accuracy["halvings"]
-    how = f"by {percent(error)} of its largest value" if error is not None else "beyond where that can go on"
+    how = (
+        f"by {percent(accuracy['change'])} of its largest value"
+        if error is not None
+        else "from stopping to going on"
+    )
     return [
         f"The tow force depends on steps and segments: from twice as long ones to these ({finer} times as fine as "
         f"given) it changes {how} (at {accuracy['time']:g} s; run.rtol allows {percent(trial.rtol)}). Either they are "

@@ -162,7 +162,7 @@ def test_a_force_that_no_two_resolutions_agree_on_is_warned_of_with_its_size():
     accuracy = json.loads(run.attrs["accuracy"])
     (said,) = checked(run, trial_of(rtol=0.02), check="resolution")
     assert accuracy["force_error"] > 0.02
-    assert f"changes by {100.0 * accuracy['force_error']:.3g} % of its largest value" in said
+    assert f"changes by {100.0 * accuracy['change']:.3g} % of its largest value" in said
     assert f"at {accuracy['time']:g} s; run.rtol allows 2 %" in said
 
 
