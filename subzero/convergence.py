@@ -24,6 +24,7 @@ import numpy as np
 
 import scenarios
 from scenarios import ScenarioError
+from subzero.errors import UserError
 
 if TYPE_CHECKING:
     from subzero.recording import Run
@@ -87,18 +88,30 @@ def run_converged(
     coarser = _resolved(trial, 2.0)
     if coarser is None or coarse_times.size < 3:
         return take(trial, times, 1, progress), None
-    coarse = take(coarser, coarse_times, 1, _share(progress, 0.0, 0.2))
+    coarse = _taken(take, coarser, coarse_times, 1, _share(progress, 0.0, 0.2))
     run = take(trial, times, 1, _share(progress, 0.2, 0.8))
+    if coarse is None:
+        return run, None
     accuracy = _compare(coarse, run, trial.rtol, 0)
     for halvings in range(1, MOST_HALVINGS + 1):
         finer = _resolved(trial, 0.5**halvings)
         if accuracy.converged or finer is None or _work(run) * 4**halvings > MOST_WORK:
             break
-        fine = take(finer, times, 2**halvings, progress)
-        if run.completed and not fine.completed:
+        fine = _taken(take, finer, times, 2**halvings, progress)
+        if fine is None or (run.completed and not fine.completed):
             break
         run, accuracy = fine, _compare(run, fine, trial.rtol, halvings, accuracy.change)
     return run, accuracy
+
+
+def _taken(
+    take: Take, trial: scenarios.Trial, times: np.ndarray, parts: int, progress: Progress | None
+) -> Run | None:
+    """Return a run beside the one that was asked for; None where it is refused, for memory or a start that fails."""
+    try:
+        return take(trial, times, parts, progress)
+    except UserError:
+        return None
 
 
 def _resolved(trial: scenarios.Trial, factor: float) -> scenarios.Trial | None:

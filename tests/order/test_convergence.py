@@ -14,6 +14,8 @@ import numpy as np
 import pytest
 
 import subzero
+from subzero.convergence import run_converged
+from subzero.simulation import run_trial
 
 BODY = ("cable_force_forward", "cable_force_starboard", "cable_force_down")
 
@@ -88,6 +90,24 @@ def test_a_last_step_that_is_no_whole_one_is_covered_too():
     run = subzero.simulate(changed("fig6", duration=3.05))
     assert float(run["time"][-1]) == 3.05
     assert 0.0 < accuracy(run)["force_error"] < 0.02
+
+
+@pytest.mark.parametrize("refused, tried", [(0.25, [1.0, 0.5, 0.25]), (1.0, [1.0, 0.5])])
+def test_what_is_refused_at_another_resolution_leaves_the_run_as_it_was_asked_for(refused, tried):
+    """A finer run that does not fit into memory, a coarser one whose cable cannot be laid."""
+    trial, taken = changed("stop_and_drift", duration=21.0), []
+
+    def take(one, times, parts, _):
+        taken.append(one.segment_length)
+        if one.segment_length == refused:
+            raise subzero.UserError("it does not fit")
+        return run_trial(one, subzero.Model.of(one), True, times=times, parts=parts)
+
+    run, found = run_converged(trial, take)
+    assert taken == tried
+    assert run.completed
+    assert (found is None) == (refused == 1.0)
+    assert found is None or not found.converged
 
 
 def test_a_heavy_cable_on_a_free_drum_never_settles_and_says_so():
