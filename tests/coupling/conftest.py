@@ -28,7 +28,7 @@ def simulate():
 
 @pytest.fixture(scope="session")
 def trial_of():
-    """Return a shipped trial with fields, cable, drum or start changed, or held commands; steps are taken as they are."""
+    """Return a shipped trial with fields, cable, drum or start changed, or held commands; steps as they are."""
 
     def call(name="fig6", *, cable=None, drum=None, start=None, held=None, **fields):
         trial = subzero.load_scenario(name)
