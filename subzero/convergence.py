@@ -3,7 +3,7 @@
     e_h = max |F_h − F_2h| / max |F_h|,    F the cable's force on the hull (12), steps and segments h and 2h
 
 If each halving divides the change by r, what is left is e_h/(r − 1) (Richardson): a third of e_h at second order, e_h
-at first. Of one pair r is not known, and `FIRST_GAIN` is supposed. The coarse run costs a quarter of the run itself.
+at first. Of one pair r is not known, and `FIRST_GAIN` is supposed. The coarse run has a quarter of the nodes and steps.
 Where the error is above `rtol`, the run is repeated with steps and segments halved, `MOST_HALVINGS` times at most; what
 was the run is then the coarse one, and r = e_2h/e_h. Where it stays above `rtol`, the answer depends on the resolution,
 and the run says so: a jolt, or an ill-posed drum (`docs/theory.md`).
