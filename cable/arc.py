@@ -33,10 +33,9 @@ from math import sqrt
 
 import numpy as np
 
+from cable.element import Load, chord_length
+from cable.line import NEW, NOW, Line
 from subzero.compiled import inlined, inner
-
-from .element import Load, chord_length
-from .line import NEW, NOW, Line
 
 MOST_BENT = 1.0
 """Segments that turn by more than this do not know their curvature; the corrections stop growing there. [rad]"""

@@ -17,17 +17,16 @@ from __future__ import annotations
 
 import numpy as np
 
+from cable.bending import add_bending
+from cable.differences import Weights
+from cable.drum import FREE, STANDING
+from cable.element import Load, differentiate_load, evaluate_load, fading_rate, turning_rate
+from cable.far_end import add_drogue, add_influx, differentiate_influx, drum_row
+from cable.first_segment import write_single_segment
+from cable.line import BEFORE, DIAGONAL, LOWER, NEW, NOW, RESIDUAL, UPPER, Line, held_node, take_segment
+from cable.properties import CableNumbers, DrumNumbers
+from cable.slack import slack_law
 from subzero.compiled import compiled, inlined, inner
-
-from .bending import add_bending
-from .differences import Weights
-from .drum import FREE, STANDING
-from .element import Load, differentiate_load, evaluate_load, fading_rate, turning_rate
-from .far_end import add_drogue, add_influx, differentiate_influx, drum_row
-from .first_segment import write_single_segment
-from .line import BEFORE, DIAGONAL, LOWER, NEW, NOW, RESIDUAL, UPPER, Line, held_node, take_segment
-from .properties import CableNumbers, DrumNumbers
-from .slack import slack_law
 
 
 @inner

@@ -18,9 +18,8 @@ from __future__ import annotations
 
 from math import sqrt
 
+from cable.properties import DrumNumbers
 from subzero.compiled import inner
-
-from .properties import DrumNumbers
 
 TURNING, STANDING, SPINNING = 0, 1, 2
 

@@ -8,9 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from cable.properties import DrumNumbers
 from subzero.compiled import inner
-
-from .properties import DrumNumbers
 
 PLACE, VELOCITY, SETPOINT = 1, 4, 7
 """First columns of what the table holds beside the time."""

@@ -21,10 +21,9 @@ from typing import Any
 
 import numpy as np
 
+from cable.properties import CableNumbers
 from subzero.compiled import inlined, inner
 from subzero.packed import packed
-
-from .properties import CableNumbers
 
 FOLDING = 0.3
 """How early a heaped segment loses its direction, see `chord_length`; without any effect on a taut one."""

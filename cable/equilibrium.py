@@ -23,18 +23,17 @@ from math import sqrt
 
 import numpy as np
 
+from cable.arc import correct_for_arc
+from cable.differences import Weights
+from cable.element import Load, evaluate_load
+from cable.line import BEFORE, NEW, NOW, TOLERANCE, Line, feel_water, segment_momentum, take_segment
+from cable.newton import solve_step
+from cable.properties import CableNumbers, DrumNumbers
+from cable.slack import SMOOTHING
+from cable.stepping import SOFTEST
+from cable.tow_point import fill_node_tensions
+from cable.water import Water
 from subzero.compiled import allocating, compiled, inner
-
-from .arc import correct_for_arc
-from .differences import Weights
-from .element import Load, evaluate_load
-from .line import BEFORE, NEW, NOW, TOLERANCE, Line, feel_water, segment_momentum, take_segment
-from .newton import solve_step
-from .properties import CableNumbers, DrumNumbers
-from .slack import SMOOTHING
-from .stepping import SOFTEST
-from .tow_point import fill_node_tensions
-from .water import Water
 
 DRAG_ROUNDS = 12
 """How often the convex problem takes the drag of its new shape."""

@@ -9,13 +9,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from cable.differences import Weights
+from cable.drum import LENGTH, SPINNING, STANDING, TENSION, friction
+from cable.element import Load, fading_rate, turning_rate
+from cable.line import BEFORE, DIAGONAL, LOWER, NEW, NOW, RESIDUAL, Line
+from cable.properties import CableNumbers, DrumNumbers
 from subzero.compiled import compiled, inner
-
-from .differences import Weights
-from .drum import LENGTH, SPINNING, STANDING, TENSION, friction
-from .element import Load, fading_rate, turning_rate
-from .line import BEFORE, DIAGONAL, LOWER, NEW, NOW, RESIDUAL, Line
-from .properties import CableNumbers, DrumNumbers
 
 
 @inner

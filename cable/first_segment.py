@@ -15,9 +15,8 @@ from math import sqrt
 
 import numpy as np
 
+from cable.line import DIAGONAL, LOWER, NEW, NOW, RESIDUAL, Line
 from subzero.compiled import compiled, inner
-
-from .line import DIAGONAL, LOWER, NEW, NOW, RESIDUAL, Line
 
 CORNER = 1e-9
 """Size of the rounding of both maxima. [m], [N]"""

@@ -7,12 +7,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from cable.element import Load
+from cable.line import BEFORE, NOW, Line, segment_momentum
+from cable.properties import CableNumbers
+from cable.slack import KNOWN
 from subzero.compiled import compiled, inner
-
-from .element import Load
-from .line import BEFORE, NOW, Line, segment_momentum
-from .properties import CableNumbers
-from .slack import KNOWN
 
 
 @inner

@@ -18,13 +18,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from cable.blocks import factor, solve
+from cable.drum import LENGTH, STANDING, TENSION
+from cable.element import Load, chord_length
+from cable.line import BEFORE, DIAGONAL, LOWER, NOW, RESIDUAL, UPPER, Line, segment_momentum
+from cable.properties import CableNumbers, DrumNumbers
 from subzero.compiled import allocating, inner
-
-from .blocks import factor, solve
-from .drum import LENGTH, STANDING, TENSION
-from .element import Load, chord_length
-from .line import BEFORE, DIAGONAL, LOWER, NOW, RESIDUAL, UPPER, Line, segment_momentum
-from .properties import CableNumbers, DrumNumbers
 
 FELT = 1e-6
 """A jump of the tow point's velocity smaller than this is none. [m/s]"""

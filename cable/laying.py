@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from cable.drum import TURNING
+from cable.element import Load
+from cable.line import BEFORE, NEW, NOW, SPLIT_AT, Line, feel_water, segment_momentum, spacing
+from cable.properties import CableNumbers, DrumNumbers
+from cable.water import Water
 from subzero.compiled import compiled
-
-from .drum import TURNING
-from .element import Load
-from .line import BEFORE, NEW, NOW, SPLIT_AT, Line, feel_water, segment_momentum, spacing
-from .properties import CableNumbers, DrumNumbers
-from .water import Water
 
 
 @compiled

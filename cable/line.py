@@ -14,14 +14,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cable.drum import TURNING
+from cable.element import Load, chord_length, evaluate_momentum
+from cable.properties import CableNumbers
+from cable.slack import SMOOTHING
+from cable.water import Water, water_velocity
 from subzero.compiled import inlined, inner
 from subzero.packed import packed
-
-from .drum import TURNING
-from .element import Load, chord_length, evaluate_momentum
-from .properties import CableNumbers
-from .slack import SMOOTHING
-from .water import Water, water_velocity
 
 NEW, NOW, BEFORE = 0, 1, 2
 

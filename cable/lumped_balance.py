@@ -13,12 +13,11 @@ from math import sqrt
 
 import numpy as np
 
+from cable.lumped_band import add
+from cable.lumped_load import evaluate_node, shorten
+from cable.lumped_rope import NEW, PULL, REST, START_MOMENTUM, THINNING, WATER, Rope, unknowns
+from cable.properties import CableNumbers
 from subzero.compiled import allocating, compiled, inner
-
-from .lumped_band import add
-from .lumped_load import evaluate_node, shorten
-from .lumped_rope import NEW, PULL, REST, START_MOMENTUM, THINNING, WATER, Rope, unknowns
-from .properties import CableNumbers
 
 
 @allocating

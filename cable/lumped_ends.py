@@ -17,15 +17,14 @@ from math import sqrt
 
 import numpy as np
 
+from cable.lumped_band import add
+from cable.lumped_load import evaluate_node
+from cable.lumped_rope import ANSWER, DIRECTION, GAIN, GAP, NEW, PULL, REST, SIZE, START_MOMENTUM, WATER, Rope
+from cable.lumped_spring import drum_friction
+from cable.lumped_springs import unit_length
+from cable.properties import CableNumbers, DrumNumbers
+from cable.winch import LENGTH, TENSION
 from subzero.compiled import allocating, compiled, inner
-
-from .lumped_band import add
-from .lumped_load import evaluate_node
-from .lumped_rope import ANSWER, DIRECTION, GAIN, GAP, NEW, PULL, REST, SIZE, START_MOMENTUM, WATER, Rope
-from .lumped_spring import drum_friction
-from .lumped_springs import unit_length
-from .properties import CableNumbers, DrumNumbers
-from .winch import LENGTH, TENSION
 
 
 @allocating

@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from .history import History, Outcome
-from .lumped_rope import Rope, new_rope, unknowns
-from .lumped_run import FULL, Course, Journey, run_rope
-from .lumped_start import held_at_drum, lay, steady_direction, steady_tensions, winch_rows
-from .properties import CableProperties, DrumProperties
-from .runs import TowVelocity, first_direction, sample_path
-from .water import Current, Water
-from .winch import Brake, PayOutRate, Winch
+from cable.history import History, Outcome
+from cable.lumped_rope import Rope, new_rope, unknowns
+from cable.lumped_run import FULL, Course, Journey, run_rope
+from cable.lumped_start import held_at_drum, lay, steady_direction, steady_tensions, winch_rows
+from cable.properties import CableProperties, DrumProperties
+from cable.runs import TowVelocity, first_direction, sample_path
+from cable.water import Current, Water
+from cable.winch import Brake, PayOutRate, Winch
 
 AXES = ("northward", "eastward", "downward")
 START_LENGTH = 1e-6

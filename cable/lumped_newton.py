@@ -9,16 +9,15 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from cable.lumped_balance import balance_nodes, bend_nodes
+from cable.lumped_band import WIDTH, solve_band
+from cable.lumped_ends import hold_end
+from cable.lumped_rope import FADING, GAIN, GAP, NEW, PULL, REST, WATER, Rope, unknowns
+from cable.lumped_springs import observe, pull_nodes, update_springs
+from cable.lumped_tow_point import tow_force
+from cable.properties import CableNumbers, DrumNumbers
+from cable.water import Water, water_velocity
 from subzero.compiled import compiled, inner
-
-from .lumped_balance import balance_nodes, bend_nodes
-from .lumped_band import WIDTH, solve_band
-from .lumped_ends import hold_end
-from .lumped_rope import FADING, GAIN, GAP, NEW, PULL, REST, WATER, Rope, unknowns
-from .lumped_springs import observe, pull_nodes, update_springs
-from .lumped_tow_point import tow_force
-from .properties import CableNumbers, DrumNumbers
-from .water import Water, water_velocity
 
 TOLERANCE = 1e-9
 """Residual of a balance, as a share of the largest tension (or of `SMALL`)."""

@@ -11,10 +11,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from subzero.compiled import allocating, compiled, inner
-
-from .lumped_balance import load_node, neighbours
-from .lumped_rope import (
+from cable.lumped_balance import load_node, neighbours
+from cable.lumped_rope import (
     DIRECTION,
     FADING,
     MOMENTUM_RATE,
@@ -28,9 +26,10 @@ from .lumped_rope import (
     WATER,
     Rope,
 )
-from .lumped_spring import spring_law, spring_state
-from .lumped_tow_point import first_tangent
-from .properties import CableNumbers
+from cable.lumped_spring import spring_law, spring_state
+from cable.lumped_tow_point import first_tangent
+from cable.properties import CableNumbers
+from subzero.compiled import allocating, compiled, inner
 
 SPLIT_AT = 1.5
 MERGE_AT = 0.5

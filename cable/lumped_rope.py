@@ -16,11 +16,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cable.lumped_band import WIDTH
+from cable.lumped_load import NodeLoad, new_node_load
 from subzero.compiled import compiled
 from subzero.packed import packed
-
-from .lumped_band import WIDTH
-from .lumped_load import NodeLoad, new_node_load
 
 NEW, OLD, MIDDLE = 0, 1, 2
 """Levels: being solved for, start of the step, end of its first stage."""

@@ -6,11 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .lumped_newton import StageSolved
-from .lumped_rope import OLD, PULL, REST, STATE, Rope
-from .lumped_step import GAMMA, START_OF_LEG, begin, take_step
-from .properties import CableNumbers, DrumNumbers
-from .water import Water
+from cable.lumped_newton import StageSolved
+from cable.lumped_rope import OLD, PULL, REST, STATE, Rope
+from cable.lumped_step import GAMMA, START_OF_LEG, begin, take_step
+from cable.properties import CableNumbers, DrumNumbers
+from cable.water import Water
 
 MOST_HALVINGS = 12
 """A failing step is halved up to this many times before the run gives up."""

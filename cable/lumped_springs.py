@@ -15,10 +15,8 @@ from __future__ import annotations
 
 from math import sqrt
 
-from subzero.compiled import compiled, inner
-
-from .lumped_band import add
-from .lumped_rope import (
+from cable.lumped_band import add
+from cable.lumped_rope import (
     ANSWER,
     DIRECTION,
     FADING,
@@ -36,7 +34,8 @@ from .lumped_rope import (
     Rope,
     unknowns,
 )
-from .lumped_spring import spring_law
+from cable.lumped_spring import spring_law
+from subzero.compiled import compiled, inner
 
 POINT = 1e-7
 """A chord shorter than this share of its spring has no direction. [-]"""

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from .lumped_rope import DIRECTION, OLD, PULL, REST, STATE, Rope
-from .lumped_spring import LEAST_COMPLIANCE, spring_law, spring_state
-from .properties import CableProperties, DrumProperties
-from .winch import SHORTEST, ConstantTension, PayOutRate, Winch
+from cable.lumped_rope import DIRECTION, OLD, PULL, REST, STATE, Rope
+from cable.lumped_spring import LEAST_COMPLIANCE, spring_law, spring_state
+from cable.properties import CableProperties, DrumProperties
+from cable.winch import SHORTEST, ConstantTension, PayOutRate, Winch
 
 STRAIGHT_UP = np.array([0.0, 0.0, -1.0])
 FAINTEST = 1e-11

@@ -14,11 +14,9 @@ from math import sqrt
 
 import numpy as np
 
-from subzero.compiled import compiled, inner
-
-from .lumped_newton import StageSolved, solve_stage
-from .lumped_nodes import fill_momenta, mind_the_drum, settle
-from .lumped_rope import (
+from cable.lumped_newton import StageSolved, solve_stage
+from cable.lumped_nodes import fill_momenta, mind_the_drum, settle
+from cable.lumped_rope import (
     MIDDLE,
     MOMENTUM_RATE,
     NEW,
@@ -31,9 +29,10 @@ from .lumped_rope import (
     WATER,
     Rope,
 )
-from .properties import CableNumbers, DrumNumbers
-from .water import Water, water_velocity
-from .winch import LENGTH
+from cable.properties import CableNumbers, DrumNumbers
+from cable.water import Water, water_velocity
+from cable.winch import LENGTH
+from subzero.compiled import compiled, inner
 
 GAMMA = 2.0 - sqrt(2.0)
 """Where the first stage ends, as a share of the step."""

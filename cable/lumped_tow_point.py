@@ -10,11 +10,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from cable.lumped_balance import arm, load_node, neighbours
+from cable.lumped_rope import DIRECTION, NEW, PULL, REST, START_MOMENTUM, Rope
+from cable.properties import CableNumbers
 from subzero.compiled import allocating, compiled
-
-from .lumped_balance import arm, load_node, neighbours
-from .lumped_rope import DIRECTION, NEW, PULL, REST, START_MOMENTUM, Rope
-from .properties import CableNumbers
 
 
 @allocating

@@ -6,15 +6,14 @@ from math import isfinite, sqrt
 
 import numpy as np
 
+from cable.assembly import assemble, assemble_residual
+from cable.bending import factor_step, has_residual, solve_factored
+from cable.differences import Weights
+from cable.element import Load
+from cable.line import GUESS, NEW, NOW, RESIDUAL, STEP, Line, held_node
+from cable.properties import CableNumbers, DrumNumbers
+from cable.slack import STRAIN_SCALE
 from subzero.compiled import compiled, inlined, inner
-
-from .assembly import assemble, assemble_residual
-from .bending import factor_step, has_residual, solve_factored
-from .differences import Weights
-from .element import Load
-from .line import GUESS, NEW, NOW, RESIDUAL, STEP, Line, held_node
-from .properties import CableNumbers, DrumNumbers
-from .slack import STRAIN_SCALE
 
 MAX_ITERATIONS = 40
 MAX_HALVINGS = 8

@@ -6,18 +6,17 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cable.drum_path import hermite, lead_drum
+from cable.element import Load
+from cable.energy import FLOWS, book_step, energy_flow
+from cable.jolt import take_jolt
+from cable.line import NOW, Line
+from cable.properties import CableNumbers, DrumNumbers
+from cable.step_size import estimate_error, next_step, note_force
+from cable.stepping import accept, try_step
+from cable.tow_point import ends
+from cable.water import Water
 from subzero.compiled import allocating, compiled
-
-from .drum_path import hermite, lead_drum
-from .element import Load
-from .energy import FLOWS, book_step, energy_flow
-from .jolt import take_jolt
-from .line import NOW, Line
-from .properties import CableNumbers, DrumNumbers
-from .step_size import estimate_error, next_step, note_force
-from .stepping import accept, try_step
-from .tow_point import ends
-from .water import Water
 
 MOST_HALVINGS = 10
 """A failing step is halved up to this many times before the run gives up."""

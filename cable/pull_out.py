@@ -6,17 +6,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from subzero.errors import BadValueError, checked, real, short, suggestion
-
-from .drum import LENGTH
-from .drum_path import PLACE, SETPOINT, VELOCITY, drum_path, resting
-from .element import new_load
-from .history import History
-from .hold import Equilibrium, lay_held
-from .laying import lay_straight
-from .line import TOLERANCE, new_line
-from .properties import CableProperties, DrumProperties
-from .runs import (
+from cable.drum import LENGTH
+from cable.drum_path import PLACE, SETPOINT, VELOCITY, drum_path, resting
+from cable.element import new_load
+from cable.history import History
+from cable.hold import Equilibrium, lay_held
+from cable.laying import lay_straight
+from cable.line import TOLERANCE, new_line
+from cable.properties import CableProperties, DrumProperties
+from cable.runs import (
     TowVelocity,
     check_kinds,
     check_memory,
@@ -29,8 +27,9 @@ from .runs import (
     sample_path,
     segments_needed,
 )
-from .water import Current
-from .winch import Brake, ConstantTension, PayOutRate, Winch
+from cable.water import Current
+from cable.winch import Brake, ConstantTension, PayOutRate, Winch
+from subzero.errors import BadValueError, checked, real, short, suggestion
 
 START_LENGTH = 1e-6
 """A run "without cable" starts with this length in the water, so that there is a direction. [m]"""
@@ -129,7 +128,7 @@ def pull_out(
     if scheme == "lumped":
         segments_needed(max(wet_length, segment_length), segment_length, 0.0)
     if scheme == "lumped" and rtol == 0.0 and grading == 0.0:
-        from .lumped_history import pull_out_lumped
+        from cable.lumped_history import pull_out_lumped
 
         return pull_out_lumped(
             tow_velocity,
@@ -150,7 +149,7 @@ def pull_out(
                 "grading ('lumped' knows all but these two); use 'moving_end'."
             )
             raise BadValueError(message)
-        from .paper_history import pull_out_as_printed
+        from cable.paper_history import pull_out_as_printed
 
         uniform = water.velocity.reshape(3)
         return pull_out_as_printed(tow_velocity, duration, step, cable, drum, uniform, scheme, segment_length)

@@ -6,18 +6,17 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from cable.element import Load
+from cable.energy import LOSS, STORED
+from cable.history import History, Outcome
+from cable.laying import start_in_water
+from cable.line import Line, Solved
+from cable.pay_out import Record, TowPath, follow_path, new_record
+from cable.properties import CableNumbers, DrumNumbers
+from cable.stops import describe_stop
+from cable.water import Current, Water
 from subzero.errors import BadValueError, checked, real, short
 from subzero.memory import refuse_unless_it_fits
-
-from .element import Load
-from .energy import LOSS, STORED
-from .history import History, Outcome
-from .laying import start_in_water
-from .line import Line, Solved
-from .pay_out import Record, TowPath, follow_path, new_record
-from .properties import CableNumbers, DrumNumbers
-from .stops import describe_stop
-from .water import Current, Water
 
 TowVelocity = Callable[[float], Sequence[float] | np.ndarray]
 

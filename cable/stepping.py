@@ -12,19 +12,18 @@ from __future__ import annotations
 
 import numpy as np
 
+from cable.arc import correct_for_arc
+from cable.differences import backward_weights
+from cable.drum import FREE, STANDING, next_mode
+from cable.element import Load
+from cable.growing import merge_last, split_last
+from cable.line import BEFORE, NEW, NOW, SPLIT_AT, Line, feel_water, held_node, spacing
+from cable.newton import solve_step
+from cable.properties import CableNumbers, DrumNumbers
+from cable.slack import KNOWN, SMOOTHING
+from cable.tow_point import fill_node_tensions, follow_tow
+from cable.water import Water
 from subzero.compiled import compiled, inlined
-
-from .arc import correct_for_arc
-from .differences import backward_weights
-from .drum import FREE, STANDING, next_mode
-from .element import Load
-from .growing import merge_last, split_last
-from .line import BEFORE, NEW, NOW, SPLIT_AT, Line, feel_water, held_node, spacing
-from .newton import solve_step
-from .properties import CableNumbers, DrumNumbers
-from .slack import KNOWN, SMOOTHING
-from .tow_point import fill_node_tensions, follow_tow
-from .water import Water
 
 SOFTEST = 1e-4
 """T₀ that a difficult step starts with, a tenth at a time down to `slack.SMOOTHING`. [N]"""

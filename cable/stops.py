@@ -12,9 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .drum import FREE, LENGTH, TENSION
-from .line import NEW, NOW, Line
-from .properties import CableNumbers, DrumNumbers
+from cable.drum import FREE, LENGTH, TENSION
+from cable.line import NEW, NOW, Line
+from cable.properties import CableNumbers, DrumNumbers
 
 EQUATIONS = ("length", "northward balance", "eastward balance", "downward balance")
 NEARLY_TAUT = 0.999

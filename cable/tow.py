@@ -7,15 +7,13 @@ from math import inf, sqrt
 
 import numpy as np
 
-from subzero.errors import BadValueError, checked, short
-
-from .drum_path import resting
-from .element import new_load
-from .history import History
-from .laying import lay_straight
-from .line import NOW, TOLERANCE, Line, new_line
-from .properties import CableProperties, DrumProperties
-from .runs import (
+from cable.drum_path import resting
+from cable.element import new_load
+from cable.history import History
+from cable.laying import lay_straight
+from cable.line import NOW, TOLERANCE, Line, new_line
+from cable.properties import CableProperties, DrumProperties
+from cable.runs import (
     TowVelocity,
     check_kinds,
     check_memory,
@@ -28,7 +26,8 @@ from .runs import (
     sample_path,
     segments_needed,
 )
-from .water import Current
+from cable.water import Current
+from subzero.errors import BadValueError, checked, short
 
 
 def tow(
@@ -85,7 +84,7 @@ def tow(
     if not isinstance(scheme, str) or scheme not in ("moving_end", "lumped"):
         raise BadValueError(f"scheme {short(scheme)} cannot tow a free end; choose 'moving_end' or 'lumped'.")
     if scheme == "lumped":
-        from .lumped_history import tow_lumped
+        from cable.lumped_history import tow_lumped
 
         return tow_lumped(
             tow_velocity,

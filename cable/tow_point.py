@@ -6,11 +6,10 @@ from math import sqrt
 
 import numpy as np
 
+from cable.blocks import SIZE, spread
+from cable.line import LOWER, NEW, RESIDUAL, Line
+from cable.newton import go_from_guess, save_guess
 from subzero.compiled import inner
-
-from .blocks import SIZE, spread
-from .line import LOWER, NEW, RESIDUAL, Line
-from .newton import go_from_guess, save_guess
 
 
 @inner

@@ -14,9 +14,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from cable.blocks import SIZE, factor_block, solve_block, transpose
 from subzero.compiled import compiled, inner
-
-from .blocks import SIZE, factor_block, solve_block, transpose
 
 
 @inner

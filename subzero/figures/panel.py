@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from subzero.channels import BY_NAME
-
-from .style import DOTS, DPI, LINES, NORMAL, SMALL, TINY, Runs
+from subzero.figures.style import DOTS, DPI, LINES, NORMAL, SMALL, TINY, Runs
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
