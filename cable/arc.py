@@ -35,7 +35,7 @@ import numpy as np
 
 from cable.element import Load, chord_length
 from cable.line import NEW, NOW, Line
-from subzero.compiled import inlined, inner
+from subzero.jit import inlined, inner
 
 MOST_BENT = 1.0
 """Segments that turn by more than this do not know their curvature; the corrections stop growing there. [rad]"""

@@ -26,7 +26,7 @@ from cable.first_segment import write_single_segment
 from cable.line import BEFORE, DIAGONAL, LOWER, NEW, NOW, RESIDUAL, UPPER, Line, held_node, take_segment
 from cable.properties import CableNumbers, DrumNumbers
 from cable.slack import slack_law
-from subzero.compiled import compiled, inlined, inner
+from subzero.jit import compiled, inlined, inner
 
 
 @inner

@@ -24,7 +24,7 @@ from cable.blocks import factor, solve
 from cable.line import DIAGONAL, LOWER, LOWER2, NEW, NOW, RESIDUAL, UPPER, UPPER2, Line, held_node
 from cable.properties import CableNumbers, StiffCableNumbers
 from cable.wide_blocks import factor_wide, solve_wide
-from subzero.compiled import allocating, by_field, compiled, inner
+from subzero.jit import allocating, by_field, compiled, inner
 
 
 @inner

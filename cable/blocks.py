@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from subzero.compiled import compiled, inlined
+from subzero.jit import compiled, inlined
 
 SIZE = 4
 

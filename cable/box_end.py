@@ -13,7 +13,7 @@ import numpy as np
 
 from cable.box_newton import BoxWorkspace, box_workspace
 from cable.paper_scheme import start_paper
-from subzero.compiled import compiled
+from subzero.jit import compiled
 
 SPLIT, MERGE = 1.5, 0.4
 """Lengths of the last box, in segments, beyond which a node is inserted or removed."""

@@ -22,7 +22,7 @@ import numpy as np
 from cable.box_solver import CARRIED, RIGHT, SIZE
 from cable.equation7 import Equation7Numbers, load, space_matrix, time_matrix, to_local
 from cable.equation7_slopes import load_slope, space_slope, time_slope
-from subzero.compiled import compiled
+from subzero.jit import compiled
 
 
 class BoxRule(NamedTuple):

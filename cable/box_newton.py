@@ -25,7 +25,7 @@ from cable.box_equations import (
 )
 from cable.box_solver import CARRIED, RIGHT, SIZE, WINDOW, back_substitute, carry, eliminate
 from cable.equation7 import EQUATIONS, Equation7Numbers
-from subzero.compiled import compiled, inlined, inner
+from subzero.jit import compiled, inlined, inner
 
 CONVERGED, STALLED, SINGULAR, NOT_FINITE, FULL, SLACK = 0, 1, 2, 3, 4, 5
 OUTCOMES = (
@@ -63,7 +63,7 @@ class NewtonReport(NamedTuple):
 
 @inlined
 def told(report: NewtonReport) -> tuple[int, int, float, int, int]:
-    """Return a report as compiled code may hand it to Python: a plain tuple, see `subzero.compiled`."""
+    """Return a report as compiled code may hand it to Python: a plain tuple, see `subzero.jit`."""
     return report.outcome, report.iterations, report.residual, report.node, report.row
 
 

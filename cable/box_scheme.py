@@ -42,7 +42,7 @@ from cable.box_newton import (
 from cable.equation7 import Equation7Numbers, equation7_numbers
 from cable.paper_scheme import NOTHING
 from cable.properties import CableProperties, DrumNumbers, DrumProperties
-from subzero.compiled import compiled, inner
+from subzero.jit import compiled, inner
 
 GAMMA = 2.0 - math.sqrt(2.0)
 NEW_SHARE = 1.0 / (GAMMA * (2.0 - GAMMA))

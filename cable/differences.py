@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from subzero.compiled import inner
+from subzero.jit import inner
 
 
 class Weights(NamedTuple):

@@ -19,7 +19,7 @@ from __future__ import annotations
 from math import sqrt
 
 from cable.properties import DrumNumbers
-from subzero.compiled import inner
+from subzero.jit import inner
 
 TURNING, STANDING, SPINNING = 0, 1, 2
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from cable.properties import DrumNumbers
-from subzero.compiled import inner
+from subzero.jit import inner
 
 PLACE, VELOCITY, SETPOINT = 1, 4, 7
 """First columns of what the table holds beside the time."""

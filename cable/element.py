@@ -22,8 +22,7 @@ from typing import Any
 import numpy as np
 
 from cable.properties import CableNumbers
-from subzero.compiled import inlined, inner
-from subzero.packed import packed
+from subzero.jit import inlined, inner, packed
 
 FOLDING = 0.3
 """How early a heaped segment loses its direction, see `chord_length`; without any effect on a taut one."""

@@ -24,7 +24,7 @@ from cable.bending import bending_energy
 from cable.element import Load, evaluate_load
 from cable.line import BEFORE, NOW, Line, take_segment
 from cable.properties import CableNumbers
-from subzero.compiled import compiled, inlined, inner
+from subzero.jit import compiled, inlined, inner
 
 LOSS, STORED, GRAVITY_WORK, AT_DRUM, ADDED_MASS, STRAINED, CARRIED, TOWED = range(8)
 """What `energy_flow` fills: L, E [J], G, D_S, M, −∫T t·∂J/∂s ds, ∫m U·dJ/dt ds (mean over a step), −F·U(0). [W]"""

@@ -30,7 +30,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cable.properties import CableProperties
-from subzero.compiled import compiled
+from subzero.jit import compiled
 
 UNKNOWNS = ("T", "Vt", "Vn", "Vb", "alpha", "beta")
 EQUATIONS = (

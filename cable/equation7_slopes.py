@@ -16,7 +16,7 @@ import math
 import numpy as np
 
 from cable.equation7 import Equation7Numbers, to_local
-from subzero.compiled import compiled
+from subzero.jit import compiled
 
 
 @compiled

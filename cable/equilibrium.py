@@ -33,7 +33,7 @@ from cable.slack import SMOOTHING
 from cable.stepping import SOFTEST
 from cable.tow_point import fill_node_tensions
 from cable.water import Water
-from subzero.compiled import allocating, compiled, inner
+from subzero.jit import allocating, compiled, inner
 
 DRAG_ROUNDS = 12
 """How often the convex problem takes the drag of its new shape."""

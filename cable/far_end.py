@@ -14,7 +14,7 @@ from cable.drum import LENGTH, SPINNING, STANDING, TENSION, friction
 from cable.element import Load, fading_rate, turning_rate
 from cable.line import BEFORE, DIAGONAL, LOWER, NEW, NOW, RESIDUAL, Line
 from cable.properties import CableNumbers, DrumNumbers
-from subzero.compiled import compiled, inner
+from subzero.jit import compiled, inner
 
 
 @inner

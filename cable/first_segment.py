@@ -16,7 +16,7 @@ from math import sqrt
 import numpy as np
 
 from cable.line import DIAGONAL, LOWER, NEW, NOW, RESIDUAL, Line
-from subzero.compiled import compiled, inner
+from subzero.jit import compiled, inner
 
 CORNER = 1e-9
 """Size of the rounding of both maxima. [m], [N]"""

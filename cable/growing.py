@@ -11,7 +11,7 @@ from cable.element import Load
 from cable.line import BEFORE, NOW, Line, segment_momentum
 from cable.properties import CableNumbers
 from cable.slack import KNOWN
-from subzero.compiled import compiled, inner
+from subzero.jit import compiled, inner
 
 
 @inner

@@ -23,7 +23,7 @@ from cable.drum import LENGTH, STANDING, TENSION
 from cable.element import Load, chord_length
 from cable.line import BEFORE, DIAGONAL, LOWER, NOW, RESIDUAL, UPPER, Line, segment_momentum
 from cable.properties import CableNumbers, DrumNumbers
-from subzero.compiled import allocating, inner
+from subzero.jit import allocating, inner
 
 FELT = 1e-6
 """A jump of the tow point's velocity smaller than this is none. [m/s]"""

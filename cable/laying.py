@@ -9,7 +9,7 @@ from cable.element import Load
 from cable.line import BEFORE, NEW, NOW, SPLIT_AT, Line, feel_water, segment_momentum, spacing
 from cable.properties import CableNumbers, DrumNumbers
 from cable.water import Water
-from subzero.compiled import compiled
+from subzero.jit import compiled
 
 
 @compiled

@@ -19,8 +19,7 @@ from cable.element import Load, chord_length, evaluate_momentum
 from cable.properties import CableNumbers
 from cable.slack import SMOOTHING
 from cable.water import Water, water_velocity
-from subzero.compiled import inlined, inner
-from subzero.packed import packed
+from subzero.jit import inlined, inner, packed
 
 NEW, NOW, BEFORE = 0, 1, 2
 

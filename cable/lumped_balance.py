@@ -17,7 +17,7 @@ from cable.lumped_band import add
 from cable.lumped_load import evaluate_node, shorten
 from cable.lumped_rope import NEW, PULL, REST, START_MOMENTUM, THINNING, WATER, Rope, unknowns
 from cable.properties import CableNumbers
-from subzero.compiled import allocating, compiled, inner
+from subzero.jit import allocating, compiled, inner
 
 
 @allocating

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from subzero.compiled import compiled, inner
+from subzero.jit import compiled, inner
 
 REACH = 8
 WIDTH = 3 * REACH + 1

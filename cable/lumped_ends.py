@@ -24,7 +24,7 @@ from cable.lumped_spring import drum_friction
 from cable.lumped_springs import unit_length
 from cable.properties import CableNumbers, DrumNumbers
 from cable.winch import LENGTH, TENSION
-from subzero.compiled import allocating, compiled, inner
+from subzero.jit import allocating, compiled, inner
 
 
 @allocating

@@ -18,8 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from subzero.compiled import inner
-from subzero.packed import packed
+from subzero.jit import inner, packed
 
 FOLD = 0.3
 """δ in `shorten`."""

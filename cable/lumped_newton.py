@@ -17,7 +17,7 @@ from cable.lumped_springs import observe, pull_nodes, update_springs
 from cable.lumped_tow_point import tow_force
 from cable.properties import CableNumbers, DrumNumbers
 from cable.water import Water, water_velocity
-from subzero.compiled import compiled, inner
+from subzero.jit import compiled, inner
 
 TOLERANCE = 1e-9
 """Residual of a balance, as a share of the largest tension (or of `SMALL`)."""

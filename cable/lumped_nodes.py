@@ -29,7 +29,7 @@ from cable.lumped_rope import (
 from cable.lumped_spring import spring_law, spring_state
 from cable.lumped_tow_point import first_tangent
 from cable.properties import CableNumbers
-from subzero.compiled import allocating, compiled, inner
+from subzero.jit import allocating, compiled, inner
 
 SPLIT_AT = 1.5
 MERGE_AT = 0.5

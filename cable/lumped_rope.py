@@ -18,8 +18,7 @@ import numpy as np
 
 from cable.lumped_band import WIDTH
 from cable.lumped_load import NodeLoad, new_node_load
-from subzero.compiled import compiled
-from subzero.packed import packed
+from subzero.jit import compiled, packed
 
 NEW, OLD, MIDDLE = 0, 1, 2
 """Levels: being solved for, start of the step, end of its first stage."""

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from math import sqrt
 
-from subzero.compiled import compiled, inner
+from subzero.jit import compiled, inner
 
 LEAST_COMPLIANCE = 1e-6
 """e of a cable that does not stretch. [1/N]"""

@@ -35,7 +35,7 @@ from cable.lumped_rope import (
     unknowns,
 )
 from cable.lumped_spring import spring_law
-from subzero.compiled import compiled, inner
+from subzero.jit import compiled, inner
 
 POINT = 1e-7
 """A chord shorter than this share of its spring has no direction. [-]"""

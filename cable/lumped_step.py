@@ -32,7 +32,7 @@ from cable.lumped_rope import (
 from cable.properties import CableNumbers, DrumNumbers
 from cable.water import Water, water_velocity
 from cable.winch import LENGTH
-from subzero.compiled import compiled, inner
+from subzero.jit import compiled, inner
 
 GAMMA = 2.0 - sqrt(2.0)
 """Where the first stage ends, as a share of the step."""

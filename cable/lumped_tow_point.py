@@ -13,7 +13,7 @@ import numpy as np
 from cable.lumped_balance import arm, load_node, neighbours
 from cable.lumped_rope import DIRECTION, NEW, PULL, REST, START_MOMENTUM, Rope
 from cable.properties import CableNumbers
-from subzero.compiled import allocating, compiled
+from subzero.jit import allocating, compiled
 
 
 @allocating

@@ -13,7 +13,7 @@ from cable.element import Load
 from cable.line import GUESS, NEW, NOW, RESIDUAL, STEP, Line, held_node
 from cable.properties import CableNumbers, DrumNumbers
 from cable.slack import STRAIN_SCALE
-from subzero.compiled import compiled, inlined, inner
+from subzero.jit import compiled, inlined, inner
 
 MAX_ITERATIONS = 40
 MAX_HALVINGS = 8

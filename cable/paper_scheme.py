@@ -36,8 +36,8 @@ from cable.box_newton import (
 )
 from cable.equation7 import Equation7Numbers, angles_of, equation7_numbers, tangent
 from cable.properties import CableProperties, DrumProperties
-from subzero.compiled import compiled, inner
 from subzero.errors import BadValueError, short
+from subzero.jit import compiled, inner
 
 READINGS = ("tangent", "drum")
 NOTHING = 1e-9

@@ -16,7 +16,7 @@ from cable.step_size import estimate_error, next_step, note_force
 from cable.stepping import accept, try_step
 from cable.tow_point import ends
 from cable.water import Water
-from subzero.compiled import allocating, compiled
+from subzero.jit import allocating, compiled
 
 MOST_HALVINGS = 10
 """A failing step is halved up to this many times before the run gives up."""

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from subzero.errors import BadValueError, checked
-from subzero.packed import packed
+from subzero.jit import packed
 
 GRAVITY = 9.81
 """Gravitational acceleration g, as printed in section 2.2 of the source. [m/s²]"""

@@ -11,12 +11,12 @@ from cable.energy import LOSS, STORED
 from cable.history import History, Outcome
 from cable.laying import start_in_water
 from cable.line import Line, Solved
+from cable.memory import refuse_unless_it_fits
 from cable.pay_out import Record, TowPath, follow_path, new_record
 from cable.properties import CableNumbers, DrumNumbers
 from cable.stops import describe_stop
 from cable.water import Current, Water
 from subzero.errors import BadValueError, checked, real, short
-from subzero.memory import refuse_unless_it_fits
 
 TowVelocity = Callable[[float], Sequence[float] | np.ndarray]
 

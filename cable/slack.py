@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from math import sqrt
 
-from subzero.compiled import inlined
+from subzero.jit import inlined
 
 TENSION_SCALE = 1e-3
 """T_r [N] and σ_r [-]: where the corner between taut and slack is seen at the same size in both."""

@@ -11,7 +11,7 @@ from __future__ import annotations
 from math import sqrt
 
 from cable.line import Line
-from subzero.compiled import inner
+from subzero.jit import inner
 
 SAFETY = 0.8
 LARGEST_GROWTH, LARGEST_CUT = 2.0, 0.2

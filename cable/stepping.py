@@ -23,7 +23,7 @@ from cable.properties import CableNumbers, DrumNumbers
 from cable.slack import KNOWN, SMOOTHING
 from cable.tow_point import fill_node_tensions, follow_tow
 from cable.water import Water
-from subzero.compiled import compiled, inlined
+from subzero.jit import compiled, inlined
 
 SOFTEST = 1e-4
 """T₀ that a difficult step starts with, a tenth at a time down to `slack.SMOOTHING`. [N]"""

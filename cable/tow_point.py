@@ -9,7 +9,7 @@ import numpy as np
 from cable.blocks import SIZE, spread
 from cable.line import LOWER, NEW, RESIDUAL, Line
 from cable.newton import go_from_guess, save_guess
-from subzero.compiled import inner
+from subzero.jit import inner
 
 
 @inner

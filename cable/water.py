@@ -19,8 +19,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from subzero.compiled import allocating, inlined, inner
 from subzero.errors import BadValueError, short
+from subzero.jit import allocating, inlined, inner
 
 WaterVelocity = Callable[[float, float, float, float], Sequence[float]]
 """Function of north, east, down [m] and time [s] that gives the water's velocity (3,). [m/s]"""

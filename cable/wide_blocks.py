@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 
 from cable.blocks import SIZE, factor_block, solve_block, transpose
-from subzero.compiled import compiled, inner
+from subzero.jit import compiled, inner
 
 
 @inner

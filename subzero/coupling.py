@@ -23,12 +23,11 @@ from cable.energy import energy_flow
 from cable.line import NOW
 from cable.stepping import accept, try_step
 from cable.tow_point import impedance
-from subzero.compiled import compiled, inlined, inner
 from subzero.energy import book
 from subzero.hull import advance_hull, follow_track, tow_point
+from subzero.jit import compiled, inlined, inner, scratch
 from subzero.jolt import take_jolt_of_motion
 from subzero.run_state import Live, Now, Setup
-from subzero.scratch import scratch
 from vehicle import STATE_SIZE
 
 MOST_EXCHANGES = 60

@@ -16,8 +16,8 @@ import numpy as np
 
 import vehicle
 from cable.energy import ADDED_MASS, AT_DRUM, CARRIED, FLOWS, GRAVITY_WORK, LOSS, STORED, STRAINED, TOWED
-from subzero.compiled import inlined
 from subzero.hull import feel_current, row_at, tow_wrench
+from subzero.jit import inlined
 from subzero.missing_wrench import add_missing
 from subzero.run_state import Live, Setup
 

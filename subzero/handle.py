@@ -14,7 +14,7 @@ import numpy as np
 from numba import types
 from numba.experimental import structref
 
-from subzero.compiled import allocating
+from subzero.jit import allocating
 from subzero.loop import run_rows
 from subzero.recording import Recording, record_row
 from subzero.run_state import Live, Setup

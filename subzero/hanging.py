@@ -10,7 +10,7 @@ from cable.drum_path import SETPOINT
 from cable.energy import FLOWS, energy_flow
 from cable.hold import hold, lay_held
 from cable.laying import start_in_water
-from subzero.compiled import compiled
+from subzero.jit import compiled
 from subzero.model import Model
 from subzero.run_state import Live, Setup
 from subzero.surroundings import water_of

@@ -15,10 +15,9 @@ import numpy as np
 
 import vehicle
 from cable.water import water_velocity
-from subzero.compiled import allocating, compiled, inlined, inner
+from subzero.jit import allocating, compiled, inlined, inner, scratch
 from subzero.missing_wrench import add_missing
 from subzero.run_state import HEADING, LINEAR_ROWS, PITCH, PLACE, SLOPE, SPEED, TIME, HullWork, Live, Setup
-from subzero.scratch import scratch
 from vehicle import STATE_SIZE
 
 GAUSS_OFFSET = 0.5 * np.sqrt(0.6)

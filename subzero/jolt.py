@@ -11,9 +11,9 @@ import numpy as np
 import vehicle
 from cable.energy import STORED, energy_flow
 from cable.jolt import take_jolt
-from subzero.compiled import allocating, inner
 from subzero.energy import KINETIC, PROPELLER
 from subzero.hull import row_at
+from subzero.jit import allocating, inner
 from subzero.run_state import HEADING, LINEAR_ROWS, PITCH, TIME, Live, Setup
 
 AT_KNOT = 1e-9

@@ -14,9 +14,9 @@ import numpy as np
 import scenarios
 import vehicle
 from cable.energy import FLOWS, STORED, energy_flow
-from subzero.compiled import allocating
 from subzero.errors import BadValueError, UserError, real, short
 from subzero.hull import feel_current
+from subzero.jit import allocating
 from subzero.model import Model
 from subzero.run_state import Live, Setup
 from subzero.start import setup_of

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from subzero.compiled import compiled
 from subzero.errors import BadValueError, real, short, suggestion
+from subzero.jit import compiled
 
 AXES = ("X", "Y", "Z", "K", "M", "N")
 """Forward, to starboard, down [N]; roll, pitch and yaw moment [N m]."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 import vehicle
-from subzero.compiled import allocating, compiled, inner
+from subzero.jit import allocating, compiled, inner
 from subzero.missing_force import FACTORS, fill_factors
 from subzero.run_state import HullWork, Live, Setup
 from vehicle.dynamics import relative_velocity

@@ -20,9 +20,9 @@ from cable.box_equations import Ends
 from cable.box_newton import CONVERGED, BoxWorkspace, NewtonReport, told
 from cable.equation7 import Equation7Numbers, tangent
 from cable.paper_scheme import NOTHING, advance_paper, node_force, start_paper
-from subzero.compiled import compiled
 from subzero.coupling import ABSURD, CABLE_FAILED, FINE, _move, hull_steps
 from subzero.energy import CABLE_LOSS, book
+from subzero.jit import compiled
 from subzero.recording import Recording, record_row
 from subzero.run_state import Live, Setup
 from vehicle import STATE_SIZE

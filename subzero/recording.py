@@ -10,8 +10,8 @@ import numpy as np
 
 import vehicle
 from cable.line import NOW
-from subzero.compiled import compiled
 from subzero.hull import feel_current, row_at, tow_wrench
+from subzero.jit import compiled
 from subzero.run_state import Live, Setup
 from vehicle import BREAKDOWN, STATE_SIZE
 

@@ -12,7 +12,7 @@ from cable.energy import FLOWS
 from cable.line import Line
 from cable.properties import CableNumbers, DrumNumbers
 from cable.water import Water
-from subzero.packed import packed
+from subzero.jit import packed
 from vehicle import VehicleNumbers
 
 

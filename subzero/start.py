@@ -13,13 +13,12 @@ from cable.energy import FLOWS, energy_flow
 from cable.laying import lay_straight, start_in_water
 from cable.line import NOW, Line, new_line
 from cable.pull_out import START_LENGTH
-from subzero.compiled import compiled
 from subzero.hanging import hang_between
 from subzero.hull import feel_current, pose, tow_point, way_of_tow_point
+from subzero.jit import compiled, packed
 from subzero.knots import knots
 from subzero.missing_force import MissingForce
 from subzero.model import Model
-from subzero.packed import packed
 from subzero.run_state import LINEAR_ROWS, Fixed, Live, Orders, Setup, new_now
 from subzero.steady_start import first_state
 from subzero.surroundings import drum_of, water_of, way_of_drum

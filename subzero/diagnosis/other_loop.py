@@ -15,8 +15,8 @@ import numpy as np
 from cable.drum_path import lead_drum
 from cable.lumped_rope import REST, STATE, Rope
 from cable.lumped_step import GAMMA, accept_step, try_step
-from subzero.compiled import allocating, compiled
 from subzero.coupling import _move, _solve_three, hull_steps
+from subzero.jit import allocating, compiled
 from subzero.recording import Recording, record_row
 from subzero.run_state import Live, Setup
 from vehicle import STATE_SIZE

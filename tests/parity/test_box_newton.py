@@ -19,7 +19,7 @@ from cable.box_solver import back_substitute
 from cable.equation7 import equation7_numbers
 from cable.paper_scheme import add_node, keep_old_time, pull_out_paper
 from cable.properties import CableProperties
-from subzero.compiled import compiled
+from subzero.jit import compiled
 
 HEAVY = equation7_numbers(CableProperties(mass_per_length=0.02, compliance=0.05), (0.2, 0.1, -0.1))
 TABLE_1 = equation7_numbers(CableProperties())

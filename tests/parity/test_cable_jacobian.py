@@ -31,7 +31,7 @@ from cable.line import (
 from cable.properties import CableProperties, DrumProperties
 from cable.water import Current
 from cable.wide_blocks import factor_wide, solve_wide
-from subzero.compiled import compiled
+from subzero.jit import compiled
 
 CABLE = CableProperties(mass_per_length=0.02, compliance=0.05, tangential_drag_coefficient=0.02).numbers()
 DRUM = DrumProperties(inertia=1e-3, friction_torque=0.01).numbers()

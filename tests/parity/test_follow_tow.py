@@ -18,7 +18,7 @@ from cable.properties import CableProperties, DrumProperties
 from cable.stepping import accept, try_step
 from cable.tow_point import follow_tow
 from cable.water import Current
-from subzero.compiled import compiled
+from subzero.jit import compiled
 
 CABLE = CableProperties(mass_per_length=0.02, compliance=1e-4).numbers()
 STIFF = CableProperties(mass_per_length=0.02, compliance=1e-4, bending_stiffness=1e-3).numbers()

@@ -21,12 +21,13 @@ from pathlib import Path
 
 import pytest
 
-from subzero import machine_code, progress
-from subzero.machine_code import CODE, HALF, KEPT, OTHERS, OUT_OF_USE_S, home_of
-from subzero.sources import Tree
+from subzero import progress
+from subzero.jit import machine_code
+from subzero.jit.machine_code import CODE, HALF, KEPT, OTHERS, OUT_OF_USE_S, home_of
+from subzero.jit.sources import Tree
 
 TINY = """
-from subzero.compiled import compiled
+from subzero.jit import compiled
 
 @compiled
 def scaled(x):
@@ -172,7 +173,7 @@ def test_two_processes_that_compile_the_same_leave_whole_files(tiny, base):
     """Each writes the file while the other does, many times; whatever a reader finds is whole."""
     write = f"""
 from pathlib import Path
-from subzero.machine_code import OTHERS, home_of
+from subzero.jit.machine_code import OTHERS, home_of
 home = home_of(OTHERS, Path({str(tiny)!r}))
 for k in range(100):
     home.keep("same.code", bytes([k % 256]) * 300_000)

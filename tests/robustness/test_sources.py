@@ -17,8 +17,8 @@ import pytest
 from numba.core.registry import CPUDispatcher
 
 import subzero
-from subzero.machine_code import compiler
-from subzero.sources import PACKAGES, Tree
+from subzero.jit.machine_code import compiler
+from subzero.jit.sources import PACKAGES, Tree
 
 ROOT = Path(subzero.__file__).resolve().parents[1]
 COMPILED = ("cable", "vehicle", "subzero")

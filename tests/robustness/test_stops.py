@@ -35,7 +35,7 @@ def fig6():
 @pytest.fixture
 def little_memory(monkeypatch):
     """100 MB are free."""
-    monkeypatch.setattr("subzero.memory.free_memory", lambda: 1e8)
+    monkeypatch.setattr("cable.memory.free_memory", lambda: 1e8)
 
 
 def test_ten_hours_at_default_steps_are_refused_with_what_to_change(fig6):

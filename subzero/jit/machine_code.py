@@ -1,7 +1,7 @@
 """Keep machine code for the next run: never stale, never damaged, never anybody else's, and never needed.
 
 What is kept of one function for one kind of arguments is a file. It lies in a folder named by a digest of all sources
-that it is made of (`subzero.sources`), of the versions of the compiler and of its settings, so whatever changes
+that it is made of (`subzero.jit.sources`), of the versions of the compiler and of its settings, so whatever changes
 starts a new folder. In front of the code stands a digest of it: a file that was cut, zeroed or has a flipped bit is
 not loaded but made anew. A file appears by one renaming, so neither an interrupt nor a second process spoils it.
 
@@ -37,7 +37,7 @@ from numba.core.serialize import dumps
 from numba.core.sigutils import normalize_signature
 
 from subzero.errors import printable
-from subzero.sources import PACKAGES, Tree
+from subzero.jit.sources import PACKAGES, Tree
 
 MARK = b"subzero machine code 1\n"
 """A file begins with this, then the digest of its name and of the rest."""

@@ -18,8 +18,8 @@ from pathlib import Path
 PACKAGES = ("cable", "scenarios", "subzero", "vehicle")
 """What is followed. All stand in one folder."""
 
-COMPILER = b"subzero.compiled"
-"""Whoever compiles a function imports this."""
+COMPILER = re.compile(rb"subzero\.jit(?!\.(?:machine_code|sources)\b)")
+"""Whoever compiles a function imports this; the two files that it leaves out only keep machine code."""
 
 _COMMENT = re.compile(rb"#[^\n]*")
 _IMPORT = re.compile(
@@ -37,7 +37,7 @@ class Tree:
     """
 
     def __init__(self, root: Path | None = None) -> None:
-        self.root = root or Path(__file__).resolve().parent.parent
+        self.root = root or Path(__file__).resolve().parents[2]
         self._texts: dict[Path, tuple[bytes, tuple[int, int]]] = {}
         self._led: dict[Path, frozenset[Path]] = {}
         self._files: dict[str, Path | None] = {}
@@ -54,7 +54,7 @@ class Tree:
             return self._led_to([file] if file else [])
         inside = sorted((self.root / package).rglob("*.py"))
         return self._led_to(
-            inside if package != "subzero" else [path for path in inside if COMPILER in self._text(path)]
+            inside if package != "subzero" else [path for path in inside if COMPILER.search(self._text(path))]
         )
 
     def _led_to(self, start: Iterable[Path]) -> frozenset[Path]:

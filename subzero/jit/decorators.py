@@ -1,7 +1,7 @@
 """Compile physics with numba, and keep what was compiled for the next run.
 
 The one thing that all packages share: a decorator, `compiled`, for functions on plain floats and arrays. What it
-compiles is kept by `subzero.machine_code`.
+compiles is kept by `subzero.jit.machine_code`.
 
 Setting ``NUMBA_DISABLE_JIT=1`` runs the same code interpreted.
 """
@@ -15,7 +15,7 @@ from typing import Any, TypeVar
 import numba
 import numba.extending
 
-from subzero.machine_code import MachineCode
+from subzero.jit.machine_code import MachineCode
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
