@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
+from cable.current import Current, Water
 from cable.drum import TURNING
-from cable.element import new_load
-from cable.equilibrium import hang, relax
-from cable.line import NOW, Line, new_line
+from cable.moving_end.equilibrium import hang, relax
+from cable.moving_end.segment_load import new_load
+from cable.moving_end.state import NOW, Line, new_line
 from cable.properties import CableProperties
-from cable.runs import check_kinds, current_of
-from cable.water import Current, Water
+from cable.tow_path import check_kinds, current_of
 from cable.winch import Brake
 from subzero.errors import UserError, real, short
 

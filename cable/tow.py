@@ -7,13 +7,15 @@ from math import inf, sqrt
 
 import numpy as np
 
-from cable.drum_path import resting
-from cable.element import new_load
+from cable.current import Current
+from cable.drum_motion import resting
 from cable.history import History
-from cable.laying import lay_straight
-from cable.line import NOW, TOLERANCE, Line, new_line
+from cable.moving_end.initial_shape import lay_straight
+from cable.moving_end.run import run
+from cable.moving_end.segment_load import new_load
+from cable.moving_end.state import NOW, TOLERANCE, Line, new_line
 from cable.properties import CableProperties, DrumProperties
-from cable.runs import (
+from cable.tow_path import (
     TowVelocity,
     check_kinds,
     check_memory,
@@ -22,11 +24,9 @@ from cable.runs import (
     checked_time,
     current_of,
     first_direction,
-    run,
     sample_path,
     segments_needed,
 )
-from cable.water import Current
 from subzero.errors import BadValueError, checked, short
 
 
@@ -84,7 +84,7 @@ def tow(
     if not isinstance(scheme, str) or scheme not in ("moving_end", "lumped"):
         raise BadValueError(f"scheme {short(scheme)} cannot tow a free end; choose 'moving_end' or 'lumped'.")
     if scheme == "lumped":
-        from cable.lumped_history import tow_lumped
+        from cable.lumped.history import tow_lumped
 
         return tow_lumped(
             tow_velocity,

@@ -6,10 +6,9 @@ import numpy as np
 
 import scenarios
 from cable.drum import LENGTH
-from cable.drum_path import SETPOINT
-from cable.energy import FLOWS, energy_flow
+from cable.drum_motion import SETPOINT
 from cable.hold import hold, lay_held
-from cable.laying import start_in_water
+from cable.moving_end import FLOWS, energy_flow, start_in_water
 from subzero.jit import compiled
 from subzero.model import Model
 from subzero.run_state import Live, Setup

@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 import vehicle
-from cable.water import water_velocity
+from cable.current import water_velocity
 from subzero.jit import allocating, compiled, inlined, inner, scratch
 from subzero.missing_wrench import add_missing
 from subzero.run_state import HEADING, LINEAR_ROWS, PITCH, PLACE, SLOPE, SPEED, TIME, HullWork, Live, Setup

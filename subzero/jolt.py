@@ -1,7 +1,8 @@
 """A prescribed motion whose rates change at once jolts its tow point: the cable takes that as an impulse.
 
 The motion is linear between its times, so speed and attitude have kinks there, and the rates of pitch and heading jump:
-the tow point, r_c from the centre, changes its velocity by R (ΔΩ × r_c). See `cable.jolt`. A smooth motion has none.
+the tow point, r_c from the centre, changes its velocity by R (ΔΩ × r_c). See `cable.moving_end.jolt`. A smooth motion
+has none.
 """
 
 from __future__ import annotations
@@ -9,8 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 import vehicle
-from cable.energy import STORED, energy_flow
-from cable.jolt import take_jolt
+from cable.moving_end import STORED, energy_flow, take_jolt
 from subzero.energy import KINETIC, PROPELLER
 from subzero.hull import row_at
 from subzero.jit import allocating, inner

@@ -13,7 +13,7 @@ import numpy as np
 
 import scenarios
 import vehicle
-from cable.energy import FLOWS, STORED, energy_flow
+from cable.moving_end import FLOWS, STORED, energy_flow
 from subzero.errors import BadValueError, UserError, real, short
 from subzero.hull import feel_current
 from subzero.jit import allocating

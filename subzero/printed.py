@@ -15,9 +15,15 @@ from collections.abc import Callable
 import numpy as np
 
 import scenarios
-from cable.box_history import START
-from cable.box_newton import OUTCOMES, ROW_NAMES, NewtonReport, box_workspace
-from cable.equation7 import angles_of, equation7_numbers
+from cable.feng_allen import (
+    OUTCOMES,
+    ROW_NAMES,
+    START,
+    NewtonReport,
+    angles_of,
+    box_workspace,
+    equation7_numbers,
+)
 from subzero.coupling import CABLE_FAILED, FASTEST, FINE
 from subzero.hull import tow_point, way_of_tow_point
 from subzero.model import Model

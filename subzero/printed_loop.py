@@ -1,7 +1,7 @@
 """The compiled loop of a coupled run with the paper's scheme: one cable step is one exchange, one node, one segment.
 
     (2) predict the vehicle to t_{k+1}, pulled by the cable's force of t_k, which is held
-    (3) solve (22)-(26) with the tow point's velocity V + Ω × r_c at t_{k+1}, `cable.paper_scheme`
+    (3) solve (22)-(26) with the tow point's velocity V + Ω × r_c at t_{k+1}, `cable.feng_allen.printed_scheme`
     (4) force (12) and moment (13) on the vehicle from node 0 of that solution
 
 as section 3 of Feng and Allen (2004) prints it: nothing is iterated between vehicle and cable, and no step is tried
@@ -16,10 +16,19 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cable.box_equations import Ends
-from cable.box_newton import CONVERGED, BoxWorkspace, NewtonReport, told
-from cable.equation7 import Equation7Numbers, tangent
-from cable.paper_scheme import NOTHING, advance_paper, node_force, start_paper
+from cable.feng_allen import (
+    CONVERGED,
+    NOTHING,
+    BoxWorkspace,
+    Ends,
+    Equation7Numbers,
+    NewtonReport,
+    advance_paper,
+    node_force,
+    start_paper,
+    tangent,
+    told,
+)
 from subzero.coupling import ABSURD, CABLE_FAILED, FINE, _move, hull_steps
 from subzero.energy import CABLE_LOSS, book
 from subzero.jit import compiled

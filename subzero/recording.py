@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 import vehicle
-from cable.line import NOW
+from cable.moving_end import NOW
 from subzero.hull import feel_current, row_at, tow_wrench
 from subzero.jit import compiled
 from subzero.run_state import Live, Setup

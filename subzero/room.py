@@ -12,7 +12,7 @@ import numpy as np
 
 import scenarios
 from cable.memory import fits, refuse_unless_it_fits
-from cable.runs import segments_needed
+from cable.tow_path import segments_needed
 from subzero.model import Model
 from subzero.recording import new_recording
 

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 import scenarios
-from cable.line import enlarged
-from cable.stops import Names, describe_stop
+from cable.moving_end import Names, describe_stop, enlarged
 from subzero import coupling
 from subzero.convergence import Accuracy, run_converged
 from subzero.errors import truth

@@ -7,11 +7,8 @@ import numpy as np
 import scenarios
 import vehicle
 from cable.drum import FREE
-from cable.drum_path import lead_drum
-from cable.element import new_load
-from cable.energy import FLOWS, energy_flow
-from cable.laying import lay_straight, start_in_water
-from cable.line import NOW, Line, new_line
+from cable.drum_motion import lead_drum
+from cable.moving_end import FLOWS, NOW, Line, energy_flow, lay_straight, new_line, new_load, start_in_water
 from cable.pull_out import START_LENGTH
 from subzero.hanging import hang_between
 from subzero.hull import feel_current, pose, tow_point, way_of_tow_point

@@ -7,9 +7,9 @@ from collections.abc import Callable
 import numpy as np
 
 import scenarios
-from cable.drum_path import PLACE, SETPOINT, VELOCITY, resting
+from cable.current import Current
+from cable.drum_motion import PLACE, SETPOINT, VELOCITY, resting
 from cable.properties import DrumProperties
-from cable.water import Current
 from cable.winch import Brake, ConstantTension, PayOutRate, Winch
 from subzero.model import Model
 
@@ -34,7 +34,7 @@ def drum_of(model: Model) -> DrumProperties | Winch:
 
 
 def way_of_drum(trial: scenarios.Trial, model: Model, wet: float) -> np.ndarray:
-    """Return where the drum goes, and what its winch is asked for, from a length `wet` [m] on, as `cable.drum_path`.
+    """Return where the drum goes, and what its winch is asked for, from a length `wet` [m] on, as `cable.drum_motion`.
 
     The times are those of the exchanges, and of all changes of winch and vessel: between them a velocity is linear, so
     the way is summed up exactly.

@@ -13,7 +13,7 @@ import numpy as np
 from subzero.run_state import Live
 
 NOT_KEPT = ("blocks", "pivots", "rows", "load", "slip", "normal_gain", "forcing", "solved")
-"""Fields of `cable.line.Line` and its ends that a step fills before it reads them, or that stay zero."""
+"""Fields of `cable.moving_end.state.Line` and its ends that a step fills before it reads them, or that stay zero."""
 OF_NOW = ("force", "force_before", "last_step")
 """Fields of `subzero.run_state.Now` that a step leaves for the next."""
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import vehicle
-from cable.line import enlarged
+from cable.moving_end import enlarged
 from scenarios import Start, Trial
 from subzero.autopilot.memory import Memory
 from subzero.autopilot.states import INPUT_NAMES, STATE_NAMES, from_vehicle, to_vehicle

@@ -1,6 +1,6 @@
 """The truth of a setting by the other cable formulation: lumped masses and springs instead of the moving end.
 
-Another cable (`cable.lumped_step`), another way to couple it (`other_loop`), finer steps, and sensors written once more
+Another cable (`cable.lumped.step`), another way to couple it (`other_loop`), finer steps, and sensors written once more
 (`other_sensors`). Only the hull is the same. Without the cable it is the hull alone in finer steps.
 
 Deliberately left out: a motion that is prescribed.
@@ -14,11 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 import scenarios
-from cable.lumped_history import rope_off_drum
-from cable.lumped_rope import Rope
-from cable.lumped_run import Course
-from cable.lumped_start import winch_rows
-from cable.lumped_step import begin
+from cable.lumped import Course, Rope, begin, rope_off_drum, winch_rows
 from cable.pull_out import START_LENGTH
 from scenarios.steps import fitting_step
 from subzero.diagnosis.other_loop import FINE, Led, follow_rope

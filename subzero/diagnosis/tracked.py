@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cable.line import enlarged
+from cable.moving_end import enlarged
 from subzero import coupling
 from subzero.diagnosis.setting import Setting
 from subzero.diagnosis.track import COLUMNS, follow

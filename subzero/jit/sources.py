@@ -141,7 +141,7 @@ def _imported(source: bytes, package: str) -> Iterator[str]:
 
 
 def _absolute(origin: str, package: str) -> str:
-    """Return ``cable.line`` for ``.line`` in the package cable; one more dot leads one package up."""
+    """Return ``cable.moving_end.state`` for ``.line`` in the package cable; one more dot leads one package up."""
     name = origin.lstrip(".")
     dots = len(origin) - len(name)
     if not dots:

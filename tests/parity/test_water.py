@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 import cable
-from cable.water import water_velocity
+from cable.current import water_velocity
 from subzero.jit import compiled
 
 HEAVY = cable.CableProperties(mass_per_length=0.0098)

@@ -310,7 +310,7 @@ def test_a_read_only_cache_without_the_code_says_so_in_one_line(run, base, monke
 def test_a_process_that_can_keep_nothing_runs_and_says_one_line(tmp_path):
     """A whole process, with several functions of two packages, whose cache folder is a file."""
     (tmp_path / "file").touch()
-    script = "from vehicle import initial_state; from cable.pay_out import *; print(initial_state()[3])"
+    script = "from vehicle import initial_state; from cable.moving_end.time_loop import *; print(initial_state()[3])"
     environment = os.environ | {"SUBZERO_CACHE_DIR": str(tmp_path / "file")}
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, env=environment,
                           check=False)  # fmt: skip

@@ -19,8 +19,8 @@ from rich.console import Console
 import cable
 import scenarios
 import subzero
-from cable.line import new_line
-from cable.stops import describe_stop
+from cable.moving_end.state import new_line
+from cable.moving_end.stops import describe_stop
 from subzero.cli import MISTAKE, main
 from subzero.progress import LONG_S, STANDSTILL_S, ProgressBar, costs_of
 
