@@ -12,9 +12,9 @@ import numpy as np
 import vehicle
 from cable.moving_end import STORED, energy_flow, take_jolt
 from subzero.energy import KINETIC, PROPELLER
-from subzero.hull import row_at
 from subzero.jit import allocating, inner
 from subzero.run_state import HEADING, LINEAR_ROWS, PITCH, TIME, Live, Setup
+from subzero.vehicle_step import row_at
 
 AT_KNOT = 1e-9
 """A time this near to one of the motion's is that time. [s]"""

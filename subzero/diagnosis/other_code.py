@@ -20,13 +20,13 @@ from scenarios.steps import fitting_step
 from subzero.diagnosis.other_loop import FINE, Led, follow_rope
 from subzero.diagnosis.other_sensors import seen
 from subzero.diagnosis.setting import Setting
+from subzero.environment import drum_of, water_of
 from subzero.errors import UserError
-from subzero.later import go_on_with, rows_of_changes
+from subzero.initial_conditions import prepare
+from subzero.model_changes import go_on_with, rows_of_changes
 from subzero.recording import Run, new_recording, record_row
 from subzero.run_state import Live, Setup
 from subzero.simulation import run_trial
-from subzero.start import prepare
-from subzero.surroundings import drum_of, water_of
 
 FASTEST = 2.0
 """Room for cable is made for this speed. [m/s]"""

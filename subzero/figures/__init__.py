@@ -21,7 +21,7 @@ from subzero.figures.style import Runs, warnings_in_short
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from subzero.measured import Record
+    from subzero.records.record import Record
 
 __all__ = [
     "attitude",

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from subzero.measured import Record
+    from subzero.records.record import Record
 
 ATTITUDE = {
     "propeller_speed": "Propeller speed",

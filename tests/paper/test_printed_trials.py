@@ -222,4 +222,4 @@ def test_a_default_run_imports_nothing_of_the_papers_scheme():
     scheme, modules = json.loads(done.stdout)
     assert scheme == "moving_end"
     assert "cable.moving_end.state" in modules
-    assert [m for m in modules if m.startswith(("subzero.printed", "cable.feng_allen"))] == []
+    assert [m for m in modules if m.startswith(("subzero.paper", "cable.feng_allen"))] == []

@@ -10,8 +10,8 @@ from math import cos, sin, sqrt
 
 import numpy as np
 
-from subzero.autopilot.pull import SteadyPull
-from subzero.autopilot.states import DEPTH, PITCH, ROLL, VELOCITY, rate
+from subzero.steady_motion.hull_state_space import DEPTH, PITCH, ROLL, VELOCITY, rate
+from subzero.steady_motion.steady_cable_force import SteadyPull
 from vehicle import VehicleNumbers
 
 RESIDUAL = 1e-9

@@ -21,7 +21,7 @@ import numpy as np
 from subzero.channels import BY_COLUMN, BY_NAME, TIME
 from subzero.errors import UserError, listed, printable, suggestion
 from subzero.errors import short as shown
-from subzero.turns import HEADING, TURN
+from subzero.records.heading import HEADING, TURN
 from subzero.user_file import MOST_COLUMNS, MOST_OF_A_CSV, UnreadableFileError, read_text
 
 GAPS = ("", "nan", "+nan", "-nan")

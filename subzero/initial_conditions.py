@@ -1,4 +1,7 @@
-"""The start of a run: from a trial and a model to what stays and what changes, the cable laid straight behind."""
+"""The start of a run: from a trial and a model to what stays and what changes.
+
+The cable is laid straight behind the vehicle, or hangs at rest between it and a drum that is somewhere else.
+"""
 
 from __future__ import annotations
 
@@ -6,19 +9,19 @@ import numpy as np
 
 import scenarios
 import vehicle
-from cable.drum import FREE
-from cable.drum_motion import lead_drum
+from cable.drum import FREE, LENGTH
+from cable.drum_motion import SETPOINT, lead_drum
+from cable.hold import hold, lay_held
 from cable.moving_end import FLOWS, NOW, Line, energy_flow, lay_straight, new_line, new_load, start_in_water
 from cable.pull_out import START_LENGTH
-from subzero.hanging import hang_between
-from subzero.hull import feel_current, pose, tow_point, way_of_tow_point
+from subzero.environment import drum_of, water_of, way_of_drum
+from subzero.external_force import MissingForce
 from subzero.jit import compiled, packed
 from subzero.knots import knots
-from subzero.missing_force import MissingForce
 from subzero.model import Model
 from subzero.run_state import LINEAR_ROWS, Fixed, Live, Orders, Setup, new_now
 from subzero.steady_start import first_state
-from subzero.surroundings import drum_of, water_of, way_of_drum
+from subzero.vehicle_step import feel_current, pose, tow_point, way_of_tow_point
 
 FORCE_TOLERANCE = 1e-9
 """Hull and cable agree when their forces differ by less than this fraction (and 1e-11 N)."""
@@ -157,3 +160,34 @@ def _track(trial: scenarios.Trial) -> np.ndarray:
         return knots(motion, trial.start.depth)
     columns = (motion.time, motion.surge_speed, motion.pitch, motion.heading)
     return np.array(columns, dtype=float)
+
+
+def hang_between(setup: Setup, live: Live, trial: scenarios.Trial, model: Model) -> None:
+    """Move the drum to where the trial has it, and let the cable in the water hang between it and the tow point.
+
+    Raises:
+        cable.HoldError: a cable that does not reach, or has no equilibrium.
+    """
+    fixed, now, wet = setup.fixed, live.now, trial.start.wet_length
+    places = np.array([now.tow, now.tow + np.array(trial.start.drum)])
+    held = hold(places, wet, water_of(model), cable=model.cable, segment_length=trial.segment_length)
+    fixed.drum_place[:] = setup.water.points[:3] = places[1]
+    led = setup.led
+    rate = (
+        (led[1, SETPOINT] - led[0, SETPOINT]) / (led[1, 0] - led[0, 0])
+        if fixed.drum.control == LENGTH
+        else 0.0
+    )
+    lay_held(live.line, held, now.change.copy(), fixed.drum.velocity, rate)
+    live.line.ends.segment_length = trial.segment_length
+    now.force[:] = held.tow_force
+    begin_at_rest(setup, live)
+
+
+@compiled
+def begin_at_rest(setup: Setup, live: Live) -> None:
+    """Fill what a cable that is laid out has at the start: the water around it, its momenta, its energy."""
+    start_in_water(live.line, setup.water, setup.fixed.cable, live.load)
+    energy_flow(live.line, setup.fixed.cable, live.load, live.now.ledger.cable_new)
+    for i in range(FLOWS):
+        live.now.ledger.cable_old[i] = live.now.ledger.cable_new[i]

@@ -1,4 +1,4 @@
-"""Run a trial with the paper's own scheme, "paper_tangent" or "paper_drum": the Python around `subzero.printed_loop`.
+"""Run a trial with the paper's own scheme, "paper_tangent" or "paper_drum": the Python around `subzero.paper.loop`.
 
 Imported, and compiled, only when a trial asks for it. What comes out looks like any other run, but for its energies:
 the work of the propeller and the loss of the hull are there, what needs the energy of the cable is NaN, for (22) has
@@ -25,13 +25,13 @@ from cable.feng_allen import (
     equation7_numbers,
 )
 from subzero.coupling import CABLE_FAILED, FASTEST, FINE
-from subzero.hull import tow_point, way_of_tow_point
+from subzero.initial_conditions import prepare
 from subzero.model import Model
-from subzero.printed_loop import Printed, pull_of, record_printed, run_printed_rows, start_at_drum
+from subzero.paper.loop import Printed, pull_of, record_printed, run_printed_rows, start_at_drum
 from subzero.recording import Pace, Run, cut, new_recording
 from subzero.run_state import Live, Setup
-from subzero.start import prepare
 from subzero.steady_start import first_state
+from subzero.vehicle_step import tow_point, way_of_tow_point
 
 REMEDIES = {
     "paper": 'scheme = "moving_end", the default, or a longer cable_step_s',

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from subzero.autopilot.states import SURGE
+from subzero.steady_motion.hull_state_space import SURGE
 from vehicle import Servo, Vehicle
 from vehicle.actuators import QUICKEST
 from vehicle.motor import battery_current, motor_numbers, voltage

@@ -6,21 +6,24 @@ Seven equations, seven unknowns; the roll angle is asked for (0) and held by unl
 are solved for without their limits first, if need be in steps from straight level motion to what is asked for: so a
 motion that cannot be had is told with the limit that is in its way. Speeds are through the water; a uniform current
 only carries the track.
+
+A motion that cannot be had is refused with what is in the way, and how far one can go (`NoTrimError`).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import cos, floor, sin
+from math import cos, degrees, floor, radians, sin
+from typing import NoReturn
 
 import numpy as np
 
-from subzero.autopilot.actuators import commands, ideal
-from subzero.autopilot.balance import Motion, level_propeller
-from subzero.autopilot.limits import NoTrimError, check_limits, check_request, say_how_far
-from subzero.autopilot.pull import SteadyPull, from_cable_model
-from subzero.autopilot.states import STATE_NAMES, VELOCITY, to_vehicle
+from subzero.errors import UserError, real, short
 from subzero.model import Model
+from subzero.steady_motion.actuators import commands, demands, ideal
+from subzero.steady_motion.equilibrium import Motion, level_propeller
+from subzero.steady_motion.hull_state_space import STATE_NAMES, VELOCITY, to_vehicle
+from subzero.steady_motion.steady_cable_force import SteadyPull, from_cable_model
 from vehicle import Vehicle, rotation
 
 STEPS = 20
@@ -202,3 +205,70 @@ def _cable_pull(model: Model, x: np.ndarray, turn_rate: float, wet_length: float
         return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]) @ R
 
     return from_cable_model(model, lambda t: turned(t) @ V, turned(duration), duration)
+
+
+CABLES = ("formula", "model")
+FASTEST = 50.0
+"""A run that is faster is stopped as absurd, `subzero.coupling.FASTEST`. [m/s]"""
+STEEPEST = radians(80.0)
+"""Pitch beyond which Euler angles are no use any more. [rad]"""
+
+
+class NoTrimError(UserError):
+    """There is no such steady motion; the message names the limit that is hit."""
+
+
+def check_request(
+    speed: float, depth_rate: float, turn_rate: float, wet_length: float, roll: float, cable: str
+) -> tuple[float, float, float, float, float]:
+    """Return the numbers of a request as floats; refuse what cannot be asked for."""
+    asked = {
+        "speed": speed,
+        "depth_rate": depth_rate,
+        "turn_rate": turn_rate,
+        "wet_length": wet_length,
+        "roll": roll,
+    }
+    numbers = {name: real(value) for name, value in asked.items()}
+    for name, number in numbers.items():
+        if number is None:
+            raise UserError(f"trim: {name} is {short(asked[name])}; it must be a finite number.")
+    speed, depth_rate, turn_rate, wet_length, roll = (number or 0.0 for number in numbers.values())
+    if speed <= 0.0:
+        raise UserError(f"trim: speed is {speed:g} m/s; fins need a flow, so it must be above 0.")
+    if speed > FASTEST:
+        raise UserError(
+            f"trim: speed is {speed:g} m/s; it must be at most {FASTEST:g}, as runs are stopped beyond."
+        )
+    if wet_length < 0.0:
+        raise UserError(f"trim: wet_length is {wet_length:g} m; it must be 0 or more.")
+    if not isinstance(cable, str) or cable not in CABLES:
+        raise UserError(f"trim: cable is {short(cable)}; it must be one of {', '.join(CABLES)}.")
+    if abs(depth_rate) > speed * sin(STEEPEST):
+        raise NoTrimError(
+            f"There is no steady motion at {speed:g} m/s with a depth rate of {depth_rate:g} m/s: the pitch angle would"
+            f" pass {degrees(STEEPEST):.0f} degrees. At this speed ±{speed * sin(STEEPEST):.2g} m/s is the most."
+        )
+    return speed, depth_rate, turn_rate, wet_length, roll
+
+
+def check_limits(hull: Vehicle, x: np.ndarray) -> None:
+    """Refuse a steady motion that some actuator cannot hold."""
+    beyond = [one for one in demands(hull, x) if one.value > one.limit]
+    if beyond:
+        said = "; ".join(
+            f"the {one.name} would need {one.value:.3g} {one.unit}, its limit is {one.limit:.3g}"
+            for one in beyond
+        )
+        raise NoTrimError(f"There is no such steady motion: {said}. Ask for less speed, turn or depth rate.")
+
+
+def say_how_far(hull: Vehicle, x: np.ndarray, share: float) -> NoReturn:
+    """Raise the error of a motion that has no balance."""
+    check_limits(hull, x)
+    most = max(demands(hull, x), key=lambda one: one.value / one.limit)
+    raise NoTrimError(
+        f"There is no such steady motion: there is no balance beyond {share:.0%} of the asked depth rate, turn rate and"
+        f" roll, where the {most.name} stands at {most.value:.3g} {most.unit} (limit {most.limit:.3g}): they stall."
+        " Ask for less, or for more speed."
+    )

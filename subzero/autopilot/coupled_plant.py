@@ -1,10 +1,14 @@
 """The coupled simulation as a discrete-time system: state and command in, next state out, nothing remembered.
 
-The vector of its state starts with the hull's 16 states and goes on with everything the cable remembers (`memory`).
+The vector of its state starts with the hull's 16 states and goes on with everything the cable remembers, as one flat
+array (`Memory`): what a step leaves for the next. The state of a cable is everything in its line but the work space of
+a step, and the pull at the last two times. As a flat array it can be the state vector of a discrete-time system:
+stored, restored and stepped again from anywhere.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from math import remainder, tau
 from typing import TYPE_CHECKING, Any
 
@@ -13,16 +17,15 @@ import numpy as np
 import vehicle
 from cable.moving_end import enlarged
 from scenarios import Start, Trial
-from subzero.autopilot.memory import Memory
-from subzero.autopilot.states import INPUT_NAMES, STATE_NAMES, from_vehicle, to_vehicle
 from subzero.coupling import FINE
 from subzero.errors import UserError
+from subzero.initial_conditions import prepare
 from subzero.loop import NO_ROOM, SPARE, run_rows
 from subzero.model import Model
 from subzero.recording import new_recording
-from subzero.run_state import Orders
+from subzero.run_state import Live, Orders
 from subzero.simulation import in_words
-from subzero.start import prepare
+from subzero.steady_motion.hull_state_space import INPUT_NAMES, STATE_NAMES, from_vehicle, to_vehicle
 from vehicle.state import CHARGE, LINKAGE
 
 if TYPE_CHECKING:
@@ -79,7 +82,7 @@ class Tethered:
         exact: solve every step to rounding, for derivatives by differences.
 
     Attributes:
-        initial: the state to start with, `HULL_SIZE` numbers of the hull and those of `memory.Memory`.
+        initial: the state to start with, `HULL_SIZE` numbers of the hull and those of `Memory`.
         sample_time: of a step. [s]
     """
 
@@ -152,3 +155,49 @@ class Tethered:
         pull = R.T @ F
         tensions = (np.linalg.norm(F), flat[places["node_tension"]][count])
         return np.concatenate([x[: len(STATE_NAMES)], [length, *tensions], pull, np.cross(self._r_c, pull)])
+
+
+NOT_KEPT = ("blocks", "pivots", "rows", "load", "slip", "normal_gain", "forcing", "solved")
+"""Fields of `cable.moving_end.state.Line` and its ends that a step fills before it reads them, or that stay zero."""
+OF_NOW = ("force", "force_before", "last_step")
+"""Fields of `subzero.run_state.Now` that a step leaves for the next."""
+
+
+class Memory:
+    """Views of all the numbers that a step leaves for the next, in one order.
+
+    Attributes:
+        places: name → its slice of the flat array.
+        size: numbers in all.
+    """
+
+    def __init__(self, live: Live) -> None:
+        self._views: dict[str, np.ndarray] = dict(_views(live))
+        ends = np.cumsum([view.size for view in self._views.values()])
+        self.places = {
+            name: slice(int(end) - view.size, int(end))
+            for (name, view), end in zip(self._views.items(), ends, strict=True)
+        }
+        self.size = int(ends[-1])
+
+    def read(self) -> np.ndarray:
+        """Return the numbers as they stand (size,)."""
+        return np.concatenate([view.ravel().astype(float) for view in self._views.values()])
+
+    def write(self, flat: np.ndarray) -> None:
+        """Put numbers (size,) back; whole numbers are rounded."""
+        for name, view in self._views.items():
+            values = flat[self.places[name]].reshape(view.shape)
+            view[...] = values if view.dtype.kind == "f" else np.rint(values).astype(view.dtype)
+
+
+def _views(live: Live) -> Iterator[tuple[str, np.ndarray]]:
+    """Walk through what is kept: name, view of the memory."""
+    for name in OF_NOW:
+        yield name, live.now.base[name]  # type: ignore[attr-defined]  # a packed record
+    for name in live.line.ends.base.dtype.names:  # type: ignore[attr-defined]
+        if name not in NOT_KEPT:
+            yield name, live.line.ends.base[name]  # type: ignore[attr-defined]
+    for name, values in zip(live.line._fields[1:], live.line[1:], strict=True):
+        if name not in NOT_KEPT:
+            yield name, values

@@ -15,11 +15,11 @@ import scenarios
 import vehicle
 from cable.moving_end import FLOWS, STORED, energy_flow
 from subzero.errors import BadValueError, UserError, real, short
-from subzero.hull import feel_current
+from subzero.initial_conditions import setup_of
 from subzero.jit import allocating
 from subzero.model import Model
 from subzero.run_state import Live, Setup
-from subzero.start import setup_of
+from subzero.vehicle_step import feel_current
 
 Later = Sequence[tuple[float, Model]]
 """(time [s], model) from which on another model holds."""

@@ -1,7 +1,7 @@
 """The one table of autopilots, and of what can be fed forward, by name.
 
 To add one of your own: a small file with a class as `flight.Autopilot` says, and a line here; or hand the object to
-`fly`; or give the path of the file as the name (`own`), on the command line too.
+`fly`; or give the path of the file as the name (`user_autopilot`), on the command line too.
 """
 
 from __future__ import annotations
@@ -12,10 +12,10 @@ import scenarios
 from subzero.autopilot.estimator import EstimatorLoop, estimates
 from subzero.autopilot.feed_forward import CableModel, FormulaCable, NoCable, TwinCable
 from subzero.autopilot.flight import Autopilot
-from subzero.autopilot.own import Build, built, from_file
-from subzero.autopilot.robustness import check_stable
+from subzero.autopilot.stability_margins import check_stable
 from subzero.autopilot.standard import StandardAutopilot
 from subzero.autopilot.tuning import Tuning, tune
+from subzero.autopilot.user_autopilot import Build, built, from_file
 from subzero.errors import UserError, chosen, real, short
 from subzero.model import Model, model_of
 
@@ -58,7 +58,7 @@ def make(
     """Return an autopilot by name.
 
     Args:
-        name: one of `AUTOPILOTS`, or the path of a Python file with one (`own`).
+        name: one of `AUTOPILOTS`, or the path of a Python file with one (`user_autopilot`).
         trial: what it will fly.
         feed_forward: one of `FEED_FORWARD`.
         sample_time: of the controller. [s]

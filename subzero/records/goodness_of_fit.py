@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from subzero.measured import Record
-from subzero.turns import HEADING, turned
+from subzero.records.heading import HEADING, turned
+from subzero.records.record import Record
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -32,7 +32,7 @@ def write(measured: Measured, title: str, answer: str, command: str, stage: Stag
         command: channel that was commanded.
         stage: where to.
     """
-    from subzero.autopilot.picture import picture
+    from subzero.autopilot.manoeuvre_figure import picture
     from subzero.summary import summary_of
 
     runs = {name: run for name, (run, _) in measured.items()}

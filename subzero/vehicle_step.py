@@ -15,8 +15,8 @@ import numpy as np
 
 import vehicle
 from cable.current import water_velocity
+from subzero.external_force import add_missing
 from subzero.jit import allocating, compiled, inlined, inner, scratch
-from subzero.missing_wrench import add_missing
 from subzero.run_state import HEADING, LINEAR_ROWS, PITCH, PLACE, SLOPE, SPEED, TIME, HullWork, Live, Setup
 from vehicle import STATE_SIZE
 
