@@ -15,8 +15,8 @@ from pathlib import Path
 import numpy as np
 
 import cable
-from cable.box_scheme import pull_out_boxes
-from cable.paper_scheme import BoxHistory, pull_out_paper
+from cable.feng_allen.box_scheme import pull_out_boxes
+from cable.feng_allen.printed_scheme import BoxHistory, pull_out_paper
 
 DRAG = cable.CableProperties().tangential_drag
 FIGURE = Path(__file__).parent.parent / "docs" / "figures" / "paper_scheme.png"

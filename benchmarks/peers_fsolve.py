@@ -14,7 +14,7 @@ import numpy as np
 from scipy.optimize import fsolve
 
 import cable
-from cable.equation7 import angles_of, equation7_numbers, load, space_matrix, time_matrix
+from cable.feng_allen.equation7 import angles_of, equation7_numbers, load, space_matrix, time_matrix
 
 SOLVED = 1e-6
 """Largest residual that counts as solved; fsolve's own verdict is "no good progress" where its guess is the answer."""

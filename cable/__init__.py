@@ -3,33 +3,37 @@
 Everything is SI, earth axes are north, east, down, positions are relative to the drum. The arc length s runs from
 the tow point to the drum, the tangent t points that way, so V_t is negative while cable is pulled out.
 
-symbol         name                                  unit      equation                           file
--------------  ------------------------------------  --------  ---------------------------------  ---------------
-T              tension                               N         (7), slack law T σ = T₀            slack
-t, d           tangent, chord of a segment           1, m      t = d/|d|                          element
-V, U           velocity, and relative to the water   m/s       U = V − J                          element
-p              momentum per length                   kg/s      p = m V + ρA (V − J)_⊥             element
-m, m1          mass, and with added mass, per length kg/m      m1 = m + ρA                        properties
-w_c            weight in water per length            N/m       (m − ρA) g                         properties
-e              compliance 1/(E A)                    1/N       strain e T                         properties
-C_t, C_n       drag coefficients                     1         ½ρπdC_t U_t|U_t|, ½ρdC_n U_⊥|U_⊥|  properties
-S              length in the water                   m         dS/dt = −V_t(S), (14)-(19)         line
-R_d, I_d, C_f  drum: radius, inertia, friction       m …       (11)                               drum
-F_c            force on the vehicle                  N         (12), f_1 − ½Q_1                   assembly
-α, β           angles of the paper's local frame     rad       (3)-(4)                            equation7
+symbol         name                                 unit      equation                           file
+-------------  -----------------------------------  --------  ---------------------------------  -----------------------
+T              tension                              N         (7), slack law T σ = T₀            moving_end/slack_law
+t, d           tangent, chord of a segment          1, m      t = d/|d|                          moving_end/segment_load
+V, U           velocity, and relative to the water  m/s       U = V − J                          moving_end/segment_load
+p              momentum per length                  kg/s      p = m V + ρA (V − J)_⊥             moving_end/segment_load
+m, m1          mass, with added mass, per length    kg/m      m1 = m + ρA                        properties
+w_c            weight in water per length           N/m       (m − ρA) g                         properties
+e              compliance 1/(E A)                   1/N       strain e T                         properties
+C_t, C_n       drag coefficients                    1         ½ρπdC_t U_t|U_t|, ½ρdC_n U_⊥|U_⊥|  properties
+S              length in the water                  m         dS/dt = −V_t(S), (14)-(19)         moving_end/state
+R_d, I_d, C_f  drum: radius, inertia, friction      m …       (11)                               drum
+F_c            force on the vehicle                 N         (12), f_1 − ½Q_1                   moving_end/assembly
+α, β           angles of the paper's local frame    rad       (3)-(4)                            feng_allen/equation7
 
-The balances are vectors, `element` and `assembly` (their equivalence with the paper's six scalar equations, whose
-signs are derived anew, is in `equation7` and tested); time is differenced backward, `differences`; a step is solved by
-Newton's method, `newton`, on a block tridiagonal system, `blocks`, and made real by `stepping`. The paper's own scheme
-(20)-(26) stands beside it as `paper_scheme`. Where a cable comes to rest is `hold`; what a jolt does to it, `jolt`.
+What a user calls stands here: `pull_out`, `tow` and `hold`, what they take (`properties`, `winch`, `current`,
+`tow_path`, `drum_motion`) and give (`history`). Below are three formulations that share nothing but these:
+
+* `moving_end`, the default: balances are vectors (their equivalence with the paper's six scalar equations, whose signs
+  are derived anew, is in `feng_allen.equation7` and tested), time is differenced backward, and a step is solved by
+  Newton's method on a block tridiagonal system.
+* `lumped`: masses and stiff springs, another time scheme.
+* `feng_allen`: the paper's angles, in its own scheme (20)-(26) as printed, and in a box scheme of second order.
 """
 
+from cable.current import Current
 from cable.history import History, Outcome
 from cable.hold import Equilibrium, HoldError, hold
 from cable.properties import CableProperties, DrumProperties
 from cable.pull_out import SCHEMES, pull_out
 from cable.tow import tow
-from cable.water import Current
 from cable.winch import Brake, ConstantTension, PayOutRate
 
 __all__ = [

@@ -18,9 +18,8 @@ from __future__ import annotations
 
 from math import sqrt
 
-from subzero.compiled import inner
-
-from .properties import DrumNumbers
+from cable.properties import DrumNumbers
+from subzero.jit import inner
 
 TURNING, STANDING, SPINNING = 0, 1, 2
 

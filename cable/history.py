@@ -22,7 +22,8 @@ class Outcome:
         worst_residual: residual left in the last step, as a multiple of its tolerance.
         steps: how many steps were taken, with those that were made smaller than the time between two results.
         largest_courant_number: √(T/m1) Δt/Δs, how many segments a transverse wave crosses in a step, at most.
-        energy_residual: what is missing in the balance of `cable.energy`, as a share of the work and the loss in all.
+        energy_residual: what is missing in the balance of `moving_end.energy`, as a share of the work and the loss in
+            all.
     """
 
     completed: bool
@@ -50,7 +51,7 @@ class History:
         outcome: how the run ended; a stopped run keeps what it has.
         scheme: the scheme that was used.
         tow_impulse: impulse of the cable on the vehicle just after each time, where the tow point changes its
-            velocity at once (n, 3), zero elsewhere; the tow forces do not show it (`cable.jolt`). Empty for other
+            velocity at once (n, 3), zero elsewhere; the tow forces do not show it (`moving_end.jolt`). Empty for other
             schemes. [N s]
     """
 

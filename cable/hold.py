@@ -8,16 +8,15 @@ from typing import Any
 
 import numpy as np
 
+from cable.current import Current, Water
+from cable.drum import TURNING
+from cable.moving_end.equilibrium import hang, relax
+from cable.moving_end.segment_load import new_load
+from cable.moving_end.state import NOW, Line, new_line
+from cable.properties import CableProperties
+from cable.tow_path import check_kinds, current_of
+from cable.winch import Brake
 from subzero.errors import UserError, real, short
-
-from .drum import TURNING
-from .element import new_load
-from .equilibrium import hang, relax
-from .line import NOW, Line, new_line
-from .properties import CableProperties
-from .runs import check_kinds, current_of
-from .water import Current, Water
-from .winch import Brake
 
 Place = Sequence[float] | np.ndarray
 """North, east, down. [m]"""

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from subzero.errors import BadValueError, checked
-from subzero.packed import packed
+from subzero.jit import packed
 
 GRAVITY = 9.81
 """Gravitational acceleration g, as printed in section 2.2 of the source. [m/s²]"""
@@ -76,7 +76,7 @@ class CableProperties:
         tangential_drag_coefficient: C_t, on the wetted surface π d. [-]
         normal_drag_coefficient: C_n, on the projected area d. [-]
         compliance: e = 1/(E A); 0 is an inextensible cable. [1/N]
-        bending_stiffness: E I; see `cable.bending`. [N m²]
+        bending_stiffness: E I; see `moving_end.bending`. [N m²]
         strength: the load that it may carry, working or breaking; 0 is not known. Nothing is computed with it. [N]
         minimum_bend_radius: the tightest bend that it may take; 0 is not known. Nothing is computed with it. [m]
 

@@ -6,17 +6,17 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from subzero.errors import BadValueError, checked, real, short, suggestion
-
-from .drum import LENGTH
-from .drum_path import PLACE, SETPOINT, VELOCITY, drum_path, resting
-from .element import new_load
-from .history import History
-from .hold import Equilibrium, lay_held
-from .laying import lay_straight
-from .line import TOLERANCE, new_line
-from .properties import CableProperties, DrumProperties
-from .runs import (
+from cable.current import Current
+from cable.drum import LENGTH
+from cable.drum_motion import PLACE, SETPOINT, VELOCITY, drum_path, resting
+from cable.history import History
+from cable.hold import Equilibrium, lay_held
+from cable.moving_end.initial_shape import lay_straight
+from cable.moving_end.run import run
+from cable.moving_end.segment_load import new_load
+from cable.moving_end.state import TOLERANCE, new_line
+from cable.properties import CableProperties, DrumProperties
+from cable.tow_path import (
     TowVelocity,
     check_kinds,
     check_memory,
@@ -25,12 +25,11 @@ from .runs import (
     checked_time,
     current_of,
     first_direction,
-    run,
     sample_path,
     segments_needed,
 )
-from .water import Current
-from .winch import Brake, ConstantTension, PayOutRate, Winch
+from cable.winch import Brake, ConstantTension, PayOutRate, Winch
+from subzero.errors import BadValueError, checked, real, short, suggestion
 
 START_LENGTH = 1e-6
 """A run "without cable" starts with this length in the water, so that there is a direction. [m]"""
@@ -85,7 +84,7 @@ def pull_out(
         drum_velocity: function of time [s] that gives the velocity of a moving drum (a boat) north, east, down (3,); a
             drum on the shore when not given. [m/s]
         rtol: with a positive value, steps are made as small as needed for an error of the tow force of about this share
-            of its largest (`cable.step_size`), but for jolts; 0 takes every step as it is.
+            of its largest (`moving_end.step_control`), but for jolts; 0 takes every step as it is.
         grading: new segments are Δs + grading · s long, s from the tow point: far from the vehicle a cable is coarser.
         tolerance: how exactly the default scheme solves a step: balances of forces to this share of the largest
             tension, strains to a thousandth of it. With 1e-5 most steps take one Newton iteration, not two, and what
@@ -129,7 +128,7 @@ def pull_out(
     if scheme == "lumped":
         segments_needed(max(wet_length, segment_length), segment_length, 0.0)
     if scheme == "lumped" and rtol == 0.0 and grading == 0.0:
-        from .lumped_history import pull_out_lumped
+        from cable.lumped.history import pull_out_lumped
 
         return pull_out_lumped(
             tow_velocity,
@@ -150,7 +149,7 @@ def pull_out(
                 "grading ('lumped' knows all but these two); use 'moving_end'."
             )
             raise BadValueError(message)
-        from .paper_history import pull_out_as_printed
+        from cable.feng_allen.printed_history import pull_out_as_printed
 
         uniform = water.velocity.reshape(3)
         return pull_out_as_printed(tow_velocity, duration, step, cable, drum, uniform, scheme, segment_length)

@@ -7,15 +7,15 @@ from math import inf, sqrt
 
 import numpy as np
 
-from subzero.errors import BadValueError, checked, short
-
-from .drum_path import resting
-from .element import new_load
-from .history import History
-from .laying import lay_straight
-from .line import NOW, TOLERANCE, Line, new_line
-from .properties import CableProperties, DrumProperties
-from .runs import (
+from cable.current import Current
+from cable.drum_motion import resting
+from cable.history import History
+from cable.moving_end.initial_shape import lay_straight
+from cable.moving_end.run import run
+from cable.moving_end.segment_load import new_load
+from cable.moving_end.state import NOW, TOLERANCE, Line, new_line
+from cable.properties import CableProperties, DrumProperties
+from cable.tow_path import (
     TowVelocity,
     check_kinds,
     check_memory,
@@ -24,11 +24,10 @@ from .runs import (
     checked_time,
     current_of,
     first_direction,
-    run,
     sample_path,
     segments_needed,
 )
-from .water import Current
+from subzero.errors import BadValueError, checked, short
 
 
 def tow(
@@ -85,7 +84,7 @@ def tow(
     if not isinstance(scheme, str) or scheme not in ("moving_end", "lumped"):
         raise BadValueError(f"scheme {short(scheme)} cannot tow a free end; choose 'moving_end' or 'lumped'.")
     if scheme == "lumped":
-        from .lumped_history import tow_lumped
+        from cable.lumped.history import tow_lumped
 
         return tow_lumped(
             tow_velocity,

@@ -15,11 +15,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cable.drum import LENGTH, TENSION
+from cable.properties import DrumNumbers
 from subzero.errors import BadValueError, checked, real, short
-from subzero.packed import packed
-
-from .drum import LENGTH, TENSION
-from .properties import DrumNumbers
+from subzero.jit import packed
 
 Schedule = float | Callable[[float], float]
 """A number, or a function of time [s]."""

@@ -89,11 +89,11 @@ def simulate(
         check: run it once more with half the steps and half the segment length, and say what changes.
         strict: end with exit code 3 if the run ends with warnings.
     """
-    from subzero import delivery
+    from subzero import write_results
     from subzero.output import staged
 
     trial = scenarios.load(scenario, commands_csv=commands, motion_csv=motion)
-    with staged(out or delivery.default_folder(trial)) as stage:
+    with staged(out or write_results.default_folder(trial)) as stage:
         trial, extended = cli_diagnosis.extended_run(_checked(scenario, commands, motion), with_, effects)
         with _progress(trial) as progress:
             from subzero.simulation import simulate as run
@@ -101,8 +101,8 @@ def simulate(
             result = run(trial, tethered=not untethered, **extended, progress=progress)
         runs = {"untethered" if untethered else "tethered": result}
         runs = _refined(runs, trial, extended) if check else runs
-        summary = delivery.write_all(runs, None, stage)
-    return FINE if delivery.tell(summary, stage, strict=strict) else STOPPED
+        summary = write_results.write_all(runs, None, stage)
+    return FINE if write_results.tell(summary, stage, strict=strict) else STOPPED
 
 
 @app.command
@@ -132,21 +132,21 @@ def compare(
         check: run both once more with half the steps and half the segment length, and say what changes.
         strict: end with exit code 3 if a run ends with warnings.
     """
-    from subzero import delivery
-    from subzero.measured import read_record
+    from subzero import write_results
     from subzero.output import staged
+    from subzero.records.record import read_record
 
     trial = scenarios.load(scenario, commands_csv=commands, motion_csv=motion)
     record = read_record(measured) if measured is not None else None
-    with staged(out or delivery.default_folder(trial)) as stage:
+    with staged(out or write_results.default_folder(trial)) as stage:
         trial, extended = cli_diagnosis.extended_run(_checked(scenario, commands, motion), with_, effects)
         with _progress(trial) as progress:
             from subzero.comparison import compare as run
 
             result = run(trial, measured=record, **extended, progress=progress)
         runs = _refined(result.runs, trial, extended) if check else result.runs
-        summary = delivery.write_all(runs, result.measured, stage)
-    return FINE if delivery.tell(summary, stage, strict=strict) else STOPPED
+        summary = write_results.write_all(runs, result.measured, stage)
+    return FINE if write_results.tell(summary, stage, strict=strict) else STOPPED
 
 
 cli_autopilot.add_to(app)

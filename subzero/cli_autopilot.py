@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     import xarray as xr
 
-    from subzero.autopilot.showing import Measured
+    from subzero.autopilot.output import Measured
     from subzero.simulation import Progress
 
     Fly = Callable[[str, Progress], tuple[xr.Dataset, dict[str, float]]]
@@ -94,7 +94,7 @@ def fly_step(
     Args:
         name: heading_step, depth_step or speed_step.
         scenario: whose vehicle, cable and start: a name (see "subzero list") or a path.
-        autopilot: pid, lqr, or the path of a Python file with one (see subzero/autopilot/own.py).
+        autopilot: pid, lqr, or the path of a Python file with one (see subzero/autopilot/user_autopilot.py).
         feed_forward: none, formula or model: what it knows of the cable.
         size: of the step, in degrees, m or m/s.
         speed: to hold, in m/s.
@@ -140,10 +140,10 @@ def _deliver(
     trial: scenarios.Trial, fly: Fly, folder: Path, title: str, shown: tuple[str, str], strict: bool
 ) -> int:
     """Fly with the cable and without, write and tell; return the exit code."""
-    from subzero.autopilot import AutopilotWarning, showing
-    from subzero.delivery import refuse_warnings
+    from subzero.autopilot import AutopilotWarning, output
     from subzero.output import staged
     from subzero.progress import costs_of, progress_bar
+    from subzero.write_results import refuse_warnings
 
     with staged(folder) as stage:
         with warnings.catch_warnings():
@@ -152,8 +152,8 @@ def _deliver(
             for label in RUNS:
                 with progress_bar(f"Flying {trial.name}, {label}", lambda: costs_of(trial)) as progress:
                     measured[label] = fly(label, progress)
-        summary = showing.write(measured, title, *shown, stage)
-    stopped = showing.tell(summary, list(measured), stage)
+        summary = output.write(measured, title, *shown, stage)
+    stopped = output.tell(summary, list(measured), stage)
     for message in stopped:
         print(message, file=sys.stderr)
     return STOPPED if stopped or (strict and refuse_warnings(summary)) else FINE

@@ -64,12 +64,12 @@ def diagnose(
     with staged(out) as stage:
         own = _own(effects)
         logged = _read(records, scenario, commands)
-        from subzero import delivery_diagnosis
+        from subzero import write_diagnosis
 
         with patience(LAST_WORDS_S):
             verdict = _ask(logged, own, seed, "screen" if screen else "full")
-            delivery_diagnosis.write_all(verdict, logged, stage, effects=own, effects_file=effects)
-    delivery_diagnosis.tell(verdict, stage)
+            write_diagnosis.write_all(verdict, logged, stage, effects=own, effects_file=effects)
+    write_diagnosis.tell(verdict, stage)
     if not verdict.complete:
         print("Interrupted; what it has is written.", file=sys.stderr)
     return FINE if verdict.complete else INTERRUPTED
@@ -162,8 +162,8 @@ def _read(paths: list[Path], scenario: str | None, commands: str | None) -> list
 
 def _ask(logged: list[Logged], own: tuple[Effect, ...], seed: int, budget: str) -> Verdict:
     """Diagnose under a progress bar; an interrupt ends it with what it has, if it has anything."""
-    from subzero.delivery_diagnosis import tell_before
     from subzero.diagnosis.entrance import diagnose as run
+    from subzero.write_diagnosis import tell_before
 
     with progress_bar("Diagnosing", lambda: COSTS) as progress:
         return run(logged, effects=own, progress=progress, seed=seed, budget=budget, seen=tell_before)

@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import scenarios
-from subzero.fit import Fit, beside, fits
-from subzero.later import Later
-from subzero.measured import Record, read_record
 from subzero.model import Model
+from subzero.model_changes import Later
+from subzero.records.goodness_of_fit import Fit, beside, fits
+from subzero.records.record import Record, read_record
 from subzero.simulation import simulate
 from subzero.summary import summary_of
 from subzero.trials import load

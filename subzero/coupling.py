@@ -5,9 +5,9 @@ the cable is solved for the place to which that takes the tow point; F_{n+1} is 
 
     G(F) = F_cable(x_tow(F)) − F = 0
 
-Newton's method solves it, with the cable's own ∂F/∂x (`cable.tow_point.impedance`) and the hull's ∂x/∂F = (h²/2) A,
-A the inverse mass at the tow point; two to three evaluations do. An exchange that does not converge is tried again in
-halves.
+Newton's method solves it, with the cable's own ∂F/∂x (`cable.moving_end.tow_boundary.impedance`) and the hull's ∂x/∂F
+= (h²/2) A, A the inverse mass at the tow point; two to three evaluations do. An exchange that does not converge is
+tried again in halves.
 
 The exchange is of second order, and stable for a cable of any weight. A loose one (the force of the step before) is not
 for a cable heavier than the vehicle; nor is a force that goes linearly from F_n to F_{n+1}: a heavy cable then answers
@@ -18,17 +18,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from cable.drum_path import lead_drum
-from cable.energy import energy_flow
-from cable.line import NOW
-from cable.stepping import accept, try_step
-from cable.tow_point import impedance
-from subzero.compiled import compiled, inlined, inner
+from cable.drum_motion import lead_drum
+from cable.moving_end import NOW, accept, energy_flow, impedance, try_step
 from subzero.energy import book
-from subzero.hull import advance_hull, follow_track, tow_point
+from subzero.jit import compiled, inlined, inner, scratch
 from subzero.jolt import take_jolt_of_motion
 from subzero.run_state import Live, Now, Setup
-from subzero.scratch import scratch
+from subzero.vehicle_step import advance_hull, follow_track, tow_point
 from vehicle import STATE_SIZE
 
 MOST_EXCHANGES = 60

@@ -4,10 +4,10 @@
 
 relative to the water. ΔE is the change of the kinetic energy (hull with its added mass, cable), of the potential energy
 and of the elastic energy. What a missing force takes is booked with the loss of the hull. In a current that changes
-along the way, the hull's balance closes only as far as it may be taken as steady (`hull.feel_current`), and what the
-current does to the cable is booked with its added mass. The terms of the cable are those of `cable.energy`. Powers are
-summed up by the trapezoidal rule over hull steps (hull) and exchanges (cable), so the residual is of second order in
-both. In a prescribed run the "propeller" is whatever moves the tow point.
+along the way, the hull's balance closes only as far as it may be taken as steady (`vehicle_step.feel_current`), and
+what the current does to the cable is booked with its added mass. The terms of the cable are those of
+`cable.moving_end.energy`. Powers are summed up by the trapezoidal rule over hull steps (hull) and exchanges (cable),
+so the residual is of second order in both. In a prescribed run the "propeller" is whatever moves the tow point.
 """
 
 from __future__ import annotations
@@ -15,11 +15,21 @@ from __future__ import annotations
 import numpy as np
 
 import vehicle
-from cable.energy import ADDED_MASS, AT_DRUM, CARRIED, FLOWS, GRAVITY_WORK, LOSS, STORED, STRAINED, TOWED
-from subzero.compiled import inlined
-from subzero.hull import feel_current, row_at, tow_wrench
-from subzero.missing_wrench import add_missing
+from cable.moving_end import (
+    ADDED_MASS,
+    AT_DRUM,
+    CARRIED,
+    FLOWS,
+    GRAVITY_WORK,
+    LOSS,
+    STORED,
+    STRAINED,
+    TOWED,
+)
+from subzero.external_force import add_missing
+from subzero.jit import inlined
 from subzero.run_state import Live, Setup
+from subzero.vehicle_step import feel_current, row_at, tow_wrench
 
 PROPELLER, HULL_LOSS, CABLE_LOSS, KINETIC, DRUM, ADDED, RESIDUAL = range(7)
 """Rows of `Ledger.total`, in the order of the energy channels. [J]"""

@@ -1,7 +1,8 @@
 """A prescribed motion whose rates change at once jolts its tow point: the cable takes that as an impulse.
 
 The motion is linear between its times, so speed and attitude have kinks there, and the rates of pitch and heading jump:
-the tow point, r_c from the centre, changes its velocity by R (ΔΩ × r_c). See `cable.jolt`. A smooth motion has none.
+the tow point, r_c from the centre, changes its velocity by R (ΔΩ × r_c). See `cable.moving_end.jolt`. A smooth motion
+has none.
 """
 
 from __future__ import annotations
@@ -9,12 +10,11 @@ from __future__ import annotations
 import numpy as np
 
 import vehicle
-from cable.energy import STORED, energy_flow
-from cable.jolt import take_jolt
-from subzero.compiled import allocating, inner
+from cable.moving_end import STORED, energy_flow, take_jolt
 from subzero.energy import KINETIC, PROPELLER
-from subzero.hull import row_at
+from subzero.jit import allocating, inner
 from subzero.run_state import HEADING, LINEAR_ROWS, PITCH, TIME, Live, Setup
+from subzero.vehicle_step import row_at
 
 AT_KNOT = 1e-9
 """A time this near to one of the motion's is that time. [s]"""

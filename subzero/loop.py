@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from subzero.compiled import compiled
 from subzero.coupling import FINE, exchange
+from subzero.jit import compiled
 from subzero.recording import Recording, record_row
 from subzero.run_state import Live, Setup
 

@@ -39,7 +39,7 @@ def progress_bar(words: str, costs: Callable[[], str] = str) -> ProgressBar:
 
     Arguments as of `ProgressBar`.
     """
-    from subzero.machine_code import before_compiling
+    from subzero.jit.machine_code import before_compiling
 
     console = Console(stderr=True, highlight=False)
     before_compiling(lambda: console.print(COMPILING))

@@ -9,10 +9,10 @@ from typing import NamedTuple
 import numpy as np
 
 import vehicle
-from cable.line import NOW
-from subzero.compiled import compiled
-from subzero.hull import feel_current, row_at, tow_wrench
+from cable.moving_end import NOW
+from subzero.jit import compiled
 from subzero.run_state import Live, Setup
+from subzero.vehicle_step import feel_current, row_at, tow_wrench
 from vehicle import BREAKDOWN, STATE_SIZE
 
 BREATH_S = 0.1

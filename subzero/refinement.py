@@ -20,8 +20,8 @@ import xarray as xr
 
 import scenarios
 from subzero.channels import BY_NAME, CHANNELS
-from subzero.later import Later
 from subzero.model import Model
+from subzero.model_changes import Later
 from subzero.simulation import simulate
 from subzero.summary import FORCE, MOMENT
 from subzero.trials import load

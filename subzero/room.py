@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 import scenarios
-from cable.runs import segments_needed
-from subzero.memory import fits, refuse_unless_it_fits
+from cable.memory import fits, refuse_unless_it_fits
+from cable.tow_path import segments_needed
 from subzero.model import Model
 from subzero.recording import new_recording
 

@@ -7,12 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cable.element import Load
-from cable.energy import FLOWS
-from cable.line import Line
+from cable.current import Water
+from cable.moving_end import FLOWS, Line, Load
 from cable.properties import CableNumbers, DrumNumbers
-from cable.water import Water
-from subzero.packed import packed
+from subzero.jit import packed
 from vehicle import VehicleNumbers
 
 
@@ -47,7 +45,7 @@ class Ledger:
     Attributes:
         total: (7,), rows as in `subzero.energy`. [J]
         hull_old, hull_new: powers of `vehicle.power` (4,). [W]
-        cable_old, cable_new: flows of `cable.energy.energy_flow` (FLOWS,).
+        cable_old, cable_new: flows of `cable.moving_end.energy.energy_flow` (FLOWS,).
         kinetic: kinetic energy of the hull at the last accepted time. [J]
     """
 
@@ -119,7 +117,7 @@ class Setup(NamedTuple):
         fixed: numbers; `drum` in it is where the drum is at the end of the step that is being tried.
         orders, track: what the vehicle is told, or how it moves (LINEAR_ROWS or KNOT_ROWS, n).
         water: how the water moves; its origin is the drum's place at the start.
-        led: how the drum moves, and what its winch is asked for, see `cable.drum_path` (n, 8).
+        led: how the drum moves, and what its winch is asked for, see `cable.drum_motion` (n, 8).
         added, terms: what the model lacks, see `MissingForce.numbers` (7, n), (m, 5); empty for nothing.
     """
 

@@ -56,8 +56,8 @@ def _check_fins(start: scenarios.Start, model: Model) -> None:
 
 def _steady(trial: scenarios.Trial, model: Model, tethered: bool) -> np.ndarray:
     """Return the state of a trial that starts in trim."""
-    from subzero.autopilot.states import to_vehicle
-    from subzero.autopilot.steady import trim
+    from subzero.steady_motion.hull_state_space import to_vehicle
+    from subzero.steady_motion.trim_point import trim
 
     start, water = trial.start, _water_at_the_start(model, trial.start.depth)
     wet, speed, R = start.wet_length if tethered else 0.0, start.surge_speed, np.empty((3, 3))

@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from subzero.channels import BY_NAME
-from subzero.fit import Fit, fits
+from subzero.records.goodness_of_fit import Fit, fits
 from subzero.validity import warnings_of
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from subzero.measured import Record
+    from subzero.records.record import Record
 
 ENERGY_PARTS = ("hull_loss", "cable_loss", "kinetic_change", "drum", "added_mass_term", "residual")
 """Where the work of the propeller goes; their sum is ``energy_propeller_work``."""

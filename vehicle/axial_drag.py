@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from subzero.compiled import compiled
+from subzero.jit import compiled
 from vehicle.parameters import Section, parameter
 
 

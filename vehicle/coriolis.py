@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from subzero.compiled import compiled
+from subzero.jit import compiled
 
 
 @compiled

@@ -15,7 +15,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from subzero.compiled import compiled
+from subzero.jit import compiled
 from vehicle.geometry import Hull, hull_radius
 from vehicle.parameters import Section, parameter
 

@@ -13,7 +13,7 @@ from dataclasses import astuple, dataclass
 
 import numpy as np
 
-from subzero.compiled import compiled
+from subzero.jit import compiled
 from vehicle.parameters import Section, parameter
 
 

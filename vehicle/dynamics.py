@@ -11,8 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from subzero.compiled import compiled
-from subzero.scratch import scratch
+from subzero.jit import compiled, scratch
 from vehicle.actuators import fin_angle, servo_rate, settle
 from vehicle.kinematics import motion, normalise, rotation
 from vehicle.motor import battery_current, shaft_goal, shaft_rate, shaft_speed, voltage

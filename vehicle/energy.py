@@ -10,8 +10,7 @@ water, so use P_restoring, not V, there.
 
 from __future__ import annotations
 
-from subzero.compiled import compiled
-from subzero.scratch import scratch
+from subzero.jit import compiled, scratch
 from vehicle.dynamics import evaluate, relative_velocity
 from vehicle.kinematics import rotation
 from vehicle.restoring import potential

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from subzero.compiled import allocating, compiled
+from subzero.jit import allocating, compiled
 from vehicle.dynamics import derivative, finish_step
 from vehicle.energy import POWERS, power
 from vehicle.state import STATE_SIZE

@@ -14,7 +14,7 @@ import math
 
 import numpy as np
 
-from subzero.compiled import allocating, compiled
+from subzero.jit import allocating, compiled
 
 
 @compiled

@@ -16,7 +16,7 @@ import math
 from dataclasses import astuple, dataclass
 from typing import NamedTuple
 
-from subzero.compiled import compiled
+from subzero.jit import compiled
 from vehicle.actuators import QUICKEST
 from vehicle.parameters import Section, parameter
 from vehicle.propeller import PropellerNumbers, torque

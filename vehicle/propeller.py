@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from subzero.compiled import compiled
+from subzero.jit import compiled
 from vehicle.parameters import Section, parameter
 
 

@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from subzero.compiled import compiled
+from subzero.jit import compiled
 from vehicle.added_mass import munk_correction
 from vehicle.axial_drag import axial_drag
 from vehicle.body_lift import body_lift

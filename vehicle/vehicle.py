@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from subzero.errors import short
-from subzero.packed import packed
+from subzero.jit import packed
 from vehicle.actuators import Servo, Servos
 from vehicle.added_mass import AddedMass
 from vehicle.axial_drag import AxialDrag

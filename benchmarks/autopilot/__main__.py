@@ -67,8 +67,8 @@ other = autopilot.fly(trial, Mine(), lambda t: goal)
 
 `autopilot.plant(model, tethered=True)` is the same vehicle for `control.interconnect` and `input_output_response`;
 `subzero.Simulator` steps it for any other controller, and for one that learns Gymnasium does:
-`gymnasium.make("subzero.environment:subzero/TetheredHeading-v0")`, or `"subzero/TetheredHeading-v0"` after
-`import subzero.environment` (since 1.0 Gymnasium finds no environments by itself). On the command line:
+`gymnasium.make("subzero.gym_environment:subzero/TetheredHeading-v0")`, or `"subzero/TetheredHeading-v0"` after
+`import subzero.gym_environment` (since 1.0 Gymnasium finds no environments by itself). On the command line:
 `subzero manoeuvre zigzag --rudder 10`, `subzero autopilot heading_step --autopilot lqr --feed-forward model`, or
 `--autopilot mine.py` with a function `make(tuning, sample_time, cable)` that returns such an object.
 """

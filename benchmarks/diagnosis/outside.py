@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from subzero.diagnosis.setting import Setting
-from subzero.missing_force import AXES, MissingForce, Term
+from subzero.external_force import AXES, MissingForce, Term
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -18,7 +18,7 @@ import numpy as np
 
 import subzero
 from benchmarks.diagnosis.story_cases import STORIES, Story
-from subzero import delivery_diagnosis
+from subzero import write_diagnosis
 from subzero.channels import BY_NAME
 from subzero.diagnosis import tables, words
 from subzero.diagnosis.challenge import SAMPLE
@@ -94,7 +94,7 @@ def keep(logged: Logged, verdict: Verdict, folder: Path) -> None:
         header = ",".join(["time_s", *(BY_NAME[name].column for name in names)])
         columns = np.column_stack([logged.record.time, *(logged.record.values[name] for name in names)])
         np.savetxt(stage.path / "record.csv", columns, fmt="%.6g", delimiter=",", header=header, comments="")
-        delivery_diagnosis.write_all(verdict, [logged], stage)
+        write_diagnosis.write_all(verdict, [logged], stage)
 
 
 def main() -> None:

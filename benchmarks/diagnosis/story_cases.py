@@ -9,7 +9,7 @@ from benchmarks.diagnosis.manoeuvres import braked_rich
 from subzero.diagnosis.setting import Setting
 from subzero.diagnosis.trial_library import cruise, flown, rudder_doublets
 from subzero.diagnosis.verdict import CAUSE_NAMED, NOTHING_WRONG, OUTSIDE, UNDECIDED
-from subzero.missing_force import MissingForce
+from subzero.external_force import MissingForce
 
 BASIC = ("surge_speed", "heading", "yaw_rate", "pitch", "roll", "depth")
 

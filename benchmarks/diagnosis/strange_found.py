@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from subzero.diagnosis.verdict import Unknown, Verdict
-from subzero.missing_force import AXES, history_at
+from subzero.external_force import AXES, history_at
 
 from .cases import Made
 

@@ -7,7 +7,7 @@ import numpy as np
 from subzero.diagnosis.effects.sensors import SPECS
 from subzero.diagnosis.other_code import NoTruthError, simulate_otherwise
 from subzero.diagnosis.setting import Setting
-from subzero.measured import Record
+from subzero.records.record import Record
 
 RHO, OUTLIERS, GAPS, FAR = 0.5, 0.01, 0.02, 15.0
 """Of the noise: correlation from sample to sample, shares of outliers and gaps; size of an outlier in noise levels."""

@@ -1,4 +1,4 @@
-"""Where the tow point's work goes: into motion, stretch and weight, drag, the drum and the water (`cable.energy`):
+"""Where the tow point's work goes: into motion, stretch and weight, drag, the drum and the water (`moving_end.energy`):
 
     −F·U(0) = dE/dt + L − G + D_S + M + C,        U = V − J
 
@@ -29,7 +29,7 @@ from .row import Row, order_row
 CROSSES_ZERO = ("elastic helix",)
 """What is missing changes its sign on the way: a slope through that tells no order, and is shown without a verdict."""
 HEAVY = cable.CableProperties(mass_per_length=0.0055, compliance=0.05)
-SOURCE = "cable/energy.py"
+SOURCE = "cable/moving_end/energy.py"
 ELASTIC = {
     "cable": HEAVY,
     "current": SHEARED,

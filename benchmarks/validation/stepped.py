@@ -1,4 +1,4 @@
-"""A cable stepped by hand through `cable.stepping`: for cases whose start, ends or forces no public call offers.
+"""A cable stepped by hand (`moving_end.time_step`): for cases whose start, ends or forces no public call offers.
 
 The start is any shape: node positions, a tension for each segment, everything at rest or moving as given. Then the tow
 point is put anywhere, step by step, and the far end is a drum, a winch or free.
@@ -11,12 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from cable import Brake, CableProperties, Current
-from cable.element import Load, new_load
-from cable.laying import start_in_water
-from cable.line import NOW, Line, new_line
+from cable.current import Water
+from cable.moving_end.initial_shape import start_in_water
+from cable.moving_end.segment_load import Load, new_load
+from cable.moving_end.state import NOW, Line, new_line
+from cable.moving_end.time_step import accept, try_step
 from cable.properties import DrumNumbers
-from cable.stepping import accept, try_step
-from cable.water import Water
 
 STILL = Current.uniform((0.0, 0.0, 0.0))
 

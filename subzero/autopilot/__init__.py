@@ -19,74 +19,76 @@ are through the water. Names come from their modules when they are first used: p
     >>> run = autopilot.fly(trial, pilot, lambda t: autopilot.Wanted(speed=1.0, heading=0.5, depth=1.0))
 
 symbol       name                                    unit        file
------------  --------------------------------------  ----------  ----------
-x, u         states and inputs of a plant            SI          states
-F_c          pull of the cable in steady motion      N           pull
-x₀, u₀       trim: steady state and its command      SI          steady
+-----------  --------------------------------------  ----------  ---------------------
+x, u         states and inputs of a plant            SI          hull_state_space
+F_c          pull of the cable in steady motion      N           steady_cable_force
+x₀, u₀       trim: steady state and its command      SI          trim_point
 A, B, C, D   linear model about it                   SI          linear, cable_modes
 A_k, B_k     linear model along a run                SI          along
-λ L/U, ζ     poles in the vehicle's time scale       1           poles
-k, k_I       feedback and integral gains             SI          design, weighting
+λ L/U, ζ     poles in the vehicle's time scale       1           linear
+k, k_I       feedback and integral gains             SI          design, lqr_weights
 δ_ff         feed-forward, against hull and cable    SI          standard
+
+`hull_state_space`, `steady_cable_force` and `trim_point` stand in `subzero.steady_motion`: a run may start in trim.
 """
 
 from importlib import import_module
 from typing import Any
 
 _HOME = {
-    "AUTOPILOTS": "table",
-    "Along": "along",
-    "Autopilot": "flight",
-    "AutopilotError": "flight",
-    "AutopilotWarning": "flight",
-    "CableModel": "feed_forward",
-    "ESTIMATED": "sensors",
-    "EstimatorLoop": "estimator",
-    "FEED_FORWARD": "table",
-    "FormulaCable": "feed_forward",
-    "Gains": "design",
-    "INPUTS": "states",
-    "Law": "loops",
-    "Loop": "loops",
-    "MANOEUVRES": "manoeuvres",
-    "Margins": "frequency",
-    "Mode": "poles",
-    "NoCable": "feed_forward",
-    "NoTrimError": "limits",
-    "PERFECT": "sensors",
-    "STATES": "states",
-    "STEPS": "steps",
-    "SUBSYSTEMS": "linear",
-    "Schedule": "schedule",
-    "Sensor": "sensors",
-    "Sensors": "sensors",
-    "StandardAutopilot": "standard",
-    "Trim": "steady",
-    "Tuning": "tuning",
-    "TwinCable": "feed_forward",
-    "UNITS": "states",
-    "WEIGHTS": "weighting",
-    "Wanted": "standard",
-    "Weights": "weighting",
-    "design_gains": "design",
-    "estimates": "estimator",
-    "fly": "flight",
-    "linearise": "linear",
-    "linearise_along": "along",
-    "loop_margins": "robustness",
-    "make": "table",
-    "manoeuvre": "manoeuvres",
-    "margins": "frequency",
-    "modes": "poles",
-    "plant": "plants",
-    "reduced": "design",
-    "step": "steps",
-    "subsystem": "linear",
-    "trim": "steady",
-    "tune": "tuning",
-    "with_weights": "weighting",
+    "AUTOPILOTS": "subzero.autopilot.registry",
+    "Along": "subzero.autopilot.along",
+    "Autopilot": "subzero.autopilot.flight",
+    "AutopilotError": "subzero.autopilot.flight",
+    "AutopilotWarning": "subzero.autopilot.flight",
+    "CableModel": "subzero.autopilot.feed_forward",
+    "ESTIMATED": "subzero.autopilot.sensors",
+    "EstimatorLoop": "subzero.autopilot.estimator",
+    "FEED_FORWARD": "subzero.autopilot.registry",
+    "FormulaCable": "subzero.autopilot.feed_forward",
+    "Gains": "subzero.autopilot.design",
+    "INPUTS": "subzero.steady_motion.hull_state_space",
+    "Law": "subzero.autopilot.loops",
+    "Loop": "subzero.autopilot.loops",
+    "MANOEUVRES": "subzero.autopilot.manoeuvres",
+    "Margins": "subzero.autopilot.stability_margins",
+    "Mode": "subzero.autopilot.linear",
+    "NoCable": "subzero.autopilot.feed_forward",
+    "NoTrimError": "subzero.steady_motion.trim_point",
+    "PERFECT": "subzero.autopilot.sensors",
+    "STATES": "subzero.steady_motion.hull_state_space",
+    "STEPS": "subzero.autopilot.steps",
+    "SUBSYSTEMS": "subzero.autopilot.linear",
+    "Schedule": "subzero.autopilot.schedule",
+    "Sensor": "subzero.autopilot.sensors",
+    "Sensors": "subzero.autopilot.sensors",
+    "StandardAutopilot": "subzero.autopilot.standard",
+    "Trim": "subzero.steady_motion.trim_point",
+    "Tuning": "subzero.autopilot.tuning",
+    "TwinCable": "subzero.autopilot.feed_forward",
+    "UNITS": "subzero.steady_motion.hull_state_space",
+    "WEIGHTS": "subzero.autopilot.lqr_weights",
+    "Wanted": "subzero.autopilot.standard",
+    "Weights": "subzero.autopilot.lqr_weights",
+    "design_gains": "subzero.autopilot.design",
+    "estimates": "subzero.autopilot.estimator",
+    "fly": "subzero.autopilot.flight",
+    "linearise": "subzero.autopilot.linear",
+    "linearise_along": "subzero.autopilot.along",
+    "loop_margins": "subzero.autopilot.stability_margins",
+    "make": "subzero.autopilot.registry",
+    "manoeuvre": "subzero.autopilot.manoeuvres",
+    "margins": "subzero.autopilot.stability_margins",
+    "modes": "subzero.autopilot.linear",
+    "plant": "subzero.autopilot.plants",
+    "reduced": "subzero.autopilot.design",
+    "step": "subzero.autopilot.steps",
+    "subsystem": "subzero.autopilot.linear",
+    "trim": "subzero.steady_motion.trim_point",
+    "tune": "subzero.autopilot.tuning",
+    "with_weights": "subzero.autopilot.lqr_weights",
 }
-"""Public name → module of this package; no module may be called like a public name."""
+"""Public name → its module; no module of this package may be called like a public name."""
 
 __all__ = sorted(_HOME)
 
@@ -97,7 +99,7 @@ def __getattr__(name: str) -> Any:
         raise AttributeError(
             f"module 'subzero.autopilot' has no attribute '{name}'; it has {', '.join(__all__)}"
         )
-    value = getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
+    value = getattr(import_module(_HOME[name]), name)
     globals()[name] = value
     return value
 

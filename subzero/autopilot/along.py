@@ -2,9 +2,9 @@
 
     δx_{k+1} = A_k δx_k + B_k δu_k,   A_k = ∂Φ/∂x, B_k = ∂Φ/∂u at (x_k, u_k) of the run
 
-with Φ one exchange of the coupled simulation (`tethered`): hull, actuators as they are, the cable's shape at two times,
-its drum. A_k has thousands of entries that nobody needs by themselves, so it is never written down: its product with a
-deviation is a central difference along that deviation,
+with Φ one exchange of the coupled simulation (`coupled_plant`): hull, actuators as they are, the cable's shape at two
+times, its drum. A_k has thousands of entries that nobody needs by themselves, so it is never written down: its product
+with a deviation is a central difference along that deviation,
 
     A_k δx_k + B_k δu_k = (Φ(x_k + h δx_k, u_k + h δu_k) − Φ(x_k − h δx_k, u_k − h δu_k))/2h
 
@@ -23,12 +23,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from scenarios import Trial
-from subzero.autopilot.states import INPUT_NAMES, STATE_NAMES, UNITS
-from subzero.autopilot.steady import Trim
-from subzero.autopilot.tethered import CABLE_OUTPUTS, HULL_SIZE, NoRoomError, Tethered, blank_trial
+from subzero.autopilot.coupled_plant import CABLE_OUTPUTS, HULL_SIZE, NoRoomError, Tethered, blank_trial
 from subzero.channels import BY_NAME
 from subzero.errors import UserError
 from subzero.model import Model
+from subzero.steady_motion.hull_state_space import INPUT_NAMES, STATE_NAMES, UNITS
+from subzero.steady_motion.trim_point import Trim
 from subzero.trials import load
 
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ class Along:
 
         Returns:
             deviations over `time` by name: `STATES`, and length, tensions and pull of the cable
-            (`tethered.CABLE_OUTPUTS`), in SI units, rad and rev/s.
+            (`coupled_plant.CABLE_OUTPUTS`), in SI units, rad and rev/s.
 
         Raises:
             UserError: deviations of another shape, or not finite; a step of the run that has no derivative.

@@ -1,7 +1,7 @@
 """What the cable does to the vehicle, as a controller can know it: for the feed-forward path.
 
 Both need no look at the true state. The formula takes drum length, speed and yaw rate as measured, and knows how a
-cable cuts a corner (`behind`). The twin is a simulation of vehicle and cable that runs beside the
+cable cuts a corner (`cable_in_turn`). The twin is a simulation of vehicle and cable that runs beside the
 controller under the commands that were sent; its pull is taken in proportion to the length of cable that the drum has
 really let go.
 """
@@ -14,7 +14,7 @@ from math import cos, exp, sin
 import numpy as np
 
 import scenarios
-from subzero.autopilot.behind import Behind
+from subzero.autopilot.cable_in_turn import Behind
 from subzero.autopilot.sensors import UNKNOWN
 from subzero.autopilot.tuning import Tuning
 from subzero.errors import UserError
@@ -70,7 +70,8 @@ class FormulaCable(CableModel):
     """½ρπdC_t ∫V_t² ds against the end of the cable, from drum length, speed and yaw rate.
 
     On a straight way the cable slides with the speed S' at which the drum lets it go, and pulls against the way of the
-    tow point; in a turn it cuts the corner (`behind`). S' is the slope of the drum length, smoothed over `SMOOTHED`.
+    tow point; in a turn it cuts the corner (`cable_in_turn`). S' is the slope of the drum length, smoothed over
+    `SMOOTHED`.
 
     Args:
         tuning: of the vehicle, for the sway that goes with a yaw rate.

@@ -2,33 +2,36 @@
 
     δx' = A δx + B δu,   A = ∂f/∂x, B = ∂f/∂u at (x₀, u₀)               by central differences
 
-with f of `states`, and with a cable the motion of its own (`cable_modes`): straight behind the vehicle, paying out at
-its speed from a drum on the shore, and frozen at one length. The actuators have their lags and no limits, dead bands or
-play: at a command inside a dead band the true derivative would be zero. Where the hull is (north, east) changes nothing
-and is left out; on a cable the bearing from the drum takes its place.
+with f of `hull_state_space`, and with a cable the motion of its own (`cable_modes`): straight behind the vehicle,
+paying out at its speed from a drum on the shore, and frozen at one length. The actuators have their lags and no
+limits, dead bands or play: at a command inside a dead band the true derivative would be zero. Where the hull is
+(north, east) changes nothing and is left out; on a cable the bearing from the drum takes its place.
 
 A cable pulls the heading back to the line from the drum. Only the whole picture, cable and all, may be turned about the
 drum, which is the pole at 0 that is left: it stands for the bearing, which moves on over a length S of way, not for
 the heading. What this model promises: 10 % of gain and 10° of phase from 0.3 to 4 rad/s, while the cable grows by less
 than two fifths of its length in a period (docs/autopilot.md). For anything else than a straight way there is
 `linearise_along`.
+
+`modes` gives its poles in words: how fast, how damped, in seconds and in the vehicle's own time L/U.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import inf, pi
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 import vehicle
-from subzero.autopilot.actuators import ideal
 from subzero.autopilot.cable_modes import BENDS, CableModes
-from subzero.autopilot.pull import SteadyPull
-from subzero.autopilot.states import INPUT_NAMES, STATE_NAMES, VELOCITY, rate, to_vehicle
-from subzero.autopilot.steady import Trim
 from subzero.errors import UserError, suggestion
 from subzero.model import Model
+from subzero.steady_motion.actuators import ideal
+from subzero.steady_motion.hull_state_space import INPUT_NAMES, STATE_NAMES, VELOCITY, rate, to_vehicle
+from subzero.steady_motion.steady_cable_force import SteadyPull
+from subzero.steady_motion.trim_point import Trim
 from vehicle.rigid_body import skew
 
 if TYPE_CHECKING:
@@ -66,7 +69,7 @@ SUBSYSTEMS = {
     ),
     "roll": Subsystem(("roll_rate", "roll", "stern_planes_difference"), ("stern_planes_difference_command",)),
 }
-"""The four loops, by name; both planes together pitch, unlike they roll (`states.MIXED`)."""
+"""The four loops, by name; both planes together pitch, unlike they roll (`hull_state_space.MIXED`)."""
 
 
 def linearise(model: Model, steady: Trim, *, cross_flow: float = 0.0) -> control.StateSpace:
@@ -238,7 +241,7 @@ SUBSYSTEM_COMMANDS = ("stern_planes_command", "stern_planes_difference_command")
 
 
 def _rows(names: tuple[str, ...], port: str, mixed: tuple[str, str]) -> dict[str, np.ndarray]:
-    """Return each signal as a row over `names`, and the planes together and unlike (`states.MIXED`)."""
+    """Return each signal as a row over `names`, and the planes together and unlike (`hull_state_space.MIXED`)."""
     rows = dict(zip(names, np.eye(len(names)), strict=True))
     starboard = rows[port.replace("port", "starboard")]
     rows[mixed[0]], rows[mixed[1]] = 0.5 * (starboard + rows[port]), 0.5 * (starboard - rows[port])
@@ -248,3 +251,51 @@ def _rows(names: tuple[str, ...], port: str, mixed: tuple[str, str]) -> dict[str
 def _spread(row: np.ndarray) -> np.ndarray:
     """Return how the signals move when the one that `row` reads moves by one and its opposite stays."""
     return row / float(row @ row)
+
+
+if TYPE_CHECKING:
+    import control
+
+
+class Mode(NamedTuple):
+    """One pole, or a pair.
+
+    Attributes:
+        pole: λ; of a pair the one above the real axis. [1/s]
+        scaled: λ L/U; −1 decays to 37 % while the hull moves on by its own length.
+        time_constant: −1/Re λ, infinite for an integrator, negative for what grows. [s]
+        damping: ζ = −Re λ/|λ|; 1 for a real pole that decays, −1 for one that grows, 0 for an integrator.
+        period: of the oscillation, infinite without one. [s]
+    """
+
+    pole: complex
+    scaled: complex
+    time_constant: float
+    damping: float
+    period: float
+
+
+INTEGRATOR = 1e-6
+"""A pole nearer to zero than this times U/L is an integrator: differences do not know it better."""
+
+
+def modes(system: control.StateSpace, steady: Trim) -> list[Mode]:
+    """Return the modes of a continuous linear model, slowest first.
+
+    Args:
+        system: from `linearise` or `subsystem`.
+        steady: the motion it belongs to, for L/U.
+    """
+    scale = steady.time_scale
+    poles = [complex(pole) for pole in np.linalg.eigvals(np.asarray(system.A))]
+    kept = [pole for pole in poles if pole.imag >= -1e-12 * abs(pole)]
+    return [_mode(pole, scale) for pole in sorted(kept, key=abs)]
+
+
+def _mode(pole: complex, scale: float) -> Mode:
+    """Describe a pole."""
+    if abs(pole) * scale < INTEGRATOR:
+        return Mode(pole, pole * scale, inf, 0.0, inf)
+    time_constant = -1.0 / pole.real if pole.real else inf
+    period = 2.0 * pi / abs(pole.imag) if pole.imag else inf
+    return Mode(pole, pole * scale, time_constant, -pole.real / abs(pole), period)

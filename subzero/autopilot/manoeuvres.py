@@ -29,11 +29,11 @@ from subzero.autopilot.programs import (
     ZigZag,
 )
 from subzero.autopilot.standard import Wanted
-from subzero.autopilot.states import INPUT_NAMES
-from subzero.autopilot.steady import trim
 from subzero.errors import UserError, checked, chosen
 from subzero.model import Model, model_of
 from subzero.simulation import Progress
+from subzero.steady_motion.hull_state_space import INPUT_NAMES
+from subzero.steady_motion.trim_point import trim
 from subzero.trials import load
 
 if TYPE_CHECKING:

@@ -1,8 +1,8 @@
 """Plants for python-control: the hull alone in continuous time, and hull and cable together in discrete time.
 
-The hull alone is x' = f(x, u) of `states`, with the servos and the motor as they are: limits, dead bands, sag. With the
-cable it is the coupled simulation itself, one exchange of hull and cable a step (`tethered`): an update depends on
-nothing but its arguments, and may be repeated, interconnected and linearised like any other system.
+The hull alone is x' = f(x, u) of `hull_state_space`, with the servos and the motor as they are: limits, dead bands,
+sag. With the cable it is the coupled simulation itself, one exchange of hull and cable a step (`coupled_plant`): an
+update depends on nothing but its arguments, and may be repeated, interconnected and linearised like any other system.
 """
 
 from __future__ import annotations
@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from subzero.autopilot.states import INPUT_NAMES, PLACE, STATE_NAMES, rate
-from subzero.autopilot.steady import Trim
-from subzero.autopilot.tethered import Tethered, blank_trial
+from subzero.autopilot.coupled_plant import Tethered, blank_trial
 from subzero.errors import UserError
 from subzero.model import Model
+from subzero.steady_motion.hull_state_space import INPUT_NAMES, PLACE, STATE_NAMES, rate
+from subzero.steady_motion.trim_point import Trim
 
 if TYPE_CHECKING:
     import control
@@ -40,7 +40,7 @@ def plant(
 
     Args:
         model: vehicle, cable, drum and current.
-        tethered: the coupled simulation, in discrete time, with `tethered.CABLE_OUTPUTS`; else the hull alone in
+        tethered: the coupled simulation, in discrete time, with `coupled_plant.CABLE_OUTPUTS`; else the hull alone in
             continuous time, with its states as outputs.
         start: the steady motion to begin with, its length of cable laid straight behind; at rest by default.
         depth: to begin at. [m]

@@ -17,8 +17,8 @@ import numpy as np
 
 from subzero.autopilot.feed_forward import CableModel, NoCable
 from subzero.autopilot.loops import Law, Loop
+from subzero.autopilot.lqr_weights import WEIGHTS
 from subzero.autopilot.tuning import Tuning
-from subzero.autopilot.weighting import WEIGHTS
 from subzero.errors import UserError
 from subzero.simulator import Observation
 from vehicle import Servo

@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING
 import scenarios
 from subzero.autopilot.flight import fly
 from subzero.autopilot.indices import step_response
+from subzero.autopilot.registry import make
 from subzero.autopilot.sensors import PERFECT, Sensor
 from subzero.autopilot.standard import Wanted
-from subzero.autopilot.steady import trim
-from subzero.autopilot.table import make
 from subzero.autopilot.tuning import Tuning
 from subzero.errors import UserError, checked, chosen, real, short
 from subzero.model import Model, model_of
 from subzero.simulation import Progress
+from subzero.steady_motion.trim_point import trim
 from subzero.trials import load
 
 if TYPE_CHECKING:

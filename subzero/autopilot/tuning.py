@@ -14,10 +14,10 @@ import numpy as np
 
 from subzero.autopilot.design import Gains, design_gains, reduced
 from subzero.autopilot.linear import linearise, subsystem
+from subzero.autopilot.lqr_weights import WEIGHTS, Weights, checked
 from subzero.autopilot.schedule import Schedule
-from subzero.autopilot.steady import Trim, trim
-from subzero.autopilot.weighting import WEIGHTS, Weights, checked
 from subzero.model import Model
+from subzero.steady_motion.trim_point import Trim, trim
 from vehicle.propeller import thrust
 
 if TYPE_CHECKING:

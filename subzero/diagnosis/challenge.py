@@ -22,10 +22,10 @@ from subzero.diagnosis.outside_kinds import draw_outside
 from subzero.diagnosis.setting import Setting
 from subzero.diagnosis.told import TOLD
 from subzero.errors import UserError, printable
-from subzero.measured import Record
 from subzero.model import Model
+from subzero.records.heading import HEADING, TURN
+from subzero.records.record import Record
 from subzero.trials import load
-from subzero.turns import HEADING, TURN
 
 BASIC = ("surge_speed", "heading", "yaw_rate", "pitch", "roll", "depth")
 """Channels that a challenge measures."""

@@ -20,7 +20,7 @@ from subzero.diagnosis.extended import STARTS, ExtendedFile, all_effects, force_
 from subzero.diagnosis.verdict import Extended
 from subzero.errors import UserError, listed, printable, suggestion
 from subzero.errors import short as shown
-from subzero.missing_force import AXES, MissingForce, Term
+from subzero.external_force import AXES, MissingForce, Term
 
 KEYS = ("scenario", "source", "effects_file", "effects", "calibration", "missing_force", "missing_term")
 

@@ -12,7 +12,7 @@ from subzero.diagnosis.extended import STARTS, all_effects, force_key, key_of, p
 from subzero.diagnosis.setting import Setting
 from subzero.diagnosis.verdict import Extended
 from subzero.errors import printable
-from subzero.missing_force import AXES, FEATURES, MissingForce
+from subzero.external_force import AXES, FEATURES, MissingForce
 
 DIGITS = 8
 """Significant ones in the file."""

@@ -22,7 +22,7 @@ from subzero.diagnosis.struck import Struck, in_its_place, struck
 from subzero.diagnosis.sudden import Place
 from subzero.diagnosis.suspects import Suspect, suspects
 from subzero.diagnosis.unknown import FINE, FORCE, Knots, all_columns, force_columns, knots_of
-from subzero.missing_force import AXES
+from subzero.external_force import AXES
 
 ALIKE = 10.0
 """Forces whose log posteriors differ by less are told apart with finer knots."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from subzero.diagnosis.shapes import SAMPLE, Shape
 from subzero.diagnosis.unknown import history
-from subzero.missing_force import MissingForce, Term
+from subzero.external_force import MissingForce, Term
 
 NORMAL = 1.96
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from subzero.diagnosis.setting import Setting
-from subzero.measured import Record
+from subzero.records.record import Record
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,7 +9,7 @@ import numpy as np
 from subzero.diagnosis.effects.sensors import NOISE
 from subzero.diagnosis.other_code import simulate_otherwise
 from subzero.diagnosis.setting import Setting
-from subzero.measured import Record
+from subzero.records.record import Record
 
 OUTLIER = (8.0, 25.0)
 """Outliers lie so many noise levels off."""

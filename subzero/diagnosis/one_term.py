@@ -17,7 +17,7 @@ from subzero.diagnosis.problem import Problem
 from subzero.diagnosis.shape_prior import all_shapes, shape_weight, size_of
 from subzero.diagnosis.shapes import factors_along
 from subzero.diagnosis.unknown import Knots
-from subzero.missing_force import AXES
+from subzero.external_force import AXES
 
 
 def one_terms(problem: Problem, z: np.ndarray, knots: Knots) -> Mapping[str, Terms]:

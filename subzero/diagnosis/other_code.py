@@ -1,6 +1,6 @@
 """The truth of a setting by the other cable formulation: lumped masses and springs instead of the moving end.
 
-Another cable (`cable.lumped_step`), another way to couple it (`other_loop`), finer steps, and sensors written once more
+Another cable (`cable.lumped.step`), another way to couple it (`other_loop`), finer steps, and sensors written once more
 (`other_sensors`). Only the hull is the same. Without the cable it is the hull alone in finer steps.
 
 Deliberately left out: a motion that is prescribed.
@@ -14,23 +14,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 import scenarios
-from cable.lumped_history import rope_off_drum
-from cable.lumped_rope import Rope
-from cable.lumped_run import Course
-from cable.lumped_start import winch_rows
-from cable.lumped_step import begin
+from cable.lumped import Course, Rope, begin, rope_off_drum, winch_rows
 from cable.pull_out import START_LENGTH
 from scenarios.steps import fitting_step
 from subzero.diagnosis.other_loop import FINE, Led, follow_rope
 from subzero.diagnosis.other_sensors import seen
 from subzero.diagnosis.setting import Setting
+from subzero.environment import drum_of, water_of
 from subzero.errors import UserError
-from subzero.later import go_on_with, rows_of_changes
+from subzero.initial_conditions import prepare
+from subzero.model_changes import go_on_with, rows_of_changes
 from subzero.recording import Run, new_recording, record_row
 from subzero.run_state import Live, Setup
 from subzero.simulation import run_trial
-from subzero.start import prepare
-from subzero.surroundings import drum_of, water_of
 
 FASTEST = 2.0
 """Room for cable is made for this speed. [m/s]"""

@@ -12,11 +12,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cable.drum_path import lead_drum
-from cable.lumped_rope import REST, STATE, Rope
-from cable.lumped_step import GAMMA, accept_step, try_step
-from subzero.compiled import allocating, compiled
+from cable.drum_motion import lead_drum
+from cable.lumped import GAMMA, REST, STATE, Rope, accept_step, try_step
 from subzero.coupling import _move, _solve_three, hull_steps
+from subzero.jit import allocating, compiled
 from subzero.recording import Recording, record_row
 from subzero.run_state import Live, Setup
 from vehicle import STATE_SIZE
@@ -39,7 +38,7 @@ class Led(NamedTuple):
 
     Attributes:
         ends: place and velocity, relative to the drum, at start and end (2, 6). [m], [m/s]
-        legs: what `cable.lumped_step` is led by (2, 15).
+        legs: what `cable.lumped.step` is led by (2, 15).
         matrix: I − ∂F_cable/∂F (3, 3).
         states: of the springs at the start of an exchange.
         history: pull of the cable, earth axes, its tension at the drum and its length, by rows (n, 5). [N], [m]

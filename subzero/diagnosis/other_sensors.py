@@ -12,7 +12,7 @@ import numpy as np
 
 from subzero.channels import BY_NAME
 from subzero.diagnosis.setting import Sensing, Setting
-from subzero.surroundings import water_of
+from subzero.environment import water_of
 
 if TYPE_CHECKING:
     from subzero.diagnosis.other_code import Truth

@@ -11,8 +11,8 @@ import numpy as np
 
 from subzero.diagnosis.other_code import Truth
 from subzero.diagnosis.setting import Setting
-from subzero.missing_force import AXES, FACTORS, MissingForce, feature_value, fill_factors, history_at
-from subzero.surroundings import water_of
+from subzero.environment import water_of
+from subzero.external_force import AXES, FACTORS, MissingForce, feature_value, fill_factors, history_at
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,7 +59,7 @@ def force_along(outside: Outside, setting: Setting, truth: Truth) -> np.ndarray:
 
 
 def factors_of(setting: Setting, truth: Truth) -> np.ndarray:
-    """Return the factors of features (n, len(FACTORS)) along a truth, see `subzero.missing_force`."""
+    """Return the factors of features (n, len(FACTORS)) along a truth, see `subzero.external_force`."""
     r, water, out = (
         truth.run.recording,
         water_of(setting.model),

@@ -1,7 +1,7 @@
 """The kinds of forces outside the catalogue, each drawn at random.
 
 Each draws its size and times, and says which axis it acts on and, where there is one, which feature of
-`subzero.missing_force` its formula has. Sizes are told in the drag of the hull at 1 m/s, so they fit any vehicle.
+`subzero.external_force` its formula has. Sizes are told in the drag of the hull at 1 m/s, so they fit any vehicle.
 
 To add a kind: a function (draw) → Outside, and a line in KINDS.
 """
@@ -15,7 +15,7 @@ import numpy as np
 
 from subzero.diagnosis.outside import Outside
 from subzero.diagnosis.setting import Setting
-from subzero.missing_force import AXES, MissingForce, Term
+from subzero.external_force import AXES, MissingForce, Term
 
 EDGE = 0.2
 """How long a sudden force takes to come. [s]"""

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from subzero.channels import BY_NAME
-from subzero.turns import HEADING, TURN, turned
+from subzero.records.heading import HEADING, TURN, turned
 
 MISTAKEN: dict[str, dict[str, float]] = {
     "m/s": {"knots": 1.944, "km/h": 3.6, "feet per second": 3.281, "cm/s": 100.0},

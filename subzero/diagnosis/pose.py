@@ -17,7 +17,7 @@ from subzero.diagnosis.noise_estimate import Behind, Usual, estimate, resolution
 from subzero.diagnosis.problem import Observed, Problem
 from subzero.diagnosis.response import economical, finer, respond
 from subzero.errors import UserError
-from subzero.turns import HEADING, turned
+from subzero.records.heading import HEADING, turned
 
 VISIBLE = 1.0
 """Squared size, in noise, of an error of the steps that is worth correcting."""

@@ -18,8 +18,8 @@ from subzero.diagnosis.plausible import stuck, unit_questions
 from subzero.diagnosis.sidecar import Sidecar, read_sidecar
 from subzero.diagnosis.timing import epoch_problems
 from subzero.errors import UserError, listed
-from subzero.fit import fits, modelled
-from subzero.measured import Record
+from subzero.records.goodness_of_fit import fits, modelled
+from subzero.records.record import Record
 
 if TYPE_CHECKING:
     import xarray as xr

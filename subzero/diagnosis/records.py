@@ -1,7 +1,7 @@
 """From files to what a diagnosis takes: measured records, each with the trial that it belongs to.
 
-A record is a CSV file of `subzero.measured`, with or without columns of commands, and with a sidecar (`sidecar`) or
-without. Everything that can be wrong with it is said before anything long is begun, in one message for a record.
+A record is a CSV file of `subzero.records.record`, with or without columns of commands, and with a sidecar (`sidecar`)
+or without. Everything that can be wrong with it is said before anything long is begun, in one message for a record.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ from subzero.diagnosis.sidecar import Sidecar, read_sidecar
 from subzero.diagnosis.timing import cut_to, time_problems, without_repeats
 from subzero.diagnosis.told import FROM_RECORD, TOLD, commanded
 from subzero.errors import UserError, listed
-from subzero.measured import Record, read_record
 from subzero.model import Model
+from subzero.records.heading import HEADING, turned
+from subzero.records.record import Record, read_record
 from subzero.trials import load
-from subzero.turns import HEADING, turned
 
 Simulated = Callable[[Setting, np.ndarray, Sequence[str]], Mapping[str, np.ndarray]]
 """(setting, times, channels) → channel → what the sensors would have measured."""

@@ -26,7 +26,7 @@ from subzero.diagnosis.unknown import (
     with_force,
 )
 from subzero.diagnosis.verdict import Unknown
-from subzero.missing_force import MissingForce
+from subzero.external_force import MissingForce
 
 TIMES = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0)
 """Correlation times that are tried. [s]"""

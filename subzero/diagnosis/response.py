@@ -15,7 +15,7 @@ from subzero.channels import DEGREE
 from subzero.diagnosis.setting import Sensing, Setting
 from subzero.diagnosis.track import LENGTH, RUDDER, TENSION, VOLTAGE, WATER
 from subzero.diagnosis.tracked import tracked
-from subzero.turns import HEADING, turned
+from subzero.records.heading import HEADING, turned
 from vehicle.state import QUATERNION, SHAFT, VELOCITY
 
 HULL_STEP, CABLE_STEP, SEGMENT = 0.05, 0.2, 1.0

@@ -2,7 +2,7 @@
 
     φ(t) = feature(state(t)) · window(t),   window = 1,  [t ≥ t₀],  [t₀ ≤ t < t₁],  exp(−t/T);   or  cos ωt, sin ωt
 
-Features are those of `missing_force`, along a track that was fitted.
+Features are those of `external_force`, along a track that was fitted.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from subzero.diagnosis.setting import Setting
 from subzero.diagnosis.told import held
 from subzero.diagnosis.track import LENGTH, RUDDER, WATER
 from subzero.diagnosis.tracked import tracked
-from subzero.missing_force import FACTORS, FEATURES, feature_value, fill_factors
+from subzero.external_force import FACTORS, FEATURES, feature_value, fill_factors
 from vehicle.dynamics import relative_velocity
 from vehicle.kinematics import rotation
 from vehicle.motor import shaft_speed

@@ -8,7 +8,7 @@ import math
 import numpy as np
 
 import scenarios
-from subzero.measured import Record
+from subzero.records.record import Record
 
 SHORTEST, SLOWEST, FEWEST = 5.0, 1.0, 20
 """A record has to last so long [s], with a sample at least so often [s], and so many samples."""

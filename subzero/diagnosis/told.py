@@ -10,7 +10,7 @@ import numpy as np
 import scenarios
 from subzero.channels import BY_NAME, DEGREE
 from subzero.errors import UserError
-from subzero.measured import Record
+from subzero.records.record import Record
 
 TOLD = {
     "propeller_command": ("the propeller command", "rev/s", 1.0),

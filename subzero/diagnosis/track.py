@@ -9,11 +9,11 @@ from __future__ import annotations
 import numpy as np
 
 import vehicle
-from subzero.compiled import compiled, inner
 from subzero.coupling import FINE, exchange, hull_steps
-from subzero.hull import feel_current, row_at
+from subzero.jit import compiled, inner
 from subzero.loop import NO_ROOM, SPARE
 from subzero.run_state import Live, Setup
+from subzero.vehicle_step import feel_current, row_at
 from vehicle import STATE_SIZE
 
 RUDDER, VOLTAGE, TENSION, LENGTH, WATER = (STATE_SIZE + i for i in range(5))

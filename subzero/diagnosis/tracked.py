@@ -11,15 +11,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cable.line import enlarged
+from cable.moving_end import enlarged
 from subzero import coupling
 from subzero.diagnosis.setting import Setting
 from subzero.diagnosis.track import COLUMNS, follow
-from subzero.later import go_on_with
+from subzero.initial_conditions import most_hull_steps, prepare
 from subzero.loop import NO_ROOM
 from subzero.model import Model
+from subzero.model_changes import go_on_with
 from subzero.run_state import Live, Setup
-from subzero.start import most_hull_steps, prepare
 
 AGREEMENT = 1e-6
 """Fraction within which the forces of hull and cable agree, in the place of 1e-9: a quarter faster, nothing seen. With

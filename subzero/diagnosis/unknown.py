@@ -20,7 +20,7 @@ from subzero.diagnosis.effect import Effect, Parameter
 from subzero.diagnosis.entries import Entry
 from subzero.diagnosis.problem import Problem
 from subzero.diagnosis.setting import Setting
-from subzero.missing_force import AXES, MissingForce
+from subzero.external_force import AXES, MissingForce
 
 SPACING, FINE = 2.0, 1.0
 """Of knots: to look for a force, and to tell its history. [s]"""

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from subzero.channels import BY_NAME
-from subzero.missing_force import MissingForce
+from subzero.external_force import MissingForce
 
 NOTHING_WRONG, CAUSE_NAMED, UNDECIDED, OUTSIDE = (
     "nothing_wrong",

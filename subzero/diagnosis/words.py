@@ -16,7 +16,7 @@ from subzero.diagnosis.verdict import (
     Unknown,
     Verdict,
 )
-from subzero.missing_force import FEATURES
+from subzero.external_force import FEATURES
 
 HEADLINES = {
     NOTHING_WRONG: "Nothing is wrong beyond tolerance",

@@ -10,18 +10,18 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from .cable import shape
-from .deployment import deployment, is_deployed
-from .forces import forces
-from .motion import attitude, figure_6, measured
-from .prescribed import exact_tension, figure_4, figure_5, is_straight
-from .sheet import Title
-from .style import Runs, warnings_in_short
+from subzero.figures.cable import shape
+from subzero.figures.deployment import deployment, is_deployed
+from subzero.figures.forces import forces
+from subzero.figures.motion import attitude, figure_6, measured
+from subzero.figures.prescribed import exact_tension, figure_4, figure_5, is_straight
+from subzero.figures.sheet import Title
+from subzero.figures.style import Runs, warnings_in_short
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from subzero.measured import Record
+    from subzero.records.record import Record
 
 __all__ = [
     "attitude",

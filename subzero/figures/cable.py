@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib import colormaps
 
-from . import style
-from .panel import calm, headline, in_time, label, legend, spread
-from .sheet import Title, sheet
+from subzero.figures import style
+from subzero.figures.panel import calm, headline, in_time, label, legend, spread
+from subzero.figures.sheet import Title, sheet
 
 if TYPE_CHECKING:
     import xarray as xr

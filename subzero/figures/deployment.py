@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from . import style
-from .cable import EAST, NORTH, axes_of, in_scale, way_of_drum
-from .panel import calm, headline, in_time, label, legend
-from .sheet import Title, sheet
+from subzero.figures import style
+from subzero.figures.cable import EAST, NORTH, axes_of, in_scale, way_of_drum
+from subzero.figures.panel import calm, headline, in_time, label, legend
+from subzero.figures.sheet import Title, sheet
 
 if TYPE_CHECKING:
     import xarray as xr

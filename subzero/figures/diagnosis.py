@@ -9,12 +9,11 @@ import numpy as np
 
 from subzero.channels import BY_NAME
 from subzero.diagnosis.verdict import Curves, Misfit, Verdict
-
-from . import style
-from .diagnosis_causes import detectable, evidence, gain
-from .diagnosis_force import missing_force
-from .panel import headline, label, legend, time_label
-from .sheet import Title, sheet
+from subzero.figures import style
+from subzero.figures.diagnosis_causes import detectable, evidence, gain
+from subzero.figures.diagnosis_force import missing_force
+from subzero.figures.panel import headline, label, legend, time_label
+from subzero.figures.sheet import Title, sheet
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

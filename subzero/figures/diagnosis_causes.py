@@ -10,10 +10,9 @@ import numpy as np
 from subzero.channels import BY_NAME
 from subzero.diagnosis.tables import CLEAR, CONFUSED, SEEN
 from subzero.diagnosis.verdict import ChannelGain, Verdict
-
-from . import style
-from .panel import headline, legend
-from .sheet import Title, sheet
+from subzero.figures import style
+from subzero.figures.panel import headline, legend
+from subzero.figures.sheet import Title, sheet
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -137,7 +136,7 @@ def _bars(
     columns: int, rows: int, title: Title, *, left: float = 0.2, apart: float = 0.72
 ) -> tuple[Figure, list[Axes]]:
     """Return a sheet for horizontal bars, as high as they need, with room for their names."""
-    from .sheet import BOTTOM, TOP, WIDTH
+    from subzero.figures.sheet import BOTTOM, TOP, WIDTH
 
     figure, panels = sheet(1, columns, title)
     height = TOP + 0.4 + BOTTOM + 0.17 * max(rows, 3)

@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING
 
 from subzero.diagnosis.verdict import Unknown, Verdict
 from subzero.diagnosis.words import formula_term
-
-from . import style
-from .panel import headline, label, time_label
-from .sheet import Title, sheet
+from subzero.figures import style
+from subzero.figures.panel import headline, label, time_label
+from subzero.figures.sheet import Title, sheet
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

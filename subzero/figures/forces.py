@@ -7,12 +7,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from subzero.channels import BY_NAME
+from subzero.figures import style
+from subzero.figures.panel import calm, headline, in_time, label, legend, time_label
+from subzero.figures.sheet import Title, sheet
+from subzero.figures.style import CYCLE, DASHES
 from subzero.summary import ENERGY_PARTS, FORCE, MOMENT
-
-from . import style
-from .panel import calm, headline, in_time, label, legend, time_label
-from .sheet import Title, sheet
-from .style import CYCLE, DASHES
 
 if TYPE_CHECKING:
     import xarray as xr

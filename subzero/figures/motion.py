@@ -8,18 +8,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from subzero.channels import BY_NAME
-
-from . import style
-from .panel import channel_panel, headline, in_time, label, legend, time_label
-from .sheet import Title, sheet
-from .style import Runs
+from subzero.figures import style
+from subzero.figures.panel import channel_panel, headline, in_time, label, legend, time_label
+from subzero.figures.sheet import Title, sheet
+from subzero.figures.style import Runs
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from subzero.measured import Record
+    from subzero.records.record import Record
 
 ATTITUDE = {
     "propeller_speed": "Propeller speed",

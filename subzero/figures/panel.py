@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from subzero.channels import BY_NAME
-
-from .style import DOTS, DPI, LINES, NORMAL, SMALL, TINY, Runs
+from subzero.figures.style import DOTS, DPI, LINES, NORMAL, SMALL, TINY, Runs
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from subzero.measured import Record
+    from subzero.records.record import Record
 
 LEGEND_ROW, LEGEND_MARGIN = 0.145, 0.1
 """Height of one row of a legend and of the space around it. [inch]"""

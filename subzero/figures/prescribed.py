@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from subzero.channels import BY_NAME
-
-from . import style
-from .cable import DOWN, EAST, configurations, longest
-from .forces import cable_forces
-from .panel import calm, headline, in_time, label, legend, spread, time_label
-from .sheet import Title, sheet
-from .style import CYCLE, DASHES
+from subzero.figures import style
+from subzero.figures.cable import DOWN, EAST, configurations, longest
+from subzero.figures.forces import cable_forces
+from subzero.figures.panel import calm, headline, in_time, label, legend, spread, time_label
+from subzero.figures.sheet import Title, sheet
+from subzero.figures.style import CYCLE, DASHES
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -14,7 +14,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from .style import DPI, GREY, LARGE, NORMAL, ORANGE, PALE, SMALL
+from subzero.figures.style import DPI, GREY, LARGE, NORMAL, ORANGE, PALE, SMALL
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -14,7 +14,7 @@ import subzero
 from subzero import autopilot
 from subzero.autopilot import Wanted
 from subzero.autopilot.programs import VerticalZigZag, ZigZag
-from subzero.autopilot.robustness import check_stable
+from subzero.autopilot.stability_margins import check_stable
 from subzero.cli import MISTAKE, main
 from subzero.cli_autopilot import STOPPED
 

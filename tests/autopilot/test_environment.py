@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 
-import subzero.environment
+import subzero.gym_environment
 
 
 @pytest.fixture
@@ -56,7 +56,7 @@ def test_the_same_seed_draws_the_same_heading(env):
 
 
 def test_it_can_be_made_without_its_cable():
-    env = gymnasium.make(subzero.environment.ENVIRONMENT, tethered=False, sample_time=0.2)
+    env = gymnasium.make(subzero.gym_environment.ENVIRONMENT, tethered=False, sample_time=0.2)
     _, info = episode(env, proportional)
     assert info["time"] == pytest.approx(60.0)
     assert info["cable_length"] == 0.0
@@ -65,9 +65,9 @@ def test_it_can_be_made_without_its_cable():
 @pytest.mark.parametrize(
     "program",
     [
-        "import gymnasium; env = gymnasium.make('subzero.environment:subzero/TetheredHeading-v0')",
-        "import gymnasium, subzero.environment; env = gymnasium.make('subzero/TetheredHeading-v0')",
-        "import subzero.environment, gymnasium; env = gymnasium.make('subzero/TetheredHeading-v0')",
+        "import gymnasium; env = gymnasium.make('subzero.gym_environment:subzero/TetheredHeading-v0')",
+        "import gymnasium, subzero.gym_environment; env = gymnasium.make('subzero/TetheredHeading-v0')",
+        "import subzero.gym_environment, gymnasium; env = gymnasium.make('subzero/TetheredHeading-v0')",
     ],
 )
 def test_a_program_of_its_own_can_make_it(program, tmp_path):

@@ -16,7 +16,7 @@ import subzero
 import vehicle
 from subzero import autopilot
 from subzero.autopilot.linear import KEPT
-from subzero.autopilot.states import INPUT_NAMES, from_vehicle, to_vehicle
+from subzero.steady_motion.hull_state_space import INPUT_NAMES, from_vehicle, to_vehicle
 
 
 @pytest.fixture(scope="module")

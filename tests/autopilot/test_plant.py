@@ -13,7 +13,7 @@ import pytest
 import subzero
 import vehicle
 from subzero import autopilot
-from subzero.autopilot.states import INPUT_NAMES, PLACE, STATE_NAMES, from_vehicle
+from subzero.steady_motion.hull_state_space import INPUT_NAMES, PLACE, STATE_NAMES, from_vehicle
 
 
 @pytest.fixture(scope="module")

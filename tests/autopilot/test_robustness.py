@@ -11,7 +11,7 @@ import pytest
 
 import subzero
 from subzero import autopilot
-from subzero.autopilot.robustness import sampled_loop
+from subzero.autopilot.stability_margins import sampled_loop
 
 
 @pytest.fixture(scope="module")

@@ -15,7 +15,7 @@ import pytest
 import subzero
 import vehicle
 from subzero import autopilot
-from subzero.autopilot.states import from_vehicle, to_vehicle
+from subzero.steady_motion.hull_state_space import from_vehicle, to_vehicle
 
 
 @pytest.fixture(scope="module")

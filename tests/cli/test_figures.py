@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from subzero.figures import draw, exact_tension
-from subzero.measured import Record
+from subzero.records.record import Record
 
 
 @pytest.fixture(scope="module")

@@ -12,8 +12,8 @@ from numpy.testing import assert_allclose
 
 from subzero.channels import BY_COLUMN, CHANNELS, column_name
 from subzero.cli import FINE, STOPPED, main
-from subzero.measured import read_record
 from subzero.output import staged
+from subzero.records.record import read_record
 
 PICTURES = {"fig6.png", "attitude.png", "cable.png", "forces.png"}
 RUN_KEYS = """outcome outcome_message time_at_end_s peak_speed_m_s time_of_peak_speed_s speed_at_end_m_s
@@ -157,6 +157,6 @@ def test_a_run_that_stops_keeps_what_it_has_and_exits_with_3(tmp_path, rails, mo
 def test_the_folder_of_a_trial_is_always_here(name, folder):
     from types import SimpleNamespace
 
-    from subzero.delivery import default_folder
+    from subzero.write_results import default_folder
 
     assert str(default_folder(SimpleNamespace(name=name))) == folder  # type: ignore[arg-type]

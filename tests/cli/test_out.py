@@ -186,7 +186,7 @@ def test_an_interrupt_after_the_last_move_is_told_as_it_is(tmp_path, rails, monk
     def interrupted(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("subzero.delivery.tell", interrupted)
+    monkeypatch.setattr("subzero.write_results.tell", interrupted)
     assert simulate(tmp_path) == INTERRUPTED
     assert capsys.readouterr().err.endswith(f"Interrupted; all files were written to {tmp_path}.\n")
 

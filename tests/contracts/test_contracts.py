@@ -19,7 +19,7 @@ def test_cable_vehicle_and_scenarios_do_not_know_one_another_and_data_flows_one_
 def test_the_cable_runs_without_vehicle_scenarios_or_files():
     code = (
         "import sys, cable; cable.pull_out(lambda t: (1.0, 0.0, 0.0), 0.2);"
-        "others = {'vehicle', 'scenarios', 'xarray', 'matplotlib', 'pydantic', 'cable.equation7'};"
+        "others = {'vehicle', 'scenarios', 'xarray', 'matplotlib', 'pydantic', 'cable.feng_allen'};"
         "print(sorted(others & set(sys.modules)))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

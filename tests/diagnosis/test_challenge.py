@@ -22,8 +22,8 @@ from subzero.diagnosis.outside import force_along
 from subzero.diagnosis.outside_kinds import KINDS, draw_outside
 from subzero.diagnosis.setting import Setting
 from subzero.errors import UserError
-from subzero.measured import read_record
-from subzero.missing_force import AXES
+from subzero.external_force import AXES
+from subzero.records.record import read_record
 
 FIG6 = subzero.load_scenario("fig6")
 NOMINAL = Setting(trial=FIG6, model=subzero.Model.of(FIG6))

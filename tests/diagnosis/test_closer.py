@@ -15,7 +15,7 @@ from subzero.diagnosis.one_term import one_terms
 from subzero.diagnosis.refit import refit
 from subzero.diagnosis.suspects import suspects
 from subzero.diagnosis.unknown import force_columns, knots_of, lacking
-from subzero.missing_force import MissingForce, Term
+from subzero.external_force import MissingForce, Term
 
 
 def weed(coefficient):

@@ -27,7 +27,7 @@ from subzero.diagnosis.response import TRUTHS, economical, respond
 from subzero.diagnosis.setting import Setting
 from subzero.diagnosis.stride import quadratic_step
 from subzero.diagnosis.tracked import tracked
-from subzero.missing_force import MissingForce, Term
+from subzero.external_force import MissingForce, Term
 
 BASIC = ("surge_speed", "heading", "yaw_rate", "pitch", "roll", "depth")
 KINDS = ("scale", "bias", "lag")

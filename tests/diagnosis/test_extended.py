@@ -16,7 +16,7 @@ from subzero.diagnosis.extended_text import text_of
 from subzero.diagnosis.setting import Setting
 from subzero.diagnosis.verdict import Extended
 from subzero.errors import UserError
-from subzero.missing_force import MissingForce, Term
+from subzero.external_force import MissingForce, Term
 from subzero.model import Model
 
 

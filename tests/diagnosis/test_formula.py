@@ -10,7 +10,7 @@ from subzero.diagnosis.recover import recover
 from subzero.diagnosis.shape_prior import all_shapes, size_of
 from subzero.diagnosis.shapes import Shape, factors_along, shifted, windowed
 from subzero.diagnosis.unknown import lacking
-from subzero.missing_force import FEATURES, MissingForce, Term, feature_value, history_at
+from subzero.external_force import FEATURES, MissingForce, Term, feature_value, history_at
 
 TIMES, KNOTS = samples_of(30.0), np.linspace(0.0, 30.0, 31)
 

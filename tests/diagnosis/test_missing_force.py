@@ -1,6 +1,6 @@
 """A force that the model lacks: what it adds is what its words say, and no force at all changes nothing.
 
-Verifies: `subzero.missing_force`, and the loop that feels it. Configuration: fig6 with and without the cable.
+Verifies: `subzero.external_force`, and the loop that feels it. Configuration: fig6 with and without the cable.
 Tolerance: a term that repeats a term of the hull gives the same run within the rounding of its numbers; the energy
 balance keeps the 1e-3 of the work that every run keeps.
 """
@@ -12,7 +12,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import subzero
-from subzero.missing_force import AXES, FACTORS, FEATURES, MissingForce, Term, history_at
+from subzero.external_force import AXES, FACTORS, FEATURES, MissingForce, Term, history_at
 
 FIG6 = subzero.load_scenario("fig6")
 MODEL = subzero.Model.of(FIG6)

@@ -1,8 +1,8 @@
 """A vehicle that heads north has a compass that jumps from 360 to 0 degrees, and a diagnosis that does not.
 
-Verifies: `subzero.turns`, and what `response`, `problem`, `other_code` and `challenge` make of a heading about north.
-Configuration: the first seconds of zigzag, which starts at north. Tolerance: an angle at the start is there at the
-start, to the steps' error of 0.02 degrees.
+Verifies: `subzero.records.heading`, and what `response`, `problem`, `other_code` and `challenge` make of a heading
+about north. Configuration: the first seconds of zigzag, which starts at north. Tolerance: an angle at the start is
+there at the start, to the steps' error of 0.02 degrees.
 """
 
 import dataclasses
@@ -23,8 +23,8 @@ from subzero.diagnosis.plausible import unit_questions
 from subzero.diagnosis.pose import pose
 from subzero.diagnosis.response import respond
 from subzero.diagnosis.setting import Setting
-from subzero.measured import Record, read_record
-from subzero.turns import turned
+from subzero.records.heading import turned
+from subzero.records.record import Record, read_record
 
 LONG = subzero.load_scenario("zigzag")
 TRIAL = dataclasses.replace(LONG, duration=4.0)

@@ -16,7 +16,7 @@ from subzero.diagnosis.latent import Seen, Terms, log_evidence_term
 from subzero.diagnosis.one_term import one_terms
 from subzero.diagnosis.suspects import suspects
 from subzero.diagnosis.unknown import FORCE, force_columns, knots_of
-from subzero.missing_force import AXES, MissingForce, Term
+from subzero.external_force import AXES, MissingForce, Term
 
 
 def heeled(setting):

@@ -16,7 +16,7 @@ from subzero.diagnosis.effects.sensors import NOISE
 from subzero.diagnosis.other_code import NoTruthError, simulate_otherwise, truth_of
 from subzero.diagnosis.other_sensors import seen
 from subzero.diagnosis.setting import Setting
-from subzero.missing_force import MissingForce, Term
+from subzero.external_force import MissingForce, Term
 from subzero.simulation import run_trial
 
 FIG6 = subzero.load_scenario("fig6")

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from cable.equation7 import (
+from cable.feng_allen.equation7 import (
     Equation7Numbers,
     angles_of,
     equation7_numbers,
@@ -22,7 +22,7 @@ from cable.equation7 import (
     time_matrix,
     to_local,
 )
-from cable.equation7_slopes import load_slope, space_slope, time_slope
+from cable.feng_allen.equation7_slopes import load_slope, space_slope, time_slope
 from cable.properties import CableProperties
 
 HEAVY = CableProperties(

@@ -1,9 +1,9 @@
 """The cable's own energy balance closes with everything that moves, stretches and changes.
 
-Verifies: −F·U(0) = dE/dt + L − G + D_S + M + C of `cable.energy`, by `History.diagnostics`, in a sheared current that
-changes in time, with a moving drum, stretch, winch, friction and inertia, and for a towed cable with a drogue.
-Tolerance: what is missing at 0.5 m and 0.1 s is below 1e-3 of all work and loss (measured: 2e-5 to 5e-4), and falls
-when both are halved, again and again: with the square in still water (measured slope 1.75), and at least with
+Verifies: −F·U(0) = dE/dt + L − G + D_S + M + C of `cable.moving_end.energy`, by `History.diagnostics`, in a sheared
+current that changes in time, with a moving drum, stretch, winch, friction and inertia, and for a towed cable with a
+drogue. Tolerance: what is missing at 0.5 m and 0.1 s is below 1e-3 of all work and loss (measured: 2e-5 to 5e-4), and
+falls when both are halved, again and again: with the square in still water (measured slope 1.75), and at least with
 the first power where water passes the drum (measured: 1.0 to 1.6), because the books take t(S) half a segment away.
 """
 

@@ -5,8 +5,8 @@ three-dimensional motion at about 1 m/s, 0.1 s, 0.5 m, V of 0.8 m/s; free drum w
 uniform current and one with shear in depth, which a horizontal V leaves as it is.
 Tolerance: 1e-12 N where Newton's method takes the same way in both runs, 2e-7 N where it ends an iteration earlier in
 one (1e-9 of the tension in each of 30 balances). The first step is left out: it differences momenta to first order
-(`cable.differences`), and m V of the cable that enters is not the same in both. That is 3e-5 N on a free drum, and is
-forgotten by the second step.
+(`cable.moving_end.bdf2`), and m V of the cable that enters is not the same in both. That is 3e-5 N on a free drum, and
+is forgotten by the second step.
 """
 
 import numpy as np

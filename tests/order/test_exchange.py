@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import subzero
-from cable.differences import backward_weights
+from cable.moving_end.bdf2 import backward_weights
 from subzero.model import Model
 
 RATIOS = np.logspace(-3, 6, 400)

@@ -1,6 +1,6 @@
 """The second formulation of the cable (masses at nodes, stiff springs, TR-BDF2): closed forms, order, and the default.
 
-Verifies: `cable.lumped_history`. Closed forms: straight pull ½ρπdC_tU²S, the same accelerating with a drum that has
+Verifies: `cable.lumped.history`. Closed forms: straight pull ½ρπdC_tU²S, the same accelerating with a drum that has
 inertia and friction, towing with a drogue, at the critical angle and with stretch, winch of constant tension out and
 in, catenary, tensioned beam, motion of everything together. Second order on a helix and on the dive of section 4.1
 (ii), with soft ends. Agreement with "moving_end", which shares no solver code, on dive, helix, a U-turn with a stop
@@ -19,8 +19,8 @@ import pytest
 from scipy.optimize import brentq
 
 import cable
-from cable.lumped_history import pull_out_lumped, tow_lumped
-from cable.water import Current
+from cable.current import Current
+from cable.lumped.history import pull_out_lumped, tow_lumped
 
 TABLE_1 = cable.CableProperties()
 HEAVY = cable.CableProperties(mass_per_length=0.0098)

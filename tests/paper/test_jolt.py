@@ -1,8 +1,8 @@
 """A tow point that changes its velocity at once: Fig. 5 (c) at 20 s, where the pitch rate ends.
 
-Verifies: the impulse of `cable.jolt` on a straight cable, by hand; that Fig. 5 (c) is the same at steps of 0.1 and
-0.02 s, where a dip at 20 s used to grow with shorter steps (0.557 and 0.463 N); and that a cable is not pushed for
-long. Tolerance: rounding for the impulse; 1 % of the tension for the steps, and 0.3 % of it a second behind the
+Verifies: the impulse of `cable.moving_end.jolt` on a straight cable, by hand; that Fig. 5 (c) is the same at steps of
+0.1 and 0.02 s, where a dip at 20 s used to grow with shorter steps (0.557 and 0.463 N); and that a cable is not pushed
+for long. Tolerance: rounding for the impulse; 1 % of the tension for the steps, and 0.3 % of it a second behind the
 jolt.
 """
 

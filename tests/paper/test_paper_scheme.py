@@ -11,10 +11,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cable.box_equations import Ends
-from cable.box_newton import box_workspace
-from cable.equation7 import equation7_numbers
-from cable.paper_scheme import node_force, paper_step, pull_out_paper, start_paper, undo_paper_step
+from cable.feng_allen.box_equations import Ends
+from cable.feng_allen.box_newton import box_workspace
+from cable.feng_allen.equation7 import equation7_numbers
+from cable.feng_allen.printed_scheme import (
+    node_force,
+    paper_step,
+    pull_out_paper,
+    start_paper,
+    undo_paper_step,
+)
 from cable.properties import CableProperties, DrumProperties
 
 DRAG = 0.5 * 1000.0 * np.pi * 0.0025 * 0.01

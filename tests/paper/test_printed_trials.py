@@ -221,7 +221,5 @@ def test_a_default_run_imports_nothing_of_the_papers_scheme():
     done = subprocess.run([sys.executable, "-c", LOOK], capture_output=True, check=True)
     scheme, modules = json.loads(done.stdout)
     assert scheme == "moving_end"
-    assert "cable.line" in modules
-    assert [
-        m for m in modules if m.startswith(("subzero.printed", "cable.paper", "cable.box", "cable.equation7"))
-    ] == []
+    assert "cable.moving_end.state" in modules
+    assert [m for m in modules if m.startswith(("subzero.paper", "cable.feng_allen"))] == []

@@ -13,13 +13,13 @@ import sys
 import numpy as np
 import pytest
 
-from cable.box_equations import BoxRule, Ends, box_rows, box_scratch, drum_rows, tow_rows
-from cable.box_newton import box_workspace, newton_pass
-from cable.box_solver import back_substitute
-from cable.equation7 import equation7_numbers
-from cable.paper_scheme import add_node, keep_old_time, pull_out_paper
+from cable.feng_allen.box_equations import BoxRule, Ends, box_rows, box_scratch, drum_rows, tow_rows
+from cable.feng_allen.box_newton import box_workspace, newton_pass
+from cable.feng_allen.box_solver import back_substitute
+from cable.feng_allen.equation7 import equation7_numbers
+from cable.feng_allen.printed_scheme import add_node, keep_old_time, pull_out_paper
 from cable.properties import CableProperties
-from subzero.compiled import compiled
+from subzero.jit import compiled
 
 HEAVY = equation7_numbers(CableProperties(mass_per_length=0.02, compliance=0.05), (0.2, 0.1, -0.1))
 TABLE_1 = equation7_numbers(CableProperties())
@@ -117,7 +117,7 @@ def test_the_staircase_solver_finds_what_a_dense_solver_finds(segments, length):
 
 RUN = """
 import json, sys
-from cable.paper_scheme import pull_out_paper
+from cable.feng_allen.printed_scheme import pull_out_paper
 h = pull_out_paper(lambda t: (1.0, 0.1 * t, -0.1 * t), 5.0, 1.0)
 json.dump([h.message, *h.tow_force.ravel().tolist()], sys.stdout)
 """

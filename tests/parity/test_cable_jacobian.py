@@ -1,9 +1,9 @@
 """The analytic Jacobian of a cable step against central differences of its residual.
 
-Verifies: every entry of the block tridiagonal matrix of `cable.assembly` (and that nothing lies outside the blocks), in
-random bent, half slack states, for all that a drum can do; and the tow force's own derivatives. Configuration: a
-heavy stretching cable, a current that differs from node to node, a moving drum with inertia and friction, corrections
-for the arc and a further force switched on; with and without a bending stiffness.
+Verifies: every entry of the block tridiagonal matrix of `cable.moving_end.assembly` (and that nothing lies outside the
+blocks), in random bent, half slack states, for all that a drum can do; and the tow force's own derivatives.
+Configuration: a heavy stretching cable, a current that differs from node to node, a moving drum with inertia and
+friction, corrections for the arc and a further force switched on; with and without a bending stiffness.
 Tolerance: differences of step 1e-6 carry 1e-9 of truncation and rounding; 2e-6 of the largest entry of a row.
 """
 
@@ -11,12 +11,14 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from cable.assembly import assemble
-from cable.differences import backward_weights
+from cable.current import Current
 from cable.drum import SPINNING, STANDING, TURNING
-from cable.element import new_load
-from cable.laying import lay_straight, start_in_water
-from cable.line import (
+from cable.moving_end.assembly import assemble
+from cable.moving_end.bdf2 import backward_weights
+from cable.moving_end.block_solver import factor_wide, solve_wide
+from cable.moving_end.initial_shape import lay_straight, start_in_water
+from cable.moving_end.segment_load import new_load
+from cable.moving_end.state import (
     BEFORE,
     DIAGONAL,
     LOWER,
@@ -29,9 +31,7 @@ from cable.line import (
     new_line,
 )
 from cable.properties import CableProperties, DrumProperties
-from cable.water import Current
-from cable.wide_blocks import factor_wide, solve_wide
-from subzero.compiled import compiled
+from subzero.jit import compiled
 
 CABLE = CableProperties(mass_per_length=0.02, compliance=0.05, tangential_drag_coefficient=0.02).numbers()
 DRUM = DrumProperties(inertia=1e-3, friction_torque=0.01).numbers()
@@ -155,7 +155,7 @@ def test_bending_has_its_jacobian_right_too(segments):
 
 @pytest.mark.parametrize("segments", [3, 4, 7])
 def test_the_wide_elimination_solves_what_a_dense_one_solves(segments):
-    """Verifies `cable.wide_blocks` against LAPACK; round-off only."""
+    """Verifies `cable.moving_end.block_solver` against LAPACK; round-off only."""
     line, work = bent_line(segments, TURNING, 3, c=STIFF)
     residual(line, work, unknowns(line), backward_weights.py_func(0.1, 0.1), STIFF)
     expected = np.linalg.solve(dense(line), line.rows[RESIDUAL, 1 : segments + 1].ravel())

@@ -1,6 +1,6 @@
 """The Newton system of the lumped cable against central differences of its residual, and its band solver against numpy.
 
-Verifies: every entry of the banded matrix of `cable.lumped_newton.assemble_stage`, the elimination of the springs' own
+Verifies: every entry of the banded matrix of `cable.lumped.newton.assemble_stage`, the elimination of the springs' own
 unknowns included, in random bent states with taut and slack springs, for each thing the far end can be: a free drum
 that turns, one that stands, one that overruns, a winch that keeps a tension, one that keeps a length, a tail with a
 drogue. Configuration: five springs; a heavy stretching cable with bending stiffness, a slanting uniform current, a
@@ -13,9 +13,10 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.optimize import brentq
 
-from cable.lumped_band import REACH, WIDTH, solve_band
-from cable.lumped_newton import assemble_stage
-from cable.lumped_rope import (
+from cable.current import Current
+from cable.lumped.band_solver import REACH, WIDTH, solve_band
+from cable.lumped.newton import assemble_stage
+from cable.lumped.rope import (
     NEW,
     REST,
     START_MOMENTUM,
@@ -25,10 +26,8 @@ from cable.lumped_rope import (
     new_rope,
     unknowns,
 )
-from cable.lumped_spring import spring_law
-from cable.lumped_springs import observe
+from cable.lumped.springs import observe, spring_law
 from cable.properties import CableProperties, DrumProperties
-from cable.water import Current
 from cable.winch import ConstantTension, PayOutRate
 
 CABLE = CableProperties(mass_per_length=0.02, compliance=0.05, tangential_drag_coefficient=0.02)

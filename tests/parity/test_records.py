@@ -1,12 +1,11 @@
-"""Records in memory: `subzero.packed.packed` reads and writes like the named tuple or dataclass it was made of."""
+"""Records in memory: `subzero.jit.packed` reads and writes like the named tuple or dataclass it was made of."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from subzero.compiled import compiled
-from subzero.packed import packed
+from subzero.jit import compiled, packed
 
 
 class Inner(NamedTuple):

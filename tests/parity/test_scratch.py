@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from numba.core.errors import TypingError
 
-from subzero.compiled import compiled
-from subzero.scratch import scratch
+from subzero.jit import compiled, scratch
 
 ROWS = 3
 
@@ -70,7 +69,7 @@ def test_a_size_that_is_no_constant_is_refused():
 
 
 def test_interpreted_code_has_the_like():
-    from subzero import scratch as module
+    from subzero.jit import stack as module
 
     array = module._interpreted(2, 3)
     assert array.shape == (2, 3)

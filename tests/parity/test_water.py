@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 import cable
-from cable.water import water_velocity
-from subzero.compiled import compiled
+from cable.current import water_velocity
+from subzero.jit import compiled
 
 HEAVY = cable.CableProperties(mass_per_length=0.0098)
 STREAM = np.array([0.125, -0.25, 0.0625])

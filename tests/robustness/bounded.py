@@ -17,7 +17,7 @@ import cable
 import scenarios
 import subzero
 from scenarios.trial import SCHEMES
-from subzero.compiled import compiled
+from subzero.jit import compiled
 
 COMMAND = (27.0, 0.2, 0.05, -0.05)
 

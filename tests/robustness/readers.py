@@ -27,7 +27,7 @@ from subzero.diagnosis.extended_reading import read_extended
 from subzero.diagnosis.records import read_trials
 from subzero.diagnosis.sidecar import read_sidecar
 from subzero.errors import UserError
-from subzero.measured import read_record
+from subzero.records.record import read_record
 from subzero.trials import load
 from subzero.user_file import INCOMPLETE, read_bytes
 

@@ -21,12 +21,13 @@ from pathlib import Path
 
 import pytest
 
-from subzero import machine_code, progress
-from subzero.machine_code import CODE, HALF, KEPT, OTHERS, OUT_OF_USE_S, home_of
-from subzero.sources import Tree
+from subzero import progress
+from subzero.jit import machine_code
+from subzero.jit.machine_code import CODE, HALF, KEPT, OTHERS, OUT_OF_USE_S, home_of
+from subzero.jit.sources import Tree
 
 TINY = """
-from subzero.compiled import compiled
+from subzero.jit import compiled
 
 @compiled
 def scaled(x):
@@ -172,7 +173,7 @@ def test_two_processes_that_compile_the_same_leave_whole_files(tiny, base):
     """Each writes the file while the other does, many times; whatever a reader finds is whole."""
     write = f"""
 from pathlib import Path
-from subzero.machine_code import OTHERS, home_of
+from subzero.jit.machine_code import OTHERS, home_of
 home = home_of(OTHERS, Path({str(tiny)!r}))
 for k in range(100):
     home.keep("same.code", bytes([k % 256]) * 300_000)
@@ -309,7 +310,7 @@ def test_a_read_only_cache_without_the_code_says_so_in_one_line(run, base, monke
 def test_a_process_that_can_keep_nothing_runs_and_says_one_line(tmp_path):
     """A whole process, with several functions of two packages, whose cache folder is a file."""
     (tmp_path / "file").touch()
-    script = "from vehicle import initial_state; from cable.pay_out import *; print(initial_state()[3])"
+    script = "from vehicle import initial_state; from cable.moving_end.time_loop import *; print(initial_state()[3])"
     environment = os.environ | {"SUBZERO_CACHE_DIR": str(tmp_path / "file")}
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, env=environment,
                           check=False)  # fmt: skip

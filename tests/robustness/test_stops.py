@@ -19,8 +19,8 @@ from rich.console import Console
 import cable
 import scenarios
 import subzero
-from cable.line import new_line
-from cable.stops import describe_stop
+from cable.moving_end.state import new_line
+from cable.moving_end.stops import describe_stop
 from subzero.cli import MISTAKE, main
 from subzero.progress import LONG_S, STANDSTILL_S, ProgressBar, costs_of
 
@@ -35,7 +35,7 @@ def fig6():
 @pytest.fixture
 def little_memory(monkeypatch):
     """100 MB are free."""
-    monkeypatch.setattr("subzero.memory.free_memory", lambda: 1e8)
+    monkeypatch.setattr("cable.memory.free_memory", lambda: 1e8)
 
 
 def test_ten_hours_at_default_steps_are_refused_with_what_to_change(fig6):

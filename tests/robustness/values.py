@@ -31,7 +31,7 @@ import cable
 import scenarios
 import subzero
 from subzero import autopilot
-from subzero.missing_force import MissingForce, Term
+from subzero.external_force import MissingForce, Term
 from vehicle import Vehicle
 
 ROWS = 5

@@ -1,0 +1,233 @@
+"""Equation (7) with a moving end: box rule in space, TR-BDF2 in time; second order in both, every step.
+
+The independent formulation (six unknowns, angles) beside the default Cartesian one; scheme "equation7".
+
+*Space.* Nodes 0 … N−1 are material points, node N is the end s = S(t) on the drum, with dS/dt = −Vt(S) solved
+together with everything else. A last box longer than 1.5 Δs gets a node at Δs, by linear interpolation; one
+shorter than 0.4 Δs loses its first node. Segment length and time step have nothing to do with each other.
+
+*Time.* TR-BDF2 (Bank and others, 1985) with γ = 2 − √2: a trapezoidal stage to t + γ Δt, then backward
+differences over t, t + γ Δt, t + Δt. Both stages read ẏ = a (y − h) with the same a = 2/(γ Δt). It is
+L-stable and stiffly accurate: the tension, which has no rate of its own, is solved anew at the end of every
+step and does not remember (no staircase); and as the last stage differences states only, the tension is of
+second order too. SDIRK2, whose stages are of first order, gives its inertia part to first order only.
+
+*How fine.* Where T < m1 Vt² the cable runs faster than its transverse waves, and Vn = Vb = 0 alone does not
+say at which angle it leaves the drum. With a free drum (T = 0 there) that layer is m1/(½ρπdCt) long, 0.25 m
+for Table 1 at any speed. Segments down to that length smooth over it; shorter ones resolve it and ring.
+
+Leaves out: slack. T → 0 in a bent cable leaves the angles undetermined, and a vertical tangent (cosβ = 0)
+leaves α undetermined; a run that meets either stops and says so. The drum stands while the cable would run
+back.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from cable.feng_allen.box_end import MovingEnd, fit_nodes, moving_end, start_moving_end, with_room
+from cable.feng_allen.box_equations import BoxRule, Ends
+from cable.feng_allen.box_history import (
+    START,
+    BoxHistory,
+    BoxRecord,
+    TowVelocity,
+    check_positive,
+    explain,
+    velocity_at,
+)
+from cable.feng_allen.box_newton import (
+    CONVERGED,
+    FULL,
+    SLACK,
+    BoxWorkspace,
+    NewtonReport,
+    copy_nodes,
+    scales,
+    solve_boxes,
+)
+from cable.feng_allen.equation7 import Equation7Numbers, equation7_numbers
+from cable.feng_allen.printed_scheme import NOTHING
+from cable.properties import CableProperties, DrumNumbers, DrumProperties
+from subzero.jit import compiled, inner
+
+GAMMA = 2.0 - math.sqrt(2.0)
+NEW_SHARE = 1.0 / (GAMMA * (2.0 - GAMMA))
+OLD_SHARE = (1.0 - GAMMA) ** 2 * NEW_SHARE
+"""The second stage starts from NEW_SHARE y(t + γΔt) − OLD_SHARE y(t)."""
+SLACK_TOLERANCE = 1e-6
+"""Tensions below zero by less than this, in units of the cable's force scale, are rounding."""
+MOST_HALVINGS = 6
+"""A failing step is halved this often before the run stops."""
+
+
+@inner
+def solve_stage(
+    w: BoxWorkspace, a: float, end_history: float, ends: Ends, c: Equation7Numbers
+) -> NewtonReport:
+    """Solve ẏ = a (y − h) with the moving end; let the drum stand while the cable would run back."""
+    rule = BoxRule(1.0, 1.0, a, True, end_history)
+    last = w.count[0] - 1
+    report = solve_boxes(w, rule, ends, c)
+    if report.outcome == CONVERGED and w.y[last, 1] > 0.0:
+        still = Ends(ends.north, ends.east, ends.down, ends.inertia, ends.friction, True)
+        report = solve_boxes(w, rule, still, c)
+    return report
+
+
+@inner
+def refuse_slack(w: BoxWorkspace, report: NewtonReport, ends: Ends, c: Equation7Numbers) -> NewtonReport:
+    """Return the report, or one that names the node with the least tension when that is below zero."""
+    worst = 0
+    for j in range(w.count[0]):
+        worst = j if w.y[j, 0] < w.y[worst, 0] else worst
+    force, _ = scales(w, ends, c)
+    if w.y[worst, 0] >= -SLACK_TOLERANCE * force:
+        return report
+    return NewtonReport(SLACK, report.iterations, report.residual, worst, 0)
+
+
+@compiled
+def begin_step(b: MovingEnd, middle: Ends) -> bool:
+    """Keep y(t) in ``b.old``, after a cable of no length took the direction of motion; False: no motion."""
+    w = b.boxes
+    speed = w.y[0, 1]
+    is_new = w.count[0] == 2 and w.length[1] <= NOTHING
+    if is_new:
+        start_moving_end(b, middle.north, middle.east, middle.down, middle.friction)
+    copy_nodes(w.y, b.old, w.count[0])
+    if is_new:
+        b.old[0, 1] = speed
+        b.old[1, 1] = speed
+    return not is_new or w.y[0, 1] < -NOTHING
+
+
+@compiled
+def first_stage(b: MovingEnd, a: float) -> float:
+    """Set h = y(t) + ẏ(t)/a, the trapezoidal rule to t + γΔt; return L_h of the last box [m]."""
+    w, count = b.boxes, b.boxes.count[0]
+    for j in range(count):
+        for i in range(6):
+            w.history[j, i] = b.old[j, i] + b.rate[j, i] / a
+    return w.length[count - 1] - b.old[count - 1, 1] / a
+
+
+@compiled
+def second_stage(b: MovingEnd, length: float, middle_length: float) -> float:
+    """Set h = NEW_SHARE y(t + γΔt) − OLD_SHARE y(t), backward differences; return L_h [m]."""
+    w = b.boxes
+    for j in range(w.count[0]):
+        for i in range(6):
+            w.history[j, i] = NEW_SHARE * w.y[j, i] - OLD_SHARE * b.old[j, i]
+    return NEW_SHARE * middle_length - OLD_SHARE * length
+
+
+@compiled
+def box_step(
+    b: MovingEnd, step: float, middle: Ends, new: Ends, segment_length: float, c: Equation7Numbers
+) -> tuple[int, int, float, int, int]:
+    """Take one TR-BDF2 step; return its `NewtonReport` as a tuple. On failure ``b`` holds the cable before the step.
+
+    Args:
+        b: the cable, started with `start_moving_end`.
+        step: Δt. [s]
+        middle: velocity of the tow point at t + γΔt, and the drum.
+        new: the same at t + Δt.
+        segment_length: Δs. [m]
+        c: constants of equation (7).
+    """
+    w, a = b.boxes, 2.0 / (GAMMA * step)
+    if not begin_step(b, middle):
+        return CONVERGED, 0, 0.0, 0, 0
+    last, length = w.count[0] - 1, w.length[w.count[0] - 1]
+    end_history = first_stage(b, a)
+    report = solve_stage(w, a, end_history, middle, c)
+    spent = report.iterations
+    if report.outcome == CONVERGED:
+        middle_length = end_history - w.y[last, 1] / a
+        end_history = second_stage(b, length, middle_length)
+        report = solve_stage(w, a, end_history, new, c)
+        spent += report.iterations
+    if report.outcome == CONVERGED:
+        report = refuse_slack(w, report, new, c)
+    if report.outcome != CONVERGED:
+        copy_nodes(b.old, w.y, last + 1)
+        return report.outcome, spent, report.residual, report.node, report.row
+    for j in range(last + 1):
+        for i in range(6):
+            b.rate[j, i] = a * (w.y[j, i] - w.history[j, i])
+    w.length[last] = end_history - w.y[last, 1] / a
+    fits = fit_nodes(b, segment_length)
+    return CONVERGED if fits else FULL, spent, report.residual, report.node, report.row
+
+
+def pull_out_boxes(
+    tow_velocity: TowVelocity,
+    duration: float,
+    step: float = 0.1,
+    cable: CableProperties | None = None,
+    drum: DrumProperties | None = None,
+    current: Sequence[float] | None = None,
+    *,
+    segment_length: float = 0.5,
+) -> BoxHistory:
+    """Pull cable off the drum along a given motion: the second, independent formulation of second order.
+
+    Args:
+        tow_velocity: velocity of the tow point, earth axes (north, east, down), at a time. [m/s]
+        duration: of the run. [s]
+        step: Δt. [s]
+        cable: the cable; Table 1 by default.
+        drum: the drum; Table 1 by default.
+        current: uniform steady velocity of the water, earth axes. [m/s]
+        segment_length: Δs, independent of the step. [m]
+
+    Returns:
+        The history; a run that cannot go on is cut short and says so in `message`.
+
+    Raises:
+        subzero.UserError: a step, duration or segment length that is not positive, or a velocity that is not finite.
+    """
+    check_positive(duration=duration, step=step, segment_length=segment_length)
+    cable, drum = cable or CableProperties(), drum or DrumProperties()
+    north, east, down = (0.0, 0.0, 0.0) if current is None else (float(x) for x in current)
+    c = equation7_numbers(cable, (north, east, down), stretch_momentum=0.0)
+    turning, record = drum.numbers(), BoxRecord(compliance=c.e)
+    steps = max(1, round(duration / step))
+    b = moving_end(64)
+    start_moving_end(b, *velocity_at(tow_velocity, 0.0), turning.friction)
+    record.add(0.0, b.boxes, START)
+    for k in range(steps):
+        b = with_room(b, step, segment_length)
+        report = _advance(b, tow_velocity, k * step, step, turning, segment_length, c, MOST_HALVINGS)
+        if report.outcome != CONVERGED:
+            remedy = "another step or segment length, or the default scheme (scheme='moving_end')"
+            return record.history(explain(report, (k + 1) * step, remedy))
+        record.add((k + 1) * step, b.boxes, report)
+    return record.history()
+
+
+def _advance(
+    b: MovingEnd,
+    tow_velocity: TowVelocity,
+    time: float,
+    step: float,
+    turning: DrumNumbers,
+    segment_length: float,
+    c: Equation7Numbers,
+    halvings: int,
+) -> NewtonReport:
+    """Take a step, in halves where it fails."""
+    middle, new = (
+        Ends(*velocity_at(tow_velocity, at), turning.inertia, turning.friction, False)
+        for at in (time + GAMMA * step, time + step)
+    )
+    report = NewtonReport(*box_step(b, step, middle, new, segment_length, c))
+    if report.outcome in (CONVERGED, FULL, SLACK) or halvings == 0:
+        return report
+    half = 0.5 * step
+    report = _advance(b, tow_velocity, time, half, turning, segment_length, c, halvings - 1)
+    if report.outcome != CONVERGED:
+        return report
+    return _advance(b, tow_velocity, time + half, half, turning, segment_length, c, halvings - 1)

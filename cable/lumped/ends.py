@@ -1,0 +1,174 @@
+"""The far end of the lumped cable: the drum with the half spring before it, or a drogue.
+
+The last half spring, between the middle M of spring N and the drum, holds ½ℓ p(S); material enters it at the drum and
+leaves it at M, at half the rate, into the lump of node N − 1:
+
+    Q = d(½ℓ p(S))/dt − U p(S) + ½U p(M) + ½ℓ f(S),        T(S) = T_N + t_N·Q
+    V(S) = V_drum − U t_N,                                   V(M) = ½ (V_{N−1} + V(S))
+
+    free drum    (I_d/R_d²) dU/dt + C_f/R_d = T(S), or it stands: U ≥ 0 (whichever is the smaller of the two sides);
+                 with inertia it may overrun a slack cable, T(S) = 0
+    winch        U or T(S) as asked for
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+
+import numpy as np
+
+from cable.lumped.band_solver import add
+from cable.lumped.load import evaluate_node
+from cable.lumped.rope import ANSWER, DIRECTION, GAIN, GAP, NEW, PULL, REST, SIZE, START_MOMENTUM, WATER, Rope
+from cable.lumped.springs import drum_friction, unit_length
+from cable.properties import CableNumbers, DrumNumbers
+from cable.winch import LENGTH, TENSION
+from subzero.jit import allocating, compiled, inner
+
+
+@allocating
+def hold_end(rope: Rope, g: float, c: CableNumbers, drum: DrumNumbers) -> None:
+    """Write the equations of the far end."""
+    if rope.ends.free_end:
+        _add_drogue(rope)
+        return
+    _load_ends(rope, g, c)
+    flow, flow_by_U = np.zeros((3, 3)), np.zeros(3)
+    _flow_slopes(rope, g, flow, flow_by_U)
+    _cross_middle(rope, flow, flow_by_U)
+    _drum_row(rope, g, c, drum, flow, flow_by_U)
+
+
+@allocating
+def _add_drogue(rope: Rope) -> None:
+    """Add ½ρC_dA |U| U to the balance of the free end."""
+    N, square = rope.ends.count, 0.0
+    U = np.zeros(3)
+    for i in range(3):
+        U[i] = rope.velocity[NEW, N, i] - rope.vector[WATER, N, i]
+        square += U[i] * U[i]
+    size = sqrt(square)
+    rope.ends.drum_pull = rope.ends.tail_drag * square
+    for i in range(3):
+        rope.right[3 * (N - 1) + i] += rope.ends.tail_drag * size * U[i]
+        for k in range(3):
+            slope = (size if i == k else 0.0) + U[i] * U[k] / max(size, 1e-12)
+            add(rope.band, 3 * (N - 1) + i, 3 * (N - 1) + k, rope.ends.tail_drag * slope)
+
+
+@compiled
+def _load_ends(rope: Rope, g: float, c: CableNumbers) -> None:
+    """Fill the loads at the drum and in the middle of the last spring; ∂h is for h = a p + f, a = 1/g − 2U/ℓ."""
+    N, U, end, middle = rope.ends.count, rope.ends.payout[NEW], rope.drum, rope.middle
+    thin = sqrt(1.0 + rope.ends.stretch * rope.spring[PULL, N])
+    for i in range(3):
+        t = rope.vector[DIRECTION, N, i]
+        end.tangent[i], middle.tangent[i] = t, t
+        end.velocity[i] = rope.ends.drum_velocity[i] - U * t
+        end.water[i] = rope.vector[WATER, N, i]
+        middle.velocity[i] = 0.5 * (rope.velocity[NEW, N - 1, i] + end.velocity[i])
+        middle.water[i] = 0.5 * (rope.vector[WATER, N - 1, i] + rope.vector[WATER, N, i])
+    a = 1.0 / g - 2.0 * U / rope.spring[REST, N]
+    evaluate_node(c.mass, c.added_mass, c.weight, thin * c.tangential_drag, thin * c.normal_drag, a, end)
+    evaluate_node(c.mass, c.added_mass, 0.0, 0.0, 0.0, 1.0, middle)
+
+
+@inner
+def turn(rope: Rope, g: float, i: int, k: int) -> float:
+    """Return ∂t_N/∂V_{N−1}, an entry of −g (I − t tᵀ)/|d|. [s/m]."""
+    N, t = rope.ends.count, rope.vector[DIRECTION]
+    return -g * ((1.0 if i == k else 0.0) - t[N, i] * t[N, k]) / rope.spring[SIZE, N]
+
+
+@compiled
+def _flow_slopes(rope: Rope, g: float, flow: np.ndarray, flow_by_U: np.ndarray) -> None:
+    """Fill ∂(½U p(M))/∂V_{N−1} (3, 3) and ∂(½U p(M))/∂U (3,)."""
+    U, middle, t = rope.ends.payout[NEW], rope.middle, rope.vector[DIRECTION, rope.ends.count]
+    for i in range(3):
+        flow_by_U[i] = 0.5 * middle.momentum[i]
+        for k in range(3):
+            flow_by_U[i] -= 0.25 * U * middle.by_velocity[i, k] * t[k]
+            flow[i, k] = 0.25 * U * middle.by_velocity[i, k]
+            for m in range(3):
+                by_t = middle.by_tangent[i, m] - 0.5 * U * middle.by_velocity[i, m]
+                flow[i, k] += 0.5 * U * by_t * turn(rope, g, m, k)
+
+
+@compiled
+def _cross_middle(rope: Rope, flow: np.ndarray, flow_by_U: np.ndarray) -> None:
+    """Give the node before the drum the momentum that crosses the middle of the last spring."""
+    N, U = rope.ends.count, rope.ends.payout[NEW]
+    if N < 2:
+        return
+    for i in range(3):
+        row = 3 * (N - 2) + i
+        rope.right[row] -= 0.5 * U * rope.middle.momentum[i]
+        add(rope.band, row, 3 * (N - 1), -flow_by_U[i])
+        for k in range(3):
+            add(rope.band, row, 3 * (N - 2) + k, -flow[i, k])
+
+
+@allocating
+def _drum_row(
+    rope: Rope, g: float, c: CableNumbers, drum: DrumNumbers, flow: np.ndarray, flow_by_U: np.ndarray
+) -> None:
+    """Write the drum's equation, the last row."""
+    N, U, half, end = (
+        rope.ends.count,
+        rope.ends.payout[NEW],
+        0.5 * rope.spring[REST, rope.ends.count],
+        rope.drum,
+    )
+    row, by_V, Q = 3 * (N - 1), np.zeros(3), np.zeros(3)
+    unit = unit_length(rope, N) * rope.ends.by_payout
+    thinner = 0.5 * half * rope.ends.stretch / (1.0 + rope.ends.stretch * rope.spring[PULL, N])
+    gain = rope.spring[GAIN, N] * (1.0 + thinner * _along(rope.vector[DIRECTION, N], end.drag))
+    along, by_U = rope.spring[PULL, N], -gain * unit
+    for i in range(3):
+        t = rope.vector[DIRECTION, N, i]
+        rope.momentum[NEW, N, i] = half * end.momentum[i]
+        Q[i] = (rope.momentum[NEW, N, i] - rope.vector[START_MOMENTUM, N, i]) / g + half * end.force[i]
+        Q[i] += U * (0.5 * rope.middle.momentum[i] - end.momentum[i])
+        along += t * Q[i]
+        grown = 0.5 * rope.ends.by_payout * (end.momentum[i] / g + end.force[i])
+        by_U += t * (grown - end.momentum[i] + flow_by_U[i])
+        by_V[i] -= gain * rope.vector[ANSWER, N, i]
+        for k in range(3):
+            by_U -= t * half * end.by_velocity[i, k] * rope.vector[DIRECTION, N, k]
+            by_V[k] += t * flow[i, k] + Q[i] * turn(rope, g, i, k)
+            for m in range(3):
+                by_t = half * (end.by_tangent[i, m] - U * end.by_velocity[i, m])
+                by_V[k] += t * by_t * turn(rope, g, m, k)
+    rope.ends.drum_pull = along
+    excess, by_excess, spins = _drum_law(rope, g, drum, along)
+    if spins < 1.0:
+        by_V *= 0.0
+    rope.right[row] = excess - spins * gain * rope.spring[GAP, N]
+    add(rope.band, row, row, by_excess - spins * by_U)
+    if N > 1:
+        for k in range(3):
+            add(rope.band, row, row - 3 + k, -spins * by_V[k])
+
+
+@inner
+def _along(t: np.ndarray, vector: np.ndarray) -> float:
+    """Return t·vector."""
+    return t[0] * vector[0] + t[1] * vector[1] + t[2] * vector[2]
+
+
+@compiled
+def _drum_law(rope: Rope, g: float, drum: DrumNumbers, pull: float) -> tuple[float, float, float]:
+    """Return what the drum's equation leaves, its slope by U, and how much of the pull it feels (0 or 1)."""
+    U = rope.ends.payout[NEW]
+    if drum.control == LENGTH:
+        return 0.0, 1.0, 0.0
+    if drum.control == TENSION:
+        return rope.ends.wanted - pull, 0.0, 1.0
+    held, slope = drum_friction(drum.friction, U)
+    own = drum.inertia * (U - rope.ends.start_payout) / g + held
+    by_own = drum.inertia / g + slope
+    feels = 0.0 if drum.inertia > 0.0 and pull < 0.0 else 1.0
+    excess = own - feels * pull
+    if excess > U:
+        return U, 1.0, 0.0
+    return excess, by_own, feels

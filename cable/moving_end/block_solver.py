@@ -1,0 +1,177 @@
+"""Solve a block tridiagonal system with 4×4 blocks, in time and memory proportional to the number of blocks.
+
+    L_j z_{j−1} + D_j z_j + U_j z_{j+1} = r_j,   j = 1 … N
+
+One block holds the four unknowns of a cable segment: its tension and the position of its far node. Block Gauss
+elimination runs from the drum to the tow point, with partial pivoting inside a block; between blocks none is needed,
+because what is eliminated first is the piece of cable between the drum and a held node, a well-posed problem by
+itself. The first column of every L_j is zero (a node knows its neighbour's position, not the tension beyond it).
+
+The elimination ends at the tow point, so W_1 = D_1⁻¹ L_1 tells how the first block answers to a displacement of
+the tow point, all cable behind it included: the coupling to a vehicle gets that derivative for nothing.
+
+Solve a block pentadiagonal system with 4×4 blocks: what bending makes of the tridiagonal one of `block_solver`.
+
+    K_j z_{j−2} + L_j z_{j−1} + D_j z_j + U_j z_{j+1} + V_j z_{j+2} = r_j,   j = 1 … N
+
+Elimination from the drum to the tow point leaves z_j = b_j − W_j z_{j−1} − X_j z_{j−2} with
+
+    U' = U_j − V_j W_{j+2},   D' = D_j − V_j X_{j+2} − U' W_{j+1},   W_j = D'⁻¹ (L_j − U' X_{j+1}),   X_j = D'⁻¹ K_j
+
+W replaces L and X replaces K, both transposed as in `block_solver`, so W_1 still tells how the first block answers to
+the tow point.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from subzero.jit import compiled, inlined, inner
+
+SIZE = 4
+
+
+@inlined
+def factor_block(D: np.ndarray, pivots: np.ndarray) -> bool:
+    """Factor a 4×4 block in place by rows exchanged for size; return False when it is singular.
+
+    Multipliers stay in the row they were made in, so `solve_block` exchanges and eliminates in the same order;
+    the diagonal keeps the inverses of the pivots.
+    """
+    for k in range(SIZE):
+        best = k
+        for i in range(k + 1, SIZE):
+            if abs(D[i, k]) > abs(D[best, k]):
+                best = i
+        pivots[k] = best
+        if not abs(D[best, k]) > 0.0:
+            return False
+        if best != k:
+            for c in range(k, SIZE):
+                D[k, c], D[best, c] = D[best, c], D[k, c]
+        inverse = 1.0 / D[k, k]
+        D[k, k] = inverse
+        for i in range(k + 1, SIZE):
+            D[i, k] *= inverse
+            for c in range(k + 1, SIZE):
+                D[i, c] -= D[i, k] * D[k, c]
+    return True
+
+
+@inlined
+def solve_block(D: np.ndarray, pivots: np.ndarray, b: np.ndarray) -> None:
+    """Overwrite the right-hand side b (4,) with the solution of the factored block."""
+    for k in range(SIZE):
+        p = pivots[k]
+        if p != k:
+            b[k], b[p] = b[p], b[k]
+        for i in range(k + 1, SIZE):
+            b[i] -= D[i, k] * b[k]
+    for k in range(SIZE - 1, -1, -1):
+        for c in range(k + 1, SIZE):
+            b[k] -= D[k, c] * b[c]
+        b[k] *= D[k, k]
+
+
+@compiled
+def factor(L: np.ndarray, D: np.ndarray, U: np.ndarray, pivots: np.ndarray, last: int) -> int:
+    """Factor blocks 1 … last in place; L_j becomes W_j = D_j⁻¹ L_j, transposed so that columns are contiguous.
+
+    Returns:
+        0 when done, else the index of the singular block.
+    """
+    for j in range(last, 0, -1):
+        if j < last:
+            for row in range(1, SIZE):
+                for column in range(1, SIZE):
+                    total = 0.0
+                    for k in range(SIZE):
+                        total += U[j, row, k] * L[j + 1, column, k]
+                    D[j, row, column] -= total
+        if not factor_block(D[j], pivots[j]):
+            return j
+        transpose(L[j])
+        for column in range(1, SIZE):
+            solve_block(D[j], pivots[j], L[j, column])
+    return 0
+
+
+@compiled
+def solve(L: np.ndarray, D: np.ndarray, U: np.ndarray, pivots: np.ndarray, last: int, r: np.ndarray) -> None:
+    """Overwrite r (blocks, 4) with the solution, given what `factor` left."""
+    for j in range(last, 0, -1):
+        if j < last:
+            for row in range(1, SIZE):
+                for k in range(SIZE):
+                    r[j, row] -= U[j, row, k] * r[j + 1, k]
+        solve_block(D[j], pivots[j], r[j])
+    spread(L, last, r)
+
+
+@inlined
+def spread(L: np.ndarray, last: int, r: np.ndarray) -> None:
+    """Take what each block does to the next off r (blocks, 4), from the tow point to the drum: z_j −= W_j z_{j−1}."""
+    for j in range(2, last + 1):
+        for column in range(1, SIZE):
+            for row in range(SIZE):
+                r[j, row] -= L[j, column, row] * r[j - 1, column]
+
+
+@inlined
+def transpose(A: np.ndarray) -> None:
+    """Transpose a 4×4 block in place."""
+    for i in range(SIZE):
+        for k in range(i + 1, SIZE):
+            A[i, k], A[k, i] = A[k, i], A[i, k]
+
+
+@inner
+def factor_wide(blocks: np.ndarray, pivots: np.ndarray, last: int) -> int:
+    """Factor blocks 1 … last of L, D, U, K, V (5, blocks, 4, 4) in place; return 0, or the index of a singular one."""
+    L, D, U, K, V = blocks[0], blocks[1], blocks[2], blocks[3], blocks[4]
+    for j in range(last, 0, -1):
+        if j + 2 <= last:
+            _take_off(V[j], L[j + 2], U[j])
+            _take_off(V[j], K[j + 2], D[j])
+        if j + 1 <= last:
+            _take_off(U[j], L[j + 1], D[j])
+            _take_off(U[j], K[j + 1], L[j])
+        if not factor_block(D[j], pivots[j]):
+            return j
+        transpose(L[j])
+        transpose(K[j])
+        for column in range(SIZE):
+            solve_block(D[j], pivots[j], L[j, column])
+            solve_block(D[j], pivots[j], K[j, column])
+    return 0
+
+
+@compiled
+def _take_off(A: np.ndarray, transposed: np.ndarray, out: np.ndarray) -> None:
+    """Take A·B off `out`, given Bᵀ."""
+    for row in range(SIZE):
+        for column in range(SIZE):
+            total = 0.0
+            for k in range(SIZE):
+                total += A[row, k] * transposed[column, k]
+            out[row, column] -= total
+
+
+@inner
+def solve_wide(blocks: np.ndarray, pivots: np.ndarray, last: int, r: np.ndarray) -> None:
+    """Overwrite r (blocks, 4) with the solution, given what `factor_wide` left."""
+    L, D, U, K, V = blocks[0], blocks[1], blocks[2], blocks[3], blocks[4]
+    for j in range(last, 0, -1):
+        for row in range(SIZE):
+            for k in range(SIZE):
+                if j + 1 <= last:
+                    r[j, row] -= U[j, row, k] * r[j + 1, k]
+                if j + 2 <= last:
+                    r[j, row] -= V[j, row, k] * r[j + 2, k]
+        solve_block(D[j], pivots[j], r[j])
+    for j in range(2, last + 1):
+        for column in range(SIZE):
+            for row in range(SIZE):
+                r[j, row] -= L[j, column, row] * r[j - 1, column]
+                if j > 2:
+                    r[j, row] -= K[j, column, row] * r[j - 2, column]

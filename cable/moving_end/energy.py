@@ -1,0 +1,116 @@
+"""Where the energy of a moving cable goes, per unit time.
+
+Relative to the water, U = V − J, the balance of `segment_load` times U gives
+
+    −F·U(0) = dE/dt + L − G + D_S + M + C
+
+with F the force on the vehicle, E = ∫(½mU² + ½ρA U_⊥² + ½eT²) ds (and bending) the energy in the water, L = ∫D·U ds the
+loss to drag, G = ∫w_c U_k ds the work of gravity, and
+
+    D_S = −F_S·U(S) − (dS/dt) e(S)       work on the drum, F_S = T_N t_N + ½Q_N, less the energy that enters with new
+                                         cable; at a free end, the loss of the drogue
+    M   = −ρA ∫ U_t U_⊥·(∂t/∂t) ds       (the paper's added mass is no gradient of an energy when the cable turns)
+    C   = ∫ m U·dJ/dt ds − ∫ T t·∂J/∂s ds    what a current that changes along the cable's way does; 0 in a uniform one
+
+M is the vector form of −(m1 − m)∫V_t V_n β̇ ds. It follows from U·∂(P U)/∂t = ∂(½U_⊥²)/∂t − U_t U_⊥·∂t/∂t, because
+U_⊥ has no component along t; and ∂t/∂t = ∂V/∂s across.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cable.moving_end.bending import bending_energy
+from cable.moving_end.segment_load import Load, evaluate_load
+from cable.moving_end.state import BEFORE, NOW, Line, take_segment
+from cable.properties import CableNumbers
+from subzero.jit import compiled, inlined, inner
+
+LOSS, STORED, GRAVITY_WORK, AT_DRUM, ADDED_MASS, STRAINED, CARRIED, TOWED = range(8)
+"""What `energy_flow` fills: L, E [J], G, D_S, M, −∫T t·∂J/∂s ds, ∫m U·dJ/dt ds (mean over a step), −F·U(0). [W]"""
+FLOWS = 8
+
+
+@inner
+def energy_flow(line: Line, c: CableNumbers, work: Load, out: np.ndarray) -> None:
+    """Fill out (FLOWS,) with the powers and the stored energy of the cable at level NOW."""
+    N, t, across, V, J = line.ends.count, work.tangent, work.across, work.velocity, work.water
+    loss, energy, sunk, added, strained, carried = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for j in range(1, N + 1):
+        length = line.ends.last_length[NOW] if j == N else line.length[j]
+        T = line.tension[NOW, j]
+        take_segment(line.position[NOW], line.velocity[NOW], line.water[NOW], j, work)
+        evaluate_load(length, T, line.slip[j], line.normal_gain[j], 0.0, c, work)
+        square, turn = 0.0, 0.0
+        for i in range(3):
+            speed = V[i] - J[i]
+            square += speed * speed
+            loss += length * work.drag[i] * speed
+            turn += across[i] * (line.velocity[NOW, j, i] - line.velocity[NOW, j - 1, i])
+            strained -= T * t[i] * (line.water[NOW, j, i] - line.water[NOW, j - 1, i])
+        stored = c.mass * square + c.added_mass * work.side * work.side + c.compliance * T * T
+        energy += 0.5 * length * stored
+        sunk += length * c.weight * (V[2] - J[2])
+        added -= c.added_mass * work.along * turn * length / work.chord_length
+        carried += length * c.mass * _carried(line, j)
+    out[LOSS], out[STORED], out[GRAVITY_WORK], out[ADDED_MASS] = loss, energy, sunk, added
+    out[STRAINED], out[CARRIED], out[AT_DRUM], out[TOWED] = strained, carried, 0.0, 0.0
+    out[STORED] += bending_energy(line, c)
+    _flow_at_ends(line, c, out)
+
+
+@inlined
+def _carried(line: Line, j: int) -> float:
+    """Return U·dJ/dt in the middle of segment j, over the last step. [m²/s³]."""
+    if line.ends.previous_step <= 0.0:
+        return 0.0
+    power, V, J = 0.0, line.velocity, line.water
+    for i in range(3):
+        change = J[NOW, j - 1, i] + J[NOW, j, i] - J[BEFORE, j - 1, i] - J[BEFORE, j, i]
+        now = V[NOW, j - 1, i] + V[NOW, j, i] - J[NOW, j - 1, i] - J[NOW, j, i]
+        before = V[BEFORE, j - 1, i] + V[BEFORE, j, i] - J[BEFORE, j - 1, i] - J[BEFORE, j, i]
+        power += 0.125 * (now + before) * change
+    return power / line.ends.previous_step
+
+
+@compiled
+def _flow_at_ends(line: Line, c: CableNumbers, out: np.ndarray) -> None:
+    """Fill −F·U(0) and D_S."""
+    T, N = max(line.ends.drum_pull, 0.0), line.ends.count
+    along, square, size = 0.0, 0.0, 0.0
+    for i in range(3):
+        d = line.position[NOW, N, i] - line.position[NOW, N - 1, i]
+        U = line.velocity[NOW, N, i] - line.water[NOW, N, i]
+        along += d * U
+        size += d * d
+        square += U * U
+        out[TOWED] -= line.ends.tow_force[i] * (line.velocity[NOW, 0, i] - line.water[NOW, 0, i])
+    if line.ends.free_end:
+        out[AT_DRUM] = T * np.sqrt(square)
+        return
+    along /= np.sqrt(max(size, 1e-30))
+    entering = 0.5 * (c.mass * square + c.added_mass * (square - along * along) + c.compliance * T * T)
+    out[AT_DRUM] = -line.ends.payout[NOW] * entering
+    for i in range(3):
+        out[AT_DRUM] -= line.ends.drum_force[i] * (line.velocity[NOW, N, i] - line.water[NOW, N, i])
+
+
+@inner
+def book_step(line: Line, step: float, c: CableNumbers, work: Load, ledger: np.ndarray) -> None:
+    """Add an accepted step to a ledger (3, FLOWS): flows before, flows now, and what came in, went out and is missing.
+
+    The third row holds the work of the tow point, the sum of the sizes of all terms, and the residual of the balance
+    at TOWED, LOSS and STORED. [J]
+    """
+    for i in range(FLOWS):
+        ledger[0, i] = ledger[1, i]
+    energy_flow(line, c, work, ledger[1])
+    old, new, total, half = ledger[0], ledger[1], ledger[2], 0.5 * step
+    stored = new[STORED] - old[STORED]
+    spent = half * (old[LOSS] + new[LOSS]) + half * (old[AT_DRUM] + new[AT_DRUM])
+    spent += half * (old[ADDED_MASS] + new[ADDED_MASS] + old[STRAINED] + new[STRAINED])
+    spent += step * new[CARRIED] - half * (old[GRAVITY_WORK] + new[GRAVITY_WORK])
+    towed = half * (old[TOWED] + new[TOWED])
+    total[TOWED] += towed
+    total[LOSS] += abs(towed) + half * (old[LOSS] + new[LOSS])
+    total[STORED] += towed - stored - spent

@@ -1,0 +1,74 @@
+"""The start of a run: a straight cable between drum and tow point, in segments, at three equal levels of time."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cable.current import Water
+from cable.drum import TURNING
+from cable.moving_end.segment_load import Load
+from cable.moving_end.state import BEFORE, NEW, NOW, SPLIT_AT, Line, feel_water, segment_momentum, spacing
+from cable.properties import CableNumbers, DrumNumbers
+from subzero.jit import compiled
+
+
+@compiled
+def lay_straight(
+    line: Line, wet_length: float, direction: np.ndarray, tow: np.ndarray, drum: DrumNumbers, c: CableNumbers
+) -> None:
+    """Lay a straight cable from the drum along `direction` (a unit vector) to a tow point that moves at `tow`.
+
+    The cable is as long as `wet_length` says, in segments of `spacing`; it comes off the drum as fast as the tow point
+    moves away, and its tension is that of a steady straight pull with none at the drum, so a run can start at speed
+    without a jolt. Needs 0 < wet_length and room.
+    """
+    ends, away = line.ends, 0.0
+    ends.count, ends.settled, ends.time, ends.previous_step = 1, 0.0, 0.0, 0.0
+    ends.drum_mode, ends.drum_pull = TURNING, 0.0
+    while wet_length - ends.settled > SPLIT_AT * spacing(line):
+        line.length[ends.count] = spacing(line)
+        ends.settled += line.length[ends.count]
+        ends.count += 1
+    line.length[ends.count] = wet_length - ends.settled
+    for i in range(3):
+        away += (tow[i] - drum.velocity[i]) * direction[i]
+    for level in range(3):
+        ends.last_length[level] = line.length[ends.count]
+        ends.payout[level] = away
+    _pull_straight(line, wet_length, direction, tow, drum, c)
+
+
+@compiled
+def _pull_straight(
+    line: Line, wet_length: float, direction: np.ndarray, tow: np.ndarray, drum: DrumNumbers, c: CableNumbers
+) -> None:
+    """Fill places, velocities (even between both ends) and tensions of a straight cable that moves along itself."""
+    speed = tow[0] * direction[0] + tow[1] * direction[1] + tow[2] * direction[2]
+    per_metre, along = c.tangential_drag * speed * abs(speed), wet_length
+    for j in range(line.ends.count + 1):
+        if j > 0:
+            for level in range(2):
+                line.tension[level, j] = per_metre * (along - 0.5 * line.length[j])
+            along = along - line.length[j] if j < line.ends.count else 0.0
+        line.node_tension[j] = max(per_metre, 0.0) * along
+        for i in range(3):
+            at_drum = drum.velocity[i] + line.ends.payout[NOW] * direction[i]
+            velocity = at_drum + along / wet_length * (tow[i] - at_drum)
+            for level in range(3):
+                line.position[level, j, i] = along * direction[i]
+                line.velocity[level, j, i] = velocity
+    for i in range(3):
+        line.ends.tow_force[i] = -per_metre * wet_length * direction[i]
+
+
+@compiled
+def start_in_water(line: Line, water: Water, c: CableNumbers, work: Load) -> None:
+    """Fill the water's velocity at the nodes and the segments' momenta, at all levels, from what moves at the start."""
+    feel_water(line, water, line.ends.time)
+    for level in (NOW, BEFORE):
+        for j in range(line.ends.count + 1):
+            for i in range(3):
+                line.water[level, j, i] = line.water[NEW, j, i]
+        for j in range(1, line.ends.count + 1):
+            length = line.ends.last_length[level] if j == line.ends.count else line.length[j]
+            segment_momentum(line, level, j, length, c, work)

@@ -1,0 +1,179 @@
+"""A tow point that changes its velocity at once: an impulse along the whole cable, taken apart from the steps of time.
+
+A cable that does not stretch has to follow at once. With ΔV the jump of the velocity of a node, τ the impulse of the
+tension in a segment and ΔP = ℓ (m ΔV + ρA ΔV_⊥) that of its momentum,
+
+    τ_j t_j − τ_{j+1} t_{j+1} + ½(ΔP_j + ΔP_{j+1}) = 0,     (ΔV_j − ΔV_{j−1})·t_j = 0
+
+the equations of `assembly` in an infinitely short step: drag and weight have no part in it, places stay as they
+are. A step of time that spreads this impulse over its length shows a peak, or a dip, of the tension that grows
+without bound as the step gets shorter, and rings after it.
+
+An impulse that pushes is a cable that gets slack for the time in which drag slows it down, −τ/T: 2 ms where the
+turn of Fig. 5 ends. Up to `SLACK_FOR` it is taken at once too; where it is longer, as when a vehicle stops, nothing
+is taken, and the cable gets slack step by step. A cable that stretches has no impulse: waves take it up.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cable.drum import LENGTH, STANDING, TENSION
+from cable.moving_end.block_solver import factor, solve
+from cable.moving_end.segment_load import Load, chord_length
+from cable.moving_end.state import BEFORE, DIAGONAL, LOWER, NOW, RESIDUAL, UPPER, Line, segment_momentum
+from cable.properties import CableNumbers, DrumNumbers
+from subzero.jit import allocating, inner
+
+FELT = 1e-6
+"""A jump of the tow point's velocity smaller than this is none. [m/s]"""
+SLACK_FOR = 0.01
+"""A cable that would be slack for no longer is taken to follow at once. [s]"""
+
+
+@allocating
+def take_jolt(
+    line: Line, change: np.ndarray, c: CableNumbers, drum: DrumNumbers, work: Load, out: np.ndarray
+) -> bool:
+    """Give a line, at level NOW, the velocities that it has just after a jolt; say whether it was taken.
+
+    Args:
+        line: the cable.
+        change: jump of the tow point's velocity (3,). [m/s]
+        c: cable.
+        drum: drum or winch.
+        work: work space.
+        out: impulse on the vehicle (3,); zeros where none was taken. [N s]
+    """
+    for i in range(3):
+        out[i] = 0.0
+    size = max(abs(change[0]), abs(change[1]), abs(change[2]))
+    if size < FELT or c.compliance > 0.0 or line.ends.count < 2 or line.ends.free_end:
+        return False
+    tangents, masses = np.zeros((line.ends.count + 1, 3)), np.zeros((3, 3))
+    _fill_tangents(line, tangents)
+    _assemble(line, tangents, change, c, drum, masses)
+    blocks, jump = line.blocks, line.rows[RESIDUAL]
+    line.ends.factored = False
+    if factor(blocks[LOWER], blocks[DIAGONAL], blocks[UPPER], line.pivots, line.ends.count) > 0:
+        return False
+    solve(blocks[LOWER], blocks[DIAGONAL], blocks[UPPER], line.pivots, line.ends.count, jump)
+    for j in range(1, line.ends.count + 1):
+        if jump[j, 0] < -max(line.tension[NOW, j], 0.0) * SLACK_FOR:
+            return False
+    _mass(line, tangents, 1, c, masses)
+    for i in range(3):
+        out[i] = jump[1, 0] * tangents[1, i]
+        for k in range(3):
+            out[i] -= 0.25 * masses[i, k] * (change[k] + jump[1, 1 + k])
+    _apply(line, tangents, change, c, work)
+    return True
+
+
+@inner
+def _length(line: Line, j: int) -> float:
+    """Return the length of segment j. [m]."""
+    return line.ends.last_length[NOW] if j == line.ends.count else line.length[j]
+
+
+@inner
+def _fill_tangents(line: Line, tangents: np.ndarray) -> None:
+    """Fill the tangents of all segments (segments + 1, 3)."""
+    for j in range(1, line.ends.count + 1):
+        for i in range(3):
+            tangents[j, i] = line.position[NOW, j, i] - line.position[NOW, j - 1, i]
+        r = chord_length(tangents[j], _length(line, j))
+        for i in range(3):
+            tangents[j, i] /= r
+
+
+@inner
+def _mass(line: Line, tangents: np.ndarray, j: int, c: CableNumbers, out: np.ndarray) -> None:
+    """Fill out (3, 3) with ∂P/∂V of segment j. [kg]."""
+    length, t = _length(line, j), tangents[j]
+    for i in range(3):
+        for k in range(3):
+            out[i, k] = -length * c.added_mass * t[i] * t[k]
+        out[i, i] += length * (c.mass + c.added_mass)
+
+
+@inner
+def _assemble(
+    line: Line, tangents: np.ndarray, change: np.ndarray, c: CableNumbers, drum: DrumNumbers, M: np.ndarray
+) -> None:
+    """Fill matrix and right-hand side for the impulses and jumps of all blocks; ΔV_0 is `change`."""
+    N, L, D, U, r = (
+        line.ends.count,
+        line.blocks[LOWER],
+        line.blocks[DIAGONAL],
+        line.blocks[UPPER],
+        line.rows[RESIDUAL],
+    )
+    for j in range(1, N + 1):
+        for i in range(4):
+            r[j, i] = 0.0
+            for k in range(4):
+                L[j, i, k] = 0.0
+                D[j, i, k] = 0.0
+                U[j, i, k] = 0.0
+    for j in range(1, N + 1):
+        _mass(line, tangents, j, c, M)
+        t = tangents[j]
+        for i in range(3):
+            L[j, 0, 1 + i] = -t[i]
+            if j < N:
+                D[j, 0, 1 + i] = t[i]
+                D[j, 1 + i, 0] += t[i]
+            if j > 1:
+                U[j - 1, 1 + i, 0] -= t[i]
+            for k in range(3):
+                quarter = 0.25 * M[i, k]
+                if j < N:
+                    D[j, 1 + i, 1 + k] += quarter
+                    L[j, 1 + i, 1 + k] += quarter
+                if j > 1:
+                    D[j - 1, 1 + i, 1 + k] += quarter
+                    if j < N:
+                        U[j - 1, 1 + i, 1 + k] += quarter
+    _assemble_drum(line, tangents, M, drum)
+    for m in range(4):
+        for k in range(3):
+            r[1, m] -= L[1, m, 1 + k] * change[k]
+
+
+@inner
+def _assemble_drum(line: Line, tangents: np.ndarray, M: np.ndarray, drum: DrumNumbers) -> None:
+    """Fill the last block: ΔV_N = −ΔU t_N, and the drum's equation for τ_N and ΔU; `M` is that of the last segment."""
+    N = line.ends.count
+    t, D, L, U = tangents[N], line.blocks[DIAGONAL, N], line.blocks[LOWER, N], line.blocks[UPPER]
+    mass = 0.0
+    for i in range(3):
+        Mt = 0.0
+        for k in range(3):
+            Mt += M[i, k] * t[k]
+        mass += t[i] * Mt
+        U[N - 1, 1 + i, 1] -= 0.25 * Mt
+    D[0, 1], D[2, 2], D[3, 3] = -1.0, 1.0, 1.0
+    if drum.control == LENGTH or line.ends.drum_mode == STANDING:
+        D[1, 1] = 1.0
+        return
+    D[1, 0], D[1, 1] = 1.0, -0.25 * mass - (0.0 if drum.control == TENSION else drum.inertia)
+    for i in range(3):
+        for k in range(3):
+            L[1, 1 + i] += 0.25 * t[k] * M[k, i]
+
+
+@inner
+def _apply(line: Line, tangents: np.ndarray, change: np.ndarray, c: CableNumbers, work: Load) -> None:
+    """Add the jumps to the velocities of level NOW, and forget what was before."""
+    N, jump = line.ends.count, line.rows[RESIDUAL]
+    for i in range(3):
+        line.velocity[NOW, 0, i] += change[i]
+        for j in range(1, N):
+            line.velocity[NOW, j, i] += jump[j, 1 + i]
+        line.velocity[NOW, N, i] -= jump[N, 1] * tangents[N, i]
+    line.ends.payout[NOW] += jump[N, 1]
+    line.ends.payout[BEFORE] = line.ends.payout[NOW]
+    line.ends.previous_step = 0.0
+    for j in range(1, N + 1):
+        segment_momentum(line, NOW, j, _length(line, j), c, work)

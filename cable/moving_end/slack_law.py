@@ -1,0 +1,40 @@
+"""The law between tension and strain: inextensible or elastic when taut, and never a push.
+
+A thin cable cannot be compressed: it buckles, and its chord gets shorter. With the shortening
+σ = ½(1 + eT)² − ½|d|²/ℓ² of a segment (the strain, for a small one), slackness is the alternative
+
+    T ≥ 0,   σ ≥ 0,   T σ = 0
+
+which is smoothed to T σ = T₀ (`SMOOTHING`, 1e-13 N) and written as one equation that Newton's method likes,
+the Fischer-Burmeister function φ(a, b) = a + b − √(a² + b² + 2μ) = 0 with a = T/T_r and b = σ/σ_r.
+
+Departs from source: the paper takes the cable as taut everywhere (its equations are singular at T = 0). The cost of
+the smoothing is a strain of T₀/T: 1e-12 at a tenth of a newton. What happens inside a slack bight (folding, contact,
+bending) is not modelled: without bending stiffness its shape below one segment length is ill-posed, and only its
+ends, its drag and its inertia mean anything.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+
+from subzero.jit import inlined
+
+TENSION_SCALE = 1e-3
+"""T_r [N] and σ_r [-]: where the corner between taut and slack is seen at the same size in both."""
+STRAIN_SCALE = 1e-3
+SMOOTHING = 1e-13
+"""T₀ = T σ of the smoothed law. [N]"""
+KNOWN = 1e-4
+"""A cable with more tension than this is taut, and its tension is foreseen from the steps before. [N]"""
+
+
+@inlined
+def slack_law(T: float, shortening: float, smoothing: float) -> tuple[float, float, float]:
+    """Return φ and its derivatives by the tension T [N] and the shortening σ [-], for T₀ = `smoothing` [N]."""
+    a, b = T / TENSION_SCALE, shortening / STRAIN_SCALE
+    mu = smoothing / (TENSION_SCALE * STRAIN_SCALE)
+    s = sqrt(a * a + b * b + 2.0 * mu)
+    # a + b − s, without cancellation when one of the two is large
+    phi = 2.0 * (a * b - mu) / (a + b + s) if a + b > 0.0 else a + b - s
+    return phi, (1.0 - a / s) / TENSION_SCALE, (1.0 - b / s) / STRAIN_SCALE

@@ -1,0 +1,89 @@
+"""Why a run of the default scheme stopped: when, where, and what cures such stops.
+
+What to try was found on random trials that stop (`python -m benchmarks.stops` follows the advice, and counts): a limp
+cable wants shorter steps; a stiff one longer segments, in which it cannot fold (shorter steps make it worse); one that
+a winch forces to a length wants a winch that gives way. A message names settings as the caller's users know them, and
+how to change them, in words that a program can follow: "a shorter step", "more wet_length", "compliance = 1e-3".
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from cable.drum import FREE, LENGTH, TENSION
+from cable.moving_end.state import NEW, NOW, Line
+from cable.properties import CableNumbers, DrumNumbers
+
+EQUATIONS = ("length", "northward balance", "eastward balance", "downward balance")
+NEARLY_TAUT = 0.999
+"""A cable whose ends are this share of its length apart, or more, and that has no solution, is too short."""
+SHORT_SEGMENTS = 3.0
+"""A cable of fewer segments than this has hardly begun."""
+
+
+class Names(NamedTuple):
+    """What the settings are called where the advice is read."""
+
+    step: str = "step"
+    segment: str = "segment_length"
+    wet: str = "wet_length"
+    rate: str = "rate"
+    yielding: str = "a cable.ConstantTension"
+
+
+def describe_stop(
+    time: float, line: Line, drum: DrumNumbers, c: CableNumbers, names: Names | None = None
+) -> str:
+    """Return why a run could not go on beyond `time` [s], where, and what to try.
+
+    Args:
+        time: of the last result. [s]
+        line: the cable, with what was tried on level NEW.
+        drum: the drum or winch.
+        c: the cable's numbers.
+        names: of the settings.
+    """
+    words, solved = names or Names(), line.ends.solved
+    way = float(np.linalg.norm(line.position[NEW, 0] - drum.place))
+    if drum.control == LENGTH and way >= NEARLY_TAUT * drum.setpoint:
+        return (
+            f"The cable is too short beyond t = {time:g} s: the winch has paid out {drum.setpoint:.5g} m, the vehicle "
+            f"is {way:.5g} m away. Try {words.yielding}, or a higher {words.rate}."
+        )
+    if solved.converged:
+        return (
+            f"The drum has given far more cable until t = {time:g} s than the ways of its ends ask for: nothing holds "
+            "it back. Try more friction_torque, or a winch."
+        )
+    if solved.residual <= 1.0 and drum.control == FREE:
+        return (
+            f"The cable would push itself back onto the drum beyond t = {time:g} s, and a free drum takes none up. "
+            f"Try {_remedy(line, drum, c, words)}, or more friction_torque."
+        )
+    return (
+        f"The cable could not be solved beyond t = {time:g} s: after {solved.iterations} Newton iterations "
+        f"{_worst(line)}. Try {_remedy(line, drum, c, words)}."
+    )
+
+
+def _worst(line: Line) -> str:
+    """Return which equation is off most."""
+    solved = line.ends.solved
+    place = f"the {EQUATIONS[solved.worst_equation]} at node {solved.worst_node}"
+    if not np.isfinite(solved.residual):
+        return f"{place} is not a number"
+    return f"{place} is off by {max(solved.residual, 1.0):.1e} times its tolerance"
+
+
+def _remedy(line: Line, drum: DrumNumbers, c: CableNumbers, words: Names) -> str:
+    """Return what cures most stops of this kind, the surest first."""
+    if hasattr(c, "bending_stiffness"):
+        return f"a longer {words.segment}, or bending_stiffness = 0"
+    length = float(line.ends.settled + line.ends.last_length[NOW])
+    if drum.control == TENSION and length < SHORT_SEGMENTS * float(line.ends.segment_length):
+        return f"more {words.wet}, or a shorter {words.step}"
+    if drum.control == LENGTH and not line.ends.free_end:
+        return f"{words.yielding}, compliance = 1e-3, or a higher {words.rate}"
+    return f"a shorter {words.step}, or a longer {words.segment}"

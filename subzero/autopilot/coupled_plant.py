@@ -1,0 +1,203 @@
+"""The coupled simulation as a discrete-time system: state and command in, next state out, nothing remembered.
+
+The vector of its state starts with the hull's 16 states and goes on with everything the cable remembers, as one flat
+array (`Memory`): what a step leaves for the next. The state of a cable is everything in its line but the work space of
+a step, and the pull at the last two times. As a flat array it can be the state vector of a discrete-time system:
+stored, restored and stepped again from anywhere.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from math import remainder, tau
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+import vehicle
+from cable.moving_end import enlarged
+from scenarios import Start, Trial
+from subzero.coupling import FINE
+from subzero.errors import UserError
+from subzero.initial_conditions import prepare
+from subzero.loop import NO_ROOM, SPARE, run_rows
+from subzero.model import Model
+from subzero.recording import new_recording
+from subzero.run_state import Live, Orders
+from subzero.simulation import in_words
+from subzero.steady_motion.hull_state_space import INPUT_NAMES, STATE_NAMES, from_vehicle, to_vehicle
+from vehicle.state import CHARGE, LINKAGE
+
+if TYPE_CHECKING:
+    import control
+
+CABLE_OUTPUTS = (
+    "cable_length",
+    "cable_tension",
+    "drum_tension",
+    "cable_force_forward",
+    "cable_force_starboard",
+    "cable_force_down",
+    "cable_moment_roll",
+    "cable_moment_pitch",
+    "cable_moment_yaw",
+)
+"""What the tethered plant gives beside its hull's states, as channels of `subzero.channels` [m, N, N m]."""
+
+HIDDEN = ("battery_charge", "rudder_linkage", "stern_plane_port_linkage", "stern_plane_starboard_linkage")
+"""States of the hull that only the tethered plant has [C, rad]."""
+HULL_SIZE = len(STATE_NAMES) + len(HIDDEN)
+EXACT = 1e-12
+"""How exactly a step is solved for differences of it: what is left of cable forces, and between hull and cable. [-]"""
+
+
+def blank_trial(model: Model, x: np.ndarray, wet_length: float, steps: dict[str, float]) -> Trial:
+    """Return a trial that says only how the hull lies, how much cable is out, and the steps."""
+    heading = remainder(float(x[5]), tau)
+    start = Start(roll=x[3], pitch=x[4], heading=heading, depth=x[2], surge_speed=x[6], wet_length=wet_length)
+    nothing: dict[str, Any] = {
+        "vehicle": {},
+        "cable": {},
+        "drum": {},
+        "text": "",
+        "source": "",
+        "description": "",
+    }
+    duration = steps["cable_step"]
+    return Trial(name="plant", duration=duration, start=start, current=model.current, **(nothing | steps))
+
+
+class NoRoomError(UserError):
+    """More cable than there is room for."""
+
+
+class Tethered:
+    """The coupled simulation as a function from state and command to the next state.
+
+    Args:
+        trial: where it starts, and its steps; its commands are not used.
+        model: vehicle, cable, drum and water.
+        longest: length of cable that there is room for. [m]
+        x: state of the hull to start with (16,), other than the trial's.
+        exact: solve every step to rounding, for derivatives by differences.
+
+    Attributes:
+        initial: the state to start with, `HULL_SIZE` numbers of the hull and those of `Memory`.
+        sample_time: of a step. [s]
+    """
+
+    def __init__(
+        self, trial: Trial, model: Model, longest: float, *, x: np.ndarray | None = None, exact: bool = False
+    ) -> None:
+        self._setup, live = prepare(trial, model, True)
+        self._setup = self._setup._replace(orders=Orders(np.zeros(1), np.zeros((1, 4))))
+        if exact:
+            live.line.ends.tolerance, self._setup.fixed.agreement = EXACT, EXACT  # type: ignore[misc]  # a record
+        room = int(longest / trial.segment_length) + SPARE + 4
+        self._live = live._replace(line=enlarged(live.line, max(room, live.line.length.size)))
+        self._memory = Memory(self._live)
+        self._recording = new_recording(2, 4 * self._live.line.length.size)
+        self._r_c = model.vehicle.tow_point.position()
+        self.sample_time, self._longest = trial.cable_step, longest
+        x = from_vehicle(live.state, heading_near=trial.start.heading) if x is None else x
+        self.initial = np.concatenate([x, np.zeros(len(HIDDEN)), self._memory.read()])
+        self.initial[len(STATE_NAMES) + 1 : HULL_SIZE] = x[13:]
+
+    def system(self) -> control.NonlinearIOSystem:
+        """Return the discrete-time system."""
+        import control
+
+        cable = [f"cable[{i}]" for i in range(self._memory.size)]
+        system = control.NonlinearIOSystem(
+            self.update,
+            self.output,
+            inputs=list(INPUT_NAMES),
+            outputs=[*STATE_NAMES, *CABLE_OUTPUTS],
+            states=[*STATE_NAMES, *HIDDEN, *cable],
+            dt=self.sample_time,
+            name="tethered",
+        )
+        system.initial_state = self.initial
+        return system
+
+    def update(self, t: float, x: np.ndarray, u: np.ndarray, params: dict[str, Any]) -> np.ndarray:
+        """Return the state one step after x under a command u (4,)."""
+        live = self._live
+        live.state[:] = to_vehicle(x[: len(STATE_NAMES)])
+        live.state[CHARGE], live.state[LINKAGE : LINKAGE + 3] = x[16], x[17:HULL_SIZE]
+        self._memory.write(x[HULL_SIZE:])
+        self._setup.orders.values[0] = u
+        times = np.array([t, t + self.sample_time])
+        _, _, ending = run_rows(self._setup, live, self._recording, times, 1, 2, 0, 1)
+        if ending == NO_ROOM:
+            raise NoRoomError(
+                f"plant: at t = {t:g} s there is no room for more than longest = {self._longest:g} m of cable."
+            )
+        if ending != FINE:
+            raise UserError(in_words(ending, t, self._setup, self._live))
+        hull = from_vehicle(live.state, heading_near=float(x[5]))
+        hidden = (live.state[CHARGE], *live.state[LINKAGE : LINKAGE + 3])
+        return np.concatenate([hull, hidden, self._memory.read()])
+
+    def events(self, x: np.ndarray) -> tuple[float, float]:
+        """Return what changes at once in a cable: the number of its segments, and what its drum does."""
+        flat, places = x[HULL_SIZE:], self._memory.places
+        return float(flat[places["count"]][0]), float(flat[places["drum_mode"]][0])
+
+    def output(self, t: float, x: np.ndarray, u: np.ndarray, params: dict[str, Any]) -> np.ndarray:
+        """Return hull states and cable channels of a state."""
+        flat, places = x[HULL_SIZE:], self._memory.places
+        count = round(float(flat[places["count"]][0]))
+        levels = flat[places["last_length"]]
+        length = levels[1] + flat[places["length"]][1:count].sum()
+        F, R = flat[places["force"]], np.empty((3, 3))
+        vehicle.rotation(to_vehicle(x[: len(STATE_NAMES)])[3:7], R)
+        pull = R.T @ F
+        tensions = (np.linalg.norm(F), flat[places["node_tension"]][count])
+        return np.concatenate([x[: len(STATE_NAMES)], [length, *tensions], pull, np.cross(self._r_c, pull)])
+
+
+NOT_KEPT = ("blocks", "pivots", "rows", "load", "slip", "normal_gain", "forcing", "solved")
+"""Fields of `cable.moving_end.state.Line` and its ends that a step fills before it reads them, or that stay zero."""
+OF_NOW = ("force", "force_before", "last_step")
+"""Fields of `subzero.run_state.Now` that a step leaves for the next."""
+
+
+class Memory:
+    """Views of all the numbers that a step leaves for the next, in one order.
+
+    Attributes:
+        places: name → its slice of the flat array.
+        size: numbers in all.
+    """
+
+    def __init__(self, live: Live) -> None:
+        self._views: dict[str, np.ndarray] = dict(_views(live))
+        ends = np.cumsum([view.size for view in self._views.values()])
+        self.places = {
+            name: slice(int(end) - view.size, int(end))
+            for (name, view), end in zip(self._views.items(), ends, strict=True)
+        }
+        self.size = int(ends[-1])
+
+    def read(self) -> np.ndarray:
+        """Return the numbers as they stand (size,)."""
+        return np.concatenate([view.ravel().astype(float) for view in self._views.values()])
+
+    def write(self, flat: np.ndarray) -> None:
+        """Put numbers (size,) back; whole numbers are rounded."""
+        for name, view in self._views.items():
+            values = flat[self.places[name]].reshape(view.shape)
+            view[...] = values if view.dtype.kind == "f" else np.rint(values).astype(view.dtype)
+
+
+def _views(live: Live) -> Iterator[tuple[str, np.ndarray]]:
+    """Walk through what is kept: name, view of the memory."""
+    for name in OF_NOW:
+        yield name, live.now.base[name]  # type: ignore[attr-defined]  # a packed record
+    for name in live.line.ends.base.dtype.names:  # type: ignore[attr-defined]
+        if name not in NOT_KEPT:
+            yield name, live.line.ends.base[name]  # type: ignore[attr-defined]
+    for name, values in zip(live.line._fields[1:], live.line[1:], strict=True):
+        if name not in NOT_KEPT:
+            yield name, values

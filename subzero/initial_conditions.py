@@ -1,0 +1,193 @@
+"""The start of a run: from a trial and a model to what stays and what changes.
+
+The cable is laid straight behind the vehicle, or hangs at rest between it and a drum that is somewhere else.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+import scenarios
+import vehicle
+from cable.drum import FREE, LENGTH
+from cable.drum_motion import SETPOINT, lead_drum
+from cable.hold import hold, lay_held
+from cable.moving_end import FLOWS, NOW, Line, energy_flow, lay_straight, new_line, new_load, start_in_water
+from cable.pull_out import START_LENGTH
+from subzero.environment import drum_of, water_of, way_of_drum
+from subzero.external_force import MissingForce
+from subzero.jit import compiled, packed
+from subzero.knots import knots
+from subzero.model import Model
+from subzero.run_state import LINEAR_ROWS, Fixed, Live, Orders, Setup, new_now
+from subzero.steady_start import first_state
+from subzero.vehicle_step import feel_current, pose, tow_point, way_of_tow_point
+
+FORCE_TOLERANCE = 1e-9
+"""Hull and cable agree when their forces differ by less than this fraction (and 1e-11 N)."""
+FIRST_ROOM = 16
+"""Segments that a new cable has room for, beyond those that are in the water."""
+
+
+def prepare(
+    trial: scenarios.Trial,
+    model: Model,
+    tethered: bool,
+    state: np.ndarray | None = None,
+    longest_exchange: float | None = None,
+) -> tuple[Setup, Live]:
+    """Return what stays and what changes in a run, at its start: the cable laid straight behind the vehicle.
+
+    Args:
+        trial: what is simulated.
+        model: vehicle, cable, drum and water.
+        tethered: with the cable of the default scheme.
+        state: another first state than that of the trial.
+        longest_exchange: there is room for the hull's steps in so long an exchange; that of the trial by default. [s]
+
+    Raises:
+        UserError: a start that cannot be.
+    """
+    wet, size = _wet_length(trial), vehicle.STATE_SIZE
+    longest = longest_exchange or max(trial.cable_step, float(np.diff(trial.times()).max()))
+    steps = most_hull_steps(longest, trial.hull_step)
+    setup = setup_of(trial, model, tethered)
+    live = Live(
+        now=new_now(),
+        state=first_state(trial, model, tethered) if state is None else state,
+        path=np.zeros((steps + 1, size)),
+        stages=np.zeros((5, size)),
+        line=new_line(int(wet / trial.segment_length) + FIRST_ROOM),
+        load=new_load(),
+    )
+    live.now.length = wet if tethered else 0.0
+    live.line.ends.segment_length, live.line.ends.grading = trial.segment_length, trial.grading
+    lay_out(setup, live, wet)
+    if trial.start.drum is not None:
+        hang_between(setup, live, trial, model)
+    elif setup.fixed.drum.control != FREE:
+        _hang(live.line, float(live.now.guess[2] * setup.fixed.cable.weight))
+    return setup, live
+
+
+def setup_of(trial: scenarios.Trial, model: Model, tethered: bool) -> Setup:
+    """Return what stays in a run; where its drum is, is still to be filled in."""
+    added, terms = (model.missing or MissingForce()).numbers()
+    return Setup(
+        fixed=_fixed(trial, model, tethered, bool(added.size or terms.size)),
+        orders=_orders(trial),
+        track=_track(trial),
+        water=water_of(model).numbers(),
+        led=way_of_drum(trial, model, _wet_length(trial)),
+        added=added,
+        terms=terms,
+    )
+
+
+def most_hull_steps(span: float, hull_step: float) -> int:
+    """Return how many hull steps an exchange of `span` [s] takes at most, as `coupling.hull_steps` counts."""
+    return max(1, int(np.ceil(span / hull_step - 1e-6)))
+
+
+def _wet_length(trial: scenarios.Trial) -> float:
+    """Return the length of cable in the water at the start; there is always some, for its direction. [m]."""
+    return max(trial.start.wet_length, START_LENGTH)
+
+
+@compiled
+def lay_out(setup: Setup, live: Live, wet: float) -> None:
+    """Lay `wet` metres of cable straight behind the tow point, on its way, and put the drum at their end."""
+    fixed, now, state = setup.fixed, live.now, live.state
+    if setup.fixed.prescribed:
+        pose(setup.track, 0.0, state)
+    tow_point(state, fixed.r_c, now.hull.rotation, now.tow)
+    speed = way_of_tow_point(state, fixed.r_c, now.hull.rotation, now.guess)
+    for i in range(3):
+        fixed.drum_place[i] = now.tow[i] - wet * now.guess[i]
+        setup.water.points[i] = fixed.drum_place[i]
+        pull = fixed.cable.tangential_drag * speed * abs(speed) * wet if fixed.tethered else 0.0
+        now.force[i], now.change[i] = -pull * now.guess[i], speed * now.guess[i]
+    lead_drum(setup.led, 0.0, fixed.drum)
+    lay_straight(live.line, wet, now.guess, now.change, fixed.drum, fixed.cable)
+    start_in_water(live.line, setup.water, fixed.cable, live.load)
+    energy_flow(live.line, fixed.cable, live.load, now.ledger.cable_new)
+    for i in range(FLOWS):
+        now.ledger.cable_old[i] = now.ledger.cable_new[i]
+    feel_current(setup, state, 0.0, now.hull)
+    now.ledger.kinetic = vehicle.kinetic_energy(state, now.hull.current, fixed.vehicle)
+
+
+def _hang(line: Line, weight: float) -> None:
+    """Add the weight that a winch carries, `weight` [N/m] per length of a straight cable below it."""
+    N = int(line.ends.count)
+    lengths = np.append(line.length[1:N], line.ends.last_length[NOW])
+    along = np.cumsum(lengths)
+    line.tension[:, 1 : N + 1] += max(weight, 0.0) * (along - 0.5 * lengths)
+    line.node_tension[1 : N + 1] += max(weight, 0.0) * along
+
+
+def _fixed(trial: scenarios.Trial, model: Model, tethered: bool, lacking: bool) -> Fixed:
+    """Return the numbers of a run; the drum's place is still to be filled in."""
+    fixed = Fixed(
+        vehicle=model.vehicle.numbers(),
+        cable=model.cable.numbers(),
+        drum=drum_of(model).numbers(),
+        r_c=model.vehicle.tow_point.position(),
+        drum_place=np.zeros(3),
+        hull_step=trial.hull_step,
+        agreement=FORCE_TOLERANCE,
+        tethered=tethered,
+        prescribed=trial.motion is not None,
+        booked=True,
+        lacking=lacking,
+    )
+    return packed(fixed)
+
+
+def _orders(trial: scenarios.Trial) -> Orders:
+    """Return the commands, none for a prescribed motion."""
+    if trial.commands is None:
+        return Orders(np.zeros(1), np.zeros((1, 4)))
+    return Orders(np.array(trial.commands.time, dtype=float), np.array(trial.commands.values, dtype=float))
+
+
+def _track(trial: scenarios.Trial) -> np.ndarray:
+    """Return the prescribed motion, of one resting sample for a run with commands."""
+    motion = trial.motion
+    if motion is None:
+        return np.zeros((LINEAR_ROWS, 1))
+    if motion.is_smooth:
+        return knots(motion, trial.start.depth)
+    columns = (motion.time, motion.surge_speed, motion.pitch, motion.heading)
+    return np.array(columns, dtype=float)
+
+
+def hang_between(setup: Setup, live: Live, trial: scenarios.Trial, model: Model) -> None:
+    """Move the drum to where the trial has it, and let the cable in the water hang between it and the tow point.
+
+    Raises:
+        cable.HoldError: a cable that does not reach, or has no equilibrium.
+    """
+    fixed, now, wet = setup.fixed, live.now, trial.start.wet_length
+    places = np.array([now.tow, now.tow + np.array(trial.start.drum)])
+    held = hold(places, wet, water_of(model), cable=model.cable, segment_length=trial.segment_length)
+    fixed.drum_place[:] = setup.water.points[:3] = places[1]
+    led = setup.led
+    rate = (
+        (led[1, SETPOINT] - led[0, SETPOINT]) / (led[1, 0] - led[0, 0])
+        if fixed.drum.control == LENGTH
+        else 0.0
+    )
+    lay_held(live.line, held, now.change.copy(), fixed.drum.velocity, rate)
+    live.line.ends.segment_length = trial.segment_length
+    now.force[:] = held.tow_force
+    begin_at_rest(setup, live)
+
+
+@compiled
+def begin_at_rest(setup: Setup, live: Live) -> None:
+    """Fill what a cable that is laid out has at the start: the water around it, its momenta, its energy."""
+    start_in_water(live.line, setup.water, setup.fixed.cable, live.load)
+    energy_flow(live.line, setup.fixed.cable, live.load, live.now.ledger.cable_new)
+    for i in range(FLOWS):
+        live.now.ledger.cable_old[i] = live.now.ledger.cable_new[i]

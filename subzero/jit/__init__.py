@@ -1,0 +1,18 @@
+"""Compile physics, and keep what was compiled: what every package of physics stands on, and nothing else of subzero.
+
+`cable` and `vehicle` import of `subzero` this package and `subzero.errors`, a leaf as well (a contract holds it).
+
+name                                            what for                                              file
+----------------------------------------------  ----------------------------------------------------  ------------
+compiled, allocating, inner, inlined, by_field  how a function is compiled                            decorators
+packed                                          numbers as one record in memory, a single pointer     record
+scratch                                         a small array on the stack of a compiled function     stack
+-                                               machine code kept for the next run, never stale       machine_code
+-                                               which files a piece of machine code is made of        sources
+"""
+
+from subzero.jit.decorators import allocating, by_field, compiled, inlined, inner
+from subzero.jit.record import packed
+from subzero.jit.stack import scratch
+
+__all__ = ["allocating", "by_field", "compiled", "inlined", "inner", "packed", "scratch"]

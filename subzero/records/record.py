@@ -1,0 +1,182 @@
+"""Measured records: a CSV file with a time column and any of the channels.
+
+A record has the column ``time_s`` and any columns of `subzero.channels`, such as ``surge_speed_m_s`` or
+``heading_deg``. An empty cell or ``nan`` is a gap. Lines that start with ``#`` are remarks. A file that
+cannot be used is refused with all its problems at once. A heading that jumps from 360 to 0 degrees is made
+continuous.
+
+The files that a run writes are themselves records, so one run can be compared with another.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from subzero.channels import BY_COLUMN, BY_NAME, TIME
+from subzero.errors import UserError, listed, printable, suggestion
+from subzero.errors import short as shown
+from subzero.records.heading import HEADING, TURN
+from subzero.user_file import MOST_COLUMNS, MOST_OF_A_CSV, UnreadableFileError, read_text
+
+GAPS = ("", "nan", "+nan", "-nan")
+"""Cells that hold no measurement; numerical libraries write a NaN with either sign."""
+
+LARGEST = 1e9
+"""No channel measures more than this, in whatever unit; squares of it are still far from an overflow."""
+
+Row = tuple[int, list[str]]
+"""Line number in the file (from 1), and its cells."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Record:
+    """What was measured: samples of some channels, with gaps.
+
+    Args:
+        source: the file, as the user named it.
+        time: time of each sample, increasing. Shape (samples,). [s]
+        values: channel name → measured values in the channel's display unit, NaN where there is a gap.
+    """
+
+    source: str
+    time: np.ndarray
+    values: Mapping[str, np.ndarray]
+
+
+def read_record(path: str | Path) -> Record:
+    """Read a measured record from a CSV file, and check all of it.
+
+    Args:
+        path: the file; its columns are ``time_s`` and any channels of `subzero.channels`, each with its unit.
+
+    Raises:
+        UserError: if it cannot be read or used; names every problem with its line.
+    """
+    header, rows = _table(path)
+    problems = _header_problems(header)
+    if not problems:
+        problems = [f"line {line}: {len(row)} cells, but the header has {len(header)} columns"
+                    for line, row in rows if len(row) != len(header)]  # fmt: skip
+    _refuse(path, problems)
+    columns = {name: _numbers(name, at, rows, problems) for at, name in enumerate(header)}
+    problems += _time_problems(columns[TIME.column], rows, header.index(TIME.column))
+    problems += _empty_problems(columns)
+    _refuse(path, problems)
+    values = {BY_COLUMN[name].name: column for name, column in columns.items() if name != TIME.column}
+    if HEADING in values:
+        values[HEADING] = _continuous(values[HEADING])
+    return Record(source=_name(path), time=columns[TIME.column], values=values)
+
+
+def _name(path: str | Path) -> str:
+    """Return a file's name as it can be shown and written."""
+    return printable(str(path))
+
+
+def _refuse(path: str | Path, problems: list[str]) -> None:
+    if problems:
+        raise UserError(listed(f"The measured record {_name(path)} cannot be used:", problems))
+
+
+def _table(path: str | Path) -> tuple[list[str], list[Row]]:
+    """Return the header and the rows of a CSV file, without empty lines and remarks."""
+    try:
+        text = read_text(path, MOST_OF_A_CSV)
+    except UnreadableFileError as error:
+        if error.is_missing:
+            raise UserError(
+                f"There is no measured record {_name(path)}. Give the path of a CSV file."
+            ) from None
+        raise UserError(
+            f"The measured record {_name(path)} cannot be read: {error.why}. {error.remedy}"
+        ) from None
+    try:
+        reader = csv.reader(io.StringIO(text, newline=""))
+        rows = [(reader.line_num, [cell.strip() for cell in row]) for row in reader]
+    except csv.Error as error:
+        raise UserError(
+            f"The measured record {_name(path)} is not a CSV file: {error}. Save it as plain CSV."
+        ) from None
+    rows = [(line, row) for line, row in rows if any(row) and not row[0].startswith("#")]
+    if len(rows) < 2:
+        raise UserError(
+            f"The measured record {_name(path)} holds no samples: it needs a header and at least one row."
+        )
+    if len(rows[0][1]) > MOST_COLUMNS:
+        raise UserError(
+            f"The measured record {_name(path)} has {len(rows[0][1])} columns; at most {MOST_COLUMNS} are read. "
+            "Leave out those that are no channels."
+        )
+    return rows[0][1], rows[1:]
+
+
+def _header_problems(header: list[str]) -> list[str]:
+    problems = [_unknown(name) for name in header if name not in BY_COLUMN]
+    twice = sorted({name for name in header if header.count(name) > 1})
+    problems += [f"column {shown(name)} occurs twice; keep one" for name in twice]
+    if TIME.column not in header:
+        problems.append(
+            f"column '{TIME.column}' is missing; it is needed, in seconds since the first command"
+        )
+    if not problems and len(header) == 1:
+        problems.append("there is no column beside the time; add a channel, such as 'surge_speed_m_s'")
+    return problems
+
+
+def _unknown(name: str) -> str:
+    """Say that a column is not known, and which might be meant: often a channel without its unit."""
+    meant = f" Did you mean '{BY_NAME[name].column}'?" if name in BY_NAME else suggestion(name, BY_COLUMN)
+    return f"unknown column {shown(name)}.{meant}"
+
+
+def _numbers(name: str, at: int, rows: list[Row], problems: list[str]) -> np.ndarray:
+    """Return one column as numbers; what is no number becomes a problem."""
+    column = np.full(len(rows), np.nan)
+    for index, (line, row) in enumerate(rows):
+        cell = row[at]
+        if cell.lower() in GAPS:
+            continue
+        try:
+            value = float(cell)
+        except ValueError:
+            problems.append(f"line {line}, column '{name}': {shown(cell)} is not a number; leave a gap empty")
+            continue
+        if abs(value) <= LARGEST:
+            column[index] = value
+        else:
+            why = f"outside ±{LARGEST:g}" if np.isfinite(value) else "not finite"
+            problems.append(f"line {line}, column '{name}': {shown(cell)} is {why}; leave a gap empty")
+    return column
+
+
+def _time_problems(time: np.ndarray, rows: list[Row], at: int) -> list[str]:
+    """Time has no gaps and increases."""
+    gaps = [line for line, row in rows if row[at].lower() in GAPS]
+    lines = [line for line, _ in rows]
+    return [f"line {line}: the time is missing; every sample needs one" for line in gaps] + [
+        f"line {line}: the time {now:g} s does not come after {before:g} s; time must increase"
+        for line, before, now in zip(lines[1:], time[:-1], time[1:], strict=True)
+        if now <= before
+    ]
+
+
+def _empty_problems(columns: Mapping[str, np.ndarray]) -> list[str]:
+    return [
+        f"column '{name}' holds no number at all; remove it"
+        for name, column in columns.items()
+        if name != TIME.column and not np.isfinite(column).any()
+    ]
+
+
+def _continuous(angle: np.ndarray) -> np.ndarray:
+    """Return an angle without jumps of a whole turn; gaps stay gaps. [degree]"""
+    known = np.isfinite(angle)
+    smooth = angle.copy()
+    smooth[known] = np.unwrap(angle[known], period=TURN)
+    return smooth

@@ -1,0 +1,134 @@
+"""A run held by one reference, so that a step from Python costs microseconds.
+
+Compiled functions take a named tuple apart, array by array, each time Python calls them: with some fifty arrays that
+costs more than the step itself. A `Handle` is taken apart once and then passed as one pointer.
+"""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, NamedTuple
+
+import numba
+import numpy as np
+from numba import types
+from numba.experimental import structref
+
+from subzero.jit import allocating
+from subzero.loop import run_rows
+from subzero.recording import Recording, record_row
+from subzero.run_state import Live, Setup
+
+FIELDS = ("setup", "live", "recording", "times")
+
+
+@structref.register
+class _HandleType(types.StructRef):
+    """What compiled code takes a handle for."""
+
+    def preprocess_fields(self, fields: Any) -> Any:
+        """Let fields have no literal types."""
+        return tuple((name, types.unliteral(kind)) for name, kind in fields)
+
+
+class _Reference(structref.StructRefProxy):
+    """A run as one pointer; the arrays must be kept alive by whoever made it."""
+
+
+class _Interpreted(NamedTuple):
+    """The same for code that is not compiled."""
+
+    setup: Setup
+    live: Live
+    recording: Recording
+    times: np.ndarray
+
+
+structref.define_boxing(_HandleType, _Reference)
+structref.define_constructor(_Reference, _HandleType, FIELDS)
+Handle: Any = _Interpreted if numba.config.DISABLE_JIT else _Reference
+
+
+ROW, USED, ENDING = range(3)
+"""Where a held run stands (3,): the present row, nodes of the recording in use, and how the last step ended.
+
+Compiled code writes it, so that it is true whenever Python code runs, an interrupt's handler among it.
+"""
+
+
+def hold(setup: Setup, live: Live, recording: Recording, times: np.ndarray) -> Any:
+    """Return a handle of a run and the times of its rows (n,) [s].
+
+    It is made in a thread of its own: numba builds the object by Python code and dies of an interrupt in there, and
+    signals reach the main thread only.
+    """
+    with ThreadPoolExecutor(1) as aside:
+        return aside.submit(make_handle, setup, live, recording, times).result()
+
+
+@allocating
+def make_handle(setup: Setup, live: Live, recording: Recording, times: np.ndarray) -> Any:
+    """Return a handle of a run; `hold` makes it safely."""
+    return Handle(setup, live, recording, times)
+
+
+@allocating
+def advance(
+    handle: Any,
+    at: np.ndarray,
+    count: int,
+    n: float,
+    rudder: float,
+    port: float,
+    starboard: float,
+    seen: np.ndarray,
+) -> int:
+    """Take some exchanges under one command, from a row that is written anew with that command.
+
+    Args:
+        handle: the run; its orders have one row.
+        at: where the run stands (ROW, USED, ENDING); changed.
+        count: how many exchanges.
+        n: propeller command. [rev/s]
+        rudder: rudder command. [rad]
+        port: command of the port plane. [rad]
+        starboard: command of the starboard plane. [rad]
+        seen: filled with the new present row, in the order of `subzero.simulator.Observation`.
+
+    Returns:
+        how it ended, which at[ENDING] says, too.
+    """
+    command = handle.setup.orders.values
+    command[0, 0], command[0, 1], command[0, 2], command[0, 3] = n, rudder, port, starboard
+    row = at[ROW]
+    before = at[USED] - handle.recording.nodes[row]
+    used = record_row(handle.setup, handle.live, handle.recording, row, handle.times[row], before)
+    after, used, ending = run_rows(
+        handle.setup, handle.live, handle.recording, handle.times, row + 1, row + 1 + count, used, 1
+    )
+    at[ROW], at[USED], at[ENDING] = after - 1, used, ending
+    observe(handle, after - 1, seen)
+    return ending
+
+
+@allocating
+def observe(handle: Any, row: int, seen: np.ndarray) -> None:
+    """Fill `seen` with a row; the heading goes on from the one that stands there, without jumps."""
+    r, before = handle.recording, seen[6]
+    seen[0] = handle.times[row]
+    for i in range(3):
+        seen[1 + i] = r.state[row, i]
+        seen[4 + i] = r.attitude[row, i]
+        seen[14 + i] = r.fins[row, i]
+    seen[6] += 2.0 * np.pi * np.round((before - seen[6]) / (2.0 * np.pi))
+    for i in range(6):
+        seen[7 + i] = r.state[row, 7 + i]
+        seen[21 + i] = r.wrench[row, i]
+    seen[13] = r.state[row, 13]
+    seen[17] = r.voltage[row]
+    seen[18] = r.length[row]
+    size = 0.0
+    for i in range(3):
+        size += r.tow_force[row, i] * r.tow_force[row, i]
+    seen[19] = np.sqrt(size)
+    seen[20] = r.drum_tension[row]

@@ -1,0 +1,205 @@
+"""Advance the hull over one exchange with the cable, pulled by a force that changes linearly in time.
+
+Classic Runge-Kutta of fourth order in fixed steps. The cable's force is given in earth axes; at every stage it is
+turned into the body's axes with the attitude of that stage, equations (12)-(13):
+
+    F_c = Rᵀ F,    M_c = r_c × F_c
+
+A prescribed run follows its motion instead: that of an "idealised vehicle" without dynamics (section 4.1 of the paper),
+linear between its samples, or one that was measured (section 3, step 2), smooth between them (`subzero.knots`).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+import vehicle
+from cable.current import water_velocity
+from subzero.external_force import add_missing
+from subzero.jit import allocating, compiled, inlined, inner, scratch
+from subzero.run_state import HEADING, LINEAR_ROWS, PITCH, PLACE, SLOPE, SPEED, TIME, HullWork, Live, Setup
+from vehicle import STATE_SIZE
+
+GAUSS_OFFSET = 0.5 * np.sqrt(0.6)
+"""Three-point Gauss quadrature: nodes at the middle and this fraction of a step before and behind it."""
+
+
+@inner
+def row_at(time: np.ndarray, t: float) -> int:
+    """Return the last row whose time is not later than t (with a nanosecond of grace for rounding)."""
+    low, high = 0, time.size - 1
+    while low < high:
+        middle = (low + high + 1) // 2
+        if time[middle] <= t + 1e-9:
+            low = middle
+        else:
+            high = middle - 1
+    return low
+
+
+@inner
+def tow_wrench(state: np.ndarray, F: np.ndarray, r_c: np.ndarray, work: HullWork) -> None:
+    """Fill work.wrench (6,) with the force (12) and the moment (13) of a pull F in earth axes (3,). [N, N m]."""
+    R, w = work.rotation, work.wrench
+    vehicle.rotation(state[3:7], R)
+    for i in range(3):
+        w[i] = R[0, i] * F[0] + R[1, i] * F[1] + R[2, i] * F[2]
+    w[3] = r_c[1] * w[2] - r_c[2] * w[1]
+    w[4] = r_c[2] * w[0] - r_c[0] * w[2]
+    w[5] = r_c[0] * w[1] - r_c[1] * w[0]
+
+
+@inlined
+def feel_current(setup: Setup, state: np.ndarray, time: float, work: HullWork) -> None:
+    """Fill work.current (3,) with the water's velocity at the hull's centre. [m/s].
+
+    Departs from source: where the water changes along the vehicle's way, the hull takes every instant as steady and
+    uniform; the pressure of the accelerating water, (m + M_A) dJ/dt, is left out.
+    """
+    drum, J = setup.fixed.drum_place, work.current
+    place = state[0] - drum[0], state[1] - drum[1], state[2] - drum[2]
+    J[0], J[1], J[2] = water_velocity(setup.water, place[0], place[1], place[2], time)
+
+
+@compiled
+def tow_point(state: np.ndarray, r_c: np.ndarray, R: np.ndarray, out: np.ndarray) -> None:
+    """Fill out (3,) with the place of the tow point in earth axes, η + R r_c. [m]."""
+    vehicle.rotation(state[3:7], R)
+    for i in range(3):
+        out[i] = state[i] + R[i, 0] * r_c[0] + R[i, 1] * r_c[1] + R[i, 2] * r_c[2]
+
+
+@compiled
+def way_of_tow_point(state: np.ndarray, r_c: np.ndarray, R: np.ndarray, out: np.ndarray) -> float:
+    """Fill out (3,) with the unit vector along which the tow point goes, forward where it goes straight or rests.
+
+    R is R_nb of the state. Returns its speed along that vector, negative astern. [m/s]
+    """
+    x = state[7] + state[11] * r_c[2] - state[12] * r_c[1]
+    y = state[8] + state[12] * r_c[0] - state[10] * r_c[2]
+    z = state[9] + state[10] * r_c[1] - state[11] * r_c[0]
+    if y == 0.0 and z == 0.0:
+        for i in range(3):
+            out[i] = R[i, 0]
+        return x
+    speed = np.sqrt(x * x + y * y + z * z)
+    speed = -speed if x < 0.0 else speed
+    for i in range(3):
+        out[i] = (R[i, 0] * x + R[i, 1] * y + R[i, 2] * z) / speed
+    return speed
+
+
+@inlined
+def advance_hull(setup: Setup, live: Live, start: float, span: float, steps: int) -> None:
+    """Fill live.path[1 … steps] from path[0], pulled by F(t) = F_{n+1} + (t − t_{n+1}) (F_n − F_{n−1})/h_n.
+
+    Args:
+        setup: vehicle, water, commands (held during a step).
+        live: forces and work space.
+        start: time of the first state. [s]
+        span: length of the exchange. [s]
+        steps: Runge-Kutta steps in it.
+    """
+    work, orders, now = live.now.hull, setup.orders, live.now
+    h = span / steps
+    ratio = span / now.last_step if now.last_step > 0.0 else 0.0
+    k, stage = live.stages, live.stages[4]
+    for n in range(steps):
+        state, new = live.path[n], live.path[n + 1]
+        command = orders.values[row_at(orders.time, start + n * h)]
+        for s in range(4):
+            part = 0.0 if s == 0 else (h if s == 3 else 0.5 * h)
+            for i in range(STATE_SIZE):
+                stage[i] = state[i] + (part * k[s - 1, i] if s > 0 else 0.0)
+            along = (n * h + part) / span
+            for i in range(3):
+                work.pull[i] = now.guess[i] + (along - 1.0) * ratio * (now.force[i] - now.force_before[i])
+            tow_wrench(stage, work.pull, setup.fixed.r_c, work)
+            feel_current(setup, stage, start + n * h + part, work)
+            if setup.fixed.lacking:
+                add_missing(setup, live, stage, command, start + n * h + part, work)
+            vehicle.derivative(stage, command, work.current, work.wrench, setup.fixed.vehicle, k[s])
+        for i in range(STATE_SIZE):
+            new[i] = state[i] + h / 6.0 * (k[0, i] + 2.0 * k[1, i] + 2.0 * k[2, i] + k[3, i])
+        vehicle.finish_step(new, command, setup.fixed.vehicle)
+
+
+@compiled
+def _attitude(track: np.ndarray, t: float) -> tuple[float, float, float, float, float]:
+    """Return surge speed [m/s], pitch, heading [rad] and the rates of both [rad/s] at t."""
+    row = row_at(track[TIME], t)
+    if row == track.shape[1] - 1:
+        return track[SPEED, row], track[PITCH, row], track[HEADING, row], 0.0, 0.0
+    span = track[TIME, row + 1] - track[TIME, row]
+    x = (t - track[TIME, row]) / span
+    turn, dive = track[HEADING, row + 1] - track[HEADING, row], track[PITCH, row + 1] - track[PITCH, row]
+    speed = track[SPEED, row] + x * (track[SPEED, row + 1] - track[SPEED, row])
+    return speed, track[PITCH, row] + x * dive, track[HEADING, row] + x * turn, dive / span, turn / span
+
+
+@compiled
+def _move(track: np.ndarray, t: float, weight: float, state: np.ndarray) -> None:
+    """Add the displacement of `weight` seconds at the velocity of time t."""
+    u, pitch, heading, _, _ = _attitude(track, t)
+    state[0] += weight * u * np.cos(pitch) * np.cos(heading)
+    state[1] += weight * u * np.cos(pitch) * np.sin(heading)
+    state[2] -= weight * u * np.sin(pitch)
+
+
+@allocating
+def pose(track: np.ndarray, t: float, state: np.ndarray) -> None:
+    """Write attitude and velocities of a prescribed motion at t into a state; of a smooth one its place too."""
+    if track.shape[0] != LINEAR_ROWS:
+        _pose_between_knots(track, t, state)
+        return
+    u, pitch, heading, dive, turn = _attitude(track, t)
+    q = vehicle.quaternion_from_euler(0.0, pitch, heading)
+    for i in range(4):
+        state[3 + i] = q[i]
+    for i in range(6):
+        state[7 + i] = 0.0
+    state[7] = u
+    state[10] = -turn * np.sin(pitch)
+    state[11] = dive
+    state[12] = turn * np.cos(pitch)
+
+
+@allocating
+def _pose_between_knots(track: np.ndarray, t: float, state: np.ndarray) -> None:
+    """Write place, attitude and velocities of a smooth motion at t into a state: cubics and their derivatives."""
+    row = min(row_at(track[TIME], t), track.shape[1] - 2)
+    h = track[TIME, row + 1] - track[TIME, row]
+    x = (t - track[TIME, row]) / h
+    place, rate, R = scratch(1, 6)[0], scratch(1, 6)[0], scratch(3, 3)
+    for i in range(6):
+        first, rise = track[PLACE + i, row], track[PLACE + i, row + 1] - track[PLACE + i, row]
+        a, end = h * track[SLOPE + i, row], h * track[SLOPE + i, row + 1]
+        b, c = 3.0 * rise - 2.0 * a - end, a + end - 2.0 * rise
+        place[i] = first + x * (a + x * (b + x * c))
+        rate[i] = (a + x * (2.0 * b + x * 3.0 * c)) / h
+    q = vehicle.quaternion_from_euler(place[3], place[4], place[5])
+    vehicle.rotation(q, R)
+    for i in range(4):
+        state[3 + i] = q[i]
+    for i in range(3):
+        state[i] = place[i]
+        state[7 + i] = R[0, i] * rate[0] + R[1, i] * rate[1] + R[2, i] * rate[2]
+    sr, cr, sp, cp = np.sin(place[3]), np.cos(place[3]), np.sin(place[4]), np.cos(place[4])
+    state[10] = rate[3] - rate[5] * sp
+    state[11] = rate[4] * cr + rate[5] * cp * sr
+    state[12] = rate[5] * cp * cr - rate[4] * sr
+
+
+@inner
+def follow_track(start: float, span: float, steps: int, track: np.ndarray, path: np.ndarray) -> None:
+    """Fill path[1 … steps] with a prescribed motion; positions of a linear one by three-point Gauss quadrature."""
+    h = span / steps
+    for n in range(steps):
+        new, t = path[n + 1], start + n * h
+        for i in range(STATE_SIZE):
+            new[i] = path[n, i]
+        if track.shape[0] == LINEAR_ROWS:
+            _move(track, t + h * (0.5 - GAUSS_OFFSET), h * 5.0 / 18.0, new)
+            _move(track, t + h * 0.5, h * 8.0 / 18.0, new)
+            _move(track, t + h * (0.5 + GAUSS_OFFSET), h * 5.0 / 18.0, new)
+        pose(track, t + h, new)
