@@ -22,6 +22,7 @@ from typing import Any, NamedTuple
 
 import cyclopts
 import numpy as np
+from subzero.records.record import Record
 
 import scenarios
 import subzero
@@ -32,7 +33,6 @@ from subzero.diagnosis.noise import Noise
 from subzero.diagnosis.pose import pose
 from subzero.diagnosis.problem import Problem
 from subzero.diagnosis.setting import Setting
-from subzero.measured import Record
 from subzero.model import Model
 
 from .cases import AFTER

@@ -14,7 +14,7 @@ from functools import cached_property
 
 import numpy as np
 
-from subzero.compiled import compiled
+from subzero.jit import compiled
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
