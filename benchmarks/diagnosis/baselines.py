@@ -27,7 +27,9 @@ def white(problem: Problem) -> tuple[Problem, np.ndarray, np.ndarray]:
 
 
 def _colourless(one: Observed) -> dict[str, Noise]:
-    return {name: replace(noise, rho=0.0) for name, noise in one.noise.items()}
+    return {
+        name: replace(noise, white=noise.sd, slow=0.0, resolution=0.0) for name, noise in one.noise.items()
+    }
 
 
 def score(problem: Problem, r: np.ndarray, J: np.ndarray) -> tuple[str, bool]:

@@ -60,7 +60,7 @@ def closer(
         found = recover(problem, start, which, D, spacing=knots.spacing, most_fresh=1)
         done = found.fit
     else:
-        found = drifted(problem, start, which, DRIFTS * SPECS[which].bias, D)
+        found = drifted(problem, start, which, DRIFTS * SPECS[which].noise, D)
         knots, done = found.knots, beside_drift(problem, found, D)
     fit = _without(found, done, D.size)
     ((log, what),) = linear(problem, fit, {name: found.columns}, knots, terms, [kappa])

@@ -75,8 +75,7 @@ def _work(work: Work, seen: Seen) -> None:
         work.seconds[part] = perf_counter() - start - sum(work.seconds.values())
 
     search.begin()
-    for one in work.problem.records:
-        work.misfit[one.name] = misfits(one, respond(one.setting, one.time, one.noise))
+    _measure_misfit(work)
     work.detectable = detectability(work.problem, with_secants(work.problem, search.nominal[1]))
     seen(work.detectable)
     if search.is_far and work.budget != "screen":
@@ -97,7 +96,14 @@ def _work(work: Work, seen: Seen) -> None:
         done("fits")
         search.progress(0.8, "forces that no cause explains")
         work.foreign = foreigners(search)
+    _measure_misfit(work)
     done("outside")
+
+
+def _measure_misfit(work: Work) -> None:
+    """Set the nominal simulation beside the records, with the noise as it is known by now."""
+    for one in work.problem.records:
+        work.misfit[one.name] = misfits(one, respond(one.setting, one.time, one.noise))
 
 
 def _from_afar(work: Work) -> None:

@@ -112,7 +112,7 @@ def _recovered(work: Work, foreign: Foreign) -> Recovered:
     kind, _, which = foreign.id.partition(":")
     if kind + ":" == FORCE:
         return recover(work.problem, base.fit, which, D)
-    return drifted(work.problem, base.fit, which, DRIFTS * SPECS[which].bias, D)
+    return drifted(work.problem, base.fit, which, DRIFTS * SPECS[which].noise, D)
 
 
 def of_sudden(work: Work, what: Struck, cause: Cause) -> Extension:

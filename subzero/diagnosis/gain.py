@@ -14,7 +14,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from subzero.diagnosis.noise import Noise
 from subzero.diagnosis.problem import Problem
 from subzero.diagnosis.refit import Fit
 from subzero.diagnosis.stride import bounds
@@ -136,19 +135,9 @@ def raw(problem: Problem, whitened: np.ndarray) -> np.ndarray:
     parts, at = [], 0
     for one in problem.records:
         for noise in one.noise.values():
-            parts.append(coloured(noise, whitened[at : at + noise.gap.size]))
-            at += noise.gap.size
+            parts.append(noise.colour(whitened[at : at + noise.count]))
+            at += noise.count
     return np.concatenate(parts)
-
-
-def coloured(noise: Noise, white: np.ndarray) -> np.ndarray:
-    """Undo `Noise.whiten` of used samples (m,)."""
-    kept = noise.rho**noise.gap
-    kept[0] = 0.0
-    found, before = noise.sd * np.sqrt(1.0 - kept**2) * white, 0.0
-    for k in range(found.size):
-        before = found[k] = found[k] + kept[k] * before
-    return found
 
 
 def _blocks(rows: _Row) -> np.ndarray:

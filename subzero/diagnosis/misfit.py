@@ -35,7 +35,9 @@ def _misfit(one: Observed, name: str, simulated: np.ndarray) -> Misfit:
         command_correlation=_correlations(one, noise, measured - simulated),
         windows=_windows(one.time[noise.used], residual, noise),
         noise_sd=noise.sd,
-        noise_rho=noise.rho,
+        noise_slow=noise.slow,
+        noise_time=noise.correlation_time,
+        resolution=noise.resolution,
         outliers=int(np.sum(np.isfinite(measured) & ~noise.used)),
         gaps=int(np.sum(~np.isfinite(measured))),
     )
@@ -73,10 +75,9 @@ def _correlations(one: Observed, noise: Noise, difference: np.ndarray) -> dict[s
 def _windows(time: np.ndarray, residual: np.ndarray, noise: Noise) -> tuple[tuple[float, float], ...]:
     """Return the times in which the mean residual is more than noise can be, joined."""
     found: list[tuple[float, float]] = []
-    spread = noise.sd * np.sqrt((1.0 + noise.rho) / (1.0 - noise.rho))
     for begin in np.arange(time[0], time[-1], WINDOW):
         own = (time >= begin) & (time < begin + WINDOW)
-        if own.sum() > 3 and abs(np.mean(residual[own])) > 3.0 * spread / np.sqrt(own.sum()):
+        if own.sum() > 3 and abs(np.mean(residual[own])) > 3.0 * noise.sd_of_mean(int(own.sum()), WINDOW):
             if found and abs(found[-1][1] - begin) < 1e-9:
                 found[-1] = (found[-1][0], float(begin + WINDOW))
             else:

@@ -19,14 +19,11 @@ from subzero.diagnosis.effects import START
 from subzero.diagnosis.effects.sensors import NOISE
 from subzero.diagnosis.entries import entries_of
 from subzero.diagnosis.evidence import posterior
-from subzero.diagnosis.noise import Noise
+from subzero.diagnosis.noise_estimate import Usual, usual_noise
 from subzero.diagnosis.problem import Observed, Problem
 from subzero.diagnosis.refit import Fit
 from subzero.diagnosis.response import economical
 from subzero.diagnosis.setting import Setting
-
-COLOUR = 0.5
-"""ρ of a channel that has not been logged yet."""
 
 
 class Survivor(Protocol):
@@ -74,10 +71,9 @@ def to_come(problem: Problem, setting: Setting, channels: Sequence[str] = ()) ->
     step = float(np.median(np.diff(first.time)))
     setting = economical(setting, setting.trial.duration)
     time = np.arange(step, setting.trial.duration + 1e-9, step)
-    every = {**{name: (one.sd, one.rho) for name, one in first.noise.items()},
-             **{name: (NOISE[name], COLOUR) for name in channels}}  # fmt: skip
-    noise = {name: Noise(sd=sd, rho=rho, used=np.ones(time.size, bool), gap=np.ones(time.size, int))
-             for name, (sd, rho) in every.items()}  # fmt: skip
+    used = np.ones(time.size, bool)
+    noise = {name: replace(one, used=used, time=time) for name, one in first.noise.items()}
+    noise |= {name: usual_noise(time, used, Usual(NOISE[name], 0.0, is_known=False)) for name in channels}
     seen = Observed(name="to come", time=time, values={name: np.zeros(time.size) for name in noise}, noise=noise,
                     setting=setting)  # fmt: skip
     effects = list(dict.fromkeys(entry.effect for entry in problem.entries if entry.record < 0))

@@ -104,10 +104,15 @@ def _misfit(verdict: Verdict, records: Mapping[str, str]) -> list[str]:
 
 
 def _noise(rows: Mapping[str, Misfit]) -> str:
-    """Return noise, its colour, outliers and gaps of the channels."""
-    return "; ".join(
-        f"{name} {one.noise_sd:.3g} (correlation {one.noise_rho:.2f}, outliers {one.outliers}, gaps {one.gaps})"
-        for name, one in rows.items()
+    """Return the noise of the channels: its level, its slow part, the step of its values, outliers and gaps."""
+    return "; ".join(f"{name} {_parts(one)}" for name, one in rows.items())
+
+
+def _parts(one: Misfit) -> str:
+    rounded = f", rounded to {one.resolution:.3g}" if one.resolution > 0.0 else ""
+    return (
+        f"{one.noise_sd:.3g} (of that slow {one.noise_slow:.2g}, over {one.noise_time:.2g} s{rounded}; "
+        f"outliers {one.outliers}, gaps {one.gaps})"
     )
 
 

@@ -6,7 +6,7 @@ all tolerances wide → a point close to the data → linear evidence of everyth
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import chain
 
 import numpy as np
@@ -42,11 +42,9 @@ class Search(GrowingFits):
     """A search that goes on: what was found so far is always in `candidates`.
 
     Attributes:
-        nominal: residual and sensitivities of the nominal model.
         is_far: nothing came close to the records so far, not even within wide tolerances.
     """
 
-    nominal: tuple[np.ndarray, np.ndarray] = field(init=False)
     is_far: bool = False
 
     def begin(self) -> None:

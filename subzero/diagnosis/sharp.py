@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import partial
+
+import numpy as np
 
 from subzero.diagnosis.candidate import Candidate
 from subzero.diagnosis.fits import HOPELESS, Fits
-from subzero.diagnosis.hypotheses import Ids
-from subzero.diagnosis.pose import with_finer_steps
+from subzero.diagnosis.hypotheses import Ids, variances
+from subzero.diagnosis.pose import whitened_again, with_finer_steps, with_noise_behind
 from subzero.diagnosis.problem import Problem
 from subzero.diagnosis.refit import Fit, refit
+from subzero.diagnosis.screen import look
 
 
 @dataclass(kw_only=True, eq=False)
@@ -20,23 +25,46 @@ class SharpFits(Fits):
         behind: hypothesis → how far its fit was behind the best when it was given up, in log posterior.
         economical: the problem before what economical steps get wrong was taken from its records.
         sharp_at: the hypothesis at whose fit that was done.
+        nominal: residual (m,) and sensitivities (m, k) of the nominal model.
     """
 
     behind: dict[Ids, float] = field(default_factory=dict)
     economical: Problem = field(init=False)
     sharp_at: Ids | None = None
+    nominal: tuple[np.ndarray, np.ndarray] = field(init=False)
 
     def sharpen(self) -> None:
-        """Take from the records what economical steps get wrong at the best fit, if that can be seen, and fit again."""
+        """Estimate the noise behind the best fit, take from the records what economical steps get wrong there, and fit
+        all again; nothing where neither is seen.
+        """
         best = self.best()
         if self.sharp_at == best.ids:
             return
-        self.progress(0.6, "finer steps")
-        self.sharp_at, sharper = best.ids, with_finer_steps(self.economical, best.fit.z)
-        if sharper is not None:
-            self.problem = sharper
+        self.progress(0.6, "noise behind the best fit, and finer steps")
+        self.sharp_at, noise_is_new = best.ids, self._estimate_noise(best)
+        sharper = with_finer_steps(self.economical, best.fit.z)
+        if noise_is_new or sharper is not None:
+            self.problem = sharper or self.economical
             self._give_up(best)
             self._go_on()
+
+    def _estimate_noise(self, best: Candidate) -> bool:
+        """Estimate the noise behind the best fit, and make white by it what the noise before has made white; say
+        whether it is another.
+        """
+        D = variances(self.problem.entries, best.ids, best.kappa)
+        found = with_noise_behind(self.economical, best.fit.z, D, again=True)
+        if found is None:
+            return False
+        again = partial(whitened_again, self.economical, found)
+        self.candidates = {
+            ids: replace(one, fit=_rewhitened(one.fit, again)) for ids, one in self.candidates.items()
+        }
+        self.wide, self.economical = _rewhitened(self.wide, again), found
+        self.nominal = again(self.nominal[0]), again(self.nominal[1])
+        self.problem = found
+        self.screen = look(found, self.wide, self.nominal, far=self.screen.far)
+        return True
 
     def _give_up(self, best: Candidate) -> None:
         """Give up what is hopelessly behind the best candidate and no part of it."""
@@ -58,3 +86,8 @@ class SharpFits(Fits):
         """Return the fit of a candidate from where it is, with the sensitivities at hand."""
         fit = self.candidates[ids].fit
         return refit(self.problem, fit.z, fit.J, fit.D, most_fresh=0, made_at=fit.made_at)
+
+
+def _rewhitened(fit: Fit, again: Callable[[np.ndarray], np.ndarray]) -> Fit:
+    """Return a fit whose residual and sensitivities are made white by another noise."""
+    return replace(fit, r=again(fit.r), J=again(fit.J))

@@ -215,7 +215,7 @@ def _run(stops: Mapping[float, Stop], job: tuple[Setting, float]) -> Track:
 
 def _rows(problem: Problem, record: int) -> tuple[int, int]:
     """Return where the rows of a record begin, and how many there are in all."""
-    sizes = [sum(noise.gap.size for noise in one.noise.values()) for one in problem.records]
+    sizes = [sum(noise.count for noise in one.noise.values()) for one in problem.records]
     return sum(sizes[:record]), sum(sizes)
 
 

@@ -75,7 +75,7 @@ def _amplitudes(problem: Problem, name: str) -> list[float]:
     kind, _, which = name.partition(":")
     if kind + ":" == FORCE:
         return amplitude_grid(problem.records[0].setting, which)
-    return [share * DRIFTS * SPECS[which].bias for share in SHARES]
+    return [share * DRIFTS * SPECS[which].noise for share in SHARES]
 
 
 def amplitude_grid(setting: Setting, axis: str) -> list[float]:

@@ -31,8 +31,8 @@ WORDS = {
 }  # fmt: skip
 """What a positive force or moment does to the vehicle."""
 FORCE, DRIFT = "unknown_force:", "sensor_drift:"
-DRIFTS = 30.0
-"""A drift can be this many tolerances of the sensor's bias."""
+DRIFTS = 20.0
+"""A drift can be this many usual noise levels of the sensor; a wander of one level is noise."""
 
 
 class Knots(NamedTuple):

@@ -111,7 +111,8 @@ class Misfit:
         command_correlation: command → (lag [s], correlation), the strongest.
         windows: when the misfit lives: (from, to). [s]
         noise_sd: of the channel, estimated.
-        noise_rho: its correlation from sample to sample.
+        noise_slow, noise_time: standard deviation of its slow part, and how long that lasts [s].
+        resolution: the step that values are rounded to; 0 for none.
         outliers: samples that are left out.
         gaps: samples that are missing.
     """
@@ -124,7 +125,9 @@ class Misfit:
     command_correlation: Mapping[str, tuple[float, float]]
     windows: tuple[tuple[float, float], ...]
     noise_sd: float
-    noise_rho: float
+    noise_slow: float
+    noise_time: float
+    resolution: float
     outliers: int
     gaps: int
 

@@ -25,7 +25,8 @@ def fit_wide(problem: Problem, progress: Progress) -> tuple[Problem, Fit, Nomina
     J = problem.jacobian(zero)
     fit = _from(problem, zero, J, progress)
     for _ in range(ROUNDS):
-        again = with_noise_behind(problem, fit.z) if np.isfinite(fit.r).all() else None
+        D = variances(problem.entries, (), WIDE)
+        again = with_noise_behind(problem, fit.z, D) if np.isfinite(fit.r).all() else None
         if again is None:
             break
         problem, J = again, again.jacobian(zero)

@@ -44,6 +44,13 @@ def coloured(random: np.random.Generator, size: int) -> np.ndarray:
     return noise
 
 
+def autoregressive(sd: float, rho: float, time: np.ndarray, step: float = 0.1) -> Noise:
+    """Return the noise whose samples a step [s] apart are AR(1) with level sd and correlation rho, all of them used."""
+    return Noise(
+        white=0.0, slow=sd, correlation_time=-step / np.log(rho), used=np.ones(time.size, bool), time=time
+    )
+
+
 def nominal(duration: float, scenario: str = "fig6") -> Setting:
     """Return the nominal setting of a scenario."""
     trial = dataclasses.replace(subzero.load_scenario(scenario), duration=duration)
@@ -58,8 +65,7 @@ def plant():
         setting, random = nominal(duration), np.random.default_rng(seed)
         time = np.linspace(0.1, duration, round(10 * duration))
         values = respond(change(setting), time, CHANNELS)
-        noise = {name: Noise(sd=NOISE[name], rho=COLOUR, used=np.ones(time.size, bool), gap=np.ones(time.size))
-                 for name in CHANNELS}  # fmt: skip
+        noise = {name: autoregressive(NOISE[name], COLOUR, time) for name in CHANNELS}
         seen = {name: value + NOISE[name] * coloured(random, time.size) for name, value in values.items()}
         for name, added in (drift or {}).items():
             seen[name] = seen[name] + added(time)

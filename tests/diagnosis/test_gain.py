@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from subzero.diagnosis.effects import catalogue
-from subzero.diagnosis.gain import BLOCKS, Fitted, coloured, gain, held_out, parts_of, raw, rows_of, share
+from subzero.diagnosis.gain import BLOCKS, Fitted, gain, held_out, parts_of, raw, rows_of, share
 from subzero.diagnosis.noise import Noise
 
 
@@ -71,8 +71,8 @@ def test_parts_cover_the_trial_and_a_refit_without_them_is_worse(struck):
 def test_what_was_whitened_gets_its_colour_and_unit_back(struck):
     values = np.random.default_rng(0).standard_normal(8)
     used = np.array([True, True, False, True, True, True, False, True])
-    noise = Noise(sd=0.3, rho=0.6, used=used, gap=np.array([1, 1, 2, 1, 1, 2]))
-    assert_allclose(coloured(noise, noise.whiten(values)), values[used])
+    noise = Noise(white=0.1, slow=0.3, correlation_time=0.2, used=used, time=0.1 * np.flatnonzero(used))
+    assert_allclose(noise.colour(noise.whiten(values)), values[used])
     planted, _ = struck
     assert raw(planted.problem, planted.r).shape == planted.r.shape
 

@@ -60,7 +60,8 @@ def make_curves(seed=0):
 def make_misfit(sd):
     return Misfit(rmse=2.3 * sd, nrmse=2.3, fit_percent=91.2, bias=0.1 * sd, whiteness_p=1e-7,
                   command_correlation={"rudder_command": (0.4, 0.61), "propeller_command": (0.0, 0.1)},
-                  windows=((1.2, 3.9),), noise_sd=sd, noise_rho=0.5, outliers=1, gaps=10)  # fmt: skip
+                  windows=((1.2, 3.9),), noise_sd=sd, noise_slow=0.5 * sd, noise_time=2.0,
+                  resolution=0.0, outliers=1, gaps=10)  # fmt: skip
 
 
 GAIN = {

@@ -75,7 +75,7 @@ def test_a_sensor_shows_too_much_by_its_bias_and_its_share():
 def problem(values):
     """Return the problem of a record without noise, of level 1."""
     noise = {
-        name: Noise(sd=1.0, rho=0.5, used=np.ones(TIME.size, bool), gap=np.ones(TIME.size))
+        name: Noise(white=0.5, slow=0.9, correlation_time=0.2, used=np.ones(TIME.size, bool), time=TIME)
         for name in CHANNELS
     }
     record = Observed(name="plain", time=TIME, values=values, noise=noise, setting=SETTING)

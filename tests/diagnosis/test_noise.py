@@ -1,0 +1,131 @@
+"""The noise of a channel against dense linear algebra, and what is found of it behind a fit, whatever kind it is.
+
+Verifies: whitening, and its inverse, against the Cholesky factor of the covariance; level, slow part and resolution
+behind a misfit that parameters explain, for noise of any family and sampling. Configuration: made-up channels, 24
+records each. Tolerance: linear algebra to 1e-9; medians of levels within 20 %, as 24 records of 30 s let one expect.
+"""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from subzero.diagnosis.noise import Noise
+from subzero.diagnosis.noise_estimate import Behind, Usual, estimate, resolution_of, spikes
+
+LEVEL = 0.3
+RECORDS = 24
+
+
+def slow(random, time, sd, lasts):
+    """Return an Ornstein-Uhlenbeck process by the factor of its covariance: not as the program makes it white."""
+    covariance = np.exp(-np.abs(np.subtract.outer(time, time)) / lasts)
+    return sd * np.linalg.cholesky(covariance + 1e-12 * np.eye(time.size)) @ random.standard_normal(time.size)
+
+
+def test_whitening_is_the_inverse_of_a_cholesky_factor_at_uneven_times():
+    random = np.random.default_rng(1)
+    time, used = np.sort(random.uniform(0.0, 30.0, 300)), random.random(300) > 0.1
+    noise = Noise(white=0.1, slow=0.2, correlation_time=2.0, resolution=0.3, used=used, time=time[used])
+    apart = np.abs(np.subtract.outer(time[used], time[used]))
+    covariance = 0.2**2 * np.exp(-apart / 2.0) + (0.1**2 + 0.3**2 / 12.0) * np.eye(int(used.sum()))
+    values, half = random.standard_normal((300, 3)), np.linalg.cholesky(covariance)
+    assert_allclose(noise.whiten(values), np.linalg.solve(half, values[used]), atol=1e-9)
+    assert_allclose(noise.colour(noise.whiten(values)), values[used], atol=1e-9)
+    assert_allclose(noise.log_scale, np.sum(np.log(np.diag(half))), atol=1e-9)
+    assert_allclose(noise.whiten(values[:, 0]), noise.whiten(values)[:, 0])
+
+
+def test_the_mean_of_slow_noise_scatters_as_its_covariance_says():
+    noise = Noise(
+        white=0.1, slow=0.2, correlation_time=3.0, used=np.ones(21, bool), time=np.arange(21) / 10.0
+    )
+    apart = np.abs(np.subtract.outer(noise.time, noise.time))
+    covariance = 0.2**2 * np.exp(-apart / 3.0) + 0.1**2 * np.eye(21)
+    assert_allclose(noise.sd_of_mean(21, 2.0), np.sqrt(np.mean(covariance)), rtol=0.01)
+
+
+def behind(random, time, noise, misfit=1.0):
+    """Return noise on top of a misfit that six parameters explain, each within its tolerance."""
+    J = np.column_stack([np.sin((k + 1) * time / 9.0 + k) for k in range(6)])
+    return Behind(residual=noise + J @ (misfit * random.standard_normal(6)), J=J, D=np.full(6, misfit**2))
+
+
+FAMILIES = {
+    "white": (0.1, 30.0, LEVEL, 0.0, 1.0),
+    "mild": (0.1, 30.0, 0.0, LEVEL, 0.144),
+    "slow": (0.1, 30.0, 0.0, LEVEL, 0.95),
+    "slow and white": (0.1, 60.0, 0.7 * LEVEL, 0.7 * LEVEL, 3.0),
+    "once a second": (1.0, 60.0, LEVEL, 0.0, 1.0),
+    "a hundred times a second": (0.01, 6.0, LEVEL, 0.0, 1.0),
+    "thrice as much": (0.1, 30.0, 3.0 * LEVEL, 0.0, 1.0),
+}
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_level_is_found_behind_what_parameters_explain(family):
+    step, end, white, slow_sd, lasts = FAMILIES[family]
+    random, time, found = np.random.default_rng(3), np.arange(0.0, end, step), []
+    for _ in range(RECORDS):
+        noise = white * random.standard_normal(time.size) + slow(random, time, slow_sd, lasts)
+        found.append(estimate(time, behind(random, time, noise), Usual(LEVEL, 0.0, is_known=False)))
+    assert_allclose(np.median([one.sd for one in found]), np.hypot(white, slow_sd), rtol=0.2)
+    lasting = 2.0 * slow_sd**2 * lasts + white**2 * step
+    unseen = 2.0 * (0.35 * LEVEL) ** 2  # of a slow part so small that nothing but its prior speaks of it
+    assert 0.5 < np.median([one.lasting for one in found]) / lasting < 2.0 + unseen / lasting
+
+
+def test_a_wander_of_twenty_levels_is_no_noise():
+    random, time = np.random.default_rng(4), np.arange(0.0, 30.0, 0.1)
+    wander = 20.0 * LEVEL * np.sin(2.0 * np.pi * time / 20.0)
+    found = estimate(
+        time,
+        behind(random, time, LEVEL * random.standard_normal(300) + wander, 1e-3),
+        Usual(LEVEL, 0.0, False),
+    )
+    assert found.slow < 4.0 * LEVEL
+    assert np.sum(found.whiten(wander) ** 2) > 100.0, "ten standard deviations of it still show"
+
+
+def test_a_known_level_is_kept():
+    random, time = np.random.default_rng(5), np.arange(0.0, 30.0, 0.1)
+    noise = behind(random, time, LEVEL * random.standard_normal(300))
+    assert_allclose(estimate(time, noise, Usual(LEVEL, 0.0, is_known=True)).sd, LEVEL, rtol=0.1)
+
+
+@pytest.mark.parametrize("step", [1.0, 0.05, 0.1, 1e-3])
+def test_the_resolution_is_read_off_the_values(step):
+    random = np.random.default_rng(6)
+    smooth = 30.0 * step * np.sin(np.arange(300) / 40.0) + step * random.standard_normal(300)
+    smooth[random.random(300) < 0.05] = np.nan
+    rounded = np.round((170.0 + smooth) / step) * step
+    assert_allclose(resolution_of(rounded, LEVEL), step, rtol=1e-6)
+    assert_allclose(resolution_of(np.round(rounded, 7), LEVEL), step, rtol=1e-4)
+    assert resolution_of(170.0 + smooth, LEVEL) == 0.0, "what is not rounded has none"
+
+
+def test_a_record_of_seven_digits_is_hardly_rounded():
+    values = np.array([float(f"{x:.7g}") for x in 27.0 + np.random.default_rng(7).standard_normal(300)])
+    assert resolution_of(values, LEVEL) < 1e-4
+
+
+def test_a_value_that_never_changes_says_nothing_of_its_step():
+    """Then it is as coarse as a usual sensor is noisy, not perfect."""
+    assert_allclose(resolution_of(np.full(50, 5.0), LEVEL) / np.sqrt(12.0), LEVEL)
+
+
+def test_spikes_are_those_that_stand_alone():
+    values = np.sin(np.arange(200) / 200.0) + 0.02 * np.random.default_rng(5).standard_normal(200)
+    values[[20, 77, 150]] += [1.0, -0.8, 0.5]
+    assert np.flatnonzero(spikes(values, 0.02)).tolist() == [20, 77, 150]
+    values[100:] += 3.0
+    assert np.flatnonzero(spikes(values, 0.02)).tolist() == [20, 77, 150], "a step is no spike"
+
+
+def test_two_spikes_at_the_end_of_a_record_are_no_majority():
+    values = 0.02 * np.random.default_rng(3).standard_normal(200)
+    for first, second in ((-1, -2), (-1, -3), (-2, -3), (0, 1), (1, 2)):
+        spoilt = values.copy()
+        spoilt[[first, second]] += 0.25
+        assert np.flatnonzero(spikes(spoilt, 0.02)).tolist() == sorted({first % 200, second % 200})
+    slope = values + 0.01 * np.arange(200)
+    assert not spikes(slope, 0.02).any(), "a slope of half a noise level a sample is none at the ends either"
