@@ -22,7 +22,6 @@ from typing import Any, NamedTuple
 
 import cyclopts
 import numpy as np
-from subzero.records.record import Record
 
 import scenarios
 import subzero
@@ -34,6 +33,7 @@ from subzero.diagnosis.pose import pose
 from subzero.diagnosis.problem import Problem
 from subzero.diagnosis.setting import Setting
 from subzero.model import Model
+from subzero.records.record import Record
 
 from .cases import AFTER
 from .distance import discriminations, sensitivities
