@@ -1,10 +1,13 @@
 """A simulation that is driven from outside, step by step: for people with a controller of their own.
 
+    >>> import subzero
     >>> sim = subzero.Simulator("fig6")
     >>> obs = sim.observation
-    >>> while sim.time < 30.0:
-    ...     obs = sim.step((25.0, 0.5 * (wanted - obs.heading), 0.0, 0.0))
+    >>> while sim.time < 1.0:
+    ...     obs = sim.step((25.0, 0.5 * (0.6 - obs.heading), 0.0, 0.0))   # propeller [rev/s], fins [rad]
     >>> run = sim.result()                              # the dataset of subzero.simulate
+    >>> run["rudder_command"].attrs["units"]
+    'degree'
 
 Each step holds a command for one sample time. The exchanges of hull and cable inside are those of `subzero.simulate`:
 the same commands give the same numbers, to the last bit.
