@@ -17,12 +17,14 @@ from cable.feng_allen.equation7 import (
     angles_of,
     equation7_numbers,
     load,
+    load_slope,
     space_matrix,
+    space_slope,
     tangent,
     time_matrix,
+    time_slope,
     to_local,
 )
-from cable.feng_allen.equation7_slopes import load_slope, space_slope, time_slope
 from cable.properties import CableProperties
 
 HEAVY = CableProperties(

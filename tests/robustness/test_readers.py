@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 
 import scenarios
-from subzero.autopilot.user_autopilot import from_file
+from subzero.autopilot.registry import from_file
 from subzero.diagnosis import effects
 from subzero.errors import UserError
 
