@@ -9,12 +9,14 @@ Setting ``NUMBA_DISABLE_JIT=1`` runs the same code interpreted.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from types import FunctionType
 from typing import Any, TypeVar
 
 import numba
 import numba.extending
 
+from subzero.aside import aside
 from subzero.machine_code import MachineCode
 
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -66,7 +68,15 @@ def _compile(function: Function, *, gate: bool, inline: bool = False, makes: boo
     found: Any = numba.njit(**options)(function)
     if not numba.config.DISABLE_JIT:
         found._cache = MachineCode(function)  # where numba's own `cache=True` puts its own
+        found._compile_for_args = _made_aside(
+            found._compile_for_args
+        )  # what numba calls for new kinds of arguments
     return found
+
+
+def _made_aside(compile_for: Callable[..., Any]) -> Callable[..., Any]:
+    """Return what compiles, or loads, where no interrupt breaks into it."""
+    return lambda *arguments, **named: aside(partial(compile_for, *arguments, **named))
 
 
 def by_field(field: str, yes: Function, no: Function) -> Function:

@@ -6,7 +6,7 @@ costs more than the step itself. A `Handle` is taken apart once and then passed 
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from typing import Any, NamedTuple
 
 import numba
@@ -14,6 +14,7 @@ import numpy as np
 from numba import types
 from numba.experimental import structref
 
+from subzero.aside import aside
 from subzero.compiled import allocating
 from subzero.loop import run_rows
 from subzero.recording import Recording, record_row
@@ -59,11 +60,9 @@ Compiled code writes it, so that it is true whenever Python code runs, an interr
 def hold(setup: Setup, live: Live, recording: Recording, times: np.ndarray) -> Any:
     """Return a handle of a run and the times of its rows (n,) [s].
 
-    It is made in a thread of its own: numba builds the object by Python code and dies of an interrupt in there, and
-    signals reach the main thread only.
+    It is made aside: numba builds the object by Python code and dies of an interrupt in there.
     """
-    with ThreadPoolExecutor(1) as aside:
-        return aside.submit(make_handle, setup, live, recording, times).result()
+    return aside(partial(make_handle, setup, live, recording, times))
 
 
 @allocating

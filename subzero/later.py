@@ -19,7 +19,7 @@ from subzero.errors import BadValueError, UserError, real, short
 from subzero.hull import feel_current
 from subzero.model import Model
 from subzero.run_state import Live, Setup
-from subzero.start import setup_of
+from subzero.setup import setup_of
 
 Later = Sequence[tuple[float, Model]]
 """(time [s], model) from which on another model holds."""

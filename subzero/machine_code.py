@@ -36,6 +36,7 @@ from numba.core.compiler import CompileResult
 from numba.core.serialize import dumps
 from numba.core.sigutils import normalize_signature
 
+from subzero.aside import heed
 from subzero.errors import printable
 from subzero.sources import PACKAGES, Tree
 
@@ -275,6 +276,7 @@ class MachineCode(_Cache):
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Return what was kept for a signature; None if it has to be compiled."""
+        heed()
         target_context.refresh()
         code = self._home.read(self._name(sig, target_context.codegen()))
         if code is not None:
