@@ -16,8 +16,8 @@ from typing import Any, TypeVar
 import numba
 import numba.extending
 
-from subzero.aside import aside
 from subzero.machine_code import MachineCode
+from subzero.unbroken import unbroken
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -68,15 +68,13 @@ def _compile(function: Function, *, gate: bool, inline: bool = False, makes: boo
     found: Any = numba.njit(**options)(function)
     if not numba.config.DISABLE_JIT:
         found._cache = MachineCode(function)  # where numba's own `cache=True` puts its own
-        found._compile_for_args = _made_aside(
-            found._compile_for_args
-        )  # what numba calls for new kinds of arguments
+        found._compile_for_args = _unbroken(found._compile_for_args)
     return found
 
 
-def _made_aside(compile_for: Callable[..., Any]) -> Callable[..., Any]:
-    """Return what compiles, or loads, where no interrupt breaks into it."""
-    return lambda *arguments, **named: aside(partial(compile_for, *arguments, **named))
+def _unbroken(compile_for: Callable[..., Any]) -> Callable[..., Any]:
+    """Return what numba calls for new kinds of arguments, which compiles or loads, without a signal that breaks in."""
+    return lambda *arguments, **named: unbroken(partial(compile_for, *arguments, **named))
 
 
 def by_field(field: str, yes: Function, no: Function) -> Function:

@@ -14,11 +14,11 @@ import numpy as np
 from numba import types
 from numba.experimental import structref
 
-from subzero.aside import aside
 from subzero.compiled import allocating
 from subzero.loop import run_rows
 from subzero.recording import Recording, record_row
 from subzero.run_state import Live, Setup
+from subzero.unbroken import unbroken
 
 FIELDS = ("setup", "live", "recording", "times")
 
@@ -60,9 +60,9 @@ Compiled code writes it, so that it is true whenever Python code runs, an interr
 def hold(setup: Setup, live: Live, recording: Recording, times: np.ndarray) -> Any:
     """Return a handle of a run and the times of its rows (n,) [s].
 
-    It is made aside: numba builds the object by Python code and dies of an interrupt in there.
+    No signal breaks in: numba builds the object by Python code and dies of an interrupt in there.
     """
-    return aside(partial(make_handle, setup, live, recording, times))
+    return unbroken(partial(make_handle, setup, live, recording, times))
 
 
 @allocating

@@ -36,9 +36,9 @@ from numba.core.compiler import CompileResult
 from numba.core.serialize import dumps
 from numba.core.sigutils import normalize_signature
 
-from subzero.aside import heed
 from subzero.errors import printable
 from subzero.sources import PACKAGES, Tree
+from subzero.unbroken import heed
 
 MARK = b"subzero machine code 1\n"
 """A file begins with this, then the digest of its name and of the rest."""

@@ -125,3 +125,27 @@ def test_an_interrupt_while_it_is_written_leaves_the_old_file_or_the_new_one(tin
     assert len(found) > 10
     assert set(found) <= {old, new}
     home_of.cache_clear()
+
+
+CALLED = """
+from subzero.compiled import compiled
+
+FACTOR = 3.0
+
+@compiled
+def scaled(x):
+    return FACTOR * x
+
+VALUE = scaled(2.0)
+"""
+
+
+def test_a_module_may_call_what_it_compiles_while_it_is_imported(tmp_path):
+    """Compiled or loaded in another thread, it waited for ever for the import to end."""
+    (tmp_path / "called.py").write_text(CALLED)
+    environment = os.environ | {"SUBZERO_CACHE_DIR": str(tmp_path / "cache")}
+    script = f"import sys; sys.path.append({str(tmp_path)!r}); import called; print(called.VALUE)"
+    for _ in range(2):
+        done = subprocess.run([sys.executable, "-c", script], env=environment, capture_output=True, text=True,
+                              check=False, timeout=300)  # fmt: skip
+        assert (done.stdout, done.stderr) == ("6.0\n", "")
