@@ -20,6 +20,7 @@ import math
 import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Any
 
 from scenarios.errors import Problem, ScenarioError, nearest_or_all
@@ -63,8 +64,9 @@ class Part:
     complete: bool = False
 
 
+@cache
 def pattern(kind: str) -> Source:
-    """Return the pattern of a kind of part, ``vehicle`` or ``cable``."""
+    """Return the pattern of a kind of part, ``vehicle`` or ``cable``; read once."""
     folder, name = PATTERNS[kind]
     return read_toml(shipped_path(folder, name), name)
 
