@@ -20,7 +20,7 @@ from typing import Never
 
 INTERRUPTED = 130
 """Exit code: 128 and the number of SIGINT, as shells have it."""
-PATIENCE_S = 1.5
+PATIENCE_S = 1.2
 """A command has so long to end by itself. [s]"""
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
