@@ -9,7 +9,7 @@ down, heading runs clockwise from north and is continuous (no jump at 360 degree
 turns the heading clockwise, positive stern-planes raise the nose. Forces and moments of the cable are
 those *on the vehicle*, and moments are about the hull centre.
 
-To add a channel, add a row here and fill it in `subzero.simulation`; files, records and reports follow.
+To add a channel, add a row here and fill it in `subzero.dataset.channel_values`; files, records and reports follow.
 """
 
 from __future__ import annotations

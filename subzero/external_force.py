@@ -52,7 +52,7 @@ class Feature:
 
 
 def _read(table: str) -> dict[str, Feature]:
-    """Turn rows ``name | factors | unit | words`` into features by name."""
+    """Turn rows ``name ; factors ; unit ; words`` into features by name."""
     rows = [[cell.strip() for cell in line.split(";")] for line in table.strip().splitlines()]
     padded = {name: (*factors.split(), "1", "1")[:3] for name, factors, _, _ in rows}
     return {name: Feature(padded[name], unit, words) for name, _, unit, words in rows}  # type: ignore[arg-type]

@@ -38,7 +38,7 @@ class Load:
         along, side, chord_length: U_t, |U_⊥| and r.
         kt, kn: drag constants with stretch and correction.
         q_V, q_d: ∂q/∂V and ∂q/∂d (3, 3).
-        q_tt, G: (∂q/∂t) t (3,) and G (3, 3), see `_differentiate_load`.
+        q_tt, G: (∂q/∂t) t (3,) and G (3, 3), see `differentiate_load`.
         by_near, by_far: derivatives of the segment's total load Q by the position of its near node (3, 3) and by the
             unknowns of its own block (3, 4), see `assembly`.
     """

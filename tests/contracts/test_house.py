@@ -1,8 +1,7 @@
 """The code stays as easy to carry on as it is: no circle of imports, and no longer chain of them than stands.
 
-Verifies: `python -m benchmarks.house`. Configuration: the sources as they are, and graphs drawn by hand.
-Tolerance: none.
-A change that shortens a chain lowers its number here.
+Verifies: `python -m benchmarks.house`. Configuration: the sources as they are, and graphs drawn by hand. Tolerance:
+none. A change that shortens a chain lowers its number here.
 """
 
 import pytest
