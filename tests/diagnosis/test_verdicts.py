@@ -74,7 +74,7 @@ def check(case: Case, folder) -> None:
     if hidden.kind == "none":
         assert verdict.verdict in ("nothing_wrong", "undecided"), verdict.sentence
         assert first == "none"
-    elif case.D >= (CLEAR_FROM_MID_TRIAL if hidden.kind == "sudden" else CLEAR):
+    elif (CLEAR_FROM_MID_TRIAL if hidden.kind == "sudden" else CLEAR) <= case.D:
         assert is_true(first, hidden), (hidden.names, first, p)
     assert is_true(first, hidden) or is_part(first, hidden) or p < SURE, (hidden.names, first, p)
     assert sum(verdict.probabilities.values()) < 1.0 + 1e-9
