@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from subzero.cli import FINE, INTERRUPTED, MISTAKE, main
-from subzero.diagnosis.verdict import (
+from subzero.diagnosis.results import (
     CAUSE_NAMED,
     NOTHING_WRONG,
     OUTSIDE,
@@ -64,7 +64,7 @@ def engine(monkeypatch, tmp_path):
         return dict.fromkeys(channels, np.interp(times, TIME, SPEED))
 
     for name, members in (
-        ("diagnose", {"diagnose": diagnose}),
+        ("api", {"diagnose_trials": diagnose}),
         ("response", {"respond": respond}),
     ):
         module = types.ModuleType(f"subzero.diagnosis.{name}")
@@ -113,7 +113,7 @@ def test_a_screen_is_the_first_look(engine):
 
 def test_effects_of_the_users_own_are_given_to_the_engine_and_copied_beside_the_model(engine, tmp_path):
     (tmp_path / "mine.py").write_text(
-        "from subzero.diagnosis.effect import Effect\n"
+        "from subzero.diagnosis.hypothesis.effect import Effect\n"
         "EFFECTS = [Effect(id='mine', sentence='mine', slot='hull', parameters=(), apply=lambda s: s)]\n"
     )
     assert (
