@@ -4,7 +4,7 @@
     python -m benchmarks.diagnosis.stories rudder_lag_on_fig6   # or some
     python -m benchmarks.diagnosis.stories --keep stories/      # with records and reports, to look into
 
-The truth comes from the other cable formulation (`subzero.synthetic.reference_run`), with every tolerance drawn, coloured
+The truth comes from the other cable formulation (`synthetic.reference_run`), with every tolerance drawn, coloured
 noise, a few outliers and a gap.
 """
 

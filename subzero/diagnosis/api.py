@@ -1,6 +1,6 @@
 """`subzero.diagnose`: from files or records to a verdict, and the order in which the engine does its parts.
 
-problem → detectability → residuals → model search → out of catalogue → decision rule → extended model → gain → next trial
+    problem → detectability → residuals → model search → out of catalogue → verdict → extended model, gain, next trial
 
 If even wide priors (κ = 4) do not come close to the records, or the first fits are all poor, explanations outside the
 catalogue are asked first: an estimated input force takes the simulation along the records, where linearisation is

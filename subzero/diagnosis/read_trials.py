@@ -1,12 +1,10 @@
 """From files to what a diagnosis takes: measured records, each with the trial that it belongs to.
 
-A record is a CSV file of `subzero.records.record`, with or without columns of commands, and with a sidecar (`sidecar`)
-or without. Everything that can be wrong with it is said before anything long is begun, in one message for a record.
+A record is a CSV file of `subzero.records.record`, with or without columns of commands and a file of metadata. All that
+can be wrong with it is said before anything long is begun, in one message for a record.
 
-The checks of a diagnosis for a record that is only set beside a run: its epoch, its units, its signs.
-
-A comparison has its simulation anyway, so what is asked costs nothing. What a diagnosis needs besides (a length, a
-sampling rate) is not asked for here.
+A comparison (`check_epoch`, `check_beside`) asks for less: the epoch, the units and the signs, but neither a length nor
+a sampling rate. It has its simulation anyway, so these checks cost nothing.
 """
 
 from __future__ import annotations

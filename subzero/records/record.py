@@ -1,13 +1,12 @@
-"""A heading is known but for whole turns: one compass begins at 359 degrees where another, or a run, begins at −1.
-
-So a run's heading is counted from its trial's start, without a jump wherever that lies, and a record's from the run's.
-
-Measured records: a CSV file with a time column and any of the channels.
+"""Measured records: a CSV file with a time column and any of the channels.
 
 A record has the column ``time_s`` and any columns of `subzero.channels`, such as ``surge_speed_m_s`` or
 ``heading_deg``. An empty cell or ``nan`` is a gap. Lines that start with ``#`` are remarks. A file that
 cannot be used is refused with all its problems at once. A heading that jumps from 360 to 0 degrees is made
 continuous.
+
+A heading is known but for whole turns: one compass begins at 359 degrees where another, or a run, begins at −1. So a
+run's heading is counted from its trial's start, without a jump wherever that lies, and a record's from the run's.
 
 The files that a run writes are themselves records, so one run can be compared with another.
 """

@@ -26,7 +26,8 @@ MISTAKEN: dict[str, dict[str, float]] = {
 """Unit → what a column may be in by mistake → how many of those make one."""
 
 CLEAR_MISFIT, WIDE_MISFIT, FAR_FACTOR = 0.2, 0.6, 5.0
-"""How well (error over size) a channel has to fit in the other unit: well, or less well if the factor is above FAR_FACTOR."""
+"""How well (error over size) a channel has to fit in the other unit: well, or less well if the factor is
+above FAR_FACTOR."""
 
 BETTER_RATIO = 3.0
 """How many times better the other unit has to fit."""

@@ -1,6 +1,6 @@
-"""What is hidden in a record: drawn deviations of every number within its tolerance, and effects on top of them.
+"""What is planted in a record: deviations within tolerance, effects on top of them; and the record as sensors write it.
 
-A record as sensors write it: the truth of the other cable formulation, with coloured noise, outliers and gaps.
+The truth comes from the other cable formulation (`reference_run`); noise is AR(1), with outliers, rounding and gaps.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The hull and the lumped cable, exchange by exchange: the loop of `other_code`.
+"""The hull and the lumped cable, exchange by exchange: the loop of `reference_run`.
 
 In an exchange of length h the hull is pulled by a force that ends at F, with the slope of the exchange before; the
 lumped cable is led to where that takes the tow point, on a cubic; F is right when the cable answers with it. Broyden's

@@ -1,11 +1,10 @@
-"""What sensors show of a truth by the other formulation, written independently of `response`.
+"""The truth of a setting by the other cable formulation, lumped masses and springs, and what sensors show of it.
 
-y' = (x − y)/lag,   shown = (1 + scale) y + bias,   at t − clock offset
+Another cable (`cable.lumped`), another way to couple it (`reference_coupling`), finer steps, and sensors written
+independently of `inference.measurement`. Only the hull is the same; without the cable it is the hull alone in finer
+steps.
 
-The truth of a setting by the other cable formulation: lumped masses and springs instead of the moving end.
-
-Another cable (`cable.lumped.step`), another way to couple it (`other_loop`), finer steps, and sensors written once more
-(`other_sensors`). Only the hull is the same. Without the cable it is the hull alone in finer steps.
+    y' = (x − y)/lag,   shown = (1 + scale) y + bias,   at t − clock offset
 
 Deliberately left out: a motion that is prescribed.
 """

@@ -1,13 +1,9 @@
-"""What happens to vehicles and is in no catalogue: forces to hide in a record, none of which a cause can name.
+"""Forces that happen to vehicles and are in no catalogue, to plant in a record: none that a cause can name.
 
-The kinds are those of `subzero.diagnosis.outside_kinds`.
-
-The kinds of forces outside the catalogue, each drawn at random.
-
-Each draws its size and times, and says which axis it acts on and, where there is one, which feature of
+Each kind draws its size and times, and says which axis it acts on and, where there is one, which feature of
 `subzero.external_force` its formula has. Sizes are told in the drag of the hull at 1 m/s, so they fit any vehicle.
 
-To add a kind: a function (draw) → Outside, and a line in KINDS.
+To add a kind: a function (draw) → `UnmodelledForce`, and a line in KINDS.
 """
 
 from __future__ import annotations

@@ -21,7 +21,7 @@ def shown(monkeypatch, error):
     def simulate(setting, times, channels, *, segment_length, **steps):
         return {"heading": error(segment_length) * SPECS["heading"].noise * np.ones(times.size)}
 
-    monkeypatch.setattr(truth, "simulate_otherwise", simulate)
+    monkeypatch.setattr(truth, "simulate_reference", simulate)
     return truth.agreed(manoeuvres.nominal("fig6"), TIMES, CHANNELS)["heading"] / SPECS["heading"].noise
 
 

@@ -1,6 +1,6 @@
 """A challenge hides what it says, says nothing by accident, and hides nothing that the catalogue could name.
 
-Verifies: `subzero.synthetic.challenge`, `planted`, `unmodelled_forces`. Configuration: fig6, and 10 s of it where that is enough.
+Verifies: `subzero.synthetic`. Configuration: fig6, and 10 s of it where that is enough.
 """
 
 import dataclasses

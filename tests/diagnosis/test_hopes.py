@@ -1,7 +1,7 @@
 """What hardly acts any more from some time on is found, although a small change of it says little where it is small.
 
-Verifies: `ranked_by_runs` of `inference.change_point_scan`, and what `fit_change_points` makes of it. Configuration: fig6,
-30 s, six channels
+Verifies: `inference.change_point_scan.ranked_by_runs`, and what `fit_change_points` makes of it. Configuration:
+fig6, 30 s, six channels
 with coloured noise; a cable that from 9 s on drags along itself by 12 % of what it did. Tolerance: a step of the times
 that are tried, 2 s, before the fit; behind it a step and a half of the runs, 0.3 s, and the drag's own tolerance, 0.05.
 """

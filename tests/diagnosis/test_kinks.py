@@ -14,11 +14,7 @@ import pytest
 
 from subzero.diagnosis.hypothesis.catalogue import catalogue
 from subzero.diagnosis.hypothesis.hypotheses import columns_of, variances
-from subzero.diagnosis.inference import map_fit as kinks
-from subzero.diagnosis.inference import map_fit as refitting
-from subzero.diagnosis.inference import map_fit as wide
-from subzero.diagnosis.inference import model_search as growing
-from subzero.diagnosis.inference import model_search as searching
+from subzero.diagnosis.inference import map_fit, model_search
 from subzero.diagnosis.inference.laplace import Candidate, candidate_of
 from subzero.diagnosis.inference.map_fit import (
     RESTART_TOLERANCES,
@@ -153,7 +149,7 @@ def test_a_fit_is_begun_again_off_its_kinks_and_where_all_else_is_best_for_that(
     """Best in the linear problem: the slope of the objective is 0 in all that is neither held nor at a bound."""
     problem, begins = plant(duration=8.0).problem, []
     fit, D = astray(problem), variances(problem.entries, ids, 1.0)
-    monkeypatch.setattr(kinks, "refit", lambda problem, z, *others, **more: begins.append(z))
+    monkeypatch.setattr(map_fit, "refit", lambda problem, z, *others, **more: begins.append(z))
     restarted_off_kinks(problem, fit, ids, D)
     (z,), at = begins, non_smooth(problem, ids)
     tolerance = np.array([entry.parameter.tolerance for entry in problem.entries])
@@ -191,9 +187,14 @@ def test_sensitivities_are_made_again_where_a_fit_has_moved(plant, away, same):
 
 
 def test_the_wide_fit_comes_back_from_astray(plant, monkeypatch):
-    problem = plant(duration=8.0).problem
-    monkeypatch.setattr(wide, "refit", lambda problem, *others, **more: astray(problem))
-    _, fit, _ = wide.fit_wide(problem, lambda share, words: None)
+    problem, fits = plant(duration=8.0).problem, []
+
+    def first_astray(problem, *others, **more):
+        fits.append(refit(problem, *others, **more) if fits else astray(problem))
+        return fits[-1]
+
+    monkeypatch.setattr(map_fit, "refit", first_astray)
+    _, fit, _ = map_fit.fit_wide(problem, lambda share, words: None)
     assert fit.z[columns_of(problem.entries, DRUM)] < 2.0 * DRUM_TOLERANCE
 
 
@@ -207,34 +208,6 @@ def test_the_best_comes_back_from_astray_before_it_is_looked_beside_and_so_does_
     assert search.candidates[()].log_posterior > lost.log_posterior + 5.0
 
 
-def test_growing_looks_beside_what_is_best_off_its_kinks(monkeypatch):
-    """... and each hypothesis is fitted from there once."""
-    level = dict.fromkeys((1.0, 2.0, 4.0), 0.0)
-    search, looked, made = (
-        Search(problem=SimpleNamespace(entries=()), progress=lambda share, words: None),
-        [],
-        [],
-    )
-    search.candidates = {ids: Candidate(ids=ids, fit=None, log_evidence=level, log_posterior=log)
-                         for ids, log in ((("a",), -10.0), (("b",), -12.0))}  # fmt: skip
-
-    def again(problem, ids, fit):
-        made.append(ids)
-        return Candidate(ids=ids, fit=fit, log_evidence=level, log_posterior=-5.0)
-
-    monkeypatch.setattr(growing, "begun_again", lambda *asked: "again")
-    monkeypatch.setattr(growing, "candidate_of", again)
-    monkeypatch.setattr(search, "_more", lambda best: looked.append((best.ids, best.log_posterior)) or [])
-    monkeypatch.setattr(search, "_simpler", lambda: looked.append("simpler"))
-    later = Candidate(ids=("c",), fit=None, log_evidence=level, log_posterior=-4.0)
-    monkeypatch.setattr(search, "cross", lambda: search.candidates.setdefault(("c",), later))
-    for name in ("_without", "_aside_of", "_kinked", "_parts_again", "race", "sharpen"):
-        monkeypatch.setattr(search, name, lambda *asked: None)
-    search.grow()
-    assert looked == [(("a",), -5.0), (("c",), -4.0), "simpler"], "what is simpler once the best stays"
-    assert made == [("a",), ("c",)]
-
-
 def test_the_first_that_are_close_are_fitted_from_off_their_kinks_before_they_are_told(monkeypatch):
     search, again = Search(problem=None, progress=lambda share, words: None), []
     for name, log in zip("abcde", (-10.0, -11.0, -15.9, -10.5, -17.0), strict=True):
@@ -243,7 +216,7 @@ def test_the_first_that_are_close_are_fitted_from_off_their_kinks_before_they_ar
     for name in ("_is_open", "cross", "_nothing"):
         monkeypatch.setattr(search, name, lambda *asked: None)
     search.settle()
-    assert again == ["a", "d", "b"], f"the first {searching.FIRST}"
+    assert again == ["a", "d", "b"], f"the first {model_search.MAX_RESTARTED}"
     again.clear()
     search.candidates = {ids: one for ids, one in search.candidates.items() if ids[0] in "ace"}
     search.settle()
@@ -275,7 +248,7 @@ def test_a_pair_is_looked_for_beside_what_is_not_the_best(monkeypatch):
         "right": {("other", "right"): -41.0},
         "other": {("other", "right"): -44.0, ("other", "wrong"): -51.0},
     }
-    monkeypatch.setattr(growing, "beside", lambda problem, one: found.get(one.ids[0], {}))
+    monkeypatch.setattr(model_search, "with_one_added", lambda problem, one: found.get(one.ids[0], {}))
     monkeypatch.setattr(search, "fit", lambda ids, start: fits.setdefault(ids, start))
     search._aside_of(search.best())
     assert fits == {("other", "right"): "right"}, "from the better of the two; not what is behind the best"
@@ -299,7 +272,7 @@ def test_one_cause_that_is_far_away_is_found_in_the_place_of_two(plant, monkeypa
 
 
 @pytest.mark.parametrize(
-    ("promises", "legs"), [([100.0, 50.0, 20.0], 2), ([100.0] * 9, refitting.LEGS), ([5.0], 0)]
+    ("promises", "legs"), [([100.0, 50.0, 20.0], 2), ([100.0] * 9, map_fit.MAX_RESTARTS), ([5.0], 0)]
 )
 def test_a_cause_that_is_far_away_is_fitted_on_while_much_is_promised(plant, monkeypatch, promises, legs):
     search, asked = begun(plant(duration=4.0)), []
@@ -308,7 +281,7 @@ def test_a_cause_that_is_far_away_is_fitted_on_while_much_is_promised(plant, mon
         asked.append(z)
         return SimpleNamespace(z=z + 1.0, r=None, D=D, promise=promises[len(asked) - 1])
 
-    for module in (searching, refitting):
+    for module in (model_search, map_fit):
         monkeypatch.setattr(module, "refit", leg)
     monkeypatch.setattr(type(search.problem), "jacobian", lambda self, z: None)
     search._alone(("hull_drag",))

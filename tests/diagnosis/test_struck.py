@@ -16,7 +16,8 @@ from subzero.diagnosis.hypothesis.catalogue import catalogue
 from subzero.diagnosis.hypothesis.effect import with_onset
 from subzero.diagnosis.hypothesis.hypotheses import columns_of, variances
 from subzero.diagnosis.inference.basis import one_terms
-from subzero.diagnosis.inference.change_point_fit import Hope, _worth, fit_change_points, linearised_at
+from subzero.diagnosis.inference.change_point_fit import _worth, fit_change_points, linearised_at
+from subzero.diagnosis.inference.change_point_scan import RankedChangePoint
 from subzero.diagnosis.inference.input_estimation import relinearised_force
 from subzero.diagnosis.inference.latent_force import FINE_SPACING_S, history, knots_of, without_force
 from subzero.diagnosis.inference.map_fit import is_poor_fit, refit
@@ -107,7 +108,7 @@ def test_a_force_that_comes_and_goes_is_no_sudden_cause(plant):
 def a_hope(name, log_posterior, gain):
     """Return a hope of a sudden cause, in no place."""
     begun = SimpleNamespace(effect=EFFECTS[name], log_gain=gain, between=0.0)
-    return Hope(log_posterior, begun, None)
+    return RankedChangePoint(log_posterior, begun, None)
 
 
 def test_what_gains_most_is_fitted_whatever_it_hopes_and_others_if_they_are_close():
@@ -196,7 +197,8 @@ def test_more_drag_and_less_thrust_from_the_same_time_on_are_not_told_apart(plan
     planted = plant(lambda setting: with_onset(EFFECTS["hull_drag"], 20.4).apply(setting, 0.35))
     problem, _, late = asked(planted, "X")
     pair = {"hull_drag", "propeller_thrust_gain"}
-    told = SimpleNamespace(problem=problem, foreign=[OutOfCatalogue(beside=(), what=one, log_posterior=one.log_posterior)
+    told = SimpleNamespace(problem=problem, foreign=[OutOfCatalogue(beside=(), what=one,
+                                                                    log_posterior=one.log_posterior)
                                                      for one in late if one.begun.effect.id in pair])  # fmt: skip
     one = fitted(told)[0]
     assert one.begun.effect.id in pair

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from subzero.diagnosis.hypothesis.catalogue import catalogue
+from subzero.diagnosis.hypothesis.effect import with_onset
 from subzero.diagnosis.inference import problem as problem_module
-from subzero.diagnosis.inference import simulator as kept_runs
-from subzero.diagnosis.inference.change_point_scan import begun_at
+from subzero.diagnosis.inference import simulator
 from subzero.diagnosis.inference.latent_force import history, without_force
 from subzero.diagnosis.inference.model_search import Search
 from subzero.diagnosis.inference.simulator import simulate_on, simulate_track, with_stops
@@ -42,16 +42,16 @@ def test_a_stop_can_be_gone_on_from_again_and_again():
 
 @pytest.mark.parametrize("time", [2.0, 2.5, 3.7])
 def test_a_cause_that_begins_between_exchanges_begins_where_it_does_from_the_start(time):
-    later = begun_at(CATALOGUE["rudder_offset"], time).apply(SETTING, 3.0)
+    later = with_onset(CATALOGUE["rudder_offset"], time).apply(SETTING, 3.0)
     stop = with_stops(SETTING, [time])[1][time]
     assert np.array_equal(simulate_on(later, stop)[1], simulate_track(later)[1])
 
 
 def test_a_cause_goes_on_beside_one_that_began_before():
     """The run that is gone on from has changed already: what holds at the stop is what had begun by then."""
-    bent = begun_at(CATALOGUE["rudder_offset"], 1.0).apply(SETTING, 3.0)
+    bent = with_onset(CATALOGUE["rudder_offset"], 1.0).apply(SETTING, 3.0)
     stop = with_stops(bent, [2.0])[1][2.0]
-    for more in (begun_at(CATALOGUE["hull_drag"], 2.0).apply(bent, 0.5), pushed(0.05, bent)):
+    for more in (with_onset(CATALOGUE["hull_drag"], 2.0).apply(bent, 0.5), pushed(0.05, bent)):
         assert np.array_equal(simulate_on(more, stop)[1], simulate_track(more)[1])
 
 
@@ -68,12 +68,12 @@ def counted(monkeypatch):
         runs.append(setting)
         return simulate_track(setting)
 
-    monkeypatch.setattr(problem_module, "tracked", count)
+    monkeypatch.setattr(problem_module, "simulate_track", count)
     return runs
 
 
 def test_no_run_is_made_twice_and_sensors_need_none(plant, counted):
-    problem = dataclasses.replace(plant(duration=6.0).problem, kept=kept_runs.KeptRuns())
+    problem = dataclasses.replace(plant(duration=6.0).problem, kept=simulator.RunCache())
     counted.clear()
     z = np.zeros(len(problem.entries))
     bias = next(k for k, entry in enumerate(problem.entries) if entry.effect.id == "sensor_bias:heading")
@@ -99,10 +99,10 @@ def test_runs_of_another_setting_are_others(plant):
 
 
 def test_old_runs_are_forgotten_when_there_is_no_room(plant, counted, monkeypatch):
-    problem = dataclasses.replace(plant(duration=6.0).problem, kept=kept_runs.KeptRuns())
+    problem = dataclasses.replace(plant(duration=6.0).problem, kept=simulator.RunCache())
     counted.clear()
     z = np.zeros(len(problem.entries))
-    monkeypatch.setattr(kept_runs, "ROOM", simulate_track(SETTING)[1].nbytes)
+    monkeypatch.setattr(simulator, "CACHE_BYTES", simulate_track(SETTING)[1].nbytes)
     other = z.copy()
     other[0] = 0.01
     for deviations in (z, other, z):

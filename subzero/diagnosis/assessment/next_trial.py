@@ -1,18 +1,14 @@
-"""What a trial that has not been flown would show of hypotheses that the records at hand cannot tell apart.
+"""The trial that best tells apart what the records at hand cannot: of a library, with a further channel, or random.
 
     y = h(z_a) + J (z − z_a) + e,   z ~ N(z_a, M_a) of the records at hand,   e ~ N(0, I)
-    D(a|b) = dᵀ (I + J M_b Jᵀ)⁻¹ d,   d = h(z_a) − h(z_b)
+    D(a|b) = dᵀ (I + J M_b Jᵀ)⁻¹ d,   d = h(z_a) − h(z_b);   max over trials of min over pairs of D   (T-optimal)
 
-h(z_a) and h(z_b) are real runs; J is made once for a trial. Only the directions in which hypotheses and tolerances move
-the data matter; noise in all others says nothing.
+h(z_a) and h(z_b) are real simulations; J is made once for a trial. Only the directions in which hypotheses and
+tolerances move the data matter.
 
-The next trial: of the library, with a further channel, or made to measure, what best separates what is left.
-
-    max over trials of min over pairs of D, tolerances free within what is known of them already
-
-Every trial is run for every hypothesis; the most promising ones with sensitivities, in the order of the library, until
-one decides for sure (D ≥ AMPLE_DISCRIMINATION). If none does, further channels are looked at; and if nothing decides at all
-(D < DECISIVE_DISCRIMINATION), command sequences are drawn at random, within the same limits.
+Every trial is simulated for every hypothesis; the most promising ones with sensitivities, in the order of the library,
+until one decides for sure (D ≥ AMPLE_DISCRIMINATION). If none does, further channels are looked at; if nothing decides
+at all (D < DECISIVE_DISCRIMINATION), command sequences are drawn at random, within the same limits.
 """
 
 from __future__ import annotations

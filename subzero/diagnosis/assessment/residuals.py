@@ -1,6 +1,6 @@
-"""What is wrong, channel by channel, before anybody asks why: the nominal simulation beside what was measured.
+"""Residuals of the nominal model, channel by channel, and the curves of all models beside the records for the figures.
 
-What models say to the records, for the figures.
+residual = measured − simulated;   nrmse = rms(W residual);   whiteness by Ljung-Box, 25 lags
 """
 
 from __future__ import annotations

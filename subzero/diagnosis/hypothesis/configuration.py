@@ -1,6 +1,7 @@
-"""A setting is a value: a trial, a model, and the sensors that look at it. Effects make new settings from it.
+"""The configuration of a trial, and a measured record with the configuration that it belongs to.
 
-What a diagnosis takes: a measured record with the trial that it belongs to. `records` reads it from files.
+A `Setting` is a value: trial, model and sensors. Effects make new settings from it. A `Logged` is a record with its
+setting; `read_trials` makes it from files.
 """
 
 from __future__ import annotations

@@ -1,10 +1,7 @@
-"""What an effect is: data. One value with an id, a sentence, its parameters, and how it changes a setting.
+"""An effect as data: an id, a sentence, its parameters, and how it changes a setting; throughout, or from an onset on.
 
-All parameters are deviations from the nominal model, so that 0 is the model as it stands, exactly.
-
-An effect that begins in the middle of a trial: a fin struck at 12 s, the cable caught at 20 s.
-
-θ(t) = θ₀ for t < t₀,  θ₀ + z from t₀ on
+θ = θ₀ + z                                          throughout; z = 0 is the nominal model, exactly
+θ(t) = θ₀ for t < t₀,   θ₀ + z from t₀ on           with an onset: a fin struck at 12 s, the cable caught at 20 s
 """
 
 from __future__ import annotations

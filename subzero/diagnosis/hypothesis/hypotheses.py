@@ -1,6 +1,7 @@
-"""What the numbers of z are: parameters of effects that all records share, and the start of each record.
+"""The parameter vector z, the hypotheses about it, and their prior probabilities in one visible table.
 
-The hypotheses and how probable they are before a record is seen, in one visible table.
+z holds the parameters of all effects, which all records share, and then the start of each record. A hypothesis is a set
+of causes, whose entries get the prior variance s² instead of (κτ)².
 """
 
 from __future__ import annotations

@@ -1,17 +1,10 @@
-"""What a missing force may look like in time: a feature of the motion, from some time on, dying away, or a wave.
+"""The dictionary of force formulas: shapes that a latent force may have in time, and their prior probabilities.
 
     φ(t) = feature(state(t)) · window(t),   window = 1,  [t ≥ t₀],  [t₀ ≤ t < t₁],  exp(−t/T);   or  cos ωt, sin ωt
 
-Features are those of `external_force`, along a track that was fitted.
-
-What a missing force is made of: a short sum of shapes, w(t) = Σ c_j φ_j(t), as a value and as a part of a model.
-
-The shapes of a missing force that are tried, and how probable each is along an axis before a record is seen.
-
-The simplest formulas that a force may have: one feature of the motion, throughout, in a window, or dying away.
-
-A process over time costs evidence for every second in which it is free to change; a drag that grows all the time, or a
-push that lasts for some seconds, is told by one number. Shapes are those of `shapes`, sensible ones for an axis first.
+Features are those of `external_force`, along a fitted track; those that usually act along an axis have a larger prior.
+`one_terms` gives the formulas of one term. A Gaussian process costs evidence for every second in which it is free to
+change; a drag that grows all the time, or a push that lasts for some seconds, is told by one number.
 """
 
 from __future__ import annotations

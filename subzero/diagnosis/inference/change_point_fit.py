@@ -1,10 +1,10 @@
-"""How probable a cause that begins in mid-trial is: each fitted by real runs, and when it began with it.
-
-Where much is wrong from some time on, a model without it has to bend, and what is linear there says little. But a force
-that nobody explains, fitted, takes the run along the true one: there every sudden cause is tried from every time, the
-best are fitted, and the others tried again in the place of the best, until none is left that might be better.
+"""Change points, fitted: how probable a cause is that begins in mid-trial, with its onset as a parameter.
 
     z ~ N(0, κ² τ²),   size ~ N(0, s²),   p(t₀) = 1/T          log p = −objective − ½ log det (D P)
+
+Where much is wrong from some time on, a model without it has to deviate from its priors, and the linearisation there
+says little. With an estimated input force the simulation follows the true trajectory: there every candidate is scanned,
+the best are fitted, and the others tried again around the best fit, until none is left that might be better.
 """
 
 from __future__ import annotations

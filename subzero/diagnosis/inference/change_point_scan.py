@@ -1,10 +1,8 @@
-"""Effects that begin in the middle of a trial, in a linear problem: which, and when?
+"""Change-point candidates, ranked by linear evidence before any is fitted: which cause, and from when on?
 
-Every sudden effect is tried from every time of a grid, in the linear problem with all tolerances free; the best one
-again on a finer grid. What is left out: effects that end again, and two that begin at different times.
-
-Which causes that begin in mid-trial have any hope, before one is fitted: every one from every time, in the linear
-problem of a place; and those that hold throughout in a hypothesis, by real runs, as large as they are there.
+Every effect that may begin in mid-trial is tried from every time of a grid, in the linear problem at a linearisation
+point with all tolerances free; the best one again on a finer grid. Causes of a hypothesis are tried by real
+simulations, as large as they are there. What is left out: effects that end again, and two with different onsets.
 """
 
 from __future__ import annotations

@@ -1,12 +1,10 @@
-"""What a missing force is made of: a short sum of shapes, w(t) = Σ c_j φ_j(t), as a value and as a part of a model.
+"""A formula for a latent force: sparse regression on the dictionary of `basis`, by evidence from the data themselves.
 
-What a missing force is made of: a short sum of features, chosen by evidence from the data themselves.
-
-    w(t) = Σ c_j φ_j(t),   φ_j of `shapes`;      c ~ N(0, (a/rms φ)²), amplitudes a mixed
+    w(t) = Σ c_j φ_j(t),   φ_j of `basis`;      c ~ N(0, (a/rms φ)²), amplitudes a mixed
     log p = log evidence of the sum (tolerances free) + log prior of its features and of their number
 
-The smoothed history is only described by what the data say of it (`latent.Seen`): nothing is fitted to a curve that was
-smoothed before. Sensible features for an axis come first: they have a larger prior.
+The smoothed history enters only through what the data say of it (`ForceInformation`): nothing is fitted to a curve that
+was smoothed before.
 """
 
 from __future__ import annotations

@@ -1,15 +1,11 @@
-"""Forces and drifts that no cause explains, in the linear problem around a fit: how probable is each?
+"""Latent forces and sensor drifts: candidates by linear evidence, histories, and a linearisation at their own fit.
 
-The history of a force that no cause explains, with its band: fitted with real runs, all tolerances free.
+    w ~ Gaussian process(a, T) on one axis;   a and T are those that make the record most probable
 
-The prior of the history (amplitude, correlation time) is the one that makes the record most probable. What is left out:
-forces on two axes at once.
-
-How probable a force or a drift is where it acts: the linear problem around a real fit with it, beside nothing else.
-
-Without it the model has to bend all its tolerances to come close to a record, and what is linear there says little of
-a model that is as declared but for the force. So the force, or the drift, is recovered, and all is asked again around
-that fit: of "nothing is wrong", as it would be if everything were linear from there, and of the force beside it.
+`latent_force_candidates` compares axes and channels in the linear problem around a fit. `estimate_force` fits the
+history with real simulations, all tolerances free, and gives its band. `relinearised_force` asks for the evidence again
+at that fit: without the force, all tolerances have to deviate from their priors to come close to a record, and a
+linearisation there says little of a model that is as declared but for the force. What is left out: forces on two axes.
 """
 
 from __future__ import annotations

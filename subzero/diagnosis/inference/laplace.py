@@ -1,4 +1,7 @@
-"""A hypothesis with a real fit, and how probable that makes it: by Laplace's method around the fit, mixed over κ."""
+"""The evidence of a hypothesis around its MAP fit, by Laplace's method and mixed over κ.
+
+log p(y | κ) = −objective(ẑ) − ½ log det (D P),   P = D⁻¹ + Jᵀ J;      log p(y) = log Σ_κ p(κ) p(y | κ)
+"""
 
 from __future__ import annotations
 

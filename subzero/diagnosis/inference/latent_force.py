@@ -1,10 +1,10 @@
-"""A force that no cause explains, as a function of time on one axis; how probable it is, `suspects` tells.
+"""A latent force on one axis as further parameters of the problem; and the drift of a sensor.
 
     w(t) = Σ f_k Λ((t − t_k)/Δ) on one axis,   f ~ a Gaussian process        (Λ: hat function)
 
 An effect like any other: its parameters are the knots f_k, or modes x of the process (f = L x, x ~ N(0, I)), so that
-sensitivities and refits are those of `problem` and `refit`. Records have histories of their own. A sensor that
-drifts is the same in one channel, without a run.
+sensitivities and fits are those of `problem` and `map_fit`. Records have histories of their own. A drift is the same in
+one channel, without a simulation. How probable either is, `input_estimation` finds.
 """
 
 from __future__ import annotations

@@ -1,15 +1,12 @@
-"""How probable the data are under a hypothesis, while all tolerances are free: linear algebra on k parameters.
+"""Evidence and posterior in the linear Gaussian problem: of parameters z, and of a Gaussian process f beside them.
 
     r = J z + e,   z ~ N(0, D),   e ~ N(0, I);      A = Jᵀ J,  b = Jᵀ r,  P = D⁻¹ + A
     log p = −½ (rᵀr − bᵀ P⁻¹ b) − ½ log det(D P)
 
-A hypothesis frees some entries: their variance becomes s² in the place of (κτ)². That changes P on a few places of
-its diagonal only, so that all pairs cost a few products of 2 × 2 matrices each.
+A hypothesis frees some entries: their variance becomes s² instead of (κτ)². That changes P on a few places of its
+diagonal only, so that all pairs cost a few products of 2 × 2 matrices each.
 
-Gaussian processes over time in a linear problem: how probable, how large, while all tolerances are free.
-
-    r = J z + C f + e,   z ~ N(0, D),   f ~ N(0, a² R(T)),   e ~ N(0, I)
-    M = Cᵀ Σ₀⁻¹ C,   q = Cᵀ Σ₀⁻¹ r,   Σ₀ = I + J D Jᵀ
+    r = J z + C f + e,   f ~ N(0, a² R(T));      M = Cᵀ Σ₀⁻¹ C,   q = Cᵀ Σ₀⁻¹ r,   Σ₀ = I + J D Jᵀ
     log p(r | f) − log p(r | f = 0) = −½ log |I + a² R M| + ½ qᵀ (a⁻² R⁻¹ + M)⁻¹ q
 
 M and q are all that the data say of f, whatever its prior; amplitudes a and correlation times T are mixed.

@@ -1,14 +1,13 @@
-"""One step of a fit: the best for the linear model within bounds, or the part of it that gains; and what it teaches.
+"""The MAP fit of a hypothesis with real simulations: bounded, damped Gauss-Newton with Broyden updates.
 
-The best fit of a hypothesis with real runs: bounded Gauss-Newton on data and priors, and its evidence by Laplace.
+    objective = ½ |r(z)|² + ½ zᵀ D⁻¹ z,   low ≤ z ≤ high
 
-A fit once more from off its kinks.
+A step is the best of the linear model within bounds, or the part of it that gains, and its secant updates J.
 
-Where a drum stops, a cable falls slack or a gear has play, runs have kinks, and a fit may end in a hollow of its own:
-far on their other side, where slack cable jerks taut, or on the kink itself. So it is begun again with all that is
-possible on one side only as it is in most vehicles, but for causes that are named.
-
-The fit with wide tolerances: close to the records whatever is wrong, and what their noise is estimated behind.
+Where a drum stops, a cable falls slack or a gear has play, simulations have non-smooth points, and a fit may end in a
+local minimum beyond one. `restarted_off_kinks` fits once more with all one-sided parameters as they are in most
+vehicles, but for those of named causes. `fit_wide` is the fit with κ = 4, close to the records whatever is wrong; the
+noise is estimated behind it.
 """
 
 from __future__ import annotations

@@ -1,12 +1,13 @@
-"""From probabilities to a verdict: one visible set of rules.
+"""Probabilities of all hypotheses from their evidence, and the decision rule for the verdict.
 
 nothing_wrong      p(none) ≥ 0.5, or the named size is within the practical one (then the model wants calibration)
 cause_named        one hypothesis, or one cause that begins in mid-trial, with p ≥ 0.8, D ≥ 9 to its closest rival,
                    its size beyond 4 tolerances
-outside_catalogue  a force or a drift that no cause explains has p ≥ 0.8
+outside_catalogue  a latent force or a drift that no cause explains has p ≥ 0.8
 undecided          everything else: the smallest set with p ≥ 0.95
 
-From fits to the probability of every hypothesis, told no finer than it is needed.
+Hypotheses with a fit have Laplace's evidence; all others that of the screening, never ahead of the best fit. A further
+cause counts only if it could be named (Occam fold).
 """
 
 from __future__ import annotations

@@ -1,9 +1,8 @@
-"""Real fits of hypotheses, each kept if it is better than what is known: from afar, again, and from each other's place.
+"""The pool of fitted hypotheses: each keeps its best fit, and all follow when noise or discretisation are known better.
 
-Where a drum stops, a cable falls slack or a gear has play, runs have kinks, and a fit may end in a hollow of its own.
-So what is close to the best is fitted again with sensitivities of its own, and rivals from where the others are.
-
-Records as sharp as the best fit asks for: what economical steps get wrong is taken from them, where that is seen.
+Simulations have non-smooth points, and a fit may end in a local minimum. So what is close to the best is fitted again
+with a Jacobian of its own, and rivals from where the others are. `SharpFits` estimates the noise again behind the best
+fit, and takes from the records what economical steps get wrong there, where that is seen.
 """
 
 from __future__ import annotations
@@ -234,7 +233,8 @@ class SharpFits(Fits):
     def _give_up(self, best: Candidate) -> None:
         """Give up what is hopelessly behind the best candidate and no part of it."""
         kept = {ids: one for ids, one in self.candidates.items()
-                if one.log_posterior > best.log_posterior - HOPELESS_LOG_POSTERIOR or set(ids) <= set(best.ids)}  # fmt: skip
+                if one.log_posterior > best.log_posterior - HOPELESS_LOG_POSTERIOR
+                or set(ids) <= set(best.ids)}  # fmt: skip
         self.behind |= {ids: one.log_posterior - best.log_posterior for ids, one in self.candidates.items()
                         if ids not in kept}  # fmt: skip
         self.candidates = kept

@@ -1,9 +1,7 @@
-"""Growing: what is beside the best candidate, in the place of its causes, and below it, until the best stays.
+"""The search over hypotheses: from linear evidence of all to MAP fits of a few, adding, dropping and swapping causes.
 
-The search: from all hypotheses by linear evidence to a few by real fits.
-
-all tolerances wide → a point close to the data → linear evidence of everything there → refits of what is left
-→ a second cause beside the best, and a third, or another in the place of one → probabilities
+fit with κ = 4 → screening of nothing, all causes, all pairs → fits of the best → best-first refinement
+→ add, drop, swap, or merge two causes of the best, until it stays → settle the best and its rivals
 """
 
 from __future__ import annotations
@@ -40,7 +38,9 @@ from subzero.diagnosis.inference.screening import (
 )
 
 MAX_ADDED, MAX_SWAPPED, MIN_ADDED_LOG_POSTERIOR = 2, 3, -4.0
-"""At most so many with a cause more, of a log posterior that adds at least MIN_ADDED_LOG_POSTERIOR; so many with another cause."""
+"""At most so many with a cause more, of a log posterior that adds at least MIN_ADDED_LOG_POSTERIOR; so many with
+another cause.
+"""
 BAD_MINIMUM_LOG_POSTERIOR = 6.0
 """A fit with so much less log posterior than the linear problem at another promises may have gone astray."""
 MIN_MERGED_LOG_POSTERIOR, MERGED_SCALES = -15.0, (0.5, 1.5)

@@ -1,22 +1,17 @@
-"""The noise of a channel: white, slow, and rounded; and whitening with it.
+"""The noise of a channel: white, slow and rounded; whitening with it, and its estimate behind a fit (REML).
 
     e_k = w_k + x(t_k) + rounding,   w ~ N(0, σ_w²),   x ~ Ornstein-Uhlenbeck(σ_s, τ_s),   rounding ~ N(0, q²/12)
     Σ_ij = (σ_w² + q²/12) δ_ij + σ_s² exp(−|t_i − t_j|/τ_s)
 
 Σ is never made. A Kalman filter whose state is x turns e into its innovations, which are white, for any times of the
-samples; AR(1) noise is the case σ_w = 0. How the five numbers are found: `noise_estimate`.
+samples; AR(1) noise is the case σ_w = 0. The parameters are the most probable ones behind a fit z*, Jacobian J:
 
-How large, how slow and how coarse the noise of a channel is: by its marginal likelihood behind a fit (REML).
-
-    e = y − h(z*) + J z*  ~  N(0, J D Jᵀ + Σ(σ_w, σ_s, τ_s, q)),        z ~ N(0, D)
-
-Whatever the parameters can do is taken out with the probability that they do it, so that a smooth misfit that the model
-can follow is no noise, whatever the sampling. What a slow part may be is said beforehand: a sensor of a usual kind
-wanders by about its usual noise. A wander that is many times as large is something to find, not noise.
-
+    y − h(z*) + J z*  ~  N(0, J D Jᵀ + Σ(σ_w, σ_s, τ_s, q)),        z ~ N(0, D)
     log σ_w ~ N(log ν, 1.5²),   log σ_s ~ N(log(0.7 ν + q/√12), 1²) below `MOST_SLOW`,   log τ_s ~ N(log 1 s, 1.5²)
 
-ν is the usual level of the sensor, or the known one. q is read off the values: sensors round.
+What the parameters can do is marginalised, so that a smooth misfit that the model can follow is no noise. A slow part
+has a prior: a usual sensor wanders by about its usual noise, and a wander many times as large is something to find. ν
+is the usual level of the sensor, or the known one. q is read off the values: sensors round.
 """
 
 from __future__ import annotations

@@ -1,11 +1,8 @@
-"""Where causes that begin in mid-trial are looked for.
+"""Explanations outside the list of hypotheses: latent forces, drifts and change points, on one scale of probability.
 
-Around the best hypothesis, and along the runs of the best forces, if they are close to it or it does not explain; and
-as large as the best hypotheses have them throughout.
-
-What no cause explains: forces, drifts and sudden changes, set beside the causes on one scale of probability.
-
-A diagnosis in progress: an interrupted one keeps what stands here.
+Each stands beside "nothing is wrong" or beside the best causes. Change points are looked for around the best
+hypothesis, and along the simulations with the best latent forces. `Findings` holds everything that an engine has found
+so far: an interrupted diagnosis concludes from it.
 """
 
 from __future__ import annotations
@@ -79,9 +76,9 @@ def largest_hypotheses(search: Search) -> list[Candidate]:
 ALIKE_FORCES_LOG_POSTERIOR = 10.0
 """Forces whose log posteriors differ by less are told apart with finer knots."""
 NEAR_LOG_POSTERIOR, FAR_LOG_POSTERIOR, MAX_RELINEARISED = 6.0, 45.0, 3
-"""No force that is further behind the best than FAR_LOG_POSTERIOR, in log posterior, is looked at around its own fit, and at most so
-many; where one cause explains the record within declared tolerances, what is linear is nearly true there: besides the
-most probable force only those that are as close as NEAR_LOG_POSTERIOR."""
+"""No force that is further behind the best than FAR_LOG_POSTERIOR, in log posterior, is looked at
+around its own fit, and at most so many; where one cause explains the record within declared tolerances, what is linear
+is nearly true there: besides the most probable force only those that are as close as NEAR_LOG_POSTERIOR."""
 DECISIVE_LOG_POSTERIOR = 30.0
 """No sum of causes gains more than this, in log posterior, over one cause that leaves nothing but noise."""
 CLOSER_LOOK_LOG_POSTERIOR = 2.0
@@ -172,8 +169,10 @@ def _suspected(
     found: list[OutOfCatalogue] = []
     for candidate in _bases(search):
         scales = candidate.scales(problem)
-        found += [OutOfCatalogue(beside=candidate.ids, what=one, log_posterior=candidate.log_posterior + one.log_gain + prior)
-                  for one in latent_force_candidates(problem, columns, candidate.fit, scales, knots, terms)]  # fmt: skip
+        found += [OutOfCatalogue(beside=candidate.ids, what=one,
+                                 log_posterior=candidate.log_posterior + one.log_gain + prior)
+                  for one in latent_force_candidates(problem, columns, candidate.fit, scales, knots,
+                                                     terms)]  # fmt: skip
     return found
 
 
@@ -238,7 +237,8 @@ def _sudden(search: Search, close: Sequence[RelinearisedForce], known: float) ->
     prior = float(np.log(PRIOR["sudden"] / (len(effects) * len(problem.records))))
     places, large = linearisation_points(search, close, _log_prior(problem)), largest_hypotheses(search)
     made = [one for record in range(len(problem.records))
-            for one in fit_change_points(problem, places, effects, record, known - prior, search.side, large)]  # fmt: skip
+            for one in fit_change_points(problem, places, effects, record, known - prior, search.side,
+                                         large)]  # fmt: skip
     return [OutOfCatalogue(beside=(), what=one, log_posterior=one.log_posterior + prior,
                     place=None if is_poor_fit(one.fit) else linearised_at(problem, one)) for one in made]  # fmt: skip
 

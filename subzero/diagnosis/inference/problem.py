@@ -1,8 +1,9 @@
-"""The least-squares problem behind a diagnosis: all parameters, all records, one whitened residual.
+"""The least-squares problem of a diagnosis: all parameters, all records, one whitened residual.
 
-r(z) = W (y − h(z)),    J = ∂(W h)/∂z
+    r(z) = W (y − h(z)),    J = ∂(W h)/∂z by finite differences
 
-From records to the problem: settings in economical steps, noise from the data, all that is free.
+`pose` makes it from records: settings in economical steps, usual noise, all effects free; `with_noise_behind` puts the
+noise in that is estimated behind a fit, and `with_finer_steps` corrects for the discretisation.
 """
 
 from __future__ import annotations
@@ -194,7 +195,8 @@ Progress = Callable[[float, str], None]
 VISIBLE_ERROR = 1.0
 """Squared size, in noise, of an error of the steps that is worth correcting."""
 LEVEL_CHANGE = 0.1
-"""Change of a noise level, as a logarithm, that is worth beginning again; of its slow part, SLOW_CHANGE_FACTOR times as much."""
+"""Change of a noise level, as a logarithm, that is worth beginning again; of its slow part,
+SLOW_CHANGE_FACTOR times as much."""
 SLOW_CHANGE_FACTOR = 2.0
 
 

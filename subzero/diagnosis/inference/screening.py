@@ -1,12 +1,8 @@
-"""The screen: how probable every hypothesis is in the linear problem at a wide fit, before any is fitted.
+"""Screening: the linear evidence of every hypothesis at the fit with κ = 4, and of all neighbours of a fitted one.
 
-Causes that do nothing when they are small have no place in a linear problem: real runs try some sizes of them. If even
-wide tolerances do not come close to the records, that is done with all of them.
-
-What else there may be around a candidate: beside it, or in the place of one of its causes.
-
-The linear problem at its fit says that of all causes, but for those that runs have kinks in: a slope on one side of a
-kink says nothing of the other, so that real runs try some sizes of them.
+A cause that does nothing while it is small has no slope, and a one-sided slope at a non-smooth point says nothing of
+the other side: real simulations try some sizes of such causes. If even κ = 4 does not come close to the records, all causes
+are tried so.
 """
 
 from __future__ import annotations
@@ -42,7 +38,8 @@ from subzero.diagnosis.inference.problem import Problem
 POOR_MEAN_SQUARE = 1.08
 """A wide fit that leaves a greater mean square, in noise, is not close to the records."""
 STRAINED_TOLERANCES, MAX_STRAINED = 5.0, 6
-"""Nor is one that bends MAX_STRAINED parameters of the model by more than STRAINED_TOLERANCES tolerances: it is close by chance."""
+"""Nor is one that bends MAX_STRAINED parameters of the model by more than STRAINED_TOLERANCES tolerances: it is
+close by chance."""
 SWEEP_SCALES = (0.25, 0.5, 1.0, 2.0)
 """Sizes, in effect scales, that causes are tried at by real runs, either way."""
 FLAT_SIGNAL = 1.0

@@ -1,13 +1,10 @@
-"""The compiled loop behind every response: exchange after exchange, keeping only what sensors see.
+"""A simulation as a diagnosis needs it: a compiled loop that keeps what sensors see, resumed where runs part, cached.
 
-As `subzero.loop`, without forces, energies and shapes, but with the hull's states on the way of an exchange: a rudder
-moves faster than cable and hull exchange their forces.
+As `subzero.loop`, without forces, energies and shapes, but with the hull's states inside an exchange: a rudder moves
+faster than cable and hull exchange their forces.
 
-One run as sensors see it, from its start, or on from where another run, the same until then, has been.
-
-A force that begins at 20 s changes nothing before: its sensitivity needs the last 10 of 30 s only.
-
-Runs that were made are kept for a while: fits come back to where they were, and sensors change no run.
+A force that begins at 20 s changes nothing before: its sensitivity needs the last 10 of 30 s only. Runs are kept for a
+while: fits come back to where they were, and sensors change no run.
 """
 
 from __future__ import annotations

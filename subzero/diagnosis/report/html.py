@@ -88,7 +88,8 @@ def _detectable(verdict: Verdict) -> list[str]:
     return [
         "Known before anything was compared. *Signal*: what a cause of its usual size does, in noise and tolerances; "
         f"below {tables.SEEN_SIGNAL:g} it is not seen. *D*: squared distance to the cause that looks most alike, all "
-        f"tolerances free; below {tables.CONFUSED_BELOW:g} the two cannot be told apart, from {tables.CLEAR_FROM:g} on they can.",
+        f"tolerances free; below {tables.CONFUSED_BELOW:g} the two cannot be told apart, from "
+        f"{tables.CLEAR_FROM:g} on they can.",
         "",
         *table(tables.detectable(verdict, every=True)),
     ]

@@ -1,9 +1,7 @@
-"""Write an extended model, as `subzero.diagnosis.extended` explains it.
+"""An extended model as a TOML file (`hypothesis.extended_model` shows one): written, and read with all its faults told.
 
-Read an extended model, as `subzero.diagnosis.extended` explains it, and say all that is wrong with it.
-
-An extended model may name the Python file that its effects came from. That file is never run from here, for reading
-data must not run code: whoever trusts it says so on the command line (``--effects FILE``).
+It may name the Python file that its effects came from. That file is never run from here, for reading data must not run
+code: whoever trusts it says so on the command line (``--effects FILE``).
 """
 
 from __future__ import annotations

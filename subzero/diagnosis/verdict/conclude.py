@@ -1,8 +1,9 @@
-"""What is told of causes that begin in mid-trial: how large, how far from rivals, as a rival, in a trial to come.
+"""From findings to the verdict: what is named, its rivals, the extended model, and the next trial.
 
-What is left beside what is told: hypotheses and sudden causes as rivals, and for the next trial to tell apart.
+Beside the named explanation stand the remaining models: hypotheses and change points that the records allow, each with
+its distance D. A change point has its own, with the onset free:
 
-From finished work to the verdict as a value.
+    D = sᵀ (I + B Bᵀ)⁻¹ s,    B = [J κτ, C s_b]
 """
 
 from __future__ import annotations
