@@ -1,8 +1,10 @@
 """How the water moves: J(north, east, down, time), given on a grid and linear between its points.
 
-    >>> Current.uniform([0.2, 0.0, 0.0])
-    >>> Current.profile(down=[0.0, 10.0, 40.0], velocity=[[0.6, 0.0, 0.0], [0.2, 0.1, 0.0], [0.0, 0.1, 0.0]])
-    >>> Current.sampled(lambda n, e, d, t: (0.1 * d, 0.0, 0.0), down=[0.0, 50.0])
+    >>> steady = Current.uniform([0.2, 0.0, 0.0])
+    >>> sheared = Current.profile(down=[0.0, 10.0, 40.0], velocity=[[0.6, 0.0, 0.0], [0.2, 0.0, 0.0], [0.0, 0.1, 0.0]])
+    >>> sampled = Current.sampled(lambda n, e, d, t: (0.1 * d, 0.0, 0.0), down=[0.0, 50.0])
+    >>> sheared.at((0.0, 0.0, 5.0)).tolist()            # half way down to 10 m
+    [0.4, 0.0, 0.0]
 
 Beyond the grid the value at its edge holds. An axis with one point is an axis along which nothing changes.
 

@@ -12,9 +12,9 @@ from cable.drum_motion import PLACE, SETPOINT, VELOCITY, drum_path, resting
 from cable.history import History
 from cable.hold import Equilibrium, lay_held
 from cable.moving_end.initial_shape import lay_straight
-from cable.moving_end.run import run
 from cable.moving_end.segment_load import new_load
 from cable.moving_end.state import TOLERANCE, new_line
+from cable.moving_end.time_loop import run
 from cable.properties import CableProperties, DrumProperties
 from cable.tow_path import (
     TowVelocity,

@@ -19,7 +19,7 @@ degrees and revolutions per second; a `Trial` of radians and revolutions per sec
 
 Stories: `trial` what a trial is; `motion` one that is prescribed or was measured; `quantities` the one table of
 numbers, units and limits; `schema` what a file may say; `files` opening and parsing; `csv_file`, `samples` columns
-over time; `instructions` commands or motion; `surroundings` water, winch and vessel; `parts`, `changes` vehicles and
+over time; `instructions` commands or motion; `surroundings` water, winch and vessel; `parts` vehicles and
 cables; `steps` what must fit; `reader` all together; `errors` what a problem is.
 """
 

@@ -1,8 +1,10 @@
 """Refuse values where they are made, whoever makes them, a file or Python: by the limits of `quantities`.
 
+>>> import scenarios
 >>> scenarios.Start(heading=27.0)
-ScenarioError: The scenario cannot be used (1 problem):
-Start, heading: found 27 rad (1546.99 degree), but this is outside its limits. Allowed: -360 to 360 degree ...
+Traceback (most recent call last):
+scenarios.errors.ScenarioError: The scenario cannot be used (1 problem):
+  Start, heading: found 27 rad (1546.99 degree), but this is outside its limits. Allowed: -360 to 360 degree ...
 """
 
 from __future__ import annotations

@@ -12,11 +12,10 @@ from math import remainder, tau
 from pathlib import Path
 from typing import Any, TypeVar
 
-from scenarios.changes import read_changes
 from scenarios.errors import Problem, ScenarioError
 from scenarios.files import Source, find
 from scenarios.instructions import LEFT_OPEN, read_instructions
-from scenarios.parts import Part, nested, read_part
+from scenarios.parts import Part, nested, read_changes, read_part
 from scenarios.quantities import START, by_field
 from scenarios.samples import commands, motion
 from scenarios.schema import LISTS, check_page, check_section

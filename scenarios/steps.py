@@ -1,10 +1,12 @@
-"""Checks of time steps and lengths against one another: they must fit, and the run must end in a lifetime."""
+"""Time steps: the grid of a run, which sample holds at a time, and whether steps and lengths fit one another."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
 from typing import NamedTuple
+
+import numpy as np
 
 from scenarios.errors import Problem
 from scenarios.files import Source
@@ -18,6 +20,9 @@ MOST_SEGMENTS = 100_000
 
 TOLERANCE = 1e-9
 """Ratios of decimal fractions are whole numbers to within this, relatively."""
+
+JUST_BEFORE_S = 1e-9
+"""A sample holds from this much before its time on: grids of decimal fractions meet only to rounding. [s]"""
 
 Numbers = Mapping[str, float]
 """Fields of a trial and its start → value, as far as they are good by themselves."""
@@ -60,6 +65,21 @@ def misfits(numbers: Numbers, words: Mapping[str, str] | None = None) -> list[Mi
     known = [(names, check) for names, check in checks.items() if set(names) <= set(numbers)]
     found = [check(*names, numbers, words) for names, check in known]
     return [misfit for misfit in found if misfit]
+
+
+def whole_steps(step: float, count: int) -> np.ndarray:
+    """Return the times 0, h, 2h, … (count,). [s]."""
+    return step * np.arange(count)
+
+
+def holding_rows(time: np.ndarray, at: np.ndarray | float) -> np.ndarray:
+    """Return which sample holds at some times: the last that is not later; before the first one, the first.
+
+    Args:
+        time: of the samples, increasing (samples,). [s]
+        at: times of any shape. [s]
+    """
+    return np.clip(np.searchsorted(time, np.asarray(at) + JUST_BEFORE_S, side="right") - 1, 0, None)
 
 
 def fitting_step(span: float, longest: float) -> float:

@@ -20,7 +20,7 @@ import numpy as np
 from scenarios.checks import Checks
 from scenarios.motion import REACH_THE_END, Motion, ends_early
 from scenarios.quantities import BED, COMMANDS, PROFILE, RUN, START, VESSEL, WATER, WINCH, by_field
-from scenarios.steps import misfits
+from scenarios.steps import holding_rows, misfits, whole_steps
 
 SCHEMES = ("moving_end", "paper", "paper_tangent", "paper_drum")
 """How the cable is solved: our moving end, or the paper's scheme, with either reading of its new node
@@ -157,6 +157,15 @@ class Commands:
         assert time is not None and values is not None  # noqa: PT018  # `refuse` has seen to it
         check.freeze("time", time)
         check.freeze("values", values)
+
+    def at(self, time: np.ndarray | float) -> np.ndarray:
+        """Return what is commanded at some times, the sample that holds: shape of `time`, then (4,).
+
+        >>> fin = Commands(time=np.array([0.0, 2.0]), values=np.array([[9.0, 0.0, 0.0, 0.0], [9.0, 0.1, 0.0, 0.0]]))
+        >>> fin.at(np.array([0.0, 1.9, 2.0, 50.0]))[:, 1].tolist()
+        [0.0, 0.0, 0.1, 0.1]
+        """
+        return np.asarray(self.values, dtype=float)[holding_rows(self.time, time)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -339,4 +348,4 @@ class Trial:
         if abs(steps - whole) <= 1e-9 * steps:
             return np.linspace(0.0, self.duration, whole + 1)
         full = max(int(steps - SHORTEST_LAST_STEP), 0)
-        return np.append(self.cable_step * np.arange(full + 1), self.duration)
+        return np.append(whole_steps(self.cable_step, full + 1), self.duration)

@@ -94,7 +94,7 @@ def fly_step(
     Args:
         name: heading_step, depth_step or speed_step.
         scenario: whose vehicle, cable and start: a name (see "subzero list") or a path.
-        autopilot: pid, lqr, or the path of a Python file with one (see subzero/autopilot/user_autopilot.py).
+        autopilot: pid, lqr, or the path of a Python file with one (see subzero/autopilot/registry.py).
         feed_forward: none, formula or model: what it knows of the cable.
         size: of the step, in degrees, m or m/s.
         speed: to hold, in m/s.

@@ -3,6 +3,8 @@
 >>> import dataclasses, subzero
 >>> model = subzero.Model.of(subzero.load_scenario("fig6"))
 >>> heavy = dataclasses.replace(model, vehicle=model.vehicle.with_parameter("rigid_body.mass", 7.0))
+>>> heavy.parameters()["vehicle"]["rigid_body"]["mass"]
+7.0
 """
 
 from __future__ import annotations

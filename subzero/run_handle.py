@@ -6,7 +6,7 @@ costs more than the step itself. A `Handle` is taken apart once and then passed 
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from typing import Any, NamedTuple
 
 import numba
@@ -15,6 +15,7 @@ from numba import types
 from numba.experimental import structref
 
 from subzero.jit import allocating
+from subzero.jit.unbroken import unbroken
 from subzero.loop import run_rows
 from subzero.recording import Recording, record_row
 from subzero.run_state import Live, Setup
@@ -59,11 +60,9 @@ Compiled code writes it, so that it is true whenever Python code runs, an interr
 def hold(setup: Setup, live: Live, recording: Recording, times: np.ndarray) -> Any:
     """Return a handle of a run and the times of its rows (n,) [s].
 
-    It is made in a thread of its own: numba builds the object by Python code and dies of an interrupt in there, and
-    signals reach the main thread only.
+    No signal breaks in: numba builds the object by Python code and dies of an interrupt in there.
     """
-    with ThreadPoolExecutor(1) as aside:
-        return aside.submit(make_handle, setup, live, recording, times).result()
+    return unbroken(partial(make_handle, setup, live, recording, times))
 
 
 @allocating

@@ -1,10 +1,13 @@
 """A simulation that is driven from outside, step by step: for people with a controller of their own.
 
+    >>> import subzero
     >>> sim = subzero.Simulator("fig6")
     >>> obs = sim.observation
-    >>> while sim.time < 30.0:
-    ...     obs = sim.step((25.0, 0.5 * (wanted - obs.heading), 0.0, 0.0))
+    >>> while sim.time < 1.0:
+    ...     obs = sim.step((25.0, 0.5 * (0.6 - obs.heading), 0.0, 0.0))   # propeller [rev/s], fins [rad]
     >>> run = sim.result()                              # the dataset of subzero.simulate
+    >>> run["rudder_command"].attrs["units"]
+    'degree'
 
 Each step holds a command for one sample time. The exchanges of hull and cable inside are those of `subzero.simulate`:
 the same commands give the same numbers, to the last bit.
@@ -20,6 +23,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 import scenarios
+from scenarios.steps import whole_steps
 from subzero import coupling
 from subzero.errors import UserError, real, short, truth
 from subzero.initial_conditions import prepare
@@ -238,8 +242,7 @@ class Simulator:
         commands = self.trial.commands
         if commands is None:
             return 0.0, 0.0, 0.0, 0.0
-        row = int(np.searchsorted(commands.time, time + 1e-9, side="right")) - 1
-        n, rudder, port, starboard = commands.values[row].tolist()
+        n, rudder, port, starboard = commands.at(time).tolist()
         return n, rudder, port, starboard
 
     def _message(self) -> str:
@@ -260,15 +263,15 @@ def _with_rows(held: Held, goal: int) -> Held:
     new = new_recording(rows, old.tension.size)
     for name, values in old._asdict().items():
         getattr(new, name)[: values.shape[0]] = values
-    later = times[1] * np.arange(times.size, rows)
-    return Held.of(held.setup, held.live, new, np.concatenate([times, later]), held.at, held.seen)
+    further = whole_steps(times[1], rows)[times.size :]
+    return Held.of(held.setup, held.live, new, np.concatenate([times, further]), held.at, held.seen)
 
 
 def _times(trial: scenarios.Trial) -> np.ndarray:
     """Return times of rows (n,), whole cable steps; as far as the trial goes, those of `subzero.simulate` [s]."""
     times = trial.times()
     even = np.allclose(np.diff(times), trial.cable_step, rtol=0.0, atol=1e-9)
-    return times if even else trial.cable_step * np.arange(times.size + 1)
+    return times if even else whole_steps(trial.cable_step, times.size + 1)
 
 
 def _exchanges(trial: scenarios.Trial, sample_time: float | None, tethered: bool) -> int:

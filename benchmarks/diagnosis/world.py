@@ -252,6 +252,25 @@ def line_of(one: Mapping[str, Any]) -> str:
             f"{one['first']} {one['p']:.2f} {one['seconds']:.0f} s")  # fmt: skip
 
 
+CLOSE = 0.05
+"""Probabilities that differ by less are the same. [-]"""
+
+
+def differences(kept: Sequence[Mapping[str, Any]], results: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Return a line for every record whose verdict, first name or probability is not what was kept of it."""
+    before, found = {one["index"]: one for one in kept}, []
+    for one in sorted(results, key=lambda one: one["index"]):
+        old = before.get(one["index"])
+        if old is None or "error" in old or "error" in one:
+            found += [f"{one['index']:4d} cannot be compared"] if old != one else []
+        elif (old["verdict"], old["first"]) != (one["verdict"], one["first"]) or abs(
+            old["p"] - one["p"]
+        ) > CLOSE:
+            then = f"{old['verdict']} {old['first']} {old['p']:.2f}"
+            found.append(f"{one['index']:4d} {then} → {one['verdict']} {one['first']} {one['p']:.2f}")
+    return found
+
+
 @app.default
 def benchmark(
     *,
@@ -261,6 +280,7 @@ def benchmark(
     results: Path | None = None,
     resume: bool = False,
     families: str = "",
+    against: Path | None = None,
 ) -> None:
     """Diagnose records of the world and print what came of it.
 
@@ -271,6 +291,7 @@ def benchmark(
         results: where they are kept, one JSON object a line; nowhere if not given.
         resume: keep the results of an interrupted run, and go on behind them.
         families: only these, with commas between; all if empty.
+        against: results that were kept; what is no more as it was is listed, and the exit code is 1.
     """
     if results and not resume:
         results.unlink(missing_ok=True)
@@ -286,6 +307,9 @@ def benchmark(
                 with results.open("a") as file:
                     file.write(line(one))
     print(Counter(one["error"] for one in known if "error" in one) or "", table(known), sep="\n")
+    changed = differences(read(against), known) if against else []
+    print(*changed, sep="\n")
+    raise SystemExit(bool(changed))
 
 
 if __name__ == "__main__":

@@ -20,8 +20,16 @@ from typing import NamedTuple
 import numpy as np
 
 from cable.feng_allen.box_solver import CARRIED, RIGHT, SIZE
-from cable.feng_allen.equation7 import Equation7Numbers, load, space_matrix, time_matrix, to_local
-from cable.feng_allen.equation7_slopes import load_slope, space_slope, time_slope
+from cable.feng_allen.equation7 import (
+    Equation7Numbers,
+    load,
+    load_slope,
+    space_matrix,
+    space_slope,
+    time_matrix,
+    time_slope,
+    to_local,
+)
 from subzero.jit import compiled
 
 

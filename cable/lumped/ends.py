@@ -1,7 +1,7 @@
-"""The far end of the lumped cable: the drum with the half spring before it, or a drogue.
+"""The ends of the lumped cable: the force on the vehicle, and the drum with the half spring before it, or a drogue.
 
-The last half spring, between the middle M of spring N and the drum, holds ½ℓ p(S); material enters it at the drum and
-leaves it at M, at half the rate, into the lump of node N − 1:
+At the far end, the last half spring, between the middle M of spring N and the drum, holds ½ℓ p(S); material enters it
+at the drum and leaves it at M, at half the rate, into the lump of node N − 1:
 
     Q = d(½ℓ p(S))/dt − U p(S) + ½U p(M) + ½ℓ f(S),        T(S) = T_N + t_N·Q
     V(S) = V_drum − U t_N,                                   V(M) = ½ (V_{N−1} + V(S))
@@ -9,6 +9,13 @@ leaves it at M, at half the rate, into the lump of node N − 1:
     free drum    (I_d/R_d²) dU/dt + C_f/R_d = T(S), or it stands: U ≥ 0 (whichever is the smaller of the two sides);
                  with inertia it may overrun a slack cable, T(S) = 0
     winch        U or T(S) as asked for
+
+At the near end, the force on the vehicle is
+
+    F = T_1 t_1 + B_0 − ½ℓ_1 q(¼ℓ_1),      q = ∂p/∂t + f
+
+The half spring at the tow point carries its load q a quarter into the spring, between that at the tow point and that
+at the next node. B_0 is what bending does there.
 """
 
 from __future__ import annotations
@@ -17,6 +24,7 @@ from math import sqrt
 
 import numpy as np
 
+from cable.lumped.balance import arm, load_node, neighbours
 from cable.lumped.band_solver import add
 from cable.lumped.load import evaluate_node
 from cable.lumped.rope import ANSWER, DIRECTION, GAIN, GAP, NEW, PULL, REST, SIZE, START_MOMENTUM, WATER, Rope
@@ -172,3 +180,57 @@ def _drum_law(rope: Rope, g: float, drum: DrumNumbers, pull: float) -> tuple[flo
     if excess > U:
         return U, 1.0, 0.0
     return excess, by_own, feels
+
+
+@allocating
+def tow_force(rope: Rope, g: float, c: CableNumbers) -> None:
+    """Fill the force on the vehicle, and the momentum of the half spring at the tow point."""
+    half, s, load = 0.5 * rope.spring[REST, 1], np.zeros(3), np.zeros(3)
+    share = 0.0 if rope.ends.count == 1 else 0.25
+    if share > 0.0:
+        _, _, width = neighbours(rope, 1, s)
+        load_node(rope, 1, s, 0.0, c)
+        _metre_load(rope, 1, width, g, load)
+    next_load = share * load
+    first_tangent(rope, s)
+    load_node(rope, 0, s, 0.0, c)
+    for i in range(3):
+        rope.momentum[NEW, 0, i] = half * rope.node.momentum[i]
+    _metre_load(rope, 0, half, g, load)
+    for i in range(3):
+        pull = rope.spring[PULL, 1] * rope.vector[DIRECTION, 1, i]
+        rope.ends.tow_force[i] = pull - half * ((1.0 - share) * load[i] + next_load[i])
+    if rope.ends.count > 1 and rope.ends.bending > 0.0:
+        _add_bending(rope)
+
+
+@compiled
+def _metre_load(rope: Rope, j: int, width: float, g: float, out: np.ndarray) -> None:
+    """Fill out (3,) with q at node j, whose lump is `width` long; rope.node holds its load. [N/m]."""
+    held = j == rope.ends.count - 1 and not rope.ends.free_end
+    for i in range(3):
+        rate = (rope.momentum[NEW, j, i] - rope.vector[START_MOMENTUM, j, i]) / g
+        if held:
+            rate -= 0.5 * rope.ends.payout[NEW] * rope.middle.momentum[i]
+        out[i] = rate / width + rope.node.force[i]
+
+
+@compiled
+def first_tangent(rope: Rope, s: np.ndarray) -> None:
+    """Fill the mean chord at the tow point (3,), on the circle through the first three nodes."""
+    near, x, share = rope.spring[REST, 1], rope.position, 0.0
+    if rope.ends.count > 1:
+        share = near / (near + rope.spring[REST, 2])
+    for i in range(3):
+        s[i] = (x[NEW, 1, i] - x[NEW, 0, i]) / near
+        if share > 0.0:
+            s[i] += share * (s[i] - (x[NEW, 2, i] - x[NEW, 1, i]) / rope.spring[REST, 2])
+
+
+@compiled
+def _add_bending(rope: Rope) -> None:
+    """Add what bending does at the tow point, from the bend at the next node."""
+    near, far, x = rope.spring[REST, 1], rope.spring[REST, 2], rope.position
+    for i in range(3):
+        bend = (x[NEW, 2, i] - x[NEW, 1, i]) / far - (x[NEW, 1, i] - x[NEW, 0, i]) / near
+        rope.ends.tow_force[i] -= rope.ends.bending / (0.5 * (near + far)) * bend * arm(near, far, -1)

@@ -12,10 +12,9 @@ from typing import NamedTuple
 from cable.current import Water, water_velocity
 from cable.lumped.balance import balance_nodes, bend_nodes
 from cable.lumped.band_solver import WIDTH, solve_band
-from cable.lumped.ends import hold_end
+from cable.lumped.ends import hold_end, tow_force
 from cable.lumped.rope import FADING, GAIN, GAP, NEW, PULL, REST, WATER, Rope, unknowns
 from cable.lumped.springs import observe, pull_nodes, update_springs
-from cable.lumped.tow_point import tow_force
 from cable.properties import CableNumbers, DrumNumbers
 from subzero.jit import compiled, inner
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from cable.lumped.balance import load_node, neighbours
+from cable.lumped.ends import first_tangent
 from cable.lumped.rope import (
     DIRECTION,
     FADING,
@@ -27,7 +28,6 @@ from cable.lumped.rope import (
     Rope,
 )
 from cable.lumped.springs import spring_law, spring_state
-from cable.lumped.tow_point import first_tangent
 from cable.properties import CableNumbers
 from subzero.jit import allocating, compiled, inner
 

@@ -1,7 +1,7 @@
 """The default scheme: a cable whose end at the drum moves along it, in Cartesian balances, of second order.
 
 The four unknowns of a segment are its tension and the place of its far node. The last segment grows at the drum; a
-longer one is split, a shorter one merged (`remeshing`). What may be used from outside stands in `__all__`; everything
+longer one is split, a shorter one merged (`time_step`). What may be used from outside stands in `__all__`; everything
 else of this package is its own (a contract in ``pyproject.toml`` holds it).
 
 what is computed                                              file
@@ -12,10 +12,10 @@ tension against stretch, and none when it is slack            slack_law
 backward differences of second order in time                  bdf2
 balance of every node, first and last                         assembly, drum_boundary, bending
 Newton's method on block tridiagonal systems                  newton, block_solver
-one step, made real: the drum's mode, a node more or less     time_step, remeshing
+one step, made real: the drum's mode, a node more or less     time_step
 force on the vehicle and how it answers to its displacement   tow_boundary
 a velocity that changes at once                               jolt
-the run: start, steps by their error, results, why it stopped initial_shape, time_loop, step_control, run, stops
+the run: start, steps by their error, results, why it stopped initial_shape, time_loop, stops
 where a cable comes to rest                                   equilibrium
 where the work goes                                           energy
 """

@@ -1,23 +1,35 @@
-"""The compiled loop of a cable whose tow point moves on a given path; steps that fail or err are retried smaller."""
+"""The compiled loop of a cable whose tow point moves on a given path; steps that fail or err are retried smaller.
+
+`run` follows a sampled path and hands back its history.
+
+Where an error is allowed (`rtol`), it is estimated, and the next step is the one that would just be allowed. A
+backward difference of second order errs by h(h + h')/6 x‴ in the velocity V, that is by h(h + h')/6 V̈. The tow force
+goes about with the square of the velocity, so it errs by h(h + h')/6 F̈ or so, while the force that is extrapolated
+from the two steps before is off by h(h + h')/2 F̈. A third of that gap, as a share of the largest force so far, is
+what is taken for the error.
+"""
 
 from __future__ import annotations
 
+from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
 
 from cable.current import Water
 from cable.drum_motion import hermite, lead_drum
-from cable.moving_end.energy import FLOWS, book_step, energy_flow
+from cable.history import History, Outcome
+from cable.moving_end.energy import FLOWS, LOSS, STORED, book_step, energy_flow
+from cable.moving_end.initial_shape import start_in_water
 from cable.moving_end.jolt import take_jolt
 from cable.moving_end.segment_load import Load
-from cable.moving_end.state import NOW, Line
-from cable.moving_end.step_control import estimate_error, next_step, note_force
+from cable.moving_end.state import NOW, Line, Solved
+from cable.moving_end.stops import describe_stop
 from cable.moving_end.time_step import accept, try_step
 from cable.moving_end.tow_boundary import ends
 from cable.properties import CableNumbers, DrumNumbers
 from cable.tow_path import TowPath
-from subzero.jit import allocating, compiled
+from subzero.jit import allocating, compiled, inner
 
 MOST_HALVINGS = 10
 """A failing step is halved up to this many times before the run gives up."""
@@ -181,3 +193,87 @@ def write_row(line: Line, record: Record, k: int, used: int, c: CableNumbers) ->
         if 0 < j < N:
             wave = np.sqrt(max(line.tension[NOW, j], 0.0) / (c.mass + c.added_mass))
             record.courant[k] = max(record.courant[k], wave * line.ends.previous_step / line.length[j])
+
+
+def run(
+    line: Line,
+    path: TowPath,
+    led: np.ndarray,
+    water: Water,
+    c: CableNumbers,
+    drum: DrumNumbers,
+    rtol: float,
+    work: Load,
+    capacity: int,
+) -> History:
+    """Run a line that is laid out, and return its history."""
+    start_in_water(line, water, c, work)
+    record = new_record(path.times.size, capacity)
+    rows = follow_path(line, path, led, water, c, drum, rtol, work, record)
+    solved = line.ends.solved
+    trouble = "" if rows == path.times.size else describe_stop(float(path.times[rows - 1]), line, drum, c)
+    return as_history(path, record, rows, solved, trouble)
+
+
+def as_history(path: TowPath, record: Record, rows: int, solved: Solved, trouble: str) -> History:
+    """Return the record's filled rows as a history; `trouble` says what stopped it, if it was stopped."""
+    times, tow, completed = path.times, path.place, rows == path.times.size
+    message = "The run reached its end." if completed else trouble
+    cuts = np.cumsum(record.segments[:rows] + 1).tolist()
+    parts = [slice(first, last) for first, last in zip([0, *cuts], cuts, strict=False)]
+    return History(
+        time=times[:rows],
+        tow_force=record.tow_force[:rows],
+        tow_tension=record.tow_tension[:rows],
+        drum_tension=record.drum_tension[:rows],
+        length=record.length[:rows],
+        tow_point=tow[:rows],
+        shapes=tuple(record.position[part] for part in parts),
+        tensions=tuple(record.tension[part] for part in parts),
+        outcome=Outcome(
+            completed=completed,
+            message=message,
+            iterations=int(record.iterations[:rows].sum()),
+            worst_residual=float(solved.residual),
+            steps=int(record.steps[:rows].sum()),
+            largest_courant_number=float(record.courant[:rows].max()),
+            energy_residual=float(abs(record.ledger[2, STORED]) / max(record.ledger[2, LOSS], 1e-30)),
+        ),
+        scheme="moving_end",
+        tow_impulse=record.impulse[:rows],
+    )
+
+
+SAFETY = 0.8
+LARGEST_GROWTH, LARGEST_CUT = 2.0, 0.2
+
+
+@inner
+def estimate_error(line: Line, step: float) -> float:
+    """Return the relative error of the tow force on level NEW; 0 when there is no history to tell. [-]."""
+    if line.ends.previous_step <= 0.0:
+        return 0.0
+    ratio, F, past = step / line.ends.previous_step, line.ends.tow_force, line.ends.past_force
+    gap, size = 0.0, line.ends.largest_force * line.ends.largest_force
+    for i in range(3):
+        gap += (F[i] - past[0, i] - ratio * (past[0, i] - past[1, i])) ** 2
+    return sqrt(gap / max(size, 1e-30)) / 3.0
+
+
+@inner
+def note_force(line: Line) -> None:
+    """Remember the tow force of an accepted step."""
+    square, F = 0.0, line.ends.tow_force
+    for i in range(3):
+        line.ends.past_force[1, i] = line.ends.past_force[0, i]
+        line.ends.past_force[0, i] = F[i]
+        square += F[i] * F[i]
+    line.ends.largest_force = max(line.ends.largest_force, sqrt(square))
+
+
+@inner
+def next_step(step: float, error: float, rtol: float) -> float:
+    """Return the step that would err by a little less than `rtol`, given that `step` errs by `error`. [s]."""
+    if error <= 0.0 or rtol <= 0.0:
+        return LARGEST_GROWTH * step
+    return step * min(max(SAFETY * sqrt(rtol / error), LARGEST_CUT), LARGEST_GROWTH)

@@ -59,7 +59,7 @@ _HOME = {
     "STATES": "subzero.steady_motion.hull_state_space",
     "STEPS": "subzero.autopilot.steps",
     "SUBSYSTEMS": "subzero.autopilot.linear",
-    "Schedule": "subzero.autopilot.schedule",
+    "Schedule": "subzero.autopilot.design",
     "Sensor": "subzero.autopilot.sensors",
     "Sensors": "subzero.autopilot.sensors",
     "StandardAutopilot": "subzero.autopilot.standard",

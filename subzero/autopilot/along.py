@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from scenarios import Trial
+from scenarios.steps import whole_steps
 from subzero.autopilot.coupled_plant import CABLE_OUTPUTS, HULL_SIZE, NoRoomError, Tethered, blank_trial
 from subzero.channels import BY_NAME
 from subzero.errors import UserError
@@ -161,7 +162,7 @@ def linearise_along(
     model, end = model or Model.of(trial), trial.duration if duration is None else duration
     if not (np.isfinite(end) and end >= trial.cable_step):
         raise UserError(f"linearise_along: the duration is {end!r}. Allowed: at least one cable step.")
-    time = trial.cable_step * np.arange(round(end / trial.cable_step) + 1)
+    time = whole_steps(trial.cable_step, round(end / trial.cable_step) + 1)
     commands = _commands(trial, time[:-1]) if start is None else np.tile(start.command, (time.size - 1, 1))
     x = None
     if start is not None:
@@ -184,8 +185,7 @@ def _commands(trial: Trial, time: np.ndarray) -> np.ndarray:
     """Return the commands of a trial at times (n, 4)."""
     if trial.commands is None:
         return np.zeros((time.size, 4))
-    rows = np.searchsorted(trial.commands.time, time + 1e-9, side="right") - 1
-    return np.asarray(trial.commands.values, dtype=float)[rows]
+    return trial.commands.at(time)
 
 
 def _run(step: Tethered, time: np.ndarray, commands: np.ndarray) -> np.ndarray:

@@ -15,10 +15,9 @@ from math import inf, pi, radians
 
 import numpy as np
 
-from subzero.autopilot.design import Gains, design_gains
+from subzero.autopilot.design import Gains, Schedule, design_gains
 from subzero.autopilot.linear import linearise, subsystem
 from subzero.autopilot.loops import refuse_unknown
-from subzero.autopilot.schedule import Schedule
 from subzero.autopilot.tuning import Tuning
 from subzero.simulator import Observation
 from subzero.steady_motion.trim_point import trim

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 import scenarios
+from scenarios.steps import holding_rows
 from subzero.autopilot.sensors import PERFECT, Sensor, Sensors
 from subzero.autopilot.standard import Wanted
 from subzero.channels import DEGREE
@@ -169,8 +170,7 @@ def _check(autopilot: Autopilot, duration: float | None) -> None:
 
 def _with_goals(run: xr.Dataset, goals: np.ndarray, trouble: str) -> xr.Dataset:
     """Return a run with what was wanted beside what was had."""
-    rows = np.searchsorted(goals[1:, 0], run["time"].values + 1e-9, side="right")
-    held = goals[rows]
+    held = goals[holding_rows(goals[:, 0], run["time"].values)]
     for i, (name, unit, scale) in enumerate(
         (("speed", "m/s", 1.0), ("heading", "degree", DEGREE), ("depth", "m", 1.0))
     ):

@@ -13,7 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import inf, isfinite
 
-from subzero.autopilot.schedule import Schedule
+from subzero.autopilot.design import Schedule
 from subzero.errors import UserError
 from subzero.simulator import Observation
 

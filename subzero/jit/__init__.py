@@ -9,6 +9,7 @@ packed                                          numbers as one record in memory,
 scratch                                         a small array on the stack of a compiled function     stack
 -                                               machine code kept for the next run, never stale       machine_code
 -                                               which files a piece of machine code is made of        sources
+-                                               signals wait while code is compiled                   unbroken
 """
 
 from subzero.jit.decorators import allocating, by_field, compiled, inlined, inner

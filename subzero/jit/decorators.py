@@ -9,6 +9,7 @@ Setting ``NUMBA_DISABLE_JIT=1`` runs the same code interpreted.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from types import FunctionType
 from typing import Any, TypeVar
 
@@ -16,6 +17,7 @@ import numba
 import numba.extending
 
 from subzero.jit.machine_code import MachineCode
+from subzero.jit.unbroken import unbroken
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -66,7 +68,13 @@ def _compile(function: Function, *, gate: bool, inline: bool = False, makes: boo
     found: Any = numba.njit(**options)(function)
     if not numba.config.DISABLE_JIT:
         found._cache = MachineCode(function)  # where numba's own `cache=True` puts its own
+        found._compile_for_args = _unbroken(found._compile_for_args)
     return found
+
+
+def _unbroken(compile_for: Callable[..., Any]) -> Callable[..., Any]:
+    """Return what numba calls for new kinds of arguments, which compiles or loads, without a signal that breaks in."""
+    return lambda *arguments, **named: unbroken(partial(compile_for, *arguments, **named))
 
 
 def by_field(field: str, yes: Function, no: Function) -> Function:

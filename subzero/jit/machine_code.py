@@ -38,6 +38,7 @@ from numba.core.sigutils import normalize_signature
 
 from subzero.errors import printable
 from subzero.jit.sources import PACKAGES, Tree
+from subzero.jit.unbroken import heed
 
 MARK = b"subzero machine code 1\n"
 """A file begins with this, then the digest of its name and of the rest."""
@@ -275,6 +276,7 @@ class MachineCode(_Cache):
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Return what was kept for a signature; None if it has to be compiled."""
+        heed()
         target_context.refresh()
         code = self._home.read(self._name(sig, target_context.codegen()))
         if code is not None:

@@ -13,7 +13,7 @@ import pytest
 import subzero
 from subzero import autopilot
 from subzero.autopilot import Wanted
-from subzero.autopilot.programs import VerticalZigZag, ZigZag
+from subzero.autopilot.manoeuvres import VerticalZigZag, ZigZag
 from subzero.autopilot.stability_margins import check_stable
 from subzero.cli import MISTAKE, main
 from subzero.cli_autopilot import STOPPED

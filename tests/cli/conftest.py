@@ -47,7 +47,7 @@ def make_run(*, tethered=True, prescribed=None, samples=301, outcome="completed"
     return run.assign_attrs(
         outcome=outcome, outcome_message="Reached the end." if outcome == "completed" else STOPPED,
         scenario=name, title="a synthetic trial", scenario_text="[run]", parameters=json.dumps(PARAMETERS),
-        subzero_version="0.1.0", versions=json.dumps({"numpy": "2"}), tethered=int(tethered),
+        subzero_version="0.2.0", versions=json.dumps({"numpy": "2"}), tethered=int(tethered),
         prescribed=int(prescribed is not None), scheme="moving_end",
     )  # fmt: skip
 

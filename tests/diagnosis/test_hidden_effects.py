@@ -2,7 +2,8 @@
 
 Verifies: the whole diagnosis. Configuration: fig6, six channels at 10 Hz, coloured noise, outliers, gaps, and
 every parameter drawn from its tolerance. Cases are drawn from a seed (benchmarks/diagnosis); chosen are
-those that the trial can tell at all, D ≥ 25, whatever comes out. Slow: every id of the catalogue, with both signs.
+those that the trial can tell at all, D ≥ 25, whatever comes out. Slow: more of each kind, and every id of the
+catalogue with both signs.
 """
 
 import dataclasses
@@ -32,6 +33,11 @@ def drawn(kind, number, marks=(), **changes):
     return pytest.param(
         dataclasses.replace(found, manoeuvre="fig6", **changes), id=f"{kind}_{number}", marks=marks
     )
+
+
+def slow(kind, *numbers):
+    """Return more cases of a kind, for the long form."""
+    return [drawn(kind, number, marks=pytest.mark.slow) for number in numbers]
 
 
 def both_signs():
@@ -71,7 +77,7 @@ def words(result):
 
 
 SINGLES = [drawn("single", number) for number in (5, 9, 12, 18)]
-MORE = [drawn("single", number, marks=pytest.mark.slow) for number in (8, 11, 13, 16, 19, 25)]
+MORE = slow("single", 8, 11, 13, 16, 19, 25)
 
 
 @pytest.mark.parametrize("case", SINGLES + MORE)
@@ -90,7 +96,7 @@ def test_hidden_effects_are_named(told):
     assert len(missed) <= 1, missed
 
 
-@pytest.mark.parametrize("case", [drawn("healthy", number) for number in (0, 1, 2)])
+@pytest.mark.parametrize("case", [drawn("healthy", 0), *slow("healthy", 1, 2)])
 def test_a_healthy_record_gets_no_name(told, case):
     result = told[case].result()
     assert not names(result), words(result)
@@ -103,7 +109,7 @@ def test_two_hidden_effects_are_named(told, case):
     assert names(result) == set(result["truth"]), words(result)
 
 
-@pytest.mark.parametrize("case", [drawn("sudden", number) for number in (0, 4)])
+@pytest.mark.parametrize("case", [drawn("sudden", 0), *slow("sudden", 4)])
 def test_what_begins_in_mid_trial_is_named_with_its_time(told, case):
     result = told[case].result()
     assert min(result["D"].values()) >= CLEAR
@@ -114,7 +120,7 @@ def test_what_begins_in_mid_trial_is_named_with_its_time(told, case):
     )
 
 
-@pytest.mark.parametrize("case", [drawn("outside", number) for number in (0, 3)])
+@pytest.mark.parametrize("case", [drawn("outside", 0), *slow("outside", 3)])
 def test_what_is_outside_the_catalogue_is_flagged(told, case):
     result = told[case].result()
     assert result["verdict"] == "outside_catalogue", words(result)

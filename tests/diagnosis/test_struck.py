@@ -54,14 +54,19 @@ def hit(plant, degrees):
     return asked(plant(lambda setting: with_onset(EFFECTS["rudder_offset"], BEGINS).apply(setting, degrees)))
 
 
-def asked(planted, axis="N"):
-    """Return a record's problem, the force that explains it, and the sudden causes that are fitted there."""
+def forced(planted, axis="N"):
+    """Return a record's problem, and the force that explains it."""
     problem, D = planted.problem, variances(planted.problem.entries, (), 4.0)
     wide = refit(problem, np.zeros(D.size), planted.J, D, most_fresh=2)
     knots = knots_of(problem, FINE_SPACING_S)
-    force = relinearised_force(
+    return problem, relinearised_force(
         problem, wide, f"unknown_force:{axis}", 1.0, knots, one_terms(problem, wide.z, knots)
     )
+
+
+def asked(planted, axis="N"):
+    """Return the same, and the sudden causes that are fitted there."""
+    problem, force = forced(planted, axis)
     with ThreadPoolExecutor(2) as side:
         return problem, force, fit_change_points(problem, [force.place], ABLE, 0, force.log_posterior, side)
 
@@ -154,7 +159,7 @@ def test_it_ends_the_search_only_if_it_leaves_noise_and_is_far_before_the_rest(f
 
 def test_nothing_wrong_is_fitted_again_where_a_sudden_cause_of_no_size_explains_the_records(plant):
     """Fits of a rough record may end in a hollow, and whatever begins elsewhere then explains more."""
-    problem, force, _ = asked(plant())
+    problem, force = forced(plant())
     good = force.place
     search = Search(problem=problem, progress=lambda share, words: None)
     search.wide = good.fit

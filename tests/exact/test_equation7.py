@@ -17,12 +17,14 @@ from cable.feng_allen.equation7 import (
     angles_of,
     equation7_numbers,
     load,
+    load_slope,
     space_matrix,
+    space_slope,
     tangent,
     time_matrix,
+    time_slope,
     to_local,
 )
-from cable.feng_allen.equation7_slopes import load_slope, space_slope, time_slope
 from cable.properties import CableProperties
 
 HEAVY = CableProperties(
@@ -43,13 +45,15 @@ def frame(alpha, beta):
 
 
 @cache
-def derived_matrices(stretch_momentum: float):
-    """Return a function of (y, numbers) giving M, N, q as derived from the vector equations."""
+def derived_matrices():
+    """Return a function of (y, numbers, share of the stretch's momentum) giving M, N, q, derived from the vector
+    equations.
+    """
     s, t = sp.symbols("s t")
     y = [sp.Function(name)(s, t) for name in ("T", "Vt", "Vn", "Vb", "alpha", "beta")]
     T, Vt, Vn, Vb, alpha, beta = y
-    names = "m rhoA wc e tangential normal north east down"
-    m, rhoA, wc, e, ct, cn, jn, je, jd = symbols = sp.symbols(names)
+    names = "m rhoA wc e tangential normal north east down stretch_momentum"
+    m, rhoA, wc, e, ct, cn, jn, je, jd, stretch_momentum = symbols = sp.symbols(names)
     tt, nn, bb = frame(alpha, beta)
     J, k = sp.Matrix([jn, je, jd]), sp.Matrix([0, 0, 1])
     V = Vt * tt + Vn * nn + Vb * bb
@@ -91,9 +95,10 @@ def coded_matrices(y, c: Equation7Numbers):
 @pytest.mark.parametrize("stretch_momentum", [0.0, 1.0])
 def test_every_entry_of_equation_7_follows_from_the_vector_equations(stretch_momentum):
     c = equation7_numbers(HEAVY, CURRENT, stretch_momentum=stretch_momentum)
-    derived = derived_matrices(stretch_momentum)
+    derived = derived_matrices()
+    numbers = (c.m, c.rhoA, c.wc, c.e, c.tangential, c.normal, c.north, c.east, c.down, stretch_momentum)
     for y in STATES:
-        expected = derived(*y, c.m, c.rhoA, c.wc, c.e, c.tangential, c.normal, c.north, c.east, c.down)
+        expected = derived(*y, *numbers)
         for coded, exact in zip(coded_matrices(y, c), expected, strict=True):
             np.testing.assert_allclose(coded, np.asarray(exact).reshape(coded.shape), rtol=0, atol=1e-12)
 

@@ -1,4 +1,4 @@
-"""An allowed error chooses the steps: `rtol=` of `cable.pull_out` and `cable.tow` (`cable.moving_end.step_control`).
+"""An allowed error chooses the steps: `rtol=` of `cable.pull_out` and `cable.tow` (`cable.moving_end.time_loop`).
 
 Verifies: error of the tow force, over its largest value, against the same segments with steps of 12.5 ms (good to
 2e-5); how many steps that takes; recorded rows of 0.8 s, so that the steps between them are the estimate's own choice.

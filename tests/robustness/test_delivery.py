@@ -10,8 +10,11 @@ from __future__ import annotations
 
 import functools
 import json
+import os
 import subprocess
 import sys
+import tempfile
+from pathlib import Path
 
 import pytest
 
@@ -121,11 +124,26 @@ print(json.dumps([last, [[spot, *broken(k, spot)] for k, spot in enumerate(spots
 '''
 
 
+MEMORY = Path("/dev/shm")
+"""What is forced to the disk is there at once, if it lies in memory: hundreds of deliveries are made here."""
+
+
 @pytest.fixture(scope="module")
-def broken(tmp_path_factory):
+def place(tmp_path_factory):
+    """A folder for deliveries."""
+    if not os.access(MEMORY, os.W_OK):
+        yield tmp_path_factory.mktemp("broken")
+        return
+    with tempfile.TemporaryDirectory(dir=MEMORY) as folder:
+        yield Path(folder)
+
+
+@pytest.fixture(scope="module")
+def broken(place):
     @functools.cache
     def run(how, kind, twice="once"):
-        top = tmp_path_factory.mktemp("broken")
+        top = place / f"{how}-{kind}-{twice}"
+        top.mkdir()
         done = subprocess.run([sys.executable, "-c", BREAKER, how, kind, twice, str(top)],
                               capture_output=True, text=True, check=False, timeout=300)  # fmt: skip
         assert done.returncode == 0, done.stderr

@@ -76,7 +76,9 @@ SLOW_COMMANDS = COMMANDS | {"full": ["diagnose", "record.csv", "--scenario", "fi
 
 def started(words, folder, cache=None):
     """Start a command; return it when it heeds signals."""
-    environment = os.environ | ({"SUBZERO_CACHE_DIR": str(cache)} if cache else {})
+    environment = (
+        os.environ | {"PYTHONFAULTHANDLER": "1"} | ({"SUBZERO_CACHE_DIR": str(cache)} if cache else {})
+    )
     command = subprocess.Popen(
         [sys.executable, "-m", "subzero", *words], cwd=folder, env=environment, text=True,
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, preexec_fn=heed_again,
@@ -250,6 +252,80 @@ def test_an_interrupt_that_machine_code_would_swallow_is_heard():
         [sys.executable, "-c", SWALLOWED], capture_output=True, text=True, check=False, preexec_fn=heed_again
     )
     assert (done.stdout, done.stderr) == ("heard\n", "")
+
+
+LINKED = """
+import gc, os, signal, sys
+from llvmlite.binding import ffi
+
+link, left = ffi.lib.LLVMPY_LinkModules, [int(sys.argv[1])]
+
+def interrupted(*modules):
+    done = link(*modules)
+    left[0] -= 1
+    if left[0] == 0:
+        os.kill(os.getpid(), signal.SIGINT)
+    return done
+
+ffi.lib._fntab["LLVMPY_LinkModules"] = interrupted
+"""
+IN_PROCESS = """
+from subzero.jit import compiled, inner
+
+@inner
+def once(x):
+    return x + 1.0
+
+@compiled
+def twice(x):
+    return once(x) + once(x)
+
+try:
+    print(twice(1.0))
+except KeyboardInterrupt:
+    print("interrupted")
+gc.collect()
+print(twice(1.0))
+"""
+ON_THE_COMMAND_LINE = """
+sys.argv[1:] = sys.argv[2:]
+from subzero.__main__ import run
+run()
+"""
+
+
+def linked(script, *words, cache=""):
+    """Run a script that is interrupted right behind LLVM's linking of two modules."""
+    return subprocess.run(
+        [sys.executable, "-c", LINKED + script, *words], env=os.environ | {"SUBZERO_CACHE_DIR": str(cache)},
+        capture_output=True, text=True, check=False, preexec_fn=heed_again,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("nth", ["1", "4"])
+def test_an_interrupt_behind_the_linker_ends_the_call_and_nothing_else(nth):
+    """The linker destroys a module; interrupted before Python knew, it was destroyed twice: SIGSEGV a moment later."""
+    done = linked(IN_PROCESS, nth)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "interrupted\n4.0\n", "")
+
+
+def test_an_interrupt_behind_the_linker_ends_a_command_as_any_other(tmp_path):
+    """A diagnosis died of SIGSEGV behind its last words."""
+    record(tmp_path)
+    words = [
+        "diagnose",
+        str(tmp_path / "record.csv"),
+        "--scenario",
+        "fig6",
+        "--screen",
+        "--out",
+        str(tmp_path / "out"),
+    ]
+    done = linked(ON_THE_COMMAND_LINE, "9", *words, cache=tmp_path / "cold")
+    assert (done.returncode, done.stderr.splitlines()[-1:]) == (
+        INTERRUPTED,
+        ["Interrupted; nothing was written."],
+    )
 
 
 @pytest.mark.slow

@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 
 import scenarios
-from subzero.autopilot.user_autopilot import from_file
+from subzero.autopilot.registry import from_file
 from subzero.diagnosis.hypothesis import catalogue as effects
 from subzero.errors import UserError
 

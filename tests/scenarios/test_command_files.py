@@ -1,5 +1,6 @@
 """Command files that cannot be used: every wrong cell, column and time, with its line."""
 
+import numpy as np
 import pytest
 
 import scenarios
@@ -75,3 +76,12 @@ def test_a_message_stays_readable_however_much_is_wrong(tmp_path):
     assert len(lines) == 42
     assert lines[0] == "The scenario cannot be used (1000 problems):"
     assert lines[-1] == "  ... and 960 more."
+
+
+def test_what_is_commanded_at_a_time_is_the_sample_that_holds():
+    """From its own time on, to rounding; before the first sample the first, after the last one the last."""
+    commands = scenarios.Commands(time=np.array([0.0, 0.3, 2.0]), values=np.arange(12.0).reshape(3, 4) / 10.0)
+    held = commands.at(np.array([[-1.0, 0.0, 0.299], [0.1 * 3, 0.1 + 0.2, 1e9]]))
+    assert held[..., 0].tolist() == [[0.0, 0.0, 0.0], [0.4, 0.4, 0.8]]
+    assert commands.at(0.1 * 20).tolist() == [0.8, 0.9, 1.0, 1.1]
+    assert commands.at(0.3 - 1e-12).tolist() == [0.4, 0.5, 0.6, 0.7]

@@ -61,7 +61,7 @@ def _rudder(setting: Setting, steps: Sequence[tuple[float, float]], duration: fl
 
 
 def _planes(setting: Setting, steps: Sequence[tuple[float, float, float]], duration: float) -> Setting:
-    """Return a trial at cruise with steps of both stern-planes: time [s], shares of PLANE_AMPLITUDE at port and starboard."""
+    """Return a trial at cruise with steps of stern-planes: time [s], shares of PLANE_AMPLITUDE (port, starboard)."""
     n = cruise(setting)
     moved = ((t, n, 0.0, a * PLANE_AMPLITUDE, b * PLANE_AMPLITUDE) for t, a, b in steps)
     return flown(setting, [(0.0, n, 0.0, 0.0, 0.0), *moved], duration)

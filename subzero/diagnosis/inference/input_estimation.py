@@ -26,7 +26,7 @@ from subzero.diagnosis.inference.latent_force import (
     DRIFT,
     FINE_SPACING_S,
     FORCE,
-    MAX_DRIFT_TOLERANCES,
+    MAX_DRIFT_LEVELS,
     Knots,
     drift_columns,
     force_columns,
@@ -122,7 +122,7 @@ def _amplitudes(problem: Problem, name: str) -> list[float]:
     kind, _, which = name.partition(":")
     if kind + ":" == FORCE:
         return amplitude_grid(problem.records[0].setting, which)
-    return [share * MAX_DRIFT_TOLERANCES * SPECS[which].bias for share in AMPLITUDE_SHARES]
+    return [share * MAX_DRIFT_LEVELS * SPECS[which].noise for share in AMPLITUDE_SHARES]
 
 
 def amplitude_grid(setting: Setting, axis: str) -> list[float]:
@@ -291,7 +291,7 @@ def relinearised_force(
         found = estimate_force(problem, start, which, D, spacing=knots.spacing, most_fresh=1)
         done = found.fit
     else:
-        found = estimate_drift(problem, start, which, MAX_DRIFT_TOLERANCES * SPECS[which].bias, D)
+        found = estimate_drift(problem, start, which, MAX_DRIFT_LEVELS * SPECS[which].noise, D)
         knots, done = found.knots, fit_beside_drift(problem, found, D)
     fit = _without(found, done, D.size)
     ((log, what),) = linear_candidates(problem, fit, {name: found.columns}, knots, terms, [kappa])

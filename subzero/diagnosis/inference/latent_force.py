@@ -31,8 +31,8 @@ AXIS_WORDS = {
 }  # fmt: skip
 """What a positive force or moment does to the vehicle."""
 FORCE, DRIFT = "unknown_force:", "sensor_drift:"
-MAX_DRIFT_TOLERANCES = 30.0
-"""A drift can be this many tolerances of the sensor's bias."""
+MAX_DRIFT_LEVELS = 20.0
+"""A drift can be this many usual noise levels of the sensor; a wander of one level is noise."""
 
 
 class Knots(NamedTuple):

@@ -150,8 +150,9 @@ USUAL_TIME = 1.0
 """Usual correlation time of a sensor's slow part. [s]"""
 KNOWN_SPREAD = 0.1
 """Standard deviation of the logarithm of a level that the user knows. [-]"""
-MOST_SLOW = 4.0
-"""A slow part of more usual sizes than this is no noise of the sensor. [-]"""
+LEAST_SLOW, MOST_SLOW = 0.05, 4.0
+"""A slow part of more usual sizes than the last is no noise of the sensor; of less than the first is no sensor, and the
+steps of a simulation err by as much. [-]"""
 SHORTEST, LONGEST = 0.25, 1.0 / 3.0
 """Correlation times lie between this share of a sample and that of the record. [-]"""
 FELT = 0.03
@@ -261,7 +262,7 @@ def resolution_of(values: np.ndarray, level: float) -> float:
     distinct = np.unique(known)
     if distinct.size == 1 and known.size >= FEWEST:
         return float(np.sqrt(12.0) * level)
-    if distinct.size < FEWEST and 2 * distinct.size > known.size:
+    if distinct.size < 2 or (distinct.size < FEWEST and 2 * distinct.size > known.size):
         return 0.0
     steps = np.diff(distinct)
     multiples = steps / np.min(steps)
@@ -318,7 +319,7 @@ def _bounds(at: np.ndarray, r: np.ndarray, usual: Usual) -> tuple[np.ndarray, np
     seen = 1.4826 * float(np.median(np.abs(np.diff(r, 2)))) / np.sqrt(6.0)
     step, span = float(np.median(np.diff(at))), float(at[-1] - at[0])
     shortest = SHORTEST * step
-    low = [1e-3 * usual.level, 1e-3 * usual.level, shortest]
+    low = [1e-3 * usual.level, LEAST_SLOW * _slow_usual(usual), shortest]
     most_white = max(MOST_WHITE * usual.level, SEEN_WHITE * seen)
     high = [most_white, MOST_SLOW * _slow_usual(usual), max(LONGEST * span, 2.0 * shortest)]
     return np.log(low), np.log(high)

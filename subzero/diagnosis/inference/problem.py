@@ -232,7 +232,10 @@ def _observed(one: Logged) -> Observed:
     """Return a record with its noise."""
     time = one.record.time
     setting = economical(one.setting, float(time[-1]))
-    values = {name: column for name, column in one.record.values.items() if name in SPECS}
+    values = {name: column for name, column in one.record.values.items()
+              if name in SPECS and np.isfinite(column).any()}  # fmt: skip
+    if not values:
+        raise UserError(f"'{one.name}' has no measured sample in any channel that can be diagnosed.")
     simulated = respond(setting, time, values)
     if not all(np.isfinite(column).all() for column in simulated.values()):
         raise UserError(

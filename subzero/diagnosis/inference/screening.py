@@ -1,8 +1,8 @@
 """Screening: the linear evidence of every hypothesis at the fit with κ = 4, and of all neighbours of a fitted one.
 
 A cause that does nothing while it is small has no slope, and a one-sided slope at a non-smooth point says nothing of
-the other side: real simulations try some sizes of such causes. If even κ = 4 does not come close to the records, all causes
-are tried so.
+the other side: real simulations try some sizes of such causes. If even κ = 4 does not come close to the records, all
+causes are tried so.
 """
 
 from __future__ import annotations

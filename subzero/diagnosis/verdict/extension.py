@@ -29,7 +29,7 @@ from subzero.diagnosis.inference.input_estimation import (
     fit_beside_drift,
 )
 from subzero.diagnosis.inference.laplace import Candidate
-from subzero.diagnosis.inference.latent_force import FORCE, MAX_DRIFT_TOLERANCES
+from subzero.diagnosis.inference.latent_force import FORCE, MAX_DRIFT_LEVELS
 from subzero.diagnosis.inference.linear_gaussian import KAPPAS, log_sum, posterior
 from subzero.diagnosis.inference.map_fit import Fit
 from subzero.diagnosis.inference.model_average import practical_causes
@@ -257,7 +257,7 @@ def _recovered(work: Findings, foreign: OutOfCatalogue) -> EstimatedForce:
     kind, _, which = foreign.id.partition(":")
     if kind + ":" == FORCE:
         return estimate_force(work.problem, base.fit, which, D)
-    return estimate_drift(work.problem, base.fit, which, MAX_DRIFT_TOLERANCES * SPECS[which].bias, D)
+    return estimate_drift(work.problem, base.fit, which, MAX_DRIFT_LEVELS * SPECS[which].noise, D)
 
 
 def of_sudden(work: Findings, what: FittedChangePoint, cause: Cause) -> Extension:

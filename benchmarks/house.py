@@ -1,0 +1,304 @@
+"""How easy the code is to carry on, in figures: sizes, import chains, circles, parameters, docstrings, tests.
+
+    python -m benchmarks.house                   # one table; what stands behind its counts with --list
+    python -m benchmarks.house --json house.json
+
+figure            what it counts
+----------------  -----------------------------------------------------------------------------------------------------
+lines             of source that are not blank
+files/1000        files in a thousand of them
+floors            modules on the longest chain of imports inside the package; imports inside functions count, those for
+                  types only (``TYPE_CHECKING``) do not; a name that a face hands on counts as an import of the module
+                  that defines it; a circle counts as one
+circles           sets of modules that import one another, by any import
+lone              modules with exactly one importer in the whole product (faces, ``__init__``, left out)
+> 7 parameters    functions outside compiled kernels, ``self`` left out
+doc/source        lines of docstrings by lines
+test/source       lines of tests by lines; those of a test file are shared out over the packages that it imports
+below the face    share of the tests of a package whose file imports more of it than its face (a face: ``cable``,
+                  ``subzero``, ``subzero.autopilot``, …, what a user imports)
+
+"subzero, rest" is what stands in no package of its own row. The last row is the whole product.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import json
+from collections import defaultdict
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+PRODUCT = ("subzero", "cable", "vehicle", "scenarios")
+ROWS = ("cable", "vehicle", "scenarios", "subzero.autopilot", "subzero.diagnosis", "subzero")
+"""Packages with a row of their own; a module belongs to the first that holds it."""
+REST, ALL = "subzero, rest", "all"
+COMPILERS = {"compiled", "inner", "inlined", "allocating", "intrinsic"}
+MOST_PARAMETERS = 7
+
+Graph = dict[str, set[str]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Figures:
+    """The figures of one package; lists name what is counted."""
+
+    files: int
+    lines: int
+    files_per_1000: float
+    floors: int
+    chain: list[str]
+    circles: list[list[str]]
+    lone: list[str]
+    many_parameters: list[str]
+    doc_by_source: float
+    test_by_source: float
+    tests: int
+    tests_below_face: int
+
+
+class Module:
+    """One file of source: its name, its tree, and its lines."""
+
+    def __init__(self, path: Path, name: str) -> None:
+        self.path, self.name = path, name
+        text = path.read_text(encoding="utf-8")
+        self.tree = ast.parse(text)
+        self.lines = sum(1 for line in text.splitlines() if line.strip())
+
+    @property
+    def docstring_lines(self) -> int:
+        """Count lines of docstrings, those of constants (a text behind an assignment) too."""
+        texts = [
+            node.value
+            for node in ast.walk(self.tree)
+            if isinstance(node, ast.Expr)
+            and isinstance(node.value, ast.Constant)
+            and isinstance(node.value.value, str)
+        ]
+        return sum((text.end_lineno or text.lineno) - text.lineno + 1 for text in texts)
+
+    def imports(self, names: Names, *, types: bool = False) -> set[str]:
+        """Return the modules of the product that this one imports; with `types`, those for types only too."""
+        found: set[str] = set()
+        for node in _nodes(self.tree, types):
+            if isinstance(node, ast.Import):
+                found |= {alias.name for alias in node.names} & names.modules
+            elif isinstance(node, ast.ImportFrom) and not node.level:
+                named = {f"{node.module}.{alias.name}" for alias in node.names}
+                found |= named & names.modules
+                if node.module in names.modules:
+                    found |= {names.homes.get(name, node.module) for name in named - names.modules}
+        return found - {self.name}
+
+    def hands_on(self) -> dict[str, str]:
+        """Return the names that a face hands on → the modules that it has them from."""
+        if self.path.name != "__init__.py":
+            return {}
+        return {
+            f"{self.name}.{alias.asname or alias.name}": node.module
+            for node in self.tree.body
+            if isinstance(node, ast.ImportFrom) and node.module not in (None, self.name)
+            for alias in node.names
+        }
+
+    def long_signatures(self) -> Iterator[str]:
+        """Give the functions with too many parameters that are no compiled kernels."""
+        for node in ast.walk(self.tree):
+            if isinstance(node, ast.FunctionDef) and not _is_compiled(node):
+                count = len([*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs])
+                count -= bool(node.args.args) and node.args.args[0].arg in ("self", "cls")
+                if count > MOST_PARAMETERS:
+                    yield f"{self.name}.{node.name} ({count})"
+
+
+def _nodes(tree: ast.AST, types: bool) -> Iterator[ast.AST]:
+    """Give all nodes of a tree, without what is for types only unless `types`."""
+    for node in ast.iter_child_nodes(tree):
+        is_for_types = isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test)
+        if types or not is_for_types:
+            yield node
+            yield from _nodes(node, types)
+
+
+@dataclass(frozen=True)
+class Names:
+    """All modules of the product, and the names that faces hand on → the modules that they have them from."""
+
+    modules: frozenset[str]
+    homes: dict[str, str]
+
+    @classmethod
+    def of(cls, product: dict[str, Module]) -> Names:
+        """Return the names of a product."""
+        homes = {name: home for one in product.values() for name, home in one.hands_on().items()}
+        return cls(frozenset(product), {name: home for name, home in homes.items() if home in product})
+
+
+def _is_compiled(node: ast.FunctionDef) -> bool:
+    return any(isinstance(each, ast.Name) and each.id in COMPILERS for each in node.decorator_list)
+
+
+def modules(folder: Path, root: Path = ROOT) -> dict[str, Module]:
+    """Return the modules in a folder by their dotted names."""
+    found = {}
+    for path in sorted(folder.rglob("*.py")):
+        parts = path.relative_to(root).with_suffix("").parts
+        name = ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+        found[name] = Module(path, name)
+    return found
+
+
+def circles(graph: Graph) -> list[list[str]]:
+    """Return the sets of modules that import one another (strongly connected), each sorted."""
+    ahead = {name: _reached(graph, name) for name in graph}
+    found = {tuple(sorted(other for other in ahead[name] if name in ahead[other])) for name in graph}
+    return [list(one) for one in sorted(found) if len(one) > 1]
+
+
+def _reached(graph: Graph, start: str) -> set[str]:
+    seen, todo = {start}, [start]
+    while todo:
+        for name in graph[todo.pop()] & graph.keys() - seen:
+            seen.add(name)
+            todo.append(name)
+    return seen
+
+
+def longest_chain(graph: Graph) -> list[str]:
+    """Return the longest chain of imports, from the top floor to the ground."""
+    as_one = {name: circle[0] for circle in circles(graph) for name in circle}
+    floors: dict[str, list[str]] = {}
+
+    def below(name: str) -> list[str]:
+        if name not in floors:
+            members = [each for each in graph if as_one.get(each, each) == name]
+            under = {as_one.get(other, other) for each in members for other in graph[each] & graph.keys()}
+            floors[name] = [name, *max((below(one) for one in under - {name}), key=len, default=[])]
+        return floors[name]
+
+    return max((below(as_one.get(name, name)) for name in graph), key=len, default=[])
+
+
+def row_of(name: str) -> str:
+    """Return the row that a module belongs to."""
+    row = next((row for row in ROWS if name == row or name.startswith(f"{row}.")), "")
+    return REST if row == "subzero" else row
+
+
+def is_below_face(name: str) -> bool:
+    """Say whether a module is none of the faces that users import."""
+    return name not in (*ROWS, "subzero.jit", "subzero.errors")
+
+
+@dataclass(frozen=True)
+class TestFile:
+    """A file of tests: how many, how many lines, and what it imports of each row, its face or more."""
+
+    tests: int
+    lines: int
+    below: dict[str, bool]
+
+
+def test_files(names: Names) -> list[TestFile]:
+    """Return all files of tests; helpers without tests count by their lines."""
+    found = []
+    for module in modules(ROOT / "tests").values():
+        tests = sum(
+            isinstance(node, ast.FunctionDef) and node.name.startswith("test_")
+            for node in ast.walk(module.tree)
+        )
+        below: dict[str, bool] = defaultdict(bool)
+        for name in module.imports(names, types=True):
+            below[row_of(name)] |= is_below_face(name)
+        found.append(TestFile(tests, module.lines, dict(below)))
+    return found
+
+
+def figures() -> dict[str, Figures]:
+    """Return the figures of every row, and of the whole product."""
+    product = {name: one for package in PRODUCT for name, one in modules(ROOT / package).items()}
+    names = Names.of(product)
+    graph = {name: one.imports(names) for name, one in product.items()}
+    any_import = {name: one.imports(names, types=True) for name, one in product.items()}
+    importers: Graph = defaultdict(set)
+    for name, found in any_import.items():
+        for other in found:
+            importers[other].add(name)
+    tests = test_files(names)
+    rows = [*dict.fromkeys(row_of(name) for name in product), ALL]
+    return {row: _figures(row, product, graph, importers, tests) for row in rows}
+
+
+def _figures(
+    row: str, product: dict[str, Module], graph: Graph, importers: Graph, tests: list[TestFile]
+) -> Figures:
+    """Return the figures of one row."""
+    inside = [name for name in product if row in (ALL, row_of(name))]
+    own = {name: graph[name] for name in inside}
+    lines = sum(product[name].lines for name in inside)
+    chain = longest_chain(own)
+    if row == ALL:
+        here, shared = tests, sum(one.lines for one in tests)
+        below = sum(one.tests for one in tests if any(one.below.values()))
+    else:
+        here = [one for one in tests if row in one.below]
+        shared = sum(one.lines / len(one.below) for one in here)
+        below = sum(one.tests for one in here if one.below[row])
+    return Figures(
+        files=len(inside),
+        lines=lines,
+        files_per_1000=1000.0 * len(inside) / lines,
+        floors=len(chain),
+        chain=chain,
+        circles=circles(own),
+        lone=[
+            name
+            for name in inside
+            if len(importers[name]) == 1 and product[name].path.name not in ("__init__.py", "__main__.py")
+        ],
+        many_parameters=[each for name in inside for each in product[name].long_signatures()],
+        doc_by_source=sum(product[name].docstring_lines for name in inside) / lines,
+        test_by_source=shared / lines,
+        tests=sum(one.tests for one in here),
+        tests_below_face=below,
+    )
+
+
+def table(found: dict[str, Figures]) -> str:
+    """Return the figures as lines of a table."""
+    head = (
+        f"{'package':<18}{'files':>6}{'lines':>7}{'/1000':>6}{'floors':>7}{'circles':>8}{'lone':>5}"
+        f"{'>7 par.':>8}{'doc':>6}{'test':>6}  below the face"
+    )
+    rows = [
+        f"{row:<18}{one.files:>6}{one.lines:>7}{one.files_per_1000:>6.1f}{one.floors:>7}{len(one.circles):>8}"
+        f"{len(one.lone):>5}{len(one.many_parameters):>8}{one.doc_by_source:>6.2f}{one.test_by_source:>6.2f}"
+        f"  {one.tests_below_face} of {one.tests} tests"
+        for row, one in found.items()
+    ]
+    return "\n".join([head, *rows])
+
+
+def main() -> None:
+    """Print the table, and write it as JSON if asked for."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--json", type=Path, help="file for all figures, with the names behind the counts")
+    parser.add_argument("--list", action="store_true", help="print the names behind the counts too")
+    asked = parser.parse_args()
+    found = figures()
+    print(table(found))
+    if asked.list:
+        for name in ("chain", "circles", "lone", "many_parameters"):
+            print(f"\n{name}:", *(f"  {each}" for each in getattr(found[ALL], name)), sep="\n")
+    if asked.json:
+        asked.json.write_text(json.dumps({row: asdict(one) for row, one in found.items()}, indent=1))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,17 @@
+"""The examples in docstrings run, and give what they say."""
+
+import doctest
+from importlib import import_module
+
+import pytest
+
+MODULES = (
+    "scenarios", "scenarios.checks", "scenarios.trial", "cable.current", "subzero.model", "subzero.simulator",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_the_examples_of_a_docstring_run(name):
+    told = doctest.testmod(import_module(name), optionflags=doctest.ELLIPSIS)
+    assert told.attempted > 1
+    assert told.failed == 0
