@@ -29,7 +29,7 @@ class Shared:
         self.tell = engine.conclude
 
     def tracked(self, setting: Setting) -> Track:
-        """As `response.simulate_track`, each setting once."""
+        """As `simulate_track`, each setting once."""
         key = pickle.dumps(setting)
         if key not in self.runs:
             self.runs[key] = self.plain(setting)

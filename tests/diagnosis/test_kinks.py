@@ -104,7 +104,7 @@ def astray(problem):
     z[columns_of(problem.entries, DRUM)] = 5.0 * DRUM_TOLERANCE
     r, J, D = problem.residual(z), problem.jacobian(z), variances(problem.entries, (), 4.0)
     objective = 0.5 * float(r @ r + np.sum(z * z / D))
-    return Fit(z=z, r=r, J=J, D=D, objective=objective, converged=False, promise=0.0, fresh=0)
+    return Fit(z=z, r=r, J=J, D=D, objective=objective, converged=False, predicted_gain=0.0, fresh=0)
 
 
 def test_a_fit_that_bends_a_kink_far_has_gone_astray(plant):
@@ -180,7 +180,7 @@ def test_sensitivities_are_made_again_where_a_fit_has_moved(plant, away, same):
     tolerance = np.array([entry.parameter.tolerance for entry in problem.entries])
     z, r = np.zeros(tolerance.size), problem.residual(np.zeros(tolerance.size))
     fit = Fit(z=z, r=r, J=np.zeros((r.size, z.size)), D=tolerance**2, objective=0.5 * float(r @ r), converged=True,
-              promise=0.0, fresh=0, made_at=None if away is None else z + away * tolerance)  # fmt: skip
+              predicted_gain=0.0, fresh=0, made_at=None if away is None else z + away * tolerance)  # fmt: skip
     again = with_own_jacobian(problem, fit)
     assert (again is fit) is same
     assert np.any(again.J) == (not same)
@@ -279,7 +279,7 @@ def test_a_cause_that_is_far_away_is_fitted_on_while_much_is_promised(plant, mon
 
     def leg(problem, z, J, D, **more):
         asked.append(z)
-        return SimpleNamespace(z=z + 1.0, r=None, D=D, promise=promises[len(asked) - 1])
+        return SimpleNamespace(z=z + 1.0, r=None, D=D, predicted_gain=promises[len(asked) - 1])
 
     for module in (model_search, map_fit):
         monkeypatch.setattr(module, "refit", leg)

@@ -1,6 +1,6 @@
 """A vehicle that heads north has a compass that jumps from 360 to 0 degrees, and a diagnosis that does not.
 
-Verifies: `subzero.records.heading`, and what `response`, `problem`, `other_code` and `challenge` make of a heading
+Verifies: `subzero.records.record`, and what `measurement`, `problem`, `reference_run` and `challenge` make of a heading
 about north. Configuration: the first seconds of zigzag, which starts at north. Tolerance: an angle at the start is
 there at the start, to the steps' error of 0.02 degrees.
 """

@@ -80,7 +80,7 @@ def racing(runs, records=1, **hopes):
     search._again = fit_again
     for name, hope in hopes.items():
         fit = SimpleNamespace(
-            converged=hope is None, moved=lambda problem: np.inf, promise=(hope or -9.0) + 9.0
+            converged=hope is None, moved=lambda problem: np.inf, predicted_gain=(hope or -9.0) + 9.0
         )
         search.candidates[(name,)] = Candidate(ids=(name,), fit=fit, log_evidence={}, log_posterior=-9.0)
     search.raced |= {("best",), ("second",)}

@@ -43,7 +43,7 @@ from subzero.diagnosis.results import NextTrial
 
 
 class Survivor(Protocol):
-    """A hypothesis with its fit, such as `candidate.Candidate`."""
+    """A hypothesis with its fit, such as `laplace.Candidate`."""
 
     @property
     def ids(self) -> tuple[str, ...]:

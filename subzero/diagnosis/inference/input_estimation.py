@@ -343,7 +343,7 @@ def _without(found: EstimatedForce, done: Fit, count: int) -> Fit:
     """Return a fit with a force or beside a drift as one of the entries before it: with what the records lack then."""
     z, D, r = done.z[:count], done.D[:count], done.r + found.columns @ found.force
     objective = 0.5 * float(r @ r) + 0.5 * float(np.sum(z * z / D))
-    return Fit(z=z, r=r, J=done.J[:, :count], D=D, objective=objective, converged=done.converged, promise=0.0,
+    return Fit(z=z, r=r, J=done.J[:, :count], D=D, objective=objective, converged=done.converged, predicted_gain=0.0,
                fresh=done.fresh)  # fmt: skip
 
 

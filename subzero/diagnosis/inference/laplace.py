@@ -17,7 +17,7 @@ from subzero.diagnosis.inference.map_fit import Fit
 from subzero.diagnosis.inference.problem import Problem
 
 MAX_PREDICTED_GAIN = 300.0
-"""A promise of old sensitivities counts up to this much."""
+"""A gain predicted by old sensitivities counts up to this much."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -37,9 +37,9 @@ class Candidate:
     log_posterior: float
 
     @property
-    def hope(self) -> float:
+    def optimistic_log_posterior(self) -> float:
         """The log posterior that a better fit might have."""
-        return self.log_posterior + min(self.fit.promise, MAX_PREDICTED_GAIN)
+        return self.log_posterior + min(self.fit.predicted_gain, MAX_PREDICTED_GAIN)
 
     @property
     def log_mixed(self) -> float:

@@ -155,7 +155,7 @@ class Fit:
         D: prior variances (k,).
         objective: ½|r|² + ½ zᵀD⁻¹z.
         converged: no step would gain more.
-        promise: what the linear model says that a further step would gain; of old sensitivities, little to rely on.
+        predicted_gain: what the linear model says a further step would gain; of old sensitivities, little to rely on.
         fresh: how many times sensitivities were made.
         made_at: deviations that the sensitivities were made at, if that is known (k,).
     """
@@ -166,7 +166,7 @@ class Fit:
     D: np.ndarray
     objective: float
     converged: bool
-    promise: float
+    predicted_gain: float
     fresh: int
     made_at: np.ndarray | None = None
 
@@ -199,7 +199,7 @@ def with_own_jacobian(problem: Problem, fit: Fit) -> Fit:
 def continued(problem: Problem, fit: Fit) -> Fit:
     """Return a fit that has gone on, with sensitivities of its own, while much is promised."""
     for _ in range(MAX_RESTARTS):
-        if fit.promise < RESTART_GAIN:
+        if fit.predicted_gain < RESTART_GAIN:
             break
         J = problem.jacobian(fit.z)
         fit = refit(problem, fit.z, J, fit.D, r=fit.r, most_fresh=2, made_at=fit.z)
@@ -246,7 +246,7 @@ def refit(
         D=D,
         objective=now,
         converged=converged,
-        promise=0.0 if converged else left,
+        predicted_gain=0.0 if converged else left,
         fresh=fresh,
         made_at=made_at,
     )

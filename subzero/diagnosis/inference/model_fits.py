@@ -109,11 +109,11 @@ class Fits:
             waiting = [one for one in self.candidates.values() if one.ids not in self.raced]
             if not waiting:
                 return
-            now = max(waiting, key=lambda one: one.hope)
+            now = max(waiting, key=lambda one: one.optimistic_log_posterior)
             done = [self.candidates[ids].log_posterior for ids in self.raced]
             most = MAX_RUNS_PER_RECORD * len(self.problem.records)
             behind = 0.0 if self.problem.kept.asked > most else hopeless
-            if len(done) >= 2 and now.hope < max(done) - behind:
+            if len(done) >= 2 and now.optimistic_log_posterior < max(done) - behind:
                 return
             self._say(0.5, "fitting again", now.ids)
             self._again(now)

@@ -274,7 +274,7 @@ class Search(GrowingFits):
 
     def _is_open(self, one: Candidate, best: Candidate) -> bool:
         """Say whether a candidate that is as good as the best, or might still catch up with it, has not settled."""
-        behind = best.log_posterior - one.hope
+        behind = best.log_posterior - one.optimistic_log_posterior
         if behind < RIVAL_LOG_POSTERIOR:
             return not self._settled(one.fit, SETTLED_JACOBIAN_WITHIN)
         akin = behind < AKIN_LOG_POSTERIOR and _akin(one.ids, best.ids)
