@@ -33,7 +33,16 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 PRODUCT = ("subzero", "cable", "vehicle", "scenarios")
-ROWS = ("cable", "vehicle", "scenarios", "subzero.autopilot", "subzero.diagnosis", "subzero")
+ROWS = (
+    "cable",
+    "vehicle",
+    "scenarios",
+    "subzero.autopilot",
+    "subzero.diagnosis",
+    "subzero.records",
+    "subzero.synthetic",
+    "subzero",
+)
 """Packages with a row of their own; a module belongs to the first that holds it."""
 REST, ALL = "subzero, rest", "all"
 COMPILERS = {"compiled", "inner", "inlined", "allocating", "intrinsic"}

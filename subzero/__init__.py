@@ -20,7 +20,7 @@ from typing import Any
 _HOME = {
     "CHANNELS": ("subzero.channels", "CHANNELS"),
     "Comparison": ("subzero.comparison", "Comparison"),
-    "Logged": ("subzero.diagnosis.logged", "Logged"),
+    "Logged": ("subzero.diagnosis.hypothesis.configuration", "Logged"),
     "Model": ("subzero.model", "Model"),
     "Observation": ("subzero.simulator", "Observation"),
     "Record": ("subzero.records.record", "Record"),
@@ -32,11 +32,11 @@ _HOME = {
     "challenge": ("subzero.diagnosis.challenge", "challenge"),
     "check": ("subzero.refinement", "check"),
     "compare": ("subzero.comparison", "compare"),
-    "diagnose": ("subzero.diagnosis.entrance", "diagnose"),
+    "diagnose": ("subzero.diagnosis.api", "diagnose"),
     "draw": ("subzero.figures", "draw"),
     "load_scenario": ("subzero.trials", "load"),
     "read_record": ("subzero.records.record", "read_record"),
-    "read_trials": ("subzero.diagnosis.records", "read_trials"),
+    "read_trials": ("subzero.diagnosis.read_trials", "read_trials"),
     "simulate": ("subzero.simulation", "simulate"),
     "warnings_of": ("subzero.validity", "warnings_of"),
 }

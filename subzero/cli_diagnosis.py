@@ -16,9 +16,9 @@ from subzero.interrupts import INTERRUPTED, patience
 from subzero.progress import progress_bar
 
 if TYPE_CHECKING:
-    from subzero.diagnosis.effect import Effect
-    from subzero.diagnosis.logged import Logged
-    from subzero.diagnosis.verdict import Verdict
+    from subzero.diagnosis.hypothesis.configuration import Logged
+    from subzero.diagnosis.hypothesis.effect import Effect
+    from subzero.diagnosis.results import Verdict
 
 FINE = 0
 LAST_WORDS_S = 60.0
@@ -91,13 +91,13 @@ def challenge(
         reveal: folder of a challenge, to be told what is hidden in it.
     """
     if reveal is not None:
-        from subzero.diagnosis.answer import reveal as told
+        from subzero.synthetic.sealed_answer import reveal as told
 
         print(told(reveal))
         return FINE
     scenarios.load(scenario)
-    from subzero.diagnosis.challenge import challenge as hide
     from subzero.output import staged
+    from subzero.synthetic.challenge import challenge as hide
 
     with staged(out) as stage, progress_bar("Hiding an effect"):
         hide(scenario, seed, stage.path)
@@ -123,9 +123,9 @@ def extended_run(
                 "--effects says what an extended model is made of. Give the model too: --with FILE."
             )
         return trial, {}
-    from subzero.diagnosis.extended import apply, unseen
-    from subzero.diagnosis.extended_reading import read_extended
-    from subzero.diagnosis.setting import Setting
+    from subzero.diagnosis.hypothesis.configuration import Setting
+    from subzero.diagnosis.hypothesis.extended_model import apply, unseen
+    from subzero.diagnosis.report.toml_file import read_extended
     from subzero.model import Model
 
     found = read_extended(path, _own(own))
@@ -147,14 +147,14 @@ def _own(path: Path | None) -> tuple[Effect, ...]:
     """Return the user's own causes."""
     if path is None:
         return ()
-    from subzero.diagnosis.effects import load
+    from subzero.diagnosis.hypothesis.catalogue import load
 
     return load(path)
 
 
 def _read(paths: list[Path], scenario: str | None, commands: str | None) -> list[Logged]:
     """Read the records; the compiler is needed to see whether their units are plausible."""
-    from subzero.diagnosis.records import read_trials
+    from subzero.diagnosis.read_trials import read_trials
 
     with progress_bar("Reading"):
         return read_trials(paths, scenario=scenario, commands=commands)
@@ -162,7 +162,7 @@ def _read(paths: list[Path], scenario: str | None, commands: str | None) -> list
 
 def _ask(logged: list[Logged], own: tuple[Effect, ...], seed: int, budget: str) -> Verdict:
     """Diagnose under a progress bar; an interrupt ends it with what it has, if it has anything."""
-    from subzero.diagnosis.entrance import diagnose as run
+    from subzero.diagnosis.api import diagnose as run
     from subzero.write_diagnosis import tell_before
 
     with progress_bar("Diagnosing", lambda: COSTS) as progress:

@@ -82,7 +82,7 @@ def compare(
     untethered = simulate(trial, tethered=False, **other, progress=_half(progress, 0.5))
     record = beside(record, tethered) if record is not None else None
     if record is not None:
-        from subzero.diagnosis.record_checks import check_beside
+        from subzero.diagnosis.read_trials import check_beside
 
         check_beside(record, {"tethered": tethered, "untethered": untethered}, sidecar)
     return Comparison(tethered=tethered, untethered=untethered, trial=trial, measured=record)
@@ -92,7 +92,7 @@ def _checked(record: Record | None, trial: scenarios.Trial) -> Any:
     """Check before the runs that a record belongs to them; return its sidecar, None if there is no record."""
     if record is None:
         return None
-    from subzero.diagnosis.record_checks import check_epoch
+    from subzero.diagnosis.read_trials import check_epoch
 
     return check_epoch(record, trial)
 

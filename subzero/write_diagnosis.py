@@ -13,14 +13,14 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from subzero.diagnosis import tables, words
-from subzero.diagnosis.verdict import Detectability, Verdict
+from subzero.diagnosis.report import tables, words
+from subzero.diagnosis.results import Detectability, Verdict
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from subzero.diagnosis.effect import Effect
-    from subzero.diagnosis.logged import Logged
+    from subzero.diagnosis.hypothesis.configuration import Logged
+    from subzero.diagnosis.hypothesis.effect import Effect
     from subzero.output import Stage
 
 MOST_ROWS = 12
@@ -36,7 +36,7 @@ def tell_before(rows: Sequence[Detectability], console: Console | None = None) -
         return
     console.print(
         f"Known beforehand: {len(hidden.rows)} of {len(rows)} causes would not be seen in these records, or hardly be "
-        f"told from another (D below {tables.CLEAR:g}).",
+        f"told from another (D below {tables.CLEAR_FROM:g}).",
         highlight=False,
     )
     console.print(_rich(tables.Table(hidden.header, hidden.rows[:MOST_ROWS])), highlight=False)
@@ -76,9 +76,9 @@ def write_all(
     effects_file: Path | None = None,
 ) -> None:
     """Write ``diagnosis.json``, ``extended.toml``, figures, and the report as ``report.md`` and ``report.html``."""
-    from subzero.diagnosis import json_file
-    from subzero.diagnosis.extended import all_effects
-    from subzero.diagnosis.extended_text import text_of
+    from subzero.diagnosis.hypothesis.extended_model import all_effects
+    from subzero.diagnosis.report import json_file
+    from subzero.diagnosis.report.toml_file import text_of
 
     stage.failed = not verdict.complete
     if effects_file is not None:
@@ -93,7 +93,7 @@ def write_all(
 
 
 def _write_report(verdict: Verdict, logged: Sequence[Logged], stage: Stage) -> None:
-    from subzero.diagnosis import report
+    from subzero.diagnosis.report import html as report
     from subzero.figures.diagnosis import draw_diagnosis
     from subzero.figures.sheet import Title
 

@@ -16,13 +16,12 @@ from pathlib import Path
 
 import cyclopts
 
-from subzero.diagnosis.diagnose import diagnose
-from subzero.diagnosis.logged import Logged
-from subzero.diagnosis.next_trial import ENOUGH, next_trial, outlooks
-from subzero.diagnosis.setting import Setting
-from subzero.diagnosis.trial_library import LIBRARY, flown
-from subzero.diagnosis.verdict import UNDECIDED, NextTrial
-from subzero.diagnosis.work import Work
+from subzero.diagnosis.api import diagnose_trials
+from subzero.diagnosis.assessment.next_trial import DECISIVE_DISCRIMINATION, next_trial, outlooks
+from subzero.diagnosis.assessment.trial_library import LIBRARY, flown
+from subzero.diagnosis.hypothesis.configuration import Logged, Setting
+from subzero.diagnosis.inference.out_of_catalogue import Findings
+from subzero.diagnosis.results import UNDECIDED, NextTrial
 
 from .cases import AFTER, SEED, Case, Made, cases
 from .draws import with_values
@@ -89,7 +88,7 @@ def _begin() -> None:
 
 def _measured(case: Case) -> Result:
     made = posed(case)[0]
-    before = diagnose([made.logged], seed=case.index, budget="verdict")
+    before = diagnose_trials([made.logged], seed=case.index, budget="verdict")
     work = _shared[0].work
     assert work is not None
     pair = _pair(case, work)
@@ -108,11 +107,11 @@ def _measured(case: Case) -> Result:
         second = _flown(case, made, advice)
     except NoRunError:
         return {**found, "skipped": "there is no one truth there"}
-    after = diagnose([made.logged, second], seed=case.index, budget="verdict")
+    after = diagnose_trials([made.logged, second], seed=case.index, budget="verdict")
     return {**found, **_judged(case, after.probabilities, found["rival"]), "after": after.verdict}
 
 
-def _pair(case: Case, work: Work) -> list:
+def _pair(case: Case, work: Findings) -> list:
     """Return the candidates of the truth and of its best rival."""
     candidates = work.search.candidates
     work.search.fit(case.causes)
@@ -149,7 +148,7 @@ def _judged(case: Case, probabilities: dict[str, float], rival: str) -> Result:
 
 def decided(results: Sequence[Result]) -> tuple[list[Result], list[Result]]:
     """Return what some trial of the library could decide, and what of it was decided for the truth."""
-    able = [one for one in results if "odds" in one and one["library"] >= ENOUGH]
+    able = [one for one in results if "odds" in one and one["library"] >= DECISIVE_DISCRIMINATION]
     return able, [one for one in able if one["odds"] >= DECIDED]
 
 

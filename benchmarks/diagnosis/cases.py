@@ -14,8 +14,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from subzero.diagnosis.logged import Logged
-from subzero.diagnosis.setting import Setting
+from subzero.diagnosis.hypothesis.configuration import Logged, Setting
 
 from . import outside
 from .draws import Values, hidden, nuisances, with_begun, with_values

@@ -11,15 +11,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from subzero.diagnosis.begun import begun_at
-from subzero.diagnosis.detect import information, marginal, separation
-from subzero.diagnosis.effect import Effect
-from subzero.diagnosis.evidence import Quadratic, posterior
-from subzero.diagnosis.hypotheses import named, places, variances
-from subzero.diagnosis.latent import Seen, seen
-from subzero.diagnosis.problem import Problem
-from subzero.diagnosis.setting import Setting
-from subzero.diagnosis.sudden import Along, columns
+from subzero.diagnosis.assessment.identifiability import information, marginal, separation
+from subzero.diagnosis.hypothesis.configuration import Setting
+from subzero.diagnosis.hypothesis.effect import Effect, with_onset
+from subzero.diagnosis.hypothesis.hypotheses import columns_of, nameable, variances
+from subzero.diagnosis.inference.change_point_scan import BaseRun, change_point_columns
+from subzero.diagnosis.inference.linear_gaussian import ForceInformation, Quadratic, posterior, seen
+from subzero.diagnosis.inference.problem import Problem
 
 ABOUT = (-4.0, -3.0, -2.0, -1.0, 0.0, 1.0, 2.0, 3.0, 4.0)
 """Rivals of what begins in mid-trial begin about then. [s]"""
@@ -48,7 +46,7 @@ def discriminations(problem: Problem, J: np.ndarray, hidden: Hidden) -> dict[str
     """Return cause → D and its closest rival; the other hidden causes may be of any size."""
     J, z = J.copy(), np.zeros(len(problem.entries))
     for one, values in hidden.items():
-        for k, value in zip(places(problem.entries, (one,)), values, strict=True):
+        for k, value in zip(columns_of(problem.entries, (one,)), values, strict=True):
             if value:
                 J[:, k], z[k] = secant(problem, k, value), value
     return {one: _of(problem, J, z, one, hidden) for one in hidden}
@@ -58,14 +56,14 @@ def signals(problem: Problem, J: np.ndarray, hidden: Hidden) -> dict[str, float]
     """Return cause → squared distance from what the tolerances of all others could do."""
     M, found = marginal(problem, J), {}
     for one, values in hidden.items():
-        at, z = places(problem.entries, (one,)), np.array(values)
+        at, z = columns_of(problem.entries, (one,)), np.array(values)
         found[one] = float(z @ information(problem, M, at) @ z)
     return found
 
 
 def _of(problem: Problem, J: np.ndarray, z: np.ndarray, one: str, hidden: Hidden) -> tuple[float, str]:
     """Return D of one of the hidden causes, the others freed."""
-    others = places(problem.entries, tuple(other for other in hidden if other != one))
+    others = columns_of(problem.entries, tuple(other for other in hidden if other != one))
     entries = [
         entry._replace(effect=_freed(entry.effect)) if k in others else entry
         for k, entry in enumerate(problem.entries)
@@ -84,8 +82,8 @@ def strangeness(problem: Problem, J: np.ndarray, change: np.ndarray) -> tuple[fl
     q = Quadratic(A=J.T @ J, b=J.T @ change, rr=float(change @ change))
     base = posterior(q, D)
     found = {"none": -2.0 * base.log_evidence - base.log_det}
-    for one in named(problem):
-        at = places(problem.entries, (one,))
+    for one in nameable(problem.entries):
+        at = columns_of(problem.entries, (one,))
         own = D.copy()
         own[at] = variances(problem.entries, (one,), 1.0)[at]
         found[one] = q.rr - float(q.b @ posterior(q, own).z)
@@ -101,20 +99,20 @@ def sudden_distance(
     """
     zero, setting = np.zeros(len(problem.entries)), problem.records[0].setting
     effects = {entry.effect.id: entry.effect for entry in problem.entries if entry.record < 0}
-    begun = begun_at(effects[one], time).apply(setting, *values)
+    begun = with_onset(effects[one], time).apply(setting, *values)
     change, D = change_by(problem, setting, begun), variances(problem.entries, (), 1.0)
     q = Quadratic(A=J.T @ J, b=J.T @ change, rr=float(change @ change))
     base, found = posterior(q, D), dict([strangeness(problem, J, change)[::-1]])
     others = [effect for effect in effects.values() if effect.sudden and effect.id != one]
     pairs = [(effect, time + later) for effect in others for later in ABOUT]
-    for (effect, when), C in zip(pairs, columns(Along(problem, zero), pairs), strict=True):
+    for (effect, when), C in zip(pairs, change_point_columns(BaseRun(problem, zero), pairs), strict=True):
         explained = _explained(seen(q.A, q.b, D, J, C, change), effect)
         found[f"{effect.id}@{when:.3g}"] = max(-2.0 * base.log_evidence - base.log_det - explained, 0.0)
     rival = min(found, key=lambda name: found[name])
     return found[rival], rival
 
 
-def _explained(data: Seen, effect: Effect) -> float:
+def _explained(data: ForceInformation, effect: Effect) -> float:
     """Return what an effect explains of a squared distance, as large as it may be."""
     scale = np.array([p.scale for p in effect.parameters])
     size = np.linalg.solve(data.M + np.diag(1.0 / scale**2), data.q)

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from subzero.diagnosis.effect import Effect, Parameter
-from subzero.diagnosis.setting import Setting
+from subzero.diagnosis.hypothesis.configuration import Setting
+from subzero.diagnosis.hypothesis.effect import Effect, Parameter
 
 from .manoeuvres import effects
 

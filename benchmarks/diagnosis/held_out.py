@@ -11,13 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from subzero.diagnosis.effects.sensors import SPECS
-from subzero.diagnosis.hypotheses import named
-from subzero.diagnosis.refit import Fit
-from subzero.diagnosis.response import economical, respond
-from subzero.diagnosis.setting import Setting
-from subzero.diagnosis.verdict import Verdict
-from subzero.diagnosis.work import Work
+from subzero.diagnosis.hypothesis.catalogue.sensors import SPECS
+from subzero.diagnosis.hypothesis.configuration import Setting
+from subzero.diagnosis.hypothesis.hypotheses import nameable
+from subzero.diagnosis.inference.map_fit import Fit
+from subzero.diagnosis.inference.measurement import economical, respond
+from subzero.diagnosis.inference.out_of_catalogue import Findings
+from subzero.diagnosis.results import Verdict
 
 from .cases import Case, Made
 from .draws import Values, with_values
@@ -27,7 +27,7 @@ from .truth import NoRunError, shown_by
 STARTS = "start:"
 
 
-def gains(case: Case, made: Made, verdict: Verdict, work: Work) -> dict[str, Any]:
+def gains(case: Case, made: Made, verdict: Verdict, work: Findings) -> dict[str, Any]:
     """Return the mean square errors on the other manoeuvre: nominal, tolerances' refit, extended, and of the rival."""
     setting = nominal(OTHER[case.manoeuvre])
     flown = {name: values for name, values in made.values.items() if not name.startswith(STARTS)}
@@ -40,7 +40,7 @@ def gains(case: Case, made: Made, verdict: Verdict, work: Work) -> dict[str, Any
     return {name: _error(truth, setting, values, at) for name, values in models.items()}
 
 
-def _fits(verdict: Verdict, work: Work) -> dict[str, Fit]:
+def _fits(verdict: Verdict, work: Findings) -> dict[str, Fit]:
     """Return the fits that are compared."""
     candidates = work.search.candidates
     found = {"tolerance": candidates[()].fit}
@@ -53,10 +53,10 @@ def _fits(verdict: Verdict, work: Work) -> dict[str, Fit]:
     return found
 
 
-def _shared(work: Work, fit: Fit) -> Values:
+def _shared(work: Findings, fit: Fit) -> Values:
     """Return the deviations of a fit that hold for every trial."""
     entries, found = work.problem.entries, {}
-    for one in named(work.problem):
+    for one in nameable(work.problem.entries):
         found[one] = tuple(
             float(z) for z, entry in zip(fit.z, entries, strict=False) if entry.effect.id == one
         )

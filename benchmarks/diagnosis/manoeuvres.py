@@ -9,10 +9,10 @@ from functools import cache
 import numpy as np
 
 import subzero
-from subzero.diagnosis.effect import Effect
-from subzero.diagnosis.effects import START, catalogue
-from subzero.diagnosis.setting import Setting
-from subzero.diagnosis.trial_library import rich
+from subzero.diagnosis.assessment.trial_library import rich
+from subzero.diagnosis.hypothesis.catalogue import START, catalogue
+from subzero.diagnosis.hypothesis.configuration import Setting
+from subzero.diagnosis.hypothesis.effect import Effect
 from subzero.model import Model
 
 CHANNELS = ("surge_speed", "heading", "yaw_rate", "pitch", "roll", "depth")

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from subzero.diagnosis.setting import Setting
+from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.external_force import AXES, MissingForce, Term
 
 

@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from subzero.diagnosis import diagnose as engine
-from subzero.diagnosis import problem, response, search
-from subzero.diagnosis.setting import Setting
-from subzero.diagnosis.verdict import Verdict
-from subzero.diagnosis.work import Work
+from subzero.diagnosis import api as engine
+from subzero.diagnosis.hypothesis.configuration import Setting
+from subzero.diagnosis.inference import measurement as response
+from subzero.diagnosis.inference import model_fits, problem
+from subzero.diagnosis.inference.out_of_catalogue import Findings
+from subzero.diagnosis.results import Verdict
 
 ROOM = 600
 Track = tuple[np.ndarray, np.ndarray]
@@ -23,12 +24,12 @@ class Shared:
 
     def __init__(self) -> None:
         self.runs: OrderedDict[bytes, Track] = OrderedDict()
-        self.plain = response.tracked
-        self.work: Work | None = None
-        self.tell = engine.tell
+        self.plain = response.simulate_track
+        self.work: Findings | None = None
+        self.tell = engine.conclude
 
     def tracked(self, setting: Setting) -> Track:
-        """As `response.tracked`, each setting once."""
+        """As `simulate_track`, each setting once."""
         key = pickle.dumps(setting)
         if key not in self.runs:
             self.runs[key] = self.plain(setting)
@@ -37,8 +38,8 @@ class Shared:
             self.runs.popitem(last=False)
         return self.runs[key]
 
-    def told(self, work: Work) -> Verdict:
-        """As `telling.tell`, and keep the work."""
+    def told(self, work: Findings) -> Verdict:
+        """As `conclude`, and keep the work."""
         self.work = work
         return self.tell(work)
 
@@ -48,10 +49,10 @@ def share(threads: int | None = None) -> Shared:
     shared, modules = Shared(), (problem, response)
     for module in modules:
         patch: Any = module
-        patch.tracked = shared.tracked
+        patch.simulate_track = shared.tracked
     patch = engine
-    patch.tell = shared.told
-    for module in (problem, search) if threads is not None else ():
+    patch.conclude = shared.told
+    for module in (problem, model_fits) if threads is not None else ():
         patch = module
         patch.cpu_count = lambda: threads
     return shared

@@ -4,7 +4,7 @@
     python -m benchmarks.diagnosis.stories rudder_lag_on_fig6   # or some
     python -m benchmarks.diagnosis.stories --keep stories/      # with records and reports, to look into
 
-The truth comes from the other cable formulation (`subzero.diagnosis.other_code`), with every tolerance drawn, coloured
+The truth comes from the other cable formulation (`synthetic.reference_run`), with every tolerance drawn, coloured
 noise, a few outliers and a gap.
 """
 
@@ -20,18 +20,16 @@ import subzero
 from benchmarks.diagnosis.story_cases import STORIES, Story
 from subzero import write_diagnosis
 from subzero.channels import BY_NAME
-from subzero.diagnosis import tables, words
-from subzero.diagnosis.challenge import SAMPLE
-from subzero.diagnosis.effects import START, catalogue
-from subzero.diagnosis.hidden import Hidden, draw_deviations, hide
-from subzero.diagnosis.logged import Logged
-from subzero.diagnosis.noisy_record import make_record
-from subzero.diagnosis.report import table
-from subzero.diagnosis.setting import Setting
-from subzero.diagnosis.verdict import Verdict
+from subzero.diagnosis.hypothesis.catalogue import START, catalogue
+from subzero.diagnosis.hypothesis.configuration import Logged, Setting
+from subzero.diagnosis.report import tables, words
+from subzero.diagnosis.report.html import table
+from subzero.diagnosis.results import Verdict
 from subzero.figures.diagnosis import draw_diagnosis
 from subzero.figures.sheet import Title
 from subzero.output import staged
+from subzero.synthetic.challenge import SAMPLE_S
+from subzero.synthetic.planted import Hidden, draw_deviations, hide, make_record
 
 PAGE = Path(__file__).parents[2] / "docs" / "diagnosis.md"
 FIGURES = PAGE.parent / "figures"
@@ -46,7 +44,7 @@ def hidden_record(story: Story) -> Logged:
     both = (*catalogue(story.channels).values(), *START)
     true = hide(nominal, both, draw_deviations(both, rng, 1.0), Hidden(effects=dict(story.hidden)))
     true = true if story.missing is None else true.with_model(missing=story.missing)
-    time = np.arange(story.begins, nominal.trial.duration + 1e-9, SAMPLE)
+    time = np.arange(story.begins, nominal.trial.duration + 1e-9, SAMPLE_S)
     record = make_record(true, time, story.channels, seed=rng, source=f"{story.name}.csv")
     return Logged(record=record, setting=nominal, name=story.name)
 

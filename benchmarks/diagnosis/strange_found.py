@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from subzero.diagnosis.verdict import Unknown, Verdict
+from subzero.diagnosis.results import Unknown, Verdict
 from subzero.external_force import AXES, history_at
 
 from .cases import Made

@@ -7,7 +7,7 @@ from math import inf
 from pathlib import Path
 from time import perf_counter
 
-from subzero.diagnosis.diagnose import diagnose
+from subzero.diagnosis.api import diagnose_trials
 
 from .cases import SEED, Case, cases, make
 
@@ -33,7 +33,7 @@ def _diagnosed(case: Case) -> tuple[float, float]:
     """Return how long one diagnosis takes. [s]"""
     made = make(case)
     start = perf_counter()
-    verdict = diagnose([made.logged], seed=case.index, budget="verdict")
+    verdict = diagnose_trials([made.logged], seed=case.index, budget="verdict")
     return verdict.seconds["screen"], perf_counter() - start
 
 

@@ -10,11 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from subzero.diagnosis.detect import separation
-from subzero.diagnosis.diagnose import diagnose
-from subzero.diagnosis.pose import pose
-from subzero.diagnosis.problem import Problem
-from subzero.diagnosis.verdict import Verdict
+from subzero.diagnosis.api import diagnose_trials
+from subzero.diagnosis.assessment.identifiability import separation
+from subzero.diagnosis.inference.problem import Problem, pose
+from subzero.diagnosis.results import Verdict
 
 from . import baselines
 from .cases import Case, Made, make
@@ -54,7 +53,7 @@ def _asked(case: Case, budget: str) -> tuple[Made, Problem, Verdict, Result]:
     """Return a case, and what the diagnosis says of it."""
     made, problem, D, rival = posed(case)
     start, cpu = perf_counter(), process_time()
-    verdict = diagnose([made.logged], seed=case.index, budget=budget)
+    verdict = diagnose_trials([made.logged], seed=case.index, budget=budget)
     taken = {"wall": perf_counter() - start, "cpu": process_time() - cpu, "parts": dict(verdict.seconds)}
     found = {**_truth(case, made), "code": code(), "D": D, "rival": rival, "seconds": taken, **_said(verdict)}
     if made.strange:

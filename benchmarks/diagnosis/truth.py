@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from subzero.diagnosis.effects.sensors import SPECS
-from subzero.diagnosis.other_code import NoTruthError, simulate_otherwise
-from subzero.diagnosis.setting import Setting
+from subzero.diagnosis.hypothesis.catalogue.sensors import SPECS
+from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.records.record import Record
+from subzero.synthetic.reference_run import NoTruthError, simulate_reference
 
 RHO, OUTLIERS, GAPS, FAR = 0.5, 0.01, 0.02, 15.0
 """Of the noise: correlation from sample to sample, shares of outliers and gaps; size of an outlier in noise levels."""
@@ -25,7 +25,7 @@ class NoRunError(RuntimeError):
 def shown_by(setting: Setting, times: np.ndarray, channels: tuple[str, ...], segment: float = 0.25) -> Shown:
     """Return what the sensors show without noise, by the other formulation with segments of a length [m]."""
     try:
-        shown = simulate_otherwise(setting, times, channels, segment_length=segment, cable_step=0.1 * segment,
+        shown = simulate_reference(setting, times, channels, segment_length=segment, cable_step=0.1 * segment,
                                    hull_step=0.04 * segment)  # fmt: skip
     except NoTruthError as none:
         raise NoRunError(setting.trial.name) from none

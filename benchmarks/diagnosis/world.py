@@ -25,13 +25,11 @@ import numpy as np
 
 import scenarios
 import subzero
-from subzero.diagnosis.diagnose import diagnose
-from subzero.diagnosis.effects.sensors import NOISE
-from subzero.diagnosis.logged import Logged
-from subzero.diagnosis.noise import Noise
-from subzero.diagnosis.pose import pose
-from subzero.diagnosis.problem import Problem
-from subzero.diagnosis.setting import Setting
+from subzero.diagnosis.api import diagnose_trials
+from subzero.diagnosis.hypothesis.catalogue.sensors import NOISE
+from subzero.diagnosis.hypothesis.configuration import Logged, Setting
+from subzero.diagnosis.inference.noise import Noise
+from subzero.diagnosis.inference.problem import Problem, pose
 from subzero.model import Model
 from subzero.records.record import Record
 
@@ -199,7 +197,7 @@ def result_of(one: Drawn) -> dict[str, Any]:
         problem = with_true_noise(pose([logged]), FAMILIES[one.family])
         D = discriminations(problem, sensitivities(problem), planted) if planted else {}
         start = perf_counter()
-        verdict = diagnose([logged], seed=one.index, budget="verdict")
+        verdict = diagnose_trials([logged], seed=one.index, budget="verdict")
         first, p = next(iter(verdict.probabilities.items()))
         said = {
             "D": {name: value for name, (value, _) in D.items()},

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from subzero.channels import BY_NAME
-from subzero.diagnosis.verdict import Curves, Misfit, Verdict
+from subzero.diagnosis.results import Curves, Misfit, Verdict
 from subzero.figures import style
 from subzero.figures.diagnosis_causes import detectable, evidence, gain
 from subzero.figures.diagnosis_force import missing_force

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from subzero.channels import BY_NAME
-from subzero.diagnosis.tables import CLEAR, CONFUSED, SEEN
-from subzero.diagnosis.verdict import ChannelGain, Verdict
+from subzero.diagnosis.report.tables import CLEAR_FROM, CONFUSED_BELOW, SEEN_SIGNAL
+from subzero.diagnosis.results import ChannelGain, Verdict
 from subzero.figures import style
 from subzero.figures.panel import headline, legend
 from subzero.figures.sheet import Title, sheet
@@ -66,17 +66,20 @@ def detectable(verdict: Verdict, title: Title) -> Figure | None:
     figure, (signal, apart) = _bars(2, len(rows), title)
     size = [max(one.signal, FLOOR) for one in rows]
     signal.barh(
-        range(len(rows)), size, color=[style.GREY if s < SEEN else style.BLUE for s in size], height=0.65
+        range(len(rows)),
+        size,
+        color=[style.GREY if s < SEEN_SIGNAL else style.BLUE for s in size],
+        height=0.65,
     )
-    signal.axvline(SEEN, color=style.INK, linewidth=0.8, linestyle=style.DASHES[1])
+    signal.axvline(SEEN_SIGNAL, color=style.INK, linewidth=0.8, linestyle=style.DASHES[1])
     signal.set_xlabel("signal, in noise and tolerances", fontsize=style.NORMAL)
-    headline(signal, f"Seen from {SEEN:g} on (usual size)")
+    headline(signal, f"Seen from {SEEN_SIGNAL:g} on (usual size)")
     far = [max(one.discrimination, FLOOR) for one in rows]
     apart.barh(range(len(rows)), far, color=[_verdict_colour(one) for one in far], height=0.65)
-    for limit in (CONFUSED, CLEAR):
+    for limit in (CONFUSED_BELOW, CLEAR_FROM):
         apart.axvline(limit, color=style.INK, linewidth=0.8, linestyle=style.DASHES[1])
     apart.set_xlabel("D", fontsize=style.NORMAL)
-    headline(apart, f"Told apart from {CLEAR:g} on")
+    headline(apart, f"Told apart from {CLEAR_FROM:g} on")
     for axes, words in ((signal, [one.id for one in rows]), (apart, [f"/ {one.rival}" for one in rows])):
         axes.set_xscale("log")
         axes.set_xlim(left=FLOOR)
@@ -123,9 +126,9 @@ def _words(name: str) -> str:
 
 
 def _verdict_colour(discrimination: float) -> str:
-    if discrimination < CONFUSED:
+    if discrimination < CONFUSED_BELOW:
         return style.ORANGE
-    return style.AMBER if discrimination < CLEAR else style.BLUE
+    return style.AMBER if discrimination < CLEAR_FROM else style.BLUE
 
 
 def _sorted(name: str) -> str:

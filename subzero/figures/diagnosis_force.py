@@ -5,8 +5,8 @@ from __future__ import annotations
 import textwrap
 from typing import TYPE_CHECKING
 
-from subzero.diagnosis.verdict import Unknown, Verdict
-from subzero.diagnosis.words import formula_term
+from subzero.diagnosis.report.words import formula_term
+from subzero.diagnosis.results import Unknown, Verdict
 from subzero.figures import style
 from subzero.figures.panel import headline, label, time_label
 from subzero.figures.sheet import Title, sheet

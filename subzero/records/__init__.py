@@ -1,1 +1,1 @@
-"""Measured records, read and checked (`record`) and compared with a run (`goodness_of_fit`); headings (`heading`)."""
+"""Measured records: read (`record`), their metadata, time base, units and commands checked, compared with a run."""

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from subzero.records.heading import HEADING, turned
-from subzero.records.record import Record
+from subzero.records.record import HEADING, Record, turned
 
 if TYPE_CHECKING:
     import xarray as xr

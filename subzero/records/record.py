@@ -5,6 +5,9 @@ A record has the column ``time_s`` and any columns of `subzero.channels`, such a
 cannot be used is refused with all its problems at once. A heading that jumps from 360 to 0 degrees is made
 continuous.
 
+A heading is known but for whole turns: one compass begins at 359 degrees where another, or a run, begins at −1. So a
+run's heading is counted from its trial's start, without a jump wherever that lies, and a record's from the run's.
+
 The files that a run writes are themselves records, so one run can be compared with another.
 """
 
@@ -21,8 +24,22 @@ import numpy as np
 from subzero.channels import BY_COLUMN, BY_NAME, TIME
 from subzero.errors import UserError, listed, printable, suggestion
 from subzero.errors import short as shown
-from subzero.records.heading import HEADING, TURN
 from subzero.user_file import MOST_COLUMNS, MOST_OF_A_CSV, UnreadableFileError, read_text
+
+HEADING = "heading"
+TURN = 360.0
+FIRST = 9
+"""Samples that say where a record begins: a few of them may be outliers."""
+
+
+def turned(heading: np.ndarray, like: np.ndarray | float) -> np.ndarray:
+    """Return a heading (n,) with the whole turns more or less that bring its first samples close to those of another,
+    (n,) or one. [degree]
+    """
+    apart = np.asarray(like - heading)
+    first = apart[np.isfinite(apart)][:FIRST]
+    return heading + TURN * np.round(np.median(first) / TURN) if first.size else heading
+
 
 GAPS = ("", "nan", "+nan", "-nan")
 """Cells that hold no measurement; numerical libraries write a NaN with either sign."""

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from subzero.cli import FINE, INTERRUPTED, MISTAKE, main
-from subzero.diagnosis.verdict import (
+from subzero.diagnosis.results import (
     CAUSE_NAMED,
     NOTHING_WRONG,
     OUTSIDE,
@@ -63,13 +63,8 @@ def engine(monkeypatch, tmp_path):
     def respond(setting, times, channels):
         return dict.fromkeys(channels, np.interp(times, TIME, SPEED))
 
-    for name, members in (
-        ("diagnose", {"diagnose": diagnose}),
-        ("response", {"respond": respond}),
-    ):
-        module = types.ModuleType(f"subzero.diagnosis.{name}")
-        vars(module).update(members)
-        monkeypatch.setitem(sys.modules, f"subzero.diagnosis.{name}", module)
+    monkeypatch.setattr("subzero.diagnosis.api.diagnose_trials", diagnose)
+    monkeypatch.setattr("subzero.diagnosis.inference.measurement.respond", respond)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "200")
     rows = "\n".join(f"{t:.1f},{v:.5f}" for t, v in zip(TIME, SPEED, strict=True))
@@ -113,7 +108,7 @@ def test_a_screen_is_the_first_look(engine):
 
 def test_effects_of_the_users_own_are_given_to_the_engine_and_copied_beside_the_model(engine, tmp_path):
     (tmp_path / "mine.py").write_text(
-        "from subzero.diagnosis.effect import Effect\n"
+        "from subzero.diagnosis.hypothesis.effect import Effect\n"
         "EFFECTS = [Effect(id='mine', sentence='mine', slot='hull', parameters=(), apply=lambda s: s)]\n"
     )
     assert (
@@ -186,10 +181,10 @@ def test_a_challenge_is_written_with_what_to_do_next_and_its_answer_is_told_when
 
     parts = {
         "challenge": {"challenge": challenge},
-        "answer": {"reveal": lambda folder: f"in {folder}: the rudder lags"},
+        "sealed_answer": {"reveal": lambda folder: f"in {folder}: the rudder lags"},
     }
     for name, contents in parts.items():
-        module = types.ModuleType(f"subzero.diagnosis.{name}")
+        module = types.ModuleType(f"subzero.synthetic.{name}")
         vars(module).update(contents)
         monkeypatch.setitem(sys.modules, module.__name__, module)
     assert main(["challenge", "--scenario", "fig6", "--seed", "7", "--out", "hidden"]) == FINE

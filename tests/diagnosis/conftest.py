@@ -7,15 +7,14 @@ import numpy as np
 import pytest
 
 import subzero
-from subzero.diagnosis import effects
-from subzero.diagnosis.effects.sensors import NOISE
-from subzero.diagnosis.entries import entries_of
-from subzero.diagnosis.hypotheses import variances
-from subzero.diagnosis.noise import Noise
-from subzero.diagnosis.problem import Observed, Problem
-from subzero.diagnosis.refit import Fit, refit
-from subzero.diagnosis.response import economical, respond
-from subzero.diagnosis.setting import Setting
+from subzero.diagnosis.hypothesis import catalogue as effects
+from subzero.diagnosis.hypothesis.catalogue.sensors import NOISE
+from subzero.diagnosis.hypothesis.configuration import Setting
+from subzero.diagnosis.hypothesis.hypotheses import entries_of, variances
+from subzero.diagnosis.inference.map_fit import Fit, refit
+from subzero.diagnosis.inference.measurement import economical, respond
+from subzero.diagnosis.inference.noise import Noise
+from subzero.diagnosis.inference.problem import Observed, Problem
 
 CHANNELS = ("surge_speed", "heading", "yaw_rate", "pitch", "roll", "depth")
 COLOUR = 0.5

@@ -5,9 +5,9 @@ import dataclasses
 import numpy as np
 import pytest
 
-from subzero.diagnosis.begun import beginning, begun_at
-from subzero.diagnosis.effects import catalogue
-from subzero.diagnosis.response import respond
+from subzero.diagnosis.hypothesis.catalogue import catalogue
+from subzero.diagnosis.hypothesis.effect import with_free_onset, with_onset
+from subzero.diagnosis.inference.measurement import respond
 
 EFFECTS = catalogue(("heading",))
 DRAG = EFFECTS["hull_drag"]
@@ -28,13 +28,13 @@ def drag(model):
 
 
 def test_before_it_begins_nothing_is_changed(setting):
-    plain, seen = speed(setting), speed(begun_at(DRAG, 12.4).apply(setting, 0.9))
+    plain, seen = speed(setting), speed(with_onset(DRAG, 12.4).apply(setting, 0.9))
     assert np.array_equal(seen[TIMES < 12.3], plain[TIMES < 12.3])
     assert seen[-1] < plain[-1] - 0.05, "more drag from then on: slower"
 
 
 def test_its_id_and_words_say_when():
-    effect = begun_at(EFFECTS["rudder_offset"], 12.5)
+    effect = with_onset(EFFECTS["rudder_offset"], 12.5)
     assert effect.id == "rudder_offset@12.5"
     assert effect.sentence == "from 12.5 s on the rudder is off its centre"
     assert not effect.sudden
@@ -42,19 +42,19 @@ def test_its_id_and_words_say_when():
 
 def test_other_changes_in_mid_trial_are_kept(setting):
     other = dataclasses.replace(setting.model, current=(0.1, 0.0, 0.0))
-    both = begun_at(DRAG, 12.0).apply(
+    both = with_onset(DRAG, 12.0).apply(
         dataclasses.replace(setting, later=((6.0, other), (20.0, setting.model))), 0.5
     )
     assert [time for time, _ in both.later] == [6.0, 12.0, 20.0]
     assert [model.current[0] for _, model in both.later] == [0.1, 0.1, 0.0]
     assert [drag(model) / drag(setting.model) for _, model in both.later] == pytest.approx([1.0, 1.5, 1.5])
-    assert begun_at(DRAG, 0.0).apply(setting, 0.5).later == ()
+    assert with_onset(DRAG, 0.0).apply(setting, 0.5).later == ()
 
 
 def test_what_changes_at_the_same_time_is_kept(setting):
     other = dataclasses.replace(setting.model, current=(0.1, 0.0, 0.0))
     ((time, model),) = (
-        begun_at(DRAG, 12.0).apply(dataclasses.replace(setting, later=((12.0, other),)), 0.5).later
+        with_onset(DRAG, 12.0).apply(dataclasses.replace(setting, later=((12.0, other),)), 0.5).later
     )
     assert (time, model.current[0]) == (12.0, 0.1)
     assert drag(model) == pytest.approx(1.5 * drag(setting.model))
@@ -62,14 +62,14 @@ def test_what_changes_at_the_same_time_is_kept(setting):
 
 def test_between_two_exchanges_it_has_the_share_that_is_left(setting):
     step = setting.trial.cable_step
-    later = begun_at(DRAG, 12.0 + 0.75 * step).apply(setting, 0.8).later
+    later = with_onset(DRAG, 12.0 + 0.75 * step).apply(setting, 0.8).later
     assert [time for time, _ in later] == pytest.approx([12.0, 12.0 + step])
     assert [drag(model) / drag(setting.model) for _, model in later] == pytest.approx([1.2, 1.8])
 
 
 def test_the_response_goes_evenly_with_the_time(setting):
     """Otherwise no slope leads to it: halfway between two exchanges the speed is halfway, to 2 % of the change."""
-    begins, step = beginning(DRAG, 12.0, 30.0), setting.trial.cable_step
+    begins, step = with_free_onset(DRAG, 12.0, 30.0), setting.trial.cable_step
     early, half, late = (speed(begins.apply(setting, 0.8, share * step)) for share in (0.0, 0.5, 1.0))
     change = late - early
     assert change[65] > 0.0, "begun later, it has slowed it less by 13 s"
@@ -77,14 +77,14 @@ def test_the_response_goes_evenly_with_the_time(setting):
 
 
 def test_its_time_is_a_parameter_that_is_as_likely_anywhere(setting):
-    begins = beginning(DRAG, 12.0, 30.0)
+    begins = with_free_onset(DRAG, 12.0, 30.0)
     time = begins.parameters[-1]
     assert [p.name for p in begins.parameters] == ["share", "start_time"]
     assert 1.0 / (np.sqrt(2.0 * np.pi) * time.scale) == pytest.approx(1.0 / 30.0), (
         "density of 30 s, at its height"
     )
     assert (12.0 + time.low, 12.0 + time.high) == (1.0, 29.0)
-    at = begun_at(DRAG, 13.4).apply(setting, 0.8).later
+    at = with_onset(DRAG, 13.4).apply(setting, 0.8).later
     assert [when for when, _ in begins.apply(setting, 0.8, 1.4).later] == pytest.approx(
         [when for when, _ in at]
     )

@@ -9,8 +9,8 @@ import pytest
 
 from benchmarks.diagnosis import manoeuvres, truth
 from benchmarks.diagnosis.cases import HEAVY, cases
-from subzero.diagnosis.effects.sensors import SPECS
-from subzero.diagnosis.other_code import NoTruthError
+from subzero.diagnosis.hypothesis.catalogue.sensors import SPECS
+from subzero.synthetic.reference_run import NoTruthError
 
 TIMES, CHANNELS = np.linspace(0.0, 10.0, 101), ("heading",)
 
@@ -21,7 +21,7 @@ def shown(monkeypatch, error):
     def simulate(setting, times, channels, *, segment_length, **steps):
         return {"heading": error(segment_length) * SPECS["heading"].noise * np.ones(times.size)}
 
-    monkeypatch.setattr(truth, "simulate_otherwise", simulate)
+    monkeypatch.setattr(truth, "simulate_reference", simulate)
     return truth.agreed(manoeuvres.nominal("fig6"), TIMES, CHANNELS)["heading"] / SPECS["heading"].noise
 
 

@@ -1,6 +1,6 @@
 """A challenge hides what it says, says nothing by accident, and hides nothing that the catalogue could name.
 
-Verifies: `subzero.diagnosis.challenge`, `hidden`, `outside`. Configuration: fig6, and 10 s of it where that is enough.
+Verifies: `subzero.synthetic`. Configuration: fig6, and 10 s of it where that is enough.
 """
 
 import dataclasses
@@ -11,19 +11,17 @@ import pytest
 from numpy.testing import assert_allclose
 
 import subzero
-from subzero.diagnosis.answer import SEALED, reveal
-from subzero.diagnosis.challenge import BASIC, ODDS, challenge, draw_hidden
-from subzero.diagnosis.effects import START, catalogue
-from subzero.diagnosis.effects.sensors import NOISE
-from subzero.diagnosis.hidden import Hidden, apply_all, draw_deviations, draw_effect, hide
-from subzero.diagnosis.noisy_record import make_record
-from subzero.diagnosis.other_code import simulate_otherwise, truth_of
-from subzero.diagnosis.outside import force_along
-from subzero.diagnosis.outside_kinds import KINDS, draw_outside
-from subzero.diagnosis.setting import Setting
+from subzero.diagnosis.hypothesis.catalogue import START, catalogue
+from subzero.diagnosis.hypothesis.catalogue.sensors import NOISE
+from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.errors import UserError
 from subzero.external_force import AXES
 from subzero.records.record import read_record
+from subzero.synthetic.challenge import BASIC, KIND_PROBABILITIES, challenge, draw_hidden
+from subzero.synthetic.planted import Hidden, apply_all, draw_deviations, draw_effect, hide, make_record
+from subzero.synthetic.reference_run import simulate_reference, truth_of
+from subzero.synthetic.sealed_answer import SEALED, reveal
+from subzero.synthetic.unmodelled_forces import KINDS, draw_unmodelled, force_along
 
 FIG6 = subzero.load_scenario("fig6")
 NOMINAL = Setting(trial=FIG6, model=subzero.Model.of(FIG6))
@@ -83,7 +81,7 @@ def test_a_seed_gives_the_same_record_and_another_seed_another(made):
 def test_the_hidden_effect_shows(made):
     what, _ = made
     healthy = hide(what.nominal, (*EFFECTS.values(), *START), what.answer.tolerances, Hidden())
-    clean, wrong = (simulate_otherwise(s, TIMES, BASIC) for s in (healthy, what.true))
+    clean, wrong = (simulate_reference(s, TIMES, BASIC) for s in (healthy, what.true))
     assert max(np.nanmax(np.abs(clean[name] - wrong[name])) / NOISE[name] for name in BASIC) > 0.5
 
 
@@ -130,14 +128,14 @@ def test_every_kind_is_drawn_about_as_often_as_it_should_be():
         "outside": np.mean([hidden.outside is not None for hidden in drawn]),
     }
     for kind, share in shares.items():
-        assert share == pytest.approx(ODDS[kind], abs=0.06), kind
+        assert share == pytest.approx(KIND_PROBABILITIES[kind], abs=0.06), kind
 
 
 def test_an_effect_that_begins_at_t_changes_nothing_before():
     hidden = Hidden(effects={"rudder_offset": (2.0,)}, starts={"rudder_offset": 12.0})
     assert hidden.names == ("rudder_offset@t",)
     true = hide(NOMINAL, EFFECTS.values(), {}, hidden)
-    struck, plain = (simulate_otherwise(s, TIMES, ["heading"])["heading"] for s in (true, NOMINAL))
+    struck, plain = (simulate_reference(s, TIMES, ["heading"])["heading"] for s in (true, NOMINAL))
     assert np.array_equal(struck[:121], plain[:121])
     assert np.abs(struck - plain)[150:].min() > 0.5
 
@@ -145,12 +143,12 @@ def test_an_effect_that_begins_at_t_changes_nothing_before():
 @pytest.mark.parametrize("kind", KINDS)
 def test_what_is_outside_the_catalogue_shows_on_its_axis(kind):
     assert kind not in EFFECTS
-    outside = draw_outside(NOMINAL, 5, kind)
+    outside = draw_unmodelled(NOMINAL, 5, kind)
     trial = dataclasses.replace(FIG6, cable_step=0.1, hull_step=0.02, segment_length=0.5)
     true = outside.apply(dataclasses.replace(NOMINAL, trial=trial))
     force = force_along(outside, true, truth_of(true))
     assert np.abs(force[:, AXES.index(outside.axis)]).max() > 0.0
-    wrong, plain = (simulate_otherwise(s, TIMES, BASIC) for s in (true, NOMINAL))
+    wrong, plain = (simulate_reference(s, TIMES, BASIC) for s in (true, NOMINAL))
     assert max(np.abs(wrong[name] - plain[name]).max() / NOISE[name] for name in BASIC) > 1.5
 
 

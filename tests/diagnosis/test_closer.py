@@ -6,21 +6,25 @@ Configuration: fig6, 30 s, six channels with coloured noise, all parameters nomi
 import numpy as np
 import pytest
 
-from subzero.diagnosis.candidate import Candidate, candidate_of
-from subzero.diagnosis.closer import closer
-from subzero.diagnosis.evidence import KAPPAS
-from subzero.diagnosis.foreign import FAR, MOST, NEAR, _worth_a_look
-from subzero.diagnosis.hypotheses import variances
-from subzero.diagnosis.one_term import one_terms
-from subzero.diagnosis.refit import refit
-from subzero.diagnosis.suspects import suspects
-from subzero.diagnosis.unknown import force_columns, knots_of, lacking
+from subzero.diagnosis.hypothesis.hypotheses import variances
+from subzero.diagnosis.inference.basis import one_terms
+from subzero.diagnosis.inference.input_estimation import latent_force_candidates, relinearised_force
+from subzero.diagnosis.inference.laplace import Candidate, candidate_of
+from subzero.diagnosis.inference.latent_force import force_columns, knots_of, without_force
+from subzero.diagnosis.inference.linear_gaussian import KAPPAS
+from subzero.diagnosis.inference.map_fit import refit
+from subzero.diagnosis.inference.out_of_catalogue import (
+    FAR_LOG_POSTERIOR,
+    MAX_RELINEARISED,
+    NEAR_LOG_POSTERIOR,
+    _worth_a_look,
+)
 from subzero.external_force import MissingForce, Term
 
 
 def weed(coefficient):
     """Drag that grows all the time: as the drag of a cable does that gets longer."""
-    return lambda setting: lacking(setting, MissingForce(terms=(Term("X", "time*u2", coefficient),)))
+    return lambda setting: without_force(setting, MissingForce(terms=(Term("X", "time*u2", coefficient),)))
 
 
 def both_ways(planted):
@@ -33,9 +37,9 @@ def both_ways(planted):
     none = max(none, candidate_of(problem, (), fit), key=lambda one: one.log_posterior)
     knots = knots_of(problem)
     terms = one_terms(problem, fit.z, knots)
-    here = closer(problem, fit, "unknown_force:X", 1.0, knots, terms).log_posterior
+    here = relinearised_force(problem, fit, "unknown_force:X", 1.0, knots, terms).log_posterior
     columns = {"unknown_force:X": force_columns(problem, none.fit.z, ("X",), knots)["X"]}
-    (there,) = suspects(problem, columns, none.fit, none.scales(problem), knots, terms)
+    (there,) = latent_force_candidates(problem, columns, none.fit, none.scales(problem), knots, terms)
     return here, none.log_posterior + there.log_gain
 
 
@@ -57,7 +61,7 @@ def test_a_compass_that_wanders_is_more_probable_than_any_force_that_turns_the_v
     fit = refit(problem, np.zeros(planted.J.shape[1]), planted.J, variances(problem.entries, (), 4.0))
     knots = knots_of(problem)
     terms = one_terms(problem, fit.z, knots)
-    log = {name: closer(problem, fit, name, 1.0, knots, terms).log_posterior
+    log = {name: relinearised_force(problem, fit, name, 1.0, knots, terms).log_posterior
            for name in ("sensor_drift:heading", "unknown_force:N", "unknown_force:Y")}  # fmt: skip
     assert log["sensor_drift:heading"] > max(log["unknown_force:N"], log["unknown_force:Y"]) + 10.0
 
@@ -76,8 +80,8 @@ def test_where_one_cause_explains_it_all_only_the_first_force_is_looked_at_from_
         "unknown_force:Y": -15.0,
     }
     assert _worth_a_look(hope, best_with(("a",), 1.0)) == ["unknown_force:X"]
-    assert _worth_a_look(hope, best_with(("a", "b"), 1.0)) == list(hope)[:MOST]
-    assert _worth_a_look(hope, best_with(("a",), 4.0)) == list(hope)[:MOST]
-    near = {**hope, "unknown_force:N": 1.0 - NEAR, "unknown_force:X": 3.0}
+    assert _worth_a_look(hope, best_with(("a", "b"), 1.0)) == list(hope)[:MAX_RELINEARISED]
+    assert _worth_a_look(hope, best_with(("a",), 4.0)) == list(hope)[:MAX_RELINEARISED]
+    near = {**hope, "unknown_force:N": 1.0 - NEAR_LOG_POSTERIOR, "unknown_force:X": 3.0}
     assert _worth_a_look(near, best_with(("a",), 1.0)) == ["unknown_force:X", "unknown_force:N"]
-    assert _worth_a_look({"unknown_force:X": -1.0 - FAR}, best_with(("a",), 4.0)) == []
+    assert _worth_a_look({"unknown_force:X": -1.0 - FAR_LOG_POSTERIOR}, best_with(("a",), 4.0)) == []

@@ -14,19 +14,18 @@ from scipy.optimize import lsq_linear
 from scipy.stats import multivariate_normal
 
 import subzero
-from subzero.diagnosis import effects
-from subzero.diagnosis import tracked as tracks
-from subzero.diagnosis.detect import separation
-from subzero.diagnosis.effects.sensors import NOISE
-from subzero.diagnosis.entries import entries_of
-from subzero.diagnosis.evidence import Quadratic, freed, posterior
-from subzero.diagnosis.hypotheses import places
-from subzero.diagnosis.noise import Noise
-from subzero.diagnosis.problem import Observed, Problem
-from subzero.diagnosis.response import TRUTHS, economical, respond
-from subzero.diagnosis.setting import Setting
-from subzero.diagnosis.stride import quadratic_step
-from subzero.diagnosis.tracked import tracked
+from subzero.diagnosis.assessment.identifiability import separation
+from subzero.diagnosis.hypothesis import catalogue as effects
+from subzero.diagnosis.hypothesis.catalogue.sensors import NOISE
+from subzero.diagnosis.hypothesis.configuration import Setting
+from subzero.diagnosis.hypothesis.hypotheses import columns_of, entries_of
+from subzero.diagnosis.inference import simulator as tracks
+from subzero.diagnosis.inference.linear_gaussian import Quadratic, freed, posterior
+from subzero.diagnosis.inference.map_fit import quadratic_step
+from subzero.diagnosis.inference.measurement import TRUTHS, economical, respond
+from subzero.diagnosis.inference.noise import Noise
+from subzero.diagnosis.inference.problem import Observed, Problem
+from subzero.diagnosis.inference.simulator import simulate_track
 from subzero.external_force import MissingForce, Term
 
 BASIC = ("surge_speed", "heading", "yaw_rate", "pitch", "roll", "depth")
@@ -122,7 +121,7 @@ def test_a_run_without_its_energies_is_the_same_run(monkeypatch):
     force = MissingForce(terms=(Term("X", "wet_length*u2", -0.02), Term("N", "time*u2", 0.01)))
     trial = dataclasses.replace(TRIAL, duration=4.0)
     setting = economical(Setting(trial=trial, model=dataclasses.replace(FIG6.model, missing=force)), 4.0)
-    without, eased = tracked(setting)[1], tracks._ease
+    without, eased = simulate_track(setting)[1], tracks._ease
 
     def ease(setup):
         eased(setup)
@@ -130,7 +129,7 @@ def test_a_run_without_its_energies_is_the_same_run(monkeypatch):
         setup.fixed.booked = True
 
     monkeypatch.setattr(tracks, "_ease", ease)
-    assert np.array_equal(tracked(setting)[1], without)
+    assert np.array_equal(simulate_track(setting)[1], without)
 
 
 def test_the_catalogue_has_the_ids_that_are_promised():
@@ -204,10 +203,9 @@ def _column(problem, zero, k, share):
 
 def test_a_run_that_cannot_go_on_is_told_by_nan():
     broken = FIG6.with_model(current=(-30.0, 0.0, 0.0))
-    _, track = tracked(economical(broken, 30.0))
     shown = respond(economical(broken, 30.0), np.array([0.0, 30.0]), ["surge_speed"])["surge_speed"]
     assert np.isfinite(shown[0])
-    assert np.isfinite(track[-1]).all() == np.isfinite(shown[1])
+    assert np.isnan(shown[1])
 
 
 def test_D_under_wide_tolerances_is_that_of_a_model_with_such_tolerances(plant):
@@ -221,7 +219,7 @@ def test_D_under_wide_tolerances_is_that_of_a_model_with_such_tolerances(plant):
     ]  # fmt: skip
     doubled = dataclasses.replace(problem, entries=tuple(wide))
     z = np.zeros(len(problem.entries))
-    z[places(problem.entries, ("rudder_offset",))] = 2.5
+    z[columns_of(problem.entries, ("rudder_offset",))] = 2.5
     found, who = separation(problem, J, z, ("rudder_offset",), 2.0)
     assert (found, who) == (pytest.approx(separation(doubled, J, z, ("rudder_offset",))[0]), who)
     assert 9.0 < found < separation(problem, J, z, ("rudder_offset",))[0]

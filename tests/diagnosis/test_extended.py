@@ -9,12 +9,11 @@ import pytest
 from numpy.testing import assert_allclose
 
 import subzero
-from subzero.diagnosis import effects
-from subzero.diagnosis.extended import all_effects, apply, unseen
-from subzero.diagnosis.extended_reading import read_extended
-from subzero.diagnosis.extended_text import text_of
-from subzero.diagnosis.setting import Setting
-from subzero.diagnosis.verdict import Extended
+from subzero.diagnosis.hypothesis import catalogue as effects
+from subzero.diagnosis.hypothesis.configuration import Setting
+from subzero.diagnosis.hypothesis.extended_model import all_effects, apply, unseen
+from subzero.diagnosis.report.toml_file import read_extended, text_of
+from subzero.diagnosis.results import Extended
 from subzero.errors import UserError
 from subzero.external_force import MissingForce, Term
 from subzero.model import Model
@@ -110,7 +109,7 @@ def test_effects_of_sensors_are_told_apart_for_a_run_does_not_show_them():
 
 
 OWN = """
-from subzero.diagnosis.effect import Effect, Parameter
+from subzero.diagnosis.hypothesis.effect import Effect, Parameter
 
 def lost(setting, mass):
     return setting.with_vehicle(rigid_body__mass=lambda old: old - mass)

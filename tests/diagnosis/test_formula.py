@@ -3,13 +3,20 @@
 import numpy as np
 import pytest
 
-from subzero.diagnosis.formula import as_missing, at_knots, samples_of
-from subzero.diagnosis.formula_choice import choose, describe
-from subzero.diagnosis.latent import Seen
-from subzero.diagnosis.recover import recover
-from subzero.diagnosis.shape_prior import all_shapes, size_of
-from subzero.diagnosis.shapes import Shape, factors_along, shifted, windowed
-from subzero.diagnosis.unknown import lacking
+from subzero.diagnosis.inference.basis import (
+    Shape,
+    all_shapes,
+    at_knots,
+    factors_along,
+    samples_of,
+    shifted,
+    size_of,
+    windowed,
+)
+from subzero.diagnosis.inference.force_formula import as_missing, choose, describe
+from subzero.diagnosis.inference.input_estimation import estimate_force
+from subzero.diagnosis.inference.latent_force import without_force
+from subzero.diagnosis.inference.linear_gaussian import ForceInformation
 from subzero.external_force import FEATURES, MissingForce, Term, feature_value, history_at
 
 TIMES, KNOTS = samples_of(30.0), np.linspace(0.0, 30.0, 31)
@@ -26,7 +33,7 @@ def seen_of(force, sd=0.02, seed=0):
     """What data would say that measure the force at knots directly, with noise."""
     to_knots = at_knots(TIMES, KNOTS)
     noisy = to_knots @ force + sd * np.random.default_rng(seed).standard_normal(KNOTS.size)
-    return Seen(np.eye(KNOTS.size) / sd**2, noisy / sd**2)
+    return ForceInformation(np.eye(KNOTS.size) / sd**2, noisy / sd**2)
 
 
 def chosen(shapes, force, axis):
@@ -87,8 +94,8 @@ def test_a_wave_is_called_a_wave(track):
 def test_the_drag_that_the_model_lacks_is_found_in_a_record(plant):
     """X = −0.02 · wet length, far beyond the tolerances, from six noisy channels."""
     force = MissingForce(terms=(Term("X", "wet_length", -0.02),))
-    planted = plant(lambda setting: lacking(setting, force))
-    found = describe(recover(planted.problem, planted.fit(), "X"))
+    planted = plant(lambda setting: without_force(setting, force))
+    found = describe(estimate_force(planted.problem, planted.fit(), "X"))
     assert "wet_length" in list(found.features)[:2]
     known = np.interp(TIMES, KNOTS, -0.02 * _length(planted))
     assert np.sqrt(np.mean((found.force() - known) ** 2)) < 0.3 * np.abs(known).max()

@@ -4,9 +4,18 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from subzero.diagnosis.effects import catalogue
-from subzero.diagnosis.gain import BLOCKS, Fitted, gain, held_out, parts_of, raw, rows_of, share
-from subzero.diagnosis.noise import Noise
+from subzero.diagnosis.assessment.cross_validation import (
+    BLOCKS,
+    Fitted,
+    gain,
+    held_out,
+    parts_of,
+    raw,
+    rows_of,
+    share,
+)
+from subzero.diagnosis.hypothesis.catalogue import catalogue
+from subzero.diagnosis.inference.noise import Noise
 
 
 def hidden(name, size):

@@ -1,6 +1,7 @@
 """What hardly acts any more from some time on is found, although a small change of it says little where it is small.
 
-Verifies: `subzero.diagnosis.hopes.large_hopes` and what `struck` makes of it. Configuration: fig6, 30 s, six channels
+Verifies: `inference.change_point_scan.ranked_by_runs`, and what `fit_change_points` makes of it. Configuration:
+fig6, 30 s, six channels
 with coloured noise; a cable that from 9 s on drags along itself by 12 % of what it did. Tolerance: a step of the times
 that are tried, 2 s, before the fit; behind it a step and a half of the runs, 0.3 s, and the drag's own tolerance, 0.05.
 """
@@ -10,14 +11,18 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
-from subzero.diagnosis.begun import begun_at
-from subzero.diagnosis.candidate import candidate_of
-from subzero.diagnosis.effects import catalogue
-from subzero.diagnosis.hopes import hopes_in, large_hopes
-from subzero.diagnosis.hypotheses import variances
-from subzero.diagnosis.refit import refit
-from subzero.diagnosis.struck import struck
-from subzero.diagnosis.sudden import Along, Place
+from subzero.diagnosis.hypothesis.catalogue import catalogue
+from subzero.diagnosis.hypothesis.effect import with_onset
+from subzero.diagnosis.hypothesis.hypotheses import variances
+from subzero.diagnosis.inference.change_point_fit import fit_change_points
+from subzero.diagnosis.inference.change_point_scan import (
+    BaseRun,
+    LinearisationPoint,
+    ranked_by_runs,
+    ranked_in,
+)
+from subzero.diagnosis.inference.laplace import candidate_of
+from subzero.diagnosis.inference.map_fit import refit
 
 EFFECTS = catalogue(("heading",))
 ABLE = [effect for effect in EFFECTS.values() if effect.sudden]
@@ -27,7 +32,7 @@ DRAG, SHARE, BEGINS = "cable_tangential_drag", -0.88, 9.0
 @pytest.fixture(scope="module")
 def hanging(plant):
     """Return a record's problem and the fit of a cable that drags less all the time."""
-    planted = plant(lambda setting: begun_at(EFFECTS[DRAG], BEGINS).apply(setting, SHARE))
+    planted = plant(lambda setting: with_onset(EFFECTS[DRAG], BEGINS).apply(setting, SHARE))
     problem = planted.problem
     D = variances(problem.entries, (DRAG,), 1.0)
     return problem, candidate_of(
@@ -37,7 +42,7 @@ def hanging(plant):
 
 def test_it_has_hope_from_about_then_on(hanging):
     problem, throughout = hanging
-    (hope,) = large_hopes(problem, throughout, ABLE, 0)
+    (hope,) = ranked_by_runs(problem, throughout, ABLE, 0)
     assert abs(hope.begun.time - BEGINS) <= 2.0
     assert hope.begun.mean[0] < -0.6
     assert hope.log_posterior > throughout.log_posterior
@@ -47,16 +52,16 @@ def test_it_has_hope_from_about_then_on(hanging):
 
 def test_a_small_change_promises_less(hanging):
     problem, throughout = hanging
-    (large,) = large_hopes(problem, throughout, ABLE, 0)
-    place = Place(throughout.fit, Along(problem, throughout.fit.z))
-    small = {one.begun.effect.id: one for one in hopes_in(problem, place, ABLE, 0)}
+    (large,) = ranked_by_runs(problem, throughout, ABLE, 0)
+    place = LinearisationPoint(throughout.fit, BaseRun(problem, throughout.fit.z))
+    small = {one.begun.effect.id: one for one in ranked_in(problem, place, ABLE, 0)}
     assert small[DRAG].log_posterior < large.log_posterior - 20.0
 
 
 def test_it_is_fitted_from_there(hanging):
     problem, throughout = hanging
     with ThreadPoolExecutor(2) as side:
-        (one,) = struck(problem, [], ABLE, 0, throughout.log_posterior, side, [throughout])[:1]
+        (one,) = fit_change_points(problem, [], ABLE, 0, throughout.log_posterior, side, [throughout])[:1]
     assert one.begun.effect.id == DRAG
     assert one.begun.time == pytest.approx(BEGINS, abs=0.3)
     assert one.begun.mean[0] == pytest.approx(SHARE, abs=0.05)
@@ -65,4 +70,4 @@ def test_it_is_fitted_from_there(hanging):
 
 def test_only_what_can_begin_late_is_tried(hanging):
     problem, throughout = hanging
-    assert large_hopes(problem, throughout, [effect for effect in ABLE if effect.id != DRAG], 0) == []
+    assert ranked_by_runs(problem, throughout, [effect for effect in ABLE if effect.id != DRAG], 0) == []

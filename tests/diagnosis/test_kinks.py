@@ -12,17 +12,23 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from subzero.diagnosis import growing, kinks, wide
-from subzero.diagnosis import refit as refitting
-from subzero.diagnosis import search as searching
-from subzero.diagnosis.around import beside, swept
-from subzero.diagnosis.candidate import Candidate, candidate_of
-from subzero.diagnosis.effects import catalogue
-from subzero.diagnosis.fits import HOPELESS
-from subzero.diagnosis.hypotheses import places, variances
-from subzero.diagnosis.kinks import STRAYED, TYPICAL, begun_again, kinked, strayed
-from subzero.diagnosis.refit import Fit, refit, with_own_slopes
-from subzero.diagnosis.search import Search
+from subzero.diagnosis.hypothesis.catalogue import catalogue
+from subzero.diagnosis.hypothesis.hypotheses import columns_of, variances
+from subzero.diagnosis.inference import map_fit, model_search
+from subzero.diagnosis.inference.laplace import Candidate, candidate_of
+from subzero.diagnosis.inference.map_fit import (
+    RESTART_TOLERANCES,
+    STRAYED_TOLERANCES,
+    Fit,
+    at_bad_minimum,
+    non_smooth,
+    refit,
+    restarted_off_kinks,
+    with_own_jacobian,
+)
+from subzero.diagnosis.inference.model_fits import HOPELESS_LOG_POSTERIOR
+from subzero.diagnosis.inference.model_search import Search
+from subzero.diagnosis.inference.screening import with_one_added, with_sizes_tried
 
 SLACK, DRUM = ("cable_initial_length",), ("drum_inertia",)
 DRUM_TOLERANCE = 0.2
@@ -59,20 +65,22 @@ def test_a_slack_cable_is_found_by_real_runs(plant):
     )
     search.fit(())
     nothing = search.best()
-    sizes = swept(search.problem, nothing, (), kinked(search.problem, ()))
+    sizes = with_sizes_tried(search.problem, nothing, (), non_smooth(search.problem, ()))
     best = max(sizes, key=lambda ids: sizes[ids].log_posterior)
     assert best == SLACK
-    assert sizes[SLACK].log_posterior > beside(search.problem, nothing)[SLACK] + 5.0
+    assert sizes[SLACK].log_posterior > with_one_added(search.problem, nothing)[SLACK] + 5.0
     search.grow()
     fit = search.candidates[SLACK].fit
-    assert fit.z[places(search.problem.entries, SLACK)] == pytest.approx(9.0, abs=2.0)
+    assert fit.z[columns_of(search.problem.entries, SLACK)] == pytest.approx(9.0, abs=2.0)
     assert search.best().ids == SLACK
 
 
 def test_sizes_are_tried_of_what_has_kinks_and_is_not_there(plant):
     search = begun(plant(duration=6.0))
     search.fit(SLACK)
-    tried = swept(search.problem, search.candidates[SLACK], SLACK, kinked(search.problem, SLACK))
+    tried = with_sizes_tried(
+        search.problem, search.candidates[SLACK], SLACK, non_smooth(search.problem, SLACK)
+    )
     assert all(set(SLACK) < set(ids) for ids in tried)
     more = {one for ids in tried for one in ids} - set(SLACK)
     assert more == {"drum_friction", "drum_inertia", "rudder_backlash", "rudder_rate_limit", "battery_sag"}
@@ -83,7 +91,7 @@ def test_a_fit_in_a_hollow_is_made_again_from_where_its_rival_is(plant):
     search.fit_all([ids, rival])
     good = search.candidates[ids]
     z = good.fit.z + 0.5 * np.array([entry.parameter.tolerance for entry in search.problem.entries])
-    behind = search.candidates[rival].log_posterior - HOPELESS / 2
+    behind = search.candidates[rival].log_posterior - HOPELESS_LOG_POSTERIOR / 2
     hollow = dataclasses.replace(good, fit=dataclasses.replace(good.fit, z=z), log_posterior=behind)
     search.candidates[ids] = hollow
     search.cross()
@@ -93,36 +101,36 @@ def test_a_fit_in_a_hollow_is_made_again_from_where_its_rival_is(plant):
 def astray(problem):
     """Return a fit of "nothing is wrong" that a heavy drum has led astray."""
     z = np.zeros(len(problem.entries))
-    z[places(problem.entries, DRUM)] = 5.0 * DRUM_TOLERANCE
+    z[columns_of(problem.entries, DRUM)] = 5.0 * DRUM_TOLERANCE
     r, J, D = problem.residual(z), problem.jacobian(z), variances(problem.entries, (), 4.0)
     objective = 0.5 * float(r @ r + np.sum(z * z / D))
-    return Fit(z=z, r=r, J=J, D=D, objective=objective, converged=False, promise=0.0, fresh=0)
+    return Fit(z=z, r=r, J=J, D=D, objective=objective, converged=False, predicted_gain=0.0, fresh=0)
 
 
 def test_a_fit_that_bends_a_kink_far_has_gone_astray(plant):
     problem = plant(duration=8.0).problem
-    fit, (k,) = astray(problem), places(problem.entries, DRUM)
-    assert strayed(problem, fit, ())
-    assert not strayed(problem, fit, DRUM), "a cause may be as large as it is"
+    fit, (k,) = astray(problem), columns_of(problem.entries, DRUM)
+    assert at_bad_minimum(problem, fit, ())
+    assert not at_bad_minimum(problem, fit, DRUM), "a cause may be as large as it is"
     for bent, far in ((0.9, False), (1.1, True)):
-        fit.z[k] = bent * STRAYED * DRUM_TOLERANCE
-        assert strayed(problem, fit, ()) is far
+        fit.z[k] = bent * STRAYED_TOLERANCES * DRUM_TOLERANCE
+        assert at_bad_minimum(problem, fit, ()) is far
 
 
 def test_a_fit_astray_is_begun_again_from_a_usual_drum(plant):
     problem = plant(duration=8.0).problem
     fit, D = astray(problem), variances(problem.entries, (), 1.0)
-    again = begun_again(problem, fit, (), D)
+    again = restarted_off_kinks(problem, fit, (), D)
     assert again.objective < fit.objective
-    assert not strayed(problem, again, ())
+    assert not at_bad_minimum(problem, again, ())
 
 
 def test_a_fit_on_a_kink_comes_out_of_its_hollow():
     """The residual is 1 at a resting drum, 2 behind its kink and 0 at the truth: no slope leads there from the kink."""
-    places, residuals = [0.0, 0.2, 0.8, 2.0], [1.0, 2.0, 0.0, 1.2]
+    columns_of, residuals = [0.0, 0.2, 0.8, 2.0], [1.0, 2.0, 0.0, 1.2]
 
     def residual(z):
-        return np.interp(z, places, residuals)
+        return np.interp(z, columns_of, residuals)
 
     entry = SimpleNamespace(record=-1, effect=SimpleNamespace(slot="drum", id="drum_friction"),
                             parameter=SimpleNamespace(low=0.0, high=2.0, tolerance=1.0))  # fmt: skip
@@ -131,7 +139,7 @@ def test_a_fit_on_a_kink_comes_out_of_its_hollow():
     z = np.zeros(1)
     fit = refit(problem, z, problem.jacobian(z), np.ones(1))
     assert fit.z == 0.0
-    again = begun_again(problem, fit, ())
+    again = restarted_off_kinks(problem, fit, ())
     assert 0.6 < again.z[0] <= 0.8
     assert again.objective < 0.4 < fit.objective
 
@@ -141,13 +149,13 @@ def test_a_fit_is_begun_again_off_its_kinks_and_where_all_else_is_best_for_that(
     """Best in the linear problem: the slope of the objective is 0 in all that is neither held nor at a bound."""
     problem, begins = plant(duration=8.0).problem, []
     fit, D = astray(problem), variances(problem.entries, ids, 1.0)
-    monkeypatch.setattr(kinks, "refit", lambda problem, z, *others, **more: begins.append(z))
-    begun_again(problem, fit, ids, D)
-    (z,), at = begins, kinked(problem, ids)
+    monkeypatch.setattr(map_fit, "refit", lambda problem, z, *others, **more: begins.append(z))
+    restarted_off_kinks(problem, fit, ids, D)
+    (z,), at = begins, non_smooth(problem, ids)
     tolerance = np.array([entry.parameter.tolerance for entry in problem.entries])
     assert {"drum_friction", "cable_initial_length"} <= {problem.entries[k].effect.id for k in at}
     assert ("drum_inertia" in {problem.entries[k].effect.id for k in at}) is (ids != DRUM)
-    assert z[at] == pytest.approx(TYPICAL * tolerance[at])
+    assert z[at] == pytest.approx(RESTART_TOLERANCES * tolerance[at])
     slope = fit.J.T @ (fit.r - fit.J @ (z - fit.z)) - z / D
     free = [k for k, entry in enumerate(problem.entries)
             if k not in at and entry.parameter.low < z[k] < entry.parameter.high]  # fmt: skip
@@ -160,9 +168,9 @@ def test_a_fit_is_begun_again_off_its_kinks_and_where_all_else_is_best_for_that(
 def test_a_fit_is_begun_again_within_bounds(plant):
     """What the linear problem makes of a record that nothing fits: less than no drag, which cannot be run."""
     problem = plant(duration=8.0).problem
-    fit, (k,) = astray(problem), places(problem.entries, ("cable_normal_drag",))
+    fit, (k,) = astray(problem), columns_of(problem.entries, ("cable_normal_drag",))
     fit = dataclasses.replace(fit, r=fit.r - 1e4 * fit.J[:, k])
-    again = begun_again(problem, fit, ())
+    again = restarted_off_kinks(problem, fit, ())
     assert again.z[k] >= problem.entries[k].parameter.low
 
 
@@ -172,17 +180,22 @@ def test_sensitivities_are_made_again_where_a_fit_has_moved(plant, away, same):
     tolerance = np.array([entry.parameter.tolerance for entry in problem.entries])
     z, r = np.zeros(tolerance.size), problem.residual(np.zeros(tolerance.size))
     fit = Fit(z=z, r=r, J=np.zeros((r.size, z.size)), D=tolerance**2, objective=0.5 * float(r @ r), converged=True,
-              promise=0.0, fresh=0, made_at=None if away is None else z + away * tolerance)  # fmt: skip
-    again = with_own_slopes(problem, fit)
+              predicted_gain=0.0, fresh=0, made_at=None if away is None else z + away * tolerance)  # fmt: skip
+    again = with_own_jacobian(problem, fit)
     assert (again is fit) is same
     assert np.any(again.J) == (not same)
 
 
 def test_the_wide_fit_comes_back_from_astray(plant, monkeypatch):
-    problem = plant(duration=8.0).problem
-    monkeypatch.setattr(wide, "refit", lambda problem, *others, **more: astray(problem))
-    _, fit, _ = wide.fit_wide(problem, lambda share, words: None)
-    assert fit.z[places(problem.entries, DRUM)] < 2.0 * DRUM_TOLERANCE
+    problem, fits = plant(duration=8.0).problem, []
+
+    def first_astray(problem, *others, **more):
+        fits.append(refit(problem, *others, **more) if fits else astray(problem))
+        return fits[-1]
+
+    monkeypatch.setattr(map_fit, "refit", first_astray)
+    _, fit, _ = map_fit.fit_wide(problem, lambda share, words: None)
+    assert fit.z[columns_of(problem.entries, DRUM)] < 2.0 * DRUM_TOLERANCE
 
 
 def test_the_best_comes_back_from_astray_before_it_is_looked_beside_and_so_does_it_without_its_cause(plant):
@@ -195,34 +208,6 @@ def test_the_best_comes_back_from_astray_before_it_is_looked_beside_and_so_does_
     assert search.candidates[()].log_posterior > lost.log_posterior + 5.0
 
 
-def test_growing_looks_beside_what_is_best_off_its_kinks(monkeypatch):
-    """... and each hypothesis is fitted from there once."""
-    level = dict.fromkeys((1.0, 2.0, 4.0), 0.0)
-    search, looked, made = (
-        Search(problem=SimpleNamespace(entries=()), progress=lambda share, words: None),
-        [],
-        [],
-    )
-    search.candidates = {ids: Candidate(ids=ids, fit=None, log_evidence=level, log_posterior=log)
-                         for ids, log in ((("a",), -10.0), (("b",), -12.0))}  # fmt: skip
-
-    def again(problem, ids, fit):
-        made.append(ids)
-        return Candidate(ids=ids, fit=fit, log_evidence=level, log_posterior=-5.0)
-
-    monkeypatch.setattr(growing, "begun_again", lambda *asked: "again")
-    monkeypatch.setattr(growing, "candidate_of", again)
-    monkeypatch.setattr(search, "_more", lambda best: looked.append((best.ids, best.log_posterior)) or [])
-    monkeypatch.setattr(search, "_simpler", lambda: looked.append("simpler"))
-    later = Candidate(ids=("c",), fit=None, log_evidence=level, log_posterior=-4.0)
-    monkeypatch.setattr(search, "cross", lambda: search.candidates.setdefault(("c",), later))
-    for name in ("_without", "_aside_of", "_kinked", "_parts_again", "race", "sharpen"):
-        monkeypatch.setattr(search, name, lambda *asked: None)
-    search.grow()
-    assert looked == [(("a",), -5.0), (("c",), -4.0), "simpler"], "what is simpler once the best stays"
-    assert made == [("a",), ("c",)]
-
-
 def test_the_first_that_are_close_are_fitted_from_off_their_kinks_before_they_are_told(monkeypatch):
     search, again = Search(problem=None, progress=lambda share, words: None), []
     for name, log in zip("abcde", (-10.0, -11.0, -15.9, -10.5, -17.0), strict=True):
@@ -231,7 +216,7 @@ def test_the_first_that_are_close_are_fitted_from_off_their_kinks_before_they_ar
     for name in ("_is_open", "cross", "_nothing"):
         monkeypatch.setattr(search, name, lambda *asked: None)
     search.settle()
-    assert again == ["a", "d", "b"], f"the first {searching.FIRST}"
+    assert again == ["a", "d", "b"], f"the first {model_search.MAX_RESTARTED}"
     again.clear()
     search.candidates = {ids: one for ids, one in search.candidates.items() if ids[0] in "ace"}
     search.settle()
@@ -263,7 +248,7 @@ def test_a_pair_is_looked_for_beside_what_is_not_the_best(monkeypatch):
         "right": {("other", "right"): -41.0},
         "other": {("other", "right"): -44.0, ("other", "wrong"): -51.0},
     }
-    monkeypatch.setattr(growing, "beside", lambda problem, one: found.get(one.ids[0], {}))
+    monkeypatch.setattr(model_search, "with_one_added", lambda problem, one: found.get(one.ids[0], {}))
     monkeypatch.setattr(search, "fit", lambda ids, start: fits.setdefault(ids, start))
     search._aside_of(search.best())
     assert fits == {("other", "right"): "right"}, "from the better of the two; not what is behind the best"
@@ -282,21 +267,21 @@ def test_one_cause_that_is_far_away_is_found_in_the_place_of_two(plant, monkeypa
     assert search.best().ids == ("clock_offset",)
     assert search.best().fit.made_at is not None, "with sensitivities from out there"
     assert raced == [2]
-    (late,) = places(search.problem.entries, ("clock_offset",))
+    (late,) = columns_of(search.problem.entries, ("clock_offset",))
     assert search.best().fit.z[late] == pytest.approx(0.6, abs=0.1)
 
 
 @pytest.mark.parametrize(
-    ("promises", "legs"), [([100.0, 50.0, 20.0], 2), ([100.0] * 9, refitting.LEGS), ([5.0], 0)]
+    ("promises", "legs"), [([100.0, 50.0, 20.0], 2), ([100.0] * 9, map_fit.MAX_RESTARTS), ([5.0], 0)]
 )
 def test_a_cause_that_is_far_away_is_fitted_on_while_much_is_promised(plant, monkeypatch, promises, legs):
     search, asked = begun(plant(duration=4.0)), []
 
     def leg(problem, z, J, D, **more):
         asked.append(z)
-        return SimpleNamespace(z=z + 1.0, r=None, D=D, promise=promises[len(asked) - 1])
+        return SimpleNamespace(z=z + 1.0, r=None, D=D, predicted_gain=promises[len(asked) - 1])
 
-    for module in (searching, refitting):
+    for module in (model_search, map_fit):
         monkeypatch.setattr(module, "refit", leg)
     monkeypatch.setattr(type(search.problem), "jacobian", lambda self, z: None)
     search._alone(("hull_drag",))

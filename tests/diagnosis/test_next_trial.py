@@ -5,11 +5,16 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from subzero.diagnosis.effects import catalogue
-from subzero.diagnosis.next_trial import next_trial
-from subzero.diagnosis.outlook import Belief, outlook
-from subzero.diagnosis.refit import Fit
-from subzero.diagnosis.trial_library import LIBRARY, PLANE, RUDDER, cruise, fastest
+from subzero.diagnosis.assessment.next_trial import Belief, next_trial, outlook
+from subzero.diagnosis.assessment.trial_library import (
+    LIBRARY,
+    PLANE_AMPLITUDE,
+    RUDDER_AMPLITUDE,
+    cruise,
+    fastest,
+)
+from subzero.diagnosis.hypothesis.catalogue import catalogue
+from subzero.diagnosis.inference.map_fit import Fit
 
 
 class Survivor(NamedTuple):
@@ -63,8 +68,8 @@ def test_every_trial_stays_within_limits(lagging, name):
     assert commands.time[0] == 0.0
     assert commands.time[-1] < trial.duration <= 80.0
     assert np.abs(commands.values[:, 0]).max() <= fastest(setting)
-    assert np.abs(commands.values[:, 1]).max() <= RUDDER + 1e-9
-    assert np.abs(commands.values[:, 2:]).max() <= 2.0 * PLANE + 1e-9
+    assert np.abs(commands.values[:, 1]).max() <= RUDDER_AMPLITUDE + 1e-9
+    assert np.abs(commands.values[:, 2:]).max() <= 2.0 * PLANE_AMPLITUDE + 1e-9
     assert words.endswith(".")
     assert cruise(setting) > 0.0
 

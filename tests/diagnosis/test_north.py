@@ -1,6 +1,6 @@
 """A vehicle that heads north has a compass that jumps from 360 to 0 degrees, and a diagnosis that does not.
 
-Verifies: `subzero.records.heading`, and what `response`, `problem`, `other_code` and `challenge` make of a heading
+Verifies: `subzero.records.record`, and what `measurement`, `problem`, `reference_run` and `challenge` make of a heading
 about north. Configuration: the first seconds of zigzag, which starts at north. Tolerance: an angle at the start is
 there at the start, to the steps' error of 0.02 degrees.
 """
@@ -13,18 +13,16 @@ import pytest
 from numpy.testing import assert_allclose
 
 import subzero
-from subzero.diagnosis.answer import Answer
-from subzero.diagnosis.challenge import Challenge, write
-from subzero.diagnosis.effects import START
-from subzero.diagnosis.hidden import Hidden
-from subzero.diagnosis.logged import Logged
-from subzero.diagnosis.other_code import simulate_otherwise
-from subzero.diagnosis.plausible import unit_questions
-from subzero.diagnosis.pose import pose
-from subzero.diagnosis.response import respond
-from subzero.diagnosis.setting import Setting
-from subzero.records.heading import turned
-from subzero.records.record import Record, read_record
+from subzero.diagnosis.hypothesis.catalogue import START
+from subzero.diagnosis.hypothesis.configuration import Logged, Setting
+from subzero.diagnosis.inference.measurement import respond
+from subzero.diagnosis.inference.problem import pose
+from subzero.records.record import Record, read_record, turned
+from subzero.records.unit_checks import unit_questions
+from subzero.synthetic.challenge import Challenge, write
+from subzero.synthetic.planted import Hidden
+from subzero.synthetic.reference_run import simulate_reference
+from subzero.synthetic.sealed_answer import Answer
 
 LONG = subzero.load_scenario("zigzag")
 TRIAL = dataclasses.replace(LONG, duration=4.0)
@@ -52,7 +50,7 @@ def test_a_little_to_port_of_north_is_a_little_less_than_north():
 
 
 def test_the_other_formulation_counts_a_heading_in_the_same_way():
-    shown = simulate_otherwise(TURN.apply(NORTH, -0.2), TIMES, ["heading"])["heading"]
+    shown = simulate_reference(TURN.apply(NORTH, -0.2), TIMES, ["heading"])["heading"]
     assert shown[0] == pytest.approx(-0.2, abs=0.02)
 
 

@@ -10,12 +10,17 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.stats import multivariate_normal
 
-from subzero.diagnosis.candidate import candidate_of
-from subzero.diagnosis.evidence import Scale, mixed
-from subzero.diagnosis.latent import Seen, Terms, log_evidence_term
-from subzero.diagnosis.one_term import one_terms
-from subzero.diagnosis.suspects import suspects
-from subzero.diagnosis.unknown import FORCE, force_columns, knots_of
+from subzero.diagnosis.inference.basis import one_terms
+from subzero.diagnosis.inference.input_estimation import latent_force_candidates
+from subzero.diagnosis.inference.laplace import candidate_of
+from subzero.diagnosis.inference.latent_force import FORCE, force_columns, knots_of
+from subzero.diagnosis.inference.linear_gaussian import (
+    ForceInformation,
+    Scale,
+    Terms,
+    log_evidence_term,
+    mixed,
+)
 from subzero.external_force import AXES, MissingForce, Term
 
 
@@ -37,7 +42,7 @@ def test_the_evidence_of_a_term_is_that_of_a_normal_distribution():
         random.standard_normal(30),
         random.standard_normal((6, 2)),
     )
-    data, a = Seen(columns.T @ columns, columns.T @ r), 0.8
+    data, a = ForceInformation(columns.T @ columns, columns.T @ r), 0.8
 
     def exact(term):
         column = columns @ phi[:, term]
@@ -77,8 +82,8 @@ def test_a_growing_heel_is_seen_as_a_term_where_a_free_force_is_not(planted):
     fit, knots = planted.fit(), knots_of(planted.problem)
     columns = {FORCE + a: C for a, C in force_columns(planted.problem, fit.z, ("K", "N"), knots).items()}
     scales, terms = {1.0: Scale(0.0, fit.D)}, one_terms(planted.problem, fit.z, knots)
-    free = suspects(planted.problem, columns, fit, scales, knots)
-    told = suspects(planted.problem, columns, fit, scales, knots, terms)
+    free = latent_force_candidates(planted.problem, columns, fit, scales, knots)
+    told = latent_force_candidates(planted.problem, columns, fit, scales, knots, terms)
     assert told[0].id == "unknown_force:K"
     assert told[0].log_gain > free[0].log_gain + 3.0, "one number in the place of a knot every two seconds"
 

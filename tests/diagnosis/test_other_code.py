@@ -1,6 +1,6 @@
 """The truth by the other cable formulation agrees with the coupled run, far within the noise of any sensor.
 
-Verifies: `subzero.diagnosis.other_code`. Configuration: fig6 as it is, and with a heavier cable, a drum that rubs, a
+Verifies: `subzero.synthetic.reference_run`. Configuration: fig6 as it is, and with a heavier cable, a drum that rubs, a
 heavy drum, cable in the water at the start, a current, a change in mid-run, a missing force. Tolerance: a tenth of the
 noise of a usual sensor (0.0015 m/s, 0.04 degrees, 0.0015 m), and 1e-3 of the largest tow force on fig6; wider where a
 cable hangs slack, whose shape is nobody's (heavy and unheld, overrun by its drum, or in a cross current at rest).
@@ -12,12 +12,11 @@ import numpy as np
 import pytest
 
 import subzero
-from subzero.diagnosis.effects.sensors import NOISE
-from subzero.diagnosis.other_code import NoTruthError, simulate_otherwise, truth_of
-from subzero.diagnosis.other_sensors import seen
-from subzero.diagnosis.setting import Setting
+from subzero.diagnosis.hypothesis.catalogue.sensors import NOISE
+from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.external_force import MissingForce, Term
 from subzero.simulation import run_trial
+from subzero.synthetic.reference_run import NoTruthError, seen, simulate_reference, truth_of
 
 FIG6 = subzero.load_scenario("fig6")
 PLAIN = Setting(trial=FIG6, model=subzero.Model.of(FIG6))
@@ -64,7 +63,7 @@ def shown(setting, run):
 @pytest.mark.parametrize("name", CASES)
 def test_both_formulations_agree_far_within_the_noise(name):
     setting, share = CASES[name]
-    other, tight = simulate_otherwise(setting, TIMES, CHANNELS), shown(setting, by_tight_coupling(setting))
+    other, tight = simulate_reference(setting, TIMES, CHANNELS), shown(setting, by_tight_coupling(setting))
     for channel in CHANNELS:
         gap = np.abs(other[channel] - tight[channel]).max()
         assert gap < share * NOISE[channel], f"{channel}: {gap:.2g} against a noise of {NOISE[channel]:g}"
@@ -79,12 +78,12 @@ def test_on_fig6_the_tow_force_agrees_to_a_thousandth():
 
 
 def test_the_sensors_are_those_of_the_diagnosis():
-    from subzero.diagnosis.response import respond
+    from subzero.diagnosis.inference.measurement import respond
 
     setting = PLAIN.with_sensor("heading", scale=0.02, bias=1.5, lag=0.4).with_sensor("surge_speed", lag=0.05)
     setting = setting.with_sensor("roll", lag=1e-9)  # a drawn tolerance may be that small
     setting = dataclasses.replace(setting, clock_offset=0.23)
-    other, own = (ask(setting, TIMES, CHANNELS) for ask in (simulate_otherwise, respond))
+    other, own = (ask(setting, TIMES, CHANNELS) for ask in (simulate_reference, respond))
     for channel in CHANNELS:
         gap = np.nanmax(np.abs(other[channel] - own[channel]))
         assert gap < 0.25 * NOISE[channel], f"{channel}: {gap:.2g}"
@@ -93,4 +92,4 @@ def test_the_sensors_are_those_of_the_diagnosis():
 def test_a_prescribed_motion_has_no_other_truth():
     trial = subzero.load_scenario("fig4")
     with pytest.raises(NoTruthError, match="prescribed"):
-        simulate_otherwise(Setting(trial=trial, model=subzero.Model.of(trial)), TIMES, CHANNELS)
+        simulate_reference(Setting(trial=trial, model=subzero.Model.of(trial)), TIMES, CHANNELS)

@@ -9,8 +9,9 @@ import math
 import numpy as np
 import pytest
 
-from subzero.diagnosis import json_file, report, tables, words
-from subzero.diagnosis.verdict import (
+from subzero.diagnosis.report import html as report
+from subzero.diagnosis.report import json_file, tables, words
+from subzero.diagnosis.results import (
     CAUSE_NAMED,
     NOTHING_WRONG,
     OUTSIDE,

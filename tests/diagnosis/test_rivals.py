@@ -10,14 +10,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from subzero.diagnosis import report, tables
-from subzero.diagnosis.candidate import candidate_of
-from subzero.diagnosis.contenders import strange_rival
-from subzero.diagnosis.effects import catalogue
-from subzero.diagnosis.estimates import rivals
-from subzero.diagnosis.extending import Extension
-from subzero.diagnosis.showing import curves
-from subzero.diagnosis.verdict import CAUSE_NAMED, NOTHING_WRONG, UNDECIDED, Extended, Unknown, Verdict
+from subzero.diagnosis.assessment.residuals import curves
+from subzero.diagnosis.hypothesis.catalogue import catalogue
+from subzero.diagnosis.inference.laplace import candidate_of
+from subzero.diagnosis.report import html as report
+from subzero.diagnosis.report import tables
+from subzero.diagnosis.results import CAUSE_NAMED, NOTHING_WRONG, UNDECIDED, Extended, Unknown, Verdict
+from subzero.diagnosis.verdict.conclude import strange_rival
+from subzero.diagnosis.verdict.extension import Extension, rivals
 from subzero.figures import Title
 from subzero.figures.diagnosis import draw_diagnosis
 

@@ -13,20 +13,29 @@ import pytest
 from numpy.testing import assert_allclose
 
 import subzero
-from subzero.diagnosis.around import instead
-from subzero.diagnosis.candidate import Candidate
-from subzero.diagnosis.effect import Parameter
-from subzero.diagnosis.effects import START, catalogue
-from subzero.diagnosis.entries import entries_of
-from subzero.diagnosis.fits import HOPELESS, MOST_RUNS
-from subzero.diagnosis.hypotheses import log_prior, named, places
-from subzero.diagnosis.probability import FURTHER, UNTRIED, Beliefs, folded
-from subzero.diagnosis.problem import SHARE, STEP, Problem
-from subzero.diagnosis.rules import large
-from subzero.diagnosis.screen import MANY, STRAINED, Screen, is_close, look
-from subzero.diagnosis.search import Search
-from subzero.diagnosis.setting import Setting
-from subzero.diagnosis.stride import secant
+from subzero.diagnosis.hypothesis.catalogue import START, catalogue
+from subzero.diagnosis.hypothesis.configuration import Setting
+from subzero.diagnosis.hypothesis.effect import Parameter
+from subzero.diagnosis.hypothesis.hypotheses import columns_of, entries_of, log_prior, nameable
+from subzero.diagnosis.inference.laplace import Candidate
+from subzero.diagnosis.inference.map_fit import secant
+from subzero.diagnosis.inference.model_average import (
+    UNTRIED_LOG_POSTERIOR,
+    Beliefs,
+    occam_folded,
+    practical_causes,
+)
+from subzero.diagnosis.inference.model_fits import MAX_RUNS_PER_RECORD
+from subzero.diagnosis.inference.model_search import Search
+from subzero.diagnosis.inference.problem import JACOBIAN_STEP, JACOBIAN_STEP_SHARE, Problem
+from subzero.diagnosis.inference.screening import (
+    MAX_STRAINED,
+    STRAINED_TOLERANCES,
+    Screening,
+    is_close,
+    screening_of,
+    with_one_swapped,
+)
 
 
 def fitted(**log_posteriors):
@@ -42,7 +51,7 @@ def screen(far=False, **log_posteriors):
     names = {
         () if name == "none" else tuple(name.split("__")): value for name, value in log_posteriors.items()
     }
-    return Screen(log_posterior=names, count=30, far=far)
+    return Screening(log_posterior=names, count=30, far=far)
 
 
 def test_secants_explain_the_step_and_leave_other_directions():
@@ -71,7 +80,7 @@ def racing(runs, records=1, **hopes):
     search._again = fit_again
     for name, hope in hopes.items():
         fit = SimpleNamespace(
-            converged=hope is None, moved=lambda problem: np.inf, promise=(hope or -9.0) + 9.0
+            converged=hope is None, moved=lambda problem: np.inf, predicted_gain=(hope or -9.0) + 9.0
         )
         search.candidates[(name,)] = Candidate(ids=(name,), fit=fit, log_evidence={}, log_posterior=-9.0)
     search.raced |= {("best",), ("second",)}
@@ -82,36 +91,34 @@ def racing(runs, records=1, **hopes):
 def test_a_race_ends_with_the_first_that_is_hopeless():
     hopes = {"best": None, "second": None, "near": -9.0, "far": -8.0}
     assert racing(0, **hopes) == ["far", "near"]
-    assert HOPELESS > 0.0
 
 
 def test_after_many_runs_what_hopes_to_be_the_best_is_still_fitted_again():
     """A right pair whose first fit went nowhere is not lost because others have used up the runs."""
     hopes = {"best": None, "second": None, "hopes": 30.0}
-    assert racing(MOST_RUNS + 1, **hopes) == ["hopes"]
+    assert racing(MAX_RUNS_PER_RECORD + 1, **hopes) == ["hopes"]
 
 
 def test_two_records_have_twice_the_runs():
     hopes = {"best": None, "second": None, "near": -12.0}
-    assert racing(MOST_RUNS + 1, **hopes) == []
-    assert racing(MOST_RUNS + 1, records=2, **hopes) == ["near"]
+    assert racing(MAX_RUNS_PER_RECORD + 1, **hopes) == []
+    assert racing(MAX_RUNS_PER_RECORD + 1, records=2, **hopes) == ["near"]
 
 
 def test_steps_of_sensitivities_grow_with_what_is_there(plant):
     problem = plant(duration=6.0).problem
     k = next(k for k, one in enumerate(problem.entries) if one.effect.id == "rudder_offset")
     z, tolerance = np.zeros(len(problem.entries)), problem.entries[k].parameter.tolerance
-    assert problem._moved(z, k)[k] == pytest.approx(STEP * tolerance)
+    assert problem._moved(z, k)[k] == pytest.approx(JACOBIAN_STEP * tolerance)
     z[k] = -20.0 * tolerance
-    assert abs(problem._moved(z, k)[k] - z[k]) == pytest.approx(20.0 * SHARE * tolerance)
+    assert abs(problem._moved(z, k)[k] - z[k]) == pytest.approx(20.0 * JACOBIAN_STEP_SHARE * tolerance)
 
 
 def test_a_further_cause_is_told_only_if_it_is_needed():
-    assert folded({("a",): 0.21, ("a", "b"): 0.79}) == {("a",): 1.0}
-    needed = folded({("a",): 0.19, ("a", "b"): 0.81})
+    assert occam_folded({("a",): 0.21, ("a", "b"): 0.79}) == {("a",): 1.0}
+    needed = occam_folded({("a",): 0.19, ("a", "b"): 0.81})
     assert list(needed) == [("a", "b"), ("a",)]
     assert sum(needed.values()) == pytest.approx(1.0)
-    assert pytest.approx(4.0) == FURTHER, "from the probability of 0.8 that a cause is named at"
 
 
 def test_what_was_given_up_stays_behind():
@@ -124,8 +131,10 @@ def test_what_was_never_tried_comes_no_closer_than_a_guess_may():
     beliefs = Beliefs(
         candidates=fitted(none=-50.0, a=-10.0), screen=screen(none=0.0, a=5.0, b=99.0), beside={}
     )
-    assert beliefs.log_posteriors()[("b",)] == -10.0 - UNTRIED
-    assert beliefs.log_total() == pytest.approx(-10.0 + math.log1p(math.exp(-UNTRIED)), abs=1e-6)
+    assert beliefs.log_posteriors()[("b",)] == -10.0 - UNTRIED_LOG_POSTERIOR
+    assert beliefs.log_total() == pytest.approx(
+        -10.0 + math.log1p(math.exp(-UNTRIED_LOG_POSTERIOR)), abs=1e-6
+    )
 
 
 def test_a_pair_is_estimated_from_the_better_of_its_parts():
@@ -153,8 +162,8 @@ def test_only_causes_beyond_four_tolerances_are_large():
     entries = [SimpleNamespace(effect=one, record=-1, parameter=one.parameters[0]) for one in effects]
     tolerance = np.array([one.parameters[0].tolerance for one in effects])
     ids = ("rudder_lag", "rudder_offset")
-    assert large(entries, ids, tolerance * [-5.0, 3.0], 1.0) == ("rudder_offset",)
-    assert large(entries, ids, tolerance * [-5.0, 3.0], 2.0) == (), "tolerances twice as wide"
+    assert practical_causes(entries, ids, tolerance * [-5.0, 3.0], 1.0) == ("rudder_offset",)
+    assert practical_causes(entries, ids, tolerance * [-5.0, 3.0], 2.0) == (), "tolerances twice as wide"
 
 
 def test_a_bound_on_the_whole_value_follows_the_nominal_model():
@@ -177,10 +186,10 @@ def test_a_large_effect_is_seen_from_afar_in_two_records(plant):
     both = Problem(records=planted.problem.records * 2, entries=entries_of(effects, START, 2))
     zero = np.zeros(len(both.entries))
     nominal = both.residual(zero), both.jacobian(zero)
-    seen = look(both, SimpleNamespace(r=nominal[0], z=zero, J=nominal[1]), nominal, far=True)
+    seen = screening_of(both, SimpleNamespace(r=nominal[0], z=zero, J=nominal[1]), nominal, far=True)
     assert seen.far
     assert seen.best(1, 1, np.inf) == [("roll_stiffness",)]
-    assert seen.count == len(named(both))
+    assert seen.count == len(nameable(both.entries))
 
 
 def test_several_residuals_are_those_of_each(plant):
@@ -201,7 +210,7 @@ def test_a_cause_that_does_nothing_when_small_is_fitted_where_it_acts(plant):
     search.look()
     search.fit(("rudder_rate_limit",))
     fit = search.candidates[("rudder_rate_limit",)].fit
-    assert fit.z[places(planted.problem.entries, ("rudder_rate_limit",))] == pytest.approx(0.16, abs=0.03)
+    assert fit.z[columns_of(planted.problem.entries, ("rudder_rate_limit",))] == pytest.approx(0.16, abs=0.03)
 
 
 def test_a_fit_that_went_astray_is_made_again_from_where_another_is(plant):
@@ -239,20 +248,20 @@ def test_what_another_cause_would_do_instead_is_on_the_scale_of_real_fits(plant)
     for other in ("rudder_lift_slope", "hull_drag", "yaw_inertia"):
         search.fit((other,), one.fit)
         real = search.candidates[(other,)].log_posterior
-        assert instead(search.problem, one, ())[(other,)] == pytest.approx(real, abs=2.0), other
+        assert with_one_swapped(search.problem, one, ())[(other,)] == pytest.approx(real, abs=2.0), other
 
 
 def test_a_fit_that_bends_many_parameters_is_not_close():
     effects = list(catalogue(("heading",)).values())
-    entries = [SimpleNamespace(record=-1, parameter=one.parameters[0]) for one in effects[: 2 * MANY]]
+    entries = [SimpleNamespace(record=-1, parameter=one.parameters[0]) for one in effects[: 2 * MAX_STRAINED]]
     problem, quiet = SimpleNamespace(entries=entries), np.ones(50)
     tolerance = np.array([one.parameter.tolerance for one in entries])
 
     def bent(count):
-        return np.where(np.arange(tolerance.size) < count, -1.1 * STRAINED, 0.5) * tolerance
+        return np.where(np.arange(tolerance.size) < count, -1.1 * STRAINED_TOLERANCES, 0.5) * tolerance
 
-    assert is_close(problem, SimpleNamespace(r=quiet, z=bent(MANY - 1)))
-    assert not is_close(problem, SimpleNamespace(r=quiet, z=bent(MANY)))
+    assert is_close(problem, SimpleNamespace(r=quiet, z=bent(MAX_STRAINED - 1)))
+    assert not is_close(problem, SimpleNamespace(r=quiet, z=bent(MAX_STRAINED)))
     assert not is_close(problem, SimpleNamespace(r=1.1 * quiet, z=bent(0)))
 
 

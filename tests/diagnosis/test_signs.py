@@ -9,17 +9,16 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from subzero.diagnosis.candidate import Candidate
-from subzero.diagnosis.detect import detectability, with_secants
-from subzero.diagnosis.effects import START, catalogue
-from subzero.diagnosis.entries import entries_of
-from subzero.diagnosis.estimates import deviations
-from subzero.diagnosis.evidence import Quadratic, posterior
-from subzero.diagnosis.hypotheses import variances
-from subzero.diagnosis.noise import Noise
-from subzero.diagnosis.problem import Observed, Problem
-from subzero.diagnosis.response import respond
-from subzero.diagnosis.tables import detectable
+from subzero.diagnosis.assessment.identifiability import detectability, with_secants
+from subzero.diagnosis.hypothesis.catalogue import START, catalogue
+from subzero.diagnosis.hypothesis.hypotheses import entries_of, variances
+from subzero.diagnosis.inference.laplace import Candidate
+from subzero.diagnosis.inference.linear_gaussian import Quadratic, posterior
+from subzero.diagnosis.inference.measurement import respond
+from subzero.diagnosis.inference.noise import Noise
+from subzero.diagnosis.inference.problem import Observed, Problem
+from subzero.diagnosis.report.tables import detectable
+from subzero.diagnosis.verdict.extension import deviations
 
 from .conftest import CHANNELS, nominal
 

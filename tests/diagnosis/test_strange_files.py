@@ -10,10 +10,10 @@ import zlib
 import pytest
 
 from subzero.cli import MISTAKE, main
-from subzero.diagnosis.answer import SEALED, Answer, reveal, seal
-from subzero.diagnosis.extended_reading import read_extended
-from subzero.diagnosis.sidecar import read_sidecar
+from subzero.diagnosis.report.toml_file import read_extended
 from subzero.errors import UserError
+from subzero.records.metadata import read_metadata
+from subzero.synthetic.sealed_answer import SEALED, Answer, reveal, seal
 from subzero.user_file import MEGABYTE
 
 TERM = '[[missing_term]]\naxis = "X"\nfeature = "u"\ncoefficient = {}\n'
@@ -64,7 +64,7 @@ SIDECARS = {
 def test_a_sidecar_that_nobody_means_is_refused(text, tmp_path):
     (tmp_path / "record.toml").write_text(text, encoding="utf-8")
     with pytest.raises(UserError, match=r"^The sidecar .* cannot be used:\n") as caught:
-        read_sidecar(tmp_path / "record.toml")
+        read_metadata(tmp_path / "record.toml")
     assert SIDECARS[text] in str(caught.value)
 
 

@@ -12,29 +12,37 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from subzero.diagnosis.begun import begun_at
-from subzero.diagnosis.closer import closer
-from subzero.diagnosis.contenders import contenders, names_of, to_come
-from subzero.diagnosis.effects import catalogue
-from subzero.diagnosis.foreign import SURE, Foreign, _nothing_again, is_explained
-from subzero.diagnosis.hypotheses import places, variances
-from subzero.diagnosis.one_term import one_terms
-from subzero.diagnosis.refit import is_lost, refit
-from subzero.diagnosis.rules import APART, Late, decide
-from subzero.diagnosis.search import Search
-from subzero.diagnosis.struck import Hope, _worth, in_its_place, struck
-from subzero.diagnosis.sudden_told import (
+from subzero.diagnosis.hypothesis.catalogue import catalogue
+from subzero.diagnosis.hypothesis.effect import with_onset
+from subzero.diagnosis.hypothesis.hypotheses import columns_of, variances
+from subzero.diagnosis.inference.basis import one_terms
+from subzero.diagnosis.inference.change_point_fit import _worth, fit_change_points, linearised_at
+from subzero.diagnosis.inference.change_point_scan import RankedChangePoint
+from subzero.diagnosis.inference.input_estimation import relinearised_force
+from subzero.diagnosis.inference.latent_force import FINE_SPACING_S, history, knots_of, without_force
+from subzero.diagnosis.inference.map_fit import is_poor_fit, refit
+from subzero.diagnosis.inference.model_average import MIN_DISCRIMINATION, ChangePointSummary, decide
+from subzero.diagnosis.inference.model_search import Search
+from subzero.diagnosis.inference.out_of_catalogue import (
+    DECISIVE_LOG_POSTERIOR,
+    OutOfCatalogue,
+    _nothing_again,
+    is_explained,
+)
+from subzero.diagnosis.results import CAUSE_NAMED, NOTHING_WRONG, OUTSIDE, UNDECIDED
+from subzero.diagnosis.verdict.conclude import (
+    calibration_from_onset,
     cause_of,
     closest,
     closest_rival,
     fitted,
-    from_now_on,
     is_large,
+    names_of,
+    remaining_models,
     rival_of,
+    trial_ahead,
     with_closest,
 )
-from subzero.diagnosis.unknown import FINE, history, knots_of, lacking
-from subzero.diagnosis.verdict import CAUSE_NAMED, NOTHING_WRONG, OUTSIDE, UNDECIDED
 
 EFFECTS = catalogue(("heading",))
 ABLE = [effect for effect in EFFECTS.values() if effect.sudden]
@@ -43,15 +51,15 @@ BEGINS = 13.1
 
 def hit(plant, degrees):
     """Return what is found when the rudder is hit."""
-    return asked(plant(lambda setting: begun_at(EFFECTS["rudder_offset"], BEGINS).apply(setting, degrees)))
+    return asked(plant(lambda setting: with_onset(EFFECTS["rudder_offset"], BEGINS).apply(setting, degrees)))
 
 
 def forced(planted, axis="N"):
     """Return a record's problem, and the force that explains it."""
     problem, D = planted.problem, variances(planted.problem.entries, (), 4.0)
     wide = refit(problem, np.zeros(D.size), planted.J, D, most_fresh=2)
-    knots = knots_of(problem, FINE)
-    return problem, closer(
+    knots = knots_of(problem, FINE_SPACING_S)
+    return problem, relinearised_force(
         problem, wide, f"unknown_force:{axis}", 1.0, knots, one_terms(problem, wide.z, knots)
     )
 
@@ -60,7 +68,7 @@ def asked(planted, axis="N"):
     """Return the same, and the sudden causes that are fitted there."""
     problem, force = forced(planted, axis)
     with ThreadPoolExecutor(2) as side:
-        return problem, force, struck(problem, [force.place], ABLE, 0, force.log_posterior, side)
+        return problem, force, fit_change_points(problem, [force.place], ABLE, 0, force.log_posterior, side)
 
 
 @pytest.fixture(scope="module")
@@ -71,7 +79,7 @@ def found(plant):
 @pytest.fixture(scope="module")
 def work(found):
     problem, _, (one, *_) = found
-    foreign = [Foreign(beside=(), what=one, log_posterior=one.log_posterior)]
+    foreign = [OutOfCatalogue(beside=(), what=one, log_posterior=one.log_posterior)]
     return SimpleNamespace(problem=problem, foreign=foreign)
 
 
@@ -80,7 +88,7 @@ def test_what_began_is_found_with_its_size_and_its_time(found):
     assert one.begun.effect.id == "rudder_offset"
     assert one.begun.time == pytest.approx(BEGINS, abs=0.2)
     assert one.begun.mean[0] == pytest.approx(3.0, abs=0.3)
-    assert not is_lost(one.fit)
+    assert not is_poor_fit(one.fit)
     assert one.log_posterior > force.log_posterior + 5.0, (
         "a cause of the catalogue explains more by less than a force"
     )
@@ -97,7 +105,7 @@ def test_a_force_that_comes_and_goes_is_no_sudden_cause(plant):
     """Nothing is fitted that has no hope to be as probable as the force."""
     time = np.linspace(0.0, 30.0, 301)
     bump = 0.05 * np.sin(np.pi * np.clip((time - 10.0) / 5.0, 0.0, 1.0)) ** 2
-    planted = plant(lambda setting: lacking(setting, history("N", time, bump)))
+    planted = plant(lambda setting: without_force(setting, history("N", time, bump)))
     _, force, others = asked(planted)
     assert all(one.log_posterior < force.log_posterior - 10.0 for one in others)
 
@@ -105,7 +113,7 @@ def test_a_force_that_comes_and_goes_is_no_sudden_cause(plant):
 def a_hope(name, log_posterior, gain):
     """Return a hope of a sudden cause, in no place."""
     begun = SimpleNamespace(effect=EFFECTS[name], log_gain=gain, between=0.0)
-    return Hope(log_posterior, begun, None)
+    return RankedChangePoint(log_posterior, begun, None)
 
 
 def test_what_gains_most_is_fitted_whatever_it_hopes_and_others_if_they_are_close():
@@ -124,7 +132,7 @@ def test_what_is_known_is_fitted_again_only_for_a_better_promise():
 
 def test_in_its_place_the_records_lack_what_it_explains(found):
     problem, _, (one, *_) = found
-    n, place = len(problem.entries), in_its_place(problem, one)
+    n, place = len(problem.entries), linearised_at(problem, one)
     assert place.fit.z.size == n
     assert np.allclose(place.fit.r - one.fit.r, one.fit.J[:, n] * one.begun.mean[0])
     assert np.linalg.norm(place.fit.r) > 5.0 * np.linalg.norm(one.fit.r)
@@ -132,17 +140,21 @@ def test_in_its_place_the_records_lack_what_it_explains(found):
 
 def test_it_ends_the_search_only_if_it_leaves_noise_and_is_far_before_the_rest(found):
     _, force, (one, *_) = found
-    there = [Foreign(beside=(), what=one, log_posterior=0.0)]
+    there = [OutOfCatalogue(beside=(), what=one, log_posterior=0.0)]
 
     def best(log):
         return SimpleNamespace(best=lambda: SimpleNamespace(log_posterior=log))
 
-    assert is_explained(best(-SURE - 1.0), there)
-    assert not is_explained(best(-SURE + 1.0), there)
+    assert is_explained(best(-DECISIVE_LOG_POSTERIOR - 1.0), there)
+    assert not is_explained(best(-DECISIVE_LOG_POSTERIOR + 1.0), there)
     lost = replace(one, fit=replace(one.fit, r=2.0 * one.fit.r))
-    assert not is_explained(best(-SURE - 1.0), [Foreign(beside=(), what=lost, log_posterior=0.0)])
-    assert not is_explained(best(-SURE - 1.0), [Foreign(beside=(), what=force.what, log_posterior=0.0)])
-    assert not is_explained(best(-SURE - 1.0), [])
+    assert not is_explained(
+        best(-DECISIVE_LOG_POSTERIOR - 1.0), [OutOfCatalogue(beside=(), what=lost, log_posterior=0.0)]
+    )
+    assert not is_explained(
+        best(-DECISIVE_LOG_POSTERIOR - 1.0), [OutOfCatalogue(beside=(), what=force.what, log_posterior=0.0)]
+    )
+    assert not is_explained(best(-DECISIVE_LOG_POSTERIOR - 1.0), [])
 
 
 def test_nothing_wrong_is_fitted_again_where_a_sudden_cause_of_no_size_explains_the_records(plant):
@@ -155,10 +167,12 @@ def test_nothing_wrong_is_fitted_again_where_a_sudden_cause_of_no_size_explains_
     right = search.best()
     before = right.log_posterior - 40.0
     search.candidates[()] = replace(right, log_posterior=before)
-    _nothing_again(search, Foreign(beside=(), what=force.what, log_posterior=before + 40.0))
-    _nothing_again(search, Foreign(beside=(), what=force.what, log_posterior=before - 1.0, place=good))
+    _nothing_again(search, OutOfCatalogue(beside=(), what=force.what, log_posterior=before + 40.0))
+    _nothing_again(search, OutOfCatalogue(beside=(), what=force.what, log_posterior=before - 1.0, place=good))
     assert search.best().log_posterior == before, "only if it explains the records, and more"
-    _nothing_again(search, Foreign(beside=(), what=force.what, log_posterior=before + 40.0, place=good))
+    _nothing_again(
+        search, OutOfCatalogue(beside=(), what=force.what, log_posterior=before + 40.0, place=good)
+    )
     assert search.best().log_posterior == pytest.approx(right.log_posterior, abs=2.0)
 
 
@@ -185,15 +199,16 @@ def test_it_is_told_in_words_and_numbers(work):
 
 def test_more_drag_and_less_thrust_from_the_same_time_on_are_not_told_apart(plant):
     """On the straight end of fig6; what holds throughout is far off. (A drum that rubs is as probable.)"""
-    planted = plant(lambda setting: begun_at(EFFECTS["hull_drag"], 20.4).apply(setting, 0.35))
+    planted = plant(lambda setting: with_onset(EFFECTS["hull_drag"], 20.4).apply(setting, 0.35))
     problem, _, late = asked(planted, "X")
     pair = {"hull_drag", "propeller_thrust_gain"}
-    told = SimpleNamespace(problem=problem, foreign=[Foreign(beside=(), what=one, log_posterior=one.log_posterior)
+    told = SimpleNamespace(problem=problem, foreign=[OutOfCatalogue(beside=(), what=one,
+                                                                    log_posterior=one.log_posterior)
                                                      for one in late if one.begun.effect.id in pair])  # fmt: skip
     one = fitted(told)[0]
     assert one.begun.effect.id in pair
     D, (rival,) = closest(told, one)
-    assert D < APART
+    assert D < MIN_DISCRIMINATION
     assert {one.begun.effect.id, rival.partition("@")[0]} == pair
     assert {each.begun.effect.id for each in with_closest(told, one)} == pair
     words = closest_rival(told, {})
@@ -203,12 +218,12 @@ def test_more_drag_and_less_thrust_from_the_same_time_on_are_not_told_apart(plan
 
 def test_what_began_holds_throughout_in_trials_to_come(work):
     (one,) = fitted(work)
-    (k,) = places(work.problem.entries, ("rudder_offset",))
-    to_come = from_now_on(work, one)
-    assert to_come.ids == (one.id,)
-    assert to_come.fit.z[k] == one.begun.mean[0]
-    assert np.array_equal(to_come.fit.J[:, k], one.fit.J[:, len(work.problem.entries)])
-    assert to_come.fit.D[k] == EFFECTS["rudder_offset"].parameters[0].scale ** 2
+    (k,) = columns_of(work.problem.entries, ("rudder_offset",))
+    trial_ahead = calibration_from_onset(work, one)
+    assert trial_ahead.ids == (one.id,)
+    assert trial_ahead.fit.z[k] == one.begun.mean[0]
+    assert np.array_equal(trial_ahead.fit.J[:, k], one.fit.J[:, len(work.problem.entries)])
+    assert trial_ahead.fit.D[k] == EFFECTS["rudder_offset"].parameters[0].scale ** 2
 
 
 def test_the_next_trial_is_not_asked_whether_what_is_broken_broke_in_mid_trial(work):
@@ -216,18 +231,18 @@ def test_the_next_trial_is_not_asked_whether_what_is_broken_broke_in_mid_trial(w
     (one,) = fitted(work)
     throughout = {("rudder_offset",): "throughout", ("hull_drag",): "another"}
     asked = SimpleNamespace(problem=work.problem, search=SimpleNamespace(candidates=throughout))
-    assert to_come(asked, [("rudder_offset",)], [one]) == ["throughout"]
-    (another, late) = to_come(asked, [("hull_drag",)], [one])
+    assert trial_ahead(asked, [("rudder_offset",)], [one]) == ["throughout"]
+    (another, late) = trial_ahead(asked, [("hull_drag",)], [one])
     assert (another, late.ids) == ("another", (one.id,))
 
 
 def test_sudden_causes_that_are_left_are_rivals_and_need_no_others(work):
     (one,) = fitted(work)
     key, inside = (one.id,), {(): 0.3, ("hull_drag",): 0.01}
-    assert contenders(work, UNDECIDED, None, inside, [key, ()]) == ([()], [one], [])
-    assert contenders(work, UNDECIDED, None, inside, [key]) == ([], [one], [])
+    assert remaining_models(work, UNDECIDED, None, inside, [key, ()]) == ([()], [one], [])
+    assert remaining_models(work, UNDECIDED, None, inside, [key]) == ([], [one], [])
     among = [key, ("unknown_force:N",), ("sensor_drift:heading",)]
-    assert contenders(work, UNDECIDED, None, inside, among).strange == [
+    assert remaining_models(work, UNDECIDED, None, inside, among).strange == [
         "unknown_force:N",
         "sensor_drift:heading",
     ]
@@ -237,11 +252,11 @@ def test_sudden_causes_that_are_left_are_rivals_and_need_no_others(work):
 @pytest.mark.parametrize(
     ("late", "verdict"),
     [
-        (Late(0.85, True, 20.0), CAUSE_NAMED),
-        (Late(0.75, True, 20.0), UNDECIDED),
-        (Late(0.85, False, 20.0), UNDECIDED),
-        (Late(0.85, True, 5.0), UNDECIDED),
-        (Late(0.3, True, 20.0), NOTHING_WRONG),
+        (ChangePointSummary(0.85, True, 20.0), CAUSE_NAMED),
+        (ChangePointSummary(0.75, True, 20.0), UNDECIDED),
+        (ChangePointSummary(0.85, False, 20.0), UNDECIDED),
+        (ChangePointSummary(0.85, True, 5.0), UNDECIDED),
+        (ChangePointSummary(0.3, True, 20.0), NOTHING_WRONG),
     ],
 )
 def test_it_is_named_only_if_it_is_probable_large_and_apart(late, verdict):

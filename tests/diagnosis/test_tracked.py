@@ -5,13 +5,13 @@ import dataclasses
 import numpy as np
 import pytest
 
-from subzero.diagnosis import kept_runs
-from subzero.diagnosis import problem as problem_module
-from subzero.diagnosis.effects import catalogue
-from subzero.diagnosis.search import Search
-from subzero.diagnosis.sudden import begun_at
-from subzero.diagnosis.tracked import on_from, tracked, with_stops
-from subzero.diagnosis.unknown import history, lacking
+from subzero.diagnosis.hypothesis.catalogue import catalogue
+from subzero.diagnosis.hypothesis.effect import with_onset
+from subzero.diagnosis.inference import problem as problem_module
+from subzero.diagnosis.inference import simulator
+from subzero.diagnosis.inference.latent_force import history, without_force
+from subzero.diagnosis.inference.model_search import Search
+from subzero.diagnosis.inference.simulator import simulate_on, simulate_track, with_stops
 
 from .conftest import CHANNELS, nominal
 
@@ -20,37 +20,39 @@ SETTING, CATALOGUE = nominal(6.0), catalogue(CHANNELS)
 
 def pushed(size, setting=SETTING):
     """Return a setting with a force that begins at 2 s."""
-    return lacking(setting, history("N", np.array([0.0, 2.0, 4.0, 6.0]), np.array([0.0, 0.0, size, 0.0])))
+    return without_force(
+        setting, history("N", np.array([0.0, 2.0, 4.0, 6.0]), np.array([0.0, 0.0, size, 0.0]))
+    )
 
 
 def test_a_run_that_goes_on_is_the_run_from_the_start_bit_for_bit():
     (_, plain), stops = with_stops(SETTING, [2.0])
-    whole, part = tracked(pushed(0.05))[1], on_from(pushed(0.05), stops[2.0])[1]
-    assert np.array_equal(plain, tracked(SETTING)[1]), "stops change nothing"
+    whole, part = simulate_track(pushed(0.05))[1], simulate_on(pushed(0.05), stops[2.0])[1]
+    assert np.array_equal(plain, simulate_track(SETTING)[1]), "stops change nothing"
     assert np.array_equal(part, whole)
     assert not np.array_equal(plain, whole), "the force does something"
 
 
 def test_a_stop_can_be_gone_on_from_again_and_again():
     stop = with_stops(SETTING, [2.0])[1][2.0]
-    first = on_from(pushed(0.05), stop)[1]
-    on_from(pushed(-0.3), stop)
-    assert np.array_equal(on_from(pushed(0.05), stop)[1], first)
+    first = simulate_on(pushed(0.05), stop)[1]
+    simulate_on(pushed(-0.3), stop)
+    assert np.array_equal(simulate_on(pushed(0.05), stop)[1], first)
 
 
 @pytest.mark.parametrize("time", [2.0, 2.5, 3.7])
 def test_a_cause_that_begins_between_exchanges_begins_where_it_does_from_the_start(time):
-    later = begun_at(CATALOGUE["rudder_offset"], time).apply(SETTING, 3.0)
+    later = with_onset(CATALOGUE["rudder_offset"], time).apply(SETTING, 3.0)
     stop = with_stops(SETTING, [time])[1][time]
-    assert np.array_equal(on_from(later, stop)[1], tracked(later)[1])
+    assert np.array_equal(simulate_on(later, stop)[1], simulate_track(later)[1])
 
 
 def test_a_cause_goes_on_beside_one_that_began_before():
     """The run that is gone on from has changed already: what holds at the stop is what had begun by then."""
-    bent = begun_at(CATALOGUE["rudder_offset"], 1.0).apply(SETTING, 3.0)
+    bent = with_onset(CATALOGUE["rudder_offset"], 1.0).apply(SETTING, 3.0)
     stop = with_stops(bent, [2.0])[1][2.0]
-    for more in (begun_at(CATALOGUE["hull_drag"], 2.0).apply(bent, 0.5), pushed(0.05, bent)):
-        assert np.array_equal(on_from(more, stop)[1], tracked(more)[1])
+    for more in (with_onset(CATALOGUE["hull_drag"], 2.0).apply(bent, 0.5), pushed(0.05, bent)):
+        assert np.array_equal(simulate_on(more, stop)[1], simulate_track(more)[1])
 
 
 def test_a_time_behind_the_end_has_no_stop():
@@ -64,14 +66,14 @@ def counted(monkeypatch):
 
     def count(setting):
         runs.append(setting)
-        return tracked(setting)
+        return simulate_track(setting)
 
-    monkeypatch.setattr(problem_module, "tracked", count)
+    monkeypatch.setattr(problem_module, "simulate_track", count)
     return runs
 
 
 def test_no_run_is_made_twice_and_sensors_need_none(plant, counted):
-    problem = dataclasses.replace(plant(duration=6.0).problem, kept=kept_runs.KeptRuns())
+    problem = dataclasses.replace(plant(duration=6.0).problem, kept=simulator.RunCache())
     counted.clear()
     z = np.zeros(len(problem.entries))
     bias = next(k for k, entry in enumerate(problem.entries) if entry.effect.id == "sensor_bias:heading")
@@ -97,10 +99,10 @@ def test_runs_of_another_setting_are_others(plant):
 
 
 def test_old_runs_are_forgotten_when_there_is_no_room(plant, counted, monkeypatch):
-    problem = dataclasses.replace(plant(duration=6.0).problem, kept=kept_runs.KeptRuns())
+    problem = dataclasses.replace(plant(duration=6.0).problem, kept=simulator.RunCache())
     counted.clear()
     z = np.zeros(len(problem.entries))
-    monkeypatch.setattr(kept_runs, "ROOM", tracked(SETTING)[1].nbytes)
+    monkeypatch.setattr(simulator, "CACHE_BYTES", simulate_track(SETTING)[1].nbytes)
     other = z.copy()
     other[0] = 0.01
     for deviations in (z, other, z):

@@ -7,18 +7,25 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from subzero.diagnosis.evidence import Scale
-from subzero.diagnosis.latent import Seen, log_evidence_process, log_gains
-from subzero.diagnosis.one_term import one_terms
-from subzero.diagnosis.recover import drifted, recover
-from subzero.diagnosis.suspects import suspects
-from subzero.diagnosis.unknown import (
-    WORDS,
+from subzero.diagnosis.inference.basis import one_terms
+from subzero.diagnosis.inference.input_estimation import (
+    estimate_drift,
+    estimate_force,
+    latent_force_candidates,
+)
+from subzero.diagnosis.inference.latent_force import (
+    AXIS_WORDS,
     all_columns,
     force_columns,
     history,
     knots_of,
-    lacking,
+    without_force,
+)
+from subzero.diagnosis.inference.linear_gaussian import (
+    ForceInformation,
+    Scale,
+    log_evidence_process,
+    log_gains,
 )
 
 TIME = np.arange(0.0, 30.05, 0.1)
@@ -33,7 +40,7 @@ def bend(time):
 
 
 def pushed(axis, force):
-    return lambda setting: lacking(setting, history(axis, TIME, force(TIME)))
+    return lambda setting: without_force(setting, history(axis, TIME, force(TIME)))
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +51,7 @@ def healthy(plant):
 def found_in(planted):
     fit, knots = planted.fit(), knots_of(planted.problem)
     columns, terms = all_columns(planted.problem, fit.z, knots), one_terms(planted.problem, fit.z, knots)
-    return fit, suspects(planted.problem, columns, fit, {1.0: Scale(0.0, fit.D)}, knots, terms)
+    return fit, latent_force_candidates(planted.problem, columns, fit, {1.0: Scale(0.0, fit.D)}, knots, terms)
 
 
 def test_a_healthy_record_has_no_unknown_force(healthy):
@@ -58,7 +65,7 @@ def test_a_snag_is_found_on_its_axis_and_its_history_follows(plant):
     fit, found = found_in(planted)
     assert found[0].id == "unknown_force:X"
     assert found[0].log_gain > 20.0
-    unknown = recover(planted.problem, fit, "X").unknown
+    unknown = estimate_force(planted.problem, fit, "X").unknown
     error = unknown.force - pulse(unknown.time)
     assert np.sqrt(np.mean(error**2)) < 0.35 * 0.6, "its edges are sharper than knots"
     assert np.mean(np.abs(error) < 3.0 * unknown.band) > 0.8
@@ -71,21 +78,21 @@ def test_a_yaw_moment_is_recovered_within_its_band(plant):
     assert {one.id for one in found[:2]} == {"unknown_force:N", "unknown_force:Y"}, (
         "a push aside does nearly the same"
     )
-    done = recover(planted.problem, fit, "N")
+    done = estimate_force(planted.problem, fit, "N")
     error = done.unknown.force - bend(done.unknown.time)
     assert np.sqrt(np.mean((error / done.unknown.band) ** 2)) < 1.7, "six other seeds: 0.6 to 1.3"
     assert np.sqrt(np.mean(error**2)) < 0.25 * 0.05, (
         "what a rudder offset within tolerance could do, and noise"
     )
     assert done.missing is not None
-    assert "starboard" in WORDS[done.unknown.axis]
+    assert "starboard" in AXIS_WORDS[done.unknown.axis]
 
 
 def test_a_drifting_sensor_is_no_force(plant):
     planted = plant(drift={"pitch": lambda time: 1.5 * np.sin(2.0 * np.pi * time / 20.0)})
     fit, found = found_in(planted)
     assert found[0].id == "sensor_drift:pitch"
-    drift = drifted(planted.problem, fit, "pitch", 3.0).unknown
+    drift = estimate_drift(planted.problem, fit, "pitch", 3.0).unknown
     assert_allclose(drift.force, 1.5 * np.sin(2.0 * np.pi * drift.time / 20.0), atol=0.5)
 
 
@@ -94,11 +101,11 @@ def test_columns_add_up_to_what_a_force_does(healthy):
     problem, zero = healthy.problem, np.zeros(len(healthy.problem.entries))
     knots = knots_of(problem)
     columns = force_columns(problem, zero, ("X",), knots)["X"].sum(axis=1)
-    small = lacking(problem.records[0].setting, history("X", np.array([0.0, 30.0]), np.full(2, 0.05)))
+    small = without_force(problem.records[0].setting, history("X", np.array([0.0, 30.0]), np.full(2, 0.05)))
     tracks = problem.tracks([(0, zero)])[0]
-    from subzero.diagnosis.tracked import tracked
+    from subzero.diagnosis.inference.simulator import simulate_track
 
-    change = problem.whitened(0, small, tracked(small)) - problem.whitened(
+    change = problem.whitened(0, small, simulate_track(small)) - problem.whitened(
         0, problem.setting(0, zero), tracks
     )
     assert np.linalg.norm(0.05 * columns - change) < 0.05 * np.linalg.norm(change)
@@ -107,7 +114,7 @@ def test_columns_add_up_to_what_a_force_does(healthy):
 def test_the_evidence_is_that_of_a_normal_distribution():
     random = np.random.default_rng(0)
     columns, r = random.standard_normal((40, 5)), random.standard_normal(40)
-    data = Seen(columns.T @ columns, columns.T @ r)
+    data = ForceInformation(columns.T @ columns, columns.T @ r)
     covariance = np.eye(40) + 0.7**2 * columns @ columns.T
     exact = -0.5 * np.linalg.slogdet(covariance)[1] - 0.5 * r @ (np.linalg.solve(covariance, r) - r)
     assert_allclose(log_gains(data, np.eye(5), [0.7])[0], exact, rtol=1e-4)

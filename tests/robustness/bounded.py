@@ -84,8 +84,8 @@ def held() -> None:
 
 def other_code() -> None:
     """The other formulation of a coupled run, which hides effects and checks diagnoses."""
-    from subzero.diagnosis.other_code import truth_of
-    from subzero.diagnosis.setting import Setting
+    from subzero.diagnosis.hypothesis.configuration import Setting
+    from subzero.synthetic.reference_run import truth_of
 
     fig6 = subzero.load_scenario("fig6")
     setting = Setting(trial=fig6, model=subzero.Model.of(fig6))

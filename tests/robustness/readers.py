@@ -22,12 +22,12 @@ from typing import Any
 import numpy as np
 
 import scenarios
-from subzero.diagnosis.answer import SEALED, Answer, reveal, seal
-from subzero.diagnosis.extended_reading import read_extended
-from subzero.diagnosis.records import read_trials
-from subzero.diagnosis.sidecar import read_sidecar
+from subzero.diagnosis.read_trials import read_trials
+from subzero.diagnosis.report.toml_file import read_extended
 from subzero.errors import UserError
+from subzero.records.metadata import read_metadata
 from subzero.records.record import read_record
+from subzero.synthetic.sealed_answer import SEALED, Answer, reveal, seal
 from subzero.trials import load
 from subzero.user_file import INCOMPLETE, read_bytes
 
@@ -145,7 +145,7 @@ READERS = {
     "motion": Reader("motion.csv", MOTION, lambda at: load(at / "mine.toml"), {"mine.toml": MOVED}),
     "record": Reader("record.csv", RECORD, lambda at: read_record(at / "record.csv")),
     "logged": Reader("record.csv", RECORD, _trials, {"record.toml": SIDECAR}),
-    "sidecar": Reader("record.toml", SIDECAR, lambda at: read_sidecar(at / "record.toml")),
+    "sidecar": Reader("record.toml", SIDECAR, lambda at: read_metadata(at / "record.toml")),
     "extended": Reader("extended.toml", EXTENDED, lambda at: read_extended(at / "extended.toml").extended),
     "sealed": Reader(SEALED, seal(ANSWER), reveal),
     "resealed": Reader(SEALED, json.dumps(dataclasses.asdict(ANSWER)), reveal, wrapped=_resealed),

@@ -17,8 +17,8 @@ import pytest
 
 import scenarios
 from subzero.cli import MISTAKE, main
-from subzero.diagnosis.effects import load
-from subzero.diagnosis.extended_reading import read_extended
+from subzero.diagnosis.hypothesis.catalogue import load
+from subzero.diagnosis.report.toml_file import read_extended
 from subzero.errors import UserError
 
 # pytest imports test files one by one, without their folder; this is a module beside this one.

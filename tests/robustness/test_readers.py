@@ -17,7 +17,7 @@ import pytest
 
 import scenarios
 from subzero.autopilot.registry import from_file
-from subzero.diagnosis import effects
+from subzero.diagnosis.hypothesis import catalogue as effects
 from subzero.errors import UserError
 
 # pytest imports test files one by one, without their folder; this is a module beside this one.

@@ -93,10 +93,6 @@ def test_every_import_leads_to_a_file_in_the_key(package):
 
 def test_every_compiled_function_and_what_it_names_is_in_the_key_of_its_package():
     """Looked up in the running program: modules, functions and classes among the globals of compiled functions."""
-    import subzero.diagnosis.other_loop
-    import subzero.simulation
-    import subzero.simulator  # noqa: F401
-
     files = {package: Tree(ROOT).made_of(package) for package in COMPILED}
     seen = 0
     for one in gc.get_objects():

@@ -1,0 +1,157 @@
+"""What the extended model explains of data that were not fitted: blocks of the same trial, or other trials.
+
+    G0 = (E_nominal − E_extended)/(E_nominal − floor),   G1 = (E_tolerance − E_extended)/(E_tolerance − floor)
+
+E is the mean square of the held-out residual, whitened: 1 is the noise alone. The refit without the held-out data is
+that of the linear problem around the fit of all data, so that it takes no run; entries at a bound stay there. A gain
+over the nominal model is mostly owed to tolerances; G1 is what is owed to the new physics.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from subzero.diagnosis.inference.map_fit import Fit, bounds
+from subzero.diagnosis.inference.problem import Problem
+from subzero.diagnosis.results import ChannelGain, Gain
+
+BLOCK_S, FOLDS = 2.0, 5
+"""Length of a block [s], and in how many parts a trial is held out."""
+BOOTSTRAP_DRAWS, LOWER_LEVEL = 1000, 0.05
+"""Of the bootstrap, and its one-sided level: the lower bound is exceeded with 95 %."""
+AT_BOUND = 1e-9
+BLOCKS, TRIALS = "blocks of the same trial", "other trials"
+
+
+class Fitted(NamedTuple):
+    """A fit, and the problem that it is a fit of."""
+
+    problem: Problem
+    fit: Fit
+
+
+class _Row(NamedTuple):
+    """Whose the rows of a residual are: record, channel, and time [s] of each (m,)."""
+
+    record: np.ndarray
+    channel: np.ndarray
+    time: np.ndarray
+
+
+def gain(
+    nominal: np.ndarray, tolerance: Fitted, extended: Fitted, rival: Fitted | None = None, *, seed: int = 0
+) -> Gain:
+    """Return what an extended model explains.
+
+    Args:
+        nominal: whitened residual of the nominal model (m,).
+        tolerance: "nothing is wrong", refit within tolerances.
+        extended: what is named, refit.
+        rival: the best other hypothesis; the tolerances' refit in its place if there is none.
+        seed: of the bootstrap.
+    """
+    problem = tolerance.problem
+    rows = rows_of(problem)
+    parts = parts_of(problem, rows)
+    rival = rival or tolerance
+    models = (tolerance, extended, rival)
+    fitted = [nominal, *(one.fit.r for one in models)]
+    held = [nominal, *(held_out(one, parts) for one in models)]
+    n, t, e = (held[i] ** 2 for i in range(3))
+    return Gain(
+        fitted=_channels(problem, rows, fitted),
+        held_out=_channels(problem, rows, held),
+        total=share(n.mean(), e.mean(), n.size),
+        owed=share(t.mean(), e.mean(), n.size),
+        owed_low=_lower(t, e, _blocks(rows), seed),
+        how=TRIALS if len(problem.records) > 1 else BLOCKS,
+    )
+
+
+def share(before: float, after: float, samples: float) -> float:
+    """Return (before − after)/(before − 1) of mean squares: 1 for all that can be explained, below 0 for harm.
+
+    What is left may lie below the noise's expected square; then all is explained. Where there was next to nothing to be
+    explained, the denominator is no smaller than the scatter of such squares, so that nothing is claimed.
+    """
+    scatter = float(np.sqrt(2.0 / samples))
+    return float((before - after) / max(before - min(1.0, after), scatter))
+
+
+def rows_of(problem: Problem) -> _Row:
+    """Return whose the rows of a residual are."""
+    record, channel, time = [], [], []
+    for i, one in enumerate(problem.records):
+        for name, noise in one.noise.items():
+            used = one.time[noise.used]
+            record.append(np.full(used.size, i))
+            channel.append(np.full(used.size, name, dtype=object))
+            time.append(used)
+    return _Row(np.concatenate(record), np.concatenate(channel), np.concatenate(time))
+
+
+def parts_of(problem: Problem, rows: _Row) -> np.ndarray:
+    """Return the part (m,) in which each row is held out: its record, or its block of the only trial."""
+    if len(problem.records) > 1:
+        return rows.record
+    return (rows.time // BLOCK_S).astype(int) % FOLDS
+
+
+def held_out(model: Fitted, parts: np.ndarray) -> np.ndarray:
+    """Return the residual (m,) in which each part is predicted by a linear refit of all others."""
+    fit = model.fit
+    low, high = bounds(model.problem)
+    free = (fit.z > low + AT_BOUND) & (fit.z < high - AT_BOUND)
+    J, prior = fit.J[:, free], 1.0 / fit.D[free]
+    found = fit.r.copy()
+    for part in np.unique(parts):
+        known = parts != part
+        P = J[known].T @ J[known] + np.diag(prior)
+        step = np.linalg.solve(P, J[known].T @ fit.r[known] - prior * fit.z[free])
+        found[~known] = fit.r[~known] - J[~known] @ step
+    return found
+
+
+def _channels(problem: Problem, rows: _Row, residuals: list[np.ndarray]) -> Mapping[str, ChannelGain]:
+    """Return the root mean square of residuals in each channel's unit, beside the noise."""
+    squares = [raw(problem, one) ** 2 for one in residuals]
+    found = {}
+    for name in dict.fromkeys(rows.channel.tolist()):
+        before, tolerance, after, rival = (
+            float(np.sqrt(one[rows.channel == name].mean())) for one in squares
+        )
+        levels = [one.noise[name].sd for one in problem.records if name in one.noise]
+        floor = float(np.sqrt(np.mean(np.square(levels))))
+        found[name] = ChannelGain(before=before, tolerance=tolerance, after=after, rival=rival, floor=floor)
+    return found
+
+
+def raw(problem: Problem, whitened: np.ndarray) -> np.ndarray:
+    """Return a residual (m,) in the channels' units, of a whitened one."""
+    parts, at = [], 0
+    for one in problem.records:
+        for noise in one.noise.values():
+            parts.append(noise.colour(whitened[at : at + noise.count]))
+            at += noise.count
+    return np.concatenate(parts)
+
+
+def _blocks(rows: _Row) -> np.ndarray:
+    """Return the block (m,) that each row belongs to, all channels together, numbered from 0."""
+    both = np.stack([rows.record, (rows.time // BLOCK_S).astype(int)])
+    return np.unique(both, axis=1, return_inverse=True)[1].ravel()
+
+
+def _lower(before: np.ndarray, after: np.ndarray, blocks: np.ndarray, seed: int) -> float:
+    """Return the lower bound of `share` when blocks of squares are drawn again and again."""
+    count = int(blocks.max()) + 1
+    sums = [
+        np.bincount(blocks, weights=one, minlength=count) for one in (before, after, np.ones_like(before))
+    ]
+    drawn = np.random.default_rng(seed).integers(count, size=(BOOTSTRAP_DRAWS, count))
+    b, a, n = (one[drawn].sum(axis=1) for one in sums)
+    shares = [share(x / k, y / k, k) for x, y, k in zip(b, a, n, strict=True)]
+    return float(np.quantile(shares, LOWER_LEVEL))

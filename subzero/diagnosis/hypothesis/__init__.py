@@ -1,0 +1,1 @@
+"""What may be wrong: effects with prior variances, the configuration that they edit, and sets of them."""

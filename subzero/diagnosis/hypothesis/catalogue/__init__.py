@@ -1,0 +1,55 @@
+"""The catalogue: every cause that a diagnosis can name, as data.
+
+To add one of your own, without touching these files: a Python file with ``EFFECTS = [Effect(...)]``, given as
+``--effects my_effects.py``; or a package with an entry point in the group ``subzero.effects`` that names such a list.
+"""
+
+from __future__ import annotations
+
+import runpy
+from collections.abc import Iterable
+from importlib.metadata import entry_points
+from pathlib import Path
+
+from subzero.diagnosis.hypothesis.catalogue import cable, fins, hull, propulsion, sensors, start
+from subzero.diagnosis.hypothesis.effect import Effect
+from subzero.errors import UserError
+from subzero.user_file import MOST_OF_A_PROGRAM, read_bytes
+
+START = start.EFFECTS
+"""What is free at the start of every trial, and never named."""
+
+
+def catalogue(channels: Iterable[str], more: Iterable[Effect] = ()) -> dict[str, Effect]:
+    """Return every effect by id, with those of the sensors of these channels."""
+    shipped = (*propulsion.EFFECTS, *fins.EFFECTS, *hull.EFFECTS, *cable.EFFECTS)
+    found = (*shipped, *sensors.sensor_effects(channels), sensors.CLOCK, *_installed(), *more)
+    twice = sorted({effect.id for effect in found if [e.id for e in found].count(effect.id) > 1})
+    if twice:
+        raise UserError(f"Effects need ids of their own; there are two of {', '.join(twice)}.")
+    return {effect.id: effect for effect in found}
+
+
+def load(path: str | Path) -> tuple[Effect, ...]:
+    """Return the effects of a user's file, which is run.
+
+    Raises:
+        UserError: there is no such file, or it has no list EFFECTS of effects.
+    """
+    if not Path(path).is_file():
+        raise UserError(f"There is no effects file '{path}'. Allowed: the path of a Python file.")
+    read_bytes(path, MOST_OF_A_PROGRAM)
+    try:
+        found = runpy.run_path(str(path)).get("EFFECTS")
+    except Exception as error:
+        raise UserError(
+            f"'{path}' cannot be run: {type(error).__name__}: {error}. Allowed: a Python file that runs by itself."
+        ) from error
+    if not isinstance(found, (list, tuple)) or not all(isinstance(one, Effect) for one in found):
+        raise UserError(f"'{path}' has no list EFFECTS of effects. Allowed: EFFECTS = [Effect(...)].")
+    return tuple(found)
+
+
+def _installed() -> tuple[Effect, ...]:
+    """Return the effects that installed packages bring."""
+    return tuple(effect for entry in entry_points(group="subzero.effects") for effect in entry.load())

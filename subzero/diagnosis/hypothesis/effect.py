@@ -1,0 +1,138 @@
+"""An effect as data: an id, a sentence, its parameters, and how it changes a setting; throughout, or from an onset on.
+
+θ = θ₀ + z                                          throughout; z = 0 is the nominal model, exactly
+θ(t) = θ₀ for t < t₀,   θ₀ + z from t₀ on           with an onset: a fin struck at 12 s, the cable caught at 20 s
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from subzero.diagnosis.hypothesis.configuration import Setting
+from subzero.model import Model
+
+Apply = Callable[..., Setting]
+"""(setting, *deviations) → the setting with them."""
+
+
+def nothing(setting: Setting) -> float:
+    """Return the nominal value of a parameter that a model without the effect does not have."""
+    return 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Parameter:
+    """A number that an effect changes, as a deviation from the nominal model.
+
+    Attributes:
+        name: short, such as "time_constant".
+        unit: as it is shown; "1" for a share.
+        tolerance: τ, how far a healthy vehicle may be from its nominal model (one standard deviation). [unit]
+        scale: s, how far when something is wrong (one standard deviation). [unit]
+        low, high: deviations that make sense. [unit]
+        nominal: what the nominal model has, so that the value can be named as a whole. [unit]
+        step: of a sensitivity, if not a share of the tolerance. [unit]
+        least: the whole value cannot be less, or not less than the nominal model's if that is less already. [unit]
+        begins: nothing is any different before this time of the trial. [s]
+    """
+
+    name: str
+    unit: str
+    tolerance: float
+    scale: float
+    low: float = -float("inf")
+    high: float = float("inf")
+    nominal: Callable[[Setting], float] = nothing
+    step: float = 0.0
+    least: float = -float("inf")
+    begins: float = 0.0
+
+    def within(self, setting: Setting) -> Parameter:
+        """Return the parameter with the bounds that a nominal model leaves it."""
+        low = max(self.low, min(self.least - self.nominal(setting), 0.0))
+        return replace(self, low=low)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Effect:
+    """A cause that a diagnosis can name.
+
+    Attributes:
+        id: such as "rudder_lag" or "sensor_bias:heading".
+        sentence: what is wrong, in words: "the rudder servo lags".
+        slot: where it acts: hull, propulsion, fins, cable, drum, water, start, sensors, clock.
+        parameters: one or two.
+        apply: what it does to a setting.
+        sudden: it can begin in the middle of a trial ("<id>@t").
+        channel: the only channel that it can be seen in, for effects of a sensor.
+    """
+
+    id: str
+    sentence: str
+    slot: str
+    parameters: tuple[Parameter, ...]
+    apply: Apply
+    sudden: bool = False
+    channel: str = ""
+
+
+MIN_MARGIN_S, ONSET_STEP_S = 1.0, 0.4
+"""Nothing begins closer to the ends of a record; step of the sensitivity to the time: whole steps of the cable. [s]"""
+ONSET_LINEAR_WITHIN_S = 0.5
+"""Sensitivities hold as long as the time moves less than this. [s]"""
+
+
+def with_onset(effect: Effect, time: float) -> Effect:
+    """Return the effect as it begins at a time [s]: id "<id>@<time>". To be applied after all that hold throughout."""
+    return replace(
+        effect,
+        id=f"{effect.id}@{time:g}",
+        sentence=f"from {time:g} s on {effect.sentence}",
+        apply=partial(_from_then_on, effect, time),
+        sudden=False,
+    )
+
+
+def with_free_onset(effect: Effect, time: float, end: float) -> Effect:
+    """Return the effect as it begins at about a time [s] of a trial until `end`: when exactly is its last parameter, as
+    likely at any time.
+    """
+    begins = Parameter(name="start_time", unit="s", tolerance=ONSET_LINEAR_WITHIN_S, scale=end / np.sqrt(2.0 * np.pi),
+                       low=MIN_MARGIN_S - time, high=end - MIN_MARGIN_S - time, step=ONSET_STEP_S)  # fmt: skip
+    at = with_onset(effect, time)
+    return replace(at, parameters=(*effect.parameters, begins), apply=partial(_from_about, effect, time))
+
+
+def _from_about(effect: Effect, time: float, setting: Setting, *deviations: float) -> Setting:
+    return _from_then_on(effect, time + deviations[-1], setting, *deviations[:-1])
+
+
+def _from_then_on(effect: Effect, time: float, setting: Setting, *deviations: float) -> Setting:
+    """Return a setting that has an effect from a time on, beside all other changes in mid-trial.
+
+    Models change between two exchanges only: in the one that the effect begins in, it has the share that is left.
+    """
+    if time <= 0.0:
+        return effect.apply(setting, *deviations)
+    step = setting.trial.cable_step
+    first = step * np.floor(time / step + 1e-6)
+    share = min(1.0 - (time - first) / step, 1.0)
+    base = [setting.model, *(model for begin, model in setting.later if begin <= first)][-1]
+    before = [pair for pair in setting.later if pair[0] < first]
+    after = [pair for pair in setting.later if pair[0] > first]
+    if share < 1.0 - 1e-6:
+        before += [(first, _changed(effect, setting, base, *(share * one for one in deviations)))]
+        first += step
+    changed = [
+        (when, _changed(effect, setting, model, *deviations)) for when, model in [(first, base), *after]
+    ]
+    return replace(setting, later=(*before, *changed))
+
+
+def _changed(effect: Effect, setting: Setting, model: Model, *deviations: float) -> Model:
+    """Return a model with an effect."""
+    return effect.apply(replace(setting, model=model), *deviations).model

@@ -1,0 +1,102 @@
+"""The parameter vector z, the hypotheses about it, and their prior probabilities in one visible table.
+
+z holds the parameters of all effects, which all records share, and then the start of each record. A hypothesis is a set
+of causes, whose entries get the prior variance s² instead of (κτ)².
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import combinations
+from typing import NamedTuple
+
+import numpy as np
+
+from subzero.diagnosis.hypothesis.effect import Effect, Parameter
+
+
+class Entry(NamedTuple):
+    """A number of z: a parameter of an effect; of one record only, for a start (else −1)."""
+
+    effect: Effect
+    place: int
+    record: int
+
+    @property
+    def parameter(self) -> Parameter:
+        """The parameter."""
+        return self.effect.parameters[self.place]
+
+    @property
+    def name(self) -> str:
+        """The parameter's name, unique."""
+        where = f"@{self.record}" if self.record >= 0 else ""
+        return f"{self.effect.id}.{self.parameter.name}{where}"
+
+
+def entries_of(effects: Sequence[Effect], start: Sequence[Effect], records: int) -> tuple[Entry, ...]:
+    """Return the entries of z: effects that all records share, and the start of each record."""
+    shared = [Entry(effect, i, -1) for effect in effects for i in range(len(effect.parameters))]
+    own = [
+        Entry(effect, i, record)
+        for record in range(records)
+        for effect in start
+        for i in range(len(effect.parameters))
+    ]
+    return (*shared, *own)
+
+
+def grouped(entries: tuple[Entry, ...]) -> list[tuple[Effect, list[int], int]]:
+    """Return (effect, its places in z, its record), in order."""
+    found: dict[tuple[str, int], tuple[Effect, list[int], int]] = {}
+    for k, entry in enumerate(entries):
+        found.setdefault((entry.effect.id, entry.record), (entry.effect, [], entry.record))[1].append(k)
+    return list(found.values())
+
+
+Ids = tuple[str, ...]
+"""The causes of a hypothesis, in the order of the alphabet; () is "nothing is wrong"."""
+
+PRIOR = {"none": 0.50, "single": 0.40, "pair": 0.06, "unknown": 0.04, "sudden": 0.04, "more": 0.004}
+"""Probability of each kind, shared by all hypotheses of the kind."""
+
+
+def nameable(entries: Sequence[Entry]) -> list[str]:
+    """Return the ids that can be named: all but those of the start."""
+    found = dict.fromkeys(entry.effect.id for entry in entries if entry.record < 0)
+    return list(found)
+
+
+def sudden_effects(entries: Sequence[Entry]) -> list[Effect]:
+    """Return the effects that may begin in mid-trial."""
+    effects = {entry.effect.id: entry.effect for entry in entries if entry.record < 0}
+    return [effect for effect in effects.values() if effect.sudden]
+
+
+def columns_of(entries: Sequence[Entry], ids: Ids) -> list[int]:
+    """Return where the parameters of causes stand in z."""
+    return [k for k, entry in enumerate(entries) if entry.record < 0 and entry.effect.id in ids]
+
+
+def pairs_of(entries: Sequence[Entry], ids: Sequence[str]) -> list[Ids]:
+    """Return all pairs of different causes."""
+    return [tuple(sorted(pair)) for pair in combinations(ids, 2)]
+
+
+def log_prior(ids: Ids, count: int) -> float:
+    """Return the log of a hypothesis' probability beforehand, of `count` causes that can be named."""
+    if not ids:
+        return float(np.log(PRIOR["none"]))
+    if len(ids) == 1:
+        return float(np.log(PRIOR["single"] / count))
+    if len(ids) == 2:
+        return float(np.log(PRIOR["pair"] / (count * (count - 1) / 2)))
+    return float(np.log(PRIOR["more"] / (count * (count - 1) * (count - 2) / 6)))
+
+
+def variances(entries: Sequence[Entry], ids: Ids, kappa: float) -> np.ndarray:
+    """Return the prior variances of z (k,): (κτ)², or s² for the causes that are named."""
+    D = np.array([(kappa * entry.parameter.tolerance) ** 2 for entry in entries])
+    for k in columns_of(entries, ids):
+        D[k] = max(entries[k].parameter.scale, 2.0 * kappa * entries[k].parameter.tolerance) ** 2
+    return D

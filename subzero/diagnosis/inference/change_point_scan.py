@@ -1,0 +1,306 @@
+"""Change-point candidates, ranked by linear evidence before any is fitted: which cause, and from when on?
+
+Every effect that may begin in mid-trial is tried from every time of a grid, in the linear problem at a linearisation
+point with all tolerances free; the best one again on a finer grid. Causes of a hypothesis are tried by real
+simulations, as large as they are there. What is left out: effects that end again, and two with different onsets.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+
+from subzero.diagnosis.hypothesis.configuration import Setting
+from subzero.diagnosis.hypothesis.effect import Effect, with_free_onset, with_onset
+from subzero.diagnosis.hypothesis.hypotheses import Entry, columns_of, log_prior, nameable, variances
+from subzero.diagnosis.inference.laplace import Candidate, possible
+from subzero.diagnosis.inference.linear_gaussian import KAPPAS, ForceInformation, Quadratic, posterior, seen
+from subzero.diagnosis.inference.map_fit import Fit, bounds
+from subzero.diagnosis.inference.problem import Problem
+from subzero.diagnosis.inference.simulator import Stop, Track, simulate_on, simulate_track, with_stops
+
+COARSE_ONSETS, FINE_PER_COARSE, MIN_ONSET_SPACING_S = 15, 4, 1.0
+"""A record has so many steps of times to begin at, each so many finer ones, but none is shorter than the last. [s]"""
+MIN_SCAN_GAIN = 3.0
+"""What gains less, in log evidence, is not tried on the finer grid."""
+SECANT_SCALES = 0.25
+"""Step of a sensitivity, in effect scales."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ChangePoint:
+    """A sudden effect in the linear problem.
+
+    Attributes:
+        effect: as it holds throughout.
+        time: when it begins. [s]
+        record: in which record; a sudden effect is an event of one trial.
+        log_gain: log evidence over that of no such effect.
+        mean: deviations of its parameters. [their unit]
+        between: what a time between those that were tried may gain more.
+        kappa: the most probable scale of the tolerances.
+    """
+
+    effect: Effect
+    time: float
+    record: int
+    log_gain: float
+    mean: np.ndarray
+    between: float = 0.0
+    kappa: float = 1.0
+
+    @property
+    def begun(self) -> Effect:
+        """The effect as it begins at that time."""
+        return with_onset(self.effect, self.time)
+
+    @property
+    def id(self) -> str:
+        """Such as "rudder_offset@12"."""
+        return self.begun.id
+
+
+class BaseRun(NamedTuple):
+    """A run to take sensitivities from: of a problem with deviations z of all its entries."""
+
+    problem: Problem
+    z: np.ndarray
+
+
+class LinearisationPoint(NamedTuple):
+    """A linear problem of all that holds throughout, and the run that sensitivities are taken from; what the run has
+    besides (a force, a sudden cause) is part of what the records show.
+    """
+
+    fit: Fit
+    along: BaseRun
+
+
+def spacing_of(problem: Problem, record: int) -> float:
+    """Return the steps of the times to begin at. [s]"""
+    return max(float(problem.records[record].time[-1]) / COARSE_ONSETS, MIN_ONSET_SPACING_S)
+
+
+def times_of(problem: Problem, record: int) -> list[float]:
+    """Return times to begin at: a grid within a record, without its ends. [s]"""
+    spacing = spacing_of(problem, record)
+    return [
+        float(time)
+        for time in np.arange(spacing, float(problem.records[record].time[-1]) - 0.5 * spacing, spacing)
+    ]
+
+
+def scan(
+    place: LinearisationPoint,
+    D: np.ndarray,
+    effects: Sequence[Effect],
+    record: int = 0,
+    *,
+    best: int = 3,
+) -> list[ChangePoint]:
+    """Return every sudden effect at its best time, most probable first; the `best` of them with finer times.
+
+    Args:
+        place: close to the data.
+        D: prior variances of the entries (k,).
+        effects: of the catalogue; those that are not sudden are left out.
+        record: in which they begin.
+        best: how many are tried on the finer grid.
+    """
+    able = [effect for effect in effects if effect.sudden]
+    coarse = times_of(place.along.problem, record)
+    found = _strongest(_tried(place, D, [(one, time) for one in able for time in coarse], record))
+    spacing = spacing_of(place.along.problem, record)
+    worth = [one for one in found[:best] if one.log_gain > MIN_SCAN_GAIN]
+    finer = [(one.effect, time) for one in worth for time in _around(one.time, spacing)]
+    return _strongest(found + _tried(place, D, finer, record)) if finer else found
+
+
+def _around(time: float, spacing: float) -> list[float]:
+    """Return the finer times between a time of the grid and its neighbours."""
+    return [time + i * spacing / FINE_PER_COARSE for i in range(1 - FINE_PER_COARSE, FINE_PER_COARSE) if i]
+
+
+def _strongest(found: list[ChangePoint]) -> list[ChangePoint]:
+    """Return the best time of every effect, most probable first."""
+    ranked = sorted(found, key=lambda one: -one.log_gain)
+    first = {one.effect.id: one for one in reversed(ranked)}
+    return [
+        replace(one, between=_between(one, found))
+        for one in sorted(first.values(), key=lambda one: -one.log_gain)
+    ]
+
+
+def _between(best: ChangePoint, found: list[ChangePoint]) -> float:
+    """Return how far a parabola through an effect's best time and its neighbours rises above it."""
+    at = {one.time: one for one in found if one.effect.id == best.effect.id}
+    own = [at[time] for time in sorted(at)]
+    k = next(k for k, one in enumerate(own) if one.time == best.time)
+    if not 0 < k < len(own) - 1:
+        return 0.0
+    times, gains = ([getattr(one, name) for one in own[k - 1 : k + 2]] for name in ("time", "log_gain"))
+    a, b, c = np.polyfit(np.array(times) - best.time, gains, 2)
+    return float(c - b * b / (4.0 * a) - best.log_gain) if a < 0.0 else 0.0
+
+
+def _tried(
+    place: LinearisationPoint, D: np.ndarray, pairs: list[tuple[Effect, float]], record: int
+) -> list[ChangePoint]:
+    """Return the linear evidence of effects that begin at times."""
+    fit = place.fit
+    q, whole = fit.quadratic, fit.r + fit.J @ fit.z
+    made = change_point_columns(place.along, pairs, record)
+    sizes, data = (
+        np.cumsum([0, *(C.shape[1] for C in made)]),
+        seen(q.A, q.b, D, fit.J, np.hstack(made), whole),
+    )
+    found = []
+    for (effect, time), first, last in zip(pairs, sizes[:-1], sizes[1:], strict=True):
+        own = slice(first, last)
+        log, mean = _gain(ForceInformation(data.M[own, own], data.q[own]), effect)
+        found.append(ChangePoint(effect=effect, time=time, record=record, log_gain=log, mean=mean))
+    return found
+
+
+def _gain(data: ForceInformation, effect: Effect) -> tuple[float, np.ndarray]:
+    """Return the log evidence of an effect over that of none, and the mean of its deviations."""
+    variance = np.array([parameter.scale**2 for parameter in effect.parameters])
+    inner = np.eye(variance.size) + variance[:, None] * data.M
+    M = np.linalg.solve(inner, np.diag(variance))
+    mean = M @ data.q
+    log = 0.5 * float(data.q @ mean) - 0.5 * float(np.linalg.slogdet(inner)[1])
+    entries = [Entry(effect, i, -1) for i in range(variance.size)]
+    return log + possible(entries, range(variance.size), mean, np.sqrt(np.diag(M))), mean
+
+
+def change_point_columns(
+    along: BaseRun, pairs: Sequence[tuple[Effect, float]], record: int = 0
+) -> list[np.ndarray]:
+    """Return whitened sensitivities (m, parameters) to each (effect, time) in one record; secants of a small step."""
+    problem, z = along
+    base, steps = _plain(problem, record, z), [np.diag(_steps(effect)) for effect, _ in pairs]
+    jobs = [(with_onset(effect, time).apply(base, *row.tolist()), time)
+            for (effect, time), rows in zip(pairs, steps, strict=True) for row in rows]  # fmt: skip
+    problem.kept.count(1 + len(jobs))
+    plain, stops = with_stops(base, {time for _, time in jobs})
+    tracks = [plain, *problem.pool.map(partial(_run, stops), jobs)]
+    shown = problem.setting(record, z)
+    seen_of = [problem.whitened(record, shown, track) for track in tracks]
+    first, size = _rows(problem, record)
+    changes, at = np.array(seen_of[1:]) - seen_of[0], 0
+    found: list[np.ndarray] = []
+    for rows in steps:
+        C = np.zeros((size, rows.shape[0]))
+        own = changes[at : at + rows.shape[0]] / np.diag(rows)[:, None]
+        C[first : first + own.shape[1]] = np.nan_to_num(own.T)
+        found, at = [*found, C], at + rows.shape[0]
+    return found
+
+
+def _steps(effect: Effect) -> list[float]:
+    """Return the step of each parameter, to where there is more room."""
+    return [SECANT_SCALES * one.scale * (1.0 if one.high >= -one.low else -1.0) for one in effect.parameters]
+
+
+def _plain(problem: Problem, record: int, z: np.ndarray) -> Setting:
+    """Return the setting of a record, its sensors right."""
+    return problem.setting(record, z, late=False)
+
+
+def _run(stops: Mapping[float, Stop], job: tuple[Setting, float]) -> Track:
+    """Return the track of a setting that differs from a time on; from there, if the run before it went as far."""
+    setting, time = job
+    return simulate_on(setting, stops[time]) if time in stops else simulate_track(setting)
+
+
+def _rows(problem: Problem, record: int) -> tuple[int, int]:
+    """Return where the rows of a record begin, and how many there are in all."""
+    sizes = [sum(noise.count for noise in one.noise.values()) for one in problem.records]
+    return sum(sizes[:record]), sum(sizes)
+
+
+def with_change_point(problem: Problem, begun: ChangePoint) -> Problem:
+    """Return the problem with a sudden effect's parameters and its time behind its entries."""
+    effect = with_free_onset(begun.effect, begun.time, float(problem.records[begun.record].time[-1]))
+    more = tuple(Entry(effect, i, begun.record) for i in range(len(effect.parameters)))
+    return replace(problem, entries=(*problem.entries, *more))
+
+
+LARGER_SIZES = (1.0, 1.5)
+"""A cause that begins late is larger than one that holds throughout."""
+
+
+class RankedChangePoint(NamedTuple):
+    """A sudden cause in the linear problem of a place: log posterior, as of `Struck`; where its fit begins, all entries
+    and its parameters, if that is not the best of the linear problem.
+    """
+
+    log_posterior: float
+    begun: ChangePoint
+    place: LinearisationPoint
+    start: np.ndarray | None = None
+
+    def at_most(self, bent: float) -> float:
+        """Return the log posterior that its fit may have, if that share of what it gains is not linear."""
+        return self.log_posterior + self.begun.between + bent * max(self.begun.log_gain, 0.0)
+
+
+def ranked_in(
+    problem: Problem, place: LinearisationPoint, able: Sequence[Effect], record: int
+) -> list[RankedChangePoint]:
+    """Return every sudden cause at its best time, in the linear problem of a place."""
+    here = _log_none(problem, place.fit, record)
+    found = scan(place, variances(problem.entries, (), 1.0), able, record)
+    return [RankedChangePoint(here + one.log_gain, one, place) for one in found]
+
+
+def ranked_by_runs(
+    problem: Problem, one: Candidate, able: Sequence[Effect], record: int
+) -> list[RankedChangePoint]:
+    """Return the causes of a hypothesis from their best times on, by real runs from its fit: what nearly stops in
+    mid-trial says little where it is changed a little.
+    """
+    return [_large(problem, one.fit, effect, record) for effect in able if effect.id in one.ids]
+
+
+def _large(problem: Problem, fit: Fit, effect: Effect, record: int) -> RankedChangePoint:
+    """Return a cause at its best time and size, all else the best of the linear problem there."""
+    own, times = columns_of(problem.entries, (effect.id,)), times_of(problem, record)
+    low, high = bounds(problem)
+    without = fit.z.copy()
+    without[own] = 0.0
+    first = ChangePoint(effect=effect, time=times[0], record=record, log_gain=-np.inf, mean=fit.z[own])
+    sizes = [np.clip(share * fit.z[own], low[own], high[own]) for share in LARGER_SIZES]
+    jobs = [replace(first, time=time, mean=size) for time in times for size in sizes]
+    at = [np.concatenate([without, one.mean, [one.time - first.time]]) for one in jobs]
+    place, none = LinearisationPoint(fit, BaseRun(problem, fit.z)), _log_none(problem, fit, record)
+    tried = [_at_size(problem, RankedChangePoint(none, one, place), without, r)
+             for one, r in zip(jobs, with_change_point(problem, first).residuals(at), strict=True)]  # fmt: skip
+    return max(tried, key=lambda one: one.log_posterior)
+
+
+def _at_size(
+    problem: Problem, none: RankedChangePoint, without: np.ndarray, r: np.ndarray
+) -> RankedChangePoint:
+    """Return the hope of a cause at a time and a size, with the residual there; `none` has that of nothing."""
+    if not np.isfinite(r).all():
+        return none._replace(log_posterior=-np.inf)
+    begun, D = none.begun, variances(problem.entries, (), 1.0)
+    there = posterior(Quadratic.at(without, r, none.place.fit.J), D)
+    scale = np.array([one.scale for one in begun.effect.parameters])
+    far = 0.5 * float(np.sum((begun.mean / scale) ** 2)) + scale.size
+    nothing = posterior(none.place.fit.quadratic, D).log_evidence
+    gain = there.log_evidence - far - nothing
+    begun, start = replace(begun, log_gain=gain), np.append(there.z, begun.mean)
+    return RankedChangePoint(none.log_posterior + gain, begun, none.place, start)
+
+
+def _log_none(problem: Problem, fit: Fit, record: int) -> float:
+    """Return the log posterior of nothing in the linear problem of a fit, and of any time at which it might begin."""
+    log = posterior(fit.quadratic, variances(problem.entries, (), 1.0)).log_evidence
+    any_time = -float(np.log(len(times_of(problem, record))))
+    return log + float(np.log(KAPPAS[1.0])) + log_prior((), len(nameable(problem.entries))) + any_time

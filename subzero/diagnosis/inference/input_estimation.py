@@ -1,0 +1,353 @@
+"""Latent forces and sensor drifts: candidates by linear evidence, histories, and a linearisation at their own fit.
+
+    w ~ Gaussian process(a, T) on one axis;   a and T are those that make the record most probable
+
+`latent_force_candidates` compares axes and channels in the linear problem around a fit. `estimate_force` fits the
+history with real simulations, all tolerances free, and gives its band. `relinearised_force` asks for the evidence again
+at that fit: without the force, all tolerances have to deviate from their priors to come close to a record, and a
+linearisation there says little of a model that is as declared but for the force. What is left out: forces on two axes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from subzero.channels import BY_NAME
+from subzero.diagnosis.hypothesis.catalogue.sensors import SPECS
+from subzero.diagnosis.hypothesis.configuration import Setting
+from subzero.diagnosis.hypothesis.hypotheses import log_prior, nameable, variances
+from subzero.diagnosis.inference.change_point_scan import BaseRun, LinearisationPoint
+from subzero.diagnosis.inference.laplace import possible
+from subzero.diagnosis.inference.latent_force import (
+    DRIFT,
+    FINE_SPACING_S,
+    FORCE,
+    MAX_DRIFT_LEVELS,
+    Knots,
+    drift_columns,
+    force_columns,
+    history,
+    knots_of,
+    usual_force,
+    with_force,
+)
+from subzero.diagnosis.inference.linear_gaussian import (
+    AMPLITUDE_SHARES,
+    KAPPAS,
+    ForceInformation,
+    Posterior,
+    ProcessShape,
+    Quadratic,
+    Scale,
+    Scales,
+    Terms,
+    correlation,
+    log_evidence_process,
+    log_evidence_term,
+    log_gains,
+    log_sum,
+    mixed,
+    modes,
+    posterior,
+    seen,
+)
+from subzero.diagnosis.inference.map_fit import Fit, is_poor_fit, refit, with_own_jacobian
+from subzero.diagnosis.inference.problem import Problem
+from subzero.diagnosis.results import Unknown
+from subzero.external_force import MissingForce
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LatentForceCandidate:
+    """A force or a drift in the linear problem.
+
+    Attributes:
+        id: "unknown_force:X", "sensor_drift:heading".
+        log_gain: log evidence over that of none; amplitudes, correlation times, formulas of one term and κ mixed.
+        kappa: the most probable κ.
+    """
+
+    id: str
+    log_gain: float
+    kappa: float
+
+
+def latent_force_candidates(
+    problem: Problem,
+    columns: Mapping[str, np.ndarray],
+    fit: Fit,
+    scales: Scales,
+    knots: Knots,
+    terms: Mapping[str, Terms] | None = None,
+) -> list[LatentForceCandidate]:
+    """Return every force and drift of `columns` (id → (m, n)), in the linear problem around a fit, most probable first.
+
+    Args:
+        problem: of the columns.
+        columns: as of `all_columns`.
+        fit: that the columns were made close to.
+        scales: κ → its log weight and the prior variances of the entries.
+        knots: of the columns.
+        terms: axis → what a force on it may look like beside a process.
+    """
+    q, whole = fit.quadratic, fit.r + fit.J @ fit.z
+    found = []
+    for name, C in columns.items():
+        gains = {
+            kappa: _log_gain(problem, name, seen(q.A, q.b, one.D, fit.J, C, whole), knots, terms or {})
+            for kappa, one in scales.items()
+        }
+        gain, kappa = mixed(scales, gains)
+        found.append(LatentForceCandidate(id=name, log_gain=gain, kappa=kappa))
+    return sorted(found, key=lambda one: -one.log_gain)
+
+
+def _log_gain(
+    problem: Problem, name: str, data: ForceInformation, knots: Knots, terms: Mapping[str, Terms]
+) -> float:
+    """Return the log evidence of a force or a drift over that of none: a process, or as probably a formula."""
+    amplitudes, axis = _amplitudes(problem, name), name.partition(":")[2]
+    process = log_evidence_process(data, knots.time, knots.record, amplitudes, drift=name.startswith(DRIFT))
+    if name.startswith(DRIFT) or axis not in terms:
+        return process
+    return log_sum([process, log_evidence_term(data, terms[axis], amplitudes)]) - float(np.log(2.0))
+
+
+def _amplitudes(problem: Problem, name: str) -> list[float]:
+    """Return the amplitudes that are mixed for a force or a drift."""
+    kind, _, which = name.partition(":")
+    if kind + ":" == FORCE:
+        return amplitude_grid(problem.records[0].setting, which)
+    return [share * MAX_DRIFT_LEVELS * SPECS[which].noise for share in AMPLITUDE_SHARES]
+
+
+def amplitude_grid(setting: Setting, axis: str) -> list[float]:
+    """Return the amplitudes that are mixed. [N, N m]"""
+    return [share * usual_force(setting, axis) for share in AMPLITUDE_SHARES]
+
+
+CORRELATION_TIMES_S = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0)
+"""Correlation times that are tried. [s]"""
+AMPLITUDES_TRIED = tuple(0.01 * 1.6**i for i in range(12))
+"""Amplitudes that are tried, in units of the axis' usual force."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class EstimatedForce:
+    """A force that no cause explains, fitted.
+
+    Attributes:
+        unknown: its history with a band, of the record where it is largest.
+        record: which one that is.
+        missing: the same as a part of a model.
+        problem: with the force's modes behind its entries; as it was for a drift.
+        fit: of that problem.
+        knots: of the history, all records.
+        force: at the knots (n,). [N, N m]
+        covariance: of these (n, n).
+        columns: sensitivities to the force at the knots, around the fit (m, n).
+        data: what the data alone say of it there.
+    """
+
+    unknown: Unknown
+    record: int
+    missing: MissingForce | None
+    problem: Problem
+    fit: Fit
+    knots: Knots
+    force: np.ndarray
+    covariance: np.ndarray
+    columns: np.ndarray
+    data: ForceInformation
+
+
+def estimate_force(
+    problem: Problem,
+    fit: Fit,
+    axis: str,
+    D: np.ndarray | None = None,
+    *,
+    spacing: float = FINE_SPACING_S,
+    most_fresh: int = 2,
+) -> EstimatedForce:
+    """Return the history of a force on an axis.
+
+    Args:
+        problem: records and parameters.
+        fit: to begin with: of "nothing is wrong" within wide tolerances, or of named causes.
+        axis: X, Y, Z, K, M or N.
+        D: prior variances of the problem's entries (k,); those of the fit if None.
+        spacing: of the knots. [s]
+        most_fresh: how many times sensitivities may be made again on the way.
+    """
+    D = fit.D if D is None else D
+    knots = knots_of(problem, spacing)
+    C = force_columns(problem, fit.z, (axis,), knots)[axis]
+    L = _best_modes(_seen(fit, D, C), knots, usual_force(problem.records[0].setting, axis))
+    more = with_force(problem, axis, knots, L, 1.0)
+    whole, J = np.concatenate([D, np.ones(L.shape[1])]), np.hstack([fit.J, C @ L])
+    start = _linear(fit, J, whole)
+    made_at = None if fit.made_at is None else np.concatenate([fit.made_at, np.zeros(L.shape[1])])
+    done = with_own_jacobian(more, refit(more, start.z, J, whole, most_fresh=most_fresh, made_at=made_at))
+    found = posterior(done.quadratic, whole)
+    k = D.size
+    force, covariance = L @ done.z[k:], L @ found.M[k:, k:] @ L.T
+    at_knots = np.linalg.solve(L.T, done.J[:, k:].T).T
+    return _recovered(axis, more, done, knots, force, covariance, at_knots, D)
+
+
+def estimate_drift(
+    problem: Problem, fit: Fit, channel: str, scale: float, D: np.ndarray | None = None
+) -> EstimatedForce:
+    """Return the drift of a channel, in its unit, as the history of an unknown "force"; `scale` is a usual drift."""
+    D = fit.D if D is None else D
+    knots = knots_of(problem)
+    C = drift_columns(problem, channel, knots)
+    L = _best_modes(_seen(fit, D, C), knots, scale)
+    whole, J = np.concatenate([D, np.ones(L.shape[1])]), np.hstack([fit.J, C @ L])
+    found, k = _linear(fit, J, whole), D.size
+    force, covariance = L @ found.z[k:], L @ found.M[k:, k:] @ L.T
+    return _recovered(channel, problem, fit, knots, force, covariance, C, D)
+
+
+def _seen(fit: Fit, D: np.ndarray, columns: np.ndarray) -> ForceInformation:
+    """Return what data say of columns around a fit of the entries before them, or of those and the columns' modes."""
+    J, whole = fit.J[:, : D.size], fit.r + fit.J @ fit.z
+    return seen(J.T @ J, J.T @ whole, D, J, columns, whole)
+
+
+def _linear(fit: Fit, J: np.ndarray, D: np.ndarray) -> Posterior:
+    """Return the posterior with columns added to a fit's."""
+    whole = fit.r + fit.J @ fit.z
+    return posterior(Quadratic(A=J.T @ J, b=J.T @ whole, rr=float(whole @ whole)), D)
+
+
+def _best_modes(data: ForceInformation, knots: Knots, size: float) -> np.ndarray:
+    """Return the modes of the process that makes the record most probable."""
+    amplitudes = [share * size for share in AMPLITUDES_TRIED]
+    table = np.array(
+        [log_gains(data, correlation(knots.time, knots.record, T), amplitudes) for T in CORRELATION_TIMES_S]
+    )
+    i, j = divmod(int(np.argmax(table)), table.shape[1])
+    return modes(knots.time, knots.record, ProcessShape(amplitudes[j], CORRELATION_TIMES_S[i]))
+
+
+def _recovered(
+    axis: str,
+    problem: Problem,
+    fit: Fit,
+    knots: Knots,
+    force: np.ndarray,
+    covariance: np.ndarray,
+    columns: np.ndarray,
+    D: np.ndarray,
+) -> EstimatedForce:
+    """Return it all, told for the record where the force is largest."""
+    size = [float(np.sqrt(np.mean(force[knots.record == i] ** 2))) for i in range(len(problem.records))]
+    record = int(np.argmax(size))
+    own = knots.record == record
+    band = np.sqrt(np.maximum(np.diag(covariance)[own], 0.0))
+    unknown = Unknown(axis=axis, time=knots.time[own], force=force[own], band=band)
+    missing = None if axis in BY_NAME else history(axis, knots.time[own], force[own])
+    return EstimatedForce(unknown=unknown, record=record, missing=missing, problem=problem, fit=fit, knots=knots,
+                     force=force, covariance=covariance, columns=columns, data=_seen(fit, D, columns))  # fmt: skip
+
+
+class RelinearisedForce(NamedTuple):
+    """A force or a drift around its own fit.
+
+    Attributes:
+        log_posterior: of it beside nothing, but for its own prior.
+        what: it is.
+        place: the linear problem there, without it, and the run, with it.
+        is_lost: it does not explain the records.
+    """
+
+    log_posterior: float
+    what: LatentForceCandidate
+    place: LinearisationPoint
+    is_lost: bool
+
+
+def relinearised_force(
+    problem: Problem, start: Fit, name: str, kappa: float, knots: Knots, terms: Mapping[str, Terms]
+) -> RelinearisedForce:
+    """Return a force or a drift beside nothing, around its own fit.
+
+    Args:
+        problem: records and parameters.
+        start: a fit close to the records.
+        name: "unknown_force:X", "sensor_drift:heading".
+        kappa: how wide the tolerances are in the fit.
+        knots: of its history.
+        terms: axis → what a force on it may look like.
+    """
+    D, which = variances(problem.entries, (), kappa), name.partition(":")[2]
+    if name.startswith(FORCE):
+        found = estimate_force(problem, start, which, D, spacing=knots.spacing, most_fresh=1)
+        done = found.fit
+    else:
+        found = estimate_drift(problem, start, which, MAX_DRIFT_LEVELS * SPECS[which].noise, D)
+        knots, done = found.knots, fit_beside_drift(problem, found, D)
+    fit = _without(found, done, D.size)
+    ((log, what),) = linear_candidates(problem, fit, {name: found.columns}, knots, terms, [kappa])
+    place = LinearisationPoint(fit=fit, along=BaseRun(found.problem, done.z))
+    return RelinearisedForce(log + _possible(problem, done), what, place, is_poor_fit(done))
+
+
+def linear_candidates(
+    problem: Problem,
+    fit: Fit,
+    columns: Mapping[str, np.ndarray],
+    knots: Knots,
+    terms: Mapping[str, Terms],
+    kappas: Sequence[float],
+) -> list[tuple[float, LatentForceCandidate]]:
+    """Return the log posteriors of forces beside nothing in the linear problem around a fit, and the forces.
+
+    A fit says little of tolerances that are wider than its own: with them the model would rather bend.
+    """
+    D = {kappa: variances(problem.entries, (), kappa) for kappa in kappas}
+    log = {
+        kappa: float(np.log(KAPPAS[kappa])) + posterior(fit.quadratic, D[kappa]).log_evidence
+        for kappa in kappas
+    }
+    total = log_sum(list(log.values()))
+    scales = {kappa: Scale(log[kappa] - total, D[kappa]) for kappa in kappas}
+    total += log_prior((), len(nameable(problem.entries)))
+    return [
+        (total + one.log_gain, one)
+        for one in latent_force_candidates(problem, columns, fit, scales, knots, terms)
+    ]
+
+
+def fit_beside_drift(problem: Problem, found: EstimatedForce, D: np.ndarray) -> Fit:
+    """Return the fit of the records without a drift, under prior variances D (k,)."""
+    start, channel, records = found.fit, found.unknown.axis, []
+    for i, one in enumerate(problem.records):
+        own = found.knots.record == i
+        drift = np.interp(one.time, found.knots.time[own], found.force[own])
+        records.append(replace(one, values={**one.values, channel: one.values[channel] - drift}))
+    cleared = replace(problem, records=tuple(records))
+    J, left = start.J, start.r + start.J @ start.z - found.columns @ found.force
+    there = posterior(Quadratic(A=J.T @ J, b=J.T @ left, rr=float(left @ left)), D).z
+    done = refit(cleared, there, J, D, most_fresh=1, made_at=start.made_at)
+    return with_own_jacobian(cleared, done)
+
+
+def _without(found: EstimatedForce, done: Fit, count: int) -> Fit:
+    """Return a fit with a force or beside a drift as one of the entries before it: with what the records lack then."""
+    z, D, r = done.z[:count], done.D[:count], done.r + found.columns @ found.force
+    objective = 0.5 * float(r @ r) + 0.5 * float(np.sum(z * z / D))
+    return Fit(z=z, r=r, J=done.J[:, :count], D=D, objective=objective, converged=done.converged, predicted_gain=0.0,
+               fresh=done.fresh)  # fmt: skip
+
+
+def _possible(problem: Problem, done: Fit) -> float:
+    """Return what is added to the log evidence because some values cannot be below 0."""
+    count, free = len(problem.entries), posterior(done.quadratic, done.D)
+    return possible(problem.entries, range(count), free.z[:count], np.sqrt(np.diag(free.M)[:count]))

@@ -1,0 +1,228 @@
+"""Evidence and posterior in the linear Gaussian problem: of parameters z, and of a Gaussian process f beside them.
+
+    r = J z + e,   z ~ N(0, D),   e ~ N(0, I);      A = Jᵀ J,  b = Jᵀ r,  P = D⁻¹ + A
+    log p = −½ (rᵀr − bᵀ P⁻¹ b) − ½ log det(D P)
+
+A hypothesis frees some entries: their variance becomes s² instead of (κτ)². That changes P on a few places of its
+diagonal only, so that all pairs cost a few products of 2 × 2 matrices each.
+
+    r = J z + C f + e,   f ~ N(0, a² R(T));      M = Cᵀ Σ₀⁻¹ C,   q = Cᵀ Σ₀⁻¹ r,   Σ₀ = I + J D Jᵀ
+    log p(r | f) − log p(r | f = 0) = −½ log |I + a² R M| + ½ qᵀ (a⁻² R⁻¹ + M)⁻¹ q
+
+M and q are all that the data say of f, whatever its prior; amplitudes a and correlation times T are mixed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+KAPPAS = {1.0: 0.6, 2.0: 0.3, 4.0: 0.1}
+"""κ, how much wider than declared the tolerances are → its prior probability."""
+
+
+class Scale(NamedTuple):
+    """A κ, given a hypothesis and the data: its log probability, and the prior variances under it (k,)."""
+
+    log_weight: float
+    D: np.ndarray
+
+
+Scales = Mapping[float, Scale]
+"""κ → what is made of it."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Quadratic:
+    """A linear least-squares problem in the neighbourhood of a point.
+
+    Attributes:
+        A: JᵀJ (k, k).
+        b: Jᵀ(r + J z) (k,).
+        rr: |r + J z|².
+    """
+
+    A: np.ndarray
+    b: np.ndarray
+    rr: float
+
+    @classmethod
+    def at(cls, z: np.ndarray, r: np.ndarray, J: np.ndarray) -> Quadratic:
+        """Return the problem that has residual r and sensitivities J at z."""
+        whole = r + J @ z
+        return cls(A=J.T @ J, b=J.T @ whole, rr=float(whole @ whole))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Posterior:
+    """Under prior variances D: mean and covariance of z, the log evidence, and log det(D P)."""
+
+    z: np.ndarray
+    M: np.ndarray
+    log_evidence: float
+    log_det: float
+
+
+def posterior(q: Quadratic, D: np.ndarray) -> Posterior:
+    """Return what the data say under prior variances D (k,)."""
+    root = np.sqrt(D)
+    scaled = np.eye(D.size) + root[:, None] * q.A * root
+    factor = np.linalg.cholesky(scaled)
+    half = np.linalg.solve(factor, np.diag(root))
+    M = half.T @ half
+    z = M @ q.b
+    log_det = 2.0 * float(np.sum(np.log(np.diag(factor))))
+    return Posterior(z=z, M=M, log_evidence=-0.5 * (q.rr - float(q.b @ z)) - 0.5 * log_det, log_det=log_det)
+
+
+def freed(
+    base: Posterior, D: np.ndarray, places: Sequence[int], variance: np.ndarray
+) -> tuple[float, np.ndarray, np.ndarray]:
+    """Return log evidence, means and covariance of some entries when their prior variance is another.
+
+    Args:
+        base: under D.
+        D: prior variances (k,).
+        places: of the entries.
+        variance: theirs, instead (places,).
+    """
+    at = list(places)
+    change = 1.0 / variance - 1.0 / D[at]
+    M, z = base.M[np.ix_(at, at)], base.z[at]
+    inner = np.eye(len(at)) + change[:, None] * M
+    solved = np.linalg.solve(inner, change[:, None] * np.eye(len(at)))
+    gain = -0.5 * float(z @ solved @ z)
+    log_det = float(np.linalg.slogdet(inner)[1]) + float(np.sum(np.log(variance / D[at])))
+    covariance = np.linalg.solve(np.eye(len(at)) + M * change, M)
+    mean = z - covariance @ (change * z)
+    return base.log_evidence + gain - 0.5 * log_det, mean, covariance
+
+
+def discrimination(G: np.ndarray, step: np.ndarray, free: np.ndarray) -> float:
+    """Return the squared distance of a step from what other entries could do instead.
+
+    Args:
+        G: information of all k entries, tolerances of all included as 1/D on its diagonal but for those in the step's
+            own and the rival's places (k, k).
+        step: deviations of the true cause (k,), 0 elsewhere.
+        free: which entries may answer (k,).
+    """
+    own = G @ step
+    answer = np.linalg.solve(G[np.ix_(free, free)], own[free])
+    return float(step @ own - own[free] @ answer)
+
+
+def mixed(scales: Scales, gains: Mapping[float, float]) -> tuple[float, float]:
+    """Return a log gain mixed over κ, from those under every κ, and the κ that is most probable with it."""
+    log = {kappa: scales[kappa].log_weight + gain for kappa, gain in gains.items()}
+    return log_sum(list(log.values())), max(log, key=lambda kappa: log[kappa])
+
+
+def log_sum(values: Sequence[float] | np.ndarray) -> float:
+    """Return log Σ exp(values)."""
+    top = np.max(values)
+    return float(top + np.log(np.sum(np.exp(np.asarray(values) - top))))
+
+
+CORRELATION_TIMES = (2.0, 6.0)
+"""T of the mixture: a force that changes within seconds, or lasts. [s]"""
+DRIFT_TIMES = (10.0, 30.0)
+"""The same of a sensor's drift, which is slow: one that follows every step of a force is no drift. [s]"""
+AMPLITUDE_SHARES = (0.1, 0.3, 1.0)
+"""Amplitudes of the mixture, in units of the axis' usual force: smaller ones are of no practical size."""
+JITTER = 1e-6
+
+
+class ForceInformation(NamedTuple):
+    """What data say of the coefficients f of columns: information M (n, n) and q (n,), tolerances free."""
+
+    M: np.ndarray
+    q: np.ndarray
+
+
+class Terms(NamedTuple):
+    """What a force may look like, as formulas of one term: values at the knots (n, terms), of size 1, and log prior."""
+
+    phi: np.ndarray
+    log_prior: np.ndarray
+
+
+class ProcessShape(NamedTuple):
+    """Prior of a process: amplitude [unit of f] and correlation time [s]."""
+
+    amplitude: float
+    time: float
+
+
+def seen(
+    A: np.ndarray, b: np.ndarray, D: np.ndarray, J: np.ndarray, columns: np.ndarray, r: np.ndarray
+) -> ForceInformation:
+    """Return what the data say of columns, all other entries free under D.
+
+    Args:
+        A: JᵀJ (k, k).
+        b: Jᵀr (k,).
+        D: prior variances (k,).
+        J: sensitivities (m, k).
+        columns: C (m, n).
+        r: residual with z = 0 and f = 0 in the linear problem (m,).
+    """
+    root = np.sqrt(D)
+    inner = np.eye(D.size) + root[:, None] * A * root
+    cross = root[:, None] * (J.T @ columns)
+    answer = np.linalg.solve(inner, np.column_stack([cross, root * b]))
+    M = columns.T @ columns - cross.T @ answer[:, :-1]
+    return ForceInformation(M=0.5 * (M + M.T), q=columns.T @ r - cross.T @ answer[:, -1])
+
+
+def correlation(times: np.ndarray, groups: np.ndarray, time: float, *, smooth: bool = False) -> np.ndarray:
+    """Return R (n, n) between knots: exp(−|Δt|/T), or Matérn's with two derivatives for what never jumps.
+
+    Knots of different groups (records) have nothing in common.
+    """
+    d = np.abs(np.subtract.outer(times, times)) / time
+    root = np.sqrt(5.0) * d
+    R = (1.0 + root + root**2 / 3.0) * np.exp(-root) if smooth else np.exp(-d)
+    return np.where(np.equal.outer(groups, groups), R, 0.0)
+
+
+def log_gains(data: ForceInformation, R: np.ndarray, amplitudes: Sequence[float]) -> np.ndarray:
+    """Return the log evidence over that of f = 0 for every amplitude (amplitudes,)."""
+    half = np.linalg.cholesky(R + JITTER * np.eye(R.shape[0]))
+    values, vectors = np.linalg.eigh(half.T @ data.M @ half)
+    values, y = np.maximum(values, 0.0), vectors.T @ (half.T @ data.q)
+    a2 = np.square(amplitudes)[:, None]
+    return np.sum(-0.5 * np.log1p(a2 * values) + 0.5 * a2 * y**2 / (1.0 + a2 * values), axis=1)
+
+
+def log_evidence_process(
+    data: ForceInformation,
+    times: np.ndarray,
+    groups: np.ndarray,
+    amplitudes: Sequence[float],
+    *,
+    drift: bool = False,
+) -> float:
+    """Return the log evidence of a process over that of f = 0, amplitudes and correlation times mixed."""
+    lasting = DRIFT_TIMES if drift else CORRELATION_TIMES
+    table = np.array(
+        [log_gains(data, correlation(times, groups, T, smooth=drift), amplitudes) for T in lasting]
+    )
+    return log_sum(table.ravel()) - float(np.log(table.size))
+
+
+def log_evidence_term(data: ForceInformation, terms: Terms, amplitudes: Sequence[float]) -> float:
+    """Return the log evidence of f = c φ over that of f = 0, c ~ N(0, a²); terms and amplitudes mixed."""
+    M = np.sum(terms.phi * (data.M @ terms.phi), axis=0)
+    q, a2 = terms.phi.T @ data.q, np.square(amplitudes)[:, None]
+    table = 0.5 * a2 * q**2 / (1.0 + a2 * M) - 0.5 * np.log1p(a2 * M) + terms.log_prior
+    return log_sum(table.ravel()) - float(np.log(len(amplitudes)))
+
+
+def modes(times: np.ndarray, groups: np.ndarray, shape: ProcessShape) -> np.ndarray:
+    """Return L (n, n) such that f = L x with x ~ N(0, I) is the process."""
+    R = correlation(times, groups, shape.time)
+    return shape.amplitude * np.linalg.cholesky(R + JITTER * np.eye(times.size))

@@ -1,0 +1,187 @@
+"""Probabilities of all hypotheses from their evidence, and the decision rule for the verdict.
+
+nothing_wrong      p(none) ≥ 0.5, or the named size is within the practical one (then the model wants calibration)
+cause_named        one hypothesis, or one cause that begins in mid-trial, with p ≥ 0.8, D ≥ 9 to its closest rival,
+                   its size beyond 4 tolerances
+outside_catalogue  a latent force or a drift that no cause explains has p ≥ 0.8
+undecided          everything else: the smallest set with p ≥ 0.95
+
+Hypotheses with a fit have Laplace's evidence; all others that of the screening, never ahead of the best fit. A further
+cause counts only if it could be named (Occam fold).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import combinations
+from typing import NamedTuple, TypeVar
+
+import numpy as np
+
+from subzero.diagnosis.hypothesis.hypotheses import Entry, Ids, columns_of
+from subzero.diagnosis.inference.laplace import Candidate
+from subzero.diagnosis.inference.linear_gaussian import log_sum
+from subzero.diagnosis.inference.problem import Problem
+from subzero.diagnosis.inference.screening import Screening
+from subzero.diagnosis.results import CAUSE_NAMED, NOTHING_WRONG, OUTSIDE, UNDECIDED
+
+Key = TypeVar("Key")
+NAMED_PROBABILITY, HEALTHY_PROBABILITY, OUT_OF_CATALOGUE_PROBABILITY, CREDIBLE_SET_PROBABILITY = (
+    0.8,
+    0.5,
+    0.8,
+    0.95,
+)
+MIN_DISCRIMINATION = 9.0
+"""With less than this squared distance to a rival no cause is named, whatever the record happens to say."""
+PRACTICAL_TOLERANCES = 4.0
+"""A deviation within this many tolerances is a matter of calibration, whatever its evidence."""
+
+
+def sizes_in_tolerances(entries: Sequence[Entry], ids: Ids, z: np.ndarray, kappa: float) -> dict[str, float]:
+    """Return cause → its size in tolerances, of its largest parameter."""
+    found: dict[str, float] = {}
+    for one in ids:
+        at = columns_of(entries, (one,))
+        found[one] = max(abs(float(z[k])) / (kappa * entries[k].parameter.tolerance) for k in at)
+    return found
+
+
+def practical_causes(entries: Sequence[Entry], ids: Ids, z: np.ndarray, kappa: float) -> Ids:
+    """Return those causes that are of a practical size: beyond what calibration may do."""
+    found = sizes_in_tolerances(entries, ids, z, kappa)
+    return tuple(one for one in ids if found[one] > PRACTICAL_TOLERANCES)
+
+
+def credible_set(probabilities: Mapping[Key, float], total: float = CREDIBLE_SET_PROBABILITY) -> list[Key]:
+    """Return the most probable hypotheses that together have a probability."""
+    found: list[Key] = []
+    have = 0.0
+    for ids, p in sorted(probabilities.items(), key=lambda pair: -pair[1]):
+        found.append(ids)
+        have += p
+        if have >= total:
+            break
+    return found
+
+
+class ChangePointSummary(NamedTuple):
+    """The most probable cause that begins in mid-trial: probability, of a practical size, D to its closest rival."""
+
+    probability: float = 0.0
+    practical: bool = False
+    apart: float = 0.0
+
+    @property
+    def is_named(self) -> bool:
+        """It may be named."""
+        return self.practical and self.apart >= MIN_DISCRIMINATION and self.probability >= NAMED_PROBABILITY
+
+
+def decide(
+    probabilities: Mapping[Ids, float],
+    foreign: float,
+    practical: bool,
+    apart: float,
+    late: ChangePointSummary | None = None,
+) -> str:
+    """Return the verdict.
+
+    Args:
+        probabilities: hypothesis → probability; with those outside the catalogue they sum to 1.
+        foreign: probability of a force or a drift that no cause explains.
+        practical: the most probable hypothesis' causes are all of a practical size.
+        apart: D of the most probable hypothesis against its closest rival.
+        late: what begins in mid-trial.
+    """
+    late = late or ChangePointSummary()
+    best = max(probabilities, key=lambda ids: probabilities[ids])
+    if foreign >= OUT_OF_CATALOGUE_PROBABILITY:
+        return OUTSIDE
+    if late.is_named:
+        return CAUSE_NAMED
+    if probabilities.get((), 0.0) >= HEALTHY_PROBABILITY:
+        return NOTHING_WRONG
+    if best and not practical and probabilities[best] >= HEALTHY_PROBABILITY:
+        return NOTHING_WRONG
+    if best and practical and apart >= MIN_DISCRIMINATION and probabilities[best] >= NAMED_PROBABILITY:
+        return CAUSE_NAMED
+    return UNDECIDED
+
+
+UNTRIED_LOG_POSTERIOR = 2.0
+"""A hypothesis without a fit of its own is at least this far behind the best in log posterior."""
+FURTHER_CAUSE_ODDS = NAMED_PROBABILITY / (1.0 - NAMED_PROBABILITY)
+"""A further cause has to be this many times as probable as none: then it could be named."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Beliefs:
+    """What is known of all hypotheses.
+
+    Attributes:
+        candidates: hypothesis → its real fit.
+        screen: what the linear problem at the wide fit says.
+        beside: hypothesis → log posterior, estimated at the fit of one with a cause less.
+        behind: hypothesis → how far its fit was behind the best when it was given up, in log posterior.
+    """
+
+    candidates: Mapping[Ids, Candidate]
+    screen: Screening
+    beside: Mapping[Ids, float]
+    behind: Mapping[Ids, float] = field(default_factory=dict)
+
+    def log_posteriors(self) -> dict[Ids, float]:
+        """Return the log posterior of every hypothesis, but for a common constant: by its fit, or estimated."""
+        log = self._fitted()
+        best, untried = max(log.values()), [ids for ids in self.screen.log_posterior if ids not in log]
+        return log | {ids: min(self._estimated(ids, log), best - UNTRIED_LOG_POSTERIOR) for ids in untried}
+
+    def _fitted(self) -> dict[Ids, float]:
+        """Return the log posterior of every hypothesis that has been fitted, now or before it was given up."""
+        log = {ids: candidate.log_posterior for ids, candidate in self.candidates.items()}
+        best = max(log.values())
+        return {ids: best + behind for ids, behind in self.behind.items()} | log
+
+    def log_total(self) -> float:
+        """Return the log of the sum of all posteriors."""
+        return log_sum(list(self.log_posteriors().values()))
+
+    def probabilities(self, problem: Problem) -> dict[Ids, float]:
+        """Return the probability of every hypothesis as it is told, the most probable first."""
+        log, total = self.log_posteriors(), self.log_total()
+        found = {ids: float(np.exp(value - total)) for ids, value in log.items()}
+        return occam_folded(self._without_small(problem, found))
+
+    def _estimated(self, ids: Ids, fitted: Mapping[Ids, float]) -> float:
+        """Return the log posterior of a hypothesis without a fit: of the best fit of a part of it, and what the linear
+        problem there, or else the screen, says that the rest adds.
+        """
+        if ids in self.beside:
+            return self.beside[ids]
+        parts = [one for size in range(len(ids)) for one in combinations(ids, size) if one in fitted]
+        part = max(parts, key=lambda one: fitted[one], default=())
+        return fitted[part] + self.screen.adds(ids, part)
+
+    def _without_small(self, problem: Problem, probabilities: Mapping[Ids, float]) -> dict[Ids, float]:
+        """Return probabilities where causes of less than a practical size are not told beside others of more."""
+        found = dict(probabilities)
+        for ids, one in self.candidates.items():
+            kept = practical_causes(problem.entries, ids, one.fit.z, one.kappa)
+            if kept and kept != ids:
+                found[kept] = found.get(kept, 0.0) + found.pop(ids)
+        return found
+
+
+def occam_folded(probabilities: Mapping[Ids, float]) -> dict[Ids, float]:
+    """Return probabilities, the most probable first, where a further cause that is not needed is not told: those of
+    hypotheses that are not FURTHER_CAUSE_ODDS times as probable as a part of them are that part's.
+    """
+    found = dict(probabilities)
+    for ids in sorted(probabilities, key=len, reverse=True):
+        if len(ids) > 1:
+            part = max(combinations(ids, len(ids) - 1), key=lambda one: probabilities.get(one, 0.0))
+            if probabilities.get(part, 0.0) * FURTHER_CAUSE_ODDS > probabilities[ids]:
+                found[part] += found.pop(ids)
+    return dict(sorted(found.items(), key=lambda pair: -pair[1]))

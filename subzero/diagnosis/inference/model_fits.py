@@ -1,0 +1,258 @@
+"""The pool of fitted hypotheses: each keeps its best fit, and all follow when noise or discretisation are known better.
+
+Simulations have non-smooth points, and a fit may end in a local minimum. So what is close to the best is fitted again
+with a Jacobian of its own, and rivals from where the others are. `SharpFits` estimates the noise again behind the best
+fit, and takes from the records what economical steps get wrong there, where that is seen.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field, replace
+from functools import partial
+from os import cpu_count
+from typing import TypeVar
+
+import numpy as np
+
+from subzero.diagnosis.hypothesis.hypotheses import Ids, columns_of, variances
+from subzero.diagnosis.inference.laplace import Candidate, candidate_of
+from subzero.diagnosis.inference.linear_gaussian import posterior
+from subzero.diagnosis.inference.map_fit import CONVERGED_GAIN, MIN_GAIN, Fit, refit
+from subzero.diagnosis.inference.problem import (
+    Problem,
+    Progress,
+    whitened_again,
+    with_finer_steps,
+    with_noise_behind,
+)
+from subzero.diagnosis.inference.screening import Screening, is_flat, screening_of
+
+Asked = TypeVar("Asked")
+Made = TypeVar("Made")
+MAX_REFINED, HOPELESS_LOG_POSTERIOR = 6, 6.0
+"""At most so many fits with sensitivities of their own in a race; none for what is this far behind in log posterior."""
+JACOBIAN_WITHIN = 4.0
+"""Sensitivities hold as far as this from where they were made, in tolerances."""
+MAX_RUNS_PER_RECORD = 800
+"""After so many runs of each record only what hopes to be the best is fitted again."""
+MAX_CROSSINGS = 2
+"""So often close rivals are fitted from where the others are."""
+
+
+@dataclass(kw_only=True, eq=False)
+class Fits:
+    """The fits of hypotheses, which get better and more.
+
+    Attributes:
+        problem: records and parameters.
+        progress: told what is being tried.
+        wide: the fit with wide tolerances.
+        screen: what the linear problem at the wide fit says.
+        candidates: hypothesis → its real fit.
+        raced: hypotheses that were fitted with sensitivities of their own.
+        side: threads for fits side by side, whose runs may use those of the problem.
+    """
+
+    problem: Problem
+    progress: Progress
+    wide: Fit = field(init=False)
+    screen: Screening = field(default_factory=Screening)
+    candidates: dict[Ids, Candidate] = field(default_factory=dict)
+    raced: set[Ids] = field(default_factory=set)
+    side: ThreadPoolExecutor = field(default_factory=lambda: ThreadPoolExecutor(cpu_count() or 1))
+
+    def best(self) -> Candidate:
+        """Return the most probable candidate."""
+        return max(self.candidates.values(), key=lambda candidate: candidate.log_posterior)
+
+    def _ranked(self) -> list[Ids]:
+        """Return the candidates, the most probable first."""
+        return sorted(self.candidates, key=lambda ids: -self.candidates[ids].log_posterior)
+
+    def fit(self, ids: Ids, start: Fit | None = None) -> None:
+        """Fit a hypothesis as `fit_all` does."""
+        self.fit_all([ids], start)
+
+    def fit_all(self, several: Sequence[Ids], start: Fit | None = None, words: str = "") -> None:
+        """Fit hypotheses with real runs, side by side: with the sensitivities of the wide fit, those that no fit is
+        known of; or from another fit, and keep what is better.
+        """
+        wanted = [ids for ids in dict.fromkeys(several) if start or ids not in self.candidates]
+        for ids, found in zip(wanted, self._aside(partial(self._fitted, start=start), wanted), strict=True):
+            if words:
+                self._say(0.3, words, ids)
+            self._take(found)
+
+    def _take(self, found: Candidate) -> None:
+        """Keep a candidate if it is better than what is known of it."""
+        known = self.candidates.get(found.ids)
+        if known is None or found.log_posterior > known.log_posterior:
+            self.candidates[found.ids] = found
+            self.raced.discard(found.ids)
+
+    def _fitted(self, ids: Ids, start: Fit | None) -> Candidate:
+        """Return a hypothesis with its fit from another, or from the wide one."""
+        D, z = variances(self.problem.entries, ids, 1.0), None if start else self.screen.secants.get(ids)
+        start = start or self.wide
+        z = posterior(start.quadratic, D).z if z is None else z
+        J = self._with_slopes(start.J, ids)
+        return candidate_of(
+            self.problem, ids, refit(self.problem, z, J, D, most_fresh=0, made_at=start.made_at)
+        )
+
+    def race(self, most: int = MAX_REFINED, hopeless: float = HOPELESS_LOG_POSTERIOR) -> None:
+        """Fit candidates again with sensitivities of their own, the best first, until the next is hopeless."""
+        for _ in range(most):
+            self.raced |= {one.ids for one in self.candidates.values() if self._settled(one.fit)}
+            waiting = [one for one in self.candidates.values() if one.ids not in self.raced]
+            if not waiting:
+                return
+            now = max(waiting, key=lambda one: one.optimistic_log_posterior)
+            done = [self.candidates[ids].log_posterior for ids in self.raced]
+            most = MAX_RUNS_PER_RECORD * len(self.problem.records)
+            behind = 0.0 if self.problem.kept.asked > most else hopeless
+            if len(done) >= 2 and now.optimistic_log_posterior < max(done) - behind:
+                return
+            self._say(0.5, "fitting again", now.ids)
+            self._again(now)
+
+    def cross(self) -> None:
+        """Fit the close rivals of the best candidate from where that is, and it from where they are, and keep what is
+        better: where a drum stops or a cable falls slack runs have kinks, and a fit may end in a hollow of its own.
+        """
+        for _ in range(MAX_CROSSINGS):
+            best = self.best()
+            close = [ids for ids in self._ranked()[1:MAX_REFINED]
+                     if self.candidates[ids].log_posterior > best.log_posterior - HOPELESS_LOG_POSTERIOR]  # fmt: skip
+            self.fit_all(close, best.fit)
+            starts = [self.candidates[ids].fit for ids in close]
+            for found in self._aside(partial(self._fitted, best.ids), starts):
+                self._take(found)
+            if self.best().log_posterior < best.log_posterior + CONVERGED_GAIN:
+                return
+
+    def _again(self, one: Candidate) -> None:
+        """Fit a candidate with sensitivities of its own, under its most probable κ; again if that turns out another."""
+        self.raced.add(one.ids)
+        J, D = self.problem.jacobian(one.fit.z), variances(self.problem.entries, one.ids, one.kappa)
+        fit = refit(self.problem, one.fit.z, J, D, r=one.fit.r, most_fresh=1, made_at=one.fit.z)
+        now = self._keep(one.ids, fit)
+        if now.kappa != one.kappa:
+            D = variances(self.problem.entries, one.ids, now.kappa)
+            self._keep(
+                one.ids, refit(self.problem, fit.z, fit.J, D, r=fit.r, most_fresh=0, made_at=fit.made_at)
+            )
+
+    def _keep(self, ids: Ids, fit: Fit) -> Candidate:
+        """Keep a fit and return its candidate."""
+        self.candidates[ids] = candidate_of(self.problem, ids, fit)
+        return self.candidates[ids]
+
+    def _below(self, ids: Ids, fit: Fit) -> None:
+        """Fit a part of a hypothesis from its fit, if that is better than what is known of the part."""
+        known = self.candidates.get(ids)
+        D = variances(self.problem.entries, ids, known.kappa if known else 1.0)
+        z = posterior(fit.quadratic, D).z
+        found = refit(self.problem, z, fit.J, D, most_fresh=0, made_at=fit.made_at)
+        if known is None or found.objective < known.fit.objective - MIN_GAIN:
+            self._keep(ids, found)
+            self.raced.discard(ids)
+
+    def _settled(self, fit: Fit, near: float = JACOBIAN_WITHIN) -> bool:
+        """Say whether a fit has converged close to where its sensitivities were made, or has not left from there."""
+        moved = fit.moved(self.problem)
+        return moved == 0.0 or (fit.converged and moved < near)
+
+    def _with_slopes(self, J: np.ndarray, ids: Ids) -> np.ndarray:
+        """Return sensitivities with secants for those causes of a hypothesis that do nothing when they are small."""
+        J = J.copy()
+        for k in columns_of(self.problem.entries, ids):
+            if k in self.screen.columns and is_flat(self.problem.entries[k], J[:, k]):
+                J[:, k] = self.screen.columns[k]
+        return J
+
+    def _aside(self, make: Callable[[Asked], Made], several: Sequence[Asked]) -> Iterator[Made]:
+        """Return what is made of each of several, side by side: the runs of one fit come one after the other."""
+        return self.side.map(make, several)
+
+    def _say(self, share: float, words: str, ids: Ids, more: str = "") -> None:
+        self.progress(share, f"{words} {' + '.join(ids) or 'nothing wrong'}{more}")
+
+
+@dataclass(kw_only=True, eq=False)
+class SharpFits(Fits):
+    """Fits whose problem gets sharper where the best of them is.
+
+    Attributes:
+        behind: hypothesis → how far its fit was behind the best when it was given up, in log posterior.
+        economical: the problem before what economical steps get wrong was taken from its records.
+        sharp_at: the hypothesis at whose fit that was done.
+        nominal: residual (m,) and sensitivities (m, k) of the nominal model.
+    """
+
+    behind: dict[Ids, float] = field(default_factory=dict)
+    economical: Problem = field(init=False)
+    sharp_at: Ids | None = None
+    nominal: tuple[np.ndarray, np.ndarray] = field(init=False)
+
+    def sharpen(self) -> None:
+        """Estimate the noise behind the best fit, take from the records what economical steps get wrong there, and fit
+        all again; nothing where neither is seen.
+        """
+        best = self.best()
+        if self.sharp_at == best.ids:
+            return
+        self.progress(0.6, "noise behind the best fit, and finer steps")
+        self.sharp_at, noise_is_new = best.ids, self._estimate_noise(best)
+        sharper = with_finer_steps(self.economical, best.fit.z)
+        if noise_is_new or sharper is not None:
+            self.problem = sharper or self.economical
+            self._give_up(best)
+            self._go_on()
+
+    def _estimate_noise(self, best: Candidate) -> bool:
+        """Estimate the noise behind the best fit, and make white by it what the noise before has made white; say
+        whether it is another.
+        """
+        D = variances(self.problem.entries, best.ids, best.kappa)
+        found = with_noise_behind(self.economical, best.fit.z, D, again=True)
+        if found is None:
+            return False
+        again = partial(whitened_again, self.economical, found)
+        self.candidates = {
+            ids: replace(one, fit=_rewhitened(one.fit, again)) for ids, one in self.candidates.items()
+        }
+        self.wide, self.economical = _rewhitened(self.wide, again), found
+        self.nominal = again(self.nominal[0]), again(self.nominal[1])
+        self.problem = found
+        self.screen = screening_of(found, self.wide, self.nominal, far=self.screen.far)
+        return True
+
+    def _give_up(self, best: Candidate) -> None:
+        """Give up what is hopelessly behind the best candidate and no part of it."""
+        kept = {ids: one for ids, one in self.candidates.items()
+                if one.log_posterior > best.log_posterior - HOPELESS_LOG_POSTERIOR
+                or set(ids) <= set(best.ids)}  # fmt: skip
+        self.behind |= {ids: one.log_posterior - best.log_posterior for ids, one in self.candidates.items()
+                        if ids not in kept}  # fmt: skip
+        self.candidates = kept
+
+    def _go_on(self) -> None:
+        """Fit all candidates from where they are, with the sensitivities at hand."""
+        ids_of = list(self.candidates)
+        for ids, fit in zip(ids_of, self._aside(self._going_on, ids_of), strict=True):
+            self._keep(ids, fit)
+            self.raced -= set() if fit.converged else {ids}
+        self.raced &= set(self.candidates)
+
+    def _going_on(self, ids: Ids) -> Fit:
+        """Return the fit of a candidate from where it is, with the sensitivities at hand."""
+        fit = self.candidates[ids].fit
+        return refit(self.problem, fit.z, fit.J, fit.D, most_fresh=0, made_at=fit.made_at)
+
+
+def _rewhitened(fit: Fit, again: Callable[[np.ndarray], np.ndarray]) -> Fit:
+    """Return a fit whose residual and sensitivities are made white by another noise."""
+    return replace(fit, r=again(fit.r), J=again(fit.J))

@@ -1,0 +1,324 @@
+"""The search over hypotheses: from linear evidence of all to MAP fits of a few, adding, dropping and swapping causes.
+
+fit with κ = 4 → screening of nothing, all causes, all pairs → fits of the best → best-first refinement
+→ add, drop, swap, or merge two causes of the best, until it stays → settle the best and its rivals
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from itertools import chain, combinations
+
+import numpy as np
+
+from subzero.diagnosis.hypothesis.hypotheses import Ids, columns_of, nameable, variances
+from subzero.diagnosis.inference.laplace import Candidate, candidate_of
+from subzero.diagnosis.inference.linear_gaussian import KAPPAS
+from subzero.diagnosis.inference.map_fit import (
+    MIN_GAIN,
+    Fit,
+    at_bad_minimum,
+    continued,
+    fit_wide,
+    is_poor_fit,
+    non_smooth,
+    refit,
+    restarted_off_kinks,
+)
+from subzero.diagnosis.inference.model_average import Beliefs
+from subzero.diagnosis.inference.model_fits import SharpFits
+from subzero.diagnosis.inference.screening import (
+    TriedSize,
+    is_close,
+    screening_of,
+    with_one_added,
+    with_one_swapped,
+    with_sizes_tried,
+)
+
+MAX_ADDED, MAX_SWAPPED, MIN_ADDED_LOG_POSTERIOR = 2, 3, -4.0
+"""At most so many with a cause more, of a log posterior that adds at least MIN_ADDED_LOG_POSTERIOR; so many with
+another cause.
+"""
+BAD_MINIMUM_LOG_POSTERIOR = 6.0
+"""A fit with so much less log posterior than the linear problem at another promises may have gone astray."""
+MIN_MERGED_LOG_POSTERIOR, MERGED_SCALES = -15.0, (0.5, 1.5)
+"""One cause in the place of two is fitted if its log posterior adds at least that, at one of these effect scales."""
+MOST_CAUSES, MAX_GROWING_ROUNDS = 3, 4
+"""Causes of a hypothesis, and rounds of growing."""
+
+
+@dataclass(kw_only=True, eq=False)
+class GrowingFits(SharpFits):
+    """Fits that more are made around.
+
+    Attributes:
+        beside: hypothesis → log posterior, estimated at the fit of one with a cause less.
+        begun: hypotheses that were fitted from off their kinks.
+    """
+
+    beside: dict[Ids, float] = field(default_factory=dict)
+    begun: set[Ids] = field(default_factory=set)
+
+    def grow(self) -> None:
+        """Look beside the best candidate for one more cause, in the place of each for another, and below it for one
+        less, until the best stays.
+        """
+        looked: set[Ids] = set()
+        for _ in range(MAX_GROWING_ROUNDS):
+            best = self.begin_again(self.best())
+            if best.ids in looked:
+                return
+            looked.add(best.ids)
+            self._say(0.7, "a further cause beside", best.ids)
+            self.fit_all(self._more(best) if len(best.ids) < MOST_CAUSES else [], best.fit)
+            for without in best.ids:
+                self._without(best, without)
+            self._aside_of(best)
+            self._kinked(best)
+            self._parts_again(best)
+            self.race(2, 2.0)
+            self.cross()
+            self.sharpen()
+            if self.best().ids == best.ids:
+                self._simpler()
+
+    def _more(self, best: Candidate) -> list[Ids]:
+        """Return the hypotheses with one cause more that the linear problem at the best fit finds best."""
+        found = self._unknown(with_one_added(self.problem, best))
+        self.beside |= found
+        return _best_of(found, best.log_posterior + MIN_ADDED_LOG_POSTERIOR)
+
+    def _without(self, best: Candidate, without: str) -> None:
+        """Fit the best hypothesis without one of its causes, and with others in its place."""
+        rest = tuple(one for one in best.ids if one != without)
+        self._below(rest, best.fit)
+        found = self._unknown(with_one_swapped(self.problem, best, rest))
+        self.fit_all(sorted(found, key=lambda ids: -found[ids])[:MAX_SWAPPED], best.fit)
+
+    def _aside_of(self, best: Candidate) -> None:
+        """Fit what comes out best beside the other candidates, if the linear problem there has it before the best: a
+        right pair may be far from a wrong cause that is as good as any by itself.
+        """
+        found: dict[Ids, tuple[float, Fit]] = {}
+        for one in self.candidates.values():
+            if one is not best and len(one.ids) < MOST_CAUSES:
+                for ids, log in self._unknown(with_one_added(self.problem, one)).items():
+                    if log > max(best.log_posterior, found.get(ids, (-np.inf,))[0]):
+                        found[ids] = log, one.fit
+        for ids in sorted(found, key=lambda ids: -found[ids][0])[:MAX_ADDED]:
+            self.fit(ids, found[ids][1])
+
+    def _kinked(self, best: Candidate) -> None:
+        """Fit causes that runs have kinks in beside the best, or in the place of one of its causes."""
+        found = dict[Ids, TriedSize]()
+        rests = [tuple(one for one in best.ids if one != without) for without in best.ids]
+        for rest in [best.ids, *rests] if len(best.ids) < MOST_CAUSES else rests:
+            for ids, one in with_sizes_tried(
+                self.problem, best, rest, non_smooth(self.problem, rest)
+            ).items():
+                if ids not in found or one.log_posterior > found[ids].log_posterior:
+                    found[ids] = one
+        for ids in self._worth_fitting(found, best, MIN_ADDED_LOG_POSTERIOR):
+            D = variances(self.problem.entries, ids, best.kappa)
+            fit = refit(self.problem, found[ids].z, found[ids].J, D, most_fresh=0)
+            self._take(candidate_of(self.problem, ids, fit))
+
+    def _simpler(self) -> None:
+        """Fit causes in the place of two of the best candidate's: what is one and large may look like two, and then the
+        linear problem there says little of it.
+        """
+        best, found, entries = self.best(), dict[Ids, TriedSize](), self.problem.entries
+        others = columns_of(
+            entries, tuple(one for one in nameable(self.problem.entries) if one not in best.ids)
+        )
+        for rest in combinations(best.ids, len(best.ids) - 2) if len(best.ids) > 1 else ():
+            found |= with_sizes_tried(self.problem, best, rest, others, MERGED_SCALES)
+        worth = self._worth_fitting(found, best, MIN_MERGED_LOG_POSTERIOR)
+        for ids in worth:
+            z, D = found[ids].z, variances(entries, ids, best.kappa)
+            fit = refit(self.problem, z, self.problem.jacobian(z), D, most_fresh=2, made_at=z)
+            self._take(candidate_of(self.problem, ids, fit))
+        self.race(2 if worth else 0)
+
+    def _worth_fitting(self, found: Mapping[Ids, TriedSize], best: Candidate, least: float) -> list[Ids]:
+        """Return the best of what was tried that no fit is known of, if its log posterior adds `least` to the best."""
+        new = self._unknown({ids: one.log_posterior for ids, one in found.items() if ids != best.ids})
+        return _best_of(new, best.log_posterior + least)
+
+    def begin_again(self, one: Candidate) -> Candidate:
+        """Fit a candidate from off its kinks, once, and return what is best then."""
+        if one.ids not in self.begun:
+            self.begun.add(one.ids)
+            D = variances(self.problem.entries, one.ids, one.kappa)
+            self._take(
+                candidate_of(self.problem, one.ids, restarted_off_kinks(self.problem, one.fit, one.ids, D))
+            )
+        return self.best()
+
+    def _parts_again(self, best: Candidate) -> None:
+        """Fit the best candidate without one of its causes from off its kinks, where that went astray."""
+        for without in best.ids:
+            ids = tuple(one for one in best.ids if one != without)
+            fit, D = self.candidates[ids].fit, variances(self.problem.entries, ids, 1.0)
+            if at_bad_minimum(self.problem, fit, ids):
+                self._take(candidate_of(self.problem, ids, restarted_off_kinks(self.problem, fit, ids, D)))
+
+    def _unknown(self, found: dict[Ids, float]) -> dict[Ids, float]:
+        """Return those of estimated log posteriors that no fit is known of, or only one that went astray from afar."""
+        known = {ids: one.log_posterior for ids, one in self.candidates.items()}
+        return {
+            ids: log
+            for ids, log in found.items()
+            if known.get(ids, -np.inf) < log - BAD_MINIMUM_LOG_POSTERIOR
+        }
+
+
+def _best_of(found: Mapping[Ids, float], least: float) -> list[Ids]:
+    """Return the best hypotheses, at most MAX_ADDED, of those whose log posterior is above the least."""
+    ranked = sorted(found, key=lambda ids: -found[ids])[:MAX_ADDED]
+    return [ids for ids in ranked if found[ids] > least]
+
+
+KEEP_LOG_EVIDENCE, MAX_SINGLES, MAX_PAIRS = 12.0, 7, 4
+"""Refit hypotheses whose log evidence is this close to the best of their kind, and at most so many."""
+MAX_BENT, BENT_TOLERANCES = 2, 10.0
+"""So many causes that the wide fit bends by at least so many tolerances are fitted by themselves."""
+MAX_SWEPT = 4
+"""So many causes are fitted by themselves if the wide fit is not close."""
+MAX_RESTARTED, MAX_SETTLING_ROUNDS, SETTLED_JACOBIAN_WITHIN = 3, 3, 1.0
+"""So many are fitted from off their kinks; rounds of settling; so close, in tolerances, the sensitivities of what is
+told were made.
+"""
+RIVAL_LOG_POSTERIOR, AKIN_LOG_POSTERIOR = 2.0, 6.0
+"""What is so close to the best in log posterior is settled, too; what has a cause more or less, from farther behind;
+the first within AKIN_LOG_POSTERIOR are fitted from off their kinks, too.
+"""
+
+
+@dataclass(kw_only=True, eq=False)
+class Search(GrowingFits):
+    """A search that goes on: what was found so far is always in `candidates`.
+
+    Attributes:
+        is_far: nothing came close to the records so far, not even within wide tolerances.
+    """
+
+    is_far: bool = False
+
+    def begin(self) -> None:
+        """Make the sensitivities at the nominal model, and the fit with wide tolerances."""
+        self.problem, self.wide, self.nominal = fit_wide(self.problem, self.progress)
+        self.economical, self.is_far = self.problem, not is_close(self.problem, self.wide)
+
+    def only_nothing(self) -> None:
+        """Take the wide fit for that of "nothing is wrong", before anything else is known."""
+        self._take(candidate_of(self.problem, (), self.wide))
+
+    def go_near(self, fit: Fit) -> None:
+        """Make everything around a linear problem that is closer to the records than that of the wide fit."""
+        self.wide, self.is_far = fit, False
+
+    def look(self) -> None:
+        """Fill the screen: linear evidence of nothing, every cause, and every pair."""
+        self.screen = screening_of(self.problem, self.wide, self.nominal, far=self.is_far)
+
+    def first_fits(self) -> None:
+        """Fit nothing, and the best causes and pairs of the screen, with real runs and the sensitivities at hand."""
+        first = self._first()
+        for ids, fit in zip(first, self._aside(self._alone, first), strict=True):
+            self._say(0.3, "fitting", ids, " by itself")
+            self._keep(ids, fit)
+        best = (
+            self.screen.best(1, MAX_SINGLES, KEEP_LOG_EVIDENCE),
+            self.screen.best(2, MAX_PAIRS, KEEP_LOG_EVIDENCE),
+        )
+        self.fit_all(list(chain([()], *best)), words="fitting")
+
+    def races(self) -> None:
+        """Fit what came out best again, with sensitivities of its own."""
+        self.race(2)
+        self.sharpen()
+        self.race()
+
+    def is_lost(self) -> bool:
+        """Say whether nothing that was fitted so far explains the records, within declared tolerances."""
+        return is_poor_fit(self.best().fit) or self.best().kappa > min(KAPPAS)
+
+    def settle(self) -> None:
+        """Fit the best candidate again until it has settled, so that its numbers can be told, and what might still
+        catch up with it; then its rivals from where it is.
+        """
+        self._once_more()
+        stuck: set[Ids] = set()
+        for _ in range(MAX_SETTLING_ROUNDS):
+            best = self.best()
+            for one in [one for one in self.candidates.values() if self._is_open(one, best)]:
+                if one.ids in stuck:
+                    continue
+                self._say(0.75, "settling", one.ids)
+                self._again(one)
+                if self.candidates[one.ids].log_posterior < one.log_posterior + MIN_GAIN:
+                    stuck.add(one.ids)
+        self.cross()
+        self._nothing()
+
+    def _once_more(self) -> None:
+        """Fit the first candidates from off their kinks, if they are close to the best and were not so begun before."""
+        for ids in self._ranked()[:MAX_RESTARTED]:
+            close = self.candidates[ids].log_posterior > self.best().log_posterior - AKIN_LOG_POSTERIOR
+            if close and ids not in self.begun:
+                self._say(0.75, "once more", ids)
+                self.begin_again(self.candidates[ids])
+
+    def _is_open(self, one: Candidate, best: Candidate) -> bool:
+        """Say whether a candidate that is as good as the best, or might still catch up with it, has not settled."""
+        behind = best.log_posterior - one.optimistic_log_posterior
+        if behind < RIVAL_LOG_POSTERIOR:
+            return not self._settled(one.fit, SETTLED_JACOBIAN_WITHIN)
+        akin = behind < AKIN_LOG_POSTERIOR and _akin(one.ids, best.ids)
+        return akin and not one.fit.converged and not self._settled(one.fit)
+
+    @property
+    def beliefs(self) -> Beliefs:
+        """What is known of all hypotheses by now."""
+        return Beliefs(candidates=self.candidates, screen=self.screen, beside=self.beside, behind=self.behind)
+
+    def _first(self) -> list[Ids]:
+        """Return the causes that are fitted by themselves: those that the wide fit bends most, of which the linear
+        problem says little; and if it is not close to the records, the best of those that were swept.
+        """
+        if self.screen.far:
+            return self.screen.best(1, MAX_SWEPT, np.inf)
+        bent: dict[Ids, float] = {}
+        for z, entry in zip(self.wide.z, self.problem.entries, strict=True):
+            if entry.record < 0:
+                size, ids = abs(float(z)) / entry.parameter.tolerance, (entry.effect.id,)
+                bent[ids] = max(size, bent.get(ids, 0.0))
+        return [
+            ids for ids in sorted(bent, key=lambda ids: -bent[ids])[:MAX_BENT] if bent[ids] > BENT_TOLERANCES
+        ]
+
+    def _alone(self, ids: Ids) -> Fit:
+        """Return the fit of a cause from where the wide fit has it, all else nominal, with the sensitivities there."""
+        z, at = np.zeros(len(self.problem.entries)), columns_of(self.problem.entries, ids)
+        z[at] = self.screen.secants.get(ids, self.wide.z)[at]
+        D = variances(self.problem.entries, ids, 1.0)
+        return continued(
+            self.problem, refit(self.problem, z, self.problem.jacobian(z), D, most_fresh=2, made_at=z)
+        )
+
+    def _nothing(self) -> None:
+        """Fit "nothing is wrong" from where the best fit is, if that explains more: what is outside is beside it."""
+        best, none = self.best(), self.candidates[()]
+        for kappa in sorted({best.kappa, none.kappa}) if best.ids else ():
+            D = variances(self.problem.entries, (), kappa)
+            fit = refit(self.problem, best.fit.z, best.fit.J, D, most_fresh=0, made_at=best.fit.made_at)
+            if candidate_of(self.problem, (), fit).log_posterior > self.candidates[()].log_posterior:
+                self._keep((), fit)
+
+
+def _akin(ids: Ids, others: Ids) -> bool:
+    """Say whether hypotheses are the same but for at most one cause more in one of them."""
+    return len(set(ids) ^ set(others)) <= 1

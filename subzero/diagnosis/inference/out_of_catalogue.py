@@ -1,0 +1,299 @@
+"""Explanations outside the list of hypotheses: latent forces, drifts and change points, on one scale of probability.
+
+Each stands beside "nothing is wrong" or beside the best causes. Change points are looked for around the best
+hypothesis, and along the simulations with the best latent forces. `Findings` holds everything that an engine has found
+so far: an interrupted diagnosis concludes from it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+
+import numpy as np
+
+from subzero.diagnosis.hypothesis.hypotheses import PRIOR, Ids, sudden_effects
+from subzero.diagnosis.inference.basis import one_terms
+from subzero.diagnosis.inference.change_point_fit import FittedChangePoint, fit_change_points, linearised_at
+from subzero.diagnosis.inference.change_point_scan import BaseRun, LinearisationPoint
+from subzero.diagnosis.inference.input_estimation import (
+    LatentForceCandidate,
+    RelinearisedForce,
+    latent_force_candidates,
+    linear_candidates,
+    relinearised_force,
+)
+from subzero.diagnosis.inference.laplace import Candidate
+from subzero.diagnosis.inference.latent_force import (
+    FINE_SPACING_S,
+    FORCE,
+    Knots,
+    all_columns,
+    force_columns,
+    knots_of,
+)
+from subzero.diagnosis.inference.linear_gaussian import KAPPAS, Terms, log_sum
+from subzero.diagnosis.inference.map_fit import is_poor_fit
+from subzero.diagnosis.inference.model_search import Search
+from subzero.diagnosis.inference.problem import Problem
+from subzero.diagnosis.results import Detectability, Misfit
+from subzero.external_force import AXES
+
+MAX_FORCES = 2
+"""Along the runs of at most so many forces."""
+ALIKE_LOG_POSTERIOR = 10.0
+"""Forces and hypotheses whose log posteriors differ by less."""
+MAX_LARGE = 2
+"""As large as in at most so many hypotheses."""
+
+
+def linearisation_points(
+    search: Search, close: Sequence[RelinearisedForce], prior: float
+) -> list[LinearisationPoint]:
+    """Return where to look.
+
+    Args:
+        search: with its fits.
+        close: forces and drifts around fits of their own, most probable first.
+        prior: log prior of a force, which `close` is without.
+    """
+    best = search.best()
+    here = LinearisationPoint(fit=best.fit, along=BaseRun(search.problem, best.fit.z))
+    known = [] if search.is_lost() else [best.log_posterior - prior]
+    least = max([*(one.log_posterior for one in close), *known], default=0.0) - ALIKE_LOG_POSTERIOR
+    alike = [one.place for one in close[:MAX_FORCES] if one.log_posterior > least]
+    return [here, *alike]
+
+
+def largest_hypotheses(search: Search) -> list[Candidate]:
+    """Return the hypotheses whose causes may be what begins in mid-trial: the best that have any."""
+    least = search.best().log_posterior - ALIKE_LOG_POSTERIOR
+    ranked = sorted(search.candidates.values(), key=lambda one: -one.log_posterior)
+    return [one for one in ranked if one.log_posterior > least and one.ids][:MAX_LARGE]
+
+
+ALIKE_FORCES_LOG_POSTERIOR = 10.0
+"""Forces whose log posteriors differ by less are told apart with finer knots."""
+NEAR_LOG_POSTERIOR, FAR_LOG_POSTERIOR, MAX_RELINEARISED = 6.0, 45.0, 3
+"""No force that is further behind the best than FAR_LOG_POSTERIOR, in log posterior, is looked at
+around its own fit, and at most so many; where one cause explains the record within declared tolerances, what is linear
+is nearly true there: besides the most probable force only those that are as close as NEAR_LOG_POSTERIOR."""
+DECISIVE_LOG_POSTERIOR = 30.0
+"""No sum of causes gains more than this, in log posterior, over one cause that leaves nothing but noise."""
+CLOSER_LOOK_LOG_POSTERIOR = 2.0
+"""A force that is no further behind the best, in log posterior, is worth a closer look."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class OutOfCatalogue:
+    """An explanation from outside the list of hypotheses.
+
+    Attributes:
+        beside: the causes that hold as well.
+        what: a force or a drift, or a cause that begins in mid-trial.
+        log_posterior: on the scale of `Candidate.log_posterior`.
+        place: where it was fitted, if that explains the records.
+    """
+
+    beside: Ids
+    what: LatentForceCandidate | FittedChangePoint
+    log_posterior: float
+    place: LinearisationPoint | None = None
+
+    @property
+    def id(self) -> str:
+        """Such as "unknown_force:X" or "rudder_offset@12"."""
+        return self.what.id
+
+
+def explanations_outside(search: Search) -> list[OutOfCatalogue]:
+    """Return what lies outside, most probable first: beside nothing, and beside the best causes."""
+    problem, knots, best = search.problem, knots_of(search.problem), search.best()
+    columns, terms = all_columns(problem, best.fit.z, knots), one_terms(problem, best.fit.z, knots)
+    found = _suspected(search, columns, knots, terms)
+    close = _around_themselves(search, found, columns, knots, terms)
+    own = [OutOfCatalogue(beside=(), what=one.what, log_posterior=one.log_posterior + _log_prior(problem),
+                   place=None if one.is_lost else one.place) for one in close]  # fmt: skip
+    sudden = _sudden(search, close, max(_most(found + own), best.log_posterior))
+    if _most(found + own) > max(_most(sudden), best.log_posterior) - CLOSER_LOOK_LOG_POSTERIOR:
+        found = _finer(search, found, own)
+    ranked = _sorted(found, own + sudden)
+    _nothing_again(search, ranked[0])
+    return ranked
+
+
+def _nothing_again(search: Search, first: OutOfCatalogue) -> None:
+    """Fit "nothing is wrong" from where what explains the records is, beside nothing, if that seems more probable than
+    every hypothesis: it may only have begun in a better place.
+    """
+    if first.place and first.log_posterior > search.best().log_posterior:
+        search.fit((), first.place.fit)
+
+
+def _finer(search: Search, found: list[OutOfCatalogue], own: list[OutOfCatalogue]) -> list[OutOfCatalogue]:
+    """Return forces and drifts, and again with finer knots forces that are about as probable as each other."""
+    problem, best = search.problem, search.best()
+    alike = {one.id.removeprefix(FORCE) for one in _close(found + own) if one.id.startswith(FORCE)}
+    if len(alike) < 2:
+        return found
+    finer = knots_of(problem, FINE_SPACING_S)
+    columns = {FORCE + axis: C for axis, C in force_columns(problem, best.fit.z, alike, finer).items()}
+    terms = one_terms(problem, best.fit.z, finer)
+    return [one for one in found if one.id not in columns] + _suspected(search, columns, finer, terms)
+
+
+def is_explained(search: Search, foreign: Sequence[OutOfCatalogue]) -> bool:
+    """Say whether a sudden cause leaves nothing but noise, and is so far before the best hypothesis that no sum of
+    causes that hold throughout can come close.
+    """
+    best = max(foreign, key=lambda one: one.log_posterior, default=None)
+    if best is None or not isinstance(best.what, FittedChangePoint) or is_poor_fit(best.what.fit):
+        return False
+    return best.log_posterior > search.best().log_posterior + DECISIVE_LOG_POSTERIOR
+
+
+def _sorted(found: list[OutOfCatalogue], own: list[OutOfCatalogue]) -> list[OutOfCatalogue]:
+    """Return it all, the most probable first; of what was asked in two places, the more probable."""
+    kept: dict[tuple[str, Ids], OutOfCatalogue] = {}
+    for one in sorted(found + own, key=lambda one: -one.log_posterior):
+        kept.setdefault((one.id, one.beside), one)
+    return list(kept.values())
+
+
+def _suspected(
+    search: Search, columns: dict[str, np.ndarray], knots: Knots, terms: Mapping[str, Terms]
+) -> list[OutOfCatalogue]:
+    """Return the forces and drifts of columns, beside nothing and beside the best causes."""
+    problem, prior = search.problem, _log_prior(search.problem)
+    found: list[OutOfCatalogue] = []
+    for candidate in _bases(search):
+        scales = candidate.scales(problem)
+        found += [OutOfCatalogue(beside=candidate.ids, what=one,
+                                 log_posterior=candidate.log_posterior + one.log_gain + prior)
+                  for one in latent_force_candidates(problem, columns, candidate.fit, scales, knots,
+                                                     terms)]  # fmt: skip
+    return found
+
+
+def _around_themselves(
+    search: Search,
+    found: list[OutOfCatalogue],
+    columns: dict[str, np.ndarray],
+    knots: Knots,
+    terms: Mapping[str, Terms],
+) -> list[RelinearisedForce]:
+    """Return the most probable forces and drifts beside nothing as they are around fits of their own, if they have any
+    hope; none where nothing has to bend.
+    """
+    problem, best, prior = search.problem, search.best(), _log_prior(search.problem)
+    if not best.ids and best.kappa == min(KAPPAS):
+        return []
+    hope = {one.id: one.log_posterior for one in found if not one.beside}
+    for log, what in linear_candidates(problem, best.fit, columns, knots, terms, list(KAPPAS)):
+        hope[what.id] = max(hope[what.id], log + prior)
+    finer = knots_of(problem, FINE_SPACING_S)
+    terms = one_terms(problem, best.fit.z, finer)
+    look = partial(relinearised_force, problem, best.fit, kappa=1.0, knots=finer, terms=terms)
+    return sorted(search.side.map(look, _worth_a_look(hope, best)), key=lambda one: -one.log_posterior)
+
+
+def _worth_a_look(hope: dict[str, float], best: Candidate) -> list[str]:
+    """Return the forces and drifts that are looked at around their own fits, of hoped-for log posteriors."""
+    ranked = sorted(hope, key=lambda name: -hope[name])[:MAX_RELINEARISED]
+    least = max(best.log_posterior - FAR_LOG_POSTERIOR, hope[ranked[0]] - ALIKE_FORCES_LOG_POSTERIOR)
+    plain = best.kappa == min(KAPPAS) and len(best.ids) == 1
+    further = max(least, best.log_posterior - NEAR_LOG_POSTERIOR) if plain else least
+    return [name for i, name in enumerate(ranked) if hope[name] > (further if i else least)]
+
+
+def _log_prior(problem: Problem) -> float:
+    """Return how probable a force on some axis, or the drift of some sensor, is beforehand, beside a hypothesis."""
+    return float(np.log(PRIOR["unknown"] / (len(AXES) + len(problem.records[0].noise))))
+
+
+def _most(found: Sequence[OutOfCatalogue]) -> float:
+    """Return the log posterior of the most probable."""
+    return max((one.log_posterior for one in found), default=-np.inf)
+
+
+def _close(found: list[OutOfCatalogue]) -> list[OutOfCatalogue]:
+    """Return what is about as probable as the best."""
+    best = _most(found)
+    return [one for one in found if one.log_posterior > best - ALIKE_FORCES_LOG_POSTERIOR]
+
+
+def _bases(search: Search) -> list[Candidate]:
+    """Return the candidates that something may be added to."""
+    best = search.best()
+    return [search.candidates[()]] + ([best] if best.ids else [])
+
+
+def _sudden(search: Search, close: Sequence[RelinearisedForce], known: float) -> list[OutOfCatalogue]:
+    """Return causes that begin in mid-trial, beside nothing else, that may be as probable as what is known."""
+    problem, effects = search.problem, sudden_effects(search.problem.entries)
+    if not effects:
+        return []
+    prior = float(np.log(PRIOR["sudden"] / (len(effects) * len(problem.records))))
+    places, large = linearisation_points(search, close, _log_prior(problem)), largest_hypotheses(search)
+    made = [one for record in range(len(problem.records))
+            for one in fit_change_points(problem, places, effects, record, known - prior, search.side,
+                                         large)]  # fmt: skip
+    return [OutOfCatalogue(beside=(), what=one, log_posterior=one.log_posterior + prior,
+                    place=None if is_poor_fit(one.fit) else linearised_at(problem, one)) for one in made]  # fmt: skip
+
+
+def shares(search: Search, foreign: list[OutOfCatalogue]) -> tuple[dict[Ids, float], dict[str, float]]:
+    """Return the probabilities of hypotheses, and of everything outside by id; together they sum to 1."""
+    inside = search.beliefs.probabilities(search.problem)
+    scale = search.beliefs.log_total()
+    outside = log_sum([one.log_posterior for one in foreign]) if foreign else -np.inf
+    total = log_sum([scale, outside])
+    found: dict[str, float] = {}
+    for one in foreign:
+        found[one.id] = found.get(one.id, 0.0) + float(np.exp(one.log_posterior - total))
+    kept = float(np.exp(scale - total))
+    return {ids: kept * p for ids, p in inside.items()}, found
+
+
+def tolerance_scale(search: Search) -> dict[float, float]:
+    """Return κ → probability, over all candidates."""
+    top = search.best().log_posterior
+    weight = dict.fromkeys(KAPPAS, 0.0)
+    for candidate in search.candidates.values():
+        parts = {kappa: np.log(prior) + candidate.log_evidence[kappa] for kappa, prior in KAPPAS.items()}
+        mixed = log_sum(list(parts.values()))
+        for kappa, value in parts.items():
+            weight[kappa] += float(np.exp(candidate.log_posterior - top + value - mixed))
+    total = sum(weight.values())
+    return {kappa: value / total for kappa, value in weight.items()}
+
+
+@dataclass(kw_only=True, eq=False)
+class Findings:
+    """What was found so far.
+
+    Attributes:
+        search: over hypotheses.
+        detectable: what could be seen at all.
+        misfit: record → channel → how the nominal model fails.
+        foreign: what lies outside the list.
+        seconds: how long each part took.
+        complete: nothing was left out.
+        seed: of everything random.
+        budget: one of BUDGETS.
+    """
+
+    search: Search
+    detectable: tuple[Detectability, ...] = ()
+    misfit: dict[str, dict[str, Misfit]] = field(default_factory=dict)
+    foreign: list[OutOfCatalogue] = field(default_factory=list)
+    seconds: dict[str, float] = field(default_factory=dict)
+    complete: bool = True
+    seed: int = 0
+    budget: str = "full"
+
+    @property
+    def problem(self) -> Problem:
+        """Records and parameters, with the noise as it is known by now."""
+        return self.search.problem

@@ -1,0 +1,254 @@
+"""Screening: the linear evidence of every hypothesis at the fit with κ = 4, and of all neighbours of a fitted one.
+
+A cause that does nothing while it is small has no slope, and a one-sided slope at a non-smooth point says nothing of
+the other side: real simulations try some sizes of such causes. If even κ = 4 does not come close to the records, all
+causes are tried so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from subzero.diagnosis.hypothesis.effect import Parameter
+from subzero.diagnosis.hypothesis.hypotheses import (
+    Entry,
+    Ids,
+    columns_of,
+    log_prior,
+    nameable,
+    pairs_of,
+    variances,
+)
+from subzero.diagnosis.inference.laplace import Candidate, possible
+from subzero.diagnosis.inference.linear_gaussian import (
+    KAPPAS,
+    Posterior,
+    Quadratic,
+    freed,
+    log_sum,
+    posterior,
+)
+from subzero.diagnosis.inference.map_fit import Fit
+from subzero.diagnosis.inference.problem import Problem
+
+POOR_MEAN_SQUARE = 1.08
+"""A wide fit that leaves a greater mean square, in noise, is not close to the records."""
+STRAINED_TOLERANCES, MAX_STRAINED = 5.0, 6
+"""Nor is one that bends MAX_STRAINED parameters of the model by more than STRAINED_TOLERANCES tolerances: it is
+close by chance."""
+SWEEP_SCALES = (0.25, 0.5, 1.0, 2.0)
+"""Sizes, in effect scales, that causes are tried at by real runs, either way."""
+FLAT_SIGNAL = 1.0
+"""An effect of one scale that seems to do no more than this, in noise, has no slope there."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Screening:
+    """What the linear problem says.
+
+    Attributes:
+        log_posterior: hypothesis → log (evidence, mixed over κ, times prior).
+        secants: hypothesis → where its fit begins, for causes without a slope.
+        columns: place of an entry without a slope → its sensitivities, by the secant up to there (m,).
+        count: of causes that can be named.
+        far: the wide fit was not close to the records: sums of causes are no more than guesses.
+    """
+
+    log_posterior: dict[Ids, float] = field(default_factory=dict)
+    secants: dict[Ids, np.ndarray] = field(default_factory=dict)
+    columns: dict[int, np.ndarray] = field(default_factory=dict)
+    count: int = 1
+    far: bool = False
+
+    def adds(self, ids: Ids, part: Ids) -> float:
+        """Return what a hypothesis has over a part of it; from afar only what the prior says."""
+        if self.far:
+            return log_prior(ids, self.count) - log_prior(part, self.count)
+        return self.log_posterior[ids] - self.log_posterior[part]
+
+    def best(self, size: int, most: int, keep: float) -> list[Ids]:
+        """Return the best hypotheses of a size, at most so many, this close to the best of all of that size."""
+        of_size = (ids for ids in self.log_posterior if len(ids) == size)
+        ranked = sorted(of_size, key=lambda ids: -self.log_posterior[ids])[:most]
+        return [ids for ids in ranked if self.log_posterior[ids] > self.log_posterior[ranked[0]] - keep]
+
+
+def is_close(problem: Problem, wide: Fit) -> bool:
+    """Say whether a wide fit leaves nothing but noise, and bends little."""
+    bent = np.abs(wide.z) > STRAINED_TOLERANCES * np.array(
+        [entry.parameter.tolerance for entry in problem.entries]
+    )
+    model = np.array([entry.record < 0 for entry in problem.entries])
+    return bool(
+        wide.r @ wide.r < POOR_MEAN_SQUARE * wide.r.size and np.count_nonzero(bent & model) < MAX_STRAINED
+    )
+
+
+def screening_of(
+    problem: Problem, wide: Fit, nominal: tuple[np.ndarray, np.ndarray], *, far: bool
+) -> Screening:
+    """Return the screen: nothing, every cause, and every pair.
+
+    Args:
+        problem: records and parameters.
+        wide: the fit with wide tolerances.
+        nominal: residual (m,) and sensitivities (m, k) of the nominal model.
+        far: the wide fit did not come close.
+    """
+    if far:
+        return _from_afar(problem, *nominal)
+    names = nameable(problem.entries)
+    found = Screening(count=len(names))
+    base = {kappa: posterior(wide.quadratic, variances(problem.entries, (), kappa)) for kappa in KAPPAS}
+    for ids in [(), *((one,) for one in names), *pairs_of(problem.entries, names)]:
+        found.log_posterior[ids] = linear_evidence(problem, base, (), ids) + log_prior(ids, len(names))
+    _sweep(problem, wide.z, wide.J, _without_slope(problem, wide.J), found, wide.r)
+    return found
+
+
+def _from_afar(problem: Problem, r: np.ndarray, J: np.ndarray) -> Screening:
+    """Return the screen if even wide tolerances do not come close: every cause is tried at some sizes by real runs, and
+    a pair is as good as the better of the two.
+    """
+    names, zero = nameable(problem.entries), np.zeros(J.shape[1])
+    found = Screening(count=len(names), far=True)
+    found.log_posterior[()] = mixed_evidence(problem, Quadratic.at(zero, r, J)) + log_prior((), len(names))
+    _sweep(problem, zero, J, [k for k, entry in enumerate(problem.entries) if entry.record < 0], found, r)
+    for pair in pairs_of(problem.entries, names):
+        better = max(found.log_posterior[(one,)] for one in pair)
+        found.log_posterior[pair] = better + log_prior(pair, len(names)) - log_prior(pair[:1], len(names))
+    return found
+
+
+def linear_evidence(problem: Problem, base: Mapping[float, Posterior], held: Ids, more: Ids) -> float:
+    """Return the log evidence, mixed over κ, when further causes are freed beside those that are free in `base`."""
+    at, found = columns_of(problem.entries, tuple(one for one in more if one not in held)), []
+    for kappa, prior in KAPPAS.items():
+        value = base[kappa].log_evidence
+        if at:
+            D, own = (variances(problem.entries, ids, kappa) for ids in (held, more))
+            value, mean, covariance = freed(base[kappa], D, at, own[at])
+            value += possible(problem.entries, at, mean, np.sqrt(np.diag(covariance)))
+        found.append(np.log(prior) + value)
+    return log_sum(found)
+
+
+def _without_slope(problem: Problem, J: np.ndarray) -> list[int]:
+    """Return the entries that do nothing when they are small."""
+    return [k for k, entry in enumerate(problem.entries)
+            if entry.record < 0 and entry.parameter.low == 0.0 and is_flat(entry, J[:, k])]  # fmt: skip
+
+
+def is_flat(entry: Entry, column: np.ndarray) -> bool:
+    """Say whether sensitivities to an entry (m,) are none."""
+    return bool(np.linalg.norm(column) * entry.parameter.scale <= FLAT_SIGNAL)
+
+
+def _sweep(
+    problem: Problem, z: np.ndarray, J: np.ndarray, columns_of: list[int], found: Screening, here: np.ndarray
+) -> None:
+    """Try sizes of entries about z, side by side, with the residual `here` there; keep the best of every cause."""
+    jobs = [(k, size) for k in columns_of for size in sizes_tried(problem.entries[k].parameter)]
+    moved = [np.concatenate([z[:k], [size], z[k + 1 :]]) for k, size in jobs]
+    best, dull = dict[Ids, float](), _without_slope(problem, J)
+    for (k, size), there, r in zip(jobs, moved, problem.residuals(moved), strict=True):
+        ids: Ids = (problem.entries[k].effect.id,)
+        value = _at_size(problem, k, size, there, r, J)
+        if value > best.get(ids, -np.inf) or ids not in best:
+            best[ids], found.secants[ids] = value, there
+            if k in dull and np.isfinite(r).all():
+                found.columns[k] = (here - r) / (size - z[k])
+    found.log_posterior.update(
+        {ids: best[ids] + log_prior(ids, len(nameable(problem.entries))) for ids in best}
+    )
+
+
+def sizes_tried(parameter: Parameter, scales: Sequence[float] = SWEEP_SCALES) -> list[float]:
+    """Return the deviations that are tried, at some effect scales either way."""
+    both = [side * size * parameter.scale for size in scales for side in (1.0, -1.0)]
+    return [size for size in both if parameter.low <= size <= parameter.high]
+
+
+def _at_size(problem: Problem, k: int, size: float, z: np.ndarray, r: np.ndarray, J: np.ndarray) -> float:
+    """Return the log evidence of entry k at a size, others within their tolerances about z, with the residual there."""
+    if not np.isfinite(r).all():
+        return -np.inf
+    others = z.copy()
+    others[k] = 0.0
+    far = 0.5 * (size / problem.entries[k].parameter.scale) ** 2
+    return mixed_evidence(problem, Quadratic.at(others, r, J)) - far - 1.0
+
+
+def mixed_evidence(problem: Problem, q: Quadratic, ids: Ids = ()) -> float:
+    """Return the log evidence of some causes, or with nothing but tolerances, mixed over κ."""
+    return log_sum([np.log(prior) + posterior(q, variances(problem.entries, ids, kappa)).log_evidence
+                    for kappa, prior in KAPPAS.items()])  # fmt: skip
+
+
+def with_one_added(problem: Problem, one: Candidate) -> dict[Ids, float]:
+    """Return hypothesis → log posterior of all with one cause more than a candidate, in the linear problem there."""
+    names, found = nameable(problem.entries), {}
+    base = {
+        kappa: posterior(one.fit.quadratic, variances(problem.entries, one.ids, kappa)) for kappa in KAPPAS
+    }
+    here = linear_evidence(problem, base, one.ids, one.ids) + log_prior(one.ids, len(names))
+    for more in names:
+        ids = tuple(sorted({*one.ids, more}))
+        if len(ids) > len(one.ids):
+            there = linear_evidence(problem, base, one.ids, ids) + log_prior(ids, len(names))
+            found[ids] = one.log_posterior + there - here
+    return found
+
+
+def with_one_swapped(problem: Problem, one: Candidate, rest: Ids) -> dict[Ids, float]:
+    """Return hypothesis → log posterior of all with another cause beside the rest of a candidate, likewise."""
+    q, names, found = one.fit.quadratic, nameable(problem.entries), {}
+    for other in names:
+        ids = tuple(sorted({*rest, other}))
+        if len(ids) > len(rest) and ids != one.ids:
+            found[ids] = mixed_evidence(problem, q, ids) + log_prior(ids, len(names))
+    return found
+
+
+class TriedSize(NamedTuple):
+    """A hypothesis at a size of one of its causes: log posterior, deviations (k,), and sensitivities there (m, k)."""
+
+    log_posterior: float
+    z: np.ndarray
+    J: np.ndarray
+
+
+def with_sizes_tried(
+    problem: Problem, one: Candidate, rest: Ids, at: Sequence[int], scales: Sequence[float] = SWEEP_SCALES
+) -> dict[Ids, TriedSize]:
+    """Return hypothesis → its best size, for the causes of entries beside the rest of a candidate.
+
+    Args:
+        problem: records and parameters.
+        one: the candidate.
+        rest: those of its causes that are kept.
+        at: places of the entries that are tried.
+        scales: sizes that they are tried at, in effect scales, either way.
+    """
+    entries, names, J = problem.entries, nameable(problem.entries), one.fit.J
+    z = np.maximum(posterior(one.fit.quadratic, variances(entries, rest, one.kappa)).z, _lowest(problem))
+    jobs = [(k, size) for k in at for size in sizes_tried(entries[k].parameter, scales)]
+    moved = [np.concatenate([z[:k], [size], z[k + 1 :]]) for k, size in jobs]
+    found = dict[Ids, TriedSize]()
+    here, *runs = problem.residuals([z, *moved])
+    for (k, size), there, r in zip(jobs, moved, runs, strict=True):
+        ids = tuple(sorted({*rest, entries[k].effect.id}))
+        slopes = np.column_stack([J[:, :k], (here - r) / (size - z[k]), J[:, k + 1 :]])
+        if np.isfinite(slopes).all():
+            log = mixed_evidence(problem, Quadratic.at(there, r, slopes), ids) + log_prior(ids, len(names))
+            if ids not in found or log > found[ids].log_posterior:
+                found[ids] = TriedSize(log, there, slopes)
+    return found
+
+
+def _lowest(problem: Problem) -> np.ndarray:
+    return np.array([entry.parameter.low for entry in problem.entries])

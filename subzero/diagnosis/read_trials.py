@@ -1,0 +1,215 @@
+"""From files to what a diagnosis takes: measured records, each with the trial that it belongs to.
+
+A record is a CSV file of `subzero.records.record`, with or without columns of commands and a file of metadata. All that
+can be wrong with it is said before anything long is begun, in one message for a record.
+
+A comparison (`check_epoch`, `check_beside`) asks for less: the epoch, the units and the signs, but neither a length nor
+a sampling rate. It has its simulation anyway, so these checks cost nothing.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+import scenarios
+from subzero.channels import BY_NAME
+from subzero.diagnosis.hypothesis.catalogue.sensors import NOISE, SPECS
+from subzero.diagnosis.hypothesis.configuration import Logged, Setting
+from subzero.errors import UserError, listed
+from subzero.model import Model
+from subzero.records.commands import FROM_RECORD, REPORTED_COMMANDS, trial_with_commands
+from subzero.records.goodness_of_fit import fits, modelled
+from subzero.records.metadata import Metadata, read_metadata
+from subzero.records.record import HEADING, Record, read_record, turned
+from subzero.records.time_base import cut_to, epoch_problems, time_problems, without_repeats
+from subzero.records.unit_checks import is_constant, repeating, stuck, unit_questions
+from subzero.trials import load
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Simulated = Callable[[Setting, np.ndarray, Sequence[str]], Mapping[str, np.ndarray]]
+"""(setting, times, channels) → channel → what the sensors would have measured."""
+
+
+def read_trials(
+    paths: Sequence[str | Path] | str | Path,
+    *,
+    scenario: str | Path | None = None,
+    commands: str | None = None,
+    simulated: Simulated | None = None,
+) -> list[Logged]:
+    """Read measured records, each with the trial it belongs to.
+
+    Args:
+        paths: CSV files, or folders of them.
+        scenario: the trial of every record whose sidecar does not name one.
+        commands: "record" or "scenario", if a record's commands may differ from the scenario's.
+        simulated: the nominal simulation; `subzero.diagnosis.inference.measurement.respond` if None.
+
+    Raises:
+        UserError: a record, or its sidecar, cannot be used.
+        scenarios.ScenarioError: a scenario cannot be used.
+    """
+    files = _files([paths] if isinstance(paths, str | Path) else paths)
+    names = _names(files)
+    logged = [_logged(file, name, scenario, commands) for file, name in zip(files, names, strict=True)]
+    return [_checked(one, read_metadata(file.with_suffix(".toml")), simulated)
+            for one, file in zip(logged, files, strict=True)]  # fmt: skip
+
+
+def _files(paths: Sequence[str | Path]) -> list[Path]:
+    """Return the files, those of a folder in alphabetical order."""
+    files: list[Path] = []
+    for path in map(Path, paths):
+        inside = sorted(path.glob("*.csv")) if path.is_dir() else [path]
+        if not inside:
+            raise UserError(f"The folder {path} holds no measured record. Put CSV files into it.")
+        files += inside
+    return list(dict.fromkeys(files))
+
+
+def _names(files: Sequence[Path]) -> list[str]:
+    """Return a short name for each file, unlike the others'."""
+    stems = [file.stem for file in files]
+    return [
+        stem if stems.count(stem) == 1 else f"{file.parent.name or '.'}/{stem}"
+        for file, stem in zip(files, stems, strict=True)
+    ]
+
+
+def _logged(path: Path, name: str, scenario: str | Path | None, commands: str | None) -> Logged:
+    """Read one record with its sidecar and its trial, and cut the trial to its length."""
+    record, sidecar = read_record(path), read_metadata(path.with_suffix(".toml"))
+    named = sidecar.scenario or scenario
+    if not named:
+        raise UserError(
+            f"Which trial is {path}? Give --scenario, or scenario = '…' in {path.stem}.toml beside it."
+        )
+    trial = load(named)
+    _refuse(path, time_problems(record, trial, longer=commands == FROM_RECORD))
+    trial = cut_to(trial_with_commands(trial, record, commands), record)
+    values, notes = _channels(record, sidecar)
+    if scenario and sidecar.scenario and str(scenario) != sidecar.scenario:
+        notes += (f"Its sidecar names the trial {sidecar.scenario}, so {scenario} is not taken for it.",)
+    if HEADING in values:
+        values[HEADING] = turned(values[HEADING], math.degrees(trial.start.heading))
+    return Logged(
+        record=Record(source=str(path), time=record.time, values=values),
+        setting=Setting(trial=trial, model=Model.of(trial), tethered=sidecar.tethered),
+        noise={channel: sd for channel, sd in sidecar.noise.items() if channel in values},
+        name=name,
+        notes=notes,
+    )
+
+
+def _channels(record: Record, sidecar: Metadata) -> tuple[dict[str, np.ndarray], tuple[str, ...]]:
+    """Return the channels that can be diagnosed, and what was left out."""
+    values = {channel: column for channel, column in record.values.items() if channel in SPECS}
+    others = [
+        channel for channel in record.values if channel not in SPECS and channel not in REPORTED_COMMANDS
+    ]
+    notes: tuple[str, ...] = (f"Not used, for no sensor shows it: {_columns(others)}.",) if others else ()
+    if sidecar.over_ground and "surge_speed" in values:
+        if "speed_over_ground" in values:
+            raise UserError(
+                f"{record.source} has speed_over_ground_m_s and a surge_speed_m_s that its sidecar calls over ground: "
+                "keep one of them."
+            )
+        values["speed_over_ground"] = np.abs(values.pop("surge_speed"))
+        notes += ("The surge speed is over ground, so it is read as the speed over ground.",)
+    if not values:
+        raise UserError(
+            f"{record.source} has no channel that can be diagnosed. Add one of: {_columns(SPECS)}."
+        )
+    rates = sidecar.rate
+    return {name: without_repeats(record.time, one, rates.get(name)) for name, one in values.items()}, notes
+
+
+def _checked(logged: Logged, sidecar: Metadata, simulated: Simulated | None) -> Logged:
+    """Return a record whose channels look like its trial."""
+    record, values = logged.record, logged.record.values
+    nominal = (simulated or _nominal())(logged.setting, record.time, tuple(values))
+    noise = {channel: logged.noise.get(channel, NOISE[channel]) for channel in values}
+    suspects = {channel: column for channel, column in values.items() if not sidecar.trusts(channel)}
+    still = [channel for channel, column in suspects.items() if is_constant(column)]
+    moving = {channel: column for channel, column in suspects.items() if channel not in still}
+    _refuse(record.source, stuck(suspects, nominal, noise) + unit_questions(moving, nominal, noise))
+    kept = {channel: column for channel, column in values.items() if channel not in still}
+    if not kept:
+        raise UserError(f"{record.source}: no channel moves. A diagnosis needs one that the trial moves.")
+    notes = (*logged.notes, *_notes(still, repeating(kept)))
+    return dataclasses.replace(logged, record=dataclasses.replace(record, values=kept), notes=notes)
+
+
+def _nominal() -> Simulated:
+    """Return the simulation itself; the compiler comes only with it."""
+    from subzero.diagnosis.inference.measurement import respond
+
+    return respond
+
+
+def _notes(still: Sequence[str], held: Sequence[str]) -> list[str]:
+    """Say what is left out, and what is hard to tell."""
+    notes = [f"Left out, for it never changes: {_columns(still)}."] if still else []
+    if held:
+        notes.append(
+            f"Most samples repeat the one before: {_columns(held)}. If the sensor is slower than the record, give its "
+            "rate under [rate_hz] in the sidecar."
+        )
+    return notes
+
+
+def _columns(channels: Sequence[str] | Mapping[str, object]) -> str:
+    return ", ".join(BY_NAME[channel].column for channel in channels)
+
+
+def _refuse(path: str | Path, problems: list[str]) -> None:
+    if problems:
+        raise UserError(listed(f"The measured record {path} cannot be diagnosed:", problems))
+
+
+def check_epoch(record: Record, trial: scenarios.Trial) -> Metadata:
+    """Check before a run that a record was measured in it, and return what its sidecar says.
+
+    Raises:
+        UserError: it was not, or the sidecar cannot be used.
+    """
+    _refuse_times(record, epoch_problems(record, trial))
+    path = Path(record.source)
+    return read_metadata(path.with_suffix(".toml")) if path.suffix.lower() == ".csv" else Metadata()
+
+
+def check_beside(record: Record, runs: Mapping[str, xr.Dataset], sidecar: Metadata) -> None:
+    """Check that a record looks like one of the runs of its trial, the tethered one first.
+
+    Raises:
+        UserError: no sample can be compared, or a channel looks like another unit, another sign, or a stuck sensor.
+    """
+    if not any(one.samples for by_run in fits(dict(runs), record).values() for one in by_run.values()):
+        _refuse_times(record, ["none of its samples can be compared: where the runs are, it has gaps"])
+    suspects = {
+        name: values for name, values in record.values.items() if name in NOISE and not sidecar.trusts(name)
+    }
+    found: list[list[str]] = []
+    for run in runs.values():
+        simulated = {name: modelled(run, name, record.time) for name in suspects}
+        known = {name: values for name, values in suspects.items() if _overlaps(values, simulated[name])}
+        found.append(stuck(known, simulated, NOISE) + unit_questions(known, simulated, NOISE))
+    # A cable changes how much, never which unit: what fits the run without one is in the right unit too.
+    _refuse_times(record, min(found, key=len, default=[]))
+
+
+def _overlaps(measured: np.ndarray, simulated: np.ndarray) -> bool:
+    return bool(np.isfinite(measured + simulated).any())
+
+
+def _refuse_times(record: Record, problems: list[str]) -> None:
+    if problems:
+        raise UserError(listed(f"The measured record {record.source} cannot be compared:", problems))

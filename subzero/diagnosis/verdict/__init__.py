@@ -1,0 +1,1 @@
+"""From findings to a verdict: decision rule, estimates with intervals, the extended model."""
