@@ -16,7 +16,7 @@ from time import perf_counter
 
 from threadpoolctl import threadpool_limits
 
-from subzero.diagnosis.assessment.identifiability import detectability, with_secants
+from subzero.diagnosis.assessment.identifiability import detectability, refuted_rivals, with_secants
 from subzero.diagnosis.assessment.residuals import misfits
 from subzero.diagnosis.hypothesis.catalogue import load
 from subzero.diagnosis.hypothesis.configuration import Logged
@@ -148,6 +148,7 @@ def _find(findings: Findings, seen: Seen) -> None:
         done("fits")
         search.progress(0.8, "forces that no cause explains")
         findings.foreign = explanations_outside(search)
+    findings.refuted = refuted_rivals(search)
     _measure_misfit(findings)
     done("outside")
 

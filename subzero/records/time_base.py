@@ -10,7 +10,7 @@ import numpy as np
 import scenarios
 from subzero.records.record import Record
 
-MIN_DURATION_S, MAX_STEP_S, MIN_SAMPLES = 5.0, 1.0, 20
+MIN_DURATION_S, MAX_STEP_S, MIN_SAMPLES = 5.0, 5.0, 6
 """A record has to last so long [s], with a sample at least so often [s], and so many samples."""
 
 SAME_TIME_S = 1e-6

@@ -172,7 +172,7 @@ def test_a_switch_within_one_sample_is_no_difference(write):
         (columns(depth=3.281 * SHAPE["depth"]), "depth_m looks like feet (3.28 times the simulation)"),
         (columns(depth=-SHAPE["depth"]), "depth_m has the opposite sign"),
         (columns(propeller_speed=60.0 * SHAPE["propeller_speed"]), "looks like revolutions per minute"),
-        (columns("surge_speed", time=np.arange(0.0, 30.1, 1.2)), "sampled every 1.2 s, slower than the vehicle moves"),
+        (columns("surge_speed", time=np.arange(0.0, 30.1, 5.5)), "sampled every 5.5 s, slower than the vehicle moves"),
         (columns("surge_speed", time=TIME[:40]), "it lasts 3.9 s; a diagnosis needs at least 5 s"),
         (columns("surge_speed", time=1.5 * TIME), "it lasts until 45 s, but the trial fig6 ends at 30 s"),
         (columns("surge_speed", time=TIME + 1000.0), "time_s counts from the start of the trial"),

@@ -9,9 +9,13 @@ can. A cause of another size v has (v/s)² times as much.
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import numpy as np
 
 from subzero.diagnosis.hypothesis.hypotheses import Entry, columns_of, nameable
+from subzero.diagnosis.inference.model_average import MIN_DISCRIMINATION
+from subzero.diagnosis.inference.model_search import Search
 from subzero.diagnosis.inference.problem import Problem
 from subzero.diagnosis.results import Detectability
 
@@ -19,6 +23,9 @@ FLAT_SIGNAL = 1.0
 """A cause of one scale that seems to do less than this, in noise, has no slope at the nominal model."""
 SEEN_SIGNAL = 4.0
 """A signal that would be seen."""
+MAX_REFUTED, REFUTED_NATS = 3, 16.0
+"""So many close rivals of the best are simulated; one whose log posterior, as good as a better fit might have it, is so far
+behind is none: luck alone would have to be worth three standard deviations where D is 9. [nat]"""
 
 
 def with_secants(problem: Problem, J: np.ndarray, z: np.ndarray | None = None) -> np.ndarray:
@@ -120,15 +127,39 @@ def _signal(problem: Problem, M: np.ndarray, k: int) -> float:
 
 
 def separation(
-    problem: Problem, J: np.ndarray, z: np.ndarray, ids: tuple[str, ...], kappa: float = 1.0
+    problem: Problem,
+    J: np.ndarray,
+    z: np.ndarray,
+    ids: tuple[str, ...],
+    kappa: float = 1.0,
+    refuted: Collection[str] = (),
 ) -> tuple[float, str]:
-    """Return D of causes as they are in z against their closest rival, and that rival ("none": the tolerances)."""
+    """Return D of causes as they are in z against their closest rival, and that rival ("none": the tolerances), none of
+    those that are `refuted`.
+    """
     M = marginal(problem, J, kappa)
     own = columns_of(problem.entries, ids)
     whole = float(z[own] @ information(problem, M, own, kappa) @ z[own])
     best, who = whole, "none"
     for other in nameable(problem.entries):
-        if other not in ids:
+        if other not in ids and other not in refuted:
             D = against(problem, M, own, z[own], columns_of(problem.entries, (other,)), kappa)[0]
             best, who = (D, other) if best > D else (best, who)
     return best, who
+
+
+def refuted_rivals(search: Search) -> frozenset[str]:
+    """Return the rivals of the best hypothesis that only the linear problem has close, as simulations show: a play of the
+    rudder may look like its offset from where there is none, and explain nothing of a record.
+    """
+    best, problem, found = search.best(), search.problem, set[str]()
+    J = with_secants(problem, best.fit.J, best.fit.z)
+    for _ in range(MAX_REFUTED if best.ids else 0):
+        D, rival = separation(problem, J, best.fit.z, best.ids, best.kappa, found)
+        if rival == "none" or D >= MIN_DISCRIMINATION:
+            break
+        search.fit((rival,), best.fit)
+        if search.candidates[(rival,)].optimistic_log_posterior > best.log_posterior - REFUTED_NATS:
+            break
+        found.add(rival)
+    return frozenset(found)

@@ -57,8 +57,9 @@ def grouped(entries: tuple[Entry, ...]) -> list[tuple[Effect, list[int], int]]:
 Ids = tuple[str, ...]
 """The causes of a hypothesis, in the order of the alphabet; () is "nothing is wrong"."""
 
-PRIOR = {"none": 0.50, "single": 0.40, "pair": 0.06, "unknown": 0.04, "sudden": 0.04, "more": 0.004}
-"""Probability of each kind, shared by all hypotheses of the kind."""
+_ODDS = {"none": 0.50, "single": 0.40, "pair": 0.06, "unknown": 0.04, "sudden": 0.04, "more": 0.004}
+PRIOR = {kind: odds / sum(_ODDS.values()) for kind, odds in _ODDS.items()}
+"""Probability of each kind, shared by all hypotheses of the kind; they sum to one."""
 
 
 def nameable(entries: Sequence[Entry]) -> list[str]:

@@ -331,7 +331,7 @@ def fit_beside_drift(problem: Problem, found: EstimatedForce, D: np.ndarray) -> 
     for i, one in enumerate(problem.records):
         own = found.knots.record == i
         drift = np.interp(one.time, found.knots.time[own], found.force[own])
-        records.append(replace(one, values={**one.values, channel: one.values[channel] - drift}))
+        records.append(one.corrected({channel: drift}))
     cleared = replace(problem, records=tuple(records))
     J, left = start.J, start.r + start.J @ start.z - found.columns @ found.force
     there = posterior(Quadratic(A=J.T @ J, b=J.T @ left, rr=float(left @ left)), D).z

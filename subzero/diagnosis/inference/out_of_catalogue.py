@@ -278,6 +278,7 @@ class Findings:
         detectable: what could be seen at all.
         misfit: record → channel → how the nominal model fails.
         foreign: what lies outside the list.
+        refuted: rivals of the best that simulations refute, however alike the linear problem has them.
         seconds: how long each part took.
         complete: nothing was left out.
         seed: of everything random.
@@ -288,6 +289,7 @@ class Findings:
     detectable: tuple[Detectability, ...] = ()
     misfit: dict[str, dict[str, Misfit]] = field(default_factory=dict)
     foreign: list[OutOfCatalogue] = field(default_factory=list)
+    refuted: frozenset[str] = frozenset()
     seconds: dict[str, float] = field(default_factory=dict)
     complete: bool = True
     seed: int = 0

@@ -54,8 +54,16 @@ Job = tuple[int, np.ndarray, Stop | None]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Observed:
-    """A record, ready: times [s] (n,), channel → values (n,), channel → noise, its nominal setting, and the levels of
-    noise that the user knows.
+    """A record, ready.
+
+    Attributes:
+        name: short.
+        time: of its samples (n,). [s]
+        values: channel → as measured (n,), NaN in gaps.
+        noise: channel → its noise.
+        setting: the nominal one, in economical steps.
+        known: channel → level of noise that the user knows.
+        correction: channel → what is added to the simulation (n,): the error of its economical steps, a drift.
     """
 
     name: str
@@ -64,6 +72,12 @@ class Observed:
     noise: dict[str, Noise]
     setting: Setting
     known: Mapping[str, float] = field(default_factory=dict)
+    correction: Mapping[str, np.ndarray] = field(default_factory=dict)
+
+    def corrected(self, more: Mapping[str, np.ndarray]) -> Observed:
+        """Return the record beside a simulation to which more is added; what was measured stays as it is."""
+        both = {name: self.correction.get(name, 0.0) + column for name, column in more.items()}
+        return replace(self, correction={**self.correction, **both})
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -184,7 +198,9 @@ class Problem:
         for channel, noise in seen.noise.items():
             shown = sensed(setting.sensing.get(channel), grid, truth(setting, track[1], channel))
             values = np.interp(earlier, grid, shown)
-            parts.append(noise.whiten(seen.values[channel] - values if measured else values))
+            if measured:
+                values = seen.values[channel] - values - seen.correction.get(channel, 0.0)
+            parts.append(noise.whiten(values))
         return np.concatenate(parts)
 
 
@@ -341,14 +357,12 @@ def _alike(old: Noise, new: Noise) -> bool:
 
 
 def with_finer_steps(problem: Problem, z: np.ndarray) -> Problem | None:
-    """Return the problem with records freed from the error of economical steps at z; None if that is not seen."""
+    """Return the problem with the error of economical steps at z made good; None if that is not seen."""
     records, size = [], 0.0
     for i, one in enumerate(problem.records):
         setting = problem.setting(i, z)
         coarse, fine = (respond(made, one.time, one.noise) for made in (setting, finer(setting)))
         wrong = {name: fine[name] - coarse[name] for name in one.noise}
         size += sum(float(np.sum(one.noise[name].whiten(column) ** 2)) for name, column in wrong.items())
-        records.append(
-            replace(one, values={name: one.values[name] - column for name, column in wrong.items()})
-        )
+        records.append(one.corrected(wrong))
     return replace(problem, records=tuple(records)) if VISIBLE_ERROR < size < np.inf else None

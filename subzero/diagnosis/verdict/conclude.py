@@ -257,7 +257,7 @@ def _with_closest(work: Findings, best: Candidate, left: list[Ids]) -> list[Ids]
     if len(left) > 1 or not best.ids:
         return left
     J = with_secants(work.problem, best.fit.J, best.fit.z)
-    rival = separation(work.problem, J, best.fit.z, best.ids, best.kappa)[1]
+    rival = separation(work.problem, J, best.fit.z, best.ids, best.kappa, work.refuted)[1]
     closest = () if rival == "none" else (rival,)
     work.search.fit(closest)
     return [*left, closest]
@@ -297,7 +297,7 @@ def _large(work: Findings, best: Candidate) -> tuple[bool, float]:
     if not ids:
         return False, 0.0
     J = with_secants(work.problem, best.fit.J, best.fit.z)
-    return True, separation(work.problem, J, best.fit.z, ids, best.kappa)[0]
+    return True, separation(work.problem, J, best.fit.z, ids, best.kappa, work.refuted)[0]
 
 
 def _extension(work: Findings, verdict: str, best: Candidate) -> Extension:
