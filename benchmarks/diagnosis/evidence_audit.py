@@ -1,4 +1,4 @@
-"""Is Laplace's evidence that of the model? ``python -m benchmarks.diagnosis.evidence_audit`` sets it beside nested sampling.
+"""Is Laplace's evidence that of the model? ``python -m benchmarks.diagnosis.evidence_audit`` asks nested sampling.
 
 Two small problems on fig6, three parameters each with their tolerances, a record of its own noise: the log evidence
 −objective − ½ log det(D P) of the program, and that of dynesty, which knows nothing of slopes or fits.

@@ -24,8 +24,8 @@ FLAT_SIGNAL = 1.0
 SEEN_SIGNAL = 4.0
 """A signal that would be seen."""
 MAX_REFUTED, REFUTED_NATS = 3, 16.0
-"""So many close rivals of the best are simulated; one whose log posterior, as good as a better fit might have it, is so far
-behind is none: luck alone would have to be worth three standard deviations where D is 9. [nat]"""
+"""So many close rivals of the best are simulated; one that is so far behind in log posterior, as good as a better fit
+might have it, is none: where D is 9, luck would have to be worth three standard deviations. [nat]"""
 
 
 def with_secants(problem: Problem, J: np.ndarray, z: np.ndarray | None = None) -> np.ndarray:
@@ -149,8 +149,9 @@ def separation(
 
 
 def refuted_rivals(search: Search) -> frozenset[str]:
-    """Return the rivals of the best hypothesis that only the linear problem has close, as simulations show: a play of the
-    rudder may look like its offset from where there is none, and explain nothing of a record.
+    """Return the rivals of the best hypothesis that only the linear problem has close, as simulations show.
+
+    A play of the rudder may look like its offset from where there is none, and explain nothing of a record.
     """
     best, problem, found = search.best(), search.problem, set[str]()
     J = with_secants(problem, best.fit.J, best.fit.z)
