@@ -29,7 +29,7 @@ _HOME = {
     "RunStoppedError": ("subzero.simulator", "RunStoppedError"),
     "Simulator": ("subzero.simulator", "Simulator"),
     "UserError": ("subzero.errors", "UserError"),
-    "challenge": ("subzero.diagnosis.challenge", "challenge"),
+    "challenge": ("subzero.synthetic.challenge", "challenge"),
     "check": ("subzero.refinement", "check"),
     "compare": ("subzero.comparison", "compare"),
     "diagnose": ("subzero.diagnosis.api", "diagnose"),
