@@ -63,7 +63,7 @@ def test_a_record_from_359_degrees_is_a_degree_from_north_for_the_engine(counted
     z = np.zeros(len(problem.entries))
     (at,) = (k for k, entry in enumerate(problem.entries) if entry.effect.id == "sensor_bias:heading")
     z[at] = -1.0
-    seen = problem.records[0].noise["heading"].gap.size
+    seen = problem.records[0].noise["heading"].count
     assert problem.residual(z)[:seen] @ problem.residual(z)[:seen] < 2.0 * seen
 
 
