@@ -13,7 +13,7 @@ from .drum_path import PLACE, SETPOINT, VELOCITY, drum_path, resting
 from .element import new_load
 from .history import History
 from .hold import Equilibrium, lay_held
-from .laying import lay_straight
+from .laying import RUN_IN, lay_straight, run_in
 from .line import TOLERANCE, new_line
 from .properties import CableProperties, DrumProperties
 from .runs import (
@@ -160,13 +160,14 @@ def pull_out(
     path.place[:] += wet * direction if start is None else start.shape[0] - start.shape[-1]
     reach = 1.5 * (_way(path.place) + _way(led[:, PLACE:VELOCITY]) + water.fastest * duration) + wet
     longest = led[:, SETPOINT].max() if isinstance(drum, PayOutRate | Brake) else 2.0 * reach + 5.0
-    capacity = segments_needed(float(longest), segment_length, grading)
+    capacity = segments_needed(float(longest), segment_length, grading) + int(RUN_IN / segment_length)
     capacity += 0 if start is None else start.segment_lengths.size
     check_memory(path.times.size, capacity)
     line, work, c, turning = new_line(capacity), new_load(), cable.numbers(), drum.numbers()
     line.ends.segment_length, line.ends.grading, line.ends.tolerance = segment_length, grading, tolerance
     turning.velocity[:] = led[0, VELOCITY:SETPOINT]
     if start is None:
+        line.ends.run_in = run_in(wet, turning)
         lay_straight(line, wet, direction, path.leaving[0], turning, c)
     else:
         rate = (led[1, SETPOINT] - led[0, SETPOINT]) / path.times[1] if turning.control == LENGTH else 0.0

@@ -10,7 +10,7 @@ from cable.drum import FREE
 from cable.drum_path import lead_drum
 from cable.element import new_load
 from cable.energy import FLOWS, energy_flow
-from cable.laying import lay_straight, start_in_water
+from cable.laying import RUN_IN, lay_straight, run_in, start_in_water
 from cable.line import NOW, Line, new_line
 from cable.pull_out import START_LENGTH
 from subzero.compiled import compiled
@@ -58,11 +58,12 @@ def prepare(
         state=first_state(trial, model, tethered) if state is None else state,
         path=np.zeros((steps + 1, size)),
         stages=np.zeros((5, size)),
-        line=new_line(int(wet / trial.segment_length) + FIRST_ROOM),
+        line=new_line(int((wet + RUN_IN) / trial.segment_length) + FIRST_ROOM),
         load=new_load(),
     )
     live.now.length = wet if tethered else 0.0
     live.line.ends.segment_length, live.line.ends.grading = trial.segment_length, trial.grading
+    live.line.ends.run_in = run_in(wet, setup.fixed.drum)
     lay_out(setup, live, wet)
     if trial.start.drum is not None:
         hang_between(setup, live, trial, model)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import vehicle
+from cable.laying import RUN_IN
 from cable.line import enlarged
 from scenarios import Start, Trial
 from subzero.autopilot.memory import Memory
@@ -90,7 +91,7 @@ class Tethered:
         self._setup = self._setup._replace(orders=Orders(np.zeros(1), np.zeros((1, 4))))
         if exact:
             live.line.ends.tolerance, self._setup.fixed.agreement = EXACT, EXACT  # type: ignore[misc]  # a record
-        room = int(longest / trial.segment_length) + SPARE + 4
+        room = int((longest + RUN_IN) / trial.segment_length) + SPARE + 4
         self._live = live._replace(line=enlarged(live.line, max(room, live.line.length.size)))
         self._memory = Memory(self._live)
         self._recording = new_recording(2, 4 * self._live.line.length.size)
