@@ -6,21 +6,11 @@ import numpy as np
 
 from subzero.compiled import compiled
 
-from .drum import FREE, TURNING
+from .drum import TURNING
 from .element import Load
 from .line import BEFORE, NEW, NOW, SPLIT_AT, Line, feel_water, segment_momentum, spacing
 from .properties import CableNumbers, DrumNumbers
 from .water import Water
-
-RUN_IN = 2.0
-"""A cable that begins shorter than this, on a free drum, has shorter segments up to here (`cable.line.spacing`). With
-even ones it is a straight line until it is 1.5 of them long; then its force jumps, by an error of first order. A winch
-may pay out slack, which short segments would fold. [m]"""
-
-
-def run_in(wet_length: float, drum: DrumNumbers) -> float:
-    """Return the length beside the tow point in which a cable that begins with `wet_length` has shorter segments. [m]."""
-    return RUN_IN if wet_length < RUN_IN and drum.control == FREE else 0.0
 
 
 @compiled

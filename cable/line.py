@@ -217,15 +217,14 @@ def held_node(line: Line) -> int:
 def spacing(line: Line) -> float:
     """Return how long a segment that starts at the end of the full ones, s from the tow point, has to be. [m].
 
-    Δs + g s; and, within the first metres L₀ (`run_in`), Δs (√(s/L₀) + Δs/4L₀): then node j is at s = (jΔs)²/4L₀. So a
-    cable that begins with no length has as many segments after a second, whose lengths are of the order Δs².
+    Δs + g s; and, within the first metres L₀ (`run_in`), Δs (√(s/L₀) + Δs/4L₀) + g s: then, without grading, node j is
+    at s = (jΔs)²/4L₀. So a cable that begins with no length soon has as many segments as it needs.
     """
     ends = line.ends
-    longest = ends.segment_length + ends.grading * ends.settled
-    if ends.run_in <= 0.0:
-        return longest
-    share = np.sqrt(ends.settled / ends.run_in) + 0.25 * ends.segment_length / ends.run_in
-    return min(longest, ends.segment_length * share)
+    share = 1.0
+    if ends.run_in > 0.0:
+        share = min(1.0, np.sqrt(ends.settled / ends.run_in) + 0.25 * ends.segment_length / ends.run_in)
+    return share * ends.segment_length + ends.grading * ends.settled
 
 
 @inner

@@ -10,7 +10,7 @@ from cable.drum import FREE
 from cable.drum_path import lead_drum
 from cable.element import new_load
 from cable.energy import FLOWS, energy_flow
-from cable.laying import RUN_IN, lay_straight, run_in, start_in_water
+from cable.laying import lay_straight, start_in_water
 from cable.line import NOW, Line, new_line
 from cable.pull_out import START_LENGTH
 from subzero.compiled import compiled
@@ -26,6 +26,10 @@ from subzero.surroundings import drum_of, water_of, way_of_drum
 
 FORCE_TOLERANCE = 1e-9
 """Hull and cable agree when their forces differ by less than this fraction (and 1e-11 N)."""
+RUN_IN = 2.0
+"""A cable that begins shorter than this, on a free drum, has shorter segments up to here (`cable.line.spacing`). With
+even ones it is a straight line until it is 1.5 of them long; then its force jumps, by an error of first order. A winch
+may pay out slack, which short segments would fold. [m]"""
 FIRST_ROOM = 16
 """Segments that a new cable has room for, beyond those that are in the water."""
 
@@ -63,7 +67,7 @@ def prepare(
     )
     live.now.length = wet if tethered else 0.0
     live.line.ends.segment_length, live.line.ends.grading = trial.segment_length, trial.grading
-    live.line.ends.run_in = run_in(wet, setup.fixed.drum)
+    live.line.ends.run_in = RUN_IN if wet < RUN_IN and setup.fixed.drum.control == FREE else 0.0
     lay_out(setup, live, wet)
     if trial.start.drum is not None:
         hang_between(setup, live, trial, model)

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import vehicle
-from cable.laying import RUN_IN
 from cable.line import enlarged
 from scenarios import Start, Trial
 from subzero.autopilot.memory import Memory
@@ -23,7 +22,7 @@ from subzero.model import Model
 from subzero.recording import new_recording
 from subzero.run_state import Orders
 from subzero.simulation import in_words
-from subzero.start import prepare
+from subzero.start import RUN_IN, prepare
 from vehicle.state import CHARGE, LINKAGE
 
 if TYPE_CHECKING:

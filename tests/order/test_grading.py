@@ -68,27 +68,36 @@ def test_a_straight_pull_stays_exact(grading, friction):
 
 @pytest.mark.parametrize("grading", [0.0, 0.02, 0.1])
 def test_segments_are_as_long_as_they_were_asked_for(grading):
-    """Straight and inextensible, chords are lengths; s is where a segment starts. All but the last, which grows, and
-    those of the first 2 m, whose nodes are at (jΔs)²/8 m.
-    """
+    """Straight and inextensible, chords are lengths; s is where a segment starts. All but the last, which grows."""
     run = cable.pull_out(lambda _: (1.0, 0.0, 0.0), 60.0, drum=DRUM, grading=grading, segment_length=SEGMENT)
     lengths = np.linalg.norm(np.diff(run.shapes[-1], axis=0), axis=1)
     starts = np.concatenate([[0.0], np.cumsum(lengths)[:-1]])
-    first = starts < 2.0 - 1e-9
-    assert_allclose(starts[first], (SEGMENT * np.arange(first.sum())) ** 2 / 8.0, atol=1e-6)
-    even = (SEGMENT + grading * starts)[~first]
-    assert_allclose(lengths[~first][:-1], even[:-1], rtol=1e-9)
-    assert lengths[-1] < 1.5 * even[-1] + 1e-9
+    assert_allclose(lengths[:-1], (SEGMENT + grading * starts)[:-1], rtol=1e-9)
+    assert lengths[-1] < 1.5 * (SEGMENT + grading * starts[-1]) + 1e-9
+
+
+@pytest.mark.parametrize("grading", [0.0, 0.05])
+def test_the_first_segments_are_shorter_where_that_is_asked_for(grading):
+    """Node j at (jΔs)²/4L₀ up to L₀, as with grading, and as long as ever beyond it."""
+    run = cable.pull_out(
+        lambda _: (1.0, 0.0, 0.0), 10.0, drum=DRUM, grading=grading, segment_length=SEGMENT, run_in=2.0
+    )
+    nodes = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(run.shapes[-1], axis=0), axis=1))])
+    beyond = nodes[:-1] >= 2.0 - 1e-9
+    assert_allclose(np.diff(nodes)[beyond][:-1], (SEGMENT + grading * nodes[:-1][beyond])[:-1], rtol=1e-9)
+    if not grading:
+        assert_allclose(nodes[:17], (SEGMENT * np.arange(17)) ** 2 / 8.0, rtol=1e-9)
+    assert nodes[1] == pytest.approx(SEGMENT**2 / 8.0, rel=1e-9)
 
 
 def test_their_number_grows_with_the_logarithm_of_the_length():
-    """N segments are Δs ((1 + g)^N − 1)/g long, beside 4 more in the first 2 m."""
+    """N segments are Δs ((1 + g)^N − 1)/g long."""
     counts = []
     for duration in (100.0, 1000.0):
         run = cable.pull_out(lambda _: (1.0, 0.0, 0.0), duration, 1.0, drum=DRUM, grading=0.05)
         expected = np.log1p(0.05 * duration / 0.5) / np.log1p(0.05)
         counts.append(len(run.shapes[-1]) - 1)
-        assert abs(counts[-1] - 4.0 - expected) <= 2.0
+        assert abs(counts[-1] - expected) <= 2.0
     assert counts[1] < 2.5 * counts[0]
 
 
