@@ -50,6 +50,7 @@ def pull_out(
     drum_velocity: TowVelocity | None = None,
     rtol: float = 0.0,
     grading: float = 0.0,
+    run_in: float = 0.0,
     tolerance: float = TOLERANCE,
     start: Equilibrium | None = None,
 ) -> History:
@@ -63,7 +64,7 @@ def pull_out(
     readings of the new node ("paper" is the usable one, "paper_tangent"); there `segment_length` has no meaning.
     "equation7" is independent of both: the six unknowns of the paper in a scheme of second order with a moving end,
     for comparison; it has no slack law. "lumped" is a third formulation, of masses at nodes and stiff springs between
-    them, that does all the default does but `rtol` and `grading`: the other code to compare with.
+    them, that does all the default does but `rtol`, `grading` and `run_in`: the other code to compare with.
 
     Straight ahead at U the tension is ½ρπdC_t U² S, and the force points against the motion. A drum with no friction
     and no inertia gives T(S) = 0. The drum cannot take cable up: a vehicle that comes back makes the cable slack
@@ -86,6 +87,9 @@ def pull_out(
         rtol: with a positive value, steps are made as small as needed for an error of the tow force of about this share
             of its largest (`moving_end.step_control`), but for jolts; 0 takes every step as it is.
         grading: new segments are Δs + grading · s long, s from the tow point: far from the vehicle a cable is coarser.
+        run_in: segments are shorter up to this length L₀ from the tow point, node j at (jΔs)²/4L₀: for a start with no
+            cable in a cross current, whose force is of second order then from the first step on. Coupled runs take
+            2 m. [m]
         tolerance: how exactly the default scheme solves a step: balances of forces to this share of the largest
             tension, strains to a thousandth of it. With 1e-5 most steps take one Newton iteration, not two, and what
             that leaves is far below the error of the step; what compares runs with one another wants the 1e-9.
@@ -116,6 +120,7 @@ def pull_out(
     duration, step, segment_length, rtol, grading, wet_length = _checked(
         duration, step, segment_length, rtol, grading, wet_length
     )
+    run_in = checked("", "run_in", run_in, least=0.0, most=100.0, unit="m")
     _check_scheme(scheme)
     check_kinds(
         cable=(cable, (CableProperties,)), drum=(drum, (DrumProperties, PayOutRate, Brake, ConstantTension))
@@ -127,8 +132,13 @@ def pull_out(
     water = current_of(current)
     if scheme == "lumped":
         segments_needed(max(wet_length, segment_length), segment_length, 0.0)
+<<<<<<< HEAD
     if scheme == "lumped" and rtol == 0.0 and grading == 0.0:
         from cable.lumped.history import pull_out_lumped
+=======
+    if scheme == "lumped" and rtol == grading == run_in == 0.0:
+        from .lumped_history import pull_out_lumped
+>>>>>>> trust
 
         return pull_out_lumped(
             tow_velocity,
@@ -142,11 +152,15 @@ def pull_out(
             drum_velocity=drum_velocity,
         )
     if scheme != "moving_end":
-        plain = wet_length == rtol == grading == 0.0 and drum_velocity is None and water.velocity.size == 3
+        plain = (
+            wet_length == rtol == grading == run_in == 0.0
+            and drum_velocity is None
+            and water.velocity.size == 3
+        )
         if not (plain and isinstance(drum, DrumProperties)):
             message = (
-                f"scheme {scheme!r} knows a free drum on the shore and a uniform current, and no wet_length, rtol or "
-                "grading ('lumped' knows all but these two); use 'moving_end'."
+                f"scheme {scheme!r} knows a free drum on the shore and a uniform current, and no wet_length, rtol, "
+                "grading or run_in ('lumped' knows all but these three); use 'moving_end'."
             )
             raise BadValueError(message)
         from cable.feng_allen.printed_history import pull_out_as_printed
@@ -159,11 +173,12 @@ def pull_out(
     path.place[:] += wet * direction if start is None else start.shape[0] - start.shape[-1]
     reach = 1.5 * (_way(path.place) + _way(led[:, PLACE:VELOCITY]) + water.fastest * duration) + wet
     longest = led[:, SETPOINT].max() if isinstance(drum, PayOutRate | Brake) else 2.0 * reach + 5.0
-    capacity = segments_needed(float(longest), segment_length, grading)
+    capacity = segments_needed(float(longest), segment_length, grading) + int(run_in / segment_length)
     capacity += 0 if start is None else start.segment_lengths.size
     check_memory(path.times.size, capacity)
     line, work, c, turning = new_line(capacity), new_load(), cable.numbers(), drum.numbers()
     line.ends.segment_length, line.ends.grading, line.ends.tolerance = segment_length, grading, tolerance
+    line.ends.run_in = run_in
     turning.velocity[:] = led[0, VELOCITY:SETPOINT]
     if start is None:
         lay_straight(line, wet, direction, path.leaving[0], turning, c)

@@ -3,10 +3,15 @@
     e_h = max |F_h − F_2h| / max |F_h|,    F the cable's force on the hull (12), steps and segments h and 2h
 
 If each halving divides the change by r, what is left is e_h/(r − 1) (Richardson): a third of e_h at second order, e_h
-at first. Of one pair r is not known, and `FIRST_GAIN` is supposed. The coarse run has a quarter of the nodes and steps.
-Where the error is above `rtol`, the run is repeated with steps and segments halved, `MOST_HALVINGS` times at most; what
-was the run is then the coarse one, and r = e_2h/e_h. Where it stays above `rtol`, the answer depends on the resolution,
-and the run says so: a jolt, or an ill-posed drum (`docs/theory.md`).
+at first. Of one pair r is not known, and the first order is supposed. The coarse run has a quarter of the nodes and
+steps. Where the error is above `rtol`, the run is repeated with steps and segments halved, `MOST_HALVINGS` times at
+most; what was the run is then the coarse one, and r = e_2h/e_h. Where it stays above `rtol`, the answer depends on the
+resolution, and the run says so: a jolt, or an ill-posed drum (`docs/theory.md`).
+
+The first `START_ROWS` samples follow no such law. A start is a jolt: a current, a winch or the propeller takes hold of
+the cable at once, what it sets off fades or rings within a few steps, and the coarse run has no sample in the first.
+But they are cheap. So there the error is found, not estimated, by a run of these samples alone with steps and segments
+a quarter as long (`START_REFINEMENTS`).
 
 That looks at the whole error, of segments, steps, slack and coupling alike, which an estimate inside a step does not: a
 cable that is bent sharply beside the drum errs in its segments only, and its steps look perfect.
@@ -33,11 +38,11 @@ MOST_HALVINGS = 2
 """Steps and segments a quarter as long cost sixteen times as much; what they do not settle, is not settled by more."""
 MOST_WORK = 1e7
 """Nodes times exchanges that a repeated run may take: half a minute or so. [-]"""
-FIRST_GAIN = 1.5
-"""Gain of a halving that nobody has seen yet, below that of first order, 2: starts and jolts have less. [-]"""
-LEAST_GAIN, MOST_GAIN = 1.25, 4.0
-"""A halving that gains less than the first has hardly begun to converge; more than the scheme's second order gives is
-not believed. [-]"""
+LEAST_GAIN, MOST_GAIN = 2.0, 4.0
+"""Gain of a halving, of the first and of the second order; more or less than these is chance, and not believed. [-]"""
+START_ROWS, START_REFINEMENTS = 5, (4, 2)
+"""Samples that belong to the start, and how much finer these are taken to see their error: half as fine where a run of
+a stiff cable does not get so far. [-]"""
 SMALLEST_FORCE = 1e-6
 """Forces are compared with at least this: what is smaller means nothing. [N]"""
 
@@ -51,9 +56,11 @@ class Accuracy:
     """How far the cable's force can be trusted.
 
     Attributes:
-        force_error: of the force, as a share of its largest; infinite where the coarser run could not go on. [-]
-        change: largest change of the force from the resolution before to this one, as the same share. [-]
+        force_error: of the force, as a share of its largest; infinite where another resolution could not go on. [-]
+        change: largest change of the force from the resolution before to this one, after the start, as that share. [-]
         time: when it changes most. [s]
+        start_error: of the force in the first samples, beside a run that is finer still, as that share. [-]
+        start_time: when that is largest. [s]
         halvings: how often steps and segments were halved.
         rtol: what was asked for. [-]
     """
@@ -61,6 +68,8 @@ class Accuracy:
     force_error: float
     change: float
     time: float
+    start_error: float
+    start_time: float
     halvings: int
     rtol: float
 
@@ -68,6 +77,14 @@ class Accuracy:
     def converged(self) -> bool:
         """Whether the error is what was asked for."""
         return self.force_error <= self.rtol
+
+
+@dataclass(frozen=True, kw_only=True)
+class Change:
+    """Largest change of the force between two runs, as a share of its largest value [-], and when it is [s]."""
+
+    size: float
+    time: float
 
 
 def run_converged(
@@ -92,7 +109,8 @@ def run_converged(
     run = take(trial, times, 1, _share(progress, 0.2, 0.8))
     if coarse is None:
         return run, None
-    accuracy = _compare(coarse, run, trial.rtol, 0)
+    change = _after_start(coarse, run)
+    accuracy = _accuracy(trial, take, run, change, None, 0)
     for halvings in range(1, MOST_HALVINGS + 1):
         finer = _resolved(trial, 0.5**halvings)
         if accuracy.converged or finer is None or _work(run) * 4**halvings > MOST_WORK:
@@ -100,7 +118,8 @@ def run_converged(
         fine = _taken(take, finer, times, 2**halvings, progress)
         if fine is None or (run.completed and not fine.completed):
             break
-        run, accuracy = fine, _compare(run, fine, trial.rtol, halvings, accuracy.change)
+        run, before, change = fine, change, _after_start(run, fine)
+        accuracy = _accuracy(trial, take, run, change, before, halvings)
     return run, accuracy
 
 
@@ -132,28 +151,66 @@ def _every_other(times: np.ndarray) -> np.ndarray:
     return times[::2] if times.size % 2 else np.append(times[::2], times[-1])
 
 
-def _compare(coarse: Run, fine: Run, rtol: float, halvings: int, before: float | None = None) -> Accuracy:
-    """Return the accuracy of a run beside one with steps and segments twice as long.
+def _accuracy(
+    trial: scenarios.Trial, take: Take, run: Run, change: Change, before: Change | None, halvings: int
+) -> Accuracy:
+    """Return the accuracy of a run; `change` is what the last halving brought, `before` the one before, if any.
 
-    `before` is what the halving before this one changed, if there was one. [-]
+    A run that will be repeated anyhow needs no look at its start.
     """
-    rows = np.searchsorted(fine.times, coarse.times - 1e-9)
-    here = rows < fine.times.size
-    force = fine.recording.wrench[:, :3]
-    gap = np.linalg.norm(force[rows[here]] - coarse.recording.wrench[here, :3], axis=1)
-    gap[0] = 0.0  # the force of the first row is a guess
-    size = max(float(np.linalg.norm(force, axis=1).max()), SMALLEST_FORCE)
-    worst = int(np.argmax(gap))
-    stopped_early = fine.completed and not coarse.completed
-    change = inf if stopped_early else float(gap[worst]) / size
-    gain = FIRST_GAIN if before is None or not isfinite(before) else before / max(change, 1e-12)
-    return Accuracy(
-        force_error=change / (min(max(gain, LEAST_GAIN), MOST_GAIN) - 1.0),
-        change=change,
-        time=float(coarse.times[-1 if stopped_early else worst]),
-        halvings=halvings,
-        rtol=rtol,
+    gain = (
+        LEAST_GAIN if before is None or not isfinite(before.size) else before.size / max(change.size, 1e-12)
     )
+    error = change.size / (min(max(gain, LEAST_GAIN), MOST_GAIN) - 1.0)
+    looks = error <= trial.rtol or halvings == MOST_HALVINGS
+    start = _start(trial, take, run, halvings) if looks else Change(size=0.0, time=0.0)
+    return Accuracy(
+        force_error=max(error, start.size),
+        change=change.size,
+        time=change.time,
+        start_error=start.size,
+        start_time=start.time,
+        halvings=halvings,
+        rtol=trial.rtol,
+    )
+
+
+def _after_start(coarse: Run, fine: Run) -> Change:
+    """Return the change from a run to a finer one, after the start; infinite if only the finer one reaches the end."""
+    if fine.completed and not coarse.completed:
+        return Change(size=inf, time=float(coarse.times[-1]))
+    return _change(coarse, fine, START_ROWS + 1, _largest(fine))
+
+
+def _start(trial: scenarios.Trial, take: Take, run: Run, halvings: int) -> Change:
+    """Return what finer steps and segments change in the first samples; nothing where no finer run gets so far."""
+    times = run.times[: START_ROWS + 1]
+    for finer in START_REFINEMENTS if times.size > 1 else ():
+        other = _resolved(trial, 0.5**halvings / finer)
+        fine = None if other is None else _taken(take, other, times, finer * 2**halvings, None)
+        if fine is not None and fine.completed:
+            return _change(run, fine, 1, _largest(run))
+    return Change(size=0.0, time=0.0)
+
+
+def _change(one: Run, fine: Run, first: int, largest: float) -> Change:
+    """Return the change from a run to a finer one, at their common times from row `first` of the finer one on.
+
+    The force of row 0 is a guess. Forces are compared with the `largest` of the run. [N]
+    """
+    rows = np.searchsorted(fine.times, one.times - 1e-9)
+    here = (rows < fine.times.size) & (rows >= first)
+    if not here.any():
+        return Change(size=0.0, time=0.0)
+    gap = fine.recording.wrench[rows[here], :3] - one.recording.wrench[here, :3]
+    size = np.linalg.norm(gap, axis=1)
+    worst = int(np.argmax(size))
+    return Change(size=float(size[worst]) / largest, time=float(one.times[here][worst]))
+
+
+def _largest(run: Run) -> float:
+    """Return the largest force of a run, at least what means something. [N]."""
+    return max(float(np.linalg.norm(run.recording.wrench[:, :3], axis=1).max()), SMALLEST_FORCE)
 
 
 def _work(run: Run) -> float:

@@ -25,6 +25,10 @@ from subzero.vehicle_step import feel_current, pose, tow_point, way_of_tow_point
 
 FORCE_TOLERANCE = 1e-9
 """Hull and cable agree when their forces differ by less than this fraction (and 1e-11 N)."""
+RUN_IN = 2.0
+"""A cable that begins shorter than this, on a free drum, has shorter segments up to here (`cable.moving_end.state.spacing`). With
+even ones it is a straight line until it is 1.5 of them long; then its force jumps, by an error of first order. A winch
+may pay out slack, which short segments would fold. [m]"""
 FIRST_ROOM = 16
 """Segments that a new cable has room for, beyond those that are in the water."""
 
@@ -57,11 +61,12 @@ def prepare(
         state=first_state(trial, model, tethered) if state is None else state,
         path=np.zeros((steps + 1, size)),
         stages=np.zeros((5, size)),
-        line=new_line(int(wet / trial.segment_length) + FIRST_ROOM),
+        line=new_line(int((wet + RUN_IN) / trial.segment_length) + FIRST_ROOM),
         load=new_load(),
     )
     live.now.length = wet if tethered else 0.0
     live.line.ends.segment_length, live.line.ends.grading = trial.segment_length, trial.grading
+    live.line.ends.run_in = RUN_IN if wet < RUN_IN and setup.fixed.drum.control == FREE else 0.0
     lay_out(setup, live, wet)
     if trial.start.drum is not None:
         hang_between(setup, live, trial, model)

@@ -44,7 +44,7 @@ def run_rows(
     """
     for row in range(first, last):
         nodes = live.line.ends.count + 1 + SPARE * parts
-        if nodes > live.line.length.size or used + nodes > recording.tension.size:
+        if nodes > live.line.length.size or used + live.line.length.size > recording.tension.size:
             return row, used, NO_ROOM
         span = (times[row] - times[row - 1]) / parts
         for part in range(parts):

@@ -66,6 +66,7 @@ class Ends:
         tolerance: how exactly a step is solved, see `newton`. [-]
         time: of level NOW. [s]
         segment_length, grading: new segments are `segment_length` + `grading` s long, s from the tow point. [m], [-]
+        run_in: length L₀ beside the tow point in which segments are shorter (`spacing`), 0 for none. [m]
         settled: length of all segments but the last. [m]
         drum_velocity: of the drum at level NEW (3,). [m/s]
         tow_force: force on the vehicle at level NEW (3,). [N]
@@ -92,6 +93,7 @@ class Ends:
     time: float
     segment_length: float
     grading: float
+    run_in: float
     settled: float
     drum_velocity: np.ndarray
     tow_force: np.ndarray
@@ -166,6 +168,7 @@ def new_line(capacity: int) -> Line:
         time=0.0,
         segment_length=1.0,
         grading=0.0,
+        run_in=0.0,
         settled=0.0,
         drum_velocity=np.zeros(3),
         tow_force=np.zeros(3),
@@ -210,8 +213,16 @@ def held_node(line: Line) -> int:
 
 @inner
 def spacing(line: Line) -> float:
-    """Return how long a segment that starts at the end of the full ones has to be. [m]."""
-    return line.ends.segment_length + line.ends.grading * line.ends.settled
+    """Return how long a segment that starts at the end of the full ones, s from the tow point, has to be. [m].
+
+    Δs + g s; and, within the first metres L₀ (`run_in`), Δs (√(s/L₀) + Δs/4L₀) + g s: then, without grading, node j is
+    at s = (jΔs)²/4L₀. So a cable that begins with no length soon has as many segments as it needs.
+    """
+    ends = line.ends
+    share = 1.0
+    if ends.run_in > 0.0:
+        share = min(1.0, np.sqrt(ends.settled / ends.run_in) + 0.25 * ends.segment_length / ends.run_in)
+    return share * ends.segment_length + ends.grading * ends.settled
 
 
 @inner

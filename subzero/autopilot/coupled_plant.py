@@ -19,7 +19,7 @@ from cable.moving_end import enlarged
 from scenarios import Start, Trial
 from subzero.coupling import FINE
 from subzero.errors import UserError
-from subzero.initial_conditions import prepare
+from subzero.initial_conditions import RUN_IN, prepare
 from subzero.loop import NO_ROOM, SPARE, run_rows
 from subzero.model import Model
 from subzero.recording import new_recording
@@ -93,7 +93,7 @@ class Tethered:
         self._setup = self._setup._replace(orders=Orders(np.zeros(1), np.zeros((1, 4))))
         if exact:
             live.line.ends.tolerance, self._setup.fixed.agreement = EXACT, EXACT  # type: ignore[misc]  # a record
-        room = int(longest / trial.segment_length) + SPARE + 4
+        room = int((longest + RUN_IN) / trial.segment_length) + SPARE + 4
         self._live = live._replace(line=enlarged(live.line, max(room, live.line.length.size)))
         self._memory = Memory(self._live)
         self._recording = new_recording(2, 4 * self._live.line.length.size)

@@ -76,19 +76,32 @@ def resolution(run: xr.Dataset, trial: scenarios.Trial, _: Model) -> list[str]:
     accuracy = json.loads(run.attrs.get("accuracy", "{}"))
     if not accuracy or is_resolved(run):
         return []
-    error, finer = accuracy["force_error"], 2 ** accuracy["halvings"]
-    how = (
-        f"by {percent(accuracy['change'])} of its largest value"
-        if error is not None
-        else "from stopping to going on"
-    )
+    finer = f"({2 ** accuracy['halvings']} times as fine as given)"
+    asked = f"run.rtol allows {percent(trial.rtol)}"
+    if (start := _share(accuracy["start_error"])) > max(trial.rtol, _share(accuracy["change"])):
+        return [
+            f"The tow force of the start depends on steps and segments: four times as fine as these {finer} they "
+            f"change it by {_told(start)} (at {accuracy['start_time']:g} s; {asked}). The cable is jerked at the "
+            "start, by a winch, a current or the propeller, and the samples do not follow how that fades or rings. "
+            "Shorten cable_step_s, let commands and the winch begin gently, or leave these samples out."
+        ]
     return [
-        f"The tow force depends on steps and segments: from twice as long ones to these ({finer} times as fine as "
-        f"given) it changes {how} (at {accuracy['time']:g} s; run.rtol allows {percent(trial.rtol)}). Either they are "
+        f"The tow force depends on steps and segments: from twice as long ones to these {finer} it changes by "
+        f"{_told(_share(accuracy['change']))} (at {accuracy['time']:g} s; {asked}). Either they are "
         "still too long, or the problem is ill-posed: a heavy cable, or one in a cross current, on a drum that does "
         "not hold it, or a cable that snaps taut. Give the drum friction_torque or a [winch], or the cable "
         "bending_stiffness."
     ]
+
+
+def _share(number: float | None) -> float:
+    """Return a number of an accuracy; what is infinite stands as None in it."""
+    return np.inf if number is None else number
+
+
+def _told(share: float) -> str:
+    """Return a change of the force in words."""
+    return f"{percent(share)} of its largest value" if np.isfinite(share) else "from stopping to going on"
 
 
 def is_resolved(run: xr.Dataset) -> bool:

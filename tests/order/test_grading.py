@@ -76,6 +76,20 @@ def test_segments_are_as_long_as_they_were_asked_for(grading):
     assert lengths[-1] < 1.5 * (SEGMENT + grading * starts[-1]) + 1e-9
 
 
+@pytest.mark.parametrize("grading", [0.0, 0.05])
+def test_the_first_segments_are_shorter_where_that_is_asked_for(grading):
+    """Node j at (jΔs)²/4L₀ up to L₀, as with grading, and as long as ever beyond it."""
+    run = cable.pull_out(
+        lambda _: (1.0, 0.0, 0.0), 10.0, drum=DRUM, grading=grading, segment_length=SEGMENT, run_in=2.0
+    )
+    nodes = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(run.shapes[-1], axis=0), axis=1))])
+    beyond = nodes[:-1] >= 2.0 - 1e-9
+    assert_allclose(np.diff(nodes)[beyond][:-1], (SEGMENT + grading * nodes[:-1][beyond])[:-1], rtol=1e-9)
+    if not grading:
+        assert_allclose(nodes[:17], (SEGMENT * np.arange(17)) ** 2 / 8.0, rtol=1e-9)
+    assert nodes[1] == pytest.approx(SEGMENT**2 / 8.0, rel=1e-9)
+
+
 def test_their_number_grows_with_the_logarithm_of_the_length():
     """N segments are Δs ((1 + g)^N − 1)/g long."""
     counts = []

@@ -144,10 +144,11 @@ def test_what_cannot_be_allowed_is_refused(name, value):
         cable.pull_out(dive, 1.0, **{name: value})
 
 
-@pytest.mark.parametrize("settings", [{"rtol": 1e-3}, {"grading": 0.1}])
+@pytest.mark.parametrize("settings", [{"rtol": 1e-3}, {"grading": 0.1}, {"run_in": 2.0}])
 @pytest.mark.parametrize("scheme", ["lumped", "equation7", "paper_tangent"])
 def test_schemes_that_do_not_know_it_say_so(scheme, settings):
     with pytest.raises(
-        ValueError, match=rf"scheme '{scheme}' knows .* no wet_length, rtol or grading.*use 'moving_end'"
+        ValueError,
+        match=rf"scheme '{scheme}' knows .* no wet_length, rtol, grading or run_in.*use 'moving_end'",
     ):
         cable.pull_out(dive, 1.0, scheme=scheme, **settings)
