@@ -132,13 +132,8 @@ def pull_out(
     water = current_of(current)
     if scheme == "lumped":
         segments_needed(max(wet_length, segment_length), segment_length, 0.0)
-<<<<<<< HEAD
-    if scheme == "lumped" and rtol == 0.0 and grading == 0.0:
-        from cable.lumped.history import pull_out_lumped
-=======
     if scheme == "lumped" and rtol == grading == run_in == 0.0:
-        from .lumped_history import pull_out_lumped
->>>>>>> trust
+        from cable.lumped.history import pull_out_lumped
 
         return pull_out_lumped(
             tow_velocity,
