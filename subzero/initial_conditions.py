@@ -26,9 +26,9 @@ from subzero.vehicle_step import feel_current, pose, tow_point, way_of_tow_point
 FORCE_TOLERANCE = 1e-9
 """Hull and cable agree when their forces differ by less than this fraction (and 1e-11 N)."""
 RUN_IN = 2.0
-"""A cable that begins shorter than this, on a free drum, has shorter segments up to here (`spacing` in
-`cable.moving_end.state`). With even ones it is a straight line until it is 1.5 of them long; then its force jumps, by an
-error of first order. A winch may pay out slack, which short segments would fold. [m]"""
+"""A cable that begins shorter than this, on a free drum, has shorter segments up to here: `spacing` in
+`cable.moving_end.state`. With even ones it is a straight line until it is 1.5 of them long; then its force jumps, by
+an error of first order. A winch may pay out slack, which short segments would fold. [m]"""
 FIRST_ROOM = 16
 """Segments that a new cable has room for, beyond those that are in the water."""
 

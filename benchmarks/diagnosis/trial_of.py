@@ -21,6 +21,7 @@ from .distance import change_by, discriminations, sensitivities, signals, strang
 from .held_out import gains
 from .sharing import Shared
 from .strange_found import judged
+from .truth import with_true_noise
 
 Result = dict[str, Any]
 ATTEMPTS, LISTED = {"outside": 12, "twin": 40}, 12
@@ -69,7 +70,7 @@ def posed(case: Case) -> tuple[Made, Problem, dict[str, float], dict[str, str]]:
     """
     for attempt in range(ATTEMPTS.get(case.kind, 1)):
         made = make(case, attempt, size=1.3 ** min(attempt, 5))
-        problem = pose([made.logged])
+        problem = with_true_noise(pose([made.logged]), 3.0 if case.how == "noise" else 1.0)
         D, rival, fits = _measured(case, made, problem)
         if fits:
             break

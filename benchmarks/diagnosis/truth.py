@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from subzero.diagnosis.hypothesis.catalogue.sensors import SPECS
 from subzero.diagnosis.hypothesis.configuration import Setting
+from subzero.diagnosis.inference.problem import Problem
 from subzero.records.record import Record
 from subzero.synthetic.reference_run import NoTruthError, simulate_reference
 
@@ -51,6 +54,24 @@ def noisy(shown: Shown, times: np.ndarray, rng: np.random.Generator, level: floa
         name: column + _noise(rng, column.size, level * SPECS[name].noise) for name, column in shown.items()
     }
     return Record(source="benchmark", time=times, values=values)
+
+
+def with_true_noise(problem: Problem, level: float = 1.0) -> Problem:
+    """Return the problem of records with the noise that `noisy` gives them."""
+    lasts = -float(np.median(np.diff(problem.records[0].time))) / np.log(RHO)
+    records = tuple(
+        replace(
+            one,
+            noise={
+                name: replace(
+                    old, white=0.0, slow=level * SPECS[name].noise, correlation_time=lasts, resolution=0.0
+                )
+                for name, old in one.noise.items()
+            },
+        )
+        for one in problem.records
+    )
+    return replace(problem, records=records)
 
 
 def _noise(rng: np.random.Generator, size: int, level: float) -> np.ndarray:
