@@ -60,7 +60,10 @@ def test_commands_and_what_stays_zero_are_left_out(refinement):
 
 
 def test_a_tow_force_that_changes_by_more_than_a_percent_is_warned_of():
-    coarse = subzero.check(dataclasses.replace(SHORT, cable_step=0.4, hull_step=0.04, segment_length=2.0))
+    """Ten metres that are pulled from rest, with long steps that are taken as they are."""
+    start = dataclasses.replace(SHORT.start, wet_length=10.0)
+    steps = {"cable_step": 0.4, "hull_step": 0.04, "segment_length": 2.0, "rtol": 0.0}
+    coarse = subzero.check(dataclasses.replace(SHORT, start=start, **steps))
     assert coarse.tow_force > 0.01
     (one,) = coarse.warnings
     assert one.check == "refinement"
@@ -87,14 +90,17 @@ def test_its_representation_tells_the_worst_channels(refinement):
 
 @pytest.fixture
 def mine(tmp_path):
-    """A short trial in a file, with steps of 0.4 s or of 0.1 s."""
+    """A short trial in a file, with steps of 0.4 s that are taken as they are, on ten metres of cable, or of 0.1 s."""
     text = scenarios.path("fig6").read_text(encoding="utf-8").replace("duration_s = 30.0", "duration_s = 4.0")
     coarse = text.replace("cable_step_s = 0.1", "cable_step_s = 0.4").replace(
         "hull_step_s = 0.02", "hull_step_s = 0.04"
     )
     (tmp_path / "fine.toml").write_text(text, encoding="utf-8")
     (tmp_path / "coarse.toml").write_text(
-        coarse.replace("segment_length_m = 0.5", "segment_length_m = 2.0"), encoding="utf-8"
+        coarse.replace("segment_length_m = 0.5", "segment_length_m = 2.0")
+        .replace("rtol = 0.02", "rtol = 0.0")
+        .replace("wet_length_m = 0.0", "wet_length_m = 10.0"),
+        encoding="utf-8",
     )
     return tmp_path
 
