@@ -10,8 +10,8 @@ This page rests on **{cases} of {whole} cases**.{unfinished} {fig6} on
 `fig6` (30 s), {rich} on `rich` (a minute with doublets of all fins, speed steps, a coast-down); six channels at 10 Hz:
 speed through the water, heading, yaw rate, pitch, roll, depth. Cases that ended in an error: {broken}.
 
-They were diagnosed before noise was inferred with the fit: all of them have the noise that the engine supposed then (AR(1),
-ρ 0.5, 10 Hz). What the present engine says of other noise: `python -m benchmarks.diagnosis.world` (table in
+They were diagnosed before noise was inferred with the fit: all of them have the noise that the engine supposed then
+(AR(1), ρ 0.5, 10 Hz). What the present engine says of other noise: `python -m benchmarks.diagnosis.world` (table in
 [diagnosis.md](diagnosis.md)).
 
 The cases are those of seed {seed}, which no choice was made with: engine, kinds of cases and rules were settled with
