@@ -20,7 +20,7 @@ from typing import Any
 _HOME = {
     "CHANNELS": ("subzero.channels", "CHANNELS"),
     "Comparison": ("subzero.comparison", "Comparison"),
-    "Logged": ("subzero.diagnosis.hypothesis.configuration", "Logged"),
+    "Logged": ("subzero.diagnosis.hypothesis.logged", "Logged"),
     "Model": ("subzero.model", "Model"),
     "Observation": ("subzero.simulator", "Observation"),
     "Record": ("subzero.records.record", "Record"),

@@ -16,8 +16,8 @@ from subzero.interrupts import INTERRUPTED, patience
 from subzero.progress import progress_bar
 
 if TYPE_CHECKING:
-    from subzero.diagnosis.hypothesis.configuration import Logged
     from subzero.diagnosis.hypothesis.effect import Effect
+    from subzero.diagnosis.hypothesis.logged import Logged
     from subzero.diagnosis.results import Verdict
 
 FINE = 0

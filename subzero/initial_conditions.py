@@ -39,6 +39,7 @@ def prepare(
     tethered: bool,
     state: np.ndarray | None = None,
     longest_exchange: float | None = None,
+    run_in: float = RUN_IN,
 ) -> tuple[Setup, Live]:
     """Return what stays and what changes in a run, at its start: the cable laid straight behind the vehicle.
 
@@ -48,6 +49,7 @@ def prepare(
         tethered: with the cable of the default scheme.
         state: another first state than that of the trial.
         longest_exchange: there is room for the hull's steps in so long an exchange; that of the trial by default. [s]
+        run_in: length up to which a cable that begins shorter, on a free drum, has short segments; 0 for even ones. [m]
 
     Raises:
         UserError: a start that cannot be.
@@ -66,7 +68,7 @@ def prepare(
     )
     live.now.length = wet if tethered else 0.0
     live.line.ends.segment_length, live.line.ends.grading = trial.segment_length, trial.grading
-    live.line.ends.run_in = RUN_IN if wet < RUN_IN and setup.fixed.drum.control == FREE else 0.0
+    live.line.ends.run_in = run_in if wet < run_in and setup.fixed.drum.control == FREE else 0.0
     lay_out(setup, live, wet)
     if trial.start.drum is not None:
         hang_between(setup, live, trial, model)

@@ -19,8 +19,8 @@ from subzero.diagnosis.results import Detectability, Verdict
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from subzero.diagnosis.hypothesis.configuration import Logged
     from subzero.diagnosis.hypothesis.effect import Effect
+    from subzero.diagnosis.hypothesis.logged import Logged
     from subzero.output import Stage
 
 MOST_ROWS = 12

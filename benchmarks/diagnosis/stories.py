@@ -21,7 +21,8 @@ from benchmarks.diagnosis.story_cases import STORIES, Story
 from subzero import write_diagnosis
 from subzero.channels import BY_NAME
 from subzero.diagnosis.hypothesis.catalogue import START, catalogue
-from subzero.diagnosis.hypothesis.configuration import Logged, Setting
+from subzero.diagnosis.hypothesis.configuration import Setting
+from subzero.diagnosis.hypothesis.logged import Logged
 from subzero.diagnosis.report import tables, words
 from subzero.diagnosis.report.html import table
 from subzero.diagnosis.results import Verdict

@@ -27,7 +27,8 @@ import scenarios
 import subzero
 from subzero.diagnosis.api import diagnose_trials
 from subzero.diagnosis.hypothesis.catalogue.sensors import NOISE
-from subzero.diagnosis.hypothesis.configuration import Logged, Setting
+from subzero.diagnosis.hypothesis.configuration import Setting
+from subzero.diagnosis.hypothesis.logged import Logged
 from subzero.diagnosis.inference.noise import Noise
 from subzero.diagnosis.inference.problem import Problem, pose
 from subzero.model import Model

@@ -19,8 +19,8 @@ from threadpoolctl import threadpool_limits
 from subzero.diagnosis.assessment.identifiability import detectability, refuted_rivals, with_secants
 from subzero.diagnosis.assessment.residuals import misfits
 from subzero.diagnosis.hypothesis.catalogue import load
-from subzero.diagnosis.hypothesis.configuration import Logged
 from subzero.diagnosis.hypothesis.effect import Effect
+from subzero.diagnosis.hypothesis.logged import Logged
 from subzero.diagnosis.inference.measurement import respond
 from subzero.diagnosis.inference.model_search import Search
 from subzero.diagnosis.inference.out_of_catalogue import Findings, explanations_outside, is_explained

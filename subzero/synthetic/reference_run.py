@@ -168,7 +168,7 @@ def truth_of(setting: Setting) -> Truth:
     if not setting.tethered:
         return _alone(setting, times.size)
     changes = rows_of_changes(trial, True, times, setting.later)
-    setup, live = prepare(trial, model, True)
+    setup, live = prepare(trial, model, True, run_in=0.0)
     rope = _rope(setting, setup, live, times)
     led = _led(times.size, rope.spring.shape[1])
     recording = new_recording(times.size, live.line.length.size)

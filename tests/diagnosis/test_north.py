@@ -14,7 +14,8 @@ from numpy.testing import assert_allclose
 
 import subzero
 from subzero.diagnosis.hypothesis.catalogue import START
-from subzero.diagnosis.hypothesis.configuration import Logged, Setting
+from subzero.diagnosis.hypothesis.configuration import Setting
+from subzero.diagnosis.hypothesis.logged import Logged
 from subzero.diagnosis.inference.measurement import respond
 from subzero.diagnosis.inference.problem import pose
 from subzero.records.record import Record, read_record, turned

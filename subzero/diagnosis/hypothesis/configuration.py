@@ -1,8 +1,4 @@
-"""The configuration of a trial, and a measured record with the configuration that it belongs to.
-
-A `Setting` is a value: trial, model and sensors. Effects make new settings from it. A `Logged` is a record with its
-setting; `read_trials` makes it from files.
-"""
+"""The configuration of a trial is a value, a `Setting`: trial, model and sensors. Effects make new settings from it."""
 
 from __future__ import annotations
 
@@ -13,7 +9,6 @@ from typing import Any, TypeVar
 
 import scenarios
 from subzero.model import Model
-from subzero.records.record import Record
 
 Value = TypeVar("Value")
 
@@ -95,22 +90,3 @@ class Setting:
         """Return the setting with a channel's sensor changed."""
         sensor = dataclasses.replace(self.sensing.get(channel, Sensing()), **changes)
         return _changed(self, {"sensing": {**self.sensing, channel: sensor}})
-
-
-@dataclass(frozen=True, kw_only=True)
-class Logged:
-    """A record and the trial in which it was measured.
-
-    Attributes:
-        record: the channels that are diagnosed.
-        setting: the trial with its commands, and the nominal model.
-        noise: channel → standard deviation, where it is known. [display unit]
-        name: short, for figures and tables.
-        notes: what was left out, and why.
-    """
-
-    record: Record
-    setting: Setting
-    noise: Mapping[str, float] = field(default_factory=dict)
-    name: str
-    notes: tuple[str, ...] = ()

@@ -18,9 +18,10 @@ import numpy as np
 
 from subzero.diagnosis.hypothesis.catalogue import START, catalogue
 from subzero.diagnosis.hypothesis.catalogue.sensors import SPECS
-from subzero.diagnosis.hypothesis.configuration import Logged, Setting
+from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.effect import Effect
 from subzero.diagnosis.hypothesis.hypotheses import Entry, entries_of, grouped
+from subzero.diagnosis.hypothesis.logged import Logged
 from subzero.diagnosis.inference.measurement import economical, finer, respond, sensed, truth
 from subzero.diagnosis.inference.noise import (
     Behind,

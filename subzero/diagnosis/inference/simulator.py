@@ -123,7 +123,8 @@ def simulate_track(setting: Setting) -> Track:
 def with_stops(setting: Setting, times: Collection[float]) -> tuple[Track, dict[float, Stop]]:
     """Return the track of a setting, and the run as it was at times [s], or at the last exchange before each."""
     trial = setting.trial
-    setup, live = prepare(trial, setting.model, setting.tethered)
+    # Even segments, however the cable begins: a mesh that changes with its initial length has no slope.
+    setup, live = prepare(trial, setting.model, setting.tethered, run_in=0.0)
     _ease(setup)
     live = _roomy(live, trial.start.wet_length + FASTEST_PAY_OUT * trial.duration, trial.segment_length)
     grid, steps = _exchanges(setting)
