@@ -29,6 +29,8 @@ RUN_IN = 2.0
 """A cable that begins shorter than this, on a free drum, has shorter segments up to here: `spacing` in
 `cable.moving_end.state`. With even ones it is a straight line until it is 1.5 of them long; then its force jumps, by
 an error of first order. A winch may pay out slack, which short segments would fold. [m]"""
+NO_WEIGHT = 1e-4
+"""A cable that weighs less in water is neutral. [N/m]"""
 FIRST_ROOM = 16
 """Segments that a new cable has room for, beyond those that are in the water."""
 
@@ -68,13 +70,23 @@ def prepare(
     )
     live.now.length = wet if tethered else 0.0
     live.line.ends.segment_length, live.line.ends.grading = trial.segment_length, trial.grading
-    live.line.ends.run_in = run_in if wet < run_in and setup.fixed.drum.control == FREE else 0.0
+    live.line.ends.run_in = run_in if wet < run_in and _can_run_in(setup.fixed) else 0.0
     lay_out(setup, live, wet)
     if trial.start.drum is not None:
         hang_between(setup, live, trial, model)
     elif setup.fixed.drum.control != FREE:
         _hang(live.line, float(live.now.guess[2] * setup.fixed.cable.weight))
     return setup, live
+
+
+def _can_run_in(fixed: Fixed) -> bool:
+    """Say whether a cable may begin with short segments: one on a free drum, that is held there or weighs nothing.
+
+    Else its direction at the drum is open (all waves leave), and short segments would follow whatever comes.
+    """
+    return bool(
+        fixed.drum.control == FREE and (fixed.drum.friction > 0.0 or abs(fixed.cable.weight) < NO_WEIGHT)
+    )
 
 
 def setup_of(trial: scenarios.Trial, model: Model, tethered: bool) -> Setup:
