@@ -32,6 +32,7 @@ from time import perf_counter
 
 import numpy as np
 import xarray as xr
+from scipy.stats import binomtest
 
 import scenarios
 import subzero
@@ -343,13 +344,20 @@ def _counts(verdicts: list[Verdict], judged: list[Verdict]) -> str:
     names = ("wrong", "silent", "unchecked", "right", "false")
     wrong, silent, unchecked, right, false = (sum(map(_is(name), judged)) for name in names)
     others = len(verdicts) - len(judged)
-    share = 100.0 * false / max(right, 1)
     return (
         f"{len(verdicts)} trials, {len(judged)} judged, {others} stopped or without a reference\n"
-        f"wrong (force off by > 3 % or residual > 5 %): {wrong}; of them silent: {silent}, and silent under --check: "
-        f"{unchecked}\n"
-        f"right within 1 %: {right}; of them with a numerical warning: {false} ({share:.1f} %)"
+        f"wrong (force off by > 3 % or residual > 5 %): {wrong}; of them silent: {silent} "
+        f"({interval(silent, len(judged))} of all), and silent under --check: {unchecked}\n"
+        f"right within 1 %: {right}; of them with a numerical warning: {false} ({interval(false, right)})"
     )
+
+
+def interval(some: int, of: int) -> str:
+    """Return a share with its 95 % interval, of the binomial distribution (Clopper and Pearson)."""
+    if not of:
+        return "of none"
+    low, high = binomtest(some, of).proportion_ci()
+    return f"{100.0 * some / of:.1f} %, 95 %: {100.0 * low:.1f} to {100.0 * high:.1f} %"
 
 
 def _line(one: Verdict) -> str:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import subzero
-from benchmarks.trust import Verdict, draw, force_errors, judge, refined, residual_of, tags_of
+from benchmarks.trust import Verdict, draw, force_errors, interval, judge, refined, residual_of, tags_of
 
 
 def test_a_trial_is_drawn_from_its_seed_alone():
@@ -78,6 +78,12 @@ def test_verdicts_follow_from_errors_and_warnings(force_error, residual, warning
     for name in ("wrong", "silent", "right", "false"):
         assert getattr(verdict, name) is (name in verdicts), name
     assert not verdict.unchecked  # half the steps change the force by 2 %: the check would have told
+
+
+def test_none_of_so_many_is_no_more_than_chance_allows():
+    """The rule of three, exactly: 1 − 0.025^(1/n)."""
+    assert interval(0, 100) == f"0.0 %, 95 %: 0.0 to {100.0 * (1.0 - 0.025**0.01):.1f} %"
+    assert interval(0, 0) == "of none"
 
 
 @pytest.mark.slow
