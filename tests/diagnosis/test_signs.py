@@ -3,6 +3,7 @@
 Configuration: fig6 for 12 s with the cable, economical steps, no noise; deviations of half an effect scale.
 """
 
+import dataclasses
 from types import SimpleNamespace
 
 import numpy as np
@@ -124,3 +125,12 @@ def test_what_can_be_seen_has_its_unit():
     assert rows["rudder_lag"].startswith("time constant ")
     assert rows["rudder_lag"].endswith(" s")
     assert not rows["hull_drag"].endswith(" 1"), "a share has no unit"
+
+
+def test_a_correction_is_added_to_what_is_simulated():
+    """A record that shows half a metre more than the simulation fits one that half a metre is added to."""
+    more = {"depth": np.full(TIME.size, 0.5)}
+    made = problem({**PLAIN, "depth": PLAIN["depth"] + more["depth"]})
+    (record,) = made.records
+    corrected = dataclasses.replace(made, records=(record.corrected(more),))
+    assert_allclose(corrected.residual(np.zeros(len(made.entries))), 0.0, atol=1e-9)
