@@ -10,7 +10,7 @@ from benchmarks.house import circles, figures, longest_chain
 
 FLOORS = {
     "cable": 12,
-    "vehicle": 8,
+    "vehicle": 6,
     "scenarios": 6,
     "subzero.autopilot": 8,
     "subzero.diagnosis": 14,
