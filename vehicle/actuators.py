@@ -18,7 +18,7 @@ offset, and no feedback moves it.
 Each stage has a neutral value that switches it off exactly: dead band 0, offset 0, lag 0 with an infinite
 rate limit (the fin then *is* at its target and the state merely follows), rate and deflection limit infinite,
 backlash 0, position feedback 0, lost command 0. With a finite rate limit a servo still has to stop somewhere: lags
-shorter than `QUICKEST` count as `QUICKEST`.
+shorter than `vehicle.state.QUICKEST` count as `QUICKEST`.
 
 Backlash is a play between servo and fin: the linkage stays where it is until the servo has taken up the
 slack. Inside a step the fin is the linkage clipped into the play around the servo; `settle` moves the linkage
@@ -35,10 +35,7 @@ import numpy as np
 
 from subzero.jit import compiled
 from vehicle.parameters import Section, parameter
-from vehicle.state import LINKAGE, SERVO
-
-QUICKEST = 0.01
-"""Shortest lag of a state [s]: an explicit Runge-Kutta step of 0.02 s is stable down to a lag of 0.0072 s."""
+from vehicle.state import LINKAGE, QUICKEST, SERVO
 
 
 class ServoNumbers(NamedTuple):

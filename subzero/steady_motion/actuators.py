@@ -10,8 +10,8 @@ import numpy as np
 
 from subzero.steady_motion.hull_state_space import SURGE
 from vehicle import Servo, Vehicle
-from vehicle.actuators import QUICKEST
 from vehicle.motor import battery_current, motor_numbers, voltage
+from vehicle.state import QUICKEST
 
 
 class Demand(NamedTuple):
