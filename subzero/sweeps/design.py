@@ -342,7 +342,8 @@ def _morris(spreads: tuple[Spread, ...], samples: int, seed: int) -> Made:
     """`samples` trajectories that change one parameter after another (Morris 1991): samples·(k + 1) points."""
     sample = _salib("sample", "morris")
     unit = sample.sample(_problem(spreads), samples, seed=seed)
-    return unit, _values(spreads, unit)
+    low, high = np.array([spread.ends for spread in spreads]).T  # u is 0 or 1 at times, where a normal one has no value
+    return unit, np.clip(_values(spreads, unit), low, high)
 
 
 def _saltelli(spreads: tuple[Spread, ...], samples: int, seed: int) -> Made:
