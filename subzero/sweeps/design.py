@@ -340,8 +340,8 @@ def _sobol(spreads: tuple[Spread, ...], samples: int, seed: int) -> Made:
 
 def _morris(spreads: tuple[Spread, ...], samples: int, seed: int) -> Made:
     """`samples` trajectories that change one parameter after another (Morris 1991): samples·(k + 1) points."""
-    sample = _salib("sample", "morris")
-    unit = sample.sample(_problem(spreads), samples, seed=seed)
+    sample = salib("sample", "morris")
+    unit = sample.sample(salib_problem(spreads), samples, seed=seed)
     low, high = np.array([spread.ends for spread in spreads]).T  # u is 0 or 1 at times, where a normal one has no value
     return unit, np.clip(_values(spreads, unit), low, high)
 
@@ -350,18 +350,18 @@ def _saltelli(spreads: tuple[Spread, ...], samples: int, seed: int) -> Made:
     """Saltelli's scheme for Sobol indices of first and total order: samples·(k + 2) points."""
     if samples & (samples - 1):
         raise UserError(f"samples is {samples}: a \"saltelli\" design needs a power of two, such as 64 or 256.")
-    sample = _salib("sample", "sobol")
-    unit = sample.sample(_problem(spreads), samples, calc_second_order=False, seed=seed)
+    sample = salib("sample", "sobol")
+    unit = sample.sample(salib_problem(spreads), samples, calc_second_order=False, seed=seed)
     return unit, _values(spreads, unit)
 
 
-def _problem(spreads: tuple[Spread, ...]) -> dict[str, Any]:
+def salib_problem(spreads: tuple[Spread, ...]) -> dict[str, Any]:
     """Return what SALib takes: the unit cube, so that any distribution serves."""
     names = [spread.name for spread in spreads]
     return {"num_vars": len(names), "names": names, "bounds": [[0.0, 1.0]] * len(names)}
 
 
-def _salib(kind: str, method: str) -> Any:
+def salib(kind: str, method: str) -> Any:
     """Return a module of SALib, or say how to get it."""
     from importlib import import_module
 

@@ -10,10 +10,10 @@ Scalars are float64, channels float32 (six to seven digits). A run that could no
 from __future__ import annotations
 
 import hashlib
-import inspect
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from types import CodeType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -94,7 +94,7 @@ class Outcomes:
         return math.floor(self.until / self.every + 1e-9) + 1 if self.channels else 0
 
     def digest(self) -> str:
-        """SHA-256 of all that says what is kept; of a function the text, not what it calls."""
+        """SHA-256 of all that says what is kept; of a function its code, not what it calls."""
         parts = (self.scalars, self.channels, self.every, self.until, text_of(self.function))
         return hashlib.sha256(repr(parts).encode()).hexdigest()
 
@@ -243,13 +243,25 @@ def name_of(function: Function) -> str:
 
 
 def text_of(function: Function | None) -> str:
-    """Return the text of a function, or its code and constants where there is no text."""
+    """Return what a function does, as text that changes with its code, constants, defaults and closure.
+
+    What it calls is not looked at, and of an object that is no function only its name is.
+    """
     if function is None:
         return ""
-    try:
-        return inspect.getsource(function)
-    except (OSError, TypeError):
-        code = getattr(function, "__code__", None)
-        return name_of(function) + (
-            f"{code.co_code!r}{code.co_consts!r}{code.co_names!r}" if code else repr(function)
-        )
+    code = getattr(function, "__code__", None)
+    if code is None:
+        return name_of(function)
+    cells = [cell.cell_contents for cell in getattr(function, "__closure__", None) or ()]
+    held = [one for one in (*(getattr(function, "__defaults__", None) or ()), *cells) if isinstance(one, PLAIN)]
+    return f"{_code_text(code)} {held!r}"
+
+
+PLAIN = (int, float, complex, str, bytes, tuple, type(None))
+"""Kinds whose text is the same in every process."""
+
+
+def _code_text(code: CodeType) -> str:
+    """Return a piece of compiled Python as text, without lines and places."""
+    inside = [_code_text(one) if isinstance(one, CodeType) else repr(one) for one in code.co_consts]
+    return f"{code.co_code.hex()} {code.co_names} {inside}"
