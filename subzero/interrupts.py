@@ -13,7 +13,7 @@ import socket
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
 from typing import Never
@@ -28,6 +28,7 @@ AGAIN_S = 0.02
 """An interrupt that was lost comes again after this. [s]"""
 
 _patience = [PATIENCE_S]
+_left: list[Callable[[], str]] = []
 _lost = [0]
 """How many signals were lost and have been sent again, and not been heard by the thread yet."""
 
@@ -72,8 +73,15 @@ def leave(code: int) -> Never:
     os._exit(code)
 
 
+def leaves(left: Callable[[], str]) -> None:
+    """Let an interrupted command say what it leaves, which keeps something besides the files of its end."""
+    _left[:] = [left]
+
+
 def words() -> str:
     """Return what an interrupted command says: what became of its files."""
+    if _left:
+        return f"Interrupted; {_left[0]()}."
     stage = sys.modules.get("subzero.stage")
     left = stage.interruption() if stage and hasattr(stage, "interruption") else "nothing was written"
     return f"Interrupted; {left}."
