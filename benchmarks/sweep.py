@@ -6,17 +6,15 @@
     python -m benchmarks.sweep --kills 50           # a sweep of 5 000 that is killed at random places, and goes on
     python -m benchmarks.sweep --stores             # what a store costs: SQLite, npz, netCDF, Parquet, zarr
 
-A bare loop gives each member its numbers, simulates it and keeps the same outcomes; two bare loops at a time are what two
-cores of this machine can do at most (two threads of one core do not do twice as much). Compiled beforehand.
+A bare loop gives each member its numbers, simulates it and keeps the same outcomes; two bare loops at a time are what
+two cores of this machine can do at most (two threads of one core do not do twice as much). Compiled beforehand.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import random
-import resource
 import shutil
 import signal
 import statistics
@@ -24,7 +22,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 import numpy as np
@@ -147,7 +145,9 @@ def command_of_200():
     with tempfile.TemporaryDirectory() as folder:
         begun = time.perf_counter()
         subprocess.run(
-            [sys.executable, "-m", "subzero", "sweep", str(spec), "--out", f"{folder}/out"], check=True, capture_output=True
+            [sys.executable, "-m", "subzero", "sweep", str(spec), "--out", f"{folder}/out"],
+            check=True,
+            capture_output=True,
         )
         print(f"subzero sweep of 200 runs, all files: {time.perf_counter() - begun:.2f} s")
 
@@ -156,14 +156,18 @@ def peak_memory(members):
     """Return the peak memory of a sweep of short members in a process of its own, and of its workers [MB]."""
     code = (
         "import resource, sys, subzero; from benchmarks.sweep import plan, SHORT, GRID;"
-        "import tempfile; from pathlib import Path; from subzero.sweeps.api import finished; from subzero.stage import staged;"
+        "import tempfile; from pathlib import Path; from subzero.sweeps.api import finished;"
+        "from subzero.stage import staged;"
         "from subzero.sweeps.tell import write_sweep;"
         "d = tempfile.mkdtemp(); one = plan({}, SHORT);\n"
         "with finished(one, Path(d), workers=2) as store, staged(Path(d)) as stage: write_sweep(one, store, stage)\n"
-        "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss);"
+        "peak = [resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)];"
+        "print(*peak);"
         "import shutil; shutil.rmtree(d)"
     )
-    done = subprocess.run([sys.executable, "-c", code.format(members)], capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        [sys.executable, "-c", code.format(members)], capture_output=True, text=True, check=True
+    )
     return [float(kb) / 1024.0 for kb in done.stdout.split()]
 
 
@@ -172,7 +176,9 @@ def memory():
     for members in (1000, 20000):
         begun = time.perf_counter()
         own, workers = peak_memory(members)
-        print(f"{members:>6} members: {own:6.0f} MB, a worker {workers:6.0f} MB   ({time.perf_counter() - begun:.0f} s)")
+        print(
+            f"{members:>6} members: {own:6.0f} MB, a worker {workers:6.0f} MB   ({time.perf_counter() - begun:.0f} s)"
+        )
 
 
 SHORT_SPEC = """
@@ -246,10 +252,8 @@ def _children(pid):
 
 
 def _kill(pid):
-    try:
+    with suppress(ProcessLookupError):
         os.kill(pid, signal.SIGKILL)
-    except ProcessLookupError:
-        pass
 
 
 def _kept(folder):
@@ -295,7 +299,11 @@ def _stores():
     """Return name → how to write batches to a folder, and how to read them."""
     import importlib.util
 
-    table = {"SQLite": (_write_sqlite, _read_sqlite), "npz": (_write_npz, _read_npz), "netCDF": (_write_netcdf, _read_netcdf)}
+    table = {
+        "SQLite": (_write_sqlite, _read_sqlite),
+        "npz": (_write_npz, _read_npz),
+        "netCDF": (_write_netcdf, _read_netcdf),
+    }
     if importlib.util.find_spec("pyarrow"):
         table["Parquet"] = (_write_parquet, _read_parquet)
     if importlib.util.find_spec("zarr"):
@@ -399,7 +407,9 @@ def _read_zarr(home):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--members", type=int, default=200)
     parser.add_argument("--repeats", type=int, default=5)
     parser.add_argument("--dask", action="store_true")

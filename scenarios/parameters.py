@@ -25,7 +25,19 @@ import numpy as np
 from scenarios.errors import Problem, ScenarioError, nearest_or_all
 from scenarios.files import Source
 from scenarios.parts import Leaf, changeable, leaves, read_part, value_complaint
-from scenarios.quantities import BED, COMMANDS, MOTION, PROFILE, RUN, START, VESSEL, WATER, WINCH, Quantity, by_field
+from scenarios.quantities import (
+    BED,
+    COMMANDS,
+    MOTION,
+    PROFILE,
+    RUN,
+    START,
+    VESSEL,
+    WATER,
+    WINCH,
+    Quantity,
+    by_field,
+)
 from scenarios.trial import SETPOINT, Trial
 from subzero.errors import real
 from subzero.errors import short as shown
@@ -195,7 +207,9 @@ def _unknown(trial: Trial, name: str) -> Problem:
         remedy = f"Allowed: {_list_of(name)}[0] to [{count - 1}], or without [ ] for all of them."
         return Problem(file=trial.name, key=name, why=f"this list has {count} values", remedy=remedy)
     last = name.rpartition(".")[2]
-    alike = [other for other in known if other.rpartition(".")[2] == last]  # the key is right, and its section is not
+    alike = [
+        other for other in known if other.rpartition(".")[2] == last
+    ]  # the key is right, and its section is not
     hint = f"Did you mean '{alike[0]}'?" if alike else nearest_or_all(name, known)
     if not hint.startswith("Did"):
         hint = (
@@ -247,7 +261,8 @@ def _with_run(trial: Trial, own: Mapping[str, float]) -> dict[str, Any]:
 
 
 def _with_start(trial: Trial, own: Mapping[str, float]) -> dict[str, Any]:
-    return {"start": replace(trial.start, **_fields(START, own))}
+    changes: dict[str, Any] = _fields(START, own)
+    return {"start": replace(trial.start, **changes)}
 
 
 def _fields(rows: tuple[Quantity, ...], own: Mapping[str, float]) -> dict[str, float]:

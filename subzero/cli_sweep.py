@@ -54,10 +54,13 @@ def sweep(
     if workers is not None and scheduler is not None:
         raise UserError("--workers are processes here, and --scheduler has its own. Leave out one of them.")
     folder = out or default_folder(spec)
-    with _Bar(plan.description, len(plan.points.values), folder) as bar, _client(scheduler) as client:
-        with finished(plan, folder, workers=workers, client=client, progress=bar, retry=retry) as store:
-            with staged(folder, FILES) as stage:
-                summary = write_sweep(plan, store, stage)
+    with (
+        _Bar(plan.description, len(plan.points.values), folder) as bar,
+        _client(scheduler) as client,
+        finished(plan, folder, workers=workers, client=client, progress=bar, retry=retry) as store,
+        staged(folder, FILES) as stage,
+    ):
+        summary = write_sweep(plan, store, stage)
     tell_sweep(summary, stage)
     return STOPPED if summary["failed"] or (strict and summary["warnings"]) else FINE
 
@@ -78,7 +81,9 @@ class _Bar:
         from subzero import interrupts
         from subzero.progress import progress_bar
 
-        self._bar = progress_bar(words, lambda: "Workers compile what is not compiled yet in their first run.")
+        self._bar = progress_bar(
+            words, lambda: "Workers compile what is not compiled yet in their first run."
+        )
         self._said, self._members, self._finished, self._folder = monotonic(), members, 0, folder
         interrupts.leaves(self._left)
 
@@ -134,7 +139,8 @@ def _client(scheduler: str | None) -> Iterator[Any]:
         client = Client(scheduler, timeout=CONNECT_S)
     except (OSError, ValueError, TypeError) as error:
         raise UserError(
-            f"No Dask scheduler answers at {scheduler} ({error}). Start one with 'dask scheduler', or leave out --scheduler."
+            f"No Dask scheduler answers at {scheduler} ({error}). Start one with 'dask scheduler',"
+            " or leave out --scheduler."
         ) from error
     with client:
         yield client

@@ -6,7 +6,7 @@
     ('member', 'time')
 
 A plan (`plan`) has points (`design`) and says what is kept of each run (`outcomes`). A job (`member`) runs any of its
-members anywhere. A schedule (`schedule`) hands them to an executor, of processes here (`workers`) or of a cluster, and a
-store (`store`) keeps what comes back. In the end one dataset is written (`result`), and looked at (`sensitivity`,
+members anywhere. A schedule (`schedule`) hands them to an executor, of processes here (`workers`) or of a cluster, and
+a store (`store`) keeps what comes back. In the end one dataset is written (`result`), and looked at (`sensitivity`,
 `figures`). `api` does it all; the command is ``subzero sweep``.
 """

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -90,7 +89,8 @@ def sweep(
         samples: how many points; trajectories of ``morris``; a power of two of ``saltelli``.
         seed: of the points.
         changes: dotted name → value that holds for all members.
-        scalars: what is kept of each run: numbers of its summary, or ``cable_tension.max``; see `subzero.sweeps.outcomes`.
+        scalars: what is kept of each run: numbers of its summary, or ``cable_tension.max``
+            (`subzero.sweeps.outcomes`).
         channels: kept over time, on a common grid.
         every: interval of that grid. [s]
         function: of one's own: takes a run, returns a number, or numbers by name.
@@ -139,7 +139,9 @@ def finished(
     Args:
         plan: the sweep.
         folder: where the store is, or will be.
-        workers, client, progress: as of `sweep`.
+        workers: as of `sweep`.
+        client: as of `sweep`.
+        progress: as of `sweep`.
         retry: run members again that failed.
 
     Raises:
@@ -176,7 +178,9 @@ class _Tally:
     def _tell(self) -> None:
         if self._progress is not None:
             rate = (self._finished - self._before) / max(monotonic() - self._begun, 1e-9)
-            self._progress(Standing(finished=self._finished, members=self._members, failed=self._failed, rate=rate))
+            self._progress(
+                Standing(finished=self._finished, members=self._members, failed=self._failed, rate=rate)
+            )
 
 
 def deliver(plan: Plan, store: Store, folder: Path) -> Gathered:
@@ -203,7 +207,9 @@ def _executor(workers: int | None, client: Any, members: int) -> Iterator[tuple[
     elif hasattr(client, "get_executor") and hasattr(client, "ncores"):
         yield client.get_executor(), _cluster_size(client)
     else:
-        raise UserError(f"client is {short(client)}. Allowed: a Dask client, or a concurrent.futures.Executor.")
+        raise UserError(
+            f"client is {short(client)}. Allowed: a Dask client, or a concurrent.futures.Executor."
+        )
 
 
 CLUSTER_WAIT_S = 30

@@ -5,7 +5,7 @@ each spread makes values of it, x = F⁻¹(u). So every design serves every dist
 same points, whatever runs them.
 
     [0.0, 0.1, 0.2]                         these values
-    { from = 0, to = 40 }                   uniform; with count = 5 also a grid's values; with log = true in the logarithm
+    { from = 0, to = 40 }                   uniform; with count = 5 a grid's values too; log = true in the logarithm
     { normal = [1.2, 0.1] }                 mean, standard deviation
     "declared"                              uniform over the range that the vehicle's or the cable's file declares
 
@@ -144,7 +144,7 @@ def _expanded(trial: scenarios.Trial, parameters: Mapping[str, Any]) -> Any:
         known = [one for one in fnmatch.filter(declared, name) if one not in parameters]
         if said != "declared" or not known:
             raise UserError(
-                f"{name} stands for several parameters, and is {short(said)}. Allowed: \"declared\", and names of"
+                f'{name} stands for several parameters, and is {short(said)}. Allowed: "declared", and names of'
                 f" parameters whose file declares a range.{suggestion(name, declared)}"
             )
         for one in known:
@@ -290,7 +290,8 @@ def _levels(spreads: tuple[Spread, ...], design: str) -> list[tuple[float, ...]]
     for spread in spreads:
         if not spread.levels:
             raise UserError(
-                f'{spread.name}: a "{design}" design needs values. Give a list, or {{ from, to, count }}; or another design:'
+                f'{spread.name}: a "{design}" design needs values. Give a list, or {{ from, to, count }}; or another'
+                " design:"
                 f" {', '.join(name for name in DESIGNS if name not in COUNT_THEMSELVES)}."
             )
     return [spread.levels for spread in spreads]
@@ -342,14 +343,16 @@ def _morris(spreads: tuple[Spread, ...], samples: int, seed: int) -> Made:
     """`samples` trajectories that change one parameter after another (Morris 1991): samples·(k + 1) points."""
     sample = salib("sample", "morris")
     unit = sample.sample(salib_problem(spreads), samples, seed=seed)
-    low, high = np.array([spread.ends for spread in spreads]).T  # u is 0 or 1 at times, where a normal one has no value
+    low, high = np.array(
+        [spread.ends for spread in spreads]
+    ).T  # u is 0 or 1 at times, where a normal one has no value
     return unit, np.clip(_values(spreads, unit), low, high)
 
 
 def _saltelli(spreads: tuple[Spread, ...], samples: int, seed: int) -> Made:
     """Saltelli's scheme for Sobol indices of first and total order: samples·(k + 2) points."""
     if samples & (samples - 1):
-        raise UserError(f"samples is {samples}: a \"saltelli\" design needs a power of two, such as 64 or 256.")
+        raise UserError(f'samples is {samples}: a "saltelli" design needs a power of two, such as 64 or 256.')
     sample = salib("sample", "sobol")
     unit = sample.sample(salib_problem(spreads), samples, calc_second_order=False, seed=seed)
     return unit, _values(spreads, unit)
@@ -368,9 +371,7 @@ def salib(kind: str, method: str) -> Any:
     try:
         return import_module(f"SALib.{kind}.{method}")
     except ImportError:
-        raise UserError(
-            "Designs for sensitivities need SALib: pip install 'subzero[sensitivity]'."
-        ) from None
+        raise UserError("Designs for sensitivities need SALib: pip install 'subzero[sensitivity]'.") from None
 
 
 DESIGNS: dict[str, Callable[[tuple[Spread, ...], int, int], Made]] = {

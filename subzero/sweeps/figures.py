@@ -32,7 +32,9 @@ BAR_LEFT = 0.3
 """Where the bars of a tornado begin: to their left stand the names, as a share of the width."""
 
 
-def draw_sweep(points: Points, job: Job, found: Gathered, effects: list[Effect], title: Title) -> dict[str, Figure]:
+def draw_sweep(
+    points: Points, job: Job, found: Gathered, effects: list[Effect], title: Title
+) -> dict[str, Figure]:
     """Return the figures of a sweep by the name of their file.
 
     Args:
@@ -95,7 +97,14 @@ def _histograms(found: Gathered, alive: list[int], title: Title) -> Figure:
     for axes, i in zip(panels, shown, strict=False):
         values = found.scalars[np.isfinite(found.scalars[:, i]), i]
         flat = np.ptp(values) <= 1e-9 * max(np.abs(values).max(), 1e-300)
-        axes.hist(values, bins=1 if flat else _bins(values), color=BLUE, alpha=0.75, edgecolor="white", linewidth=0.4)
+        axes.hist(
+            values,
+            bins=1 if flat else _bins(values),
+            color=BLUE,
+            alpha=0.75,
+            edgecolor="white",
+            linewidth=0.4,
+        )
         for rank, dash in ((5.0, ":"), (50.0, "-"), (95.0, ":")):
             axes.axvline(np.percentile(values, rank), color=ORANGE, linewidth=1.1, linestyle=dash)
         label(axes, f"[{unit_of(found.names[i])}]", "members")
@@ -135,7 +144,7 @@ def _against(points: Points, found: Gathered, effects: list[Effect], title: Titl
 
 
 def _important(points: Points, effects: list[Effect]) -> list[int]:
-    """Return the parameters, those first that matter more: by the sum of their shares in what is known of each scalar."""
+    """Return the parameters, those first that matter more: by the sum of their shares in each scalar."""
     total = dict.fromkeys(points.names, 0.0)
     for scalar in dict.fromkeys(one.scalar for one in effects):
         own = [one for one in effects if one.scalar == scalar]
@@ -158,8 +167,10 @@ def _tornado(points: Points, effects: list[Effect], title: Title) -> Figure:
         own = [one for one in effects if one.scalar == scalar][:MOST_BARS]
         places = np.arange(len(own))
         errors = [one.error if one.error == one.error else 0.0 for one in own]
-        error = {"xerr": errors, "error_kw": {"ecolor": INK, "elinewidth": 0.8}} if any(errors) else {}
-        axes.barh(places, [one.size for one in own], color=BLUE, alpha=0.75, height=0.62, label=first, **error)
+        sizes = [one.size for one in own]
+        axes.barh(places, sizes, color=BLUE, alpha=0.75, height=0.62, label=first)
+        if any(errors):
+            axes.errorbar(sizes, places, xerr=errors, fmt="none", ecolor=INK, elinewidth=0.8)
         if second:
             axes.plot([one.other for one in own], places, "o", color=ORANGE, markersize=3.5, label=second)
         axes.set_yticks(places, [_short(one.parameter, 34) for one in own], fontsize=TINY)

@@ -129,7 +129,7 @@ def outcomes_of(
     if function is not None and not callable(function):
         raise UserError(f"function is {short(function)}; it must be a function of a run.")
     step = duration / DEFAULT_INTERVALS if every is None else real(every)
-    if step is None or not 0.0 < step or duration / step > MOST_GRID_TIMES:
+    if step is None or not step > 0.0 or duration / step > MOST_GRID_TIMES:
         raise UserError(
             f"every is {short(every)}. Allowed: a time from {duration / MOST_GRID_TIMES:g} s on, above 0."
         )
@@ -253,7 +253,9 @@ def text_of(function: Function | None) -> str:
     if code is None:
         return name_of(function)
     cells = [cell.cell_contents for cell in getattr(function, "__closure__", None) or ()]
-    held = [one for one in (*(getattr(function, "__defaults__", None) or ()), *cells) if isinstance(one, PLAIN)]
+    held = [
+        one for one in (*(getattr(function, "__defaults__", None) or ()), *cells) if isinstance(one, PLAIN)
+    ]
     return f"{_code_text(code)} {held!r}"
 
 

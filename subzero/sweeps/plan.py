@@ -40,7 +40,17 @@ from subzero.sweeps.outcomes import Function, outcomes_of
 from subzero.trials import load
 
 KEYS = {
-    "": ("trial", "description", "design", "samples", "seed", "untethered", "parameters", "changes", "outcomes"),
+    "": (
+        "trial",
+        "description",
+        "design",
+        "samples",
+        "seed",
+        "untethered",
+        "parameters",
+        "changes",
+        "outcomes",
+    ),
     "outcomes": ("scalars", "channels", "every_s"),
 }
 """Section of a file → its keys; those of parameters and changes are names of numbers."""
@@ -141,7 +151,9 @@ def read_plan(path: str | Path) -> Plan:
     kept = table.get("outcomes", {})
     _check_keys(name, "outcomes", kept)
     if not isinstance(table.get("trial"), str):
-        raise UserError(f'{name}: it does not say which trial is swept. Add trial = "fig6", or the path of a trial file.')
+        raise UserError(
+            f'{name}: it does not say which trial is swept. Add trial = "fig6", or the path of a trial file.'
+        )
     try:
         return plan_of(
             _trial_of(table["trial"], source.folder),
@@ -182,7 +194,9 @@ def _dotted(table: Mapping[str, Any], above: str = "") -> dict[str, Any]:
     found: dict[str, Any] = {}
     for key, inside in table.items():
         name = f"{above}{key}"
-        is_spread = isinstance(inside, Mapping) and any(not isinstance(one, Mapping) for one in inside.values())
+        is_spread = isinstance(inside, Mapping) and any(
+            not isinstance(one, Mapping) for one in inside.values()
+        )
         if isinstance(inside, Mapping) and not (is_spread and _says_spread(inside)):
             found |= _dotted(inside, f"{name}.")
         else:

@@ -62,7 +62,9 @@ class Gathered:
     warned: Counter[str] = field(default_factory=Counter)
 
 
-def write_result(store: Store, job: Job, points: Points, attributes: dict[str, Any], folder: Path) -> Gathered:
+def write_result(
+    store: Store, job: Job, points: Points, attributes: dict[str, Any], folder: Path
+) -> Gathered:
     """Write the dataset and the table of all members, and return what is looked at.
 
     Args:
@@ -81,7 +83,9 @@ def write_result(store: Store, job: Job, points: Points, attributes: dict[str, A
     found = Gathered(
         names=names,
         scalars=np.full((members, len(names)), np.nan),
-        channels=np.full((drawn.sum(), len(job.outcomes.channels), job.outcomes.times.size), np.nan, np.float32),
+        channels=np.full(
+            (drawn.sum(), len(job.outcomes.channels), job.outcomes.times.size), np.nan, np.float32
+        ),
         failed=np.zeros(members, dtype=bool),
     )
     place = np.cumsum(drawn) - 1
@@ -101,7 +105,9 @@ def write_result(store: Store, job: Job, points: Points, attributes: dict[str, A
     except RuntimeError as error:
         if "HDF error" not in str(error):
             raise
-        raise OSError(0, f"{path.name} could not be written, perhaps because the disk is full ({error})") from error
+        raise OSError(
+            0, f"{path.name} could not be written, perhaps because the disk is full ({error})"
+        ) from error
     return found
 
 
@@ -124,7 +130,9 @@ def _own_names(store: Store, job: Job) -> tuple[str, ...]:
     names = tuple(dict.fromkeys(name for block in store.blocks() for one in block for name in one.own))
     taken = set(names) & {*TAKEN, *job.names, *job.outcomes.scalars, *job.outcomes.channels}
     if taken:
-        raise UserError(f"The function gives {', '.join(sorted(taken))}, which the sweep has already. Use another name.")
+        raise UserError(
+            f"The function gives {', '.join(sorted(taken))}, which the sweep has already. Use another name."
+        )
     return names
 
 
@@ -140,12 +148,16 @@ def _head(file: Any, job: Job, points: Points, names: tuple[str, ...], attribute
     members, times = len(points.values), job.outcomes.times
     file.createDimension("member", members)
     file.setncatts({"Conventions": "CF-1.11", "parameters": json.dumps(points.names), **attributes})
-    _variable(file, "member", "i4", ("member",), {"long_name": "number of the run, from 0"})[:] = np.arange(members)
+    _variable(file, "member", "i4", ("member",), {"long_name": "number of the run, from 0"})[:] = np.arange(
+        members
+    )
     for spread, column in zip(points.spreads, points.values.T, strict=True):
-        about = {"units": spread.unit, "long_name": f"parameter {spread.name}"}
-        _variable(file, spread.name, "f8", ("member",), about)[:] = column
+        meaning = {"units": spread.unit, "long_name": f"parameter {spread.name}"}
+        _variable(file, spread.name, "f8", ("member",), meaning)[:] = column
     for name in names:
-        _variable(file, name, "f8", ("member",), {"units": unit_of(name), "long_name": name.replace("_", " ")})
+        _variable(
+            file, name, "f8", ("member",), {"units": unit_of(name), "long_name": name.replace("_", " ")}
+        )
     _variable(file, "failed", "i1", ("member",), {"long_name": "1 where the run could not go on"})
     for name, about in (("reason", "why it failed"), ("warnings", "checks that its run warns of")):
         _variable(file, name, str, ("member",), {"long_name": about})
@@ -153,7 +165,9 @@ def _head(file: Any, job: Job, points: Points, names: tuple[str, ...], attribute
         file.createDimension("time", times.size)
         _variable(file, "time", "f8", ("time",), TIME.attributes)[:] = times
     for name in job.outcomes.channels:
-        _variable(file, name, "f4", ("member", "time"), BY_NAME[name].attributes, (min(members, BLOCK), times.size))
+        _variable(
+            file, name, "f4", ("member", "time"), BY_NAME[name].attributes, (min(members, BLOCK), times.size)
+        )
 
 
 def _variable(
@@ -165,7 +179,9 @@ def _variable(
     return variable
 
 
-def _gather(block: list[Member], found: Gathered, own: tuple[str, ...], drawn: np.ndarray, place: np.ndarray) -> None:
+def _gather(
+    block: list[Member], found: Gathered, own: tuple[str, ...], drawn: np.ndarray, place: np.ndarray
+) -> None:
     """Note what is looked at of some members."""
     for one in block:
         numbers = [one.own.get(name, np.nan) for name in own]
@@ -201,7 +217,7 @@ def _table_row(one: Member, points: Points, found: Gathered) -> Iterable[str]:
 
 
 def percentiles(found: Gathered) -> dict[str, dict[str, float]]:
-    """Return what is told of every scalar, over the members that did not fail: percentiles, mean, deviation, extremes."""
+    """Return what is told of every scalar, of members that did not fail: percentiles, mean, deviation, extremes."""
     told = {}
     for name, column in zip(found.names, found.scalars.T, strict=True):
         values = column[np.isfinite(column)]

@@ -1,8 +1,8 @@
 """Hand the members of a sweep to an executor in batches, and keep what comes back.
 
-A batch takes about `BATCH_S`, so that handing it out costs little, and less towards the end, so that no worker waits for
-another. Only a few batches are under way at a time, so memory does not grow with the number of members. A batch whose
-worker dies is taken apart, and its members run again one by one; one that dies alone `MOST_DEATHS` times has failed.
+A batch takes about `BATCH_S`, so that handing it out costs little, and less towards the end, so that no worker waits
+for another. Only a few batches are under way at a time, so memory does not grow with the number of members. A batch
+whose worker dies is taken apart, and its members run again one by one; one that dies alone `MOST_DEATHS` times has failed.
 """
 
 from __future__ import annotations
@@ -82,9 +82,13 @@ class Schedule:
         """Hand out batches as long as there is room; return whether anything is under way."""
         while len(self._under_way) < AHEAD * self.workers and (batch := self._batch()) is not None:
             try:
-                future = executor.submit(run_members, self.job, batch.members.tolist(), self.rows[batch.members])
+                future = executor.submit(
+                    run_members, self.job, batch.members.tolist(), self.rows[batch.members]
+                )
             except (BrokenExecutor, RuntimeError) as error:
-                raise UserError(f"The workers cannot go on: {error}. Run the same again: what is finished is kept.") from error
+                raise UserError(
+                    f"The workers cannot go on: {error}. Run the same again: what is finished is kept."
+                ) from error
             self._under_way[future] = batch
         return bool(self._under_way)
 
@@ -107,7 +111,9 @@ class Schedule:
         except UserError:
             raise
         except BrokenExecutor as error:
-            raise UserError(f"The workers cannot go on: {error}. Run the same again: what is finished is kept.") from error
+            raise UserError(
+                f"The workers cannot go on: {error}. Run the same again: what is finished is kept."
+            ) from error
         except Exception as error:
             self._lost(batch, error)
         else:

@@ -1,6 +1,6 @@
 """What matters: how much each parameter moves each scalar, by the method that the design of the sweep allows.
 
-morris        mu_star, the mean size of its elementary effects, and their deviation sigma  (Morris 1991, Campolongo 2007)
+morris        mu_star, the mean size of its elementary effects, and their deviation sigma (Morris 1991, Campolongo 2007)
 saltelli      Sobol indices, its share of the variance alone (first order) and with all others (total)  (Saltelli 2010)
 all others    Spearman's rank correlation of the scalar with the parameter
 
@@ -103,7 +103,9 @@ def _correlations(points: Points, name: str, values: np.ndarray) -> list[Effect]
 
 def _correlation(one: np.ndarray, other: np.ndarray) -> float:
     """Return Pearson's correlation of two ranks; nothing of one that does not change."""
-    return float(np.corrcoef(one, other)[0, 1]) if one.max() > one.min() and other.max() > other.min() else 0.0
+    return (
+        float(np.corrcoef(one, other)[0, 1]) if one.max() > one.min() and other.max() > other.min() else 0.0
+    )
 
 
 def _effects(points: Points, name: str, sizes: Any, others: Any, errors: Any) -> list[Effect]:

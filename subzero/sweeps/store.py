@@ -73,7 +73,9 @@ class Store:
         ]  # fmt: skip
         with _told(self.path), self._file:
             self._file.execute("BEGIN")
-            self._file.executemany(f"INSERT OR IGNORE INTO members ({COLUMNS}) VALUES (?, ?, ?, ?, ?, ?, ?)", rows)
+            self._file.executemany(
+                f"INSERT OR IGNORE INTO members ({COLUMNS}) VALUES (?, ?, ?, ?, ?, ?, ?)", rows
+            )
 
     def forget_failed(self) -> int:
         """Take out the members that failed, so that they are run again; return how many."""
@@ -108,7 +110,11 @@ class Store:
 
     def _member(self, row: Any) -> Member:
         member, reason, warned, own, scalars, channels, seconds = row
-        shown = np.frombuffer(channels, dtype=np.float32) if channels else np.full(self._shape, np.nan, np.float32)
+        shown = (
+            np.frombuffer(channels, dtype=np.float32)
+            if channels
+            else np.full(self._shape, np.nan, np.float32)
+        )
         return Member(
             index=member,
             reason=reason,
@@ -138,7 +144,9 @@ def opened(folder: Path, manifest: Mapping[str, str], shape: tuple[int, int]) ->
         connection = sqlite3.connect(path, isolation_level=None, timeout=1.0)
     try:
         with _told(path):
-            connection.execute("PRAGMA locking_mode = EXCLUSIVE")  # before WAL: then no memory is shared, on any disk
+            connection.execute(
+                "PRAGMA locking_mode = EXCLUSIVE"
+            )  # before WAL: then no memory is shared, on any disk
             connection.execute("PRAGMA journal_mode = WAL")
             connection.execute("PRAGMA synchronous = NORMAL")
             connection.executescript(TABLES)
@@ -171,12 +179,19 @@ def _told(path: Path) -> Iterator[None]:
         yield
     except sqlite3.OperationalError as error:
         if "locked" in str(error):
-            why, remedy = "another command is running this sweep", "Wait for it, or give another folder with --out DIR"
+            why, remedy = (
+                "another command is running this sweep",
+                "Wait for it, or give another folder with --out DIR",
+            )
         else:
             why = str(error)
             remedy = "What it has is kept: make room, and run the same command again"
         raise UserError(f"{name}: {why}. {remedy}.") from error
     except sqlite3.DatabaseError as error:
-        raise UserError(f"{name} is no store of a sweep ({error}). Remove it, or give another folder with --out DIR.") from error
+        raise UserError(
+            f"{name} is no store of a sweep ({error}). Remove it, or give another folder with --out DIR."
+        ) from error
     except OSError as error:
-        raise UserError(f"{name} cannot be written: {error.strerror}. Give another folder with --out DIR.") from error
+        raise UserError(
+            f"{name} cannot be written: {error.strerror}. Give another folder with --out DIR."
+        ) from error

@@ -1,4 +1,4 @@
-"""What the command leaves behind and tells: dataset, table, summary, figures; numbers and what matters on the terminal."""
+"""What the command leaves behind: dataset, table, summary, figures; and tells: numbers and what matters."""
 
 from __future__ import annotations
 
@@ -58,7 +58,9 @@ def summary_of(plan: Plan, store: Store, found: Gathered, effects: list[Effect])
         "title": plan.description,
         "subzero_version": plan.attributes["subzero_version"],
         "design": {"name": points.design, "samples": points.samples, "seed": points.seed},
-        "parameters": {one.name: {"unit": one.unit, "from": one.ends[0], "to": one.ends[1]} for one in points.spreads},
+        "parameters": {
+            one.name: {"unit": one.unit, "from": one.ends[0], "to": one.ends[1]} for one in points.spreads
+        },
         "members": len(points.values),
         "failed": int(found.failed.sum()),
         "reasons": dict(store.reasons(KEPT_REASONS)),
@@ -69,7 +71,10 @@ def summary_of(plan: Plan, store: Store, found: Gathered, effects: list[Effect])
 
 
 def _plain(effect: Effect) -> dict[str, Any]:
-    return {key: None if isinstance(one, float) and not math.isfinite(one) else one for key, one in asdict(effect).items()}
+    return {
+        key: None if isinstance(one, float) and not math.isfinite(one) else one
+        for key, one in asdict(effect).items()
+    }
 
 
 def _in_short(summary: dict[str, Any]) -> str:
@@ -101,7 +106,9 @@ def _numbers(summary: dict[str, Any]) -> Table:
         table.add_column({"standard_deviation": "deviation"}.get(name, name), justify="right")
     for scalar, one in summary["scalars"].items():
         unit = "" if one["unit"] == "1" else f" [{one['unit']}]"
-        table.add_row(printable(f"{scalar}{unit}").replace("[", r"\["), *(f"{one[name]:.4g}" for name in columns))
+        table.add_row(
+            printable(f"{scalar}{unit}").replace("[", r"\["), *(f"{one[name]:.4g}" for name in columns)
+        )
     return table
 
 
@@ -137,4 +144,3 @@ def _troubles(summary: dict[str, Any]) -> Iterator[str]:
 def default_folder(path: Path) -> Path:
     """Return the folder that is named after the file of a sweep, here."""
     return Path(path.stem or "sweep")
-

@@ -81,9 +81,9 @@ class _Hand:
     """A thread that looks after one process at a time, and hands it tasks."""
 
     def __init__(self, tasks: queue.SimpleQueue[tuple[Future[Any], bytes] | None]) -> None:
-        self._tasks, self._process, self._ended = tasks, None, False
-        self._thread = threading.Thread(target=self._serve, daemon=True)
+        self._tasks, self._ended = tasks, False
         self._process: _Process | None = None
+        self._thread = threading.Thread(target=self._serve, daemon=True)
         self._false_starts, self._trouble = 0, ""
         self._thread.start()
 
