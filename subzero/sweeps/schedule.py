@@ -2,7 +2,8 @@
 
 A batch takes about `BATCH_S`, so that handing it out costs little, and less towards the end, so that no worker waits
 for another. Only a few batches are under way at a time, so memory does not grow with the number of members. A batch
-whose worker dies is taken apart, and its members run again one by one; one that dies alone `MOST_DEATHS` times has failed.
+whose worker dies is taken apart, and its members run again one by one; one that dies alone `MOST_DEATHS` times has
+failed.
 """
 
 from __future__ import annotations
