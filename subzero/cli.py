@@ -20,7 +20,7 @@ from cyclopts import Parameter
 from rich.console import Console
 
 import scenarios
-from subzero import cli_autopilot, cli_diagnosis
+from subzero import cli_autopilot, cli_diagnosis, cli_sweep
 from subzero.errors import UserError, printable
 from subzero.interrupts import INTERRUPTED, came, words
 
@@ -151,6 +151,7 @@ def compare(
 
 cli_autopilot.add_to(app)
 cli_diagnosis.add_to(app)
+cli_sweep.add_to(app)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

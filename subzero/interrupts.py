@@ -13,7 +13,7 @@ import socket
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
 from typing import Never
@@ -30,6 +30,7 @@ AGAIN_S = 0.02
 _patience = [PATIENCE_S]
 _raised = [False]
 """Whether a signal has interrupted this process."""
+_left: list[Callable[[], str]] = []
 _lost = [0]
 """How many signals were lost and have been sent again, and not been heard by the thread yet."""
 
@@ -79,8 +80,15 @@ def came() -> bool:
     return _raised[0]
 
 
+def leaves(left: Callable[[], str]) -> None:
+    """Let an interrupted command say what it leaves, which keeps something besides the files of its end."""
+    _left[:] = [left]
+
+
 def words() -> str:
     """Return what an interrupted command says: what became of its files."""
+    if _left:
+        return f"Interrupted; {_left[0]()}."
     stage = sys.modules.get("subzero.stage")
     left = stage.interruption() if stage and hasattr(stage, "interruption") else "nothing was written"
     return f"Interrupted; {left}."
