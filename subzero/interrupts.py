@@ -28,6 +28,8 @@ AGAIN_S = 0.02
 """An interrupt that was lost comes again after this. [s]"""
 
 _patience = [PATIENCE_S]
+_raised = [False]
+"""Whether a signal has interrupted this process."""
 _left: list[Callable[[], str]] = []
 _lost = [0]
 """How many signals were lost and have been sent again, and not been heard by the thread yet."""
@@ -73,6 +75,11 @@ def leave(code: int) -> Never:
     os._exit(code)
 
 
+def came() -> bool:
+    """Say whether a signal came: an error behind it may be its doing, as machine code makes its own of an interrupt."""
+    return _raised[0]
+
+
 def leaves(left: Callable[[], str]) -> None:
     """Let an interrupted command say what it leaves, which keeps something besides the files of its end."""
     _left[:] = [left]
@@ -89,6 +96,7 @@ def words() -> str:
 
 def _interrupt(number: int, frame: FrameType | None) -> Never:
     """Raise what Ctrl-C raises."""
+    _raised[0] = True
     raise KeyboardInterrupt
 
 
