@@ -200,7 +200,7 @@ def _in_words(error: cyclopts.CycloptsError) -> str:
 
 def _checked(scenario: str, commands: Path | None, motion: Path | None) -> scenarios.Trial:
     """Read the scenario again with the vehicle's own check, which needs the compiler and so comes late."""
-    from subzero.trials import load
+    from subzero.model import load
 
     return load(scenario, commands_csv=commands, motion_csv=motion)
 

@@ -18,7 +18,7 @@ from subzero.model import Model
 from subzero.validity import as_json, check_run
 
 if TYPE_CHECKING:
-    from subzero.recording import Recording, Run
+    from subzero.engine.recording import Recording, Run
 
 NO_PULL = 1e-9
 """A tow force below this has no direction; then the cable is taken to lie straight behind the vehicle. [N]"""
@@ -32,7 +32,7 @@ ENERGY_CHANNELS = (
     "energy_added_mass_term",
     "energy_residual",
 )
-"""In the order of `subzero.energy`."""
+"""In the order of `subzero.engine.energy`."""
 
 AXES = {
     "term": list(vehicle.BREAKDOWN),

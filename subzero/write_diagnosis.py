@@ -95,7 +95,7 @@ def write_all(
 def _write_report(verdict: Verdict, logged: Sequence[Logged], stage: Stage) -> None:
     from subzero.diagnosis.report import html as report
     from subzero.figures.diagnosis import draw_diagnosis
-    from subzero.figures.sheet import Title
+    from subzero.figures.style import Title
 
     names = ", ".join(dict.fromkeys(one.setting.trial.name for one in logged))
     records = ", ".join(one.name for one in logged)

@@ -21,12 +21,11 @@ from subzero.autopilot import indices
 from subzero.autopilot.flight import fly
 from subzero.autopilot.standard import Wanted
 from subzero.errors import UserError, checked, chosen
-from subzero.model import Model, model_of
+from subzero.model import Model, load, model_of
 from subzero.simulation import Progress
 from subzero.simulator import Observation
 from subzero.steady_motion.hull_state_space import INPUT_NAMES
 from subzero.steady_motion.trim_point import trim
-from subzero.trials import load
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from subzero.autopilot.design import WEIGHTS
 from subzero.autopilot.estimator import MEASURED, STATES, Estimates
 from subzero.autopilot.linear import linearise, subsystem
-from subzero.autopilot.lqr_weights import WEIGHTS
 from subzero.autopilot.tuning import Tuning
 from subzero.errors import UserError, suggestion
 from subzero.model import Model

@@ -15,9 +15,9 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
+from subzero.autopilot.design import WEIGHTS
 from subzero.autopilot.feed_forward import CableModel, NoCable
 from subzero.autopilot.loops import Law, Loop
-from subzero.autopilot.lqr_weights import WEIGHTS
 from subzero.autopilot.tuning import Tuning
 from subzero.errors import UserError
 from subzero.simulator import Observation

@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from subzero.autopilot.design import Gains, Schedule, design_gains, reduced
+from subzero.autopilot.design import WEIGHTS, Gains, Schedule, Weights, checked, design_gains, reduced
 from subzero.autopilot.linear import linearise, subsystem
-from subzero.autopilot.lqr_weights import WEIGHTS, Weights, checked
 from subzero.model import Model
 from subzero.steady_motion.trim_point import Trim, trim
 from vehicle.propeller import thrust

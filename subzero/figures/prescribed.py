@@ -11,9 +11,19 @@ from subzero.channels import BY_NAME
 from subzero.figures import style
 from subzero.figures.cable import DOWN, EAST, configurations, longest
 from subzero.figures.forces import cable_forces
-from subzero.figures.panel import calm, headline, in_time, label, legend, spread, time_label
-from subzero.figures.sheet import Title, sheet
-from subzero.figures.style import CYCLE, DASHES
+from subzero.figures.style import (
+    CYCLE,
+    DASHES,
+    Title,
+    calm,
+    headline,
+    in_time,
+    label,
+    legend,
+    sheet,
+    spread,
+    time_label,
+)
 
 if TYPE_CHECKING:
     import xarray as xr

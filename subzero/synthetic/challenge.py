@@ -16,14 +16,13 @@ from subzero.diagnosis.hypothesis.catalogue import START, catalogue
 from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.effect import Effect
 from subzero.errors import UserError, printable
-from subzero.model import Model
+from subzero.model import Model, load
 from subzero.records.commands import REPORTED_COMMANDS
 from subzero.records.record import HEADING, TURN, Record
 from subzero.synthetic.planted import Hidden, draw_deviations, draw_effect, hide, make_record
 from subzero.synthetic.reference_run import NoTruthError
 from subzero.synthetic.sealed_answer import SEALED, Answer, seal
 from subzero.synthetic.unmodelled_forces import draw_unmodelled
-from subzero.trials import load
 
 BASIC = ("surge_speed", "heading", "yaw_rate", "pitch", "roll", "depth")
 """Channels that a challenge measures."""

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from subzero.validity.spans import first_time, longest_span, percent
+from subzero.validity.limits import first_time, longest_span, percent
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -10,7 +10,7 @@ import pytest
 
 import cable
 import subzero
-from subzero.autopilot.cable_in_turn import Behind
+from subzero.autopilot.feed_forward import Behind
 
 STEP, DURATION = 0.1, 30.0
 

@@ -6,7 +6,8 @@ turned into the body's axes with the attitude of that stage, equations (12)-(13)
     F_c = Rᵀ F,    M_c = r_c × F_c
 
 A prescribed run follows its motion instead: that of an "idealised vehicle" without dynamics (section 4.1 of the paper),
-linear between its samples, or one that was measured (section 3, step 2), smooth between them (`subzero.knots`).
+linear between its samples, or one that was measured (section 3, step 2), smooth between them
+(`subzero.engine.prescribed_motion`).
 """
 
 from __future__ import annotations

@@ -20,11 +20,10 @@ import numpy as np
 
 from cable.drum_motion import lead_drum
 from cable.moving_end import NOW, accept, energy_flow, impedance, try_step
-from subzero.energy import book
+from subzero.engine.energy import book, take_jolt_of_motion
+from subzero.engine.vehicle_step import advance_hull, follow_track, tow_point
 from subzero.jit import compiled, inlined, inner, scratch
-from subzero.jolt import take_jolt_of_motion
 from subzero.run_state import Live, Now, Setup
-from subzero.vehicle_step import advance_hull, follow_track, tow_point
 from vehicle import STATE_SIZE
 
 MOST_EXCHANGES = 60

@@ -10,9 +10,9 @@ import numpy as np
 
 import vehicle
 from cable.moving_end import NOW
+from subzero.engine.vehicle_step import feel_current, row_at, tow_wrench
 from subzero.jit import compiled
 from subzero.run_state import Live, Setup
-from subzero.vehicle_step import feel_current, row_at, tow_wrench
 from vehicle import BREAKDOWN, STATE_SIZE
 
 BREATH_S = 0.1
@@ -35,7 +35,7 @@ class Recording(NamedTuple):
         courant: √(T/m1) Δt/ℓ, how many segments a transverse wave crosses in an exchange, at most (n,). [-]
         iterations: of Newton's method on the cable since the start (n,).
         breakdown: every term of the hull (n, terms, 6). [N, N m]
-        energy: rows of `subzero.energy` (n, 7). [J]
+        energy: rows of `subzero.engine.energy` (n, 7). [J]
         nodes: how many (n,), 0 without a cable.
         position, tension: nodes of all rows, relative to the drum (all, 3) [m]; tension there (all,). [N]
     """
