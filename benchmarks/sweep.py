@@ -22,7 +22,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, closing, contextmanager, suppress
 from pathlib import Path
 
 import numpy as np
@@ -205,34 +205,38 @@ def kills(count, members, seed=0):
     spec.write_text(SHORT_SPEC.format(members=members))
     whole = _sweep_command(spec, home / "whole").wait()
     assert whole == 0
-    done = {"parent": 0, "worker": 0}
-    before = 0
-    while sum(done.values()) < count:
+    done, before = {"parent": 0, "worker": 0}, 0
+    while True:
         run = _sweep_command(spec, home / "killed")
-        while sum(done.values()) < count:
-            time.sleep(rng.uniform(0.1, 2.5))
-            if run.poll() is not None:
+        _strike(run, rng, count, done)
+        if run.wait() == 0:
+            if sum(done.values()) >= count:
                 break
-            workers = _children(run.pid)
-            if rng.random() < 0.5 and workers:
-                _kill(rng.choice(workers))
-                done["worker"] += 1
-            else:
-                _kill(run.pid)
-                run.wait()
-                done["parent"] += 1
-        if run.poll() == 0:
             shutil.rmtree(home / "killed")  # it got through: begin anew, for the kills that are left
+            before = 0
             continue
         now = _kept(home / "killed") if (home / "killed/members.sqlite").exists() else 0
-        assert now >= before or now == 0, (before, now)
+        assert now >= before, (before, now)
         before = now
-    assert run.wait() == 0 or _sweep_command(spec, home / "killed").wait() == 0
     same = (home / "whole/sweep.nc").read_bytes() == (home / "killed/sweep.nc").read_bytes()
     print(f"{done['parent']} kills of the parent, {done['worker']} of a worker, {members} members:")
     print(f"kept {_kept(home / 'killed')}, the same result to the last byte: {same}")
     shutil.rmtree(home)
     return same
+
+
+def _strike(run, rng, count, done):
+    """Kill workers of a command, or it, at random moments, until it has ended or there were kills enough."""
+    while sum(done.values()) < count:
+        time.sleep(rng.uniform(0.1, 2.5))
+        if run.poll() is not None:
+            return
+        workers = _children(run.pid)
+        victim = "worker" if rng.random() < 0.5 and workers else "parent"
+        _kill(rng.choice(workers) if victim == "worker" else run.pid)
+        done[victim] += 1
+        if victim == "parent":
+            return
 
 
 def _sweep_command(spec, out):
@@ -259,8 +263,11 @@ def _kill(pid):
 def _kept(folder):
     import sqlite3
 
-    with sqlite3.connect(folder / "members.sqlite") as file:
-        return file.execute("SELECT count(*) FROM members").fetchone()[0]
+    with closing(sqlite3.connect(folder / "members.sqlite")) as file:
+        try:
+            return file.execute("SELECT count(*) FROM members").fetchone()[0]
+        except sqlite3.OperationalError:  # killed before there was a table
+            return 0
 
 
 def stores(members=20000, batch=20):
