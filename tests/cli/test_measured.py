@@ -10,8 +10,7 @@ from numpy.testing import assert_allclose
 
 from subzero.cli import FINE, MISTAKE, main
 from subzero.errors import UserError
-from subzero.records.goodness_of_fit import beside, fit
-from subzero.records.record import Record, read_record
+from subzero.records.record import Record, beside, fit, read_record
 
 
 @pytest.fixture
