@@ -85,11 +85,12 @@ def channel_values(run: Run, model: Model) -> dict[str, np.ndarray]:
 
 def _tow_tension(r: Recording) -> np.ndarray:
     """Return T(0) (n,), negative where the cable pushes, as it may in the paper's scheme. [N]."""
-    size = np.linalg.norm(r.tow_force, axis=1)
+    size: np.ndarray = np.linalg.norm(r.tow_force, axis=1)
     if not r.nodes.any():
         return size
     first = np.cumsum(r.nodes) - r.nodes
-    return np.where(r.tension[first] < 0.0, -size, size)
+    signed: np.ndarray = np.where(r.tension[first] < 0.0, -size, size)
+    return signed
 
 
 def _attitudes(attitude: np.ndarray) -> np.ndarray:
@@ -179,7 +180,8 @@ def _closure_error(run: Run, values: dict[str, np.ndarray], model: Model) -> np.
     hull = np.stack([values[name] for name in ("north", "east", "depth")], axis=1)
     tow = hull + r.rotation @ model.vehicle.tow_point.position()
     gap = tow - r.position[np.cumsum(r.nodes) - r.nodes]
-    return np.linalg.norm(gap - gap[0], axis=1)
+    opened: np.ndarray = np.linalg.norm(gap - gap[0], axis=1)
+    return opened
 
 
 def _provenance(trial: scenarios.Trial, model: Model, tethered: bool, run: Run) -> dict[str, Any]:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from subzero.diagnosis.hypothesis.effect import Effect
     from subzero.diagnosis.hypothesis.logged import Logged
-    from subzero.output import Stage
+    from subzero.stage import Stage
 
 MOST_ROWS = 12
 """So many causes that cannot be told apart are shown on the terminal; the report has them all."""

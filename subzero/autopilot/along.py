@@ -106,7 +106,8 @@ class Along:
                 for s in (1.0, -1.0)
             ]
             if self.step.events(ends[0]) == self.step.events(ends[1]):
-                return (ends[0] - ends[1]) / (2.0 * h)
+                column: np.ndarray = (ends[0] - ends[1]) / (2.0 * h)
+                return column
             size *= 0.1
         raise UserError(
             f"linearise_along: at t = {self.time[k]:g} s the drum begins or stops to turn, or the cable is split, just"
@@ -120,7 +121,8 @@ class Along:
             return np.zeros(len(STATE_NAMES) + len(CABLE_OUTPUTS))
         h, x, u = SIZE / largest, self.states[k], self.commands[min(k, len(self.commands) - 1)]
         ends = [self.step.output(self.time[k], x + s * h * dx, u, {}) for s in (1.0, -1.0)]
-        return (ends[0] - ends[1]) / (2.0 * h)
+        column: np.ndarray = (ends[0] - ends[1]) / (2.0 * h)
+        return column
 
     def _checked(self, values: np.ndarray, what: str, shape: tuple[int, ...]) -> np.ndarray:
         """Return deviations as an array of a shape, or refuse them."""

@@ -95,7 +95,8 @@ def _matrices(
     f, g, h = (np.array([shape.deriv(n)(sigma) for shape in _shapes(bends)]) for n in (0, 1, 2))
 
     def integral(left: np.ndarray, right: np.ndarray, by: np.ndarray | float = 1.0) -> np.ndarray:
-        return (left * (weight * by)) @ right.T
+        rates: np.ndarray = (left * (weight * by)) @ right.T
+        return rates
 
     M = S * S * m1 * integral(f, f)
     C = S * U * (2.0 * m1 * (integral(f, f) - integral(f, g, sigma)) + added * integral(f, g))

@@ -169,7 +169,7 @@ class EstimatorLoop:
         self._wanted = wanted
         k, b = self.matrices.feedback.at(speed)[[2, 5]].tolist()
         now = float(self.estimate[2])
-        return (1.0 - b) * k * (_limited(wanted - now) - _limited(before - now))
+        return float((1.0 - b) * k * (_limited(wanted - now) - _limited(before - now)))
 
     def _predict(self, reading: Observation, speed: float, command: float) -> None:
         """Move the estimate on by a sample, corrected by what was measured."""

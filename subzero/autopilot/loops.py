@@ -134,7 +134,7 @@ class Loop:
         self._wanted = wanted
         *_, k, _, b = self.law.gains.at(speed).tolist()
         measured = getattr(reading, self.law.measured[-1])
-        return (1.0 - b) * k * (self._limited(wanted - measured) - self._limited(before - measured))
+        return float((1.0 - b) * k * (self._limited(wanted - measured) - self._limited(before - measured)))
 
     def _limited(self, error: float) -> float:
         """Return an error, no larger than counts."""

@@ -74,7 +74,7 @@ class Program(ABC):
         change = self.side * (getattr(now, channel) - getattr(begun, channel))
         if change != change:
             raise UserError(f"at t = {now.time:g} s the {channel} is not a number: no sensor measures it.")
-        return change
+        return float(change)
 
     def with_rudder(self, angle: float) -> Command:
         """Return the straight command with a rudder [rad]."""

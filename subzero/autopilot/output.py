@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from subzero.output import Stage
+    from subzero.stage import Stage
 
 
 Measured = dict[str, tuple["xr.Dataset", dict[str, float]]]

@@ -133,7 +133,8 @@ def _against(linear: control.StateSpace, name: str, inverse_mass: np.ndarray) ->
     fin = labels[-1]
     v, r, f = 0, 1, labels.index(fin)
     row = np.array([-A[r, v] / A[v, v], 1.0])
-    return -(row @ inverse_mass) / float(row @ A[[v, r], f])
+    shares: np.ndarray = -(row @ inverse_mass) / float(row @ A[[v, r], f])
+    return shares
 
 
 def _steady_turn(linear: control.StateSpace) -> np.ndarray:

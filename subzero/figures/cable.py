@@ -79,7 +79,8 @@ def configurations(run: xr.Dataset, axes: Axes, times: list[float]) -> None:
 def way_of_drum(run: xr.Dataset) -> np.ndarray:
     """Return where the drum is, relative to its place at the start (n, 3); without a cable it is not known. [m]."""
     nodes = run["node_count"].values
-    return run["cable_position"].values[np.arange(nodes.size), np.maximum(nodes - 1, 0)]
+    places: np.ndarray = run["cable_position"].values[np.arange(nodes.size), np.maximum(nodes - 1, 0)]
+    return places
 
 
 def axes_of(run: xr.Dataset) -> tuple[str, str, str]:

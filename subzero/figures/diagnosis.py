@@ -175,7 +175,7 @@ def _gain_bars(axes: Axes, rows: Mapping[str, ChannelGain]) -> None:
 def _high(rows: Mapping[str, ChannelGain]) -> float:
     """Return the largest error, in noise floors."""
     found = [getattr(row, key) / row.floor for row in rows.values() for key in GAINS]
-    return max([1.0, *(one for one in found if np.isfinite(one))])
+    return float(max([1.0, *(one for one in found if np.isfinite(one))]))
 
 
 def _words(name: str) -> str:
@@ -379,7 +379,8 @@ def _smooth(time: np.ndarray, values: np.ndarray) -> np.ndarray:
     total = np.r_[0.0, np.cumsum(np.nan_to_num(values))]
     first = np.searchsorted(time, time - 0.5 * SMOOTH)
     last = np.searchsorted(time, time + 0.5 * SMOOTH, side="right")
-    return (total[last] - total[first]) / (last - first)
+    mean: np.ndarray = (total[last] - total[first]) / (last - first)
+    return mean
 
 
 def _fit_to(axes: Axes, curves: list[np.ndarray]) -> None:

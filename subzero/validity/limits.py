@@ -214,4 +214,5 @@ def _node_depths(run: xr.Dataset, model: Model) -> np.ndarray:
     x, y, z = model.vehicle.tow_point.position()
     tow = -np.sin(pitch) * x + np.cos(pitch) * (np.sin(roll) * y + np.cos(roll) * z)
     down = run["cable_position"].values[:, :, 2]
-    return down + (float(run["depth"].values[0]) + tow - down[0, 0])
+    depths: np.ndarray = down + (float(run["depth"].values[0]) + tow - down[0, 0])
+    return depths

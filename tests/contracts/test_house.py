@@ -6,7 +6,7 @@ none. A change that shortens a chain lowers its number here.
 
 import pytest
 
-from benchmarks.house import circles, figures, longest_chain
+from benchmarks.house import MOST_FILES_PER_1000, SMALL_FILES, circles, figures, goals, longest_chain, targets
 
 FLOORS = {
     "cable": 12,
@@ -36,6 +36,23 @@ def test_no_modules_import_one_another(stands):
 @pytest.mark.parametrize("row", FLOORS)
 def test_no_chain_of_imports_is_longer_than_it_was(stands, row):
     assert stands[row].floors <= FLOORS[row], stands[row].chain
+
+
+def test_no_package_is_scattered_over_more_files_than_is_asked_for(stands):
+    density = {row: one.files_per_1000 for row, one in stands.items()}
+    assert {row for row, one in density.items() if one > MOST_FILES_PER_1000} <= set(SMALL_FILES), density
+
+
+@pytest.mark.parametrize(
+    "row", ["subzero.autopilot", "subzero.records", "subzero.sweeps", "subzero.synthetic"]
+)
+def test_a_file_with_one_importer_is_a_whole_concept(stands, row):
+    assert stands[row].short_lone == []
+
+
+def test_a_target_that_is_missed_says_so(stands):
+    for goal, line in zip(goals(stands), targets(stands).splitlines()[1:], strict=True):
+        assert ("NOT" in line) == (goal.found > goal.most)
 
 
 def test_every_module_has_a_row(stands):
