@@ -1,8 +1,8 @@
 """The cable's force on the vehicle as a controller can estimate it, for the feed-forward path.
 
 There are two estimators; neither sees the true state. `FormulaCable` takes cable length, speed and yaw rate as
-measured, and a reduced model of the cable in a turn (`Behind`). `TwinCable` is a simulation of vehicle and cable that
-runs beside the controller under the same commands; its force is scaled with the length of cable that the drum has
+measured, and a reduced model of the cable in a turn (`CableInTurn`). `TwinCable` is a simulation of vehicle and cable
+that runs beside the controller under the same commands; its force is scaled with the length of cable that the drum has
 really paid out.
 
 The reduced model: a light cable without stretch slides along itself and is dragged sideways where it is curved. At the
@@ -45,7 +45,7 @@ STRAIGHT = 1e-9
 """Below this A the way was straight. [1]"""
 
 
-class Behind:
+class CableInTurn:
     """A cable behind a tow point, in the plane of a turn.
 
     Args:
@@ -113,7 +113,7 @@ SMOOTHED = 1.0
 
 
 class CableModel(ABC):
-    """What estimates the cable's pull; to write one:
+    """An estimator of the cable's force on the hull. To write one:
 
     1. `reset` begins again at the start of a run.
     2. `wrench` is called once a sample, in order, with what the sensors tell and the command of the sample before; it
@@ -131,7 +131,7 @@ class CableModel(ABC):
 
 
 def _refuse_unknown_length(reading: Observation) -> None:
-    """Refuse a length that no sensor measures: nothing would be fed forward, unseen."""
+    """Refuse a cable length that no sensor measures: feed-forward would silently be 0."""
     if reading.cable_length != reading.cable_length:
         raise UserError(
             f"at t = {reading.time:g} s no sensor measures the cable's length (cable_length), which feed-forward needs."
@@ -139,7 +139,7 @@ def _refuse_unknown_length(reading: Observation) -> None:
 
 
 class NoCable(CableModel):
-    """Feedback alone."""
+    """No feed-forward: feedback only."""
 
     def reset(self) -> None:
         """Nothing to forget."""
@@ -153,7 +153,7 @@ class FormulaCable(CableModel):
     """½ρπdC_t ∫V_t² ds against the end of the cable, from drum length, speed and yaw rate.
 
     On a straight way the cable slides with the speed S' at which the drum lets it go, and pulls against the way of the
-    tow point; in a turn it cuts the corner (`cable_in_turn`). S' is the slope of the drum length, smoothed over
+    tow point; in a turn it cuts the corner (`CableInTurn`). S' is the slope of the drum length, smoothed over
     `SMOOTHED`.
 
     Args:
@@ -167,9 +167,9 @@ class FormulaCable(CableModel):
         self.reset()
 
     def reset(self) -> None:
-        """Forget how fast the drum turns, and how the cable lies."""
+        """Set the drum's speed and the cable's shape to those of the start."""
         drum = self._model.drum
-        self._behind = Behind(self._model.cable, drum.friction_torque / drum.radius)
+        self._cable = CableInTurn(self._model.cable, drum.friction_torque / drum.radius)
         self._rate, self._before = 0.0, UNKNOWN
 
     def wrench(self, reading: Observation, last_command: np.ndarray | None) -> np.ndarray:
@@ -182,23 +182,23 @@ class FormulaCable(CableModel):
         speed = float(np.linalg.norm(V))
         if not reading.cable_length > SHORT or speed < SLOW or self._rate <= 0.0:
             return np.zeros(6)
-        T = self._behind.pull(reading.cable_length, self._rate, float(V[0]), float(V[1]))
-        angle = self._behind.angle
+        T = self._cable.pull(reading.cable_length, self._rate, float(V[0]), float(V[1]))
+        angle = self._cable.angle
         F = -T * np.array([cos(angle), sin(angle), V[2] / speed])
         return np.concatenate([F, np.cross(self._tow_point, F)])
 
     def _follow(self, reading: Observation, V: np.ndarray) -> None:
-        """Smooth the slope of the drum length, and move the cable on."""
+        """Low-pass the rate of the cable length, and move the cable on by a sample."""
         passed = reading.time - self._before.time
         if passed > 0.0:
             slope = (reading.cable_length - self._before.cable_length) / passed
             self._rate += (1.0 - exp(-passed / SMOOTHED)) * (slope - self._rate)
-            self._behind.move(passed, float(V[0]), float(V[1]), reading.yaw_rate)
+            self._cable.move(passed, float(V[0]), float(V[1]), reading.yaw_rate)
         self._before = reading
 
 
 class TwinCable(CableModel):
-    """A simulation beside the controller, told the same commands, corrected by the drum's length.
+    """A simulation that runs beside the controller under the same commands, corrected by the measured length.
 
     Args:
         trial: where the run starts, and its steps.

@@ -1,9 +1,9 @@
-"""Manoeuvres: each a program of commands, and the numbers that are read off its run, with and without the cable.
+"""Standard manoeuvres: a program of commands each, and the indices that are computed from its run.
 
-Each begins with a straight run at the trim of the bare hull, so that both vehicles come to the manoeuvre as they would
-in water: the tethered one with cable behind it, and slower for it. To add one: a program (a final class with `after`:
-commands that look at the vehicle, flown like an autopilot), a function that measures it (`indices`), and a line in
-`MANOEUVRES`.
+Each begins with a straight run at the trim of the bare hull, with and without the cable, as in a sea trial: the
+tethered vehicle then enters the manoeuvre with cable behind it, and slower. To add one: a program (a final class with
+`after`, which gives the commands from what it sees, like an autopilot), a function for its indices (`indices`), and a
+line in `MANOEUVRES`.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ Command = tuple[float, float, float, float]
 
 @dataclass(kw_only=True)
 class Program(ABC):
-    """What all manoeuvres have: the straight run. Final classes say what comes then, in `after`.
+    """The straight run that all manoeuvres begin with; final classes add the rest in `after`.
 
     Attributes:
         straight: command of the straight run: propeller [rev/s], rudder, port and starboard plane [rad].
