@@ -60,7 +60,7 @@ def book(setup: Setup, live: Live, start: float, span: float, steps: int) -> Non
     total[ADDED] += span * new[CARRIED]
     total[KINETIC] += new[STORED] - old[STORED] - half * (old[GRAVITY_WORK] + new[GRAVITY_WORK])
     for i in range(FLOWS):
-        old[i] = new[i]
+        old[i] = new[i]  # the trapezium of the next exchange begins where this one ends
     total[RESIDUAL] = total[PROPELLER]
     for i in range(HULL_LOSS, RESIDUAL):
         total[RESIDUAL] -= total[i]
@@ -85,6 +85,7 @@ def _book_hull(setup: Setup, live: Live, start: float, span: float, steps: int) 
         total[KINETIC] -= 0.5 * h * (old[P_RESTORING] + new[P_RESTORING])
     if setup.fixed.prescribed:
         return
+    # A difference of states, not a sum of powers: exact, so that the residual shows the errors of the other terms.
     kinetic = vehicle.kinetic_energy(live.path[steps], live.now.hull.current, setup.fixed.vehicle)
     total[KINETIC] += kinetic - ledger.kinetic
     ledger.kinetic = kinetic

@@ -114,7 +114,7 @@ def record_row(setup: Setup, live: Live, recording: Recording, row: int, time: f
     """Write a row for the present state; return how many nodes are in use after it (`used` before)."""
     state, r = live.state, recording
     command = setup.orders.values[row_at(setup.orders.time, time)]
-    tow_wrench(state, live.now.force, setup.fixed.r_c, live.now.hull)
+    tow_wrench(state, live.now.force, setup.fixed.r_c, live.now.hull)  # fills hull.rotation, too
     for i in range(STATE_SIZE):
         r.state[row, i] = state[i]
     for i in range(4):
@@ -152,6 +152,7 @@ def _record_cable(live: Live, r: Recording, row: int, used: int, m1: float) -> i
             r.position[used + j, i] = line.position[NOW, j, i]
         r.tension[used + j] = line.node_tension[j]
         if 0 < j < N:
+            # speed √(T/m₁) of a transverse wave; m₁ with the water that moves along
             wave = np.sqrt(max(line.tension[NOW, j], 0.0) / m1)
             r.courant[row] = max(r.courant[row], wave * step / line.length[j])
     r.nodes[row] = N + 1

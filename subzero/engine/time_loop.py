@@ -55,6 +55,7 @@ def run_rows(
         cable's last step was solved.
     """
     for row in range(first, last):
+        # Arrays cannot grow in here: stop before they are full, and let Python enlarge them and call again.
         nodes = live.line.ends.count + 1 + SPARE * parts
         if nodes > live.line.length.size or used + live.line.length.size > recording.tension.size:
             return row, used, NO_ROOM
@@ -147,7 +148,7 @@ def advance(
     command = handle.setup.orders.values
     command[0, 0], command[0, 1], command[0, 2], command[0, 3] = n, rudder, port, starboard
     row = at[ROW]
-    before = at[USED] - handle.recording.nodes[row]
+    before = at[USED] - handle.recording.nodes[row]  # the present row is written again, under the new command
     used = record_row(handle.setup, handle.live, handle.recording, row, handle.times[row], before)
     after, used, ending = run_rows(
         handle.setup, handle.live, handle.recording, handle.times, row + 1, row + 1 + count, used, 1

@@ -1,8 +1,8 @@
 """How a cable lies behind a vehicle that turns, from four sums, is how the cable itself lies.
 
-Verifies: `autopilot.feed_forward.CableInTurn` against `cable.pull_out` along straight and circular ways. Tolerance: 1e-12 for the
-straight pull of equation (37); in a turn 8 % of the angle and 15 % of the tension: the sums leave out the change of
-V_n along the cable, which is an eighth of ψ' here, and weight and acceleration of the cable.
+Verifies: `autopilot.feed_forward.CableInTurn` against `cable.pull_out` along straight and circular ways. Tolerance:
+1e-12 for the straight pull of equation (37); in a turn 8 % of the angle and 15 % of the tension: the sums leave out the
+change of V_n along the cable, which is an eighth of ψ' here, and weight and acceleration of the cable.
 """
 
 import numpy as np
