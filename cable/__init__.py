@@ -29,9 +29,10 @@ What a user calls stands here: `pull_out`, `tow` and `hold`, what they take (`pr
 """
 
 from cable.current import Current
-from cable.history import History, Outcome
-from cable.hold import Equilibrium, HoldError, hold
-from cable.properties import CableProperties, DrumProperties
+from cable.drum import DrumProperties
+from cable.history import Equilibrium, History, Outcome
+from cable.hold import HoldError, hold
+from cable.properties import CableProperties
 from cable.pull_out import SCHEMES, pull_out
 from cable.tow import tow
 from cable.winch import Brake, ConstantTension, PayOutRate

@@ -7,15 +7,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from cable.current import Current
-from cable.drum import LENGTH
+from cable.drum import LENGTH, DrumProperties
 from cable.drum_motion import PLACE, SETPOINT, VELOCITY, drum_path, resting
-from cable.history import History
-from cable.hold import Equilibrium, lay_held
-from cable.moving_end.initial_shape import lay_straight
+from cable.history import Equilibrium, History
+from cable.moving_end.initial_shape import lay_held, lay_straight
 from cable.moving_end.segment_load import new_load
 from cable.moving_end.state import TOLERANCE, new_line
 from cable.moving_end.time_loop import run
-from cable.properties import CableProperties, DrumProperties
+from cable.properties import CableProperties
 from cable.tow_path import (
     TowVelocity,
     check_kinds,

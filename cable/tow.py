@@ -8,13 +8,14 @@ from math import inf, sqrt
 import numpy as np
 
 from cable.current import Current
+from cable.drum import DrumProperties
 from cable.drum_motion import resting
 from cable.history import History
 from cable.moving_end.initial_shape import lay_straight
 from cable.moving_end.segment_load import new_load
 from cable.moving_end.state import NOW, TOLERANCE, Line, new_line
 from cable.moving_end.time_loop import run
-from cable.properties import CableProperties, DrumProperties
+from cable.properties import CableProperties
 from cable.tow_path import (
     TowVelocity,
     check_kinds,

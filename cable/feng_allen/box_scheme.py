@@ -31,6 +31,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cable.drum import DrumNumbers, DrumProperties
 from cable.feng_allen.box_equations import BoxRule, Ends
 from cable.feng_allen.box_history import (
     START,
@@ -54,7 +55,7 @@ from cable.feng_allen.box_newton import (
 )
 from cable.feng_allen.equation7 import Equation7Numbers, equation7_numbers
 from cable.feng_allen.printed_scheme import NOTHING, start_paper
-from cable.properties import CableProperties, DrumNumbers, DrumProperties
+from cable.properties import CableProperties
 from subzero.jit import compiled, inner
 
 GAMMA = 2.0 - math.sqrt(2.0)

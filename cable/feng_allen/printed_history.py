@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from cable.drum import DrumProperties
 from cable.feng_allen.box_history import BoxHistory, TowVelocity
 from cable.feng_allen.box_scheme import pull_out_boxes
 from cable.feng_allen.printed_scheme import pull_out_paper
 from cable.history import History, Outcome
-from cable.properties import CableProperties, DrumProperties
+from cable.properties import CableProperties
 from cable.tow_path import sample_path
 
 READINGS = {"paper": "tangent", "paper_tangent": "tangent", "paper_drum": "drum"}

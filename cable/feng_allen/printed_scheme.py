@@ -22,6 +22,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from cable.drum import DrumProperties
 from cable.feng_allen.box_equations import BoxRule, Ends, known_part
 from cable.feng_allen.box_history import (
     START,
@@ -43,7 +44,7 @@ from cable.feng_allen.box_newton import (
     told,
 )
 from cable.feng_allen.equation7 import Equation7Numbers, angles_of, equation7_numbers, tangent
-from cable.properties import CableProperties, DrumProperties
+from cable.properties import CableProperties
 from subzero.errors import BadValueError, short
 from subzero.jit import compiled, inner
 

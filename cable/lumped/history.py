@@ -12,12 +12,12 @@ from typing import NamedTuple
 import numpy as np
 
 from cable.current import Current, Water
+from cable.drum import DrumNumbers, DrumProperties
 from cable.history import History, Outcome
-from cable.lumped.newton import StageSolved
 from cable.lumped.rope import OLD, PULL, REST, STATE, Rope, new_rope, unknowns
 from cable.lumped.start import held_at_drum, lay, steady_direction, steady_tensions, winch_rows
-from cable.lumped.step import GAMMA, START_OF_LEG, begin, take_step
-from cable.properties import CableNumbers, CableProperties, DrumNumbers, DrumProperties
+from cable.lumped.step import GAMMA, START_OF_LEG, StageSolved, begin, take_step
+from cable.properties import CableNumbers, CableProperties
 from cable.tow_path import TowVelocity, first_direction, sample_path
 from cable.winch import Brake, PayOutRate, Winch
 

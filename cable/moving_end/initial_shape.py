@@ -1,14 +1,15 @@
-"""The start of a run: a straight cable between drum and tow point, in segments, at three equal levels of time."""
+"""The start of a run: a cable straight between drum and tow point, or as it hangs, at three equal levels of time."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from cable.current import Water
-from cable.drum import TURNING
-from cable.moving_end.segment_load import Load
-from cable.moving_end.state import BEFORE, NEW, NOW, SPLIT_AT, Line, feel_water, segment_momentum, spacing
-from cable.properties import CableNumbers, DrumNumbers
+from cable.drum import TURNING, DrumNumbers
+from cable.history import Equilibrium
+from cable.moving_end.segment_load import Load, segment_momentum
+from cable.moving_end.state import BEFORE, NEW, NOW, SPLIT_AT, Line, feel_water, spacing
+from cable.properties import CableNumbers
 from subzero.jit import compiled
 
 
@@ -59,6 +60,28 @@ def _pull_straight(
                 line.velocity[level, j, i] = velocity
     for i in range(3):
         line.ends.tow_force[i] = -per_metre * wet_length * direction[i]
+
+
+def lay_held(line: Line, held: Equilibrium, tow: np.ndarray, drum: np.ndarray, payout: float) -> None:
+    """Lay a line as it hangs, at all levels of time: at rest, or carried along by ends that move at `tow` and `drum`.
+
+    Args:
+        line: with room for its segments; filled, relative to the second end.
+        held: the equilibrium.
+        tow: velocity of its first end (3,); even along the cable to the other. [m/s]
+        drum: velocity of its second end (3,). [m/s]
+        payout: rate at which cable enters at the second end. [m/s]
+    """
+    ends, N = line.ends, held.segment_lengths.size
+    ends.count, ends.time, ends.previous_step, ends.drum_mode = N, 0.0, 0.0, TURNING
+    line.length[1 : N + 1] = held.segment_lengths
+    ends.settled, ends.last_length[:] = held.segment_lengths[:-1].sum(), held.segment_lengths[-1]
+    ends.payout[:] = payout
+    along = np.concatenate([[0.0], np.cumsum(held.segment_lengths)]) / held.length
+    line.position[:, : N + 1] = held.shape - held.shape[-1]
+    line.velocity[:, : N + 1] = tow + along[:, None] * (drum - tow)
+    line.tension[:, 1 : N + 1], line.node_tension[: N + 1] = held.segment_tensions, held.tensions
+    ends.tow_force[:], ends.drum_pull = held.tow_force, held.tensions[-1]
 
 
 @compiled

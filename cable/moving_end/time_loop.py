@@ -17,17 +17,18 @@ from typing import NamedTuple
 import numpy as np
 
 from cable.current import Water
+from cable.drum import DrumNumbers
 from cable.drum_motion import hermite, lead_drum
 from cable.history import History, Outcome
 from cable.moving_end.energy import FLOWS, LOSS, STORED, book_step, energy_flow
 from cable.moving_end.initial_shape import start_in_water
 from cable.moving_end.jolt import take_jolt
+from cable.moving_end.remeshing import accept, end_tensions
 from cable.moving_end.segment_load import Load
 from cable.moving_end.state import NOW, Line, Solved
 from cable.moving_end.stops import describe_stop
-from cable.moving_end.time_step import accept, try_step
-from cable.moving_end.tow_boundary import ends
-from cable.properties import CableNumbers, DrumNumbers
+from cable.moving_end.time_step import try_step
+from cable.properties import CableNumbers
 from cable.tow_path import TowPath
 from subzero.jit import allocating, compiled, inner
 
@@ -181,7 +182,7 @@ def _cover(
 def write_row(line: Line, record: Record, k: int, used: int, c: CableNumbers) -> None:
     """Write row k of a record, with the shape of level NOW behind the `used` nodes that are there already."""
     N = line.ends.count
-    record.tow_tension[k], record.drum_tension[k] = ends(line)
+    record.tow_tension[k], record.drum_tension[k] = end_tensions(line)
     record.length[k] = line.ends.settled + line.ends.last_length[NOW]
     record.segments[k] = N
     for i in range(3):

@@ -10,8 +10,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from cable import CableProperties, DrumProperties
 from cable.feng_allen.box_scheme import pull_out_boxes
-from cable.properties import CableProperties, DrumProperties
 
 DRAG = 0.5 * 1000.0 * np.pi * 0.0025 * 0.01
 

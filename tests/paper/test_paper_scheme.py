@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from cable import CableProperties, DrumProperties
 from cable.feng_allen.box_equations import Ends
 from cable.feng_allen.box_newton import box_workspace
 from cable.feng_allen.equation7 import equation7_numbers
@@ -21,7 +22,6 @@ from cable.feng_allen.printed_scheme import (
     start_paper,
     undo_paper_step,
 )
-from cable.properties import CableProperties, DrumProperties
 
 DRAG = 0.5 * 1000.0 * np.pi * 0.0025 * 0.01
 """½ρπdCt [N s²/m³]."""

@@ -13,12 +13,12 @@ import sys
 import numpy as np
 import pytest
 
+from cable import CableProperties
 from cable.feng_allen.box_equations import BoxRule, Ends, box_rows, box_scratch, drum_rows, tow_rows
 from cable.feng_allen.box_newton import box_workspace, newton_pass
 from cable.feng_allen.box_solver import back_substitute
 from cable.feng_allen.equation7 import equation7_numbers
 from cable.feng_allen.printed_scheme import add_node, keep_old_time, pull_out_paper
-from cable.properties import CableProperties
 from subzero.jit import compiled
 
 HEAVY = equation7_numbers(CableProperties(mass_per_length=0.02, compliance=0.05), (0.2, 0.1, -0.1))
