@@ -13,7 +13,7 @@ from cable.moving_end.equilibrium import hang, relax
 from cable.moving_end.segment_load import new_load
 from cable.moving_end.state import NOW, Line, new_line
 from cable.properties import CableProperties
-from cable.tow_path import check_kinds, current_of
+from cable.task import check_kinds, current_of
 from cable.winch import Brake
 from subzero.errors import UserError, real, short
 

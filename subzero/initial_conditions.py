@@ -23,7 +23,7 @@ from cable.moving_end import (
     new_load,
     start_in_water,
 )
-from cable.pull_out import START_LENGTH
+from cable.task import START_LENGTH
 from subzero.environment import drum_of, water_of, way_of_drum
 from subzero.external_force import MissingForce
 from subzero.jit import compiled, packed

@@ -34,12 +34,12 @@ from cable.moving_end.state import (
     BEFORE,
     NEW,
     NOW,
-    TOLERANCE,
     Line,
     feel_water,
 )
 from cable.moving_end.time_step import solve_step
 from cable.properties import CableNumbers
+from cable.schemes import TOLERANCE
 from subzero.jit import allocating, compiled, inner
 
 DRAG_ROUNDS = 12
@@ -53,7 +53,7 @@ STILL = 1e-11
 WAVERS = 0.9
 """A step that moves the cable by more than this share of what the one before did goes to and fro: try a shorter one."""
 LOOSER = 1e-7
-"""Where a cable is so taut that rounding does not let it be solved to `state.TOLERANCE`, this will do."""
+"""Where a cable is so taut that rounding does not let it be solved to `schemes.TOLERANCE`, this will do."""
 LOOKS = 400
 """So many steps of continuation, at most."""
 FIRST, LONGEST, SHORTEST = 0.1, 1e4, 1e-7

@@ -17,12 +17,11 @@ import numpy as np
 from cable.current import Water, water_velocity
 from cable.drum import TURNING
 from cable.moving_end.slack_law import SMOOTHING
+from cable.schemes import TOLERANCE
 from subzero.jit import inlined, inner, packed
 
 NEW, NOW, BEFORE = 0, 1, 2
 
-TOLERANCE = 1e-9
-"""How exactly a step is solved where nobody asks for less: this share of the largest tension, strains of 1e-12."""
 SPLIT_AT = 1.5
 """The last segment is split when it has grown to this many segment lengths."""
 

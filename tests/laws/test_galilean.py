@@ -82,7 +82,9 @@ def test_a_tow_that_drifts_with_the_water_feels_the_same():
 
 def test_the_drift_matters_when_the_drum_alone_takes_part():
     """A neutral cable straight behind the vehicle: it leaves the drum at the difference of the two speeds."""
-    run = cable.pull_out(lambda _: (1.0, 0.0, 0.0), 10.0, drum_velocity=lambda _: (0.4, 0.0, 0.0))
+    run = cable.pull_out(
+        lambda _: (1.0, 0.0, 0.0), 10.0, drum=cable.MovingDrum(velocity=lambda _: (0.4, 0.0, 0.0))
+    )
     assert run.outcome.completed, run.outcome.message
     assert_allclose(run.length, 1e-6 + 0.6 * run.time, rtol=0, atol=1e-9)
     drag = cable.CableProperties().tangential_drag * run.length
@@ -92,7 +94,9 @@ def test_the_drift_matters_when_the_drum_alone_takes_part():
 def test_a_boat_that_leaves_a_waiting_vehicle_lays_the_cable_on_its_way():
     """The cable lies still, so nothing but the friction of the drum pulls on it: C_f/R_d everywhere."""
     drum = cable.DrumProperties(friction_torque=0.005)
-    run = cable.pull_out(lambda _: (0.0, 0.0, 0.0), 10.0, drum=drum, drum_velocity=lambda _: (1.0, 0.0, 0.0))
+    run = cable.pull_out(
+        lambda _: (0.0, 0.0, 0.0), 10.0, drum=cable.MovingDrum(velocity=lambda _: (1.0, 0.0, 0.0), drum=drum)
+    )
     assert run.outcome.completed, run.outcome.message
     assert_allclose(run.length, 1e-6 + run.time, rtol=0, atol=1e-7)
     assert_allclose(run.tow_force[2:, 0], 0.05, rtol=1e-5)

@@ -234,7 +234,13 @@ def both(name, refinement):
     motion, duration, setting, rows = CASES[name]
     segment, step = 0.5 / refinement, 0.1 / refinement
     ours = pull(motion, duration, step, segment, **setting)
-    return distance(ours, cable.pull_out(motion, duration, step, segment_length=segment, **setting), rows)
+    return distance(
+        ours,
+        cable.pull_out(
+            motion, duration, scheme=cable.MovingEnd(time_step=step, segment_length=segment), **setting
+        ),
+        rows,
+    )
 
 
 def after(start):
@@ -291,9 +297,8 @@ def test_both_formulations_tow_a_turning_wire_with_the_same_force(properties):
             lambda t: (np.cos(0.1 * t), np.sin(0.1 * t), 0.0),
             15.0,
             20.0,
-            step,
-            segment_length=segment,
             cable=properties,
+            scheme=cable.MovingEnd(time_step=step, segment_length=segment),
         )
         distances.append(distance(ours, theirs, after(1.0)))
     assert distances[1] < 3e-4

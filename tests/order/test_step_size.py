@@ -48,7 +48,9 @@ every_manoeuvre = pytest.mark.parametrize("name", MANOEUVRES)
 
 @cache
 def pulled(name, rtol):
-    run = cable.pull_out(MANOEUVRES[name], DURATION, ROW, drum=DRUM, rtol=rtol)
+    run = cable.pull_out(
+        MANOEUVRES[name], DURATION, drum=DRUM, scheme=cable.MovingEnd(time_step=ROW, rtol=rtol)
+    )
     assert run.outcome.completed, run.outcome.message
     return run
 
@@ -56,7 +58,9 @@ def pulled(name, rtol):
 @cache
 def errors(name, rtol):
     """Return the errors of the tow force at the rows, as shares of the largest force (n,)."""
-    fine = cable.pull_out(MANOEUVRES[name], DURATION, ROW / 64, drum=DRUM).tow_force[::64]
+    fine = cable.pull_out(
+        MANOEUVRES[name], DURATION, drum=DRUM, scheme=cable.MovingEnd(time_step=ROW / 64)
+    ).tow_force[::64]
     gaps = np.linalg.norm(pulled(name, rtol).tow_force - fine, axis=1)
     return gaps[1:] / np.linalg.norm(fine, axis=1).max()
 
@@ -84,14 +88,19 @@ def test_a_larger_error_takes_fewer_steps(name):
 
 def test_steps_are_short_where_the_motion_changes_and_long_where_it_does_not():
     """Straight ahead there is nothing to estimate but the start: one step a row, whatever is allowed."""
-    straight = cable.pull_out(lambda _: (1.0, 0.0, 0.0), DURATION, ROW, drum=DRUM, rtol=1e-3)
+    straight = cable.pull_out(
+        lambda _: (1.0, 0.0, 0.0), DURATION, drum=DRUM, scheme=cable.MovingEnd(time_step=ROW, rtol=1e-3)
+    )
     assert straight.diagnostics()["steps"] < 2.0 * DURATION / ROW
     assert pulled("turn", 1e-3).diagnostics()["steps"] > 4.0 * DURATION / ROW
 
 
 def test_a_towed_cable_chooses_its_steps_too():
-    coarse, fine = (cable.tow(turn, 15.0, DURATION, ROW, rtol=rtol) for rtol in (1e-2, 1e-3))
-    exact = cable.tow(turn, 15.0, DURATION, ROW / 64).tow_force[::64]
+    coarse, fine = (
+        cable.tow(turn, 15.0, DURATION, scheme=cable.MovingEnd(time_step=ROW, rtol=rtol))
+        for rtol in (1e-2, 1e-3)
+    )
+    exact = cable.tow(turn, 15.0, DURATION, scheme=cable.MovingEnd(time_step=ROW / 64)).tow_force[::64]
     largest = np.linalg.norm(exact, axis=1).max()
     for run, rtol in ((coarse, 1e-2), (fine, 1e-3)):
         assert np.median(np.linalg.norm(run.tow_force - exact, axis=1)) < rtol * largest
@@ -106,9 +115,9 @@ def test_a_kink_at_a_recorded_time_does_not_stop_it(angle):
     def kinked(t):
         return (1.0, 0.0, 0.0) if t < 4.0 else after
 
-    run = cable.pull_out(kinked, 8.0, ROW, drum=DRUM, rtol=1e-2)
+    run = cable.pull_out(kinked, 8.0, drum=DRUM, scheme=cable.MovingEnd(time_step=ROW, rtol=1e-2))
     assert run.outcome.completed, run.outcome.message
-    fine = cable.pull_out(kinked, 8.0, ROW / 64, drum=DRUM).tow_force[::64]
+    fine = cable.pull_out(kinked, 8.0, drum=DRUM, scheme=cable.MovingEnd(time_step=ROW / 64)).tow_force[::64]
     gaps = np.linalg.norm(run.tow_force - fine, axis=1) / np.linalg.norm(fine, axis=1).max()
     assert gaps[1:6].max() < 1e-6
     assert np.median(gaps[7:]) < 1e-2
@@ -120,7 +129,9 @@ def test_a_kink_at_a_recorded_time_does_not_stop_it(angle):
 def test_steps_that_are_solved_less_exactly_take_fewer_iterations_and_err_no_more(name):
     """A hundredth of what a step of this length errs by is lost, and a seventh of the iterations saved, or more."""
     fine, exact, rough = (
-        cable.pull_out(MANOEUVRES[name], DURATION, step, drum=DRUM, tolerance=tolerance)
+        cable.pull_out(
+            MANOEUVRES[name], DURATION, drum=DRUM, scheme=cable.MovingEnd(time_step=step, tolerance=tolerance)
+        )
         for step, tolerance in ((ROW / 32, 1e-9), (ROW / 8, 1e-9), (ROW / 8, 1e-5))
     )
     error = np.linalg.norm(exact.tow_force - fine.tow_force[::4], axis=1).max()

@@ -253,7 +253,9 @@ def short_pull(**arguments: Any) -> str:
     check_work(
         duration, step, arguments.get("segment_length", 0.5), 2.0 + number(arguments.get("wet_length", 0.0))
     )
-    return check_history(cable.pull_out(velocity, duration, step, **arguments), duration)
+    return check_history(
+        cable.pull_out(velocity, duration, scheme=cable.MovingEnd(time_step=step), **arguments), duration
+    )
 
 
 def short_tow(**arguments: Any) -> str:
@@ -261,7 +263,9 @@ def short_tow(**arguments: Any) -> str:
         arguments.pop(name) for name in ("tow_velocity", "length", "duration", "step")
     )
     check_work(duration, step, arguments.get("segment_length", 0.5), number(length))
-    return check_history(cable.tow(velocity, length, duration, step, **arguments), duration)
+    return check_history(
+        cable.tow(velocity, length, duration, scheme=cable.MovingEnd(time_step=step), **arguments), duration
+    )
 
 
 def number(value: Any) -> float:
