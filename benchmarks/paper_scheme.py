@@ -15,11 +15,23 @@ from pathlib import Path
 import numpy as np
 
 import cable
-from cable.feng_allen.box_scheme import pull_out_boxes
-from cable.feng_allen.printed_scheme import BoxHistory, pull_out_paper
+from cable.feng_allen import run as feng_allen
+from cable.feng_allen.run import BoxHistory
+from cable.task import PullOut
 
 DRAG = cable.CableProperties().tangential_drag
 FIGURE = Path(__file__).parent.parent / "docs" / "figures" / "paper_scheme.png"
+
+
+def pull_out_paper(tow_velocity, duration, step, *, reading="tangent", implicit=False) -> BoxHistory:
+    """Run the paper's scheme; with the states of its nodes, which `cable.pull_out` does not show."""
+    scheme = cable.Paper(time_step=step, reading=reading, implicit=implicit)
+    return feng_allen.pull_out_paper(PullOut.of(tow_velocity, duration), scheme)
+
+
+def pull_out_boxes(tow_velocity, duration, step) -> BoxHistory:
+    """Run equation (7) in boxes."""
+    return feng_allen.pull_out_boxes(PullOut.of(tow_velocity, duration), cable.Equation7(time_step=step))
 
 
 def ahead(_time):

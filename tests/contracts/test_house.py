@@ -9,7 +9,7 @@ import pytest
 from benchmarks.house import circles, figures, longest_chain
 
 FLOORS = {
-    "cable": 12,
+    "cable": 8,
     "vehicle": 6,
     "scenarios": 6,
     "subzero.autopilot": 8,

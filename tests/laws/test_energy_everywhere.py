@@ -43,9 +43,9 @@ PULLS = {
     "stretch": {"drum": DRUM},
     "uniform": {"drum": DRUM, "current": (0.1, 0.2, 0.0)},
     "shear": {"drum": DRUM, "current": SHEARED},
-    "boat": {"drum": DRUM, "drum_velocity": boat},
-    "everything": {"drum": DRUM, "current": CHANGING, "drum_velocity": boat},
-    "everything on a winch": {"drum": WINCH, "current": CHANGING, "drum_velocity": boat},
+    "boat": {"drum": cable.MovingDrum(velocity=boat, drum=DRUM)},
+    "everything": {"drum": cable.MovingDrum(velocity=boat, drum=DRUM), "current": CHANGING},
+    "everything on a winch": {"drum": cable.MovingDrum(velocity=boat, drum=WINCH), "current": CHANGING},
 }
 
 

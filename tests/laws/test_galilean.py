@@ -36,10 +36,11 @@ def shear(added):
 def pulls(drift, current, drum):
     """Return the run of a drum that rests, and of the same that drifts with everything else."""
     rest, moving = (
-        cable.pull_out(
-            lambda t, V=V: motion(t) + V, DURATION, cable=HEAVY, drum=drum, current=current(V), **boat
+        cable.pull_out(lambda t, V=V: motion(t) + V, DURATION, cable=HEAVY, drum=held, current=current(V))
+        for V, held in (
+            (np.zeros(3), drum),
+            (drift, cable.MovingDrum(velocity=lambda _: drift, drum=drum)),
         )
-        for V, boat in ((np.zeros(3), {}), (drift, {"drum_velocity": lambda _: drift}))
     )
     assert rest.outcome.completed, rest.outcome.message
     assert moving.outcome.completed, moving.outcome.message

@@ -20,7 +20,6 @@ from scipy.optimize import brentq
 
 import cable
 from cable.current import Current
-from cable.lumped.history import pull_out_lumped, tow_lumped
 
 TABLE_1 = cable.CableProperties()
 HEAVY = cable.CableProperties(mass_per_length=0.0098)
@@ -34,21 +33,16 @@ SHEARED = Current.profile(
 
 def pull(motion, duration, step, segment, **changes):
     """Pull out with the lumped cable; Table 1 and still water unless changed."""
-    setting = {
-        "cable": TABLE_1,
-        "drum": cable.DrumProperties(),
-        "current": STILL,
-        "wet_length": 0.0,
-    } | changes
-    run = pull_out_lumped(motion, duration, step, segment_length=segment, **setting)
+    lumped = cable.Lumped(time_step=step, segment_length=segment)
+    run = cable.pull_out(motion, duration, scheme=lumped, **changes)
     assert run.outcome.completed, run.outcome.message
     return run
 
 
 def tow(motion, length, duration, step=0.1, segment=0.5, **changes):
     """Tow the lumped cable."""
-    setting = {"cable": TABLE_1, "current": STILL, "drogue_drag_area": 0.0} | changes
-    run = tow_lumped(motion, length, duration, step, segment_length=segment, **setting)
+    lumped = cable.Lumped(time_step=step, segment_length=segment)
+    run = cable.tow(motion, length, duration, scheme=lumped, **changes)
     assert run.outcome.completed, run.outcome.message
     return run
 
@@ -268,9 +262,8 @@ CASES = {
         20.0,
         {
             "cable": UMBILICAL,
-            "drum": cable.DrumProperties(friction_torque=0.5),
-            "drum_velocity": boat,
-            "wet_length": 1.0,
+            "drum": cable.MovingDrum(velocity=boat, drum=cable.DrumProperties(friction_torque=0.5)),
+            "start": 1.0,
         },
         after(4.0),
     ),
@@ -317,16 +310,7 @@ def test_a_slack_cable_never_pushes_and_a_standing_drum_gives_nothing():
 def test_a_run_that_cannot_go_on_says_where_when_and_what_to_do():
     """A cable that sinks off a drum that nothing holds: ill-posed, and told so."""
     sinking = cable.CableProperties(mass_per_length=0.2)
-    run = pull_out_lumped(
-        lambda t: (0.0, 0.0, 0.1),
-        60.0,
-        0.1,
-        segment_length=0.5,
-        cable=sinking,
-        drum=cable.DrumProperties(),
-        current=STILL,
-        wet_length=2.0,
-    )
+    run = cable.pull_out(lambda t: (0.0, 0.0, 0.1), 60.0, cable=sinking, start=2.0, scheme="lumped")
     assert not run.outcome.completed
     assert run.time[-1] < 60.0
     assert "t = " in run.outcome.message

@@ -141,25 +141,44 @@ def test_steps_that_are_solved_less_exactly_take_fewer_iterations_and_err_no_mor
 
 @pytest.mark.parametrize("value", [0.0, 1e-13, 0.1, -1e-9, np.nan])
 def test_a_tolerance_without_sense_is_refused(value):
-    for run in (cable.pull_out, lambda v, t, **k: cable.tow(v, 10.0, t, **k)):
-        with pytest.raises(
-            ValueError, match=r"tolerance is .*; it must be .* at least 1e-12 and at most 0.001"
-        ):
-            run(dive, 1.0, tolerance=value)
+    with pytest.raises(ValueError, match=r"tolerance is .*; it must be .* at least 1e-12 and at most 0.001"):
+        cable.MovingEnd(tolerance=value)
 
 
 @pytest.mark.parametrize("name", ["rtol", "grading"])
 @pytest.mark.parametrize("value", [-0.1, 1.0, np.nan, np.inf])
 def test_what_cannot_be_allowed_is_refused(name, value):
     with pytest.raises(ValueError, match=rf"{name} is {value!r}; it must be .* at least 0 and at most 0.5"):
+        cable.MovingEnd(**{name: value})
+
+
+@pytest.mark.parametrize("name", ["rtol", "grading", "run_in", "tolerance"])
+@pytest.mark.parametrize("kind", [cable.Lumped, cable.Equation7, cable.Paper])
+def test_a_scheme_has_only_the_options_that_it_knows(kind, name):
+    with pytest.raises(TypeError, match=name):
+        kind(**{name: 0.1})
+
+
+MOVED = {
+    "step": (0.05, r"scheme=cable.MovingEnd\(time_step=0.05\)"),
+    "segment_length": (0.25, r"scheme=cable.MovingEnd\(segment_length=0.25\)"),
+    "rtol": (1e-3, r"scheme=cable.MovingEnd\(rtol=0.001\)"),
+    "wet_length": (2.0, "start=2.0"),
+    "drum_velocity": (dive, r"drum=cable.MovingDrum\(velocity=..., drum=...\)"),
+}
+
+
+@pytest.mark.parametrize("name", MOVED)
+def test_an_argument_of_older_versions_says_where_it_is_now(name):
+    value, place = MOVED[name]
+    with pytest.raises(ValueError, match=rf"pull_out: {name} moved. Write {place}"):
         cable.pull_out(dive, 1.0, **{name: value})
 
 
-@pytest.mark.parametrize("settings", [{"rtol": 1e-3}, {"grading": 0.1}, {"run_in": 2.0}])
-@pytest.mark.parametrize("scheme", ["lumped", "equation7", "paper_tangent"])
-def test_schemes_that_do_not_know_it_say_so(scheme, settings):
+def test_what_was_given_by_its_place_says_so_too_and_what_never_was_is_no_argument():
     with pytest.raises(
-        ValueError,
-        match=rf"scheme '{scheme}' knows .* no wet_length, rtol, grading or run_in.*use 'moving_end'",
+        ValueError, match=r"tow: step, rtol moved. Write scheme=cable.MovingEnd\(time_step=0.1, rtol=0.01\)"
     ):
-        cable.pull_out(dive, 1.0, scheme=scheme, **settings)
+        cable.tow(dive, 10.0, 1.0, 0.1, rtol=0.01)
+    with pytest.raises(TypeError, match="unexpected keyword argument 'colour'"):
+        cable.pull_out(dive, 1.0, colour="red")

@@ -37,9 +37,9 @@ def test_both_formulations_give_the_same_tow_force_and_length(motion, friction):
 def test_the_difference_between_the_formulations_shrinks_fourfold_with_step_and_segment():
     drum, differences = cable.DrumProperties(friction_torque=0.005), []
     for step, segment_length in ((0.2, 1.0), (0.1, 0.5)):
-        setting = {"segment_length": segment_length, "drum": drum}
-        ours = cable.pull_out(helix, 20.0, scheme=cable.MovingEnd(time_step=step), **setting)
-        angles = cable.pull_out(helix, 20.0, scheme=cable.Equation7(time_step=step), **setting)
+        steps = {"time_step": step, "segment_length": segment_length}
+        ours = cable.pull_out(helix, 20.0, drum=drum, scheme=cable.MovingEnd(**steps))
+        angles = cable.pull_out(helix, 20.0, drum=drum, scheme=cable.Equation7(**steps))
         difference = np.abs(ours.tow_force - angles.tow_force)
         differences.append(difference[ours.time > 3.0].max())
     assert differences[0] / differences[1] > 3.5

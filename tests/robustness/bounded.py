@@ -53,12 +53,15 @@ def back_and_forth(t: float) -> tuple[float, float, float]:
 
 def pulled_out(scheme: str) -> None:
     for way in (turning, back_and_forth):
-        cable.pull_out(way, 20.0, 0.1, scheme=scheme)
+        cable.pull_out(way, 20.0, scheme=scheme)
     if scheme in ("moving_end", "lumped"):
         stiff = cable.CableProperties(mass_per_length=0.02, bending_stiffness=1e-4)
         drums = (cable.ConstantTension(tension=5.0), cable.DrumProperties(friction_torque=0.05, inertia=0.02))
         for drum in drums:
-            cable.pull_out(turning, 20.0, cable=stiff, current=(0.1, 0.2, 0.0), start=3.0, drum=cable.MovingDrum(velocity=lambda t: (0.1 * np.sin(t), 0.0, 0.0), drum=drum), scheme=scheme)  # fmt: skip
+            boat = cable.MovingDrum(velocity=lambda t: (0.1 * np.sin(t), 0.0, 0.0), drum=drum)
+            cable.pull_out(
+                turning, 20.0, cable=stiff, drum=boat, current=(0.1, 0.2, 0.0), start=3.0, scheme=scheme
+            )
     if scheme == "moving_end":
         cable.pull_out(turning, 60.0, scheme=cable.MovingEnd(rtol=1e-3, grading=0.1))
         held = cable.hold([(0.0, 0.0, 0.0), (5.0, 0.0, 2.0)], 8.0)
