@@ -15,6 +15,7 @@ FLOORS = {
     "subzero.autopilot": 8,
     "subzero.diagnosis": 14,
     "subzero.records": 2,
+    "subzero.sweeps": 8,
     "subzero.synthetic": 5,
     "subzero, rest": 15,
     "all": 35,
