@@ -1,6 +1,6 @@
 """Only motion through the water counts: drum, water and tow point that all drift along with V change no force.
 
-Verifies: `drum_velocity=` and `Current` of `cable.pull_out` and `cable.tow`. Configuration: heavy stretching cable,
+Verifies: `cable.MovingDrum` and `Current` of `cable.pull_out` and `cable.tow`. Configuration: heavy stretching cable,
 three-dimensional motion at about 1 m/s, 0.1 s, 0.5 m, V of 0.8 m/s; free drum with inertia and friction, winches;
 uniform current and one with shear in depth, which a horizontal V leaves as it is.
 Tolerance: 1e-12 N where Newton's method takes the same way in both runs, 2e-7 N where it ends an iteration earlier in

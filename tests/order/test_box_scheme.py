@@ -123,5 +123,5 @@ def test_a_cable_that_would_have_to_push_stops_the_run_and_says_so():
     run = pull_out_boxes(lambda t: (max(1.0 - 0.2 * t, 0.0), 0.0, 0.0), 8.0, 0.1)
     assert not run.converged
     assert "goes slack" in run.message
-    assert "scheme='moving_end'" in run.message
+    assert "cable.MovingEnd" in run.message
     assert run.smallest_tension > -1e-6

@@ -195,10 +195,8 @@ def test_only_motion_relative_to_the_water_and_to_the_drum_counts():
         8.0,
         0.1,
         0.5,
-        drum=RUBBING,
+        drum=cable.MovingDrum(velocity=lambda t: drift, drum=RUBBING),
         current=Current.uniform(drift),
-        drum_velocity=lambda t: drift,
-        wet_length=1e-6,
     )
     late = plain.time > 2.0  # the first micrometre of cable points another way
     np.testing.assert_allclose(
