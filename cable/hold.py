@@ -200,7 +200,8 @@ def _checked_start(start: Place, places: np.ndarray) -> np.ndarray:
     if nodes.ndim != 2 or nodes.shape[0] < 2 or nodes.shape[1] != 3 or not np.isfinite(nodes).all():
         message = f"hold: start must be finite node positions (n, 3), two at least; got shape {nodes.shape}."
         raise HoldError(message)
-    return nodes - places[1]
+    from_second_end: np.ndarray = nodes - places[1]
+    return from_second_end
 
 
 def _between(places: np.ndarray, length: float, count: int) -> Line:

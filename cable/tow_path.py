@@ -65,7 +65,8 @@ def first_direction(velocity: np.ndarray) -> np.ndarray:
     moving = np.flatnonzero(speeds > REST)
     if moving.size == 0:
         return np.array([1.0, 0.0, 0.0])
-    return velocity[moving[0]] / speeds[moving[0]]
+    direction: np.ndarray = velocity[moving[0]] / speeds[moving[0]]
+    return direction
 
 
 def length_of_way(place: np.ndarray) -> float:
@@ -91,7 +92,7 @@ def segments_needed(length: float, segment_length: float, grading: float) -> int
 def _segments_needed(length: float, segment_length: float, grading: float) -> float:
     if grading * length < segment_length:
         return length // segment_length + 8
-    return np.log1p(grading * length / segment_length) // np.log1p(grading) + 12
+    return float(np.log1p(grading * length / segment_length) // np.log1p(grading) + 12)
 
 
 BYTES_A_NODE = 32.0
