@@ -13,7 +13,7 @@ from functools import partial
 
 import numpy as np
 
-from subzero.diagnosis.hypothesis.hypotheses import PRIOR, Ids, sudden_effects
+from subzero.diagnosis.hypothesis.hypotheses import PRIOR, Ids
 from subzero.diagnosis.inference.basis import one_terms
 from subzero.diagnosis.inference.change_point_fit import FittedChangePoint, fit_change_points, linearised_at
 from subzero.diagnosis.inference.change_point_scan import BaseRun, LinearisationPoint
@@ -231,7 +231,7 @@ def _bases(search: Search) -> list[Candidate]:
 
 def _sudden(search: Search, close: Sequence[RelinearisedForce], known: float) -> list[OutOfCatalogue]:
     """Return causes that begin in mid-trial, beside nothing else, that may be as probable as what is known."""
-    problem, effects = search.problem, sudden_effects(search.problem.entries)
+    problem, effects = search.problem, search.problem.sudden_effects
     if not effects:
         return []
     prior = float(np.log(PRIOR["sudden"] / (len(effects) * len(problem.records))))

@@ -25,8 +25,8 @@ from subzero.diagnosis.assessment.identifiability import (
 from subzero.diagnosis.assessment.next_trial import Survivor
 from subzero.diagnosis.assessment.residuals import curves
 from subzero.diagnosis.hypothesis.catalogue.sensors import SPECS
-from subzero.diagnosis.hypothesis.effect import with_onset
-from subzero.diagnosis.hypothesis.hypotheses import Ids, columns_of, nameable, sudden_effects
+from subzero.diagnosis.hypothesis.effect import MINUTE_S, with_onset
+from subzero.diagnosis.hypothesis.hypotheses import Ids, columns_of, nameable
 from subzero.diagnosis.inference.change_point_fit import FittedChangePoint
 from subzero.diagnosis.inference.change_point_scan import BaseRun, change_point_columns
 from subzero.diagnosis.inference.laplace import Candidate
@@ -103,9 +103,11 @@ def _from_its_time_on(work: Findings, one: FittedChangePoint) -> dict[Ids, float
     """Return D against each other cause that would begin when it does: what no tolerance and no size of that explains,
 
     D = sᵀ (I + B Bᵀ)⁻¹ s,    B = [J κτ, C s_b]
+
+    A jam of a fin with no command lost is an offset of the fin: what both do is no rival of either.
     """
     begun, fit, n = one.begun, one.fit, len(work.problem.entries)
-    others = [effect for effect in sudden_effects(work.problem.entries) if effect.id != begun.effect.id]
+    others = [effect for effect in work.problem.sudden_effects if effect.id != begun.effect.id]
     C = change_point_columns(
         BaseRun(one.problem, fit.z), [(effect, begun.time) for effect in others], begun.record
     )
@@ -114,7 +116,8 @@ def _from_its_time_on(work: Findings, one: FittedChangePoint) -> dict[Ids, float
     shown, within = fit.J[:, n:-1] @ fit.z[n:-1], fit.J[:, free] * tolerance
     found = dict[Ids, float]()
     for effect, own in zip(others, C, strict=True):
-        B = np.hstack([within, own * np.array([p.scale for p in effect.parameters])])
+        scales = [0.0 if p.also_of == begun.effect.id else p.scale for p in effect.parameters]
+        B = np.hstack([within, own * np.array(scales)])
         b = B.T @ shown
         rest = float(shown @ shown - b @ np.linalg.solve(np.eye(b.size) + B.T @ B, b))
         found[(with_onset(effect, begun.time).id,)] = max(rest, 0.0)
@@ -151,7 +154,8 @@ def closest_rival(work: Findings, inside: Mapping[Ids, float]) -> Rival:
 def _words(work: Findings, one: str) -> str:
     """Return a cause in words, also one that begins in mid-trial."""
     which, _, time = one.partition("@")
-    sentence = sentence_of(work.problem, which)
+    begins = {effect.id: effect.sentence for effect in work.problem.sudden_effects}
+    sentence = begins[which] if which in begins else sentence_of(work.problem, which)
     return f"from {time} s on {sentence}" if time else sentence
 
 
@@ -173,12 +177,18 @@ class CalibrationFromOnset:
     fit: Fit
 
 
-def calibration_from_onset(work: Findings, what: FittedChangePoint) -> CalibrationFromOnset:
-    """Return a sudden cause as one that holds throughout, as large, with what the records say of its size."""
-    n, fit = len(work.problem.entries), what.fit
-    at = columns_of(work.problem.entries, (what.begun.effect.id,))
+def calibration_from_onset(work: Findings, what: FittedChangePoint) -> CalibrationFromOnset | None:
+    """Return a sudden cause as one that holds throughout, as large (or grown) as it is at the end of its record, with
+    what the records say of its size; None of a jam, which is no deviation of a fin that follows.
+    """
+    n, fit, effect = len(work.problem.entries), what.fit, what.begun.effect
+    at = columns_of(work.problem.entries, (effect.grows or effect.id,))
+    if not at:
+        return None
+    lasts = float(work.problem.records[what.begun.record].time[-1]) - what.begun.time
+    grown = lasts / MINUTE_S if effect.grows else 1.0
     z, J, D = fit.z[:n].copy(), fit.J[:, :n].copy(), fit.D[:n].copy()
-    z[at], J[:, at], D[at] = fit.z[n:-1], fit.J[:, n:-1], fit.D[n:-1]
+    z[at], J[:, at], D[at] = grown * fit.z[n:-1], fit.J[:, n:-1] / grown, grown**2 * fit.D[n:-1]
     return CalibrationFromOnset(ids=(what.id,), fit=replace(fit, z=z, J=J, D=D))
 
 
@@ -247,7 +257,8 @@ def trial_ahead(work: Findings, left: Sequence[Ids], late: Sequence[FittedChange
     been.
     """
     found: list[Survivor] = [work.search.candidates[ids] for ids in left if ids in work.search.candidates]
-    return found + [calibration_from_onset(work, one) for one in late if (one.begun.effect.id,) not in left]
+    broken = [calibration_from_onset(work, one) for one in late if (one.begun.effect.id,) not in left]
+    return found + [one for one in broken if one]
 
 
 def _with_closest(work: Findings, best: Candidate, left: list[Ids]) -> list[Ids]:
