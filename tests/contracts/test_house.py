@@ -9,11 +9,12 @@ import pytest
 from benchmarks.house import circles, figures, longest_chain
 
 FLOORS = {
-    "cable": 12,
+    "cable": 8,
     "vehicle": 6,
     "scenarios": 6,
     "subzero.autopilot": 8,
     "subzero.diagnosis": 14,
+    "subzero.page": 4,
     "subzero.records": 2,
     "subzero.sweeps": 8,
     "subzero.synthetic": 5,
