@@ -39,7 +39,6 @@ ROWS = (
     "scenarios",
     "subzero.autopilot",
     "subzero.diagnosis",
-    "subzero.page",
     "subzero.records",
     "subzero.sweeps",
     "subzero.synthetic",
