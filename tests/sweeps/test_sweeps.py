@@ -379,8 +379,22 @@ def test_the_command_writes_everything_and_goes_on_where_it_was(tmp_path, monkey
 def test_a_file_with_a_mistake_is_answered_with_what_to_do(line, instead, said, tmp_path, capsys):
     (tmp_path / "mine.toml").write_text(SPEC.replace(line, instead), encoding="utf-8")
     assert main(["sweep", str(tmp_path / "mine.toml"), "--out", str(tmp_path / "out")]) == 2
-    assert said in capsys.readouterr().err
+    told = capsys.readouterr().err
+    assert said in told
+    assert "mine.toml" in told
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [(["mine.toml", "--workers", "0"], "workers is 0"), (["none.toml"], "The sweep none.toml")],
+)
+def test_a_mistake_on_the_command_line_leaves_no_folder(words, said, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "mine.toml").write_text(SPEC, encoding="utf-8")
+    assert main(["sweep", *words]) == 2
+    assert said in capsys.readouterr().err
+    assert [path.name for path in tmp_path.iterdir()] == ["mine.toml"]
 
 
 @pytest.mark.slow
