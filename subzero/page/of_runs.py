@@ -57,12 +57,13 @@ def page_of_runs(
 
 
 def _moves(runs: dict[str, xr.Dataset]) -> bool:
-    """Say whether there is anything to replay: at least two samples of the first run."""
-    return next(iter(runs.values())).sizes["time"] > 1
+    """Say whether there is anything to replay: two samples of the first run or more, of a vehicle that is told."""
+    first = next(iter(runs.values()))
+    return first.sizes["time"] > 1 and "hull" in json.loads(first.attrs["parameters"]).get("vehicle", {})
 
 
 def _second_word(command: str) -> str:
-    return (command.split() + ["", ""])[1]
+    return [*command.split(), "", ""][1]
 
 
 def _outcome(label: str, run: dict[str, Any]) -> list[Line]:
@@ -104,9 +105,7 @@ def _indices(summary: dict[str, Any], labels: list[str]) -> list[tuple[str, ...]
         return NOTHING if value is None else f"{value:.4g}"
 
     names = summary[labels[0]]["indices"]
-    return [
-        (name, *(cell(summary[label]["indices"].get(name)) for label in labels)) for name in names
-    ]
+    return [(name, *(cell(summary[label]["indices"].get(name)) for label in labels)) for name in names]
 
 
 def _sources(run: xr.Dataset) -> dict[str, str]:

@@ -36,7 +36,11 @@ FIGURES = {
 }
 """What a figure shows, by its name."""
 
-SVG_STYLE = {"svg.hashsalt": "subzero", "svg.fonttype": "path", "path.simplify_threshold": 0.3}
+SVG_STYLE: dict[Any, Any] = {
+    "svg.hashsalt": "subzero",
+    "svg.fonttype": "path",
+    "path.simplify_threshold": 0.3,
+}
 """Two pages of one run are alike to the last letter."""
 
 
