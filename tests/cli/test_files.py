@@ -84,9 +84,13 @@ def test_column_names_lead_back_to_their_channels():
 
 
 def test_two_runs_leave_the_same_bytes(folder, rails, tmp_path):
+    """But for the page's line that makes it again, which names the folder."""
     assert main(["compare", "fig6", "--out", str(tmp_path / "again")]) == FINE
     for path in folder.iterdir():
-        assert path.read_bytes() == (tmp_path / "again" / path.name).read_bytes(), path.name
+        again = (tmp_path / "again" / path.name).read_bytes()
+        if path.name == "report.html":
+            again = again.replace(f" --out {tmp_path / 'again'}".encode(), b"")
+        assert path.read_bytes() == again, path.name
 
 
 def test_the_summary_has_plain_numbers_with_units_in_their_names(folder):
