@@ -6,11 +6,14 @@ Configuration: `fig6` for two seconds, written by the command. Tolerance of the 
 
 from __future__ import annotations
 
+import html
+import json
 import re
 import shutil
 import subprocess
 
 import pytest
+import xarray as xr
 
 import scenarios
 from subzero.cli import main
@@ -52,16 +55,52 @@ def test_the_players_modules_share_no_name(page):
     assert sorted(names) == sorted(set(names))
 
 
-@pytest.mark.skipif(shutil.which("chromium") is None, reason="needs Debian's chromium")
-def test_the_player_runs_in_a_browser_without_an_error(page, tmp_path):
-    flags = (
-        "--headless --no-sandbox --use-gl=angle --use-angle=swiftshader --enable-unsafe-swiftshader --disable-quic "
-        "--no-first-run --disable-background-networking --disable-component-update --disable-sync "
-        "--virtual-time-budget=4000 --enable-logging=stderr --dump-dom"
-    )
+IN_A_BROWSER = pytest.mark.skipif(shutil.which("chromium") is None, reason="needs Debian's chromium")
+FLAGS = (
+    "--headless --no-sandbox --use-gl=angle --use-angle=swiftshader --enable-unsafe-swiftshader --disable-quic "
+    "--no-first-run --disable-background-networking --disable-component-update --disable-sync "
+    "--virtual-time-budget=4000 --enable-logging=stderr --dump-dom"
+)
+SLIDE = """<script>setTimeout(() => {
+  const slider = document.getElementById("time");
+  slider.value = TIME; slider.dispatchEvent(new Event("input"));
+  requestAnimationFrame(() => requestAnimationFrame(() => {
+    document.title = JSON.stringify(window.subzero.shown());
+  }));
+}, 500);</script>"""
+"""What a hand at the slider does; the title tells what is on the screen then."""
+
+
+def opened(path, profile):
+    """Open a page in a browser of its own; return what it became and what the console said."""
     done = subprocess.run(
-        ["chromium", *flags.split(), f"--user-data-dir={tmp_path}", page.as_uri()],
+        ["chromium", *FLAGS.split(), f"--user-data-dir={profile}", path.as_uri()],
         capture_output=True, text=True, check=False, timeout=120,
     )  # fmt: skip
-    assert "Uncaught" not in done.stderr, done.stderr[-2000:]
-    assert "of 2 s" in done.stdout  # the time beside the slider is written by the player
+    return done.stdout, done.stderr
+
+
+@IN_A_BROWSER
+def test_the_player_runs_in_a_browser_without_an_error(page, tmp_path):
+    became, said = opened(page, tmp_path)
+    assert "Uncaught" not in said, said[-2000:]
+    assert "of 2 s" in became  # the time beside the slider is written by the player
+
+
+@IN_A_BROWSER
+@pytest.mark.parametrize("time", [0.73, 1.6])
+def test_the_slider_moves_the_vehicle_to_where_the_dataset_has_it(page, tmp_path, time):
+    """To a millimetre: places are stored as whole numbers of a thirty-thousandth of the extent."""
+    driven = tmp_path / "driven.html"
+    driven.write_text(
+        page.read_text(encoding="utf-8").replace("</body>", SLIDE.replace("TIME", str(time)) + "</body>")
+    )
+    became, said = opened(driven, tmp_path / "profile")
+    title = re.search(r"<title>(.*?)</title>", became)
+    assert title, said[-2000:]
+    shown = json.loads(html.unescape(title[1]))
+    assert shown["time"] == pytest.approx(time)
+    for name in ("tethered", "untethered"):
+        with xr.open_dataset(page.with_name(f"{name}.nc")) as run:
+            place = [float(run[axis].interp(time=time)) for axis in ("north", "east", "depth")]
+        assert shown["places"][name] == pytest.approx(place, abs=1e-3)
