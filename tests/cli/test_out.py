@@ -193,7 +193,7 @@ def test_an_interrupt_after_the_last_move_is_told_as_it_is(tmp_path, rails, monk
 
 
 def test_a_command_says_nothing_of_a_former_one_in_the_same_process(tmp_path, rails, monkeypatch, capsys):
-    """What an interrupted sweep had kept was told of the next command; and its errors would have passed for interrupts."""
+    """What an interrupted sweep had kept was told of the next command, whose errors would have passed as well."""
     interrupts.leaves(lambda: "3 of 6 members are kept")
     monkeypatch.setattr(interrupts, "_raised", [True])
 
