@@ -14,6 +14,7 @@ FLOORS = {
     "scenarios": 6,
     "subzero.autopilot": 8,
     "subzero.diagnosis": 14,
+    "subzero.page": 4,
     "subzero.records": 2,
     "subzero.sweeps": 8,
     "subzero.synthetic": 5,
