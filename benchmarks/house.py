@@ -41,6 +41,7 @@ ROWS = (
     "scenarios",
     "subzero.autopilot",
     "subzero.diagnosis",
+    "subzero.page",
     "subzero.records",
     "subzero.sweeps",
     "subzero.synthetic",

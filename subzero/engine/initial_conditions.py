@@ -23,19 +23,20 @@ import scenarios
 import vehicle
 from cable.drum import FREE, LENGTH
 from cable.drum_motion import SETPOINT, lead_drum
-from cable.hold import hold, lay_held
+from cable.hold import hold
 from cable.moving_end import (
     FLOWS,
     NOW,
     STORED,
     Line,
     energy_flow,
+    lay_held,
     lay_straight,
     new_line,
     new_load,
     start_in_water,
 )
-from cable.pull_out import START_LENGTH
+from cable.task import START_LENGTH
 from subzero.engine.environment import drum_of, water_of, way_of_drum
 from subzero.engine.prescribed_motion import knots
 from subzero.engine.vehicle_step import feel_current, pose, tow_point, way_of_tow_point

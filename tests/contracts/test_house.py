@@ -9,11 +9,12 @@ import pytest
 from benchmarks.house import MOST_FILES_PER_1000, SMALL_FILES, circles, figures, goals, longest_chain, targets
 
 FLOORS = {
-    "cable": 12,
+    "cable": 8,
     "vehicle": 6,
     "scenarios": 6,
     "subzero.autopilot": 8,
     "subzero.diagnosis": 14,
+    "subzero.page": 3,
     "subzero.records": 2,
     "subzero.sweeps": 7,
     "subzero.synthetic": 5,
