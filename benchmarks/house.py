@@ -322,13 +322,26 @@ class Goal:
 MOST_FILES_PER_1000 = 7.5
 SMALL_FILES = ("vehicle",)
 """Packages of many small parts that are alike, a file for each: a force, an actuator."""
+FEW_FILES = 5
+"""A package of no more files than a reader follows to understand one thing is not scattered, however short they are."""
+
+
+def scattered(found: dict[str, Figures]) -> dict[str, Figures]:
+    """Return the packages that have more files for their lines than is asked for."""
+    return {
+        row: one
+        for row, one in found.items()
+        if one.files > FEW_FILES and one.files_per_1000 > MOST_FILES_PER_1000
+    }
 
 
 def goals(found: dict[str, Figures]) -> list[Goal]:
     """Return what is asked for, with the figures that stand."""
     whole, diagnosis = found[ALL], found["subzero.diagnosis"]
-    counted = {row: one for row, one in found.items() if row not in (ALL, *SMALL_FILES)}
-    over = {row: one for row, one in counted.items() if one.files_per_1000 > MOST_FILES_PER_1000}
+    counted = {
+        row: one for row, one in found.items() if row not in (ALL, *SMALL_FILES) and one.files > FEW_FILES
+    }
+    over = scattered(counted)
     densest = max(one.files_per_1000 for one in counted.values())
     return [
         Goal(name="files of the diagnosis", found=diagnosis.files, most=60),
