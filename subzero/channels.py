@@ -35,6 +35,16 @@ UNITS: dict[str, tuple[str, float]] = {
 """Display unit → (suffix of the CSV column, display units per unit used inside: SI, but rev/s)."""
 
 
+STANDARD_NAMES = {
+    "depth": "depth",
+    "roll": "platform_roll_starboard_down",
+    "pitch": "platform_pitch_fore_up",
+    "heading": "platform_orientation",
+    "speed_over_ground": "platform_speed_wrt_ground",
+}
+"""Channel → its name in the CF conventions. Theirs for rates are about the horizontal, not about the body's axes."""
+
+
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Channel:
     """One scalar that a run gives at every time.
@@ -68,8 +78,9 @@ class Channel:
 
     @property
     def attributes(self) -> dict[str, str]:
-        """What a variable of a dataset carries: units, long name, symbol."""
-        return {"units": self.unit, "long_name": self.long_name, "symbol": self.symbol}
+        """What a variable of a dataset carries: units, long name, symbol, and CF's standard name where it has one."""
+        named = {"standard_name": STANDARD_NAMES[self.name]} if self.name in STANDARD_NAMES else {}
+        return {"units": self.unit, "long_name": self.long_name, "symbol": self.symbol, **named}
 
 
 def _read(table: str) -> tuple[Channel, ...]:
