@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
+from subzero.channels import RENAMED_CHANNELS
 from subzero.errors import UserError, printable
 from subzero.user_file import UnreadableFileError, check_readable
 from subzero.validity import RunWarning, warnings_of
@@ -69,6 +70,8 @@ def open_run(path: str | Path) -> xr.Dataset:
 
 def up_to_date(run: xr.Dataset) -> xr.Dataset:
     """Return a run of an earlier version by today's names."""
+    old = {name: now for name, now in RENAMED_CHANNELS.items() if name in run.variables}
+    run = run.rename_vars(old)
     terms = [RENAMED_TERMS.get(str(term), str(term)) for term in run["term"].values]
     run = run.assign_coords(term=("term", terms, run["term"].attrs))
     if "arc_length" in run.coords:

@@ -67,7 +67,7 @@ def channel_values(run: Run, model: Model) -> dict[str, np.ndarray]:
     """Return every channel by name, in SI units (propeller speeds in rev/s)."""
     r = run.recording
     attitude, velocity = _attitudes(r.attitude), r.state[:, 7:13]
-    names = ("north", "east", "depth", "roll", "pitch", "heading")
+    names = ("north", "east", "depth", "roll_angle", "pitch", "heading")
     values = dict(zip(names, (*r.state[:, :3].T, *attitude), strict=True))
     rates = ("surge_speed", "sway_speed", "heave_speed", "roll_rate", "pitch_rate", "yaw_rate")
     values |= dict(zip(rates, velocity.T, strict=True))

@@ -146,7 +146,7 @@ def _start_of_cable(run: xr.Dataset) -> np.ndarray:
     hull = np.array([run[name].values[first] for name in ("north", "east", "depth")])
     tow = json.loads(run.attrs["parameters"])["vehicle"]["tow_point"]
     arm = np.array([tow["x"], tow["y"], tow["z"]])
-    angles = [run[name].values[first] for name in ("heading", "pitch", "roll")]
+    angles = [run[name].values[first] for name in ("heading", "pitch", "roll_angle")]
     to_earth = Rotation.from_euler("ZYX", angles, degrees=True)
     return hull + to_earth.apply(arm) - run["cable_position"].values[first, 0]
 

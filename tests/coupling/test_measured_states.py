@@ -67,7 +67,7 @@ def test_fig6_replayed_from_its_own_record_pulls_alike(replay):
         "north",
         "east",
         "depth",
-        "roll",
+        "roll_angle",
         "pitch",
         "heading",
         "surge_speed",

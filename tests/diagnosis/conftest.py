@@ -16,7 +16,7 @@ from subzero.diagnosis.inference.measurement import economical, respond
 from subzero.diagnosis.inference.noise import Noise
 from subzero.diagnosis.inference.problem import Observed, Problem
 
-CHANNELS = ("surge_speed", "heading", "yaw_rate", "pitch", "roll", "depth")
+CHANNELS = ("surge_speed", "heading", "yaw_rate", "pitch", "roll_angle", "depth")
 COLOUR = 0.5
 
 

@@ -76,7 +76,7 @@ def test_where_one_cause_explains_it_all_only_the_first_force_is_looked_at_from_
     hope = {
         "unknown_force:X": -9.0,
         "unknown_force:N": -12.0,
-        "sensor_drift:roll": -14.0,
+        "sensor_drift:roll_angle": -14.0,
         "unknown_force:Y": -15.0,
     }
     assert _worth_a_look(hope, best_with(("a",), 1.0)) == ["unknown_force:X"]

@@ -28,7 +28,7 @@ from subzero.diagnosis.inference.problem import Observed, Problem
 from subzero.diagnosis.inference.simulator import simulate_track
 from subzero.external_force import MissingForce, Term
 
-BASIC = ("surge_speed", "heading", "yaw_rate", "pitch", "roll", "depth")
+BASIC = ("surge_speed", "heading", "yaw_rate", "pitch", "roll_angle", "depth")
 KINDS = ("scale", "bias", "lag")
 IDS = {
     *("propeller_thrust_gain", "propeller_thrust_slope", "motor_lag", "battery_sag", "propeller_torque"),
