@@ -12,14 +12,15 @@
 from __future__ import annotations
 
 import textwrap
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
 
-from subzero.channels import RENAMED_CHANNELS
-from subzero.errors import UserError, printable
+from subzero.channels import BY_NAME, RENAMED_CHANNELS
+from subzero.errors import UserError, printable, short, suggestion
 from subzero.user_file import UnreadableFileError, check_readable
 from subzero.validity import RunWarning, warnings_of
 
@@ -169,12 +170,44 @@ class RunPlots:
 
         return shape(self._run, self._title())
 
+    def channel(self, name: str) -> Figure:
+        """Return one channel over time."""
+        from subzero.figures.style import channel_panel, headline, sheet, time_label
+
+        label = "tethered" if self._run.attrs["tethered"] else "untethered"
+        figure, panels = sheet(1, 1, self._title())
+        channel_panel(panels[0], {label: self._run}, name)
+        headline(panels[0], BY_NAME[name].long_name)
+        time_label(panels, 1)
+        return figure
+
     def _title(self) -> Title:
         from subzero.figures.style import Title, warnings_in_short
 
         run = self._run
         warns: Any = warnings_in_short({"": run})
         return Title(words=run.attrs["title"], scenario=run.attrs["scenario"], warnings=warns)
+
+
+def figures_of(run: xr.Dataset, what: Sequence[str] | None = None) -> dict[str, Figure]:
+    """Return figures of a run by name.
+
+    Args:
+        run: a dataset of `subzero.simulate`.
+        what: names of `PLOTS`, or channels, which are drawn over time; all of `PLOTS` if None.
+
+    Raises:
+        UserError: neither a figure nor a channel of this name.
+    """
+    for name in what or ():
+        if name not in PLOTS and (name not in BY_NAME or name not in run):
+            hint = suggestion(name, (*PLOTS, *BY_NAME))
+            raise UserError(
+                f"There is no figure and no channel {short(name)}.{hint} Figures: {', '.join(PLOTS)}; or a channel of "
+                "the run, such as heading, depth, cable_tension."
+            )
+    plots = RunPlots(run)
+    return {name: getattr(plots, name)() if name in PLOTS else plots.channel(name) for name in what or PLOTS}
 
 
 PLOTS = ("tension", "shape3d", "motion", "forces", "attitude", "cable")

@@ -15,6 +15,7 @@ from rich.table import Table
 
 from subzero.diagnosis.report import tables, words
 from subzero.diagnosis.results import Detectability, Verdict
+from subzero.voice import PLAIN, Voice
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -28,7 +29,7 @@ MOST_ROWS = 12
 
 
 def tell_before(rows: Sequence[Detectability], console: Console | None = None) -> None:
-    """Print what the records cannot show, or not tell apart, before anything is compared."""
+    """Print how much the records cannot show, or not tell apart, before anything is compared."""
     console = console or Console()
     hidden = tables.detectable(rows)
     if not hidden.rows:
@@ -39,14 +40,28 @@ def tell_before(rows: Sequence[Detectability], console: Console | None = None) -
         f"told from another (D below {tables.CLEAR_FROM:g}).",
         highlight=False,
     )
+
+
+def _tell_hidden(verdict: Verdict, console: Console) -> None:
+    """Print which causes these records cannot show, or not tell apart, behind what they do show."""
+    hidden = tables.detectable(verdict)
+    if not hidden.rows:
+        return
+    console.print("Not seen in these records, or hardly told from another:", highlight=False)
     console.print(_rich(tables.Table(hidden.header, hidden.rows[:MOST_ROWS])), highlight=False)
     if len(hidden.rows) > MOST_ROWS:
         console.print(f"… and {len(hidden.rows) - MOST_ROWS} more in the report.", highlight=False)
 
 
-def tell(verdict: Verdict, stage: Stage, console: Console | None = None) -> None:
-    """Print a verdict in words, and where the files are."""
-    console = console or Console()
+def tell(verdict: Verdict, stage: Stage, console: Console | None = None, voice: Voice = PLAIN) -> None:
+    """Print a verdict in words, what cannot be told, and where the files are."""
+    from subzero.diagnosis.report import json_file
+
+    with voice.tells(json_file.mapping(verdict) | stage.files()):
+        _tell(verdict, stage, console or Console())
+
+
+def _tell(verdict: Verdict, stage: Stage, console: Console) -> None:
     console.print(f"\n[bold]{escape(words.headline(verdict))}[/bold]", highlight=False)
     for line in words.story(verdict):
         console.print(line, highlight=False, markup=False)
@@ -55,13 +70,16 @@ def tell(verdict: Verdict, stage: Stage, console: Console | None = None) -> None
     for name, table in tables.gain(verdict).items():
         console.print(f"Root mean square error, {name}:", highlight=False, markup=False)
         console.print(_rich(table), highlight=False)
+    _tell_hidden(verdict, console)
     console.print(stage.words(), highlight=False, markup=False)
 
 
 def _rich(table: tables.Table) -> Table:
+    """Return a table for a terminal; ids and numbers stay in one piece, sentences are broken between words."""
     shown = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    for name in table.header:
-        shown.add_column(name, overflow="fold")
+    for at, name in enumerate(table.header):
+        is_prose = any(" " in row[at] for row in table.rows)
+        shown.add_column(name, no_wrap=not is_prose, overflow="fold")
     for row in table.rows:
         shown.add_row(*map(escape, row))
     return shown
