@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -327,12 +328,12 @@ class Trial:
             ScenarioError: as the reader of files says it, all that is wrong at once: names that the trial does not
                 have, values outside their limits, values that do not fit together.
         """
-        from scenarios.parameters import with_parameters
-
+        # The names of all numbers stand above trials, and are fetched only where they are needed.
+        with_parameters = import_module("scenarios.parameters").with_parameters
         if not isinstance(changes, Mapping) or not all(isinstance(name, str) for name in changes):
             why, remedy = "this is no mapping of names to values", 'Write {"cable.diameter": 0.003}.'
             raise ScenarioError([Problem(file=self.name, found=short(changes), why=why, remedy=remedy)])
-        changed = with_parameters(self, changes)
+        changed: Trial = with_parameters(self, changes)
         told = "".join(f"# changed: {name} = {float(value)!r}\n" for name, value in changes.items())
         return replace(changed, text=f"{self.text.rstrip()}\n{told}" if told else self.text)
 

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import cyclopts
 
+from subzero.cli_examples import register
 from subzero.errors import printable
 from subzero.voice import PLAIN, Voice
 
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from subzero.simulation import Progress
 
 FINE, STOPPED = 0, 3
+Shell = Literal["bash", "zsh", "fish"]
 LIBRARIES = (
     "numpy",
     "scipy",
@@ -93,15 +95,17 @@ def warm(*, voice: Voice = PLAIN) -> int:
 
     began = perf_counter()
     with progress_bar("Warming up") as progress:
-        from subzero.comparison import compare
         from subzero.figures import draw
         from subzero.model import load
+        from subzero.simulation import simulate
 
-        trial = load("fig6")
-        result = compare(replace(trial, duration=WARM_S), progress=lambda done: progress(0.9 * done))
+        trial, runs = replace(load("fig6"), duration=WARM_S), {}
+        for share, label in ((0.0, "tethered"), (0.5, "untethered")):
+            progress(share)
+            runs[label] = simulate(trial, tethered=label == "tethered")
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            draw(result.runs)["fig6"].canvas.draw()  # matplotlib looks for its fonts
+            draw(runs)["fig6"].canvas.draw()  # matplotlib looks for its fonts
     seconds, kept = perf_counter() - began, _machine_code()
     told = {"compiled": made(), "seconds": round(seconds, 1), **kept}
     with voice.tells(told):
@@ -112,21 +116,17 @@ def warm(*, voice: Voice = PLAIN) -> int:
     return FINE
 
 
-def completion(shell: Literal["bash", "zsh", "fish"], /) -> int:
-    """Print what makes a shell complete commands and options; put it where your shell looks for completions.
-
-    Args:
-        shell: bash, zsh or fish.
-    """
-    from subzero.cli import app
-
-    sys.stdout.write(app.generate_completion(prog_name="subzero", shell=shell))
-    return FINE
-
-
 def add_to(app: cyclopts.App) -> None:
     """Add the commands to the command line."""
-    from subzero.cli_examples import register
+
+    def completion(shell: Shell, /) -> int:
+        """Print what makes a shell complete commands and options; put it where your shell looks for completions.
+
+        Args:
+            shell: bash, zsh or fish.
+        """
+        sys.stdout.write(app.generate_completion(prog_name="subzero", shell=shell))
+        return FINE
 
     for command in (doctor, warm, completion):
         register(app, command)

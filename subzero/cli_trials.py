@@ -14,6 +14,7 @@ import cyclopts
 from cyclopts import Parameter
 
 import scenarios
+from subzero.cli_examples import register
 from subzero.errors import UserError, printable, short
 from subzero.voice import PLAIN, Voice
 
@@ -127,8 +128,6 @@ def validate(path: Path, /, *, voice: Voice = PLAIN) -> int:
 
 def add_to(app: cyclopts.App) -> None:
     """Add the commands to the command line."""
-    from subzero.cli_examples import register
-
     register(app, list_shipped, name="list")
     for command in (new, show, validate):
         register(app, command)
