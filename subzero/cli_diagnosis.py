@@ -127,13 +127,14 @@ def add_to(app: cyclopts.App) -> None:
 def _sorted(files: list[Path], scenario: str | None) -> tuple[str | None, list[Path]]:
     """Return the scenario among what was named, and the records.
 
-    A TOML file is a scenario, and so is the name of a shipped one, unless a file or folder here has that name.
+    A TOML file is a scenario, and so is the name of a shipped one beside a record, even if a folder here has that name:
+    `subzero compare fig6` makes one. With --scenario, or alone, such a folder is one of records.
     """
-    named = [
-        file
-        for file in files
-        if file.suffix == ".toml" or (str(file) in scenarios.names() and not file.exists())
-    ]
+    named = [file for file in files if file.suffix == ".toml"]
+    if scenario is None and not named:
+        named = [
+            file for file in files if str(file) in scenarios.names() and (len(files) > 1 or not file.exists())
+        ]
     if len(named) + (scenario is not None) > 1:
         every = [str(file) for file in named] + ([scenario] if scenario else [])
         raise UserError(f"One scenario is flown, and these are several: {', '.join(map(printable, every))}.")

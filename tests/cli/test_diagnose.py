@@ -72,12 +72,13 @@ def engine(monkeypatch, tmp_path):
     return asked
 
 
-def test_a_diagnosis_tells_what_cannot_be_told_apart_then_the_verdict_and_leaves_all_its_files(
+def test_a_diagnosis_tells_the_verdict_then_what_cannot_be_told_apart_and_leaves_all_its_files(
     engine, tmp_path, capsys
 ):
     assert main(["diagnose", "record.csv", "--scenario", "fig6", "--out", "found", "--seed", "3"]) == FINE
     said = capsys.readouterr().out
-    assert said.index("current") < said.index("The cause is named") < said.index("time constant 0.31 s")
+    assert said.index("1 of 1 causes") < said.index("The cause is named") < said.index("time constant 0.31 s")
+    assert said.index("time constant 0.31 s") < said.index("current")
     assert "not seen" in said
     left = {path.name for path in (tmp_path / "found").iterdir()}
     assert left == {"diagnosis.json", "extended.toml", "report.md", "report.html", "misfit.png", "evidence.png",

@@ -249,3 +249,11 @@ def test_a_scenario_stands_in_its_place_without_a_name(words, here, capsys):
 def test_two_scenarios_are_refused(here, capsys):
     told = said(capsys, "diagnose", "fig6", "zigzag", "record.csv", code=MISTAKE).err
     assert "One scenario is flown, and these are several: fig6, zigzag." in told
+
+
+def test_a_folder_named_after_the_scenario_does_not_stand_in_its_place(here, capsys):
+    """`subzero compare fig6` leaves the folder fig6; the name beside a record is still the scenario."""
+    (here / "fig6").mkdir()
+    (here / "record.csv").write_text("time_s,surge_speed_m_s\n0,oops\n")
+    told = said(capsys, "diagnose", "fig6", "record.csv", code=MISTAKE).err
+    assert "'oops' is not a number" in told
