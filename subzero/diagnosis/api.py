@@ -28,6 +28,7 @@ from subzero.diagnosis.inference.problem import Progress, pose
 from subzero.diagnosis.read_trials import read_trials
 from subzero.diagnosis.results import Detectability, Verdict
 from subzero.diagnosis.verdict.conclude import conclude
+from subzero.diagnosis.verdict.follow_up import follow_up, ranked
 from subzero.model import Model
 
 BUDGETS = ("screen", "verdict", "full")
@@ -116,7 +117,8 @@ def diagnose_trials(
         findings.complete = False
         if () not in search.candidates:
             raise
-    return conclude(findings)
+    known = ranked(findings)
+    return conclude(findings, known, follow_up(findings, known))
 
 
 def _find(findings: Findings, seen: Seen) -> None:
