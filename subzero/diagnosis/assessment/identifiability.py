@@ -14,18 +14,14 @@ from collections.abc import Collection
 import numpy as np
 
 from subzero.diagnosis.hypothesis.hypotheses import Entry, columns_of, nameable
+from subzero.diagnosis.inference import settings
 from subzero.diagnosis.inference.model_average import MIN_DISCRIMINATION
 from subzero.diagnosis.inference.model_search import Search
 from subzero.diagnosis.inference.problem import Problem
 from subzero.diagnosis.results import Detectability
 
-FLAT_SIGNAL = 1.0
-"""A cause of one scale that seems to do less than this, in noise, has no slope at the nominal model."""
 SEEN_SIGNAL = 4.0
 """A signal that would be seen."""
-MAX_REFUTED, REFUTED_NATS = 3, 16.0
-"""So many close rivals of the best are simulated; one that is so far behind in log posterior, as good as a better fit
-might have it, is none: where D is 9, luck would have to be worth three standard deviations. [nat]"""
 
 
 def with_secants(problem: Problem, J: np.ndarray, z: np.ndarray | None = None) -> np.ndarray:
@@ -49,7 +45,7 @@ def _is_dull(entry: Entry, value: float, column: np.ndarray) -> bool:
     """Say whether a parameter at its bound seems to do nothing."""
     parameter = entry.parameter
     at_rest = entry.record < 0 and parameter.low == 0.0 and value < parameter.tolerance
-    return bool(at_rest and np.linalg.norm(column) * parameter.scale < FLAT_SIGNAL)
+    return bool(at_rest and np.linalg.norm(column) * parameter.scale < settings.FLAT_SIGNAL)
 
 
 def marginal(problem: Problem, J: np.ndarray, kappa: float = 1.0) -> np.ndarray:
@@ -155,12 +151,12 @@ def refuted_rivals(search: Search) -> frozenset[str]:
     """
     best, problem, found = search.best(), search.problem, set[str]()
     J = with_secants(problem, best.fit.J, best.fit.z)
-    for _ in range(MAX_REFUTED if best.ids else 0):
+    for _ in range(settings.MAX_TRIED if best.ids else 0):
         D, rival = separation(problem, J, best.fit.z, best.ids, best.kappa, found)
         if rival == "none" or D >= MIN_DISCRIMINATION:
             break
         search.fit((rival,), best.fit)
-        if search.candidates[(rival,)].optimistic_log_posterior > best.log_posterior - REFUTED_NATS:
+        if search.candidates[(rival,)].optimistic_log_posterior > best.log_posterior - settings.REFUTED_NATS:
             break
         found.add(rival)
     return frozenset(found)

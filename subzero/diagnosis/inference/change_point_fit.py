@@ -18,6 +18,7 @@ import numpy as np
 
 from subzero.diagnosis.hypothesis.effect import Effect
 from subzero.diagnosis.hypothesis.hypotheses import log_prior, nameable, variances
+from subzero.diagnosis.inference import settings
 from subzero.diagnosis.inference.change_point_scan import (
     BaseRun,
     ChangePoint,
@@ -32,13 +33,6 @@ from subzero.diagnosis.inference.laplace import Candidate, laplace
 from subzero.diagnosis.inference.linear_gaussian import KAPPAS, Quadratic, log_sum, posterior
 from subzero.diagnosis.inference.map_fit import Fit, bounds, continued, is_poor_fit, refit, with_own_jacobian
 from subzero.diagnosis.inference.problem import Problem
-
-MAX_CHANGE_POINT_ROUNDS, MAX_FITTED_PER_ROUND, WORTH_FITTING_LOG_POSTERIOR = 3, 3, 6.0
-"""Rounds of trying; in each at most so many are fitted that the linear problem has this close to the best."""
-NON_LINEAR_SLACK, NON_LINEAR_SLACK_OF_LEADER = 0.05, 0.75
-"""Where a cause gains much, what is not linear may be this share of it; of the cause that gains most, so much."""
-REFIT_LOG_POSTERIOR = 2.0
-"""What was fitted is fitted again where the linear problem promises so much more, in log posterior."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -86,7 +80,7 @@ def fit_change_points(
     done: dict[str, FittedChangePoint] = {}
     hopes = [one for place in places for one in ranked_in(problem, place, able, record)]
     hopes += [one for each in large for one in ranked_by_runs(problem, each, able, record)]
-    for _ in range(MAX_CHANGE_POINT_ROUNDS):
+    for _ in range(settings.MAX_ROUNDS):
         worth = _worth(hopes, done, least)
         if not worth:
             break
@@ -109,14 +103,11 @@ def _worth(
     ranked = sorted(hopes, key=lambda one: -one.log_posterior)
     first = {one.begun.effect.id: one for one in reversed(ranked)}
     known = {name: one.log_posterior for name, one in done.items()}
-    bar = (
-        max([least, *known.values(), *(one.log_posterior for one in ranked[:1])])
-        - WORTH_FITTING_LOG_POSTERIOR
-    )
+    bar = max([least, *known.values(), *(one.log_posterior for one in ranked[:1])]) - settings.HOPELESS_NATS
     found = [one for name, one in first.items()
-             if one.at_most(NON_LINEAR_SLACK_OF_LEADER if one is ranked[0] else NON_LINEAR_SLACK) > bar
-             and one.log_posterior > known.get(name, -np.inf) + REFIT_LOG_POSTERIOR]  # fmt: skip
-    return sorted(found, key=lambda one: -one.log_posterior)[:MAX_FITTED_PER_ROUND]
+             if one.at_most(settings.NON_LINEAR_SHARE_OF_FIRST if one is ranked[0] else settings.NON_LINEAR_SHARE) > bar
+             and one.log_posterior > known.get(name, -np.inf) + settings.CLOSE_NATS]  # fmt: skip
+    return sorted(found, key=lambda one: -one.log_posterior)[: settings.MAX_TRIED]
 
 
 def _fitted(problem: Problem, hope: RankedChangePoint) -> FittedChangePoint:

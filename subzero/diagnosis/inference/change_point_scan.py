@@ -17,6 +17,7 @@ import numpy as np
 from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.effect import Effect, with_free_onset, with_onset
 from subzero.diagnosis.hypothesis.hypotheses import Entry, columns_of, log_prior, nameable, variances
+from subzero.diagnosis.inference import settings
 from subzero.diagnosis.inference.laplace import Candidate, possible
 from subzero.diagnosis.inference.linear_gaussian import KAPPAS, ForceInformation, Quadratic, posterior, seen
 from subzero.diagnosis.inference.map_fit import Fit, bounds
@@ -25,8 +26,6 @@ from subzero.diagnosis.inference.simulator import Stop, Track, simulate_on, simu
 
 COARSE_ONSETS, FINE_PER_COARSE, MIN_ONSET_SPACING_S = 15, 4, 1.0
 """A record has so many steps of times to begin at, each so many finer ones, but none is shorter than the last. [s]"""
-MIN_SCAN_GAIN = 3.0
-"""What gains less, in log evidence, is not tried on the finer grid."""
 SECANT_SCALES = 0.25
 """Step of a sensitivity, in effect scales."""
 
@@ -115,7 +114,7 @@ def scan(
     coarse = times_of(place.along.problem, record)
     found = _strongest(_tried(place, D, [(one, time) for one in able for time in coarse], record))
     spacing = spacing_of(place.along.problem, record)
-    worth = [one for one in found[:best] if one.log_gain > MIN_SCAN_GAIN]
+    worth = [one for one in found[:best] if one.log_gain > settings.SCAN_GAIN_NATS]
     finer = [(one.effect, time) for one in worth for time in _around(one.time, spacing)]
     return _strongest(found + _tried(place, D, finer, record)) if finer else found
 
@@ -230,10 +229,6 @@ def with_change_point(problem: Problem, begun: ChangePoint) -> Problem:
     return replace(problem, entries=(*problem.entries, *more))
 
 
-LARGER_SIZES = (1.0, 1.5)
-"""A cause that begins late is larger than one that holds throughout."""
-
-
 class RankedChangePoint(NamedTuple):
     """A sudden cause in the linear problem of a place: log posterior, as of `Struck`; where its fit begins, all entries
     and its parameters, if that is not the best of the linear problem.
@@ -274,7 +269,7 @@ def _large(problem: Problem, fit: Fit, effect: Effect, record: int) -> RankedCha
     without = fit.z.copy()
     without[own] = 0.0
     first = ChangePoint(effect=effect, time=times[0], record=record, log_gain=-np.inf, mean=fit.z[own])
-    sizes = [np.clip(share * fit.z[own], low[own], high[own]) for share in LARGER_SIZES]
+    sizes = [np.clip(share * fit.z[own], low[own], high[own]) for share in settings.LATER_SIZES]
     jobs = [replace(first, time=time, mean=size) for time in times for size in sizes]
     at = [np.concatenate([without, one.mean, [one.time - first.time]]) for one in jobs]
     place, none = LinearisationPoint(fit, BaseRun(problem, fit.z)), _log_none(problem, fit, record)

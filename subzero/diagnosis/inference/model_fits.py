@@ -17,9 +17,10 @@ from typing import TypeVar
 import numpy as np
 
 from subzero.diagnosis.hypothesis.hypotheses import Ids, columns_of, variances
+from subzero.diagnosis.inference import settings
 from subzero.diagnosis.inference.laplace import Candidate, candidate_of
 from subzero.diagnosis.inference.linear_gaussian import posterior
-from subzero.diagnosis.inference.map_fit import CONVERGED_GAIN, MIN_GAIN, Fit, refit
+from subzero.diagnosis.inference.map_fit import Fit, refit
 from subzero.diagnosis.inference.problem import (
     Problem,
     Progress,
@@ -31,14 +32,6 @@ from subzero.diagnosis.inference.screening import Screening, is_flat, screening_
 
 Asked = TypeVar("Asked")
 Made = TypeVar("Made")
-MAX_REFINED, HOPELESS_LOG_POSTERIOR = 6, 6.0
-"""At most so many fits with sensitivities of their own in a race; none for what is this far behind in log posterior."""
-JACOBIAN_WITHIN = 4.0
-"""Sensitivities hold as far as this from where they were made, in tolerances."""
-MAX_RUNS_PER_RECORD = 800
-"""After so many runs of each record only what hopes to be the best is fitted again."""
-MAX_CROSSINGS = 2
-"""So often close rivals are fitted from where the others are."""
 
 
 @dataclass(kw_only=True, eq=False)
@@ -102,17 +95,18 @@ class Fits:
             self.problem, ids, refit(self.problem, z, J, D, most_fresh=0, made_at=start.made_at)
         )
 
-    def race(self, most: int = MAX_REFINED, hopeless: float = HOPELESS_LOG_POSTERIOR) -> None:
+    def race(self, most: int | None = None, hopeless: float | None = None) -> None:
         """Fit candidates again with sensitivities of their own, the best first, until the next is hopeless."""
-        for _ in range(most):
+        hopeless = settings.HOPELESS_NATS if hopeless is None else hopeless
+        runs = settings.MAX_RUNS_PER_RECORD * len(self.problem.records)
+        for _ in range(settings.MAX_REFINED if most is None else most):
             self.raced |= {one.ids for one in self.candidates.values() if self._settled(one.fit)}
             waiting = [one for one in self.candidates.values() if one.ids not in self.raced]
             if not waiting:
                 return
             now = max(waiting, key=lambda one: one.optimistic_log_posterior)
             done = [self.candidates[ids].log_posterior for ids in self.raced]
-            most = MAX_RUNS_PER_RECORD * len(self.problem.records)
-            behind = 0.0 if self.problem.kept.asked > most else hopeless
+            behind = 0.0 if self.problem.kept.asked > runs else hopeless
             if len(done) >= 2 and now.optimistic_log_posterior < max(done) - behind:
                 return
             self._say(0.5, "fitting again", now.ids)
@@ -122,15 +116,15 @@ class Fits:
         """Fit the close rivals of the best candidate from where that is, and it from where they are, and keep what is
         better: where a drum stops or a cable falls slack runs have kinks, and a fit may end in a hollow of its own.
         """
-        for _ in range(MAX_CROSSINGS):
+        for _ in range(settings.MAX_REPEATS):
             best = self.best()
-            close = [ids for ids in self._ranked()[1:MAX_REFINED]
-                     if self.candidates[ids].log_posterior > best.log_posterior - HOPELESS_LOG_POSTERIOR]  # fmt: skip
+            close = [ids for ids in self._ranked()[1:settings.MAX_REFINED]
+                     if self.candidates[ids].log_posterior > best.log_posterior - settings.HOPELESS_NATS]  # fmt: skip
             self.fit_all(close, best.fit)
             starts = [self.candidates[ids].fit for ids in close]
             for found in self._aside(partial(self._fitted, best.ids), starts):
                 self._take(found)
-            if self.best().log_posterior < best.log_posterior + CONVERGED_GAIN:
+            if self.best().log_posterior < best.log_posterior + settings.CONVERGED_GAIN_NATS:
                 return
 
     def _again(self, one: Candidate) -> None:
@@ -156,11 +150,11 @@ class Fits:
         D = variances(self.problem.entries, ids, known.kappa if known else 1.0)
         z = posterior(fit.quadratic, D).z
         found = refit(self.problem, z, fit.J, D, most_fresh=0, made_at=fit.made_at)
-        if known is None or found.objective < known.fit.objective - MIN_GAIN:
+        if known is None or found.objective < known.fit.objective - settings.NEGLIGIBLE_GAIN_NATS:
             self._keep(ids, found)
             self.raced.discard(ids)
 
-    def _settled(self, fit: Fit, near: float = JACOBIAN_WITHIN) -> bool:
+    def _settled(self, fit: Fit, near: float = settings.JACOBIAN_HOLDS_TOLERANCES) -> bool:
         """Say whether a fit has converged close to where its sensitivities were made, or has not left from there."""
         moved = fit.moved(self.problem)
         return moved == 0.0 or (fit.converged and moved < near)
@@ -233,7 +227,7 @@ class SharpFits(Fits):
     def _give_up(self, best: Candidate) -> None:
         """Give up what is hopelessly behind the best candidate and no part of it."""
         kept = {ids: one for ids, one in self.candidates.items()
-                if one.log_posterior > best.log_posterior - HOPELESS_LOG_POSTERIOR
+                if one.log_posterior > best.log_posterior - settings.HOPELESS_NATS
                 or set(ids) <= set(best.ids)}  # fmt: skip
         self.behind |= {ids: one.log_posterior - best.log_posterior for ids, one in self.candidates.items()
                         if ids not in kept}  # fmt: skip

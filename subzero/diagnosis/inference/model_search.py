@@ -13,10 +13,10 @@ from itertools import chain, combinations
 import numpy as np
 
 from subzero.diagnosis.hypothesis.hypotheses import Ids, columns_of, nameable, variances
+from subzero.diagnosis.inference import settings
 from subzero.diagnosis.inference.laplace import Candidate, candidate_of
 from subzero.diagnosis.inference.linear_gaussian import KAPPAS
 from subzero.diagnosis.inference.map_fit import (
-    MIN_GAIN,
     Fit,
     at_bad_minimum,
     continued,
@@ -37,17 +37,6 @@ from subzero.diagnosis.inference.screening import (
     with_sizes_tried,
 )
 
-MAX_ADDED, MAX_SWAPPED, MIN_ADDED_LOG_POSTERIOR = 2, 3, -4.0
-"""At most so many with a cause more, of a log posterior that adds at least MIN_ADDED_LOG_POSTERIOR; so many with
-another cause.
-"""
-BAD_MINIMUM_LOG_POSTERIOR = 6.0
-"""A fit with so much less log posterior than the linear problem at another promises may have gone astray."""
-MIN_MERGED_LOG_POSTERIOR, MERGED_SCALES = -15.0, (0.5, 1.5)
-"""One cause in the place of two is fitted if its log posterior adds at least that, at one of these effect scales."""
-MOST_CAUSES, MAX_GROWING_ROUNDS = 3, 4
-"""Causes of a hypothesis, and rounds of growing."""
-
 
 @dataclass(kw_only=True, eq=False)
 class GrowingFits(SharpFits):
@@ -66,19 +55,19 @@ class GrowingFits(SharpFits):
         less, until the best stays.
         """
         looked: set[Ids] = set()
-        for _ in range(MAX_GROWING_ROUNDS):
+        for _ in range(settings.MAX_GROWING_ROUNDS):
             best = self.begin_again(self.best())
             if best.ids in looked:
                 return
             looked.add(best.ids)
             self._say(0.7, "a further cause beside", best.ids)
-            self.fit_all(self._more(best) if len(best.ids) < MOST_CAUSES else [], best.fit)
+            self.fit_all(self._more(best) if len(best.ids) < settings.MAX_CAUSES else [], best.fit)
             for without in best.ids:
                 self._without(best, without)
             self._aside_of(best)
             self._kinked(best)
             self._parts_again(best)
-            self.race(2, 2.0)
+            self.race(settings.MAX_ADDED, settings.CLOSE_NATS)
             self.cross()
             self.sharpen()
             if self.best().ids == best.ids:
@@ -88,14 +77,14 @@ class GrowingFits(SharpFits):
         """Return the hypotheses with one cause more that the linear problem at the best fit finds best."""
         found = self._unknown(with_one_added(self.problem, best))
         self.beside |= found
-        return _best_of(found, best.log_posterior + MIN_ADDED_LOG_POSTERIOR)
+        return _best_of(found, best.log_posterior - settings.FURTHER_CAUSE_NATS)
 
     def _without(self, best: Candidate, without: str) -> None:
         """Fit the best hypothesis without one of its causes, and with others in its place."""
         rest = tuple(one for one in best.ids if one != without)
         self._below(rest, best.fit)
         found = self._unknown(with_one_swapped(self.problem, best, rest))
-        self.fit_all(sorted(found, key=lambda ids: -found[ids])[:MAX_SWAPPED], best.fit)
+        self.fit_all(sorted(found, key=lambda ids: -found[ids])[: settings.MAX_TRIED], best.fit)
 
     def _aside_of(self, best: Candidate) -> None:
         """Fit what comes out best beside the other candidates, if the linear problem there has it before the best: a
@@ -103,24 +92,24 @@ class GrowingFits(SharpFits):
         """
         found: dict[Ids, tuple[float, Fit]] = {}
         for one in self.candidates.values():
-            if one is not best and len(one.ids) < MOST_CAUSES:
+            if one is not best and len(one.ids) < settings.MAX_CAUSES:
                 for ids, log in self._unknown(with_one_added(self.problem, one)).items():
                     if log > max(best.log_posterior, found.get(ids, (-np.inf,))[0]):
                         found[ids] = log, one.fit
-        for ids in sorted(found, key=lambda ids: -found[ids][0])[:MAX_ADDED]:
+        for ids in sorted(found, key=lambda ids: -found[ids][0])[: settings.MAX_ADDED]:
             self.fit(ids, found[ids][1])
 
     def _kinked(self, best: Candidate) -> None:
         """Fit causes that runs have kinks in beside the best, or in the place of one of its causes."""
         found = dict[Ids, TriedSize]()
         rests = [tuple(one for one in best.ids if one != without) for without in best.ids]
-        for rest in [best.ids, *rests] if len(best.ids) < MOST_CAUSES else rests:
+        for rest in [best.ids, *rests] if len(best.ids) < settings.MAX_CAUSES else rests:
             for ids, one in with_sizes_tried(
                 self.problem, best, rest, non_smooth(self.problem, rest)
             ).items():
                 if ids not in found or one.log_posterior > found[ids].log_posterior:
                     found[ids] = one
-        for ids in self._worth_fitting(found, best, MIN_ADDED_LOG_POSTERIOR):
+        for ids in self._worth_fitting(found, best, -settings.FURTHER_CAUSE_NATS):
             D = variances(self.problem.entries, ids, best.kappa)
             fit = refit(self.problem, found[ids].z, found[ids].J, D, most_fresh=0)
             self._take(candidate_of(self.problem, ids, fit))
@@ -134,8 +123,8 @@ class GrowingFits(SharpFits):
             entries, tuple(one for one in nameable(self.problem.entries) if one not in best.ids)
         )
         for rest in combinations(best.ids, len(best.ids) - 2) if len(best.ids) > 1 else ():
-            found |= with_sizes_tried(self.problem, best, rest, others, MERGED_SCALES)
-        worth = self._worth_fitting(found, best, MIN_MERGED_LOG_POSTERIOR)
+            found |= with_sizes_tried(self.problem, best, rest, others, settings.MERGED_SCALES)
+        worth = self._worth_fitting(found, best, -settings.MERGED_NATS)
         for ids in worth:
             z, D = found[ids].z, variances(entries, ids, best.kappa)
             fit = refit(self.problem, z, self.problem.jacobian(z), D, most_fresh=2, made_at=z)
@@ -169,32 +158,14 @@ class GrowingFits(SharpFits):
         """Return those of estimated log posteriors that no fit is known of, or only one that went astray from afar."""
         known = {ids: one.log_posterior for ids, one in self.candidates.items()}
         return {
-            ids: log
-            for ids, log in found.items()
-            if known.get(ids, -np.inf) < log - BAD_MINIMUM_LOG_POSTERIOR
+            ids: log for ids, log in found.items() if known.get(ids, -np.inf) < log - settings.HOPELESS_NATS
         }
 
 
 def _best_of(found: Mapping[Ids, float], least: float) -> list[Ids]:
     """Return the best hypotheses, at most MAX_ADDED, of those whose log posterior is above the least."""
-    ranked = sorted(found, key=lambda ids: -found[ids])[:MAX_ADDED]
+    ranked = sorted(found, key=lambda ids: -found[ids])[: settings.MAX_ADDED]
     return [ids for ids in ranked if found[ids] > least]
-
-
-KEEP_LOG_EVIDENCE, MAX_SINGLES, MAX_PAIRS = 12.0, 7, 4
-"""Refit hypotheses whose log evidence is this close to the best of their kind, and at most so many."""
-MAX_BENT, BENT_TOLERANCES = 2, 10.0
-"""So many causes that the wide fit bends by at least so many tolerances are fitted by themselves."""
-MAX_SWEPT = 4
-"""So many causes are fitted by themselves if the wide fit is not close."""
-MAX_RESTARTED, MAX_SETTLING_ROUNDS, SETTLED_JACOBIAN_WITHIN = 3, 3, 1.0
-"""So many are fitted from off their kinks; rounds of settling; so close, in tolerances, the sensitivities of what is
-told were made.
-"""
-RIVAL_LOG_POSTERIOR, AKIN_LOG_POSTERIOR = 2.0, 6.0
-"""What is so close to the best in log posterior is settled, too; what has a cause more or less, from farther behind;
-the first within AKIN_LOG_POSTERIOR are fitted from off their kinks, too.
-"""
 
 
 @dataclass(kw_only=True, eq=False)
@@ -231,8 +202,8 @@ class Search(GrowingFits):
             self._say(0.3, "fitting", ids, " by itself")
             self._keep(ids, fit)
         best = (
-            self.screen.best(1, MAX_SINGLES, KEEP_LOG_EVIDENCE),
-            self.screen.best(2, MAX_PAIRS, KEEP_LOG_EVIDENCE),
+            self.screen.best(1, settings.MAX_SINGLES, settings.SCREENED_NATS),
+            self.screen.best(2, settings.MAX_PAIRS, settings.SCREENED_NATS),
         )
         self.fit_all(list(chain([()], *best)), words="fitting")
 
@@ -252,22 +223,22 @@ class Search(GrowingFits):
         """
         self._once_more()
         stuck: set[Ids] = set()
-        for _ in range(MAX_SETTLING_ROUNDS):
+        for _ in range(settings.MAX_ROUNDS):
             best = self.best()
             for one in [one for one in self.candidates.values() if self._is_open(one, best)]:
                 if one.ids in stuck:
                     continue
                 self._say(0.75, "settling", one.ids)
                 self._again(one)
-                if self.candidates[one.ids].log_posterior < one.log_posterior + MIN_GAIN:
+                if self.candidates[one.ids].log_posterior < one.log_posterior + settings.NEGLIGIBLE_GAIN_NATS:
                     stuck.add(one.ids)
         self.cross()
         self._nothing()
 
     def _once_more(self) -> None:
         """Fit the first candidates from off their kinks, if they are close to the best and were not so begun before."""
-        for ids in self._ranked()[:MAX_RESTARTED]:
-            close = self.candidates[ids].log_posterior > self.best().log_posterior - AKIN_LOG_POSTERIOR
+        for ids in self._ranked()[: settings.MAX_TRIED]:
+            close = self.candidates[ids].log_posterior > self.best().log_posterior - settings.HOPELESS_NATS
             if close and ids not in self.begun:
                 self._say(0.75, "once more", ids)
                 self.begin_again(self.candidates[ids])
@@ -275,9 +246,9 @@ class Search(GrowingFits):
     def _is_open(self, one: Candidate, best: Candidate) -> bool:
         """Say whether a candidate that is as good as the best, or might still catch up with it, has not settled."""
         behind = best.log_posterior - one.optimistic_log_posterior
-        if behind < RIVAL_LOG_POSTERIOR:
-            return not self._settled(one.fit, SETTLED_JACOBIAN_WITHIN)
-        akin = behind < AKIN_LOG_POSTERIOR and _akin(one.ids, best.ids)
+        if behind < settings.CLOSE_NATS:
+            return not self._settled(one.fit, settings.OWN_JACOBIAN_TOLERANCES)
+        akin = behind < settings.HOPELESS_NATS and _akin(one.ids, best.ids)
         return akin and not one.fit.converged and not self._settled(one.fit)
 
     @property
@@ -290,14 +261,16 @@ class Search(GrowingFits):
         problem says little; and if it is not close to the records, the best of those that were swept.
         """
         if self.screen.far:
-            return self.screen.best(1, MAX_SWEPT, np.inf)
+            return self.screen.best(1, settings.MAX_PAIRS, np.inf)
         bent: dict[Ids, float] = {}
         for z, entry in zip(self.wide.z, self.problem.entries, strict=True):
             if entry.record < 0:
                 size, ids = abs(float(z)) / entry.parameter.tolerance, (entry.effect.id,)
                 bent[ids] = max(size, bent.get(ids, 0.0))
         return [
-            ids for ids in sorted(bent, key=lambda ids: -bent[ids])[:MAX_BENT] if bent[ids] > BENT_TOLERANCES
+            ids
+            for ids in sorted(bent, key=lambda ids: -bent[ids])[: settings.MAX_ADDED]
+            if bent[ids] > settings.BENT_TOLERANCES
         ]
 
     def _alone(self, ids: Ids) -> Fit:

@@ -14,6 +14,7 @@ from functools import partial
 import numpy as np
 
 from subzero.diagnosis.hypothesis.hypotheses import PRIOR, Ids, sudden_effects
+from subzero.diagnosis.inference import settings
 from subzero.diagnosis.inference.basis import one_terms
 from subzero.diagnosis.inference.change_point_fit import FittedChangePoint, fit_change_points, linearised_at
 from subzero.diagnosis.inference.change_point_scan import BaseRun, LinearisationPoint
@@ -40,13 +41,6 @@ from subzero.diagnosis.inference.problem import Problem
 from subzero.diagnosis.results import Detectability, Misfit
 from subzero.external_force import AXES
 
-MAX_FORCES = 2
-"""Along the runs of at most so many forces."""
-ALIKE_LOG_POSTERIOR = 10.0
-"""Forces and hypotheses whose log posteriors differ by less."""
-MAX_LARGE = 2
-"""As large as in at most so many hypotheses."""
-
 
 def linearisation_points(
     search: Search, close: Sequence[RelinearisedForce], prior: float
@@ -61,28 +55,16 @@ def linearisation_points(
     best = search.best()
     here = LinearisationPoint(fit=best.fit, along=BaseRun(search.problem, best.fit.z))
     known = [] if search.is_lost() else [best.log_posterior - prior]
-    least = max([*(one.log_posterior for one in close), *known], default=0.0) - ALIKE_LOG_POSTERIOR
-    alike = [one.place for one in close[:MAX_FORCES] if one.log_posterior > least]
+    least = max([*(one.log_posterior for one in close), *known], default=0.0) - settings.LINEAR_NATS
+    alike = [one.place for one in close[: settings.MAX_ADDED] if one.log_posterior > least]
     return [here, *alike]
 
 
 def largest_hypotheses(search: Search) -> list[Candidate]:
     """Return the hypotheses whose causes may be what begins in mid-trial: the best that have any."""
-    least = search.best().log_posterior - ALIKE_LOG_POSTERIOR
+    least = search.best().log_posterior - settings.LINEAR_NATS
     ranked = sorted(search.candidates.values(), key=lambda one: -one.log_posterior)
-    return [one for one in ranked if one.log_posterior > least and one.ids][:MAX_LARGE]
-
-
-ALIKE_FORCES_LOG_POSTERIOR = 10.0
-"""Forces whose log posteriors differ by less are told apart with finer knots."""
-NEAR_LOG_POSTERIOR, FAR_LOG_POSTERIOR, MAX_RELINEARISED = 6.0, 45.0, 3
-"""No force that is further behind the best than FAR_LOG_POSTERIOR, in log posterior, is looked at
-around its own fit, and at most so many; where one cause explains the record within declared tolerances, what is linear
-is nearly true there: besides the most probable force only those that are as close as NEAR_LOG_POSTERIOR."""
-DECISIVE_LOG_POSTERIOR = 30.0
-"""No sum of causes gains more than this, in log posterior, over one cause that leaves nothing but noise."""
-CLOSER_LOOK_LOG_POSTERIOR = 2.0
-"""A force that is no further behind the best, in log posterior, is worth a closer look."""
+    return [one for one in ranked if one.log_posterior > least and one.ids][: settings.MAX_ADDED]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -116,7 +98,7 @@ def explanations_outside(search: Search) -> list[OutOfCatalogue]:
     own = [OutOfCatalogue(beside=(), what=one.what, log_posterior=one.log_posterior + _log_prior(problem),
                    place=None if one.is_lost else one.place) for one in close]  # fmt: skip
     sudden = _sudden(search, close, max(_most(found + own), best.log_posterior))
-    if _most(found + own) > max(_most(sudden), best.log_posterior) - CLOSER_LOOK_LOG_POSTERIOR:
+    if _most(found + own) > max(_most(sudden), best.log_posterior) - settings.CLOSE_NATS:
         found = _finer(search, found, own)
     ranked = _sorted(found, own + sudden)
     _nothing_again(search, ranked[0])
@@ -150,7 +132,7 @@ def is_explained(search: Search, foreign: Sequence[OutOfCatalogue]) -> bool:
     best = max(foreign, key=lambda one: one.log_posterior, default=None)
     if best is None or not isinstance(best.what, FittedChangePoint) or is_poor_fit(best.what.fit):
         return False
-    return best.log_posterior > search.best().log_posterior + DECISIVE_LOG_POSTERIOR
+    return best.log_posterior > search.best().log_posterior + settings.DECISIVE_NATS
 
 
 def _sorted(found: list[OutOfCatalogue], own: list[OutOfCatalogue]) -> list[OutOfCatalogue]:
@@ -200,10 +182,10 @@ def _around_themselves(
 
 def _worth_a_look(hope: dict[str, float], best: Candidate) -> list[str]:
     """Return the forces and drifts that are looked at around their own fits, of hoped-for log posteriors."""
-    ranked = sorted(hope, key=lambda name: -hope[name])[:MAX_RELINEARISED]
-    least = max(best.log_posterior - FAR_LOG_POSTERIOR, hope[ranked[0]] - ALIKE_FORCES_LOG_POSTERIOR)
+    ranked = sorted(hope, key=lambda name: -hope[name])[: settings.MAX_TRIED]
+    least = max(best.log_posterior - settings.FAR_NATS, hope[ranked[0]] - settings.LINEAR_NATS)
     plain = best.kappa == min(KAPPAS) and len(best.ids) == 1
-    further = max(least, best.log_posterior - NEAR_LOG_POSTERIOR) if plain else least
+    further = max(least, best.log_posterior - settings.HOPELESS_NATS) if plain else least
     return [name for i, name in enumerate(ranked) if hope[name] > (further if i else least)]
 
 
@@ -220,7 +202,7 @@ def _most(found: Sequence[OutOfCatalogue]) -> float:
 def _close(found: list[OutOfCatalogue]) -> list[OutOfCatalogue]:
     """Return what is about as probable as the best."""
     best = _most(found)
-    return [one for one in found if one.log_posterior > best - ALIKE_FORCES_LOG_POSTERIOR]
+    return [one for one in found if one.log_posterior > best - settings.LINEAR_NATS]
 
 
 def _bases(search: Search) -> list[Candidate]:

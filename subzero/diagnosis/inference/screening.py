@@ -23,6 +23,7 @@ from subzero.diagnosis.hypothesis.hypotheses import (
     pairs_of,
     variances,
 )
+from subzero.diagnosis.inference import settings
 from subzero.diagnosis.inference.laplace import Candidate, possible
 from subzero.diagnosis.inference.linear_gaussian import (
     KAPPAS,
@@ -34,16 +35,6 @@ from subzero.diagnosis.inference.linear_gaussian import (
 )
 from subzero.diagnosis.inference.map_fit import Fit
 from subzero.diagnosis.inference.problem import Problem
-
-POOR_MEAN_SQUARE = 1.08
-"""A wide fit that leaves a greater mean square, in noise, is not close to the records."""
-STRAINED_TOLERANCES, MAX_STRAINED = 5.0, 6
-"""Nor is one that bends MAX_STRAINED parameters of the model by more than STRAINED_TOLERANCES tolerances: it is
-close by chance."""
-SWEEP_SCALES = (0.25, 0.5, 1.0, 2.0)
-"""Sizes, in effect scales, that causes are tried at by real runs, either way."""
-FLAT_SIGNAL = 1.0
-"""An effect of one scale that seems to do no more than this, in noise, has no slope there."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -79,13 +70,12 @@ class Screening:
 
 def is_close(problem: Problem, wide: Fit) -> bool:
     """Say whether a wide fit leaves nothing but noise, and bends little."""
-    bent = np.abs(wide.z) > STRAINED_TOLERANCES * np.array(
+    bent = np.abs(wide.z) > settings.STRAINED_TOLERANCES * np.array(
         [entry.parameter.tolerance for entry in problem.entries]
     )
     model = np.array([entry.record < 0 for entry in problem.entries])
-    return bool(
-        wide.r @ wide.r < POOR_MEAN_SQUARE * wide.r.size and np.count_nonzero(bent & model) < MAX_STRAINED
-    )
+    is_poor = wide.r @ wide.r >= settings.POOR_MEAN_SQUARE * wide.r.size
+    return bool(not is_poor and np.count_nonzero(bent & model) < settings.MAX_STRAINED)
 
 
 def screening_of(
@@ -145,7 +135,7 @@ def _without_slope(problem: Problem, J: np.ndarray) -> list[int]:
 
 def is_flat(entry: Entry, column: np.ndarray) -> bool:
     """Say whether sensitivities to an entry (m,) are none."""
-    return bool(np.linalg.norm(column) * entry.parameter.scale <= FLAT_SIGNAL)
+    return bool(np.linalg.norm(column) * entry.parameter.scale <= settings.FLAT_SIGNAL)
 
 
 def _sweep(
@@ -167,7 +157,7 @@ def _sweep(
     )
 
 
-def sizes_tried(parameter: Parameter, scales: Sequence[float] = SWEEP_SCALES) -> list[float]:
+def sizes_tried(parameter: Parameter, scales: Sequence[float] = settings.SWEEP_SCALES) -> list[float]:
     """Return the deviations that are tried, at some effect scales either way."""
     both = [side * size * parameter.scale for size in scales for side in (1.0, -1.0)]
     return [size for size in both if parameter.low <= size <= parameter.high]
@@ -223,7 +213,11 @@ class TriedSize(NamedTuple):
 
 
 def with_sizes_tried(
-    problem: Problem, one: Candidate, rest: Ids, at: Sequence[int], scales: Sequence[float] = SWEEP_SCALES
+    problem: Problem,
+    one: Candidate,
+    rest: Ids,
+    at: Sequence[int],
+    scales: Sequence[float] = settings.SWEEP_SCALES,
 ) -> dict[Ids, TriedSize]:
     """Return hypothesis → its best size, for the causes of entries beside the rest of a candidate.
 
