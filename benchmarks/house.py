@@ -40,6 +40,7 @@ ROWS = (
     "subzero.autopilot",
     "subzero.diagnosis",
     "subzero.records",
+    "subzero.sweeps",
     "subzero.synthetic",
     "subzero",
 )

@@ -36,7 +36,7 @@ from scipy.stats import binomtest
 
 import scenarios
 import subzero
-from scenarios.trial import CONTROLS
+from scenarios import CONTROLS
 from subzero.refinement import MOST, refine
 
 WRONG, RIGHT = 0.03, 0.01

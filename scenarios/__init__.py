@@ -17,10 +17,10 @@ Signs, here and everywhere: depth is positive down, heading runs clockwise from 
 the heading to starboard (it increases), positive stern-planes (both) pitch the nose up. Files speak of
 degrees and revolutions per second; a `Trial` of radians and revolutions per second.
 
-Stories: `trial` what a trial is; `motion` one that is prescribed or was measured; `quantities` the one table of
-numbers, units and limits; `schema` what a file may say; `files` opening and parsing; `csv_file`, `samples` columns
-over time; `instructions` commands or motion; `surroundings` water, winch and vessel; `parts` vehicles and
-cables; `steps` what must fit; `reader` all together; `errors` what a problem is.
+Stories: `trial` what a trial is; `instructions` what its vehicle is told, commands or a motion; `steps` the times of a
+run, and what holds at them; `quantities` the one table of numbers, units and limits; `checks` values that are refused
+where they are made; `schema` what a file may say; `files` opening and parsing; `parts` vehicles and cables; `samples`
+columns over time; `reader` all together; `errors` what a problem is.
 """
 
 from __future__ import annotations
@@ -30,7 +30,9 @@ from pathlib import Path
 from typing import Any
 
 from scenarios.errors import Problem, ScenarioError
-from scenarios.trial import CONTROLS, SCHEMES, Commands, Motion, Profile, Start, Trial, Vessel, Winch
+from scenarios.instructions import Commands, Motion
+from scenarios.quantities import CONTROLS, SCHEMES
+from scenarios.trial import Profile, Start, Trial, Vessel, Winch
 
 __all__ = [
     "CONTROLS",

@@ -1,90 +1,182 @@
-"""What a trial is told to do: [commands] or [motion], inline or from a CSV file that it names or is given."""
+"""What a vehicle is told, as values: commands to its actuators, or a motion that is prescribed.
+
+Commands are sampled and held: `Commands.at` says what holds at a time, and nothing else in the product does.
+
+The paper evaluates the cable from the states (u, v, w, p, q, r, φ, θ, ψ) of the vehicle, "measured by the on-board
+sensors or predicted by the dynamical model" (section 3, step 2), and shows it on an idealised vehicle (section 4.1),
+whose motion is linear between a few times. Both are a `Motion`. `subzero.knots` makes a smooth one of its samples.
+"""
 
 from __future__ import annotations
 
-import dataclasses
-from collections.abc import Mapping
-from pathlib import Path
+from collections.abc import Collection
+from dataclasses import dataclass
 
-from scenarios.csv_file import read_csv
-from scenarios.errors import Problem
-from scenarios.files import Source
-from scenarios.quantities import START
-from scenarios.samples import Samples, check_motion, check_times, inline
-from scenarios.schema import LISTS, check_section
+import numpy as np
 
-LEFT_OPEN = ("depth_m", "wet_length_m", "drum_north_m", "drum_east_m", "drum_down_m")
-"""Keys of [start] that a prescribed motion leaves open; the depth unless the motion says it."""
+from scenarios.checks import Checks
+from scenarios.quantities import COMMANDS, INTERPOLATIONS, LINEAR, MOTION, SMOOTH, by_field
+from scenarios.steps import held
+from subzero.errors import short as shown
 
-Given = Mapping[str, str | Path]
-"""``commands`` or ``motion`` → a CSV file that replaces what the trial says."""
+REQUIRED = tuple(by_field(tuple(q for q in MOTION if q.default is None)))
+"""Fields of every motion; those of a motion of the paper's idealised vehicle."""
+LONGEST_GAP = 1.0
+"""A smooth motion is not known where samples are further apart than this … [s]"""
+GAP_RATIO = 5.0
+"""… and than so many of its usual (median) sampling intervals. [-]"""
+
+REACH_THE_END = "Give samples to the end of the run, or shorten the duration to the last of them."
 
 
-def read_instructions(
-    source: Source, given: Given, duration: float | None
-) -> tuple[dict[str, Samples], list[Problem]]:
-    """Read the commands or the motion of a trial.
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Commands:
+    """What the actuators are told; each sample is held until the next, the last one to the end.
 
-    Args:
-        source: the trial file.
-        given: a file of commands that replaces those of the trial, or of a motion that replaces whatever it says.
-        duration: how long the run lasts; None if that is wrong itself. [s]
-
-    Returns:
-        ``commands`` or ``motion`` → its samples; and the problems.
+    Attributes:
+        time: starts at 0 and increases. Shape (samples,). [s]
+        values: propeller [rev/s], rudder [rad], port and starboard stern-plane [rad]. Shape (samples, 4).
     """
-    kinds = [kind for kind in LISTS if source.table.get(kind) not in (None, {})]
-    if "motion" in given or (given and not kinds):
-        kinds = list(given)
-    problems = _check_kinds(source, kinds, given)
-    found: dict[str, Samples] = {}
-    for kind in kinds:
-        samples, wrong = _read(source, kind, given)
-        problems += wrong
-        if kind == "motion" and "motion" not in given:
-            problems += _check_start(source, samples)
-        if samples:
-            found[kind] = samples
-            problems += check_times(samples, duration)
-            problems += check_motion(samples) if kind == "motion" else []
-    return found, problems
+
+    time: np.ndarray
+    values: np.ndarray
+
+    def __post_init__(self) -> None:
+        """Refuse what are no commands; keep arrays of their own that cannot be changed."""
+        check = Checks(self)
+        time = check.rows("time", COMMANDS[:1])
+        values = check.rows("values", COMMANDS[1:], None if time is None else time.size)
+        if time is not None:
+            check.increasing("time", time)
+        check.refuse()
+        assert time is not None and values is not None  # noqa: PT018  # `refuse` has seen to it
+        check.freeze("time", time)
+        check.freeze("values", values)
+
+    def at(self, time: np.ndarray | float) -> np.ndarray:
+        """Return what is commanded at some times, the sample that holds: shape of `time`, then (4,).
+
+        >>> fin = Commands(time=np.array([0.0, 2.0]), values=np.array([[9.0, 0.0, 0.0, 0.0], [9.0, 0.1, 0.0, 0.0]]))
+        >>> fin.at(np.array([0.0, 1.9, 2.0, 50.0]))[:, 1].tolist()
+        [0.0, 0.0, 0.1, 0.1]
+        """
+        return held(self.time, self.values, time)
 
 
-def _check_kinds(source: Source, kinds: list[str], given: Given) -> list[Problem]:
-    """Return the problem that there are no instructions, or two that exclude each other."""
-    if not kinds:
-        why = "neither [commands] nor [motion] is given"
-        return [source.problem("", why, "Give one of the two; fig6 and fig5 show how.")]
-    if "commands" in given and "motion" in kinds:
-        why = "a prescribed motion takes no commands"
-        remedy = "Leave out the file of commands, or take a scenario with [commands]."
-        return [source.problem("motion", why, remedy)]
-    if len(kinds) > 1:
-        return [source.problem("motion", "[commands] is given too", "Keep one of [commands] and [motion].")]
-    return []
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Motion:
+    """A prescribed motion: of the paper's idealised vehicle (section 4.1), or one that was measured (section 3).
+
+    *Linear* between the samples, with kinks that jolt the cable, and after the last sample the last values hold: so is
+    a motion of speed, pitch and heading alone, unless it asks for the other. Sway, heave and roll are zero; pitch and
+    yaw rates are the slopes of pitch and heading.
+
+    *Smooth* between the samples, and known as far as the last one: so is a motion that says more. Its angles and its
+    place are cubics through the samples with the rates and speeds given as slopes (`subzero.knots`). What is not given:
+    sway, heave and roll are zero, rates the slopes of the angles, and the place is where the speeds lead. A place that
+    is given is believed: its noise is noise in the speed of the tow point. Heading and roll may jump by whole turns.
+
+    Attributes:
+        time: starts at 0 and increases. Shape (samples,). [s]
+        surge_speed: u. Shape (samples,). [m/s]
+        pitch: θ, positive nose up. Shape (samples,). [rad]
+        heading: ψ, clockwise from north. Shape (samples,). [rad]
+        sway_speed: v, to starboard; None if it is not known, as all that follow. Shape (samples,). [m/s]
+        heave_speed: w, along the body's down axis. Shape (samples,). [m/s]
+        roll: φ, positive starboard side down. Shape (samples,). [rad]
+        roll_rate: p; only beside a roll. Shape (samples,). [rad/s]
+        pitch_rate: q. Shape (samples,). [rad/s]
+        yaw_rate: r. Shape (samples,). [rad/s]
+        north: place of the hull centre. Shape (samples,). [m]
+        east: place of the hull centre. Shape (samples,). [m]
+        depth: place of the hull centre, positive down; counts before the start's depth. Shape (samples,). [m]
+        interpolation: one of `INTERPOLATIONS`; None: as said above.
+    """
+
+    time: np.ndarray
+    surge_speed: np.ndarray
+    pitch: np.ndarray
+    heading: np.ndarray
+    sway_speed: np.ndarray | None = None
+    heave_speed: np.ndarray | None = None
+    roll: np.ndarray | None = None
+    roll_rate: np.ndarray | None = None
+    pitch_rate: np.ndarray | None = None
+    yaw_rate: np.ndarray | None = None
+    north: np.ndarray | None = None
+    east: np.ndarray | None = None
+    depth: np.ndarray | None = None
+    interpolation: str | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse what is no motion; keep arrays of their own that cannot be changed."""
+        check, columns = Checks(self), by_field(MOTION)
+        given = [name for name in columns if name in REQUIRED or getattr(self, name) is not None]
+        time = check.rows("time", MOTION[:1])
+        count = None if time is None else time.size
+        arrays = {name: check.rows(name, (columns[name],), count) for name in given}
+        if time is not None:
+            check.increasing("time", time)
+        for name, why, remedy in motion_faults(given, self.interpolation):
+            check.say(name, why, remedy)
+        check.refuse()
+        object.__setattr__(self, "interpolation", interpolation_of(given, self.interpolation))
+        for name, array in arrays.items():
+            if array is not None:
+                turns = self.is_smooth and name in ("heading", "roll")
+                check.freeze(name, np.unwrap(array) if turns else array)
+        at = gap_at(self.time) if self.is_smooth else None
+        if at is not None:
+            check.say(f"time[{at}]", *gap_words(self.time, at), self.time[at])
+        check.refuse()
+
+    @property
+    def is_smooth(self) -> bool:
+        """Whether it is smooth between its samples."""
+        return self.interpolation == SMOOTH
+
+    @property
+    def given(self) -> tuple[str, ...]:
+        """Names of what is given over time."""
+        return tuple(name for name in by_field(MOTION) if name != "time" and getattr(self, name) is not None)
 
 
-def _check_start(source: Source, samples: Samples | None) -> list[Problem]:
-    """Return what [start] says beside a prescribed motion, though the motion says it already, or has no actuators."""
-    start = source.table.get("start", {})
-    why, remedy = "the prescribed motion says how the run starts", "Leave it out, and set it in [motion]."
-    known = {quantity.name for quantity in START} | {"at_trim"}
-    said = known - set(LEFT_OPEN) | {"depth_m"} & set(samples.columns if samples else ())
-    given = [key for key in start if key in said] if isinstance(start, Mapping) else []
-    return [source.problem(f"start.{key}", why, remedy, found=start[key]) for key in given]
+def interpolation_of(given: Collection[str], asked: str | None) -> str:
+    """Return how a motion that gives some fields goes on between its samples."""
+    return asked or (SMOOTH if set(given) - set(REQUIRED) else LINEAR)
 
 
-def _read(source: Source, kind: str, given: Given) -> tuple[Samples | None, list[Problem]]:
-    """Return the samples of a section: from the file that replaces it, the file that it names, or itself."""
-    if kind in given:
-        return read_csv(Path(given[kind]), str(given[kind]), kind)
-    values, problems = check_section(source, kind, source.table[kind])
-    asked = values.pop("interpolation", None)
-    if "file" in values:
-        samples, wrong = read_csv(source.folder / values["file"], values["file"], kind)
-    else:
-        lists = {name: values[name] for name in values if values[name] is not None}
-        samples, wrong = inline(source, kind, lists)
-    if samples:
-        samples = dataclasses.replace(samples, interpolation=asked)
-    return samples, problems + wrong
+def motion_faults(given: Collection[str], asked: str | None) -> list[tuple[str, str, str]]:
+    """Return what does not fit in a motion that gives some fields: the field, why, and what to do."""
+    faults = []
+    more = [name for name in given if name not in REQUIRED]
+    if asked not in (None, *INTERPOLATIONS):
+        allowed = f"Allowed: {', '.join(INTERPOLATIONS)}."
+        faults.append(("interpolation", f"a motion knows no interpolation {shown(asked)}", allowed))
+    elif asked == LINEAR and more:
+        why = f"a linear motion has speed, pitch and heading alone, and here is {', '.join(more)} too"
+        faults.append(("interpolation", why, f'Leave out the others, or take "{SMOOTH}".'))
+    if "roll_rate" in given and "roll" not in given:
+        faults.append(("roll_rate", "a roll rate is given, and no roll", "Give both, or neither."))
+    return faults
+
+
+def gap_at(time: np.ndarray) -> int | None:
+    """Return the first sample of a smooth motion that comes too late after the one before it; None if none does."""
+    intervals = np.diff(time)
+    if not intervals.size:
+        return None
+    late = np.flatnonzero(intervals > max(LONGEST_GAP, GAP_RATIO * float(np.median(intervals))))
+    return int(late[0]) + 1 if late.size else None
+
+
+def gap_words(time: np.ndarray, at: int) -> tuple[str, str]:
+    """Return why a gap before sample `at` cannot be, and what to do."""
+    gap, usual = time[at] - time[at - 1], float(np.median(np.diff(time)))
+    why = f"nothing is known for {gap:g} s before it, in a record with a sample every {usual:g} s"
+    return why, "Fill the gap, or end the run before it."
+
+
+def ends_early(duration: float) -> str:
+    """Return why the last sample of a smooth motion comes too soon."""
+    return f"the motion is known until then, and the run lasts {duration:g} s"

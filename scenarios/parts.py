@@ -37,7 +37,7 @@ OPTIONAL = {
     "cable.bending_stiffness": 0.0,
     "cable.strength": 0.0,
     "cable.minimum_bend_radius": 0.0,
-    **{f"{servo}.position_feedback": 0.0 for servo in SERVOS},
+    **{f"{servo}.{key}": 0.0 for servo in SERVOS for key in ("position_feedback", "lost_command")},
 }
 """Keys of the pattern that a file need not have → the value that is taken then."""
 

@@ -1,4 +1,4 @@
-"""The one table of numbers that a trial file may hold: name, unit, limits, default, meaning.
+"""The one table of what a trial file may hold: numbers with unit, limits, default and meaning, and the words.
 
 The unit is part of the name, as in ``hull_step_s``. Limits are hard: a number outside is a slip of the pen or
 of the unit, and is refused. A quantity without a default must be given. The TOML reader, the CSV reader and
@@ -176,3 +176,13 @@ SECTIONS = {
     "motion": MOTION,
 }
 """Section of a trial file → the numbers it may hold."""
+
+SCHEMES = ("moving_end", "paper", "paper_tangent", "paper_drum")
+"""How the cable is solved: our moving end, or the paper's scheme, with either reading of its new node
+("paper" is the usable one, "paper_tangent")."""
+
+CONTROLS = ("pay_out_rate", "constant_tension", "brake")
+"""What a winch does; without a winch the drum is free, and the cable is pulled off it."""
+
+LINEAR, SMOOTH = INTERPOLATIONS = ("linear", "smooth")
+"""What a motion does between its samples: straight lines with kinks, or curves without."""

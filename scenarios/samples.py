@@ -1,40 +1,61 @@
-"""Commands and prescribed motions: columns of numbers over time, inline in the trial file or in a CSV file.
+"""What a vehicle is told, as it stands in files: columns of numbers over time, inline in the trial or in a CSV file.
 
 Inline lists are *switch points*: the last value holds to the end of the run. The rows of a CSV file are
 *samples of a log*: a row holds until the next, and the last for one sampling interval more, at most
 `LONGEST_HOLD`. A log that ends before the run does is refused, because what was commanded after it is not
 known. A smooth motion is known only as far as its last sample, and not where samples are missing, inline or not.
+
+A CSV file has one header line with the columns of `scenarios.quantities`, in any order, then one row a sample. Empty
+lines and lines that start with ``#`` are remarks. A motion may stand in the file that a run writes: the channels that
+say nothing of the motion are passed over.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import csv
+import dataclasses
+import io
+import math
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 
-from scenarios.errors import Problem
-from scenarios.files import Source
-from scenarios.motion import (
+from scenarios.errors import Problem, ScenarioError, nearest_or_all
+from scenarios.files import Source, read_text
+from scenarios.instructions import (
     REACH_THE_END,
-    SMOOTH,
+    Commands,
     Motion,
     ends_early,
     gap_at,
     gap_words,
     interpolation_of,
     motion_faults,
-)  # fmt: skip
-from scenarios.quantities import COMMANDS, MOTION, Quantity, by_field
-from scenarios.trial import Commands
+)
+from scenarios.quantities import COMMANDS, MOTION, SECTIONS, SMOOTH, START, Quantity, by_field
+from scenarios.schema import LISTS, check_section
+from subzero.channels import BY_COLUMN
+from subzero.errors import printable
 from subzero.errors import short as shown
+from subzero.user_file import MOST_COLUMNS, MOST_OF_A_CSV
+
+LEFT_OPEN = ("depth_m", "wet_length_m", "drum_north_m", "drum_east_m", "drum_down_m")
+"""Keys of [start] that a prescribed motion leaves open; the depth unless the motion says it."""
+
+Given = Mapping[str, str | Path]
+"""``commands`` or ``motion`` → a CSV file that replaces what the trial says."""
 
 LONGEST_HOLD = 1.0
 """The last row of a log is believed for no longer than this: a vehicle turns by tens of degrees in it. [s]"""
 
 NUMERICAL = 1e-9
 """Times that differ by less than this are the same: decimal fractions are not exact in binary. [s]"""
+
+Row = tuple[int, list[str]]
+"""Line in the file, from 1, and the cells."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,6 +95,76 @@ class Samples:
         line = self.lines[at] if self.lines else self.key_line
         key = self.key if self.lines else f"{self.key}[{at}]"
         return Problem(file=self.file, line=line, key=key, found=shown(self.time[at]), why=why, remedy=remedy)
+
+
+def read_instructions(
+    source: Source, given: Given, duration: float | None
+) -> tuple[dict[str, Samples], list[Problem]]:
+    """Read the commands or the motion of a trial.
+
+    Args:
+        source: the trial file.
+        given: a file of commands that replaces those of the trial, or of a motion that replaces whatever it says.
+        duration: how long the run lasts; None if that is wrong itself. [s]
+
+    Returns:
+        ``commands`` or ``motion`` → its samples; and the problems.
+    """
+    kinds = [kind for kind in LISTS if source.table.get(kind) not in (None, {})]
+    if "motion" in given or (given and not kinds):
+        kinds = list(given)
+    problems = _check_kinds(source, kinds, given)
+    found: dict[str, Samples] = {}
+    for kind in kinds:
+        samples, wrong = _read_kind(source, kind, given)
+        problems += wrong
+        if kind == "motion" and "motion" not in given:
+            problems += _check_start(source, samples)
+        if samples:
+            found[kind] = samples
+            problems += check_times(samples, duration)
+            problems += check_motion(samples) if kind == "motion" else []
+    return found, problems
+
+
+def _check_kinds(source: Source, kinds: list[str], given: Given) -> list[Problem]:
+    """Return the problem that there are no instructions, or two that exclude each other."""
+    if not kinds:
+        why = "neither [commands] nor [motion] is given"
+        return [source.problem("", why, "Give one of the two; fig6 and fig5 show how.")]
+    if "commands" in given and "motion" in kinds:
+        why = "a prescribed motion takes no commands"
+        remedy = "Leave out the file of commands, or take a scenario with [commands]."
+        return [source.problem("motion", why, remedy)]
+    if len(kinds) > 1:
+        return [source.problem("motion", "[commands] is given too", "Keep one of [commands] and [motion].")]
+    return []
+
+
+def _check_start(source: Source, samples: Samples | None) -> list[Problem]:
+    """Return what [start] says beside a prescribed motion, though the motion says it already, or has no actuators."""
+    start = source.table.get("start", {})
+    why, remedy = "the prescribed motion says how the run starts", "Leave it out, and set it in [motion]."
+    known = {quantity.name for quantity in START} | {"at_trim"}
+    said = known - set(LEFT_OPEN) | {"depth_m"} & set(samples.columns if samples else ())
+    given = [key for key in start if key in said] if isinstance(start, Mapping) else []
+    return [source.problem(f"start.{key}", why, remedy, found=start[key]) for key in given]
+
+
+def _read_kind(source: Source, kind: str, given: Given) -> tuple[Samples | None, list[Problem]]:
+    """Return the samples of a section: from the file that replaces it, the file that it names, or itself."""
+    if kind in given:
+        return read_csv(Path(given[kind]), str(given[kind]), kind)
+    values, problems = check_section(source, kind, source.table[kind])
+    asked = values.pop("interpolation", None)
+    if "file" in values:
+        samples, wrong = read_csv(source.folder / values["file"], values["file"], kind)
+    else:
+        lists = {name: values[name] for name in values if values[name] is not None}
+        samples, wrong = inline(source, kind, lists)
+    if samples:
+        samples = dataclasses.replace(samples, interpolation=asked)
+    return samples, problems + wrong
 
 
 def inline(
@@ -170,3 +261,125 @@ def motion(samples: Samples) -> Motion:
 def _inner(samples: Samples, quantity: Quantity) -> np.ndarray:
     """Return one column in inner units."""
     return np.asarray(samples.columns[quantity.name], dtype=float) * quantity.scale
+
+
+def read_csv(path: Path, name: str, section: str) -> tuple[Samples | None, list[Problem]]:
+    """Read the samples of a section from a CSV file.
+
+    Args:
+        path: the file.
+        name: the file as the user named it.
+        section: ``commands`` or ``motion``.
+
+    Returns:
+        the samples, None if there are no times to speak of; and the problems.
+    """
+    name = printable(name)
+    try:
+        header, rows = _table(read_text(path, name, MOST_OF_A_CSV), name)
+    except ScenarioError as error:
+        return None, list(error.problems)
+    columns, problems = _columns(name, header[1], rows, SECTIONS[section])
+    problems += _header_problems(name, header, SECTIONS[section], BY_COLUMN if section == "motion" else ())
+    problems += _shape_problems(name, header[1], rows)
+    problems.sort(key=lambda problem: problem.line or 0)
+    whole = _whole(header[1], rows)
+    time = columns.get("time_s", [])
+    if not time or any(math.isnan(at) for at in time):
+        return None, problems
+    return Samples(file=name, key="time_s", columns=columns, lines=[line for line, _ in whole]), problems
+
+
+def _whole(header: list[str], rows: list[Row]) -> list[Row]:
+    """Return the rows that have one cell for each column."""
+    return [row for row in rows if len(row[1]) == len(header)]
+
+
+def _columns(
+    name: str, header: list[str], rows: list[Row], quantities: Iterable[Quantity]
+) -> tuple[dict[str, list[float]], list[Problem]]:
+    """Return the columns we know, NaN where a cell cannot be used, and the problems of those cells."""
+    columns: dict[str, list[float]] = {}
+    problems: list[Problem] = []
+    for quantity in quantities:
+        if quantity.name in header:
+            at = header.index(quantity.name)
+            columns[quantity.name] = [
+                _number(name, quantity, line, cells[at], problems) for line, cells in _whole(header, rows)
+            ]
+    return columns, problems
+
+
+def _table(text: str, name: str) -> tuple[Row, list[Row]]:
+    """Return the header and the rows, without remarks."""
+    reader = csv.reader(io.StringIO(text, newline=""))
+    try:
+        rows = [(reader.line_num, [cell.strip() for cell in cells]) for cells in reader]
+    except csv.Error as error:
+        why = f"this is not a CSV file ({error})"
+        problem = Problem(file=name, line=reader.line_num, why=why, remedy="Save it as plain CSV.")
+        raise ScenarioError([problem]) from None
+    rows = [(line, cells) for line, cells in rows if any(cells) and not cells[0].startswith("#")]
+    if not rows:
+        remedy = "Write a header line and one row for each sample."
+        raise ScenarioError([Problem(file=name, why="the file is empty", remedy=remedy)])
+    if len(rows[0][1]) > MOST_COLUMNS:
+        why = f"it has more than {MOST_COLUMNS} columns"
+        raise ScenarioError([Problem(file=name, why=why, remedy="Leave out those that say nothing here.")])
+    return rows[0], rows[1:]
+
+
+def _header_problems(
+    name: str, header: Row, quantities: Iterable[Quantity], passed_over: Iterable[str]
+) -> list[Problem]:
+    """Return the columns that are unknown, doubled or missing."""
+    line, columns = header
+    problems = []
+    allowed = [quantity.name for quantity in quantities]
+    needed = [quantity.name for quantity in quantities if quantity.default is None]
+    for at, column in enumerate(columns):
+        if column not in allowed and column in passed_over:
+            continue
+        if column not in allowed:
+            why, remedy = "there is no such column", nearest_or_all(column, allowed)
+        elif column in columns[:at]:
+            why, remedy = "this column stands twice", "Keep one of the two."
+        else:
+            continue
+        problems.append(
+            Problem(file=name, line=line, key="header", found=shown(column), why=why, remedy=remedy)
+        )
+    remedy = f"Needed: {', '.join(needed)}."
+    missing = [column for column in needed if column not in columns]
+    why = "this column is missing"
+    return problems + [Problem(file=name, line=line, key=key, why=why, remedy=remedy) for key in missing]
+
+
+def _shape_problems(name: str, columns: list[str], rows: list[Row]) -> list[Problem]:
+    """Return the rows that have more or fewer cells than the header, or that there are no rows."""
+    if not rows:
+        return [Problem(file=name, why="there are no rows below the header", remedy="Add one a sample.")]
+    count = len(columns)
+    return [
+        Problem(
+            file=name, line=line, found=f"{len(cells)} cells",
+            why=f"the header has {count} columns", remedy="Give every column one cell.",
+        )
+        for line, cells in rows
+        if len(cells) != count
+    ]  # fmt: skip
+
+
+def _number(name: str, quantity: Quantity, line: int, cell: str, problems: list[Problem]) -> float:
+    """Return the number in a cell; if it cannot be used, add the problem and return NaN."""
+    try:
+        value = float(cell)
+    except ValueError:
+        value, why = math.nan, "this is not a number" if cell else "this cell is empty"
+    else:
+        if quantity.low <= value <= quantity.high:
+            return value
+        why = "this is outside its limits" if math.isfinite(value) else "this is not a finite number"
+    found, remedy = shown(cell) if cell else "", quantity.allowed
+    problems.append(Problem(file=name, line=line, key=quantity.name, found=found, why=why, remedy=remedy))
+    return math.nan

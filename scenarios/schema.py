@@ -14,9 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
 from scenarios.errors import Problem, nearest_or_all
 from scenarios.files import Source
-from scenarios.motion import INTERPOLATIONS
-from scenarios.quantities import SECTIONS, Quantity
-from scenarios.trial import CONTROLS, SCHEMES
+from scenarios.quantities import CONTROLS, INTERPOLATIONS, SCHEMES, SECTIONS, Quantity
 
 STRICT = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
 

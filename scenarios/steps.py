@@ -1,4 +1,12 @@
-"""Time steps: the grid of a run, which sample holds at a time, and whether steps and lengths fit one another."""
+"""Time steps: the one grid of a run, which sample holds at a time, and whether steps and lengths fit one another.
+
+>>> run_times(1.0, 0.3).tolist()              # of a run: whole cable steps, and a last one that ends it
+[0.0, 0.3, 0.6, 0.8999999999999999, 1.0]
+>>> even_times(1.0, 0.3).tolist()             # even, to the end or beyond
+[0.0, 0.3, 0.6, 0.8999999999999999, 1.2]
+>>> sample_times(1.0, 0.3).tolist()           # of a sensor: even, as far as the end
+[0.0, 0.3, 0.6, 0.8999999999999999]
+"""
 
 from __future__ import annotations
 
@@ -7,10 +15,6 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
-
-from scenarios.errors import Problem
-from scenarios.files import Source
-from scenarios.quantities import RUN, START, by_field
 
 MOST_STEPS = 10_000_000
 """A run of more hull steps than this is a slip of the pen: it takes minutes to hours, and gigabytes."""
@@ -24,6 +28,12 @@ TOLERANCE = 1e-9
 JUST_BEFORE_S = 1e-9
 """A sample holds from this much before its time on: grids of decimal fractions meet only to rounding. [s]"""
 
+SHORTEST_LAST_STEP = 0.1
+"""Where a run does not last a whole number of steps, its last step is from this to this and 1 of them. [-]"""
+
+END_TOLERANCE = 1e-6
+"""An even grid may miss the end of a run by this, in steps and in seconds. [-], [s]"""
+
 Numbers = Mapping[str, float]
 """Fields of a trial and its start → value, as far as they are good by themselves."""
 
@@ -35,23 +45,6 @@ class Misfit(NamedTuple):
     found: float
     why: str
     remedy: str
-
-
-def check_steps(source: Source, run: Mapping[str, float], start: Mapping[str, float]) -> list[Problem]:
-    """Return what does not fit in [run] and [start], as far as their numbers are good by themselves.
-
-    Args:
-        source: the trial file, for the lines in messages.
-        run: numbers of the section [run], without those that are wrong.
-        start: numbers of the section [start], likewise.
-    """
-    keys = {field: quantity.name for field, quantity in by_field(RUN + START).items()}
-    given = {**run, **start}
-    numbers = {field: given[key] for field, key in keys.items() if key in given}
-    return [
-        source.problem(f"run.{keys[field]}", why, remedy, found=found)
-        for field, found, why, remedy in misfits(numbers, keys)
-    ]
 
 
 def misfits(numbers: Numbers, words: Mapping[str, str] | None = None) -> list[Misfit]:
@@ -72,6 +65,31 @@ def whole_steps(step: float, count: int) -> np.ndarray:
     return step * np.arange(count)
 
 
+def run_times(duration: float, step: float) -> np.ndarray:
+    """Return the times of a run's results (n,): whole steps from 0, and a last step that ends the run. [s]."""
+    steps = duration / step
+    whole = max(round(steps), 1)
+    if abs(steps - whole) <= TOLERANCE * steps:
+        return np.linspace(0.0, duration, whole + 1)
+    full = max(int(steps - SHORTEST_LAST_STEP), 0)
+    return np.append(whole_steps(step, full + 1), duration)
+
+
+def even_times(duration: float, step: float) -> np.ndarray:
+    """Return times that are evenly spaced by a step (n,), to the end of a run, or just beyond if it is not whole. [s].
+
+    A microsecond more or less is rounding: the grid then ends with the run.
+    """
+    count = max(1, math.ceil(duration / step - END_TOLERANCE))
+    end = duration if abs(count * step - duration) < END_TOLERANCE else count * step
+    return np.linspace(0.0, end, count + 1)
+
+
+def sample_times(duration: float, interval: float) -> np.ndarray:
+    """Return the times at which a sensor is read (n,): 0 and whole intervals, none later than the end. [s]."""
+    return np.arange(0.0, duration + JUST_BEFORE_S, interval)
+
+
 def holding_rows(time: np.ndarray, at: np.ndarray | float) -> np.ndarray:
     """Return which sample holds at some times: the last that is not later; before the first one, the first.
 
@@ -80,6 +98,23 @@ def holding_rows(time: np.ndarray, at: np.ndarray | float) -> np.ndarray:
         at: times of any shape. [s]
     """
     return np.clip(np.searchsorted(time, np.asarray(at) + JUST_BEFORE_S, side="right") - 1, 0, None)
+
+
+def held(time: np.ndarray, values: np.ndarray, at: np.ndarray | float) -> np.ndarray:
+    """Return the values that hold at some times, sample and hold; what `Commands.at` is for commands.
+
+    >>> held(np.array([0.0, 2.0]), np.array([5.0, 7.0]), np.array([-1.0, 1.9, 2.0, 50.0])).tolist()
+    [5.0, 5.0, 7.0, 7.0]
+
+    Args:
+        time: of the samples, increasing (samples,). [s]
+        values: one row a sample (samples, …).
+        at: times of any shape. [s]
+
+    Returns:
+        shape of `at`, then that of a row.
+    """
+    return np.asarray(values, dtype=float)[holding_rows(time, at)]
 
 
 def fitting_step(span: float, longest: float) -> float:

@@ -18,16 +18,20 @@ from typing import Any
 import numpy as np
 
 from scenarios.checks import Checks
-from scenarios.motion import REACH_THE_END, Motion, ends_early
-from scenarios.quantities import BED, COMMANDS, PROFILE, RUN, START, VESSEL, WATER, WINCH, by_field
-from scenarios.steps import holding_rows, misfits, whole_steps
-
-SCHEMES = ("moving_end", "paper", "paper_tangent", "paper_drum")
-"""How the cable is solved: our moving end, or the paper's scheme, with either reading of its new node
-("paper" is the usable one, "paper_tangent")."""
-
-CONTROLS = ("pay_out_rate", "constant_tension", "brake")
-"""What a winch does; without a winch the drum is free, and the cable is pulled off it."""
+from scenarios.instructions import REACH_THE_END, Commands, Motion, ends_early
+from scenarios.quantities import (
+    BED,
+    CONTROLS,
+    PROFILE,
+    RUN,
+    SCHEMES,
+    START,
+    VESSEL,
+    WATER,
+    WINCH,
+    by_field,
+)
+from scenarios.steps import even_times, misfits, run_times
 
 SETPOINT = dict(zip(CONTROLS, (*WINCH[1:], None), strict=True))
 """Control of a winch → the quantity that it follows."""
@@ -50,9 +54,6 @@ FOUND_BY_TRIM = (
 """Fields of a start that a start in trim leaves no room for."""
 FOUND_WHY = "a start with at_trim finds it"
 TRIM_NEEDS_SPEED = "a start with at_trim holds a forward speed: fins need a flow"
-
-SHORTEST_LAST_STEP = 0.1
-"""Where a run does not last a whole number of cable steps, its last step is from this to this and 1 of them. [-]"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -132,40 +133,6 @@ class Start:
         """Where the drum is from the tow point, north, east, down; None where a straight cable says so. [m]."""
         place = self.drum_north, self.drum_east, self.drum_down
         return place if any(place) else None
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Commands:
-    """What the actuators are told; each sample is held until the next, the last one to the end.
-
-    Attributes:
-        time: starts at 0 and increases. Shape (samples,). [s]
-        values: propeller [rev/s], rudder [rad], port and starboard stern-plane [rad]. Shape (samples, 4).
-    """
-
-    time: np.ndarray
-    values: np.ndarray
-
-    def __post_init__(self) -> None:
-        """Refuse what are no commands; keep arrays of their own that cannot be changed."""
-        check = Checks(self)
-        time = check.rows("time", COMMANDS[:1])
-        values = check.rows("values", COMMANDS[1:], None if time is None else time.size)
-        if time is not None:
-            check.increasing("time", time)
-        check.refuse()
-        assert time is not None and values is not None  # noqa: PT018  # `refuse` has seen to it
-        check.freeze("time", time)
-        check.freeze("values", values)
-
-    def at(self, time: np.ndarray | float) -> np.ndarray:
-        """Return what is commanded at some times, the sample that holds: shape of `time`, then (4,).
-
-        >>> fin = Commands(time=np.array([0.0, 2.0]), values=np.array([[9.0, 0.0, 0.0, 0.0], [9.0, 0.1, 0.0, 0.0]]))
-        >>> fin.at(np.array([0.0, 1.9, 2.0, 50.0]))[:, 1].tolist()
-        [0.0, 0.0, 0.1, 0.1]
-        """
-        return np.asarray(self.values, dtype=float)[holding_rows(self.time, time)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -343,9 +310,8 @@ class Trial:
 
     def times(self) -> np.ndarray:
         """Return the times of the results (n,): whole cable steps from 0, and a last step that ends the run. [s]."""
-        steps = self.duration / self.cable_step
-        whole = max(round(steps), 1)
-        if abs(steps - whole) <= 1e-9 * steps:
-            return np.linspace(0.0, self.duration, whole + 1)
-        full = max(int(steps - SHORTEST_LAST_STEP), 0)
-        return np.append(whole_steps(self.cable_step, full + 1), self.duration)
+        return run_times(self.duration, self.cable_step)
+
+    def even_times(self) -> np.ndarray:
+        """Return times that are one cable step apart (n,): to the end, or to the first whole step beyond it. [s]."""
+        return even_times(self.duration, self.cable_step)

@@ -38,6 +38,7 @@ _HOME = {
     "read_record": ("subzero.records.record", "read_record"),
     "read_trials": ("subzero.diagnosis.read_trials", "read_trials"),
     "simulate": ("subzero.simulation", "simulate"),
+    "sweep": ("subzero.sweeps.api", "sweep"),
     "warnings_of": ("subzero.validity", "warnings_of"),
 }
 """Public name → (module, name there)."""

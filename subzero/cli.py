@@ -20,9 +20,9 @@ from cyclopts import Parameter
 from rich.console import Console
 
 import scenarios
-from subzero import cli_autopilot, cli_diagnosis
+from subzero import cli_autopilot, cli_diagnosis, cli_sweep
 from subzero.errors import UserError, printable
-from subzero.interrupts import INTERRUPTED, words
+from subzero.interrupts import INTERRUPTED, came, words
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -151,6 +151,7 @@ def compare(
 
 cli_autopilot.add_to(app)
 cli_diagnosis.add_to(app)
+cli_sweep.add_to(app)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -168,6 +169,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except UserError as error:
         return _refuse(str(error))
     except KeyboardInterrupt:
+        print(words(), file=sys.stderr)
+        return INTERRUPTED
+    except Exception:  # matplotlib's drawing in C++ made a ValueError of an interrupt in a call back
+        if not came():
+            raise
         print(words(), file=sys.stderr)
         return INTERRUPTED
 

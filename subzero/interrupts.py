@@ -13,7 +13,7 @@ import socket
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
 from typing import Never
@@ -28,6 +28,9 @@ AGAIN_S = 0.02
 """An interrupt that was lost comes again after this. [s]"""
 
 _patience = [PATIENCE_S]
+_raised = [False]
+"""Whether a signal has interrupted this process."""
+_left: list[Callable[[], str]] = []
 _lost = [0]
 """How many signals were lost and have been sent again, and not been heard by the thread yet."""
 
@@ -72,8 +75,20 @@ def leave(code: int) -> Never:
     os._exit(code)
 
 
+def came() -> bool:
+    """Say whether a signal came: an error behind it may be its doing, as machine code makes its own of an interrupt."""
+    return _raised[0]
+
+
+def leaves(left: Callable[[], str]) -> None:
+    """Let an interrupted command say what it leaves, which keeps something besides the files of its end."""
+    _left[:] = [left]
+
+
 def words() -> str:
     """Return what an interrupted command says: what became of its files."""
+    if _left:
+        return f"Interrupted; {_left[0]()}."
     stage = sys.modules.get("subzero.stage")
     left = stage.interruption() if stage and hasattr(stage, "interruption") else "nothing was written"
     return f"Interrupted; {left}."
@@ -81,6 +96,7 @@ def words() -> str:
 
 def _interrupt(number: int, frame: FrameType | None) -> Never:
     """Raise what Ctrl-C raises."""
+    _raised[0] = True
     raise KeyboardInterrupt
 
 

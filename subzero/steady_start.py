@@ -32,7 +32,7 @@ def first_state(trial: scenarios.Trial, model: Model, tethered: bool) -> np.ndar
         return _steady(trial, model, tethered)
     _check_fins(start, model)
     state = vehicle.initial_state(
-        depth=start.depth,
+        position=(0.0, 0.0, start.depth),
         roll=start.roll,
         pitch=start.pitch,
         heading=start.heading,

@@ -14,7 +14,7 @@ symbol         name                                  unit        equation       
 ν_r            the same through the water            m/s, rad/s  ν − (R_nbᵀ v_c, 0)            terms
 M_RB, r_G      mass matrix, centre of gravity        kg, m       Fossen 3.47                   rigid_body
 M_A, A_ij      added mass                            kg, kg m2   Lamb, strips                  added_mass
-C(ν)           Coriolis matrix of a mass matrix                  Kirchhoff                     coriolis
+C(ν)           Coriolis matrix of a mass matrix                  Kirchhoff                     rigid_body
 W, B, r_B      weight, buoyancy and its centre       N, m        (r_G W − r_B B) × k           restoring
 Y_uv, N_ur …   lift of the hull per surge speed      kg/m …      Y_uv |u| v + …                body_lift
 C_d            cross-flow drag coefficient           1           −½ρ C_d 2R |V| V dx           cross_flow
@@ -29,19 +29,22 @@ V, I, q_e      voltage, current, charge drawn        V, A, C     V_full − k q_
 
 from vehicle.actuators import Servo
 from vehicle.dynamics import (
+    POWERS,
     battery_voltage,
     breakdown,
+    breakdown_table,
     deflections,
     derivative,
     finish_step,
+    kinetic_energy,
+    potential_energy,
+    power,
     relative_velocity,
 )
-from vehicle.energy import POWERS, kinetic_energy, potential_energy, power
 from vehicle.free_run import FreeRun, free_run
 from vehicle.kinematics import euler_angles, normalise, quaternion_from_euler, rotation
 from vehicle.parameters import Problem, VehicleError
 from vehicle.state import STATE, STATE_SIZE, initial_state
-from vehicle.table import breakdown_table
 from vehicle.terms import BREAKDOWN, TERMS
 from vehicle.vehicle import SECTIONS, Vehicle, VehicleNumbers, from_mapping, to_mapping
 

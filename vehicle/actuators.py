@@ -1,6 +1,7 @@
 """Servos: from a command to the angle of a fin.
 
-    target = (1 − k) clip(dead zone(command) + offset, ± deflection limit) + k clip(command, ± deflection limit)
+    k      = (1 − c) position feedback
+    target = (1 − k) clip((1 − c) dead zone(command) + offset, ± deflection limit) + k clip(command, ± deflection limit)
     seen   = (1 − k) δ + k fin
     δ'     = clip((target − seen)/lag, ± rate limit)
     fin    = δ, dragged behind by half the backlash of the linkage
@@ -11,10 +12,13 @@ was commanded: "feeding back the actual positions of the control fins to their s
 their remedy for what Fig. 6 (d) leaves unexplained). Between the two, k is the share of the error that is taken at the
 fin, and 1 − k of dead band, offset and play stays. The fin's own sensor is taken as perfect, and as fast as the servo.
 
+c is the share of the command that is lost on the way: a coupling that slips. With c = 1 the fin is jammed at its
+offset, and no feedback moves it.
+
 Each stage has a neutral value that switches it off exactly: dead band 0, offset 0, lag 0 with an infinite
 rate limit (the fin then *is* at its target and the state merely follows), rate and deflection limit infinite,
-backlash 0, position feedback 0. With a finite rate limit a servo still has to stop somewhere: lags shorter than
-`QUICKEST` count as `QUICKEST`.
+backlash 0, position feedback 0, lost command 0. With a finite rate limit a servo still has to stop somewhere: lags
+shorter than `vehicle.state.QUICKEST` count as `QUICKEST`.
 
 Backlash is a play between servo and fin: the linkage stays where it is until the servo has taken up the
 slack. Inside a step the fin is the linkage clipped into the play around the servo; `settle` moves the linkage
@@ -31,10 +35,7 @@ import numpy as np
 
 from subzero.jit import compiled
 from vehicle.parameters import Section, parameter
-from vehicle.state import LINKAGE, SERVO
-
-QUICKEST = 0.01
-"""Shortest lag of a state [s]: an explicit Runge-Kutta step of 0.02 s is stable down to a lag of 0.0072 s."""
+from vehicle.state import LINKAGE, QUICKEST, SERVO
 
 
 class ServoNumbers(NamedTuple):
@@ -47,6 +48,7 @@ class ServoNumbers(NamedTuple):
     deflection_limit: float
     half_backlash: float
     position_feedback: float
+    lost_command: float
 
 
 Servos = tuple[ServoNumbers, ServoNumbers, ServoNumbers]
@@ -64,6 +66,7 @@ class Servo(Section):
     deflection_limit: float = parameter("largest angle either way", "rad", low=0.0, unlimited=True)
     half_backlash: float = parameter("half the play of the linkage", "rad", low=0.0)
     position_feedback: float = parameter("share of the error taken at the fin, k", "1", low=0.0, high=1.0)
+    lost_command: float = parameter("share of the command that is lost, c; 1: jammed", "1", low=0.0, high=1.0)
 
     def numbers(self) -> ServoNumbers:
         """Return what the compiled servo needs."""
@@ -71,18 +74,24 @@ class Servo(Section):
 
 
 @compiled
+def _feedback(servo: ServoNumbers) -> float:
+    """Return k, the share of the error that is taken at the fin, as far as the fin follows at all."""
+    return (1.0 - servo.lost_command) * servo.position_feedback
+
+
+@compiled
 def servo_target(command: float, servo: ServoNumbers) -> float:
     """Return the angle that a commanded angle leads to in the end, but for the play [rad]."""
     moved = max(0.0, command - servo.dead_band) + min(0.0, command + servo.dead_band)
-    most, k = servo.deflection_limit, servo.position_feedback
-    own = max(-most, min(most, moved + servo.offset))
+    most, k = servo.deflection_limit, _feedback(servo)
+    own = max(-most, min(most, (1.0 - servo.lost_command) * moved + servo.offset))
     return (1.0 - k) * own + k * max(-most, min(most, command))
 
 
 @compiled
 def servo_rate(angle: float, linkage: float, command: float, servo: ServoNumbers) -> float:
     """Return how fast a servo at `angle`, with its linkage at `linkage`, turns under a commanded angle [rad/s]."""
-    k = servo.position_feedback
+    k = _feedback(servo)
     seen = (1.0 - k) * angle + k * _dragged(linkage, angle, servo.half_backlash)
     rate = (servo_target(command, servo) - seen) / max(servo.lag, QUICKEST)
     return max(-servo.rate_limit, min(servo.rate_limit, rate))
@@ -96,9 +105,8 @@ def fin_angle(angle: float, linkage: float, command: float, servo: ServoNumbers)
     the share 1 − k stays.
     """
     if servo.lag == 0.0 and math.isinf(servo.rate_limit):
-        return _dragged(
-            linkage, servo_target(command, servo), (1.0 - servo.position_feedback) * servo.half_backlash
-        )
+        play = (1.0 - _feedback(servo)) * servo.half_backlash
+        return _dragged(linkage, servo_target(command, servo), play)
     return _dragged(linkage, angle, servo.half_backlash)
 
 

@@ -1,13 +1,25 @@
-"""The equations of motion: the rate of the whole state, and its breakdown into named forces.
+"""The equations of motion: the rate of the whole state, and its breakdown into named forces and powers.
 
     η' = J(η) ν,    M ν' = Σ terms,    servos, motor and battery as in `actuators` and `motor`
 
 The state is that of `vehicle.state`; the command is (propeller [rev/s], rudder, port plane, starboard plane
 [rad]); `current_n` (3,) is the velocity of the water in earth axes, steady and uniform around the vehicle;
 `wrench_b` (6,) is what pulls from outside, about the hull centre in body axes.
+
+Every joule of the propeller can be found again:
+
+    d/dt (½ ν_rᵀ M ν_r + V) = P_propeller + P_loss + P_external        (P_restoring = −dV/dt)
+
+reckoned in the frame that moves with the steady, uniform current: there all terms are those of still water
+and "turning_current" is absent. P is the wrench of a term times ν_r. The kinetic energy holds that of the
+added mass. V is the potential of weight and buoyancy; in a vertical current its depth is that relative to the
+water, so use P_restoring, not V, there.
 """
 
 from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,8 +27,16 @@ from subzero.jit import compiled, scratch
 from vehicle.actuators import fin_angle, servo_rate, settle
 from vehicle.kinematics import motion, normalise, rotation
 from vehicle.motor import battery_current, shaft_goal, shaft_rate, shaft_speed, voltage
+from vehicle.restoring import potential
 from vehicle.state import CHARGE, LINKAGE, SERVO, SHAFT
-from vehicle.terms import TERM_COUNT, fill_terms
+from vehicle.terms import BREAKDOWN, POWER_OF_TERM, TERM_COUNT, fill_terms
+
+if TYPE_CHECKING:
+    from vehicle.vehicle import Vehicle
+
+POWERS = ("propeller", "loss", "restoring", "external")
+"""What `power` fills: thrust and reaction torque; fins, lift and drag; weight and buoyancy; from outside."""
+NO_COMMAND, NO_CURRENT, NO_WRENCH = (0.0,) * 4, (0.0,) * 3, (0.0,) * 6
 
 
 @compiled
@@ -115,3 +135,70 @@ def battery_voltage(state, command, current_n, numbers):
     motor, propeller = numbers.motor, numbers.propeller
     n = shaft_speed(state[SHAFT], state[CHARGE], command[0], u, motor, propeller)
     return voltage(state[CHARGE], battery_current(n, u, motor, propeller), motor)
+
+
+@compiled
+def power(state, command, current_n, wrench_b, numbers, out):
+    """Fill out (len(POWERS),) with the powers on the hull relative to the water [W].
+
+    Args:
+        state: as for `derivative`.
+        command: as for `derivative`.
+        current_n: as for `derivative`.
+        wrench_b: as for `derivative`.
+        numbers: as for `derivative`.
+        out: the powers; losses are negative, whatever the motion.
+    """
+    R, nu_r, terms = scratch(3, 3), scratch(1, 6)[0], scratch(TERM_COUNT, 6)
+    evaluate(state, command, current_n, wrench_b, numbers, R, nu_r, terms)
+    for i in range(len(POWERS)):
+        out[i] = 0.0
+    for i in range(TERM_COUNT):
+        which = POWER_OF_TERM[i]
+        if which >= 0:
+            for j in range(6):
+                out[which] += terms[i, j] * nu_r[j]
+
+
+@compiled
+def kinetic_energy(state, current_n, numbers):
+    """Return ½ ν_rᵀ M ν_r, hull and added mass together [J]."""
+    R, nu_r = scratch(3, 3), scratch(1, 6)[0]
+    rotation(state[3:7], R)
+    relative_velocity(state, R, current_n, nu_r)
+    total = 0.0
+    for i in range(6):
+        for j in range(6):
+            total += nu_r[i] * numbers.mass_matrix[i, j] * nu_r[j]
+    return 0.5 * total
+
+
+@compiled
+def potential_energy(state, numbers):
+    """Return the potential energy of weight and buoyancy [J]."""
+    R = scratch(3, 3)
+    rotation(state[3:7], R)
+    return potential(state[2], R, numbers.restoring)
+
+
+def breakdown_table(
+    vehicle: Vehicle,
+    state: Sequence[float] | np.ndarray,
+    command: Sequence[float] = NO_COMMAND,
+    *,
+    current_n: Sequence[float] = NO_CURRENT,
+    wrench_b: Sequence[float] = NO_WRENCH,
+) -> dict[str, np.ndarray]:
+    """Return every named force on the vehicle: name → (X, Y, Z, K, M, N) in body axes [N, N m].
+
+    Args:
+        vehicle: whose forces.
+        state: as in `vehicle.STATE`, for example from `initial_state`.
+        command: propeller [rev/s], rudder, port plane, starboard plane [rad].
+        current_n: velocity of the water, earth axes. [m/s]
+        wrench_b: external force and moment about the hull centre. [N, N m]
+    """
+    out = np.empty((len(BREAKDOWN), 6))
+    inputs = [np.asarray(values, dtype=float) for values in (state, command, current_n, wrench_b)]
+    breakdown(inputs[0], inputs[1], inputs[2], inputs[3], vehicle.numbers(), out)
+    return dict(zip(BREAKDOWN, out, strict=True))

@@ -1,7 +1,7 @@
 """A run of the hull alone, in still or flowing water: no cable, no files, one compiled loop.
 
 Classic Runge-Kutta of fourth order with a fixed step; commands are held during a step. The work of each kind
-of force (`energy.POWERS`) is integrated with the same stages, so the energy balance closes to the order of
+of force (`dynamics.POWERS`) is integrated with the same stages, so the energy balance closes to the order of
 the scheme. The coupled simulation has its own loop, because there the pull of the cable changes inside a
 step.
 """
@@ -14,8 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from subzero.jit import allocating, compiled
-from vehicle.dynamics import derivative, finish_step
-from vehicle.energy import POWERS, power
+from vehicle.dynamics import POWERS, derivative, finish_step, power
 from vehicle.state import STATE_SIZE
 from vehicle.vehicle import Vehicle, VehicleNumbers
 

@@ -1,4 +1,4 @@
-"""The shape of the hull, and what follows from it alone: volume, centre, inertia, added mass.
+"""The shape of the hull with its tow point, and what follows from it: volume, centre, inertia, added mass, strips.
 
     nose   R = D/2 [1 − ((x' − a)/a)²]^(1/n),   x' from the tip, a its length
     tail   R = D/2 − (3D/(2c²) − tan θ/c) s² + (D/c³ − tan θ/c²) s³,   s from its start, c its length
@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -21,6 +22,9 @@ from vehicle.parameters import Section, parameter
 
 SLICES = 20_000
 """Midpoint slices of the integrals below: relative errors under 1e-6, at a millisecond each."""
+
+PARTS_OF_A_SLICE = 50
+"""Parts of a strip for its area and centroid: one radius a strip misses the blunt nose by 2 %."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,6 +38,25 @@ class Hull(Section):
     tail_length: float = parameter("length of the tail, c", "m", above=0.0)
     nose_exponent: float = parameter("fullness of the nose, n", "1", above=0.0)
     tail_angle: float = parameter("half angle of the tail's end, theta", "rad", low=0.0, high=1.5)
+
+    def slices(self, count: int) -> tuple[np.ndarray, np.ndarray]:
+        """Return the centroids from the hull centre [m] and half the side areas [m2] of slices, (count,) each."""
+        return _slices(self, count)
+
+
+@dataclass(frozen=True, kw_only=True)
+class TowPoint(Section):
+    """The point r_c of the hull that something outside, such as a cable, may pull at: from the hull centre, body axes
+    (section 2.3 of the paper).
+    """
+
+    x: float = parameter("forward", "m")
+    y: float = parameter("to starboard", "m")
+    z: float = parameter("down", "m")
+
+    def position(self) -> np.ndarray:
+        """Return r_c (3,). [m]"""
+        return np.array([self.x, self.y, self.z])
 
 
 class LambFactors(NamedTuple):
@@ -53,6 +76,16 @@ def hull_radius(hull: Hull, x: np.ndarray) -> np.ndarray:
     tail = 0.5 * D - (1.5 * D / c**2 - tan / c) * s**2 + (D / c**3 - tan / c**2) * s**3
     radius = np.where(aft < a, nose, np.where(s > 0.0, tail, 0.5 * D))
     return np.where((aft < 0.0) | (aft > hull.length), 0.0, np.maximum(radius, 0.0))
+
+
+@lru_cache(maxsize=64)
+def _slices(hull: Hull, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the centroids from the hull centre [m] and half the side areas [m2] of slices, (count,) each."""
+    step = hull.length / (count * PARTS_OF_A_SLICE)
+    x = hull.nose_station - step * (np.arange(count * PARTS_OF_A_SLICE) + 0.5)
+    part = hull_radius(hull, x) * step
+    area = part.reshape(count, PARTS_OF_A_SLICE).sum(axis=1)
+    return (part * x).reshape(count, PARTS_OF_A_SLICE).sum(axis=1) / area, area
 
 
 def stations(hull: Hull) -> tuple[np.ndarray, float]:

@@ -17,9 +17,9 @@ from dataclasses import astuple, dataclass
 from typing import NamedTuple
 
 from subzero.jit import compiled
-from vehicle.actuators import QUICKEST
 from vehicle.parameters import Section, parameter
 from vehicle.propeller import PropellerNumbers, torque
+from vehicle.state import QUICKEST
 
 
 class MotorNumbers(NamedTuple):

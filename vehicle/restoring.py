@@ -10,13 +10,15 @@ the potential −W z(G) + B z(B), hence free of loss.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from subzero.jit import compiled
 from vehicle.parameters import Section, parameter
-from vehicle.rigid_body import RigidBody
+
+if TYPE_CHECKING:
+    from vehicle.rigid_body import RigidBody
 
 
 class RestoringNumbers(NamedTuple):

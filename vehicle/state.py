@@ -9,6 +9,7 @@ If you add an entry, also look at `dynamics.derivative` and `initial_state`.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +19,9 @@ from vehicle.kinematics import quaternion_from_euler
 STATE_SIZE = 21
 POSITION, QUATERNION, VELOCITY = 0, 3, 7
 SHAFT, SERVO, CHARGE, LINKAGE = 13, 14, 17, 18
+
+QUICKEST = 0.01
+"""Shortest lag of a state [s]: an explicit Runge-Kutta step of 0.02 s is stable down to a lag of 0.0072 s."""
 
 
 class StateEntry(NamedTuple):
@@ -45,21 +49,17 @@ STATE = (
 
 def initial_state(
     *,
-    north: float = 0.0,
-    east: float = 0.0,
-    depth: float = 0.0,
+    position: Sequence[float] = (0.0, 0.0, 0.0),
     roll: float = 0.0,
     pitch: float = 0.0,
     heading: float = 0.0,
-    velocity: tuple[float, ...] = (0.0,) * 6,
+    velocity: Sequence[float] = (0.0,) * 6,
     propeller_speed: float = 0.0,
 ) -> np.ndarray:
     """Return a state with central fins and a full battery.
 
     Args:
-        north: position of the hull centre. [m]
-        east: position of the hull centre. [m]
-        depth: position of the hull centre, positive down. [m]
+        position: of the hull centre, north, east, depth (positive down). [m]
         roll: starboard side down is positive. [rad]
         pitch: nose up is positive. [rad]
         heading: from north, clockwise seen from above. [rad]
@@ -67,7 +67,7 @@ def initial_state(
         propeller_speed: n. [rev/s]
     """
     state = np.zeros(STATE_SIZE)
-    state[0:3] = north, east, depth
+    state[0:3] = position
     state[3:7] = quaternion_from_euler(float(roll), float(pitch), float(heading))
     state[7:13] = velocity
     state[SHAFT] = propeller_speed

@@ -22,12 +22,12 @@ from subzero.jit import compiled
 from vehicle.added_mass import munk_correction
 from vehicle.axial_drag import axial_drag
 from vehicle.body_lift import body_lift
-from vehicle.coriolis import coriolis
 from vehicle.cross_flow import cross_flow_drag
 from vehicle.damping import linear_damping, quadratic_damping
 from vehicle.fins import rudder, stern_plane
 from vehicle.propeller import propeller
 from vehicle.restoring import restoring
+from vehicle.rigid_body import coriolis
 
 INERTIAL, PROPULSION, LOSS, RESTORING, EXTERNAL = -1, 0, 1, 2, 3
 """What a term does to the energy: nothing, or which entry of `energy.POWERS` its power belongs to."""

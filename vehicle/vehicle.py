@@ -22,13 +22,12 @@ from vehicle.body_lift import BodyLift
 from vehicle.cross_flow import CrossFlowDrag
 from vehicle.damping import LinearDamping, QuadraticDamping
 from vehicle.fins import FinNumbers, Fins
-from vehicle.geometry import Hull
+from vehicle.geometry import Hull, TowPoint
 from vehicle.motor import Battery, Motor, MotorNumbers, motor_numbers
 from vehicle.parameters import Problem, Section, VehicleError, nearest, parameter, read_section
 from vehicle.propeller import Propeller, PropellerNumbers
 from vehicle.restoring import Buoyancy, RestoringNumbers
 from vehicle.rigid_body import RigidBody
-from vehicle.tow_point import TowPoint
 
 
 class VehicleNumbers(NamedTuple):

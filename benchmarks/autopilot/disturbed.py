@@ -13,7 +13,7 @@ import numpy as np
 
 import scenarios
 import subzero
-from scenarios.trial import Commands
+from scenarios import Commands
 from subzero import autopilot
 
 from .trials import trial, tuning

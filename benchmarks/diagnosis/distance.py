@@ -98,18 +98,24 @@ def sudden_distance(
     sudden causes, each from the best time about then.
     """
     zero, setting = np.zeros(len(problem.entries)), problem.records[0].setting
-    effects = {entry.effect.id: entry.effect for entry in problem.entries if entry.record < 0}
+    effects = {effect.id: effect for effect in problem.sudden_effects}
     begun = with_onset(effects[one], time).apply(setting, *values)
     change, D = change_by(problem, setting, begun), variances(problem.entries, (), 1.0)
     q = Quadratic(A=J.T @ J, b=J.T @ change, rr=float(change @ change))
     base, found = posterior(q, D), dict([strangeness(problem, J, change)[::-1]])
-    others = [effect for effect in effects.values() if effect.sudden and effect.id != one]
+    others = [without_common(effect, one) for effect in effects.values() if effect.id != one]
     pairs = [(effect, time + later) for effect in others for later in ABOUT]
     for (effect, when), C in zip(pairs, change_point_columns(BaseRun(problem, zero), pairs), strict=True):
         explained = _explained(seen(q.A, q.b, D, J, C, change), effect)
         found[f"{effect.id}@{when:.3g}"] = max(-2.0 * base.log_evidence - base.log_det - explained, 0.0)
     rival = min(found, key=lambda name: found[name])
     return found[rival], rival
+
+
+def without_common(effect: Effect, one: str) -> Effect:
+    """Return an effect with what another cause can do, too, held: a jam is no rival of an offset by its angle."""
+    held = [replace(p, scale=1e-6 * p.scale) if p.also_of == one else p for p in effect.parameters]
+    return replace(effect, parameters=tuple(held))
 
 
 def _explained(data: ForceInformation, effect: Effect) -> float:

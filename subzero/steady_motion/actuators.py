@@ -10,8 +10,8 @@ import numpy as np
 
 from subzero.steady_motion.hull_state_space import SURGE
 from vehicle import Servo, Vehicle
-from vehicle.actuators import QUICKEST
 from vehicle.motor import battery_current, motor_numbers, voltage
+from vehicle.state import QUICKEST
 
 
 class Demand(NamedTuple):
@@ -27,7 +27,8 @@ def ideal(hull: Vehicle) -> Vehicle:
     """Return a vehicle whose actuators know no limit, dead band, offset, play or sag; lags stay (none: `QUICKEST`)."""
 
     def servo(one: Servo) -> Servo:
-        free = {"dead_band": 0.0, "offset": 0.0, "half_backlash": 0.0, "position_feedback": 0.0}
+        free = {"dead_band": 0.0, "offset": 0.0, "half_backlash": 0.0, "position_feedback": 0.0,
+                "lost_command": 0.0}  # fmt: skip
         return replace(one, **free, lag=max(one.lag, QUICKEST), rate_limit=inf, deflection_limit=inf)
 
     lag = max(hull.motor.lag, QUICKEST)
@@ -44,10 +45,14 @@ def demands(hull: Vehicle, x: np.ndarray) -> list[Demand]:
     """Return what a state (16,) asks of each actuator."""
     propeller = Demand("propeller", abs(float(x[12])), fastest_propeller(hull, float(x[SURGE])), "rev/s")
     fins = zip(("rudder", "port stern-plane", "starboard stern-plane"), x[13:], servos(hull), strict=True)
-    return [propeller] + [
-        Demand(name, degrees(abs(float(angle))), degrees(servo.deflection_limit), "degrees")
-        for name, angle, servo in fins
-    ]
+    return [propeller] + [_fin_demand(name, float(angle), servo) for name, angle, servo in fins]
+
+
+def _fin_demand(name: str, angle: float, servo: Servo) -> Demand:
+    """Return what is asked of a fin: to stand at an angle [rad]; of one that is jammed, to leave its offset."""
+    if servo.lost_command == 1.0:
+        return Demand(f"jammed {name}", degrees(abs(angle - servo.offset)), 1e-9, "degrees")
+    return Demand(name, degrees(abs(angle)), degrees(servo.deflection_limit), "degrees")
 
 
 def servos(hull: Vehicle) -> tuple[Servo, Servo, Servo]:
@@ -64,11 +69,12 @@ def commands(hull: Vehicle, x: np.ndarray) -> np.ndarray:
 
 
 def _command(angle: float, servo: Servo) -> float:
-    """Return the command that leads a fin to an angle [rad]: offset and dead band undone where no feedback does."""
-    k = servo.position_feedback
-    moved = angle - (1.0 - k) * servo.offset
-    if abs(moved) > max(k * servo.dead_band, 1e-12):
-        return moved + float(np.sign(moved)) * (1.0 - k) * servo.dead_band
+    """Return the command that leads a fin to an angle [rad]: what feedback leaves of offset, dead band, loss undone."""
+    arrives = 1.0 - servo.lost_command
+    k = arrives * servo.position_feedback
+    moved, own = angle - (1.0 - k) * servo.offset, (1.0 - k) * arrives
+    if own + k > 0.0 and abs(moved) > max(k * servo.dead_band, 1e-12):
+        return (moved + float(np.sign(moved)) * own * servo.dead_band) / (own + k)
     return moved / k if k > 0.0 else 0.0
 
 

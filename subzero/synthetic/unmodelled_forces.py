@@ -220,6 +220,8 @@ KINDS: dict[str, Callable[[Draw], UnmodelledForce]] = {
     )
 }
 """Every kind by name."""
+ALSO_CAUSES = {"leak": "flooding", "fouling_grows": "fouling"}
+"""Kinds that come close to a cause of the catalogue, which may be named for them."""
 
 
 def draw_unmodelled(

@@ -18,7 +18,7 @@ from benchmarks.autopilot import disturbed
 from benchmarks.autopilot.disturbed import INPUTS, SEEN, STEP, deviations, error, frozen, held, pulse
 from benchmarks.autopilot.raised import Raised
 from benchmarks.autopilot.trials import tuning
-from scenarios.trial import Commands
+from scenarios import Commands
 from subzero import autopilot
 
 

@@ -6,7 +6,8 @@ from importlib import import_module
 import pytest
 
 MODULES = (
-    "scenarios", "scenarios.checks", "scenarios.trial", "cable.current", "subzero.model", "subzero.simulator",
+    "scenarios", "scenarios.checks", "scenarios.instructions", "scenarios.steps", "cable.current", "subzero.model",
+    "subzero.simulator",
 )  # fmt: skip
 
 

@@ -10,11 +10,12 @@ from benchmarks.house import circles, figures, longest_chain
 
 FLOORS = {
     "cable": 12,
-    "vehicle": 8,
-    "scenarios": 9,
+    "vehicle": 6,
+    "scenarios": 6,
     "subzero.autopilot": 8,
     "subzero.diagnosis": 14,
     "subzero.records": 2,
+    "subzero.sweeps": 8,
     "subzero.synthetic": 5,
     "subzero, rest": 15,
     "all": 35,

@@ -60,7 +60,7 @@ def hull_alone():
         hull = subzero.Model.of(trial).vehicle.numbers()
         start, current = trial.start, np.array(trial.current, dtype=float)
         initial = vehicle.initial_state(
-            depth=start.depth,
+            position=(0.0, 0.0, start.depth),
             pitch=start.pitch,
             heading=start.heading,
             velocity=(start.surge_speed, 0, 0, 0, 0, 0),

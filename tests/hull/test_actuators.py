@@ -76,7 +76,8 @@ def test_backlash_leaves_the_fin_standing_until_the_slack_is_taken_up(angles):
 def test_neutral_values_switch_every_stage_off_exactly(angles):
     commands = 0.3 * np.sin(np.arange(100))
     neutral = {"dead_band": 0.0, "offset": 0.0, "lag": 0.0, "rate_limit": math.inf,
-               "deflection_limit": math.inf, "half_backlash": 0.0, "position_feedback": 0.0}  # fmt: skip
+               "deflection_limit": math.inf, "half_backlash": 0.0, "position_feedback": 0.0,
+               "lost_command": 0.0}  # fmt: skip
     assert np.array_equal(angles(commands, **neutral), commands)
     assert servo_target(0.123, Servo(**neutral).numbers()) == 0.123
 
@@ -116,6 +117,20 @@ def test_a_servo_that_obeys_at_once_rests_where_one_that_lags_ends(angles):
         slow = angles(commands, **CROOKED, lag=0.05, rate_limit=math.inf, position_feedback=feedback)
         at_once = angles(commands, **CROOKED, lag=0.0, rate_limit=math.inf, position_feedback=feedback)
         assert_allclose(slow[399::400], at_once[399::400], rtol=0, atol=1e-3 * DEGREE)
+
+
+@pytest.mark.parametrize("feedback", [0.0, 1.0])
+def test_a_jammed_fin_stands_at_its_offset_whatever_is_commanded_and_fed_back(angles, feedback):
+    commands = 0.3 * np.sin(0.05 * np.arange(200))
+    assert_allclose(
+        angles(commands, offset=0.05, lost_command=1.0, position_feedback=feedback)[150:], 0.05, atol=1e-5
+    )
+
+
+def test_of_a_command_that_is_lost_in_part_the_rest_arrives(angles):
+    """The offset is none of the command: it stays whole, and half of the dead band is lost with half of the command."""
+    found = angles(np.full(300, 0.1), offset=0.01, dead_band=0.02, lost_command=0.5)[-1]
+    assert found == pytest.approx(0.5 * (0.1 - 0.02) + 0.01, abs=1e-8)
 
 
 def test_a_vehicle_file_from_before_there_was_position_feedback_has_none(tmp_path):

@@ -8,7 +8,7 @@ from hypothesis.extra.numpy import arrays
 from numpy.testing import assert_allclose
 
 import vehicle
-from vehicle.coriolis import coriolis
+from vehicle.rigid_body import coriolis
 
 speeds = arrays(float, 6, elements=st.floats(-3.0, 3.0))
 angles = arrays(float, 3, elements=st.floats(-1.5, 1.5))

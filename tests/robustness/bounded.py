@@ -16,7 +16,7 @@ import numpy as np
 import cable
 import scenarios
 import subzero
-from scenarios.trial import SCHEMES
+from scenarios import SCHEMES
 from subzero.jit import compiled
 
 COMMAND = (27.0, 0.2, 0.05, -0.05)

@@ -254,6 +254,40 @@ def test_an_interrupt_that_machine_code_would_swallow_is_heard():
     assert (done.stdout, done.stderr) == ("heard\n", "")
 
 
+MADE_AN_ERROR = """
+import os, signal, sys
+from types import SimpleNamespace
+from subzero import cli
+
+def parsed(*arguments, **options):
+    try:
+        os.kill(os.getpid(), int(sys.argv[1]))
+        for _ in range(100):
+            pass
+    except KeyboardInterrupt:
+        pass
+    raise ValueError("Invalid bounding box")
+
+cli.app = SimpleNamespace(parse_args=parsed)
+from subzero.__main__ import run
+run()
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, 0])
+def test_an_error_that_machine_code_makes_of_an_interrupt_is_an_interrupt(number):
+    """Matplotlib told a ValueError, with a traceback; without a signal (0) an error stays one."""
+    done = subprocess.run(
+        [sys.executable, "-c", MADE_AN_ERROR, str(int(number))], capture_output=True, text=True, check=False,
+        preexec_fn=heed_again,
+    )  # fmt: skip
+    if number:
+        assert (done.returncode, done.stderr) == (INTERRUPTED, "Interrupted; nothing was written.\n")
+    else:
+        assert done.returncode == 1
+        assert "ValueError: Invalid bounding box" in done.stderr
+
+
 LINKED = """
 import gc, os, signal, sys
 from llvmlite.binding import ffi

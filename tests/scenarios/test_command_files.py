@@ -1,9 +1,12 @@
 """Command files that cannot be used: every wrong cell, column and time, with its line."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import scenarios
+from scenarios.steps import sample_times
 
 HEADER = "time_s,propeller_rps,rudder_deg,stern_plane_port_deg,stern_plane_starboard_deg\n"
 RUDDER = "Allowed: -90 to 90 degree (rudder, positive turns to starboard)."
@@ -85,3 +88,15 @@ def test_what_is_commanded_at_a_time_is_the_sample_that_holds():
     assert held[..., 0].tolist() == [[0.0, 0.0, 0.0], [0.4, 0.4, 0.8]]
     assert commands.at(0.1 * 20).tolist() == [0.8, 0.9, 1.0, 1.1]
     assert commands.at(0.3 - 1e-12).tolist() == [0.4, 0.5, 0.6, 0.7]
+
+
+def test_every_time_grid_starts_at_zero_and_ends_as_it_says():
+    """Of a run: it ends with the run, in a last step that is not tiny. Even: it covers the run. Samples: none later."""
+    trial = replace(scenarios.load("fig6"), duration=1.0, cable_step=0.3, hull_step=0.1, commands=None)
+    assert np.allclose(trial.times(), [0.0, 0.3, 0.6, 0.9, 1.0])
+    assert trial.times()[-1] == 1.0
+    assert np.allclose(replace(trial, duration=0.91).times(), [0.0, 0.3, 0.6, 0.91])
+    assert np.allclose(trial.even_times(), [0.0, 0.3, 0.6, 0.9, 1.2])
+    assert replace(trial, duration=0.9).even_times().tolist() == replace(trial, duration=0.9).times().tolist()
+    assert np.allclose(sample_times(0.3, 0.1), [0.0, 0.1, 0.2, 0.3])
+    assert np.allclose(sample_times(0.29, 0.1), [0.0, 0.1, 0.2])

@@ -1,6 +1,6 @@
 """Water that changes with depth, a winch, a vessel: what is in a file is what comes out, and every mistake is told.
 
-Verifies: `scenarios.surroundings`. Configuration: a short trial with these sections. Tolerance: none, texts and numbers
+Verifies: `scenarios.reader`. Configuration: a short trial with these sections. Tolerance: none, texts and numbers
 are those of the file.
 """
 

@@ -2,6 +2,7 @@
 
 θ = θ₀ + z                                          throughout; z = 0 is the nominal model, exactly
 θ(t) = θ₀ for t < t₀,   θ₀ + z from t₀ on           with an onset: a fin struck at 12 s, the cable caught at 20 s
+θ(t) = θ₀ + z max(t − t₀, 0)                        one that grows from its onset on: a hull that floods
 """
 
 from __future__ import annotations
@@ -38,6 +39,7 @@ class Parameter:
         step: of a sensitivity, if not a share of the tolerance. [unit]
         least: the whole value cannot be less, or not less than the nominal model's if that is less already. [unit]
         begins: nothing is any different before this time of the trial. [s]
+        also_of: another effect that can do the same: a jammed rudder's angle is also an offset.
     """
 
     name: str
@@ -50,6 +52,7 @@ class Parameter:
     step: float = 0.0
     least: float = -float("inf")
     begins: float = 0.0
+    also_of: str = ""
 
     def within(self, setting: Setting) -> Parameter:
         """Return the parameter with the bounds that a nominal model leaves it."""
@@ -69,6 +72,7 @@ class Effect:
         apply: what it does to a setting.
         sudden: it can begin in the middle of a trial ("<id>@t").
         channel: the only channel that it can be seen in, for effects of a sensor.
+        grows: id of the effect that grows from an onset on; its deviations are per minute then. "" for none.
     """
 
     id: str
@@ -78,6 +82,35 @@ class Effect:
     apply: Apply
     sudden: bool = False
     channel: str = ""
+    grows: str = ""
+
+
+MINUTE_S = 60.0
+"""Growth is told per minute. [s]"""
+USUAL_GROWTH_S = 15.0
+"""What grows usually reaches the size of a usual effect in about this time. [s]"""
+GROWTH_STEP_S = 1.0
+"""A model that grows changes so often: 0.1 s in its place moves no channel of fig6 by a twentieth of its noise. [s]"""
+
+
+def growing(effect: Effect, id: str, sentence: str) -> Effect:
+    """Return the effect as it grows in proportion to the time from an onset on; its deviations are per minute."""
+    faster = MINUTE_S / USUAL_GROWTH_S
+    rates = tuple(
+        replace(one, unit=f"{one.unit}/min", tolerance=faster * one.tolerance, scale=faster * one.scale,
+                low=faster * one.low, high=faster * one.high, nominal=nothing, least=-np.inf)
+        for one in effect.parameters
+    )  # fmt: skip
+    apply = partial(_within_bounds, effect)
+    return replace(
+        effect, id=id, sentence=sentence, parameters=rates, apply=apply, sudden=True, grows=effect.id
+    )
+
+
+def _within_bounds(effect: Effect, setting: Setting, *deviations: float) -> Setting:
+    """Return a setting with deviations of an effect that have grown, as far as they make sense."""
+    values = (min(max(z, p.low), p.high) for z, p in zip(deviations, effect.parameters, strict=True))
+    return effect.apply(setting, *values)
 
 
 MIN_MARGIN_S, ONSET_STEP_S = 1.0, 0.4
@@ -116,6 +149,8 @@ def _from_then_on(effect: Effect, time: float, setting: Setting, *deviations: fl
 
     Models change between two exchanges only: in the one that the effect begins in, it has the share that is left.
     """
+    if effect.grows:
+        return _growing_from(effect, time, setting, *deviations)
     if time <= 0.0:
         return effect.apply(setting, *deviations)
     step = setting.trial.cable_step
@@ -131,6 +166,34 @@ def _from_then_on(effect: Effect, time: float, setting: Setting, *deviations: fl
         (when, _changed(effect, setting, model, *deviations)) for when, model in [(first, base), *after]
     ]
     return replace(setting, later=(*before, *changed))
+
+
+def _growing_from(effect: Effect, time: float, setting: Setting, *rates: float) -> Setting:
+    """Return a setting in which an effect grows from a time on, beside all other changes in mid-trial.
+
+    In each interval between two changes the model has the mean of what has grown by then, which keeps the order of a
+    run whose models change in steps, and makes it smooth in the onset.
+    """
+    exchange, end = setting.trial.cable_step, setting.trial.duration
+    step = exchange * max(round(GROWTH_STEP_S / exchange), 1)
+    grid = step * np.arange(np.floor(max(time, 0.0) / step + 1e-6), np.ceil(end / step - 1e-6))
+    before = (
+        [pair for pair in setting.later if pair[0] < grid[0] - 1e-9] if grid.size else list(setting.later)
+    )
+    begins = sorted({*np.round(grid, 9).tolist(), *(when for when, _ in setting.later[len(before) :])})
+    changed = []
+    for begin, next_one in zip(begins, [*begins[1:], end], strict=True):
+        grown = _mean_growth(begin - time, next_one - time) / MINUTE_S
+        base = [setting.model, *(model for when, model in setting.later if when <= begin + 1e-9)][-1]
+        changed.append((begin, _changed(effect, setting, base, *(grown * rate for rate in rates))))
+    first = [model for when, model in changed if when <= 0.0]
+    later = (*before, *((when, model) for when, model in changed if when > 0.0))
+    return replace(setting, later=later, model=first[-1] if first else setting.model)
+
+
+def _mean_growth(start: float, end: float) -> float:
+    """Return the mean of max(t, 0) between two times after an onset. [s]"""
+    return 0.5 * (max(end, 0.0) ** 2 - max(start, 0.0) ** 2) / max(end - start, 1e-9)
 
 
 def _changed(effect: Effect, setting: Setting, model: Model, *deviations: float) -> Model:

@@ -28,9 +28,9 @@ import dataclasses
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from subzero.diagnosis.hypothesis.catalogue import START, catalogue, sensors
+from subzero.diagnosis.hypothesis.catalogue import ONSETS, START, catalogue, sensors
 from subzero.diagnosis.hypothesis.configuration import Setting
-from subzero.diagnosis.hypothesis.effect import Effect, Parameter
+from subzero.diagnosis.hypothesis.effect import Effect, Parameter, with_onset
 from subzero.diagnosis.results import Extended
 
 STARTS = "starts_at_s"
@@ -52,15 +52,14 @@ class ExtendedFile:
 
 
 def key_of(parameter: Parameter) -> str:
-    """Return the key of a parameter: its name with its unit, ``time_constant_s``; a share has no unit."""
-    if parameter.unit == "1":
-        return parameter.name
-    return f"{parameter.name}_{parameter.unit.replace('degree', 'deg').replace('/', '_').replace(' ', '_')}"
+    """Return the key of a parameter, with its unit: ``time_constant_s``, ``force_N_per_min``; a share has none."""
+    unit = parameter.unit.removeprefix("1").replace("degree", "deg").replace("/min", " per_min")
+    return "_".join([parameter.name, *unit.replace("/", " ").split()])
 
 
 def all_effects(more: Iterable[Effect] = ()) -> dict[str, Effect]:
-    """Return every effect there is, by id, those of the start and of all sensors too."""
-    return {**catalogue(sensors.SPECS, more), **{effect.id: effect for effect in START}}
+    """Return every effect there is, by id: of the start, of all sensors, and what only begins in mid-trial, too."""
+    return {**catalogue(sensors.SPECS, more), **{effect.id: effect for effect in (*START, *ONSETS)}}
 
 
 def force_key(axis: str) -> str:
@@ -76,7 +75,8 @@ def apply(extended: Extended, setting: Setting, effects: Mapping[str, Effect]) -
         setting: the nominal one.
         effects: by id, all that are named.
     """
-    starts = starts_of(extended)
+    grows = {name: 0.0 for name in extended.deviations if effects[plain_id(name)].grows}
+    starts = grows | starts_of(extended)
     throughout = [(name, numbers) for name, numbers in extended.deviations.items() if name not in starts]
     for name, numbers in (*extended.calibration.items(), *throughout):
         setting = _with(setting, effects[name], numbers)
@@ -101,6 +101,8 @@ def starts_of(extended: Extended) -> dict[str, float]:
 def from_then_on(setting: Setting, effect: Effect, numbers: Mapping[str, float], start: float) -> Setting:
     """Return a setting in which an effect begins in mid-trial, after all changes that are there. [s]"""
     step = setting.trial.cable_step
+    if effect.grows:
+        return with_onset(effect, start).apply(setting, *_values(effect, numbers))
     start = min(max(round(start / step), 1) * step, setting.trial.duration)
     last = setting.later[-1][1] if setting.later else setting.model
     changed = _with(dataclasses.replace(setting, model=last), effect, numbers).model
@@ -114,4 +116,8 @@ def unseen(extended: Extended, effects: Mapping[str, Effect]) -> list[str]:
 
 def _with(setting: Setting, effect: Effect, numbers: Mapping[str, float]) -> Setting:
     """Return a setting with an effect; parameters that are not named stay as they are."""
-    return effect.apply(setting, *(numbers.get(parameter.name, 0.0) for parameter in effect.parameters))
+    return effect.apply(setting, *_values(effect, numbers))
+
+
+def _values(effect: Effect, numbers: Mapping[str, float]) -> list[float]:
+    return [numbers.get(parameter.name, 0.0) for parameter in effect.parameters]

@@ -68,12 +68,6 @@ def nameable(entries: Sequence[Entry]) -> list[str]:
     return list(found)
 
 
-def sudden_effects(entries: Sequence[Entry]) -> list[Effect]:
-    """Return the effects that may begin in mid-trial."""
-    effects = {entry.effect.id: entry.effect for entry in entries if entry.record < 0}
-    return [effect for effect in effects.values() if effect.sudden]
-
-
 def columns_of(entries: Sequence[Entry], ids: Ids) -> list[int]:
     """Return where the parameters of causes stand in z."""
     return [k for k, entry in enumerate(entries) if entry.record < 0 and entry.effect.id in ids]

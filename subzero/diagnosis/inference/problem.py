@@ -16,7 +16,7 @@ from os import cpu_count
 
 import numpy as np
 
-from subzero.diagnosis.hypothesis.catalogue import START, catalogue
+from subzero.diagnosis.hypothesis.catalogue import ONSETS, START, catalogue
 from subzero.diagnosis.hypothesis.catalogue.sensors import SPECS
 from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.effect import Effect
@@ -88,12 +88,14 @@ class Problem:
     Attributes:
         records: what was measured.
         entries: what z holds, in order.
+        onsets: effects that are no part of z, as they can only begin in mid-trial.
         pool: threads for runs side by side; compiled code runs in them freely.
         kept: how many runs were asked for, and those that were made last.
     """
 
     records: tuple[Observed, ...]
     entries: tuple[Entry, ...]
+    onsets: tuple[Effect, ...] = ()
     pool: ThreadPoolExecutor = field(default_factory=lambda: ThreadPoolExecutor(cpu_count() or 1))
     kept: RunCache = field(default_factory=RunCache)
 
@@ -105,6 +107,12 @@ class Problem:
             if where in (-1, record) and any(values) and (late or effect.slot not in POST_RUN_SLOTS):
                 setting = effect.apply(setting, *values)
         return setting
+
+    @property
+    def sudden_effects(self) -> list[Effect]:
+        """All effects that may begin in mid-trial."""
+        throughout = {entry.effect.id: entry.effect for entry in self.entries if entry.record < 0}
+        return [effect for effect in throughout.values() if effect.sudden] + list(self.onsets)
 
     @cached_property
     def _groups(self) -> list[tuple[Effect, list[int], int]]:
@@ -235,7 +243,8 @@ def pose(records: Sequence[Logged], more: Iterable[Effect] = ()) -> Problem:
         for effect in catalogue(channels, more).values()
         if _possible(effect, observed)
     ]
-    return Problem(records=observed, entries=entries_of(effects, START, len(observed)))
+    onsets = tuple(effect for effect in ONSETS if _possible(effect, observed))
+    return Problem(records=observed, entries=entries_of(effects, START, len(observed)), onsets=onsets)
 
 
 def _possible(effect: Effect, observed: Sequence[Observed]) -> bool:

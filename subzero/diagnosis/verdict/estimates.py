@@ -187,7 +187,8 @@ def closest_rival(work: Findings, inside: Mapping[Ids, float], D: float, ids: Id
 def _words(work: Findings, one: str) -> str:
     """Return a cause in words, also one that begins in mid-trial."""
     which, _, time = one.partition("@")
-    sentence = sentence_of(work.problem, which)
+    begins = {effect.id: effect.sentence for effect in work.problem.sudden_effects}
+    sentence = begins[which] if which in begins else sentence_of(work.problem, which)
     return f"from {time} s on {sentence}" if time else sentence
 
 

@@ -24,8 +24,8 @@ from subzero.diagnosis.assessment.identifiability import (
 )
 from subzero.diagnosis.assessment.next_trial import Survivor, next_trial
 from subzero.diagnosis.assessment.residuals import curves
-from subzero.diagnosis.hypothesis.effect import with_onset
-from subzero.diagnosis.hypothesis.hypotheses import Ids, columns_of, nameable, sudden_effects
+from subzero.diagnosis.hypothesis.effect import MINUTE_S, with_onset
+from subzero.diagnosis.hypothesis.hypotheses import Ids, columns_of, nameable
 from subzero.diagnosis.inference.change_point_fit import FittedChangePoint
 from subzero.diagnosis.inference.change_point_scan import BaseRun, change_point_columns
 from subzero.diagnosis.inference.laplace import Candidate
@@ -131,9 +131,11 @@ def _from_its_time_on(findings: Findings, one: FittedChangePoint) -> dict[Ids, f
     """Return D against each other cause that would begin when it does: what no tolerance and no size of that explains,
 
     D = sᵀ (I + B Bᵀ)⁻¹ s,    B = [J κτ, C s_b]
+
+    A jam of a fin with no command lost is an offset of the fin: what both do is no rival of either.
     """
     begun, fit, n = one.begun, one.fit, len(findings.problem.entries)
-    others = [effect for effect in sudden_effects(findings.problem.entries) if effect.id != begun.effect.id]
+    others = [effect for effect in findings.problem.sudden_effects if effect.id != begun.effect.id]
     C = change_point_columns(
         BaseRun(one.problem, fit.z), [(effect, begun.time) for effect in others], begun.record
     )
@@ -142,7 +144,8 @@ def _from_its_time_on(findings: Findings, one: FittedChangePoint) -> dict[Ids, f
     shown, within = fit.J[:, n:-1] @ fit.z[n:-1], fit.J[:, free] * tolerance
     found = dict[Ids, float]()
     for effect, own in zip(others, C, strict=True):
-        B = np.hstack([within, own * np.array([p.scale for p in effect.parameters])])
+        scales = [0.0 if p.also_of == begun.effect.id else p.scale for p in effect.parameters]
+        B = np.hstack([within, own * np.array(scales)])
         b = B.T @ shown
         rest = float(shown @ shown - b @ np.linalg.solve(np.eye(b.size) + B.T @ B, b))
         found[(with_onset(effect, begun.time).id,)] = max(rest, 0.0)
@@ -197,12 +200,18 @@ class CalibrationFromOnset:
     fit: Fit
 
 
-def _calibration_from_onset(findings: Findings, what: FittedChangePoint) -> CalibrationFromOnset:
-    """Return a sudden cause as one that holds throughout, as large, with what the records say of its size."""
-    n, fit = len(findings.problem.entries), what.fit
-    at = columns_of(findings.problem.entries, (what.begun.effect.id,))
+def _calibration_from_onset(findings: Findings, what: FittedChangePoint) -> CalibrationFromOnset | None:
+    """Return a sudden cause as one that holds throughout, as large (or grown) as it is at the end of its record, with
+    what the records say of its size; None of a jam, which is no deviation of a fin that follows.
+    """
+    n, fit, effect = len(findings.problem.entries), what.fit, what.begun.effect
+    at = columns_of(findings.problem.entries, (effect.grows or effect.id,))
+    if not at:
+        return None
+    lasts = float(findings.problem.records[what.begun.record].time[-1]) - what.begun.time
+    grown = lasts / MINUTE_S if effect.grows else 1.0
     z, J, D = fit.z[:n].copy(), fit.J[:, :n].copy(), fit.D[:n].copy()
-    z[at], J[:, at], D[at] = fit.z[n:-1], fit.J[:, n:-1], fit.D[n:-1]
+    z[at], J[:, at], D[at] = grown * fit.z[n:-1], fit.J[:, n:-1] / grown, grown**2 * fit.D[n:-1]
     return CalibrationFromOnset(ids=(what.id,), fit=replace(fit, z=z, J=J, D=D))
 
 
@@ -212,8 +221,9 @@ def _survivors(findings: Findings, left: RemainingModels) -> list[Survivor]:
     """
     candidates = findings.search.candidates
     found: list[Survivor] = [candidates[ids] for ids in left.hypotheses if ids in candidates]
-    return found + [_calibration_from_onset(findings, one) for one in left.change_points
-                    if (one.begun.effect.id,) not in left.hypotheses]  # fmt: skip
+    broken = [_calibration_from_onset(findings, one) for one in left.change_points
+              if (one.begun.effect.id,) not in left.hypotheses]  # fmt: skip
+    return found + [one for one in broken if one]
 
 
 def _next_trial(

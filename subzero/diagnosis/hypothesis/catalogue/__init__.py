@@ -18,6 +18,9 @@ from subzero.user_file import MOST_OF_A_PROGRAM, read_bytes
 
 START = start.EFFECTS
 """What is free at the start of every trial, and never named."""
+ONSETS = (*fins.ONSETS, *hull.ONSETS, *propulsion.ONSETS)
+"""What can only begin in mid-trial: a jam is no small deviation from a fin that follows, and a growth has a time to
+begin at. Neither is a tolerance of a healthy vehicle, and so no part of every fit."""
 
 
 def catalogue(channels: Iterable[str], more: Iterable[Effect] = ()) -> dict[str, Effect]:

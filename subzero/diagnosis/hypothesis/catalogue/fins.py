@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from math import degrees, radians
 
 from subzero.diagnosis.hypothesis.configuration import Setting
@@ -39,6 +41,15 @@ def stern_plane_offset(setting: Setting, common: float, differential: float) -> 
         stern_plane_port_servo__offset=lambda old: old + radians(common - differential),
         stern_plane_starboard_servo__offset=lambda old: old + radians(common + differential),
     )
+
+
+def _jam(servo: str, setting: Setting, lost: float, angle: float) -> Setting:
+    """The servo loses a share of its command, and its fin stands off by an angle."""
+    changes: dict[str, Callable[[float], float]] = {
+        f"{servo}__lost_command": lambda old: min(old + lost, 1.0),
+        f"{servo}__offset": lambda old: old + radians(angle),
+    }
+    return setting.with_vehicle(**changes)
 
 
 def _lag(setting: Setting) -> float:
@@ -85,3 +96,25 @@ EFFECTS = (
            parameters=(_angle("common"), _angle("differential")), apply=stern_plane_offset, sudden=True),
 )  # fmt: skip
 """To add one: a function (setting, deviation) → setting, and a line here."""
+
+
+def _jammed(fin: str, servo: str, words: str, offset: str) -> Effect:
+    """Return the jam of a fin, whose angle may also be an offset of it."""
+    return Effect(id=f"{fin}_jam", sentence=f"{words} no longer follows its command: it is jammed or slips",
+                  parameters=(Parameter(name="lost_share", unit="1", tolerance=0.02, scale=0.6, low=0.0, high=1.0),
+                              Parameter(name="angle", unit="degree", tolerance=0.15, scale=5.0, low=-25.0, high=25.0,
+                                        also_of=offset)),
+                  slot="fins", apply=partial(_jam, servo), sudden=True)  # fmt: skip
+
+
+ONSETS = (
+    _jammed("rudder", "rudder_servo", "the rudder", "rudder_offset"),
+    _jammed("stern_plane_port", "stern_plane_port_servo", "the port stern-plane", "stern_plane_offset"),
+    _jammed(
+        "stern_plane_starboard",
+        "stern_plane_starboard_servo",
+        "the starboard stern-plane",
+        "stern_plane_offset",
+    ),
+)
+"""What can only begin in mid-trial."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from subzero.diagnosis.hypothesis.configuration import Setting
-from subzero.diagnosis.hypothesis.effect import Effect, Parameter
+from subzero.diagnosis.hypothesis.effect import Effect, Parameter, growing
 from vehicle import Vehicle
 
 
@@ -98,3 +98,16 @@ EFFECTS = (
            parameters=_share(0.03, 0.40), apply=roll_stiffness),
 )  # fmt: skip
 """To add one: a function (setting, deviation) → setting, and a line here."""
+
+_BY_ID = {effect.id: effect for effect in EFFECTS}
+ONSETS = (
+    growing(
+        _BY_ID["net_buoyancy"],
+        "flooding",
+        "the vehicle grows heavier or lighter: water comes in, or goes out",
+    ),
+    growing(
+        _BY_ID["hull_drag"], "fouling", "the drag of the hull grows or falls: it gathers weed, or sheds it"
+    ),
+)
+"""What grows from some time on."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from subzero.diagnosis.hypothesis.configuration import Setting
-from subzero.diagnosis.hypothesis.effect import Effect, Parameter
+from subzero.diagnosis.hypothesis.effect import Effect, Parameter, growing
 
 CHARGE = 60.0
 """What 2 A draw from the battery in 30 s: sag is told for this much. [C]"""
@@ -57,3 +57,9 @@ EFFECTS = (
            apply=propeller_torque),
 )  # fmt: skip
 """To add one: a function (setting, deviation) → setting, and a line here."""
+
+_BY_ID = {effect.id: effect for effect in EFFECTS}
+ONSETS = (
+    growing(_BY_ID["propeller_thrust_gain"], "fading_thrust", "the thrust of the propeller fades or grows"),
+)
+"""What grows from some time on."""

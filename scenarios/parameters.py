@@ -1,0 +1,351 @@
+"""Every number of a trial by one dotted name, to look at it or to give it another value.
+
+    "vehicle.rigid_body.mass"          cable.diameter, drum.inertia      as in [changes] of a trial file
+    "run.duration_s"                   start.heading_deg                 keys of their sections
+    "water.current_east_m_s"           water.sea_bed_m
+    "commands.rudder_deg[1]"           one value of a list;  commands.propeller_rps: all its values
+    "winch.tension_N"                  vessel, motion, water.profile_east_m_s likewise
+
+Names carry the unit of the files, and so do values: degrees in ``_deg``, and what a part's file says for its numbers.
+What a file refuses is refused here, in the same words, with the nearest name.
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from scenarios.errors import Problem, ScenarioError, nearest_or_all
+from scenarios.files import Source
+from scenarios.parts import Leaf, changeable, leaves, read_part, value_complaint
+from scenarios.quantities import (
+    BED,
+    COMMANDS,
+    MOTION,
+    PROFILE,
+    RUN,
+    START,
+    VESSEL,
+    WATER,
+    WINCH,
+    Quantity,
+    by_field,
+)
+from scenarios.trial import SETPOINT, Trial
+from subzero.errors import real
+from subzero.errors import short as shown
+
+ELEMENT = re.compile(r"(?P<list>[^\[\]]+)\[(?P<at>\d+)\]")
+"""``rudder_deg[1]``."""
+
+PARTS = ("vehicle", "cable", "drum")
+
+
+def with_parameters(trial: Trial, values: Mapping[str, float]) -> Trial:
+    """Return a trial with other values for some of its numbers.
+
+    Args:
+        trial: what is changed; it stays as it is.
+        values: dotted name → value, in the units of the files.
+
+    Raises:
+        ScenarioError: names that the trial does not have, values outside their limits, values that do not fit together.
+
+    >>> import scenarios
+    >>> trial = scenarios.load("fig6")
+    >>> with_parameters(trial, {"start.wet_length_m": 40.0, "cable.diameter": 0.003}).start.wet_length
+    40.0
+    """
+    problems = [problem for name, value in values.items() if (problem := _problem(trial, name, value))]
+    if problems:
+        raise ScenarioError(problems)
+    changed: dict[str, Any] = {}
+    for section in dict.fromkeys(name.partition(".")[0] for name in values):
+        own = {
+            name.partition(".")[2]: float(value)
+            for name, value in values.items()
+            if name.startswith(f"{section}.")
+        }
+        changed |= _CHANGES[section](trial, own)
+    return replace(trial, **changed)
+
+
+def parameter(trial: Trial, name: str) -> float:
+    """Return the value of a number of a trial, in the unit of the files; of a whole list its first.
+
+    Raises:
+        ScenarioError: the trial has no such number.
+    """
+    found = _known(trial).get(_list_of(name))
+    at = _at(name)
+    if found is None or (at is not None and at >= len(found[1])):
+        raise ScenarioError([_unknown(trial, name)])
+    return float(found[1][at or 0])
+
+
+def parameter_names(trial: Trial) -> tuple[str, ...]:
+    """Return the names of all numbers of a trial; lists by their name alone, without ``[1]``."""
+    return tuple(_known(trial))
+
+
+def parameter_unit(trial: Trial, name: str) -> str:
+    """Return the unit of a number of a trial, in files.
+
+    Raises:
+        ScenarioError: the trial has no such number.
+    """
+    parameter(trial, name)
+    row = _known(trial)[_list_of(name)][0]
+    return row.unit if isinstance(row, Quantity) else str(row["unit"])
+
+
+def declared_ranges(trial: Trial) -> dict[str, tuple[float, float]]:
+    """Return what the files of vehicle, cable and drum declare as plausible: dotted name → least, greatest value.
+
+    The files are those that the trial names. A value that [changes] has moved keeps the range of its file.
+
+    Raises:
+        ScenarioError: the trial was not read from a file, or its files are not there any more.
+    """
+    table = tomllib.loads(trial.text) if trial.text else {}
+    source = Source(
+        name=trial.source, folder=Path(trial.source).parent, text=trial.text, table=table, lines={}
+    )
+    ranges: dict[str, tuple[float, float]] = {}
+    for kind in ("vehicle", "cable"):
+        named = table.get(kind)
+        if not isinstance(named, str):
+            why = f"it does not say which {kind} it has, so no ranges are known"
+            raise ScenarioError([Problem(file=trial.name, key=kind, why=why, remedy="Give the ranges.")])
+        part, problems = read_part(source, kind, named)
+        if part.source is None:
+            raise ScenarioError(problems)
+        above = "vehicle." if kind == "vehicle" else ""
+        ranges |= {
+            f"{above}{key}": (float(leaf["range"][0]), float(leaf["range"][1]))
+            for key, leaf in leaves(part.source.table)
+            if "range" in leaf
+        }
+    return ranges
+
+
+# What there is, and what is wrong with a name or a value.
+
+Row = Quantity | Leaf
+"""What is known of a number: its limits, its unit."""
+
+
+@cache
+def _part_rows() -> dict[str, Leaf]:
+    return changeable()
+
+
+def _known(trial: Trial) -> dict[str, tuple[Row, np.ndarray]]:
+    """Return dotted name → what it is, and its value or values (n,), in the unit of the files."""
+    known: dict[str, tuple[Row, np.ndarray]] = {}
+    for name, row in _part_rows().items():
+        known[name] = row, np.array([_part_value(trial, name)])
+    for section, owner, rows in (("run", trial, RUN), ("start", trial.start, START)):
+        for field, quantity in by_field(rows).items():
+            known[f"{section}.{quantity.name}"] = quantity, np.array([getattr(owner, field) / quantity.scale])
+    for quantity, value in zip((*WATER, *BED), (*trial.current, trial.sea_bed), strict=True):
+        known[f"water.{quantity.name}"] = quantity, np.array([value])
+    for section in _LISTS:
+        for quantity, column in _columns(trial, section):
+            known[f"{section}.{quantity.name}"] = quantity, column / quantity.scale
+    return known
+
+
+def _row(trial: Trial, name: str) -> tuple[Row, int] | None:
+    """Return what a number is, and of how many a list has; None if there is none. Quick for single numbers."""
+    section, _, key = name.partition(".")
+    if section in PARTS:
+        row = _part_rows().get(name)
+        return None if row is None else (row, 1)
+    if section in ("run", "start", "water") and (single := _SINGLE[section].get(key)):
+        return single, 1
+    for quantity, column in _columns(trial, section) if section in _LISTS else ():
+        if quantity.name == key:
+            return quantity, column.size
+    return None
+
+
+def _problem(trial: Trial, name: str, value: object) -> Problem | None:
+    """Return what is wrong with a name or its value; None if nothing is."""
+    found, at = _row(trial, _list_of(name)), _at(name)
+    if found is None or (at is not None and at >= found[1]) or ("[" in name and at is None):
+        return _unknown(trial, name)
+    row, _ = found
+    complaint = _complaint(value, row) if isinstance(row, Quantity) else value_complaint(value, row, name)
+    if complaint is None:
+        return None
+    why, remedy = complaint
+    return Problem(file=trial.name, key=name, found=shown(value), why=why, remedy=remedy)
+
+
+def _complaint(value: object, quantity: Quantity) -> tuple[str, str] | None:
+    number = real(value)
+    if number is None:
+        return "this is not a finite number", quantity.allowed
+    if not quantity.low <= number <= quantity.high:
+        return "this is outside its limits", quantity.allowed
+    return None
+
+
+def _unknown(trial: Trial, name: str) -> Problem:
+    """Return the problem of a name that a trial does not have, with the nearest."""
+    known = _known(trial)
+    if _list_of(name) in known:
+        count = len(known[_list_of(name)][1])
+        remedy = f"Allowed: {_list_of(name)}[0] to [{count - 1}], or without [ ] for all of them."
+        return Problem(file=trial.name, key=name, why=f"this list has {count} values", remedy=remedy)
+    last = name.rpartition(".")[2]
+    alike = [
+        other for other in known if other.rpartition(".")[2] == last
+    ]  # the key is right, and its section is not
+    hint = f"Did you mean '{alike[0]}'?" if alike else nearest_or_all(name, known)
+    if not hint.startswith("Did"):
+        hint = (
+            "Write section.key, such as vehicle.rigid_body.mass, cable.diameter, start.heading_deg or "
+            "commands.rudder_deg[1]."
+        )
+    return Problem(file=trial.name, key=name, why="the trial has no such number", remedy=hint)
+
+
+def _list_of(name: str) -> str:
+    found = ELEMENT.fullmatch(name)
+    return found["list"] if found else name
+
+
+def _at(name: str) -> int | None:
+    found = ELEMENT.fullmatch(name)
+    return int(found["at"]) if found else None
+
+
+# Sections: how their numbers are changed.
+
+
+def _part_value(trial: Trial, name: str) -> float:
+    section, *keys = name.split(".")
+    table: Any = getattr(trial, section)
+    for key in keys:
+        table = table.get(key, {}) if isinstance(table, Mapping) else {}
+    return float("nan") if isinstance(table, Mapping) else float(table)
+
+
+def _with_part(section: str) -> Callable[[Trial, Mapping[str, float]], dict[str, Any]]:
+    def changed(trial: Trial, own: Mapping[str, float]) -> dict[str, Any]:
+        table = getattr(trial, section)
+        for key, value in own.items():
+            table = _with_key(table, key.split("."), value)
+        return {section: table}
+
+    return changed
+
+
+def _with_key(table: Mapping[str, Any], keys: list[str], value: float) -> dict[str, Any]:
+    """Return a table of tables with another value at the end of a way of keys."""
+    key, *rest = keys
+    return {**table, key: _with_key(table.get(key, {}), rest, value) if rest else value}
+
+
+def _with_run(trial: Trial, own: Mapping[str, float]) -> dict[str, Any]:
+    return _fields(RUN, own)
+
+
+def _with_start(trial: Trial, own: Mapping[str, float]) -> dict[str, Any]:
+    changes: dict[str, Any] = _fields(START, own)
+    return {"start": replace(trial.start, **changes)}
+
+
+def _fields(rows: tuple[Quantity, ...], own: Mapping[str, float]) -> dict[str, float]:
+    """Return values by the names of the fields that hold them, in inner units."""
+    return {
+        field: own[quantity.name] * quantity.scale
+        for field, quantity in by_field(rows).items()
+        if quantity.name in own
+    }
+
+
+def _with_water(trial: Trial, own: Mapping[str, float]) -> dict[str, Any]:
+    current = tuple(own.get(row.name, old) for row, old in zip(WATER, trial.current, strict=True))
+    lists = {name: value for name, value in own.items() if name not in _SINGLE["water"]}
+    changed = {"current": current, "sea_bed": own.get(BED[0].name, trial.sea_bed)}
+    return changed | (_with_lists("water")(trial, lists) if lists else {})
+
+
+def _columns(trial: Trial, section: str) -> list[tuple[Quantity, np.ndarray]]:
+    """Return the lists of a section, in inner units; none where the trial has no such section."""
+    part = getattr(trial, _LISTS[section])
+    if part is None:
+        return []
+    if section == "motion":
+        given = ((row, getattr(part, field)) for field, row in by_field(MOTION).items())
+        return [(row, np.asarray(column)) for row, column in given if column is not None]
+    if section == "winch":
+        row = SETPOINT[part.control]
+        return [] if row is None else [(WINCH[0], np.array(part.time)), (row, np.array(part.setpoint))]
+    first, *others = {"commands": COMMANDS, "vessel": VESSEL, "water": PROFILE}[section]
+    table = np.asarray(part.values if section == "commands" else part.velocity, dtype=float)
+    along = part.depth if section == "water" else part.time
+    return [(first, np.asarray(along, dtype=float)), *zip(others, table.T, strict=True)]
+
+
+def _with_lists(section: str) -> Callable[[Trial, Mapping[str, float]], dict[str, Any]]:
+    def changed(trial: Trial, own: Mapping[str, float]) -> dict[str, Any]:
+        rows = [(row, np.array(column, dtype=float)) for row, column in _columns(trial, section)]
+        columns = {row.name: (row, column) for row, column in rows}
+        for name, value in own.items():
+            row, column = columns[_list_of(name)]
+            at = _at(name)
+            column[slice(None) if at is None else at] = value * row.scale
+        part = getattr(trial, _LISTS[section])
+        return {_LISTS[section]: replace(part, **_part_fields(section, part, [one for _, one in rows]))}
+
+    return changed
+
+
+def _part_fields(section: str, part: Any, columns: list[np.ndarray]) -> dict[str, Any]:
+    """Return the fields of the lists of a section, from its columns in the order of `_columns`."""
+    first, *others = columns
+    if section == "motion":
+        names = [name for name in by_field(MOTION) if getattr(part, name) is not None]
+        return dict(zip(names, columns, strict=True))
+    if section == "winch":
+        return {"time": first, "setpoint": others[0]}
+    table = np.column_stack(others)
+    along = {"water": "depth"}.get(section, "time")
+    return {along: first, "values" if section == "commands" else "velocity": table}
+
+
+_SINGLE: dict[str, dict[str, Quantity]] = {
+    "run": {row.name: row for row in RUN},
+    "start": {row.name: row for row in START},
+    "water": {row.name: row for row in (*WATER, *BED)},
+}
+"""Section → its single numbers."""
+
+_LISTS = {
+    "commands": "commands",
+    "winch": "winch",
+    "vessel": "vessel",
+    "motion": "motion",
+    "water": "profile",
+}
+"""Section → the field of a trial that holds its lists."""
+
+_CHANGES: dict[str, Callable[[Trial, Mapping[str, float]], dict[str, Any]]] = {
+    **{section: _with_part(section) for section in PARTS},
+    **{section: _with_lists(section) for section in _LISTS if section != "water"},
+    "run": _with_run,
+    "start": _with_start,
+    "water": _with_water,
+}
+"""Section → what a trial's fields are with other values in it."""

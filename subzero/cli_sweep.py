@@ -1,0 +1,150 @@
+"""The command ``subzero sweep``: everything heavy is imported inside it."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from time import monotonic
+from typing import TYPE_CHECKING, Annotated, Any, Self
+
+import cyclopts
+from cyclopts import Parameter
+
+from subzero.errors import UserError, printable
+
+if TYPE_CHECKING:
+    from subzero.sweeps.api import Standing
+
+FINE, STOPPED = 0, 3
+
+Flag = Annotated[bool, Parameter(negative=())]
+
+
+def sweep(
+    spec: Path,
+    /,
+    *,
+    out: Path | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    retry: Flag = False,
+    strict: Flag = False,
+) -> int:
+    """Run a trial with many values of its parameters, and show what they do.
+
+    Kill it at any moment and give the same command again: it goes on with the members that are not finished.
+
+    Args:
+        spec: TOML file that says which trial, which parameters, which design (see docs/sweeps.md).
+        out: folder for the files; by default one named after the file, here.
+        workers: processes on this machine; by default one for each of its cores.
+        scheduler: address of a Dask scheduler, such as tcp://host:8786, to run on its workers instead.
+        retry: run members again that failed.
+        strict: end with exit code 3 if a member's run ends with warnings.
+    """
+    from subzero.sweeps.plan import read_plan
+
+    plan = read_plan(spec)
+    from subzero.stage import staged
+    from subzero.sweeps.api import finished
+    from subzero.sweeps.tell import FILES, default_folder, tell_sweep, write_sweep
+
+    if workers is not None and scheduler is not None:
+        raise UserError("--workers are processes here, and --scheduler has its own. Leave out one of them.")
+    folder = out or default_folder(spec)
+    with (
+        _Bar(plan.description, len(plan.points.values), folder) as bar,
+        _client(scheduler) as client,
+        finished(plan, folder, workers=workers, client=client, progress=bar, retry=retry) as store,
+        staged(folder, FILES) as stage,
+    ):
+        summary = write_sweep(plan, store, stage)
+    tell_sweep(summary, stage)
+    return STOPPED if summary["failed"] or (strict and summary["warnings"]) else FINE
+
+
+def add_to(app: cyclopts.App) -> None:
+    """Add the command to the command line."""
+    app.command(sweep)
+
+
+LINE_EVERY_S = 30.0
+"""So often a line tells how far it is where there is no terminal for a bar. [s]"""
+
+
+class _Bar:
+    """Shows how far a sweep is: a bar on a terminal, now and then a line elsewhere; and what an interrupt has left."""
+
+    def __init__(self, words: str, members: int, folder: Path) -> None:
+        from subzero import interrupts
+        from subzero.progress import progress_bar
+
+        self._bar = progress_bar(
+            words, lambda: "Workers compile what is not compiled yet in their first run."
+        )
+        self._said, self._members, self._finished, self._folder = monotonic(), members, 0, folder
+        interrupts.leaves(self._left)
+
+    def __enter__(self) -> Self:
+        self._bar.__enter__()
+        return self
+
+    def __exit__(self, *error: Any) -> None:
+        self._bar.__exit__(*error)
+
+    def __call__(self, standing: Standing) -> None:
+        """Show how far it is."""
+        self._finished = standing.finished
+        words = _in_words(standing)
+        self._bar(standing.finished / standing.members, words)
+        if not sys.stderr.isatty() and monotonic() - self._said > LINE_EVERY_S:
+            self._said = monotonic()
+            print(words, file=sys.stderr)
+
+    def _left(self) -> str:
+        return (
+            f"{self._finished} of {self._members} members are kept in {printable(str(self._folder))}; "
+            "the same command goes on from there"
+        )
+
+
+def _in_words(standing: Standing) -> str:
+    """Return how far a sweep is, its rate, how long it will take, and how many members failed."""
+    parts = [f"{standing.finished} of {standing.members} members"]
+    if standing.rate > 0.0:
+        parts += [f"{standing.rate:.3g}/s", f"{_span(standing.seconds_left)} left"]
+    return ", ".join([*parts, *([f"{standing.failed} failed"] if standing.failed else [])])
+
+
+def _span(seconds: float) -> str:
+    """Return a time as people say it."""
+    if seconds < 100.0:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60.0:.0f} min" if seconds < 6000.0 else f"{seconds / 3600.0:.1f} h"
+
+
+@contextmanager
+def _client(scheduler: str | None) -> Iterator[Any]:
+    """Give a client of a Dask scheduler, None without one."""
+    if scheduler is None:
+        yield None
+        return
+    try:
+        from distributed import Client
+    except ImportError:
+        raise UserError("--scheduler needs Dask: pip install 'subzero[cluster]'.") from None
+    try:
+        client = Client(scheduler, timeout=CONNECT_S)
+    except (OSError, ValueError, TypeError) as error:
+        raise UserError(
+            f"No Dask scheduler answers at {scheduler} ({error}). Start one with 'dask scheduler',"
+            " or leave out --scheduler."
+        ) from error
+    with client:
+        yield client
+
+
+CONNECT_S = 10
+"""So long is waited for a scheduler's answer. [s]"""

@@ -1,0 +1,12 @@
+"""Sweeps: a trial with many values of its parameters, on all cores or a cluster, into one dataset, never lost.
+
+    >>> import subzero
+    >>> runs = subzero.sweep("fig6", {"water.current_east_m_s": [0.0, 0.1]}, changes={"run.duration_s": 2.0})
+    >>> runs["heading"].dims
+    ('member', 'time')
+
+A plan (`plan`) has points (`design`) and says what is kept of each run (`outcomes`). A job (`member`) runs any of its
+members anywhere. A schedule (`schedule`) hands them to an executor, of processes here (`workers`) or of a cluster, and
+a store (`store`) keeps what comes back. In the end one dataset is written (`result`), and looked at (`sensitivity`,
+`figures`). `api` does it all; the command is ``subzero sweep``.
+"""

@@ -1,0 +1,232 @@
+"""Run a sweep: from a plan to one dataset, on this machine or on a cluster, however often it is interrupted."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Executor
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from time import monotonic
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+import scenarios
+from subzero.errors import UserError, short, whole
+from subzero.sweeps.member import Member
+from subzero.sweeps.outcomes import Function
+from subzero.sweeps.plan import Plan, plan_of
+from subzero.sweeps.result import RESULT, Gathered, open_result, write_result
+from subzero.sweeps.schedule import Schedule
+from subzero.sweeps.store import Store, opened
+from subzero.sweeps.workers import WorkerPool
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+@dataclass(frozen=True, kw_only=True)
+class Standing:
+    """How far a sweep is.
+
+    Attributes:
+        finished: members that are.
+        members: all of them.
+        failed: of those that are finished.
+        rate: members a second since it began. [1/s]
+    """
+
+    finished: int
+    members: int
+    failed: int
+    rate: float
+
+    @property
+    def seconds_left(self) -> float:
+        """How long it will take at this rate, infinite before there is one. [s]."""
+        return (self.members - self.finished) / self.rate if self.rate > 0.0 else float("inf")
+
+
+Progress = Callable[[Standing], None]
+"""Told after every batch how far the sweep is."""
+
+
+def sweep(
+    scenario: str | Path | scenarios.Trial,
+    parameters: Mapping[str, Any],
+    *,
+    design: str = "grid",
+    samples: int | None = None,
+    seed: int = 0,
+    changes: Mapping[str, float] | None = None,
+    scalars: Sequence[str] | None = None,
+    channels: Sequence[str] | None = None,
+    every: float | None = None,
+    function: Function | None = None,
+    tethered: bool = True,
+    out: str | Path | None = None,
+    workers: int | None = None,
+    client: Any = None,
+    progress: Progress | None = None,
+) -> xr.Dataset:
+    """Run a trial with many values of its parameters, and return one labelled dataset.
+
+    >>> import subzero
+    >>> runs = subzero.sweep("fig6", {"start.wet_length_m": [0, 20, 40]}, changes={"run.duration_s": 2.0})
+    >>> runs["peak_speed_m_s"].sizes["member"]
+    3
+
+    Args:
+        scenario: name of a shipped scenario, path of a scenario file, or a trial.
+        parameters: dotted name (`scenarios.parameters`) → a list of values, ``{"from": a, "to": b}`` with or without
+            ``"count": n`` and ``"log": True``, ``{"normal": [mean, deviation]}``, or ``"declared"``, the range that the
+            vehicle's or the cable's file declares; ``"vehicle.*"`` stands for all that have one.
+        design: ``grid``, ``together`` (lists whose values belong together), ``latin_hypercube``, ``sobol``,
+            ``monte_carlo``, ``morris`` or ``saltelli`` (sensitivities, extra [sensitivity]).
+        samples: how many points; trajectories of ``morris``; a power of two of ``saltelli``.
+        seed: of the points.
+        changes: dotted name → value that holds for all members.
+        scalars: what is kept of each run: numbers of its summary, or ``cable_tension.max``
+            (`subzero.sweeps.outcomes`).
+        channels: kept over time, on a common grid.
+        every: interval of that grid. [s]
+        function: of one's own: takes a run, returns a number, or numbers by name.
+        tethered: with the cable.
+        out: folder that keeps the members. The same call with it goes on where another was killed; without one, nothing
+            is kept.
+        workers: processes on this machine, by default one for each of its cores.
+        client: a Dask client, or any `concurrent.futures.Executor`, to run on instead.
+        progress: told after every batch how far it is.
+
+    Returns:
+        parameters as coordinates on ``member``; scalars (member), channels (member, time); ``failed``, ``reason`` and
+        ``warnings`` of every member. With `out` it is read from the file as far as it is looked at.
+        ``runs.set_index(member=[...]).unstack()`` gives a grid one dimension for each parameter.
+
+    Raises:
+        UserError: a plan that cannot be; a folder with another sweep.
+    """
+    plan = plan_of(
+        scenario, parameters, design=design, samples=samples, seed=seed, changes=changes, scalars=scalars,
+        channels=channels, every=every, function=function, tethered=tethered,
+    )  # fmt: skip
+    if out is not None:
+        with finished(plan, Path(out), workers=workers, client=client, progress=progress) as store:
+            deliver(plan, store, Path(out))
+        return open_result(Path(out) / RESULT)
+    with tempfile.TemporaryDirectory(prefix="subzero-sweep-") as folder:
+        with finished(plan, Path(folder), workers=workers, client=client, progress=progress) as store:
+            deliver(plan, store, Path(folder))
+        with open_result(Path(folder) / RESULT) as runs:
+            return runs.load()
+
+
+@contextmanager
+def finished(
+    plan: Plan,
+    folder: Path,
+    *,
+    workers: int | None = None,
+    client: Any = None,
+    progress: Progress | None = None,
+    retry: bool = False,
+) -> Iterator[Store]:
+    """Give the store of a sweep with all its members finished; what a former call has finished is not run again.
+
+    Args:
+        plan: the sweep.
+        folder: where the store is, or will be.
+        workers: as of `sweep`.
+        client: as of `sweep`.
+        progress: as of `sweep`.
+        retry: run members again that failed.
+
+    Raises:
+        UserError: as of `sweep`, or workers that cannot go on; what is finished is kept.
+    """
+    job, rows = plan.job, plan.points.values
+    shape = len(job.outcomes.channels), job.outcomes.times.size
+    with opened(folder, plan.manifest(), shape) as store:
+        if retry:
+            store.forget_failed()
+        done = store.finished(len(rows))
+        tally = _Tally(store, len(rows), int(done.sum()), progress)
+        if not done.all():
+            with _executor(workers, client, len(rows) - int(done.sum())) as (executor, count):
+                Schedule(job, rows, np.flatnonzero(~done), count, tally.keep).run(executor)
+        yield store
+
+
+class _Tally:
+    """Keeps members, and tells how far the sweep is."""
+
+    def __init__(self, store: Store, members: int, finished: int, progress: Progress | None) -> None:
+        self._store, self._members, self._progress = store, members, progress
+        self._finished, self._before = finished, finished
+        self._failed, self._begun = store.failures(), monotonic()
+        self._tell()
+
+    def keep(self, members: Sequence[Member]) -> None:
+        self._store.add(members)
+        self._finished += len(members)
+        self._failed += sum(bool(one.reason) for one in members)
+        self._tell()
+
+    def _tell(self) -> None:
+        if self._progress is not None:
+            rate = (self._finished - self._before) / max(monotonic() - self._begun, 1e-9)
+            self._progress(
+                Standing(finished=self._finished, members=self._members, failed=self._failed, rate=rate)
+            )
+
+
+def deliver(plan: Plan, store: Store, folder: Path) -> Gathered:
+    """Write the dataset of a finished sweep to a folder, whole or not at all; return what is looked at."""
+    with tempfile.TemporaryDirectory(prefix=".subzero-", dir=folder) as hidden:
+        found = write_result(store, plan.job, plan.points, plan.attributes, Path(hidden))
+        for path in sorted(Path(hidden).iterdir()):
+            os.replace(path, folder / path.name)
+    return found
+
+
+@contextmanager
+def _executor(workers: int | None, client: Any, members: int) -> Iterator[tuple[Executor, int]]:
+    """Give what runs members, and how many it runs at a time."""
+    if client is None:
+        count = min(whole("workers", workers, least=1) if workers is not None else cores(), members)
+        pool = WorkerPool(count)
+        try:
+            yield pool, count
+        finally:
+            pool.shutdown(cancel_futures=True)
+    elif isinstance(client, Executor):
+        yield client, whole("workers", workers, least=1) if workers is not None else cores()
+    elif hasattr(client, "get_executor") and hasattr(client, "ncores"):
+        yield client.get_executor(), _cluster_size(client)
+    else:
+        raise UserError(
+            f"client is {short(client)}. Allowed: a Dask client, or a concurrent.futures.Executor."
+        )
+
+
+CLUSTER_WAIT_S = 30
+"""So long is waited for the first worker of a cluster. [s]"""
+
+
+def _cluster_size(client: Any) -> int:
+    """Return how many members a Dask cluster runs at a time, once it has a worker."""
+    try:
+        client.wait_for_workers(1, timeout=CLUSTER_WAIT_S)
+    except TimeoutError:
+        raise UserError(
+            f"The Dask scheduler has no worker after {CLUSTER_WAIT_S} s. Start some: dask worker ADDRESS --nthreads 1"
+        ) from None
+    return max(1, sum(client.ncores().values()))
+
+
+def cores() -> int:
+    """Return how many cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -1,0 +1,176 @@
+"""One member of a sweep: a trial with its own numbers, run and looked at, in any process.
+
+A `Job` is all that a worker needs, and is sent to it with every batch. What a member gives depends on the job and its
+own number only: neither on who runs it, nor on what was run before. Whatever goes wrong with a member is kept as its
+reason; only a damaged job, or another version of the code, stops the sweep.
+"""
+
+from __future__ import annotations
+
+import json
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from importlib.metadata import version
+from time import perf_counter
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+import scenarios
+from scenarios.parameters import with_parameters
+from subzero.errors import UserError, printable
+from subzero.sweeps.outcomes import Outcomes, channels_of, own_numbers, scalars_of
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+LONGEST_REASON = 1000
+"""So much of a reason is kept. [characters]"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Member:
+    """What is kept of a member.
+
+    Attributes:
+        index: its number in the sweep, from 0.
+        reason: why it failed; empty if it did not.
+        warnings: (check, message) of its run.
+        scalars: (scalars,), NaN if it failed.
+        channels: (channels, times), float32; NaN if it failed.
+        own: what a function of one's own returned, by name.
+        seconds: how long it took, which is no part of a result. [s]
+    """
+
+    index: int
+    reason: str
+    warnings: tuple[tuple[str, str], ...]
+    scalars: np.ndarray
+    channels: np.ndarray
+    own: dict[str, float]
+    seconds: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Job:
+    """What a worker needs to run members.
+
+    Attributes:
+        trial: what is swept, with all changes that hold for every member.
+        names: of the parameters that change.
+        outcomes: what is kept.
+        tethered: with the cable.
+        code: digest of the sources that the sweep was planned with.
+    """
+
+    trial: scenarios.Trial
+    names: tuple[str, ...]
+    outcomes: Outcomes
+    tethered: bool
+    code: str
+
+    def run(self, first: int, rows: np.ndarray) -> Member:
+        """Run a member; `rows` are the values of its parameters (parameters,)."""
+        begun = perf_counter()
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # the run keeps its own
+                run, indices = self._run(first, rows)
+            return self._seen(first, run, indices, begun)
+        except Exception as error:
+            told = str(error) if isinstance(error, UserError) else f"{type(error).__name__}: {error}"
+            return self.failed(first, told, perf_counter() - begun)
+
+    def _run(self, index: int, row: np.ndarray) -> tuple[xr.Dataset, dict[str, float]]:
+        """Return the run of a member, and the indices that it is judged by."""
+        from subzero.simulation import simulate
+
+        trial = with_parameters(self.trial, dict(zip(self.names, row.tolist(), strict=True)))
+        return simulate(trial, tethered=self.tethered), {}
+
+    def _seen(self, index: int, run: xr.Dataset, indices: dict[str, float], begun: float) -> Member:
+        """Return what is kept of a run."""
+        warned = tuple((one["check"], one["message"]) for one in json.loads(run.attrs.get("warnings", "[]")))
+        if run.attrs["outcome"] != "completed":
+            return self.failed(index, run.attrs["outcome_message"], perf_counter() - begun, warned)
+        return Member(
+            index=index,
+            reason="",
+            warnings=warned,
+            scalars=scalars_of(run, self.outcomes.scalars, indices),
+            channels=channels_of(run, self.outcomes),
+            own=own_numbers(run, self.outcomes.function),
+            seconds=perf_counter() - begun,
+        )
+
+    def failed(
+        self, index: int, why: str, seconds: float = 0.0, warned: tuple[tuple[str, str], ...] = ()
+    ) -> Member:
+        """Return a member that failed, and why."""
+        shape = (len(self.outcomes.channels), self.outcomes.times.size)
+        return Member(
+            index=index,
+            reason=printable(why[:LONGEST_REASON]) or "it failed without a word",
+            warnings=warned,
+            scalars=np.full(len(self.outcomes.scalars), np.nan),
+            channels=np.full(shape, np.nan, dtype=np.float32),
+            own={},
+            seconds=seconds,
+        )
+
+
+class OtherVersionError(UserError):
+    """A worker has another version of the code than the sweep was planned with."""
+
+
+def run_members(job: Job, indices: Sequence[int], rows: np.ndarray) -> list[Member]:
+    """Run members one after another; what a worker is asked for.
+
+    Args:
+        job: the sweep.
+        indices: their numbers.
+        rows: their parameters (members, parameters), in the units of the files.
+
+    Raises:
+        OtherVersionError: this process has other sources.
+    """
+    if job.code != code_digest():
+        raise OtherVersionError(
+            "A worker has another version of subzero than the one that plans the sweep, and would give other numbers."
+            " Install the same on all machines, and start the workers again."
+        )
+    return [job.run(int(index), row) for index, row in zip(indices, rows, strict=True)]
+
+
+@cache
+def code_digest() -> str:
+    """Return a digest of all that the numbers of a run depend on: our sources, and the libraries' versions."""
+    import hashlib
+    from pathlib import Path
+
+    root = Path(__file__).resolve().parents[2]
+    digest = hashlib.sha256()
+    for package in ("cable", "scenarios", "subzero", "vehicle"):
+        for path in sorted((root / package).rglob("*")):
+            if path.suffix in (".py", ".toml"):
+                digest.update(str(path.relative_to(root)).encode() + b"\0" + path.read_bytes())
+    for library in ("numpy", "scipy", "numba", "xarray"):
+        digest.update(f"{library} {version(library)}".encode())
+    return digest.hexdigest()
+
+
+def canonical(value: Any) -> Any:
+    """Return a value of a trial as JSON can hold it, floats to the last bit."""
+    from dataclasses import fields, is_dataclass
+
+    if is_dataclass(value):
+        return {one.name: canonical(getattr(value, one.name)) for one in fields(value)}
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    if isinstance(value, dict):
+        return {str(key): canonical(inside) for key, inside in sorted(value.items())}
+    if isinstance(value, list | tuple):
+        return [canonical(one) for one in value]
+    return value

@@ -1,0 +1,269 @@
+"""What is kept of each run: scalars by name, channels on a common grid, and what a function of one's own returns.
+
+    "peak_speed_m_s", "energy.hull_loss_J", "diagnostics.closure_error_m"      the numbers of a run's summary
+    "cable_tension.max", "heading.end", "surge_speed.mean"                     a channel and a statistic of it
+    "index.overshoot"                                                          what a flight is judged by
+
+Scalars are float64, channels float32 (six to seven digits). A run that could not go on has none of them.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import CodeType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from subzero.channels import BY_NAME
+from subzero.errors import UserError, real, short, suggestion
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Function = Callable[["xr.Dataset"], Any]
+"""Of one's own: takes a run, returns a number, or numbers by name."""
+
+STATISTICS: dict[str, Callable[[np.ndarray], float]] = {
+    "max": lambda values: float(np.nanmax(values)),
+    "min": lambda values: float(np.nanmin(values)),
+    "mean": lambda values: float(np.nanmean(values)),
+    "end": lambda values: float(values[-1]),
+    "range": lambda values: float(np.nanmax(values) - np.nanmin(values)),
+    "rms": lambda values: float(np.sqrt(np.nanmean(values**2))),
+}
+"""Of a channel over its samples, in its display unit; the mean counts every sample alike."""
+
+SUMMARY = (
+    "time_at_end_s", "peak_speed_m_s", "time_of_peak_speed_s", "speed_at_end_m_s", "heading_at_end_deg",
+    "depth_at_end_m", "path_length_m", "cable_length_at_end_m", "largest_cable_force_N",
+    "time_of_largest_cable_force_s", "largest_cable_moment_N_m", "time_of_largest_cable_moment_s",
+)  # fmt: skip
+"""Numbers of `subzero.summary.summarise`."""
+
+TABLES = {
+    "energy": (
+        "propeller_work_J", "hull_loss_J", "cable_loss_J", "kinetic_change_J", "drum_J", "added_mass_term_J",
+        "residual_J", "unexplained_share",
+    ),
+    "diagnostics": (
+        "closure_error_m", "energy_residual", "largest_courant_number", "smallest_tension_N", "newton_iterations",
+    ),
+}  # fmt: skip
+"""Tables in it, and their numbers."""
+
+INDEX = "index."
+OWN = "own"
+"""Name of the number that a function of one's own returns without a name."""
+
+DEFAULT_SCALARS = ("peak_speed_m_s", "heading.end", "path_length_m", "largest_cable_force_N")
+DEFAULT_CHANNELS = ("surge_speed", "heading", "depth", "cable_tension")
+MOST_GRID_TIMES = 100_000
+DEFAULT_INTERVALS = 100
+"""A run is kept at so many intervals where no `every` says otherwise."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Outcomes:
+    """What is kept of each run.
+
+    Attributes:
+        scalars: names, as this module says.
+        channels: names of `subzero.channels`.
+        every: interval of the common grid. [s]
+        until: its end; a run that is over sooner has NaN behind its end. [s]
+        function: of one's own.
+    """
+
+    scalars: tuple[str, ...]
+    channels: tuple[str, ...]
+    every: float
+    until: float
+    function: Function | None = None
+
+    @property
+    def times(self) -> np.ndarray:
+        """The common grid (n,). [s]."""
+        return np.arange(self._count) * self.every
+
+    @property
+    def _count(self) -> int:
+        return math.floor(self.until / self.every + 1e-9) + 1 if self.channels else 0
+
+    def digest(self) -> str:
+        """SHA-256 of all that says what is kept; of a function its code, not what it calls."""
+        parts = (self.scalars, self.channels, self.every, self.until, text_of(self.function))
+        return hashlib.sha256(repr(parts).encode()).hexdigest()
+
+
+def outcomes_of(
+    scalars: Any = None,
+    channels: Any = None,
+    every: float | None = None,
+    *,
+    duration: float,
+    function: Function | None = None,
+) -> Outcomes:
+    """Return what is kept, checked.
+
+    Args:
+        scalars: names; `DEFAULT_SCALARS` when not given.
+        channels: names; `DEFAULT_CHANNELS` when not given.
+        every: interval of the common grid; a hundredth of the run when not given. [s]
+        duration: of the nominal run. [s]
+        function: of one's own.
+
+    Raises:
+        UserError: no such name, an interval that is none.
+    """
+    names = _names("scalars", scalars, DEFAULT_SCALARS)
+    kept = _names("channels", channels, DEFAULT_CHANNELS)
+    for name in names:
+        _check_scalar(name)
+    for name in kept:
+        if name not in BY_NAME or name == "time":
+            raise UserError(f"There is no channel {short(name)}.{suggestion(name, BY_NAME)}")
+    if function is not None and not callable(function):
+        raise UserError(f"function is {short(function)}; it must be a function of a run.")
+    step = duration / DEFAULT_INTERVALS if every is None else real(every)
+    if step is None or not step > 0.0 or duration / step > MOST_GRID_TIMES:
+        raise UserError(
+            f"every is {short(every)}. Allowed: a time from {duration / MOST_GRID_TIMES:g} s on, above 0."
+        )
+    return Outcomes(scalars=names, channels=kept, every=step, until=duration, function=function)
+
+
+def _names(what: str, given: Any, default: tuple[str, ...]) -> tuple[str, ...]:
+    """Return names that are given, each once."""
+    if given is None:
+        return default
+    names = (given,) if isinstance(given, str) else tuple(given)
+    if not all(isinstance(name, str) for name in names):
+        raise UserError(f"{what} are {short(given)}. Allowed: a list of names.")
+    return tuple(dict.fromkeys(names))
+
+
+def _check_scalar(name: str) -> None:
+    """Refuse a name that no run has."""
+    head, _, tail = name.rpartition(".")
+    known = (
+        name in SUMMARY
+        or tail in TABLES.get(head, ())
+        or (head in BY_NAME and tail in STATISTICS)
+        or name.startswith(INDEX)
+    )
+    if not known:
+        raise UserError(
+            f"There is no scalar {short(name)}.{suggestion(name, scalar_names())} Allowed: a number of a run's summary,"
+            f" such as {SUMMARY[1]}, or channel.statistic with {', '.join(STATISTICS)}."
+        )
+
+
+def scalar_names() -> list[str]:
+    """Return every scalar of a run by name."""
+    tables = [f"{table}.{name}" for table, names in TABLES.items() for name in names]
+    return [
+        *SUMMARY,
+        *tables,
+        *(f"{channel}.{one}" for channel in BY_NAME if channel != "time" for one in STATISTICS),
+    ]
+
+
+def unit_of(name: str) -> str:
+    """Return the unit of a scalar, as its name or its channel says."""
+    head, _, tail = name.rpartition(".")
+    if head in BY_NAME and tail in STATISTICS:
+        return BY_NAME[head].unit
+    endings = (
+        ("_N_m", "N m"),
+        ("_m_s", "m/s"),
+        ("_deg", "degree"),
+        ("_m", "m"),
+        ("_s", "s"),
+        ("_N", "N"),
+        ("_J", "J"),
+    )
+    return next((unit for ending, unit in endings if name.endswith(ending)), "1")
+
+
+def scalars_of(run: xr.Dataset, names: tuple[str, ...], indices: Mapping[str, float]) -> np.ndarray:
+    """Return scalars of a run (n,); NaN for one that this run does not have, such as an energy without a propeller."""
+    needs_summary = any(name in SUMMARY or name.partition(".")[0] in TABLES for name in names)
+    summary: dict[str, Any] = {}
+    if needs_summary:
+        from subzero.summary import summarise
+
+        summary = summarise(run)
+    return np.array([_scalar(run, name, summary, indices) for name in names], dtype=float)
+
+
+def _scalar(
+    run: xr.Dataset, name: str, summary: Mapping[str, Any], indices: Mapping[str, float]
+) -> float | None:
+    if name.startswith(INDEX):
+        return indices.get(name.removeprefix(INDEX))
+    head, _, tail = name.rpartition(".")
+    if head in BY_NAME:
+        values = run[head].values
+        return STATISTICS[tail](values) if not np.isnan(values).all() else None
+    return (summary.get(head) or {}).get(tail) if head else summary.get(name)
+
+
+def channels_of(run: xr.Dataset, outcomes: Outcomes) -> np.ndarray:
+    """Return channels of a run on the common grid (channels, times), linear between samples, float32."""
+    times, at = outcomes.times, run["time"].values
+    rows = [np.interp(times, at, run[name].values, right=np.nan) for name in outcomes.channels]
+    return np.array(rows, dtype=np.float32).reshape(len(outcomes.channels), times.size)
+
+
+def own_numbers(run: xr.Dataset, function: Function | None) -> dict[str, float]:
+    """Return what a function of one's own makes of a run, numbers by name.
+
+    Raises:
+        UserError: it returned what is no number, nor numbers by name.
+    """
+    if function is None:
+        return {}
+    made = function(run)
+    named = made if isinstance(made, Mapping) else {OWN: made}
+    try:
+        return {str(name): float(value) for name, value in named.items()}
+    except (TypeError, ValueError):
+        raise UserError(
+            f"The function {name_of(function)} returned {short(made)}. Allowed: a number, or numbers by name."
+        ) from None
+
+
+def name_of(function: Function) -> str:
+    """Return what a function is called."""
+    return getattr(function, "__qualname__", type(function).__name__)
+
+
+def text_of(function: Function | None) -> str:
+    """Return what a function does, as text that changes with its code, constants, defaults and closure.
+
+    What it calls is not looked at, and of an object that is no function only its name is.
+    """
+    if function is None:
+        return ""
+    code = getattr(function, "__code__", None)
+    if code is None:
+        return name_of(function)
+    cells = [cell.cell_contents for cell in getattr(function, "__closure__", None) or ()]
+    held = [
+        one for one in (*(getattr(function, "__defaults__", None) or ()), *cells) if isinstance(one, PLAIN)
+    ]
+    return f"{_code_text(code)} {held!r}"
+
+
+PLAIN = (int, float, complex, str, bytes, tuple, type(None))
+"""Kinds whose text is the same in every process."""
+
+
+def _code_text(code: CodeType) -> str:
+    """Return a piece of compiled Python as text, without lines and places."""
+    inside = [_code_text(one) if isinstance(one, CodeType) else repr(one) for one in code.co_consts]
+    return f"{code.co_code.hex()} {code.co_names} {inside}"

@@ -1,0 +1,211 @@
+"""What a sweep is, as one value: a trial, its points, what is kept; from Python, or from a TOML file.
+
+    trial = "fig6"                          # a name, or a path from this file's folder
+    design = "sobol"                        # see `subzero.sweeps.design`
+    samples = 256
+    seed = 1
+
+    [parameters]
+    "start.wet_length_m" = { from = 0, to = 40 }
+    "vehicle.axial_drag.*" = "declared"
+
+    [changes]                               # holds for all members
+    "run.rtol" = 0.0
+
+    [outcomes]
+    scalars = ["peak_speed_m_s", "cable_tension.max"]
+    channels = ["surge_speed", "heading"]
+    every_s = 0.5
+
+A file names data only: it holds no program and starts none.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import scenarios
+from scenarios.files import read_toml
+from scenarios.parameters import with_parameters
+from subzero.errors import UserError, printable, short, suggestion, truth
+from subzero.sweeps.design import Points, points_of
+from subzero.sweeps.member import Job, canonical, code_digest
+from subzero.sweeps.outcomes import Function, outcomes_of
+from subzero.trials import load
+
+KEYS = {
+    "": (
+        "trial",
+        "description",
+        "design",
+        "samples",
+        "seed",
+        "untethered",
+        "parameters",
+        "changes",
+        "outcomes",
+    ),
+    "outcomes": ("scalars", "channels", "every_s"),
+}
+"""Section of a file → its keys; those of parameters and changes are names of numbers."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Plan:
+    """A sweep, checked.
+
+    Attributes:
+        job: what a worker needs.
+        points: which members there are.
+        description: one line.
+    """
+
+    job: Job
+    points: Points
+    description: str
+
+    def manifest(self) -> dict[str, str]:
+        """Return what its members belong to: anything that could change a number, by its digest."""
+        values = canonical(self.job.trial)
+        for words in ("name", "description", "text", "source"):
+            values.pop(words)
+        return {
+            "trial": hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest(),
+            "parameters": json.dumps(self.points.names),
+            "points": self.points.digest,
+            "outcomes": self.job.outcomes.digest(),
+            "tethered": str(self.job.tethered),
+            "version of subzero": f"{version('subzero')} {self.job.code}",
+        }
+
+    @property
+    def attributes(self) -> dict[str, Any]:
+        """What a dataset says of where it is from; no clock, so that two are alike to the last bit."""
+        return {
+            "title": self.description,
+            "scenario": self.job.trial.name,
+            "scenario_text": self.job.trial.text,
+            "design": self.points.design,
+            "seed": self.points.seed,
+            "manifest": json.dumps(self.manifest(), sort_keys=True),
+            "subzero_version": version("subzero"),
+        }
+
+
+def plan_of(
+    scenario: str | Path | scenarios.Trial,
+    parameters: Mapping[str, Any],
+    *,
+    design: str = "grid",
+    samples: int | None = None,
+    seed: int = 0,
+    changes: Mapping[str, float] | None = None,
+    scalars: Any = None,
+    channels: Any = None,
+    every: float | None = None,
+    function: Function | None = None,
+    tethered: bool = True,
+    description: str = "",
+) -> Plan:
+    """Return a sweep, checked; arguments as of `subzero.sweep`.
+
+    Raises:
+        UserError: anything in it that cannot be.
+    """
+    trial = scenario if isinstance(scenario, scenarios.Trial) else load(scenario)
+    trial = with_parameters(trial, changes or {})
+    both = sorted(set(changes or {}) & set(parameters)) if isinstance(parameters, Mapping) else []
+    if both:
+        raise UserError(f"{', '.join(both)}: in changes and in parameters too. Keep one of them.")
+    points = points_of(trial, parameters, design=design, samples=samples, seed=seed)
+    job = Job(
+        trial=trial,
+        names=points.names,
+        outcomes=outcomes_of(scalars, channels, every, duration=trial.duration, function=function),
+        tethered=truth("tethered", tethered),
+        code=code_digest(),
+    )
+    words = description or f"{len(points.values)} members of {trial.name}, {points.design.replace('_', ' ')}"
+    return Plan(job=job, points=points, description=printable(words))
+
+
+def read_plan(path: str | Path) -> Plan:
+    """Read a sweep from a TOML file.
+
+    Raises:
+        UserError: it cannot be read, or cannot be a sweep; with the nearest valid name.
+    """
+    name = printable(str(path))
+    source = read_toml(Path(path), str(path))
+    table = source.table
+    _check_keys(name, "", table)
+    for section in ("parameters", "changes", "outcomes"):
+        if not isinstance(table.get(section, {}), dict):
+            raise UserError(f"{name}: {section} is {short(table[section])}. Allowed: a section [{section}].")
+    kept = table.get("outcomes", {})
+    _check_keys(name, "outcomes", kept)
+    if not isinstance(table.get("trial"), str):
+        raise UserError(
+            f'{name}: it does not say which trial is swept. Add trial = "fig6", or the path of a trial file.'
+        )
+    try:
+        return plan_of(
+            _trial_of(table["trial"], source.folder),
+            _dotted(table.get("parameters", {})),
+            design=table.get("design", "grid"),
+            samples=table.get("samples"),
+            seed=table.get("seed", 0),
+            changes=_dotted(table.get("changes", {})),
+            scalars=kept.get("scalars"),
+            channels=kept.get("channels"),
+            every=kept.get("every_s"),
+            tethered=not truth("untethered", table.get("untethered", False)),
+            description=str(table.get("description", "")),
+        )
+    except scenarios.ScenarioError:
+        raise
+    except UserError as error:
+        raise UserError(f"{name}: {error}") from error
+
+
+def _check_keys(file: str, section: str, table: Mapping[str, Any]) -> None:
+    for key in table:
+        if key not in KEYS[section]:
+            where = f"[{section}]" if section else "a sweep"
+            raise UserError(
+                f"{file}: {where} has no key {short(key)}.{suggestion(key, KEYS[section])}"
+                f" Allowed: {', '.join(KEYS[section])}."
+            )
+
+
+def _trial_of(named: str, folder: Path) -> str | Path:
+    """Return a shipped trial's name, or a path from the folder of the file that names it."""
+    return folder / named if named.endswith(".toml") else named
+
+
+def _dotted(table: Mapping[str, Any], above: str = "") -> dict[str, Any]:
+    """Return dotted names → what is said of them, whether the quotes were left out or not."""
+    found: dict[str, Any] = {}
+    for key, inside in table.items():
+        name = f"{above}{key}"
+        is_spread = isinstance(inside, Mapping) and any(
+            not isinstance(one, Mapping) for one in inside.values()
+        )
+        if isinstance(inside, Mapping) and not (is_spread and _says_spread(inside)):
+            found |= _dotted(inside, f"{name}.")
+        else:
+            found[name] = inside
+    return found
+
+
+def _says_spread(table: Mapping[str, Any]) -> bool:
+    """Say whether a table is a spread, and no section without quotes."""
+    from subzero.sweeps.design import DISTRIBUTION_KEYS
+
+    return any(key in DISTRIBUTION_KEYS for key in table)

@@ -1,0 +1,146 @@
+"""What the command leaves behind: dataset, table, summary, figures; and tells: numbers and what matters."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rich import box
+from rich.console import Console
+from rich.table import Table
+
+from subzero.errors import printable
+from subzero.figures.sheet import Title
+from subzero.sweeps.figures import draw_sweep
+from subzero.sweeps.outcomes import unit_of
+from subzero.sweeps.plan import Plan
+from subzero.sweeps.result import RESULT, TABLE, Gathered, percentiles, write_result
+from subzero.sweeps.sensitivity import Effect, effects_of, words_of
+from subzero.sweeps.store import FILE, Store
+
+if TYPE_CHECKING:
+    from subzero.stage import Stage
+
+FIGURES = ("bands", "histograms", "against", "tornado")
+FILES = (RESULT, TABLE, "summary.json", *(f"{name}.png" for name in FIGURES))
+"""What a sweep writes beside its store."""
+SHOWN_REASONS = 5
+"""So many members that failed are told with their reason. [-]"""
+KEPT_REASONS = 100
+"""So many stand in the summary; the table has all."""
+SHOWN_EFFECTS = 5
+"""So many parameters are told for each scalar. [-]"""
+
+
+def write_sweep(plan: Plan, store: Store, stage: Stage) -> dict[str, Any]:
+    """Write everything that belongs to a finished sweep, and return its summary."""
+    from subzero import output
+    from subzero.stage import told
+
+    with told(stage.folder):
+        found = write_result(store, plan.job, plan.points, plan.attributes, stage.path)
+    effects = effects_of(plan.points, found)
+    summary = summary_of(plan, store, found, effects)
+    output.write_summary(summary, stage)
+    words = Title(words=plan.description, scenario=plan.job.trial.name, warnings=_in_short(summary))
+    output.write_figures(draw_sweep(plan.points, plan.job, found, effects, words), stage)
+    return summary
+
+
+def summary_of(plan: Plan, store: Store, found: Gathered, effects: list[Effect]) -> dict[str, Any]:
+    """Return a sweep in a few numbers, ready for JSON."""
+    points = plan.points
+    return {
+        "scenario": plan.job.trial.name,
+        "title": plan.description,
+        "subzero_version": plan.attributes["subzero_version"],
+        "design": {"name": points.design, "samples": points.samples, "seed": points.seed},
+        "parameters": {
+            one.name: {"unit": one.unit, "from": one.ends[0], "to": one.ends[1]} for one in points.spreads
+        },
+        "members": len(points.values),
+        "failed": int(found.failed.sum()),
+        "reasons": dict(store.reasons(KEPT_REASONS)),
+        "warnings": dict(found.warned.most_common()),
+        "scalars": {name: {"unit": unit_of(name), **one} for name, one in percentiles(found).items()},
+        "sensitivity": {"method": words_of(points.design)[0], "effects": [_plain(one) for one in effects]},
+    }
+
+
+def _plain(effect: Effect) -> dict[str, Any]:
+    return {
+        key: None if isinstance(one, float) and not math.isfinite(one) else one
+        for key, one in asdict(effect).items()
+    }
+
+
+def _in_short(summary: dict[str, Any]) -> str:
+    """Return how many members failed or warn, for a line of a figure; or nothing."""
+    failed = [f"{summary['failed']} of {summary['members']} members failed"] if summary["failed"] else []
+    warned = [f"{count} warn of {check.replace('_', ' ')}" for check, count in summary["warnings"].items()]
+    return "; ".join([*failed, *warned])
+
+
+def tell_sweep(summary: dict[str, Any], stage: Stage) -> None:
+    """Print what came of a sweep."""
+    console = Console()
+    console.print(f"{summary['scenario']}: {summary['title']}", highlight=False, markup=False)
+    console.print(_numbers(summary), highlight=False)
+    if summary["sensitivity"]["effects"]:
+        console.print(_what_matters(summary), highlight=False)
+    for line in _troubles(summary):
+        console.print(printable(line), highlight=False, markup=False, soft_wrap=True)
+    kept = f"{FILE} keeps its members: the same command does not run them again."
+    console.print(f"{stage.words()}\n{kept}", highlight=False, markup=False)
+
+
+def _numbers(summary: dict[str, Any]) -> Table:
+    """Return the table of all scalars."""
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    table.add_column(f"{summary['members'] - summary['failed']} members")
+    columns = ("min", "p5", "p50", "p95", "max", "mean", "standard_deviation")
+    for name in columns:
+        table.add_column({"standard_deviation": "deviation"}.get(name, name), justify="right")
+    for scalar, one in summary["scalars"].items():
+        unit = "" if one["unit"] == "1" else f" [{one['unit']}]"
+        table.add_row(
+            printable(f"{scalar}{unit}").replace("[", r"\["), *(f"{one[name]:.4g}" for name in columns)
+        )
+    return table
+
+
+def _what_matters(summary: dict[str, Any]) -> Table:
+    """Return the table of the parameters that matter most for each scalar."""
+    method, first, second = words_of(summary["design"]["name"])
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, title=f"What matters: {method}", title_justify="left")
+    for name in ("scalar", "parameter"):
+        table.add_column(name)
+    for name in filter(None, (first, second)):
+        table.add_column(name, justify="right")
+    for scalar in summary["scalars"]:
+        own = [one for one in summary["sensitivity"]["effects"] if one["scalar"] == scalar][:SHOWN_EFFECTS]
+        for i, one in enumerate(own):
+            numbers = [one["size"], *([one["other"]] if second else [])]
+            cells = ("–" if value is None else f"{value:.3g}" for value in numbers)
+            table.add_row(printable(scalar) if i == 0 else "", one["parameter"], *cells)
+    return table
+
+
+def _troubles(summary: dict[str, Any]) -> Iterator[str]:
+    """Give the lines on members that warn or failed."""
+    for check, count in summary["warnings"].items():
+        yield f"Warning: {count} of {summary['members']} members' runs warn of {check.replace('_', ' ')}."
+    if summary["failed"]:
+        yield f"{summary['failed']} of {summary['members']} members failed:"
+        for member, reason in list(summary["reasons"].items())[:SHOWN_REASONS]:
+            yield f"  member {member}: {' '.join(reason.split())}"
+        if summary["failed"] > SHOWN_REASONS:
+            yield f"  … and {summary['failed'] - SHOWN_REASONS} more, in {TABLE}."
+
+
+def default_folder(path: Path) -> Path:
+    """Return the folder that is named after the file of a sweep, here."""
+    return Path(path.stem or "sweep")
