@@ -30,7 +30,8 @@ from subzero.diagnosis.hypothesis.catalogue.sensors import NOISE
 from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.logged import Logged
 from subzero.diagnosis.inference.noise import Noise
-from subzero.diagnosis.inference.problem import Problem, pose
+from subzero.diagnosis.inference.posing import pose
+from subzero.diagnosis.inference.problem import Problem
 from subzero.model import Model
 from subzero.records.record import Record
 

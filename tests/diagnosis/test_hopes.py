@@ -43,10 +43,10 @@ def hanging(plant):
 def test_it_has_hope_from_about_then_on(hanging):
     problem, throughout = hanging
     (hope,) = ranked_by_runs(problem, throughout, ABLE, 0)
-    assert abs(hope.begun.time - BEGINS) <= 2.0
-    assert hope.begun.mean[0] < -0.6
+    assert abs(hope.change_point.time - BEGINS) <= 2.0
+    assert hope.change_point.mean[0] < -0.6
     assert hope.log_posterior > throughout.log_posterior
-    assert hope.start[-1] == hope.begun.mean[0], "its fit begins with it as large"
+    assert hope.start[-1] == hope.change_point.mean[0], "its fit begins with it as large"
     assert hope.start.size == len(problem.entries) + 1
 
 
@@ -54,7 +54,7 @@ def test_a_small_change_promises_less(hanging):
     problem, throughout = hanging
     (large,) = ranked_by_runs(problem, throughout, ABLE, 0)
     place = LinearisationPoint(throughout.fit, BaseRun(problem, throughout.fit.z))
-    small = {one.begun.effect.id: one for one in ranked_in(problem, place, ABLE, 0)}
+    small = {one.change_point.effect.id: one for one in ranked_in(problem, place, ABLE, 0)}
     assert small[DRAG].log_posterior < large.log_posterior - 20.0
 
 
@@ -62,9 +62,9 @@ def test_it_is_fitted_from_there(hanging):
     problem, throughout = hanging
     with ThreadPoolExecutor(2) as side:
         (one,) = fit_change_points(problem, [], ABLE, 0, throughout.log_posterior, side, [throughout])[:1]
-    assert one.begun.effect.id == DRAG
-    assert one.begun.time == pytest.approx(BEGINS, abs=0.3)
-    assert one.begun.mean[0] == pytest.approx(SHARE, abs=0.05)
+    assert one.change_point.effect.id == DRAG
+    assert one.change_point.time == pytest.approx(BEGINS, abs=0.3)
+    assert one.change_point.mean[0] == pytest.approx(SHARE, abs=0.05)
     assert one.log_posterior > throughout.log_posterior + 10.0
 
 

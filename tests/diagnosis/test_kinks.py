@@ -23,7 +23,7 @@ from subzero.diagnosis.inference.map_fit import (
     at_bad_minimum,
     non_smooth,
     refit,
-    restarted_off_kinks,
+    restarted_where_smooth,
     with_own_jacobian,
 )
 from subzero.diagnosis.inference.model_fits import HOPELESS_LOG_POSTERIOR
@@ -120,7 +120,7 @@ def test_a_fit_that_bends_a_kink_far_has_gone_astray(plant):
 def test_a_fit_astray_is_begun_again_from_a_usual_drum(plant):
     problem = plant(duration=8.0).problem
     fit, D = astray(problem), variances(problem.entries, (), 1.0)
-    again = restarted_off_kinks(problem, fit, (), D)
+    again = restarted_where_smooth(problem, fit, (), D)
     assert again.objective < fit.objective
     assert not at_bad_minimum(problem, again, ())
 
@@ -139,7 +139,7 @@ def test_a_fit_on_a_kink_comes_out_of_its_hollow():
     z = np.zeros(1)
     fit = refit(problem, z, problem.jacobian(z), np.ones(1))
     assert fit.z == 0.0
-    again = restarted_off_kinks(problem, fit, ())
+    again = restarted_where_smooth(problem, fit, ())
     assert 0.6 < again.z[0] <= 0.8
     assert again.objective < 0.4 < fit.objective
 
@@ -150,7 +150,7 @@ def test_a_fit_is_begun_again_off_its_kinks_and_where_all_else_is_best_for_that(
     problem, begins = plant(duration=8.0).problem, []
     fit, D = astray(problem), variances(problem.entries, ids, 1.0)
     monkeypatch.setattr(map_fit, "refit", lambda problem, z, *others, **more: begins.append(z))
-    restarted_off_kinks(problem, fit, ids, D)
+    restarted_where_smooth(problem, fit, ids, D)
     (z,), at = begins, non_smooth(problem, ids)
     tolerance = np.array([entry.parameter.tolerance for entry in problem.entries])
     assert {"drum_friction", "cable_initial_length"} <= {problem.entries[k].effect.id for k in at}
@@ -170,7 +170,7 @@ def test_a_fit_is_begun_again_within_bounds(plant):
     problem = plant(duration=8.0).problem
     fit, (k,) = astray(problem), columns_of(problem.entries, ("cable_normal_drag",))
     fit = dataclasses.replace(fit, r=fit.r - 1e4 * fit.J[:, k])
-    again = restarted_off_kinks(problem, fit, ())
+    again = restarted_where_smooth(problem, fit, ())
     assert again.z[k] >= problem.entries[k].parameter.low
 
 
@@ -202,7 +202,7 @@ def test_the_best_comes_back_from_astray_before_it_is_looked_beside_and_so_does_
     search = begun(plant(duration=8.0))
     lost = candidate_of(search.problem, (), astray(search.problem))
     search.candidates = {(): lost}
-    assert search.begin_again(lost).log_posterior > lost.log_posterior + 5.0
+    assert search.restart(lost).log_posterior > lost.log_posterior + 5.0
     search.candidates = {(): lost, DRUM: candidate_of(search.problem, DRUM, lost.fit)}
     search._parts_again(search.candidates[DRUM])
     assert search.candidates[()].log_posterior > lost.log_posterior + 5.0
@@ -212,7 +212,7 @@ def test_the_first_that_are_close_are_fitted_from_off_their_kinks_before_they_ar
     search, again = Search(problem=None, progress=lambda share, words: None), []
     for name, log in zip("abcde", (-10.0, -11.0, -15.9, -10.5, -17.0), strict=True):
         search.candidates[(name,)] = Candidate(ids=(name,), fit=None, log_evidence={}, log_posterior=log)
-    monkeypatch.setattr(search, "begin_again", lambda one: again.append(one.ids[0]))
+    monkeypatch.setattr(search, "restart", lambda one: again.append(one.ids[0]))
     for name in ("_is_open", "cross", "_nothing"):
         monkeypatch.setattr(search, name, lambda *asked: None)
     search.settle()
@@ -222,7 +222,7 @@ def test_the_first_that_are_close_are_fitted_from_off_their_kinks_before_they_ar
     search.settle()
     assert again == ["a", "c"], "no more than 6 behind"
     again.clear()
-    search.begun.add(("a",))
+    search.restarted.add(("a",))
     search.settle()
     assert again == ["c"], "once"
 
@@ -250,7 +250,7 @@ def test_a_pair_is_looked_for_beside_what_is_not_the_best(monkeypatch):
     }
     monkeypatch.setattr(model_search, "with_one_added", lambda problem, one: found.get(one.ids[0], {}))
     monkeypatch.setattr(search, "fit", lambda ids, start: fits.setdefault(ids, start))
-    search._aside_of(search.best())
+    search._beside_others(search.best())
     assert fits == {("other", "right"): "right"}, "from the better of the two; not what is behind the best"
 
 
@@ -261,12 +261,12 @@ def test_one_cause_that_is_far_away_is_found_in_the_place_of_two(plant, monkeypa
     )
     search.fit_all([(), ("motor_lag", "rudder_lag")])
     assert search.best().ids == ("motor_lag", "rudder_lag")
-    raced = []
-    monkeypatch.setattr(search, "race", raced.append)
+    refined = []
+    monkeypatch.setattr(search, "race", refined.append)
     search._simpler()
     assert search.best().ids == ("clock_offset",)
     assert search.best().fit.made_at is not None, "with sensitivities from out there"
-    assert raced == [2]
+    assert refined == [2]
     (late,) = columns_of(search.problem.entries, ("clock_offset",))
     assert search.best().fit.z[late] == pytest.approx(0.6, abs=0.1)
 

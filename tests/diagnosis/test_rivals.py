@@ -16,7 +16,7 @@ from subzero.diagnosis.inference.laplace import candidate_of
 from subzero.diagnosis.report import html as report
 from subzero.diagnosis.report import tables
 from subzero.diagnosis.results import CAUSE_NAMED, NOTHING_WRONG, UNDECIDED, Extended, Unknown, Verdict
-from subzero.diagnosis.verdict.conclude import strange_rival
+from subzero.diagnosis.verdict.conclude import force_rival
 from subzero.diagnosis.verdict.extension import Extension, rivals
 from subzero.figures import Title
 from subzero.figures.diagnosis import draw_diagnosis
@@ -60,7 +60,7 @@ def test_beside_what_is_told_only_the_others_are_listed(work):
 
 
 def test_forces_and_drifts_are_rivals_in_words():
-    force, drift = strange_rival("unknown_force:N", 0.3), strange_rival("sensor_drift:yaw_rate", 0.2)
+    force, drift = force_rival("unknown_force:N", 0.3), force_rival("sensor_drift:yaw_rate", 0.2)
     assert force.sentence == "a moment that turns it to starboard acts that no cause explains"
     assert (drift.ids, drift.sentence) == (("sensor_drift:yaw_rate",), "the sensor of the yaw rate drifts")
     assert (force.probability, drift.probability) == (0.3, 0.2)

@@ -18,7 +18,7 @@ from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.effect import Parameter
 from subzero.diagnosis.hypothesis.hypotheses import columns_of, entries_of, log_prior, nameable
 from subzero.diagnosis.inference.laplace import Candidate
-from subzero.diagnosis.inference.map_fit import secant
+from subzero.diagnosis.inference.map_fit import broyden_update
 from subzero.diagnosis.inference.model_average import (
     UNTRIED_LOG_POSTERIOR,
     Beliefs,
@@ -58,7 +58,7 @@ def test_secants_explain_the_step_and_leave_other_directions():
     random = np.random.default_rng(1)
     J, step, change = random.normal(size=(9, 4)), random.normal(size=4), random.normal(size=9)
     D = np.array([1.0, 4.0, 0.01, 9.0])
-    new = secant(J, step, change, D)
+    new = broyden_update(J, step, change, D)
     assert_allclose(new @ step, -change, atol=1e-12, err_msg="a residual falls by J times the step")
     other = np.array([step[1] * D[0], -step[0] * D[1], 0.0, 0.0])
     assert abs(step @ (other / D)) < 1e-12
@@ -75,7 +75,7 @@ def racing(runs, records=1, **hopes):
 
     def fit_again(one):
         again.append(one.ids[0])
-        search.raced.add(one.ids)
+        search.refined.add(one.ids)
 
     search._again = fit_again
     for name, hope in hopes.items():
@@ -83,8 +83,8 @@ def racing(runs, records=1, **hopes):
             converged=hope is None, moved=lambda problem: np.inf, predicted_gain=(hope or -9.0) + 9.0
         )
         search.candidates[(name,)] = Candidate(ids=(name,), fit=fit, log_evidence={}, log_posterior=-9.0)
-    search.raced |= {("best",), ("second",)}
-    search.race()
+    search.refined |= {("best",), ("second",)}
+    search.refine()
     return again
 
 
@@ -224,12 +224,12 @@ def test_a_fit_that_went_astray_is_made_again_from_where_another_is(plant):
     search.fit(ids)
     good = search.candidates[ids]
     search.candidates[ids] = dataclasses.replace(good, log_posterior=good.log_posterior - 600.0)
-    search.raced.add(ids)
-    search.screen.secants[ids] = np.full(len(planted.problem.entries), np.nan)
+    search.refined.add(ids)
+    search.screen.starts[ids] = np.full(len(planted.problem.entries), np.nan)
     assert search._unknown({ids: good.log_posterior}) == {ids: good.log_posterior}
     search.fit(ids, good.fit)
     assert search.candidates[ids].log_posterior == pytest.approx(good.log_posterior, abs=0.5)
-    assert ids not in search.raced
+    assert ids not in search.refined
     assert search._unknown({ids: good.log_posterior}) == {}
     better = dataclasses.replace(good, log_posterior=good.log_posterior + 600.0)
     search.candidates[ids] = better

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from subzero.diagnosis.assessment.identifiability import detectability, with_secants
+from subzero.diagnosis.assessment.identifiability import detectability, with_whole_effects
 from subzero.diagnosis.hypothesis.catalogue import START, catalogue
 from subzero.diagnosis.hypothesis.hypotheses import entries_of, variances
 from subzero.diagnosis.inference.laplace import Candidate
@@ -98,7 +98,7 @@ def test_secants_mean_by_a_column_what_sensitivities_mean():
     scale, zero = made.entries[k].parameter.scale, np.zeros(len(made.entries))
     there = zero.copy()
     there[k] = scale
-    J = with_secants(made, np.zeros((made.residual(zero).size, zero.size)))
+    J = with_whole_effects(made, np.zeros((made.residual(zero).size, zero.size)))
     assert np.linalg.norm(J[:, k]) > 0.0
     assert_allclose(made.residual(there), made.residual(zero) - scale * J[:, k], atol=1e-9)
 

@@ -85,9 +85,9 @@ def work(found):
 
 def test_what_began_is_found_with_its_size_and_its_time(found):
     _, force, (one, *others) = found
-    assert one.begun.effect.id == "rudder_offset"
-    assert one.begun.time == pytest.approx(BEGINS, abs=0.2)
-    assert one.begun.mean[0] == pytest.approx(3.0, abs=0.3)
+    assert one.change_point.effect.id == "rudder_offset"
+    assert one.change_point.time == pytest.approx(BEGINS, abs=0.2)
+    assert one.change_point.mean[0] == pytest.approx(3.0, abs=0.3)
     assert not is_poor_fit(one.fit)
     assert one.log_posterior > force.log_posterior + 5.0, (
         "a cause of the catalogue explains more by less than a force"
@@ -97,8 +97,8 @@ def test_what_began_is_found_with_its_size_and_its_time(found):
 
 def test_a_rudder_to_the_other_side_has_the_other_sign(plant):
     _, _, (one, *_) = hit(plant, -3.0)
-    assert one.begun.effect.id == "rudder_offset"
-    assert one.begun.mean[0] == pytest.approx(-3.0, abs=0.3)
+    assert one.change_point.effect.id == "rudder_offset"
+    assert one.change_point.mean[0] == pytest.approx(-3.0, abs=0.3)
 
 
 def test_a_force_that_comes_and_goes_is_no_sudden_cause(plant):
@@ -134,7 +134,7 @@ def test_in_its_place_the_records_lack_what_it_explains(found):
     problem, _, (one, *_) = found
     n, place = len(problem.entries), linearised_at(problem, one)
     assert place.fit.z.size == n
-    assert np.allclose(place.fit.r - one.fit.r, one.fit.J[:, n] * one.begun.mean[0])
+    assert np.allclose(place.fit.r - one.fit.r, one.fit.J[:, n] * one.change_point.mean[0])
     assert np.linalg.norm(place.fit.r) > 5.0 * np.linalg.norm(one.fit.r)
 
 
@@ -185,12 +185,12 @@ def test_it_is_told_in_words_and_numbers(work):
         "the rudder is off its centre",
         0.9,
     )
-    assert cause.start_time == one.begun.time
+    assert cause.start_time == one.change_point.time
     assert 0.0 < cause.start_sd < 0.2
     assert angle.low < 3.0 < angle.high
     rival = rival_of(work, one, 0.3)
-    assert rival.ids == (f"rudder_offset@{one.begun.time:g}",)
-    assert rival.sentence == f"from {one.begun.time:g} s on the rudder is off its centre"
+    assert rival.ids == (f"rudder_offset@{one.change_point.time:g}",)
+    assert rival.sentence == f"from {one.change_point.time:g} s on the rudder is off its centre"
     assert is_large(one)
     D, rival = closest(work, one)
     assert D > 100.0
@@ -204,16 +204,16 @@ def test_more_drag_and_less_thrust_from_the_same_time_on_are_not_told_apart(plan
     pair = {"hull_drag", "propeller_thrust_gain"}
     told = SimpleNamespace(problem=problem, foreign=[OutOfCatalogue(beside=(), what=one,
                                                                     log_posterior=one.log_posterior)
-                                                     for one in late if one.begun.effect.id in pair])  # fmt: skip
+                                                     for one in late if one.change_point.effect.id in pair])  # fmt: skip
     one = fitted(told)[0]
-    assert one.begun.effect.id in pair
+    assert one.change_point.effect.id in pair
     D, (rival,) = closest(told, one)
     assert D < MIN_DISCRIMINATION
-    assert {one.begun.effect.id, rival.partition("@")[0]} == pair
-    assert {each.begun.effect.id for each in with_closest(told, one)} == pair
+    assert {one.change_point.effect.id, rival.partition("@")[0]} == pair
+    assert {each.change_point.effect.id for each in with_closest(told, one)} == pair
     words = closest_rival(told, {})
     assert (words.ids, words.discrimination) == ((rival,), D)
-    assert words.sentence.startswith(f"from {one.begun.time:g} s on ")
+    assert words.sentence.startswith(f"from {one.change_point.time:g} s on ")
 
 
 def test_what_began_holds_throughout_in_trials_to_come(work):
@@ -221,7 +221,7 @@ def test_what_began_holds_throughout_in_trials_to_come(work):
     (k,) = columns_of(work.problem.entries, ("rudder_offset",))
     trial_ahead = calibration_from_onset(work, one)
     assert trial_ahead.ids == (one.id,)
-    assert trial_ahead.fit.z[k] == one.begun.mean[0]
+    assert trial_ahead.fit.z[k] == one.change_point.mean[0]
     assert np.array_equal(trial_ahead.fit.J[:, k], one.fit.J[:, len(work.problem.entries)])
     assert trial_ahead.fit.D[k] == EFFECTS["rudder_offset"].parameters[0].scale ** 2
 

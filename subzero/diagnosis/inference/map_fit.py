@@ -2,10 +2,10 @@
 
     objective = ½ |r(z)|² + ½ zᵀ D⁻¹ z,   low ≤ z ≤ high
 
-A step is the best of the linear model within bounds, or the part of it that gains, and its secant updates J.
+A step is the best of the linear model within bounds, or the part of it that gains, and its broyden_update updates J.
 
 Where a drum stops, a cable falls slack or a gear has play, simulations have non-smooth points, and a fit may end in a
-local minimum beyond one. `restarted_off_kinks` fits once more with all one-sided parameters as they are in most
+local minimum beyond one. `restarted_where_smooth` fits once more with all one-sided parameters as they are in most
 vehicles, but for those of named causes. `fit_wide` is the fit with κ = 4, close to the records whatever is wrong; the
 noise is estimated behind it.
 """
@@ -17,18 +17,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from subzero.diagnosis.hypothesis.hypotheses import Ids, variances
+from subzero.diagnosis.hypothesis.hypotheses import Ids
 from subzero.diagnosis.inference import settings
 from subzero.diagnosis.inference.linear_gaussian import Quadratic
-from subzero.diagnosis.inference.problem import Problem, Progress, with_noise_behind
+from subzero.diagnosis.inference.problem import Problem
 
 
 class Step(NamedTuple):
-    """A step: what the linear model promised, and promises of what is left; the share of it that was gained; where it
+    """A step: what the linear model predicted, and promises of what is left; the share of it that was gained; where it
     leads, the residual and the objective there.
     """
 
-    promised: float
+    predicted: float
     left: float
     share: float
     z: np.ndarray
@@ -36,33 +36,35 @@ class Step(NamedTuple):
     now: float
 
 
-def stride(problem: Problem, z: np.ndarray, r: np.ndarray, now: float, J: np.ndarray, D: np.ndarray) -> Step:
+def damped_step(
+    problem: Problem, z: np.ndarray, r: np.ndarray, now: float, J: np.ndarray, D: np.ndarray
+) -> Step:
     """Return the step that is best for the linear model within bounds; if that gains nothing, the one that holds what
-    has kinks; none where no more than settings.NEGLIGIBLE_GAIN_NATS is promised.
+    has kinks; none where no more than settings.NEGLIGIBLE_GAIN_NATS is predicted.
     """
     low, high = bounds(problem)
-    promised = 0.0
+    predicted = 0.0
     for bound in ((low, high), _held(z, low, high)):
         step = bounded_step(J, r, z, D, *bound)
         left = now - objective(r - J @ step, z + step, D)
-        promised = max(promised, left)
+        predicted = max(predicted, left)
         if left < settings.NEGLIGIBLE_GAIN_NATS:
             break
         share, there, r_there, then = _walk(problem, z, r, now, step, left, D)
         if share > 0.0:
-            return Step(promised, left, share, there, r_there, then)
-    return Step(promised, left, 0.0, z, r, now)
+            return Step(predicted, left, share, there, r_there, then)
+    return Step(predicted, left, 0.0, z, r, now)
 
 
 def _held(z: np.ndarray, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return bounds that hold where they are all entries that are possible on one side only: where a drum stops, a
     cable falls slack or a gear has play, runs have kinks, and a step across one spoils what the others would gain.
     """
-    kinked = low == 0.0
-    return np.where(kinked, z, low), np.where(kinked, z, high)
+    one_sided = low == 0.0
+    return np.where(one_sided, z, low), np.where(one_sided, z, high)
 
 
-def secant(J: np.ndarray, step: np.ndarray, change: np.ndarray, D: np.ndarray) -> np.ndarray:
+def broyden_update(J: np.ndarray, step: np.ndarray, change: np.ndarray, D: np.ndarray) -> np.ndarray:
     """Return sensitivities that explain the change of the residual along a step, otherwise as they were (Broyden
     1965), with steps measured in prior deviations: J + (−Δr − J s) (D⁻¹s)ᵀ/(sᵀD⁻¹s).
     """
@@ -76,16 +78,16 @@ def _walk(
     r: np.ndarray,
     now: float,
     step: np.ndarray,
-    promised: float,
+    predicted: float,
     D: np.ndarray,
 ) -> tuple[float, np.ndarray, np.ndarray, float]:
-    """Return the share of what was promised that a step, or a part of it, gains; and where it leads."""
+    """Return the share of what was predicted that a step, or a part of it, gains; and where it leads."""
     for part in (1.0, 0.4, 0.1):
         there = z + part * step
         r_there = problem.residual(there)
         then = objective(r_there, there, D)
         if then < now:
-            return (now - then) / promised, there, r_there, then
+            return (now - then) / predicted, there, r_there, then
     return 0.0, z, r, now
 
 
@@ -182,7 +184,7 @@ def with_own_jacobian(problem: Problem, fit: Fit) -> Fit:
 
 
 def continued(problem: Problem, fit: Fit) -> Fit:
-    """Return a fit that has gone on, with sensitivities of its own, while much is promised."""
+    """Return a fit that has gone on, with sensitivities of its own, while much is predicted."""
     for _ in range(settings.MAX_ROUNDS):
         if fit.predicted_gain < settings.DECISIVE_NATS:
             break
@@ -215,13 +217,13 @@ def refit(
     z, r = _runnable(problem, np.clip(z, *bounds(problem)), r)
     now, fresh, converged, left = objective(r, z, D), 0, False, 0.0
     for _ in range(settings.MAX_STEPS):
-        one = stride(problem, z, r, now, J, D)
+        one = damped_step(problem, z, r, now, J, D)
         if one.share > 0.0:
-            J = secant(J, one.z - z, one.r - r, D)
+            J = broyden_update(J, one.z - z, one.r - r, D)
         z, r, now, left = one.z, one.r, one.now, one.left
         if (
             one.share < settings.STALE_GAIN_SHARE
-            and one.promised > settings.CONVERGED_GAIN_NATS
+            and one.predicted > settings.CONVERGED_GAIN_NATS
             and fresh < most_fresh
         ):
             J, fresh, made_at = problem.jacobian(z), fresh + 1, z.copy()
@@ -267,7 +269,7 @@ def at_bad_minimum(problem: Problem, fit: Fit, ids: Ids) -> bool:
     return bool(np.any(np.abs(fit.z[at]) > settings.STRAYED_TOLERANCES * tolerance))
 
 
-def restarted_off_kinks(problem: Problem, fit: Fit, ids: Ids, D: np.ndarray | None = None) -> Fit:
+def restarted_where_smooth(problem: Problem, fit: Fit, ids: Ids, D: np.ndarray | None = None) -> Fit:
     """Return the fit of a hypothesis from where what has kinks is RESTART_TOLERANCES, and all else best for that.
 
     Args:
@@ -281,35 +283,3 @@ def restarted_off_kinks(problem: Problem, fit: Fit, ids: Ids, D: np.ndarray | No
     low[at] = high[at] = [settings.RESTART_TOLERANCES * problem.entries[k].parameter.tolerance for k in at]
     z = fit.z + bounded_step(fit.J, fit.r, fit.z, D, low, high)
     return refit(problem, z, problem.jacobian(z), D, most_fresh=1, made_at=z)
-
-
-KAPPA_WIDE = 4.0
-"""κ of the fit that the linear evidence is made at."""
-Nominal = tuple[np.ndarray, np.ndarray]
-"""Residual (m,) and sensitivities (m, k) of the nominal model."""
-
-
-def fit_wide(problem: Problem, progress: Progress) -> tuple[Problem, Fit, Nominal]:
-    """Return the problem with the noise that is left behind the fit, the fit, and what the nominal model leaves."""
-    progress(0.05, "sensitivities of the nominal model")
-    zero = np.zeros(len(problem.entries))
-    J = problem.jacobian(zero)
-    fit = _from(problem, zero, J, progress)
-    for _ in range(settings.MAX_REPEATS):
-        D = variances(problem.entries, (), KAPPA_WIDE)
-        again = with_noise_behind(problem, fit.z, D) if np.isfinite(fit.r).all() else None
-        if again is None:
-            break
-        problem, J = again, again.jacobian(zero)
-        fit = _from(problem, fit.z, problem.jacobian(fit.z), progress)
-    return problem, fit, (problem.residual(zero), J)
-
-
-def _from(problem: Problem, z: np.ndarray, J: np.ndarray, progress: Progress) -> Fit:
-    """Return the fit from z, with the sensitivities there; or if it went astray, a better one from off its kinks."""
-    progress(0.15, "fit within wide tolerances")
-    fit = refit(problem, z, J, variances(problem.entries, (), KAPPA_WIDE), most_fresh=2, made_at=z)
-    if not at_bad_minimum(problem, fit, ()):
-        return fit
-    again = restarted_off_kinks(problem, fit, ())
-    return again if again.objective < fit.objective else fit

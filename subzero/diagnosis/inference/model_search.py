@@ -20,16 +20,16 @@ from subzero.diagnosis.inference.map_fit import (
     Fit,
     at_bad_minimum,
     continued,
-    fit_wide,
     is_poor_fit,
     non_smooth,
     refit,
-    restarted_off_kinks,
+    restarted_where_smooth,
 )
 from subzero.diagnosis.inference.model_average import Beliefs
 from subzero.diagnosis.inference.model_fits import SharpFits
 from subzero.diagnosis.inference.screening import (
     TriedSize,
+    fit_wide,
     is_close,
     screening_of,
     with_one_added,
@@ -43,12 +43,12 @@ class GrowingFits(SharpFits):
     """Fits that more are made around.
 
     Attributes:
-        beside: hypothesis → log posterior, estimated at the fit of one with a cause less.
-        begun: hypotheses that were fitted from off their kinks.
+        one_more: hypothesis → log posterior, estimated at the fit of one with a cause less.
+        restarted: hypotheses that were fitted from off their kinks.
     """
 
-    beside: dict[Ids, float] = field(default_factory=dict)
-    begun: set[Ids] = field(default_factory=set)
+    one_more: dict[Ids, float] = field(default_factory=dict)
+    restarted: set[Ids] = field(default_factory=set)
 
     def grow(self) -> None:
         """Look beside the best candidate for one more cause, in the place of each for another, and below it for one
@@ -56,7 +56,7 @@ class GrowingFits(SharpFits):
         """
         looked: set[Ids] = set()
         for _ in range(settings.MAX_GROWING_ROUNDS):
-            best = self.begin_again(self.best())
+            best = self.restart(self.best())
             if best.ids in looked:
                 return
             looked.add(best.ids)
@@ -64,10 +64,10 @@ class GrowingFits(SharpFits):
             self.fit_all(self._more(best) if len(best.ids) < settings.MAX_CAUSES else [], best.fit)
             for without in best.ids:
                 self._without(best, without)
-            self._aside_of(best)
-            self._kinked(best)
+            self._beside_others(best)
+            self._non_smooth(best)
             self._parts_again(best)
-            self.race(settings.MAX_ADDED, settings.CLOSE_NATS)
+            self.refine(settings.MAX_ADDED, settings.CLOSE_NATS)
             self.cross()
             self.sharpen()
             if self.best().ids == best.ids:
@@ -76,7 +76,7 @@ class GrowingFits(SharpFits):
     def _more(self, best: Candidate) -> list[Ids]:
         """Return the hypotheses with one cause more that the linear problem at the best fit finds best."""
         found = self._unknown(with_one_added(self.problem, best))
-        self.beside |= found
+        self.one_more |= found
         return _best_of(found, best.log_posterior - settings.FURTHER_CAUSE_NATS)
 
     def _without(self, best: Candidate, without: str) -> None:
@@ -86,7 +86,7 @@ class GrowingFits(SharpFits):
         found = self._unknown(with_one_swapped(self.problem, best, rest))
         self.fit_all(sorted(found, key=lambda ids: -found[ids])[: settings.MAX_TRIED], best.fit)
 
-    def _aside_of(self, best: Candidate) -> None:
+    def _beside_others(self, best: Candidate) -> None:
         """Fit what comes out best beside the other candidates, if the linear problem there has it before the best: a
         right pair may be far from a wrong cause that is as good as any by itself.
         """
@@ -99,7 +99,7 @@ class GrowingFits(SharpFits):
         for ids in sorted(found, key=lambda ids: -found[ids][0])[: settings.MAX_ADDED]:
             self.fit(ids, found[ids][1])
 
-    def _kinked(self, best: Candidate) -> None:
+    def _non_smooth(self, best: Candidate) -> None:
         """Fit causes that runs have kinks in beside the best, or in the place of one of its causes."""
         found = dict[Ids, TriedSize]()
         rests = [tuple(one for one in best.ids if one != without) for without in best.ids]
@@ -129,20 +129,20 @@ class GrowingFits(SharpFits):
             z, D = found[ids].z, variances(entries, ids, best.kappa)
             fit = refit(self.problem, z, self.problem.jacobian(z), D, most_fresh=2, made_at=z)
             self._take(candidate_of(self.problem, ids, fit))
-        self.race(2 if worth else 0)
+        self.refine(2 if worth else 0)
 
     def _worth_fitting(self, found: Mapping[Ids, TriedSize], best: Candidate, least: float) -> list[Ids]:
         """Return the best of what was tried that no fit is known of, if its log posterior adds `least` to the best."""
         new = self._unknown({ids: one.log_posterior for ids, one in found.items() if ids != best.ids})
         return _best_of(new, best.log_posterior + least)
 
-    def begin_again(self, one: Candidate) -> Candidate:
+    def restart(self, one: Candidate) -> Candidate:
         """Fit a candidate from off its kinks, once, and return what is best then."""
-        if one.ids not in self.begun:
-            self.begun.add(one.ids)
+        if one.ids not in self.restarted:
+            self.restarted.add(one.ids)
             D = variances(self.problem.entries, one.ids, one.kappa)
             self._take(
-                candidate_of(self.problem, one.ids, restarted_off_kinks(self.problem, one.fit, one.ids, D))
+                candidate_of(self.problem, one.ids, restarted_where_smooth(self.problem, one.fit, one.ids, D))
             )
         return self.best()
 
@@ -152,7 +152,7 @@ class GrowingFits(SharpFits):
             ids = tuple(one for one in best.ids if one != without)
             fit, D = self.candidates[ids].fit, variances(self.problem.entries, ids, 1.0)
             if at_bad_minimum(self.problem, fit, ids):
-                self._take(candidate_of(self.problem, ids, restarted_off_kinks(self.problem, fit, ids, D)))
+                self._take(candidate_of(self.problem, ids, restarted_where_smooth(self.problem, fit, ids, D)))
 
     def _unknown(self, found: dict[Ids, float]) -> dict[Ids, float]:
         """Return those of estimated log posteriors that no fit is known of, or only one that went astray from afar."""
@@ -198,7 +198,7 @@ class Search(GrowingFits):
     def first_fits(self) -> None:
         """Fit nothing, and the best causes and pairs of the screen, with real runs and the sensitivities at hand."""
         first = self._first()
-        for ids, fit in zip(first, self._aside(self._alone, first), strict=True):
+        for ids, fit in zip(first, self._in_parallel(self._alone, first), strict=True):
             self._say(0.3, "fitting", ids, " by itself")
             self._keep(ids, fit)
         best = (
@@ -207,13 +207,13 @@ class Search(GrowingFits):
         )
         self.fit_all(list(chain([()], *best)), words="fitting")
 
-    def races(self) -> None:
+    def refine_first(self) -> None:
         """Fit what came out best again, with sensitivities of its own."""
-        self.race(2)
+        self.refine(2)
         self.sharpen()
-        self.race()
+        self.refine()
 
-    def is_lost(self) -> bool:
+    def is_poor(self) -> bool:
         """Say whether nothing that was fitted so far explains the records, within declared tolerances."""
         return is_poor_fit(self.best().fit) or self.best().kappa > min(KAPPAS)
 
@@ -239,9 +239,9 @@ class Search(GrowingFits):
         """Fit the first candidates from off their kinks, if they are close to the best and were not so begun before."""
         for ids in self._ranked()[: settings.MAX_TRIED]:
             close = self.candidates[ids].log_posterior > self.best().log_posterior - settings.HOPELESS_NATS
-            if close and ids not in self.begun:
+            if close and ids not in self.restarted:
                 self._say(0.75, "once more", ids)
-                self.begin_again(self.candidates[ids])
+                self.restart(self.candidates[ids])
 
     def _is_open(self, one: Candidate, best: Candidate) -> bool:
         """Say whether a candidate that is as good as the best, or might still catch up with it, has not settled."""
@@ -254,7 +254,9 @@ class Search(GrowingFits):
     @property
     def beliefs(self) -> Beliefs:
         """What is known of all hypotheses by now."""
-        return Beliefs(candidates=self.candidates, screen=self.screen, beside=self.beside, behind=self.behind)
+        return Beliefs(
+            candidates=self.candidates, screen=self.screen, one_more=self.one_more, behind=self.behind
+        )
 
     def _first(self) -> list[Ids]:
         """Return the causes that are fitted by themselves: those that the wide fit bends most, of which the linear
@@ -262,21 +264,21 @@ class Search(GrowingFits):
         """
         if self.screen.far:
             return self.screen.best(1, settings.MAX_PAIRS, np.inf)
-        bent: dict[Ids, float] = {}
+        moved: dict[Ids, float] = {}
         for z, entry in zip(self.wide.z, self.problem.entries, strict=True):
             if entry.record < 0:
                 size, ids = abs(float(z)) / entry.parameter.tolerance, (entry.effect.id,)
-                bent[ids] = max(size, bent.get(ids, 0.0))
+                moved[ids] = max(size, moved.get(ids, 0.0))
         return [
             ids
-            for ids in sorted(bent, key=lambda ids: -bent[ids])[: settings.MAX_ADDED]
-            if bent[ids] > settings.BENT_TOLERANCES
+            for ids in sorted(moved, key=lambda ids: -moved[ids])[: settings.MAX_ADDED]
+            if moved[ids] > settings.BENT_TOLERANCES
         ]
 
     def _alone(self, ids: Ids) -> Fit:
         """Return the fit of a cause from where the wide fit has it, all else nominal, with the sensitivities there."""
         z, at = np.zeros(len(self.problem.entries)), columns_of(self.problem.entries, ids)
-        z[at] = self.screen.secants.get(ids, self.wide.z)[at]
+        z[at] = self.screen.starts.get(ids, self.wide.z)[at]
         D = variances(self.problem.entries, ids, 1.0)
         return continued(
             self.problem, refit(self.problem, z, self.problem.jacobian(z), D, most_fresh=2, made_at=z)

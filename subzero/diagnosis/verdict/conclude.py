@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from subzero.diagnosis.hypothesis.catalogue.sensors import SPECS
 from subzero.diagnosis.hypothesis.hypotheses import Ids
@@ -22,8 +22,8 @@ from subzero.diagnosis.inference.model_average import (
     ChangePointSummary,
     credible_set,
     decide,
+    tolerance_scale,
 )
-from subzero.diagnosis.inference.out_of_catalogue import Findings, tolerance_scale
 from subzero.diagnosis.results import (
     CAUSE_NAMED,
     NOTHING_WRONG,
@@ -42,14 +42,17 @@ from subzero.diagnosis.verdict.estimates import (
     causes,
     closest_rival,
     deviations,
+    force_rival,
     name,
     names_of,
     practical_of,
     rival_of,
     rivals,
-    strange_rival,
 )
-from subzero.diagnosis.verdict.extension import Extension
+
+if TYPE_CHECKING:
+    from subzero.diagnosis.inference.out_of_catalogue import Findings
+    from subzero.diagnosis.verdict.extension import Extension
 
 LISTED_PROBABILITY = 1e-4
 """Hypotheses that are less probable than this are not listed."""
@@ -106,8 +109,10 @@ def is_large(one: FittedChangePoint) -> bool:
     """Say whether a sudden cause is of a practical size; calibration changes nothing in the middle of a trial, so that
     half of what calibration may do is enough.
     """
-    sizes = zip(one.begun.mean, one.begun.effect.parameters, strict=True)
-    return any(abs(float(z)) > 0.5 * PRACTICAL_TOLERANCES * one.begun.kappa * p.tolerance for z, p in sizes)
+    sizes = zip(one.change_point.mean, one.change_point.effect.parameters, strict=True)
+    return any(
+        abs(float(z)) > 0.5 * PRACTICAL_TOLERANCES * one.change_point.kappa * p.tolerance for z, p in sizes
+    )
 
 
 class RemainingModels(NamedTuple):
@@ -173,7 +178,7 @@ def rivals_of(
         found = (closest_rival(findings, ranked.inside, *ranked.close_to_change_point),)
     late = [rival_of(findings, one, ranked.outside[one.id]) for one in remaining.change_points
             if one.id != new.id]  # fmt: skip
-    forces = [strange_rival(key, ranked.outside[key]) for key in remaining.forces] if is_undecided else []
+    forces = [force_rival(key, ranked.outside[key]) for key in remaining.forces] if is_undecided else []
     return tuple(sorted([*found, *late, *forces], key=lambda one: -one.probability))
 
 
@@ -193,7 +198,7 @@ def conclude(findings: Findings, ranked: Ranked, follow_up: FollowUp) -> Verdict
         next_trial=follow_up.next_trial,
         curves=follow_up.curves,
         probabilities=_listed(ranked.inside, ranked.outside),
-        tolerance_scale=tolerance_scale(findings.search),
+        tolerance_scale=tolerance_scale(findings.search.candidates.values()),
         detectable=findings.detectable,
         misfit=findings.misfit,
         deviations=deviations(findings, best),
@@ -222,7 +227,7 @@ def _listed(inside: Mapping[Ids, float], outside: Mapping[str, float]) -> dict[s
 
 def _notes(work: Findings, best: Candidate, inside: float) -> tuple[str, ...]:
     """Return what else a reader should know; of the tolerances, if what holds throughout is probable."""
-    found, scale = [], tolerance_scale(work.search)
+    found, scale = [], tolerance_scale(work.search.candidates.values())
     wide = max(scale, key=lambda kappa: scale[kappa])
     if wide > 1.0 and inside > HEALTHY_PROBABILITY:
         found.append(

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,9 +22,11 @@ from subzero.diagnosis.inference.latent_force import AXIS_WORDS, DRIFT, FORCE
 from subzero.diagnosis.inference.linear_gaussian import KAPPAS, log_sum, posterior
 from subzero.diagnosis.inference.map_fit import Fit
 from subzero.diagnosis.inference.model_average import practical_causes
-from subzero.diagnosis.inference.out_of_catalogue import Findings
 from subzero.diagnosis.inference.problem import Problem
 from subzero.diagnosis.results import Cause, Estimate, Rival
+
+if TYPE_CHECKING:
+    from subzero.diagnosis.inference.out_of_catalogue import Findings
 
 HALF_INTERVAL_95 = 1.96
 """Half a 95 % interval, in standard deviations."""
@@ -109,15 +112,15 @@ def causes(work: Findings, best: Candidate, inside: Mapping[Ids, float], ids: Id
 
 def cause_of(work: Findings, what: FittedChangePoint, probability: float) -> Cause:
     """Return a sudden cause in words and numbers."""
-    fit, effect, n = what.fit, what.begun.effect, len(work.problem.entries)
+    fit, effect, n = what.fit, what.change_point.effect, len(work.problem.entries)
     sd = np.sqrt(np.diag(posterior(fit.quadratic, fit.D).M))
-    setting = what.problem.records[what.begun.record].setting
+    setting = what.problem.records[what.change_point.record].setting
     numbers = {
         p.name: estimate(p, p.nominal(setting), float(fit.z[n + i]), float(sd[n + i]))
         for i, p in enumerate(effect.parameters)
     }
     return Cause(id=effect.id, sentence=effect.sentence, probability=probability, parameters=numbers,
-                 start_time=what.begun.time, start_sd=float(sd[-1]))  # fmt: skip
+                 start_time=what.change_point.time, start_sd=float(sd[-1]))  # fmt: skip
 
 
 def rivals(
@@ -174,7 +177,8 @@ def _scaled(problem: Problem, fit: Fit, ids: Ids) -> Fit:
 def rival_of(work: Findings, what: FittedChangePoint, probability: float) -> Rival:
     """Return a sudden cause as a rival of what is told."""
     cause = cause_of(work, what, probability)
-    return Rival(ids=(what.id,), sentence=what.begun.begun.sentence, probability=probability, discrimination=np.nan,
+    sentence = what.change_point.with_onset.sentence
+    return Rival(ids=(what.id,), sentence=sentence, probability=probability, discrimination=np.nan,
                  parameters={what.id: cause.parameters})  # fmt: skip
 
 
@@ -199,7 +203,7 @@ OUTSIDE_SENTENCES = {
 """Forces and drifts in words."""
 
 
-def strange_rival(key: str, probability: float) -> Rival:
+def force_rival(key: str, probability: float) -> Rival:
     """Return a force or a drift as a rival."""
     return Rival(
         ids=(key,), sentence=OUTSIDE_SENTENCES[key], probability=probability, discrimination=math.nan

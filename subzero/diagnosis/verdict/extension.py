@@ -7,6 +7,7 @@ simulations; everything else is taken from fits that are there.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -25,9 +26,11 @@ from subzero.diagnosis.inference.input_estimation import (
 from subzero.diagnosis.inference.laplace import Candidate
 from subzero.diagnosis.inference.latent_force import FORCE, MAX_DRIFT_LEVELS
 from subzero.diagnosis.inference.map_fit import Fit
-from subzero.diagnosis.inference.out_of_catalogue import Findings, OutOfCatalogue
 from subzero.diagnosis.inference.problem import Problem
 from subzero.diagnosis.results import Cause, Extended, Unknown
+
+if TYPE_CHECKING:
+    from subzero.diagnosis.inference.out_of_catalogue import Findings, OutOfCatalogue
 
 MENTIONED_PROBABILITY = 0.01
 """Features that are less probable in a formula are not mentioned."""
@@ -82,18 +85,18 @@ def of_nothing(work: Findings, best: Candidate) -> Extension:
 
 def of_unknown(work: Findings) -> Extension:
     """Return the extension by the most probable force; beside the drift of a sensor there is nothing new but causes."""
-    foreign = next(one for one in work.foreign if isinstance(one.what, LatentForceCandidate))
-    found = _recovered(work, foreign)
+    explanation = next(one for one in work.out_of_catalogue if isinstance(one.what, LatentForceCandidate))
+    found = _estimated(work, explanation)
     if found.missing is None:
         found = replace(found, fit=fit_beside_drift(work.problem, found, found.fit.D))
-    deviations = by_effect(work.problem, found.fit.z, foreign.beside)
-    calibration = by_effect(work.problem, found.fit.z, None, but=foreign.beside)
+    deviations = by_effect(work.problem, found.fit.z, explanation.causes)
+    calibration = by_effect(work.problem, found.fit.z, None, but=explanation.causes)
     extended = Extended(deviations=deviations, calibration=calibration, missing=found.missing)
-    unknown = found.unknown if found.missing is None else _told(found.unknown, describe(found))
+    unknown = found.unknown if found.missing is None else _as_formula(found.unknown, describe(found))
     return Extension(fit=found.fit, problem=found.problem, extended=extended, unknown=unknown)
 
 
-def _told(unknown: Unknown, formula: Formula) -> Unknown:
+def _as_formula(unknown: Unknown, formula: Formula) -> Unknown:
     """Return a force as its formula tells it, if there is one: far closer to what acts than the free history."""
     if not formula.shapes or formula.log_gain <= 0.0:
         return unknown
@@ -104,12 +107,12 @@ def _told(unknown: Unknown, formula: Formula) -> Unknown:
                    features={one: p for one, p in formula.features.items() if p >= MENTIONED_PROBABILITY})  # fmt: skip
 
 
-def _recovered(work: Findings, foreign: OutOfCatalogue) -> EstimatedForce:
+def _estimated(work: Findings, explanation: OutOfCatalogue) -> EstimatedForce:
     """Return a force or a drift, fitted beside the causes that it stands beside."""
-    base = work.search.candidates[foreign.beside]
-    assert isinstance(foreign.what, LatentForceCandidate)
-    D = variances(work.problem.entries, base.ids, foreign.what.kappa)
-    kind, _, which = foreign.id.partition(":")
+    base = work.search.candidates[explanation.causes]
+    assert isinstance(explanation.what, LatentForceCandidate)
+    D = variances(work.problem.entries, base.ids, explanation.what.kappa)
+    kind, _, which = explanation.id.partition(":")
     if kind + ":" == FORCE:
         return estimate_force(work.problem, base.fit, which, D)
     return estimate_drift(work.problem, base.fit, which, MAX_DRIFT_LEVELS * SPECS[which].noise, D)
@@ -119,7 +122,7 @@ def of_sudden(work: Findings, what: FittedChangePoint, cause: Cause) -> Extensio
     """Return the extension by a cause that begins in mid-trial, as it is fitted."""
     extended = Extended(
         deviations={cause.id: {parameter: one.deviation for parameter, one in cause.parameters.items()}},
-        start_times={cause.id: what.begun.time},
+        start_times={cause.id: what.change_point.time},
         calibration=by_effect(work.problem, what.fit.z, None, but=(cause.id,)),
     )
     return Extension(fit=what.fit, problem=what.problem, extended=extended, cause=cause)

@@ -20,16 +20,19 @@ from subzero.diagnosis.assessment.identifiability import (
     information,
     marginal,
     separation,
-    with_secants,
+    with_whole_effects,
 )
 from subzero.diagnosis.assessment.next_trial import Survivor, next_trial
 from subzero.diagnosis.assessment.residuals import curves
 from subzero.diagnosis.hypothesis.effect import MINUTE_S, with_onset
 from subzero.diagnosis.hypothesis.hypotheses import Ids, columns_of, nameable
+from subzero.diagnosis.inference import settings
 from subzero.diagnosis.inference.change_point_fit import FittedChangePoint
 from subzero.diagnosis.inference.change_point_scan import BaseRun, change_point_columns
 from subzero.diagnosis.inference.laplace import Candidate
 from subzero.diagnosis.inference.map_fit import Fit
+from subzero.diagnosis.inference.model_average import MIN_DISCRIMINATION
+from subzero.diagnosis.inference.model_search import Search
 from subzero.diagnosis.inference.out_of_catalogue import Findings, shares
 from subzero.diagnosis.results import (
     CAUSE_NAMED,
@@ -60,7 +63,7 @@ MAX_SURVIVORS = 4
 
 def ranked(findings: Findings) -> Ranked:
     """Return all explanations by their probability, with the closest rivals of the first."""
-    inside, outside = shares(findings.search, findings.foreign)
+    inside, outside = shares(findings.search, findings.out_of_catalogue)
     candidates = findings.search.candidates
     best = candidates[max((ids for ids in inside if ids in candidates), key=lambda ids: inside[ids])]
     change_points = _change_points(findings)
@@ -98,7 +101,7 @@ def follow_up(findings: Findings, known: Ranked) -> FollowUp:
 
 def _change_points(findings: Findings) -> list[FittedChangePoint]:
     """Return the change points that have a fit of their own, the most probable first."""
-    ordered = sorted(findings.foreign, key=lambda one: -one.log_posterior)
+    ordered = sorted(findings.out_of_catalogue, key=lambda one: -one.log_posterior)
     return [one.what for one in ordered if isinstance(one.what, FittedChangePoint)]
 
 
@@ -106,7 +109,7 @@ def _close_to(findings: Findings, best: Candidate, ids: Ids) -> ClosestRival:
     """Return the closest rival of causes as they are in a candidate; none of no causes."""
     if not ids:
         return ClosestRival()
-    J = with_secants(findings.problem, best.fit.J, best.fit.z)
+    J = with_whole_effects(findings.problem, best.fit.J, best.fit.z)
     D, rival = separation(findings.problem, J, best.fit.z, ids, best.kappa, findings.refuted)
     return ClosestRival(D, () if rival == "none" else (rival,))
 
@@ -116,12 +119,12 @@ def _closest(findings: Findings, one: FittedChangePoint) -> ClosestRival:
     time on.
     """
     n, more = len(findings.problem.entries), one.problem
-    M, own = marginal(more, one.fit.J, one.begun.kappa), list(range(n, len(more.entries) - 1))
+    M, own = marginal(more, one.fit.J, one.change_point.kappa), list(range(n, len(more.entries) - 1))
     step = one.fit.z[own]
-    found: dict[Ids, float] = {(): float(step @ information(more, M, own, one.begun.kappa) @ step)}
+    found: dict[Ids, float] = {(): float(step @ information(more, M, own, one.change_point.kappa) @ step)}
     for other in nameable(more.entries):
         at = columns_of(more.entries, (other,))
-        found[(other,)] = against(more, M, own, step, at, one.begun.kappa)[0]
+        found[(other,)] = against(more, M, own, step, at, one.change_point.kappa)[0]
     found |= _from_its_time_on(findings, one)
     rival = min(found, key=lambda ids: found[ids])
     return ClosestRival(found[rival], rival)
@@ -134,7 +137,7 @@ def _from_its_time_on(findings: Findings, one: FittedChangePoint) -> dict[Ids, f
 
     A jam of a fin with no command lost is an offset of the fin: what both do is no rival of either.
     """
-    begun, fit, n = one.begun, one.fit, len(findings.problem.entries)
+    begun, fit, n = one.change_point, one.fit, len(findings.problem.entries)
     others = [effect for effect in findings.problem.sudden_effects if effect.id != begun.effect.id]
     C = change_point_columns(
         BaseRun(one.problem, fit.z), [(effect, begun.time) for effect in others], begun.record
@@ -172,7 +175,7 @@ def _with_closest(findings: Findings, known: Ranked, verdict: str, left: Remaini
     hypotheses, late, best = left.hypotheses, left.change_points, known.best
     if verdict != UNDECIDED:
         return left
-    is_same_cause = all((one.begun.effect.id,) in hypotheses for one in late)
+    is_same_cause = all((one.change_point.effect.id,) in hypotheses for one in late)
     if len(hypotheses) == 1 and best.ids and is_same_cause:
         closest = _close_to(findings, best, best.ids).ids
         findings.search.fit(closest)
@@ -180,7 +183,7 @@ def _with_closest(findings: Findings, known: Ranked, verdict: str, left: Remaini
     if len(late) == len(left.credible) == 1:
         rival = known.close_to_change_point.ids
         late = late + [one for one in known.change_points if rival and "@" in rival[0]
-                       and one.begun.effect.id == rival[0].partition("@")[0]]  # fmt: skip
+                       and one.change_point.effect.id == rival[0].partition("@")[0]]  # fmt: skip
     return left._replace(hypotheses=hypotheses, change_points=late)
 
 
@@ -204,11 +207,11 @@ def _calibration_from_onset(findings: Findings, what: FittedChangePoint) -> Cali
     """Return a sudden cause as one that holds throughout, as large (or grown) as it is at the end of its record, with
     what the records say of its size; None of a jam, which is no deviation of a fin that follows.
     """
-    n, fit, effect = len(findings.problem.entries), what.fit, what.begun.effect
+    n, fit, effect = len(findings.problem.entries), what.fit, what.change_point.effect
     at = columns_of(findings.problem.entries, (effect.grows or effect.id,))
     if not at:
         return None
-    lasts = float(findings.problem.records[what.begun.record].time[-1]) - what.begun.time
+    lasts = float(findings.problem.records[what.change_point.record].time[-1]) - what.change_point.time
     grown = lasts / MINUTE_S if effect.grows else 1.0
     z, J, D = fit.z[:n].copy(), fit.J[:, :n].copy(), fit.D[:n].copy()
     z[at], J[:, at], D[at] = grown * fit.z[n:-1], fit.J[:, n:-1] / grown, grown**2 * fit.D[n:-1]
@@ -222,7 +225,7 @@ def _survivors(findings: Findings, left: RemainingModels) -> list[Survivor]:
     candidates = findings.search.candidates
     found: list[Survivor] = [candidates[ids] for ids in left.hypotheses if ids in candidates]
     broken = [_calibration_from_onset(findings, one) for one in left.change_points
-              if (one.begun.effect.id,) not in left.hypotheses]  # fmt: skip
+              if (one.change_point.effect.id,) not in left.hypotheses]  # fmt: skip
     return found + [one for one in broken if one]
 
 
@@ -244,3 +247,21 @@ def _curves(findings: Findings, verdict: str, new: Extension, rivals: Sequence[I
     fits |= {"extended": new.fit} if verdict in (CAUSE_NAMED, OUTSIDE) else {}
     fits |= {f"rival: {name(ids)}": candidates[ids].fit for ids in rivals[: RIVALS_DRAWN[verdict]]}
     return curves(new.problem, fits)
+
+
+def refuted_rivals(search: Search) -> frozenset[str]:
+    """Return the rivals of the best hypothesis that only the linear problem has close, as simulations show.
+
+    A play of the rudder may look like its offset from where there is none, and explain nothing of a record.
+    """
+    best, problem, found = search.best(), search.problem, set[str]()
+    J = with_whole_effects(problem, best.fit.J, best.fit.z)
+    for _ in range(settings.MAX_TRIED if best.ids else 0):
+        D, rival = separation(problem, J, best.fit.z, best.ids, best.kappa, found)
+        if rival == "none" or D >= MIN_DISCRIMINATION:
+            break
+        search.fit((rival,), best.fit)
+        if search.candidates[(rival,)].optimistic_log_posterior > best.log_posterior - settings.REFUTED_NATS:
+            break
+        found.add(rival)
+    return frozenset(found)
