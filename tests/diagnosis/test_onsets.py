@@ -10,11 +10,11 @@ from numpy.testing import assert_allclose
 
 import subzero
 from subzero import diagnose
-from subzero.diagnosis.hypothesis.catalogue.sensors import SPECS
+from subzero.diagnosis.hypothesis.catalogue import SPECS
 from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.effect import with_onset
 from subzero.diagnosis.hypothesis.extended_model import all_effects
-from subzero.diagnosis.inference.measurement import respond
+from subzero.diagnosis.inference import respond
 from subzero.model import Model
 from subzero.synthetic.reference_run import simulate_reference
 
