@@ -10,6 +10,7 @@ is imported inside the commands, after the request has been checked, so that hel
 
 from __future__ import annotations
 
+import shlex
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -22,7 +23,7 @@ from rich.console import Console
 import scenarios
 from subzero import cli_autopilot, cli_diagnosis, cli_sweep
 from subzero.errors import UserError, printable
-from subzero.interrupts import INTERRUPTED, came, words
+from subzero.interrupts import INTERRUPTED, begin, came, words
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -161,6 +162,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         arguments: words behind ``subzero``; those of this process if None.
     """
     _never_choke(sys.stdout, sys.stderr)
+    begin()
+    _note_command(sys.argv[1:] if arguments is None else arguments)
     try:
         command, bound, _ = app.parse_args(arguments, exit_on_error=False, print_error=False)
         return command(*bound.args, **bound.kwargs) or FINE
@@ -176,6 +179,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
             raise
         print(words(), file=sys.stderr)
         return INTERRUPTED
+
+
+def _note_command(words: Sequence[str]) -> None:
+    """Keep the line that is carried out, for the pages that tell how to do it again."""
+    from subzero.output import COMMAND
+
+    COMMAND.set(printable(shlex.join(["subzero", *words])))
 
 
 def _never_choke(*streams: Any) -> None:

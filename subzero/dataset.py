@@ -200,6 +200,7 @@ def _provenance(trial: scenarios.Trial, model: Model, tethered: bool, run: Run) 
             else {}
         ),
         "scheme": trial.scheme,
+        "sea_bed_m": trial.sea_bed,
         "outcome": "completed" if run.completed else "stopped",
         "outcome_message": run.message,
     }

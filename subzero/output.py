@@ -6,6 +6,7 @@ import csv
 import json
 from collections.abc import Iterator
 from contextlib import contextmanager
+from contextvars import ContextVar
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +18,10 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-RUN_FILES = (*("tethered.nc", "tethered.csv", "untethered.nc", "untethered.csv", "summary.json"),
+COMMAND: ContextVar[str] = ContextVar("COMMAND", default="")
+"""The line of the shell that is being carried out; a page says it, so that its reader can do it again."""
+
+RUN_FILES = (*("tethered.nc", "tethered.csv", "untethered.nc", "untethered.csv", "summary.json", "report.html"),
              *("fig4.png", "fig5.png", "fig6.png", "attitude.png", "cable.png", "forces.png"),
              *("deployment.png", "measured.png", "manoeuvre.png"))  # fmt: skip
 """Files of runs; `subzero.figures.draw` names the figures."""
@@ -72,6 +76,12 @@ def write_summary(summary: dict[str, Any], stage: Stage) -> None:
     text = json.dumps(summary, indent=2, ensure_ascii=False, allow_nan=False)
     with stages.told(stage.folder):
         (stage.path / "summary.json").write_text(text + "\n", encoding="utf-8")
+
+
+def write_page(page: str, stage: Stage) -> None:
+    """Write ``report.html``."""
+    with stages.told(stage.folder):
+        (stage.path / "report.html").write_text(page, encoding="utf-8")
 
 
 def write_figures(figures: dict[str, Figure], stage: Stage) -> None:

@@ -13,6 +13,9 @@ from rich.table import Table
 Summary = dict[str, Any]
 """The summary of one run, as `subzero.summary.summarise` gives it."""
 
+Row = tuple[str, ...]
+"""The cells of a row; the first says what the others are."""
+
 NOTHING = "–"
 SHOWN_CHANNELS = 12
 """So many channels are shown of those that change by finer steps; ``summary.json`` has all."""
@@ -62,19 +65,28 @@ def show_warnings(runs: dict[str, Summary], console: Console) -> None:
             console.print(row, highlight=False)
 
 
+def number_groups(summary: Summary) -> list[list[Row]]:
+    """Return what one reads first, runs side by side: rows in groups, each a row's words and a cell for each run."""
+    runs = [summary[label] for label in RUNS if label in summary]
+    first = _rows(bool(summary["prescribed"])).items()
+    groups: list[list[Row]] = [[(words, *map(cell, runs)) for words, cell in first]]
+    if all(run["energy"] is not None for run in runs):
+        groups.append(_energy_rows([run["energy"] for run in runs]))
+    if any(run["diagnostics"] is not None for run in runs):
+        groups.append(_diagnostic_rows([run["diagnostics"] or {} for run in runs]))
+    return groups
+
+
 def _runs_table(summary: Summary) -> Table:
     """Return the table of what one reads first, runs side by side."""
-    runs = {label: summary[label] for label in RUNS if label in summary}
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     table.add_column("")
-    for label in runs:
+    for label in (label for label in RUNS if label in summary):
         table.add_column(label, justify="right")
-    for words, cell in _rows(bool(summary["prescribed"])).items():
-        table.add_row(escape(words), *(escape(cell(run)) for run in runs.values()))
-    if all(run["energy"] is not None for run in runs.values()):
-        _add_energy(table, [run["energy"] for run in runs.values()])
-    if any(run["diagnostics"] is not None for run in runs.values()):
-        _add_diagnostics(table, [run["diagnostics"] or {} for run in runs.values()])
+    for group in number_groups(summary):
+        table.add_section()
+        for row in group:
+            table.add_row(*map(escape, row))
     return table
 
 
@@ -111,21 +123,22 @@ def _plain(value: float | None, digits: int) -> str:
     return NOTHING if value is None else f"{round(value, digits) + 0.0:.{digits}f}"
 
 
-def _add_energy(table: Table, balances: list[Summary]) -> None:
-    """Add the energy balance at the end, and which share of the work it leaves unexplained."""
-    table.add_section()
-    for key, words in ENERGY_ROWS.items():
-        table.add_row(escape(words), *(_plain(balance[key], 3) for balance in balances))
+def _energy_rows(balances: list[Summary]) -> list[Row]:
+    """Return the energy balance at the end, and which share of the work it leaves unexplained."""
+    rows = [(words, *(_plain(balance[key], 3) for balance in balances)) for key, words in ENERGY_ROWS.items()]
     shares = [balance["unexplained_share"] for balance in balances]
-    table.add_row("  unexplained share", *(NOTHING if share is None else f"{share:.1e}" for share in shares))
+    return [
+        *rows,
+        ("  unexplained share", *(NOTHING if share is None else f"{share:.1e}" for share in shares)),
+    ]
 
 
-def _add_diagnostics(table: Table, found: list[Summary]) -> None:
-    """Add what tells how far to trust the cable; nothing where there is no cable."""
-    table.add_section()
-    for key, (words, form) in DIAGNOSTIC_ROWS.items():
-        values = [one.get(key) for one in found]
-        table.add_row(escape(words), *(NOTHING if x is None else form.format(x) for x in values))
+def _diagnostic_rows(found: list[Summary]) -> list[Row]:
+    """Return what tells how far to trust the cable; nothing where there is no cable."""
+    return [
+        (words, *(NOTHING if (x := one.get(key)) is None else form.format(x) for one in found))
+        for key, (words, form) in DIAGNOSTIC_ROWS.items()
+    ]
 
 
 def _refinement_table(label: str, channels: Summary) -> Table:
@@ -153,12 +166,20 @@ def _fit_table(measured: Summary) -> Table:
     table.add_column("run", no_wrap=True)
     for what in ("samples", "RMSE", "bias", "fit %"):
         table.add_column(what, justify="right", no_wrap=True)
+    for row in fit_rows(measured):
+        table.add_row(*map(escape, row))
+    return table
+
+
+def fit_rows(measured: Summary) -> list[Row]:
+    """Return how well each run explains each measured channel, one run a row; the channel stands in its first row."""
+    rows: list[Row] = []
     for name, row in measured["channels"].items():
         words = f"{name} [{row['unit']}]"
         for label in (label for label in RUNS if label in row):
-            table.add_row(escape(words), label, *_fit_cells(row[label]))
+            rows.append((words, label, *_fit_cells(row[label])))
             words = ""
-    return table
+    return rows
 
 
 def _fit_cells(one: Summary) -> list[str]:

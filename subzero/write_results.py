@@ -27,6 +27,7 @@ def default_folder(trial: scenarios.Trial) -> Path:
 def write_all(runs: dict[str, xr.Dataset], record: Record | None, stage: Stage) -> dict[str, Any]:
     """Write everything that belongs to some runs of one trial, and return their summary."""
     from subzero.figures import draw
+    from subzero.page import page_of_runs
     from subzero.summary import summary_of
 
     summary = summary_of(runs, record)
@@ -34,7 +35,11 @@ def write_all(runs: dict[str, xr.Dataset], record: Record | None, stage: Stage) 
     for label, run in runs.items():
         output.write_run(run, stage, label)
     output.write_summary(summary, stage)
-    output.write_figures(draw(runs, record), stage)
+    figures = draw(runs, record)
+    output.write_figures(figures, stage)
+    output.write_page(
+        page_of_runs(runs, summary, figures, command=output.COMMAND.get(), record=record), stage
+    )
     return summary
 
 

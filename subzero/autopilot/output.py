@@ -33,6 +33,7 @@ def write(measured: Measured, title: str, answer: str, command: str, stage: Stag
         stage: where to.
     """
     from subzero.autopilot.manoeuvre_figure import picture
+    from subzero.page import page_of_runs
     from subzero.summary import summary_of
 
     runs = {name: run for name, (run, _) in measured.items()}
@@ -43,7 +44,9 @@ def write(measured: Measured, title: str, answer: str, command: str, stage: Stag
         output.write_run(run, stage, name)
         summary[name]["indices"] = {key: _number(value) for key, value in indices.items()}
     output.write_summary(summary, stage)
-    output.write_figures({"manoeuvre": picture(runs, title, answer, command)}, stage)
+    figures = {"manoeuvre": picture(runs, title, answer, command)}
+    output.write_figures(figures, stage)
+    output.write_page(page_of_runs(runs, summary, figures, command=output.COMMAND.get()), stage)
     return summary
 
 

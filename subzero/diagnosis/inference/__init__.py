@@ -24,107 +24,139 @@ change points, forces and drifts beside the hypotheses    out_of_catalogue
 all that only steers the search                           settings
 
 What others may use stands in `__all__`; everything else is the engine's own (a contract in ``pyproject.toml`` holds
-it for what stands outside the diagnosis). Names come from their files when they are first used.
+it for what stands outside the diagnosis).
 """
 
-from importlib import import_module
-from typing import Any
+# ruff: noqa: I001 - in the order in which they stand on one another, not in that of the alphabet
 
-_HOME = {
-    "noise": (
-        "Behind",
-        "Noise",
-        "Usual",
-        "estimate",
-        "resolution_of",
-        "spikes",
-    ),
-    "measurement": (
-        "TRUTHS",
-        "economical",
-        "respond",
-    ),
-    "problem": (
-        "Observed",
-        "Problem",
-    ),
-    "posing": ("pose",),
-    "linear_gaussian": (
-        "KAPPAS",
-        "ForceInformation",
-        "Quadratic",
-        "Scale",
-        "Terms",
-        "freed",
-        "log_evidence_process",
-        "log_evidence_term",
-        "log_gains",
-        "mixed",
-        "posterior",
-        "seen",
-    ),
-    "map_fit": (
-        "Fit",
-        "at_bad_minimum",
-        "broyden_update",
-        "is_poor_fit",
-        "quadratic_step",
-        "refit",
-        "restarted_where_smooth",
-    ),
-    "laplace": (
-        "Candidate",
-        "candidate_of",
-        "laplace",
-    ),
-    "change_point_scan": (
-        "BaseRun",
-        "LinearisationPoint",
-        "change_point_columns",
-        "scan",
-        "times_of",
-    ),
-    "change_point_fit": (
-        "fit_change_points",
-        "linearised_at",
-    ),
-    "latent_force": (
-        "AXIS_WORDS",
-        "FORCE",
-        "all_columns",
-        "force_columns",
-        "history",
-        "knots_of",
-        "without_force",
-    ),
-    "input_estimation": (
-        "estimate_drift",
-        "estimate_force",
-        "latent_force_candidates",
-        "relinearised_force",
-    ),
-    "basis": ("one_terms",),
-    "screening": ("Screening",),
-    "model_average": (
-        "UNTRIED_LOG_POSTERIOR",
-        "Beliefs",
-        "ChangePointSummary",
-        "decide",
-        "occam_folded",
-        "practical_causes",
-    ),
-    "out_of_catalogue": ("Findings",),
-}
-"""File → names that others may use."""
+from subzero.diagnosis.inference.noise import Behind, Noise, Usual, estimate, resolution_of, spikes
+from subzero.diagnosis.inference.measurement import TRUTHS, economical, respond
+from subzero.diagnosis.inference.problem import Observed, Problem
+from subzero.diagnosis.inference.posing import pose
+from subzero.diagnosis.inference.linear_gaussian import (
+    KAPPAS,
+    ForceInformation,
+    Quadratic,
+    Scale,
+    Terms,
+    freed,
+    log_evidence_process,
+    log_evidence_term,
+    log_gains,
+    mixed,
+    posterior,
+    seen,
+)
+from subzero.diagnosis.inference.map_fit import (
+    Fit,
+    at_bad_minimum,
+    broyden_update,
+    is_poor_fit,
+    quadratic_step,
+    refit,
+    restarted_where_smooth,
+)
+from subzero.diagnosis.inference.laplace import Candidate, candidate_of, laplace
+from subzero.diagnosis.inference.change_point_scan import (
+    BaseRun,
+    LinearisationPoint,
+    change_point_columns,
+    grown,
+    scan,
+    spacing_of,
+    times_of,
+)
+from subzero.diagnosis.inference.change_point_fit import fit_change_points, linearised_at
+from subzero.diagnosis.inference.latent_force import (
+    AXIS_WORDS,
+    FORCE,
+    all_columns,
+    force_columns,
+    history,
+    knots_of,
+    without_force,
+)
+from subzero.diagnosis.inference.basis import one_terms
+from subzero.diagnosis.inference.input_estimation import (
+    estimate_drift,
+    estimate_force,
+    latent_force_candidates,
+    relinearised_force,
+)
+from subzero.diagnosis.inference.screening import Screening
+from subzero.diagnosis.inference.model_average import (
+    UNTRIED_LOG_POSTERIOR,
+    Beliefs,
+    ChangePointSummary,
+    decide,
+    occam_folded,
+    practical_causes,
+)
+from subzero.diagnosis.inference.out_of_catalogue import Findings, special_cases_folded
 
-__all__ = sorted(name for names in _HOME.values() for name in names)
-
-
-def __getattr__(name: str) -> Any:
-    """Fetch a name from its file, once."""
-    for file, names in _HOME.items():
-        if name in names:
-            value = getattr(import_module(f"{__name__}.{file}"), name)
-            globals()[name] = value
-            return value
-    raise AttributeError(f"module '{__name__}' has no attribute '{name}'; it has {', '.join(__all__)}")
+__all__ = [
+    "AXIS_WORDS",
+    "FORCE",
+    "KAPPAS",
+    "TRUTHS",
+    "UNTRIED_LOG_POSTERIOR",
+    "BaseRun",
+    "Behind",
+    "Beliefs",
+    "Candidate",
+    "ChangePointSummary",
+    "Findings",
+    "Fit",
+    "ForceInformation",
+    "LinearisationPoint",
+    "Noise",
+    "Observed",
+    "Problem",
+    "Quadratic",
+    "Scale",
+    "Screening",
+    "Terms",
+    "Usual",
+    "all_columns",
+    "at_bad_minimum",
+    "broyden_update",
+    "candidate_of",
+    "change_point_columns",
+    "decide",
+    "economical",
+    "estimate",
+    "estimate_drift",
+    "estimate_force",
+    "fit_change_points",
+    "force_columns",
+    "freed",
+    "grown",
+    "history",
+    "is_poor_fit",
+    "knots_of",
+    "laplace",
+    "latent_force_candidates",
+    "linearised_at",
+    "log_evidence_process",
+    "log_evidence_term",
+    "log_gains",
+    "mixed",
+    "occam_folded",
+    "one_terms",
+    "pose",
+    "posterior",
+    "practical_causes",
+    "quadratic_step",
+    "refit",
+    "relinearised_force",
+    "resolution_of",
+    "respond",
+    "restarted_where_smooth",
+    "scan",
+    "seen",
+    "spacing_of",
+    "special_cases_folded",
+    "spikes",
+    "times_of",
+    "without_force",
+]

@@ -1,0 +1,119 @@
+"""The page of some runs of one trial, from what is known of them."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any
+
+from subzero.page.replay import actors_of, encode
+from subzero.page.report import Line, Report, Table, render
+from subzero.report import NOTHING, RUNS, fit_rows, number_groups
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+    from subzero.records.record import Record
+
+
+def page_of_runs(
+    runs: dict[str, xr.Dataset],
+    summary: dict[str, Any],
+    figures: Mapping[str, Figure],
+    *,
+    command: str,
+    record: Record | None = None,
+    name: str = "",
+) -> str:
+    """Return ``report.html`` of some runs.
+
+    Args:
+        runs: runs by name; the first one is followed by the camera, the others are ghosts.
+        summary: of `subzero.summary.summary_of`, perhaps with ``indices`` of each run.
+        figures: by name.
+        command: the line that makes them again.
+        record: what was measured.
+        name: of the command, such as compare; by default the second word of its line.
+    """
+    first = next(iter(runs.values()))
+    labels = [label for label in RUNS if label in summary]
+    return render(
+        Report(
+            command_name=name or _second_word(command),
+            scenario=summary["scenario"],
+            title=summary["title"],
+            version=summary["subzero_version"],
+            outcome=[line for label in labels for line in _outcome(label, summary[label])],
+            command=command,
+            warnings=_warnings(summary, labels),
+            tables=_tables(summary, labels),
+            figures=figures,
+            replay=encode(actors_of(runs), record) if _moves(runs) else None,
+            sources=_sources(first),
+        )
+    )
+
+
+def _moves(runs: dict[str, xr.Dataset]) -> bool:
+    """Say whether there is anything to replay: two samples of the first run or more, of a vehicle that is told."""
+    first = next(iter(runs.values()))
+    return first.sizes["time"] > 1 and "hull" in json.loads(first.attrs["parameters"]).get("vehicle", {})
+
+
+def _second_word(command: str) -> str:
+    return [*command.split(), "", ""][1]
+
+
+def _outcome(label: str, run: dict[str, Any]) -> list[Line]:
+    """Return what one reads first of a run."""
+    is_complete = run["outcome"] == "completed"
+    end = NOTHING if run["time_at_end_s"] is None else f"{run['time_at_end_s']:g} s"
+    message = "" if is_complete else f": {run['outcome_message']}"
+    lines = [Line(text=f"{label}: {run['outcome']} at {end}{message}", kind="good" if is_complete else "bad")]
+    count = len(run["warnings"])
+    words = f"{label}: {count} warning{'s' if count > 1 else ''}"
+    return [*lines, Line(text=words, kind="bad")] if count else lines
+
+
+def _warnings(summary: dict[str, Any], labels: list[str]) -> dict[str, list[str]]:
+    """Return the warnings of the runs that have some."""
+    return {
+        f"{label} run": [one["message"] for one in summary[label]["warnings"]]
+        for label in labels
+        if summary[label]["warnings"]
+    }
+
+
+def _tables(summary: dict[str, Any], labels: list[str]) -> list[Table]:
+    """Return the numbers: indices of a manoeuvre, what one reads first, and how well a record is explained."""
+    tables = [Table(title="Numbers", header=("", *labels), groups=number_groups(summary))]
+    if all("indices" in summary[label] for label in labels):
+        tables.insert(0, Table(title="Indices", header=("", *labels), groups=[_indices(summary, labels)]))
+    if summary["measured"] is not None:
+        header = ("channel", "run", "samples", "RMSE", "bias", "fit %")
+        title = f"Model − measured, {summary['measured']['source']}"
+        tables.append(Table(title=title, header=header, groups=[fit_rows(summary["measured"])]))
+    return tables
+
+
+def _indices(summary: dict[str, Any], labels: list[str]) -> list[tuple[str, ...]]:
+    """Return the rows of the indices of a manoeuvre; a number that does not exist is a dash."""
+
+    def cell(value: float | None) -> str:
+        return NOTHING if value is None else f"{value:.4g}"
+
+    names = summary[labels[0]]["indices"]
+    return [(name, *(cell(summary[label]["indices"].get(name)) for label in labels)) for name in names]
+
+
+def _sources(run: xr.Dataset) -> dict[str, str]:
+    """Return what a run came from: the scenario as it was read, all parameters, the versions of the libraries."""
+    parameters = json.dumps(json.loads(run.attrs["parameters"]), indent=2, ensure_ascii=False)
+    versions = {"subzero": run.attrs["subzero_version"], **json.loads(run.attrs["versions"])}
+    return {
+        "The scenario, as it was read": run.attrs["scenario_text"],
+        "All parameters (SI, radians)": parameters,
+        "Versions": "\n".join(f"{name} {number}" for name, number in versions.items()),
+    }

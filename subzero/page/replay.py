@@ -1,0 +1,181 @@
+"""What the replay of a page needs of some runs: poses, channels and cable shapes, small enough to stand inside it.
+
+A series of numbers x is stored as 16-bit integers c, little-endian, in base64,
+
+    x ≈ low + step (c + 32767),   step = (high − low)/65534,   c = −32768 where there is no number,
+
+so that it is known to half a step: 0.2 mm on a track of 25 m, 8 mm on one of a kilometre. Samples are left out evenly
+where there are more than a page should carry, and the cable is given at a fixed number of points, spread evenly over
+its nodes, so that what is graded finely near the vehicle stays fine. Nothing is smoothed, and nothing invented: every
+sample of the replay is one of the run.
+
+Axes are north, east and down from where the vehicle starts; channels have the units of `subzero.channels`.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from subzero.channels import BY_NAME, CHANNELS
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from subzero.records.record import Record
+
+MOST_SAMPLES, MOST_SHAPES, MOST_POINTS = 5000, 1500, 96
+"""Samples of channels, shapes of the cable and points of a shape that a page carries of one run."""
+
+MISSING, LOWEST, STEPS = -32768, 32767, 65534
+"""The code for no number; what is added to a code; the steps between the lowest and the highest."""
+
+HULL = ("hull", "rudder", "stern_planes", "propeller", "tow_point")
+"""Sections of a vehicle's parameters that say what it looks like."""
+
+Packed = dict[str, Any]
+"""A series as the page reads it: n, low, step, and data unless the series is constant."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Actor:
+    """One vehicle of a replay, with its cable if it has one.
+
+    Args:
+        name: what it is called beside it.
+        run: what it does.
+        ghost: drawn translucent, behind the others.
+    """
+
+    name: str
+    run: xr.Dataset
+    ghost: bool = False
+
+
+def actors_of(runs: dict[str, xr.Dataset]) -> tuple[Actor, ...]:
+    """Return the vehicles of some runs by name: the first one solid, the others as ghosts."""
+    return tuple(Actor(name=name, run=run, ghost=at > 0) for at, (name, run) in enumerate(runs.items()))
+
+
+def encode(actors: tuple[Actor, ...], record: Record | None = None) -> dict[str, Any]:
+    """Return the data of a replay, ready for JSON.
+
+    Args:
+        actors: who moves; the first one is followed.
+        record: what was measured, drawn as dots, and as a track if it has places.
+    """
+    first = actors[0].run
+    parameters = json.loads(first.attrs["parameters"])
+    return {
+        "vehicle": {name: parameters["vehicle"][name] for name in HULL},
+        "drum_radius": parameters["drum"]["radius"],
+        "drum_on_vessel": parameters.get("vessel") is not None,
+        "sea_bed": float(first.attrs.get("sea_bed_m", 0.0)) or None,
+        "channels": {
+            one.name: {"unit": one.unit, "words": one.long_name} for one in CHANNELS if one.name in first
+        },
+        "actors": [_actor(one) for one in actors],
+        "measured": None if record is None else _measured(record),
+    }
+
+
+def _actor(actor: Actor) -> dict[str, Any]:
+    """Return what one vehicle does."""
+    run = actor.run
+    kept = _spread(run.sizes["time"], MOST_SAMPLES)
+    channels = {one.name: pack(run[one.name].values[kept]) for one in CHANNELS if one.name in run}
+    return {
+        "name": actor.name,
+        "ghost": actor.ghost,
+        "samples_of_run": int(run.sizes["time"]),
+        "time": pack_exactly(run["time"].values[kept]),
+        "turns": pack(_turns(run)[kept]),
+        "channels": channels,
+        "cable": _cable(run) if run.attrs["tethered"] and run["node_count"].values.any() else None,
+    }
+
+
+def _measured(record: Record) -> dict[str, Any]:
+    """Return what was measured, in the channels that the page knows."""
+    kept = _spread(record.time.size, MOST_SAMPLES)
+    values = {name: pack(values[kept]) for name, values in record.values.items() if name in BY_NAME}
+    return {"time": pack_exactly(record.time[kept]), "channels": values}
+
+
+def _turns(run: xr.Dataset) -> np.ndarray:
+    """Return how often the propeller has turned since the start: the integral of its speed, by trapezia."""
+    time, speed = run["time"].values, np.nan_to_num(run["propeller_speed"].values)
+    return np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(time))])
+
+
+def _cable(run: xr.Dataset) -> dict[str, Any]:
+    """Return the shapes of the cable and the tension along it, point 0 at the vehicle."""
+    kept = _spread(run.sizes["time"], MOST_SHAPES)
+    counts = run["node_count"].values[kept].astype(int)
+    points = min(int(counts.max()), MOST_POINTS)
+    position = run["cable_position"].values[kept] + _start_of_cable(run)
+    tension = run["cable_node_tension"].values[kept]
+    along = np.concatenate([position, tension[:, :, None]], axis=2)
+    shapes = np.stack([_points(rows, count, points) for rows, count in zip(along, counts, strict=True)])
+    packed = [pack(shapes[:, :, axis].ravel()) for axis in range(4)]
+    return {
+        "time": pack_exactly(run["time"].values[kept]),
+        "points": points,
+        **dict(zip(("north", "east", "down", "tension"), packed, strict=True)),
+    }
+
+
+def _points(rows: np.ndarray, count: int, points: int) -> np.ndarray:
+    """Return `points` rows spread evenly over the first `count`, between them linearly; no numbers without a cable."""
+    if count < 2:
+        return np.full((points, rows.shape[1]), np.nan)
+    at = np.linspace(0.0, count - 1.0, points)
+    before = np.minimum(at.astype(int), count - 2)
+    share = (at - before)[:, None]
+    return (1.0 - share) * rows[before] + share * rows[before + 1]
+
+
+def _start_of_cable(run: xr.Dataset) -> np.ndarray:
+    """Return from where the cable's places count, (3,): at the start, node 0 is at the tow point. [m]"""
+    first = int(np.argmax(run["node_count"].values > 0))
+    hull = np.array([run[name].values[first] for name in ("north", "east", "depth")])
+    tow = json.loads(run.attrs["parameters"])["vehicle"]["tow_point"]
+    arm = np.array([tow["x"], tow["y"], tow["z"]])
+    angles = [run[name].values[first] for name in ("heading", "pitch", "roll")]
+    to_earth = Rotation.from_euler("ZYX", angles, degrees=True)
+    return hull + to_earth.apply(arm) - run["cable_position"].values[first, 0]
+
+
+def _spread(size: int, most: int) -> np.ndarray:
+    """Return indices spread evenly over a sequence, every n-th and the last, `most` at most and one more."""
+    every = max(1, -(-size // most))
+    return np.unique(np.append(np.arange(0, size, every), size - 1))
+
+
+def pack(values: np.ndarray) -> Packed:
+    """Return a series as 16-bit steps between its lowest and its highest number."""
+    values = np.asarray(values, dtype=float)
+    known = np.isfinite(values)
+    if not known.any():
+        return {"n": values.size, "low": None, "step": 0.0}
+    low, high = float(values[known].min()), float(values[known].max())
+    step = (high - low) / STEPS
+    if known.all() and step <= 0.0:
+        return {"n": values.size, "low": low, "step": 0.0}
+    codes = np.full(values.size, MISSING, dtype="<i2")
+    codes[known] = np.rint((values[known] - low) / (step or 1.0)) - LOWEST
+    return {"n": values.size, "low": low, "step": step, "data": _base64(codes)}
+
+
+def pack_exactly(values: np.ndarray) -> Packed:
+    """Return a series in double precision: times, which must rise."""
+    return {"n": values.size, "doubles": _base64(np.asarray(values, dtype="<f8"))}
+
+
+def _base64(values: np.ndarray) -> str:
+    return base64.b64encode(values.tobytes()).decode("ascii")

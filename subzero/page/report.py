@@ -1,0 +1,154 @@
+"""One page of some runs: what was run, the replay, warnings, numbers, figures, and how to do it again.
+
+The page is one file that loads nothing. It is made of a template (`assets/template.html`), whose engine escapes every
+text that comes from a user; of figures as SVG, inside as images, so that nothing in them can act; and of the player's
+modules (`assets/player`), joined to one script. Without JavaScript all but the replay is there.
+"""
+
+from __future__ import annotations
+
+import base64
+import io
+import json
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cache
+from importlib import resources
+from typing import TYPE_CHECKING, Any, Literal
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+MODULES = ("vectors", "data", "meshes", "shaders", "scene", "camera", "plan", "plots", "player")
+"""The modules of the player, each behind those that it imports."""
+
+FIGURES = {
+    "fig4": "Tension of a straight pull, computed and exact",
+    "fig5": "Tension, force and tow-point velocities of a turn",
+    "fig6": "Propeller command, forward speed, rudder and heading over time",
+    "attitude": "Actuators and attitude over time",
+    "cable": "Shape of the cable, and tension along it",
+    "forces": "Forces on the vehicle, and where the energy went",
+    "deployment": "What the drum does",
+    "measured": "Other channels that were measured, beside the runs",
+    "manoeuvre": "The manoeuvre",
+}
+"""What a figure shows, by its name."""
+
+SVG_STYLE: dict[Any, Any] = {
+    "svg.hashsalt": "subzero",
+    "svg.fonttype": "path",
+    "path.simplify_threshold": 0.3,
+}
+"""Two pages of one run are alike to the last letter."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Table:
+    """Rows in groups; the first cell of a row says what the others are."""
+
+    title: str
+    header: Sequence[str]
+    groups: Sequence[Sequence[Sequence[str]]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Line:
+    """What one reads first: a few words, and whether they are good news."""
+
+    text: str
+    kind: Literal["good", "bad"] = "good"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Report:
+    """What a page says.
+
+    Args:
+        command_name: of the command that made it, such as compare.
+        scenario: name of the trial.
+        title: the trial in words.
+        version: of subzero.
+        outcome: what one reads first.
+        command: the line that does it again.
+        warnings: what may be wrong, by run.
+        tables: the numbers.
+        figures: by name, see `FIGURES`.
+        replay: of `subzero.page.replay.encode`; None without one.
+        sources: texts to unfold at the end, by name.
+    """
+
+    command_name: str
+    scenario: str
+    title: str
+    version: str
+    outcome: Sequence[Line]
+    command: str
+    warnings: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    tables: Sequence[Table] = ()
+    figures: Mapping[str, Figure] = field(default_factory=dict)
+    replay: Mapping[str, Any] | None = None
+    sources: Mapping[str, str] = field(default_factory=dict)
+
+
+def render(report: Report) -> str:
+    """Return the page as HTML; the same report gives the same page."""
+    from markupsafe import Markup
+
+    figures = [
+        {"source": _image(figure), "words": FIGURES.get(name, name.replace("_", " "))}
+        for name, figure in report.figures.items()
+    ]
+    return _template().render(
+        report=report,
+        figures=figures,
+        styles=Markup(asset("page.css") + "\n" + _vendored("uPlot.min.css")),
+        replay_data=Markup(_in_script(report.replay)),
+        uplot=Markup(_vendored("uPlot.iife.min.js")),
+        player=Markup(player()),
+    )
+
+
+def player() -> str:
+    """Return the player as one script: its modules in order, without the lines that import one from another."""
+    texts = [asset(f"player/{name}.js") for name in MODULES]
+    return "\n".join(re.sub(r"^export ", "", _without_imports(text), flags=re.MULTILINE) for text in texts)
+
+
+def _without_imports(text: str) -> str:
+    return re.sub(r"^import [^;]*;\n", "", text, flags=re.MULTILINE)
+
+
+@cache
+def asset(name: str) -> str:
+    """Return the text of a file of the page."""
+    return (resources.files("subzero.page") / "assets" / name).read_text(encoding="utf-8")
+
+
+def _vendored(name: str) -> str:
+    return (resources.files("subzero.page") / "vendor" / name).read_text(encoding="utf-8")
+
+
+@cache
+def _template() -> Any:
+    from jinja2 import Environment, StrictUndefined
+
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True)
+    return environment.from_string(asset("template.html"))
+
+
+def _in_script(data: Mapping[str, Any] | None) -> str:
+    """Return data as JSON that cannot end the script it stands in."""
+    text = json.dumps(data, ensure_ascii=True, allow_nan=False, separators=(",", ":"))
+    return text.replace("<", "\\u003c").replace("&", "\\u0026")
+
+
+def _image(figure: Figure) -> str:
+    """Return a figure as the address of an image that is inside the page."""
+    import matplotlib as mpl
+
+    held = io.BytesIO()
+    with mpl.rc_context(SVG_STYLE):
+        figure.savefig(held, format="svg", metadata={"Date": None})
+    return f"data:image/svg+xml;base64,{base64.b64encode(held.getvalue()).decode('ascii')}"
