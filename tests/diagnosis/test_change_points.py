@@ -58,7 +58,7 @@ def asked(planted, axis="N"):
     """Return the same, and the change points that are fitted there."""
     problem, force = forced(planted, axis)
     with ThreadPoolExecutor(2) as side:
-        return problem, force, fit_change_points(problem, [force.place], ABLE, 0, force.log_posterior, side)
+        return problem, force, fit_change_points(problem, [force.point], ABLE, 0, force.log_posterior, side)
 
 
 @pytest.fixture(scope="module")
@@ -169,6 +169,6 @@ def test_it_is_reported_with_its_onset_and_its_size(plant):
     assert 0.0 < cause.start_sd < 0.2
     angle = cause.parameters["angle"]
     assert angle.low < 3.0 < angle.high
-    assert verdict.sentence == f"From {cause.start_time:g} s on the rudder is off its centre."
+    assert verdict.sentence == f"From {cause.start_time:g} s on, the rudder is off its centre."
     assert verdict.extended.start_times == {"rudder_offset": cause.start_time}
     assert all("rudder_offset" not in one.ids[0] for one in verdict.rivals if one.ids)
