@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import csv
 import json
+import math
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -175,6 +176,8 @@ def _variable(
 ) -> Any:
     packing = {} if kind is str else {"zlib": True, "complevel": COMPRESSION, "shuffle": True}
     variable = file.createVariable(name, kind, axes, chunksizes=chunks, **packing)
+    if chunks is not None:
+        variable.set_var_chunk_cache(size=2 * 4 * math.prod(chunks))  # netCDF keeps 16 MB of each variable otherwise
     variable.setncatts(about)
     return variable
 
