@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     Runs = dict[str, xr.Dataset]
 
 Flag = cli_autopilot.Flag
+Export = Annotated[tuple[str, ...], Parameter(negative=())]
 FINE, MISTAKE, STOPPED = 0, 2, 3
 
 
@@ -74,6 +75,7 @@ def simulate(
     commands: Path | None = None,
     motion: Path | None = None,
     out: Path | None = None,
+    export: Export = (),
     check: Flag = False,
     strict: Flag = False,
 ) -> int:
@@ -87,6 +89,7 @@ def simulate(
         commands: CSV file of commands, instead of those of the scenario.
         motion: CSV file of the vehicle's measured states, such as a run's own tethered.csv, which it then follows.
         out: folder for the files; by default one named after the scenario, here.
+        export: further files, for other programs: mcap, mat, parquet or cf; more than one may be given.
         check: run it once more with half the steps and half the segment length, and say what changes.
         strict: end with exit code 3 if the run ends with warnings.
     """
@@ -94,6 +97,7 @@ def simulate(
     from subzero.output import staged
 
     trial = scenarios.load(scenario, commands_csv=commands, motion_csv=motion)
+    _refuse_no_export(export)
     with staged(out or write_results.default_folder(trial)) as stage:
         trial, extended = cli_diagnosis.extended_run(_checked(scenario, commands, motion), with_, effects)
         with _progress(trial) as progress:
@@ -102,7 +106,7 @@ def simulate(
             result = run(trial, tethered=not untethered, **extended, progress=progress)
         runs = {"untethered" if untethered else "tethered": result}
         runs = _refined(runs, trial, extended) if check else runs
-        summary = write_results.write_all(runs, None, stage)
+        summary = write_results.write_all(runs, None, stage, export)
     return FINE if write_results.tell(summary, stage, strict=strict) else STOPPED
 
 
@@ -117,6 +121,7 @@ def compare(
     commands: Path | None = None,
     motion: Path | None = None,
     out: Path | None = None,
+    export: Export = (),
     check: Flag = False,
     strict: Flag = False,
 ) -> int:
@@ -130,6 +135,7 @@ def compare(
         commands: CSV file of commands, instead of those of the scenario.
         motion: CSV file of the vehicle's measured states, such as a run's own tethered.csv, which it then follows.
         out: folder for the files; by default one named after the scenario, here.
+        export: further files, for other programs: mcap, mat, parquet or cf; more than one may be given.
         check: run both once more with half the steps and half the segment length, and say what changes.
         strict: end with exit code 3 if a run ends with warnings.
     """
@@ -139,6 +145,7 @@ def compare(
 
     trial = scenarios.load(scenario, commands_csv=commands, motion_csv=motion)
     record = read_record(measured) if measured is not None else None
+    _refuse_no_export(export)
     with staged(out or write_results.default_folder(trial)) as stage:
         trial, extended = cli_diagnosis.extended_run(_checked(scenario, commands, motion), with_, effects)
         with _progress(trial) as progress:
@@ -146,7 +153,7 @@ def compare(
 
             result = run(trial, measured=record, **extended, progress=progress)
         runs = _refined(result.runs, trial, extended) if check else result.runs
-        summary = write_results.write_all(runs, result.measured, stage)
+        summary = write_results.write_all(runs, result.measured, stage, export)
     return FINE if write_results.tell(summary, stage, strict=strict) else STOPPED
 
 
@@ -213,6 +220,15 @@ def _checked(scenario: str, commands: Path | None, motion: Path | None) -> scena
     from subzero.trials import load
 
     return load(scenario, commands_csv=commands, motion_csv=motion)
+
+
+def _refuse_no_export(kinds: Sequence[str]) -> None:
+    """Refuse a kind of file that nothing here writes, before the run."""
+    if kinds:
+        from subzero.exports import writer_of
+
+        for kind in kinds:
+            writer_of(kind)
 
 
 def _refined(runs: Runs, trial: scenarios.Trial, extended: dict[str, Any]) -> Runs:

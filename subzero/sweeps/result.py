@@ -177,7 +177,9 @@ def _variable(
     packing = {} if kind is str else {"zlib": True, "complevel": COMPRESSION, "shuffle": True}
     variable = file.createVariable(name, kind, axes, chunksizes=chunks, **packing)
     if chunks is not None:
-        variable.set_var_chunk_cache(size=2 * 4 * math.prod(chunks))  # netCDF keeps 16 MB of each variable otherwise
+        variable.set_var_chunk_cache(
+            size=2 * 4 * math.prod(chunks)
+        )  # netCDF keeps 16 MB of each variable otherwise
     variable.setncatts(about)
     return variable
 

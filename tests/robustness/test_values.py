@@ -52,7 +52,7 @@ def tried(seed, count, folder):
     last = log.read_text(encoding="utf-8").splitlines()[-1:] if log.exists() else []
     assert done.returncode == 0, f"died of {last}: {done.stderr[-3000:]}"
     found = json.loads(done.stdout.splitlines()[-1])
-    assert found["wrong"] == []
+    assert not found["wrong"], "\n".join(map(str, found["wrong"]))
     assert sum(found["counts"].values()) == count
     assert min(found["counts"]["ran"], found["counts"]["refused"]) > 0.05 * count
     return found["counts"]
