@@ -265,7 +265,7 @@ def scheme_of(arguments: dict[str, Any], duration: Any, length: float) -> Any:
     options = {name: arguments.pop(name) for name in list(arguments) if name in OPTIONS}
     check_work(duration, options.get("time_step", 0.1), options.get("segment_length", 0.5), length)
     scheme = arguments.get("scheme", "moving_end")
-    return cable.MovingEnd(**options) if scheme == "moving_end" else scheme
+    return cable.MovingEnd(**options) if isinstance(scheme, str) and scheme == "moving_end" else scheme
 
 
 def number(value: Any) -> float:
