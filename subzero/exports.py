@@ -104,14 +104,32 @@ def _topic(log: Any, topic: str, name: str, schema: dict[str, Any]) -> int:
 
 def _topics(run: xr.Dataset) -> dict[str, tuple[str, dict[str, Any]]]:
     """Return topic → name and JSON schema of its messages."""
-    channels = {one.column: {"type": "number", "description": f"{one.long_name} [{one.unit}]"}
-                for one in CHANNELS if one.name in run}  # fmt: skip
+    channels = {
+        one.column: {"type": "number", "description": f"{one.long_name} [{one.unit}]"}
+        for one in CHANNELS
+        if one.name in run
+    }
+    origin = np.zeros((1, 3))
+    scene = _scene(0, "", "", cylinders=[_hull(run)], lines=[_line(origin)])
     return {
         "/channels": ("subzero.Channels", {"type": "object", "properties": channels}),
-        "/tf": ("foxglove.FrameTransform", {"type": "object"}),
-        "/scene": ("foxglove.SceneUpdate", {"type": "object"}),
-        "/log": ("foxglove.Log", {"type": "object"}),
+        "/tf": ("foxglove.FrameTransform", _schema_of(_transform(0, "", "", origin[0], UP_AND_EAST))),
+        "/scene": ("foxglove.SceneUpdate", _schema_of(scene)),
+        "/log": ("foxglove.Log", _schema_of(_line_of_log(0, WARNING, ""))),
     }
+
+
+def _schema_of(message: Any) -> dict[str, Any]:
+    """Return the JSON schema of messages like this one; viewers know the rest of a schema by its name.
+
+    Lists that are empty here are left out: what would be in them is not known.
+    """
+    if isinstance(message, dict):
+        parts = {name: _schema_of(part) for name, part in message.items() if part != []}
+        return {"type": "object", "properties": parts}
+    if isinstance(message, list):
+        return {"type": "array", "items": _schema_of(message[0])}
+    return {"type": {bool: "boolean", str: "string"}.get(type(message), "number")}
 
 
 def _messages(run: xr.Dataset) -> Iterator[tuple[int, str, dict[str, Any]]]:
@@ -128,17 +146,13 @@ def _messages(run: xr.Dataset) -> Iterator[tuple[int, str, dict[str, Any]]]:
             at,
             "/channels",
             {name: value for name, value in values.items() if value == value},
-        )  # no NaN in JSON
+        )  # JSON has no NaN
         if np.isfinite(place[row]).all():
             yield at, "/tf", _transform(at, "ned", "vehicle", place[row], turn[row])
         if shapes is not None:
             yield at, "/scene", _scene(at, "cable", "ned", lines=[_line(shapes[row])])
     for level, words in _told(run):
-        yield (
-            times[-1],
-            "/log",
-            {"timestamp": _stamp(times[-1]), "level": level, "name": "subzero", "message": words},
-        )
+        yield times[-1], "/log", _line_of_log(times[-1], level, words)
 
 
 UP_AND_EAST = np.array([np.sqrt(0.5), np.sqrt(0.5), 0.0, 0.0])
@@ -169,6 +183,10 @@ def _told(run: xr.Dataset) -> Iterator[tuple[int, str]]:
         yield WARNING, f"{one['check']}: {one['message']}"
     if run.attrs["outcome"] != "completed":
         yield ERROR, run.attrs["outcome_message"]
+
+
+def _line_of_log(at: int, level: int, words: str) -> dict[str, Any]:
+    return {"timestamp": _stamp(at), "level": level, "name": "subzero", "message": words}
 
 
 def _stamp(at: int) -> dict[str, int]:

@@ -38,6 +38,20 @@ def exported(run, folder, kind):
     return folder / f"run.{kind}"
 
 
+def describes(schema, message):
+    """Say whether a schema describes all of a message but what is empty; a viewer refuses a topic otherwise."""
+    if message == []:
+        return True
+    if schema["type"] == "object":
+        return all(
+            describes(schema["properties"].get(name, {"type": ""}), part) for name, part in message.items()
+        )
+    if schema["type"] == "array":
+        return all(describes(schema["items"], part) for part in message)
+    kinds = {"number": (int, float), "string": str, "boolean": bool}
+    return isinstance(message, kinds.get(schema["type"], ()))
+
+
 def logged(path):
     """Return topic → [(time [s], message)], and the metadata of the run."""
     topics = {}
@@ -45,7 +59,9 @@ def logged(path):
         reader = make_reader(stream)
         for schema, channel, message in reader.iter_messages():
             assert schema.encoding == "jsonschema"
-            topics.setdefault(channel.topic, []).append((1e-9 * message.log_time, json.loads(message.data)))
+            said = json.loads(message.data)
+            assert describes(json.loads(schema.data), said), (schema.name, said)
+            topics.setdefault(channel.topic, []).append((1e-9 * message.log_time, said))
         (about,) = reader.iter_metadata()
     return topics, about.metadata
 
