@@ -36,7 +36,7 @@ _HOME = {
     "diagnose": ("subzero.diagnosis.api", "diagnose"),
     "draw": ("subzero.figures", "draw"),
     "export": ("subzero.exports", "export"),
-    "load_scenario": ("subzero.trials", "load"),
+    "load_scenario": ("subzero.model", "load"),
     "read_record": ("subzero.records.record", "read_record"),
     "read_trials": ("subzero.diagnosis.read_trials", "read_trials"),
     "simulate": ("subzero.simulation", "simulate"),
