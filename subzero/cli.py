@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     Runs = dict[str, xr.Dataset]
 
 Flag = cli_autopilot.Flag
+Export = Annotated[tuple[str, ...], Parameter(negative=())]
 FINE, MISTAKE, STOPPED = 0, 2, 3
 
 
@@ -108,6 +109,7 @@ def simulate(
     untethered: Annotated[bool, Parameter(negative=())] = False,
     inputs: Inputs = NO_INPUTS,
     out: Path | None = None,
+    export: Export = (),
     check: Flag = False,
     strict: Flag = False,
 ) -> int:
@@ -118,6 +120,7 @@ def simulate(
         untethered: leave the cable away.
         inputs: what is simulated besides the scenario.
         out: folder for the files; by default one named after the scenario, here.
+        export: further files, for other programs: mcap, mat, parquet or cf; more than one may be given.
         check: run it once more with half the steps and half the segment length, and say what changes.
         strict: end with exit code 3 if the run ends with warnings.
     """
@@ -125,6 +128,7 @@ def simulate(
     from subzero.output import staged
 
     trial = inputs.read(scenario)
+    _refuse_no_export(export)
     with staged(out or write_results.default_folder(trial)) as stage:
         trial, extended = inputs.checked(scenario)
         with _progress(trial) as progress:
@@ -133,7 +137,7 @@ def simulate(
             result = run(trial, tethered=not untethered, **extended, progress=progress)
         runs = {"untethered" if untethered else "tethered": result}
         runs = _refined(runs, trial, extended) if check else runs
-        summary = write_results.write_all(runs, None, stage)
+        summary = write_results.write_all(runs, None, stage, export)
     return FINE if write_results.tell(summary, stage, strict=strict) else STOPPED
 
 
@@ -145,6 +149,7 @@ def compare(
     measured: Path | None = None,
     inputs: Inputs = NO_INPUTS,
     out: Path | None = None,
+    export: Export = (),
     check: Flag = False,
     strict: Flag = False,
 ) -> int:
@@ -155,6 +160,7 @@ def compare(
         measured: CSV file of measured channels, to set beside both runs.
         inputs: what is simulated besides the scenario.
         out: folder for the files; by default one named after the scenario, here.
+        export: further files, for other programs: mcap, mat, parquet or cf; more than one may be given.
         check: run both once more with half the steps and half the segment length, and say what changes.
         strict: end with exit code 3 if a run ends with warnings.
     """
@@ -164,6 +170,7 @@ def compare(
 
     trial = inputs.read(scenario)
     record = read_record(measured) if measured is not None else None
+    _refuse_no_export(export)
     with staged(out or write_results.default_folder(trial)) as stage:
         trial, extended = inputs.checked(scenario)
         with _progress(trial) as progress:
@@ -171,7 +178,7 @@ def compare(
 
             result = run(trial, measured=record, **extended, progress=progress)
         runs = _refined(result.runs, trial, extended) if check else result.runs
-        summary = write_results.write_all(runs, result.measured, stage)
+        summary = write_results.write_all(runs, result.measured, stage, export)
     return FINE if write_results.tell(summary, stage, strict=strict) else STOPPED
 
 
@@ -231,6 +238,15 @@ def _in_words(error: cyclopts.CycloptsError) -> str:
     if isinstance(error, cyclopts.UnusedCliTokensError):
         return f"Unexpected argument: {' '.join(error.unused_tokens or [])}."
     return str(error)
+
+
+def _refuse_no_export(kinds: Sequence[str]) -> None:
+    """Refuse a kind of file that nothing here writes, before the run."""
+    if kinds:
+        from subzero.exports import writer_of
+
+        for kind in kinds:
+            writer_of(kind)
 
 
 def _refined(runs: Runs, trial: scenarios.Trial, extended: dict[str, Any]) -> Runs:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,8 +25,18 @@ def default_folder(trial: scenarios.Trial) -> Path:
     return Path(re.sub(r"[^\w.-]+", "_", trial.name).strip(".") or "run")
 
 
-def write_all(runs: dict[str, xr.Dataset], record: Record | None, stage: Stage) -> dict[str, Any]:
-    """Write everything that belongs to some runs of one trial, and return their summary."""
+def write_all(
+    runs: dict[str, xr.Dataset], record: Record | None, stage: Stage, exports: Sequence[str] = ()
+) -> dict[str, Any]:
+    """Write everything that belongs to some runs of one trial, and return their summary.
+
+    Args:
+        runs: by label.
+        record: what was measured, if anything was.
+        stage: where to.
+        exports: kinds of files for other programs (`subzero.exports`).
+    """
+    from subzero.exports import write_exports
     from subzero.figures import draw
     from subzero.page import page_of_runs
     from subzero.summary import summary_of
@@ -34,6 +45,7 @@ def write_all(runs: dict[str, xr.Dataset], record: Record | None, stage: Stage) 
     stage.failed = any(run.attrs["outcome"] != "completed" for run in runs.values())
     for label, run in runs.items():
         output.write_run(run, stage, label)
+        write_exports(run, label, exports, stage)
     output.write_summary(summary, stage)
     figures = draw(runs, record)
     output.write_figures(figures, stage)
