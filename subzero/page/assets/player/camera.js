@@ -2,7 +2,7 @@
 
 import { add, length, mixed, subtract } from "./vectors.js";
 
-const LOWEST = -1.45, HIGHEST = 1.45;         // of the angle above the horizontal [rad]
+const STEEPEST_DOWN = -1.45, STEEPEST_UP = 1.45;         // of the angle above the horizontal [rad]
 
 export class Camera {
   constructor(extent) {
@@ -22,9 +22,9 @@ export class Camera {
 
   /** Look from behind and beside a vehicle of this length and heading [degree]. */
   besideVehicle(hullLength, heading) {
-    this.azimuth = (heading * Math.PI) / 180 - 0.75;
-    this.elevation = 0.16;
-    this.distance = 3.6 * hullLength;
+    this.azimuth = (heading * Math.PI) / 180 - 0.7;
+    this.elevation = 0.14;
+    this.distance = 2.7 * hullLength;
   }
 
   /** See all of it, from above and beside. */
@@ -47,7 +47,7 @@ export class Camera {
 
   orbit(right, up) {
     this.azimuth -= right;
-    this.elevation = Math.min(Math.max(this.elevation + up, LOWEST), HIGHEST);
+    this.elevation = Math.min(Math.max(this.elevation + up, STEEPEST_DOWN), STEEPEST_UP);
   }
 
   zoom(factor) {

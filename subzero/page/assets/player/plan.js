@@ -2,7 +2,7 @@
 
 import { roundNumber } from "./data.js";
 
-const COLOURS = { solid: "#56b4e9", ghost: "#e69f00", ink: "#dfeef2", water: "#0d3b4f", cable: "#ffd166" };
+const PLAN_COLOURS = { solid: "#56b4e9", ghost: "#e69f00", ink: "#dfeef2", water: "#0d3b4f", cable: "#ffd166" };
 
 export class PlanView {
   constructor(canvas, replay) {
@@ -15,7 +15,7 @@ export class PlanView {
 
   draw(t) {
     const { canvas, paper } = this, { width, height } = canvas, half = width / 2;
-    paper.fillStyle = COLOURS.water;
+    paper.fillStyle = PLAN_COLOURS.water;
     paper.fillRect(0, 0, width, height);
     const [low, high] = this.replay.extent;
     const deep = Math.max(high[2] * 1.1, this.replay.sea_bed ?? 0, 1), [ahead, way] = alongCourse(low, high);
@@ -37,7 +37,7 @@ export class PlanView {
     for (const actor of this.replay.actors) if (!this.hidden.has(actor.name)) this.drawActor(actor, t, at);
     paper.restore();
     const metre = roundNumber((0.3 * width) / scale), size = Math.round(canvas.height / 30);
-    paper.fillStyle = paper.strokeStyle = COLOURS.ink;
+    paper.fillStyle = paper.strokeStyle = PLAN_COLOURS.ink;
     paper.font = `${size}px system-ui, sans-serif`;
     paper.fillText(words, left + edge / 2, canvas.height - edge / 2);
     paper.fillText(`${metre} m`, left + width - edge / 2 - metre * scale, canvas.height - 0.8 * edge);
@@ -46,14 +46,14 @@ export class PlanView {
   }
 
   drawActor(actor, t, at) {
-    const { paper } = this, colour = actor.isGhost ? COLOURS.ghost : COLOURS.solid;
+    const { paper } = this, colour = actor.isGhost ? PLAN_COLOURS.ghost : PLAN_COLOURS.solid;
     const [north, east, depth] = ["north", "east", "depth"].map((name) => actor.values(name));
     const track = [...actor.time].flatMap((time, i) => (time <= t ? [[north[i], east[i], depth[i]]] : []));
     this.polyline([...track, actor.place(t)].map(at), colour, actor.isGhost);
     const shape = new Float32Array(4 * (actor.cable?.points ?? 0));
     if (actor.cable?.fill(t, shape)) {
       const points = [...Array(actor.cable.points).keys()].map((i) => [...shape.subarray(4 * i, 4 * i + 3)]);
-      this.polyline(points.map(at), COLOURS.cable, false, 3);
+      this.polyline(points.map(at), PLAN_COLOURS.cable, false, 3);
     }
     const place = actor.place(t), [x, y] = at(place);
     this.shown[actor.name] = { position: place, middle: place };

@@ -81,8 +81,9 @@ class Player {
     }
     const head = element("values").createTHead().insertRow();
     head.append(document.createElement("td"), ...this.replay.actors.map((actor) => cell("th", actor.name)));
+    const body = element("values").createTBody();
     this.rows = SHOWN.filter((name) => this.lead.has(name)).map((name) => {
-      const row = element("values").insertRow();
+      const row = body.insertRow();
       row.append(cell("th", `${spaced(name)} [${this.replay.channels[name].unit}]`));
       return { name, cells: this.replay.actors.map(() => row.insertCell()) };
     });
@@ -92,7 +93,7 @@ class Player {
   prepareBar() {
     const { highestTension } = this.replay;
     element("bar").hidden = !(highestTension > 0) || this.view instanceof PlanView;
-    ["bar-low", "bar-middle", "bar-high"].forEach((id, i) => (element(id).textContent = inShort((highestTension * i) / 2)));
+    ["bar-low", "bar-middle", "bar-high"].forEach((id, i) => (element(id).textContent = plain((highestTension * i) / 2, 2)));
   }
 
   look(mode) {
@@ -195,7 +196,7 @@ class Player {
     const t = this.time, slider = element("time");
     slider.value = t;
     slider.setAttribute("aria-valuetext", `${t.toFixed(1)} seconds`);
-    element("clock").textContent = `${t.toFixed(1)} s of ${inShort(this.replay.end)} s`;
+    element("clock").textContent = `${t.toFixed(1)} s of ${plain(this.replay.end, 6)} s`;
     this.plots.showTime(t);
     for (const { name, cells } of this.rows)
       cells.forEach((one, i) => {
@@ -214,8 +215,8 @@ class Player {
     this.labels ??= new Map();
     for (const [name, place] of wanted) this.putLabel(name, this.view.onScreen(place));
     for (const [name, label] of this.labels) if (!wanted.has(name)) label.hidden = true;
-    const bed = this.replay.sea_bed ? `sea bed at ${inShort(this.replay.sea_bed)} m` : `grid at ${inShort(this.view.groundDepth)} m depth`;
-    const large = this.view.scale > 1.05 ? `, vehicle drawn ${inShort(this.view.scale)} times its size` : "";
+    const bed = this.replay.sea_bed ? `sea bed at ${plain(this.replay.sea_bed)} m` : `grid at ${plain(this.view.groundDepth)} m depth`;
+    const large = this.view.scale > 1.05 ? `, vehicle drawn ${plain(this.view.scale, 2)} times its size` : "";
     element("scale").textContent = `${bed}, squares of ${this.view.spacing} m${large}`;
   }
 
@@ -255,6 +256,9 @@ class Player {
     return (1000 * frames) / (performance.now() - began);
   }
 }
+
+/** A number as one says it. */
+const plain = (value, digits = 3) => String(Number(value.toPrecision(digits)));
 
 function cell(kind, text) {
   const made = document.createElement(kind);

@@ -8,7 +8,7 @@ import { add, length, poseMatrix, product, projectionMatrix, subtract, transform
 const FIELD_OF_VIEW = 0.75;                   // vertical [rad]
 const SMALLEST_VEHICLE = 0.055;               // a vehicle is never drawn shorter than this share of the distance to the target
 const PROPELLER_SLOWED = 12;                  // a screen shows 25 turns a second as anything but that
-const GHOST = [1.0, 0.62, 0.32, 0.30], GHOST_TRACK = [1.0, 0.66, 0.36, 0.95], TRACK = [0.75, 0.93, 1.0, 0.85], DOTS = [1, 1, 1, 0.9];
+const GHOST = [1.0, 0.76, 0.50, 0.36], GHOST_TRACK = [1.0, 0.66, 0.36, 0.95], TRACK = [0.75, 0.93, 1.0, 0.85], DOTS = [1, 1, 1, 0.9];
 const SPECKS = 500;
 
 /** WebGL2 on a canvas, or null where there is none. */
@@ -151,11 +151,11 @@ export class Scene {
 
   drawBackground() {
     const gl = this.gl;
-    gl.depthMask(false);
+    gl.disable(gl.DEPTH_TEST);
     this.use("background", { toWorld: inverse(this.toClip) });
     gl.bindVertexArray(this.nothing);
     gl.drawArrays(gl.TRIANGLES, 0, 3);
-    gl.depthMask(true);
+    gl.enable(gl.DEPTH_TEST);
   }
 
   drawGround(isBed) {
@@ -196,8 +196,17 @@ export class Scene {
     }
   }
 
+  /** First how near a ghost is, then its nearest side only: otherwise one would see its insides through its skin. */
   drawGhosts(t) {
-    for (const actor of this.visible(true)) this.drawVehicle(actor, t, GHOST);
+    const gl = this.gl;
+    for (const actor of this.visible(true)) {
+      gl.colorMask(false, false, false, false);
+      this.drawVehicle(actor, t, GHOST);
+      gl.colorMask(true, true, true, true);
+      gl.depthFunc(gl.LEQUAL);
+      this.drawVehicle(actor, t, GHOST);
+      gl.depthFunc(gl.LESS);
+    }
   }
 
   /** A vehicle is enlarged about its tow point, so that the cable still ends where it is fixed. */

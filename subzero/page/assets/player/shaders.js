@@ -214,15 +214,17 @@ void main() {
     float glitter = pow(max(dot(reflect(look, n), SUN), 0.0), 90.0);
     float haze = 1.0 - exp(-far / (14.0 * clearness));
     vec3 colour = mix(mix(body, sky, mirror) + glitter * 0.9, HORIZON * 0.93, haze * 0.8);
-    pixel = vec4(colour, clamp(0.34 + 0.7 * mirror + glitter + haze, 0.0, 1.0));
+    pixel = vec4(colour, clamp(0.24 + 0.75 * mirror + glitter + haze, 0.0, 1.0));
     return;
   }
-  float through = max(-look.z, 0.0), window = smoothstep(0.52, 0.78, dot(look, n));
-  vec3 light = mix(waterAlong(vec3(look.xy, abs(look.z) * 0.2)), vec3(0.80, 0.95, 0.95), 0.25 + 0.55 * window);
-  float bright = caustics(place.xy * (1.3 / waveLength));
-  light += vec3(0.30, 0.35, 0.32) * bright;
-  float fade = exp(-far / (1.1 * clearness));
-  pixel = vec4(light, fade * (0.35 + 0.3 * bright + 0.25 * window) * smoothstep(0.0, 0.05, through));
+  // From below: bright straight above, where the sky shows (Snell's window, 49 degrees wide), a mirror of the deep beyond.
+  vec2 tilt = 9.0 * n.xy * calm;
+  float window = smoothstep(0.45, 0.95, -look.z + 0.8 * dot(tilt, look.xy) + 0.25 * tilt.x);
+  float crest = pow(0.5 + 0.5 * sin(5.0 * (tilt.x - 0.7 * tilt.y)), 3.0);
+  vec3 mirrored = mix(MIDDLE * 1.15, GLOW * 0.72, 0.35 + 0.4 * crest);
+  vec3 light = mix(mirrored, vec3(0.84, 0.97, 0.97), window) + vec3(0.16) * crest * window;
+  float fade = exp(-far / (1.2 * clearness));
+  pixel = vec4(light, fade * (0.55 + 0.3 * crest + 0.15 * window));
 }`,
 };
 
