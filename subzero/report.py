@@ -125,9 +125,7 @@ def _plain(value: float | None, digits: int) -> str:
 
 def _energy_rows(balances: list[Summary]) -> list[Row]:
     """Return the energy balance at the end, and which share of the work it leaves unexplained."""
-    rows = [
-        (words, *(_plain(balance[key], 3) for balance in balances)) for key, words in ENERGY_ROWS.items()
-    ]
+    rows = [(words, *(_plain(balance[key], 3) for balance in balances)) for key, words in ENERGY_ROWS.items()]
     shares = [balance["unexplained_share"] for balance in balances]
     return [
         *rows,

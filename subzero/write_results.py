@@ -37,7 +37,9 @@ def write_all(runs: dict[str, xr.Dataset], record: Record | None, stage: Stage) 
     output.write_summary(summary, stage)
     figures = draw(runs, record)
     output.write_figures(figures, stage)
-    output.write_page(page_of_runs(runs, summary, figures, command=output.COMMAND.get(), record=record), stage)
+    output.write_page(
+        page_of_runs(runs, summary, figures, command=output.COMMAND.get(), record=record), stage
+    )
     return summary
 
 

@@ -62,7 +62,7 @@ def _moves(runs: dict[str, xr.Dataset]) -> bool:
 
 
 def _second_word(command: str) -> str:
-    return (command.split() + ["", ""])[1]
+    return [*command.split(), "", ""][1]
 
 
 def _outcome(label: str, run: dict[str, Any]) -> list[Line]:
@@ -104,9 +104,7 @@ def _indices(summary: dict[str, Any], labels: list[str]) -> list[tuple[str, ...]
         return NOTHING if value is None else f"{value:.4g}"
 
     names = summary[labels[0]]["indices"]
-    return [
-        (name, *(cell(summary[label]["indices"].get(name)) for label in labels)) for name in names
-    ]
+    return [(name, *(cell(summary[label]["indices"].get(name)) for label in labels)) for name in names]
 
 
 def _sources(run: xr.Dataset) -> dict[str, str]:

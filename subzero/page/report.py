@@ -11,6 +11,7 @@ import base64
 import io
 import json
 import re
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
@@ -35,9 +36,6 @@ FIGURES = {
     "manoeuvre": "The manoeuvre",
 }
 """What a figure shows, by its name."""
-
-SVG_STYLE = {"svg.hashsalt": "subzero", "svg.fonttype": "path", "path.simplify_threshold": 0.3}
-"""Two pages of one run are alike to the last letter."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -145,6 +143,11 @@ def _image(figure: Figure) -> str:
     import matplotlib as mpl
 
     held = io.BytesIO()
-    with mpl.rc_context(SVG_STYLE):
+    alike = mpl.rc_context(
+        {"svg.hashsalt": "subzero", "svg.fonttype": "path"}
+    )  # to the last letter, in two pages
+    with alike, warnings.catch_warnings():
+        # A letter that the font of figures lacks is a box there; the page itself says the same words above them.
+        warnings.filterwarnings("ignore", "Glyph .* missing from font", UserWarning)
         figure.savefig(held, format="svg", metadata={"Date": None})
     return f"data:image/svg+xml;base64,{base64.b64encode(held.getvalue()).decode('ascii')}"

@@ -10,6 +10,7 @@ const SMALLEST_VEHICLE = 0.055;               // a vehicle is never drawn shorte
 const PROPELLER_SLOWED = 12;                  // a screen shows 25 turns a second as anything but that
 const GHOST = [1.0, 0.76, 0.50, 0.36], GHOST_TRACK = [1.0, 0.66, 0.36, 0.95], TRACK = [0.75, 0.93, 1.0, 0.85], DOTS = [1, 1, 1, 0.9];
 const SPECKS = 500;
+const BACKGROUND_TILES = [48, 40];
 
 /** WebGL2 on a canvas, or null where there is none. */
 export function webglOn(canvas) {
@@ -63,6 +64,7 @@ export class Scene {
     this.tracks = new Map(replay.actors.map((actor) => [actor, trackOf(actor)]));
     this.measured = measuredTrack(replay.measured);
     this.groundDepth = replay.sea_bed ?? depthOfGrid(replay.extent);
+    this.pixelsPerPoint = 1;
     this.shown = {};
     this.hidden = new Set();
   }
@@ -152,9 +154,9 @@ export class Scene {
   drawBackground() {
     const gl = this.gl;
     gl.disable(gl.DEPTH_TEST);
-    this.use("background", { toWorld: inverse(this.toClip) });
+    this.use("background", { toWorld: inverse(this.toClip), tiles: BACKGROUND_TILES });
     gl.bindVertexArray(this.nothing);
-    gl.drawArrays(gl.TRIANGLES, 0, 3);
+    gl.drawArrays(gl.TRIANGLES, 0, 6 * BACKGROUND_TILES[0] * BACKGROUND_TILES[1]);
     gl.enable(gl.DEPTH_TEST);
   }
 
@@ -251,7 +253,7 @@ export class Scene {
   }
 
   drawLines(t, width, height) {
-    const pixels = this.gl.canvas.width / (this.gl.canvas.clientWidth || this.gl.canvas.width);
+    const pixels = this.pixelsPerPoint;
     const common = { screen: [width, height], nearest: this.near * 1.05, highest: this.replay.highestTension || 1 };
     if (this.measured && !this.hidden.has("measured")) this.drawLine(this.measured, { ...common, colour: DOTS, width: 1.2 * pixels, dash: 0.002 * this.distance + 0.01, opacity: 0.9 });
     for (const actor of this.visible(true)) {
