@@ -2,6 +2,7 @@
 
     python -m benchmarks.sweep                      # speed: ratios in one run, medians of --repeats
     python -m benchmarks.sweep --dask               # … and on a Dask cluster of two workers on this machine
+    python -m benchmarks.sweep --idle               # which share of their time workers are at members (any machine)
     python -m benchmarks.sweep --memory             # peak memory at 1 000 and 20 000 short members
     python -m benchmarks.sweep --kills 50           # a sweep of 5 000 that is killed at random places, and goes on
     python -m benchmarks.sweep --stores             # what a store costs: SQLite, npz, netCDF, Parquet, zarr
@@ -22,7 +23,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, closing, contextmanager, suppress
 from pathlib import Path
 
 import numpy as np
@@ -105,6 +106,46 @@ def cluster():
         Client(local) as client,
     ):
         yield client
+
+
+def idle(members, repeats, dask):
+    """Print the share of the workers' time that members do not take: what handing out, keeping and waiting cost.
+
+    From the first batch of each worker to the last, so without their start. Both parts are of the same seconds, so it
+    can be measured on a machine that others use. Two workers do not begin together: a member more or less is counted on
+    the way, which can make their share a few per cent too small, and even negative.
+    """
+    one = plan(members)
+    with ExitStack() as held:
+        client = held.enter_context(cluster()) if dask else None
+        asked = {"1 worker": {"workers": 1}, "2 workers": {"workers": 2}}
+        asked |= {"Dask, 2 workers": {"client": client}} if dask else {}
+        for name, how in asked.items():
+            shares = [_idle_share(one, how.get("workers", 2), how) for _ in range(repeats)]
+            print(
+                f"{name:<18}{100 * statistics.median(shares):6.1f} %   ({', '.join(f'{100 * x:.1f}' for x in shares)})"
+            )
+
+
+def _idle_share(one, workers, how):
+    from subzero.sweeps import api
+
+    stamps, kept = [], []
+
+    class Tally(api._Tally):
+        def keep(self, members):
+            stamps.append(time.perf_counter())
+            kept.append(sum(member.seconds for member in members))
+            super().keep(members)
+
+    before, api._Tally = api._Tally, Tally
+    try:
+        with tempfile.TemporaryDirectory() as folder, api.finished(one, Path(folder), **how):
+            pass
+    finally:
+        api._Tally = before
+    first = workers  # the first batch of each worker is in before the clock starts
+    return 1.0 - sum(kept[first:]) / (workers * (stamps[-1] - stamps[first - 1]))
 
 
 def speed(members, repeats, dask):
@@ -205,34 +246,38 @@ def kills(count, members, seed=0):
     spec.write_text(SHORT_SPEC.format(members=members))
     whole = _sweep_command(spec, home / "whole").wait()
     assert whole == 0
-    done = {"parent": 0, "worker": 0}
-    before = 0
-    while sum(done.values()) < count:
+    done, before = {"parent": 0, "worker": 0}, 0
+    while True:
         run = _sweep_command(spec, home / "killed")
-        while sum(done.values()) < count:
-            time.sleep(rng.uniform(0.1, 2.5))
-            if run.poll() is not None:
+        _strike(run, rng, count, done)
+        if run.wait() == 0:
+            if sum(done.values()) >= count:
                 break
-            workers = _children(run.pid)
-            if rng.random() < 0.5 and workers:
-                _kill(rng.choice(workers))
-                done["worker"] += 1
-            else:
-                _kill(run.pid)
-                run.wait()
-                done["parent"] += 1
-        if run.poll() == 0:
             shutil.rmtree(home / "killed")  # it got through: begin anew, for the kills that are left
+            before = 0
             continue
         now = _kept(home / "killed") if (home / "killed/members.sqlite").exists() else 0
-        assert now >= before or now == 0, (before, now)
+        assert now >= before, (before, now)
         before = now
-    assert run.wait() == 0 or _sweep_command(spec, home / "killed").wait() == 0
     same = (home / "whole/sweep.nc").read_bytes() == (home / "killed/sweep.nc").read_bytes()
     print(f"{done['parent']} kills of the parent, {done['worker']} of a worker, {members} members:")
     print(f"kept {_kept(home / 'killed')}, the same result to the last byte: {same}")
     shutil.rmtree(home)
     return same
+
+
+def _strike(run, rng, count, done):
+    """Kill workers of a command, or it, at random moments, until it has ended or there were kills enough."""
+    while sum(done.values()) < count:
+        time.sleep(rng.uniform(0.1, 2.5))
+        if run.poll() is not None:
+            return
+        workers = _children(run.pid)
+        victim = "worker" if rng.random() < 0.5 and workers else "parent"
+        _kill(rng.choice(workers) if victim == "worker" else run.pid)
+        done[victim] += 1
+        if victim == "parent":
+            return
 
 
 def _sweep_command(spec, out):
@@ -259,8 +304,11 @@ def _kill(pid):
 def _kept(folder):
     import sqlite3
 
-    with sqlite3.connect(folder / "members.sqlite") as file:
-        return file.execute("SELECT count(*) FROM members").fetchone()[0]
+    with closing(sqlite3.connect(folder / "members.sqlite")) as file:
+        try:
+            return file.execute("SELECT count(*) FROM members").fetchone()[0]
+        except sqlite3.OperationalError:  # killed before there was a table
+            return 0
 
 
 def stores(members=20000, batch=20):
@@ -413,12 +461,15 @@ def main():
     parser.add_argument("--members", type=int, default=200)
     parser.add_argument("--repeats", type=int, default=5)
     parser.add_argument("--dask", action="store_true")
+    parser.add_argument("--idle", action="store_true")
     parser.add_argument("--memory", action="store_true")
     parser.add_argument("--stores", action="store_true")
     parser.add_argument("--kills", type=int, default=0)
     asked = parser.parse_args()
     if asked.memory:
         memory()
+    elif asked.idle:
+        idle(asked.members, asked.repeats, asked.dask)
     elif asked.stores:
         stores()
     elif asked.kills:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING, Any
 
-from subzero.page.replay import actors_of, encode
+from subzero.page.replay import HULL, actors_of, encode
 from subzero.page.report import Line, Report, Table, render
 from subzero.report import NOTHING, RUNS, fit_rows, number_groups
 
@@ -50,15 +50,16 @@ def page_of_runs(
             warnings=_warnings(summary, labels),
             tables=_tables(summary, labels),
             figures=figures,
-            replay=encode(actors_of(runs), record) if _moves(runs) else None,
+            replay=encode(actors_of(runs), record) if _can_be_replayed(first) else None,
             sources=_sources(first),
         )
     )
 
 
-def _moves(runs: dict[str, xr.Dataset]) -> bool:
-    """Say whether there is anything to replay: at least two samples of the first run."""
-    return next(iter(runs.values())).sizes["time"] > 1
+def _can_be_replayed(run: xr.Dataset) -> bool:
+    """Say whether there is anything to replay: at least two samples, of a vehicle whose shape is known."""
+    shape = json.loads(run.attrs["parameters"]).get("vehicle", {})
+    return run.sizes["time"] > 1 and all(name in shape for name in HULL)
 
 
 def _second_word(command: str) -> str:

@@ -35,6 +35,7 @@ from subzero.diagnosis.inference.latent_force import (
 )
 from subzero.diagnosis.inference.linear_gaussian import KAPPAS, Terms, log_sum
 from subzero.diagnosis.inference.map_fit import is_poor_fit
+from subzero.diagnosis.inference.model_average import FURTHER_CAUSE_ODDS
 from subzero.diagnosis.inference.model_search import Search
 from subzero.diagnosis.inference.problem import Problem
 from subzero.diagnosis.results import Detectability, Misfit
@@ -239,8 +240,28 @@ def _sudden(search: Search, close: Sequence[RelinearisedForce], known: float) ->
     made = [one for record in range(len(problem.records))
             for one in fit_change_points(problem, places, effects, record, known - prior, search.side,
                                          large)]  # fmt: skip
-    return [OutOfCatalogue(beside=(), what=one, log_posterior=one.log_posterior + prior,
-                    place=None if is_poor_fit(one.fit) else linearised_at(problem, one)) for one in made]  # fmt: skip
+    return [OutOfCatalogue(beside=(), what=one, log_posterior=log + prior,
+                    place=None if is_poor_fit(one.fit) else linearised_at(problem, one))
+            for one, log in special_cases_folded(made)]  # fmt: skip
+
+
+def special_cases_folded(made: Sequence[FittedChangePoint]) -> list[tuple[FittedChangePoint, float]]:
+    """Return sudden causes with their log posteriors, where one that is not needed is its special case: a fin that
+    stands off after its last command may be jammed, too, and the record cannot say.
+
+    As with a further cause (`occam_folded`): what is not FURTHER_CAUSE_ODDS times as probable as its special case is
+    told as that, which has the probability of both.
+    """
+    log = {(one.begun.effect.id, one.begun.record): one.log_posterior for one in made}
+    for one in made:
+        own = one.begun.effect.id, one.begun.record
+        for special in {
+            (parameter.also_of, own[1]) for parameter in one.begun.effect.parameters
+        } & log.keys():
+            if log[own] < log[special] + np.log(FURTHER_CAUSE_ODDS):
+                log[special] = log_sum([log[special], log.pop(own)])
+                break
+    return [(one, log[key]) for one in made if (key := (one.begun.effect.id, one.begun.record)) in log]
 
 
 def shares(search: Search, foreign: list[OutOfCatalogue]) -> tuple[dict[Ids, float], dict[str, float]]:

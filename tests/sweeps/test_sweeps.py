@@ -1,0 +1,420 @@
+"""A sweep gives each member what a run of its own would give, loses none, counts none twice, whoever runs it.
+
+Verifies: `subzero.sweep` and its store against single runs, against itself in another order, and after accidents.
+Configuration: two seconds of fig6 without refinement, executors that run in this process unless a process is what is
+looked at. Tolerance: none; channels are float32.
+"""
+
+import json
+import os
+import random
+import signal
+import sqlite3
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import subzero
+from scenarios.parameters import with_parameters
+from subzero.cli import main
+from subzero.summary import summarise
+from subzero.sweeps.api import finished
+from subzero.sweeps.design import points_of
+from subzero.sweeps.member import OtherVersionError, run_members
+from subzero.sweeps.plan import plan_of
+from subzero.sweeps.result import Gathered, write_result
+from subzero.sweeps.schedule import MOST_DEATHS, Schedule
+from subzero.sweeps.sensitivity import effects_of
+from subzero.sweeps.workers import WorkerDiedError, WorkerPool
+
+SHORT = {"run.duration_s": 2.0, "run.rtol": 0.0}
+LENGTHS = [0.0, 5.0, 10.0]
+
+
+class Here(Executor):
+    """Runs everything in this process, at once."""
+
+    def submit(self, fn, /, *args, **kwargs):
+        future = Future()
+        try:
+            future.set_result(fn(*args, **kwargs))
+        except Exception as error:
+            future.set_exception(error)
+        return future
+
+
+class Dying(Here):
+    """Its workers die of some members every time, and of others once."""
+
+    def __init__(self, always=(), once=()):
+        self.always, self.once, self.ran = set(always), set(once), []
+
+    def submit(self, fn, job, indices, rows):
+        self.ran.append(list(indices))
+        if struck := self.once & set(indices):
+            self.once -= struck
+        elif not self.always & set(indices):
+            return super().submit(fn, job, indices, rows)
+        future = Future()
+        future.set_exception(WorkerDiedError("its process died of signal 9"))
+        return future
+
+
+def fast(members, function=None):
+    """Return a plan whose members cost little."""
+    return plan_of(
+        "fig6", {"start.wet_length_m": np.linspace(0.0, 20.0, members).tolist()}, function=function,
+        changes={"run.duration_s": 0.2, "run.rtol": 0.0}, scalars=["speed_at_end_m_s"], channels=["heading"], every=0.1,
+    )  # fmt: skip
+
+
+def test_a_member_is_a_run_of_its_own():
+    runs = subzero.sweep(
+        "fig6", {"start.wet_length_m": LENGTHS}, changes=SHORT, client=Here(),
+        scalars=["peak_speed_m_s", "cable_tension.max"], channels=["surge_speed", "heading"], every=0.1,
+        function=lambda run: {"early": run["surge_speed"].values[3]},
+    )  # fmt: skip
+    assert runs["failed"].values.tolist() == [0, 0, 0]
+    assert runs["start.wet_length_m"].attrs["units"] == "m"
+    assert runs["heading"].attrs["units"] == "degree"
+    trial = with_parameters(subzero.load_scenario("fig6"), SHORT)
+    for member, length in enumerate(LENGTHS):
+        alone = subzero.simulate(with_parameters(trial, {"start.wet_length_m": length}))
+        mine = runs.isel(member=member)
+        assert float(mine["start.wet_length_m"]) == length
+        assert float(mine["peak_speed_m_s"]) == summarise(alone)["peak_speed_m_s"]
+        assert float(mine["cable_tension.max"]) == alone["cable_tension"].values.max()
+        assert float(mine["early"]) == alone["surge_speed"].values[3]
+        for channel in ("surge_speed", "heading"):
+            np.testing.assert_allclose(mine[channel], alone[channel], rtol=1e-6, atol=1e-7)
+
+
+def test_longer_cable_is_slower_and_pulls_more():
+    runs = subzero.sweep("fig6", {"start.wet_length_m": LENGTHS}, changes=SHORT, client=Here(), channels=[])
+    assert np.all(np.diff(runs["peak_speed_m_s"]) < 0.0)
+    assert np.all(np.diff(runs["largest_cable_force_N"]) > 0.0)
+
+
+def test_a_cable_as_stiff_as_a_rod_cannot_be_bent_by_what_pulls_it_and_the_other_member_can():
+    spread = {"cable.bending_stiffness": [0.0, 10.0]}
+    changes = SHORT | {"run.duration_s": 3.0}
+    runs = subzero.sweep("fig6", spread, changes=changes, channels=[], client=Here())
+    assert runs["failed"].values.tolist() == [0, 1]
+    assert np.isfinite(runs["peak_speed_m_s"].values).tolist() == [True, False]
+    assert "could not be solved" in runs["reason"].values[1]
+
+
+def test_a_grid_gets_a_dimension_for_each_parameter():
+    spreads = {"start.wet_length_m": [0.0, 5.0], "water.current_east_m_s": [0.0, 0.02, 0.04]}
+    runs = subzero.sweep("fig6", spreads, changes={"run.duration_s": 0.2, "run.rtol": 0.0}, client=Here())
+    table = runs[["path_length_m"]].set_index(member=list(spreads)).unstack()
+    assert table["path_length_m"].sizes == {"start.wet_length_m": 2, "water.current_east_m_s": 3}
+    assert float(table["path_length_m"][1, 2]) == float(runs["path_length_m"][5])
+
+
+def test_order_batches_and_accidents_do_not_change_a_byte_of_the_result(tmp_path):
+    plan = fast(12)
+    for name, executor in (("calm", Here()), ("struck", Dying(once={0, 3, 7}))):
+        with finished(plan, tmp_path / name, client=executor) as store:
+            write_result(store, plan.job, plan.points, plan.attributes, tmp_path / name)
+    order = list(range(12))
+    random.Random(1).shuffle(order)
+    with subzero_store(plan, tmp_path / "by hand") as store:
+        for member in order:
+            store.add(run_members(plan.job, [member], plan.points.values[[member]]))
+        write_result(store, plan.job, plan.points, plan.attributes, tmp_path / "by hand")
+    written = {name: (tmp_path / name / "sweep.nc").read_bytes() for name in ("calm", "struck", "by hand")}
+    assert written["calm"] == written["struck"] == written["by hand"]
+
+
+def subzero_store(plan, folder):
+    from subzero.sweeps.store import opened
+
+    return opened(folder, plan.manifest(), (len(plan.job.outcomes.channels), plan.job.outcomes.times.size))
+
+
+def test_a_member_that_kills_its_worker_each_time_is_given_up_and_the_others_are_not(tmp_path):
+    executor = Dying(always={4})
+    with finished(fast(9), tmp_path, client=executor, workers=1) as store:
+        assert store.finished(9).all()
+        ((member, reason),) = store.reasons(10)
+    assert member == 4
+    assert reason.startswith(f"{MOST_DEATHS} workers died of it")
+    assert [4] in executor.ran  # it was looked at alone, before it was given up
+
+
+def test_a_member_that_fails_is_recorded_with_its_reason_and_the_sweep_goes_on():
+    def function(run):
+        if run["cable_length"].values[0] > 4.0:
+            raise ValueError("too long for me")
+        return 1.0
+
+    runs = subzero.sweep(
+        "fig6", {"start.wet_length_m": LENGTHS}, changes=SHORT, client=Here(), function=function
+    )
+    assert runs["failed"].values.tolist() == [0, 1, 1]
+    assert runs["reason"].values.tolist() == ["", *["ValueError: too long for me"] * 2]
+    assert np.isnan(runs["peak_speed_m_s"].values).tolist() == [False, True, True]
+    assert np.isnan(runs["heading"].values).all(axis=1).tolist() == [False, True, True]
+
+
+def test_a_value_that_only_the_tail_of_a_distribution_has_fails_alone():
+    plan = plan_of(
+        "fig6", {"start.depth_m": {"normal": [0.31, 0.1]}}, design="monte_carlo", samples=5000, tethered=False,
+        changes={"run.duration_s": 0.1, "run.rtol": 0.0},
+    )  # fmt: skip
+    depth = plan.points.values[
+        :, 0
+    ]  # the plan is allowed: three deviations from the mean are below the surface
+    above = int(np.argmin(depth))
+    assert depth[above] < 0.0
+    failed, fine = run_members(
+        plan.job, [above, int(np.argmax(depth))], np.array([[depth.min()], [depth.max()]])
+    )
+    assert "outside its limits" in failed.reason
+    assert fine.reason == ""
+
+
+def test_threads_that_run_at_a_time_give_the_same_members(tmp_path):
+    plan = fast(6)
+    with ThreadPoolExecutor(2) as threads, finished(plan, tmp_path, client=threads) as store:
+        mine = [one for block in store.blocks() for one in block]
+    for one in mine:
+        (alone,) = run_members(plan.job, [one.index], plan.points.values[[one.index]])
+        assert one.scalars.tobytes() == alone.scalars.tobytes()
+        assert one.channels.tobytes() == alone.channels.tobytes()
+
+
+def test_what_is_finished_is_not_run_again(tmp_path):
+    plan = fast(6)
+    with subzero_store(plan, tmp_path) as store:
+        store.add(run_members(plan.job, [1, 4], plan.points.values[[1, 4]]))
+    executor = Dying()
+    with finished(plan, tmp_path, client=executor) as store:
+        assert store.finished(6).all()
+    assert sorted(member for ran in executor.ran for member in ran) == [0, 2, 3, 5]
+
+
+def test_a_member_that_comes_twice_is_counted_once(tmp_path):
+    plan = fast(3)
+    with subzero_store(plan, tmp_path) as store:
+        for _ in range(2):
+            store.add(run_members(plan.job, [0, 1], plan.points.values[:2]))
+        assert [one.index for block in store.blocks() for one in block] == [0, 1]
+
+
+OTHER = {
+    "trial": {"changes": {"run.duration_s": 0.3, "run.rtol": 0.0}},
+    "points": {"parameters": {"start.wet_length_m": [0.0, 1.0, 3.0]}},
+    "parameters": {"parameters": {"start.depth_m": [0.0, 1.0, 2.0]}},
+    "outcomes": {"function": lambda run: 2.0},
+    "tethered": {"tethered": False},
+}
+
+
+@pytest.mark.parametrize("what", OTHER)
+def test_another_sweep_does_not_mix_with_what_is_there(what, tmp_path):
+    asked = {
+        "parameters": {"start.wet_length_m": [0.0, 1.0, 2.0]},
+        "changes": {"run.duration_s": 0.2, "run.rtol": 0.0},
+        "function": lambda run: 1.0,
+    }
+    with subzero_store(plan_of("fig6", **asked), tmp_path):
+        pass
+    with subzero_store(plan_of("fig6", **asked), tmp_path):
+        pass  # the same goes on
+    with (
+        pytest.raises(subzero.UserError, match=rf"another sweep: its .*{what}"),
+        subzero_store(plan_of("fig6", **(asked | OTHER[what])), tmp_path),
+    ):
+        pass
+
+
+def test_another_version_of_the_code_is_refused_by_the_store_and_by_workers(tmp_path, monkeypatch):
+    plan = fast(2)
+    with subzero_store(plan, tmp_path):
+        pass
+    monkeypatch.setattr("subzero.sweeps.plan.code_digest", lambda: "another")
+    other = fast(2)
+    with pytest.raises(subzero.UserError, match="version of subzero"), subzero_store(other, tmp_path):
+        pass
+    with pytest.raises(OtherVersionError):
+        run_members(other.job, [0], other.points.values[:1])
+
+
+def test_two_commands_do_not_run_the_same_sweep_at_a_time(tmp_path):
+    plan = fast(2)
+    with (
+        subzero_store(plan, tmp_path),
+        pytest.raises(subzero.UserError, match="another command is running"),
+        subzero_store(plan, tmp_path),
+    ):
+        pass
+
+
+def test_a_full_disk_is_told_and_what_was_kept_before_is_still_there(tmp_path):
+    plan = fast(4)
+    members = run_members(plan.job, range(4), plan.points.values)
+    with subzero_store(plan, tmp_path) as store:
+        store.add(members[:1])
+        pages = store._file.execute("PRAGMA page_count").fetchone()[0]
+        store._file.execute(f"PRAGMA max_page_count = {pages}")
+        with pytest.raises(subzero.UserError, match=r"full\. What it has is kept: make room"):
+            store.add([_longer(one) for one in members[1:]])
+        assert store.finished(4)[0]
+    with finished(plan, tmp_path, client=Here()) as store:
+        assert store.finished(4).all()
+        assert store.failures() == 0
+
+
+def _longer(member):
+    import dataclasses
+
+    return dataclasses.replace(member, reason="x" * 100_000)
+
+
+def test_effects_of_a_linear_outcome_are_those_of_algebra():
+    """An outcome 3 x1 + x2 on x in [0, 2] x [0, 4]: elementary effects 6 and 4, no deviation; variances 36 to 16."""
+    trial = subzero.load_scenario("fig6")
+    spreads = {"start.wet_length_m": {"from": 0.0, "to": 2.0}, "start.depth_m": {"from": 0.0, "to": 4.0}}
+    sizes = {}
+    for design, samples in (("morris", 8), ("saltelli", 1024), ("sobol", 1024)):
+        points = points_of(trial, spreads, design=design, samples=samples, seed=2)
+        y = points.values @ np.array([3.0, 1.0])
+        found = Gathered(
+            names=("y",),
+            scalars=y[:, None],
+            channels=np.zeros((1, 0, 0)),
+            failed=np.zeros(y.size, dtype=bool),
+        )
+        effects = effects_of(points, found)
+        assert [one.parameter for one in effects] == list(spreads)  # the greatest first
+        sizes[design] = [one.size for one in effects]
+        others = [one.other for one in effects]
+        if design == "morris":
+            assert others == pytest.approx([0.0, 0.0], abs=1e-9)
+        elif design == "saltelli":
+            assert others == pytest.approx([36.0 / 52.0, 16.0 / 52.0], abs=0.02)
+    assert sizes["morris"] == pytest.approx([6.0, 4.0], rel=1e-9)
+    assert sizes["saltelli"] == pytest.approx([36.0 / 52.0, 16.0 / 52.0], abs=0.02)
+    assert sizes["sobol"][0] > sizes["sobol"][1] > 0.0
+
+
+def test_a_process_that_is_killed_costs_its_own_task_only():
+    pool = WorkerPool(2)
+    try:
+        pids = {future.result() for future in [pool.submit(os.getpid) for _ in range(20)]}
+        assert os.getpid() not in pids
+        struck = pool.submit(_end_yourself)
+        others = [pool.submit(abs, -k) for k in range(10)]
+        with pytest.raises(WorkerDiedError, match="signal 9"):
+            struck.result()
+        assert [future.result() for future in others] == list(range(10))
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+def _end_yourself():
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+SPEC = """
+trial = "fig6"
+design = "latin_hypercube"
+samples = 6
+[parameters]
+"start.wet_length_m" = { from = 0.0, to = 20.0 }
+cable.diameter = "declared"
+[changes]
+run.duration_s = 1.0
+run.rtol = 0.0
+[outcomes]
+scalars = ["peak_speed_m_s"]
+channels = ["heading"]
+"""
+
+
+def test_the_command_writes_everything_and_goes_on_where_it_was(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "mine.toml").write_text(SPEC, encoding="utf-8")
+    assert main(["sweep", "mine.toml", "--workers", "1"]) == 0
+    here = tmp_path / "mine"
+    made = {
+        "sweep.nc",
+        "members.csv",
+        "members.sqlite",
+        "summary.json",
+        "bands.png",
+        "histograms.png",
+        "against.png",
+    }
+    assert made <= {path.name for path in here.iterdir()}
+    summary = json.loads((here / "summary.json").read_text(encoding="utf-8"))
+    assert (summary["members"], summary["failed"]) == (6, 0)
+    with xr.open_dataset(here / "sweep.nc") as runs:
+        assert summary["scalars"]["peak_speed_m_s"]["max"] == float(runs["peak_speed_m_s"].max())
+    before = (here / "sweep.nc").read_bytes()
+    with sqlite3.connect(here / "members.sqlite") as file:
+        file.execute("DELETE FROM members WHERE member IN (0, 5)")
+    file.close()
+    assert main(["sweep", "mine.toml", "--workers", "1"]) == 0
+    assert (here / "sweep.nc").read_bytes() == before
+    assert "peak_speed_m_s" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("line", "instead", "said"),
+    [
+        ('trial = "fig6"', 'trial = "fig7"', "there is no such scenario"),
+        ('trial = "fig6"', 'trail = "fig6"', "Did you mean 'trial'?"),
+        ('"start.wet_length_m"', '"start.wet_lenght_m"', "Did you mean 'start.wet_length_m'?"),
+        ("samples = 6", "", "needs samples"),
+        ('["peak_speed_m_s"]', '["peak_speed"]', "Did you mean"),
+        ('channels = ["heading"]', 'channels = ["headin"]', "Did you mean 'heading'?"),
+        ("run.rtol = 0.0", "run.rtol = 2.0", "outside its limits"),
+    ],
+)
+def test_a_file_with_a_mistake_is_answered_with_what_to_do(line, instead, said, tmp_path, capsys):
+    (tmp_path / "mine.toml").write_text(SPEC.replace(line, instead), encoding="utf-8")
+    assert main(["sweep", str(tmp_path / "mine.toml"), "--out", str(tmp_path / "out")]) == 2
+    assert said in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.slow
+def test_two_dask_workers_give_the_same_bytes_as_processes_here(tmp_path):
+    from distributed import Client, LocalCluster
+
+    plan = fast(200)
+    with (
+        LocalCluster(n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address=None) as cluster,
+        Client(cluster) as client,
+        finished(plan, tmp_path / "dask", client=client) as store,
+    ):
+        write_result(store, plan.job, plan.points, plan.attributes, tmp_path / "dask")
+    with finished(plan, tmp_path / "here", workers=2) as store:
+        write_result(store, plan.job, plan.points, plan.attributes, tmp_path / "here")
+    assert (tmp_path / "dask/sweep.nc").read_bytes() == (tmp_path / "here/sweep.nc").read_bytes()
+
+
+@pytest.mark.slow
+def test_a_sweep_that_is_killed_time_after_time_loses_nothing():
+    from benchmarks.sweep import kills
+
+    assert kills(8, 600, seed=5)
+
+
+def test_batches_get_as_long_as_they_should_and_shrink_towards_the_end():
+    plan = fast(2)
+    taken = []
+    schedule = Schedule(plan.job, np.zeros((400, 1)), np.arange(400), 2, taken.append)
+    schedule._seconds = 0.05
+    sizes = []
+    while (batch := schedule._batch()) is not None:
+        sizes.append(batch.members.size)
+    assert sum(sizes) == 400
+    assert max(sizes) == 10  # half a second
+    assert sizes[-1] == 1
+    assert sizes == sorted(sizes, reverse=True)
