@@ -181,10 +181,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _note_command(words: Sequence[str]) -> None:
-    """Keep the line that is carried out, for the pages that tell how to do it again."""
+    """Keep the line that is carried out, for the pages that tell how to do it again; where it writes to is no part."""
     from subzero.output import COMMAND
 
-    COMMAND.set(printable(shlex.join(["subzero", *words])))
+    kept = [word for before, word in zip(["", *words], words, strict=False)
+            if "--out" not in (before, word) and not word.startswith("--out=")]  # fmt: skip
+    COMMAND.set(printable(shlex.join(["subzero", *kept])))
 
 
 def _never_choke(*streams: Any) -> None:

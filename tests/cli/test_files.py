@@ -20,7 +20,7 @@ RUN_KEYS = """outcome outcome_message time_at_end_s peak_speed_m_s time_of_peak_
     heading_at_end_deg depth_at_end_m path_length_m cable_length_at_end_m largest_cable_force_N
     time_of_largest_cable_force_s largest_cable_moment_N_m time_of_largest_cable_moment_s energy diagnostics
     warnings refinement"""
-BOTH = {"tethered.nc", "tethered.csv", "untethered.nc", "untethered.csv", "summary.json"}
+BOTH = {"tethered.nc", "tethered.csv", "untethered.nc", "untethered.csv", "summary.json", "report.html"}
 
 
 def names(folder):
@@ -48,7 +48,7 @@ def test_simulate_leaves_one_run(flag, kind, tmp_path, rails):
     assert main(["simulate", "fig6", *flag, "--out", str(tmp_path / "new" / "deep")]) == FINE
     assert [tethered for _, tethered in rails] == [kind == "tethered"]
     pictures = PICTURES if kind == "tethered" else PICTURES - {"cable.png"}
-    assert names(tmp_path / "new" / "deep") == {f"{kind}.nc", f"{kind}.csv", "summary.json"} | pictures
+    assert names(tmp_path / "new" / "deep") == {f"{kind}.nc", f"{kind}.csv", "summary.json", "report.html"} | pictures
 
 
 def test_columns_carry_their_units(folder):

@@ -40,7 +40,7 @@ def test_ci_takes_its_test_line_from_the_readme():
 @pytest.mark.parametrize("line", COMMANDS)
 def test_every_command_of_the_readme_is_understood(line):
     command, bound, _ = app.parse_args(shlex.split(line)[1:], exit_on_error=False, print_error=False)
-    assert command.__name__ in ("list_scenarios", "simulate", "compare", "diagnose", "challenge")
+    assert command.__name__ in ("list_scenarios", "simulate", "compare", "diagnose", "challenge", "sweep")
     assert bound.arguments or command.__name__ == "list_scenarios"
 
 
