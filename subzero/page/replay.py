@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
     from subzero.records.record import Record
 
-MOST_SAMPLES, MOST_SHAPES, MOST_POINTS = 5000, 1500, 96
+MOST_SAMPLES, MOST_SHAPES, MOST_POINTS = 4000, 1200, 80
 """Samples of channels, shapes of the cable and points of a shape that a page carries of one run."""
 
 MISSING, LOWEST, STEPS = -32768, 32767, 65534

@@ -13,7 +13,15 @@ import scenarios
 from subzero import autopilot
 from subzero.cli import FINE, MISTAKE, STOPPED, main
 
-FILES = {"manoeuvre.png", "summary.json", "tethered.csv", "tethered.nc", "untethered.csv", "untethered.nc"}
+FILES = {
+    "manoeuvre.png",
+    "report.html",
+    "summary.json",
+    "tethered.csv",
+    "tethered.nc",
+    "untethered.csv",
+    "untethered.nc",
+}
 
 
 def test_a_manoeuvre_delivers_both_runs_and_their_indices(tmp_path, capsys):

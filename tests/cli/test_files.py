@@ -48,7 +48,10 @@ def test_simulate_leaves_one_run(flag, kind, tmp_path, rails):
     assert main(["simulate", "fig6", *flag, "--out", str(tmp_path / "new" / "deep")]) == FINE
     assert [tethered for _, tethered in rails] == [kind == "tethered"]
     pictures = PICTURES if kind == "tethered" else PICTURES - {"cable.png"}
-    assert names(tmp_path / "new" / "deep") == {f"{kind}.nc", f"{kind}.csv", "summary.json", "report.html"} | pictures
+    assert (
+        names(tmp_path / "new" / "deep")
+        == {f"{kind}.nc", f"{kind}.csv", "summary.json", "report.html"} | pictures
+    )
 
 
 def test_columns_carry_their_units(folder):
@@ -120,7 +123,14 @@ def test_a_failure_while_writing_leaves_nothing_half_written(tmp_path):
 
 def test_a_prescribed_run_gets_figure_4(tmp_path, rails):
     assert main(["simulate", "fig4", "--out", str(tmp_path)]) == FINE
-    assert names(tmp_path) == {"fig4.png", "cable.png", "summary.json", "tethered.csv", "tethered.nc"}
+    assert names(tmp_path) == {
+        "fig4.png",
+        "cable.png",
+        "report.html",
+        "summary.json",
+        "tethered.csv",
+        "tethered.nc",
+    }
     assert json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))["tethered"]["energy"] is None
 
 

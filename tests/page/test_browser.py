@@ -5,7 +5,6 @@ Places are compared to 2 mm: half a step of 16 bits on a track of ten metres, an
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -13,36 +12,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-BROWSER, DRIVER = shutil.which("chromium"), shutil.which("chromedriver")
-FLAGS = (
-    *("--headless=new", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader"),
-    *("--enable-unsafe-swiftshader", "--disable-quic", "--no-first-run", "--disable-background-networking"),
-    *("--disable-component-update", "--disable-sync", "--window-size=1360,1000"),
-)
+from subzero.page import browser as browser_of_page
+
 pytestmark = pytest.mark.skipif(
-    not (BROWSER and DRIVER), reason="needs Debian's chromium and chromium-driver, which are not here"
+    browser_of_page.installed() is None,
+    reason="needs Debian's chromium and chromium-driver, which are not here",
 )
-
-
-def opened(page: Path, profile: Path, *more: str) -> Any:
-    from selenium import webdriver
-    from selenium.webdriver.chrome.service import Service
-
-    options = webdriver.ChromeOptions()
-    options.binary_location = str(BROWSER)
-    for flag in (*FLAGS, f"--user-data-dir={profile}", *more):
-        options.add_argument(flag)
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-    driver = webdriver.Chrome(options=options, service=Service(DRIVER))
-    driver.get(page.as_uri())
-    return driver
 
 
 @pytest.fixture(scope="module")
-def browser(page: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
-    driver = opened(page, tmp_path_factory.mktemp("profile"))
-    yield driver
-    driver.quit()
+def browser(page: Path) -> Iterator[Any]:
+    with browser_of_page.opened(page) as driver:
+        yield driver
 
 
 def place_of(run: Any, time: float) -> np.ndarray:
@@ -95,12 +76,16 @@ def test_keys_and_the_button_play_and_step(browser: Any) -> None:
     assert browser.get_log("browser") == []
 
 
-def test_without_webgl_there_are_flat_views(page: Path, tmp_path: Path, runs: dict) -> None:
-    driver = opened(page, tmp_path, "--disable-3d-apis")
-    try:
+def test_without_webgl_there_are_flat_views(page: Path, runs: dict) -> None:
+    with browser_of_page.opened(page, "--disable-3d-apis") as driver:
         assert driver.find_element("id", "no-webgl").is_displayed()
         shown = moved_to(driver, 9.0)
         np.testing.assert_allclose(shown["places"]["tethered"], place_of(runs["tethered"], 9.0), atol=2e-3)
         assert not [line for line in driver.get_log("browser") if "Uncaught" in line["message"]]
-    finally:
-        driver.quit()
+
+
+def test_a_picture_of_the_replay_shows_the_yellow_vehicle_in_its_middle(browser: Any) -> None:
+    image = browser_of_page.picture(browser, 6.0, 640, 360).astype(float)
+    assert image.shape == (360, 640, 3)
+    red, green, blue = image[150:210, 270:370].reshape(-1, 3).T
+    assert np.mean((red > 1.5 * blue) & (green > 1.2 * blue)) > 0.1  # yellow: nothing else here is

@@ -198,7 +198,13 @@ def interrupt_commands(seed, count, names, made, folder, cold=False):
 def short(name):
     """Return how long a short command lasts at least, and the files that it leaves."""
     figures = ("attitude", "cable", "fig6", "forces")
-    files = ["report.html", "summary.json", "tethered.csv", "tethered.nc", *(f"{figure}.png" for figure in figures)]
+    files = [
+        "report.html",
+        "summary.json",
+        "tethered.csv",
+        "tethered.nc",
+        *(f"{figure}.png" for figure in figures),
+    ]
     return {"list": (0.2, []), "simulate": (1.5, sorted(f"out/{file}" for file in files))}[name]
 
 

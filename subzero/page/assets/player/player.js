@@ -180,9 +180,8 @@ class Player {
   spare(passed) {
     this.slowness = 0.9 * (this.slowness ?? 16) + 0.1 * passed;
     if (this.slowness < SLOWEST_FRAME_MS || this.fineness <= COARSEST) return;
-    this.fineness = Math.max(COARSEST, 0.8 * this.fineness);
     this.slowness = 16;
-    this.resize();
+    this.setFineness(Math.max(COARSEST, 0.8 * this.fineness));
   }
 
   draw(now) {
@@ -253,6 +252,21 @@ class Player {
     return { time: this.time, places: Object.fromEntries(places), camera: this.camera.mode, isPlaying: this.isPlaying };
   }
 
+  /** Draw with so many pixels a point. */
+  setFineness(fineness) {
+    this.fineness = fineness;
+    this.resize();
+  }
+
+  /** Show the moment `t` in a picture of so many points, and nothing around it: for films and still pictures. */
+  filmAt(t, width, height) {
+    const picture = this.canvas.parentElement;
+    picture.style.cssText = `position: fixed; left: 0; top: 0; width: ${width}px; height: ${height}px; z-index: 9; border-radius: 0`;
+    if (this.size[0] !== this.canvas.clientWidth || this.size[1] !== this.canvas.clientHeight) this.resize();
+    this.waves = t;
+    this.seek(t);
+  }
+
   /** Draw so many frames of a whole replay one after the other, each to its end, and return how many a second. */
   framesPerSecond(frames = 60) {
     this.seek(0);
@@ -281,6 +295,8 @@ window.subzero = {
   seek: (t) => player.seek(t),
   shown: () => player.shown(),
   look: (mode) => player.look(mode),
+  setFineness: (fineness) => player.setFineness(fineness),
+  filmAt: (t, width, height) => player.filmAt(t, width, height),
   framesPerSecond: (frames) => player.framesPerSecond(frames),
   camera: player.camera,
   end: player.replay.end,
