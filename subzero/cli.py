@@ -14,7 +14,7 @@ import shlex
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import cyclopts
 from cyclopts import Parameter
@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     Runs = dict[str, xr.Dataset]
 
 Flag = cli_autopilot.Flag
+Film = Literal["gif", "mp4"] | None
 FINE, MISTAKE, STOPPED = 0, 2, 3
 
 
@@ -76,6 +77,7 @@ def simulate(
     out: Path | None = None,
     check: Flag = False,
     strict: Flag = False,
+    animate: Film = None,
 ) -> int:
     """Simulate one run, and write its channels, a summary and figures.
 
@@ -89,11 +91,13 @@ def simulate(
         out: folder for the files; by default one named after the scenario, here.
         check: run it once more with half the steps and half the segment length, and say what changes.
         strict: end with exit code 3 if the run ends with warnings.
+        animate: film the replay of report.html as a gif or an mp4; needs Chromium and the extra [animate].
     """
     from subzero import write_results
     from subzero.output import staged
 
     trial = scenarios.load(scenario, commands_csv=commands, motion_csv=motion)
+    write_results.check_film(animate)
     with staged(out or write_results.default_folder(trial)) as stage:
         trial, extended = cli_diagnosis.extended_run(_checked(scenario, commands, motion), with_, effects)
         with _progress(trial) as progress:
@@ -103,6 +107,7 @@ def simulate(
         runs = {"untethered" if untethered else "tethered": result}
         runs = _refined(runs, trial, extended) if check else runs
         summary = write_results.write_all(runs, None, stage)
+        write_results.write_film(animate, stage)
     return FINE if write_results.tell(summary, stage, strict=strict) else STOPPED
 
 
@@ -119,6 +124,7 @@ def compare(
     out: Path | None = None,
     check: Flag = False,
     strict: Flag = False,
+    animate: Film = None,
 ) -> int:
     """Simulate with the cable and without, and set both side by side.
 
@@ -132,6 +138,7 @@ def compare(
         out: folder for the files; by default one named after the scenario, here.
         check: run both once more with half the steps and half the segment length, and say what changes.
         strict: end with exit code 3 if a run ends with warnings.
+        animate: film the replay of report.html as a gif or an mp4; needs Chromium and the extra [animate].
     """
     from subzero import write_results
     from subzero.output import staged
@@ -139,6 +146,7 @@ def compare(
 
     trial = scenarios.load(scenario, commands_csv=commands, motion_csv=motion)
     record = read_record(measured) if measured is not None else None
+    write_results.check_film(animate)
     with staged(out or write_results.default_folder(trial)) as stage:
         trial, extended = cli_diagnosis.extended_run(_checked(scenario, commands, motion), with_, effects)
         with _progress(trial) as progress:
@@ -147,6 +155,7 @@ def compare(
             result = run(trial, measured=record, **extended, progress=progress)
         runs = _refined(result.runs, trial, extended) if check else result.runs
         summary = write_results.write_all(runs, result.measured, stage)
+        write_results.write_film(animate, stage)
     return FINE if write_results.tell(summary, stage, strict=strict) else STOPPED
 
 

@@ -23,7 +23,7 @@ COMMAND: ContextVar[str] = ContextVar("COMMAND", default="")
 
 RUN_FILES = (*("tethered.nc", "tethered.csv", "untethered.nc", "untethered.csv", "summary.json"),
              *("fig4.png", "fig5.png", "fig6.png", "attitude.png", "cable.png", "forces.png"),
-             *("deployment.png", "measured.png", "manoeuvre.png"))  # fmt: skip
+             *("deployment.png", "measured.png", "manoeuvre.png", "replay.gif", "replay.mp4"))  # fmt: skip
 """Files of runs; `subzero.figures.draw` names the figures."""
 
 DIAGNOSIS_FILES = ("diagnosis.json", "extended.toml", "report.md", "report.html", "record.csv", "record.toml",

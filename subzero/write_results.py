@@ -43,6 +43,25 @@ def write_all(runs: dict[str, xr.Dataset], record: Record | None, stage: Stage) 
     return summary
 
 
+def check_film(kind: str | None) -> None:
+    """Refuse a film that cannot be made here, before anything is simulated."""
+    if kind is not None:
+        from subzero.page.browser import check_film as check
+
+        check()
+
+
+def write_film(kind: str | None, stage: Stage) -> None:
+    """Write the replay of ``report.html`` as ``replay.gif`` or ``replay.mp4``, if it is asked for."""
+    if kind is None:
+        return
+    from subzero.page.browser import film
+    from subzero.progress import progress_bar
+
+    with progress_bar("Filming") as progress:
+        film(stage.path / "report.html", stage.path / f"replay.{kind}", progress)
+
+
 def tell(summary: dict[str, Any], stage: Stage, *, strict: bool = False) -> bool:
     """Print the summary and where the files are; say why runs could not go on, and if `strict`, that some warn.
 

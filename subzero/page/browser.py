@@ -10,12 +10,13 @@ import shutil
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from subzero.errors import UserError
+from subzero.errors import UserError, listed
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -40,6 +41,31 @@ def installed() -> tuple[str, str] | None:
     return (browser, driver) if browser and driver else None
 
 
+def check_film() -> None:
+    """Refuse to film where something that it takes is not installed, before anything is simulated.
+
+    Raises:
+        UserError: says what to install.
+    """
+    _needed()
+    missing = [name for name in ("imageio", "imageio_ffmpeg", "PIL") if find_spec(name) is None]
+    if missing:
+        raise UserError(f"A film of the replay needs {listed(missing)}. pip install 'subzero[animate]'.")
+
+
+def _needed() -> tuple[str, str]:
+    """Return the paths of a Chromium and of its driver, or refuse."""
+    found = installed()
+    if found is None:
+        raise UserError(
+            "A film of the replay is made with Chromium, which is not here. Install chromium and chromium-driver "
+            "(Debian: apt install chromium chromium-driver), or leave --animate away: report.html has the replay."
+        )
+    if find_spec("selenium") is None:
+        raise UserError("A film of the replay needs selenium. pip install 'subzero[animate]'.")
+    return found
+
+
 @contextmanager
 def opened(page: Path, *flags: str, width: int = 1400, height: int = 1000) -> Iterator[Any]:
     """Give a Selenium driver that has opened a page, with a profile of its own that is gone afterwards.
@@ -53,18 +79,10 @@ def opened(page: Path, *flags: str, width: int = 1400, height: int = 1000) -> It
     Raises:
         UserError: if Chromium, its driver or Selenium are not installed.
     """
-    found = installed()
-    if found is None:
-        raise UserError(
-            "A film of the replay is made with Chromium, which is not here. Install chromium and chromium-driver "
-            "(Debian: apt install chromium chromium-driver), or leave --animate away: report.html has the replay."
-        )
-    try:
-        from selenium import webdriver
-        from selenium.webdriver.chrome.service import Service
-    except ModuleNotFoundError:
-        raise UserError("A film of the replay needs Selenium. pip install 'subzero[animate]'.") from None
-    browser, driver_path = found
+    browser, driver_path = _needed()
+    from selenium import webdriver
+    from selenium.webdriver.chrome.service import Service
+
     with tempfile.TemporaryDirectory(prefix="subzero-browser-", ignore_cleanup_errors=True) as profile:
         options = webdriver.ChromeOptions()
         options.binary_location = browser
@@ -90,10 +108,9 @@ def film(page: Path, out: Path, progress: Callable[[float], None] | None = None)
     Raises:
         UserError: if what it takes is not installed, or the page has no replay.
     """
-    try:
-        import imageio.v2 as imageio
-    except ModuleNotFoundError:
-        raise UserError("A film of the replay needs imageio. pip install 'subzero[animate]'.") from None
+    check_film()
+    import imageio.v2 as imageio
+
     with opened(page) as driver:
         if not driver.execute_script("return Boolean(window.subzero)"):
             raise UserError(f"{page.name} has no replay to film.")

@@ -10,7 +10,7 @@ const SMALLEST_VEHICLE = 0.055;               // a vehicle is never drawn shorte
 const PROPELLER_SLOWED = 12;                  // a screen shows 25 turns a second as anything but that
 const GHOST = [1.0, 0.76, 0.50, 0.36], GHOST_TRACK = [1.0, 0.66, 0.36, 0.95], TRACK = [0.75, 0.93, 1.0, 0.85], DOTS = [1, 1, 1, 0.9];
 const SPECKS = 500;
-const BACKGROUND_TILES = [48, 40];
+const BACKGROUND_TILES = [24, 24];
 
 /** WebGL2 on a canvas, or null where there is none. */
 export function webglOn(canvas) {

@@ -169,16 +169,15 @@ in vec3 place;
 uniform float spacing;
 uniform bool isBed;
 out vec4 pixel;
-float gridLine(vec2 p, float every, float thick) {
-  vec2 q = p / every, grain = fwidth(q);
-  vec2 lines = smoothstep(grain * (thick + 0.7), grain * (thick - 0.3), abs(fract(q - 0.5) - 0.5));
-  vec2 fading = 1.0 - smoothstep(0.15, 0.6, grain);
-  return max(lines.x * fading.x, lines.y * fading.y);
+/** How much of a pixel lies on lines between squares of side 1; none where squares are finer than pixels. */
+float gridLines(vec2 q, vec2 grain, float thick) {
+  vec2 lines = clamp(thick + 0.5 - abs(fract(q - 0.5) - 0.5) / grain, 0.0, 1.0) * clamp(1.4 - 2.4 * grain, 0.0, 1.0);
+  return max(lines.x, lines.y);
 }
 void main() {
-  float thin = gridLine(place.xy, spacing, 0.6), bold = gridLine(place.xy, 5.0 * spacing, 1.1);
-  float lines = max(0.45 * thin, 0.9 * bold);
-  vec3 way = place - eye;
+  vec2 q = place.xy / spacing, grain = fwidth(q);
+  float lines = max(0.45 * gridLines(q, grain, 0.5), 0.9 * gridLines(0.2 * q, 0.2 * grain, 0.9));
+  vec3 way = (place - eye) / clearness;
   if (isBed) {
     float rough = sin(place.x * 1.1 + 1.7 * sin(place.y * 0.37)) * sin(place.y * 0.9 + 1.3 * sin(place.x * 0.23));
     float web = caustics(place.xy * (0.9 / max(spacing, 0.5))) * exp(-place.z / 30.0);
@@ -186,8 +185,8 @@ void main() {
     pixel = vec4(seenThroughWater(mix(sand, vec3(0.75, 0.86, 0.86), 0.40 * lines), place, 1.0), 1.0);
     return;
   }
-  float fade = exp(-length(way) / (1.4 * clearness));
-  pixel = vec4(vec3(0.62, 0.86, 0.92), 0.55 * lines * fade);
+  float fade = 1.0 / (1.0 + 0.35 * dot(way, way));
+  pixel = vec4(vec3(0.62, 0.86, 0.92), 0.5 * lines * fade * fade);
 }`,
 };
 
