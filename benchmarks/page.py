@@ -56,7 +56,7 @@ def pictures(driver):
 
     for name, at, look in (("page_follows", 12.0, "follow"), ("page_sees_all", 30.0, "whole")):
         driver.execute_script("subzero.look(arguments[0])", look)
-        image = Image.fromarray(browser.picture(driver, at, 800, 450))
+        image = browser.picture(driver, at, 800, 450)
         image.quantize(256, Image.Quantize.MAXCOVERAGE).save(FIGURES / f"{name}.png", optimize=True)
 
 

@@ -1,6 +1,6 @@
 """The page in a browser without a window, to film its replay and to measure and test it.
 
-Needs a Chromium with its driver on the machine, and the extra ``[animate]``: Selenium, and imageio to write films.
+Needs a Chromium with its driver on the machine, and the extra ``[animate]``: Selenium, and imageio-ffmpeg for films.
 """
 
 from __future__ import annotations
@@ -10,16 +10,17 @@ import shutil
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from subzero.errors import UserError, listed
+from subzero.errors import UserError
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from PIL import Image
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
 FLAGS = ("--headless=new", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
@@ -27,11 +28,24 @@ FLAGS = ("--headless=new", "--no-sandbox", "--use-gl=angle", "--use-angle=swifts
          "--disable-sync", "--hide-scrollbars")  # fmt: skip
 """No window, no graphics card, no network."""
 
-WIDTH, HEIGHT = 960, 540
-"""Size of a film. [pixels]"""
 
-FRAMES_PER_SECOND, LONGEST_S = 15, 20.0
-"""Of a film; a longer run is shown faster, so that its film is not longer than this."""
+@dataclass(frozen=True, kw_only=True)
+class Film:
+    """The size of a film [pixels], its frames a second, and how long it may be [s]: a longer run is shown faster."""
+
+    width: int
+    height: int
+    rate: int
+    longest: float
+
+
+FILMS = {
+    ".mp4": Film(width=960, height=540, rate=15, longest=20.0),
+    ".gif": Film(width=640, height=360, rate=8, longest=12.0),  # every frame is stored whole
+}
+"""How a film of a kind is made."""
+
+GIF_COLOURS = 96
 
 
 def installed() -> tuple[str, str] | None:
@@ -48,9 +62,9 @@ def check_film() -> None:
         UserError: says what to install.
     """
     _needed()
-    missing = [name for name in ("imageio", "imageio_ffmpeg", "PIL") if find_spec(name) is None]
+    missing = [name for name in ("imageio_ffmpeg", "PIL") if find_spec(name) is None]
     if missing:
-        raise UserError(f"A film of the replay needs {listed(missing)}. pip install 'subzero[animate]'.")
+        raise UserError(f"A film of the replay needs {', '.join(missing)}. pip install 'subzero[animate]'.")
 
 
 def _needed() -> tuple[str, str]:
@@ -109,29 +123,43 @@ def film(page: Path, out: Path, progress: Callable[[float], None] | None = None)
         UserError: if what it takes is not installed, or the page has no replay.
     """
     check_film()
-    import imageio.v2 as imageio
-
+    style = FILMS[out.suffix]
     with opened(page) as driver:
         if not driver.execute_script("return Boolean(window.subzero)"):
             raise UserError(f"{page.name} has no replay to film.")
         end = float(driver.execute_script("subzero.look('turn'); return subzero.end"))
-        count = max(2, round(min(end, LONGEST_S) * FRAMES_PER_SECOND))
-        style = (
-            {"duration": 1000.0 / FRAMES_PER_SECOND, "loop": 0}
-            if out.suffix == ".gif"
-            else {"fps": FRAMES_PER_SECOND}
-        )
-        with imageio.get_writer(out, **style) as writer:
-            for at, time in enumerate(np.linspace(0.0, end, count)):
-                writer.append_data(picture(driver, float(time)))
+        times = np.linspace(0.0, end, max(2, round(min(end, style.longest) * style.rate)))
+
+        def frames() -> Iterator[Image.Image]:
+            for at, time in enumerate(times):
+                yield picture(driver, float(time), style.width, style.height)
                 if progress is not None:
-                    progress((at + 1) / count)
+                    progress((at + 1) / times.size)
+
+        _write_gif(frames(), out, style) if out.suffix == ".gif" else _write_mp4(frames(), out, style)
 
 
-def picture(driver: Any, time: float, width: int = WIDTH, height: int = HEIGHT) -> NDArray[np.uint8]:
-    """Return the replay at a time as an image (height, width, 3), with its labels, from an opened page."""
+def _write_gif(frames: Iterator[Image.Image], out: Path, style: Film) -> None:
+    from PIL import Image
+
+    few = [one.quantize(GIF_COLOURS, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE) for one in frames]
+    few[0].save(out, save_all=True, append_images=few[1:], duration=round(1000 / style.rate), loop=0)
+
+
+def _write_mp4(frames: Iterator[Image.Image], out: Path, style: Film) -> None:
+    from imageio_ffmpeg import write_frames
+
+    writer = write_frames(str(out), (style.width, style.height), fps=style.rate, quality=7)
+    writer.send(None)
+    for one in frames:
+        writer.send(one.tobytes())
+    writer.close()
+
+
+def picture(driver: Any, time: float, width: int, height: int) -> Image.Image:
+    """Return the replay at a time as an image of this size, with its labels, from an opened page."""
     from PIL import Image
 
     driver.execute_script("subzero.filmAt(...arguments)", time, width, height)
     png = driver.find_element("css selector", ".picture").screenshot_as_png
-    return np.asarray(Image.open(io.BytesIO(png)).convert("RGB"))
+    return Image.open(io.BytesIO(png)).convert("RGB").resize((width, height))
