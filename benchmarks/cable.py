@@ -61,7 +61,10 @@ def per_node():
         length, steps = 0.3 * segments, 10
         run, seconds = least(
             lambda length=length, steps=steps: cable.tow(
-                lambda t: (1.0, 0.2 * np.sin(t), 0.0), length, 0.1 * steps, segment_length=0.3
+                lambda t: (1.0, 0.2 * np.sin(t), 0.0),
+                length,
+                0.1 * steps,
+                scheme=cable.MovingEnd(segment_length=0.3),
             ),
             2,
         )
@@ -78,12 +81,21 @@ def worst_error(run, reference):
 
 def pay_out(segment, step, rtol=0.0, tolerance=1e-9):
     """Run the dive, paying out."""
-    return cable.pull_out(dive, DURATION, step, segment_length=segment, rtol=rtol, tolerance=tolerance)
+    return cable.pull_out(
+        dive,
+        DURATION,
+        scheme=cable.MovingEnd(time_step=step, segment_length=segment, rtol=rtol, tolerance=tolerance),
+    )
 
 
 def tow_30(segment, step, rtol=0.0, tolerance=1e-9):
     """Run the dive with 30 m of cable in tow."""
-    return cable.tow(dive, 30.0, DURATION, step, segment_length=segment, rtol=rtol, tolerance=tolerance)
+    return cable.tow(
+        dive,
+        30.0,
+        DURATION,
+        scheme=cable.MovingEnd(time_step=step, segment_length=segment, rtol=rtol, tolerance=tolerance),
+    )
 
 
 CASES = {
@@ -178,7 +190,9 @@ def paper():
     """Yield rows: the paper's equations in a dense solver, on the same grid, one node and one step a second."""
     from benchmarks import peers_fsolve
 
-    _, best = least(lambda: cable.pull_out(dive, DURATION, 1.0, segment_length=1.0), 20)
+    _, best = least(
+        lambda: cable.pull_out(dive, DURATION, scheme=cable.MovingEnd(time_step=1.0, segment_length=1.0)), 20
+    )
     ours = 1e3 * best / DURATION
     for boxes in (peers_fsolve.box_by_box, peers_fsolve.vectorised):
         _, seconds = least(lambda boxes=boxes: peers_fsolve.pull_out(dive, DURATION, 1.0, boxes=boxes), 1)
@@ -198,7 +212,9 @@ def long_runs():
         for grading in (0.0, 0.02):
             run, seconds = least(
                 lambda minutes=minutes, grading=grading: cable.pull_out(
-                    wander, 60.0 * minutes, 0.5, segment_length=1.0, grading=grading
+                    wander,
+                    60.0 * minutes,
+                    scheme=cable.MovingEnd(time_step=0.5, segment_length=1.0, grading=grading),
                 ),
                 1,
             )

@@ -39,6 +39,7 @@ ROWS = (
     "scenarios",
     "subzero.autopilot",
     "subzero.diagnosis",
+    "subzero.page",
     "subzero.records",
     "subzero.sweeps",
     "subzero.synthetic",

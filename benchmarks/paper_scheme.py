@@ -15,11 +15,23 @@ from pathlib import Path
 import numpy as np
 
 import cable
-from cable.feng_allen.box_scheme import pull_out_boxes
-from cable.feng_allen.printed_scheme import BoxHistory, pull_out_paper
+from cable.feng_allen import run as feng_allen
+from cable.feng_allen.run import BoxHistory
+from cable.task import PullOut
 
 DRAG = cable.CableProperties().tangential_drag
 FIGURE = Path(__file__).parent.parent / "docs" / "figures" / "paper_scheme.png"
+
+
+def pull_out_paper(tow_velocity, duration, step, *, reading="tangent", implicit=False) -> BoxHistory:
+    """Run the paper's scheme; with the states of its nodes, which `cable.pull_out` does not show."""
+    scheme = cable.Paper(time_step=step, reading=reading, implicit=implicit)
+    return feng_allen.pull_out_paper(PullOut.of(tow_velocity, duration), scheme)
+
+
+def pull_out_boxes(tow_velocity, duration, step) -> BoxHistory:
+    """Run equation (7) in boxes."""
+    return feng_allen.pull_out_boxes(PullOut.of(tow_velocity, duration), cable.Equation7(time_step=step))
 
 
 def ahead(_time):
@@ -51,7 +63,7 @@ def straight_table() -> str:
         pull_out_paper(ahead, 30.0, 1.0),
         pull_out_paper(ahead, 30.0, 1.0, implicit=True),
         pull_out_paper(ahead, 30.0, 1.0, reading="drum"),
-        cable.pull_out(ahead, 30.0, 1.0),
+        cable.pull_out(ahead, 30.0, scheme=cable.MovingEnd(time_step=1.0)),
     ]
     head = [
         "t [s]",
@@ -73,7 +85,7 @@ def dive_table() -> str:
     rows = []
     for step in (1.0, 0.5, 0.25, 0.1):
         runs = [pull_out_paper(dive, 30.0, step, implicit=implicit) for implicit in (False, True)]
-        ours = cable.pull_out(dive, 30.0, step)
+        ours = cable.pull_out(dive, 30.0, scheme=cable.MovingEnd(time_step=step))
         boxes = pull_out_boxes(dive, 30.0, step)
         cells = [f"{run.tow_tension[-1]:.3f}, {run.length[-1]:.2f}" for run in (*runs, ours, boxes)]
         rows.append([f"{step:g}", f"{jitter(runs[0]):.4f}", *cells])
@@ -112,7 +124,7 @@ def stop_table() -> str:
     runs = [
         pull_out_paper(stop, 14.0, 1.0),
         pull_out_paper(stop, 14.0, 1.0, implicit=True),
-        cable.pull_out(stop, 14.0, 1.0),
+        cable.pull_out(stop, 14.0, scheme=cable.MovingEnd(time_step=1.0)),
     ]
     rows = [[str(k), *(f"{run.tow_tension[k] + 0.0:.4f}" for run in runs)] for k in range(8, 15)]
     return table(["t [s]", "tangent continued", "the same, implicit", "moving end"], rows)
@@ -155,14 +167,17 @@ def draw() -> None:
     stairs.plot(
         run.time, run.tow_tension, "o-", color=ORANGE, markersize=3, linewidth=1, label="as printed, 1 s"
     )
-    ours = cable.pull_out(ahead, 12.0, 1.0)
+    ours = cable.pull_out(ahead, 12.0, scheme=cable.MovingEnd(time_step=1.0))
     stairs.plot(ours.time, ours.tow_tension, "x", color=BLUE, markersize=4, label="moving end, 1 s")
     for step, colour in ((1.0, ORANGE), (0.1, GREEN)):
         run = pull_out_paper(dive, 30.0, step)
         down.plot(run.time, run.tow_tension, color=colour, linewidth=0.9, label=f"as printed, {step:g} s")
-    ours = cable.pull_out(dive, 30.0, 0.1)
+    ours = cable.pull_out(dive, 30.0, scheme=cable.MovingEnd(time_step=0.1))
     down.plot(ours.time, ours.tow_tension, color=BLUE, linewidth=1.2, label="moving end, 0.1 s")
-    run, ours = pull_out_paper(stop, 20.0, 1.0), cable.pull_out(stop, 20.0, 1.0)
+    run, ours = (
+        pull_out_paper(stop, 20.0, 1.0),
+        cable.pull_out(stop, 20.0, scheme=cable.MovingEnd(time_step=1.0)),
+    )
     rest.plot(
         run.time, run.tow_tension, "o-", color=ORANGE, markersize=3, linewidth=1, label="as printed, 1 s"
     )

@@ -1,7 +1,7 @@
 """The paper's way, plainly: the box equations (20)-(26) for all nodes at once, handed to `scipy.optimize.fsolve`.
 
 No Jacobian is given, and every step starts from the last one's answer: what an engineer would write first. The same
-equations as `cable.pull_out(..., scheme="paper")`, for a cable without stretch in still water and a drum without
+equations as `cable.pull_out(..., scheme=cable.Paper())`, for a cable without stretch in still water and a drum without
 inertia. Unknowns of a node: T, V_t, V_n, V_b, α, β. The residual comes in two kinds: box by box with the matrices of
 (7), as it is printed, and written out and vectorised over the boxes.
 """

@@ -18,8 +18,9 @@ R_d, I_d, C_f  drum: radius, inertia, friction      m …       (11)            
 F_c            force on the vehicle                 N         (12), f_1 − ½Q_1                   moving_end/assembly
 α, β           angles of the paper's local frame    rad       (3)-(4)                            feng_allen/equation7
 
-What a user calls stands here: `pull_out`, `tow` and `hold`, what they take (`properties`, `winch`, `current`,
-`tow_path`, `drum_motion`) and give (`history`). Below are three formulations that share nothing but these:
+What a user calls stands here: `pull_out`, `tow` and `hold`, what they take (`properties`, `drum`, `winch`, `current`,
+`schemes`) and give (`history`). A call makes a `task` of it, which one of three formulations computes; they share
+nothing else:
 
 * `moving_end`, the default: balances are vectors (their equivalence with the paper's six scalar equations, whose signs
   are derived anew, is in `feng_allen.equation7` and tested), time is differenced backward, and a step is solved by
@@ -29,11 +30,13 @@ What a user calls stands here: `pull_out`, `tow` and `hold`, what they take (`pr
 """
 
 from cable.current import Current
-from cable.history import History, Outcome
-from cable.hold import Equilibrium, HoldError, hold
-from cable.properties import CableProperties, DrumProperties
-from cable.pull_out import SCHEMES, pull_out
-from cable.tow import tow
+from cable.drum import DrumProperties
+from cable.history import Equilibrium, History, Outcome
+from cable.hold import HoldError, hold
+from cable.properties import CableProperties
+from cable.pull_out import SCHEMES, pull_out, tow
+from cable.schemes import Equation7, Lumped, MovingEnd, Paper
+from cable.task import MovingDrum
 from cable.winch import Brake, ConstantTension, PayOutRate
 
 __all__ = [
@@ -43,10 +46,15 @@ __all__ = [
     "ConstantTension",
     "Current",
     "DrumProperties",
+    "Equation7",
     "Equilibrium",
     "History",
     "HoldError",
+    "Lumped",
+    "MovingDrum",
+    "MovingEnd",
     "Outcome",
+    "Paper",
     "PayOutRate",
     "hold",
     "pull_out",

@@ -1,4 +1,4 @@
-"""What the drum can do: turn with the cable, stand and hold it, or spin ahead of it.
+"""The drum: what it is, and what it can do: turn with the cable, stand and hold it, or spin ahead of it.
 
     turning    T(S) R_d = I_d dΩ/dt + C_f      (11); the cable is taut at the drum
     standing   dS/dt = 0                        nothing pulls; cable is never taken up
@@ -12,14 +12,20 @@ T(S) at a prescribed value, paying out and reeling in as needed.
 
 Departs from source: the paper writes (11) for a drum that always turns with a taut cable. A frictionless drum without
 inertia turns whenever it is pulled, and cannot overrun.
+
+Symbols are those of Feng & Allen (2004), section 2.2; defaults are their section 4. The moment of inertia I_d is not
+printed there: 0 makes the tension at a frictionless drum exactly zero.
 """
 
 from __future__ import annotations
 
-from math import sqrt
+from dataclasses import dataclass, field
+from math import isfinite, sqrt
 
-from cable.properties import DrumNumbers
-from subzero.jit import inner
+import numpy as np
+
+from subzero.errors import BadValueError, checked
+from subzero.jit import inner, packed
 
 TURNING, STANDING, SPINNING = 0, 1, 2
 
@@ -30,6 +36,61 @@ CREEP = 1e-3
 """Pay-out rate at which friction has come to 0.7 of its full size. [m/s]"""
 HELD = 1e-12
 """A tension or pay-out rate below this is none. [N], [m/s]"""
+
+
+@dataclass
+class DrumNumbers:
+    """The drum as compiled code sees it, at the cable.
+
+    Attributes:
+        inertia: I_d/R_d². [kg]
+        friction: C_f/R_d. [N]
+        control: who decides on the pay-out, `FREE`, `LENGTH` or `TENSION`.
+        setpoint: what is asked for at the new time: length [m] or tension [N]; without meaning for a free drum.
+        place, velocity: of the drum at the new time, relative to its place at the start (3,). [m], [m/s]
+    """
+
+    inertia: float
+    friction: float
+    control: int
+    setpoint: float
+    place: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    velocity: np.ndarray = field(default_factory=lambda: np.zeros(3))
+
+
+@dataclass(frozen=True, kw_only=True)
+class DrumProperties:
+    """The drum on the shore that the cable is pulled off, equation (11).
+
+    Attributes:
+        radius: R_d. [m]
+        inertia: I_d; acts like an extra towed mass I_d/R_d². [kg m²]
+        friction_torque: C_f, Coulomb friction between drum and pivot, while it turns; when the drum stands it
+            holds the cable up to the tension C_f/R_d. [N m]
+
+    Raises:
+        subzero.UserError: a value that is not a finite number, or not in its physical range (a ValueError, too).
+    """
+
+    radius: float = 0.1
+    inertia: float = 0.0
+    friction_torque: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be a drum."""
+        for name in ("radius", "inertia", "friction_torque"):
+            above = 0.0 if name == "radius" else None
+            value = checked("DrumProperties", name, getattr(self, name), least=0.0, above=above)
+            object.__setattr__(self, name, value)
+
+    def numbers(self) -> DrumNumbers:
+        """Return the plain numbers that compiled code takes."""
+        inertia, friction = self.inertia / self.radius / self.radius, self.friction_torque / self.radius
+        if not isfinite(inertia + friction):
+            raise BadValueError(
+                f"DrumProperties: radius is {self.radius:g}; so small that inertia and friction are not finite."
+            )
+        return packed(DrumNumbers(inertia, friction, 0, 0.0))
 
 
 @inner

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cable.properties import DrumNumbers
+from cable.drum import DrumNumbers
 from subzero.jit import inner
 
 PLACE, VELOCITY, SETPOINT = 1, 4, 7

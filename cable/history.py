@@ -1,4 +1,4 @@
-"""What a cable did: tensions, forces, lengths and shapes over time, with units and how the solving went."""
+"""What a cable did, over time or at rest: tensions, forces, lengths and shapes, with units and how the solving went."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ from math import nan
 
 import numpy as np
 
+from cable.current import Current
+from cable.properties import CableProperties
 from subzero.errors import BadValueError, real, short
 
 
@@ -110,3 +112,39 @@ class History:
             message = f"There is no shape at t = {short(t)} s: the run covers {first:g} to {last:g} s."
             raise BadValueError(message)
         return int(np.abs(self.time - t).argmin())
+
+
+@dataclass(frozen=True, kw_only=True)
+class Equilibrium:
+    """A cable at rest between two ends.
+
+    Attributes:
+        cable: what it is made of.
+        current: how the water moves.
+        length: unstretched. [m]
+        shape: node positions from the first end to the second, in the axes of `ends` (nodes, 3). [m]
+        tensions: at the nodes (nodes,). [N]
+        tow_force: force of the cable on the first end, north, east, down (3,). [N]
+        drum_force: force of the cable on the second end (3,). [N]
+        segment_lengths: unstretched (nodes − 1,). [m]
+        segment_tensions: in the segments (nodes − 1,). [N]
+        steps: how many steps the search took; 2 or 3 where Newton's method came through at once.
+    """
+
+    cable: CableProperties
+    current: Current
+    length: float
+    shape: np.ndarray
+    tensions: np.ndarray
+    tow_force: np.ndarray
+    drum_force: np.ndarray
+    segment_lengths: np.ndarray
+    segment_tensions: np.ndarray
+    steps: int
+
+    @property
+    def slack_length(self) -> float:
+        """How much of the cable is folded up without tension: its shape there means nothing. [m]."""
+        chords = np.linalg.norm(np.diff(self.shape, axis=0), axis=1)
+        stretched = self.segment_lengths * (1.0 + self.cable.compliance * self.segment_tensions)
+        return float(self.segment_lengths[chords < (1.0 - 1e-6) * stretched].sum())

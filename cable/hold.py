@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from cable.current import Current, Water
-from cable.drum import TURNING
+from cable.history import Equilibrium
 from cable.moving_end.equilibrium import hang, relax
 from cable.moving_end.segment_load import new_load
 from cable.moving_end.state import NOW, Line, new_line
 from cable.properties import CableProperties
-from cable.tow_path import check_kinds, current_of
+from cable.task import check_kinds, current_of
 from cable.winch import Brake
 from subzero.errors import UserError, real, short
 
@@ -38,42 +37,6 @@ TAUT = 1.0 - 1e-9
 
 class HoldError(UserError, ValueError):
     """A cable that cannot be held so, or whose equilibrium was not found; the message says what to change."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Equilibrium:
-    """A cable at rest between two ends.
-
-    Attributes:
-        cable: what it is made of.
-        current: how the water moves.
-        length: unstretched. [m]
-        shape: node positions from the first end to the second, in the axes of `ends` (nodes, 3). [m]
-        tensions: at the nodes (nodes,). [N]
-        tow_force: force of the cable on the first end, north, east, down (3,). [N]
-        drum_force: force of the cable on the second end (3,). [N]
-        segment_lengths: unstretched (nodes − 1,). [m]
-        segment_tensions: in the segments (nodes − 1,). [N]
-        steps: how many steps the search took; 2 or 3 where Newton's method came through at once.
-    """
-
-    cable: CableProperties
-    current: Current
-    length: float
-    shape: np.ndarray
-    tensions: np.ndarray
-    tow_force: np.ndarray
-    drum_force: np.ndarray
-    segment_lengths: np.ndarray
-    segment_tensions: np.ndarray
-    steps: int
-
-    @property
-    def slack_length(self) -> float:
-        """How much of the cable is folded up without tension: its shape there means nothing. [m]."""
-        chords = np.linalg.norm(np.diff(self.shape, axis=0), axis=1)
-        stretched = self.segment_lengths * (1.0 + self.cable.compliance * self.segment_tensions)
-        return float(self.segment_lengths[chords < (1.0 - 1e-6) * stretched].sum())
 
 
 def hold(
@@ -171,28 +134,6 @@ def _check_bends(found: Equilibrium) -> None:
         raise HoldError(message)
 
 
-def lay_held(line: Line, held: Equilibrium, tow: np.ndarray, drum: np.ndarray, payout: float) -> None:
-    """Lay a line as it hangs, at all levels of time: at rest, or carried along by ends that move at `tow` and `drum`.
-
-    Args:
-        line: with room for its segments; filled, relative to the second end.
-        held: the equilibrium.
-        tow: velocity of its first end (3,); even along the cable to the other. [m/s]
-        drum: velocity of its second end (3,). [m/s]
-        payout: rate at which cable enters at the second end. [m/s]
-    """
-    ends, N = line.ends, held.segment_lengths.size
-    ends.count, ends.time, ends.previous_step, ends.drum_mode = N, 0.0, 0.0, TURNING
-    line.length[1 : N + 1] = held.segment_lengths
-    ends.settled, ends.last_length[:] = held.segment_lengths[:-1].sum(), held.segment_lengths[-1]
-    ends.payout[:] = payout
-    along = np.concatenate([[0.0], np.cumsum(held.segment_lengths)]) / held.length
-    line.position[:, : N + 1] = held.shape - held.shape[-1]
-    line.velocity[:, : N + 1] = tow + along[:, None] * (np.asarray(drum) - tow)
-    line.tension[:, 1 : N + 1], line.node_tension[: N + 1] = held.segment_tensions, held.tensions
-    ends.tow_force[:], ends.drum_pull = held.tow_force, held.tensions[-1]
-
-
 def _checked_ends(ends: Sequence[Place] | np.ndarray) -> np.ndarray:
     """Return the ends as finite numbers (2, 3)."""
     try:
@@ -259,7 +200,8 @@ def _checked_start(start: Place, places: np.ndarray) -> np.ndarray:
     if nodes.ndim != 2 or nodes.shape[0] < 2 or nodes.shape[1] != 3 or not np.isfinite(nodes).all():
         message = f"hold: start must be finite node positions (n, 3), two at least; got shape {nodes.shape}."
         raise HoldError(message)
-    return nodes - places[1]
+    from_second_end: np.ndarray = nodes - places[1]
+    return from_second_end
 
 
 def _between(places: np.ndarray, length: float, count: int) -> Line:

@@ -1,16 +1,13 @@
-"""What a cable and a drum are: values with units, and the plain numbers that compiled code takes.
+"""What a cable is: values with units, and the plain numbers that compiled code takes.
 
-Symbols are those of Feng & Allen (2004), section 2.2; defaults are their Table 1 and section 4. The drum's
-moment of inertia I_d is not printed there: 0 makes the tension at a frictionless drum exactly zero.
+Symbols are those of Feng & Allen (2004), section 2.2; defaults are their Table 1.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, fields
 from math import isfinite, sqrt
 from typing import Any, NamedTuple
-
-import numpy as np
 
 from subzero.errors import BadValueError, checked
 from subzero.jit import packed
@@ -44,24 +41,8 @@ class StiffCableNumbers(NamedTuple):
     normal_drag: float
 
 
-@dataclass
-class DrumNumbers:
-    """The drum as compiled code sees it, at the cable.
-
-    Attributes:
-        inertia: I_d/R_d². [kg]
-        friction: C_f/R_d. [N]
-        control: who decides on the pay-out, see `cable.drum`.
-        setpoint: what is asked for at the new time: length [m] or tension [N]; without meaning for a free drum.
-        place, velocity: of the drum at the new time, relative to its place at the start (3,). [m], [m/s]
-    """
-
-    inertia: float
-    friction: float
-    control: int
-    setpoint: float
-    place: np.ndarray = field(default_factory=lambda: np.zeros(3))
-    velocity: np.ndarray = field(default_factory=lambda: np.zeros(3))
+ABOVE_ZERO = ("water_density", "mass_per_length", "cross_section_area", "diameter")
+"""Without these it is no cable; everything else may be zero."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -97,7 +78,10 @@ class CableProperties:
 
     def __post_init__(self) -> None:
         """Refuse what cannot be a cable."""
-        _check(self, above_zero=("water_density", "mass_per_length", "cross_section_area", "diameter"))
+        for each in fields(self):
+            above = 0.0 if each.name in ABOVE_ZERO else None
+            value = checked(type(self).__name__, each.name, getattr(self, each.name), least=0.0, above=above)
+            object.__setattr__(self, each.name, value)
 
     @property
     def virtual_mass_per_length(self) -> float:
@@ -140,46 +124,6 @@ class CableProperties:
         if self.bending_stiffness > 0.0:
             return _finite("CableProperties", StiffCableNumbers(self.bending_stiffness, *numbers))
         return _finite("CableProperties", numbers)
-
-
-@dataclass(frozen=True, kw_only=True)
-class DrumProperties:
-    """The drum on the shore that the cable is pulled off, equation (11).
-
-    Attributes:
-        radius: R_d. [m]
-        inertia: I_d; acts like an extra towed mass I_d/R_d². [kg m²]
-        friction_torque: C_f, Coulomb friction between drum and pivot, while it turns; when the drum stands it
-            holds the cable up to the tension C_f/R_d. [N m]
-
-    Raises:
-        subzero.UserError: a value that is not a finite number, or not in its physical range (a ValueError, too).
-    """
-
-    radius: float = 0.1
-    inertia: float = 0.0
-    friction_torque: float = 0.0
-
-    def __post_init__(self) -> None:
-        """Refuse what cannot be a drum."""
-        _check(self, above_zero=("radius",))
-
-    def numbers(self) -> DrumNumbers:
-        """Return the plain numbers that compiled code takes."""
-        inertia, friction = self.inertia / self.radius / self.radius, self.friction_torque / self.radius
-        if not isfinite(inertia + friction):
-            raise BadValueError(
-                f"DrumProperties: radius is {self.radius:g}; so small that inertia and friction are not finite."
-            )
-        return packed(DrumNumbers(inertia, friction, 0, 0.0))
-
-
-def _check(thing: CableProperties | DrumProperties, above_zero: tuple[str, ...]) -> None:
-    """Keep every field as a float, or raise a `BadValueError` that names the first that cannot be; none is negative."""
-    for each in fields(thing):
-        above = 0.0 if each.name in above_zero else None
-        value = checked(type(thing).__name__, each.name, getattr(thing, each.name), least=0.0, above=above)
-        object.__setattr__(thing, each.name, value)
 
 
 def _finite(name: str, numbers: Any) -> Any:

@@ -1,6 +1,6 @@
-"""What a run of the cable is given: the ways of its ends, sampled from velocities, and its numbers, checked.
+"""The ways of a cable's ends, sampled from their velocities, and whether there is room to follow them.
 
-`cable.pull_out` and `cable.tow` share it, and every scheme samples its paths here, so all of them run the same way.
+Every scheme samples its paths here, so all of them run the same way.
 """
 
 from __future__ import annotations
@@ -10,11 +10,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cable.current import Current
 from cable.memory import refuse_unless_it_fits
-from subzero.errors import BadValueError, checked, real, short
+from subzero.errors import BadValueError, real, short
 
-TowVelocity = Callable[[float], Sequence[float] | np.ndarray]
+Velocity = Callable[[float], Sequence[float] | np.ndarray]
+"""Function of time [s] that gives a velocity north, east, down (3,). [m/s]"""
 
 REST = 1e-12
 """Slower than this is at rest. [m/s]"""
@@ -22,8 +22,6 @@ GAUSS = ((-np.sqrt(0.15), 5.0 / 18.0), (0.0, 8.0 / 18.0), (np.sqrt(0.15), 5.0 / 
 """Offsets and weights of three-point Gauss quadrature on a step of length one: no time at which a motion may jump."""
 MOMENT = 1e-9
 """Just before and just after, as a share of the step."""
-FINEST, COARSEST = 1e-12, 1e-3
-"""Between these a tolerance makes sense: rounding is below, and the error of a step above."""
 
 
 class TowPath(NamedTuple):
@@ -41,7 +39,7 @@ class TowPath(NamedTuple):
     arriving: np.ndarray
 
 
-def sample_path(velocity: TowVelocity, duration: float, step: float, name: str = "tow_velocity") -> TowPath:
+def sample_path(velocity: Velocity, duration: float, step: float, name: str = "tow_velocity") -> TowPath:
     """Return the way of a point that moves at `velocity`, from 0: places by Gauss quadrature of order six.
 
     Velocities are taken just after and just before the times: the motion may change abruptly at a recorded time.
@@ -67,7 +65,13 @@ def first_direction(velocity: np.ndarray) -> np.ndarray:
     moving = np.flatnonzero(speeds > REST)
     if moving.size == 0:
         return np.array([1.0, 0.0, 0.0])
-    return velocity[moving[0]] / speeds[moving[0]]
+    direction: np.ndarray = velocity[moving[0]] / speeds[moving[0]]
+    return direction
+
+
+def length_of_way(place: np.ndarray) -> float:
+    """Return the length of the way through places (n, 3). [m]."""
+    return float(np.linalg.norm(np.diff(place, axis=0), axis=1).sum())
 
 
 MOST_SEGMENTS = 10_000_000
@@ -88,7 +92,7 @@ def segments_needed(length: float, segment_length: float, grading: float) -> int
 def _segments_needed(length: float, segment_length: float, grading: float) -> float:
     if grading * length < segment_length:
         return length // segment_length + 8
-    return np.log1p(grading * length / segment_length) // np.log1p(grading) + 12
+    return float(np.log1p(grading * length / segment_length) // np.log1p(grading) + 12)
 
 
 BYTES_A_NODE = 32.0
@@ -103,45 +107,6 @@ def check_memory(rows: int, segments: int) -> None:
     size = rows * (segments + 2.0) * BYTES_A_NODE + segments * BYTES_A_SEGMENT
     what = f"A run of {rows} results with up to {segments} segments each"
     refuse_unless_it_fits(size, what, SHORTEN)
-
-
-def check_kinds(**wanted: tuple[object, tuple[type, ...]]) -> None:
-    """Refuse an argument, name → (value, kinds), that is of none of its kinds."""
-    for name, (value, kinds) in wanted.items():
-        if not isinstance(value, kinds):
-            words = " or ".join(kind.__name__ for kind in kinds)
-            raise BadValueError(
-                f"{name} is {short(value)}, of type {type(value).__name__}; it must be {words}."
-            )
-
-
-def check_motion(name: str, velocity: object) -> None:
-    """Refuse a motion that is no function of time."""
-    if not callable(velocity):
-        raise BadValueError(
-            f"{name} is {short(velocity)}; it must be a function of time that gives a velocity."
-        )
-
-
-SHORTEST_S = 1e-9
-"""A run or a step that is shorter cannot be halved where it is difficult: what it is halved to is rounded away. [s]"""
-
-
-def checked_time(name: str, value: float) -> float:
-    """Return a duration or a step as a float; refuse one that is too short to be halved."""
-    return checked("", name, value, least=SHORTEST_S, unit="s")
-
-
-def check_tolerance(tolerance: float) -> float:
-    """Return a tolerance as a float; refuse one that a step cannot be solved to."""
-    return checked("", "tolerance", tolerance, least=FINEST, most=COARSEST)
-
-
-def current_of(current: Sequence[float] | np.ndarray | Current | None) -> Current:
-    """Return a current from what users give: nothing, three numbers, or a current."""
-    if isinstance(current, Current):
-        return current
-    return Current.uniform(np.zeros(3) if current is None else current)
 
 
 def _three_numbers(

@@ -15,8 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cable.drum import LENGTH, TENSION
-from cable.properties import DrumNumbers
+from cable.drum import LENGTH, TENSION, DrumNumbers
 from subzero.errors import BadValueError, checked, real, short
 from subzero.jit import packed
 

@@ -114,7 +114,8 @@ def held(time: np.ndarray, values: np.ndarray, at: np.ndarray | float) -> np.nda
     Returns:
         shape of `at`, then that of a row.
     """
-    return np.asarray(values, dtype=float)[holding_rows(time, at)]
+    found: np.ndarray = np.asarray(values, dtype=float)[holding_rows(time, at)]
+    return found
 
 
 def fitting_step(span: float, longest: float) -> float:

@@ -23,7 +23,7 @@ from rich.console import Console
 import scenarios
 from subzero import cli_autopilot, cli_diagnosis, cli_sweep
 from subzero.errors import UserError, printable
-from subzero.interrupts import INTERRUPTED, came, words
+from subzero.interrupts import INTERRUPTED, begin, came, words
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -171,6 +171,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         arguments: words behind ``subzero``; those of this process if None.
     """
     _never_choke(sys.stdout, sys.stderr)
+    begin()
     _note_command(sys.argv[1:] if arguments is None else arguments)
     try:
         command, bound, _ = app.parse_args(arguments, exit_on_error=False, print_error=False)

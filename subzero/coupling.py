@@ -5,7 +5,7 @@ the cable is solved for the place to which that takes the tow point; F_{n+1} is 
 
     G(F) = F_cable(x_tow(F)) − F = 0
 
-Newton's method solves it, with the cable's own ∂F/∂x (`cable.moving_end.tow_boundary.impedance`) and the hull's ∂x/∂F
+Newton's method solves it, with the cable's own ∂F/∂x (`cable.moving_end.time_step.impedance`) and the hull's ∂x/∂F
 = (h²/2) A, A the inverse mass at the tow point; two to three evaluations do. An exchange that does not converge is
 tried again in halves.
 

@@ -8,8 +8,8 @@ import numpy as np
 
 import scenarios
 from cable.current import Current
+from cable.drum import DrumProperties
 from cable.drum_motion import PLACE, SETPOINT, VELOCITY, resting
-from cable.properties import DrumProperties
 from cable.winch import Brake, ConstantTension, PayOutRate, Winch
 from subzero.model import Model
 

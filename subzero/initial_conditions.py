@@ -11,9 +11,19 @@ import scenarios
 import vehicle
 from cable.drum import FREE, LENGTH
 from cable.drum_motion import SETPOINT, lead_drum
-from cable.hold import hold, lay_held
-from cable.moving_end import FLOWS, NOW, Line, energy_flow, lay_straight, new_line, new_load, start_in_water
-from cable.pull_out import START_LENGTH
+from cable.hold import hold
+from cable.moving_end import (
+    FLOWS,
+    NOW,
+    Line,
+    energy_flow,
+    lay_held,
+    lay_straight,
+    new_line,
+    new_load,
+    start_in_water,
+)
+from cable.task import START_LENGTH
 from subzero.environment import drum_of, water_of, way_of_drum
 from subzero.external_force import MissingForce
 from subzero.jit import compiled, packed

@@ -75,6 +75,12 @@ def leave(code: int) -> Never:
     os._exit(code)
 
 
+def begin() -> None:
+    """Forget what a former command of this process has left, and that it was interrupted."""
+    _left.clear()
+    _raised[0] = False
+
+
 def came() -> bool:
     """Say whether a signal came: an error behind it may be its doing, as machine code makes its own of an interrupt."""
     return _raised[0]

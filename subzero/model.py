@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import scenarios
-from cable.properties import CableProperties, DrumProperties
+from cable import CableProperties, DrumProperties
 from subzero.errors import BadValueError, real, short, suggestion
 from subzero.external_force import MissingForce
 from vehicle import Vehicle, from_mapping, to_mapping

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 COMMAND: ContextVar[str] = ContextVar("COMMAND", default="")
 """The line of the shell that is being carried out; a page says it, so that its reader can do it again."""
 
-RUN_FILES = (*("tethered.nc", "tethered.csv", "untethered.nc", "untethered.csv", "summary.json"),
+RUN_FILES = (*("tethered.nc", "tethered.csv", "untethered.nc", "untethered.csv", "summary.json", "report.html"),
              *("fig4.png", "fig5.png", "fig6.png", "attitude.png", "cable.png", "forces.png"),
              *("deployment.png", "measured.png", "manoeuvre.png", "replay.gif", "replay.mp4"))  # fmt: skip
 """Files of runs; `subzero.figures.draw` names the figures."""

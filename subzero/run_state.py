@@ -8,8 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from cable.current import Water
+from cable.drum import DrumNumbers
 from cable.moving_end import FLOWS, Line, Load
-from cable.properties import CableNumbers, DrumNumbers
+from cable.properties import CableNumbers
 from subzero.jit import packed
 from vehicle import VehicleNumbers
 

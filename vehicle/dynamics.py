@@ -32,7 +32,7 @@ from vehicle.state import CHARGE, LINKAGE, SERVO, SHAFT
 from vehicle.terms import BREAKDOWN, POWER_OF_TERM, TERM_COUNT, fill_terms
 
 if TYPE_CHECKING:
-    from vehicle.vehicle import Vehicle
+    from vehicle.vehicle import Vehicle, VehicleNumbers
 
 POWERS = ("propeller", "loss", "restoring", "external")
 """What `power` fills: thrust and reaction torque; fins, lift and drag; weight and buoyancy; from outside."""
@@ -57,7 +57,9 @@ def surge_through_water(state: np.ndarray, current_n: np.ndarray) -> float:
 
 
 @compiled
-def deflections(state, command, numbers):
+def deflections(
+    state: np.ndarray, command: np.ndarray, numbers: VehicleNumbers
+) -> tuple[float, float, float]:
     """Return the angles of rudder, port and starboard plane in the water [rad], after backlash."""
     servos = numbers.servos
     rudder = fin_angle(state[SERVO], state[LINKAGE], command[1], servos[0])
@@ -67,7 +69,16 @@ def deflections(state, command, numbers):
 
 
 @compiled
-def evaluate(state, command, current_n, wrench_b, numbers, R, nu_r, out):
+def evaluate(
+    state: np.ndarray,
+    command: np.ndarray,
+    current_n: np.ndarray,
+    wrench_b: np.ndarray,
+    numbers: VehicleNumbers,
+    R: np.ndarray,
+    nu_r: np.ndarray,
+    out: np.ndarray,
+) -> None:
     """Fill R_nb (3, 3), nu_r (6,) and all terms (terms, 6) of a state."""
     rotation(state[3:7], R)
     relative_velocity(state, R, current_n, nu_r)
@@ -76,7 +87,9 @@ def evaluate(state, command, current_n, wrench_b, numbers, R, nu_r, out):
 
 
 @compiled
-def actuators(state, command, u, numbers, out):
+def actuators(
+    state: np.ndarray, command: np.ndarray, u: float, numbers: VehicleNumbers, out: np.ndarray
+) -> None:
     """Fill the rates of shaft, servos, charge and linkages; u is the surge speed through the water [m/s]."""
     motor, propeller = numbers.motor, numbers.propeller
     goal = shaft_goal(state[SHAFT], state[CHARGE], command[0], u, motor, propeller)
@@ -88,7 +101,14 @@ def actuators(state, command, u, numbers, out):
 
 
 @compiled
-def derivative(state, command, current_n, wrench_b, numbers, out):
+def derivative(
+    state: np.ndarray,
+    command: np.ndarray,
+    current_n: np.ndarray,
+    wrench_b: np.ndarray,
+    numbers: VehicleNumbers,
+    out: np.ndarray,
+) -> None:
     """Fill out (STATE_SIZE,) with the rate of the state.
 
     Args:
@@ -116,20 +136,29 @@ def derivative(state, command, current_n, wrench_b, numbers, out):
 
 
 @compiled
-def breakdown(state, command, current_n, wrench_b, numbers, out):
+def breakdown(
+    state: np.ndarray,
+    command: np.ndarray,
+    current_n: np.ndarray,
+    wrench_b: np.ndarray,
+    numbers: VehicleNumbers,
+    out: np.ndarray,
+) -> None:
     """Fill out (len(BREAKDOWN), 6) with every named term [N, N m], M ν' in sum. Arguments: `derivative`."""
     evaluate(state, command, current_n, wrench_b, numbers, scratch(3, 3), scratch(1, 6)[0], out)
 
 
 @compiled
-def finish_step(state, command, numbers):
+def finish_step(state: np.ndarray, command: np.ndarray, numbers: VehicleNumbers) -> None:
     """Tidy a state after a step: quaternion to length one, linkages behind their servos."""
     normalise(state)
     settle(state, command, numbers.servos)
 
 
 @compiled
-def battery_voltage(state, command, current_n, numbers):
+def battery_voltage(
+    state: np.ndarray, command: np.ndarray, current_n: np.ndarray, numbers: VehicleNumbers
+) -> float:
     """Return the battery voltage under load [V]."""
     u = surge_through_water(state, current_n)
     motor, propeller = numbers.motor, numbers.propeller
@@ -138,7 +167,14 @@ def battery_voltage(state, command, current_n, numbers):
 
 
 @compiled
-def power(state, command, current_n, wrench_b, numbers, out):
+def power(
+    state: np.ndarray,
+    command: np.ndarray,
+    current_n: np.ndarray,
+    wrench_b: np.ndarray,
+    numbers: VehicleNumbers,
+    out: np.ndarray,
+) -> None:
     """Fill out (len(POWERS),) with the powers on the hull relative to the water [W].
 
     Args:
@@ -161,7 +197,7 @@ def power(state, command, current_n, wrench_b, numbers, out):
 
 
 @compiled
-def kinetic_energy(state, current_n, numbers):
+def kinetic_energy(state: np.ndarray, current_n: np.ndarray, numbers: VehicleNumbers) -> float:
     """Return ½ ν_rᵀ M ν_r, hull and added mass together [J]."""
     R, nu_r = scratch(3, 3), scratch(1, 6)[0]
     rotation(state[3:7], R)
@@ -174,7 +210,7 @@ def kinetic_energy(state, current_n, numbers):
 
 
 @compiled
-def potential_energy(state, numbers):
+def potential_energy(state: np.ndarray, numbers: VehicleNumbers) -> float:
     """Return the potential energy of weight and buoyancy [J]."""
     R = scratch(3, 3)
     rotation(state[3:7], R)

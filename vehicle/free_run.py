@@ -32,7 +32,14 @@ class FreeRun(NamedTuple):
 
 
 @compiled
-def rates(y, command, current_n, wrench_b, numbers, out):
+def rates(
+    y: np.ndarray,
+    command: np.ndarray,
+    current_n: np.ndarray,
+    wrench_b: np.ndarray,
+    numbers: VehicleNumbers,
+    out: np.ndarray,
+) -> None:
     """Fill out (SIZE,) with the rates of the state and of the works."""
     state = y[:STATE_SIZE]
     derivative(state, command, current_n, wrench_b, numbers, out[:STATE_SIZE])
@@ -40,7 +47,17 @@ def rates(y, command, current_n, wrench_b, numbers, out):
 
 
 @compiled
-def rk4_step(y, step, command, current_n, wrench_b, numbers, k, stage, out):
+def rk4_step(
+    y: np.ndarray,
+    step: float,
+    command: np.ndarray,
+    current_n: np.ndarray,
+    wrench_b: np.ndarray,
+    numbers: VehicleNumbers,
+    k: np.ndarray,
+    stage: np.ndarray,
+    out: np.ndarray,
+) -> None:
     """Fill out (SIZE,) with y one step later [s]; k (4, SIZE) and stage (SIZE,) are scratch."""
     rates(y, command, current_n, wrench_b, numbers, k[0])
     for i in range(1, 4):
@@ -54,7 +71,14 @@ def rk4_step(y, step, command, current_n, wrench_b, numbers, k, stage, out):
 
 
 @allocating
-def march(commands, step, current_n, wrench_b, numbers, history):
+def march(
+    commands: np.ndarray,
+    step: float,
+    current_n: np.ndarray,
+    wrench_b: np.ndarray,
+    numbers: VehicleNumbers,
+    history: np.ndarray,
+) -> None:
     """Fill history (n + 1, SIZE) from its first row on, one command of commands (n, 4) a step."""
     k, stage = np.empty((4, SIZE)), np.empty(SIZE)
     for i in range(commands.shape[0]):

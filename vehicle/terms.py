@@ -14,7 +14,7 @@ at the same place in `fill_terms`.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -28,6 +28,9 @@ from vehicle.fins import rudder, stern_plane
 from vehicle.propeller import propeller
 from vehicle.restoring import restoring
 from vehicle.rigid_body import coriolis
+
+if TYPE_CHECKING:
+    from vehicle.vehicle import VehicleNumbers
 
 INERTIAL, PROPULSION, LOSS, RESTORING, EXTERNAL = -1, 0, 1, 2, 3
 """What a term does to the energy: nothing, or which entry of `energy.POWERS` its power belongs to."""
@@ -75,7 +78,16 @@ def turning_current(nu: np.ndarray, nu_r: np.ndarray, mass_matrix: np.ndarray, o
 
 
 @compiled
-def fill_terms(nu, nu_r, R, n, angles, wrench_b, numbers, out):
+def fill_terms(
+    nu: np.ndarray,
+    nu_r: np.ndarray,
+    R: np.ndarray,
+    n: float,
+    angles: tuple[float, float, float],
+    wrench_b: np.ndarray,
+    numbers: VehicleNumbers,
+    out: np.ndarray,
+) -> None:
     """Fill out (terms, 6) with every term of TERMS, in that order [N, N m].
 
     Args:

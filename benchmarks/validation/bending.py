@@ -54,11 +54,10 @@ def at_rest(stiffness: float, segments: int) -> cable.History:
     run = cable.pull_out(
         lambda _t: (0.0, 0.0, 0.0),
         100.0,
-        0.5,
-        segment_length=LENGTH / segments,
         cable=beam(stiffness),
+        start=LENGTH,
         drum=cable.ConstantTension(tension=HELD),
-        wet_length=LENGTH,
+        scheme=cable.MovingEnd(time_step=0.5, segment_length=LENGTH / segments),
     )
     if not run.outcome.completed:
         raise RuntimeError(run.outcome.message)

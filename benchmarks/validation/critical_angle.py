@@ -44,7 +44,13 @@ def compare(run: cable.History, speed: float, c: cable.CableProperties, name: st
 
 def staying(speed: float, c: cable.CableProperties, name: str) -> list[Row]:
     """Start at the critical angle."""
-    run = cable.tow(lambda _: (speed, 0.0, 0.0), 30.0, 10.0, 0.1, segment_length=0.3, cable=c)
+    run = cable.tow(
+        lambda _: (speed, 0.0, 0.0),
+        30.0,
+        10.0,
+        cable=c,
+        scheme=cable.MovingEnd(time_step=0.1, segment_length=0.3),
+    )
     return compare(run, speed, c, f"{name}, {speed:g} m/s", 1e-6)
 
 
@@ -54,9 +60,8 @@ def finding(speed: float, length: float = 10.0) -> list[Row]:
         lambda t: (speed * (1.0 + 0.5 * np.cos(0.1 * np.pi * min(t, 5.0)) ** 2), 0.0, 0.0),
         length,
         40.0 * length / speed,
-        0.2 / speed,
-        segment_length=length / 100,
         cable=HEAVY,
+        scheme=cable.MovingEnd(time_step=0.2 / speed, segment_length=length / 100),
     )
     return compare(run, speed, HEAVY, f"heavy, from {1.5 * speed:g} to {speed:g} m/s", 1e-4)
 

@@ -55,11 +55,10 @@ def tension_run(segments: int) -> cable.History:
     return cable.pull_out(
         going_to((SPAN, 0.0, 0.0)),
         200.0,
-        0.5,
-        segment_length=LENGTH / segments,
         cable=NO_SKIN,
-        drum=cable.ConstantTension(tension=WINCH_TENSION),
         current=(0.0, CURRENT, 0.0),
+        drum=cable.ConstantTension(tension=WINCH_TENSION),
+        scheme=cable.MovingEnd(time_step=0.5, segment_length=LENGTH / segments),
     )
 
 

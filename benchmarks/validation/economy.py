@@ -37,7 +37,9 @@ def towed(step: float, rtol: float, heavy: bool = True) -> cable.History:
     """Tow a cable into a helix."""
     way = MANOEUVRES["helix"]
     properties = cable.CableProperties(mass_per_length=0.01) if heavy else None
-    return cable.tow(way.velocity, 30.0, way.duration, step, cable=properties, rtol=rtol)
+    return cable.tow(
+        way.velocity, 30.0, way.duration, cable=properties, scheme=cable.MovingEnd(time_step=step, rtol=rtol)
+    )
 
 
 def step_error(step: float, rtol: float, heavy: bool = True) -> float:
@@ -67,7 +69,9 @@ def winding(t: float) -> tuple[float, float, float]:
 def paid_out(grading: float) -> cable.History:
     """Wind along for ten minutes."""
     drum = cable.DrumProperties(friction_torque=0.005)
-    return cable.pull_out(winding, 600.0, 0.5, segment_length=1.0, grading=grading, drum=drum)
+    return cable.pull_out(
+        winding, 600.0, drum=drum, scheme=cable.MovingEnd(time_step=0.5, segment_length=1.0, grading=grading)
+    )
 
 
 def graded_error(grading: float) -> float:

@@ -43,7 +43,7 @@ def softly(t: float) -> tuple[float, float, float]:
     return north, east, down * ramp(t / 3.0)
 
 
-UMBILICAL = MANOEUVRES["umbilical"].settings | {"wet_length": 0.0}
+UMBILICAL = MANOEUVRES["umbilical"].settings | {"start": 0.0}
 RUNS = {name: MANOEUVRES[name] for name in ("dive", "helix")}
 RUNS["umbilical"] = Manoeuvre(softly, 28.0, UMBILICAL)
 RUNS["elastic helix"] = Manoeuvre(MANOEUVRES["helix"].velocity, 24.0, ELASTIC)

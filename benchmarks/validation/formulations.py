@@ -30,8 +30,9 @@ from .row import Row, order_row
 
 def history(way: Manoeuvre, scheme: str, segment_length: float, step: float) -> cable.History:
     """Return the run of a manoeuvre with a formulation."""
-    settings = {"segment_length": segment_length, "scheme": scheme, **way.settings}
-    return cable.pull_out(way.velocity, way.duration, step, **settings)
+    kind = type(cable.SCHEMES[scheme].options)
+    options = kind(time_step=step, segment_length=segment_length)
+    return cable.pull_out(way.velocity, way.duration, scheme=options, **way.settings)
 
 
 @cache

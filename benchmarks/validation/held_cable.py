@@ -40,11 +40,10 @@ def held(
     run = cable.pull_out(
         going_to(place),
         120.0,
-        0.5,
-        segment_length=length / segments,
         cable=properties,
-        drum=cable.PayOutRate(rate=lambda t: length * share_per_second(t)),
         current=current,
+        drum=cable.PayOutRate(rate=lambda t: length * share_per_second(t)),
+        scheme=cable.MovingEnd(time_step=0.5, segment_length=length / segments),
     )
     if not run.outcome.completed:
         raise RuntimeError(run.outcome.message)

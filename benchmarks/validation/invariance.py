@@ -71,10 +71,11 @@ def later(wait: float = 4.0) -> Row:
 def drifting(name: str, drum: cable.DrumProperties | cable.ConstantTension, gate: float) -> Row:
     """Compare the forces of a manoeuvre with those of the same on a drum that drifts with the water."""
     rest, moved = (
-        cable.pull_out(
-            lambda t, V=V: manoeuvre(t) + V, 10.0, cable=HEAVY, drum=drum, current=STREAM + V, **boat
+        cable.pull_out(lambda t, V=V: manoeuvre(t) + V, 10.0, cable=HEAVY, drum=held, current=STREAM + V)
+        for V, held in (
+            (np.zeros(3), drum),
+            (DRIFT, cable.MovingDrum(velocity=lambda _t: DRIFT, drum=drum)),
         )
-        for V, boat in ((np.zeros(3), {}), (DRIFT, {"drum_velocity": lambda _t: DRIFT}))
     )
     what = f"everything drifts at {np.linalg.norm(DRIFT):.2f} m/s, {name}"
     row = worst_vector(what, moved.tow_force[2:], rest.tow_force[2:], gate)

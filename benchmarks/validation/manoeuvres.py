@@ -88,7 +88,7 @@ MANOEUVRES = {
             "cable": UMBILICAL,
             "current": SHEARED,
             "drum": cable.ConstantTension(tension=60.0),
-            "wet_length": 4.0,
+            "start": 4.0,
         },
     ),
 }

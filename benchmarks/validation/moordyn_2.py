@@ -82,7 +82,7 @@ def straight_tow() -> list[Row]:
 
 def paid_out(segments: int) -> Row:
     """Compare a straight pull from 10 m to 30 m, with our free drum and MoorDyn's rate of length."""
-    run = cable.pull_out(straight, 20.0, wet_length=10.0)
+    run = cable.pull_out(straight, 20.0, start=10.0)
     peer = recorded()[f"paid out, {segments}"]
     name = f"paid out straight to 30 m, {segments} of MoorDyn's segments: T(0)/(½ρπdC_tU²S)"
     exact = NEUTRAL.tangential_drag * 30.0

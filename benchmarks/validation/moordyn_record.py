@@ -63,7 +63,11 @@ class Trial:
     def ours(self, step: float = 0.025) -> cable.History:
         """Return our run, with segments of 0.1 m."""
         return cable.tow(
-            self.velocity, LENGTH, self.delay + DURATION, step, segment_length=0.1, cable=self.wire
+            self.velocity,
+            LENGTH,
+            self.delay + DURATION,
+            cable=self.wire,
+            scheme=cable.MovingEnd(time_step=step, segment_length=0.1),
         )
 
     def theirs(self, segments: int) -> Towed:

@@ -27,9 +27,8 @@ def to_and_fro(step: float) -> tuple[cable.History, np.ndarray]:
     run = cable.pull_out(
         lambda t: (np.sin(rate * t), 0.0, 0.0),
         PERIOD,
-        step,
-        segment_length=0.127,
         drum=cable.ConstantTension(tension=WINCH_TENSION),
+        scheme=cable.MovingEnd(time_step=step, segment_length=0.127),
     )
     u, length = np.sin(rate * run.time), (1.0 - np.cos(rate * run.time)) / rate + 1e-6
     load = TABLE_1.tangential_drag * u * np.abs(u) + TABLE_1.mass_per_length * rate * np.cos(rate * run.time)
@@ -63,10 +62,9 @@ def hanging_rows() -> list[Row]:
     run = cable.pull_out(
         going_to((9.0, 0.0, 0.0)),
         200.0,
-        0.5,
-        segment_length=0.1,
         cable=HEAVY,
         drum=cable.PayOutRate(rate=rate),
+        scheme=cable.MovingEnd(time_step=0.5, segment_length=0.1),
     )
     if not run.outcome.completed:
         raise RuntimeError(run.outcome.message)

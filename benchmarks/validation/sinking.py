@@ -36,7 +36,12 @@ def sinking(step: float, follows: bool) -> cable.History:
         return SPEED, 0.0, TERMINAL * np.tanh(t / TAU) if follows else 0.0
 
     return cable.tow(
-        velocity, LENGTH, 2.0, step, segment_length=LENGTH / 100, cable=HEAVY, drogue_drag_area=1e-9
+        velocity,
+        LENGTH,
+        2.0,
+        cable=HEAVY,
+        drogue_drag_area=1e-9,
+        scheme=cable.MovingEnd(time_step=step, segment_length=LENGTH / 100),
     )
 
 

@@ -12,11 +12,12 @@ import numpy as np
 
 from cable import Brake, CableProperties, Current
 from cable.current import Water
+from cable.drum import DrumNumbers
 from cable.moving_end.initial_shape import start_in_water
+from cable.moving_end.remeshing import accept
 from cable.moving_end.segment_load import Load, new_load
 from cable.moving_end.state import NOW, Line, new_line
-from cable.moving_end.time_step import accept, try_step
-from cable.properties import DrumNumbers
+from cable.moving_end.time_step import try_step
 
 STILL = Current.uniform((0.0, 0.0, 0.0))
 

@@ -40,7 +40,11 @@ def constant(speed: float, step: float, name: str) -> Row:
     """Pull 100 segments off a drum at a constant speed."""
     drum = DRUMS[name]
     run = cable.pull_out(
-        lambda _: (speed, 0.0, 0.0), 30.0 / speed, step, segment_length=0.3, cable=TABLE_1, drum=drum
+        lambda _: (speed, 0.0, 0.0),
+        30.0 / speed,
+        cable=TABLE_1,
+        drum=drum,
+        scheme=cable.MovingEnd(time_step=step, segment_length=0.3),
     )
     setting = Setting(f"constant {speed:g} m/s, {step:g} s, {name}", SOURCE, 1e-6)
     reference = exact(np.full(run.time.size, speed), np.zeros(run.time.size), run, drum)
@@ -58,7 +62,10 @@ def accelerating(step: float, name: str) -> Row:
     """Pull cable off a drum while speeding up, in segments of 0.3 m."""
     drum = DRUMS[name]
     run = cable.pull_out(
-        lambda t: (float(speed_up(t)[0]), 0.0, 0.0), 0.8 * TIMES, step, segment_length=0.3, drum=drum
+        lambda t: (float(speed_up(t)[0]), 0.0, 0.0),
+        0.8 * TIMES,
+        drum=drum,
+        scheme=cable.MovingEnd(time_step=step, segment_length=0.3),
     )
     setting = Setting(f"0.6 to 1.37 m/s, {step:g} s, {name}", SOURCE, 1e-4)
     reference = exact(*speed_up(run.time), run, drum)

@@ -34,8 +34,7 @@ def turning(radius: float, segments: int = 100, step: float = 1.0 / 300.0) -> ca
         lambda t: (SPEED * np.cos(rate * t), SPEED * np.sin(rate * t), 0.0),
         LENGTH,
         5.0 * LENGTH / SPEED + 2.0 * np.pi / rate,
-        step / rate,
-        segment_length=LENGTH / segments,
+        scheme=cable.MovingEnd(time_step=step / rate, segment_length=LENGTH / segments),
     )
 
 

@@ -1,22 +1,24 @@
 """Equation (7) of Feng and Allen (2004) in its angles: the printed scheme (20)-(26), and a box scheme of our own.
 
-`scheme="paper"` and its readings, `scheme="equation7"`. Loaded only when one of them is asked for. What may be used
+`cable.Paper` and `cable.Equation7`. Loaded only when one of them is asked for. What may be used
 from outside, to run a vehicle on the printed scheme, stands in `__all__`.
 """
 
 from cable.feng_allen.box_equations import Ends
-from cable.feng_allen.box_history import START
 from cable.feng_allen.box_newton import (
     CONVERGED,
+    NOTHING,
     OUTCOMES,
     ROW_NAMES,
+    START,
     BoxWorkspace,
     NewtonReport,
     box_workspace,
+    start_paper,
     told,
 )
 from cable.feng_allen.equation7 import Equation7Numbers, angles_of, equation7_numbers, tangent
-from cable.feng_allen.printed_scheme import NOTHING, advance_paper, node_force, start_paper
+from cable.feng_allen.printed_scheme import advance_paper, node_force
 
 __all__ = [
     "CONVERGED",

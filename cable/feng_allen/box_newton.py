@@ -24,7 +24,7 @@ from cable.feng_allen.box_equations import (
     tow_rows,
 )
 from cable.feng_allen.box_solver import CARRIED, RIGHT, SIZE, WINDOW, back_substitute, carry, eliminate
-from cable.feng_allen.equation7 import EQUATIONS, Equation7Numbers
+from cable.feng_allen.equation7 import EQUATIONS, Equation7Numbers, angles_of
 from subzero.jit import compiled, inlined, inner
 
 CONVERGED, STALLED, SINGULAR, NOT_FINITE, FULL, SLACK = 0, 1, 2, 3, 4, 5
@@ -50,6 +50,10 @@ LARGEST_TURN = 1.0
 """No angle moves by more in one iteration. [rad]"""
 
 
+NOTHING = 1e-9
+"""Less cable than this [m] in a step is none: a thousandth of its diameter would be more."""
+
+
 class NewtonReport(NamedTuple):
     """How a step ended: outcome (index into `OUTCOMES`), passes, worst scaled residual and where it is."""
 
@@ -59,6 +63,10 @@ class NewtonReport(NamedTuple):
     node: int
     row: int
     """Index into `ROW_NAMES`."""
+
+
+START = NewtonReport(CONVERGED, 0, 0.0, 0, 0)
+"""The report of the time at which a run starts."""
 
 
 @inlined
@@ -101,6 +109,27 @@ def box_workspace(capacity: int) -> BoxWorkspace:
         window=np.zeros((WINDOW, RIGHT + 1)),
         scratch=box_scratch(),
     )
+
+
+@compiled
+def start_paper(w: BoxWorkspace, north: float, east: float, down: float, friction: float) -> None:
+    """Set the single node of a cable of no length: the tow point at the drum, conditions (8)-(11).
+
+    Args:
+        w: the workspace; node 0 is set, `count` becomes 1.
+        north: velocity of the tow point, earth axes. The cable leaves in the opposite direction. [m/s]
+        east: the same.
+        down: the same.
+        friction: C_f/R_d, the tension that turns the drum. [N]
+    """
+    alpha, beta = angles_of(-north, -east, -down)
+    w.count[0] = 1
+    w.y[0, 0] = friction
+    w.y[0, 1] = -math.sqrt(north * north + east * east + down * down)
+    w.y[0, 2] = 0.0
+    w.y[0, 3] = 0.0
+    w.y[0, 4] = alpha
+    w.y[0, 5] = beta
 
 
 @compiled

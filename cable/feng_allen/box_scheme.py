@@ -26,24 +26,15 @@ The end itself is never touched when the cable gains or loses a node, so tension
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from cable.feng_allen.box_equations import BoxRule, Ends
-from cable.feng_allen.box_history import (
-    START,
-    BoxHistory,
-    BoxRecord,
-    TowVelocity,
-    check_positive,
-    explain,
-    velocity_at,
-)
 from cable.feng_allen.box_newton import (
     CONVERGED,
     FULL,
+    NOTHING,
     SLACK,
     BoxWorkspace,
     NewtonReport,
@@ -51,10 +42,9 @@ from cable.feng_allen.box_newton import (
     copy_nodes,
     scales,
     solve_boxes,
+    start_paper,
 )
-from cable.feng_allen.equation7 import Equation7Numbers, equation7_numbers
-from cable.feng_allen.printed_scheme import NOTHING, start_paper
-from cable.properties import CableProperties, DrumNumbers, DrumProperties
+from cable.feng_allen.equation7 import Equation7Numbers
 from subzero.jit import compiled, inner
 
 GAMMA = 2.0 - math.sqrt(2.0)
@@ -63,8 +53,6 @@ OLD_SHARE = (1.0 - GAMMA) ** 2 * NEW_SHARE
 """The second stage starts from NEW_SHARE y(t + γΔt) − OLD_SHARE y(t)."""
 SLACK_TOLERANCE = 1e-6
 """Tensions below zero by less than this, in units of the cable's force scale, are rounding."""
-MOST_HALVINGS = 6
-"""A failing step is halved this often before the run stops."""
 
 
 @inner
@@ -94,13 +82,13 @@ def refuse_slack(w: BoxWorkspace, report: NewtonReport, ends: Ends, c: Equation7
 
 
 @compiled
-def begin_step(b: MovingEnd, middle: Ends) -> bool:
+def begin_step(b: MovingBoxes, middle: Ends) -> bool:
     """Keep y(t) in ``b.old``, after a cable of no length took the direction of motion; False: no motion."""
     w = b.boxes
     speed = w.y[0, 1]
     is_new = w.count[0] == 2 and w.length[1] <= NOTHING
     if is_new:
-        start_moving_end(b, middle.north, middle.east, middle.down, middle.friction)
+        start_moving_boxes(b, middle.north, middle.east, middle.down, middle.friction)
     copy_nodes(w.y, b.old, w.count[0])
     if is_new:
         b.old[0, 1] = speed
@@ -109,7 +97,7 @@ def begin_step(b: MovingEnd, middle: Ends) -> bool:
 
 
 @compiled
-def first_stage(b: MovingEnd, a: float) -> float:
+def first_stage(b: MovingBoxes, a: float) -> float:
     """Set h = y(t) + ẏ(t)/a, the trapezoidal rule to t + γΔt; return L_h of the last box [m]."""
     w, count = b.boxes, b.boxes.count[0]
     for j in range(count):
@@ -119,7 +107,7 @@ def first_stage(b: MovingEnd, a: float) -> float:
 
 
 @compiled
-def second_stage(b: MovingEnd, length: float, middle_length: float) -> float:
+def second_stage(b: MovingBoxes, length: float, middle_length: float) -> float:
     """Set h = NEW_SHARE y(t + γΔt) − OLD_SHARE y(t), backward differences; return L_h [m]."""
     w = b.boxes
     for j in range(w.count[0]):
@@ -130,12 +118,12 @@ def second_stage(b: MovingEnd, length: float, middle_length: float) -> float:
 
 @compiled
 def box_step(
-    b: MovingEnd, step: float, middle: Ends, new: Ends, segment_length: float, c: Equation7Numbers
+    b: MovingBoxes, step: float, middle: Ends, new: Ends, segment_length: float, c: Equation7Numbers
 ) -> tuple[int, int, float, int, int]:
     """Take one TR-BDF2 step; return its `NewtonReport` as a tuple. On failure ``b`` holds the cable before the step.
 
     Args:
-        b: the cable, started with `start_moving_end`.
+        b: the cable, started with `start_moving_boxes`.
         step: Δt. [s]
         middle: velocity of the tow point at t + γΔt, and the drum.
         new: the same at t + Δt.
@@ -167,82 +155,11 @@ def box_step(
     return CONVERGED if fits else FULL, spent, report.residual, report.node, report.row
 
 
-def pull_out_boxes(
-    tow_velocity: TowVelocity,
-    duration: float,
-    step: float = 0.1,
-    cable: CableProperties | None = None,
-    drum: DrumProperties | None = None,
-    current: Sequence[float] | None = None,
-    *,
-    segment_length: float = 0.5,
-) -> BoxHistory:
-    """Pull cable off the drum along a given motion: the second, independent formulation of second order.
-
-    Args:
-        tow_velocity: velocity of the tow point, earth axes (north, east, down), at a time. [m/s]
-        duration: of the run. [s]
-        step: Δt. [s]
-        cable: the cable; Table 1 by default.
-        drum: the drum; Table 1 by default.
-        current: uniform steady velocity of the water, earth axes. [m/s]
-        segment_length: Δs, independent of the step. [m]
-
-    Returns:
-        The history; a run that cannot go on is cut short and says so in `message`.
-
-    Raises:
-        subzero.UserError: a step, duration or segment length that is not positive, or a velocity that is not finite.
-    """
-    check_positive(duration=duration, step=step, segment_length=segment_length)
-    cable, drum = cable or CableProperties(), drum or DrumProperties()
-    north, east, down = (0.0, 0.0, 0.0) if current is None else (float(x) for x in current)
-    c = equation7_numbers(cable, (north, east, down), stretch_momentum=0.0)
-    turning, record = drum.numbers(), BoxRecord(compliance=c.e)
-    steps = max(1, round(duration / step))
-    b = moving_end(64)
-    start_moving_end(b, *velocity_at(tow_velocity, 0.0), turning.friction)
-    record.add(0.0, b.boxes, START)
-    for k in range(steps):
-        b = with_room(b, step, segment_length)
-        report = _advance(b, tow_velocity, k * step, step, turning, segment_length, c, MOST_HALVINGS)
-        if report.outcome != CONVERGED:
-            remedy = "another step or segment length, or the default scheme (scheme='moving_end')"
-            return record.history(explain(report, (k + 1) * step, remedy))
-        record.add((k + 1) * step, b.boxes, report)
-    return record.history()
-
-
-def _advance(
-    b: MovingEnd,
-    tow_velocity: TowVelocity,
-    time: float,
-    step: float,
-    turning: DrumNumbers,
-    segment_length: float,
-    c: Equation7Numbers,
-    halvings: int,
-) -> NewtonReport:
-    """Take a step, in halves where it fails."""
-    middle, new = (
-        Ends(*velocity_at(tow_velocity, at), turning.inertia, turning.friction, False)
-        for at in (time + GAMMA * step, time + step)
-    )
-    report = NewtonReport(*box_step(b, step, middle, new, segment_length, c))
-    if report.outcome in (CONVERGED, FULL, SLACK) or halvings == 0:
-        return report
-    half = 0.5 * step
-    report = _advance(b, tow_velocity, time, half, turning, segment_length, c, halvings - 1)
-    if report.outcome != CONVERGED:
-        return report
-    return _advance(b, tow_velocity, time + half, half, turning, segment_length, c, halvings - 1)
-
-
 SPLIT, MERGE = 1.5, 0.4
 """Lengths of the last box, in segments, beyond which a node is inserted or removed."""
 
 
-class MovingEnd(NamedTuple):
+class MovingBoxes(NamedTuple):
     """A cable with a moving end: the boxes, the rates of change of its nodes, and where a step began."""
 
     boxes: BoxWorkspace
@@ -252,13 +169,13 @@ class MovingEnd(NamedTuple):
     """y at the beginning of a step."""
 
 
-def moving_end(capacity: int) -> MovingEnd:
-    """Return a cable of no length with room for `capacity` nodes; `start_moving_end` gives it a direction."""
-    return MovingEnd(box_workspace(capacity), np.zeros((capacity, 6)), np.zeros((capacity, 6)))
+def moving_boxes(capacity: int) -> MovingBoxes:
+    """Return a cable of no length with room for `capacity` nodes; `start_moving_boxes` gives it a direction."""
+    return MovingBoxes(box_workspace(capacity), np.zeros((capacity, 6)), np.zeros((capacity, 6)))
 
 
 @compiled
-def start_moving_end(b: MovingEnd, north: float, east: float, down: float, friction: float) -> None:
+def start_moving_boxes(b: MovingBoxes, north: float, east: float, down: float, friction: float) -> None:
     """Lay a cable of no length against the motion of the tow point; its two nodes are the same place."""
     start_paper(b.boxes, north, east, down, friction)
     b.boxes.count[0] = 2
@@ -270,7 +187,7 @@ def start_moving_end(b: MovingEnd, north: float, east: float, down: float, frict
 
 
 @compiled
-def fit_nodes(b: MovingEnd, segment_length: float) -> bool:
+def fit_nodes(b: MovingBoxes, segment_length: float) -> bool:
     """Insert or remove nodes until the last box has a fair length; False when there is no room."""
     w = b.boxes
     while w.length[w.count[0] - 1] > SPLIT * segment_length:
@@ -283,7 +200,7 @@ def fit_nodes(b: MovingEnd, segment_length: float) -> bool:
 
 
 @compiled
-def insert_node(b: MovingEnd, segment_length: float) -> None:
+def insert_node(b: MovingBoxes, segment_length: float) -> None:
     """Put a material node Δs into the last box, by linear interpolation; the end stays as it is.
 
     The new node does not move with the end: its rate is interpolated from that of the material at the end,
@@ -303,7 +220,7 @@ def insert_node(b: MovingEnd, segment_length: float) -> None:
 
 
 @compiled
-def remove_node(b: MovingEnd) -> None:
+def remove_node(b: MovingBoxes) -> None:
     """Take the last material node out; the last two boxes become one, the end stays as it is."""
     w, n = b.boxes, b.boxes.count[0]
     for i in range(6):
@@ -312,13 +229,13 @@ def remove_node(b: MovingEnd) -> None:
     w.count[0] = n - 1
 
 
-def with_room(b: MovingEnd, step: float, segment_length: float) -> MovingEnd:
+def with_room(b: MovingBoxes, step: float, segment_length: float) -> MovingBoxes:
     """Return the cable with room for twice what the next step can add."""
     used = int(b.boxes.count[0])
     wanted = used + 8 + int(4.0 * abs(b.boxes.y[used - 1, 1]) * step / segment_length)
     if wanted <= len(b.boxes.y):
         return b
-    larger = moving_end(2 * wanted)
+    larger = moving_boxes(2 * wanted)
     larger.boxes.y[:used], larger.rate[:used] = b.boxes.y[:used], b.rate[:used]
     larger.boxes.length[:used], larger.boxes.count[0] = b.boxes.length[:used], used
     return larger

@@ -10,7 +10,7 @@ At t_k the cable has nodes 0 … k. A step
 Segment length and time step are one thing here, and the cost of a run grows with the square of its length.
 When the drum stands or is overrun (ΔS ≤ 0) the same nodes take the step and no node is added. While there is
 no cable in the water at all, the single node follows the tow point, (8)-(11). Nothing in the printed scheme
-keeps T ≥ 0: after a stop the trapezoidal rule rings about zero for ever (`BoxHistory.smallest_tension`).
+keeps T ≥ 0: after a stop the trapezoidal rule rings about zero for ever (`run.BoxHistory.smallest_tension`).
 
 ``implicit=True`` takes the same boxes fully implicit in time, which removes the staircase in the tension that
 the trapezoidal rule of (22) leaves; that is our comparison, not the paper's. What the scheme does, with
@@ -19,58 +19,20 @@ numbers: ``docs/paper_scheme.md``.
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
-
 from cable.feng_allen.box_equations import BoxRule, Ends, known_part
-from cable.feng_allen.box_history import (
-    START,
-    BoxHistory,
-    BoxRecord,
-    TowVelocity,
-    check_positive,
-    explain,
-    velocity_at,
-)
 from cable.feng_allen.box_newton import (
     CONVERGED,
     FULL,
+    NOTHING,
     BoxWorkspace,
     NewtonReport,
-    box_workspace,
     copy_nodes,
     solve_boxes,
+    start_paper,
     told,
 )
-from cable.feng_allen.equation7 import Equation7Numbers, angles_of, equation7_numbers, tangent
-from cable.properties import CableProperties, DrumProperties
-from subzero.errors import BadValueError, short
+from cable.feng_allen.equation7 import Equation7Numbers, tangent
 from subzero.jit import compiled, inner
-
-READINGS = ("tangent", "drum")
-NOTHING = 1e-9
-"""Less cable than this [m] in a step is none: a thousandth of its diameter would be more."""
-
-
-@compiled
-def start_paper(w: BoxWorkspace, north: float, east: float, down: float, friction: float) -> None:
-    """Set the single node of a cable of no length: the tow point at the drum, conditions (8)-(11).
-
-    Args:
-        w: the workspace; node 0 is set, `count` becomes 1.
-        north: velocity of the tow point, earth axes. The cable leaves in the opposite direction. [m/s]
-        east: the same.
-        down: the same.
-        friction: C_f/R_d, the tension that turns the drum. [N]
-    """
-    alpha, beta = angles_of(-north, -east, -down)
-    w.count[0] = 1
-    w.y[0, 0] = friction
-    w.y[0, 1] = -math.sqrt(north * north + east * east + down * down)
-    w.y[0, 2] = 0.0
-    w.y[0, 3] = 0.0
-    w.y[0, 4] = alpha
-    w.y[0, 5] = beta
 
 
 @compiled
@@ -152,60 +114,3 @@ def node_force(w: BoxWorkspace, node: int) -> tuple[float, float, float]:
     north, east, down = tangent(w.y[node, 4], w.y[node, 5])
     T = w.y[node, 0]
     return T * north, T * east, T * down
-
-
-def pull_out_paper(
-    tow_velocity: TowVelocity,
-    duration: float,
-    step: float,
-    cable: CableProperties | None = None,
-    drum: DrumProperties | None = None,
-    current: Sequence[float] | None = None,
-    *,
-    reading: str = "tangent",
-    implicit: bool = False,
-) -> BoxHistory:
-    """Pull cable off the drum along a given motion with the paper's scheme (14)-(26).
-
-    Args:
-        tow_velocity: velocity of the tow point, earth axes (north, east, down), at a time. [m/s]
-        duration: of the run. [s]
-        step: Δt; a segment is as long as the cable that leaves the drum in it. [s]
-        cable: the cable; Table 1 by default.
-        drum: the drum; Table 1 by default.
-        current: uniform steady velocity of the water, earth axes. [m/s]
-        reading: of the prescribed state of the new node: ``tangent`` or ``drum`` (as printed).
-        implicit: fully implicit in time instead of the trapezoidal rule (22).
-
-    Returns:
-        The history; a run that cannot go on is cut short and says so in `message`.
-
-    Raises:
-        subzero.UserError: a reading that is not one of `READINGS`, or a step or duration that is not positive.
-    """
-    check_positive(duration=duration, step=step)
-    if reading not in READINGS:
-        raise BadValueError(f"reading is {short(reading)}; it must be one of {', '.join(READINGS)}.")
-    cable, drum = cable or CableProperties(), drum or DrumProperties()
-    north, east, down = (0.0, 0.0, 0.0) if current is None else (float(x) for x in current)
-    c, turning = equation7_numbers(cable, (north, east, down)), drum.numbers()
-    wound = 1.0 / drum.radius if reading == "drum" else 0.0
-    steps = max(1, round(duration / step))
-    w, record = box_workspace(steps + 2), BoxRecord(compliance=c.e)
-    start_paper(w, *velocity_at(tow_velocity, 0.0), turning.friction)
-    record.add(0.0, w, START)
-    for k in range(1, steps + 1):
-        ends = Ends(*velocity_at(tow_velocity, k * step), turning.inertia, turning.friction, False)
-        report = NewtonReport(*paper_step(w, step, ends, wound, implicit, c))
-        if report.outcome != CONVERGED:
-            return record.history(explain(report, k * step, _remedy(reading, implicit)))
-        record.add(k * step, w, report)
-    return record.history()
-
-
-def _remedy(reading: str, implicit: bool) -> str:
-    """Say what to try when a step fails."""
-    default = "the default scheme (scheme='moving_end')"
-    if reading == "drum":
-        return f"reading='tangent' or {default}"
-    return default if implicit else f"a smaller step, or {default}"

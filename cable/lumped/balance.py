@@ -58,6 +58,18 @@ def neighbours(rope: Rope, j: int, s: np.ndarray) -> tuple[float, float, float]:
     return before, after, width
 
 
+@compiled
+def first_tangent(rope: Rope, s: np.ndarray) -> None:
+    """Fill the mean chord at the tow point (3,), on the circle through the first three nodes."""
+    near, x, share = rope.spring[REST, 1], rope.position, 0.0
+    if rope.ends.count > 1:
+        share = near / (near + rope.spring[REST, 2])
+    for i in range(3):
+        s[i] = (x[NEW, 1, i] - x[NEW, 0, i]) / near
+        if share > 0.0:
+            s[i] += share * (s[i] - (x[NEW, 2, i] - x[NEW, 1, i]) / rope.spring[REST, 2])
+
+
 @inner
 def load_node(rope: Rope, j: int, s: np.ndarray, a: float, c: CableNumbers) -> float:
     """Fill rope.node with the load of a metre of cable at node j, its tangent along s (3,); return √(1 + eT)."""

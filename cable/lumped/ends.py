@@ -24,13 +24,13 @@ from math import sqrt
 
 import numpy as np
 
-from cable.lumped.balance import arm, load_node, neighbours
+from cable.drum import LENGTH, TENSION, DrumNumbers
+from cable.lumped.balance import arm, first_tangent, load_node, neighbours
 from cable.lumped.band_solver import add
 from cable.lumped.load import evaluate_node
 from cable.lumped.rope import ANSWER, DIRECTION, GAIN, GAP, NEW, PULL, REST, SIZE, START_MOMENTUM, WATER, Rope
 from cable.lumped.springs import drum_friction, unit_length
-from cable.properties import CableNumbers, DrumNumbers
-from cable.winch import LENGTH, TENSION
+from cable.properties import CableNumbers
 from subzero.jit import allocating, compiled, inner
 
 
@@ -213,18 +213,6 @@ def _metre_load(rope: Rope, j: int, width: float, g: float, out: np.ndarray) -> 
         if held:
             rate -= 0.5 * rope.ends.payout[NEW] * rope.middle.momentum[i]
         out[i] = rate / width + rope.node.force[i]
-
-
-@compiled
-def first_tangent(rope: Rope, s: np.ndarray) -> None:
-    """Fill the mean chord at the tow point (3,), on the circle through the first three nodes."""
-    near, x, share = rope.spring[REST, 1], rope.position, 0.0
-    if rope.ends.count > 1:
-        share = near / (near + rope.spring[REST, 2])
-    for i in range(3):
-        s[i] = (x[NEW, 1, i] - x[NEW, 0, i]) / near
-        if share > 0.0:
-            s[i] += share * (s[i] - (x[NEW, 2, i] - x[NEW, 1, i]) / rope.spring[REST, 2])
 
 
 @compiled

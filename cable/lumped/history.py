@@ -11,62 +11,57 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cable.current import Current, Water
+from cable.current import Water
+from cable.drum import DrumNumbers, DrumProperties
 from cable.history import History, Outcome
-from cable.lumped.newton import StageSolved
 from cable.lumped.rope import OLD, PULL, REST, STATE, Rope, new_rope, unknowns
 from cable.lumped.start import held_at_drum, lay, steady_direction, steady_tensions, winch_rows
-from cable.lumped.step import GAMMA, START_OF_LEG, begin, take_step
-from cable.properties import CableNumbers, CableProperties, DrumNumbers, DrumProperties
-from cable.tow_path import TowVelocity, first_direction, sample_path
+from cable.lumped.step import GAMMA, START_OF_LEG, StageSolved, begin, take_step
+from cable.properties import CableNumbers, CableProperties
+from cable.schemes import Lumped
+from cable.task import PullOut, Tow
+from cable.tow_path import first_direction, sample_path, segments_needed
 from cable.winch import Brake, PayOutRate, Winch
 
 AXES = ("northward", "eastward", "downward")
-START_LENGTH = 1e-6
-"""A run "without cable" starts with this length in the water. [m]"""
 
 
-def pull_out_lumped(
-    tow_velocity: TowVelocity,
-    duration: float,
-    step: float,
-    *,
-    segment_length: float,
-    cable: CableProperties,
-    drum: DrumProperties | Winch,
-    current: Current,
-    wet_length: float,
-    drum_velocity: TowVelocity | None = None,
-) -> History:
-    """Pull a cable off a drum, as `cable.pull_out` does.
-
-    An inextensible cable stretches by 1e-6 of its length at one newton (`springs.LEAST_COMPLIANCE`).
-
-    Args:
-        tow_velocity: function of time [s] that gives the tow point's velocity north, east, down (3,). [m/s]
-        duration: how long. [s]
-        step: time between recorded results; a step that fails is retried in smaller pieces. [s]
-        segment_length: Δs. [m]
-        cable: the cable.
-        drum: a free drum or a winch.
-        current: the water's velocity, at places relative to the drum at the start.
-        wet_length: cable in the water at the start, straight behind the tow point. [m]
-        drum_velocity: like tow_velocity, of the drum; it stands when not given.
-
-    Returns:
-        the history; positions are relative to where the drum is at the start.
-    """
-    times, tow, velocity, _ = sample_path(tow_velocity, duration, step)
-    still = np.zeros_like(tow)
+def pull_out(task: PullOut, scheme: Lumped) -> History:
+    """Pull a cable off a drum, as `cable.pull_out` does; positions are relative to where the drum is at the start."""
+    segment_length, wet = scheme.segment_length, task.wet_length
+    segments_needed(max(wet, segment_length), segment_length, 0.0)  # refuses a cable of countless ones
+    times, tow_place, velocity, _ = sample_path(task.tow_velocity, task.duration, scheme.time_step)
+    still = np.zeros_like(tow_place)
     place, speed = still, still
-    if drum_velocity is not None:
-        _, place, speed, _ = sample_path(drum_velocity, duration, step, "drum_velocity")
-    ahead, wet = first_direction(velocity - speed), max(wet_length, START_LENGTH)
-    tow += wet * ahead
-    setpoint, rate = winch_rows(drum, times, wet)
-    course = Course(times, np.c_[tow, place, setpoint], np.c_[velocity, speed, rate])
-    rope = rope_off_drum(course, segment_length, cable, drum, current.fastest, wet, ahead)
-    return _run(rope, course, cable, drum, current.numbers(), segment_length)
+    if task.drum_velocity is not None:
+        _, place, speed, _ = sample_path(task.drum_velocity, task.duration, scheme.time_step, "drum_velocity")
+    ahead = first_direction(velocity - speed)
+    tow_place += wet * ahead
+    setpoint, rate = winch_rows(task.drum, times, wet)
+    course = Course(times, np.c_[tow_place, place, setpoint], np.c_[velocity, speed, rate])
+    rope = rope_off_drum(course, segment_length, task.cable, task.drum, task.current.fastest, wet, ahead)
+    fixed = Fixed(task.cable.numbers(), task.drum.numbers(), task.current.numbers(), segment_length)
+    return _run(rope, course, fixed)
+
+
+def tow(task: Tow, scheme: Lumped) -> History:
+    """Tow a cable of fixed length, as `cable.tow` does; positions are relative to where the tail is at the start."""
+    times, place, velocity, _ = sample_path(task.tow_velocity, task.duration, scheme.time_step)
+    count = max(1, int(np.ceil(task.length / scheme.segment_length - 1e-9)))
+    rope, lengths = new_rope(count), np.full(count, task.length / count)
+    J, tail_drag = task.current.at((0.0, 0.0, 0.0), 0.0), task.tail_drag
+    ahead = steady_direction(velocity[0] - J, first_direction(velocity - J), task.cable, tail_drag)
+    place += task.length * ahead
+    still = np.zeros((times.size, 4))
+    course = Course(times, np.c_[place, still], np.c_[velocity, still])
+    tail = tail_drag * float(np.sum((velocity[0] - J) ** 2))
+    tensions = steady_tensions(velocity[0] - J, ahead, task.cable, lengths, tail)
+    lay(rope, task.cable, lengths, 0.5 * (tensions[1:] + tensions[:-1]), place[0], ahead)
+    rope.velocity[:, : count + 1] = velocity[0]
+    rope.ends.free_end, rope.ends.tail_drag, rope.ends.drum_pull = True, tail_drag, tail
+    rope.ends.tow_force[:] = -tensions[0] * ahead
+    idle, water = DrumProperties().numbers(), task.current.numbers(-place[0])
+    return _run(rope, course, Fixed(task.cable.numbers(), idle, water, task.length / count))
 
 
 def rope_off_drum(
@@ -112,60 +107,9 @@ def rope_off_drum(
     return rope
 
 
-def tow_lumped(
-    tow_velocity: TowVelocity,
-    length: float,
-    duration: float,
-    step: float,
-    *,
-    segment_length: float,
-    cable: CableProperties,
-    current: Current,
-    drogue_drag_area: float,
-) -> History:
-    """Tow a cable of fixed length from its steady straight tow on, as `cable.tow` does.
-
-    Args:
-        tow_velocity: function of time [s] that gives the tow point's velocity north, east, down (3,). [m/s]
-        length: L. [m]
-        duration: how long. [s]
-        step: time between recorded results. [s]
-        segment_length: Δs; taken a little smaller where L is not a whole number of it. [m]
-        cable: the cable.
-        current: the water's velocity, at places relative to the tow point at the start.
-        drogue_drag_area: C_d A of a drogue at the free end. [m²]
-
-    Returns:
-        the history; positions are relative to where the tail is at the start.
-    """
-    times, tow, velocity, _ = sample_path(tow_velocity, duration, step)
-    count = max(1, int(np.ceil(length / segment_length - 1e-9)))
-    rope, lengths = new_rope(count), np.full(count, length / count)
-    tail_drag = 0.5 * cable.water_density * drogue_drag_area
-    J = current.at((0.0, 0.0, 0.0), 0.0)
-    ahead = steady_direction(velocity[0] - J, first_direction(velocity - J), cable, tail_drag)
-    tow += length * ahead
-    still = np.zeros((times.size, 4))
-    course = Course(times, np.c_[tow, still], np.c_[velocity, still])
-    tail = tail_drag * float(np.sum((velocity[0] - J) ** 2))
-    tensions = steady_tensions(velocity[0] - J, ahead, cable, lengths, tail)
-    lay(rope, cable, lengths, 0.5 * (tensions[1:] + tensions[:-1]), tow[0], ahead)
-    rope.velocity[:, : count + 1] = velocity[0]
-    rope.ends.free_end, rope.ends.tail_drag, rope.ends.drum_pull = True, tail_drag, tail
-    rope.ends.tow_force[:] = -tensions[0] * ahead
-    return _run(rope, course, cable, DrumProperties(), current.numbers(-tow[0]), length / count)
-
-
-def _run(
-    rope: Rope,
-    course: Course,
-    cable: CableProperties,
-    drum: DrumProperties | Winch,
-    water: Water,
-    segment_length: float,
-) -> History:
+def _run(rope: Rope, course: Course, fixed: Fixed) -> History:
     """Run, and return the history."""
-    journey = run_rope(rope, course, cable.numbers(), drum.numbers(), water, segment_length)
+    journey = run_rope(rope, course, fixed)
     rows, completed = journey.rows, journey.solved.converged
     force = np.array([row.tow_force for row in rows])
     return History(
@@ -230,6 +174,15 @@ class Course(NamedTuple):
     rates: np.ndarray
 
 
+class Fixed(NamedTuple):
+    """What stays what it is during a run, in the order in which `take_step` takes it."""
+
+    cable: CableNumbers
+    drum: DrumNumbers
+    water: Water
+    segment_length: float
+
+
 class Row(NamedTuple):
     """What is recorded at a time: force on the vehicle (3,), tension at the drum, length, positions and tensions."""
 
@@ -250,18 +203,16 @@ class Journey(NamedTuple):
     stopped_at: float
 
 
-def run_rope(
-    rope: Rope, course: Course, c: CableNumbers, drum: DrumNumbers, water: Water, segment_length: float
-) -> Journey:
+def run_rope(rope: Rope, course: Course, fixed: Fixed) -> Journey:
     """Follow a course from its first row on, to its end or until a step fails however small."""
-    begin(rope, _leg(course, 1, 0.0), c, water)
+    begin(rope, _leg(course, 1, 0.0), fixed.cable, fixed.water)
     capacity = rope.spring.shape[1] - 2
     rows, spent, steps, solved = [_row(rope)], 0, 0, StageSolved(True, 0, 0.0, 0)
     for k in range(1, course.times.size):
         done, step = 0.0, 1.0
         while done < 1.0:
             end = min(done + step, 1.0) if done + step < 1.0 - 1e-9 else 1.0
-            solved = _try(rope, course, k, done, end, c, drum, water, segment_length)
+            solved = _try(rope, course, k, (done, end), fixed)
             spent, steps = spent + solved.iterations, steps + 1
             if solved.converged:
                 done, step = end, 2.0 * step
@@ -270,28 +221,19 @@ def run_rope(
             else:
                 time = float(course.times[k - 1] + done * (course.times[k] - course.times[k - 1]))
                 return Journey(rows, spent, steps, solved, time)
-        if rope.ends.count == capacity and rope.ends.last[OLD] > 2.0 * segment_length:
+        if rope.ends.count == capacity and rope.ends.last[OLD] > 2.0 * fixed.segment_length:
             return Journey(rows, spent, steps, StageSolved(False, 0, 0.0, FULL), float(course.times[k]))
         rows.append(_row(rope))
     return Journey(rows, spent, steps, solved, float(course.times[-1]))
 
 
-def _try(
-    rope: Rope,
-    course: Course,
-    k: int,
-    done: float,
-    end: float,
-    c: CableNumbers,
-    drum: DrumNumbers,
-    water: Water,
-    segment_length: float,
-) -> StageSolved:
+def _try(rope: Rope, course: Course, k: int, span: tuple[float, float], fixed: Fixed) -> StageSolved:
     """Take one step between two fractions of row k; a step that fails leaves everything as it was."""
+    done, end = span
     state = rope.spring[STATE].copy()
     h = float((end - done) * (course.times[k] - course.times[k - 1]))
     legs = np.array([_leg(course, k, done + GAMMA * (end - done)), _leg(course, k, end)])
-    solved = StageSolved(*take_step(rope, h, legs, c, drum, water, segment_length))
+    solved = StageSolved(*take_step(rope, h, legs, *fixed))
     if not solved.converged:
         rope.spring[STATE] = state
     return solved

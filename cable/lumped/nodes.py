@@ -11,8 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cable.lumped.balance import load_node, neighbours
-from cable.lumped.ends import first_tangent
+from cable.lumped.balance import first_tangent, load_node, neighbours
 from cable.lumped.rope import (
     DIRECTION,
     FADING,

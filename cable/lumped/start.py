@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from cable.drum import DrumProperties
 from cable.lumped.rope import DIRECTION, OLD, PULL, REST, STATE, Rope
 from cable.lumped.springs import LEAST_COMPLIANCE, spring_law, spring_state
-from cable.properties import CableProperties, DrumProperties
+from cable.properties import CableProperties
 from cable.winch import SHORTEST, ConstantTension, PayOutRate, Winch
 
 STRAIGHT_UP = np.array([0.0, 0.0, -1.0])

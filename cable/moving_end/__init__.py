@@ -1,7 +1,7 @@
 """The default scheme: a cable whose end at the drum moves along it, in Cartesian balances, of second order.
 
 The four unknowns of a segment are its tension and the place of its far node. The last segment grows at the drum; a
-longer one is split, a shorter one merged (`time_step`). What may be used from outside stands in `__all__`; everything
+longer one is split, a shorter one merged (`remeshing`). What may be used from outside stands in `__all__`; everything
 else of this package is its own (a contract in ``pyproject.toml`` holds it).
 
 what is computed                                              file
@@ -10,10 +10,9 @@ the cable now, the steps before, the matrix, options          state
 momentum, drag and weight of one segment                      segment_load, chord_correction
 tension against stretch, and none when it is slack            slack_law
 backward differences of second order in time                  bdf2
-balance of every node, first and last                         assembly, drum_boundary, bending
-Newton's method on block tridiagonal systems                  newton, block_solver
-one step, made real: the drum's mode, a node more or less     time_step
-force on the vehicle and how it answers to its displacement   tow_boundary
+balance of every node, first and last                         assembly, bending
+one step: Newton's method, and how the tow force answers      time_step, block_solver
+a step made real; a node more or less at the drum             remeshing
 a velocity that changes at once                               jolt
 the run: start, steps by their error, results, why it stopped initial_shape, time_loop, stops
 where a cable comes to rest                                   equilibrium
@@ -32,13 +31,13 @@ from cable.moving_end.energy import (
     TOWED,
     energy_flow,
 )
-from cable.moving_end.initial_shape import lay_straight, start_in_water
+from cable.moving_end.initial_shape import lay_held, lay_straight, start_in_water
 from cable.moving_end.jolt import take_jolt
+from cable.moving_end.remeshing import accept
 from cable.moving_end.segment_load import Load, new_load
 from cable.moving_end.state import NOW, Line, enlarged, new_line
 from cable.moving_end.stops import Names, describe_stop
-from cable.moving_end.time_step import accept, try_step
-from cable.moving_end.tow_boundary import impedance
+from cable.moving_end.time_step import impedance, try_step
 
 __all__ = [
     "ADDED_MASS",
@@ -59,6 +58,7 @@ __all__ = [
     "energy_flow",
     "enlarged",
     "impedance",
+    "lay_held",
     "lay_straight",
     "new_line",
     "new_load",

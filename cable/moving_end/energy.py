@@ -21,8 +21,8 @@ from __future__ import annotations
 import numpy as np
 
 from cable.moving_end.bending import bending_energy
-from cable.moving_end.segment_load import Load, evaluate_load
-from cable.moving_end.state import BEFORE, NOW, Line, take_segment
+from cable.moving_end.segment_load import Load, evaluate_load, take_segment
+from cable.moving_end.state import BEFORE, NOW, Line
 from cable.properties import CableNumbers
 from subzero.jit import compiled, inlined, inner
 

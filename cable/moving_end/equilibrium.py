@@ -10,7 +10,7 @@ Three methods, each the start of the next:
 
    so Newton's method with a line search always ends, from anywhere; ε → 0 rounds off a segment without tension. The
    drag is taken again for the new shape, a few times.
-2. Newton's method on all nodes and tensions (`newton.solve_step`, every weight of time zero): drag, stretch, bending
+2. Newton's method on all nodes and tensions (`time_step.solve_step`, every weight of time zero): drag, stretch, bending
    and slack law as in a run. Water and arc corrections are taken again until nothing moves.
 3. Where that fails, steps of time from rest, backward and implicit, each forgetting its motion: with m1 and a step h a
    way downhill that cannot miss when h is short, and becomes 2. when h has grown (pseudo-transient continuation; Kelley
@@ -24,24 +24,22 @@ from math import sqrt
 import numpy as np
 
 from cable.current import Water
+from cable.drum import DrumNumbers
 from cable.moving_end.bdf2 import Weights
 from cable.moving_end.chord_correction import correct_for_arc
-from cable.moving_end.newton import solve_step
-from cable.moving_end.segment_load import Load, evaluate_load
-from cable.moving_end.slack_law import SMOOTHING
+from cable.moving_end.remeshing import fill_node_tensions
+from cable.moving_end.segment_load import Load, evaluate_load, segment_momentum, take_segment
+from cable.moving_end.slack_law import SMOOTHING, SOFTEST
 from cable.moving_end.state import (
     BEFORE,
     NEW,
     NOW,
-    TOLERANCE,
     Line,
     feel_water,
-    segment_momentum,
-    take_segment,
 )
-from cable.moving_end.time_step import SOFTEST
-from cable.moving_end.tow_boundary import fill_node_tensions
-from cable.properties import CableNumbers, DrumNumbers
+from cable.moving_end.time_step import solve_step
+from cable.properties import CableNumbers
+from cable.schemes import TOLERANCE
 from subzero.jit import allocating, compiled, inner
 
 DRAG_ROUNDS = 12
@@ -55,7 +53,7 @@ STILL = 1e-11
 WAVERS = 0.9
 """A step that moves the cable by more than this share of what the one before did goes to and fro: try a shorter one."""
 LOOSER = 1e-7
-"""Where a cable is so taut that rounding does not let it be solved to `state.TOLERANCE`, this will do."""
+"""Where a cable is so taut that rounding does not let it be solved to `schemes.TOLERANCE`, this will do."""
 LOOKS = 400
 """So many steps of continuation, at most."""
 FIRST, LONGEST, SHORTEST = 0.1, 1e4, 1e-7
@@ -254,7 +252,7 @@ def _keep(line: Line, c: CableNumbers, work: Load) -> None:
 def relax(line: Line, water: Water, c: CableNumbers, drum: DrumNumbers, work: Load) -> int:
     """Take steps from rest, the first one without inertia, until nothing moves; return how many, or −1.
 
-    Tensions should be of about 1 N, as those that `newton` was made for: rest does not know the size of forces, so
+    Tensions should be of about 1 N, as those that `time_step` was made for: rest does not know the size of forces, so
     weight, drag and stiffness can be divided by any number, and the compliance multiplied by it.
 
     Args:

@@ -1,14 +1,18 @@
-"""The start of a run: a straight cable between drum and tow point, in segments, at three equal levels of time."""
+"""The start of a run: a cable that is straight, hangs, or is towed steadily, at three equal levels of time."""
 
 from __future__ import annotations
+
+from math import inf, sqrt
 
 import numpy as np
 
 from cable.current import Water
-from cable.drum import TURNING
-from cable.moving_end.segment_load import Load
-from cable.moving_end.state import BEFORE, NEW, NOW, SPLIT_AT, Line, feel_water, segment_momentum, spacing
-from cable.properties import CableNumbers, DrumNumbers
+from cable.drum import TURNING, DrumNumbers
+from cable.history import Equilibrium
+from cable.moving_end.segment_load import Load, segment_momentum
+from cable.moving_end.state import BEFORE, NEW, NOW, SPLIT_AT, Line, feel_water, spacing
+from cable.properties import CableNumbers, CableProperties
+from cable.tow_path import first_direction
 from subzero.jit import compiled
 
 
@@ -61,6 +65,28 @@ def _pull_straight(
         line.ends.tow_force[i] = -per_metre * wet_length * direction[i]
 
 
+def lay_held(line: Line, held: Equilibrium, tow: np.ndarray, drum: np.ndarray, payout: float) -> None:
+    """Lay a line as it hangs, at all levels of time: at rest, or carried along by ends that move at `tow` and `drum`.
+
+    Args:
+        line: with room for its segments; filled, relative to the second end.
+        held: the equilibrium.
+        tow: velocity of its first end (3,); even along the cable to the other. [m/s]
+        drum: velocity of its second end (3,). [m/s]
+        payout: rate at which cable enters at the second end. [m/s]
+    """
+    ends, N = line.ends, held.segment_lengths.size
+    ends.count, ends.time, ends.previous_step, ends.drum_mode = N, 0.0, 0.0, TURNING
+    line.length[1 : N + 1] = held.segment_lengths
+    ends.settled, ends.last_length[:] = held.segment_lengths[:-1].sum(), held.segment_lengths[-1]
+    ends.payout[:] = payout
+    along = np.concatenate([[0.0], np.cumsum(held.segment_lengths)]) / held.length
+    line.position[:, : N + 1] = held.shape - held.shape[-1]
+    line.velocity[:, : N + 1] = tow + along[:, None] * (drum - tow)
+    line.tension[:, 1 : N + 1], line.node_tension[: N + 1] = held.segment_tensions, held.tensions
+    ends.tow_force[:], ends.drum_pull = held.tow_force, held.tensions[-1]
+
+
 @compiled
 def start_in_water(line: Line, water: Water, c: CableNumbers, work: Load) -> None:
     """Fill the water's velocity at the nodes and the segments' momenta, at all levels, from what moves at the start."""
@@ -72,3 +98,46 @@ def start_in_water(line: Line, water: Water, c: CableNumbers, work: Load) -> Non
         for j in range(1, line.ends.count + 1):
             length = line.ends.last_length[level] if j == line.ends.count else line.length[j]
             segment_momentum(line, level, j, length, c, work)
+
+
+def steady_direction(
+    velocity: np.ndarray, J: np.ndarray, cable: CableProperties, tail_drag: float
+) -> np.ndarray:
+    """Return the direction from the tail to the tow point in a steady tow, a unit vector (3,)."""
+    speed, weight = float(np.linalg.norm(velocity[0] - J)), cable.weight_in_water
+    if speed == 0.0 and weight != 0.0:
+        return np.array([0.0, 0.0, -np.sign(weight)])
+    ahead = first_direction(velocity - J)
+    if weight == 0.0 or tail_drag > 0.0 or speed == 0.0 or abs(ahead[2]) > 1e-9:
+        return ahead
+    phi = cable.critical_angle(speed)
+    return np.cos(phi) * ahead + np.array([0.0, 0.0, -np.sign(weight) * np.sin(phi)])
+
+
+def set_steady_tow(
+    line: Line, velocity: np.ndarray, J: np.ndarray, cable: CableProperties, tail_drag: float
+) -> None:
+    """Give every node the tow point's velocity, and the segments tension and stretch of a steady straight tow."""
+    N, U = line.ends.count, velocity - J
+    t = -line.position[NOW, 0] / np.linalg.norm(line.position[NOW, 0])
+    drag, weight = cable.tangential_drag * abs(U @ t) * -(U @ t), cable.weight_in_water * t[2]
+    line.velocity[:, : N + 1] = velocity
+    line.ends.payout[:] = 0.0
+    pulls, middles = [tail_drag * float(U @ U)], []
+    lengths = [*line.length[1:N].tolist(), line.ends.last_length[NOW]]
+    for length in reversed(lengths):
+        middles.append(_grown(pulls[-1], 0.5 * length, drag, weight, cable.compliance))
+        pulls.append(_grown(middles[-1], 0.5 * length, drag, weight, cable.compliance))
+    line.tension[:, 1 : N + 1], line.node_tension[: N + 1] = middles[::-1], pulls[::-1]
+    chords = np.array(lengths) * (1.0 + cable.compliance * np.array(middles[::-1]))
+    behind = np.cumsum(chords[::-1])[::-1]
+    line.position[:, :N] = line.position[NOW, N] - behind[:, None] * t
+    line.ends.tow_force[:], line.ends.drum_pull = pulls[-1] * t, pulls[0]
+
+
+def _grown(T: float, length: float, drag: float, weight: float, e: float) -> float:
+    """Return the tension `length` further up, dT/ds = drag √(1 + eT) + weight; none where it would push. [N]."""
+    end, before = T, inf
+    while abs(end - before) > 1e-15 * abs(end):
+        before, end = end, T + length * (drag * sqrt(1.0 + e * 0.5 * (T + end)) + weight)
+    return max(end, 0.0)

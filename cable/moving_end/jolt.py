@@ -18,11 +18,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from cable.drum import LENGTH, STANDING, TENSION
+from cable.drum import LENGTH, STANDING, TENSION, DrumNumbers
 from cable.moving_end.block_solver import factor, solve
-from cable.moving_end.segment_load import Load, chord_length
-from cable.moving_end.state import BEFORE, DIAGONAL, LOWER, NOW, RESIDUAL, UPPER, Line, segment_momentum
-from cable.properties import CableNumbers, DrumNumbers
+from cable.moving_end.segment_load import Load, chord_length, segment_momentum
+from cable.moving_end.state import BEFORE, DIAGONAL, LOWER, NOW, RESIDUAL, UPPER, Line
+from cable.properties import CableNumbers
 from subzero.jit import allocating, inner
 
 FELT = 1e-6

@@ -21,6 +21,7 @@ from typing import Any
 
 import numpy as np
 
+from cable.moving_end.state import NOW, Line
 from cable.properties import CableNumbers
 from subzero.jit import inlined, inner, packed
 
@@ -174,3 +175,24 @@ def differentiate_load(length: float, slip: float, a0: float, c: CableNumbers, w
         for k in range(3):
             work.q_d[i, k] = (work.q_d[i, k] - g * work.q_tt[i] * t[k]) * shorter
         work.q_V[i, i] += a0 * c.mass
+
+
+@inlined
+def take_segment(x: np.ndarray, V: np.ndarray, J: np.ndarray, j: int, work: Load) -> None:
+    """Fill chord, velocity and water of segment j, given those of the nodes at one level (nodes, 3)."""
+    for i in range(3):
+        work.chord[i] = x[j, i] - x[j - 1, i]
+        work.velocity[i] = 0.5 * (V[j - 1, i] + V[j, i])
+        work.water[i] = 0.5 * (J[j - 1, i] + J[j, i])
+
+
+@inner
+def segment_momentum(line: Line, level: int, j: int, length: float, c: CableNumbers, work: Load) -> None:
+    """Fill ∫p ds of segment j at a level; the tangent is the one of level NOW, where the segment has a length."""
+    take_segment(line.position[NOW], line.velocity[level], line.water[level], j, work)
+    r = chord_length(work.chord, line.ends.last_length[NOW] if j == line.ends.count else line.length[j])
+    for i in range(3):
+        work.tangent[i] = work.chord[i] / r
+    evaluate_momentum(c, work)
+    for i in range(3):
+        line.momentum[level, j, i] = length * work.momentum[i]

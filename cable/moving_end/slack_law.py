@@ -25,6 +25,8 @@ TENSION_SCALE = 1e-3
 STRAIN_SCALE = 1e-3
 SMOOTHING = 1e-13
 """T₀ = T σ of the smoothed law. [N]"""
+SOFTEST = 1e-4
+"""T₀ that a difficult step starts with, a tenth at a time down to `SMOOTHING`. [N]"""
 KNOWN = 1e-4
 """A cable with more tension than this is taut, and its tension is foreseen from the steps before. [N]"""
 

@@ -16,15 +16,12 @@ import numpy as np
 
 from cable.current import Water, water_velocity
 from cable.drum import TURNING
-from cable.moving_end.segment_load import Load, chord_length, evaluate_momentum
 from cable.moving_end.slack_law import SMOOTHING
-from cable.properties import CableNumbers
+from cable.schemes import TOLERANCE
 from subzero.jit import inlined, inner, packed
 
 NEW, NOW, BEFORE = 0, 1, 2
 
-TOLERANCE = 1e-9
-"""How exactly a step is solved where nobody asks for less: this share of the largest tension, strains of 1e-12."""
 SPLIT_AT = 1.5
 """The last segment is split when it has grown to this many segment lengths."""
 
@@ -63,7 +60,7 @@ class Ends:
         drum_force: the cable's pull on it, with what acts across the last half segment (3,). [N]
         previous_step: t_now − t_before, 0 after a start. [s]
         smoothing: T₀ of the slack law in force. [N]
-        tolerance: how exactly a step is solved, see `newton`. [-]
+        tolerance: how exactly a step is solved, see `time_step`. [-]
         time: of level NOW. [s]
         segment_length, grading: new segments are `segment_length` + `grading` s long, s from the tow point. [m], [-]
         run_in: length L₀ beside the tow point in which segments are shorter (`spacing`), 0 for none. [m]
@@ -236,24 +233,3 @@ def feel_water(line: Line, water: Water, time: float) -> None:
         return
     for j in range(line.ends.count + 1):
         J[j, 0], J[j, 1], J[j, 2] = water_velocity(water, x[j, 0], x[j, 1], x[j, 2], time)
-
-
-@inlined
-def take_segment(x: np.ndarray, V: np.ndarray, J: np.ndarray, j: int, work: Load) -> None:
-    """Fill chord, velocity and water of segment j, given those of the nodes at one level (nodes, 3)."""
-    for i in range(3):
-        work.chord[i] = x[j, i] - x[j - 1, i]
-        work.velocity[i] = 0.5 * (V[j - 1, i] + V[j, i])
-        work.water[i] = 0.5 * (J[j - 1, i] + J[j, i])
-
-
-@inner
-def segment_momentum(line: Line, level: int, j: int, length: float, c: CableNumbers, work: Load) -> None:
-    """Fill ∫p ds of segment j at a level; the tangent is the one of level NOW, where the segment has a length."""
-    take_segment(line.position[NOW], line.velocity[level], line.water[level], j, work)
-    r = chord_length(work.chord, line.ends.last_length[NOW] if j == line.ends.count else line.length[j])
-    for i in range(3):
-        work.tangent[i] = work.chord[i] / r
-    evaluate_momentum(c, work)
-    for i in range(3):
-        line.momentum[level, j, i] = length * work.momentum[i]

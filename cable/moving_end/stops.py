@@ -12,9 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cable.drum import FREE, LENGTH, TENSION
+from cable.drum import FREE, LENGTH, TENSION, DrumNumbers
 from cable.moving_end.state import NEW, NOW, Line
-from cable.properties import CableNumbers, DrumNumbers
+from cable.properties import CableNumbers
 
 EQUATIONS = ("length", "northward balance", "eastward balance", "downward balance")
 NEARLY_TAUT = 0.999

@@ -1,6 +1,6 @@
 """The compiled loop of a cable whose tow point moves on a given path; steps that fail or err are retried smaller.
 
-`run` follows a sampled path and hands back its history.
+`pull_out` and `tow` lay a cable out, let it follow a sampled path, and hand back its history.
 
 Where an error is allowed (`rtol`), it is estimated, and the next step is the one that would just be allowed. A
 backward difference of second order errs by h(h + h')/6 x‴ in the velocity V, that is by h(h + h')/6 V̈. The tow force
@@ -17,18 +17,35 @@ from typing import NamedTuple
 import numpy as np
 
 from cable.current import Water
-from cable.drum_motion import hermite, lead_drum
-from cable.history import History, Outcome
+from cable.drum import LENGTH, DrumNumbers, DrumProperties
+from cable.drum_motion import PLACE, SETPOINT, VELOCITY, drum_path, hermite, lead_drum, resting
+from cable.history import Equilibrium, History, Outcome
 from cable.moving_end.energy import FLOWS, LOSS, STORED, book_step, energy_flow
-from cable.moving_end.initial_shape import start_in_water
+from cable.moving_end.initial_shape import (
+    lay_held,
+    lay_straight,
+    set_steady_tow,
+    start_in_water,
+    steady_direction,
+)
 from cable.moving_end.jolt import take_jolt
-from cable.moving_end.segment_load import Load
-from cable.moving_end.state import NOW, Line, Solved
+from cable.moving_end.remeshing import accept, end_tensions
+from cable.moving_end.segment_load import Load, new_load
+from cable.moving_end.state import NOW, Line, Solved, new_line
 from cable.moving_end.stops import describe_stop
-from cable.moving_end.time_step import accept, try_step
-from cable.moving_end.tow_boundary import ends
-from cable.properties import CableNumbers, DrumNumbers
-from cable.tow_path import TowPath
+from cable.moving_end.time_step import try_step
+from cable.properties import CableNumbers
+from cable.schemes import MovingEnd
+from cable.task import PullOut, Tow
+from cable.tow_path import (
+    TowPath,
+    check_memory,
+    first_direction,
+    length_of_way,
+    sample_path,
+    segments_needed,
+)
+from cable.winch import Brake, PayOutRate
 from subzero.jit import allocating, compiled, inner
 
 MOST_HALVINGS = 10
@@ -181,7 +198,7 @@ def _cover(
 def write_row(line: Line, record: Record, k: int, used: int, c: CableNumbers) -> None:
     """Write row k of a record, with the shape of level NOW behind the `used` nodes that are there already."""
     N = line.ends.count
-    record.tow_tension[k], record.drum_tension[k] = ends(line)
+    record.tow_tension[k], record.drum_tension[k] = end_tensions(line)
     record.length[k] = line.ends.settled + line.ends.last_length[NOW]
     record.segments[k] = N
     for i in range(3):
@@ -195,7 +212,78 @@ def write_row(line: Line, record: Record, k: int, used: int, c: CableNumbers) ->
             record.courant[k] = max(record.courant[k], wave * line.ends.previous_step / line.length[j])
 
 
-def run(
+def pull_out(task: PullOut, scheme: MovingEnd) -> History:
+    """Pull a cable off a drum, as `cable.pull_out` does."""
+    start, segment_length = task.start, scheme.segment_length
+    if isinstance(start, Equilibrium):
+        segment_length = float(start.segment_lengths[0])
+    path, wet = sample_path(task.tow_velocity, task.duration, scheme.time_step), task.wet_length
+    led = led_drum(task, path.times)
+    direction = first_direction(path.leaving - led[:, VELOCITY:SETPOINT])
+    path.place[:] += start.shape[0] - start.shape[-1] if isinstance(start, Equilibrium) else wet * direction
+    line = new_line(_capacity(task, path, led, segment_length, scheme))
+    line.ends.segment_length, line.ends.grading = segment_length, scheme.grading
+    line.ends.tolerance, line.ends.run_in = scheme.tolerance, scheme.run_in
+    c, drum = task.cable.numbers(), task.drum.numbers()
+    drum.velocity[:] = led[0, VELOCITY:SETPOINT]
+    if isinstance(start, Equilibrium):
+        rate = (led[1, SETPOINT] - led[0, SETPOINT]) / path.times[1] if drum.control == LENGTH else 0.0
+        lay_held(line, start, path.leaving[0], drum.velocity, rate)
+    else:
+        lay_straight(line, wet, direction, path.leaving[0], drum, c)
+    return _run(line, path, led, task.current.numbers(task.origin), c, drum, scheme.rtol)
+
+
+def tow(task: Tow, scheme: MovingEnd) -> History:
+    """Tow a cable of fixed length, as `cable.tow` does."""
+    path = sample_path(task.tow_velocity, task.duration, scheme.time_step)
+    segments_needed(task.length, scheme.segment_length, 0.0)  # refuses a cable of countless ones
+    count = max(1, int(np.ceil(task.length / scheme.segment_length - 1e-9)))
+    check_memory(path.times.size, count)
+    line, c, idle = new_line(count), task.cable.numbers(), DrumProperties().numbers()
+    J, tail_drag = task.current.at((0.0, 0.0, 0.0)), task.tail_drag
+    uphill = steady_direction(path.leaving, J, task.cable, tail_drag)
+    line.ends.segment_length = task.length / count
+    lay_straight(line, task.length, uphill, path.leaving[0], idle, c)
+    line.ends.free_end, line.ends.tail_drag, line.ends.tolerance = True, tail_drag, scheme.tolerance
+    set_steady_tow(line, path.leaving[0], J, task.cable, tail_drag)
+    path.place[:] += line.position[NOW, 0]
+    origin = -line.position[NOW, 0]
+    return _run(line, path, resting(path.times), task.current.numbers(origin), c, idle, scheme.rtol)
+
+
+def led_drum(task: PullOut, times: np.ndarray) -> np.ndarray:
+    """Return the way of the drum and the setpoints of its winch at times (n,), see `cable.drum_motion`."""
+    if isinstance(task.drum, DrumProperties):
+        setpoints = np.zeros(times.size)
+    else:
+        setpoints = task.drum.setpoints(times, task.wet_length)
+    if task.drum_velocity is None:
+        return resting(times, setpoints)
+    way = sample_path(task.drum_velocity, float(times[-1]), float(times[1] - times[0]), "drum_velocity")
+    return drum_path(times, way.place, way.leaving, setpoints)
+
+
+def _capacity(task: PullOut, path: TowPath, led: np.ndarray, segment_length: float, scheme: MovingEnd) -> int:
+    """Return for how many segments there has to be room; refuse what does not fit into memory.
+
+    A winch says how much cable there will be. A free drum gives what the ways of both ends and the current ask for, and
+    some of its own accord; room is made for three times their sum and 5 m more, and `stops` tells where that ends.
+    """
+    if isinstance(task.drum, PayOutRate | Brake):
+        longest = float(led[:, SETPOINT].max())
+    else:
+        ways = length_of_way(path.place) + length_of_way(led[:, PLACE:VELOCITY])
+        reach = 1.5 * (ways + task.current.fastest * task.duration) + task.wet_length
+        longest = 2.0 * reach + 5.0
+    capacity = segments_needed(longest, segment_length, scheme.grading) + int(scheme.run_in / segment_length)
+    if isinstance(task.start, Equilibrium):
+        capacity += task.start.segment_lengths.size
+    check_memory(path.times.size, capacity)
+    return capacity
+
+
+def _run(
     line: Line,
     path: TowPath,
     led: np.ndarray,
@@ -203,12 +291,11 @@ def run(
     c: CableNumbers,
     drum: DrumNumbers,
     rtol: float,
-    work: Load,
-    capacity: int,
 ) -> History:
     """Run a line that is laid out, and return its history."""
+    work = new_load()
     start_in_water(line, water, c, work)
-    record = new_record(path.times.size, capacity)
+    record = new_record(path.times.size, line.length.size - 1)
     rows = follow_path(line, path, led, water, c, drum, rtol, work, record)
     solved = line.ends.solved
     trouble = "" if rows == path.times.size else describe_stop(float(path.times[rows - 1]), line, drum, c)

@@ -1,52 +1,59 @@
-"""Advance the cable by one step: try it, and when all agree, accept it.
+"""Solve one step: guess it, and let Newton's method make the guess right.
 
 `try_step` solves for a new tow-point position without forgetting where the cable was, so a vehicle and its cable
-can ask "what if" until they agree. `accept` makes the new level the present one and, when the growing segment has
-become long, splits it.
+can ask "what if" until they agree; `remeshing.accept` then makes the answer the present state.
 
 What the drum does in the step (turn, stand, spin ahead of the cable) is guessed from the step before, and changed
-when the answer contradicts it (`cable.drum`).
-
-There is a new node at the drum when the last segment has become long, and one less when it has become short. Both
-happen between two steps, at levels NOW and BEFORE, and leave length, shape and motion of the cable as they are.
+when the answer contradicts it (`cable.drum`). Newton's method is damped, bounded in iterations, and always has an
+outcome. From its last matrix follows how the tow force, and all the cable, answers to the tow point.
 """
 
 from __future__ import annotations
 
+from math import isfinite, sqrt
+
 import numpy as np
 
 from cable.current import Water
-from cable.drum import FREE, STANDING, next_mode
-from cable.moving_end.bdf2 import backward_weights
+from cable.drum import FREE, STANDING, DrumNumbers, next_mode
+from cable.moving_end.assembly import assemble, assemble_residual
+from cable.moving_end.bdf2 import Weights, backward_weights
+from cable.moving_end.bending import factor_step, has_residual, solve_factored
+from cable.moving_end.block_solver import SIZE, spread
 from cable.moving_end.chord_correction import correct_for_arc
-from cable.moving_end.newton import solve_step
 from cable.moving_end.segment_load import Load
-from cable.moving_end.slack_law import KNOWN, SMOOTHING
+from cable.moving_end.slack_law import KNOWN, SMOOTHING, SOFTEST, STRAIN_SCALE
 from cable.moving_end.state import (
     BEFORE,
+    GUESS,
+    LOWER,
     NEW,
     NOW,
-    SPLIT_AT,
+    RESIDUAL,
+    STEP,
     Line,
     feel_water,
     held_node,
-    segment_momentum,
-    spacing,
 )
-from cable.moving_end.tow_boundary import fill_node_tensions, follow_tow
-from cable.properties import CableNumbers, DrumNumbers
+from cable.properties import CableNumbers
 from subzero.jit import compiled, inlined, inner
 
-SOFTEST = 1e-4
-"""T₀ that a difficult step starts with, a tenth at a time down to `slack_law.SMOOTHING`. [N]"""
 TAUT = 1e-2
 """A step begins with at least this tension everywhere: Newton then looks for a taut cable first. [N]"""
 TAKEN_UP = 1e-9
 """A free drum that would take up more cable than this in a step has not been solved: try a smaller one. [m]"""
-MERGE_AT = 0.5
-"""While cable is reeled in, a last segment shorter than this fraction of the one before is joined to it."""
 MOST_DRUM_CHANGES = 4
 """How often one step may change its mind about what the drum does."""
+MAX_ITERATIONS = 40
+MAX_HALVINGS = 8
+ABSOLUTE_TOLERANCE = 1e-13
+"""Balances of a cable without tension hold to this. [N]"""
+ROUNDING = 1e-15
+"""Positions x are known to this fraction; inertia m1 ℓ a₀ b₀ x and strain x/ℓ of a segment cannot be known better."""
+NEARLY = 1e-5
+"""Below this merit a step is taken whole: Newton's method ends there by itself; rounding could hide its progress."""
+SMALLEST_SEGMENT = 1e-9
+"""The growing segment never gets shorter than this while iterating. [m]"""
 
 
 @compiled
@@ -168,119 +175,174 @@ def _predict(
     correct_for_arc(line, drum.control != FREE, work)
 
 
+@inner
+def solve_step(
+    line: Line,
+    w: Weights,
+    c: CableNumbers,
+    drum: DrumNumbers,
+    work: Load,
+    near: bool,
+) -> bool:
+    """Solve the equations of `assembly` for level NEW, from the guess that stands there; return whether that went well,
+    and leave in `line.ends.solved` how. One that is as `near` as that
+    of `follow_tow` is likely to be right: no matrix is made until the residual says that it is not.
+
+    The matrix is made anew for every step: a kept one converges to the tolerance only, and what is left then differs
+    from run to run, which sensitivities by differences see. Whether a guess will do, the residual tells by itself.
+    """
+    rounding, alone = ROUNDING * (c.mass + c.added_mass) * w.a0 * w.b0, has_residual(line, c)
+    made = not near
+    _residual(line, w, c, drum, work, near)
+    merit = _merit(line)
+    for iteration in range(MAX_ITERATIONS):
+        if _size(line, rounding, merit) <= 1.0:
+            return _solved(line, rounding, True, iteration)
+        if not made:
+            assemble(line, w, c, drum, work)
+        line.ends.factored = factor_step(line, c)
+        if not line.ends.factored:
+            break
+        solve_factored(line, c)
+        last_length, before, fraction = save_guess(line), merit, 1.0
+        for _ in range(MAX_HALVINGS):
+            go_from_guess(line, last_length, fraction)
+            _residual(line, w, c, drum, work, alone)
+            made, merit = not alone, _merit(line)
+            if isfinite(merit) and merit <= max(before * (1.0 - 0.1 * fraction), NEARLY):
+                break
+            fraction *= 0.5
+        if not isfinite(merit):
+            break
+    return _solved(line, rounding, _size(line, rounding, merit) <= 1.0, MAX_ITERATIONS)
+
+
 @compiled
-def accept(line: Line, step: float, c: CableNumbers, work: Load) -> None:
-    """Make level NEW the present one; split the last segment while it is too long, join it while it is too short."""
-    N = line.ends.count
-    for level in (BEFORE, NOW):
-        for j in range(N + 1):
+def _residual(line: Line, w: Weights, c: CableNumbers, drum: DrumNumbers, work: Load, alone: bool) -> None:
+    """Fill the residual: `alone`, so that the factors of the last matrix stay, or with the matrix."""
+    if alone:
+        assemble_residual(line, w, c, drum, work)
+    else:
+        assemble(line, w, c, drum, work)
+        line.ends.factored = False
+
+
+@compiled
+def save_guess(line: Line) -> float:
+    """Keep the guess and the Newton step; return the guess of the last segment's length. [m]."""
+    for j in range(1, line.ends.count + 1):
+        line.rows[GUESS, j, 0] = line.tension[NEW, j]
+        for i in range(3):
+            line.rows[GUESS, j, 1 + i] = line.position[NEW, j, i]
+        for i in range(4):
+            line.rows[STEP, j, i] = line.rows[RESIDUAL, j, i]
+    return line.ends.last_length[NEW]
+
+
+@compiled
+def go_from_guess(line: Line, last_length: float, fraction: float) -> None:
+    """Write guess minus `fraction` of the Newton step to level NEW."""
+    N, held, guess, step = line.ends.count, held_node(line), line.rows[GUESS], line.rows[STEP]
+    for j in range(1, N + 1):
+        line.tension[NEW, j] = guess[j, 0] - fraction * step[j, 0]
+        if j < held:
             for i in range(3):
-                line.position[level, j, i] = line.position[level - 1, j, i]
-                line.velocity[level, j, i] = line.velocity[level - 1, j, i]
-                line.momentum[level, j, i] = line.momentum[level - 1, j, i]
-                line.water[level, j, i] = line.water[level - 1, j, i]
-        line.ends.last_length[level] = line.ends.last_length[level - 1]
-        line.ends.payout[level] = line.ends.payout[level - 1]
-    for j in range(N + 1):
-        line.tension[BEFORE, j] = line.tension[NOW, j]
-        line.tension[NOW, j] = line.tension[NEW, j]
-    fill_node_tensions(line)
-    line.ends.previous_step = step
-    line.ends.time += step
+                line.position[NEW, j, i] = guess[j, 1 + i] - fraction * step[j, 1 + i]
     if line.ends.free_end:
         return
-    last = line.ends.last_length
-    while last[NOW] > SPLIT_AT * spacing(line) and line.ends.count < line.length.size - 1:
-        split_last(line, spacing(line), c, work)
-    while line.ends.count > 1 and last[NOW] < MERGE_AT * line.length[line.ends.count - 1]:
-        merge_last(line, c, work)
+    line.ends.last_length[NEW] = max(last_length - fraction * step[N, 1], 0.1 * last_length, SMALLEST_SEGMENT)
 
 
-@inner
-def split_last(line: Line, segment_length: float, c: CableNumbers, work: Load) -> None:
-    """Insert a node `segment_length` from the start of the last segment, on its chord, at levels NOW and BEFORE.
+@inlined
+def _tolerances(line: Line, rounding: float) -> tuple[float, float]:
+    """Return by how much a length equation [-] and a balance [N] may be off.
 
-    The new node is a material point. At level BEFORE it may still have been on the drum: then it is put where the
-    straight continuation of the chord would have had it, so that its backward differences stay smooth. Where little or
-    nothing of the last segment was out of the drum then, the segment before it is continued: a step may pay out several
-    segments, or one exactly.
+    `ends.tolerance` is the share of the largest tension in the cable for balances, and of `slack_law.STRAIN_SCALE` for
+    lengths: 1e-9 is a strain of 1e-12.
     """
-    N = line.ends.count
-    for level in (NOW, BEFORE):
-        beyond = N > 1 and line.ends.last_length[level] < 0.5 * segment_length
-        fraction = segment_length / (line.length[N - 1] if beyond else line.ends.last_length[level])
-        _insert_between(line.position[level], N, fraction, beyond)
-        _insert_between(line.velocity[level], N, fraction, beyond)
-        _insert_between(line.water[level], N, fraction, beyond)
-        line.ends.last_length[level] -= segment_length
-        if level == NOW:
-            near, end = line.node_tension[N - 1], line.node_tension[N]
-            line.node_tension[N] = near + fraction * (end - near)
-            line.node_tension[N + 1] = end
-            _share_tension(line, N, fraction, near - end)
-    line.length[N] = segment_length
-    line.ends.count = N + 1
-    line.ends.settled += segment_length
-    for level in (NOW, BEFORE):
-        segment_momentum(line, level, N, segment_length, c, work)
-        segment_momentum(line, level, N + 1, line.ends.last_length[level], c, work)
+    tension, reach, x = 0.0, 0.0, line.position
+    for j in range(1, line.ends.count + 1):
+        tension = max(tension, abs(line.tension[NEW, j]))
+        reach = max(reach, abs(x[NEW, j, 0]), abs(x[NEW, j, 1]), abs(x[NEW, j, 2]))
+    known = 2.0 * ROUNDING / STRAIN_SCALE * reach / max(line.length[1], SMALLEST_SEGMENT)
+    strain = line.ends.tolerance + known
+    return strain, line.ends.tolerance * tension + ABSOLUTE_TOLERANCE + rounding * line.length[1] * reach
 
 
 @compiled
-def _share_tension(line: Line, N: int, fraction: float, drop: float) -> None:
-    """Give both parts of a split segment the tension at their middles, for a tension that falls evenly by `drop`."""
-    for level in (NOW, BEFORE):
-        line.tension[level, N + 1] = max(line.tension[level, N] - 0.5 * fraction * drop, 0.0)
-        line.tension[level, N] += 0.5 * (1.0 - fraction) * drop
+def _size(line: Line, rounding: float, merit: float) -> float:
+    """Return the largest residual as a multiple of its tolerance; infinite for one that is no number."""
+    strain, allowed = _tolerances(line, rounding)
+    length, balance, r = 0.0, 0.0, line.rows[RESIDUAL]
+    for j in range(1, line.ends.count + 1):
+        length = max(length, abs(r[j, 0]))
+        balance = max(balance, abs(r[j, 1]), abs(r[j, 2]), abs(r[j, 3]))
+    return max(length / strain, balance / allowed) if isfinite(merit) else np.inf
 
 
 @compiled
-def _insert_between(values: np.ndarray, last: int, fraction: float, beyond: bool) -> None:
-    """Move the last row of `values` (nodes, 3) one down, and interpolate or extrapolate a new row before it.
+def _solved(line: Line, rounding: float, converged: bool, iterations: int) -> bool:
+    """Note how it ended, with the worst equation and where it stands; return whether it converged."""
+    strain, allowed = _tolerances(line, rounding)
+    worst, node, equation = 0.0, 0, 0
+    for j in range(1, line.ends.count + 1):
+        for i in range(4):
+            size = abs(line.rows[RESIDUAL, j, i]) / (strain if i == 0 else allowed)
+            if worst == worst and not size <= worst:
+                worst, node, equation = size, j, i
+    solved = line.ends.solved
+    solved.converged, solved.iterations, solved.residual = converged, iterations, worst
+    solved.worst_node, solved.worst_equation = node, equation
+    return converged
 
-    Either along the last interval, or, `beyond`, along the one before it.
+
+@compiled
+def _merit(line: Line) -> float:
+    """Return the root of the sum of squares of all residuals, lengths in `STRAIN_SCALE`, balances in millinewtons.
+
+    Where the cable pulls with more than 1 N, balances count in thousandths of its pull: the rounding of theirs, which
+    grows with it, would hide the lengths, and no step would seem to help.
     """
-    for i in range(3):
-        near, end = values[last - 1, i], values[last, i]
-        values[last + 1, i] = end
-        values[last, i] = near + fraction * (near - values[last - 2, i] if beyond else end - near)
+    total, pull = 0.0, 1.0
+    for j in range(1, line.ends.count + 1):
+        pull = max(pull, line.tension[NOW, j])
+    for j in range(1, line.ends.count + 1):
+        total += line.rows[RESIDUAL, j, 0] ** 2
+        for i in range(1, 4):
+            total += (1e3 / pull * line.rows[RESIDUAL, j, i]) ** 2
+    return sqrt(total)
 
 
 @inner
-def merge_last(line: Line, c: CableNumbers, work: Load) -> None:
-    """Take the node before the drum out, at levels NOW and BEFORE: the last two segments become one.
+def impedance(line: Line, Z: np.ndarray) -> None:
+    """Fill Z = ∂F/∂x (3, 3), the change of the tow force by a displacement of the tow point at the end of the step.
 
-    A taut new segment is as long as its chord (in the elastic state of its neighbours): the arc that the node cut
-    off, an eighth of the angle squared, is given back to the drum, without a jolt.
+    Taken from the last Newton matrix, the answer of the whole cable included. [N/m].
     """
-    N = line.ends.count
-    last = line.ends.last_length
-    square = 0.0
     for i in range(3):
-        square += (line.position[NOW, N, i] - line.position[NOW, N - 2, i]) ** 2
-    whole = line.length[N - 1] + last[NOW]
-    pieces = _chord(line, N - 1) + _chord(line, N)
-    taut = min(line.tension[NOW, N - 1], line.tension[NOW, N]) > KNOWN
-    cut_off = whole * (1.0 - np.sqrt(square) / max(pieces, 1e-12)) if taut else 0.0
-    for level in (NOW, BEFORE):
-        last[level] += line.length[N - 1] - cut_off
+        for k in range(3):
+            Z[i, k] = line.ends.tow_by_tow[i, k]
+            for m in range(4):
+                Z[i, k] -= line.ends.tow_by_block[i, m] * line.ends.tow_answer[k, m]
+
+
+@inner
+def follow_tow(line: Line, tow: np.ndarray) -> bool:
+    """Move the tow point of the answer on level NEW, and all that moves with it by the factors of the last matrix.
+
+    False, and nothing has moved, if there are none.
+    """
+    step, at, L = line.rows[RESIDUAL], line.position[NEW, 0], line.blocks[LOWER]
+    if not line.ends.factored:
+        return False
+    for j in range(1, line.ends.count + 1):
+        for m in range(SIZE):
+            step[j, m] = 0.0
+    for m in range(SIZE):
         for i in range(3):
-            line.position[level, N - 1, i] = line.position[level, N, i]
-            line.velocity[level, N - 1, i] = line.velocity[level, N, i]
-            line.water[level, N - 1, i] = line.water[level, N, i]
-    line.tension[NOW, N - 1] = 0.5 * (line.tension[NOW, N - 1] + line.tension[NOW, N])
-    line.tension[BEFORE, N - 1] = 0.5 * (line.tension[BEFORE, N - 1] + line.tension[BEFORE, N])
-    line.node_tension[N - 1] = line.node_tension[N]
-    line.ends.count = N - 1
-    line.ends.settled -= line.length[N - 1]
-    for level in (NOW, BEFORE):
-        segment_momentum(line, level, N - 1, last[level], c, work)
-
-
-@compiled
-def _chord(line: Line, j: int) -> float:
-    """Return the distance of the ends of segment j at level NOW. [m]."""
-    square = 0.0
+            step[1, m] += L[1, 1 + i, m] * (tow[i] - at[i])
+    spread(L, line.ends.count, step)
+    go_from_guess(line, save_guess(line), 1.0)
     for i in range(3):
-        square += (line.position[NOW, j, i] - line.position[NOW, j - 1, i]) ** 2
-    return np.sqrt(square)
+        at[i] = tow[i]
+    return True

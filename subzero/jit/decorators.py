@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 from types import FunctionType
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import numba
 import numba.extending
@@ -65,11 +65,11 @@ def _compile(function: Function, *, gate: bool, inline: bool = False, makes: boo
         "forceinline": inline,
         "_nrt": makes,
     }
-    found: Any = numba.njit(**options)(function)
+    found: Any = numba.njit(**options)(function)  # called as the function is
     if not numba.config.DISABLE_JIT:
         found._cache = MachineCode(function)  # where numba's own `cache=True` puts its own
         found._compile_for_args = _unbroken(found._compile_for_args)
-    return found
+    return cast(Function, found)
 
 
 def _unbroken(compile_for: Callable[..., Any]) -> Callable[..., Any]:
@@ -83,10 +83,10 @@ def by_field(field: str, yes: Function, no: Function) -> Function:
     What few runs need so does not lengthen the first compilation of all others.
     """
 
-    def choose(line, c):
+    def choose(line, c):  # type: ignore[no-untyped-def]  # numba compares annotations of the two, too
         return (yes if field in c.dtype.names else no)(line, c)
 
-    def typed(line, c):
+    def typed(line, c):  # type: ignore[no-untyped-def]
         chosen: Any = (yes if field in c.fields else no).py_func  # type: ignore[attr-defined]
         return FunctionType(
             chosen.__code__, chosen.__globals__

@@ -258,7 +258,7 @@ def _home_for(function: Any) -> Home:
     return home_of(OTHERS, file.absolute()) if file.is_file() else Home(None, OTHERS, lambda: False)
 
 
-class MachineCode(_Cache):
+class MachineCode(_Cache):  # type: ignore[misc]  # numba has no types
     """What numba asks for the machine code of a function, and gives it to.
 
     Args:

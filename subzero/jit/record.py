@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from functools import cache
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import numpy as np
 
@@ -52,7 +52,9 @@ def packed(values: Numbers) -> Numbers:
         _layouts[shape] = _layout(values)
     out: Any = np.zeros(1, dtype=_layouts[shape])
     out[0] = inside
-    return out[0]
+    return cast(
+        Numbers, out[0]
+    )  # it is a `Packed`, and to whoever reads and writes its fields what it was made of
 
 
 @cache

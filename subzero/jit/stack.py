@@ -20,7 +20,7 @@ def _interpreted(rows: int, columns: int) -> np.ndarray:
     return np.empty((rows, columns))
 
 
-@intrinsic(prefer_literal=True)
+@intrinsic(prefer_literal=True)  # type: ignore[untyped-decorator]  # numba has no types
 def _on_stack(context: Any, rows: Any, columns: Any) -> Any:
     """Return an array (rows, columns) of anything, for as long as the function that asks is running."""
     if not (isinstance(rows, types.IntegerLiteral) and isinstance(columns, types.IntegerLiteral)):

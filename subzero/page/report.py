@@ -37,6 +37,13 @@ FIGURES = {
 }
 """What a figure shows, by its name."""
 
+SVG_STYLE: dict[Any, Any] = {
+    "svg.hashsalt": "subzero",
+    "svg.fonttype": "path",
+    "path.simplify_threshold": 0.3,
+}
+"""Two pages of one run are alike to the last letter."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Table:
@@ -143,10 +150,7 @@ def _image(figure: Figure) -> str:
     import matplotlib as mpl
 
     held = io.BytesIO()
-    alike = mpl.rc_context(
-        {"svg.hashsalt": "subzero", "svg.fonttype": "path"}
-    )  # to the last letter, in two pages
-    with alike, warnings.catch_warnings():
+    with mpl.rc_context(SVG_STYLE), warnings.catch_warnings():
         # A letter that the font of figures lacks is a box there; the page itself says the same words above them.
         warnings.filterwarnings("ignore", "Glyph .* missing from font", UserWarning)
         figure.savefig(held, format="svg", metadata={"Date": None})

@@ -78,7 +78,9 @@ def from_cable_model(
     from subzero.errors import UserError
 
     step = min(0.1, duration / 20.0)
-    run = cable.pull_out(velocity_n, duration, step, cable=model.cable, drum=model.drum)
+    run = cable.pull_out(
+        velocity_n, duration, cable=model.cable, drum=model.drum, scheme=cable.MovingEnd(time_step=step)
+    )
     if not run.outcome.completed:
         raise UserError(f"The cable has no steady pull along this way. {run.outcome.message}")
     F = R_nb.T @ run.tow_force[-1]

@@ -147,6 +147,8 @@ def finished(
     Raises:
         UserError: as of `sweep`, or workers that cannot go on; what is finished is kept.
     """
+    if workers is not None:  # before there is a folder
+        whole("workers", workers, least=1)
     job, rows = plan.job, plan.points.values
     shape = len(job.outcomes.channels), job.outcomes.times.size
     with opened(folder, plan.manifest(), shape) as store:

@@ -31,9 +31,9 @@ from pathlib import Path
 from typing import Any
 
 import scenarios
-from scenarios.files import read_toml
+from scenarios.files import Source, read_toml
 from scenarios.parameters import with_parameters
-from subzero.errors import UserError, printable, short, suggestion, truth
+from subzero.errors import UserError, listed, printable, short, suggestion, truth
 from subzero.sweeps.design import Points, points_of
 from subzero.sweeps.member import Job, canonical, code_digest
 from subzero.sweeps.outcomes import Function, outcomes_of
@@ -141,8 +141,15 @@ def read_plan(path: str | Path) -> Plan:
     Raises:
         UserError: it cannot be read, or cannot be a sweep; with the nearest valid name.
     """
-    name = printable(str(path))
-    source = read_toml(Path(path), str(path))
+    try:
+        return _plan_in(read_toml(Path(path), str(path)), printable(str(path)))
+    except scenarios.ScenarioError as error:
+        problems = [str(problem) for problem in error.problems]
+        raise UserError(listed(f"The sweep {printable(str(path))} cannot be used:", problems)) from None
+
+
+def _plan_in(source: Source, name: str) -> Plan:
+    """Return the sweep that a file says, which is shown by its name."""
     table = source.table
     _check_keys(name, "", table)
     for section in ("parameters", "changes", "outcomes"):

@@ -18,7 +18,7 @@ import numpy as np
 
 import scenarios
 from cable.lumped import Course, Rope, begin, rope_off_drum, winch_rows
-from cable.pull_out import START_LENGTH
+from cable.task import START_LENGTH
 from scenarios.steps import fitting_step
 from subzero.channels import BY_NAME
 from subzero.diagnosis.hypothesis.configuration import Sensing, Setting

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     import scenarios
-    from cable.properties import CableProperties, DrumProperties
+    from cable import CableProperties, DrumProperties
     from subzero.model import Model
 
 RESIDUAL = 0.01

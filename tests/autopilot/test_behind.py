@@ -42,7 +42,9 @@ def test_in_a_turn_it_lies_and_pulls_like_the_cable_itself(model, degrees, side)
     def velocity(t):
         return np.array([np.cos(rate * t), np.sin(rate * t), 0.0])
 
-    run = cable.pull_out(velocity, DURATION, STEP, cable=model.cable, drum=model.drum)
+    run = cable.pull_out(
+        velocity, DURATION, cable=model.cable, drum=model.drum, scheme=cable.MovingEnd(time_step=STEP)
+    )
     seen, length = behind(model), run.length
     for i in range(1, length.size):
         seen.move(STEP, 1.0, 0.0, rate)

@@ -96,10 +96,12 @@ def test_the_coupled_run_starts_in_the_steady_motion(model):
     assert float(run["surge_speed"][-1]) < 1.0
 
 
-@pytest.mark.parametrize("feedback", [0.0, 0.5, 1.0])
-def test_commands_undo_offset_dead_band_and_sag(model, feedback):
+@pytest.mark.parametrize("feedback,lost", [(0.0, 0.0), (0.5, 0.0), (1.0, 0.0), (0.0, 0.3), (0.5, 0.3)])
+def test_commands_undo_offset_dead_band_loss_and_sag(model, feedback, lost):
     crooked = changed(
         model,
+        rudder_servo__lost_command=lost,
+        stern_plane_port_servo__lost_command=lost,
         rudder_servo__position_feedback=feedback,
         stern_plane_port_servo__position_feedback=feedback,
         rudder_servo__offset=0.02,
@@ -112,6 +114,12 @@ def test_commands_undo_offset_dead_band_and_sag(model, feedback):
     start[13:17] = 0.0
     run = vehicle.free_run(crooked.vehicle, start, steady.command, 40.0)
     assert run.states[-1, 7:13] == pytest.approx(start[7:13], abs=1e-3), "the battery runs down a little"
+
+
+def test_a_turn_with_a_jammed_rudder_is_refused(model):
+    jammed = changed(model, rudder_servo__lost_command=1.0)
+    with pytest.raises(autopilot.NoTrimError, match="jammed rudder"):
+        autopilot.trim(jammed, speed=1.0, turn_rate=0.1)
 
 
 @pytest.mark.parametrize(

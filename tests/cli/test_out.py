@@ -10,6 +10,7 @@ import sys
 
 import pytest
 
+from subzero import interrupts
 from subzero.cli import FINE, INTERRUPTED, MISTAKE, STOPPED, main
 from subzero.user_file import INCOMPLETE
 
@@ -189,6 +190,20 @@ def test_an_interrupt_after_the_last_move_is_told_as_it_is(tmp_path, rails, monk
     monkeypatch.setattr("subzero.write_results.tell", interrupted)
     assert simulate(tmp_path) == INTERRUPTED
     assert capsys.readouterr().err.endswith(f"Interrupted; all files were written to {tmp_path}.\n")
+
+
+def test_a_command_says_nothing_of_a_former_one_in_the_same_process(tmp_path, rails, monkeypatch, capsys):
+    """What an interrupted sweep had kept was told of the next command, whose errors would have passed as well."""
+    interrupts.leaves(lambda: "3 of 6 members are kept")
+    monkeypatch.setattr(interrupts, "_raised", [True])
+
+    def broken(*_, **__):
+        raise RuntimeError("a bug")
+
+    monkeypatch.setattr("subzero.write_results.tell", broken)
+    with pytest.raises(RuntimeError, match="a bug"):
+        simulate(tmp_path)
+    assert "members" not in interrupts.words()
 
 
 def test_control_characters_of_a_description_are_shown_escaped(tmp_path):

@@ -6,7 +6,8 @@ from importlib import import_module
 import pytest
 
 MODULES = (
-    "scenarios", "scenarios.checks", "scenarios.instructions", "scenarios.steps", "cable.current", "subzero.model",
+    "scenarios", "scenarios.checks", "scenarios.instructions", "scenarios.steps", "cable.current", "cable.schemes",
+    "subzero.model",
     "subzero.simulator",
 )  # fmt: skip
 

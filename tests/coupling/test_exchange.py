@@ -75,7 +75,7 @@ def test_the_cable_feels_the_tow_points_path_and_nothing_else(name, simulate):
     run = simulate(name)
     times = run["time"].values
     path = CubicHermiteSpline(times, tow_point(run), tow_velocity(run))
-    alone = cable.pull_out(path.derivative(), times[-1], 0.1, run_in=2.0)
+    alone = cable.pull_out(path.derivative(), times[-1], scheme=cable.MovingEnd(time_step=0.1, run_in=2.0))
     assert alone.outcome.completed, alone.outcome.message
     # The first tenths of a second, with millimetres of cable, depend on how a start from rest is laid.
     assert_allclose(alone.tow_force[5:], pull(run)[5:], rtol=0, atol=1e-4 * np.abs(pull(run)).max())
@@ -110,7 +110,7 @@ def test_a_prescribed_run_is_the_cable_alone_with_the_same_motion(current, simul
         lift = 0.5 * rate
         return np.cos(pitch) + lift * np.sin(pitch), 0.0, -np.sin(pitch) + lift * np.cos(pitch)
 
-    alone = cable.pull_out(motion, 30.0, current=current, run_in=2.0)
+    alone = cable.pull_out(motion, 30.0, current=current, scheme=cable.MovingEnd(run_in=2.0))
     assert_allclose(pull(run)[1:], alone.tow_force[1:], rtol=0, atol=1e-8)
     assert_allclose(run["cable_length"].values, alone.length, rtol=0, atol=1e-9)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,7 +15,16 @@ from subzero.diagnosis.hypothesis.catalogue.sensors import SPECS
 from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.effect import with_onset
 from subzero.diagnosis.hypothesis.extended_model import all_effects
+from subzero.diagnosis.inference.change_point_scan import (
+    BaseRun,
+    change_point_columns,
+    grown,
+    spacing_of,
+    times_of,
+)
 from subzero.diagnosis.inference.measurement import respond
+from subzero.diagnosis.inference.out_of_catalogue import special_cases_folded
+from subzero.diagnosis.inference.problem import pose
 from subzero.model import Model
 from subzero.synthetic.reference_run import simulate_reference
 
@@ -76,6 +86,42 @@ def test_growth_is_beside_what_else_begins_in_mid_trial(setting):
         assert last.axial_drag.drag_coefficient == pytest.approx(drag * (1.0 + 24.5 / 60.0), rel=0.02)
         at_eight = [model for time, model in both.later if time <= 8.0][-1]
         assert at_eight.vehicle.rudder_servo.offset == 0.0
+
+
+def test_what_grows_is_a_sum_of_steps_in_the_scan():
+    """Against runs that grow: the trapezoidal rule errs by a tenth at most well before the end; it needs no run."""
+    flown = subzero.load_scenario("zigzag")
+    nominal = Setting(trial=flown, model=Model.of(flown))
+    times = np.arange(0.0, flown.duration + 1e-9, 0.2)
+    record = subzero.Record(source="nominal", time=times, values=respond(nominal, times, CHANNELS))
+    problem = pose([subzero.Logged(record=record, setting=nominal, name="zigzag")])
+    along, spacing = BaseRun(problem, np.zeros(len(problem.entries))), spacing_of(problem, 0)
+    thrust, fading = all_effects()["propeller_thrust_gain"], all_effects()["fading_thrust"]
+    steps = [(thrust, time) for time in times_of(problem, 0)]
+    columns = dict(zip(steps, change_point_columns(along, steps), strict=True))
+    sums = grown([fading], columns, spacing)
+    early = [begun for begun in sums if begun[1] < 0.6 * flown.duration]
+    assert len(early) > 5
+    for begun, runs in zip(early, change_point_columns(along, early), strict=True):
+        assert np.linalg.norm(sums[begun] - runs) < 0.1 * np.linalg.norm(runs)
+
+
+def fitted_change_point(name, log_posterior):
+    """A change point with nothing but what folding looks at."""
+    point = SimpleNamespace(effect=all_effects()[name], record=0)
+    return SimpleNamespace(begun=point, log_posterior=log_posterior)
+
+
+@pytest.mark.parametrize(
+    "ahead, told", [(0.0, ["rudder_offset"]), (1.0, ["rudder_offset"]), (5.0, ["rudder_jam"])]
+)
+def test_a_jam_that_is_not_needed_is_told_as_the_offset(ahead, told):
+    """Four times as probable (1.4 nats) is what it needs; the offset has the probability of both then."""
+    both = [fitted_change_point("rudder_offset", -3.0), fitted_change_point("rudder_jam", ahead - 3.0)]
+    kept = special_cases_folded(both)
+    assert [one.begun.effect.id for one, _ in kept][-1:] == told
+    total = np.logaddexp(-3.0, ahead - 3.0)
+    assert kept[0][1] == pytest.approx(total if told == ["rudder_offset"] else -3.0)
 
 
 @pytest.mark.parametrize(

@@ -42,11 +42,10 @@ def hanging_shape(segment_length, factor=1.0):
     run = cable.pull_out(
         lambda _: (0.0, 0.0, 0.0),
         60.0,
-        0.5,
-        segment_length=segment_length,
         cable=beam,
+        start=LENGTH,
         drum=cable.ConstantTension(tension=TENSION),
-        wet_length=LENGTH,
+        scheme=cable.MovingEnd(time_step=0.5, segment_length=segment_length),
     )
     assert run.outcome.completed, run.outcome.message
     return run.shapes[-1], beam.weight_in_water
@@ -98,9 +97,9 @@ def test_a_stiff_cable_of_short_segments_does_not_spike(segment_length):
         cable.pull_out(
             bowing,
             20.0,
-            segment_length=segment_length,
             cable=cable.CableProperties(**THICK, bending_stiffness=stiffness),
             drum=cable.ConstantTension(tension=50.0),
+            scheme=cable.MovingEnd(segment_length=segment_length),
         )
         for stiffness in (5.0, 0.0)
     )

@@ -29,7 +29,13 @@ def out_and_back(t):
 @cache
 def hanging(mass_per_length, segment_length):
     properties = cable.CableProperties(mass_per_length=mass_per_length)
-    run = cable.pull_out(out_and_back, 60.0, segment_length=segment_length, cable=properties, drum=HOLDING)
+    run = cable.pull_out(
+        out_and_back,
+        60.0,
+        cable=properties,
+        drum=HOLDING,
+        scheme=cable.MovingEnd(segment_length=segment_length),
+    )
     assert run.outcome.completed, run.outcome.message
     return run, properties.weight_in_water
 

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 import sympy as sp
 
+from cable import CableProperties
 from cable.feng_allen.equation7 import (
     Equation7Numbers,
     angles_of,
@@ -25,7 +26,6 @@ from cable.feng_allen.equation7 import (
     time_slope,
     to_local,
 )
-from cable.properties import CableProperties
 
 HEAVY = CableProperties(
     mass_per_length=0.02, compliance=0.07, tangential_drag_coefficient=0.02, normal_drag_coefficient=1.3

@@ -243,8 +243,8 @@ def test_a_winch_pays_out_from_a_chain_of_270_m():
 def test_both_ends_may_be_towed_along():
     """In axes that move with the ends, the water streams by: nothing changes."""
     held = cable.hold(ENDS, LENGTH, (-0.5, 0.0, 0.0), cable=made(0.02))
-    towed = {"drum_velocity": lambda _: (0.5, 0.0, 0.0), "current": STILL}
-    run = cable.pull_out(lambda _: (0.5, 0.0, 0.0), 5.0, start=held, drum=cable.Brake(), **towed)
+    boat = cable.MovingDrum(velocity=lambda _: (0.5, 0.0, 0.0), drum=cable.Brake())
+    run = cable.pull_out(lambda _: (0.5, 0.0, 0.0), 5.0, start=held, drum=boat, current=STILL)
     assert np.abs(run.tow_force - held.tow_force).max() < 1e-7 * np.linalg.norm(held.tow_force)
 
 
@@ -313,7 +313,8 @@ def test_what_cannot_be_held_is_said(ends, length, settings, said):
         cable.hold(ends, length, **settings)
 
 
-@pytest.mark.parametrize("settings", [{"scheme": "lumped"}, {"wet_length": 5.0}])
-def test_a_start_says_what_it_does_not_go_with(settings):
-    with pytest.raises(ValueError, match="start goes with scheme 'moving_end' and without wet_length"):
-        cable.pull_out(lambda _: STILL, 1.0, start=cable.hold(ENDS, LENGTH), **settings)
+@pytest.mark.parametrize("scheme", ["lumped", "paper_drum", "equation7"])
+def test_schemes_that_cannot_begin_with_a_hanging_cable_say_so(scheme):
+    said = f"scheme '{scheme}' does not know a start from cable.hold; use 'moving_end'"
+    with pytest.raises(ValueError, match=said):
+        cable.pull_out(lambda _: STILL, 1.0, start=cable.hold(ENDS, LENGTH), scheme=scheme)

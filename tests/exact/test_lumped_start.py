@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from cable import DrumProperties, pull_out
+from cable import DrumProperties, Lumped, pull_out
 
 
 @pytest.mark.parametrize("wet", [0.3, 5.0])
 @pytest.mark.parametrize("inertia", [0.0, 0.002])
 def test_a_cable_pulled_from_rest_has_the_length_between_its_ends(wet, inertia):
     history = pull_out(
-        lambda t: np.array([0.12 * t, 0.0, 0.0]), 2.0, 0.05, segment_length=0.25,
-        wet_length=wet, scheme="lumped", drum=DrumProperties(inertia=inertia),
+        lambda t: np.array([0.12 * t, 0.0, 0.0]), 2.0, start=wet, drum=DrumProperties(inertia=inertia),
+        scheme=Lumped(time_step=0.05, segment_length=0.25),
     )  # fmt: skip
     assert history.outcome.completed
     assert_allclose(history.length, history.tow_point[:, 0], rtol=2e-6, atol=1e-5)

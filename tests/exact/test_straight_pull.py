@@ -33,7 +33,11 @@ def ramp_slope(x):
 
 def steady(speed, step, segment_length, direction=NORTH, steps=40):
     """Pull at a constant speed."""
-    run = cable.pull_out(lambda _: speed * direction, steps * step, step, segment_length=segment_length)
+    run = cable.pull_out(
+        lambda _: speed * direction,
+        steps * step,
+        scheme=cable.MovingEnd(time_step=step, segment_length=segment_length),
+    )
     assert run.outcome.completed, run.outcome.message
     return run
 
@@ -102,7 +106,12 @@ def test_the_smoothing_of_slack_takes_no_visible_length():
 
 def accelerating(step, drum, times=8.0):
     """Return the largest error of T(0) and of T(S), and the run, from 0.6 to 1.4 m/s."""
-    run = cable.pull_out(lambda t: (0.6 + 0.8 * ramp(t / times)) * NORTH, times, step, drum=drum)
+    run = cable.pull_out(
+        lambda t: (0.6 + 0.8 * ramp(t / times)) * NORTH,
+        times,
+        drum=drum,
+        scheme=cable.MovingEnd(time_step=step),
+    )
     assert run.outcome.completed, run.outcome.message
     u, rate = 0.6 + 0.8 * ramp(run.time / times), 0.8 / times * ramp_slope(run.time / times)
     at_drum = (drum.inertia * rate / drum.radius + drum.friction_torque) / drum.radius
@@ -146,7 +155,9 @@ def test_drum_friction_is_felt_whole_at_the_tow_point():
 def test_a_pull_that_starts_with_an_acceleration_has_the_inertia_of_the_drum_right_from_the_start():
     """T(S) = I_d u'/R_d², constant; 2 % for what a first step of first order may leave."""
     drum = cable.DrumProperties(inertia=0.002)
-    run = cable.pull_out(lambda t: (1.0 + 0.15 * t) * NORTH, 2.0, 0.05, drum=drum)
+    run = cable.pull_out(
+        lambda t: (1.0 + 0.15 * t) * NORTH, 2.0, drum=drum, scheme=cable.MovingEnd(time_step=0.05)
+    )
     np.testing.assert_allclose(run.drum_tension[1:], 0.2 * 0.15, rtol=0.02)
 
 

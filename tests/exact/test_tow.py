@@ -24,7 +24,7 @@ def northward(speed):
 @pytest.mark.parametrize("speed", [0.3, 1.0, 2.5])
 @pytest.mark.parametrize("segment_length", [0.5, 0.7])
 def test_a_straight_tow_stays_what_it_is_at_every_step(speed, segment_length):
-    run = cable.tow(northward(speed), 30.0, 5.0, segment_length=segment_length)
+    run = cable.tow(northward(speed), 30.0, 5.0, scheme=cable.MovingEnd(segment_length=segment_length))
     exact = TABLE_1.tangential_drag * speed**2 * 30.0
     np.testing.assert_allclose(run.tow_tension, exact, rtol=TOLERANCE)
     np.testing.assert_allclose(run.length, 30.0, rtol=1e-12)
@@ -66,7 +66,13 @@ def test_a_cable_with_weight_tows_at_the_critical_angle(speed, properties, side)
 
 def test_the_critical_angle_is_found_from_another_one():
     """Start at 2 m/s, slow down to 1 m/s within a second, wait: the cable forgets."""
-    run = cable.tow(lambda t: (2.0 - min(t, 1.0), 0.0, 0.0), 20.0, 120.0, 0.2, cable=HEAVY)
+    run = cable.tow(
+        lambda t: (2.0 - min(t, 1.0), 0.0, 0.0),
+        20.0,
+        120.0,
+        cable=HEAVY,
+        scheme=cable.MovingEnd(time_step=0.2),
+    )
     assert run.outcome.completed, run.outcome.message
     away = run.shapes[-1][10] - run.shapes[-1][0]  # far from the tail
     assert np.arctan2(away[2], -away[0]) == pytest.approx(HEAVY.critical_angle(1.0), rel=1e-3)

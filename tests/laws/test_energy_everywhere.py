@@ -43,16 +43,22 @@ PULLS = {
     "stretch": {"drum": DRUM},
     "uniform": {"drum": DRUM, "current": (0.1, 0.2, 0.0)},
     "shear": {"drum": DRUM, "current": SHEARED},
-    "boat": {"drum": DRUM, "drum_velocity": boat},
-    "everything": {"drum": DRUM, "current": CHANGING, "drum_velocity": boat},
-    "everything on a winch": {"drum": WINCH, "current": CHANGING, "drum_velocity": boat},
+    "boat": {"drum": cable.MovingDrum(velocity=boat, drum=DRUM)},
+    "everything": {"drum": cable.MovingDrum(velocity=boat, drum=DRUM), "current": CHANGING},
+    "everything on a winch": {"drum": cable.MovingDrum(velocity=boat, drum=WINCH), "current": CHANGING},
 }
 
 
 @cache
 def missing(name, share):
     """Return what is missing in a pull, as a share, with segments of 0.5 m and steps of 0.1 s times `share`."""
-    run = cable.pull_out(motion, 16.0, 0.1 * share, segment_length=0.5 * share, cable=ELASTIC, **PULLS[name])
+    run = cable.pull_out(
+        motion,
+        16.0,
+        cable=ELASTIC,
+        scheme=cable.MovingEnd(time_step=0.1 * share, segment_length=0.5 * share),
+        **PULLS[name],
+    )
     assert run.outcome.completed, run.outcome.message
     return run.diagnostics()["energy_residual"]
 
@@ -80,7 +86,14 @@ def test_in_still_water_it_falls_with_their_square():
 def test_the_books_of_a_towed_cable_close(settings):
     """A free tail, and a drogue in water that changes along its way and in time."""
     coarse, fine = (
-        cable.tow(motion, 15.0, 16.0, 0.1 * share, segment_length=0.5 * share, cable=ELASTIC, **settings)
+        cable.tow(
+            motion,
+            15.0,
+            16.0,
+            cable=ELASTIC,
+            scheme=cable.MovingEnd(time_step=0.1 * share, segment_length=0.5 * share),
+            **settings,
+        )
         for share in (1.0, 0.25)
     )
     assert coarse.outcome.completed, coarse.outcome.message

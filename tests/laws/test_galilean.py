@@ -1,6 +1,6 @@
 """Only motion through the water counts: drum, water and tow point that all drift along with V change no force.
 
-Verifies: `drum_velocity=` and `Current` of `cable.pull_out` and `cable.tow`. Configuration: heavy stretching cable,
+Verifies: `cable.MovingDrum` and `Current` of `cable.pull_out` and `cable.tow`. Configuration: heavy stretching cable,
 three-dimensional motion at about 1 m/s, 0.1 s, 0.5 m, V of 0.8 m/s; free drum with inertia and friction, winches;
 uniform current and one with shear in depth, which a horizontal V leaves as it is.
 Tolerance: 1e-12 N where Newton's method takes the same way in both runs, 2e-7 N where it ends an iteration earlier in
@@ -36,10 +36,11 @@ def shear(added):
 def pulls(drift, current, drum):
     """Return the run of a drum that rests, and of the same that drifts with everything else."""
     rest, moving = (
-        cable.pull_out(
-            lambda t, V=V: motion(t) + V, DURATION, cable=HEAVY, drum=drum, current=current(V), **boat
+        cable.pull_out(lambda t, V=V: motion(t) + V, DURATION, cable=HEAVY, drum=held, current=current(V))
+        for V, held in (
+            (np.zeros(3), drum),
+            (drift, cable.MovingDrum(velocity=lambda _: drift, drum=drum)),
         )
-        for V, boat in ((np.zeros(3), {}), (drift, {"drum_velocity": lambda _: drift}))
     )
     assert rest.outcome.completed, rest.outcome.message
     assert moving.outcome.completed, moving.outcome.message
@@ -82,7 +83,9 @@ def test_a_tow_that_drifts_with_the_water_feels_the_same():
 
 def test_the_drift_matters_when_the_drum_alone_takes_part():
     """A neutral cable straight behind the vehicle: it leaves the drum at the difference of the two speeds."""
-    run = cable.pull_out(lambda _: (1.0, 0.0, 0.0), 10.0, drum_velocity=lambda _: (0.4, 0.0, 0.0))
+    run = cable.pull_out(
+        lambda _: (1.0, 0.0, 0.0), 10.0, drum=cable.MovingDrum(velocity=lambda _: (0.4, 0.0, 0.0))
+    )
     assert run.outcome.completed, run.outcome.message
     assert_allclose(run.length, 1e-6 + 0.6 * run.time, rtol=0, atol=1e-9)
     drag = cable.CableProperties().tangential_drag * run.length
@@ -92,7 +95,9 @@ def test_the_drift_matters_when_the_drum_alone_takes_part():
 def test_a_boat_that_leaves_a_waiting_vehicle_lays_the_cable_on_its_way():
     """The cable lies still, so nothing but the friction of the drum pulls on it: C_f/R_d everywhere."""
     drum = cable.DrumProperties(friction_torque=0.005)
-    run = cable.pull_out(lambda _: (0.0, 0.0, 0.0), 10.0, drum=drum, drum_velocity=lambda _: (1.0, 0.0, 0.0))
+    run = cable.pull_out(
+        lambda _: (0.0, 0.0, 0.0), 10.0, drum=cable.MovingDrum(velocity=lambda _: (1.0, 0.0, 0.0), drum=drum)
+    )
     assert run.outcome.completed, run.outcome.message
     assert_allclose(run.length, 1e-6 + run.time, rtol=0, atol=1e-7)
     assert_allclose(run.tow_force[2:, 0], 0.05, rtol=1e-5)

@@ -25,7 +25,9 @@ def fingerprint(run):
 
 def test_a_cable_run_repeats_to_the_last_bit():
     first = cable.pull_out(motion, 10.0)
-    cable.pull_out(lambda _: (0.3, 0.0, 0.4), 5.0, 0.07, segment_length=0.2)  # must leave nothing behind
+    cable.pull_out(
+        lambda _: (0.3, 0.0, 0.4), 5.0, scheme=cable.MovingEnd(time_step=0.07, segment_length=0.2)
+    )  # must leave nothing behind
     again = cable.pull_out(motion, 10.0)
     for name in ("time", "tow_force", "tow_tension", "drum_tension", "length"):
         assert getattr(first, name).tobytes() == getattr(again, name).tobytes()

@@ -41,7 +41,10 @@ MANOEUVRES = {"dive": dive, "helix": helix}
 @cache
 def pulled(name, segment_length, grading):
     run = cable.pull_out(
-        MANOEUVRES[name], DURATION, segment_length=segment_length, drum=DRUM, grading=grading
+        MANOEUVRES[name],
+        DURATION,
+        drum=DRUM,
+        scheme=cable.MovingEnd(segment_length=segment_length, grading=grading),
     )
     assert run.outcome.completed, run.outcome.message
     return run
@@ -58,7 +61,7 @@ def error(name, grading):
 @pytest.mark.parametrize("friction", [0.0, 0.005])
 def test_a_straight_pull_stays_exact(grading, friction):
     drum = cable.DrumProperties(friction_torque=friction)
-    run = cable.pull_out(lambda _: (1.0, 0.0, 0.0), 100.0, drum=drum, grading=grading)
+    run = cable.pull_out(lambda _: (1.0, 0.0, 0.0), 100.0, drum=drum, scheme=cable.MovingEnd(grading=grading))
     assert run.outcome.completed, run.outcome.message
     rubbing = 10.0 * friction / np.sqrt(1.0 + 1e-6)  # rounded off at rest, over 1 mm/s (`cable.drum`)
     exact = rubbing + TABLE_1.tangential_drag * run.length
@@ -69,7 +72,12 @@ def test_a_straight_pull_stays_exact(grading, friction):
 @pytest.mark.parametrize("grading", [0.0, 0.02, 0.1])
 def test_segments_are_as_long_as_they_were_asked_for(grading):
     """Straight and inextensible, chords are lengths; s is where a segment starts. All but the last, which grows."""
-    run = cable.pull_out(lambda _: (1.0, 0.0, 0.0), 60.0, drum=DRUM, grading=grading, segment_length=SEGMENT)
+    run = cable.pull_out(
+        lambda _: (1.0, 0.0, 0.0),
+        60.0,
+        drum=DRUM,
+        scheme=cable.MovingEnd(grading=grading, segment_length=SEGMENT),
+    )
     lengths = np.linalg.norm(np.diff(run.shapes[-1], axis=0), axis=1)
     starts = np.concatenate([[0.0], np.cumsum(lengths)[:-1]])
     assert_allclose(lengths[:-1], (SEGMENT + grading * starts)[:-1], rtol=1e-9)
@@ -80,7 +88,10 @@ def test_segments_are_as_long_as_they_were_asked_for(grading):
 def test_the_first_segments_are_shorter_where_that_is_asked_for(grading):
     """Node j at (jΔs)²/4L₀ up to L₀, as with grading, and as long as ever beyond it."""
     run = cable.pull_out(
-        lambda _: (1.0, 0.0, 0.0), 10.0, drum=DRUM, grading=grading, segment_length=SEGMENT, run_in=2.0
+        lambda _: (1.0, 0.0, 0.0),
+        10.0,
+        drum=DRUM,
+        scheme=cable.MovingEnd(grading=grading, segment_length=SEGMENT, run_in=2.0),
     )
     nodes = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(run.shapes[-1], axis=0), axis=1))])
     beyond = nodes[:-1] >= 2.0 - 1e-9
@@ -94,7 +105,12 @@ def test_their_number_grows_with_the_logarithm_of_the_length():
     """N segments are Δs ((1 + g)^N − 1)/g long."""
     counts = []
     for duration in (100.0, 1000.0):
-        run = cable.pull_out(lambda _: (1.0, 0.0, 0.0), duration, 1.0, drum=DRUM, grading=0.05)
+        run = cable.pull_out(
+            lambda _: (1.0, 0.0, 0.0),
+            duration,
+            drum=DRUM,
+            scheme=cable.MovingEnd(time_step=1.0, grading=0.05),
+        )
         expected = np.log1p(0.05 * duration / 0.5) / np.log1p(0.05)
         counts.append(len(run.shapes[-1]) - 1)
         assert abs(counts[-1] - expected) <= 2.0
@@ -122,7 +138,7 @@ def test_what_goes_out_graded_comes_in_again():
         lambda t: (np.sin(np.pi * t / 20.0), 0.0, 0.0),
         40.0,
         drum=cable.ConstantTension(tension=0.6),
-        grading=0.1,
+        scheme=cable.MovingEnd(grading=0.1),
     )
     assert run.outcome.completed, run.outcome.message
     exact_length = 20.0 / np.pi * (1.0 - np.cos(np.pi * run.time / 20.0)) + 1e-6

@@ -20,7 +20,6 @@ from scipy.optimize import brentq
 
 import cable
 from cable.current import Current
-from cable.lumped.history import pull_out_lumped, tow_lumped
 
 TABLE_1 = cable.CableProperties()
 HEAVY = cable.CableProperties(mass_per_length=0.0098)
@@ -34,21 +33,16 @@ SHEARED = Current.profile(
 
 def pull(motion, duration, step, segment, **changes):
     """Pull out with the lumped cable; Table 1 and still water unless changed."""
-    setting = {
-        "cable": TABLE_1,
-        "drum": cable.DrumProperties(),
-        "current": STILL,
-        "wet_length": 0.0,
-    } | changes
-    run = pull_out_lumped(motion, duration, step, segment_length=segment, **setting)
+    lumped = cable.Lumped(time_step=step, segment_length=segment)
+    run = cable.pull_out(motion, duration, scheme=lumped, **changes)
     assert run.outcome.completed, run.outcome.message
     return run
 
 
 def tow(motion, length, duration, step=0.1, segment=0.5, **changes):
     """Tow the lumped cable."""
-    setting = {"cable": TABLE_1, "current": STILL, "drogue_drag_area": 0.0} | changes
-    run = tow_lumped(motion, length, duration, step, segment_length=segment, **setting)
+    lumped = cable.Lumped(time_step=step, segment_length=segment)
+    run = cable.tow(motion, length, duration, scheme=lumped, **changes)
     assert run.outcome.completed, run.outcome.message
     return run
 
@@ -201,10 +195,8 @@ def test_only_motion_relative_to_the_water_and_to_the_drum_counts():
         8.0,
         0.1,
         0.5,
-        drum=RUBBING,
+        drum=cable.MovingDrum(velocity=lambda t: drift, drum=RUBBING),
         current=Current.uniform(drift),
-        drum_velocity=lambda t: drift,
-        wet_length=1e-6,
     )
     late = plain.time > 2.0  # the first micrometre of cable points another way
     np.testing.assert_allclose(
@@ -234,7 +226,13 @@ def both(name, refinement):
     motion, duration, setting, rows = CASES[name]
     segment, step = 0.5 / refinement, 0.1 / refinement
     ours = pull(motion, duration, step, segment, **setting)
-    return distance(ours, cable.pull_out(motion, duration, step, segment_length=segment, **setting), rows)
+    return distance(
+        ours,
+        cable.pull_out(
+            motion, duration, scheme=cable.MovingEnd(time_step=step, segment_length=segment), **setting
+        ),
+        rows,
+    )
 
 
 def after(start):
@@ -262,9 +260,8 @@ CASES = {
         20.0,
         {
             "cable": UMBILICAL,
-            "drum": cable.DrumProperties(friction_torque=0.5),
-            "drum_velocity": boat,
-            "wet_length": 1.0,
+            "drum": cable.MovingDrum(velocity=boat, drum=cable.DrumProperties(friction_torque=0.5)),
+            "start": 1.0,
         },
         after(4.0),
     ),
@@ -291,9 +288,8 @@ def test_both_formulations_tow_a_turning_wire_with_the_same_force(properties):
             lambda t: (np.cos(0.1 * t), np.sin(0.1 * t), 0.0),
             15.0,
             20.0,
-            step,
-            segment_length=segment,
             cable=properties,
+            scheme=cable.MovingEnd(time_step=step, segment_length=segment),
         )
         distances.append(distance(ours, theirs, after(1.0)))
     assert distances[1] < 3e-4
@@ -312,16 +308,7 @@ def test_a_slack_cable_never_pushes_and_a_standing_drum_gives_nothing():
 def test_a_run_that_cannot_go_on_says_where_when_and_what_to_do():
     """A cable that sinks off a drum that nothing holds: ill-posed, and told so."""
     sinking = cable.CableProperties(mass_per_length=0.2)
-    run = pull_out_lumped(
-        lambda t: (0.0, 0.0, 0.1),
-        60.0,
-        0.1,
-        segment_length=0.5,
-        cable=sinking,
-        drum=cable.DrumProperties(),
-        current=STILL,
-        wet_length=2.0,
-    )
+    run = cable.pull_out(lambda t: (0.0, 0.0, 0.1), 60.0, cable=sinking, start=2.0, scheme="lumped")
     assert not run.outcome.completed
     assert run.time[-1] < 60.0
     assert "t = " in run.outcome.message

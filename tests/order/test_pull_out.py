@@ -46,7 +46,12 @@ every_manoeuvre = pytest.mark.parametrize("name", MANOEUVRES)
 def force(name, step, segment_length, friction=0.005):
     """Return the tow force at whole multiples of 0.8 s from 4 s on (n, 3). [N]"""
     drum = cable.DrumProperties(friction_torque=friction)
-    run = cable.pull_out(MANOEUVRES[name], DURATION, step, segment_length=segment_length, drum=drum)
+    run = cable.pull_out(
+        MANOEUVRES[name],
+        DURATION,
+        drum=drum,
+        scheme=cable.MovingEnd(time_step=step, segment_length=segment_length),
+    )
     assert run.outcome.completed, run.outcome.message
     return run.tow_force[:: round(0.8 / step)][5:]
 
@@ -113,7 +118,9 @@ def test_half_a_metre_and_a_tenth_of_a_second_are_close_to_converged(name, in_te
     drum = cable.DrumProperties(friction_torque=friction)
 
     def pull(step, segment_length):
-        run = cable.pull_out(motion, duration, step, segment_length=segment_length, drum=drum)
+        run = cable.pull_out(
+            motion, duration, drum=drum, scheme=cable.MovingEnd(time_step=step, segment_length=segment_length)
+        )
         return run.tow_force[:: round(0.1 / step)][30:]
 
     coarse, fine = pull(0.025, 0.125), pull(0.0125, 0.0625)

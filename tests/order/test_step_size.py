@@ -48,7 +48,9 @@ every_manoeuvre = pytest.mark.parametrize("name", MANOEUVRES)
 
 @cache
 def pulled(name, rtol):
-    run = cable.pull_out(MANOEUVRES[name], DURATION, ROW, drum=DRUM, rtol=rtol)
+    run = cable.pull_out(
+        MANOEUVRES[name], DURATION, drum=DRUM, scheme=cable.MovingEnd(time_step=ROW, rtol=rtol)
+    )
     assert run.outcome.completed, run.outcome.message
     return run
 
@@ -56,7 +58,9 @@ def pulled(name, rtol):
 @cache
 def errors(name, rtol):
     """Return the errors of the tow force at the rows, as shares of the largest force (n,)."""
-    fine = cable.pull_out(MANOEUVRES[name], DURATION, ROW / 64, drum=DRUM).tow_force[::64]
+    fine = cable.pull_out(
+        MANOEUVRES[name], DURATION, drum=DRUM, scheme=cable.MovingEnd(time_step=ROW / 64)
+    ).tow_force[::64]
     gaps = np.linalg.norm(pulled(name, rtol).tow_force - fine, axis=1)
     return gaps[1:] / np.linalg.norm(fine, axis=1).max()
 
@@ -84,14 +88,19 @@ def test_a_larger_error_takes_fewer_steps(name):
 
 def test_steps_are_short_where_the_motion_changes_and_long_where_it_does_not():
     """Straight ahead there is nothing to estimate but the start: one step a row, whatever is allowed."""
-    straight = cable.pull_out(lambda _: (1.0, 0.0, 0.0), DURATION, ROW, drum=DRUM, rtol=1e-3)
+    straight = cable.pull_out(
+        lambda _: (1.0, 0.0, 0.0), DURATION, drum=DRUM, scheme=cable.MovingEnd(time_step=ROW, rtol=1e-3)
+    )
     assert straight.diagnostics()["steps"] < 2.0 * DURATION / ROW
     assert pulled("turn", 1e-3).diagnostics()["steps"] > 4.0 * DURATION / ROW
 
 
 def test_a_towed_cable_chooses_its_steps_too():
-    coarse, fine = (cable.tow(turn, 15.0, DURATION, ROW, rtol=rtol) for rtol in (1e-2, 1e-3))
-    exact = cable.tow(turn, 15.0, DURATION, ROW / 64).tow_force[::64]
+    coarse, fine = (
+        cable.tow(turn, 15.0, DURATION, scheme=cable.MovingEnd(time_step=ROW, rtol=rtol))
+        for rtol in (1e-2, 1e-3)
+    )
+    exact = cable.tow(turn, 15.0, DURATION, scheme=cable.MovingEnd(time_step=ROW / 64)).tow_force[::64]
     largest = np.linalg.norm(exact, axis=1).max()
     for run, rtol in ((coarse, 1e-2), (fine, 1e-3)):
         assert np.median(np.linalg.norm(run.tow_force - exact, axis=1)) < rtol * largest
@@ -106,9 +115,9 @@ def test_a_kink_at_a_recorded_time_does_not_stop_it(angle):
     def kinked(t):
         return (1.0, 0.0, 0.0) if t < 4.0 else after
 
-    run = cable.pull_out(kinked, 8.0, ROW, drum=DRUM, rtol=1e-2)
+    run = cable.pull_out(kinked, 8.0, drum=DRUM, scheme=cable.MovingEnd(time_step=ROW, rtol=1e-2))
     assert run.outcome.completed, run.outcome.message
-    fine = cable.pull_out(kinked, 8.0, ROW / 64, drum=DRUM).tow_force[::64]
+    fine = cable.pull_out(kinked, 8.0, drum=DRUM, scheme=cable.MovingEnd(time_step=ROW / 64)).tow_force[::64]
     gaps = np.linalg.norm(run.tow_force - fine, axis=1) / np.linalg.norm(fine, axis=1).max()
     assert gaps[1:6].max() < 1e-6
     assert np.median(gaps[7:]) < 1e-2
@@ -120,7 +129,9 @@ def test_a_kink_at_a_recorded_time_does_not_stop_it(angle):
 def test_steps_that_are_solved_less_exactly_take_fewer_iterations_and_err_no_more(name):
     """A hundredth of what a step of this length errs by is lost, and a seventh of the iterations saved, or more."""
     fine, exact, rough = (
-        cable.pull_out(MANOEUVRES[name], DURATION, step, drum=DRUM, tolerance=tolerance)
+        cable.pull_out(
+            MANOEUVRES[name], DURATION, drum=DRUM, scheme=cable.MovingEnd(time_step=step, tolerance=tolerance)
+        )
         for step, tolerance in ((ROW / 32, 1e-9), (ROW / 8, 1e-9), (ROW / 8, 1e-5))
     )
     error = np.linalg.norm(exact.tow_force - fine.tow_force[::4], axis=1).max()
@@ -130,25 +141,44 @@ def test_steps_that_are_solved_less_exactly_take_fewer_iterations_and_err_no_mor
 
 @pytest.mark.parametrize("value", [0.0, 1e-13, 0.1, -1e-9, np.nan])
 def test_a_tolerance_without_sense_is_refused(value):
-    for run in (cable.pull_out, lambda v, t, **k: cable.tow(v, 10.0, t, **k)):
-        with pytest.raises(
-            ValueError, match=r"tolerance is .*; it must be .* at least 1e-12 and at most 0.001"
-        ):
-            run(dive, 1.0, tolerance=value)
+    with pytest.raises(ValueError, match=r"tolerance is .*; it must be .* at least 1e-12 and at most 0.001"):
+        cable.MovingEnd(tolerance=value)
 
 
 @pytest.mark.parametrize("name", ["rtol", "grading"])
 @pytest.mark.parametrize("value", [-0.1, 1.0, np.nan, np.inf])
 def test_what_cannot_be_allowed_is_refused(name, value):
     with pytest.raises(ValueError, match=rf"{name} is {value!r}; it must be .* at least 0 and at most 0.5"):
+        cable.MovingEnd(**{name: value})
+
+
+@pytest.mark.parametrize("name", ["rtol", "grading", "run_in", "tolerance"])
+@pytest.mark.parametrize("kind", [cable.Lumped, cable.Equation7, cable.Paper])
+def test_a_scheme_has_only_the_options_that_it_knows(kind, name):
+    with pytest.raises(TypeError, match=name):
+        kind(**{name: 0.1})
+
+
+MOVED = {
+    "step": (0.05, r"scheme=cable.MovingEnd\(time_step=0.05\)"),
+    "segment_length": (0.25, r"scheme=cable.MovingEnd\(segment_length=0.25\)"),
+    "rtol": (1e-3, r"scheme=cable.MovingEnd\(rtol=0.001\)"),
+    "wet_length": (2.0, "start=2.0"),
+    "drum_velocity": (dive, r"drum=cable.MovingDrum\(velocity=..., drum=...\)"),
+}
+
+
+@pytest.mark.parametrize("name", MOVED)
+def test_an_argument_of_older_versions_says_where_it_is_now(name):
+    value, place = MOVED[name]
+    with pytest.raises(ValueError, match=rf"pull_out: {name} moved. Write {place}"):
         cable.pull_out(dive, 1.0, **{name: value})
 
 
-@pytest.mark.parametrize("settings", [{"rtol": 1e-3}, {"grading": 0.1}, {"run_in": 2.0}])
-@pytest.mark.parametrize("scheme", ["lumped", "equation7", "paper_tangent"])
-def test_schemes_that_do_not_know_it_say_so(scheme, settings):
+def test_what_was_given_by_its_place_says_so_too_and_what_never_was_is_no_argument():
     with pytest.raises(
-        ValueError,
-        match=rf"scheme '{scheme}' knows .* no wet_length, rtol, grading or run_in.*use 'moving_end'",
+        ValueError, match=r"tow: step, rtol moved. Write scheme=cable.MovingEnd\(time_step=0.1, rtol=0.01\)"
     ):
-        cable.pull_out(dive, 1.0, scheme=scheme, **settings)
+        cable.tow(dive, 10.0, 1.0, 0.1, rtol=0.01)
+    with pytest.raises(TypeError, match="unexpected keyword argument 'colour'"):
+        cable.pull_out(dive, 1.0, colour="red")

@@ -73,3 +73,10 @@ def test_the_player_is_all_of_its_modules_once() -> None:
     folder = Path(__file__).parents[2] / "subzero" / "page" / "assets" / "player"
     assert {path.stem for path in folder.glob("*.js")} == set(MODULES)
     assert not re.search(r"^(import|export) ", player(), flags=re.MULTILINE)
+
+
+def test_the_players_modules_share_no_name() -> None:
+    """They are joined to one script: a constant of two of them would stop it before it began."""
+    names = re.findall(r"(?m)^(?:(?:const|let)\s+(?=\w+ = )|function\s+|class\s+)(\w+)", player())
+    assert len(names) > 50
+    assert sorted(names) == sorted(set(names))

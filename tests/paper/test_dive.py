@@ -106,7 +106,7 @@ def test_turning_to_starboard_the_cable_pulls_the_tail_to_starboard_so_the_nose_
 
 def test_the_force_in_body_axes_is_the_force_in_earth_axes_turned_by_pitch():
     """Equation (12), by hand from `cable.pull_out` with the same motion: 1e-9 N for rounding and quadrature."""
-    history = cable.pull_out(tow_point_of_the_dive, 30.0, run_in=2.0)
+    history = cable.pull_out(tow_point_of_the_dive, 30.0, scheme=cable.MovingEnd(run_in=2.0))
     pitch = np.radians(channel("pitch", "fig5"))
     north, down = history.tow_force[:, 0], history.tow_force[:, 2]
     forward = north * np.cos(pitch) - down * np.sin(pitch)

@@ -11,17 +11,24 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from cable import CableProperties, DrumProperties, Paper
+from cable.feng_allen import run as feng_allen
 from cable.feng_allen.box_equations import Ends
-from cable.feng_allen.box_newton import box_workspace
+from cable.feng_allen.box_newton import box_workspace, start_paper
 from cable.feng_allen.equation7 import equation7_numbers
 from cable.feng_allen.printed_scheme import (
     node_force,
     paper_step,
-    pull_out_paper,
-    start_paper,
     undo_paper_step,
 )
-from cable.properties import CableProperties, DrumProperties
+from cable.task import PullOut
+
+
+def pull_out_paper(tow_velocity, duration, step, *, reading="tangent", implicit=False, **others):
+    """Return the run with the states of its nodes, which the public face does not show."""
+    scheme = Paper(time_step=step, reading=reading, implicit=implicit)
+    return feng_allen.pull_out_paper(PullOut.of(tow_velocity, duration, **others), scheme)
+
 
 DRAG = 0.5 * 1000.0 * np.pi * 0.0025 * 0.01
 """½ρπdCt [N s²/m³]."""

@@ -65,7 +65,7 @@ def test_fig5_is_what_the_cable_alone_does_on_the_same_motion():
         pitch, w = np.radians(-6.0) * np.clip(time - 10.0, 0.0, 10.0), 0.5 * rate
         return np.cos(pitch) + w * np.sin(pitch), 0.0, -np.sin(pitch) + w * np.cos(pitch)
 
-    run, alone = run_of("fig5", 0.5), cable.pull_out(dive, 30.0, 0.5, scheme="paper_tangent")
+    run, alone = run_of("fig5", 0.5), cable.pull_out(dive, 30.0, scheme=cable.Paper(time_step=0.5))
     assert_allclose(run["cable_tension"], alone.tow_tension, atol=1e-9)
     assert_allclose(run["cable_length"], alone.length, rtol=1e-9)
     assert_allclose(run["cable_position"].values[-1], alone.shapes[-1], atol=1e-8)

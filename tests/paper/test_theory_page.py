@@ -18,7 +18,7 @@ def test_the_page_names_a_place_that_exists(file, name):
 
 def test_the_page_names_all_parts_of_the_default_scheme():
     named = {file for file, _ in PLACES}
-    parts = {"segment_load", "assembly", "bdf2", "newton", "block_solver", "time_step", "slack_law", "tow_boundary",
+    parts = {"segment_load", "assembly", "bdf2", "block_solver", "time_step", "remeshing", "slack_law",
              "chord_correction", "energy"}  # fmt: skip
     assert {f"cable/moving_end/{part}.py" for part in parts} | {"cable/drum.py"} <= named
     assert {"subzero/coupling.py", "subzero/vehicle_step.py", "subzero/energy.py"} <= named

@@ -13,12 +13,13 @@ import sys
 import numpy as np
 import pytest
 
+import cable
+from cable import CableProperties
 from cable.feng_allen.box_equations import BoxRule, Ends, box_rows, box_scratch, drum_rows, tow_rows
 from cable.feng_allen.box_newton import box_workspace, newton_pass
 from cable.feng_allen.box_solver import back_substitute
 from cable.feng_allen.equation7 import equation7_numbers
-from cable.feng_allen.printed_scheme import add_node, keep_old_time, pull_out_paper
-from cable.properties import CableProperties
+from cable.feng_allen.printed_scheme import add_node, keep_old_time
 from subzero.jit import compiled
 
 HEAVY = equation7_numbers(CableProperties(mass_per_length=0.02, compliance=0.05), (0.2, 0.1, -0.1))
@@ -117,16 +118,17 @@ def test_the_staircase_solver_finds_what_a_dense_solver_finds(segments, length):
 
 RUN = """
 import json, sys
-from cable.feng_allen.printed_scheme import pull_out_paper
-h = pull_out_paper(lambda t: (1.0, 0.1 * t, -0.1 * t), 5.0, 1.0)
-json.dump([h.message, *h.tow_force.ravel().tolist()], sys.stdout)
+import cable
+h = cable.pull_out(lambda t: (1.0, 0.1 * t, -0.1 * t), 5.0, scheme=cable.Paper(time_step=1.0))
+json.dump([h.outcome.completed, *h.tow_force.ravel().tolist()], sys.stdout)
 """
 
 
 def test_interpreted_and_compiled_scheme_agree():
     environment = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
     done = subprocess.run([sys.executable, "-c", RUN], capture_output=True, check=True, env=environment)
-    message, *forces = json.loads(done.stdout)
-    here = pull_out_paper(lambda t: (1.0, 0.1 * t, -0.1 * t), 5.0, 1.0)
-    assert message == here.message == "completed"
+    completed, *forces = json.loads(done.stdout)
+    here = cable.pull_out(lambda t: (1.0, 0.1 * t, -0.1 * t), 5.0, scheme=cable.Paper(time_step=1.0))
+    assert completed
+    assert here.outcome.completed
     np.testing.assert_allclose(here.tow_force.ravel(), forces, atol=1e-13)  # rounding of a sum

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from cable import CableProperties, DrumProperties
 from cable.current import Current
 from cable.drum import SPINNING, STANDING, TURNING
 from cable.moving_end.assembly import assemble
@@ -30,7 +31,6 @@ from cable.moving_end.state import (
     UPPER2,
     new_line,
 )
-from cable.properties import CableProperties, DrumProperties
 from subzero.jit import compiled
 
 CABLE = CableProperties(mass_per_length=0.02, compliance=0.05, tangential_drag_coefficient=0.02).numbers()

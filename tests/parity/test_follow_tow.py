@@ -1,6 +1,6 @@
 """A cable that is asked again for a tow point close by begins with its last answer, moved as the last matrix says.
 
-Verifies: `cable.moving_end.tow_boundary.follow_tow` against full solutions, `try_step(again=True)` against a step from
+Verifies: `cable.moving_end.time_step.follow_tow` against full solutions, `try_step(again=True)` against a step from
 a prediction. Configuration: 8 m of heavy cable in segments of half a metre on a rubbing drum, towed along a bend for
 2.5 s. Tolerance: what the matrix says is off by the square of the displacement, so half of that leaves a quarter;
 steps agree as far as they are solved, 1e-9 of the tension and 1e-12 of the length.
@@ -11,13 +11,13 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
+from cable import CableProperties, DrumProperties
 from cable.current import Current
 from cable.moving_end.initial_shape import lay_straight, start_in_water
+from cable.moving_end.remeshing import accept
 from cable.moving_end.segment_load import new_load
 from cable.moving_end.state import NEW, new_line
-from cable.moving_end.time_step import accept, try_step
-from cable.moving_end.tow_boundary import follow_tow
-from cable.properties import CableProperties, DrumProperties
+from cable.moving_end.time_step import follow_tow, try_step
 from subzero.jit import compiled
 
 CABLE = CableProperties(mass_per_length=0.02, compliance=1e-4).numbers()

@@ -26,8 +26,8 @@ def smooth_dive(time):
 @pytest.mark.parametrize("friction", [0.0, 0.005], ids=["free drum", "dragging drum"])
 def test_both_formulations_give_the_same_tow_force_and_length(motion, friction):
     drum = cable.DrumProperties(friction_torque=friction)
-    ours = cable.pull_out(motion, 20.0, 0.1, drum=drum)
-    angles = cable.pull_out(motion, 20.0, 0.1, drum=drum, scheme="equation7")
+    ours = cable.pull_out(motion, 20.0, drum=drum, scheme=cable.MovingEnd(time_step=0.1))
+    angles = cable.pull_out(motion, 20.0, drum=drum, scheme=cable.Equation7(time_step=0.1))
     assert ours.outcome.completed
     assert angles.outcome.completed
     assert np.abs(ours.tow_force - angles.tow_force)[30:].max() < 3e-3 * ours.tow_tension.max()
@@ -37,9 +37,9 @@ def test_both_formulations_give_the_same_tow_force_and_length(motion, friction):
 def test_the_difference_between_the_formulations_shrinks_fourfold_with_step_and_segment():
     drum, differences = cable.DrumProperties(friction_torque=0.005), []
     for step, segment_length in ((0.2, 1.0), (0.1, 0.5)):
-        setting = {"segment_length": segment_length, "drum": drum}
-        ours = cable.pull_out(helix, 20.0, step, **setting)
-        angles = cable.pull_out(helix, 20.0, step, **setting, scheme="equation7")
+        steps = {"time_step": step, "segment_length": segment_length}
+        ours = cable.pull_out(helix, 20.0, drum=drum, scheme=cable.MovingEnd(**steps))
+        angles = cable.pull_out(helix, 20.0, drum=drum, scheme=cable.Equation7(**steps))
         difference = np.abs(ours.tow_force - angles.tow_force)
         differences.append(difference[ours.time > 3.0].max())
     assert differences[0] / differences[1] > 3.5
@@ -47,7 +47,7 @@ def test_the_difference_between_the_formulations_shrinks_fourfold_with_step_and_
 
 def test_the_second_formulation_takes_its_segments_as_asked_and_says_which_it_is():
     for length in (0.5, 1.0):
-        run = cable.pull_out(helix, 8.0, 0.1, segment_length=length, scheme="equation7")
+        run = cable.pull_out(helix, 8.0, scheme=cable.Equation7(time_step=0.1, segment_length=length))
         first, second = run.shapes[-1][:2]
         assert np.linalg.norm(first - second) == pytest.approx(length, rel=1e-9)  # inextensible
         assert run.scheme == "equation7"

@@ -19,7 +19,8 @@ import numpy as np
 import cable, subzero
 
 history = cable.pull_out(
-    lambda t: (np.cos(0.4 * t), np.sin(0.4 * t), 0.1), 2.0, 0.2, drum=cable.DrumProperties(friction_torque=0.01)
+    lambda t: (np.cos(0.4 * t), np.sin(0.4 * t), 0.1), 2.0, drum=cable.DrumProperties(friction_torque=0.01),
+    scheme=cable.MovingEnd(time_step=0.2),
 )
 trial = dataclasses.replace(
     subzero.load_scenario("fig6"), duration=0.8, cable_step=0.2, hull_step=0.1, segment_length=0.1

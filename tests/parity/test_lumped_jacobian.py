@@ -13,9 +13,9 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.optimize import brentq
 
+from cable import CableProperties, DrumProperties
 from cable.current import Current
 from cable.lumped.band_solver import REACH, WIDTH, solve_band
-from cable.lumped.newton import assemble_stage
 from cable.lumped.rope import (
     NEW,
     REST,
@@ -27,7 +27,7 @@ from cable.lumped.rope import (
     unknowns,
 )
 from cable.lumped.springs import observe, spring_law
-from cable.properties import CableProperties, DrumProperties
+from cable.lumped.step import assemble_stage
 from cable.winch import ConstantTension, PayOutRate
 
 CABLE = CableProperties(mass_per_length=0.02, compliance=0.05, tangential_drag_coefficient=0.02)

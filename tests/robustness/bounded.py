@@ -53,17 +53,17 @@ def back_and_forth(t: float) -> tuple[float, float, float]:
 
 def pulled_out(scheme: str) -> None:
     for way in (turning, back_and_forth):
-        cable.pull_out(way, 20.0, 0.1, scheme=scheme)
+        cable.pull_out(way, 20.0, scheme=scheme)
     if scheme in ("moving_end", "lumped"):
         stiff = cable.CableProperties(mass_per_length=0.02, bending_stiffness=1e-4)
         drums = (cable.ConstantTension(tension=5.0), cable.DrumProperties(friction_torque=0.05, inertia=0.02))
         for drum in drums:
+            boat = cable.MovingDrum(velocity=lambda t: (0.1 * np.sin(t), 0.0, 0.0), drum=drum)
             cable.pull_out(
-                turning, 20.0, cable=stiff, drum=drum, current=(0.1, 0.2, 0.0), scheme=scheme, wet_length=3.0,
-                drum_velocity=lambda t: (0.1 * np.sin(t), 0.0, 0.0),
-            )  # fmt: skip
+                turning, 20.0, cable=stiff, drum=boat, current=(0.1, 0.2, 0.0), start=3.0, scheme=scheme
+            )
     if scheme == "moving_end":
-        cable.pull_out(turning, 60.0, rtol=1e-3, grading=0.1)
+        cable.pull_out(turning, 60.0, scheme=cable.MovingEnd(rtol=1e-3, grading=0.1))
         held = cable.hold([(0.0, 0.0, 0.0), (5.0, 0.0, 2.0)], 8.0)
         cable.pull_out(turning, 10.0, start=held)
 
@@ -72,7 +72,7 @@ def towed(scheme: str) -> None:
     for drogue in (0.0, 0.05):
         cable.tow(turning, 20.0, 20.0, drogue_drag_area=drogue, scheme=scheme)
     if scheme == "moving_end":
-        cable.tow(back_and_forth, 20.0, 20.0, rtol=1e-3)
+        cable.tow(back_and_forth, 20.0, 20.0, scheme=cable.MovingEnd(rtol=1e-3))
 
 
 def held() -> None:

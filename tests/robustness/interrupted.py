@@ -91,15 +91,15 @@ def ahead(t: float) -> tuple[float, float, float]:
 
 
 def pulled_out() -> str:
-    return of_history(cable.pull_out(ahead, 10.0, 0.1))
+    return of_history(cable.pull_out(ahead, 10.0, scheme=cable.MovingEnd(time_step=0.1)))
 
 
 def lumped() -> str:
-    return of_history(cable.pull_out(ahead, 5.0, 0.1, scheme="lumped"))
+    return of_history(cable.pull_out(ahead, 5.0, scheme=cable.Lumped(time_step=0.1)))
 
 
 def printed() -> str:
-    return of_history(cable.pull_out(ahead, 5.0, 0.5, scheme="paper"))
+    return of_history(cable.pull_out(ahead, 5.0, scheme=cable.Paper(time_step=0.5)))
 
 
 def towed() -> str:

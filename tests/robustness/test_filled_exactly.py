@@ -15,7 +15,12 @@ import cable
 @pytest.mark.parametrize("wet_length", [0.0, 20.0])
 def test_filling_segments_exactly_leaves_the_tension_exact(segments_a_step, wet_length):
     speed = 1.0 * segments_a_step
-    run = cable.pull_out(lambda _: (speed, 0.0, 0.0), 10.0, 0.5, segment_length=0.5, wet_length=wet_length)
+    run = cable.pull_out(
+        lambda _: (speed, 0.0, 0.0),
+        10.0,
+        start=wet_length,
+        scheme=cable.MovingEnd(time_step=0.5, segment_length=0.5),
+    )
     assert run.outcome.completed, run.outcome.message
     exact = cable.CableProperties().tangential_drag * speed**2 * run.length
     np.testing.assert_allclose(run.tow_tension[1:], exact[1:], rtol=1e-6)
@@ -25,7 +30,11 @@ def test_filling_segments_exactly_leaves_the_tension_exact(segments_a_step, wet_
 def test_a_winch_may_pay_out_several_segments_a_step_to_a_vehicle_at_rest(rate):
     winch = cable.PayOutRate(rate=rate)
     run = cable.pull_out(
-        lambda _: (0.0, 0.0, 0.0), 15.0, 0.5, segment_length=0.25, drum=winch, wet_length=10.0
+        lambda _: (0.0, 0.0, 0.0),
+        15.0,
+        start=10.0,
+        drum=winch,
+        scheme=cable.MovingEnd(time_step=0.5, segment_length=0.25),
     )
     assert run.outcome.completed, run.outcome.message
     np.testing.assert_allclose(run.length[-1], 10.0 + 15.0 * rate, rtol=1e-9)

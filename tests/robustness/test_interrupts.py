@@ -172,9 +172,28 @@ def check(code, out, err, folder, whole):
     assert code == INTERRUPTED, (code, out, err)
     said = [line for line in err.splitlines() if line.startswith("Interrupted; ") and "being" not in line]
     assert len(said) == 1, err
+    if "what it has is written" in err:
+        check_unfinished(folder, left)
+        return
     assert left in ([], [one for one in whole if one != "record.csv"]), (left, err)
     if "nothing was written" in err:
         assert left == []
+
+
+OF_A_DIAGNOSIS = {
+    *(f"out/{one}" for one in ("report.html", "report.md", "diagnosis.json", "extended.toml")),
+    *(f"out/{one}.png" for one in ("misfit", "evidence", "rivals", "detectable", "gain", "missing_force")),
+}
+"""What docs/diagnosis.md says that a diagnosis leaves behind."""
+
+
+def check_unfinished(folder, left):
+    """A diagnosis that was interrupted once writes what it has: its report and its numbers, and what it has no gain of
+    has no figure of it.
+    """
+    assert {"out/report.html", "out/report.md", "out/diagnosis.json"} <= set(left) <= OF_A_DIAGNOSIS, left
+    said = json.loads((folder / "out" / "diagnosis.json").read_text(encoding="utf-8"))
+    assert said["verdict"] in ("nothing_wrong", "cause_named", "undecided", "outside_catalogue")
 
 
 def interrupt_commands(seed, count, names, made, folder, cold=False):

@@ -108,12 +108,11 @@ class Case:
         return cable.pull_out(
             lambda t: [float(np.interp(t, fine, velocity[:, i])) for i in range(3)],
             DURATION,
-            self.step,
-            segment_length=self.segment_length,
             cable=self.cable,
-            drum=self.drum,
             current=self.current,
-            wet_length=self.wet_length,
+            start=self.wet_length,
+            drum=self.drum,
+            scheme=cable.MovingEnd(time_step=self.step, segment_length=self.segment_length),
         )
 
     def leashed(self, velocity: np.ndarray) -> np.ndarray:

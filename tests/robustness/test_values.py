@@ -146,8 +146,8 @@ HEAVY = cable.CableProperties(mass_per_length=0.02)
 CALLS = {
     "a run too short to be halved": lambda: cable.pull_out(ahead, 5e-324),
     "a speed beyond all speeds": lambda: autopilot.step("heading_step", speed=1e260),
-    "a step of nothing": lambda: cable.pull_out(ahead, 1.0, 0.0),
-    "segments of a negative length": lambda: cable.pull_out(ahead, 1.0, segment_length=-1.0),
+    "a step of nothing": lambda: cable.pull_out(ahead, 1.0, scheme=cable.MovingEnd(time_step=0.0)),
+    "segments of a negative length": lambda: cable.pull_out(ahead, 1.0, scheme=cable.MovingEnd(segment_length=-1.0)),
     "a velocity of texts": lambda: cable.pull_out(lambda t: ("1", "0", "0"), 1.0),
     "a scheme that there is not": lambda: cable.pull_out(ahead, 1.0, scheme="leapfrog"),
     "a tow of no length": lambda: cable.tow(ahead, 0.0, 1.0),

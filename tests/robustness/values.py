@@ -249,19 +249,23 @@ def of_trial(name: str) -> Callable[[Any], str]:
 
 def short_pull(**arguments: Any) -> str:
     """Pull a cable out; what would take long is only accepted."""
-    velocity, duration, step = (arguments.pop(name) for name in ("tow_velocity", "duration", "step"))
-    check_work(
-        duration, step, arguments.get("segment_length", 0.5), 2.0 + number(arguments.get("wet_length", 0.0))
-    )
-    return check_history(cable.pull_out(velocity, duration, step, **arguments), duration)
+    velocity, duration = (arguments.pop(name) for name in ("tow_velocity", "duration"))
+    arguments["scheme"] = scheme_of(arguments, duration, 2.0 + number(arguments.get("start", 0.0)))
+    return check_history(cable.pull_out(velocity, duration, **arguments), duration)
 
 
 def short_tow(**arguments: Any) -> str:
-    velocity, length, duration, step = (
-        arguments.pop(name) for name in ("tow_velocity", "length", "duration", "step")
-    )
-    check_work(duration, step, arguments.get("segment_length", 0.5), number(length))
-    return check_history(cable.tow(velocity, length, duration, step, **arguments), duration)
+    velocity, length, duration = (arguments.pop(name) for name in ("tow_velocity", "length", "duration"))
+    arguments["scheme"] = scheme_of(arguments, duration, number(length))
+    return check_history(cable.tow(velocity, length, duration, **arguments), duration)
+
+
+def scheme_of(arguments: dict[str, Any], duration: Any, length: float) -> Any:
+    """Take the options of the default scheme out of the arguments; return it with them, or another scheme."""
+    options = {name: arguments.pop(name) for name in list(arguments) if name in OPTIONS}
+    check_work(duration, options.get("time_step", 0.1), options.get("segment_length", 0.5), length)
+    scheme = arguments.get("scheme", "moving_end")
+    return cable.MovingEnd(**options) if scheme == "moving_end" else scheme
 
 
 def number(value: Any) -> float:
@@ -436,15 +440,17 @@ def with_section(name: str) -> Callable[[Any], str]:
     )
 
 
+OPTIONS: dict[str, Any] = {
+    "time_step": 0.1, "segment_length": 0.5, "rtol": 0.0, "grading": 0.0, "run_in": 0.0, "tolerance": 1e-9,
+}  # fmt: skip
 PULL: dict[str, Any] = {
-    "tow_velocity": ahead, "duration": 0.5, "step": 0.1, "segment_length": 0.5, "cable": None, "drum": None,
-    "current": (0.1, 0.0, 0.0), "scheme": "moving_end", "wet_length": 2.0, "drum_velocity": None, "rtol": 0.0,
-    "grading": 0.0, "tolerance": 1e-9, "start": None,
-}  # fmt: skip
+    "tow_velocity": ahead, "duration": 0.5, "cable": None, "drum": None, "current": (0.1, 0.0, 0.0),
+    "start": 2.0, "scheme": "moving_end",
+} | OPTIONS  # fmt: skip
 TOW: dict[str, Any] = {
-    "tow_velocity": ahead, "length": 5.0, "duration": 0.5, "step": 0.1, "segment_length": 0.5, "cable": None,
-    "current": (0.1, 0.0, 0.0), "drogue_drag_area": 0.0, "rtol": 0.0, "tolerance": 1e-9, "scheme": "moving_end",
-}  # fmt: skip
+    "tow_velocity": ahead, "length": 5.0, "duration": 0.5, "cable": None, "current": (0.1, 0.0, 0.0),
+    "drogue_drag_area": 0.0, "scheme": "moving_end",
+} | OPTIONS  # fmt: skip
 HOLD: dict[str, Any] = {
     "ends": ((0.0, 0.0, 0.0), (5.0, 0.0, 1.0)), "length": 8.0, "current": (0.2, 0.0, 0.0),
     "cable": cable.CableProperties(mass_per_length=0.02), "segment_length": 0.5, "start": None,

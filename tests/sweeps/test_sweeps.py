@@ -91,6 +91,27 @@ def test_a_member_is_a_run_of_its_own():
             np.testing.assert_allclose(mine[channel], alone[channel], rtol=1e-6, atol=1e-7)
 
 
+def test_a_statistic_of_a_channel_is_that_of_its_samples():
+    kinds = ("max", "min", "mean", "end", "range", "rms")
+    runs = subzero.sweep(
+        "fig6", {"start.wet_length_m": [15.0]}, changes=SHORT, client=Here(), channels=[],
+        scalars=[f"cable_force_forward.{kind}" for kind in kinds],
+    )  # fmt: skip
+    trial = with_parameters(subzero.load_scenario("fig6"), {**SHORT, "start.wet_length_m": 15.0})
+    force = subzero.simulate(trial)["cable_force_forward"].values
+    assert force[-1] < force[0]  # the cable pulls back, and harder as the vehicle gets faster
+    expected = (
+        force.max(),
+        force.min(),
+        force.mean(),
+        force[-1],
+        np.ptp(force),
+        np.sqrt(np.mean(force * force)),
+    )
+    for kind, value in zip(kinds, expected, strict=True):
+        assert float(runs[f"cable_force_forward.{kind}"][0]) == pytest.approx(value, rel=1e-12)
+
+
 def test_longer_cable_is_slower_and_pulls_more():
     runs = subzero.sweep("fig6", {"start.wet_length_m": LENGTHS}, changes=SHORT, client=Here(), channels=[])
     assert np.all(np.diff(runs["peak_speed_m_s"]) < 0.0)
@@ -379,8 +400,22 @@ def test_the_command_writes_everything_and_goes_on_where_it_was(tmp_path, monkey
 def test_a_file_with_a_mistake_is_answered_with_what_to_do(line, instead, said, tmp_path, capsys):
     (tmp_path / "mine.toml").write_text(SPEC.replace(line, instead), encoding="utf-8")
     assert main(["sweep", str(tmp_path / "mine.toml"), "--out", str(tmp_path / "out")]) == 2
-    assert said in capsys.readouterr().err
+    told = capsys.readouterr().err
+    assert said in told
+    assert "mine.toml" in told
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [(["mine.toml", "--workers", "0"], "workers is 0"), (["none.toml"], "The sweep none.toml")],
+)
+def test_a_mistake_on_the_command_line_leaves_no_folder(words, said, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "mine.toml").write_text(SPEC, encoding="utf-8")
+    assert main(["sweep", *words]) == 2
+    assert said in capsys.readouterr().err
+    assert [path.name for path in tmp_path.iterdir()] == ["mine.toml"]
 
 
 @pytest.mark.slow

@@ -115,7 +115,7 @@ def scan(
     spacing, coarse = spacing_of(place.along.problem, record), times_of(place.along.problem, record)
     steps = [(one, time) for one in able if not one.grows for time in coarse]
     columns = dict(zip(steps, change_point_columns(place.along, steps, record), strict=True))
-    columns |= _grown([one for one in able if one.grows], columns, spacing)
+    columns |= grown([one for one in able if one.grows], columns, spacing)
     found = _strongest(_tried(place, D, columns, record))
     worth = [one for one in found[:best] if one.log_gain > MIN_SCAN_GAIN]
     finer = [(one.effect, time) for one in worth for time in _around(one.time, spacing)]
@@ -129,7 +129,7 @@ Begun = tuple[Effect, float]
 """An effect, and when it begins. [s]"""
 
 
-def _grown(
+def grown(
     effects: Sequence[Effect], columns: Mapping[Begun, np.ndarray], spacing: float
 ) -> dict[Begun, np.ndarray]:
     """Return the columns of effects that grow from each time of a grid on, without any run.

@@ -93,7 +93,7 @@ class Player {
   prepareBar() {
     const { highestTension } = this.replay;
     element("bar").hidden = !(highestTension > 0) || this.view instanceof PlanView;
-    ["bar-low", "bar-middle", "bar-high"].forEach((id, i) => (element(id).textContent = plain((highestTension * i) / 2)));
+    ["bar-low", "bar-middle", "bar-high"].forEach((id, i) => (element(id).textContent = plain((highestTension * i) / 2, 2)));
   }
 
   look(mode) {

@@ -1,0 +1,163 @@
+"""Make a solved step real; put a node in at the drum, or take one out, where the last segment asks for it.
+
+There is a new node at the drum when the last segment has become long, and one less when it has become short. Both
+happen between two steps, at levels NOW and BEFORE, and leave length, shape and motion of the cable as they are.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+
+import numpy as np
+
+from cable.moving_end.segment_load import Load, segment_momentum
+from cable.moving_end.slack_law import KNOWN
+from cable.moving_end.state import BEFORE, NEW, NOW, SPLIT_AT, Line, spacing
+from cable.properties import CableNumbers
+from subzero.jit import compiled, inner
+
+MERGE_AT = 0.5
+"""While cable is reeled in, a last segment shorter than this fraction of the one before is joined to it."""
+
+
+@compiled
+def accept(line: Line, step: float, c: CableNumbers, work: Load) -> None:
+    """Make level NEW the present one; split the last segment while it is too long, join it while it is too short."""
+    N = line.ends.count
+    for level in (BEFORE, NOW):
+        for j in range(N + 1):
+            for i in range(3):
+                line.position[level, j, i] = line.position[level - 1, j, i]
+                line.velocity[level, j, i] = line.velocity[level - 1, j, i]
+                line.momentum[level, j, i] = line.momentum[level - 1, j, i]
+                line.water[level, j, i] = line.water[level - 1, j, i]
+        line.ends.last_length[level] = line.ends.last_length[level - 1]
+        line.ends.payout[level] = line.ends.payout[level - 1]
+    for j in range(N + 1):
+        line.tension[BEFORE, j] = line.tension[NOW, j]
+        line.tension[NOW, j] = line.tension[NEW, j]
+    fill_node_tensions(line)
+    line.ends.previous_step = step
+    line.ends.time += step
+    if line.ends.free_end:
+        return
+    last = line.ends.last_length
+    while last[NOW] > SPLIT_AT * spacing(line) and line.ends.count < line.length.size - 1:
+        split_last(line, spacing(line), c, work)
+    while line.ends.count > 1 and last[NOW] < MERGE_AT * line.length[line.ends.count - 1]:
+        merge_last(line, c, work)
+
+
+@inner
+def split_last(line: Line, segment_length: float, c: CableNumbers, work: Load) -> None:
+    """Insert a node `segment_length` from the start of the last segment, on its chord, at levels NOW and BEFORE.
+
+    The new node is a material point. At level BEFORE it may still have been on the drum: then it is put where the
+    straight continuation of the chord would have had it, so that its backward differences stay smooth. Where little or
+    nothing of the last segment was out of the drum then, the segment before it is continued: a step may pay out several
+    segments, or one exactly.
+    """
+    N = line.ends.count
+    for level in (NOW, BEFORE):
+        beyond = N > 1 and line.ends.last_length[level] < 0.5 * segment_length
+        fraction = segment_length / (line.length[N - 1] if beyond else line.ends.last_length[level])
+        _insert_between(line.position[level], N, fraction, beyond)
+        _insert_between(line.velocity[level], N, fraction, beyond)
+        _insert_between(line.water[level], N, fraction, beyond)
+        line.ends.last_length[level] -= segment_length
+        if level == NOW:
+            near, end = line.node_tension[N - 1], line.node_tension[N]
+            line.node_tension[N] = near + fraction * (end - near)
+            line.node_tension[N + 1] = end
+            _share_tension(line, N, fraction, near - end)
+    line.length[N] = segment_length
+    line.ends.count = N + 1
+    line.ends.settled += segment_length
+    for level in (NOW, BEFORE):
+        segment_momentum(line, level, N, segment_length, c, work)
+        segment_momentum(line, level, N + 1, line.ends.last_length[level], c, work)
+
+
+@compiled
+def _share_tension(line: Line, N: int, fraction: float, drop: float) -> None:
+    """Give both parts of a split segment the tension at their middles, for a tension that falls evenly by `drop`."""
+    for level in (NOW, BEFORE):
+        line.tension[level, N + 1] = max(line.tension[level, N] - 0.5 * fraction * drop, 0.0)
+        line.tension[level, N] += 0.5 * (1.0 - fraction) * drop
+
+
+@compiled
+def _insert_between(values: np.ndarray, last: int, fraction: float, beyond: bool) -> None:
+    """Move the last row of `values` (nodes, 3) one down, and interpolate or extrapolate a new row before it.
+
+    Either along the last interval, or, `beyond`, along the one before it.
+    """
+    for i in range(3):
+        near, end = values[last - 1, i], values[last, i]
+        values[last + 1, i] = end
+        values[last, i] = near + fraction * (near - values[last - 2, i] if beyond else end - near)
+
+
+@inner
+def merge_last(line: Line, c: CableNumbers, work: Load) -> None:
+    """Take the node before the drum out, at levels NOW and BEFORE: the last two segments become one.
+
+    A taut new segment is as long as its chord (in the elastic state of its neighbours): the arc that the node cut
+    off, an eighth of the angle squared, is given back to the drum, without a jolt.
+    """
+    N = line.ends.count
+    last = line.ends.last_length
+    square = 0.0
+    for i in range(3):
+        square += (line.position[NOW, N, i] - line.position[NOW, N - 2, i]) ** 2
+    whole = line.length[N - 1] + last[NOW]
+    pieces = _chord(line, N - 1) + _chord(line, N)
+    taut = min(line.tension[NOW, N - 1], line.tension[NOW, N]) > KNOWN
+    cut_off = whole * (1.0 - np.sqrt(square) / max(pieces, 1e-12)) if taut else 0.0
+    for level in (NOW, BEFORE):
+        last[level] += line.length[N - 1] - cut_off
+        for i in range(3):
+            line.position[level, N - 1, i] = line.position[level, N, i]
+            line.velocity[level, N - 1, i] = line.velocity[level, N, i]
+            line.water[level, N - 1, i] = line.water[level, N, i]
+    line.tension[NOW, N - 1] = 0.5 * (line.tension[NOW, N - 1] + line.tension[NOW, N])
+    line.tension[BEFORE, N - 1] = 0.5 * (line.tension[BEFORE, N - 1] + line.tension[BEFORE, N])
+    line.node_tension[N - 1] = line.node_tension[N]
+    line.ends.count = N - 1
+    line.ends.settled -= line.length[N - 1]
+    for level in (NOW, BEFORE):
+        segment_momentum(line, level, N - 1, last[level], c, work)
+
+
+@compiled
+def _chord(line: Line, j: int) -> float:
+    """Return the distance of the ends of segment j at level NOW. [m]."""
+    square = 0.0
+    for i in range(3):
+        square += (line.position[NOW, j, i] - line.position[NOW, j - 1, i]) ** 2
+    return np.sqrt(square)
+
+
+@inner
+def end_tensions(line: Line) -> tuple[float, float]:
+    """Return the tensions T(0) at the tow point and T(S) at the drum, of the last solved step. [N].
+
+    T(0) is the size of the force (12); T(S) is the tension that drives the drum (11), with the drag and the inertia
+    of the last half segment; a slack end has none.
+    """
+    F = line.ends.tow_force
+    return sqrt(F[0] * F[0] + F[1] * F[1] + F[2] * F[2]), max(line.ends.drum_pull, 0.0)
+
+
+@inner
+def fill_node_tensions(line: Line) -> None:
+    """Fill line.node_tension (nodes,) after a step: T_j + ½ t_j·Q_j at the far end of segment j. [N]."""
+    N, x = line.ends.count, line.position
+    line.node_tension[0], line.node_tension[N] = end_tensions(line)
+    for j in range(1, N):
+        along, square = 0.0, 0.0
+        for i in range(3):
+            d = x[NEW, j, i] - x[NEW, j - 1, i]
+            along += d * line.load[j, i]
+            square += d * d
+        line.node_tension[j] = max(line.tension[NEW, j] + 0.5 * along / sqrt(max(square, 1e-30)), 0.0)

@@ -1,0 +1,215 @@
+"""What is to be computed, as a value: a cable that is pulled off a drum, or one of a fixed length that is towed.
+
+`cable.pull_out` and `cable.tow` make a task of what they are given, and every scheme takes it from there: all of them
+compute the same thing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from cable.current import Current
+from cable.drum import DrumProperties
+from cable.history import Equilibrium
+from cable.properties import CableProperties
+from cable.schemes import SHORTEST_S
+from cable.tow_path import Velocity
+from cable.winch import Brake, ConstantTension, PayOutRate, Winch
+from subzero.errors import BadValueError, checked, short
+
+Drum = DrumProperties | Winch
+DRUMS = (DrumProperties, PayOutRate, Brake, ConstantTension)
+START_LENGTH = 1e-6
+"""A run "without cable" starts with this length in the water, so that there is a direction. [m]"""
+
+WINCH, MOVING_DRUM, UNEVEN_CURRENT = "a winch", "a drum that moves", "a current that changes"
+WET_LENGTH, EQUILIBRIUM = "cable in the water at the start", "a start from cable.hold"
+EVERYTHING = frozenset({WINCH, MOVING_DRUM, UNEVEN_CURRENT, WET_LENGTH, EQUILIBRIUM})
+"""What a task may ask for beyond a free drum on the shore, uniform water and no cable at the start."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class MovingDrum:
+    """A drum that is carried, by a boat for example.
+
+    Attributes:
+        velocity: function of time [s] that gives the velocity of the drum north, east, down (3,). [m/s]
+        drum: the drum itself, free or with a winch; the free drum of Table 1 when not given.
+    """
+
+    velocity: Velocity
+    drum: Drum = field(default_factory=DrumProperties)
+
+    def __post_init__(self) -> None:
+        """Refuse what is no motion and what is no drum."""
+        _check_motion("MovingDrum: velocity", self.velocity)
+        check_kinds(**{"MovingDrum: drum": (self.drum, DRUMS)})
+
+
+@dataclass(frozen=True, kw_only=True)
+class PullOut:
+    """A cable that is pulled off a drum by a tow point whose motion is prescribed.
+
+    Attributes:
+        tow_velocity: function of time [s] that gives the tow point's velocity north, east, down (3,). [m/s]
+        duration: how long. [s]
+        cable: the cable.
+        drum: a free drum, or a winch.
+        drum_velocity: the same of the drum; None for one on the shore.
+        current: how the water moves.
+        start: length of cable in the water at the start, laid straight behind the tow point [m]; or how it hangs.
+        origin: place of the drum at the start, in the axes of the current (3,). [m]
+    """
+
+    tow_velocity: Velocity
+    duration: float
+    cable: CableProperties
+    drum: Drum
+    drum_velocity: Velocity | None
+    current: Current
+    start: float | Equilibrium
+    origin: np.ndarray
+
+    @classmethod
+    def of(
+        cls,
+        tow_velocity: Velocity,
+        duration: float,
+        *,
+        cable: CableProperties | None = None,
+        drum: Drum | MovingDrum | None = None,
+        current: Sequence[float] | np.ndarray | Current | None = None,
+        start: float | Equilibrium = 0.0,
+    ) -> PullOut:
+        """Return the task of `cable.pull_out`, with what is not given filled in.
+
+        Raises:
+            subzero.UserError: what makes no sense by itself.
+        """
+        origin = np.zeros(3)
+        if isinstance(start, Equilibrium):
+            cable = start.cable if cable is None else cable
+            origin, current = (start.shape[-1], start.current) if current is None else (origin, current)
+        else:
+            start = checked("", "start", start, least=0.0, unit="m, or what cable.hold gives")
+        cable, drum = _cable_of(cable), DrumProperties() if drum is None else drum
+        check_kinds(drum=(drum, (*DRUMS, MovingDrum)))
+        _check_motion("tow_velocity", tow_velocity)
+        return cls(
+            tow_velocity=tow_velocity,
+            duration=checked_duration(duration),
+            cable=cable,
+            drum=drum.drum if isinstance(drum, MovingDrum) else drum,
+            drum_velocity=drum.velocity if isinstance(drum, MovingDrum) else None,
+            current=current_of(current),
+            start=start,
+            origin=origin,
+        )
+
+    @property
+    def wet_length(self) -> float:
+        """Cable in the water at the start. [m]."""
+        return self.start.length if isinstance(self.start, Equilibrium) else max(self.start, START_LENGTH)
+
+    def asks_for(self) -> list[str]:
+        """Return what of `EVERYTHING` it asks for."""
+        asked = {
+            WINCH: not isinstance(self.drum, DrumProperties),
+            MOVING_DRUM: self.drum_velocity is not None,
+            UNEVEN_CURRENT: self.current.velocity.size != 3,
+            WET_LENGTH: not isinstance(self.start, Equilibrium) and self.start > 0.0,
+            EQUILIBRIUM: isinstance(self.start, Equilibrium),
+        }
+        return [what for what, is_asked in asked.items() if is_asked]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tow:
+    """A cable of a fixed length with a free tail, towed by a point whose motion is prescribed.
+
+    Attributes:
+        tow_velocity: function of time [s] that gives the tow point's velocity north, east, down (3,). [m/s]
+        length: L. [m]
+        duration: how long. [s]
+        cable: the cable.
+        current: how the water moves, at places relative to the tow point at the start.
+        drogue_drag_area: C_d A of a drogue at the free end; 0 is a free tail. [m²]
+    """
+
+    tow_velocity: Velocity
+    length: float
+    duration: float
+    cable: CableProperties
+    current: Current
+    drogue_drag_area: float
+
+    @classmethod
+    def of(
+        cls,
+        tow_velocity: Velocity,
+        length: float,
+        duration: float,
+        *,
+        cable: CableProperties | None = None,
+        current: Sequence[float] | np.ndarray | Current | None = None,
+        drogue_drag_area: float = 0.0,
+    ) -> Tow:
+        """Return the task of `cable.tow`, with what is not given filled in.
+
+        Raises:
+            subzero.UserError: what makes no sense by itself.
+        """
+        _check_motion("tow_velocity", tow_velocity)
+        return cls(
+            tow_velocity=tow_velocity,
+            length=checked("", "length", length, above=0.0),
+            duration=checked_duration(duration),
+            cable=_cable_of(cable),
+            current=current_of(current),
+            drogue_drag_area=checked("", "drogue_drag_area", drogue_drag_area, least=0.0),
+        )
+
+    @property
+    def tail_drag(self) -> float:
+        """½ρC_dA of the drogue. [kg/m]."""
+        return 0.5 * self.cable.water_density * self.drogue_drag_area
+
+
+def check_kinds(**wanted: tuple[object, tuple[type, ...]]) -> None:
+    """Refuse an argument, name → (value, kinds), that is of none of its kinds."""
+    for name, (value, kinds) in wanted.items():
+        if not isinstance(value, kinds):
+            words = " or ".join(kind.__name__ for kind in kinds)
+            raise BadValueError(
+                f"{name} is {short(value)}, of type {type(value).__name__}; it must be {words}."
+            )
+
+
+def checked_duration(value: float) -> float:
+    """Return a duration as a float; refuse one that is too short to be halved. [s]."""
+    return checked("", "duration", value, least=SHORTEST_S, unit="s")
+
+
+def current_of(current: Sequence[float] | np.ndarray | Current | None) -> Current:
+    """Return a current from what users give: nothing, three numbers, or a current."""
+    if isinstance(current, Current):
+        return current
+    return Current.uniform(np.zeros(3) if current is None else current)
+
+
+def _cable_of(cable: CableProperties | None) -> CableProperties:
+    """Return the cable, that of Table 1 when none is given."""
+    cable = CableProperties() if cable is None else cable
+    check_kinds(cable=(cable, (CableProperties,)))
+    return cable
+
+
+def _check_motion(name: str, velocity: object) -> None:
+    """Refuse a motion that is no function of time."""
+    if not callable(velocity):
+        raise BadValueError(
+            f"{name} is {short(velocity)}; it must be a function of time that gives a velocity."
+        )
