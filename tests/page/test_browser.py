@@ -85,6 +85,7 @@ def test_without_webgl_there_are_flat_views(page: Path, runs: dict) -> None:
 
 
 def test_a_picture_of_the_replay_shows_the_yellow_vehicle_in_its_middle(browser: Any) -> None:
+    browser.execute_script("subzero.look('follow')")  # whatever a test before has done
     image = np.asarray(browser_of_page.picture(browser, 6.0, 640, 360), dtype=float)
     assert image.shape == (360, 640, 3)
     red, green, blue = image[150:210, 270:370].reshape(-1, 3).T
