@@ -6,7 +6,7 @@ import json
 from typing import TYPE_CHECKING, Any
 
 from subzero.page.replay import HULL, actors_of, encode
-from subzero.page.report import Line, Report, Table, render
+from subzero.page.report import Line, Report, Section, Table, render
 from subzero.report import NOTHING, RUNS, fit_rows, number_groups
 
 if TYPE_CHECKING:
@@ -48,8 +48,7 @@ def page_of_runs(
             outcome=[line for label in labels for line in _outcome(label, summary[label])],
             command=command,
             warnings=_warnings(summary, labels),
-            tables=_tables(summary, labels),
-            figures=figures,
+            sections=_sections(_tables(summary, labels), figures),
             replay=encode(actors_of(runs), record) if _can_be_replayed(first) else None,
             sources=_sources(first),
         )
@@ -84,6 +83,12 @@ def _warnings(summary: dict[str, Any], labels: list[str]) -> dict[str, list[str]
         for label in labels
         if summary[label]["warnings"]
     }
+
+
+def _sections(tables: list[Table], figures: Mapping[str, Figure]) -> list[Section]:
+    """Return the numbers, each table a section of its own, and the figures behind them."""
+    numbers = [Section(title=table.title, tables=[table]) for table in tables]
+    return [*numbers, Section(title="Figures", figures=figures)] if figures else numbers
 
 
 def _tables(summary: dict[str, Any], labels: list[str]) -> list[Table]:
