@@ -24,7 +24,8 @@ from subzero.diagnosis.hypothesis.catalogue import START, catalogue
 from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.logged import Logged
 from subzero.diagnosis.report import tables, words
-from subzero.diagnosis.report.html import table
+from subzero.diagnosis.report.sections import table
+from subzero.diagnosis.report.summary import summary
 from subzero.diagnosis.results import Verdict
 from subzero.figures.diagnosis import draw_diagnosis
 from subzero.figures.style import Title
@@ -63,7 +64,8 @@ def tell(story: Story, verdict: Verdict) -> str:
     ]
     missed = "" if verdict.verdict == story.expected else f" *It should have been {story.expected}.*"
     lines += [f"**{words.headline(verdict)}.**{missed}", ""]
-    lines += [f"> {line}\n>" for line in words.story(verdict)[:6]]
+    for answer in summary(verdict, story.trial.__name__):
+        lines += [f"> *{answer.question}?* {' '.join(answer.words)}\n>"]
     lines += ["", *(table(tables.rivals(verdict, short=True)) if verdict.rivals else [])]
     for name in story.figures:
         if name in drawn:

@@ -48,7 +48,7 @@ COMMAND: dict[str, Any] = {"color": INK, "linestyle": "-", "linewidth": 1.2}
 DOTS: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 2.6, "color": INK, "alpha": 0.6}
 
 DPI = 150
-TINY, SMALL, NORMAL, LARGE = 6.8, 7.5, 8.5, 9.5
+TINY, SMALL, NORMAL, LARGE = 7.0, 7.5, 8.5, 9.5
 """Font sizes. [pt]"""
 
 
@@ -152,7 +152,8 @@ def label(axes: Axes, x: str | None, y: str) -> None:
 def legend(axes: Axes, columns: int = 3, *, tight: bool = False, **where: Any) -> None:
     """Show the legend, small; if no place is given, above the curves, where room is made for it."""
     if not where:
-        rows = math.ceil(len(axes.get_legend_handles_labels()[1]) / columns)
+        lines = sum(1 + label.count("\n") for label in axes.get_legend_handles_labels()[1])
+        rows = math.ceil(lines / columns)
         height = axes.get_window_extent().height / DPI
         taken = min((rows * LEGEND_ROW + LEGEND_MARGIN) / height, 0.6)
         low, high = axes.get_ylim()

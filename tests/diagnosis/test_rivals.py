@@ -13,7 +13,7 @@ import pytest
 from subzero.diagnosis.assessment.residuals import curves
 from subzero.diagnosis.hypothesis.catalogue import catalogue
 from subzero.diagnosis.inference.laplace import candidate_of
-from subzero.diagnosis.report import html as report
+from subzero.diagnosis.report import sections as report
 from subzero.diagnosis.report import tables
 from subzero.diagnosis.results import CAUSE_NAMED, NOTHING_WRONG, UNDECIDED, Extended, Unknown, Verdict
 from subzero.diagnosis.verdict.conclude import strange_rival
@@ -79,17 +79,23 @@ def test_the_others_are_drawn_beside_the_most_probable(work, everything):
     title = Title(words="a trial", scenario="fig6")
     figures = draw_diagnosis(undecided(work, everything), title)
     legend = [text.get_text() for text in figures["rivals"].axes[0].get_legend().get_texts()]
-    assert legend == ["measured", "hull_drag", "propeller_thrust_slope"]
+    assert legend == [
+        "measured",
+        "if the hull has another drag",
+        "if the thrust falls differently with speed",
+        "if nothing is wrong",
+    ]
     overlay = [text.get_text() for text in figures["misfit"].axes[0].get_legend().get_texts()]
-    assert {"nominal", "hull_drag"} < set(overlay)
+    assert {"simulated", "if the hull has another drag"} < set(overlay)
 
 
 def test_one_alone_has_nothing_beside_it(work, everything):
     title = Title(words="a trial", scenario="fig6")
-    assert "rivals" not in draw_diagnosis(undecided(work, everything, drawn=1), title)
+    alone = dataclasses.replace(undecided(work, everything, drawn=1), probabilities={"hull_drag": 1.0})
+    assert "rivals" not in draw_diagnosis(alone, title)
     healthy = draw_diagnosis(undecided(work, everything, NOTHING_WRONG, drawn=0), title)
     overlay = [text.get_text() for text in healthy["misfit"].axes[0].get_legend().get_texts()]
-    assert "within tolerances" in overlay
+    assert "calibrated within tolerances" in overlay
 
 
 def test_only_new_physics_has_a_gain(work):

@@ -67,7 +67,7 @@ class Player {
 
   /** A box to tick for each vehicle, and the table of what holds now. */
   prepareActors() {
-    const names = [...this.replay.actors.map((actor) => actor.name), ...(this.replay.measured ? ["measured"] : [])];
+    const names = [...new Set([...this.replay.actors.map((actor) => actor.name), ...(this.replay.measured ? ["measured"] : [])])];
     for (const name of names.length > 1 ? names : []) {
       const label = document.createElement("label"), box = document.createElement("input");
       Object.assign(box, { type: "checkbox", checked: true });
@@ -234,7 +234,9 @@ class Player {
       element("labels").append(label);
       this.labels.set(name, label);
     }
-    const label = this.labels.get(name), inside = at && at.every((share) => share > 0.01 && share < 0.97);
+    const label = this.labels.get(name), ghosts = this.replay.actors.filter((actor) => actor.isGhost).map((actor) => actor.name);
+    label.style.marginTop = `${1.7 * Math.max(0, ghosts.indexOf(name))}em`;  // ghosts that are close keep their names apart
+    const inside = at && at.every((share) => share > 0.01 && share < 0.97);
     label.hidden = !inside;
     if (inside) label.style.transform = `translate(${at[0] * this.size[0]}px, ${at[1] * this.size[1]}px)`;
   }

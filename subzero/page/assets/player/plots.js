@@ -66,8 +66,9 @@ export class Plots {
 
   linesOf(name) {
     const colours = isDark() ? DARK_COLOURS : COLOURS, { actors, measured } = this.replay;
-    const lines = actors.filter((actor) => actor.has(name)).map((actor, i) => ({
-      label: actor.name, source: actor, name, stroke: colours[actor.name] ?? colours[i], dash: actor.isGhost ? [6, 4] : [],
+    const isDots = (actor) => actor.name === "measured" && measured?.has(name);
+    const lines = actors.filter((actor) => actor.has(name) && !isDots(actor)).map((actor) => ({
+      label: actor.name, source: actor, name, stroke: colours[actor.name] ?? colours[actors.indexOf(actor)], dash: actor.isGhost ? [6, 4] : [],
     }));
     if (measured?.has(name)) lines.push({ label: "measured", source: measured, name, stroke: isDark() ? "#ddd" : "#333", dots: true });
     return lines;
