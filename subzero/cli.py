@@ -34,8 +34,29 @@ if TYPE_CHECKING:
     Runs = dict[str, xr.Dataset]
 
 Flag = cli_autopilot.Flag
-Film = Literal["gif", "mp4"] | None
 FINE, MISTAKE, STOPPED = 0, 2, 3
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class Pictures:
+    """How figures and films are made.
+
+    Attributes:
+        width: of the figures in inches: 7.2 for two columns of a journal page, 3.4 for one.
+        figures: png, svg or pdf.
+        animate: film the replay of report.html as a gif or an mp4; needs Chromium and the extra [animate].
+    """
+
+    width: float | None = None
+    figures: Literal["png", "svg", "pdf"] = "png"
+    animate: Literal["gif", "mp4"] | None = None
+
+    def check(self) -> None:
+        """Refuse what cannot be made, before anything is simulated."""
+        from subzero.write_results import check_pictures
+
+        check_pictures(self.width, self.animate)
 
 
 @Parameter(name="*")
@@ -71,7 +92,7 @@ class Inputs:
         return cli_diagnosis.extended_run(trial, self.with_, self.effects)
 
 
-NO_INPUTS = Inputs()
+NO_INPUTS, USUAL_PICTURES = Inputs(), Pictures()
 
 
 def _version() -> str:
@@ -111,7 +132,7 @@ def simulate(
     out: Path | None = None,
     check: Flag = False,
     strict: Flag = False,
-    animate: Film = None,
+    pictures: Pictures = USUAL_PICTURES,
 ) -> int:
     """Simulate one run, and write its channels, a summary and figures.
 
@@ -122,13 +143,13 @@ def simulate(
         out: folder for the files; by default one named after the scenario, here.
         check: run it once more with half the steps and half the segment length, and say what changes.
         strict: end with exit code 3 if the run ends with warnings.
-        animate: film the replay of report.html as a gif or an mp4; needs Chromium and the extra [animate].
+        pictures: how figures and films are made.
     """
     from subzero import write_results
     from subzero.output import staged
 
     trial = inputs.read(scenario)
-    write_results.check_film(animate)
+    pictures.check()
     with staged(out or write_results.default_folder(trial)) as stage:
         trial, extended = inputs.checked(scenario)
         with _progress(trial) as progress:
@@ -137,8 +158,8 @@ def simulate(
             result = run(trial, tethered=not untethered, **extended, progress=progress)
         runs = {"untethered" if untethered else "tethered": result}
         runs = _refined(runs, trial, extended) if check else runs
-        summary = write_results.write_all(runs, None, stage)
-        write_results.write_film(animate, stage)
+        summary = write_results.write_all(runs, None, stage, width=pictures.width, kind=pictures.figures)
+        write_results.write_film(pictures.animate, stage)
     return FINE if write_results.tell(summary, stage, strict=strict) else STOPPED
 
 
@@ -152,7 +173,7 @@ def compare(
     out: Path | None = None,
     check: Flag = False,
     strict: Flag = False,
-    animate: Film = None,
+    pictures: Pictures = USUAL_PICTURES,
 ) -> int:
     """Simulate with the cable and without, and set both side by side.
 
@@ -163,7 +184,7 @@ def compare(
         out: folder for the files; by default one named after the scenario, here.
         check: run both once more with half the steps and half the segment length, and say what changes.
         strict: end with exit code 3 if a run ends with warnings.
-        animate: film the replay of report.html as a gif or an mp4; needs Chromium and the extra [animate].
+        pictures: how figures and films are made.
     """
     from subzero import write_results
     from subzero.output import staged
@@ -171,7 +192,7 @@ def compare(
 
     trial = inputs.read(scenario)
     record = read_record(measured) if measured is not None else None
-    write_results.check_film(animate)
+    pictures.check()
     with staged(out or write_results.default_folder(trial)) as stage:
         trial, extended = inputs.checked(scenario)
         with _progress(trial) as progress:
@@ -179,8 +200,10 @@ def compare(
 
             result = run(trial, measured=record, **extended, progress=progress)
         runs = _refined(result.runs, trial, extended) if check else result.runs
-        summary = write_results.write_all(runs, result.measured, stage)
-        write_results.write_film(animate, stage)
+        summary = write_results.write_all(
+            runs, result.measured, stage, width=pictures.width, kind=pictures.figures
+        )
+        write_results.write_film(pictures.animate, stage)
     return FINE if write_results.tell(summary, stage, strict=strict) else STOPPED
 
 

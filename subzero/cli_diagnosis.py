@@ -72,7 +72,7 @@ def diagnose(
         with patience(LAST_WORDS_S):
             verdict = _ask(logged, own, seed, "screen" if screen else "full")
             write_diagnosis.write_all(
-                verdict, logged, stage, run=_simulated, effects=own, effects_file=effects
+                verdict, logged, stage, run=simulated, effects=own, effects_file=effects
             )
     write_diagnosis.tell(verdict, stage, scenario=logged[0].setting.trial.name)
     if not verdict.complete:
@@ -165,7 +165,7 @@ def _read(paths: list[Path], scenario: str | None, commands: str | None) -> list
         return read_trials(paths, scenario=scenario, commands=commands)
 
 
-def _simulated(setting: Setting) -> xr.Dataset:
+def simulated(setting: Setting) -> xr.Dataset:
     """Return what the vehicle does in a setting, with the steps that the diagnosis took."""
     from subzero.simulation import simulate
 

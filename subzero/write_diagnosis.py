@@ -282,7 +282,8 @@ def replayed(
             "White: the vehicle as the record has it; where it does not say the place, that is reckoned from its speed "
             "and attitude. "
         )
-    return tuple(found), said + "Orange: the simulation as it was." if found[0].name != "simulated" else said
+    said += "Orange: the simulation as it was. " if found[0].name != "simulated" else ""
+    return tuple(found), f"{said}A run is what is; what sensors make of it (shifts, lags) is not in it."
 
 
 def _vehicle(run: xr.Dataset) -> dict[str, Any]:

@@ -24,9 +24,25 @@ def default_folder(trial: scenarios.Trial) -> Path:
     return Path(re.sub(r"[^\w.-]+", "_", trial.name).strip(".") or "run")
 
 
-def write_all(runs: dict[str, xr.Dataset], record: Record | None, stage: Stage) -> dict[str, Any]:
-    """Write everything that belongs to some runs of one trial, and return their summary."""
-    from subzero.figures import draw
+def write_all(
+    runs: dict[str, xr.Dataset],
+    record: Record | None,
+    stage: Stage,
+    *,
+    width: float | None = None,
+    kind: str = "png",
+) -> dict[str, Any]:
+    """Write everything that belongs to some runs of one trial, and return their summary.
+
+    Args:
+        runs: by label.
+        record: what was measured, if anything was.
+        stage: where to.
+        width: of the figures; None for two columns of a page. [inch]
+        kind: of the figures: png, svg or pdf.
+    """
+    from subzero.figures import draw, page_width
+    from subzero.figures.style import WIDTH
     from subzero.page import page_of_runs
     from subzero.summary import summary_of
 
@@ -35,20 +51,26 @@ def write_all(runs: dict[str, xr.Dataset], record: Record | None, stage: Stage) 
     for label, run in runs.items():
         output.write_run(run, stage, label)
     output.write_summary(summary, stage)
-    figures = draw(runs, record)
-    output.write_figures(figures, stage)
+    with page_width(WIDTH if width is None else width):
+        figures = draw(runs, record)
+        output.write_figures(figures, stage, kind)
     output.write_page(
         page_of_runs(runs, summary, figures, command=output.COMMAND.get(), record=record), stage
     )
     return summary
 
 
-def check_film(kind: str | None) -> None:
-    """Refuse a film that cannot be made here, before anything is simulated."""
-    if kind is not None:
-        from subzero.page.browser import check_film as check
+def check_pictures(width: float | None, film: str | None) -> None:
+    """Refuse figures that cannot be so wide, and a film that cannot be made here, before anything is simulated."""
+    if width is not None:
+        from subzero.figures import page_width
 
-        check()
+        with page_width(width):
+            pass
+    if film is not None:
+        from subzero.page.browser import check_film
+
+        check_film()
 
 
 def write_film(kind: str | None, stage: Stage) -> None:

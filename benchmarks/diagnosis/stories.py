@@ -20,6 +20,7 @@ import subzero
 from benchmarks.diagnosis.story_cases import STORIES, Story
 from subzero import write_diagnosis
 from subzero.channels import BY_NAME
+from subzero.cli_diagnosis import simulated
 from subzero.diagnosis.hypothesis.catalogue import START, catalogue
 from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.logged import Logged
@@ -95,7 +96,7 @@ def keep(logged: Logged, verdict: Verdict, folder: Path) -> None:
         header = ",".join(["time_s", *(BY_NAME[name].column for name in names)])
         columns = np.column_stack([logged.record.time, *(logged.record.values[name] for name in names)])
         np.savetxt(stage.path / "record.csv", columns, fmt="%.6g", delimiter=",", header=header, comments="")
-        write_diagnosis.write_all(verdict, [logged], stage)
+        write_diagnosis.write_all(verdict, [logged], stage, run=simulated)
 
 
 def main() -> None:

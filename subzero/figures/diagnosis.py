@@ -61,7 +61,6 @@ def missing_force(verdict: Verdict, title: Title) -> Figure | None:
     axes.axhline(0.0, color=style.GREY, linewidth=0.7)
     axes.set_xlim(float(unknown.time[0]), float(unknown.time[-1]))
     label(axes, None, f"[{unknown.unit}]")
-    axes.yaxis.set_label_coords(-0.07, 0.5)
     time_label([axes], 1)
     headline(axes, _what(unknown))
     if unknown.formula:
@@ -222,11 +221,11 @@ def _bars(
     columns: int, rows: int, title: Title, *, left: float = 0.2, apart: float = 0.72
 ) -> tuple[Figure, list[Axes]]:
     """Return a sheet for horizontal bars, as high as they need, with room for their names."""
-    from subzero.figures.style import BOTTOM, TOP, WIDTH
+    from subzero.figures.style import BOTTOM, TOP
 
     figure, panels = sheet(1, columns, title)
     height = TOP + 0.4 + BOTTOM + 0.17 * max(rows, 3)
-    figure.set_size_inches(WIDTH, height)
+    figure.set_size_inches(style.width(), height)
     figure.subplots_adjust(left=left, wspace=apart, bottom=BOTTOM / height, top=1.0 - (TOP + 0.2) / height)
     for text in figure.texts:
         text.set_y(1.0 - 0.09 / height)

@@ -15,7 +15,7 @@ from subzero.cli import FINE, STOPPED, main
 from subzero.output import staged
 from subzero.records.record import read_record
 
-PICTURES = {"fig6.png", "attitude.png", "cable.png", "forces.png"}
+PICTURES = {"fig6.png", "attitude.png", "cable.png", "tension.png", "forces.png"}
 RUN_KEYS = """outcome outcome_message time_at_end_s peak_speed_m_s time_of_peak_speed_s speed_at_end_m_s
     heading_at_end_deg depth_at_end_m path_length_m cable_length_at_end_m largest_cable_force_N
     time_of_largest_cable_force_s largest_cable_moment_N_m time_of_largest_cable_moment_s energy diagnostics
@@ -47,7 +47,7 @@ def test_it_says_which_files_it_wrote(compared):
 def test_simulate_leaves_one_run(flag, kind, tmp_path, rails):
     assert main(["simulate", "fig6", *flag, "--out", str(tmp_path / "new" / "deep")]) == FINE
     assert [tethered for _, tethered in rails] == [kind == "tethered"]
-    pictures = PICTURES if kind == "tethered" else PICTURES - {"cable.png"}
+    pictures = PICTURES if kind == "tethered" else PICTURES - {"cable.png", "tension.png"}
     assert (
         names(tmp_path / "new" / "deep")
         == {f"{kind}.nc", f"{kind}.csv", "summary.json", "report.html"} | pictures
@@ -126,6 +126,7 @@ def test_a_prescribed_run_gets_figure_4(tmp_path, rails):
     assert names(tmp_path) == {
         "fig4.png",
         "cable.png",
+        "tension.png",
         "report.html",
         "summary.json",
         "tethered.csv",

@@ -62,7 +62,7 @@ def test_the_numbers_are_there_without_javascript(read: Reader, runs: dict) -> N
     shown = " ".join("".join(read.text).split())
     assert f"{float(runs['tethered']['surge_speed'].max()):.3f} at" in shown
     assert "largest cable force [N]" in shown
-    assert read.tags.count("img") == 4
+    assert read.tags.count("img") == 5
 
 
 def test_fig6_stays_below_a_megabyte_and_a_half(page: Path) -> None:

@@ -135,7 +135,10 @@ def sentences(verdict: Verdict) -> dict[str, str]:
     """Return what a verdict itself says of its causes and rivals: hypothesis → sentence."""
     told = {" + ".join(one.ids) or "none": one.sentence for one in verdict.rivals}
     told = {name: said for name, said in told.items() if not name.startswith(FORCE)}
-    return told | {one.id: one.sentence for one in verdict.causes if one.start_time is None}
+    told |= {one.id: one.sentence for one in verdict.causes if one.start_time is None}
+    if verdict.unknown is not None and not verdict.unknown.is_drift:
+        told[f"{FORCE}{verdict.unknown.axis}"] = something(verdict.unknown.axis, verdict.unknown.force)
+    return told
 
 
 def probability(value: float) -> str:
