@@ -32,7 +32,7 @@ from subzero.diagnosis.api import diagnose_trials
 from subzero.diagnosis.hypothesis.catalogue.sensors import NOISE
 from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.logged import Logged
-from subzero.diagnosis.inference.problem import pose
+from subzero.diagnosis.inference import pose
 from subzero.model import Model
 from subzero.records.record import Record
 
