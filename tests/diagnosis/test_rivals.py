@@ -58,12 +58,12 @@ def test_the_others_are_drawn_beside_the_most_probable():
     legend = [text.get_text() for text in figures["rivals"].axes[0].get_legend().get_texts()]
     assert legend == [
         "measured",
-        "if the hull has another drag",
-        "if the thrust falls differently with speed",
+        "if the hull drags more",
+        "if thrust falls faster",
         "if nothing is wrong",
     ]
     overlay = [text.get_text() for text in figures["misfit"].axes[0].get_legend().get_texts()]
-    assert {"simulated", "if the hull has another drag"} < set(overlay)
+    assert {"simulated", "if the hull drags more"} < set(overlay)
 
 
 @pytest.mark.parametrize(("verdict", "drawn"), [(UNDECIDED, 1), (NOTHING_WRONG, 0)])
