@@ -190,7 +190,7 @@ def test_a_challenge_is_written_with_what_to_do_next_and_its_answer_is_told_when
         monkeypatch.setitem(sys.modules, module.__name__, module)
     assert main(["challenge", "--scenario", "fig6", "--seed", "7", "--out", "hidden"]) == FINE
     said = capsys.readouterr().out
-    assert "subzero diagnose hidden/record.csv --scenario fig6" in said
+    assert "subzero diagnose fig6 hidden/record.csv" in said
     assert "subzero challenge --reveal hidden" in said
     assert main(["challenge", "--reveal", "hidden"]) == FINE
     assert "in hidden: the rudder lags" in capsys.readouterr().out
