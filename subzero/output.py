@@ -47,11 +47,11 @@ def staged(folder: Path) -> Iterator[Stage]:
 def write_run(run: xr.Dataset, stage: Stage, name: str) -> None:
     """Write a run as ``name.nc`` (everything, with units and provenance) and ``name.csv`` (the channels)."""
     with stages.told(stage.folder):
-        _write_netcdf(run, stage.path / f"{name}.nc")
+        write_netcdf(run, stage.path / f"{name}.nc")
         write_csv(run, stage.path / f"{name}.csv")
 
 
-def _write_netcdf(run: xr.Dataset, path: Path) -> None:
+def write_netcdf(run: xr.Dataset, path: Path) -> None:
     """Write a run as netCDF; its library says a full disk as it says everything else."""
     try:
         run.to_netcdf(path, engine="netcdf4")

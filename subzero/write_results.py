@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -31,6 +32,7 @@ def write_all(
     *,
     width: float | None = None,
     kind: str = "png",
+    exports: Sequence[str] = (),
 ) -> dict[str, Any]:
     """Write everything that belongs to some runs of one trial, and return their summary.
 
@@ -40,7 +42,9 @@ def write_all(
         stage: where to.
         width: of the figures; None for two columns of a page. [inch]
         kind: of the figures: png, svg or pdf.
+        exports: kinds of files for other programs (`subzero.exports`).
     """
+    from subzero.exports import write_exports
     from subzero.figures import draw, page_width
     from subzero.figures.style import WIDTH
     from subzero.page import page_of_runs
@@ -50,6 +54,7 @@ def write_all(
     stage.failed = any(run.attrs["outcome"] != "completed" for run in runs.values())
     for label, run in runs.items():
         output.write_run(run, stage, label)
+        write_exports(run, label, exports, stage)
     output.write_summary(summary, stage)
     with page_width(WIDTH if width is None else width):
         figures = draw(runs, record)

@@ -123,7 +123,7 @@ def _cable(run: xr.Dataset) -> dict[str, Any]:
     kept = _spread(run.sizes["time"], MOST_SHAPES)
     counts = run["node_count"].values[kept].astype(int)
     points = min(int(counts.max()), MOST_POINTS)
-    position = run["cable_position"].values[kept] + _start_of_cable(run)
+    position = run["cable_position"].values[kept] + cable_origin(run)
     tension = run["cable_node_tension"].values[kept]
     along = np.concatenate([position, tension[:, :, None]], axis=2)
     shapes = np.stack([_points(rows, count, points) for rows, count in zip(along, counts, strict=True)])
@@ -145,7 +145,7 @@ def _points(rows: np.ndarray, count: int, points: int) -> np.ndarray:
     return (1.0 - share) * rows[before] + share * rows[before + 1]
 
 
-def _start_of_cable(run: xr.Dataset) -> np.ndarray:
+def cable_origin(run: xr.Dataset) -> np.ndarray:
     """Return from where the cable's places count, (3,): at the start, node 0 is at the tow point. [m]"""
     first = int(np.argmax(run["node_count"].values > 0))
     hull = np.array([run[name].values[first] for name in ("north", "east", "depth")])

@@ -25,7 +25,7 @@ from subzero.sweeps.design import points_of
 from subzero.sweeps.member import OtherVersionError, run_members
 from subzero.sweeps.page import page_of_sweep
 from subzero.sweeps.plan import plan_of
-from subzero.sweeps.result import Gathered, write_result
+from subzero.sweeps.result import MOST_DRAWN, Gathered, _drawn, write_result
 from subzero.sweeps.schedule import MOST_DEATHS, Schedule
 from subzero.sweeps.sensitivity import effects_of
 from subzero.sweeps.workers import WorkerDiedError, WorkerPool
@@ -476,6 +476,16 @@ def test_a_sweep_that_is_killed_time_after_time_loses_nothing():
     from benchmarks.sweep import kills
 
     assert kills(8, 600, seed=5)
+
+
+@pytest.mark.parametrize("columns", [2, 3, 10])
+def test_the_members_of_a_large_grid_that_bands_are_drawn_from_have_all_its_values_alike(columns):
+    """Binomial: within five standard deviations. Every second member of a grid of two columns is of one of them."""
+    drawn = np.flatnonzero(_drawn(2 * MOST_DRAWN))
+    assert drawn.size == MOST_DRAWN
+    counts = np.bincount(drawn % columns, minlength=columns)
+    share = 1.0 / columns
+    assert np.abs(counts - share * MOST_DRAWN).max() < 5.0 * np.sqrt(MOST_DRAWN * share * (1.0 - share))
 
 
 def test_batches_get_as_long_as_they_should_and_shrink_towards_the_end():
