@@ -138,7 +138,8 @@ def _rich(table: tables.Table, width: int) -> Table:
         columns.remove(max(columns[1:-1], key=lambda one: sum(map(len, one[1]))))
     shown = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     for name, cells in columns:
-        shown.add_column(name, overflow="fold", min_width=_longest_word(name, cells))
+        is_one_word = not any(" " in cell for cell in (name, *cells))
+        shown.add_column(name, overflow="fold", no_wrap=is_one_word, min_width=_longest_word(name, cells))
     for row in zip(*(cells for _, cells in columns), strict=True):
         shown.add_row(*map(escape, row))
     return shown
