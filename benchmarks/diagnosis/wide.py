@@ -180,7 +180,7 @@ def _steered(
 def result_of(one: Wide) -> dict[str, Any]:
     """Return what was drawn and what the diagnosis says of it."""
     found = {"index": one.index, "flown": "+".join(one.flown), "family": one.family, "vehicle": one.vehicle,
-             "step": one.step, "spread": one.spread, "cause": "+".join(one.causes)}  # fmt: skip
+             "step": one.step, "spread": one.spread, "cause": " + ".join(one.causes)}  # fmt: skip
     try:
         records, planted = records_of(one)
         problem = with_true_noise(pose(records), one.noise())

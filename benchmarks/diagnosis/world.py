@@ -231,7 +231,7 @@ def result_of(one: Drawn) -> dict[str, Any]:
 
 def is_right(one: Mapping[str, Any]) -> bool:
     """Say whether the most probable is what is true."""
-    return one["first"] == (one["cause"] or "none")
+    return set(one["first"].split(" + ")) == set((one["cause"] or "none").split(" + "))
 
 
 def is_confidently_wrong(one: Mapping[str, Any]) -> bool:
