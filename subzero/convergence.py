@@ -5,7 +5,9 @@
 If each halving divides the change by r, what is left is e_h/(r − 1) (Richardson): a third of e_h at second order, e_h
 at first. Of one pair r is not known, and the first order is supposed. The coarse run has a quarter of the nodes and
 steps. Where the error is above `rtol`, the run is repeated with steps and segments halved, `MOST_HALVINGS` times at
-most; what was the run is then the coarse one, and r = e_2h/e_h. Where it stays above `rtol`, the answer depends on the
+most; what was the run is then the coarse one, and r = e_2h/e_h. A cable that comes taut makes r irregular: it does so
+between two samples, and the largest change hangs on which. So where the first order would settle it with one halving
+more, that one is taken before any doubt is told. Where the error stays above `rtol`, the answer depends on the
 resolution, and the run says so: a jolt, or an ill-posed drum (`docs/theory.md`).
 
 The first `START_ROWS` samples follow no such law. A start is a jolt: a current, a winch or the propeller takes hold of
@@ -34,8 +36,9 @@ from subzero.errors import UserError
 if TYPE_CHECKING:
     from subzero.engine.recording import Run
 
-MOST_HALVINGS = 2
-"""Steps and segments a quarter as long cost sixteen times as much; what they do not settle, is not settled by more."""
+MOST_HALVINGS, LAST_HALVING = 2, 3
+"""Steps and segments a quarter as long cost sixteen times as much; what they leave far from `rtol`, is not settled by
+more. What they leave within `LEAST_GAIN` of it, is held against a last halving."""
 MOST_WORK = 1e7
 """Nodes times exchanges that a repeated run may take: half a minute or so. [-]"""
 LEAST_GAIN, MOST_GAIN = 2.0, 4.0
@@ -111,9 +114,11 @@ def run_converged(
         return run, None
     change = _after_start(coarse, run)
     accuracy = _accuracy(trial, take, run, change, None, 0)
-    for halvings in range(1, MOST_HALVINGS + 1):
+    for halvings in range(1, LAST_HALVING + 1):
         finer = _resolved(trial, 0.5**halvings)
         if accuracy.converged or finer is None or _work(run) * 4**halvings > MOST_WORK:
+            break
+        if halvings == LAST_HALVING and accuracy.force_error > LEAST_GAIN * trial.rtol:
             break
         fine = _taken(take, finer, times, 2**halvings, progress)
         if fine is None or (run.completed and not fine.completed):
@@ -162,7 +167,7 @@ def _accuracy(
         LEAST_GAIN if before is None or not isfinite(before.size) else before.size / max(change.size, 1e-12)
     )
     error = change.size / (min(max(gain, LEAST_GAIN), MOST_GAIN) - 1.0)
-    looks = error <= trial.rtol or halvings == MOST_HALVINGS
+    looks = error <= trial.rtol or halvings >= MOST_HALVINGS
     start = _start(trial, take, run, halvings) if looks else Change(size=0.0, time=0.0)
     return Accuracy(
         force_error=max(error, start.size),

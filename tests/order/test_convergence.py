@@ -9,6 +9,7 @@ it a cable has less tension than m₁U², and what is undetermined there begins 
 
 import dataclasses
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -84,6 +85,40 @@ def test_a_run_that_is_too_coarse_is_taken_finer_at_the_same_times():
     assert accuracy(run)["force_error"] <= trial.rtol
     np.testing.assert_array_equal(run["time"], plain["time"])
     assert true_error(trial, run) < 0.3 * true_error(trial, plain)
+
+
+def jolted(forces):
+    """Return a way to make runs whose force is 1 N but for one sample, where it is that of their segment length."""
+
+    def take(trial, times, parts, _):
+        force = np.zeros((times.size, 6))
+        force[:, 0] = 1.0
+        force[np.abs(times - 5.0) < 1e-9, 0] = forces[trial.segment_length]
+        recording = SimpleNamespace(wrench=force, nodes=np.full(times.size, 20))
+        return SimpleNamespace(times=times, recording=recording, completed=True)
+
+    return take
+
+
+@pytest.mark.parametrize(
+    "forces, halvings, error",
+    [
+        ((0.90, 0.86, 0.83, 0.80, 0.785), 3, 0.015),
+        ((0.90, 0.86, 0.83, 0.80, 0.83), 3, 0.03),
+        ((0.90, 0.60, 0.80, 0.70, 0.70), 2, 0.10),
+        ((0.90, 0.86, 0.845, 0.84, 0.84), 1, 0.009),
+    ],
+    ids=["settled by a last halving", "not settled by it", "too far from it", "settled before"],
+)
+def test_what_the_first_order_would_settle_with_one_halving_more_is_halved_before_it_is_doubted(
+    forces, halvings, error
+):
+    """A sample's force with segments of 1, 0.5 … 0.0625 m, and rtol = 2 %: a jolt that gains less than its order."""
+    sizes = dict(zip((1.0, 0.5, 0.25, 0.125, 0.0625, 0.03125, 0.015625), (*forces, 0.0, 0.0), strict=True))
+    _, found = run_converged(changed("fig6", duration=10.0), jolted(sizes))
+    assert found.halvings == halvings
+    assert found.force_error == pytest.approx(error, rel=1e-6)
+    assert found.converged == (error <= 0.02)
 
 
 def test_a_last_step_that_is_no_whole_one_is_covered_too():

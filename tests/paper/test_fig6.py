@@ -124,6 +124,18 @@ def test_f7_uncertain_control_surfaces_show_in_the_transient():
         assert np.abs(other_speed - speed)[at(20.0) :].max() < 0.02 * speed.max()
 
 
+@pytest.mark.parametrize("knob", ["offset", "dead_band"])
+def test_f7_position_feedback_takes_the_uncertainty_of_a_rudder_out(knob):
+    """The improvement that section 4.2 names: a crooked servo that sees its fin leaves less than a tenth of it."""
+    crooked = {f"rudder_servo__{knob}": np.radians({"offset": 1.0, "dead_band": 2.0}[knob])}
+    wrong, fed_back = (
+        np.abs(changed(**crooked, rudder_servo__position_feedback=feedback)[0] - tethered("heading")).max()
+        for feedback in (0.0, 1.0)
+    )
+    assert wrong > 1.0
+    assert fed_back < 0.1 * wrong
+
+
 def test_f8_the_loss_of_forward_speed_is_the_dominant_effect_of_the_cable():
     loss = 1.0 - tethered("surge_speed")[-1] / free("surge_speed")[-1]
     turned = np.abs(tethered("heading") - free("heading")).max() / 360.0
