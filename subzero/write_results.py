@@ -24,8 +24,10 @@ def default_folder(trial: scenarios.Trial) -> Path:
     return Path(re.sub(r"[^\w.-]+", "_", trial.name).strip(".") or "run")
 
 
-def write_all(runs: dict[str, xr.Dataset], record: Record | None, stage: Stage) -> dict[str, Any]:
-    """Write everything that belongs to some runs of one trial, and return their summary."""
+def write_all(
+    runs: dict[str, xr.Dataset], record: Record | None, stage: Stage, *, float64: bool = False
+) -> dict[str, Any]:
+    """Write everything that belongs to some runs of one trial, and return their summary; `float64` as `write_run`."""
     from subzero.figures import draw
     from subzero.page import page_of_runs
     from subzero.summary import summary_of
@@ -33,7 +35,7 @@ def write_all(runs: dict[str, xr.Dataset], record: Record | None, stage: Stage) 
     summary = summary_of(runs, record)
     stage.failed = any(run.attrs["outcome"] != "completed" for run in runs.values())
     for label, run in runs.items():
-        output.write_run(run, stage, label)
+        output.write_run(run, stage, label, float64=float64)
     output.write_summary(summary, stage)
     figures = draw(runs, record)
     output.write_figures(figures, stage)
