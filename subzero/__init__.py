@@ -6,10 +6,12 @@
     >>> comparison.summary()["tethered"]["peak_speed_m_s"]
 
 Names come from their modules when they are first used, so that ``import subzero`` costs nothing:
-`simulate` and `compare` run a trial, `simulate_many` many at once, `Comparison` holds two runs, `load_scenario` reads a
-trial, `Checkpoint` keeps where a long run stands,
+`simulate` and `compare` run a trial, `simulate_many` many at once, `Checkpoint` keeps where a long run stands,
+`Comparison` holds two runs, `load_scenario` reads a trial,
+`open_run` reads its file again, and ``run.subzero.plot`` draws it (`subzero.accessor`),
 `warnings_of` says what may be wrong with a run, `check` how much it changes with half the steps,
-`read_record` a measured record, `draw` makes the figures, `Simulator` steps a run for a controller of your own,
+`read_record` a measured record, `draw` makes the figures, `export` writes a run for other programs,
+`Simulator` steps a run for a controller of your own,
 `diagnose` says what a simulation gets wrong in measured records, `read_trials` reads those as `Logged`, `challenge`
 hides an effect in a record to try that out,
 `autopilot` leads to linear models and controllers, `CHANNELS` is the table of everything that a run gives.
@@ -36,7 +38,9 @@ _HOME = {
     "compare": ("subzero.comparison", "compare"),
     "diagnose": ("subzero.diagnosis.api", "diagnose"),
     "draw": ("subzero.figures", "draw"),
+    "export": ("subzero.exports", "export"),
     "load_scenario": ("subzero.model", "load"),
+    "open_run": ("subzero.accessor", "open_run"),
     "read_record": ("subzero.records.record", "read_record"),
     "read_trials": ("subzero.diagnosis.read_trials", "read_trials"),
     "simulate": ("subzero.simulation", "simulate"),
@@ -49,11 +53,16 @@ _HOME = {
 _PACKAGES = ("autopilot",)
 """Packages inside, fetched as a whole."""
 
+_GIVE_RUNS = ("Comparison", "Simulator", "autopilot", "compare", "open_run", "simulate")
+"""Names that lead to runs; with the first of them, datasets get their accessor ``.subzero``."""
+
 __all__ = sorted([*_HOME, *_PACKAGES, "__version__"])
 
 
 def __getattr__(name: str) -> Any:
     """Fetch a public name from its module, once."""
+    if name in _GIVE_RUNS:
+        import_module("subzero.accessor")
     if name == "__version__":
         from importlib.metadata import version
 

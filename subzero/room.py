@@ -16,8 +16,8 @@ from cable.tow_path import segments_needed
 from subzero.engine.recording import Grid, new_recording, row_of
 from subzero.model import Model
 
-BYTES_A_NODE, BYTES_OF_TRACE = 4 * 8, 4 * 8
-"""Place and tension of a node in a row; force and nodes of every time."""
+BYTES_A_NODE, BYTES_OF_TRACE = 5 * 8, 4 * 8
+"""Place, tension and arc length of a node in a row; force and nodes of every time."""
 COPIES = 2
 """The recording, and the labelled result that is made of it."""
 SHARE_OF_FREE_RUNNING = 0.3

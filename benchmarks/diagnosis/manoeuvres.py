@@ -9,13 +9,13 @@ from functools import cache
 import numpy as np
 
 import subzero
-from subzero.diagnosis.assessment.trial_library import rich
+from subzero.diagnosis.assessment import rich
 from subzero.diagnosis.hypothesis.catalogue import START, catalogue
 from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.effect import Effect
 from subzero.model import Model
 
-CHANNELS = ("surge_speed", "heading", "yaw_rate", "pitch", "roll", "depth")
+CHANNELS = ("surge_speed", "heading", "yaw_rate", "pitch", "roll_angle", "depth")
 """The six basic ones."""
 FEW = ("surge_speed", "heading")
 BRAKE = 0.1

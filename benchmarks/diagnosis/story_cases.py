@@ -6,12 +6,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from benchmarks.diagnosis.manoeuvres import braked_rich
-from subzero.diagnosis.assessment.trial_library import cruise, flown, rudder_doublets
+from subzero.diagnosis.assessment import cruise, flown, rudder_doublets
 from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.results import CAUSE_NAMED, NOTHING_WRONG, OUTSIDE, UNDECIDED
 from subzero.external_force import MissingForce
 
-BASIC = ("surge_speed", "heading", "yaw_rate", "pitch", "roll", "depth")
+BASIC = ("surge_speed", "heading", "yaw_rate", "pitch", "roll_angle", "depth")
 
 
 def fig6(setting: Setting) -> Setting:
