@@ -81,7 +81,7 @@ def test_what_is_no_whole_number_of_cable_steps_is_refused(every):
 
 def test_the_file_and_the_command_say_it(tmp_path, monkeypatch, capsys):
     text = scenarios.path("fig6").read_text(encoding="utf-8").replace("duration_s = 30.0", "duration_s = 3.0")
-    (tmp_path / "mine.toml").write_text(text.replace("[run]", "[run]\nevery_s = 0.5"), encoding="utf-8")
+    (tmp_path / "mine.toml").write_text(text.replace("every_s = 0.0", "every_s = 0.5"), encoding="utf-8")
     monkeypatch.chdir(tmp_path)
     assert main(["simulate", "mine.toml"]) == FINE
     assert len((tmp_path / "mine" / "tethered.csv").read_text(encoding="utf-8").splitlines()) == 1 + 7
