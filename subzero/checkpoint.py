@@ -29,8 +29,7 @@ from zipfile import BadZipFile
 
 import numpy as np
 
-from subzero.engine.recording import BY_NODE, BY_TIME, Recording, new_recording, row_of
-from subzero.engine.time_loop import Standing
+from subzero.engine.recording import BY_NODE, BY_TIME, Recording, Standing, new_recording, row_of
 from subzero.errors import UserError, checked, printable
 from subzero.stage import FULL
 

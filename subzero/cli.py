@@ -33,7 +33,6 @@ from subzero.voice import PLAIN, Voice, speak
 if TYPE_CHECKING:
     import xarray as xr
 
-    from subzero.checkpoint import Checkpoint
     from subzero.progress import ProgressBar
 
     Runs = dict[str, xr.Dataset]
@@ -133,10 +132,10 @@ class Kept:
         return self.out or write_results.default_folder(trial)
 
     @contextmanager
-    def kept_in(self, folder: Path) -> Iterator[Checkpoint | None]:
-        """Give the checkpoint of a command, say from where it goes on, and remove it when all is delivered."""
+    def kept_in(self, folder: Path) -> Iterator[dict[str, Any]]:
+        """Give the checkpoint of a command as an argument of a run; it is removed when all is delivered."""
         if self.checkpoint is None:
-            yield None
+            yield {}
             return
         from subzero.checkpoint import Checkpoint
         from subzero.interrupts import leaves
@@ -154,7 +153,7 @@ class Kept:
         if (time := kept.stands_at()) is not None:
             print(f"Going on from t = {time:g} s, which is kept in {where}.", file=sys.stderr)
         try:
-            yield kept
+            yield {"checkpoint": kept}
         except BaseException:
             if kept.stands_at() is None:
                 kept.remove()
@@ -215,7 +214,7 @@ def simulate(
         with _progress(trial) as progress:
             from subzero.simulation import simulate as run
 
-            result = run(trial, tethered=not untethered, **extended, checkpoint=checkpoint, progress=progress)
+            result = run(trial, tethered=not untethered, **extended, **checkpoint, progress=progress)
         runs = {"untethered" if untethered else "tethered": result}
         runs = _refined(runs, trial, extended) if check else runs
         summary = write_results.write_all(runs, None, stage, **outputs.kinds(), float64=kept.float64)
@@ -261,7 +260,7 @@ def compare(
         with _progress(trial) as progress:
             from subzero.comparison import compare as run
 
-            result = run(trial, measured=record, **extended, checkpoint=checkpoint, progress=progress)
+            result = run(trial, measured=record, **extended, **checkpoint, progress=progress)
         runs = _refined(result.runs, trial, extended) if check else result.runs
         summary = write_results.write_all(
             runs, result.measured, stage, **outputs.kinds(), float64=kept.float64

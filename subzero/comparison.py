@@ -121,7 +121,8 @@ def compare(
             "Leave out every_s (--every)."
         )
     sidecar = _checked(record, trial)
-    other: dict[str, Any] = {"model": model, "later": later, "checkpoint": checkpoint}
+    given = {"model": model, "later": later, "checkpoint": checkpoint}
+    other: dict[str, Any] = {name: value for name, value in given.items() if value}
     tethered = simulate(trial, tethered=True, **other, progress=_half(progress, 0.0))
     untethered = simulate(trial, tethered=False, **other, progress=_half(progress, 0.5))
     record = beside(record, tethered) if record is not None else None

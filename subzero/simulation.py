@@ -25,13 +25,14 @@ from subzero.engine.recording import (
     Pace,
     Recording,
     Run,
+    Standing,
     new_recording,
     note,
     record_row,
     row_of,
     run_so_far,
 )
-from subzero.engine.time_loop import NO_ROOM, Standing, run_rows
+from subzero.engine.time_loop import NO_ROOM, run_rows
 from subzero.errors import UserError, truth, whole
 from subzero.model import Model, load, model_of
 from subzero.provenance import code_digest, digest_of, processor, trial_digest

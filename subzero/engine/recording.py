@@ -97,6 +97,24 @@ class Grid(NamedTuple):
     stride: int = 1
 
 
+class Standing(NamedTuple):
+    """Where a run stands between two calls of `subzero.engine.time_loop.run_rows`.
+
+    Attributes:
+        setup, live, recording: the run.
+        behind: how many of its times are behind.
+        used: nodes of the recording in use, in rows that are kept.
+        ending: how the last call ended.
+    """
+
+    setup: Setup
+    live: Live
+    recording: Recording
+    behind: int
+    used: int
+    ending: int
+
+
 class Pace:
     """How many rows compiled code fills at a time, from one on to as many as it fills within `BREATH_S`.
 

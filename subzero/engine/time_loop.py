@@ -27,24 +27,6 @@ SPARE = 8
 """Nodes that one exchange may add. (A tow point at 40 segments a second would need more: `coupling.FASTEST`.)"""
 
 
-class Standing(NamedTuple):
-    """Where a run stands between two calls of `run_rows`.
-
-    Attributes:
-        setup, live, recording: the run.
-        behind: how many of its times are behind.
-        used: nodes of the recording in use, in rows that are kept.
-        ending: how the last call ended.
-    """
-
-    setup: Setup
-    live: Live
-    recording: Recording
-    behind: int
-    used: int
-    ending: int
-
-
 @compiled
 def run_rows(
     setup: Setup,
