@@ -270,7 +270,7 @@ def tags_of(trial: scenarios.Trial) -> tuple[str, ...]:
 
 def refined(trial: scenarios.Trial, factor: float = REFINEMENT) -> scenarios.Trial:
     """Return a trial with all steps and segments so many times shorter, taken as they are."""
-    names = ("hull_step", "cable_step", "segment_length", "grading")
+    names = ("hull_step", "cable_step", "segment_length", "grading", "far_grading")
     return dataclasses.replace(trial, rtol=0.0, **{name: getattr(trial, name) / factor for name in names})
 
 

@@ -28,7 +28,7 @@ from subzero.validity import RunWarning, as_json, warnings_of
 
 Progress = Callable[[float], None]
 
-HALVED = ("cable_step", "hull_step", "segment_length", "grading")
+HALVED = ("cable_step", "hull_step", "segment_length", "grading", "far_grading")
 """Fields of a trial that the finer run has half as large."""
 TOW_FORCE = "tow_force"
 """Row of the table for the force of the cable as a vector, beside the channels."""

@@ -63,6 +63,8 @@ class Ends:
         tolerance: how exactly a step is solved, see `time_step`. [-]
         time: of level NOW. [s]
         segment_length, grading: new segments are `segment_length` + `grading` s long, s from the tow point. [m], [-]
+        far_length, far_grading: farther than this from both ends, segments are joined to longer ones, by so much per
+            metre (`remeshing.join_far`); 0: none are. [m], [-]
         run_in: length L₀ beside the tow point in which segments are shorter (`spacing`), 0 for none. [m]
         settled: length of all segments but the last. [m]
         drum_velocity: of the drum at level NEW (3,). [m/s]
@@ -90,6 +92,8 @@ class Ends:
     time: float
     segment_length: float
     grading: float
+    far_length: float
+    far_grading: float
     run_in: float
     settled: float
     drum_velocity: np.ndarray
@@ -165,6 +169,8 @@ def new_line(capacity: int) -> Line:
         time=0.0,
         segment_length=1.0,
         grading=0.0,
+        far_length=0.0,
+        far_grading=0.0,
         run_in=0.0,
         settled=0.0,
         drum_velocity=np.zeros(3),

@@ -94,6 +94,7 @@ def prepare(
     )
     live.now.length = wet if tethered else 0.0
     live.line.ends.segment_length, live.line.ends.grading = trial.segment_length, trial.grading
+    live.line.ends.far_length, live.line.ends.far_grading = trial.far_length, trial.far_grading
     live.line.ends.run_in = run_in if wet < run_in and _can_run_in(setup.fixed) else 0.0
     lay_out(setup, live, wet)
     if trial.start.drum is not None:

@@ -90,12 +90,11 @@ def test_a_run_that_is_too_coarse_is_taken_finer_at_the_same_times():
 def jolted(forces):
     """Return a way to make runs whose force is 1 N but for one sample, where it is that of their segment length."""
 
-    def take(trial, times, parts, _):
-        force = np.zeros((times.size, 6))
-        force[:, 0] = 1.0
-        force[np.abs(times - 5.0) < 1e-9, 0] = forces[trial.segment_length]
-        recording = SimpleNamespace(wrench=force, nodes=np.full(times.size, 20))
-        return SimpleNamespace(times=times, recording=recording, completed=True)
+    def take(trial, grid, _):
+        trace = np.zeros((grid.times.size, 4))  # a force, and a number of nodes
+        trace[:, 0], trace[:, 3] = 1.0, 20.0
+        trace[np.abs(grid.times - 5.0) < 1e-9, 0] = forces[trial.segment_length]
+        return SimpleNamespace(all_times=grid.times, recording=SimpleNamespace(trace=trace), completed=True)
 
     return take
 
@@ -132,11 +131,11 @@ def test_what_is_refused_at_another_resolution_leaves_the_run_as_it_was_asked_fo
     """A finer run that does not fit into memory, a coarser one whose cable cannot be laid."""
     trial, taken = changed("stop_and_drift", duration=21.0), set()
 
-    def take(one, times, parts, _):
+    def take(one, grid, _):
         taken.add(one.segment_length)
         if one.segment_length == refused:
             raise subzero.UserError("it does not fit")
-        return run_trial(one, subzero.Model.of(one), True, times=times, parts=parts)
+        return run_trial(one, subzero.Model.of(one), True, grid=grid)
 
     run, found = run_converged(trial, take)
     assert taken - {0.125, 0.0625} == tried, "beside the start alone, a quarter as coarse"
