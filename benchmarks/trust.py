@@ -56,6 +56,8 @@ LARGEST_RESIDUAL = 0.05
 NO_PULL = 1e-3
 """A cable that never pulls harder than this has no force to judge. [N]"""
 REFINEMENT = 4.0
+RTOL = 0.02
+"""What trials ask for, by default: as that of every trial. [-]"""
 TOO_LONG = "no reference: too long"
 WATER = 1000.0
 """Density of the water. [kg/m³]"""
@@ -316,9 +318,9 @@ def impatient(seconds: float) -> Callable[[float], None]:
     return tell
 
 
-def judge(seed: int, patience: float = np.inf) -> Verdict:
+def judge(seed: int, patience: float = np.inf, rtol: float = RTOL) -> Verdict:
     """Run a trial and its refinements, for at most so many seconds of CPU, and compare."""
-    trial, tell = draw(seed), impatient(patience)
+    trial, tell = dataclasses.replace(draw(seed), rtol=rtol), impatient(patience)
     tags, begin, warnings, given_up = tags_of(trial), perf_counter(), (), "no run: too long"
     try:
         run = subzero.simulate(trial, progress=tell)
@@ -412,12 +414,12 @@ def _line(one: Verdict) -> str:
 
 
 def judged_all(
-    seeds: Iterable[int], jobs: int, keep: Path | None = None, patience: float = np.inf
+    seeds: Iterable[int], jobs: int, keep: Path | None = None, how: Callable[[int], Verdict] | None = None
 ) -> list[Verdict]:
     """Judge trials, in so many processes; those that a file keeps are read from it, and others are added to it."""
     seeds = list(seeds)
     found = {one.seed: one for one in kept(keep)} if keep else {}
-    for verdict in _judged([seed for seed in seeds if seed not in found], jobs, patience):
+    for verdict in _judged([seed for seed in seeds if seed not in found], jobs, how or judge):
         found[verdict.seed] = verdict
         if keep:
             with keep.open("a", encoding="utf-8") as file:
@@ -425,14 +427,13 @@ def judged_all(
     return [found[seed] for seed in seeds]
 
 
-def _judged(seeds: list[int], jobs: int, patience: float) -> Iterator[Verdict]:
+def _judged(seeds: list[int], jobs: int, how: Callable[[int], Verdict]) -> Iterator[Verdict]:
     """Give verdicts as they come, in the order of the seeds."""
-    one = partial(judge, patience=patience)
     if jobs <= 1:
-        yield from map(one, seeds)
+        yield from map(how, seeds)
         return
     with ProcessPoolExecutor(jobs) as pool:
-        yield from pool.map(one, seeds)
+        yield from pool.map(how, seeds)
 
 
 def kept(path: Path) -> list[Verdict]:
@@ -457,13 +458,13 @@ def main() -> None:
     parser.add_argument("--keep", type=Path, help="file for all verdicts, one a line, as they come")
     parser.add_argument("--kept", action="store_true", help="only print the tables of what the file keeps")
     parser.add_argument("--patience", type=float, default=np.inf, help="CPU seconds that a trial may take")
+    parser.add_argument("--rtol", type=float, default=RTOL, help="of the trials; 0 takes steps as they are")
     asked = parser.parse_args()
     if asked.kept:
         verdicts = kept(asked.keep)
     else:
-        verdicts = judged_all(
-            range(asked.seed, asked.seed + asked.count), asked.jobs, asked.keep, asked.patience
-        )
+        how = partial(judge, patience=asked.patience, rtol=asked.rtol)
+        verdicts = judged_all(range(asked.seed, asked.seed + asked.count), asked.jobs, asked.keep, how)
     if asked.show:
         print(*(_line(one) for one in verdicts), sep="\n")
     print(report(verdicts))

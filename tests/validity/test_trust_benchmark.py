@@ -90,7 +90,7 @@ def test_none_of_so_many_is_no_more_than_chance_allows():
 def test_verdicts_are_kept_as_they_come_and_a_trial_that_is_kept_is_not_run_again(tmp_path, monkeypatch):
     ran = []
 
-    def judged(seed, patience):
+    def judged(seed):
         if seed == 12:
             raise KeyboardInterrupt
         ran.append(seed)
@@ -119,7 +119,7 @@ def test_a_trial_that_takes_longer_than_the_patience_is_given_up_with_what_it_ha
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "seed, halvings", [(400015, 0), (400022, 3), (400051, 1), (400082, 1), (400100, 3)], ids=str
+    "seed, halvings", [(400015, 1), (400022, 3), (400051, 1), (400082, 1), (400100, 3)], ids=str
 )
 def test_a_right_trial_that_was_once_warned_of_is_not(seed, halvings):
     """A drum held by its friction; a cable that comes taut again and again; a jolt at the start, of little energy."""
