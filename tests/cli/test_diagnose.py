@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from subzero.cli import FINE, INTERRUPTED, MISTAKE, main
-from subzero.diagnosis.results import (
+from subzero.diagnosis import (
     CAUSE_NAMED,
     NOTHING_WRONG,
     OUTSIDE,

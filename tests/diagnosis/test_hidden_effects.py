@@ -20,7 +20,7 @@ from benchmarks.diagnosis import draws, manoeuvres
 from benchmarks.diagnosis.cases import Case, cases
 from benchmarks.diagnosis.sharing import share
 from benchmarks.diagnosis.trial_of import briefly
-from subzero.diagnosis.hypothesis.catalogue import catalogue
+from subzero.diagnosis import catalogue
 
 SEED = 7
 CLEAR = 25.0

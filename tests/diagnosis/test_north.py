@@ -13,9 +13,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import subzero
-from subzero.diagnosis.hypothesis.catalogue import START
-from subzero.diagnosis.hypothesis.configuration import Setting
-from subzero.diagnosis.hypothesis.logged import Logged
+from subzero.diagnosis import START, Logged, Setting
 from subzero.diagnosis.inference import pose, respond
 from subzero.records.record import Record, read_record, turned
 from subzero.records.unit_checks import unit_questions

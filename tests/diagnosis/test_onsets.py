@@ -11,10 +11,7 @@ from numpy.testing import assert_allclose
 
 import subzero
 from subzero import diagnose
-from subzero.diagnosis.hypothesis.catalogue import SPECS
-from subzero.diagnosis.hypothesis.configuration import Setting
-from subzero.diagnosis.hypothesis.effect import with_onset
-from subzero.diagnosis.hypothesis.extended_model import all_effects
+from subzero.diagnosis import SPECS, Setting, all_effects, with_onset
 from subzero.diagnosis.inference import (
     BaseRun,
     change_point_columns,

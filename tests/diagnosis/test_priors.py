@@ -7,9 +7,17 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from subzero.diagnosis.hypothesis.catalogue import START, catalogue
-from subzero.diagnosis.hypothesis.hypotheses import PRIOR, entries_of, log_prior, variances
-from subzero.diagnosis.inference import Candidate, Observed, Quadratic, posterior
+from subzero.diagnosis import START, catalogue
+from subzero.diagnosis.inference import (
+    PRIOR,
+    Candidate,
+    Observed,
+    Quadratic,
+    entries_of,
+    log_prior,
+    posterior,
+    variances,
+)
 from subzero.diagnosis.verdict.estimates import deviations
 
 

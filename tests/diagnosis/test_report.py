@@ -9,9 +9,7 @@ import math
 import numpy as np
 import pytest
 
-from subzero.diagnosis.report import html as report
-from subzero.diagnosis.report import json_file, tables, words
-from subzero.diagnosis.results import (
+from subzero.diagnosis import (
     CAUSE_NAMED,
     NOTHING_WRONG,
     OUTSIDE,
@@ -28,6 +26,9 @@ from subzero.diagnosis.results import (
     Unknown,
     Verdict,
 )
+from subzero.diagnosis.assessment import detectability
+from subzero.diagnosis.report import html as report
+from subzero.diagnosis.report import json_file, tables, words
 from subzero.figures.diagnosis import draw_diagnosis
 from subzero.figures.sheet import Title
 
@@ -163,6 +164,16 @@ def test_the_table_of_what_can_be_seen_shows_what_would_be_missed_or_mixed_up_wo
     assert [row[0] for row in shown.rows] == ["current", "surge_added_mass"]
     assert [row[-1] for row in shown.rows] == ["not seen", "not told apart"]
     assert len(tables.detectable(NAMED, every=True).rows) == 3
+
+
+def test_what_can_be_seen_has_its_unit(plant):
+    planted = plant(duration=12.0)
+    found = detectability(planted.problem, planted.J)
+    rows = {row[0]: row[2] for row in tables.detectable(found, every=True).rows}
+    assert rows["rudder_offset"].endswith(" degree")
+    assert rows["rudder_lag"].startswith("time constant ")
+    assert rows["rudder_lag"].endswith(" s")
+    assert not rows["hull_drag"].endswith(" 1"), "a share has no unit"
 
 
 def test_the_misfit_names_the_command_it_follows():

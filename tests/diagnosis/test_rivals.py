@@ -8,17 +8,9 @@ import dataclasses
 import numpy as np
 import pytest
 
+from subzero.diagnosis import CAUSE_NAMED, NOTHING_WRONG, UNDECIDED, Curves, Estimate, Rival, Verdict
 from subzero.diagnosis.report import html as report
 from subzero.diagnosis.report import tables
-from subzero.diagnosis.results import (
-    CAUSE_NAMED,
-    NOTHING_WRONG,
-    UNDECIDED,
-    Curves,
-    Estimate,
-    Rival,
-    Verdict,
-)
 from subzero.figures import Title
 from subzero.figures.diagnosis import draw_diagnosis
 
