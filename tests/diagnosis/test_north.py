@@ -15,8 +15,8 @@ from numpy.testing import assert_allclose
 import subzero
 from subzero.diagnosis import START, Logged, Setting
 from subzero.diagnosis.inference import pose, respond
+from subzero.records.consistency import unit_questions
 from subzero.records.record import Record, read_record, turned
-from subzero.records.unit_checks import unit_questions
 from subzero.synthetic.challenge import Challenge, write
 from subzero.synthetic.planted import Hidden
 from subzero.synthetic.reference_run import simulate_reference
