@@ -50,6 +50,11 @@ def test_a_file_with_one_importer_is_a_whole_concept(stands, row):
     assert stands[row].short_lone == []
 
 
+def test_few_tests_of_the_diagnosis_know_more_of_it_than_its_faces(stands):
+    one = stands["subzero.diagnosis"]
+    assert one.tests_below_faces <= 0.25 * one.tests
+
+
 def test_a_target_that_is_missed_says_so(stands):
     for goal, line in zip(goals(stands), targets(stands).splitlines()[1:], strict=True):
         assert ("NOT" in line) == (goal.found > goal.most)

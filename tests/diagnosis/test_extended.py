@@ -114,6 +114,7 @@ def test_effects_of_sensors_are_told_apart_for_a_run_does_not_show_them():
 
 
 OWN = """
+from subzero.diagnosis import Effect, Parameter
 
 def lost(setting, mass):
     return setting.with_vehicle(rigid_body__mass=lambda old: old - mass)
