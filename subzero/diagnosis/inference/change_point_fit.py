@@ -80,7 +80,7 @@ def fit_change_points(
     done: dict[str, FittedChangePoint] = {}
     candidates = [one for point in points for one in ranked_in(problem, point, able, record)]
     candidates += [one for each in large for one in ranked_by_runs(problem, each, able, record)]
-    for _ in range(settings.MAX_ROUNDS):
+    for _ in range(settings.MAX_TRIED):
         worth = _worth(candidates, done, least)
         if not worth:
             break

@@ -97,7 +97,11 @@ class Fits:
         hopeless = settings.HOPELESS_NATS if hopeless is None else hopeless
         runs = settings.MAX_RUNS_PER_RECORD * len(self.problem.records)
         for _ in range(settings.MAX_REFINED if most is None else most):
-            self.refined |= {one.ids for one in self.candidates.values() if self._settled(one.fit)}
+            self.refined |= {
+                one.ids
+                for one in self.candidates.values()
+                if self._settled(one.fit, settings.JACOBIAN_HOLDS_TOLERANCES)
+            }
             waiting = [one for one in self.candidates.values() if one.ids not in self.refined]
             if not waiting:
                 return
@@ -113,7 +117,7 @@ class Fits:
         """Fit the close rivals of the best candidate from where that is, and it from where they are, and keep what is
         better: where a drum stops or a cable falls slack runs have kinks, and a fit may end in a hollow of its own.
         """
-        for _ in range(settings.MAX_REPEATS):
+        for _ in range(settings.MAX_ADDED):
             best = self.best()
             close = [ids for ids in self._ranked()[1:settings.MAX_REFINED]
                      if self.candidates[ids].log_posterior > best.log_posterior - settings.HOPELESS_NATS]  # fmt: skip
@@ -151,7 +155,7 @@ class Fits:
             self._keep(ids, found)
             self.refined.discard(ids)
 
-    def _settled(self, fit: Fit, near: float = settings.JACOBIAN_HOLDS_TOLERANCES) -> bool:
+    def _settled(self, fit: Fit, near: float) -> bool:
         """Say whether a fit has converged close to where its sensitivities were made, or has not left from there."""
         moved = fit.moved(self.problem)
         return moved == 0.0 or (fit.converged and moved < near)

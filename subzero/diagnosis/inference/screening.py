@@ -143,7 +143,11 @@ def _sweep(
     problem: Problem, z: np.ndarray, J: np.ndarray, columns_of: list[int], found: Screening, here: np.ndarray
 ) -> None:
     """Try sizes of entries about z, side by side, with the residual `here` there; keep the best of every cause."""
-    jobs = [(k, size) for k in columns_of for size in sizes_tried(problem.entries[k].parameter)]
+    jobs = [
+        (k, size)
+        for k in columns_of
+        for size in sizes_tried(problem.entries[k].parameter, settings.SWEEP_SCALES)
+    ]
     moved = [np.concatenate([z[:k], [size], z[k + 1 :]]) for k, size in jobs]
     best, flat = dict[Ids, float](), _without_slope(problem, J)
     for (k, size), there, r in zip(jobs, moved, problem.residuals(moved), strict=True):
@@ -158,7 +162,7 @@ def _sweep(
     )
 
 
-def sizes_tried(parameter: Parameter, scales: Sequence[float] = settings.SWEEP_SCALES) -> list[float]:
+def sizes_tried(parameter: Parameter, scales: Sequence[float]) -> list[float]:
     """Return the deviations that are tried, at some effect scales either way."""
     both = [side * size * parameter.scale for size in scales for side in (1.0, -1.0)]
     return [size for size in both if parameter.low <= size <= parameter.high]
@@ -218,7 +222,7 @@ def with_sizes_tried(
     one: Candidate,
     rest: Ids,
     at: Sequence[int],
-    scales: Sequence[float] = settings.SWEEP_SCALES,
+    scales: Sequence[float],
 ) -> dict[Ids, TriedSize]:
     """Return hypothesis → its best size, for the causes of entries beside the rest of a candidate.
 
@@ -261,7 +265,7 @@ def fit_wide(problem: Problem, progress: Progress) -> tuple[Problem, Fit, Nomina
     zero = np.zeros(len(problem.entries))
     J = problem.jacobian(zero)
     fit = _from(problem, zero, J, progress)
-    for _ in range(settings.MAX_REPEATS):
+    for _ in range(settings.MAX_ADDED):
         D = variances(problem.entries, (), KAPPA_WIDE)
         again = with_noise_behind(problem, fit.z, D) if np.isfinite(fit.r).all() else None
         if again is None:
