@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from subzero.autopilot.output import Measured
+    from subzero.autopilot.steps import Pilot
     from subzero.simulation import Progress
 
     Fly = Callable[[str, Progress], tuple[xr.Dataset, dict[str, float]]]
@@ -42,7 +43,7 @@ STEP_COMMANDS = {
 
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
-class Pilot:
+class PilotOptions:
     """Who flies.
 
     Attributes:
@@ -57,8 +58,19 @@ class Pilot:
     noisy: Flag = False
     seed: int = 0
 
+    def of(self, label: str) -> Pilot:
+        """Return who flies with the cable or without it."""
+        from subzero.autopilot.sensors import ESTIMATED, PERFECT, Sensors
+        from subzero.autopilot.steps import Pilot
 
-PID = Pilot()
+        return Pilot(
+            autopilot=self.autopilot,
+            feed_forward=self.feed_forward if label == "tethered" else "none",
+            sensors=Sensors(ESTIMATED if self.noisy else PERFECT, seed=self.seed),
+        )
+
+
+PID = PilotOptions()
 
 
 def manoeuvre(
@@ -102,7 +114,7 @@ def fly_step(
     /,
     *,
     scenario: str = "fig6",
-    pilot: Pilot = PID,
+    pilot: PilotOptions = PID,
     size: float | None = None,
     speed: float = 1.0,
     out: Path | None = None,
@@ -120,14 +132,12 @@ def fly_step(
         strict: end with exit code 3 if a run ends with warnings.
     """
     trial = scenarios.load(scenario)  # a mistake in it answers at once
-    from subzero.autopilot import ESTIMATED, PERFECT
     from subzero.autopilot.steps import step as run
 
     def fly(label: str, progress: Progress) -> tuple[xr.Dataset, dict[str, float]]:
         return run(
-            name, scenario, autopilot=pilot.autopilot, size=size, speed=speed, tethered=label == "tethered",
-            feed_forward=pilot.feed_forward if label == "tethered" else "none", seed=pilot.seed,
-            sensors=ESTIMATED if pilot.noisy else PERFECT, progress=progress,
+            name, scenario, pilot=pilot.of(label), size=size, speed=speed, tethered=label == "tethered",
+            progress=progress,
         )  # fmt: skip
 
     title = f"{name}: autopilot {pilot.autopilot}, fed forward of the cable: {pilot.feed_forward}"

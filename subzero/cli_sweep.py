@@ -57,7 +57,7 @@ def sweep(
     with (
         _Bar(plan.description, len(plan.points.values), folder) as bar,
         _client(scheduler) as client,
-        finished(plan, folder, workers=workers, client=client, progress=bar, retry=retry) as store,
+        finished(plan, folder, workers=client or workers, progress=bar, retry=retry) as store,
         staged(folder, FILES) as stage,
     ):
         summary = write_sweep(plan, store, stage)
@@ -132,11 +132,12 @@ def _client(scheduler: str | None) -> Iterator[Any]:
         yield None
         return
     try:
-        from distributed import Client
+        import distributed
     except ImportError:
         raise UserError("--scheduler needs Dask: pip install 'subzero[cluster]'.") from None
+    connect: Any = distributed.Client
     try:
-        client = Client(scheduler, timeout=CONNECT_S)
+        client = connect(scheduler, timeout=CONNECT_S)
     except (OSError, ValueError, TypeError) as error:
         raise UserError(
             f"No Dask scheduler answers at {scheduler} ({error}). Start one with 'dask scheduler',"

@@ -20,10 +20,11 @@ import subzero
 from scenarios.parameters import with_parameters
 from subzero.cli import main
 from subzero.summary import summarise
+from subzero.sweeps import Design, Kept
 from subzero.sweeps.api import finished
 from subzero.sweeps.design import points_of
 from subzero.sweeps.member import OtherVersionError, run_members
-from subzero.sweeps.plan import plan_of
+from subzero.sweeps.plan import plan_sweep
 from subzero.sweeps.result import Gathered, write_result
 from subzero.sweeps.schedule import MOST_DEATHS, Schedule
 from subzero.sweeps.sensitivity import effects_of
@@ -64,15 +65,21 @@ class Dying(Here):
 
 def fast(members, function=None):
     """Return a plan whose members cost little."""
-    return plan_of(
-        "fig6", {"start.wet_length_m": np.linspace(0.0, 20.0, members).tolist()}, function=function,
-        changes={"run.duration_s": 0.2, "run.rtol": 0.0}, scalars=["speed_at_end_m_s"], channels=["heading"], every=0.1,
+    return plan_sweep(
+        "fig6", {"start.wet_length_m": np.linspace(0.0, 20.0, members).tolist()},
+        changes={"run.duration_s": 0.2, "run.rtol": 0.0},
+        kept=Kept(scalars=["speed_at_end_m_s"], channels=["heading"], every=0.1, function=function),
     )  # fmt: skip
 
 
+def swept(parameters, changes=SHORT, **kept):
+    """Return the dataset of a sweep of fig6 that runs in this process."""
+    return subzero.sweep(plan_sweep("fig6", parameters, changes=changes, kept=Kept(**kept)), workers=Here())
+
+
 def test_a_member_is_a_run_of_its_own():
-    runs = subzero.sweep(
-        "fig6", {"start.wet_length_m": LENGTHS}, changes=SHORT, client=Here(),
+    runs = swept(
+        {"start.wet_length_m": LENGTHS},
         scalars=["peak_speed_m_s", "cable_tension.max"], channels=["surge_speed", "heading"], every=0.1,
         function=lambda run: {"early": run["surge_speed"].values[3]},
     )  # fmt: skip
@@ -93,10 +100,8 @@ def test_a_member_is_a_run_of_its_own():
 
 def test_a_statistic_of_a_channel_is_that_of_its_samples():
     kinds = ("max", "min", "mean", "end", "range", "rms")
-    runs = subzero.sweep(
-        "fig6", {"start.wet_length_m": [15.0]}, changes=SHORT, client=Here(), channels=[],
-        scalars=[f"cable_force_forward.{kind}" for kind in kinds],
-    )  # fmt: skip
+    scalars = [f"cable_force_forward.{kind}" for kind in kinds]
+    runs = swept({"start.wet_length_m": [15.0]}, channels=[], scalars=scalars)
     trial = with_parameters(subzero.load_scenario("fig6"), {**SHORT, "start.wet_length_m": 15.0})
     force = subzero.simulate(trial)["cable_force_forward"].values
     assert force[-1] < force[0]  # the cable pulls back, and harder as the vehicle gets faster
@@ -113,7 +118,7 @@ def test_a_statistic_of_a_channel_is_that_of_its_samples():
 
 
 def test_longer_cable_is_slower_and_pulls_more():
-    runs = subzero.sweep("fig6", {"start.wet_length_m": LENGTHS}, changes=SHORT, client=Here(), channels=[])
+    runs = swept({"start.wet_length_m": LENGTHS}, channels=[])
     assert np.all(np.diff(runs["peak_speed_m_s"]) < 0.0)
     assert np.all(np.diff(runs["largest_cable_force_N"]) > 0.0)
 
@@ -121,7 +126,7 @@ def test_longer_cable_is_slower_and_pulls_more():
 def test_a_cable_as_stiff_as_a_rod_cannot_be_bent_by_what_pulls_it_and_the_other_member_can():
     spread = {"cable.bending_stiffness": [0.0, 10.0]}
     changes = SHORT | {"run.duration_s": 3.0}
-    runs = subzero.sweep("fig6", spread, changes=changes, channels=[], client=Here())
+    runs = swept(spread, changes, channels=[])
     assert runs["failed"].values.tolist() == [0, 1]
     assert np.isfinite(runs["peak_speed_m_s"].values).tolist() == [True, False]
     assert "could not be solved" in runs["reason"].values[1]
@@ -129,7 +134,7 @@ def test_a_cable_as_stiff_as_a_rod_cannot_be_bent_by_what_pulls_it_and_the_other
 
 def test_a_grid_gets_a_dimension_for_each_parameter():
     spreads = {"start.wet_length_m": [0.0, 5.0], "water.current_east_m_s": [0.0, 0.02, 0.04]}
-    runs = subzero.sweep("fig6", spreads, changes={"run.duration_s": 0.2, "run.rtol": 0.0}, client=Here())
+    runs = swept(spreads, {"run.duration_s": 0.2, "run.rtol": 0.0})
     table = runs[["path_length_m"]].set_index(member=list(spreads)).unstack()
     assert table["path_length_m"].sizes == {"start.wet_length_m": 2, "water.current_east_m_s": 3}
     assert float(table["path_length_m"][1, 2]) == float(runs["path_length_m"][5])
@@ -138,7 +143,7 @@ def test_a_grid_gets_a_dimension_for_each_parameter():
 def test_order_batches_and_accidents_do_not_change_a_byte_of_the_result(tmp_path):
     plan = fast(12)
     for name, executor in (("calm", Here()), ("struck", Dying(once={0, 3, 7}))):
-        with finished(plan, tmp_path / name, client=executor) as store:
+        with finished(plan, tmp_path / name, workers=executor) as store:
             write_result(store, plan.job, plan.points, plan.attributes, tmp_path / name)
     order = list(range(12))
     random.Random(1).shuffle(order)
@@ -158,7 +163,7 @@ def subzero_store(plan, folder):
 
 def test_a_member_that_kills_its_worker_each_time_is_given_up_and_the_others_are_not(tmp_path):
     executor = Dying(always={4})
-    with finished(fast(9), tmp_path, client=executor, workers=1) as store:
+    with finished(fast(9), tmp_path, workers=executor) as store:
         assert store.finished(9).all()
         ((member, reason),) = store.reasons(10)
     assert member == 4
@@ -172,9 +177,7 @@ def test_a_member_that_fails_is_recorded_with_its_reason_and_the_sweep_goes_on()
             raise ValueError("too long for me")
         return 1.0
 
-    runs = subzero.sweep(
-        "fig6", {"start.wet_length_m": LENGTHS}, changes=SHORT, client=Here(), function=function
-    )
+    runs = swept({"start.wet_length_m": LENGTHS}, function=function)
     assert runs["failed"].values.tolist() == [0, 1, 1]
     assert runs["reason"].values.tolist() == ["", *["ValueError: too long for me"] * 2]
     assert np.isnan(runs["peak_speed_m_s"].values).tolist() == [False, True, True]
@@ -182,9 +185,9 @@ def test_a_member_that_fails_is_recorded_with_its_reason_and_the_sweep_goes_on()
 
 
 def test_a_value_that_only_the_tail_of_a_distribution_has_fails_alone():
-    plan = plan_of(
-        "fig6", {"start.depth_m": {"normal": [0.31, 0.1]}}, design="monte_carlo", samples=5000, tethered=False,
-        changes={"run.duration_s": 0.1, "run.rtol": 0.0},
+    plan = plan_sweep(
+        "fig6", {"start.depth_m": {"normal": [0.31, 0.1]}}, design=Design(kind="monte_carlo", samples=5000),
+        changes={"run.duration_s": 0.1, "run.rtol": 0.0}, tethered=False,
     )  # fmt: skip
     depth = plan.points.values[
         :, 0
@@ -200,7 +203,7 @@ def test_a_value_that_only_the_tail_of_a_distribution_has_fails_alone():
 
 def test_threads_that_run_at_a_time_give_the_same_members(tmp_path):
     plan = fast(6)
-    with ThreadPoolExecutor(2) as threads, finished(plan, tmp_path, client=threads) as store:
+    with ThreadPoolExecutor(2) as threads, finished(plan, tmp_path, workers=threads) as store:
         mine = [one for block in store.blocks() for one in block]
     for one in mine:
         (alone,) = run_members(plan.job, [one.index], plan.points.values[[one.index]])
@@ -213,7 +216,7 @@ def test_what_is_finished_is_not_run_again(tmp_path):
     with subzero_store(plan, tmp_path) as store:
         store.add(run_members(plan.job, [1, 4], plan.points.values[[1, 4]]))
     executor = Dying()
-    with finished(plan, tmp_path, client=executor) as store:
+    with finished(plan, tmp_path, workers=executor) as store:
         assert store.finished(6).all()
     assert sorted(member for ran in executor.ran for member in ran) == [0, 2, 3, 5]
 
@@ -230,7 +233,7 @@ OTHER = {
     "trial": {"changes": {"run.duration_s": 0.3, "run.rtol": 0.0}},
     "points": {"parameters": {"start.wet_length_m": [0.0, 1.0, 3.0]}},
     "parameters": {"parameters": {"start.depth_m": [0.0, 1.0, 2.0]}},
-    "outcomes": {"function": lambda run: 2.0},
+    "outcomes": {"kept": Kept(function=lambda run: 2.0)},
     "tethered": {"tethered": False},
 }
 
@@ -240,15 +243,15 @@ def test_another_sweep_does_not_mix_with_what_is_there(what, tmp_path):
     asked = {
         "parameters": {"start.wet_length_m": [0.0, 1.0, 2.0]},
         "changes": {"run.duration_s": 0.2, "run.rtol": 0.0},
-        "function": lambda run: 1.0,
+        "kept": Kept(function=lambda run: 1.0),
     }
-    with subzero_store(plan_of("fig6", **asked), tmp_path):
+    with subzero_store(plan_sweep("fig6", **asked), tmp_path):
         pass
-    with subzero_store(plan_of("fig6", **asked), tmp_path):
+    with subzero_store(plan_sweep("fig6", **asked), tmp_path):
         pass  # the same goes on
     with (
         pytest.raises(subzero.UserError, match=rf"another sweep: its .*{what}"),
-        subzero_store(plan_of("fig6", **(asked | OTHER[what])), tmp_path),
+        subzero_store(plan_sweep("fig6", **(asked | OTHER[what])), tmp_path),
     ):
         pass
 
@@ -285,7 +288,7 @@ def test_a_full_disk_is_told_and_what_was_kept_before_is_still_there(tmp_path):
         with pytest.raises(subzero.UserError, match=r"full\. What it has is kept: make room"):
             store.add([_longer(one) for one in members[1:]])
         assert store.finished(4)[0]
-    with finished(plan, tmp_path, client=Here()) as store:
+    with finished(plan, tmp_path, workers=Here()) as store:
         assert store.finished(4).all()
         assert store.failures() == 0
 
@@ -302,7 +305,7 @@ def test_effects_of_a_linear_outcome_are_those_of_algebra():
     spreads = {"start.wet_length_m": {"from": 0.0, "to": 2.0}, "start.depth_m": {"from": 0.0, "to": 4.0}}
     sizes = {}
     for design, samples in (("morris", 8), ("saltelli", 1024), ("sobol", 1024)):
-        points = points_of(trial, spreads, design=design, samples=samples, seed=2)
+        points = points_of(trial, spreads, Design(kind=design, samples=samples, seed=2))
         y = points.values @ np.array([3.0, 1.0])
         found = Gathered(
             names=("y",),
@@ -426,7 +429,7 @@ def test_two_dask_workers_give_the_same_bytes_as_processes_here(tmp_path):
     with (
         LocalCluster(n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address=None) as cluster,
         Client(cluster) as client,
-        finished(plan, tmp_path / "dask", client=client) as store,
+        finished(plan, tmp_path / "dask", workers=client) as store,
     ):
         write_result(store, plan.job, plan.points, plan.attributes, tmp_path / "dask")
     with finished(plan, tmp_path / "here", workers=2) as store:
