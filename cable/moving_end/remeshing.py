@@ -24,7 +24,7 @@ MERGE_AT = 0.5
 def accept(line: Line, step: float, c: CableNumbers, work: Load) -> None:
     """Make level NEW the present one; split the last segment while it is too long, join it while it is too short."""
     N = line.ends.count
-    for level in (BEFORE, NOW):
+    for level in (BEFORE, NOW):  # the oldest first: each takes over what the next newer one has
         for j in range(N + 1):
             for i in range(3):
                 line.position[level, j, i] = line.position[level - 1, j, i]
@@ -39,7 +39,7 @@ def accept(line: Line, step: float, c: CableNumbers, work: Load) -> None:
     fill_node_tensions(line)
     line.ends.previous_step = step
     line.ends.time += step
-    if line.ends.free_end:
+    if line.ends.layout.free_end:
         return
     last = line.ends.last_length
     while last[NOW] > SPLIT_AT * spacing(line) and line.ends.count < line.length.size - 1:
@@ -64,6 +64,8 @@ def split_last(line: Line, segment_length: float, c: CableNumbers, work: Load) -
         _insert_between(line.position[level], N, fraction, beyond)
         _insert_between(line.velocity[level], N, fraction, beyond)
         _insert_between(line.water[level], N, fraction, beyond)
+        # The same off both levels: a backward difference of the length, the pay-out rate, sees no jump. At level BEFORE
+        # it may be negative, for a node that was still on the drum.
         line.ends.last_length[level] -= segment_length
         if level == NOW:
             near, end = line.node_tension[N - 1], line.node_tension[N]
@@ -73,6 +75,7 @@ def split_last(line: Line, segment_length: float, c: CableNumbers, work: Load) -
     line.length[N] = segment_length
     line.ends.count = N + 1
     line.ends.settled += segment_length
+    # Momenta are remembered for whole segments (d(ℓp)/dt in `assembly`), so both parts need theirs at both levels.
     for level in (NOW, BEFORE):
         segment_momentum(line, level, N, segment_length, c, work)
         segment_momentum(line, level, N + 1, line.ends.last_length[level], c, work)
@@ -145,7 +148,7 @@ def end_tensions(line: Line) -> tuple[float, float]:
     T(0) is the size of the force (12); T(S) is the tension that drives the drum (11), with the drag and the inertia
     of the last half segment; a slack end has none.
     """
-    F = line.ends.tow_force
+    F = line.ends.tow.force
     return sqrt(F[0] * F[0] + F[1] * F[1] + F[2] * F[2]), max(line.ends.drum_pull, 0.0)
 
 
