@@ -235,7 +235,7 @@ def _in_words(error: cyclopts.CycloptsError) -> str:
 
 def _refined(runs: Runs, trial: scenarios.Trial, extended: dict[str, Any]) -> Runs:
     """Return runs that know how much they change with half the steps."""
-    from subzero.refinement import refine
+    from subzero.comparison import refine
 
     marked = {}
     for label, run in runs.items():

@@ -100,7 +100,7 @@ def render(report: Report) -> str:
         {"source": _image(figure), "words": FIGURES.get(name, name.replace("_", " "))}
         for name, figure in report.figures.items()
     ]
-    return _template().render(
+    html: str = _template().render(
         report=report,
         figures=figures,
         styles=Markup(asset("page.css") + "\n" + _vendored("uPlot.min.css")),
@@ -108,6 +108,7 @@ def render(report: Report) -> str:
         uplot=Markup(_vendored("uPlot.iife.min.js")),
         player=Markup(player()),
     )
+    return html
 
 
 def player() -> str:
