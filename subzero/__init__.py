@@ -8,7 +8,8 @@
 Names come from their modules when they are first used, so that ``import subzero`` costs nothing:
 `simulate` and `compare` run a trial, `Comparison` holds two runs, `load_scenario` reads a trial,
 `warnings_of` says what may be wrong with a run, `check` how much it changes with half the steps,
-`read_record` a measured record, `draw` makes the figures, `Simulator` steps a run for a controller of your own,
+`read_record` a measured record, `draw` makes the figures, `export` writes a run for other programs,
+`Simulator` steps a run for a controller of your own,
 `diagnose` says what a simulation gets wrong in measured records, `read_trials` reads those as `Logged`, `challenge`
 hides an effect in a record to try that out,
 `sweep` runs what `plan_sweep` planned, a trial with many values of its parameters,
@@ -35,6 +36,7 @@ _HOME = {
     "compare": ("subzero.comparison", "compare"),
     "diagnose": ("subzero.diagnosis.api", "diagnose"),
     "draw": ("subzero.figures", "draw"),
+    "export": ("subzero.exports", "export"),
     "load_scenario": ("subzero.model", "load"),
     "plan_sweep": ("subzero.sweeps.plan", "plan_sweep"),
     "read_record": ("subzero.records.record", "read_record"),

@@ -13,7 +13,7 @@ stored, restored and stepped again from anywhere.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from math import remainder, tau
 from typing import TYPE_CHECKING, Any
 
@@ -25,7 +25,7 @@ from subzero.engine.coupling import FINE
 from subzero.engine.initial_conditions import RUN_IN, prepare
 from subzero.engine.recording import new_recording
 from subzero.engine.time_loop import NO_ROOM, SPARE, run_rows
-from subzero.errors import UserError
+from subzero.errors import UserError, checked
 from subzero.model import Model
 from subzero.run_state import Live, Orders
 from subzero.simulation import in_words
@@ -236,7 +236,7 @@ class Discretisation:
         longest: length of cable that there is room for. [m]
 
     Raises:
-        UserError: a sample time shorter than the hull's step.
+        UserError: what is no positive number; a sample time shorter than the hull's step.
     """
 
     sample_time: float = 0.1
@@ -245,7 +245,10 @@ class Discretisation:
     longest: float = 50.0
 
     def __post_init__(self) -> None:
-        """Refuse a sample without a step of the hull."""
+        """Refuse what is no step and no length, and a sample without a step of the hull."""
+        for field in fields(self):
+            value = checked("Discretisation", field.name, getattr(self, field.name), above=0.0)
+            object.__setattr__(self, field.name, value)
         if self.sample_time < self.hull_step:
             raise UserError(
                 f"plant: a sample time of {self.sample_time:g} s is shorter than the hull's step of"

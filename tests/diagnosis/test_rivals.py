@@ -8,7 +8,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from subzero.diagnosis.report import html as report
+from subzero.diagnosis.report import sections as report
 from subzero.diagnosis.report import tables
 from subzero.diagnosis.results import (
     CAUSE_NAMED,
@@ -56,14 +56,22 @@ def test_the_report_says_what_the_records_allow_and_that_nothing_is_new_in_the_m
 def test_the_others_are_drawn_beside_the_most_probable():
     figures = draw_diagnosis(undecided(), TITLE)
     legend = [text.get_text() for text in figures["rivals"].axes[0].get_legend().get_texts()]
-    assert legend == ["measured", "hull_drag", "propeller_thrust_slope"]
+    assert legend == [
+        "measured",
+        "if the hull drags more",
+        "if thrust falls faster",
+        "if nothing is wrong",
+    ]
     overlay = [text.get_text() for text in figures["misfit"].axes[0].get_legend().get_texts()]
-    assert {"nominal", "hull_drag"} < set(overlay)
+    assert {"simulated", "if the hull drags more"} < set(overlay)
 
 
 @pytest.mark.parametrize(("verdict", "drawn"), [(UNDECIDED, 1), (NOTHING_WRONG, 0)])
 def test_one_alone_has_nothing_beside_it(verdict, drawn):
-    figures = draw_diagnosis(undecided(verdict, drawn), TITLE)
+    alone = dataclasses.replace(
+        undecided(verdict, drawn), probabilities={"hull_drag": 1.0} if drawn else {"none": 1.0}
+    )
+    figures = draw_diagnosis(alone, TITLE)
     assert "rivals" not in figures
     overlay = [text.get_text() for text in figures["misfit"].axes[0].get_legend().get_texts()]
-    assert ("within tolerances" in overlay) is (verdict == NOTHING_WRONG)
+    assert ("calibrated within tolerances" in overlay) is (verdict == NOTHING_WRONG)

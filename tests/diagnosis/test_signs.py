@@ -100,7 +100,7 @@ def test_secants_mean_by_a_column_what_sensitivities_mean():
 def test_what_can_be_seen_has_its_unit():
     made = problem(PLAIN)
     found = {one.id: one for one in detectability(made, made.jacobian(np.zeros(len(made.entries))))}
-    rows = {row[0]: row[2] for row in detectable(tuple(found.values()), every=True).rows}
+    rows = {row[-1]: row[2] for row in detectable(tuple(found.values()), every=True).rows}
     assert rows["rudder_offset"].endswith(" degree")
     assert rows["rudder_lag"].startswith("time constant ")
     assert rows["rudder_lag"].endswith(" s")
