@@ -42,7 +42,14 @@ from .truth import FAR, GAPS, OUTLIERS, NoRunError, agreed
 
 FLOWN = ("fig6", "rich", "zigzag", "dive", "turning_circle", "stop_and_drift", "spiral", "current", "random")
 """Manoeuvres; "random" draws its commands."""
-ROUNDED = {"heading": 1.0, "surge_speed": 0.05, "depth": 0.1, "pitch": 0.5, "roll": 0.5, "yaw_rate": 0.5}
+ROUNDED = {
+    "heading": 1.0,
+    "surge_speed": 0.05,
+    "depth": 0.1,
+    "pitch": 0.5,
+    "roll_angle": 0.5,
+    "yaw_rate": 0.5,
+}
 """Resolution of coarse sensors, in the channels' units."""
 CLEAR = 25.0
 """A cause with at least this D should be named. [-]"""

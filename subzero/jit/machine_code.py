@@ -287,7 +287,8 @@ class MachineCode(_Cache):  # type: ignore[misc]  # numba has no types
         return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        """Keep what was compiled for a signature; not what holds addresses of this process."""
+        """Count what was compiled for a signature, and keep it; not what holds addresses of this process."""
+        _made[0] += 1
         if self._function.__closure__ is None and not data.lifted and not data.library.has_dynamic_globals:
             self._home.keep(self._name(sig, data.codegen), dumps(data._reduce()))
 
@@ -309,6 +310,15 @@ class MachineCode(_Cache):  # type: ignore[misc]  # numba has no types
 
 
 COMPILING = "compiling"
+
+_made = [0]
+"""How many functions this process has compiled."""
+
+
+def made() -> int:
+    """Return how many functions this process has compiled so far."""
+    return _made[0]
+
 
 _told: set[str] = set()
 _announcements: list[Callable[[], None]] = []

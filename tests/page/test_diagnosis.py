@@ -54,7 +54,7 @@ def truth() -> Any:
 def logged(truth: Any) -> Logged:
     setting, true = truth
     time = np.arange(0.0, 6.01, 0.1)
-    names = ("surge_speed", "heading", "pitch", "roll", "depth")
+    names = ("surge_speed", "heading", "pitch", "roll_angle", "depth")
     values = {name: np.interp(time, true["time"], true[name]) for name in names}
     values["heading"][7] = np.nan
     values["depth"][20] += 5.0

@@ -79,7 +79,7 @@ def cause_in_short(one: Cause) -> str:
         f"{name.replace('_', ' ')} {number(p.value, p.unit)}, where the model has {number(p.nominal, p.unit)}"
         for name, p in one.parameters.items()
     )
-    return f"{_capital(one.sentence)}{_since(one)}: {numbers}." if numbers else f"{_capital(one.sentence)}."
+    return f"{_capital(one.sentence)}{_since(one)}{': ' if numbers else ''}{numbers}."
 
 
 def _since(one: Cause) -> str:
