@@ -15,7 +15,7 @@ import json
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
@@ -23,12 +23,16 @@ import xarray as xr
 import scenarios
 from subzero.channels import BY_NAME, CHANNELS, UNITS
 from subzero.engine.initial_conditions import Later
+from subzero.errors import UserError
 from subzero.model import Model, load
 from subzero.overview import Overview
 from subzero.records.record import Fit, Record, beside, fits, read_record
 from subzero.simulation import simulate
 from subzero.summary import FORCE, MOMENT, summarise, summary_of
 from subzero.validity import RunWarning, as_json, warnings_of
+
+if TYPE_CHECKING:
+    from subzero.checkpoint import Checkpoint
 
 SHOWN = {
     "peak_speed_m_s": "m/s",
@@ -100,6 +104,8 @@ def compare(
     measured: str | Path | Record | None = None,
     model: Model | None = None,
     later: Later = (),
+    every: float | None = None,
+    checkpoint: Checkpoint | None = None,
     progress: Progress | None = None,
 ) -> Comparison:
     """Simulate a trial with its cable and without.
@@ -109,6 +115,8 @@ def compare(
         measured: a measured record or the path of one, to set beside both runs.
         model: another model than the one that the scenario describes.
         later: times of results [s] and the model that holds from each of them on.
+        every: time between results that are kept, as of `simulate`; a measured record is set beside all of them. [s]
+        checkpoint: keeps where both runs stand, as of `simulate`.
         progress: told the fraction that is done, from 0 to 1, over both runs.
 
     Raises:
@@ -116,9 +124,16 @@ def compare(
         UserError: if the measured record cannot be used, or does not look like this trial.
     """
     trial = scenario if isinstance(scenario, scenarios.Trial) else load(scenario)
+    trial = trial if every is None else dataclasses.replace(trial, every=every)
     record = read_record(measured) if isinstance(measured, str | Path) else measured
+    if record is not None and trial.stride > 1:
+        raise UserError(
+            f"Every {trial.every:g} s is too seldom to set a measured record beside the results of '{trial.name}'. "
+            "Leave out every_s (--every)."
+        )
     sidecar = _checked(record, trial)
-    other: dict[str, Any] = {"model": model, "later": later} if model or later else {}
+    given = {"model": model, "later": later, "checkpoint": checkpoint}
+    other: dict[str, Any] = {name: value for name, value in given.items() if value}
     tethered = simulate(trial, tethered=True, **other, progress=_part(progress, 0.0, 0.5))
     untethered = simulate(trial, tethered=False, **other, progress=_part(progress, 0.5, 1.0))
     record = beside(record, tethered) if record is not None else None
@@ -138,7 +153,7 @@ def _checked(record: Record | None, trial: scenarios.Trial) -> Any:
     return check_epoch(record, trial)
 
 
-HALVED = ("cable_step", "hull_step", "segment_length", "grading")
+HALVED = ("cable_step", "hull_step", "segment_length", "grading", "far_grading")
 """Fields of a trial that the finer run has half as large."""
 TOW_FORCE = "tow_force"
 """Row of the table for the force of the cable as a vector, beside the channels."""

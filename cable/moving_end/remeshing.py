@@ -1,7 +1,8 @@
 """Make a solved step real; put a node in at the drum, or take one out, where the last segment asks for it.
 
-There is a new node at the drum when the last segment has become long, and one less when it has become short. Both
-happen between two steps, at levels NOW and BEFORE, and leave length, shape and motion of the cable as they are.
+There is a new node at the drum when the last segment has become long, and one less when it has become short. In a long
+cable, nodes far from both ends are taken out where it is nearly straight. All of this happens between two steps, at
+levels NOW and BEFORE, and leaves length, shape and motion of the cable as they are.
 """
 
 from __future__ import annotations
@@ -16,6 +17,8 @@ from cable.moving_end.state import BEFORE, NEW, NOW, SPLIT_AT, Line, spacing
 from cable.properties import CableNumbers
 from subzero.jit import compiled, inner
 
+STRAIGHT = 2e-5
+"""Far segments are joined where that shortens them by no more than this share: they turn by 0.7 degrees. [-]"""
 MERGE_AT = 0.5
 """While cable is reeled in, a last segment shorter than this fraction of the one before is joined to it."""
 
@@ -46,6 +49,8 @@ def accept(line: Line, step: float, c: CableNumbers, work: Load) -> None:
         split_last(line, spacing(line), c, work)
     while line.ends.count > 1 and last[NOW] < MERGE_AT * line.length[line.ends.count - 1]:
         merge_last(line, c, work)
+    if line.ends.layout.far_grading > 0.0:
+        join_far(line, c, work)
 
 
 @inner
@@ -130,6 +135,63 @@ def merge_last(line: Line, c: CableNumbers, work: Load) -> None:
     line.ends.settled -= line.length[N - 1]
     for level in (NOW, BEFORE):
         segment_momentum(line, level, N - 1, last[level], c, work)
+
+
+@inner
+def join_far(line: Line, c: CableNumbers, work: Load) -> None:
+    """Join pairs of segments far from both ends to one, where the cable is taut and nearly straight.
+
+    b metres beyond `far_length` from the nearer end, a segment may be Δs + g s + g₁ b long. The ends stay fine: there a
+    cable bends, the vehicle by its turns, a current or the cable's weight beside the drum, where it hardly pulls.
+    """
+    ends, layout, along, j = line.ends, line.ends.layout, 0.0, 1
+    while j < ends.count - 1:
+        whole = line.length[j] + line.length[j + 1]
+        beyond = min(along, ends.settled + ends.last_length[NOW] - along - whole) - layout.far_length
+        longest = layout.segment_length + layout.grading * along + layout.far_grading * beyond
+        if beyond > 0.0 and whole <= longest and min(line.tension[NOW, j], line.tension[NOW, j + 1]) > KNOWN:
+            cut_off = _cut_off(line, j)
+            if cut_off <= STRAIGHT:
+                _join(line, j, whole, cut_off)
+                for level in (NOW, BEFORE):
+                    segment_momentum(line, level, j, line.length[j], c, work)
+        along += line.length[j]
+        j += 1
+
+
+@compiled
+def _cut_off(line: Line, j: int) -> float:
+    """Return by which share the chord over segments j and j + 1 is shorter than theirs. [-]"""
+    square = 0.0
+    for i in range(3):
+        square += (line.position[NOW, j + 1, i] - line.position[NOW, j - 1, i]) ** 2
+    return 1.0 - np.sqrt(square) / max(_chord(line, j) + _chord(line, j + 1), 1e-12)
+
+
+@compiled
+def _join(line: Line, j: int, whole: float, cut_off: float) -> None:
+    """Take node j out: segments j and j + 1 become one, as long as its chord; the rest goes back to the drum."""
+    N, share = line.ends.count, line.length[j] / whole
+    line.slip[j] += (1.0 - share) * (line.slip[j + 1] - line.slip[j])
+    line.normal_gain[j] += (1.0 - share) * (line.normal_gain[j + 1] - line.normal_gain[j])
+    for level in (NOW, BEFORE):
+        line.tension[level, j] += (1.0 - share) * (line.tension[level, j + 1] - line.tension[level, j])
+        for n in range(j, N):
+            for i in range(3):
+                line.position[level, n, i] = line.position[level, n + 1, i]
+                line.velocity[level, n, i] = line.velocity[level, n + 1, i]
+                line.water[level, n, i] = line.water[level, n + 1, i]
+                line.momentum[level, n, i] = line.momentum[level, n + 1, i]
+        for n in range(j + 1, N):
+            line.tension[level, n] = line.tension[level, n + 1]
+    for n in range(j, N):
+        line.node_tension[n] = line.node_tension[n + 1]
+    for n in range(j + 1, N):
+        line.length[n] = line.length[n + 1]
+        line.slip[n], line.normal_gain[n] = line.slip[n + 1], line.normal_gain[n + 1]
+    line.length[j] = whole * (1.0 - cut_off)
+    line.ends.settled -= whole * cut_off
+    line.ends.count = N - 1
 
 
 @compiled

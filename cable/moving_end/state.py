@@ -30,6 +30,8 @@ class Layout(Record):
 
     Attributes:
         segment_length, grading: new segments are `segment_length` + `grading` s long, s from the tow point. [m], [-]
+        far_length, far_grading: farther than this from both ends, segments are joined to longer ones, by so much per
+            metre (`remeshing.join_far`); 0: none are. [m], [-]
         run_in: length L₀ beside the tow point in which segments are shorter (`spacing`), 0 for none. [m]
         free_end: whether the far end is a free tail instead of the drum.
         tail_drag: ½ρC_dA of a drogue there. [kg/m]
@@ -37,6 +39,8 @@ class Layout(Record):
 
     segment_length: float = 1.0
     grading: float = 0.0
+    far_length: float = 0.0
+    far_grading: float = 0.0
     run_in: float = 0.0
     free_end: bool = False
     tail_drag: float = 0.0

@@ -142,7 +142,7 @@ class Tethered:
         self._memory.write(x[HULL_SIZE:])
         self._setup.orders.values[0] = u
         times = np.array([t, t + self.sample_time])
-        _, _, ending = run_rows(self._setup, live, self._recording, times, 1, 2, 0, 1)
+        _, _, ending = run_rows(self._setup, live, self._recording, times, 1, 2, 0, 1, 1)
         if ending == NO_ROOM:
             raise NoRoomError(
                 f"plant: at t = {t:g} s there is no room for more than longest = {self._longest:g} m of cable."

@@ -69,12 +69,17 @@ def book(setup: Setup, live: Live, start: float, span: float, steps: int) -> Non
 def _book_hull(setup: Setup, live: Live, start: float, span: float, steps: int) -> None:
     """Add the hull's share of an exchange."""
     ledger = live.now.ledger
-    h, old, new, total = span / steps, ledger.hull_old, ledger.hull_new, ledger.total
+    h, old, new, total, before = span / steps, ledger.hull_old, ledger.hull_new, ledger.total, -1
     for n in range(steps):
-        command = setup.orders.values[row_at(setup.orders.time, start + n * h)]
-        for end in range(2):
-            row = n + end
-            _hull_power(setup, live, row, start + row * h, row / steps, command, new if end else old)
+        held = row_at(setup.orders.time, start + n * h)
+        command = setup.orders.values[held]
+        if held == before:  # a step begins as the one before ended, unless another command holds
+            for i in range(old.size):
+                old[i] = new[i]
+        else:
+            _hull_power(setup, live, n, start + n * h, n / steps, command, old)
+        row, before = n + 1, held
+        _hull_power(setup, live, row, start + row * h, row / steps, command, new)
         if setup.fixed.prescribed:
             total[PROPELLER] -= 0.5 * h * (old[P_EXTERNAL] + new[P_EXTERNAL])
             continue

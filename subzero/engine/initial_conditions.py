@@ -94,8 +94,10 @@ def prepare(
         load=new_load(),
     )
     live.now.length = wet if tethered else 0.0
-    live.line.ends.layout.segment_length, live.line.ends.layout.grading = trial.segment_length, trial.grading
-    live.line.ends.layout.run_in = run_in if wet < run_in and _can_run_in(setup.fixed) else 0.0
+    layout = live.line.ends.layout
+    layout.segment_length, layout.grading = trial.segment_length, trial.grading
+    layout.far_length, layout.far_grading = trial.far_length, trial.far_grading
+    layout.run_in = run_in if wet < run_in and _can_run_in(setup.fixed) else 0.0
     lay_out(setup, live, wet)
     if trial.start.drum is not None:
         hang_between(setup, live, trial, model)

@@ -2,7 +2,7 @@
 
     >>> import subzero
     >>> currents = {"water.current_east_m_s": [0.0, 0.1]}
-    >>> runs = subzero.sweep(subzero.plan_sweep("fig6", currents, changes={"run.duration_s": 2.0}))
+    >>> runs = subzero.sweep("fig6", currents, changes={"run.duration_s": 2.0})
     >>> runs["heading"].dims
     ('member', 'time')
 

@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from time import monotonic
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 
-from subzero.errors import UserError, short, whole
+import scenarios
+from subzero.errors import UserError, short, suggestion, whole
 from subzero.sweeps.member import Member
-from subzero.sweeps.plan import Plan
+from subzero.sweeps.plan import Plan, Planned, plan_sweep
 from subzero.sweeps.result import RESULT, Gathered, open_result, write_result
 from subzero.sweeps.schedule import Schedule
 from subzero.sweeps.store import Store, opened
@@ -53,29 +54,31 @@ Progress = Callable[[Standing], None]
 
 
 def sweep(
-    plan: Plan,
+    scenario: str | Path | scenarios.Trial | Plan,
+    parameters: Mapping[str, Any] | None = None,
     *,
     out: str | Path | None = None,
-    workers: Any = None,
+    workers: int | Executor | None = None,
+    client: Any = None,
     progress: Progress | None = None,
+    **how: Unpack[Planned],
 ) -> xr.Dataset:
     """Run a trial with many values of its parameters, and return one labelled dataset.
 
     >>> import subzero
-    >>> plan = subzero.plan_sweep(
-    ...     "fig6", {"start.wet_length_m": [0, 20, 40]}, changes={"run.duration_s": 2.0}
-    ... )
-    >>> runs = subzero.sweep(plan)
+    >>> runs = subzero.sweep("fig6", {"start.wet_length_m": [0, 20, 40]}, changes={"run.duration_s": 2.0})
     >>> runs["peak_speed_m_s"].sizes["member"]
     3
 
     Args:
-        plan: which trial, which points, what is kept: from `subzero.plan_sweep`.
+        scenario: name of a shipped scenario, path of a scenario file, a trial, or a whole plan (`plan_sweep`).
+        parameters: their values, as of `plan_sweep`; none beside a plan, which has them.
         out: folder that keeps the members. The same call with it goes on where another was killed; without one, nothing
             is kept.
-        workers: processes on this machine, by default one for each of its cores; or a Dask client, or any
-            `concurrent.futures.Executor`, to run on instead.
+        workers: processes on this machine, by default one for each of its cores; or a `concurrent.futures.Executor`.
+        client: Dask client to run on instead.
         progress: told after every batch how far it is.
+        **how: `design`, `changes`, `kept`, `tethered`, `description`, as of `plan_sweep`.
 
     Returns:
         parameters as coordinates on ``member``; scalars (member), channels (member, time); ``failed``, ``reason`` and
@@ -83,10 +86,12 @@ def sweep(
         ``runs.set_index(member=[...]).unstack()`` gives a grid one dimension for each parameter.
 
     Raises:
-        UserError: what is no plan; a folder with another sweep; workers that are none.
+        UserError: what can be no plan; a folder with another sweep; workers that are none.
     """
-    if not isinstance(plan, Plan):
-        raise UserError(f"sweep: the plan is {short(plan)}. Allowed: what subzero.plan_sweep gives.")
+    plan = _plan(scenario, parameters, how)
+    if client is not None and workers is not None:
+        raise UserError("sweep: workers and client are both given. Give one of them.")
+    workers = workers if client is None else client
     if out is not None:
         with finished(plan, Path(out), workers=workers, progress=progress) as store:
             deliver(plan, store, Path(out))
@@ -96,6 +101,27 @@ def sweep(
             deliver(plan, store, Path(folder))
         with open_result(Path(folder) / RESULT) as runs:
             return runs.load()
+
+
+def _plan(
+    scenario: str | Path | scenarios.Trial | Plan, parameters: Mapping[str, Any] | None, how: Planned
+) -> Plan:
+    """Return the plan that is meant."""
+    if not isinstance(scenario, Plan):
+        unknown = sorted(set(how) - set(Planned.__annotations__))
+        if unknown:
+            near = suggestion(unknown[0], Planned.__annotations__)
+            raise UserError(f"sweep: there is no argument {unknown[0]!r}.{near}")
+        if parameters is None:
+            raise UserError(
+                'sweep: no parameters are given. Give their values, as in {"start.wet_length_m": [0, 20, 40]}.'
+            )
+        return plan_sweep(scenario, parameters, **how)
+    if parameters is not None or how:
+        raise UserError(
+            "sweep: a plan has its parameters already. Leave them out, or give the trial and not a plan."
+        )
+    return scenario
 
 
 @contextmanager

@@ -22,21 +22,21 @@ A file names data only: it holds no program and starts none.
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict
 
 import scenarios
 from scenarios.files import Source, read_toml
 from scenarios.parameters import with_parameters
 from subzero.errors import UserError, listed, printable, short, suggestion, truth
 from subzero.model import load
+from subzero.provenance import code_digest, trial_digest
 from subzero.sweeps.design import DISTRIBUTION_KEYS, GRID, Design, Points, points_of
-from subzero.sweeps.member import Job, canonical, code_digest
+from subzero.sweeps.member import Job
 from subzero.sweeps.outcomes import AS_USUAL, Kept, outcomes_of
 
 KEYS = {
@@ -74,11 +74,8 @@ class Plan:
 
     def manifest(self) -> dict[str, str]:
         """Return what its members belong to: anything that could change a number, by its digest."""
-        values = canonical(self.job.trial)
-        for words in ("name", "description", "text", "source"):
-            values.pop(words)
         return {
-            "trial": hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest(),
+            "trial": trial_digest(self.job.trial),
             "parameters": json.dumps(self.points.names),
             "points": self.points.digest,
             "outcomes": self.job.outcomes.digest(),
@@ -98,6 +95,16 @@ class Plan:
             "manifest": json.dumps(self.manifest(), sort_keys=True),
             "subzero_version": version("subzero"),
         }
+
+
+class Planned(TypedDict, total=False):
+    """What a sweep may be told besides its trial and parameters, see `plan_sweep`."""
+
+    design: Design
+    changes: Mapping[str, float] | None
+    kept: Kept
+    tethered: bool
+    description: str
 
 
 def plan_sweep(

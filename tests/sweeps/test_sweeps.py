@@ -8,6 +8,7 @@ looked at. Tolerance: none; channels are float32.
 import json
 import os
 import random
+import re
 import signal
 import sqlite3
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
@@ -97,6 +98,22 @@ def test_a_member_is_a_run_of_its_own():
         assert float(mine["early"]) == alone["surge_speed"].values[3]
         for channel in ("surge_speed", "heading"):
             np.testing.assert_allclose(mine[channel], alone[channel], rtol=1e-6, atol=1e-7)
+
+
+def test_one_line_and_a_plan_give_the_same_members_and_neither_takes_what_is_not_its_own():
+    lengths = {"start.wet_length_m": LENGTHS}
+    plan = plan_sweep("fig6", lengths, changes=SHORT, tethered=False)
+    one_line = subzero.sweep("fig6", lengths, changes=SHORT, tethered=False, workers=Here())
+    assert one_line.identical(subzero.sweep(plan, workers=Here()))
+    for told, arguments, options in (
+        ("Did you mean 'changes'?", ("fig6", lengths), {"change": SHORT}),
+        ("no parameters are given", ("fig6",), {}),
+        ("a plan has its parameters already", (plan, lengths), {}),
+        ("a plan has its parameters already", (plan,), {"changes": SHORT}),
+        ("both given", (plan,), {"workers": 2, "client": Here()}),
+    ):
+        with pytest.raises(subzero.UserError, match=re.escape(told)):
+            subzero.sweep(*arguments, **options)
 
 
 def test_a_statistic_of_a_channel_is_that_of_its_samples():
