@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 DEGREE = 180.0 / math.pi
 REVOLUTION = 1.0
@@ -33,6 +34,26 @@ UNITS: dict[str, tuple[str, float]] = {
     "J": ("J", 1.0),
 }
 """Display unit → (suffix of the CSV column, display units per unit used inside: SI, but rev/s)."""
+
+
+STANDARD_NAMES = {
+    "depth": "depth",
+    "roll_angle": "platform_roll_starboard_down",
+    "pitch": "platform_pitch_fore_up",
+    "heading": "platform_orientation",
+    "speed_over_ground": "platform_speed_wrt_ground",
+}
+"""Channel → its name in the CF conventions. Theirs for rates are about the horizontal, not about the body's axes."""
+
+
+COLUMN_STEMS = {"roll_angle": "roll"}
+"""Channel → what its column is called before the unit, where that is not its name.
+
+``run.roll`` is a method of xarray, so the variable is ``roll_angle``; the column ``roll_deg`` hides nothing, and stays.
+"""
+
+RENAMED_CHANNELS = {"roll": "roll_angle"}
+"""Name of a channel in version 0.2 → its name today."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -64,12 +85,13 @@ class Channel:
     @property
     def column(self) -> str:
         """Name of the CSV column, such as ``surge_speed_m_s``."""
-        return f"{self.name}_{self.suffix}"
+        return f"{COLUMN_STEMS.get(self.name, self.name)}_{self.suffix}"
 
     @property
     def attributes(self) -> dict[str, str]:
-        """What a variable of a dataset carries: units, long name, symbol."""
-        return {"units": self.unit, "long_name": self.long_name, "symbol": self.symbol}
+        """What a variable of a dataset carries: units, long name, symbol, and CF's standard name where it has one."""
+        named = {"standard_name": STANDARD_NAMES[self.name]} if self.name in STANDARD_NAMES else {}
+        return {"units": self.unit, "long_name": self.long_name, "symbol": self.symbol, **named}
 
 
 def _read(table: str) -> tuple[Channel, ...]:
@@ -88,7 +110,7 @@ CHANNELS: tuple[Channel, ...] = _read(r"""
 north                         | m        | x           | position, north
 east                          | m        | y           | position, east
 depth                         | m        | z           | depth of the hull centre, positive down
-roll                          | degree   | \phi        | roll angle, positive starboard side down
+roll_angle                    | degree   | \phi        | roll angle, positive starboard side down
 pitch                         | degree   | \theta      | pitch angle, positive nose up
 heading                       | degree   | \psi        | heading, clockwise from north, continuous
 # how the hull centre moves, over ground, in body axes
@@ -148,3 +170,39 @@ def column_name(name: str) -> str:
 def channel_of_column(column: str) -> Channel | None:
     """Return the channel that a CSV column holds, ``heading_deg`` → heading; None if there is none."""
     return BY_COLUMN.get(column)
+
+
+class Observation(NamedTuple):
+    """What is true at one time, by the names of `CHANNELS`, in SI units, radians and rev/s.
+
+    The roll angle is `roll` here, ``roll_angle`` there, where `roll` is a method of xarray. The heading is continuous:
+    no jump at a full turn. Forces and moments of the cable are those on the hull, body axes.
+    """
+
+    time: float
+    north: float
+    east: float
+    depth: float
+    roll: float
+    pitch: float
+    heading: float
+    surge_speed: float
+    sway_speed: float
+    heave_speed: float
+    roll_rate: float
+    pitch_rate: float
+    yaw_rate: float
+    propeller_speed: float
+    rudder_angle: float
+    stern_plane_port_angle: float
+    stern_plane_starboard_angle: float
+    battery_voltage: float
+    cable_length: float
+    cable_tension: float
+    drum_tension: float
+    cable_force_forward: float
+    cable_force_starboard: float
+    cable_force_down: float
+    cable_moment_roll: float
+    cable_moment_pitch: float
+    cable_moment_yaw: float

@@ -1,5 +1,6 @@
-"""The command line: ``subzero list``, ``simulate``, ``compare``; ``manoeuvre`` and ``autopilot`` (`cli_autopilot`);
-``diagnose`` and ``challenge`` (`cli_diagnosis`).
+"""The command line: ``subzero simulate``, ``compare``, ``plot``; ``list``, ``new``, ``show``, ``validate``
+(`cli_trials`); ``manoeuvre``, ``autopilot`` (`cli_autopilot`); ``diagnose``, ``challenge`` (`cli_diagnosis`); ``sweep``
+(`cli_sweep`); ``doctor``, ``warm``, ``completion`` (`cli_install`).
 
 Exit codes: 0 all is well; 2 the user has to change something (one clean message on standard error,
 nothing is written); 3 a run could not go on (what it has is written, the message says when, where and
@@ -12,19 +13,22 @@ from __future__ import annotations
 
 import shlex
 import sys
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from time import perf_counter
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import cyclopts
 from cyclopts import Parameter
-from rich.console import Console
 
 import scenarios
-from subzero import cli_autopilot, cli_diagnosis, cli_sweep
+from subzero import cli_autopilot, cli_diagnosis, cli_install, cli_sweep, cli_trials
+from subzero.cli_examples import register
 from subzero.errors import UserError, printable
 from subzero.interrupts import INTERRUPTED, begin, came, words
+from subzero.voice import PLAIN, Voice, speak
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -34,7 +38,37 @@ if TYPE_CHECKING:
     Runs = dict[str, xr.Dataset]
 
 Flag = cli_autopilot.Flag
+Export = Annotated[tuple[str, ...], Parameter(negative=())]
 FINE, MISTAKE, STOPPED = 0, 2, 3
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class Outputs:
+    """Which files are made, and how.
+
+    Attributes:
+        export: further files, for other programs: mcap, mat, parquet or cf; more than one may be given.
+        width: of the figures in inches: 7.2 for two columns of a journal page, 3.4 for one.
+        figures: png, svg or pdf.
+        animate: film the replay of report.html as a gif or an mp4; needs Chromium and the extra [animate].
+    """
+
+    export: Export = ()
+    width: float | None = None
+    figures: Literal["png", "svg", "pdf"] = "png"
+    animate: Literal["gif", "mp4"] | None = None
+
+    def check(self) -> None:
+        """Refuse what cannot be made, before anything is simulated."""
+        from subzero.write_results import check_pictures
+
+        _refuse_no_export(self.export)
+        check_pictures(self.width, self.animate)
+
+    def kinds(self) -> dict[str, Any]:
+        """Return what `subzero.write_results.write_all` is to make."""
+        return {"width": self.width, "kind": self.figures, "exports": self.export}
 
 
 @Parameter(name="*")
@@ -70,7 +104,64 @@ class Inputs:
         return cli_diagnosis.extended_run(trial, self.with_, self.effects)
 
 
-NO_INPUTS = Inputs()
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class Kept:
+    """What is kept of it, and where.
+
+    Attributes:
+        out: folder for the files; by default one named after the scenario, here.
+        every: seconds between results that are kept, a whole number of cable steps; without it all are.
+        float64: write all numbers in double precision; shapes and forces by name have 7 digits without it.
+        checkpoint: minutes after which it is kept again how far the run is; the same command goes on from there.
+    """
+
+    out: Path | None = None
+    every: float | None = None
+    float64: Flag = False
+    checkpoint: float | None = None
+
+    def of(self, trial: scenarios.Trial) -> scenarios.Trial:
+        """Return a trial with the results that are asked for."""
+        return trial if self.every is None else replace(trial, every=self.every)
+
+    def folder(self, trial: scenarios.Trial) -> Path:
+        """Return where the files go."""
+        from subzero import write_results
+
+        return self.out or write_results.default_folder(trial)
+
+    @contextmanager
+    def kept_in(self, folder: Path) -> Iterator[dict[str, Any]]:
+        """Give the checkpoint of a command as an argument of a run; it is removed when all is delivered."""
+        if self.checkpoint is None:
+            yield {}
+            return
+        from subzero.checkpoint import Checkpoint
+        from subzero.interrupts import leaves
+
+        kept = Checkpoint(folder=folder / "checkpoint", minutes=self.checkpoint)
+        where = printable(str(kept.folder))
+
+        def left() -> str:
+            time = kept.stands_at()
+            if time is None:
+                return "nothing was kept yet"
+            return f"the run up to t = {time:g} s is kept in {where}; the same command goes on from there"
+
+        leaves(left)
+        if (time := kept.stands_at()) is not None:
+            print(f"Going on from t = {time:g} s, which is kept in {where}.", file=sys.stderr)
+        try:
+            yield {"checkpoint": kept}
+        except BaseException:
+            if kept.stands_at() is None:
+                kept.remove()
+            raise
+        kept.remove()
+
+
+NO_INPUTS, USUAL_OUTPUTS, ALL_KEPT = Inputs(), Outputs(), Kept()
 
 
 def _version() -> str:
@@ -87,29 +178,17 @@ app = cyclopts.App(
 )
 
 
-@app.command(name="list")
-def list_scenarios() -> int:
-    """List the scenarios that are shipped."""
-    from rich.markup import escape
-    from rich.table import Table
-
-    table = Table.grid(padding=(0, 2))
-    for name in scenarios.names():
-        table.add_row(f"[bold]{escape(name)}[/bold]", escape(scenarios.describe(name)))
-    Console(highlight=False).print(table)
-    return FINE
-
-
-@app.command
 def simulate(
     scenario: str,
     /,
     *,
     untethered: Annotated[bool, Parameter(negative=())] = False,
     inputs: Inputs = NO_INPUTS,
-    out: Path | None = None,
+    kept: Kept = ALL_KEPT,
     check: Flag = False,
     strict: Flag = False,
+    outputs: Outputs = USUAL_OUTPUTS,
+    voice: Voice = PLAIN,
 ) -> int:
     """Simulate one run, and write its channels, a summary and figures.
 
@@ -117,36 +196,43 @@ def simulate(
         scenario: name of a scenario (see "subzero list"), or path of a scenario file.
         untethered: leave the cable away.
         inputs: what is simulated besides the scenario.
-        out: folder for the files; by default one named after the scenario, here.
+        kept: what is kept of it, and where.
         check: run it once more with half the steps and half the segment length, and say what changes.
         strict: end with exit code 3 if the run ends with warnings.
+        outputs: which files are made, and how.
+        voice: how the command speaks.
     """
     from subzero import write_results
     from subzero.output import staged
 
     trial = inputs.read(scenario)
-    with staged(out or write_results.default_folder(trial)) as stage:
+    outputs.check()
+    folder = kept.folder(kept.of(trial))
+    with kept.kept_in(folder) as checkpoint, staged(folder) as stage:
         trial, extended = inputs.checked(scenario)
+        trial = kept.of(trial)
         with _progress(trial) as progress:
             from subzero.simulation import simulate as run
 
-            result = run(trial, tethered=not untethered, **extended, progress=progress)
+            result = run(trial, tethered=not untethered, **extended, **checkpoint, progress=progress)
         runs = {"untethered" if untethered else "tethered": result}
         runs = _refined(runs, trial, extended) if check else runs
-        summary = write_results.write_all(runs, None, stage)
-    return FINE if write_results.tell(summary, stage, strict=strict) else STOPPED
+        summary = write_results.write_all(runs, None, stage, **outputs.kinds(), float64=kept.float64)
+        write_results.write_film(outputs.animate, stage)
+    return FINE if write_results.tell(summary, stage, strict=strict, voice=voice) else STOPPED
 
 
-@app.command
 def compare(
     scenario: str,
     /,
     *,
     measured: Path | None = None,
     inputs: Inputs = NO_INPUTS,
-    out: Path | None = None,
+    kept: Kept = ALL_KEPT,
     check: Flag = False,
     strict: Flag = False,
+    outputs: Outputs = USUAL_OUTPUTS,
+    voice: Voice = PLAIN,
 ) -> int:
     """Simulate with the cable and without, and set both side by side.
 
@@ -154,9 +240,11 @@ def compare(
         scenario: name of a scenario (see "subzero list"), or path of a scenario file.
         measured: CSV file of measured channels, to set beside both runs.
         inputs: what is simulated besides the scenario.
-        out: folder for the files; by default one named after the scenario, here.
+        kept: what is kept of it, and where.
         check: run both once more with half the steps and half the segment length, and say what changes.
         strict: end with exit code 3 if a run ends with warnings.
+        outputs: which files are made, and how.
+        voice: how the command speaks.
     """
     from subzero import write_results
     from subzero.output import staged
@@ -164,20 +252,60 @@ def compare(
 
     trial = inputs.read(scenario)
     record = read_record(measured) if measured is not None else None
-    with staged(out or write_results.default_folder(trial)) as stage:
+    outputs.check()
+    folder = kept.folder(kept.of(trial))
+    with kept.kept_in(folder) as checkpoint, staged(folder) as stage:
         trial, extended = inputs.checked(scenario)
+        trial = kept.of(trial)
         with _progress(trial) as progress:
             from subzero.comparison import compare as run
 
-            result = run(trial, measured=record, **extended, progress=progress)
+            result = run(trial, measured=record, **extended, **checkpoint, progress=progress)
         runs = _refined(result.runs, trial, extended) if check else result.runs
-        summary = write_results.write_all(runs, result.measured, stage)
-    return FINE if write_results.tell(summary, stage, strict=strict) else STOPPED
+        summary = write_results.write_all(
+            runs, result.measured, stage, **outputs.kinds(), float64=kept.float64
+        )
+        write_results.write_film(outputs.animate, stage)
+    return FINE if write_results.tell(summary, stage, strict=strict, voice=voice) else STOPPED
 
 
-cli_autopilot.add_to(app)
-cli_diagnosis.add_to(app)
-cli_sweep.add_to(app)
+def plot(
+    run: Path,
+    /,
+    *,
+    what: Annotated[list[str] | None, Parameter(consume_multiple=True, negative=())] = None,
+    out: Path | None = None,
+    format: Literal["png", "svg", "pdf"] = "png",
+    voice: Voice = PLAIN,
+) -> int:
+    """Draw a run from its file again: figures by name, or any channel over time.
+
+    Args:
+        run: tethered.nc or untethered.nc of an earlier command.
+        what: tension, shape3d, motion, forces, attitude, cable; or channels, such as heading. Without it, all six.
+        out: folder for the figures; by default the folder of the run.
+        format: of the files.
+        voice: how the command speaks.
+    """
+    from subzero.stage import staged
+
+    names = [f"{run.stem}_{name}.{format}" for name in what or ()]
+    with staged(out or run.parent, names) as stage:
+        from subzero.accessor import figures_of, open_run
+
+        dataset = open_run(run)
+        for name, figure in figures_of(dataset, what).items():
+            figure.savefig(stage.path / f"{run.stem}_{name}.{format}")
+    with voice.tells(stage.files()):
+        print(stage.words())
+    return FINE
+
+
+cli_trials.add_to(app)
+for _command in (simulate, compare, plot):
+    register(app, _command)
+for _module in (cli_autopilot, cli_diagnosis, cli_sweep, cli_install):
+    _module.add_to(app)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -191,7 +319,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     _note_command(sys.argv[1:] if arguments is None else arguments)
     try:
         command, bound, _ = app.parse_args(arguments, exit_on_error=False, print_error=False)
-        return command(*bound.args, **bound.kwargs) or FINE
+        voice = next((one for one in bound.kwargs.values() if isinstance(one, Voice)), PLAIN)
+        with _aloud(voice):
+            return command(*bound.args, **bound.kwargs) or FINE
     except cyclopts.CycloptsError as error:
         return _refuse(f"{_in_words(error)}\nTry 'subzero --help'.")
     except UserError as error:
@@ -206,11 +336,39 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return INTERRUPTED
 
 
+@contextmanager
+def _aloud(voice: Voice) -> Iterator[None]:
+    """Let a command speak as it was asked to; with --verbose, say what runs, and in the end how long it took."""
+    speak(voice)
+    began = perf_counter()
+    if voice.verbose:
+        import platform
+
+        print(f"subzero {_version()}, Python {platform.python_version()}, {sys.executable}", file=sys.stderr)
+    try:
+        yield
+    finally:
+        speak(PLAIN)
+        if voice.verbose:
+            print(f"{_effort()}{perf_counter() - began:.1f} s in all.", file=sys.stderr)
+
+
+def _effort() -> str:
+    """Return what was compiled by this command and where it is kept, as far as it has needed any machine code."""
+    if "subzero.jit.machine_code" not in sys.modules:
+        return ""
+    from subzero.jit.machine_code import base_folder, made
+
+    return f"{made()} functions compiled; machine code is kept in {printable(str(base_folder()))}. "
+
+
 def _note_command(words: Sequence[str]) -> None:
-    """Keep the line that is carried out, for the pages that tell how to do it again."""
+    """Keep the line that is carried out, for the pages that tell how to do it again; where it writes to is no part."""
     from subzero.output import COMMAND
 
-    COMMAND.set(printable(shlex.join(["subzero", *words])))
+    kept = [word for before, word in zip(["", *words], words, strict=False)
+            if "--out" not in (before, word) and not word.startswith("--out=")]  # fmt: skip
+    COMMAND.set(printable(shlex.join(["subzero", *kept])))
 
 
 def _never_choke(*streams: Any) -> None:
@@ -233,9 +391,18 @@ def _in_words(error: cyclopts.CycloptsError) -> str:
     return str(error)
 
 
+def _refuse_no_export(kinds: Sequence[str]) -> None:
+    """Refuse a kind of file that nothing here writes, before the run."""
+    if kinds:
+        from subzero.exports import writer_of
+
+        for kind in kinds:
+            writer_of(kind)
+
+
 def _refined(runs: Runs, trial: scenarios.Trial, extended: dict[str, Any]) -> Runs:
     """Return runs that know how much they change with half the steps."""
-    from subzero.refinement import refine
+    from subzero.comparison import refine
 
     marked = {}
     for label, run in runs.items():

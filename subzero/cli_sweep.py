@@ -12,7 +12,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Self
 import cyclopts
 from cyclopts import Parameter
 
+from subzero.cli_examples import register
 from subzero.errors import UserError, printable
+from subzero.voice import PLAIN, Voice
 
 if TYPE_CHECKING:
     from subzero.sweeps.api import Standing
@@ -31,6 +33,7 @@ def sweep(
     scheduler: str | None = None,
     retry: Flag = False,
     strict: Flag = False,
+    voice: Voice = PLAIN,
 ) -> int:
     """Run a trial with many values of its parameters, and show what they do.
 
@@ -43,6 +46,7 @@ def sweep(
         scheduler: address of a Dask scheduler, such as tcp://host:8786, to run on its workers instead.
         retry: run members again that failed.
         strict: end with exit code 3 if a member's run ends with warnings.
+        voice: how the command speaks.
     """
     from subzero.sweeps.plan import read_plan
 
@@ -57,17 +61,17 @@ def sweep(
     with (
         _Bar(plan.description, len(plan.points.values), folder) as bar,
         _client(scheduler) as client,
-        finished(plan, folder, workers=workers, client=client, progress=bar, retry=retry) as store,
+        finished(plan, folder, workers=client or workers, progress=bar, retry=retry) as store,
         staged(folder, FILES) as stage,
     ):
         summary = write_sweep(plan, store, stage)
-    tell_sweep(summary, stage)
+    tell_sweep(summary, stage, voice)
     return STOPPED if summary["failed"] or (strict and summary["warnings"]) else FINE
 
 
 def add_to(app: cyclopts.App) -> None:
     """Add the command to the command line."""
-    app.command(sweep)
+    register(app, sweep)
 
 
 LINE_EVERY_S = 30.0
@@ -132,11 +136,12 @@ def _client(scheduler: str | None) -> Iterator[Any]:
         yield None
         return
     try:
-        from distributed import Client
+        import distributed
     except ImportError:
         raise UserError("--scheduler needs Dask: pip install 'subzero[cluster]'.") from None
+    connect: Any = distributed.Client
     try:
-        client = Client(scheduler, timeout=CONNECT_S)
+        client = connect(scheduler, timeout=CONNECT_S)
     except (OSError, ValueError, TypeError) as error:
         raise UserError(
             f"No Dask scheduler answers at {scheduler} ({error}). Start one with 'dask scheduler',"

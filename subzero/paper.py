@@ -48,9 +48,9 @@ from cable.feng_allen import (
 )
 from subzero.engine.coupling import ABSURD, CABLE_FAILED, FASTEST, FINE, _move, hull_steps
 from subzero.engine.energy import CABLE_LOSS, book
+from subzero.engine.external_wrench import tow_point, way_of_tow_point
 from subzero.engine.initial_conditions import first_state, prepare
-from subzero.engine.recording import Pace, Recording, Run, cut, new_recording, record_row
-from subzero.engine.vehicle_step import tow_point, way_of_tow_point
+from subzero.engine.recording import Pace, Recording, Run, cut, new_recording, record_row, thinned
 from subzero.jit import compiled
 from subzero.model import Model
 from subzero.run_state import Live, Setup
@@ -175,6 +175,9 @@ def _record_cable(w: BoxWorkspace, e: float, r: Recording, row: int, used: int) 
             r.position[used + j - 1, i] = r.position[used + j, i] - piece * t[i]
         r.length[row] += w.length[j]
         r.tension[used + j - 1] = near[0]
+    r.arc_length[used] = 0.0
+    for j in range(1, n):
+        r.arc_length[used + j] = r.arc_length[used + j - 1] + w.length[j]
     return end + 1
 
 
@@ -207,9 +210,10 @@ def run_as_printed(
         if progress is not None:
             progress(row / times.size)
     message = "The run reached its end." if ending == FINE else in_words(trial, ending, report, times[row])
-    return Run(
+    run = Run(
         times=times[:row], recording=cut(recording, row, used), completed=ending == FINE, message=message
     )
+    return thinned(run, trial.stride)
 
 
 def lay_cable(trial: scenarios.Trial, model: Model, setup: Setup, live: Live, rows: int) -> Printed:

@@ -15,7 +15,6 @@ whose components along t, n, b are the six scalar equations of Feng & Allen (200
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
 from math import sqrt
 from typing import Any
 
@@ -23,14 +22,13 @@ import numpy as np
 
 from cable.moving_end.state import NOW, Line
 from cable.properties import CableNumbers
-from subzero.jit import inlined, inner, packed
+from subzero.jit import Record, inlined, inner
 
 FOLDING = 0.3
 """How early a heaped segment loses its direction, see `chord_length`; without any effect on a taut one."""
 
 
-@dataclass(kw_only=True)
-class Load:
+class Load(Record):
     """Work space for one segment: what is known of it, its load q, and derivatives.
 
     Attributes:
@@ -67,10 +65,10 @@ class Load:
 
 def new_load() -> Load:
     """Return empty work space for one segment."""
-    parts: dict[str, Any] = {field.name: np.zeros(3) for field in fields(Load)}
+    parts: dict[str, Any] = {name: np.zeros(3) for name in Load.names}
     parts |= {name: np.zeros((3, 3)) for name in ("q_V", "q_d", "G", "by_near")}
     parts |= dict.fromkeys(("along", "side", "chord_length", "kt", "kn"), 0.0)
-    return packed(Load(**parts | {"by_far": np.zeros((3, 4))}))
+    return Load(**parts | {"by_far": np.zeros((3, 4))})
 
 
 @inlined

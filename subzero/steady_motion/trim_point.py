@@ -30,7 +30,7 @@ from typing import NoReturn
 
 import numpy as np
 
-import cable
+from cable import MovingEnd, pull_out
 from subzero.errors import UserError, real, short
 from subzero.model import Model
 from subzero.steady_motion.hull_state_space import (
@@ -105,9 +105,7 @@ def from_cable_model(
     from subzero.errors import UserError
 
     step = min(0.1, duration / 20.0)
-    run = cable.pull_out(
-        velocity_n, duration, cable=model.cable, drum=model.drum, scheme=cable.MovingEnd(time_step=step)
-    )
+    run = pull_out(velocity_n, duration, cable=model.cable, drum=model.drum, scheme=MovingEnd(time_step=step))
     if not run.outcome.completed:
         raise UserError(f"The cable has no steady pull along this way. {run.outcome.message}")
     F = R_nb.T @ run.tow_force[-1]

@@ -53,8 +53,8 @@ def _true(name: str, setting: Setting, truth: Truth) -> np.ndarray:
     r, scale = truth.run.recording, BY_NAME[name].scale
     if name in STATE:
         return scale * r.state[:, STATE[name]]
-    if name in ("roll", "pitch"):
-        return scale * r.attitude[:, ("roll", "pitch").index(name)]
+    if name in ("roll_angle", "pitch"):
+        return scale * r.attitude[:, ("roll_angle", "pitch").index(name)]
     if name == "heading":
         continuous = np.unwrap(r.attitude[:, 2])
         whole = np.round((setting.trial.start.heading - continuous[0]) / (2.0 * np.pi))
@@ -152,7 +152,7 @@ def simulate_reference(
     last = float(np.max(times)) + max(-setting.clock_offset, 0.0)
     steps = int(np.ceil(min(last, setting.trial.duration) / cable_step - 1e-6))
     trial = replace(setting.trial, cable_step=cable_step, segment_length=segment_length,
-                    hull_step=fitting_step(cable_step, hull_step), grading=0.0,
+                    hull_step=fitting_step(cable_step, hull_step), grading=0.0, far_grading=0.0, every=0.0,
                     duration=max(steps, 1) * cable_step)  # fmt: skip
     fine = replace(setting, trial=trial, later=_within(setting, trial))
     return seen(fine, truth_of(fine), times, channels)

@@ -20,7 +20,7 @@ from subzero.diagnosis.inference import (
     variances,
 )
 
-CHANNELS = ("surge_speed", "heading", "yaw_rate", "pitch", "roll", "depth")
+CHANNELS = ("surge_speed", "heading", "yaw_rate", "pitch", "roll_angle", "depth")
 COLOUR = 0.5
 
 

@@ -6,10 +6,9 @@ Verifies: report, table and figures of an undecided verdict. Configuration: a ve
 import dataclasses
 
 import numpy as np
-import pytest
 
 from subzero.diagnosis import CAUSE_NAMED, NOTHING_WRONG, UNDECIDED, Curves, Estimate, Rival, Verdict
-from subzero.diagnosis.report import html as report
+from subzero.diagnosis.report import sections as report
 from subzero.diagnosis.report import tables
 from subzero.figures import Title
 from subzero.figures.diagnosis import draw_diagnosis
@@ -48,14 +47,23 @@ def test_the_report_says_what_the_records_allow_and_that_nothing_is_new_in_the_m
 def test_the_others_are_drawn_beside_the_most_probable():
     figures = draw_diagnosis(undecided(), TITLE)
     legend = [text.get_text() for text in figures["rivals"].axes[0].get_legend().get_texts()]
-    assert legend == ["measured", "hull_drag", "propeller_thrust_slope"]
+    assert legend == [
+        "measured",
+        "if the hull drags more",
+        "if thrust falls faster",
+        "if nothing is wrong",
+    ]
     overlay = [text.get_text() for text in figures["misfit"].axes[0].get_legend().get_texts()]
-    assert {"nominal", "hull_drag"} < set(overlay)
+    assert {"simulated", "if the hull drags more"} < set(overlay)
 
 
-@pytest.mark.parametrize(("verdict", "drawn"), [(UNDECIDED, 1), (NOTHING_WRONG, 0)])
-def test_one_alone_has_nothing_beside_it(verdict, drawn):
-    figures = draw_diagnosis(undecided(verdict, drawn), TITLE)
-    assert "rivals" not in figures
-    overlay = [text.get_text() for text in figures["misfit"].axes[0].get_legend().get_texts()]
-    assert ("within tolerances" in overlay) is (verdict == NOTHING_WRONG)
+def test_one_alone_has_nothing_beside_it():
+    alone = dataclasses.replace(undecided(drawn=1), probabilities={"hull_drag": 1.0})
+    assert "rivals" not in draw_diagnosis(alone, TITLE)
+
+
+def test_a_healthy_record_is_drawn_with_the_calibrated_model_alone():
+    healthy = draw_diagnosis(undecided(NOTHING_WRONG, drawn=0), TITLE)
+    assert "rivals" not in healthy
+    overlay = [text.get_text() for text in healthy["misfit"].axes[0].get_legend().get_texts()]
+    assert "calibrated within tolerances" in overlay

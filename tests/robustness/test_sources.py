@@ -179,7 +179,7 @@ SETTLE = """
 import numpy as np
 from vehicle.actuators import ServoNumbers, settle
 state = np.arange(21.0)
-settle(state, np.zeros(4), (ServoNumbers(*[0.1] * len(ServoNumbers._fields)),) * 3)
+settle(state, np.zeros(4), (ServoNumbers(*[0.1] * len(ServoNumbers.names)),) * 3)
 print(state.tolist())
 """
 

@@ -4,7 +4,7 @@ Verifies: trials and their parts, models, vehicles, cables, drums, currents, win
 simulators, sensors, autopilots, trims, manoeuvres (`values.py` draws the cases: good, at the edge, absurd), in a
 process whose heap is checked and filled with rubbish. Tolerance: none; no crash, no exception but a `UserError`.
 
-The long form is 10 000 cases:  pytest -m slow tests/robustness/test_values.py -s
+The long form is 10 000 cases, and each odd value in each place:  pytest -m slow tests/robustness/test_values.py -s
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ import cable
 import scenarios
 import subzero
 from subzero import autopilot
+from subzero.external_force import MissingForce
 
 CASES = Path(__file__).with_name("values.py")
 SHORT, PIECES, LONG = 200, 5, 2000
@@ -42,30 +43,43 @@ def checking_heap():
     return os.environ | preload | {"MALLOC_CHECK_": "3", "MALLOC_PERTURB_": "85"}
 
 
-def tried(seed, count, folder):
-    """Try so many cases in a child process; return what came out."""
+def tried(which, count, folder):
+    """Try so many cases of a seed in a child process, or every odd value in every place; return what came out."""
     log = folder / "cases.txt"
     done = subprocess.run(
-        [sys.executable, "-W", "ignore", "-X", "faulthandler", str(CASES), str(seed), str(count), str(log)],
+        [sys.executable, "-W", "ignore", "-X", "faulthandler", str(CASES), str(which), str(count), str(log)],
         env=checking_heap(), capture_output=True, text=True, check=False,
     )  # fmt: skip
     last = log.read_text(encoding="utf-8").splitlines()[-1:] if log.exists() else []
     assert done.returncode == 0, f"died of {last}: {done.stderr[-3000:]}"
     found = json.loads(done.stdout.splitlines()[-1])
-    assert found["wrong"] == []
-    assert sum(found["counts"].values()) == count
-    assert min(found["counts"]["ran"], found["counts"]["refused"]) > 0.05 * count
+    assert not found["wrong"], "\n".join(map(str, found["wrong"]))
     return found["counts"]
 
 
+def drawn(seed, count, folder):
+    """Try so many random cases, many of which run and many of which are refused; return how many did what."""
+    counts = tried(seed, count, folder)
+    assert sum(counts.values()) == count
+    assert min(counts["ran"], counts["refused"]) > 0.05 * count
+    return counts
+
+
 def test_whatever_value_is_made_works_or_is_refused(tmp_path):
-    tried(0, SHORT, tmp_path)
+    drawn(0, SHORT, tmp_path)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("piece", range(1, 1 + PIECES))
 def test_ten_thousand_values_work_or_are_refused(piece, tmp_path):
-    print(f"\n{piece}: {tried(piece, LONG, tmp_path)}")
+    print(f"\n{piece}: {drawn(piece, LONG, tmp_path)}")
+
+
+@pytest.mark.slow
+def test_each_odd_value_in_each_place_works_or_is_refused(tmp_path):
+    counts = tried("every", 0, tmp_path)
+    print(f"\n{counts}")
+    assert counts["refused"] > 10_000
 
 
 @pytest.fixture(scope="module")
@@ -140,6 +154,15 @@ def test_values_cannot_be_changed_behind_the_checks(fig6):
 
 def ahead(_):
     return (1.0, 0.0, 0.0)
+
+
+def test_numbers_of_numpy_in_a_missing_force_are_numbers(fig6):
+    """JSON does not take them, and a run keeps its parameters as JSON."""
+    row = (np.uint8(3), 0.1, 0.0, 0.0, 0.0, np.float32(0.0))
+    force = MissingForce(time=np.array([0, 1]), wrench=(row, row))
+    model = dataclasses.replace(subzero.Model.of(fig6), missing=force)
+    run = subzero.simulate(dataclasses.replace(fig6, duration=0.2), tethered=False, model=model)
+    assert json.loads(run.attrs["parameters"])["missing"]["wrench"][0] == [3.0, 0.1, 0.0, 0.0, 0.0, 0.0]
 
 
 HEAVY = cable.CableProperties(mass_per_length=0.02)

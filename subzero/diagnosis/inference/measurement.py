@@ -32,7 +32,8 @@ def economical(setting: Setting, duration: float) -> Setting:
     cable_step = max(trial.cable_step, CABLE_STEP_S)
     steps = int(np.ceil(min(duration, trial.duration) / cable_step - 1e-9))
     made = replace(trial, hull_step=fitting_step(cable_step, hull_step), cable_step=cable_step,
-                   duration=steps * cable_step, segment_length=max(trial.segment_length, SEGMENT_M))  # fmt: skip
+                   duration=steps * cable_step, segment_length=max(trial.segment_length, SEGMENT_M),
+                   every=0.0)  # fmt: skip
     return replace(setting, trial=made)
 
 
@@ -42,7 +43,7 @@ def finer(setting: Setting) -> Setting:
     trial = setting.trial
     cable_step = min(trial.cable_step, cable_step)
     made = replace(trial, hull_step=fitting_step(cable_step, min(trial.hull_step, hull_step)), cable_step=cable_step,
-                   segment_length=min(trial.segment_length, segment))  # fmt: skip
+                   segment_length=min(trial.segment_length, segment), every=0.0)  # fmt: skip
     return replace(setting, trial=made)
 
 
@@ -128,7 +129,7 @@ TRUTHS: Mapping[str, Callable[[np.ndarray], np.ndarray]] = {
     "north": _column(0),
     "east": _column(1),
     "depth": _column(2),
-    "roll": _roll,
+    "roll_angle": _roll,
     "pitch": _pitch,
     "heading": _heading,
     "surge_speed": _surge_through_water,

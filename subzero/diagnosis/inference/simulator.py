@@ -22,9 +22,9 @@ from cable.moving_end import enlarged
 from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.engine import coupling
 from subzero.engine.coupling import FINE, exchange, hull_steps
+from subzero.engine.external_wrench import feel_current, row_at
 from subzero.engine.initial_conditions import go_on_with, most_hull_steps, prepare
 from subzero.engine.time_loop import NO_ROOM, SPARE
-from subzero.engine.vehicle_step import feel_current, row_at
 from subzero.jit import compiled, inner
 from subzero.model import Model
 from subzero.run_state import Live, Setup
