@@ -28,7 +28,8 @@ if TYPE_CHECKING:
         base: Any
         dtype: np.dtype[Any]
 
-        def tobytes(self) -> bytes: ...
+        def tobytes(self) -> bytes:
+            """Return the memory as bytes."""
 
         def __getitem__(self, name: str) -> Any: ...
         def __setitem__(self, name: str, value: Any) -> None: ...
