@@ -315,7 +315,7 @@ def write_cf(run: xr.Dataset, path: Path) -> None:
     """Write a run as netCDF by the CF conventions."""
     from subzero.output import write_netcdf
 
-    write_netcdf(as_cf(run), path)
+    write_netcdf(as_cf(run), path, float64=True)
 
 
 def as_cf(run: xr.Dataset) -> xr.Dataset:
