@@ -30,7 +30,8 @@ it for what stands outside the diagnosis).
 # ruff: noqa: I001 - in the order in which they stand on one another, not in that of the alphabet
 
 from subzero.diagnosis.inference.noise import Behind, Noise, Usual, estimate, resolution_of, spikes
-from subzero.diagnosis.inference.measurement import TRUTHS, economical, respond
+from subzero.diagnosis.inference.measurement import TRUTHS
+from subzero.diagnosis.inference.simulator import economical, respond
 from subzero.diagnosis.inference.problem import Observed, Problem
 from subzero.diagnosis.inference.posing import pose
 from subzero.diagnosis.inference.linear_gaussian import (
