@@ -12,12 +12,13 @@ floors            modules on the longest chain of imports inside the package; im
                   that defines it; a circle counts as one
 circles           sets of modules that import one another, by any import
 lone              modules with exactly one importer in the whole product (faces, ``__init__``, left out): fine if they
-                  are a whole concept, which a file of fewer than 80 lines is not
+                  are a whole concept, which a file of fewer than 80 lines is not, unless it is a row of a table that is
+                  meant to be added to: the catalogue of effects
 > 7 parameters    functions outside compiled kernels, ``self`` left out
 doc/source        lines of docstrings by lines
 test/source       lines of tests by lines; those of a test file are shared out over the packages that it imports
-engine faces      tests of a package whose file imports the faces of its engine, and nothing below (of the diagnosis
-                  ``subzero.diagnosis.inference`` and ``subzero.diagnosis.assessment``)
+engine faces      tests of a package whose file imports the faces of its rooms, and nothing below (of the diagnosis
+                  ``subzero.diagnosis.inference``, ``subzero.diagnosis.assessment`` and ``subzero.diagnosis.report``)
 below             tests of a package whose file imports more of it than its faces (a face: ``cable``, ``subzero``,
                   ``subzero.autopilot``, …, what a user imports)
 
@@ -50,13 +51,15 @@ ROWS = (
     "subzero",
 )
 """Packages with a row of their own; a module belongs to the first that holds it."""
-ENGINE_FACES = ("subzero.diagnosis.inference", "subzero.diagnosis.assessment")
+ENGINE_FACES = ("subzero.diagnosis.inference", "subzero.diagnosis.assessment", "subzero.diagnosis.report")
 """Packages whose tests import what their ``__all__`` names."""
 REST, ALL = "subzero, rest", "all"
 COMPILERS = {"compiled", "inner", "inlined", "allocating", "intrinsic"}
 MOST_PARAMETERS = 7
 SHORT_LINES = 80
 """A file with one importer and fewer lines than this is no whole concept, but a part of its importer."""
+TABLES = ("subzero.diagnosis.hypothesis.catalogue",)
+"""Packages whose files are rows of a table, one file for each part of the vehicle."""
 
 Graph = dict[str, set[str]]
 
@@ -81,8 +84,9 @@ class Figures:
 
     @property
     def short_lone(self) -> list[str]:
-        """The lone modules that are too short to be a whole concept by themselves."""
-        return [name for name, lines in self.lone.items() if lines < SHORT_LINES]
+        """The lone modules that are too short to be a whole concept by themselves, and no rows of a table."""
+        short = [name for name, lines in self.lone.items() if lines < SHORT_LINES]
+        return [name for name in short if name.rpartition(".")[0] not in TABLES]
 
 
 class Module:

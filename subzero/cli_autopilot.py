@@ -13,7 +13,7 @@ from cyclopts import Parameter
 
 import scenarios
 from subzero.cli_examples import register
-from subzero.voice import PLAIN, Voice
+from subzero.voice import NOT_STRICT, StrictVoice
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -83,8 +83,7 @@ def manoeuvre(
     planes: float | None = None,
     speed: float = 1.0,
     out: Path | None = None,
-    strict: Flag = False,
-    voice: Voice = PLAIN,
+    voice: StrictVoice = NOT_STRICT,
 ) -> int:
     """Fly a manoeuvre with the cable and without, and measure it.
 
@@ -95,7 +94,6 @@ def manoeuvre(
         planes: size of a manoeuvre with the stern-planes, in degrees.
         speed: of the bare hull before it, in m/s.
         out: folder for the files; by default one named after the manoeuvre, here.
-        strict: end with exit code 3 if a run ends with warnings.
         voice: how the command speaks.
     """
     trial = scenarios.load(scenario)  # a mistake in it answers at once
@@ -109,7 +107,7 @@ def manoeuvre(
 
     meaning = f": {MANOEUVRES[name].meaning}" if name in MANOEUVRES else ""
     shown = MANOEUVRE_COMMANDS.get(name, ("heading", "rudder_command"))
-    return _deliver(trial, fly, out or Path(name), f"{name}{meaning}", shown, strict, voice)
+    return _deliver(trial, fly, out or Path(name), f"{name}{meaning}", shown, voice)
 
 
 def fly_step(
@@ -120,8 +118,7 @@ def fly_step(
     size: float | None = None,
     speed: float = 1.0,
     out: Path | None = None,
-    strict: Flag = False,
-    voice: Voice = PLAIN,
+    voice: StrictVoice = NOT_STRICT,
 ) -> int:
     """Let an autopilot follow a step, with the cable and without, and measure it.
 
@@ -132,7 +129,6 @@ def fly_step(
         size: of the step, in degrees, m or m/s.
         speed: to hold, in m/s.
         out: folder for the files; by default one named after the step, here.
-        strict: end with exit code 3 if a run ends with warnings.
         voice: how the command speaks.
     """
     trial = scenarios.load(scenario)  # a mistake in it answers at once
@@ -146,7 +142,7 @@ def fly_step(
 
     title = f"{name}: autopilot {pilot.autopilot}, fed forward of the cable: {pilot.feed_forward}"
     shown = STEP_COMMANDS.get(name, ("heading", "rudder_command"))
-    return _deliver(trial, fly, out or Path(name), title, shown, strict, voice)
+    return _deliver(trial, fly, out or Path(name), title, shown, voice)
 
 
 def add_to(app: cyclopts.App) -> None:
@@ -172,8 +168,7 @@ def _deliver(
     folder: Path,
     title: str,
     shown: tuple[str, str],
-    strict: bool,
-    voice: Voice,
+    voice: StrictVoice,
 ) -> int:
     """Fly with the cable and without, write and tell; return the exit code."""
     from subzero.autopilot import AutopilotWarning, output
@@ -192,4 +187,4 @@ def _deliver(
     stopped = output.tell(summary, list(measured), stage, voice)
     for message in stopped:
         print(message, file=sys.stderr)
-    return STOPPED if stopped or (strict and refuse_warnings(summary)) else FINE
+    return STOPPED if stopped or (voice.strict and refuse_warnings(summary)) else FINE

@@ -42,11 +42,9 @@ from cable.moving_end.segment_load import (
     Load,
     differentiate_load,
     evaluate_load,
-    fading_rate,
     take_segment,
-    turning_rate,
 )
-from cable.moving_end.slack_law import slack_law
+from cable.moving_end.slack_law import fading_rate, slack_law, turning_rate
 from cable.moving_end.state import (
     BEFORE,
     DIAGONAL,

@@ -20,7 +20,8 @@ import numpy as np
 
 from cable.drum import LENGTH, STANDING, TENSION, DrumNumbers
 from cable.moving_end.block_solver import factor, solve
-from cable.moving_end.segment_load import Load, chord_length, segment_momentum
+from cable.moving_end.segment_load import Load, segment_momentum
+from cable.moving_end.slack_law import chord_length
 from cable.moving_end.state import BEFORE, DIAGONAL, LOWER, NOW, RESIDUAL, UPPER, Line
 from cable.properties import CableNumbers
 from subzero.jit import allocating, inner

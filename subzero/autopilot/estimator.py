@@ -20,7 +20,7 @@ from subzero.autopilot.linear import linearise, subsystem
 from subzero.autopilot.loops import refuse_unknown
 from subzero.autopilot.tuning import Tuning
 from subzero.channels import Observation
-from subzero.steady_motion.trim_point import trim
+from subzero.steady_motion.trim import trim
 
 STATES = ("sway_speed", "yaw_rate", "heading", "rudder_angle")
 TRACKED = ("yaw_rate", "heading")

@@ -25,7 +25,7 @@ from subzero.errors import UserError, checked, chosen
 from subzero.model import Model, load, model_of
 from subzero.simulation import Progress
 from subzero.steady_motion.hull_state_space import INPUT_NAMES
-from subzero.steady_motion.trim_point import trim
+from subzero.steady_motion.trim import trim
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -16,7 +16,7 @@ from subzero.autopilot.tuning import Tuning
 from subzero.errors import UserError, checked, chosen, real, short
 from subzero.model import Model, load
 from subzero.simulation import Progress
-from subzero.steady_motion.trim_point import trim
+from subzero.steady_motion.trim import trim
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

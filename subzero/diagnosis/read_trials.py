@@ -60,7 +60,7 @@ def read_trials(
         paths: CSV files, or folders of them.
         scenario: the trial of every record whose sidecar does not name one.
         commands: "record" or "scenario", if a record's commands may differ from the scenario's.
-        simulated: the nominal simulation; `subzero.diagnosis.inference.measurement.respond` if None.
+        simulated: the nominal simulation; `subzero.diagnosis.inference.simulator.respond` if None.
 
     Raises:
         UserError: a record, or its sidecar, cannot be used.
@@ -159,7 +159,7 @@ def _checked(logged: Logged, sidecar: Metadata, simulated: Simulated | None) -> 
 
 def _nominal() -> Simulated:
     """Return the simulation itself; the compiler comes only with it."""
-    from subzero.diagnosis.inference.measurement import respond
+    from subzero.diagnosis.inference.simulator import respond
 
     return respond
 

@@ -295,13 +295,13 @@ def _check_fins(start: scenarios.Start, model: Model) -> None:
 def _steady(trial: scenarios.Trial, model: Model, tethered: bool) -> np.ndarray:
     """Return the state of a trial that starts in trim."""
     from subzero.steady_motion.hull_state_space import to_vehicle
-    from subzero.steady_motion.trim_point import trim
+    from subzero.steady_motion.trim_point import Asked, steady_motion
 
     start, water = trial.start, _water_at_the_start(model, trial.start.depth)
     wet, speed, R = start.wet_length if tethered else 0.0, start.surge_speed, np.empty((3, 3))
     for _ in range(PASSES if water.any() else 1):
         try:
-            x = trim(model, speed=speed, wet_length=wet, roll=start.roll).state.copy()
+            x = steady_motion(model, Asked(speed=speed, wet_length=wet, roll=start.roll)).state.copy()
         except UserError as error:
             what = f"'{printable(trial.name)}' cannot start in trim at {start.surge_speed:g} m/s over ground"
             raise type(error)(f"{what}: {error}") from None

@@ -32,8 +32,15 @@ it for what stands outside the diagnosis).
 
 from subzero.diagnosis.hypothesis.hypotheses import PRIOR, columns_of, entries_of, log_prior, variances
 from subzero.diagnosis.inference.noise import Behind, Noise, Usual, estimate, resolution_of, spikes
-from subzero.diagnosis.inference.measurement import TRUTHS, economical, respond
-from subzero.diagnosis.inference.simulator import RunCache, simulate_on, simulate_track, with_stops
+from subzero.diagnosis.inference.measurement import TRUTHS
+from subzero.diagnosis.inference.simulator import (
+    RunCache,
+    economical,
+    respond,
+    simulate_on,
+    simulate_track,
+    with_stops,
+)
 from subzero.diagnosis.inference.problem import Observed, Problem
 from subzero.diagnosis.inference.posing import pose
 from subzero.diagnosis.inference.linear_gaussian import (

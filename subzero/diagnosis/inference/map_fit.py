@@ -13,14 +13,16 @@ noise is estimated behind it.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from subzero.diagnosis.hypothesis.hypotheses import Ids
 from subzero.diagnosis.inference import settings
 from subzero.diagnosis.inference.linear_gaussian import Quadratic
-from subzero.diagnosis.inference.problem import Problem
+
+if TYPE_CHECKING:
+    from subzero.diagnosis.hypothesis.hypotheses import Ids
+    from subzero.diagnosis.inference.problem import Problem
 
 POOR_FIT_SIGMAS = 2.0
 """A fit whose sum of squares is this many of its standard deviations above that of noise is poor."""

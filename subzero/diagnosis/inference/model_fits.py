@@ -12,7 +12,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import partial
 from os import cpu_count
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
@@ -22,8 +22,10 @@ from subzero.diagnosis.inference.laplace import Candidate, candidate_of
 from subzero.diagnosis.inference.linear_gaussian import posterior
 from subzero.diagnosis.inference.map_fit import Fit, refit
 from subzero.diagnosis.inference.posing import whitened_again, with_finer_steps, with_noise_behind
-from subzero.diagnosis.inference.problem import Problem, Progress
 from subzero.diagnosis.inference.screening import Screening, is_flat, screening_of
+
+if TYPE_CHECKING:
+    from subzero.diagnosis.inference.problem import Problem, Progress
 
 Asked = TypeVar("Asked")
 Made = TypeVar("Made")

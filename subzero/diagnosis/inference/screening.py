@@ -9,11 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from subzero.diagnosis.hypothesis.effect import Parameter
 from subzero.diagnosis.hypothesis.hypotheses import (
     Entry,
     Ids,
@@ -35,7 +34,10 @@ from subzero.diagnosis.inference.linear_gaussian import (
 )
 from subzero.diagnosis.inference.map_fit import Fit, at_bad_minimum, refit, restarted_where_smooth
 from subzero.diagnosis.inference.posing import with_noise_behind
-from subzero.diagnosis.inference.problem import Problem, Progress
+
+if TYPE_CHECKING:
+    from subzero.diagnosis.hypothesis.effect import Parameter
+    from subzero.diagnosis.inference.problem import Problem, Progress
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
