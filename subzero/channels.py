@@ -18,6 +18,8 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
+import numpy as np
+
 DEGREE = 180.0 / math.pi
 REVOLUTION = 1.0
 
@@ -206,3 +208,18 @@ class Observation(NamedTuple):
     cable_moment_roll: float
     cable_moment_pitch: float
     cable_moment_yaw: float
+
+
+HEADING = "heading"
+TURN = 360.0
+FIRST = 9
+"""Samples that say where a record begins: a few of them may be outliers."""
+
+
+def turned(heading: np.ndarray, like: np.ndarray | float) -> np.ndarray:
+    """Return a heading (n,) with the whole turns more or less that bring its first samples close to those of another,
+    (n,) or one. [degree]
+    """
+    apart = np.asarray(like - heading)
+    first = apart[np.isfinite(apart)][:FIRST]
+    return heading + TURN * np.round(np.median(first) / TURN) if first.size else heading

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 import scenarios
-from subzero.channels import BY_NAME
+from subzero.channels import BY_NAME, HEADING, turned
 from subzero.diagnosis.hypothesis.catalogue.sensors import NOISE, SPECS
 from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.logged import Logged
@@ -38,7 +38,7 @@ from subzero.records.consistency import (
     without_repeats,
 )
 from subzero.records.metadata import Metadata, read_metadata
-from subzero.records.record import HEADING, Record, fits, modelled, read_record, turned
+from subzero.records.record import Record, fits, modelled, read_record
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -13,10 +13,11 @@ import pytest
 from numpy.testing import assert_allclose
 
 import subzero
+from subzero.channels import turned
 from subzero.diagnosis import START, Logged, Setting
 from subzero.diagnosis.inference import pose, respond
 from subzero.records.consistency import unit_questions
-from subzero.records.record import Record, read_record, turned
+from subzero.records.record import Record, read_record
 from subzero.synthetic.challenge import Challenge, write
 from subzero.synthetic.planted import Hidden
 from subzero.synthetic.reference_run import simulate_reference

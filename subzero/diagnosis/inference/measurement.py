@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from subzero.channels import DEGREE
-from subzero.records.record import HEADING, turned
+from subzero.channels import DEGREE, HEADING, turned
 from vehicle.state import QUATERNION, SHAFT, STATE_SIZE, VELOCITY
 
 if TYPE_CHECKING:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from subzero.channels import HEADING, turned
 from subzero.diagnosis.hypothesis.catalogue import ONSETS, START, catalogue
 from subzero.diagnosis.hypothesis.catalogue.sensors import SPECS
 from subzero.diagnosis.hypothesis.hypotheses import entries_of
@@ -29,7 +30,6 @@ from subzero.diagnosis.inference.noise import (
 from subzero.diagnosis.inference.problem import Observed, Problem
 from subzero.diagnosis.inference.simulator import economical, finer, respond
 from subzero.errors import UserError
-from subzero.records.record import HEADING, turned
 
 if TYPE_CHECKING:
     from subzero.diagnosis.hypothesis.effect import Effect
