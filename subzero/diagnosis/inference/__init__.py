@@ -4,7 +4,7 @@ what is computed                                          file
 --------------------------------------------------------  -----------------
 parameter vector z, its prior, prior of hypotheses        ../hypothesis/hypotheses
 noise of a channel, whitening, its estimate               noise
-h(z): what the sensors would have measured                measurement
+h(z): what the sensors would have measured                ../hypothesis/measurement
 one simulation, from its start or from a stop             simulator
 r(z) and J of all records                                 problem
 records → problem                                         posing
@@ -32,7 +32,7 @@ it for what stands outside the diagnosis).
 
 from subzero.diagnosis.hypothesis.hypotheses import PRIOR, columns_of, entries_of, log_prior, variances
 from subzero.diagnosis.inference.noise import Behind, Noise, Usual, estimate, resolution_of, spikes
-from subzero.diagnosis.inference.measurement import TRUTHS
+from subzero.diagnosis.hypothesis.measurement import TRUTHS
 from subzero.diagnosis.inference.simulator import (
     RunCache,
     economical,

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from subzero.diagnosis.hypothesis.hypotheses import Entry, grouped
-from subzero.diagnosis.inference.measurement import sensed, truth
+from subzero.diagnosis.hypothesis.measurement import sensed, truth
 from subzero.diagnosis.inference.simulator import (
     RunCache,
     Stop,

@@ -21,7 +21,7 @@ import numpy as np
 import vehicle
 from cable.moving_end import enlarged
 from scenarios.steps import fitting_step
-from subzero.diagnosis.inference.measurement import (
+from subzero.diagnosis.hypothesis.measurement import (
     COLUMNS,
     LENGTH,
     RUDDER,
