@@ -14,6 +14,7 @@ Names come from their modules when they are first used, so that ``import subzero
 `Simulator` steps a run for a controller of your own,
 `diagnose` says what a simulation gets wrong in measured records, `read_trials` reads those as `Logged`, `challenge`
 hides an effect in a record to try that out,
+`sweep` runs a trial with many values of its parameters (`plan_sweep` says which without running them),
 `autopilot` leads to linear models and controllers, `CHANNELS` is the table of everything that a run gives.
 """
 
@@ -26,21 +27,22 @@ _HOME = {
     "Comparison": ("subzero.comparison", "Comparison"),
     "Logged": ("subzero.diagnosis.hypothesis.logged", "Logged"),
     "Model": ("subzero.model", "Model"),
-    "Observation": ("subzero.simulator", "Observation"),
+    "Observation": ("subzero.channels", "Observation"),
     "Record": ("subzero.records.record", "Record"),
-    "Refinement": ("subzero.refinement", "Refinement"),
+    "Refinement": ("subzero.comparison", "Refinement"),
     "RunWarning": ("subzero.validity", "RunWarning"),
     "RunStoppedError": ("subzero.simulator", "RunStoppedError"),
     "Simulator": ("subzero.simulator", "Simulator"),
     "UserError": ("subzero.errors", "UserError"),
     "challenge": ("subzero.synthetic.challenge", "challenge"),
-    "check": ("subzero.refinement", "check"),
+    "check": ("subzero.comparison", "check"),
     "compare": ("subzero.comparison", "compare"),
     "diagnose": ("subzero.diagnosis.api", "diagnose"),
     "draw": ("subzero.figures", "draw"),
     "export": ("subzero.exports", "export"),
     "load_scenario": ("subzero.model", "load"),
     "open_run": ("subzero.accessor", "open_run"),
+    "plan_sweep": ("subzero.sweeps.plan", "plan_sweep"),
     "read_record": ("subzero.records.record", "read_record"),
     "read_trials": ("subzero.diagnosis.read_trials", "read_trials"),
     "simulate": ("subzero.simulation", "simulate"),
@@ -50,7 +52,7 @@ _HOME = {
 }
 """Public name → (module, name there)."""
 
-_PACKAGES = ("autopilot",)
+_PACKAGES = ("autopilot", "sweeps")
 """Packages inside, fetched as a whole."""
 
 _GIVE_RUNS = ("Comparison", "Simulator", "autopilot", "compare", "open_run", "simulate")

@@ -31,6 +31,7 @@ import numpy as np
 
 from subzero.engine.recording import BY_NODE, BY_TIME, Recording, Standing, new_recording, row_of
 from subzero.errors import UserError, checked, printable
+from subzero.jit import Record
 from subzero.stage import FULL
 
 MANIFEST, STATE, LOCK = "manifest.json", "state.npz", "lock"
@@ -183,7 +184,7 @@ def _rows_file(number: int) -> str:
 
 def _arrays(value: Any, name: str) -> dict[str, np.ndarray]:
     """Return the arrays and records that a value of a run is made of, by their path; records as bytes."""
-    if isinstance(value, np.void):
+    if isinstance(value, Record):
         return {name: np.frombuffer(value.tobytes(), np.uint8)}
     if isinstance(value, np.ndarray):
         return {name: value}
@@ -193,7 +194,7 @@ def _arrays(value: Any, name: str) -> dict[str, np.ndarray]:
 
 def _restored(like: Any, name: str, arrays: Mapping[str, np.ndarray]) -> Any:
     """Return a value from its arrays, made as another one of its kind."""
-    if isinstance(like, np.void):
+    if isinstance(like, Record):
         return np.frombuffer(arrays[name].tobytes(), like.dtype).copy()[0]
     if isinstance(like, np.ndarray):
         found = arrays[name]

@@ -28,7 +28,7 @@ from subzero import cli_autopilot, cli_diagnosis, cli_install, cli_sweep, cli_tr
 from subzero.cli_examples import register
 from subzero.errors import UserError, printable
 from subzero.interrupts import INTERRUPTED, begin, came, words
-from subzero.voice import PLAIN, Voice, speak
+from subzero.voice import NOT_STRICT, PLAIN, StrictVoice, Voice, speak
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -186,9 +186,8 @@ def simulate(
     inputs: Inputs = NO_INPUTS,
     kept: Kept = ALL_KEPT,
     check: Flag = False,
-    strict: Flag = False,
     outputs: Outputs = USUAL_OUTPUTS,
-    voice: Voice = PLAIN,
+    voice: StrictVoice = NOT_STRICT,
 ) -> int:
     """Simulate one run, and write its channels, a summary and figures.
 
@@ -198,7 +197,6 @@ def simulate(
         inputs: what is simulated besides the scenario.
         kept: what is kept of it, and where.
         check: run it once more with half the steps and half the segment length, and say what changes.
-        strict: end with exit code 3 if the run ends with warnings.
         outputs: which files are made, and how.
         voice: how the command speaks.
     """
@@ -219,7 +217,7 @@ def simulate(
         runs = _refined(runs, trial, extended) if check else runs
         summary = write_results.write_all(runs, None, stage, **outputs.kinds(), float64=kept.float64)
         write_results.write_film(outputs.animate, stage)
-    return FINE if write_results.tell(summary, stage, strict=strict, voice=voice) else STOPPED
+    return FINE if write_results.tell(summary, stage, strict=voice.strict, voice=voice) else STOPPED
 
 
 def compare(
@@ -230,9 +228,8 @@ def compare(
     inputs: Inputs = NO_INPUTS,
     kept: Kept = ALL_KEPT,
     check: Flag = False,
-    strict: Flag = False,
     outputs: Outputs = USUAL_OUTPUTS,
-    voice: Voice = PLAIN,
+    voice: StrictVoice = NOT_STRICT,
 ) -> int:
     """Simulate with the cable and without, and set both side by side.
 
@@ -242,7 +239,6 @@ def compare(
         inputs: what is simulated besides the scenario.
         kept: what is kept of it, and where.
         check: run both once more with half the steps and half the segment length, and say what changes.
-        strict: end with exit code 3 if a run ends with warnings.
         outputs: which files are made, and how.
         voice: how the command speaks.
     """
@@ -266,7 +262,7 @@ def compare(
             runs, result.measured, stage, **outputs.kinds(), float64=kept.float64
         )
         write_results.write_film(outputs.animate, stage)
-    return FINE if write_results.tell(summary, stage, strict=strict, voice=voice) else STOPPED
+    return FINE if write_results.tell(summary, stage, strict=voice.strict, voice=voice) else STOPPED
 
 
 def plot(
@@ -402,7 +398,7 @@ def _refuse_no_export(kinds: Sequence[str]) -> None:
 
 def _refined(runs: Runs, trial: scenarios.Trial, extended: dict[str, Any]) -> Runs:
     """Return runs that know how much they change with half the steps."""
-    from subzero.refinement import refine
+    from subzero.comparison import refine
 
     marked = {}
     for label, run in runs.items():

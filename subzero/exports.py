@@ -87,7 +87,7 @@ def write_mcap(run: xr.Dataset, path: Path) -> None:
     from mcap.writer import Writer
 
     with open(path, "wb") as stream:
-        log = Writer(stream)
+        log: Any = Writer(stream)
         log.start(profile="", library=f"subzero {run.attrs.get('subzero_version', '')}".strip())
         log.add_metadata("run", {name: str(value) for name, value in run.attrs.items()})
         topics = {topic: _topic(log, topic, *about) for topic, about in _topics(run).items()}

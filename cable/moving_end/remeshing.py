@@ -27,7 +27,7 @@ MERGE_AT = 0.5
 def accept(line: Line, step: float, c: CableNumbers, work: Load) -> None:
     """Make level NEW the present one; split the last segment while it is too long, join it while it is too short."""
     N = line.ends.count
-    for level in (BEFORE, NOW):
+    for level in (BEFORE, NOW):  # the oldest first: each takes over what the next newer one has
         for j in range(N + 1):
             for i in range(3):
                 line.position[level, j, i] = line.position[level - 1, j, i]
@@ -42,14 +42,14 @@ def accept(line: Line, step: float, c: CableNumbers, work: Load) -> None:
     fill_node_tensions(line)
     line.ends.previous_step = step
     line.ends.time += step
-    if line.ends.free_end:
+    if line.ends.layout.free_end:
         return
     last = line.ends.last_length
     while last[NOW] > SPLIT_AT * spacing(line) and line.ends.count < line.length.size - 1:
         split_last(line, spacing(line), c, work)
     while line.ends.count > 1 and last[NOW] < MERGE_AT * line.length[line.ends.count - 1]:
         merge_last(line, c, work)
-    if line.ends.far_grading > 0.0:
+    if line.ends.layout.far_grading > 0.0:
         join_far(line, c, work)
 
 
@@ -69,6 +69,8 @@ def split_last(line: Line, segment_length: float, c: CableNumbers, work: Load) -
         _insert_between(line.position[level], N, fraction, beyond)
         _insert_between(line.velocity[level], N, fraction, beyond)
         _insert_between(line.water[level], N, fraction, beyond)
+        # The same off both levels: a backward difference of the length, the pay-out rate, sees no jump. At level BEFORE
+        # it may be negative, for a node that was still on the drum.
         line.ends.last_length[level] -= segment_length
         if level == NOW:
             near, end = line.node_tension[N - 1], line.node_tension[N]
@@ -78,6 +80,7 @@ def split_last(line: Line, segment_length: float, c: CableNumbers, work: Load) -
     line.length[N] = segment_length
     line.ends.count = N + 1
     line.ends.settled += segment_length
+    # Momenta are remembered for whole segments (d(ℓp)/dt in `assembly`), so both parts need theirs at both levels.
     for level in (NOW, BEFORE):
         segment_momentum(line, level, N, segment_length, c, work)
         segment_momentum(line, level, N + 1, line.ends.last_length[level], c, work)
@@ -141,11 +144,11 @@ def join_far(line: Line, c: CableNumbers, work: Load) -> None:
     b metres beyond `far_length` from the nearer end, a segment may be Δs + g s + g₁ b long. The ends stay fine: there a
     cable bends, the vehicle by its turns, a current or the cable's weight beside the drum, where it hardly pulls.
     """
-    ends, along, j = line.ends, 0.0, 1
+    ends, layout, along, j = line.ends, line.ends.layout, 0.0, 1
     while j < ends.count - 1:
         whole = line.length[j] + line.length[j + 1]
-        beyond = min(along, ends.settled + ends.last_length[NOW] - along - whole) - ends.far_length
-        longest = ends.segment_length + ends.grading * along + ends.far_grading * beyond
+        beyond = min(along, ends.settled + ends.last_length[NOW] - along - whole) - layout.far_length
+        longest = layout.segment_length + layout.grading * along + layout.far_grading * beyond
         if beyond > 0.0 and whole <= longest and min(line.tension[NOW, j], line.tension[NOW, j + 1]) > KNOWN:
             cut_off = _cut_off(line, j)
             if cut_off <= STRAIGHT:
@@ -207,7 +210,7 @@ def end_tensions(line: Line) -> tuple[float, float]:
     T(0) is the size of the force (12); T(S) is the tension that drives the drum (11), with the drag and the inertia
     of the last half segment; a slack end has none.
     """
-    F = line.ends.tow_force
+    F = line.ends.tow.force
     return sqrt(F[0] * F[0] + F[1] * F[1] + F[2] * F[2]), max(line.ends.drum_pull, 0.0)
 
 

@@ -18,7 +18,6 @@ from __future__ import annotations
 
 import numpy as np
 
-import vehicle
 from cable.moving_end import (
     ADDED_MASS,
     AT_DRUM,
@@ -32,10 +31,10 @@ from cable.moving_end import (
     energy_flow,
     take_jolt,
 )
-from subzero.engine.vehicle_step import feel_current, row_at, tow_wrench
-from subzero.external_force import add_missing
+from subzero.engine.external_wrench import add_missing, feel_current, row_at, tow_wrench
 from subzero.jit import allocating, inlined, inner
 from subzero.run_state import HEADING, LINEAR_ROWS, PITCH, TIME, Live, Setup
+from vehicle import kinetic_energy, power, rotation
 
 PROPELLER, HULL_LOSS, CABLE_LOSS, KINETIC, DRUM, ADDED, RESIDUAL = range(7)
 """Rows of `Ledger.total`, in the order of the energy channels. [J]"""
@@ -91,7 +90,7 @@ def _book_hull(setup: Setup, live: Live, start: float, span: float, steps: int) 
     if setup.fixed.prescribed:
         return
     # A difference of states, not a sum of powers: exact, so that the residual shows the errors of the other terms.
-    kinetic = vehicle.kinetic_energy(live.path[steps], live.now.hull.current, setup.fixed.vehicle)
+    kinetic = kinetic_energy(live.path[steps], live.now.hull.current, setup.fixed.vehicle)
     total[KINETIC] += kinetic - ledger.kinetic
     ledger.kinetic = kinetic
 
@@ -114,7 +113,7 @@ def _hull_power(
             hull.wrench[i] = 0.0
         if setup.fixed.lacking:
             add_missing(setup, live, live.path[row], command, time, hull)
-    vehicle.power(live.path[row], command, hull.current, hull.wrench, setup.fixed.vehicle, out)
+    power(live.path[row], command, hull.current, hull.wrench, setup.fixed.vehicle, out)
 
 
 AT_KNOT = 1e-9
@@ -154,6 +153,6 @@ def _jump_of_tow_point(setup: Setup, live: Live, row: int, out: np.ndarray) -> N
     turn = _rate(track, HEADING, row) - _rate(track, HEADING, row - 1)
     p, q, yaw = -turn * np.sin(track[PITCH, row]), dive, turn * np.cos(track[PITCH, row])
     x, y, z = q * r[2] - yaw * r[1], yaw * r[0] - p * r[2], p * r[1] - q * r[0]
-    vehicle.rotation(live.state[3:7], R)
+    rotation(live.state[3:7], R)
     for i in range(3):
         out[i] = R[i, 0] * x + R[i, 1] * y + R[i, 2] * z

@@ -12,12 +12,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-import vehicle
 from cable.moving_end import NOW
-from subzero.engine.vehicle_step import feel_current, row_at, tow_wrench
+from subzero.engine.external_wrench import feel_current, row_at, tow_wrench
 from subzero.jit import compiled
 from subzero.run_state import Live, Setup
-from vehicle import BREAKDOWN, STATE_SIZE
+from vehicle import BREAKDOWN, STATE_SIZE, battery_voltage, breakdown, deflections, euler_angles
 
 BREATH_S = 0.1
 """Compiled code computes for about so long before Python moves the progress bar and heeds an interrupt. [s]"""
@@ -167,7 +166,7 @@ def record_row(setup: Setup, live: Live, recording: Recording, row: int, time: f
         r.state[row, i] = state[i]
     for i in range(4):
         r.command[row, i] = command[i]
-    angles = vehicle.euler_angles(state[3:7])
+    angles = euler_angles(state[3:7])
     for i in range(3):
         r.attitude[row, i] = angles[i]
         r.tow_force[row, i] = live.now.force[i]
@@ -177,12 +176,12 @@ def record_row(setup: Setup, live: Live, recording: Recording, row: int, time: f
         r.wrench[row, i] = live.now.hull.wrench[i]
     for i in range(7):
         r.energy[row, i] = live.now.ledger.total[i]
-    r.fins[row, 0], r.fins[row, 1], r.fins[row, 2] = vehicle.deflections(state, command, setup.fixed.vehicle)
+    r.fins[row, 0], r.fins[row, 1], r.fins[row, 2] = deflections(state, command, setup.fixed.vehicle)
     if not setup.fixed.prescribed:
         water, wrench = live.now.hull.current, live.now.hull.wrench
         feel_current(setup, state, time, live.now.hull)
-        vehicle.breakdown(state, command, water, wrench, setup.fixed.vehicle, r.breakdown[row])
-        r.voltage[row] = vehicle.battery_voltage(state, command, water, setup.fixed.vehicle)
+        breakdown(state, command, water, wrench, setup.fixed.vehicle, r.breakdown[row])
+        r.voltage[row] = battery_voltage(state, command, water, setup.fixed.vehicle)
     r.iterations[row] = live.now.iterations
     m1 = setup.fixed.cable.mass + setup.fixed.cable.added_mass
     return _record_cable(live, r, row, used, m1) if setup.fixed.tethered else used

@@ -168,7 +168,7 @@ def test_on_the_shipped_current_the_length_settles_as_steps_shrink():
     """Its drum rubs with twice the momentum of the cable; on a free one the length moves on by as much each time."""
     trial = changed("current", duration=12.0)
     rubbing, free = (
-        [subzero.simulate(finer(one, factor)) for factor in (2, 4, 8)]
+        [subzero.simulate(finer(one, factor)) for factor in (1, 2, 4)]
         for one in (trial, dataclasses.replace(trial, drum={**trial.drum, "friction_torque": 0.0}))
     )
     spread = [np.ptp([float(run["cable_length"][-1]) for run in runs]) for runs in (rubbing, free)]
