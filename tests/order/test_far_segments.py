@@ -86,6 +86,18 @@ def test_ends_stay_fine_and_the_middle_is_as_long_as_it_may_be():
     assert chords.max() > 4.0 * trial.segment_length
 
 
+def test_a_long_cable_begins_with_few_segments_as_far_apart_as_they_may_be():
+    start = dataclasses.replace(subzero.load_scenario("fig6").start, wet_length=600.0)
+    run = followed(trial_of(turning, duration=1.0, start=start))
+    lengths = np.diff(run.recording.arc_length[: run.recording.nodes[0]])
+    trial, begins = CASES["turns"](), np.cumsum(lengths) - lengths
+    beyond = np.minimum(begins, 600.0 - begins - lengths) - trial.far_length
+    limit = trial.segment_length + trial.far_grading * np.maximum(beyond, 0.0)
+    assert_allclose(lengths[:-1], limit[:-1], rtol=1e-9)
+    assert lengths.sum() == pytest.approx(600.0, rel=1e-12)
+    assert lengths.size < 250  # of 1200
+
+
 def test_the_energy_still_balances():
     run = subzero.simulate(CASES["a cross current"](), every=10.0)
     assert np.abs(run["energy_residual"]).max() < 2e-3 * run["energy_propeller_work"].max()
