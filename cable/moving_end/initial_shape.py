@@ -10,7 +10,7 @@ from cable.current import Water
 from cable.drum import TURNING, DrumNumbers
 from cable.history import Equilibrium
 from cable.moving_end.segment_load import Load, segment_momentum
-from cable.moving_end.state import BEFORE, NEW, NOW, SPLIT_AT, Line, feel_water, spacing
+from cable.moving_end.state import BEFORE, LONGEST, NEW, NOW, SPLIT_AT, Line, feel_water, spacing
 from cable.properties import CableNumbers, CableProperties
 from cable.tow_path import first_direction
 from subzero.jit import compiled
@@ -47,12 +47,13 @@ def lay_straight(
 def _more_in_the_middle(line: Line, wet_length: float) -> float:
     """Return by how much the next segment is longer because it lies far from both ends. [m]
 
-    ℓ = ℓ₀ + g₁ b with b = min(s, S − s − ℓ) − `far_length` > 0, which is solved for ℓ where the drum is the nearer end.
+    ℓ = ℓ₀ + g₁ b, up to `LONGEST` more, with b = min(s, S − s − ℓ) − `far_length` > 0; which is solved for ℓ where the
+    drum is the nearer end.
     """
     layout, s = line.ends.layout, line.ends.settled
     from_tow = s - layout.far_length
     from_drum = (wet_length - s - layout.far_length - spacing(line)) / (1.0 + layout.far_grading)
-    return layout.far_grading * max(min(from_tow, from_drum), 0.0)
+    return min(layout.far_grading * max(min(from_tow, from_drum), 0.0), LONGEST)
 
 
 @compiled
