@@ -61,15 +61,24 @@ RUDDERS = {one.__name__: one for one in (straight, winding, lawn_mower, circles,
 
 
 def trial_of(
-    rudder: str = "straight", minutes: float = MINUTES, propeller: float = 48.0, **fields: object
+    rudder: str = "straight",
+    minutes: float = MINUTES,
+    propeller: float = 48.0,
+    wet_length: float = 0.0,
+    **fields: object,
 ) -> scenarios.Trial:
-    """Return fig6 with other commands: a rudder, and a propeller that makes about a metre a second on the cable."""
+    """Return fig6 with other commands: a rudder, a propeller that makes about a metre a second on the cable; and with
+    so much cable [m] in the water at the start.
+    """
     fig6 = subzero.load_scenario("fig6")
     times = np.arange(0.0, 60.0 * minutes, 1.0)
     values = np.zeros((times.size, 4))
     values[:, 0], values[:, 1] = propeller, np.radians(RUDDERS[rudder](times))
     commands = scenarios.Commands(time=times, values=values)
-    made: scenarios.Trial = dataclasses.replace(fig6, duration=60.0 * minutes, commands=commands, **fields)
+    start = dataclasses.replace(fig6.start, wet_length=wet_length)
+    made: scenarios.Trial = dataclasses.replace(
+        fig6, duration=60.0 * minutes, commands=commands, start=start, **fields
+    )
     return made
 
 
@@ -132,11 +141,13 @@ def tell_force(minutes: float) -> None:
 
 
 LONG = {
-    "30 minutes, 2 km, as it is": {"minutes": 30.0, "propeller": 48.0},
+    "30 minutes, 2 km": {"minutes": 30.0, "wet_length": 1100.0},
+    "30 minutes, 2 km, every second": {"minutes": 30.0, "wet_length": 1100.0, "every": 1.0},
     "5 minutes of fig6": {"minutes": 5.0, "propeller": 25.0},
-    "10 hours, 10 km, every 10 s": {"minutes": 600.0, "propeller": 20.0, "cable_step": 1.0, "every": 10.0},
-    "10 hours, 10 km, every second": {"minutes": 600.0, "propeller": 20.0, "cable_step": 1.0},
-}
+    "10 hours, 10 km, every 10 s": {
+        "minutes": 600.0, "propeller": 20.0, "wet_length": 7000.0, "cable_step": 1.0, "every": 10.0,
+    },
+}  # fmt: skip
 """What a long run costs."""
 
 

@@ -12,6 +12,7 @@ import numpy as np
 
 import scenarios
 from cable.memory import fits, refuse_unless_it_fits
+from cable.moving_end import LONGEST
 from cable.tow_path import segments_needed
 from subzero.engine.recording import Grid, new_recording, row_of
 from subzero.model import Model
@@ -62,8 +63,9 @@ def segments_of(trial: scenarios.Trial, length: float) -> int:
     near = min(2.0 * trial.far_length, length)
     if trial.far_grading == 0.0 or near == length:
         return even
-    growth = np.log1p(0.5 * trial.far_grading * (length - near) / trial.segment_length)
-    far = JOINED * 2.0 * growth / np.log1p(trial.far_grading)
+    half, graded = 0.5 * (length - near), LONGEST / trial.far_grading
+    growth = np.log1p(trial.far_grading * min(half, graded) / trial.segment_length)
+    far = JOINED * 2.0 * (growth / np.log1p(trial.far_grading) + max(half - graded, 0.0) / LONGEST)
     return min(even, segments_needed(near, trial.segment_length, trial.grading) + int(far))
 
 

@@ -10,7 +10,7 @@ from cable.current import Water
 from cable.drum import TURNING, DrumNumbers
 from cable.history import Equilibrium
 from cable.moving_end.segment_load import Load, segment_momentum
-from cable.moving_end.state import BEFORE, NEW, NOW, SPLIT_AT, Line, feel_water, spacing
+from cable.moving_end.state import BEFORE, LONGEST, NEW, NOW, SPLIT_AT, Line, feel_water, spacing
 from cable.properties import CableNumbers, CableProperties
 from cable.tow_path import first_direction
 from subzero.jit import compiled
@@ -22,7 +22,8 @@ def lay_straight(
 ) -> None:
     """Lay a straight cable from the drum along `direction` (a unit vector) to a tow point that moves at `tow`.
 
-    The cable is as long as `wet_length` says, in segments of `spacing`; it comes off the drum as fast as the tow point
+    The cable is as long as `wet_length` says, in segments of `spacing`, those far from both ends as long as
+    `remeshing.join_far` would make them; it comes off the drum as fast as the tow point
     moves away, and its tension is that of a steady straight pull with none at the drum, so a run can start at speed
     without a jolt. Needs 0 < wet_length and room.
     """
@@ -30,7 +31,7 @@ def lay_straight(
     ends.count, ends.settled, ends.time, ends.previous_step = 1, 0.0, 0.0, 0.0
     ends.drum_mode, ends.drum_pull = TURNING, 0.0
     while wet_length - ends.settled > SPLIT_AT * spacing(line):
-        line.length[ends.count] = spacing(line)
+        line.length[ends.count] = spacing(line) + _more_in_the_middle(line, wet_length)
         ends.settled += line.length[ends.count]
         ends.count += 1
     line.length[ends.count] = wet_length - ends.settled
@@ -40,6 +41,19 @@ def lay_straight(
         ends.last_length[level] = line.length[ends.count]
         ends.payout[level] = away
     _pull_straight(line, wet_length, direction, tow, drum, c)
+
+
+@compiled
+def _more_in_the_middle(line: Line, wet_length: float) -> float:
+    """Return by how much the next segment is longer because it lies far from both ends. [m]
+
+    ℓ = ℓ₀ + g₁ b, up to `LONGEST` more, with b = min(s, S − s − ℓ) − `far_length` > 0; which is solved for ℓ where the
+    drum is the nearer end.
+    """
+    layout, s = line.ends.layout, line.ends.settled
+    from_tow = s - layout.far_length
+    from_drum = (wet_length - s - layout.far_length - spacing(line)) / (1.0 + layout.far_grading)
+    return min(layout.far_grading * max(min(from_tow, from_drum), 0.0), LONGEST)
 
 
 @compiled

@@ -13,7 +13,7 @@ import numpy as np
 
 from cable.moving_end.segment_load import Load, segment_momentum
 from cable.moving_end.slack_law import KNOWN
-from cable.moving_end.state import BEFORE, NEW, NOW, SPLIT_AT, Line, spacing
+from cable.moving_end.state import BEFORE, LONGEST, NEW, NOW, SPLIT_AT, Line, spacing
 from cable.properties import CableNumbers
 from subzero.jit import compiled, inner
 
@@ -141,14 +141,15 @@ def merge_last(line: Line, c: CableNumbers, work: Load) -> None:
 def join_far(line: Line, c: CableNumbers, work: Load) -> None:
     """Join pairs of segments far from both ends to one, where the cable is taut and nearly straight.
 
-    b metres beyond `far_length` from the nearer end, a segment may be Δs + g s + g₁ b long. The ends stay fine: there a
-    cable bends, the vehicle by its turns, a current or the cable's weight beside the drum, where it hardly pulls.
+    b metres beyond `far_length` from the nearer end, a segment may be Δs + g s + g₁ b long, up to `LONGEST` more. The
+    ends stay fine: there a cable bends, the vehicle by its turns, a current or the cable's weight beside the drum,
+    where it hardly pulls.
     """
     ends, layout, along, j = line.ends, line.ends.layout, 0.0, 1
     while j < ends.count - 1:
         whole = line.length[j] + line.length[j + 1]
         beyond = min(along, ends.settled + ends.last_length[NOW] - along - whole) - layout.far_length
-        longest = layout.segment_length + layout.grading * along + layout.far_grading * beyond
+        longest = layout.segment_length + layout.grading * along + min(layout.far_grading * beyond, LONGEST)
         if beyond > 0.0 and whole <= longest and min(line.tension[NOW, j], line.tension[NOW, j + 1]) > KNOWN:
             cut_off = _cut_off(line, j)
             if cut_off <= STRAIGHT:

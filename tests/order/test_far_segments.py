@@ -13,6 +13,7 @@ from numpy.testing import assert_allclose
 
 import scenarios
 import subzero
+from cable.moving_end import LONGEST
 from subzero.engine.initial_conditions import RUN_IN
 from subzero.simulation import run_trial
 
@@ -84,6 +85,18 @@ def test_ends_stay_fine_and_the_middle_is_as_long_as_it_may_be():
     near = (beyond <= 0.0) & (begins > RUN_IN)
     assert_allclose(chords[near][:-1], trial.segment_length, rtol=1e-2)
     assert chords.max() > 4.0 * trial.segment_length
+
+
+def test_a_long_cable_begins_with_few_segments_as_far_apart_as_they_may_be():
+    start = dataclasses.replace(subzero.load_scenario("fig6").start, wet_length=600.0)
+    run = followed(trial_of(turning, duration=1.0, start=start))
+    lengths = np.diff(run.recording.arc_length[: run.recording.nodes[0]])
+    trial, begins = CASES["turns"](), np.cumsum(lengths) - lengths
+    beyond = np.minimum(begins, 600.0 - begins - lengths) - trial.far_length
+    limit = trial.segment_length + np.minimum(trial.far_grading * np.maximum(beyond, 0.0), LONGEST)
+    assert_allclose(lengths[:-1], limit[:-1], rtol=1e-9)
+    assert lengths.sum() == pytest.approx(600.0, rel=1e-12)
+    assert lengths.size < 250  # of 1200
 
 
 def test_the_energy_still_balances():
