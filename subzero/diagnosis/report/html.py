@@ -120,7 +120,7 @@ def _parts(one: Misfit) -> str:
 def _cause(verdict: Verdict) -> list[str]:
     lines = [line for one in verdict.causes for line in (_escaped(words.cause(one)), "")]
     if verdict.rivals:
-        undecided = verdict.verdict == UNDECIDED
+        undecided = verdict.on_model == UNDECIDED
         what = "What the records allow" if undecided else "What else the records allow"
         beside = "what is most probable" if undecided else "what is told"
         lines += [f"{what} (D: how far from {beside}):", "", *table(tables.rivals(verdict))]
@@ -150,7 +150,7 @@ def _shares(gain: Gain) -> tuple[float, float, float]:
 
 def _extended(verdict: Verdict) -> list[str]:
     drifts = verdict.unknown is not None and verdict.unknown.is_drift
-    new = verdict.verdict in (CAUSE_NAMED, OUTSIDE) and (not drifts or bool(verdict.extended.deviations))
+    new = verdict.on_model in (CAUSE_NAMED, OUTSIDE) and (not drifts or bool(verdict.extended.deviations))
     what = (
         "the extended model"
         if new

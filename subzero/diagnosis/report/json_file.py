@@ -29,6 +29,8 @@ def mapping(verdict: Verdict, records: Mapping[str, Mapping[str, Any]] | None = 
         "verdict": verdict.verdict,
         "sentence": verdict.sentence,
         "complete": verdict.complete,
+        "data_errors": [_plain(one) for one in verdict.data_errors],
+        "then": verdict.then,
         "causes": [_cause(one) for one in verdict.causes],
         "rivals": [_rival(one) for one in verdict.rivals],
         "probabilities": _plain(verdict.probabilities),

@@ -7,11 +7,13 @@ import math
 from subzero.channels import BY_NAME
 from subzero.diagnosis.results import (
     CAUSE_NAMED,
+    DATA_ERROR,
     NOTHING_WRONG,
     OUTSIDE,
     UNDECIDED,
     Cause,
     Estimate,
+    FoundError,
     NextTrial,
     Unknown,
     Verdict,
@@ -23,6 +25,7 @@ HEADLINES = {
     CAUSE_NAMED: "The cause is named",
     UNDECIDED: "Undecided: several causes explain the records as well",
     OUTSIDE: "Something real, and outside the catalogue",
+    DATA_ERROR: "An error in the data",
 }
 
 NOTHING = "–"
@@ -67,12 +70,18 @@ def headline(verdict: Verdict) -> str:
     named = HEADLINES[verdict.verdict]
     if verdict.verdict == CAUSE_NAMED and len(verdict.causes) > 1:
         named = f"{len(verdict.causes)} causes are named"
+    if verdict.verdict == DATA_ERROR:
+        count = len(verdict.data_errors)
+        found = f"{count} errors in the data" if count > 1 else named
+        named = f"{found}; without {'them' if count > 1 else 'it'}: {_uncapital(HEADLINES[verdict.then])}"
     return named if verdict.complete else f"{named} (interrupted: this is as far as it came)"
 
 
 def story(verdict: Verdict) -> list[str]:
     """Return the verdict in sentences: what it is, the causes, what is missing, the next trial."""
-    told = [_sentence(verdict)] if verdict.sentence and not verdict.causes else []
+    told = [data_error(one) for one in verdict.data_errors]
+    plain = verdict.sentence and not verdict.causes and verdict.then in ("", UNDECIDED)
+    told += [_sentence(verdict)] if plain else []
     told += [cause(one) for one in verdict.causes]
     told += [unknown(verdict.unknown)] if verdict.unknown else []
     if verdict.gain and math.isfinite(verdict.gain.total):
@@ -85,9 +94,16 @@ def story(verdict: Verdict) -> list[str]:
     return [*told, *verdict.notes]
 
 
+def data_error(one: FoundError) -> str:
+    """Return an error in the data in words: where, what, what to change, and what else it may be."""
+    alike = "".join(f" Or, which these records cannot tell from it: {other}." for other in one.alike)
+    what = f"{one.sentence}: {one.remedy}. Probability {probability(one.probability)}."
+    return f"{one.record}: {what}{alike} The record was not changed; all that follows is said of it with that changed."
+
+
 def _sentence(verdict: Verdict) -> str:
     """Return the verdict's own sentence; of what cannot be told apart, no more than one can read."""
-    if verdict.verdict != UNDECIDED:
+    if verdict.on_model != UNDECIDED:
         return verdict.sentence
     ranked = sorted(verdict.probabilities.items(), key=lambda item: -item[1])
     shown = ", ".join(f"{name} ({probability(p)})" for name, p in ranked[:MAX_NAMED])
@@ -148,3 +164,7 @@ def column(name: str) -> str:
 
 def _capital(sentence: str) -> str:
     return sentence[:1].upper() + sentence[1:]
+
+
+def _uncapital(sentence: str) -> str:
+    return sentence[:1].lower() + sentence[1:]
