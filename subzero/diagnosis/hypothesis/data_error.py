@@ -57,9 +57,9 @@ COMMAND_GROUPS: dict[str, tuple[str, ...]] = {
 }
 """Whose sign may be the other one."""
 SWAPS: tuple[tuple[str, str], ...] = (
-    ("rudder", "stern_planes"),
     ("rudder", "stern_plane_port"),
     ("rudder", "stern_plane_starboard"),
+    ("rudder", "stern_planes"),
     ("stern_plane_port", "stern_plane_starboard"),
 )
 """Whose columns may be exchanged; of both planes the port one's stands for both."""

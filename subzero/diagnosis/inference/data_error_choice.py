@@ -28,7 +28,7 @@ from subzero.diagnosis.inference.data_error_scan import (
 from subzero.diagnosis.inference.linear_gaussian import log_sum
 from subzero.diagnosis.inference.map_fit import is_poor_fit
 from subzero.diagnosis.inference.out_of_catalogue import Findings
-from subzero.diagnosis.inference.problem import Observed, Problem, usual_of
+from subzero.diagnosis.inference.problem import Observed, Problem, pose, usual_of
 from subzero.diagnosis.inference.repeated_values import is_rounded, repeated_values
 
 MOST_ERRORS = 3
@@ -70,12 +70,14 @@ def without(records: Sequence[Logged], found: Sequence[SuspectedError]) -> list[
 
 def _of_record(problem: Problem, record: int, logged: Logged) -> list[SuspectedError]:
     yardstick, found = yardstick_of(problem, record, logged), list[SuspectedError]()
-    for error in repeated_values(logged, logged.trusted):
+    repeated = repeated_values(logged, logged.trusted)
+    for error in repeated:
         if not is_rounded(error, logged):
             found.append(
                 SuspectedError(record=record, error=error, lead=SIGNATURE_LEAD, generous=SIGNATURE_LEAD)
             )
             yardstick = _after(yardstick, error)
+    yardstick = replace(yardstick, repeated=tuple(one for one in repeated if is_rounded(one, logged)))
     for _ in range(MOST_ERRORS):
         ranked = suspects(yardstick, logged.trusted)
         if not ranked or ranked[0].lead < LEAST_LEAD:
@@ -94,9 +96,11 @@ def _suspected(record: int, ranked: Sequence[Suspect]) -> SuspectedError:
 
 
 def _after(yardstick: Yardstick, error: DataError) -> Yardstick:
-    """Return what a record without an error is judged by."""
+    """Return what a record without an error is judged by; with other commands, it has sensitivities of its own."""
     logged = error.corrected(yardstick.logged)
-    return replace(yardstick, logged=logged, nominal=yardstick.nominal_of(logged))
+    again = error.is_of_commands
+    changed = yardstick_of(pose([logged]), 0, logged) if again else replace(yardstick, logged=logged)
+    return replace(changed, corrected=(*yardstick.corrected, error), repeated=yardstick.repeated)
 
 
 def is_clear(found: Sequence[SuspectedError], after: Findings) -> bool:

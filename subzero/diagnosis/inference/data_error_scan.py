@@ -29,7 +29,6 @@ from subzero.diagnosis.hypothesis.data_error import (
     KINDS,
     LEAST_LATE_S,
     LEAST_LATENCY_S,
-    LEAST_RATE,
     REFERENCES,
     SWAPS,
     DataError,
@@ -39,7 +38,7 @@ from subzero.diagnosis.hypothesis.logged import Logged
 from subzero.diagnosis.inference.linear_gaussian import Posterior, freed, log_sum
 from subzero.diagnosis.inference.map_fit import KAPPA_WIDE
 from subzero.diagnosis.inference.measurement import sensed, truth
-from subzero.diagnosis.inference.noise import spikes, usual_noise
+from subzero.diagnosis.inference.noise import resolution_of, spikes, usual_noise
 from subzero.diagnosis.inference.problem import Problem, usual_of
 from subzero.diagnosis.inference.simulator import Track, simulate_track
 from subzero.records.consistency import MISTAKEN
@@ -47,16 +46,23 @@ from subzero.records.record import HEADING, turned
 
 FEWEST = 6
 """A channel with fewer samples says nothing."""
+EXPLAINED_SCALE = 1.15
+"""Noise of no more than so many usual levels leaves no error of a time, or a step, to be found. [-]"""
 LEAST_SCALE, MOST_SCALE, ROUNDS = 0.3, 1e4, 5
 """Scales of the noise of a channel, and how often they are found anew behind the parameters."""
 OUTLIER_LOG_DENSITY = float(np.log(0.01 / 50.0))
 """Of a sample that is left out: one of a hundred, anywhere within fifty levels of the noise."""
 LATEST_SHARE, CLOCK_STEP_S, LATEST_CHANNEL_S = 0.5, 0.5, 6.0
 """Clocks are late by up to this share of the record, tried every so often; one channel by no more than that. [s]"""
-RATES = (0.01, 0.02, 0.04, 0.06, 0.08, 0.1, 0.15, 0.2)
-"""How fast a clock may run too fast, or too slow. [-]"""
-STEP_TIMES, STEP_LEVELS = 40, 30.0
-"""A step in a sensor is looked for at so many times; usual size in levels of the noise."""
+RATES, RATE_STEP = (0.02, 0.04, 0.06, 0.08, 0.1, 0.12, 0.14, 0.16, 0.18, 0.2), 0.02
+"""By how much a clock may run too fast, or too slow. [-]"""
+CHANNEL_STEP_S = 1.0
+"""Delays of one channel are tried every so often: its lag and the clock are free about each. [s]"""
+STEP_MARGIN = 0.1
+"""No step is looked for so close to the ends of a record, as a share of it: there it is a bias, or nothing."""
+STEP_TIMES, STEP_LEVELS, LEAST_STEP_LEVELS = 40, 30.0, 4.0
+"""A step in a sensor is looked for at so many times; its usual and its least size in levels of the noise: less is a
+drift."""
 CAUSES_TRIED = 3
 """So many causes, the most promising, have the scales of the noise found behind them."""
 FREE_NUMBER_LOG_PRIOR = -5.0
@@ -106,6 +112,10 @@ class Yardstick:
         D: prior variances that are generous to physics: every cause at once (k,).
         narrow: prior variances of wide tolerances (k,).
         causes: places of the parameters of each cause.
+        setting: of its simulations.
+        repeated: values that it repeats, which may be a channel that is rounded and stands still.
+        corrected: errors that are corrected in it already.
+        kept: predictions under other commands.
     """
 
     logged: Logged
@@ -116,6 +126,8 @@ class Yardstick:
     narrow: np.ndarray
     causes: Sequence[Sequence[int]]
     setting: Setting
+    repeated: tuple[DataError, ...] = ()
+    corrected: tuple[DataError, ...] = ()
     kept: dict[str, Mapping[str, np.ndarray]] = field(default_factory=dict)
 
     def terms(self, logged: Logged, channels: Iterable[str]) -> dict[str, Term]:
@@ -164,6 +176,11 @@ class Yardstick:
     def as_is(self) -> Reckoned:
         """The generous evidence of the record as it is."""
         return reckon(self.own, self.D)
+
+    @cached_property
+    def is_explained(self) -> bool:
+        """Wide tolerances leave no more than the noise of usual sensors."""
+        return max(reckon(self.own, self.narrow).scales.values()) < EXPLAINED_SCALE
 
     @cached_property
     def log_sparse(self) -> float:
@@ -227,7 +244,7 @@ def yardstick_of(problem: Problem, record: int, logged: Logged) -> Yardstick:
     (base,) = problem.tracks([(record, zero)])
     nominal = shown_on_grid(one.setting, base, names)
     ks = [k for k, entry in enumerate(problem.entries) if entry.record in (-1, record)]
-    moved = {k: problem._moved(zero, k) for k in ks}
+    moved = {k: _moved(problem, k) for k in ks}
     tracks = problem.tracks([(record, moved[k]) for k in ks])
     slopes = {name: np.zeros((nominal[name].size, zero.size)) for name in names}
     for k, track in zip(ks, tracks, strict=True):
@@ -239,6 +256,15 @@ def yardstick_of(problem: Problem, record: int, logged: Logged) -> Yardstick:
     return Yardstick(logged=logged, step=float(grid[1] - grid[0]), nominal=nominal, slopes=slopes, D=D,
                      narrow=variances(problem.entries, (), KAPPA_WIDE), causes=causes,
                      setting=one.setting)  # fmt: skip
+
+
+def _moved(problem: Problem, k: int) -> np.ndarray:
+    """Return deviations with an entry moved for a sensitivity: what does nothing while it is small to a usual size."""
+    zero, parameter = np.zeros(len(problem.entries)), problem.entries[k].parameter
+    if parameter.low < 0.0 or problem.entries[k].effect.slot == "sensors":
+        return problem._moved(zero, k)
+    zero[k] = min(parameter.scale, parameter.high)
+    return zero
 
 
 def shown_on_grid(setting: Setting, track: Track, names: Iterable[str]) -> dict[str, np.ndarray]:
@@ -259,6 +285,7 @@ def suspects(yardstick: Yardstick, trusted: frozenset[str] = frozenset()) -> lis
     """
     rough = []
     for group in possible(yardstick, trusted):
+        group = group._replace(each=[one for one in group.each if not _is_known(one, yardstick.corrected)])
         each = [_judged(yardstick, one, group) for one in group.each]
         rough += [(one, group) for one in (_peaks(each) if group.step else each)]
     best = max((one.generous for one, _ in rough), default=-np.inf)
@@ -272,6 +299,11 @@ def suspects(yardstick: Yardstick, trusted: frozenset[str] = frozenset()) -> lis
         if one.lead > found.get(one.error.id, one).lead or one.error.id not in found:
             found[one.error.id] = one
     return sorted((one for one in found.values() if one.lead > 0.0), key=lambda one: -one.lead)
+
+
+def _is_known(error: DataError, known: Sequence[DataError]) -> bool:
+    """Say whether such an error is corrected already."""
+    return any(one.kind == error.kind and set(one.channels) == set(error.channels) for one in known)
 
 
 def _peaks(each: Sequence[Suspect]) -> list[Suspect]:
@@ -306,6 +338,7 @@ def possible(yardstick: Yardstick, trusted: frozenset[str]) -> list[Group]:
     open_ = [name for name in names if name not in trusted]
     units = [DataError(kind="unit", channels=(name,), how=how)
              for name in open_ for how in MISTAKEN.get(BY_NAME[name].unit, {})]  # fmt: skip
+    units = [one for one in units if _is_quiet(yardstick, one)]
     pairs = [DataError(kind="swapped", channels=pair) for pair in itertools.combinations(open_, 2)]
     found = [
         Group([DataError(kind="sign", channels=(name,)) for name in open_]),
@@ -318,20 +351,46 @@ def possible(yardstick: Yardstick, trusted: frozenset[str]) -> list[Group]:
             ]
         ),
         Group(pairs),
-        Group([one for name in names for one in _step(yardstick, name)]),
-        *_clocks(time, names),
+        Group([one for one in yardstick.repeated if one.channels[0] in open_]),
     ]
+    if not yardstick.is_explained:
+        found += [Group([one for name in open_ for one in _step(yardstick, name)]), *_clocks(time, open_)]
     if yardstick.logged.setting.trial.commands is not None:
         found += _commands(yardstick.logged)
     return [group for group in found if group.each]
 
 
+LOUDEST = 6.0
+"""Noise of a sensor is never so many usual levels: what is louder in another unit is not in that unit. [-]"""
+
+
+def _is_quiet(yardstick: Yardstick, error: DataError) -> bool:
+    """Say whether a channel's noise from sample to sample is that of a sensor, once it is in the right unit.
+
+    Where the prediction fails, any unit that makes a record smaller than it would be as likely; but not its noise.
+    """
+    (name,) = error.channels
+    record = error.corrected(yardstick.logged).record
+    known = record.values[name][np.isfinite(record.values[name])]
+    level = usual_of(name, known, yardstick.logged.noise).level
+    if known.size < FEWEST or np.ptp(known) == 0.0:
+        return False
+    expected = yardstick.at(yardstick.nominal[name], record.time)
+    jitter = _jitter(known) + resolution_of(known, level) / np.sqrt(12.0)
+    return jitter < LOUDEST * level + 2.0 * _jitter(expected)
+
+
+def _jitter(values: np.ndarray) -> float:
+    """Return the standard deviation of white noise whose second differences are as large (median)."""
+    return 1.4826 * float(np.median(np.abs(np.diff(values, 2)))) / np.sqrt(6.0) if values.size > 2 else 0.0
+
+
 def _clocks(time: np.ndarray, names: Sequence[str]) -> list[Group]:
     span = float(time[-1] - time[0])
     late = np.arange(LEAST_LATE_S, max(LATEST_SHARE * span, 2.0 * LEAST_LATE_S), CLOCK_STEP_S)
-    own = np.arange(LEAST_LATENCY_S, min(LATEST_CHANNEL_S, LATEST_SHARE * span) + 1e-9, CLOCK_STEP_S)
-    found = [_numbered("late_clock", late, CLOCK_STEP_S), _numbered("clock_rate", RATES, LEAST_RATE)]
-    return found + [_numbered("latency", own, CLOCK_STEP_S, name) for name in names if len(names) > 1]
+    own = np.arange(LEAST_LATENCY_S, min(LATEST_CHANNEL_S, LATEST_SHARE * span) + 1e-9, CHANNEL_STEP_S)
+    found = [_numbered("late_clock", late, CLOCK_STEP_S), _numbered("clock_rate", RATES, RATE_STEP)]
+    return found + [_numbered("latency", own, CHANNEL_STEP_S, name) for name in names if len(names) > 1]
 
 
 def _numbered(kind: str, sizes: Iterable[float], step: float, *channels: str) -> Group:
@@ -371,7 +430,7 @@ def _step(yardstick: Yardstick, name: str) -> list[DataError]:
     usual = usual_of(name, values, yardstick.logged.noise)
     used = np.isfinite(values)
     noise = usual_noise(time, used, usual)
-    begins = np.linspace(time[0], time[-1], STEP_TIMES + 2)[1:-1]
+    begins = time[0] + (time[-1] - time[0]) * np.linspace(STEP_MARGIN, 1.0 - STEP_MARGIN, STEP_TIMES)
     steps = (time[:, None] >= begins).astype(float)
     rows = np.column_stack([values - expected - yardstick.at(yardstick.slopes[name], time) @ here.z, steps,
                             yardstick.at(yardstick.slopes[name], time)])  # fmt: skip
@@ -382,7 +441,7 @@ def _step(yardstick: Yardstick, name: str) -> list[DataError]:
     q, prior = C.T @ r, (STEP_LEVELS * usual.level) ** -2
     best = int(np.argmax(q**2 / (np.maximum(M, 0.0) + prior)))
     size = float(q[best] / (max(M[best], 0.0) + prior))
-    if abs(size) < 2.0 * usual.level:
+    if abs(size) < LEAST_STEP_LEVELS * usual.level:
         return []
     return [DataError(kind="step", channels=(name,), amount=size, since=_first(time, begins[best]))]
 

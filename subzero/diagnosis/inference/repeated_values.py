@@ -21,8 +21,9 @@ from subzero.diagnosis.inference.problem import usual_of
 
 CLEAR_LOG_ODDS = 6.0
 """Runs whose log probability by chance is less than minus this are no chance."""
-FAR_LEVELS, FEWEST_FAR, NEIGHBOURS = 8.0, 3, 5
-"""A value is no measurement if it comes at least so often, so many noise levels from what is measured around it."""
+FAR_LEVELS, FEWEST_FAR, NEIGHBOURS = 8.0, 4, 5
+"""A value is no measurement if it comes at least so often, once in two samples in a row, so many noise levels from
+what is measured around it: outliers that are rounded may be equal, but not in a row."""
 SHORT, FEWEST_FROZEN = 3, 6
 """Runs as short as this say how often values repeat by chance; a channel is frozen if it repeats so many to the end."""
 
@@ -84,8 +85,10 @@ def _far_values(values: np.ndarray, level: float) -> Mapping[float, np.ndarray]:
     found = {}
     for value in distinct[counts >= FEWEST_FAR].tolist():
         at, others = values == value, np.flatnonzero(known & (values != value))
-        if others.size >= FEWEST_FAR and all(
-            _is_far(value, i, values, others, level) for i in np.flatnonzero(at).tolist()
+        if (
+            others.size >= FEWEST_FAR
+            and np.any(at[1:] & at[:-1])
+            and all(_is_far(value, i, values, others, level) for i in np.flatnonzero(at).tolist())
         ):
             found[value] = at
     return found
