@@ -25,6 +25,7 @@ from subzero.diagnosis.inference.data_error_choice import (
     SuspectedError,
     is_clear,
     log_odds,
+    may_be_named,
     suspected,
     without,
 )
@@ -156,7 +157,7 @@ def _beside_errors(
     after = searched(pose(without(records, found), effects), _part(progress, 0.0, 0.5))
     as_is = None if is_clear(found, after) else searched(problem, _part(progress, 0.5, 1.0))
     probability = probability_of(log_odds(found, records, after, as_is))
-    if as_is is None or is_named(probability):
+    if as_is is None or (is_named(probability) and may_be_named(found, after)):
         return with_data_errors(conclude(after), records, found, probability)
     return with_possible_errors(conclude(as_is), records, found, probability)
 

@@ -33,13 +33,17 @@ from subzero.diagnosis.inference.repeated_values import is_rounded, repeated_val
 
 MOST_ERRORS = 3
 """Of a record, beside values that are repeated."""
-LEAST_LEAD = 5.0
-"""An error is suspected if a record is so much more probable with it, as a logarithm."""
+LEAST_LEAD, LEAST_SOFT_LEAD = 5.0, 15.0
+"""An error is suspected if a record is so much more probable with it, as a logarithm; the second of what is `SOFT`."""
+SOFT = ("step", "late_clock", "clock_rate", "latency", "command_sign", "command_swap")
+"""Kinds with a number to be fitted, or that change the motion: something that broke in mid-trial may look like them."""
 ALIKE_LEAD = 3.0
 """Errors whose leads differ by less are told together."""
 CLEAR_LEAD, CLEAR_GENEROUS_LEAD = 15.0, 10.0
 """With a greater lead over physics, in the linear problem, an error needs no search of the record as it is: over
 nothing and every cause, and over all causes at once."""
+LOUD = 2.5
+"""Noise of more usual levels hides a misfit. [-]"""
 SIGNATURE_LEAD = 20.0
 """Lead of what is read off a record."""
 
@@ -80,11 +84,15 @@ def _of_record(problem: Problem, record: int, logged: Logged) -> list[SuspectedE
     yardstick = replace(yardstick, repeated=tuple(one for one in repeated if is_rounded(one, logged)))
     for _ in range(MOST_ERRORS):
         ranked = suspects(yardstick, logged.trusted)
-        if not ranked or ranked[0].lead < LEAST_LEAD:
+        if not ranked or not _is_suspected(ranked[0]):
             break
         found.append(_suspected(record, ranked))
         yardstick = _after(yardstick, ranked[0].error)
     return found
+
+
+def _is_suspected(one: Suspect) -> bool:
+    return one.lead > (LEAST_SOFT_LEAD if one.error.kind in SOFT else LEAST_LEAD)
 
 
 def _suspected(record: int, ranked: Sequence[Suspect]) -> SuspectedError:
@@ -106,7 +114,19 @@ def _after(yardstick: Yardstick, error: DataError) -> Yardstick:
 def is_clear(found: Sequence[SuspectedError], after: Findings) -> bool:
     """Say whether errors need not be held against a search of the records as they are."""
     leads = all(one.lead > CLEAR_LEAD and one.generous > CLEAR_GENEROUS_LEAD for one in found)
-    return leads and not is_poor_fit(after.search.best().fit)
+    return leads and is_explained(after)
+
+
+def may_be_named(found: Sequence[SuspectedError], after: Findings) -> bool:
+    """Say whether errors may be the verdict: those that something else may look like only if they explain all."""
+    return is_explained(after) or not any(one.error.kind in SOFT for one in found)
+
+
+def is_explained(work: Findings) -> bool:
+    """Say whether one hypothesis leaves nothing but the noise of usual sensors."""
+    usual = all(noise.sd < LOUD * usual_of(name, one.values[name], one.known).level + noise.resolution
+                for one in work.problem.records for name, noise in one.noise.items())  # fmt: skip
+    return usual and not is_poor_fit(work.search.best().fit)
 
 
 def log_odds(

@@ -44,9 +44,11 @@ from subzero.diagnosis.inference.simulator import Track, simulate_track
 from subzero.records.consistency import MISTAKEN
 from subzero.records.record import HEADING, turned
 
+KAPPA_NARROW = 2.0
+"""How much wider than declared tolerances are where a cause stands by itself: the linear problem is no better."""
 FEWEST = 6
 """A channel with fewer samples says nothing."""
-EXPLAINED_SCALE = 1.15
+EXPLAINED_SCALE = 1.05
 """Noise of no more than so many usual levels leaves no error of a time, or a step, to be found. [-]"""
 LEAST_SCALE, MOST_SCALE, ROUNDS = 0.3, 1e4, 5
 """Scales of the noise of a channel, and how often they are found anew behind the parameters."""
@@ -254,7 +256,7 @@ def yardstick_of(problem: Problem, record: int, logged: Logged) -> Yardstick:
     D = np.array([max(e.parameter.scale, KAPPA_WIDE * e.parameter.tolerance) ** 2 for e in problem.entries])
     grid, causes = base[0], [columns_of(problem.entries, (name,)) for name in nameable(problem.entries)]
     return Yardstick(logged=logged, step=float(grid[1] - grid[0]), nominal=nominal, slopes=slopes, D=D,
-                     narrow=variances(problem.entries, (), KAPPA_WIDE), causes=causes,
+                     narrow=variances(problem.entries, (), KAPPA_NARROW), causes=causes,
                      setting=one.setting)  # fmt: skip
 
 

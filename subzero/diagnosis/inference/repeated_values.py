@@ -22,7 +22,7 @@ from subzero.diagnosis.inference.problem import usual_of
 CLEAR_LOG_ODDS = 6.0
 """Runs whose log probability by chance is less than minus this are no chance."""
 FAR_LEVELS, FEWEST_FAR, NEIGHBOURS = 8.0, 4, 5
-"""A value is no measurement if it comes at least so often, once in two samples in a row, so many noise levels from
+"""A value is no measurement if it comes at least so often, once in three samples in a row, so many noise levels from
 what is measured around it: outliers that are rounded may be equal, but not in a row."""
 SHORT, FEWEST_FROZEN = 3, 6
 """Runs as short as this say how often values repeat by chance; a channel is frozen if it repeats so many to the end."""
@@ -87,7 +87,7 @@ def _far_values(values: np.ndarray, level: float) -> Mapping[float, np.ndarray]:
         at, others = values == value, np.flatnonzero(known & (values != value))
         if (
             others.size >= FEWEST_FAR
-            and np.any(at[1:] & at[:-1])
+            and np.any(at[2:] & at[1:-1] & at[:-2])
             and all(_is_far(value, i, values, others, level) for i in np.flatnonzero(at).tolist())
         ):
             found[value] = at
@@ -95,11 +95,12 @@ def _far_values(values: np.ndarray, level: float) -> Mapping[float, np.ndarray]:
 
 
 def _is_far(value: float, at: int, values: np.ndarray, others: np.ndarray, level: float) -> bool:
-    """Say whether a value stands far from all others that are measured closest to its sample."""
+    """Say whether a value stands far from what is measured before and after it: no peak, but a jump there and back."""
     i = int(np.searchsorted(others, at))
     around = values[others[max(i - NEIGHBOURS, 0) : i + NEIGHBOURS]]
     spread = float(np.median(np.abs(np.diff(around)))) if around.size > 1 else 0.0
-    return abs(value - float(np.median(around))) > FAR_LEVELS * max(level, spread)
+    beside = values[others[max(i - 1, 0) : i + 1]]
+    return bool(np.min(np.abs(value - beside)) > FAR_LEVELS * max(level, spread))
 
 
 def _runs(values: np.ndarray) -> Repeats:

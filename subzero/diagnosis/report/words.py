@@ -30,6 +30,8 @@ HEADLINES = {
 
 NOTHING = "–"
 
+UNCHANGED = "No file was changed. All that follows is said of the records as they are once that is put right."
+
 MAX_NAMED = 5
 """So many explanations are named in a sentence."""
 ALTERNATIVE_PROBABILITY = 0.1
@@ -80,6 +82,7 @@ def headline(verdict: Verdict) -> str:
 def story(verdict: Verdict) -> list[str]:
     """Return the verdict in sentences: what it is, the causes, what is missing, the next trial."""
     told = [data_error(one) for one in verdict.data_errors]
+    told += [UNCHANGED] if verdict.then else []
     plain = verdict.sentence and not verdict.causes and verdict.then in ("", UNDECIDED)
     told += [_sentence(verdict)] if plain else []
     told += [cause(one) for one in verdict.causes]
@@ -98,7 +101,7 @@ def data_error(one: FoundError) -> str:
     """Return an error in the data in words: where, what, what to change, and what else it may be."""
     alike = "".join(f" Or, which these records cannot tell from it: {other}." for other in one.alike)
     what = f"{one.sentence}: {one.remedy}. Probability {probability(one.probability)}."
-    return f"{one.record}: {what}{alike} The record was not changed; all that follows is said of it with that changed."
+    return f"{one.record}: {what}{alike}"
 
 
 def _sentence(verdict: Verdict) -> str:

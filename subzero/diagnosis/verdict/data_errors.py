@@ -15,7 +15,8 @@ from subzero.diagnosis.results import DATA_ERROR, UNDECIDED, FoundError, Rival, 
 
 WORTH_TELLING = 0.05
 """An error that is less probable is not told beside a diagnosis of the records as they are."""
-SUREST_LOG_ODDS = 30.0
+SUREST_LOG_ODDS, EVEN = 30.0, 0.5
+"""Log odds say no more than that; of what is not named the probability is at most this."""
 
 
 def probability_of(log_odds: float) -> float:
@@ -42,9 +43,13 @@ def with_data_errors(
 def with_possible_errors(
     as_is: Verdict, records: Sequence[Logged], found: Sequence[SuspectedError], probability: float
 ) -> Verdict:
-    """Return the verdict on records as they are, beside which errors in their data are possible."""
+    """Return the verdict on records as they are, beside which errors in their data are possible.
+
+    Errors that are more probable, but explain no more than the records as they are, are held to be as probable as not.
+    """
     if probability < WORTH_TELLING:
         return as_is
+    probability = min(probability, EVEN)
     errors = _told(records, found, probability)
     listed = {name: (1.0 - probability) * p for name, p in as_is.probabilities.items()}
     key, words = _beside(found, "none"), " and ".join(one.sentence for one in errors)
