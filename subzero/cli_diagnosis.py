@@ -162,8 +162,10 @@ def _read(paths: list[Path], scenario: str | None, commands: str | None) -> list
 
 def _ask(logged: list[Logged], own: tuple[Effect, ...], seed: int, budget: str) -> Verdict:
     """Diagnose under a progress bar; an interrupt ends it with what it has, if it has anything."""
-    from subzero.diagnosis.api import diagnose as run
+    from subzero.diagnosis.api import diagnose_trials
     from subzero.write_diagnosis import tell_before
 
     with progress_bar("Diagnosing", lambda: COSTS) as progress:
-        return run(logged, effects=own, progress=progress, seed=seed, budget=budget, seen=tell_before)
+        return diagnose_trials(
+            logged, effects=own, progress=progress, seed=seed, budget=budget, seen=tell_before
+        )

@@ -26,11 +26,10 @@ import numpy as np
 import scenarios
 import subzero
 from subzero.diagnosis.api import diagnose_trials
-from subzero.diagnosis.hypothesis.catalogue.sensors import NOISE
+from subzero.diagnosis.hypothesis.catalogue import NOISE
 from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.logged import Logged
-from subzero.diagnosis.inference.noise import Noise
-from subzero.diagnosis.inference.problem import Problem, pose
+from subzero.diagnosis.inference import Noise, Problem, pose
 from subzero.model import Model
 from subzero.records.record import Record
 

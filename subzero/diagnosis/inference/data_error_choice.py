@@ -28,7 +28,8 @@ from subzero.diagnosis.inference.data_error_scan import (
 from subzero.diagnosis.inference.linear_gaussian import log_sum
 from subzero.diagnosis.inference.map_fit import is_poor_fit
 from subzero.diagnosis.inference.out_of_catalogue import Findings
-from subzero.diagnosis.inference.problem import Observed, Problem, pose, usual_of
+from subzero.diagnosis.inference.posing import pose, usual_of
+from subzero.diagnosis.inference.problem import Observed, Problem
 from subzero.diagnosis.inference.repeated_values import is_rounded, repeated_values
 
 MOST_ERRORS = 3
@@ -157,7 +158,7 @@ def _measured(logged: Logged, error: DataError) -> int:
 def log_evidence(work: Findings) -> float:
     """Return the log evidence of records, all explanations together, as a density of what was measured."""
     inside = work.search.beliefs.log_total()
-    found = log_sum([inside, *(one.log_posterior for one in work.foreign)])
+    found = log_sum([inside, *(one.log_posterior for one in work.out_of_catalogue)])
     return found + sum(_fixed(one) for one in work.problem.records)
 
 

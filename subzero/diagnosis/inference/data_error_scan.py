@@ -35,11 +35,11 @@ from subzero.diagnosis.hypothesis.data_error import (
 )
 from subzero.diagnosis.hypothesis.hypotheses import PRIOR, columns_of, nameable, variances
 from subzero.diagnosis.hypothesis.logged import Logged
-from subzero.diagnosis.inference.linear_gaussian import Posterior, freed, log_sum
-from subzero.diagnosis.inference.map_fit import KAPPA_WIDE
+from subzero.diagnosis.inference.linear_gaussian import KAPPAS, Posterior, freed, log_sum
 from subzero.diagnosis.inference.measurement import sensed, truth
 from subzero.diagnosis.inference.noise import resolution_of, spikes, usual_noise
-from subzero.diagnosis.inference.problem import Problem, usual_of
+from subzero.diagnosis.inference.posing import usual_of
+from subzero.diagnosis.inference.problem import Problem
 from subzero.diagnosis.inference.simulator import Track, simulate_track
 from subzero.records.consistency import MISTAKEN
 from subzero.records.record import HEADING, turned
@@ -253,7 +253,7 @@ def yardstick_of(problem: Problem, record: int, logged: Logged) -> Yardstick:
         there = shown_on_grid(problem.setting(record, moved[k]), track, names)
         for name in names:
             slopes[name][:, k] = np.nan_to_num((there[name] - nominal[name]) / moved[k][k])
-    D = np.array([max(e.parameter.scale, KAPPA_WIDE * e.parameter.tolerance) ** 2 for e in problem.entries])
+    D = np.array([max(e.parameter.scale, max(KAPPAS) * e.parameter.tolerance) ** 2 for e in problem.entries])
     grid, causes = base[0], [columns_of(problem.entries, (name,)) for name in nameable(problem.entries)]
     return Yardstick(logged=logged, step=float(grid[1] - grid[0]), nominal=nominal, slopes=slopes, D=D,
                      narrow=variances(problem.entries, (), KAPPA_NARROW), causes=causes,
@@ -264,7 +264,7 @@ def _moved(problem: Problem, k: int) -> np.ndarray:
     """Return deviations with an entry moved for a sensitivity: what does nothing while it is small to a usual size."""
     zero, parameter = np.zeros(len(problem.entries)), problem.entries[k].parameter
     if parameter.low < 0.0 or problem.entries[k].effect.slot == "sensors":
-        return problem._moved(zero, k)
+        return problem.moved(zero, k)
     zero[k] = min(parameter.scale, parameter.high)
     return zero
 

@@ -17,7 +17,7 @@ import numpy as np
 from subzero.diagnosis.hypothesis.data_error import DataError
 from subzero.diagnosis.hypothesis.logged import Logged
 from subzero.diagnosis.inference.noise import resolution_of
-from subzero.diagnosis.inference.problem import usual_of
+from subzero.diagnosis.inference.posing import usual_of
 
 CLEAR_LOG_ODDS = 6.0
 """Runs whose log probability by chance is less than minus this are no chance."""
