@@ -21,14 +21,28 @@ from subzero.diagnosis.assessment.residuals import misfits
 from subzero.diagnosis.hypothesis.catalogue import load
 from subzero.diagnosis.hypothesis.effect import Effect
 from subzero.diagnosis.hypothesis.logged import Logged
+from subzero.diagnosis.inference.data_error_choice import (
+    SuspectedError,
+    is_clear,
+    log_odds,
+    may_be_named,
+    suspected,
+    without,
+)
 from subzero.diagnosis.inference.measurement import respond
 from subzero.diagnosis.inference.model_search import Search
 from subzero.diagnosis.inference.out_of_catalogue import Findings, explanations_outside, is_explained
 from subzero.diagnosis.inference.posing import pose
-from subzero.diagnosis.inference.problem import Progress
+from subzero.diagnosis.inference.problem import Problem, Progress
 from subzero.diagnosis.read_trials import read_trials
 from subzero.diagnosis.results import Detectability, Verdict
 from subzero.diagnosis.verdict.conclude import conclude
+from subzero.diagnosis.verdict.data_errors import (
+    is_named,
+    probability_of,
+    with_data_errors,
+    with_possible_errors,
+)
 from subzero.diagnosis.verdict.follow_up import follow_up, ranked, refuted_rivals
 from subzero.model import Model
 
@@ -106,26 +120,74 @@ def diagnose_trials(
     Raises:
         UserError: the nominal model cannot be run through a trial.
     """
+    effects, progress, seen = (
+        tuple(effects),
+        progress or (lambda share, words: None),
+        seen or (lambda table: None),
+    )
+    begun = perf_counter()
     problem = pose(records, effects)
-    search = Search(problem=problem, progress=progress or (lambda share, words: None))
-    findings = Findings(search=search, seed=seed, budget=budget)
+    with threadpool_limits(limits=1, user_api="blas"):  # runs have the cores; matrices are small
+        found = suspected(problem, records)
+        spent = perf_counter() - begun
+
+        def searched(problem: Problem, parts: Progress) -> Findings:
+            work = Findings(search=Search(problem=problem, progress=parts), seed=seed, budget=budget)
+            work.seconds["errors in the data"] = spent
+            _find_all(work, seen)
+            return work
+
+        if not found:
+            return _concluded(searched(problem, progress))
+        return _beside_errors(found, records, problem, searched, progress, effects)
+
+
+Searched = Callable[[Problem, Progress], Findings]
+
+
+def _beside_errors(
+    found: Sequence[SuspectedError],
+    records: Sequence[Logged],
+    problem: Problem,
+    searched: Searched,
+    progress: Progress,
+    effects: Sequence[Effect],
+) -> Verdict:
+    """Return the verdict on records that seem to have errors in their data: without these, or as they are."""
+    after = searched(pose(without(records, found), effects), _part(progress, 0.0, 0.5))
+    as_is = None if is_clear(found, after) else searched(problem, _part(progress, 0.5, 1.0))
+    probability = probability_of(log_odds(found, records, after, as_is))
+    if as_is is None or (is_named(probability) and may_be_named(found, after)):
+        return with_data_errors(_concluded(after), records, found, probability)
+    return with_possible_errors(_concluded(as_is), records, found, probability)
+
+
+def _part(progress: Progress, low: float, high: float) -> Progress:
+    """Return the progress of a part of the work."""
+    return lambda share, words: progress(low + (high - low) * share, words)
+
+
+def _find_all(findings: Findings, seen: Seen) -> None:
+    """Do all parts in turn; if that is interrupted, keep what there is."""
     try:
-        with threadpool_limits(limits=1, user_api="blas"):  # runs have the cores; matrices are small
-            _find(findings, seen or (lambda table: None))
+        _find(findings, seen)
     except KeyboardInterrupt:
         findings.complete = False
-        if () not in search.candidates:
+        if () not in findings.search.candidates:
             raise
+
+
+def _concluded(findings: Findings) -> Verdict:
     known = ranked(findings)
     return conclude(findings, known, follow_up(findings, known))
 
 
 def _find(findings: Findings, seen: Seen) -> None:
     """Do all parts in turn, and keep their times."""
-    search, start = findings.search, perf_counter()
+    search, start, before = findings.search, perf_counter(), sum(findings.seconds.values())
 
     def done(part: str) -> None:
-        findings.seconds[part] = perf_counter() - start - sum(findings.seconds.values())
+        findings.seconds[part] = perf_counter() - start - sum(findings.seconds.values()) + before
 
     search.begin()
     _measure_misfit(findings)
