@@ -131,10 +131,19 @@ class RunPlots:
         self._run = run
 
     def tension(self) -> Figure:
-        """Return the tension at both ends over time, and along the whole cable as colour."""
-        from subzero.figures.space import tension_map
+        """Return the tension along the cable over time as an image, and the largest and smallest that was anywhere.
 
-        return tension_map(self._run, self._title())
+        Raises:
+            UserError: there is hardly any cable in the water.
+        """
+        from subzero.figures import tension
+
+        figure = tension(self._run, self._title())
+        if figure is None:
+            raise UserError(
+                "This run has no cable in the water, so there is no tension to draw. Draw the motion."
+            )
+        return figure
 
     def shape3d(self) -> Figure:
         """Return the cable at five times in three dimensions, with the way of the tow point."""
@@ -194,7 +203,7 @@ def figures_of(run: xr.Dataset, what: Sequence[str] | None = None) -> dict[str, 
 
     Args:
         run: a dataset of `subzero.simulate`.
-        what: names of `PLOTS`, or channels, which are drawn over time; all of `PLOTS` if None.
+        what: names of `PLOTS`, or channels, which are drawn over time; all that the run has if None.
 
     Raises:
         UserError: neither a figure nor a channel of this name.
@@ -206,9 +215,12 @@ def figures_of(run: xr.Dataset, what: Sequence[str] | None = None) -> dict[str, 
                 f"There is no figure and no channel {short(name)}.{hint} Figures: {', '.join(PLOTS)}; or a channel of "
                 "the run, such as heading, depth, cable_tension."
             )
-    plots = RunPlots(run)
-    return {name: getattr(plots, name)() if name in PLOTS else plots.channel(name) for name in what or PLOTS}
+    plots, usual = RunPlots(run), PLOTS if run.attrs["tethered"] else UNTETHERED_PLOTS
+    return {name: getattr(plots, name)() if name in PLOTS else plots.channel(name) for name in what or usual}
 
 
 PLOTS = ("tension", "shape3d", "motion", "forces", "attitude", "cable")
 """Methods of `RunPlots`, and what ``subzero plot --what`` takes."""
+
+UNTETHERED_PLOTS = tuple(name for name in PLOTS if name not in ("tension", "cable"))
+"""Those that a run without a cable has."""

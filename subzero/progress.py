@@ -101,7 +101,7 @@ class ProgressBar:
 
     def _count(self) -> None:
         """Show how many functions are compiled."""
-        from subzero.jit.machine_code import made
+        from subzero.jit.machine_code import counting, made
 
         self._counting = True
         self._open()
@@ -112,7 +112,7 @@ class ProgressBar:
             now = made()
             self._console.print(f" {now}" if now != self._made else ".", end="", soft_wrap=True)
             self._console.file.flush()
-            self._made = now
+            self._made, counting[0] = now, True
 
     def _end_count(self) -> None:
         """Go back to what is being done, once nothing is compiled any more."""
@@ -121,6 +121,9 @@ class ProgressBar:
             if self._bar is not None:
                 self._bar.update(self._bar.task_ids[0], description=self._words)
             else:
+                from subzero.jit.machine_code import counting
+
+                counting[0] = False
                 self._console.print(" functions.", soft_wrap=True)
 
     def _open(self) -> None:

@@ -125,24 +125,31 @@ def _tell(verdict: Verdict, stage: Stage, console: Console, scenario: str) -> No
 
 COLUMN_GAP = 3
 """So many letters stand between two columns, at most."""
+SENTENCE_LETTERS = 20
+"""A line of a sentence has at least so many, where there is room."""
 
 
 def _rich(table: tables.Table, width: int) -> Table:
     """Return a table for a terminal of some letters: no word and no id is broken, sentences between their words.
 
-    Where there is no room for the longest word of every column, the longest columns in the middle are left out; the
-    report has them.
+    Where there is no room for every column to be readable, the longest ones in the middle are left out; the report has
+    them.
     """
     columns = [(name, [row[at] for row in table.rows]) for at, name in enumerate(table.header)]
-    while len(columns) > 2 and sum(_longest_word(*one) + COLUMN_GAP for one in columns) > width:
+    while len(columns) > 2 and sum(_readable(*one) + COLUMN_GAP for one in columns) > width:
         columns.remove(max(columns[1:-1], key=lambda one: sum(map(len, one[1]))))
     shown = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     for name, cells in columns:
         is_one_word = not any(" " in cell for cell in (name, *cells))
-        shown.add_column(name, overflow="fold", no_wrap=is_one_word, min_width=_longest_word(name, cells))
+        shown.add_column(name, overflow="fold", no_wrap=is_one_word, min_width=_readable(name, cells))
     for row in zip(*(cells for _, cells in columns), strict=True):
         shown.add_row(*map(escape, row))
     return shown
+
+
+def _readable(name: str, cells: Sequence[str]) -> int:
+    """Return how many letters a column needs to be read: its longest word, of sentences a few words a line."""
+    return max(_longest_word(name, cells), min(SENTENCE_LETTERS, max(map(len, (name, *cells)), default=1)))
 
 
 def _longest_word(name: str, cells: Sequence[str]) -> int:

@@ -1,4 +1,4 @@
-"""The cable in space: its shapes in three dimensions, and its tension over length and time in one picture."""
+"""The cable in space: its shapes in three dimensions."""
 
 from __future__ import annotations
 
@@ -13,11 +13,10 @@ from matplotlib.ticker import MaxNLocator
 
 from subzero.figures import style
 from subzero.figures.cable import CHANNEL, SHAPES, axes_of, way_of_drum
-from subzero.figures.style import Title, calm, headline, in_time, label, legend, sheet, spread
+from subzero.figures.style import Title, spread
 
 if TYPE_CHECKING:
     import xarray as xr
-    from matplotlib.axes import Axes
 
 SIDE = 5.4
 """Width and height of a view in space. [inch]"""
@@ -25,8 +24,6 @@ LETTERS_A_LINE = 64
 FLATTEST = 0.2
 """The shortest edge of a view in space is at least this share of the longest, so that a flat track has a depth."""
 TICKS = 4
-LEVELS = 60
-"""Steps of the unstretched length in a picture of the tension; the cable grows through them."""
 
 
 def shape_3d(run: xr.Dataset, title: Title, count: int = SHAPES) -> Figure:
@@ -68,24 +65,6 @@ def shape_3d(run: xr.Dataset, title: Title, count: int = SHAPES) -> Figure:
     return figure
 
 
-def tension_map(run: xr.Dataset, title: Title) -> Figure:
-    """Draw the tension at both ends over time, and the tension along the whole cable over time as colour."""
-    figure, (ends, along) = sheet(1, 2, title)
-    time = run["time"].values
-    ends.plot(time, run["cable_tension"].values, color=style.BLUE, linewidth=1.5, label="$T(0)$, tow point")
-    ends.plot(time, run["drum_tension"].values, color=style.GREEN, linewidth=1.2, label="$T(S)$, drum")
-    headline(ends, "Tension at the ends")
-    label(ends, "time [s]", "$T$ [N]")
-    in_time(ends, {"": run})
-    calm(ends)
-    legend(ends)
-    headline(along, "Tension along the cable")
-    label(along, "time [s]", "$s$ from the vehicle [m]")
-    in_time(along, {"": run})
-    _colours(run, figure, along)
-    return figure
-
-
 def _shapes(run: xr.Dataset, axes: Any, count: int) -> None:
     """Draw the cable at some times, with a dot at the tow point."""
     times = spread(count, run.sizes["time"])
@@ -111,23 +90,3 @@ def _in_proportion(axes: Any) -> None:
         middle, half = 0.5 * (low + high), 0.5 * size * np.sign(high - low)
         set_limits(middle - half, middle + half)
     axes.set_box_aspect(wanted, zoom=0.88)
-
-
-def _colours(run: xr.Dataset, figure: Figure, axes: Axes) -> None:
-    """Draw the tension at even arc lengths over time; nothing where there is no cable."""
-    time, arc, tension = run["time"].values, run["arc_length"].values, run["cable_node_tension"].values
-    longest = float(np.nanmax(arc, initial=0.0))
-    if longest <= 0.0 or time.size < 2:
-        axes.text(0.5, 0.5, "no cable in the water", ha="center", transform=axes.transAxes, color=style.GREY)
-        return
-    levels = np.linspace(0.0, longest, LEVELS)
-    table = np.full((LEVELS, time.size), np.nan)
-    for column, (s, T) in enumerate(zip(arc, tension, strict=True)):
-        known = np.isfinite(s)
-        if known.sum() > 1:
-            table[:, column] = np.interp(levels, s[known], T[known], right=np.nan)
-    mesh = axes.pcolormesh(time, levels, table, cmap="viridis", shading="nearest", rasterized=True)
-    axes.grid(visible=False)
-    bar = figure.colorbar(mesh, ax=axes, pad=0.02)
-    bar.ax.set_title("$T$ [N]", fontsize=style.SMALL, pad=3)
-    bar.ax.tick_params(labelsize=style.SMALL)

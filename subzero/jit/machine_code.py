@@ -311,6 +311,8 @@ class MachineCode(_Cache):  # type: ignore[misc]  # numba has no types
 
 COMPILING = "compiling"
 
+counting = [False]
+"""Whether a line with the number of compiled functions stands open on standard error, and has to be ended first."""
 _made = [0]
 """How many functions this process has compiled."""
 
@@ -341,4 +343,4 @@ def tell(kind: str, line: str) -> None:
     if kind not in _told:
         _told.add(kind)
         with suppress(OSError, ValueError):  # nobody reads it any more
-            print(line, file=sys.stderr, flush=True)
+            print("\n" * counting[0] + line, file=sys.stderr, flush=True)

@@ -209,7 +209,7 @@ def full_disk():
     resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 
-NOT_KEPT = "(Compil.*\\n|[ 0-9.]+functions\\.\\n)*"
+NOT_KEPT = "(Compil.*\\n|[ 0-9.]+(functions\\.)?\\n)*"
 """What a full disk also means, where something has to be compiled."""
 
 

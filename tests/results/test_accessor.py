@@ -10,6 +10,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import subzero
+from subzero.accessor import figures_of
 
 
 @pytest.fixture(scope="module")
@@ -17,25 +18,33 @@ def run():
     return subzero.simulate("fig6")
 
 
-@pytest.mark.parametrize("name", ["tension", "shape3d", "motion", "forces"])
 @pytest.mark.parametrize("tethered", [True, False])
-def test_every_figure_can_be_saved(name, tethered, run, tmp_path):
-    drawn = run if tethered else subzero.simulate("fig4", tethered=False)
-    path = tmp_path / "figure.png"
-    getattr(drawn.subzero.plot, name)().savefig(path)
-    assert path.stat().st_size > 10_000
+def test_every_figure_can_be_saved(tethered, run, tmp_path):
+    drawn = run if tethered else subzero.simulate("fig6", tethered=False)
+    figures = figures_of(drawn)
+    assert set(figures) >= {"shape3d", "motion", "forces", "attitude"}
+    assert ("tension" in figures) == ("cable" in figures) == tethered
+    for name, figure in figures.items():
+        figure.savefig(tmp_path / f"{name}.png")
+        assert (tmp_path / f"{name}.png").stat().st_size > 10_000
+
+
+def test_without_a_cable_there_is_no_tension_to_draw():
+    with pytest.raises(subzero.UserError, match="no cable in the water"):
+        subzero.simulate("fig6", tethered=False).subzero.plot.tension()
 
 
 def test_the_colours_of_the_tension_are_the_tension_along_the_cable(run):
     """At the tow point the colour of each time is the channel `cable_tension`; behind the drum there is none."""
     figure = run.subzero.plot.tension()
-    (mesh,) = figure.axes[1].collections
+    (mesh,) = figure.axes[0].collections
     table = np.ma.filled(np.ma.asarray(mesh.get_array(), dtype=float), np.nan)
-    assert_allclose(table[0], run["cable_tension"], atol=1e-9)
-    levels = np.linspace(0.0, float(run["arc_length"].max()), table.shape[0])
-    beyond = levels[:, None] > run["cable_length"].values
-    assert np.isnan(table[beyond]).all()
-    assert not np.isnan(table[~beyond]).any()
+    shown = run.isel(time=slice(1, None))  # all times but the start
+    assert_allclose(table[:, 0], shown["cable_tension"], atol=1e-9)
+    along = np.linspace(0.0, float(run["arc_length"].max()), table.shape[1])
+    step = along[1]
+    assert np.isnan(table[along > shown["cable_length"].values[:, None] + step]).all()
+    assert not np.isnan(table[along < shown["cable_length"].values[:, None] - step]).any()
 
 
 def test_the_shapes_in_space_are_those_of_the_run_and_down_is_down(run):

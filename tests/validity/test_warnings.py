@@ -16,7 +16,7 @@ import subzero
 from subzero.refinement import halved
 from subzero.validity import CHECKS
 from subzero.validity.limits import bend_radii
-from subzero.validity.numerics import drum_is_ill_posed, roughness
+from subzero.validity.numerics import drum_is_ill_posed, is_resolved, roughness
 
 FIG6 = dataclasses.replace(subzero.load_scenario("fig6"), rtol=0.0)
 """With steps and segments as they are: no coarser run confirms it, and none is taken finer."""
@@ -198,6 +198,22 @@ def test_a_cable_that_unwinds_against_friction_is_doubted_only_until_a_coarser_r
     assert subzero.check(confirmed).tow_force < 0.01
     loose = dataclasses.replace(confirmed, drum=plain.drum | {"friction_torque": 0.001})  # 0.01 N
     assert "ill_posed_drum" in warned(loose)
+
+
+@pytest.mark.parametrize("friction_torque, stays", [(0.0, True), (0.004, True), (0.0085, False)])
+def test_where_momentum_outweighs_the_tension_two_runs_that_agree_settle_nothing(friction_torque, stays):
+    """m1 U² > T: no wave comes back to the drum, so that a coarser run only makes the same choice.
+
+    At a drum of 0.1 m the friction is T = 0.04 and 0.085 N, and the cable comes off with m1 U² of up to 2.3 and
+    0.85 times that.
+    """
+    drum = {"friction_torque": friction_torque}
+    slow = trial_of(held=(8.0, 0.0, 0.0, 0.0), cable=HEAVY, drum=drum, duration=15.0, start={"depth": 5.0})
+    run = subzero.simulate(slow)
+    assert checked(run, slow, check="ill_posed_drum")
+    agreed = run.assign_attrs(accuracy=json.dumps({"force_error": 0.001, "rtol": 0.02}))
+    assert is_resolved(agreed)
+    assert bool(checked(agreed, slow, check="ill_posed_drum")) is stays
 
 
 def test_the_friction_that_the_warning_asks_for_makes_finer_segments_better_instead_of_worse():

@@ -51,6 +51,8 @@ ONE_SIDED = 0.25
 
 UNCHANGED = "No file was changed. All that follows is said of the records as they are once that is put right."
 
+NAMED_FROM = 0.01
+"""What is less probable than that is not said to explain the records as well."""
 MAX_NAMED = 5
 """So many explanations are named in a sentence."""
 ALTERNATIVE_PROBABILITY = 0.1
@@ -231,7 +233,8 @@ def _undecided(verdict: Verdict) -> str:
     """Return what the records allow, the most probable first."""
     ranked = sorted(verdict.probabilities.items(), key=lambda item: -item[1])
     known = sentences(verdict)
-    shown = "; ".join(f"{explanation(name, known)} ({probability(p)})" for name, p in ranked[:MAX_NAMED])
+    worth = sum(p >= NAMED_FROM for _, p in ranked[:MAX_NAMED])
+    shown = "; ".join(f"{explanation(name, known)} ({probability(p)})" for name, p in ranked[: max(worth, 2)])
     more = len(verdict.rivals) - MAX_NAMED
     rest = f"; and {more} more that are less probable" if more > 0 else ""
     return f"These records cannot tell apart: {shown}{rest}."
