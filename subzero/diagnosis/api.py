@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
 
@@ -21,28 +22,16 @@ from subzero.diagnosis.assessment.residuals import misfits
 from subzero.diagnosis.hypothesis.catalogue import load
 from subzero.diagnosis.hypothesis.effect import Effect
 from subzero.diagnosis.hypothesis.logged import Logged
-from subzero.diagnosis.inference.data_error_choice import (
-    SuspectedError,
-    is_clear,
-    log_odds,
-    may_be_named,
-    suspected,
-    without,
-)
+from subzero.diagnosis.inference.data_error_choice import Hopeless, compared, suspected
 from subzero.diagnosis.inference.measurement import respond
 from subzero.diagnosis.inference.model_search import Search
 from subzero.diagnosis.inference.out_of_catalogue import Findings, explanations_outside, is_explained
-from subzero.diagnosis.inference.posing import pose
+from subzero.diagnosis.inference.posing import pose, posed_again
 from subzero.diagnosis.inference.problem import Problem, Progress
 from subzero.diagnosis.read_trials import read_trials
 from subzero.diagnosis.results import Detectability, Verdict
 from subzero.diagnosis.verdict.conclude import conclude
-from subzero.diagnosis.verdict.data_errors import (
-    is_named,
-    probability_of,
-    with_data_errors,
-    with_possible_errors,
-)
+from subzero.diagnosis.verdict.data_errors import on_records
 from subzero.diagnosis.verdict.follow_up import follow_up, ranked, refuted_rivals
 from subzero.model import Model
 
@@ -120,57 +109,58 @@ def diagnose_trials(
     Raises:
         UserError: the nominal model cannot be run through a trial.
     """
-    effects, progress, seen = (
-        tuple(effects),
-        progress or (lambda share, words: None),
-        seen or (lambda table: None),
-    )
-    begun = perf_counter()
-    problem = pose(records, effects)
+    effects, problem, begun = tuple(effects), pose(records, effects), perf_counter()
     with threadpool_limits(limits=1, user_api="blas"):  # runs have the cores; matrices are small
         found = suspected(problem, records)
-        spent = perf_counter() - begun
-
-        def searched(problem: Problem, parts: Progress) -> Findings:
-            work = Findings(search=Search(problem=problem, progress=parts), seed=seed, budget=budget)
-            work.seconds["errors in the data"] = spent
-            _find_all(work, seen)
-            return work
-
+        looking = _Looking(
+            problem=problem, effects=effects, progress=progress or (lambda share, words: None),
+            seen=seen or (lambda table: None), seed=seed, budget=budget, scanned=perf_counter() - begun,
+            most=len(found) + 1,
+        )  # fmt: skip
         if not found:
-            return _concluded(searched(problem, progress))
-        return _beside_errors(found, records, problem, searched, progress, effects)
+            return _concluded(looking(records))
+        return on_records(records, compared(found, records, looking), _concluded)
 
 
-Searched = Callable[[Problem, Progress], Findings]
+@dataclass(kw_only=True, eq=False)
+class _Looking:
+    """Searches records, as they are or with something in them put right, one after the other.
+
+    Attributes:
+        problem: of the records as they are.
+        effects: causes besides the catalogue.
+        scanned: how long errors in the data were looked for. [s]
+        most: so many searches there may be.
+        done: so many there were.
+    """
+
+    problem: Problem
+    effects: tuple[Effect, ...]
+    progress: Progress
+    seen: Seen
+    seed: int
+    budget: str
+    scanned: float
+    most: int
+    done: int = 0
+
+    def __call__(self, records: Sequence[Logged], is_hopeless: Hopeless = lambda findings: False) -> Findings:
+        """Return what is found in records."""
+        low, self.done = self.done / self.most, self.done + 1
+        search = Search(
+            problem=posed_again(self.problem, records, self.effects),
+            progress=lambda share, words: self.progress(low + share / self.most, words),
+        )
+        found = Findings(search=search, seed=self.seed, budget=self.budget)
+        found.seconds["errors in the data"] = self.scanned
+        _find_all(found, self.seen if self.done == 1 else lambda table: None, is_hopeless)
+        return found
 
 
-def _beside_errors(
-    found: Sequence[SuspectedError],
-    records: Sequence[Logged],
-    problem: Problem,
-    searched: Searched,
-    progress: Progress,
-    effects: Sequence[Effect],
-) -> Verdict:
-    """Return the verdict on records that seem to have errors in their data: without these, or as they are."""
-    after = searched(pose(without(records, found), effects), _part(progress, 0.0, 0.5))
-    as_is = None if is_clear(found, after) else searched(problem, _part(progress, 0.5, 1.0))
-    probability = probability_of(log_odds(found, records, after, as_is))
-    if as_is is None or (is_named(probability) and may_be_named(found, after)):
-        return with_data_errors(_concluded(after), records, found, probability)
-    return with_possible_errors(_concluded(as_is), records, found, probability)
-
-
-def _part(progress: Progress, low: float, high: float) -> Progress:
-    """Return the progress of a part of the work."""
-    return lambda share, words: progress(low + (high - low) * share, words)
-
-
-def _find_all(findings: Findings, seen: Seen) -> None:
+def _find_all(findings: Findings, seen: Seen, is_hopeless: Hopeless) -> None:
     """Do all parts in turn; if that is interrupted, keep what there is."""
     try:
-        _find(findings, seen)
+        _find(findings, seen, is_hopeless)
     except KeyboardInterrupt:
         findings.complete = False
         if () not in findings.search.candidates:
@@ -182,8 +172,8 @@ def _concluded(findings: Findings) -> Verdict:
     return conclude(findings, known, follow_up(findings, known))
 
 
-def _find(findings: Findings, seen: Seen) -> None:
-    """Do all parts in turn, and keep their times."""
+def _find(findings: Findings, seen: Seen, is_hopeless: Hopeless) -> None:
+    """Do all parts in turn, and keep their times; no more than the first fits of what is hopeless."""
     search, start, before = findings.search, perf_counter(), sum(findings.seconds.values())
 
     def done(part: str) -> None:
@@ -206,7 +196,7 @@ def _find(findings: Findings, seen: Seen) -> None:
     if search.is_poor() and not findings.out_of_catalogue:
         search.progress(0.6, "forces, and causes that begin in mid-trial")
         findings.out_of_catalogue = explanations_outside(search)
-    if not is_explained(search, findings.out_of_catalogue):
+    if not (is_explained(search, findings.out_of_catalogue) or is_hopeless(findings)):
         search.refine_first()
         search.grow()
         search.settle()

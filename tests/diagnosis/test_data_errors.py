@@ -23,7 +23,7 @@ from subzero.diagnosis.report import json_file, words
 from subzero.records.record import Record
 from subzero.synthetic.planted import draw_tolerances, make_record
 
-CHANNELS = ("surge_speed", "heading", "yaw_rate", "pitch", "roll", "depth")
+CHANNELS = ("surge_speed", "heading", "yaw_rate", "pitch", "roll_angle", "depth")
 TIME = np.arange(0.0, 30.01, 0.1)
 EACH = (
     DataError(kind="sign", channels=("heading",)),
@@ -33,10 +33,10 @@ EACH = (
     DataError(kind="reference", channels=("heading",), how="is 90 degrees too large"),
     DataError(kind="reference", channels=("heading",), how="counts counter-clockwise from east"),
     DataError(kind="step", channels=("pitch",), amount=3.0, since=12.0),
-    DataError(kind="frozen", channels=("roll",), since=20.0, at=tuple(TIME[TIME >= 20.0])),
-    DataError(kind="dropout", channels=("roll",), how="-999", at=tuple(TIME[50:60])),
+    DataError(kind="frozen", channels=("roll_angle",), since=20.0, at=tuple(TIME[TIME >= 20.0])),
+    DataError(kind="dropout", channels=("roll_angle",), how="-999", at=tuple(TIME[50:60])),
     DataError(kind="dropout", channels=("depth",), at=tuple(TIME[80:95])),
-    DataError(kind="swapped", channels=("pitch", "roll")),
+    DataError(kind="swapped", channels=("pitch", "roll_angle")),
     DataError(kind="late_clock", amount=4.0),
     DataError(kind="late_clock", amount=-3.0),
     DataError(kind="clock_rate", amount=0.05),

@@ -92,6 +92,11 @@ class DataError:
         return f"{self.kind}{where}{f'={self.how}' if self.how else ''}"
 
     @property
+    def numbers(self) -> int:
+        """How many of its numbers are fitted to a record: its size, and when it begins."""
+        return 2 if self.kind == "step" else int(self.amount != 0.0)
+
+    @property
     def is_of_commands(self) -> bool:
         """It is an error of what was commanded, not of what was measured."""
         return self.kind in ("command_sign", "command_swap")

@@ -1,22 +1,28 @@
-"""Which errors in the data a diagnosis goes on without: found one after the other, and then held against physics.
+"""Which errors in the data a diagnosis goes on without: proposed by a scan, and then held against physics.
 
-`suspected` corrects the best suspect of `data_error_scan`, looks again, and so on. Whether they are errors is for
-real fits to say: the corrected record has to be explained to its noise, and better than the record as it is. Where the
-linear problem leaves physics no chance with all its parameters free at once, no more is asked (`is_clear`); else the
-record as it is has a search of its own, and the two are set beside each other in the units of the record as written:
+`suspected` corrects the best suspect of `data_error_scan`, looks again, and so on. Nothing is named for that. Sets of
+suspects, from all of them to none, are explanations like others (`compared`): a record without them has a search of
+its own, with causes, what begins in mid-trial, forces and drifts. T the corrections, y the record as written:
 
-    log p(y, error) = log p(T y) + Σ log|dT/dy| + log p(error)
+    log p(y, errors) = log Σ_M p(T y | M) p(M) + Σ log|dT/dy| + Σ log p(error) + log p(noise)
+
+Only the search that is hopelessly behind is cut short. What no vehicle does (another sign, unit or reference of one
+channel, exchanged columns, repeated values) needs no such search where the linear problem leaves physics no chance
+with all its parameters free at once, and one cause at most explains what is left (`is_clear`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from subzero.diagnosis.hypothesis.data_error import DataError, corrected
 from subzero.diagnosis.hypothesis.logged import Logged
+from subzero.diagnosis.inference import settings
 from subzero.diagnosis.inference.data_error_scan import (
     OUTLIER_LOG_DENSITY,
     Suspect,
@@ -27,10 +33,13 @@ from subzero.diagnosis.inference.data_error_scan import (
 )
 from subzero.diagnosis.inference.linear_gaussian import log_sum
 from subzero.diagnosis.inference.map_fit import is_poor_fit
-from subzero.diagnosis.inference.out_of_catalogue import Findings
+from subzero.diagnosis.inference.noise import log_prior_of
 from subzero.diagnosis.inference.posing import pose, usual_of
 from subzero.diagnosis.inference.problem import Observed, Problem
 from subzero.diagnosis.inference.repeated_values import is_rounded, repeated_values
+
+if TYPE_CHECKING:
+    from subzero.diagnosis.inference.out_of_catalogue import Findings
 
 MOST_ERRORS = 3
 """Of a record, beside values that are repeated."""
@@ -47,6 +56,8 @@ LOUD = 2.5
 """Noise of more usual levels hides a misfit. [-]"""
 SIGNATURE_LEAD = 20.0
 """Lead of what is read off a record."""
+ALIKE = 10
+"""So many errors of a kind share its probability, about."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -112,42 +123,109 @@ def _after(yardstick: Yardstick, error: DataError) -> Yardstick:
     return replace(changed, corrected=(*yardstick.corrected, error), repeated=yardstick.repeated)
 
 
-def is_clear(found: Sequence[SuspectedError], after: Findings) -> bool:
-    """Say whether errors need not be held against a search of the records as they are."""
-    leads = all(one.lead > CLEAR_LEAD and one.generous > CLEAR_GENEROUS_LEAD for one in found)
-    return leads and is_explained(after)
+def is_clear(firm: Sequence[SuspectedError], work: Findings) -> bool:
+    """Say whether what no vehicle does need not be held against a search of the records as they are: what is left then
+    is explained without anything that begins in mid-trial, and without a force.
+    """
+    leads = all(one.lead > CLEAR_LEAD and one.generous > CLEAR_GENEROUS_LEAD for one in firm)
+    outside = max((one.log_posterior for one in work.out_of_catalogue), default=-np.inf)
+    return leads and work.search.best().log_posterior > outside and is_explained(work)
 
 
-def may_be_named(found: Sequence[SuspectedError], after: Findings) -> bool:
+def is_soft(one: SuspectedError) -> bool:
+    """Say whether something that a vehicle does may look like an error."""
+    return one.error.kind in SOFT
+
+
+def may_be_named(errors: Sequence[SuspectedError], work: Findings) -> bool:
     """Say whether errors may be the verdict: those that something else may look like only if they explain all."""
-    return is_explained(after) or not any(one.error.kind in SOFT for one in found)
+    return is_explained(work) or not any(is_soft(one) for one in errors)
 
 
 def is_explained(work: Findings) -> bool:
-    """Say whether one hypothesis leaves nothing but the noise of usual sensors."""
+    """Say whether one explanation leaves nothing but the noise of usual sensors."""
     usual = all(noise.sd < LOUD * usual_of(name, one.values[name], one.known).level + noise.resolution
                 for one in work.problem.records for name, noise in one.noise.items())  # fmt: skip
-    return usual and not is_poor_fit(work.search.best().fit)
+    return usual and (
+        not is_poor_fit(work.search.best().fit) or any(one.point for one in work.out_of_catalogue)
+    )
 
 
-def log_odds(
-    found: Sequence[SuspectedError], records: Sequence[Logged], after: Findings, as_is: Findings | None
-) -> float:
-    """Return the log odds of errors in the data against physics alone.
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Explained:
+    """Records that are taken to have errors in their data, and what explains them besides.
+
+    Attributes:
+        errors: in the data.
+        work: what was found in the records without them.
+        log_prior: of the errors, and what their corrections stretch.
+        lost: samples that are no measurements then.
+    """
+
+    errors: tuple[SuspectedError, ...]
+    work: Findings
+    log_prior: float
+    lost: int
+
+    def log_evidence(self, per_lost: float) -> float:
+        """Return the log evidence of the records as they were written; of samples that are lost, each so much."""
+        return log_evidence(self.work) + self.log_prior + self.lost * per_lost
+
+    @property
+    def mean(self) -> float:
+        """The mean log density of a sample."""
+        return log_evidence(self.work) / max(_samples(self.work), 1)
+
+
+Hopeless = Callable[["Findings"], bool]
+"""Says whether what was found so far is hopelessly behind what is known else."""
+Look = Callable[[Sequence[Logged], Hopeless], "Findings"]
+"""A search of records."""
+
+
+def compared(
+    found: Sequence[SuspectedError], records: Sequence[Logged], look: Look
+) -> list[tuple[Explained, float]]:
+    """Return what errors the data may have, with what explains the records besides and its log evidence, the most
+    probable first.
 
     Args:
-        found: the errors.
+        found: the errors that are suspected.
         records: as they are.
-        after: what was found in the records without the errors.
-        as_is: what was found in the records as they are; None if nobody looked, then the scan's word is taken.
+        look: searches records for causes, what begins in mid-trial, forces and drifts.
     """
-    if as_is is None:
-        return min(min(one.lead, one.generous) for one in found)
-    there, here = log_evidence(after), log_evidence(as_is)
-    for one in found:
-        there += log_prior(one.error, 10) + one.error.log_jacobian * _measured(records[one.record], one.error)
-    lost = sum(_samples(as_is.problem.records)) - sum(_samples(after.problem.records))
-    return there - here + lost * here / max(sum(_samples(as_is.problem.records)), 1)
+    firm, soft = (tuple(one for one in found if is_soft(one) is kind) for kind in (False, True))
+    tried = [_explained(tuple(found), records, look(without(records, found), lambda work: False))]
+    fewer = [(*firm, *soft[:count]) for count in range(len(soft))[::-1]]
+    for errors in [*fewer, ()] if firm else fewer:
+        best = max(tried, key=lambda one: one.log_evidence(one.mean))
+        if not best.work.complete or (not errors and is_clear(firm, best.work)):
+            break
+        behind = partial(_is_behind, best, errors, records)
+        tried.append(_explained(errors, records, look(without(records, errors), behind)))
+    per_lost = min(one.mean for one in tried)
+    return sorted(((one, one.log_evidence(per_lost)) for one in tried), key=lambda pair: -pair[1])
+
+
+def _explained(errors: tuple[SuspectedError, ...], records: Sequence[Logged], work: Findings) -> Explained:
+    prior = sum(log_prior(one.error, ALIKE) + one.error.log_jacobian * _measured(records[one.record], one.error)
+                for one in errors)  # fmt: skip
+    measured = sum(int(np.isfinite(logged.record.values[name]).sum()) for logged, one in
+                   zip(records, work.problem.records, strict=True) for name in one.noise)  # fmt: skip
+    return Explained(errors=errors, work=work, log_prior=float(prior), lost=measured - _samples(work))
+
+
+def _is_behind(
+    best: Explained, errors: tuple[SuspectedError, ...], records: Sequence[Logged], work: Findings
+) -> bool:
+    """Say whether no more causes, nor better fits, bring an explanation close to one that leaves only noise."""
+    if not may_be_named(best.errors, best.work):
+        return False
+    now = _explained(errors, records, work)
+    hope = max(one.optimistic_log_posterior for one in work.search.candidates.values())
+    gain = hope - work.search.best().log_posterior
+    per_lost = min(best.mean, now.mean)
+    return now.log_evidence(per_lost) + gain < best.log_evidence(per_lost) - settings.DECISIVE_NATS
 
 
 def _measured(logged: Logged, error: DataError) -> int:
@@ -162,15 +240,17 @@ def log_evidence(work: Findings) -> float:
     return found + sum(_fixed(one) for one in work.problem.records)
 
 
-def _samples(records: Sequence[Observed]) -> list[int]:
-    return [int(np.isfinite(one.values[name]).sum()) for one in records for name in one.noise]
+def _samples(work: Findings) -> int:
+    return sum(int(np.isfinite(one.values[name]).sum()) for one in work.problem.records for name in one.noise)
 
 
 def _fixed(one: Observed) -> float:
-    """Return what the noise of a record adds to its log density: −½ log det Σ, and what outliers cost."""
+    """Return what the noise of a record adds to its log density: −½ log det Σ, what outliers cost, and its prior."""
     found = 0.0
     for name, noise in one.noise.items():
+        usual = usual_of(name, one.values[name], one.known)
         out = int(np.isfinite(one.values[name]).sum()) - noise.count
-        level = usual_of(name, one.values[name], one.known).level
-        found += out * (OUTLIER_LOG_DENSITY - np.log(level)) - noise.log_scale
+        found += (
+            out * (OUTLIER_LOG_DENSITY - np.log(usual.level)) - noise.log_scale + log_prior_of(noise, usual)
+        )
     return found

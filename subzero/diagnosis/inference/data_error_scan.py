@@ -454,7 +454,7 @@ def _first(time: np.ndarray, at: float) -> float:
 
 def log_prior(error: DataError, alike: int) -> float:
     """Return the log odds beforehand of an error, one of so many of its kind, against none."""
-    among = FREE_NUMBER_LOG_PRIOR if error.amount else -np.log(max(alike, 1))
+    among = error.numbers * FREE_NUMBER_LOG_PRIOR if error.numbers else -np.log(max(alike, 1))
     return float(np.log(ANY * KINDS[error.kind].share / (1.0 - ANY)) + among)
 
 

@@ -299,6 +299,11 @@ def _log_marginal(noise: Noise, r: np.ndarray, F: np.ndarray) -> float:
     return -0.5 * float(x @ x - seen @ seen) - log_det
 
 
+def log_prior_of(noise: Noise, usual: Usual) -> float:
+    """Return the log density of a noise before the data speak, but for a constant of all noises."""
+    return _log_prior(np.log([noise.white, noise.slow, noise.correlation_time]), usual)
+
+
 def _log_prior(log: np.ndarray, usual: Usual) -> float:
     """Return the log density of log σ_w, log σ_s, log τ_s, but for a constant."""
     white, slow, time = log

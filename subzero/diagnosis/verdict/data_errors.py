@@ -1,66 +1,100 @@
-"""The verdict on records with errors in their data: what to change, and the diagnosis of the records without them."""
+"""The verdict on records that may have errors in their data: what to change, and the diagnosis of what is left.
+
+The sets of errors that were tried hold one another. Told is the largest of them that, with all that hold it, is
+probable enough to be named; the next larger one stands beside the diagnosis as possible, if it is not improbable.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from subzero.diagnosis.hypothesis.data_error import DataError
 from subzero.diagnosis.hypothesis.logged import Logged
-from subzero.diagnosis.inference.data_error_choice import SuspectedError
+from subzero.diagnosis.inference.data_error_choice import (
+    Explained,
+    SuspectedError,
+    is_soft,
+    may_be_named,
+)
+from subzero.diagnosis.inference.linear_gaussian import log_sum
 from subzero.diagnosis.inference.model_average import NAMED_PROBABILITY
+from subzero.diagnosis.inference.out_of_catalogue import Findings
 from subzero.diagnosis.results import DATA_ERROR, UNDECIDED, FoundError, Rival, Verdict
 
 WORTH_TELLING = 0.05
-"""An error that is less probable is not told beside a diagnosis of the records as they are."""
-SUREST_LOG_ODDS, EVEN = 30.0, 0.5
-"""Log odds say no more than that; of what is not named the probability is at most this."""
+"""Errors that are less probable are not told beside a diagnosis of the records without them."""
+MOST, EVEN = 1.0 - 1e-9, 0.5
+"""No error is more probable than that; nor, if it may not be named, than as not."""
 
 
-def probability_of(log_odds: float) -> float:
-    """Return the probability that has log odds."""
-    return float(1.0 / (1.0 + np.exp(-np.clip(log_odds, -SUREST_LOG_ODDS, SUREST_LOG_ODDS))))
-
-
-def is_named(probability: float) -> bool:
-    """Say whether errors of a probability are the verdict."""
-    return probability >= NAMED_PROBABILITY
-
-
-def with_data_errors(
-    after: Verdict, records: Sequence[Logged], found: Sequence[SuspectedError], probability: float
+def on_records(
+    records: Sequence[Logged],
+    tried: Sequence[tuple[Explained, float]],
+    conclude: Callable[[Findings], Verdict],
 ) -> Verdict:
-    """Return the verdict `data_error`, which goes on with the diagnosis of the records without the errors."""
-    errors = _told(records, found, probability)
-    listed = {_beside(found, name): probability * p for name, p in after.probabilities.items()}
-    words = " ".join(f"{one.record}: {one.sentence}: {one.remedy}." for one in errors)
-    return replace(after, verdict=DATA_ERROR, sentence=f"{words} After that: {after.sentence}", data_errors=errors,
-                   then=after.verdict, probabilities=listed)  # fmt: skip
+    """Return the verdict on records that may have errors in their data.
+
+    Args:
+        records: as they are.
+        tried: what errors they may have, each set with what explains the records besides and its log evidence.
+        conclude: makes the verdict on records of what was found in them.
+    """
+    sets = sorted((one for one, _ in tried), key=lambda one: len(one.errors))
+    total, logs = log_sum([log for _, log in tried]), {id(one): log for one, log in tried}
+    each = np.exp([logs[id(one)] - total for one in sets])
+    at_least = np.minimum(np.cumsum(each[::-1])[::-1], MOST)  # of a set, or one that holds it
+    told = max((i for i, one in enumerate(sets) if _is_named(one, at_least[i])), default=0)
+    verdict = conclude(sets[told].work)
+    if sets[told].errors:
+        verdict = _with_errors(verdict, records, sets[told], float(at_least[told]))
+    if told + 1 == len(sets):
+        return verdict
+    return _with_possible(verdict, records, sets[told], sets[told + 1], float(at_least[told + 1]))
 
 
-def with_possible_errors(
-    as_is: Verdict, records: Sequence[Logged], found: Sequence[SuspectedError], probability: float
+def _is_named(one: Explained, probability: float) -> bool:
+    return probability >= NAMED_PROBABILITY and may_be_named(one.errors, one.work)
+
+
+def _with_errors(after: Verdict, records: Sequence[Logged], one: Explained, probability: float) -> Verdict:
+    """Return the verdict `data_error`, which goes on with the diagnosis of the records without the errors; of errors
+    that were held against nothing yet, as the diagnosis was interrupted, `undecided`.
+    """
+    is_decided = one.work.complete or not any(map(is_soft, one.errors))
+    errors = _told(records, one.errors, probability if is_decided else EVEN)
+    listed = {_beside(one.errors, name): probability * p for name, p in after.probabilities.items()}
+    words = " ".join(f"{error.record}: {error.sentence}: {error.remedy}." for error in errors)
+    return replace(after, verdict=DATA_ERROR if is_decided else UNDECIDED, data_errors=errors, then=after.verdict,
+                   sentence=f"{words} After that: {after.sentence}", probabilities=listed)  # fmt: skip
+
+
+def _with_possible(
+    told: Verdict, records: Sequence[Logged], less: Explained, more: Explained, probability: float
 ) -> Verdict:
-    """Return the verdict on records as they are, beside which errors in their data are possible.
+    """Return a verdict beside which further errors in the data are possible.
 
-    Errors that are more probable, but explain no more than the records as they are, are held to be as probable as not.
+    Errors that would be probable enough, but may not be named, are held to be as probable as not.
     """
     if probability < WORTH_TELLING:
-        return as_is
+        return told
     probability = min(probability, EVEN)
-    errors = _told(records, found, probability)
-    listed = {name: (1.0 - probability) * p for name, p in as_is.probabilities.items()}
-    key, words = _beside(found, "none"), " and ".join(one.sentence for one in errors)
-    listed[key] = probability
-    rival = Rival(
-        ids=tuple(one.id for one in errors), sentence=words, probability=probability, discrimination=np.nan
-    )
-    rivals = tuple(sorted([*as_is.rivals, rival], key=lambda one: -one.probability))
+    further = [one for one in more.errors if one not in less.errors]
+    errors = _told(records, further, probability)
+    listed = {name: (1.0 - probability) * p for name, p in told.probabilities.items()}
+    listed[_beside(more.errors, "none")] = probability
+    words = " and ".join(one.sentence for one in errors)
+    rival = Rival(ids=tuple(one.id for one in errors), sentence=words, probability=probability,
+                  discrimination=np.nan)  # fmt: skip
+    rivals = tuple(sorted([*told.rivals, rival], key=lambda one: -one.probability))
     ranked = dict(sorted(listed.items(), key=lambda pair: -pair[1]))
-    return replace(as_is, verdict=UNDECIDED, data_errors=errors, rivals=rivals, probabilities=ranked,
-                   sentence=f"{as_is.sentence} Or {words}.")  # fmt: skip
+    beside = replace(told, rivals=rivals, probabilities=ranked, sentence=f"{told.sentence} Or {words}.",
+                     data_errors=told.data_errors or errors)  # fmt: skip
+    if probability <= 1.0 - NAMED_PROBABILITY:
+        return beside
+    return replace(beside, then=UNDECIDED) if told.then else replace(beside, verdict=UNDECIDED)
 
 
 def _beside(found: Sequence[SuspectedError], name: str) -> str:
