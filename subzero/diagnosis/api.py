@@ -10,7 +10,8 @@ accurate, and a change point that explains them ends the search.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
@@ -22,7 +23,7 @@ from subzero.diagnosis.assessment.residuals import misfits
 from subzero.diagnosis.hypothesis.catalogue import load
 from subzero.diagnosis.hypothesis.effect import Effect
 from subzero.diagnosis.hypothesis.logged import Logged
-from subzero.diagnosis.inference.data_error_choice import Hopeless, compared, suspected
+from subzero.diagnosis.inference.data_error_choice import compared, suspected
 from subzero.diagnosis.inference.measurement import respond
 from subzero.diagnosis.inference.model_search import Search
 from subzero.diagnosis.inference.out_of_catalogue import Findings, explanations_outside, is_explained
@@ -109,7 +110,8 @@ def diagnose_trials(
     Raises:
         UserError: the nominal model cannot be run through a trial.
     """
-    effects, problem, begun = tuple(effects), pose(records, effects), perf_counter()
+    effects, begun = tuple(effects), perf_counter()
+    problem = pose(records, effects)
     with threadpool_limits(limits=1, user_api="blas"):  # runs have the cores; matrices are small
         found = suspected(problem, records)
         looking = _Looking(
@@ -118,13 +120,15 @@ def diagnose_trials(
             most=len(found) + 1,
         )  # fmt: skip
         if not found:
-            return _concluded(looking(records))
+            work = looking.begin(records)
+            looking.finish(work)
+            return _concluded(work)
         return on_records(records, compared(found, records, looking), _concluded)
 
 
 @dataclass(kw_only=True, eq=False)
 class _Looking:
-    """Searches records, as they are or with something in them put right, one after the other.
+    """Searches records, as they are or with something in them put right: a `Look`.
 
     Attributes:
         problem: of the records as they are.
@@ -132,6 +136,7 @@ class _Looking:
         scanned: how long errors in the data were looked for. [s]
         most: so many searches there may be.
         done: so many there were.
+        shown: the share of the work that was told.
     """
 
     problem: Problem
@@ -143,28 +148,48 @@ class _Looking:
     scanned: float
     most: int
     done: int = 0
+    shown: float = 0.0
 
-    def __call__(self, records: Sequence[Logged], is_hopeless: Hopeless = lambda findings: False) -> Findings:
-        """Return what is found in records."""
+    def _say(self, share: float, words: str) -> None:
+        """Tell the progress, which never goes back."""
+        self.shown = max(self.shown, share)
+        self.progress(self.shown, words)
+
+    def begin(self, records: Sequence[Logged]) -> Findings:
+        """Return what a first look at records finds."""
         low, self.done = self.done / self.most, self.done + 1
         search = Search(
             problem=posed_again(self.problem, records, self.effects),
-            progress=lambda share, words: self.progress(low + share / self.most, words),
+            progress=lambda share, words: self._say(low + share / self.most, words),
         )
-        found = Findings(search=search, seed=self.seed, budget=self.budget)
-        found.seconds["errors in the data"] = self.scanned
-        _find_all(found, self.seen if self.done == 1 else lambda table: None, is_hopeless)
-        return found
+        work = Findings(search=search, seed=self.seed, budget=self.budget)
+        work.seconds["errors in the data"] = self.scanned
+        seen = self.seen if self.done == 1 else lambda table: None
+        _keeping_what_there_is(work, lambda: _first_look(work, seen))
+        return work
+
+    def finish(self, work: Findings) -> None:
+        """Find the rest."""
+        if work.complete and self.budget != "screen":
+            _keeping_what_there_is(work, lambda: _look_closer(work))
 
 
-def _find_all(findings: Findings, seen: Seen, is_hopeless: Hopeless) -> None:
-    """Do all parts in turn; if that is interrupted, keep what there is."""
+def _keeping_what_there_is(findings: Findings, part: Callable[[], None]) -> None:
+    """Do a part; if that is interrupted, keep what there is."""
     try:
-        _find(findings, seen, is_hopeless)
+        part()
     except KeyboardInterrupt:
         findings.complete = False
         if () not in findings.search.candidates:
             raise
+
+
+@contextmanager
+def _timed(findings: Findings, part: str) -> Iterator[None]:
+    """Keep how long a part takes."""
+    begun = perf_counter()
+    yield
+    findings.seconds[part] = findings.seconds.get(part, 0.0) + perf_counter() - begun
 
 
 def _concluded(findings: Findings) -> Verdict:
@@ -172,40 +197,46 @@ def _concluded(findings: Findings) -> Verdict:
     return conclude(findings, known, follow_up(findings, known))
 
 
-def _find(findings: Findings, seen: Seen, is_hopeless: Hopeless) -> None:
-    """Do all parts in turn, and keep their times; no more than the first fits of what is hopeless."""
-    search, start, before = findings.search, perf_counter(), sum(findings.seconds.values())
-
-    def done(part: str) -> None:
-        findings.seconds[part] = perf_counter() - start - sum(findings.seconds.values()) + before
-
-    search.begin()
-    _measure_misfit(findings)
-    findings.detectable = detectability(
-        findings.problem, with_whole_effects(findings.problem, search.nominal[1])
-    )
-    seen(findings.detectable)
-    if search.is_far and findings.budget != "screen":
-        _from_afar(findings)
-    search.look()
-    done("screen")
+def _first_look(findings: Findings, seen: Seen) -> None:
+    """Screen all hypotheses, fit the best, and look outside where none of them explains the records."""
+    search = findings.search
+    with _timed(findings, "screen"):
+        search.begin()
+        _measure_misfit(findings)
+        findings.detectable = detectability(
+            findings.problem, with_whole_effects(findings.problem, search.nominal[1])
+        )
+        seen(findings.detectable)
+        if search.is_far and findings.budget != "screen":
+            _from_afar(findings)
+        search.look()
     if findings.budget == "screen":
         search.fit(())
         return
-    search.first_fits()
+    with _timed(findings, "fits"):
+        search.first_fits()
     if search.is_poor() and not findings.out_of_catalogue:
-        search.progress(0.6, "forces, and causes that begin in mid-trial")
-        findings.out_of_catalogue = explanations_outside(search)
-    if not (is_explained(search, findings.out_of_catalogue) or is_hopeless(findings)):
-        search.refine_first()
-        search.grow()
-        search.settle()
-        done("fits")
-        search.progress(0.8, "forces that no cause explains")
-        findings.out_of_catalogue = explanations_outside(search)
-    findings.refuted = refuted_rivals(search)
-    _measure_misfit(findings)
-    done("outside")
+        _look_outside(findings, 0.6, "forces, and causes that begin in mid-trial")
+
+
+def _look_closer(findings: Findings) -> None:
+    """Fit until nothing gets better, and look outside again."""
+    search = findings.search
+    if not is_explained(search, findings.out_of_catalogue):
+        with _timed(findings, "fits"):
+            search.refine_first()
+            search.grow()
+            search.settle()
+        _look_outside(findings, 0.8, "forces that no cause explains")
+    with _timed(findings, "outside"):
+        findings.refuted = refuted_rivals(search)
+        _measure_misfit(findings)
+
+
+def _look_outside(findings: Findings, share: float, words: str) -> None:
+    findings.search.progress(share, words)
+    with _timed(findings, "outside"):
+        findings.out_of_catalogue = explanations_outside(findings.search)
 
 
 def _measure_misfit(findings: Findings) -> None:

@@ -6,17 +6,16 @@ its own, with causes, what begins in mid-trial, forces and drifts. T the correct
 
     log p(y, errors) = log Σ_M p(T y | M) p(M) + Σ log|dT/dy| + Σ log p(error) + log p(noise)
 
-Only the search that is hopelessly behind is cut short. What no vehicle does (another sign, unit or reference of one
+A search that is hopelessly behind ends with its first look. What no vehicle does (another sign, unit or reference of one
 channel, exchanged columns, repeated values) needs no such search where the linear problem leaves physics no chance
 with all its parameters free at once, and one cause at most explains what is left (`is_clear`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -176,35 +175,74 @@ class Explained:
         """The mean log density of a sample."""
         return log_evidence(self.work) / max(_samples(self.work), 1)
 
+    def is_behind(self, other: Explained) -> bool:
+        """Say whether no more causes, nor better fits, bring it close to another that leaves only noise."""
+        if other is self or not is_explained(other.work):
+            return False
+        fits, per_lost = self.work.search.candidates.values(), min(self.mean, other.mean)
+        gain = max(one.optimistic_log_posterior for one in fits) - max(one.log_posterior for one in fits)
+        return self.log_evidence(per_lost) + gain < other.log_evidence(per_lost) - settings.DECISIVE_NATS
 
-Hopeless = Callable[["Findings"], bool]
-"""Says whether what was found so far is hopelessly behind what is known else."""
-Look = Callable[[Sequence[Logged], Hopeless], "Findings"]
-"""A search of records."""
+
+class Look(Protocol):
+    """A search for causes, what begins in mid-trial, forces and drifts, in two parts; interrupted, it keeps what it has."""
+
+    def begin(self, records: Sequence[Logged]) -> Findings:
+        """Return what a first look at records finds."""
+
+    def finish(self, work: Findings) -> None:
+        """Find the rest."""
 
 
 def compared(
     found: Sequence[SuspectedError], records: Sequence[Logged], look: Look
 ) -> list[tuple[Explained, float]]:
-    """Return what errors the data may have, with what explains the records besides and its log evidence, the most
-    probable first.
+    """Return what errors the data may have, with what explains the records besides and its log evidence.
+
+    All sets get a first look; the most probable is finished, then what is not hopelessly behind.
 
     Args:
         found: the errors that are suspected.
         records: as they are.
-        look: searches records for causes, what begins in mid-trial, forces and drifts.
+        look: searches records.
     """
     firm, soft = (tuple(one for one in found if is_soft(one) is kind) for kind in (False, True))
-    tried = [_explained(tuple(found), records, look(without(records, found), lambda work: False))]
-    fewer = [(*firm, *soft[:count]) for count in range(len(soft))[::-1]]
-    for errors in [*fewer, ()] if firm else fewer:
-        best = max(tried, key=lambda one: one.log_evidence(one.mean))
-        if not best.work.complete or (not errors and is_clear(firm, best.work)):
-            break
-        behind = partial(_is_behind, best, errors, records)
-        tried.append(_explained(errors, records, look(without(records, errors), behind)))
+    tried: list[Explained] = []
+    try:
+        _race(tried, [(*firm, *soft[:count]) for count in range(len(soft) + 1)], records, look)
+        if firm and not is_clear(firm, _first(tried).work):
+            _race(tried, [()], records, look)
+    except KeyboardInterrupt:  # before anything was found of one of them
+        if not tried:
+            raise
+        tried[-1].work.complete = False
     per_lost = min(one.mean for one in tried)
-    return sorted(((one, one.log_evidence(per_lost)) for one in tried), key=lambda pair: -pair[1])
+    return [(one, one.log_evidence(per_lost)) for one in tried]
+
+
+def _race(
+    tried: list[Explained],
+    more: Sequence[tuple[SuspectedError, ...]],
+    records: Sequence[Logged],
+    look: Look,
+) -> None:
+    """Try further sets of errors beside those that were tried: finish what may be the most probable."""
+    new = []
+    for errors in more:
+        new.append(_explained(errors, records, look.begin(without(records, errors))))
+        tried.append(new[-1])
+        if not new[-1].work.complete:
+            return
+    while new:
+        now = _first(new)
+        new.remove(now)
+        if now.work.complete and not any(now.is_behind(one) for one in tried):
+            look.finish(now.work)
+
+
+def _first(tried: Sequence[Explained]) -> Explained:
+    per_lost = min(one.mean for one in tried)
+    return max(tried, key=lambda one: one.log_evidence(per_lost))
 
 
 def _explained(errors: tuple[SuspectedError, ...], records: Sequence[Logged], work: Findings) -> Explained:
@@ -213,19 +251,6 @@ def _explained(errors: tuple[SuspectedError, ...], records: Sequence[Logged], wo
     measured = sum(int(np.isfinite(logged.record.values[name]).sum()) for logged, one in
                    zip(records, work.problem.records, strict=True) for name in one.noise)  # fmt: skip
     return Explained(errors=errors, work=work, log_prior=float(prior), lost=measured - _samples(work))
-
-
-def _is_behind(
-    best: Explained, errors: tuple[SuspectedError, ...], records: Sequence[Logged], work: Findings
-) -> bool:
-    """Say whether no more causes, nor better fits, bring an explanation close to one that leaves only noise."""
-    if not may_be_named(best.errors, best.work):
-        return False
-    now = _explained(errors, records, work)
-    hope = max(one.optimistic_log_posterior for one in work.search.candidates.values())
-    gain = hope - work.search.best().log_posterior
-    per_lost = min(best.mean, now.mean)
-    return now.log_evidence(per_lost) + gain < best.log_evidence(per_lost) - settings.DECISIVE_NATS
 
 
 def _measured(logged: Logged, error: DataError) -> int:

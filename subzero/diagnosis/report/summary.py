@@ -78,7 +78,8 @@ def _is_new(verdict: Verdict) -> bool:
 
 def _wrong(verdict: Verdict) -> Iterator[str]:
     """Give what is wrong: errors in the data first, then the model on records without them."""
-    yield from (words.data_error(one) for one in verdict.data_errors)
+    if verdict.then or verdict.verdict == UNDECIDED:
+        yield from (words.data_error(one) for one in verdict.data_errors)
     if verdict.then:
         yield words.UNCHANGED
     if verdict.on_model == CAUSE_NAMED:

@@ -48,8 +48,11 @@ def on_records(
     at_least = np.minimum(np.cumsum(each[::-1])[::-1], MOST)  # of a set, or one that holds it
     told = max((i for i, one in enumerate(sets) if _is_named(one, at_least[i])), default=0)
     verdict = conclude(sets[told].work)
+    is_complete = all(one.work.complete for one in sets)
     if sets[told].errors:
-        verdict = _with_errors(verdict, records, sets[told], float(at_least[told]))
+        is_decided = is_complete or not any(map(is_soft, sets[told].errors))
+        verdict = _with_errors(verdict, records, sets[told], float(at_least[told]) if is_decided else None)
+    verdict = replace(verdict, complete=is_complete)
     if told + 1 == len(sets):
         return verdict
     return _with_possible(verdict, records, sets[told], sets[told + 1], float(at_least[told + 1]))
@@ -59,16 +62,19 @@ def _is_named(one: Explained, probability: float) -> bool:
     return probability >= NAMED_PROBABILITY and may_be_named(one.errors, one.work)
 
 
-def _with_errors(after: Verdict, records: Sequence[Logged], one: Explained, probability: float) -> Verdict:
-    """Return the verdict `data_error`, which goes on with the diagnosis of the records without the errors; of errors
-    that were held against nothing yet, as the diagnosis was interrupted, `undecided`.
+def _with_errors(
+    after: Verdict, records: Sequence[Logged], one: Explained, probability: float | None
+) -> Verdict:
+    """Return the verdict `data_error`, which goes on with the diagnosis of the records without the errors; `undecided`
+    where they could not be held against all else (None), as the diagnosis was interrupted.
     """
-    is_decided = one.work.complete or not any(map(is_soft, one.errors))
-    errors = _told(records, one.errors, probability if is_decided else EVEN)
-    listed = {_beside(one.errors, name): probability * p for name, p in after.probabilities.items()}
+    share = EVEN if probability is None else probability
+    errors = _told(records, one.errors, share)
+    listed = {_beside(one.errors, name): share * p for name, p in after.probabilities.items()}
     words = " ".join(f"{error.record}: {error.sentence}: {error.remedy}." for error in errors)
-    return replace(after, verdict=DATA_ERROR if is_decided else UNDECIDED, data_errors=errors, then=after.verdict,
-                   sentence=f"{words} After that: {after.sentence}", probabilities=listed)  # fmt: skip
+    return replace(after, verdict=UNDECIDED if probability is None else DATA_ERROR, data_errors=errors,
+                   then=after.verdict, sentence=f"{words} After that: {after.sentence}",
+                   probabilities=listed)  # fmt: skip
 
 
 def _with_possible(
