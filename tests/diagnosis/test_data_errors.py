@@ -2,8 +2,8 @@
 
 Verifies: that each correction undoes its error, and how it stretches values; that records made by the other formulation
 of the cable, every number drawn from its tolerance, are told as what was done to them at the public face, and a record
-that nothing was done to is not; that files carry the verdict. Configuration: fig6, zigzag and dive, AR(1) noise. Tolerance: a
-delay within 0.3 s.
+that nothing was done to is not; that files carry the verdict. Configuration: fig6, zigzag and dive, AR(1) noise.
+Tolerance: a delay within 0.3 s.
 """
 
 import dataclasses

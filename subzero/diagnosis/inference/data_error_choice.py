@@ -6,9 +6,9 @@ its own, with causes, what begins in mid-trial, forces and drifts. T the correct
 
     log p(y, errors) = log Σ_M p(T y | M) p(M) + Σ log|dT/dy| + Σ log p(error) + log p(noise)
 
-A search that is hopelessly behind ends with its first look. What no vehicle does (another sign, unit or reference of one
-channel, exchanged columns, repeated values) needs no such search where the linear problem leaves physics no chance
-with all its parameters free at once, and one cause at most explains what is left (`is_clear`).
+A search that is hopelessly behind ends with its first look. What no vehicle does (another sign, unit or reference of
+one channel, exchanged columns, repeated values) needs no such search where the linear problem leaves physics no chance
+with all its parameters free at once, and causes that hold throughout explain what is left (`is_clear`).
 """
 
 from __future__ import annotations
@@ -185,7 +185,7 @@ class Explained:
 
 
 class Look(Protocol):
-    """A search for causes, what begins in mid-trial, forces and drifts, in two parts; interrupted, it keeps what it has."""
+    """A search for causes, what begins in mid-trial, forces and drifts, in two parts; interrupted, it keeps its finds."""
 
     def begin(self, records: Sequence[Logged]) -> Findings:
         """Return what a first look at records finds."""
