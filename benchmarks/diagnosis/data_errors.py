@@ -11,12 +11,10 @@ do; what has less than `CLEAR` is drawn again. Run it:
 
 from __future__ import annotations
 
-import multiprocessing
 import statistics
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from time import perf_counter, process_time
 from typing import Any, NamedTuple
@@ -40,7 +38,7 @@ from . import onsets, world
 from .distance import sensitivities, strangeness
 from .draws import hidden, nuisances, with_values
 from .manoeuvres import CHANNELS, ids
-from .results import line, read
+from .results import results_of
 from .truth import NoRunError, agreed
 
 KINDS = ("sign", "unit", "reference", "frozen", "step", "dropout", "swapped", "late_clock", "clock_rate", "latency",
@@ -77,8 +75,21 @@ class Truth:
     hidden: str
 
 
-def drawn(seed: int, count: int) -> list[tuple[world.Drawn, tuple[str, ...], str]]:
-    """Return what the first records of a seed are: the world's draw, kinds of errors, and what the vehicle hides."""
+class Case(NamedTuple):
+    """A record that is to be made: the world's draw, kinds of errors in its data, and what the vehicle hides."""
+
+    one: world.Drawn
+    kinds: tuple[str, ...]
+    what: str
+
+    @property
+    def index(self) -> int:
+        """Its number."""
+        return self.one.index
+
+
+def drawn(seed: int, count: int) -> list[Case]:
+    """Return what the first records of a seed are."""
     rng = np.random.default_rng([seed, 55])
     causes, families = rng.permutation(ids()).tolist(), list(world.FAMILIES)
     turns = [np.random.default_rng([seed, turn]).permutation(KINDS).tolist() for turn in range(count)]
@@ -93,7 +104,7 @@ def drawn(seed: int, count: int) -> list[tuple[world.Drawn, tuple[str, ...], str
         family = families[int(np.random.default_rng([seed, i, 56]).integers(len(families)))]
         one = world.Drawn(seed=seed, index=i, flown=world.FLOWN[(i + i // 9) % len(world.FLOWN)], family=family,
                           cause=causes[i % len(causes)])  # fmt: skip
-        found.append((one, kinds, what))
+        found.append(Case(one, kinds, what))
     return found
 
 
@@ -256,11 +267,9 @@ def _clean(dense: Logged, times: np.ndarray) -> Logged:
     return replace(dense, record=Record(source="world", time=times, values=values))
 
 
-def result_of(
-    drawn_one: tuple[world.Drawn, tuple[str, ...], str], make: Any = made, diagnose: Any = diagnose_trials
-) -> dict[str, Any]:
+def result_of(case: Case, make: Any = made, diagnose: Any = diagnose_trials) -> dict[str, Any]:
     """Return what a record is, and what the diagnosis says of it."""
-    one, kinds, what = drawn_one
+    one, kinds, what = case
     found: dict[str, Any] = {
         "index": one.index,
         "flown": one.flown,
@@ -369,18 +378,9 @@ def benchmark(
         results: where they are kept, one JSON object a line; nowhere if not given.
         resume: keep the results of an interrupted run, and go on behind them.
     """
-    if results and not resume:
-        results.unlink(missing_ok=True)
-    known = read(results) if results else []
-    done = {one["index"] for one in known}
-    wanted = [one for one in drawn(seed, count) if one[0].index not in done]
-    with multiprocessing.get_context("fork").Pool(workers) as pool:
-        for one in pool.imap_unordered(partial(result_of), wanted):
-            known.append(one)
-            print(line_of(one), flush=True)
-            if results:
-                with results.open("a") as file:
-                    file.write(line(one))
+    known = results_of(
+        drawn(seed, count), result_of, tell=line_of, workers=workers, path=results, resume=resume
+    )
     print(Counter(one["error"] for one in known if "error" in one) or "", table(known), sep="\n")
 
 

@@ -185,7 +185,7 @@ class Explained:
 
 
 class Look(Protocol):
-    """A search for causes, what begins in mid-trial, forces and drifts, in two parts; interrupted, it keeps its finds."""
+    """A search for causes, what begins in mid-trial, forces and drifts, in two parts; it may be interrupted."""
 
     def begin(self, records: Sequence[Logged]) -> Findings:
         """Return what a first look at records finds."""
