@@ -113,17 +113,17 @@ def diagnose_trials(
     effects, begun = tuple(effects), perf_counter()
     problem = pose(records, effects)
     with threadpool_limits(limits=1, user_api="blas"):  # runs have the cores; matrices are small
-        found = suspected(problem, records)
+        suspicion = suspected(problem, records)
         looking = _Looking(
             problem=problem, effects=effects, progress=progress or (lambda share, words: None),
             seen=seen or (lambda table: None), seed=seed, budget=budget, scanned=perf_counter() - begun,
-            most=len(found) + 1,
+            most=len(suspicion.errors) + 1,
         )  # fmt: skip
-        if not found:
+        if not suspicion.errors:
             work = looking.begin(records)
             looking.finish(work)
             return _concluded(work)
-        return on_records(records, compared(found, records, looking), _concluded)
+        return on_records(records, compared(suspicion, records, looking), _concluded)
 
 
 @dataclass(kw_only=True, eq=False)

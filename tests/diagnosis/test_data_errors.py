@@ -19,6 +19,7 @@ from subzero.diagnosis.hypothesis.catalogue import catalogue
 from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.data_error import KINDS, DataError
 from subzero.diagnosis.hypothesis.logged import Logged
+from subzero.diagnosis.inference.repeated_values import repeated_values
 from subzero.diagnosis.report import json_file, words
 from subzero.records.record import Record
 from subzero.synthetic.planted import draw_tolerances, make_record
@@ -159,3 +160,13 @@ def test_each_error_is_named_and_the_vehicle_is_healthy_without_it(error):
     (found,) = [one for one in verdict.data_errors if one.id == error.id]
     if error.kind in ("late_clock", "latency"):
         assert found.amount == pytest.approx(error.amount, abs=0.3)
+
+
+def test_a_channel_that_is_frozen_from_the_first_sample_of_a_turn_on_is_no_value_that_stands_for_nothing():
+    """At one sample a second it is far from all before; what does not come back to a measurement is frozen."""
+    time, clean = np.arange(0.0, 40.0), smooth()
+    heading = 0.4 * np.random.default_rng(1).standard_normal(time.size)
+    heading[11:] = heading[11] + 12.0
+    record = Record(source="made", time=time, values={"heading": heading})
+    (found,) = repeated_values(dataclasses.replace(clean, record=record))
+    assert (found.kind, found.since, len(found.at)) == ("frozen", 12.0, 28)

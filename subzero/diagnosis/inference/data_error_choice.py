@@ -70,9 +70,28 @@ class SuspectedError:
     alike: tuple[DataError, ...] = ()
 
 
-def suspected(problem: Problem, records: Sequence[Logged]) -> list[SuspectedError]:
-    """Return the errors in the data of some records, in the order in which they are to be corrected."""
-    return [one for i, logged in enumerate(records) for one in _of_record(problem, i, logged)]
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Suspicion:
+    """What a scan of records says of errors in their data.
+
+    Attributes:
+        errors: that are suspected, in the order in which they are to be corrected.
+        log_as_is: log evidence in the linear problem, of nothing and every cause, but for repeated values as they are.
+    """
+
+    errors: tuple[SuspectedError, ...]
+    log_as_is: float = 0.0
+
+    def log_linear(self, errors: Sequence[SuspectedError]) -> float:
+        """Return about the log evidence in the linear problem with some of the errors."""
+        return self.log_as_is + sum(one.lead for one in errors)
+
+
+def suspected(problem: Problem, records: Sequence[Logged]) -> Suspicion:
+    """Return what errors the data of some records may have."""
+    each = [_of_record(problem, i, logged) for i, logged in enumerate(records)]
+    errors = tuple(one for _, found in each for one in found)
+    return Suspicion(errors=errors, log_as_is=sum(one.log_sparse for one, _ in each) if errors else 0.0)
 
 
 def without(records: Sequence[Logged], found: Sequence[SuspectedError]) -> list[Logged]:
@@ -83,7 +102,8 @@ def without(records: Sequence[Logged], found: Sequence[SuspectedError]) -> list[
     ]
 
 
-def _of_record(problem: Problem, record: int, logged: Logged) -> list[SuspectedError]:
+def _of_record(problem: Problem, record: int, logged: Logged) -> tuple[Yardstick, list[SuspectedError]]:
+    """Return what a record is judged by, without values that it repeats, and the errors that it may have."""
     yardstick, found = yardstick_of(problem, record, logged), list[SuspectedError]()
     repeated = repeated_values(logged, logged.trusted)
     for error in repeated:
@@ -93,13 +113,14 @@ def _of_record(problem: Problem, record: int, logged: Logged) -> list[SuspectedE
             )
             yardstick = _after(yardstick, error)
     yardstick = replace(yardstick, repeated=tuple(one for one in repeated if is_rounded(one, logged)))
+    begun = yardstick
     for _ in range(MOST_ERRORS):
         ranked = suspects(yardstick, logged.trusted)
         if not ranked or not _is_suspected(ranked[0]):
             break
         found.append(_suspected(record, ranked))
         yardstick = _after(yardstick, ranked[0].error)
-    return found
+    return begun, found
 
 
 def _is_suspected(one: Suspect) -> bool:
@@ -194,24 +215,29 @@ class Look(Protocol):
         """Find the rest."""
 
 
-def compared(
-    found: Sequence[SuspectedError], records: Sequence[Logged], look: Look
-) -> list[tuple[Explained, float]]:
+def compared(suspicion: Suspicion, records: Sequence[Logged], look: Look) -> list[tuple[Explained, float]]:
     """Return what errors the data may have, with what explains the records besides and its log evidence.
 
-    All sets get a first look; the most probable is finished, then what is not hopelessly behind.
+    The records without what no vehicle does get a first look. Unless that explains them, and what else is suspected is
+    far behind even in the linear problem, this gets one, too. The most probable is finished, then what is not
+    hopelessly behind.
 
     Args:
-        found: the errors that are suspected.
+        suspicion: what a scan says.
         records: as they are.
         look: searches records.
     """
-    firm, soft = (tuple(one for one in found if is_soft(one) is kind) for kind in (False, True))
+    firm, soft = (tuple(one for one in suspicion.errors if is_soft(one) is kind) for kind in (False, True))
     tried: list[Explained] = []
     try:
-        _race(tried, [(*firm, *soft[:count]) for count in range(len(soft) + 1)], records, look)
+        first = _explained(firm, records, look.begin(without(records, firm)))
+        tried.append(first)
+        sets = [(*firm, *soft[: count + 1]) for count in range(len(soft))]
+        bar = first.log_evidence(0.0) - settings.DECISIVE_NATS if is_explained(first.work) else -np.inf
+        _race(tried, [one for one in sets if suspicion.log_linear(one) > bar], records, look)
         if firm and not is_clear(firm, _first(tried).work):
-            _race(tried, [()], records, look)
+            tried.append(_explained((), records, look.begin(records)))
+            _race(tried, [], records, look)
     except KeyboardInterrupt:  # before anything was found of one of them
         if not tried:
             raise
@@ -226,17 +252,16 @@ def _race(
     records: Sequence[Logged],
     look: Look,
 ) -> None:
-    """Try further sets of errors beside those that were tried: finish what may be the most probable."""
-    new = []
+    """Give further sets of errors a first look, and finish what may be the most probable, also of the last before."""
+    new = tried[-1:]
     for errors in more:
-        new.append(_explained(errors, records, look.begin(without(records, errors))))
-        tried.append(new[-1])
-        if not new[-1].work.complete:
-            return
-    while new:
+        if new[-1].work.complete:
+            new.append(_explained(errors, records, look.begin(without(records, errors))))
+            tried.append(new[-1])
+    while new and new[-1].work.complete:
         now = _first(new)
         new.remove(now)
-        if now.work.complete and not any(now.is_behind(one) for one in tried):
+        if not any(now.is_behind(one) for one in tried):
             look.finish(now.work)
 
 

@@ -85,10 +85,13 @@ def _far_values(values: np.ndarray, level: float) -> Mapping[float, np.ndarray]:
     found = {}
     for value in distinct[counts >= FEWEST_FAR].tolist():
         at, others = values == value, np.flatnonzero(known & (values != value))
+        if others.size < FEWEST_FAR:
+            continue
+        back = at & (np.arange(at.size) < others[-1])  # what lasts to the end is frozen
         if (
-            others.size >= FEWEST_FAR
-            and np.any(at[2:] & at[1:-1] & at[:-2])
-            and all(_is_far(value, i, values, others, level) for i in np.flatnonzero(at).tolist())
+            np.count_nonzero(back) >= FEWEST_FAR
+            and np.any(back[2:] & back[1:-1] & back[:-2])
+            and all(_is_far(value, i, values, others, level) for i in np.flatnonzero(back).tolist())
         ):
             found[value] = at
     return found
