@@ -82,6 +82,11 @@ class Suspicion:
     errors: tuple[SuspectedError, ...]
     log_as_is: float = 0.0
 
+    def subset(self, firm: bool = True, soft: int = 0) -> tuple[SuspectedError, ...]:
+        """Return what no vehicle does, or none of it, and so many of the others, the first, in their order."""
+        counted = [one for one in self.errors if is_soft(one)][:soft]
+        return tuple(one for one in self.errors if one in counted or (firm and not is_soft(one)))
+
     def log_linear(self, errors: Sequence[SuspectedError]) -> float:
         """Return about the log evidence in the linear problem with some of the errors."""
         return self.log_as_is + sum(one.lead for one in errors)
@@ -227,15 +232,14 @@ def compared(suspicion: Suspicion, records: Sequence[Logged], look: Look) -> lis
         records: as they are.
         look: searches records.
     """
-    firm, soft = (tuple(one for one in suspicion.errors if is_soft(one) is kind) for kind in (False, True))
-    tried: list[Explained] = []
+    firm, tried = suspicion.subset(), list[Explained]()
     try:
-        first = _explained(firm, records, look.begin(without(records, firm)))
-        tried.append(first)
-        sets = [(*firm, *soft[: count + 1]) for count in range(len(soft))]
-        bar = first.log_evidence(0.0) - settings.DECISIVE_NATS if is_explained(first.work) else -np.inf
-        _race(tried, [one for one in sets if suspicion.log_linear(one) > bar], records, look)
-        if firm and not is_clear(firm, _first(tried).work):
+        tried.append(_explained(firm, records, look.begin(without(records, firm))))
+        is_known, bar = is_explained(tried[0].work), tried[0].log_evidence(0.0) - settings.DECISIVE_NATS
+        count = sum(map(is_soft, suspicion.errors))
+        more = [suspicion.subset(soft=k + 1) for k in range(count)]
+        _race(tried, [one for one in more if not is_known or suspicion.log_linear(one) > bar], records, look)
+        if firm and not is_clear(firm, _first(tried).work) and _is_complete(tried):
             tried.append(_explained((), records, look.begin(records)))
             _race(tried, [], records, look)
     except KeyboardInterrupt:  # before anything was found of one of them
@@ -255,14 +259,19 @@ def _race(
     """Give further sets of errors a first look, and finish what may be the most probable, also of the last before."""
     new = tried[-1:]
     for errors in more:
-        if new[-1].work.complete:
+        if _is_complete(tried):
             new.append(_explained(errors, records, look.begin(without(records, errors))))
             tried.append(new[-1])
-    while new and new[-1].work.complete:
+    while new and _is_complete(tried):
         now = _first(new)
         new.remove(now)
         if not any(now.is_behind(one) for one in tried):
             look.finish(now.work)
+
+
+def _is_complete(tried: Sequence[Explained]) -> bool:
+    """Say whether nothing was interrupted."""
+    return all(one.work.complete for one in tried)
 
 
 def _first(tried: Sequence[Explained]) -> Explained:
