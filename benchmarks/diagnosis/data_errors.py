@@ -23,7 +23,7 @@ import cyclopts
 import numpy as np
 
 import subzero
-from subzero.channels import BY_NAME
+from subzero.channels import BY_NAME, HEADING
 from subzero.diagnosis.api import diagnose_trials
 from subzero.diagnosis.hypothesis.catalogue import NOISE
 from subzero.diagnosis.hypothesis.data_error import COMMAND_GROUPS, REFERENCES, SWAPS, DataError
@@ -32,7 +32,7 @@ from subzero.diagnosis.hypothesis.logged import Logged
 from subzero.diagnosis.inference import Problem, pose, respond
 from subzero.diagnosis.results import Verdict
 from subzero.records.consistency import MISTAKEN
-from subzero.records.record import HEADING, Record
+from subzero.records.record import Record
 
 from . import onsets, world
 from .distance import sensitivities, strangeness

@@ -24,11 +24,11 @@ from subzero.diagnosis.hypothesis.catalogue import load
 from subzero.diagnosis.hypothesis.effect import Effect
 from subzero.diagnosis.hypothesis.logged import Logged
 from subzero.diagnosis.inference.data_error_choice import compared, suspected
-from subzero.diagnosis.inference.measurement import respond
 from subzero.diagnosis.inference.model_search import Search
 from subzero.diagnosis.inference.out_of_catalogue import Findings, explanations_outside, is_explained
 from subzero.diagnosis.inference.posing import pose, posed_again
 from subzero.diagnosis.inference.problem import Problem, Progress
+from subzero.diagnosis.inference.simulator import respond
 from subzero.diagnosis.read_trials import read_trials
 from subzero.diagnosis.results import Detectability, Verdict
 from subzero.diagnosis.verdict.conclude import conclude

@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from subzero.diagnosis.hypothesis.catalogue import catalogue
+from subzero.diagnosis import CAUSE_NAMED, NOTHING_WRONG, OUTSIDE, UNDECIDED, catalogue
 from subzero.diagnosis.inference import (
     UNTRIED_LOG_POSTERIOR,
     Beliefs,
@@ -21,7 +21,6 @@ from subzero.diagnosis.inference import (
     occam_folded,
     practical_causes,
 )
-from subzero.diagnosis.results import CAUSE_NAMED, NOTHING_WRONG, OUTSIDE, UNDECIDED
 
 
 def fitted(**log_posteriors):

@@ -27,11 +27,11 @@ from typing import NamedTuple
 import numpy as np
 
 import scenarios
-from subzero.channels import BY_NAME
+from subzero.channels import BY_NAME, HEADING, TURN, turned
 from subzero.diagnosis.hypothesis.logged import Logged
 from subzero.errors import UserError
 from subzero.records.consistency import MISTAKEN, REPORTED_COMMANDS
-from subzero.records.record import HEADING, TURN, Record, turned
+from subzero.records.record import Record
 
 LEAST_LATE_S, LEAST_LATENCY_S, LEAST_RATE = 1.5, 1.0, 0.01
 """Smaller delays are the catalogue's: three of its scales of a clock [s], five of a lag [s]; a clock that is wrong by

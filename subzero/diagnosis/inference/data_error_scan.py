@@ -16,12 +16,12 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import NamedTuple
 
 import numpy as np
 
-from subzero.channels import BY_NAME
+from subzero.channels import BY_NAME, HEADING, turned
 from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.data_error import (
     ANY,
@@ -35,14 +35,13 @@ from subzero.diagnosis.hypothesis.data_error import (
 )
 from subzero.diagnosis.hypothesis.hypotheses import PRIOR, columns_of, nameable, variances
 from subzero.diagnosis.hypothesis.logged import Logged
+from subzero.diagnosis.hypothesis.measurement import sensed, truth
 from subzero.diagnosis.inference.linear_gaussian import KAPPAS, Posterior, freed, log_sum
-from subzero.diagnosis.inference.measurement import sensed, truth
 from subzero.diagnosis.inference.noise import resolution_of, spikes, usual_noise
 from subzero.diagnosis.inference.posing import usual_of
 from subzero.diagnosis.inference.problem import Problem
 from subzero.diagnosis.inference.simulator import Track, simulate_track
 from subzero.records.consistency import MISTAKEN
-from subzero.records.record import HEADING, turned
 
 KAPPA_NARROW = 2.0
 """How much wider than declared tolerances are where a cause stands by itself: the linear problem is no better."""
@@ -490,7 +489,7 @@ FINEST = 0.02
 
 def _refined(yardstick: Yardstick, one: Suspect, group: Group) -> Suspect:
     """Return an error with the numbers that are best close to those that were tried."""
-    judge = lambda error: _judged(yardstick, error, group, closer=True)  # noqa: E731
+    judge = partial(_judged, yardstick, group=group, closer=True)
     if group.step:
         return best_number(judge, one, group.step)
     time = yardstick.logged.record.time
