@@ -15,12 +15,9 @@ from numpy.testing import assert_allclose
 
 import scenarios
 import subzero
-from subzero.diagnosis.hypothesis.catalogue import catalogue
-from subzero.diagnosis.hypothesis.configuration import Setting
-from subzero.diagnosis.hypothesis.data_error import KINDS, DataError
-from subzero.diagnosis.hypothesis.logged import Logged
-from subzero.diagnosis.inference.repeated_values import repeated_values
-from subzero.diagnosis.report import json_file, words
+from subzero import Logged
+from subzero.diagnosis import Setting, catalogue, report
+from subzero.diagnosis.inference import KINDS_OF_DATA_ERRORS, DataError, repeated_values
 from subzero.records.record import Record
 from subzero.synthetic.planted import draw_tolerances, make_record
 
@@ -61,8 +58,8 @@ def smooth(scenario: str = "fig6") -> Logged:
 
 
 def test_every_kind_is_tried_here():
-    assert {one.kind for one in EACH} == set(KINDS)
-    assert sum(kind.share for kind in KINDS.values()) == pytest.approx(1.0)
+    assert {one.kind for one in EACH} == set(KINDS_OF_DATA_ERRORS)
+    assert sum(kind.share for kind in KINDS_OF_DATA_ERRORS.values()) == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize("error", EACH, ids=lambda one: f"{one.id} {one.amount:g}")
@@ -132,10 +129,10 @@ def test_two_errors_at_once_are_named_at_the_public_face_and_nothing_is_converte
     assert {one.columns for one in verdict.data_errors} == {("heading_deg",), ("depth_m",)}
     assert {"sign:heading", "unit:depth=feet"} <= set(next(iter(verdict.probabilities)).split(" + "))
     assert_allclose(wrong.record.values["heading"], before)
-    told = json.loads(json_file.text(verdict))
+    told = json.loads(report.json_file.text(verdict))
     assert told["verdict"] == "data_error"
     assert told["data_errors"][0]["remedy"]
-    assert "heading_deg has the other sign" in words.sentence(verdict)
+    assert "heading_deg has the other sign" in report.words.sentence(verdict)
 
 
 @pytest.mark.slow
