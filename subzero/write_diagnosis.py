@@ -338,9 +338,9 @@ def _vehicle(run: xr.Dataset) -> dict[str, Any]:
 def _best(verdict: Verdict, known: Mapping[str, Effect]) -> tuple[str, Extended | None]:
     """Return the model that explains the records best, as the figures have it, and its name."""
     extended = verdict.extended
-    if verdict.verdict in (CAUSE_NAMED, OUTSIDE):
+    if verdict.on_model in (CAUSE_NAMED, OUTSIDE):
         return "extended model", extended
-    first = verdict.rivals[0] if verdict.verdict == UNDECIDED and verdict.rivals else None
+    first = verdict.rivals[0] if verdict.on_model == UNDECIDED and verdict.rivals else None
     if first is not None and first.ids and all(plain_id(one) in known for one in first.ids):
         deviations = {
             cause: {name: one.deviation for name, one in numbers.items()}

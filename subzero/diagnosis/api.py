@@ -10,7 +10,9 @@ accurate, and a change point that explains them ends the search.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
 
@@ -21,14 +23,16 @@ from subzero.diagnosis.assessment.residuals import misfits
 from subzero.diagnosis.hypothesis.catalogue import load
 from subzero.diagnosis.hypothesis.effect import Effect
 from subzero.diagnosis.hypothesis.logged import Logged
+from subzero.diagnosis.inference.data_error_choice import compared, suspected
 from subzero.diagnosis.inference.model_search import Search
 from subzero.diagnosis.inference.out_of_catalogue import Findings, explanations_outside, is_explained
-from subzero.diagnosis.inference.posing import pose
-from subzero.diagnosis.inference.problem import Progress
+from subzero.diagnosis.inference.posing import pose, posed_again
+from subzero.diagnosis.inference.problem import Problem, Progress
 from subzero.diagnosis.inference.simulator import respond
 from subzero.diagnosis.read_trials import read_trials
 from subzero.diagnosis.results import Detectability, Verdict
 from subzero.diagnosis.verdict.conclude import conclude
+from subzero.diagnosis.verdict.data_errors import on_records
 from subzero.diagnosis.verdict.follow_up import follow_up, ranked, refuted_rivals
 from subzero.model import Model
 
@@ -106,54 +110,133 @@ def diagnose_trials(
     Raises:
         UserError: the nominal model cannot be run through a trial.
     """
+    effects, begun = tuple(effects), perf_counter()
     problem = pose(records, effects)
-    search = Search(problem=problem, progress=progress or (lambda share, words: None))
-    findings = Findings(search=search, seed=seed, budget=budget)
+    with threadpool_limits(limits=1, user_api="blas"):  # runs have the cores; matrices are small
+        suspicion = suspected(problem, records)
+        looking = _Looking(
+            problem=problem, effects=effects, progress=progress or (lambda share, words: None),
+            seen=seen or (lambda table: None), seed=seed, budget=budget, scanned=perf_counter() - begun,
+            most=len(suspicion.errors) + 1,
+        )  # fmt: skip
+        if not suspicion.errors:
+            work = looking.begin(records)
+            looking.finish(work)
+            return _concluded(work)
+        return on_records(records, compared(suspicion, records, looking), _concluded)
+
+
+@dataclass(kw_only=True, eq=False)
+class _Looking:
+    """Searches records, as they are or with something in them put right: a `Look`.
+
+    Attributes:
+        problem: of the records as they are.
+        effects: causes besides the catalogue.
+        scanned: how long errors in the data were looked for. [s]
+        most: so many searches there may be.
+        done: so many there were.
+        shown: the share of the work that was told.
+    """
+
+    problem: Problem
+    effects: tuple[Effect, ...]
+    progress: Progress
+    seen: Seen
+    seed: int
+    budget: str
+    scanned: float
+    most: int
+    done: int = 0
+    shown: float = 0.0
+
+    def _say(self, share: float, words: str) -> None:
+        """Tell the progress, which never goes back."""
+        self.shown = max(self.shown, share)
+        self.progress(self.shown, words)
+
+    def begin(self, records: Sequence[Logged]) -> Findings:
+        """Return what a first look at records finds."""
+        low, self.done = self.done / self.most, self.done + 1
+        search = Search(
+            problem=posed_again(self.problem, records, self.effects),
+            progress=lambda share, words: self._say(low + share / self.most, words),
+        )
+        work = Findings(search=search, seed=self.seed, budget=self.budget)
+        work.seconds["errors in the data"] = self.scanned
+        seen = self.seen if self.done == 1 else lambda table: None
+        _keeping_what_there_is(work, lambda: _first_look(work, seen))
+        return work
+
+    def finish(self, work: Findings) -> None:
+        """Find the rest."""
+        if work.complete and self.budget != "screen":
+            _keeping_what_there_is(work, lambda: _look_closer(work))
+
+
+def _keeping_what_there_is(findings: Findings, part: Callable[[], None]) -> None:
+    """Do a part; if that is interrupted, keep what there is."""
     try:
-        with threadpool_limits(limits=1, user_api="blas"):  # runs have the cores; matrices are small
-            _find(findings, seen or (lambda table: None))
+        part()
     except KeyboardInterrupt:
         findings.complete = False
-        if () not in search.candidates:
+        if () not in findings.search.candidates:
             raise
+
+
+@contextmanager
+def _timed(findings: Findings, part: str) -> Iterator[None]:
+    """Keep how long a part takes."""
+    begun = perf_counter()
+    yield
+    findings.seconds[part] = findings.seconds.get(part, 0.0) + perf_counter() - begun
+
+
+def _concluded(findings: Findings) -> Verdict:
     known = ranked(findings)
     return conclude(findings, known, follow_up(findings, known))
 
 
-def _find(findings: Findings, seen: Seen) -> None:
-    """Do all parts in turn, and keep their times."""
-    search, start = findings.search, perf_counter()
-
-    def done(part: str) -> None:
-        findings.seconds[part] = perf_counter() - start - sum(findings.seconds.values())
-
-    search.begin()
-    _measure_misfit(findings)
-    findings.detectable = detectability(
-        findings.problem, with_whole_effects(findings.problem, search.nominal[1])
-    )
-    seen(findings.detectable)
-    if search.is_far and findings.budget != "screen":
-        _from_afar(findings)
-    search.look()
-    done("screen")
+def _first_look(findings: Findings, seen: Seen) -> None:
+    """Screen all hypotheses, fit the best, and look outside where none of them explains the records."""
+    search = findings.search
+    with _timed(findings, "screen"):
+        search.begin()
+        _measure_misfit(findings)
+        findings.detectable = detectability(
+            findings.problem, with_whole_effects(findings.problem, search.nominal[1])
+        )
+        seen(findings.detectable)
+        if search.is_far and findings.budget != "screen":
+            _from_afar(findings)
+        search.look()
     if findings.budget == "screen":
         search.fit(())
         return
-    search.first_fits()
+    with _timed(findings, "fits"):
+        search.first_fits()
     if search.is_poor() and not findings.out_of_catalogue:
-        search.progress(0.6, "forces, and causes that begin in mid-trial")
-        findings.out_of_catalogue = explanations_outside(search)
+        _look_outside(findings, 0.6, "forces, and causes that begin in mid-trial")
+
+
+def _look_closer(findings: Findings) -> None:
+    """Fit until nothing gets better, and look outside again."""
+    search = findings.search
     if not is_explained(search, findings.out_of_catalogue):
-        search.refine_first()
-        search.grow()
-        search.settle()
-        done("fits")
-        search.progress(0.8, "forces that no cause explains")
-        findings.out_of_catalogue = explanations_outside(search)
-    findings.refuted = refuted_rivals(search)
-    _measure_misfit(findings)
-    done("outside")
+        with _timed(findings, "fits"):
+            search.refine_first()
+            search.grow()
+            search.settle()
+        _look_outside(findings, 0.8, "forces that no cause explains")
+    with _timed(findings, "outside"):
+        findings.refuted = refuted_rivals(search)
+        _measure_misfit(findings)
+
+
+def _look_outside(findings: Findings, share: float, words: str) -> None:
+    findings.search.progress(share, words)
+    with _timed(findings, "outside"):
+        findings.out_of_catalogue = explanations_outside(findings.search)
 
 
 def _measure_misfit(findings: Findings) -> None:

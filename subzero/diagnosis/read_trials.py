@@ -148,13 +148,15 @@ def _checked(logged: Logged, sidecar: Metadata, simulated: Simulated | None) -> 
     noise = {channel: logged.noise.get(channel, NOISE[channel]) for channel in values}
     suspects = {channel: column for channel, column in values.items() if not sidecar.trusts(channel)}
     still = [channel for channel, column in suspects.items() if is_constant(column)]
-    moving = {channel: column for channel, column in suspects.items() if channel not in still}
-    _refuse(record.source, stuck(suspects, nominal, noise) + unit_questions(moving, nominal, noise))
+    _refuse(record.source, stuck(suspects, nominal, noise))
     kept = {channel: column for channel, column in values.items() if channel not in still}
     if not kept:
         raise UserError(f"{record.source}: no channel moves. A diagnosis needs one that the trial moves.")
     notes = (*logged.notes, *_notes(still, repeating(kept)))
-    return dataclasses.replace(logged, record=dataclasses.replace(record, values=kept), notes=notes)
+    trusted = frozenset(kept) - frozenset(suspects)
+    return dataclasses.replace(
+        logged, record=dataclasses.replace(record, values=kept), notes=notes, trusted=trusted
+    )
 
 
 def _nominal() -> Simulated:

@@ -12,13 +12,42 @@ from subzero.channels import BY_NAME
 from subzero.external_force import MissingForce
 from subzero.overview import Overview
 
-NOTHING_WRONG, CAUSE_NAMED, UNDECIDED, OUTSIDE = (
+NOTHING_WRONG, CAUSE_NAMED, UNDECIDED, OUTSIDE, DATA_ERROR = (
     "nothing_wrong",
     "cause_named",
     "undecided",
     "outside_catalogue",
+    "data_error",
 )
-"""The four verdicts."""
+"""The five verdicts."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class FoundError:
+    """An error in the data of a record: what its logger, its file or a person made of it.
+
+    Attributes:
+        id: such as "sign:heading", "unit:depth=feet", "late_clock".
+        record: its name.
+        columns: that it befalls; "time_s" for a clock.
+        sentence: what is wrong, in words.
+        remedy: what to change, in words.
+        probability: of it.
+        amount: how large, of what has a number: a delay [s], a rate [1], a step [unit of the column]; else 0.
+        since: when it begins, of what does. [s]
+        alike: other errors that the record cannot tell from it, in words.
+    """
+
+    id: str
+    record: str
+    columns: tuple[str, ...]
+    sentence: str
+    remedy: str
+    probability: float
+    amount: float = 0.0
+    since: float = 0.0
+    alike: tuple[str, ...] = ()
+
 
 SHOWN_PROBABILITIES = 3
 """So many hypotheses stand in the overview of a verdict."""
@@ -260,7 +289,7 @@ class Verdict:
     """The outcome of `subzero.diagnose`.
 
     Attributes:
-        verdict: one of the four.
+        verdict: one of the five.
         sentence: the verdict in words.
         causes: what is named.
         rivals: what else the records allow, most probable first; all of it where the records do not decide.
@@ -278,6 +307,8 @@ class Verdict:
         seconds: how long each part took.
         seed: of everything random.
         complete: False if it was interrupted.
+        data_errors: what is wrong with the data; all else is said of the records without it.
+        then: the verdict on the records without it; "" if nothing is wrong with the data.
     """
 
     verdict: str
@@ -298,6 +329,13 @@ class Verdict:
     seconds: Mapping[str, float] = field(default_factory=dict)
     seed: int = 0
     complete: bool = True
+    data_errors: tuple[FoundError, ...] = ()
+    then: str = ""
+
+    @property
+    def on_model(self) -> str:
+        """The verdict on the model: on the records without what is wrong with their data."""
+        return self.then or self.verdict
 
     def __repr__(self) -> str:
         """Return the verdict in a few lines."""

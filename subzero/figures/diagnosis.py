@@ -308,7 +308,7 @@ class Drawn(NamedTuple):
     @property
     def _is_rival(self) -> bool:
         """Whether "nothing is wrong", which the calibrated model stands for, is among what is left."""
-        return self.verdict.verdict == UNDECIDED and self._probability(CALIBRATED) >= WORTH_A_LINE
+        return self.verdict.on_model == UNDECIDED and self._probability(CALIBRATED) >= WORTH_A_LINE
 
     def _probability(self, model: str) -> float:
         return self.verdict.probabilities.get(model.removeprefix(RIVAL).replace(CALIBRATED, "none"), 0.0)

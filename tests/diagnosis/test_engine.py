@@ -184,7 +184,7 @@ def _differences(problem, zero, share):
 
 
 def _column(problem, zero, k, share):
-    moved = zero + share * (problem._moved(zero, k) - zero)
+    moved = zero + share * (problem.moved(zero, k) - zero)
     return problem.change(zero, moved) / moved[k]
 
 

@@ -174,12 +174,6 @@ def test_a_switch_within_one_sample_is_no_difference(write):
         (columns("surge_speed", time=TIME[::-1]), "time must increase"),
         (columns(heading=np.full(TIME.size, np.nan)), "holds no number at all"),
         (columns(heading=np.full(TIME.size, 27.0)), "is 27 in every sample, while the simulation moves it by 7.62"),
-        (columns(heading=np.radians(SHAPE["heading"])), "heading_deg looks like radians (1/57.3 times the simulation)"),
-        (columns(yaw_rate=np.radians(SHAPE["yaw_rate"])), "yaw_rate_deg_s looks like radians per second"),
-        (columns(surge_speed=1.944 * SHAPE["surge_speed"]), "looks like knots (1.94 times the simulation)"),
-        (columns(depth=3.281 * SHAPE["depth"]), "depth_m looks like feet (3.28 times the simulation)"),
-        (columns(depth=-SHAPE["depth"]), "depth_m has the opposite sign"),
-        (columns(propeller_speed=60.0 * SHAPE["propeller_speed"]), "looks like revolutions per minute"),
         (columns("surge_speed", time=np.arange(0.0, 30.1, 5.5)), "sampled every 5.5 s, slower than the vehicle moves"),
         (columns("surge_speed", time=TIME[:40]), "it lasts 3.9 s; a diagnosis needs at least 5 s"),
         (columns("surge_speed", time=1.5 * TIME), "it lasts until 45 s, but the trial fig6 ends at 30 s"),
@@ -192,16 +186,14 @@ def test_a_record_that_cannot_be_used_is_refused_in_words(write, table, says):
     assert says in refusal(write(table))
 
 
-def test_odd_units_are_asked_about_once_and_believed_when_confirmed(write):
-    knots = columns(surge_speed=1.944 * SHAPE["surge_speed"])
-    assert 'units_checked = ["surge_speed_m_s"]' in refusal(write(knots))
-    read(write(knots, 'units_checked = ["surge_speed_m_s"]'))
-    read(write(knots, "units_checked = true"))
-
-
-def test_a_vehicle_that_is_merely_wrong_is_not_asked_about(write):
-    for share in (0.7, 1.3, 1.5):
-        read(write(columns(surge_speed=share * SHAPE["surge_speed"], roll_angle=-0.4 * SHAPE["roll_angle"])))
+def test_odd_units_are_taken_as_they_are_and_trusted_when_the_sidecar_says_so(write):
+    """What is odd is for the diagnosis to say (`data_error`), which needs to know what the user vouches for."""
+    knots = columns("heading", surge_speed=1.944 * SHAPE["surge_speed"])
+    (plain,) = read(write(knots))
+    assert_allclose(plain.record.values["surge_speed"], knots["surge_speed_m_s"])
+    assert plain.trusted == frozenset()
+    assert read(write(knots, 'units_checked = ["surge_speed_m_s"]'))[0].trusted == {"surge_speed"}
+    assert read(write(knots, "units_checked = true"))[0].trusted == {"surge_speed", "heading"}
 
 
 def test_a_trial_without_commands_and_a_record_without_scenario_are_refused(write):

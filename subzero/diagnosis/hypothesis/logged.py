@@ -22,6 +22,7 @@ class Logged:
         noise: channel → standard deviation, where it is known. [display unit]
         name: short, for figures and tables.
         notes: what was left out, and why.
+        trusted: channels that the user has said are right as they are.
     """
 
     record: Record
@@ -29,3 +30,4 @@ class Logged:
     noise: Mapping[str, float] = field(default_factory=dict)
     name: str
     notes: tuple[str, ...] = ()
+    trusted: frozenset[str] = frozenset()

@@ -22,6 +22,9 @@ its evidence and its history                              input_estimation
 features and shapes of a formula                          basis
 a formula for a latent force                              force_formula
 change points, forces and drifts beside the hypotheses    out_of_catalogue
+values that a record repeats in place of measurements     repeated_values
+errors in the data, proposed by linear evidence           data_error_scan
+... and held against all else                             data_error_choice
 all that only steers the search                           settings
 
 What others may use stands in `__all__`; everything else is the engine's own (a contract in ``pyproject.toml`` holds
@@ -30,6 +33,7 @@ it for what stands outside the diagnosis).
 
 # ruff: noqa: I001 - in the order in which they stand on one another, not in that of the alphabet
 
+from subzero.diagnosis.hypothesis.data_error import KINDS as KINDS_OF_DATA_ERRORS, DataError
 from subzero.diagnosis.hypothesis.hypotheses import PRIOR, columns_of, entries_of, log_prior, variances
 from subzero.diagnosis.inference.noise import Behind, Noise, Usual, estimate, resolution_of, spikes
 from subzero.diagnosis.hypothesis.measurement import TRUTHS
@@ -104,10 +108,13 @@ from subzero.diagnosis.inference.model_average import (
 )
 from subzero.diagnosis.inference.out_of_catalogue import Findings, special_cases_folded
 
+from subzero.diagnosis.inference.repeated_values import repeated_values
+
 __all__ = [
     "AXIS_WORDS",
     "FORCE",
     "KAPPAS",
+    "KINDS_OF_DATA_ERRORS",
     "PRIOR",
     "TRUTHS",
     "UNTRIED_LOG_POSTERIOR",
@@ -116,6 +123,7 @@ __all__ = [
     "Beliefs",
     "Candidate",
     "ChangePointSummary",
+    "DataError",
     "Findings",
     "Fit",
     "ForceInformation",
@@ -164,6 +172,7 @@ __all__ = [
     "quadratic_step",
     "refit",
     "relinearised_force",
+    "repeated_values",
     "resolution_of",
     "respond",
     "restarted_where_smooth",

@@ -95,16 +95,22 @@ class Noise:
 
     def colour(self, white: np.ndarray) -> np.ndarray:
         """Undo `whiten`, but for samples that are not used: (m,) or (m, columns) → the same shape."""
-        columns = np.ascontiguousarray(white, dtype=float).reshape(self.count, -1)
+        columns = _as_columns(white)
         found = np.empty_like(columns)
         coloured(*self._filter, columns, found)
         return found.reshape(white.shape)
 
     def _innovations(self, known: np.ndarray) -> np.ndarray:
-        columns = np.ascontiguousarray(known, dtype=float).reshape(self.count, -1)
+        columns = _as_columns(known)
         white = np.empty_like(columns)
         innovations(*self._filter, columns, white)
         return white.reshape(known.shape)
+
+
+def _as_columns(values: np.ndarray) -> np.ndarray:
+    """Return values (m,) as one column, or columns (m, k) as they are; m may be 0."""
+    values = np.ascontiguousarray(values, dtype=float)
+    return values[:, None] if values.ndim == 1 else values
 
 
 @compiled
@@ -301,6 +307,11 @@ def _log_marginal(noise: Noise, r: np.ndarray, F: np.ndarray) -> float:
     seen = np.linalg.solve(half, G.T @ x)
     log_det = float(np.sum(np.log(np.diag(half)))) + noise.log_scale
     return -0.5 * float(x @ x - seen @ seen) - log_det
+
+
+def log_prior_of(noise: Noise, usual: Usual) -> float:
+    """Return the log density of a noise before the data speak, but for a constant of all noises."""
+    return _log_prior(np.log([noise.white, noise.slow, noise.correlation_time]), usual)
 
 
 def _log_prior(log: np.ndarray, usual: Usual) -> float:

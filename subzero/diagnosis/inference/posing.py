@@ -32,6 +32,7 @@ from subzero.diagnosis.inference.simulator import economical, finer, respond
 from subzero.errors import UserError
 
 if TYPE_CHECKING:
+    from subzero.diagnosis.hypothesis.configuration import Setting
     from subzero.diagnosis.hypothesis.effect import Effect
     from subzero.diagnosis.hypothesis.logged import Logged
 
@@ -63,6 +64,31 @@ def pose(records: Sequence[Logged], more: Iterable[Effect] = ()) -> Problem:
     ]
     onsets = tuple(effect for effect in ONSETS if _possible(effect, observed))
     return Problem(records=observed, entries=entries_of(effects, START, len(observed)), onsets=onsets)
+
+
+def posed_again(problem: Problem, records: Sequence[Logged], more: Iterable[Effect] = ()) -> Problem:
+    """Return the problem of records in which something was changed; what was simulated for them as they were, and still
+    holds, need not be run again.
+
+    Args:
+        problem: of the records as they were, as posed.
+        records: as they are now.
+        more: causes besides the catalogue.
+
+    Raises:
+        UserError: the nominal model cannot be run through a trial.
+    """
+    new = pose(records, more)
+    if [list(one.noise) for one in new.records] != [list(one.noise) for one in problem.records]:
+        return new
+    pairs = zip(problem.records, new.records, strict=True)
+    known = tuple(replace(b, setting=a.setting) if _serves(a.setting, b.setting) else b for a, b in pairs)
+    return replace(problem, records=known, kept=problem.kept.again())
+
+
+def _serves(one: Setting, other: Setting) -> bool:
+    """Say whether runs in a setting serve for another of the same trial: the same commands, and at least as long."""
+    return one.trial.commands is other.trial.commands and one.trial.duration >= other.trial.duration
 
 
 def _possible(effect: Effect, observed: Sequence[Observed]) -> bool:

@@ -126,7 +126,7 @@ class Problem:
         wanted = range(len(self.entries)) if columns is None else columns
         base = self.tracks([(i, z) for i in range(len(self.records))])
         shown = [self.whitened(i, self.setting(i, z), track) for i, track in enumerate(base)]
-        jobs = [(k, i, self._moved(z, k)) for k in wanted for i in range(len(self.records))
+        jobs = [(k, i, self.moved(z, k)) for k in wanted for i in range(len(self.records))
                 if self.entries[k].record in (-1, i)]  # fmt: skip
         stops = [self._stops(i, z, wanted) for i in range(len(self.records))]
         early = [(k, i, moved) for k, i, moved in jobs if not self._late(k)]
@@ -147,7 +147,7 @@ class Problem:
     def _late(self, k: int) -> bool:
         return self.entries[k].effect.slot in POST_RUN_SLOTS
 
-    def _moved(self, z: np.ndarray, k: int) -> np.ndarray:
+    def moved(self, z: np.ndarray, k: int) -> np.ndarray:
         """Return z with entry k moved by a step, away from the nearer bound."""
         parameter, moved = self.entries[k].parameter, z.copy()
         at_rest = parameter.low == 0.0 and z[k] < parameter.tolerance

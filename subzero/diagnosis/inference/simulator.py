@@ -284,6 +284,13 @@ class RunCache:
         self._size = 0
         self._lock = Lock()
 
+    def again(self) -> RunCache:
+        """Return what counts from none, and has the same tracks."""
+        new = RunCache()
+        with self._lock:
+            new._tracks, new._size = self._tracks.copy(), self._size
+        return new
+
     def count(self, runs: int) -> None:
         """Count runs that are asked for; the search hangs on their number, so none may be lost between threads."""
         with self._lock:

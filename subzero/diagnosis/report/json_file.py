@@ -36,6 +36,8 @@ def mapping(
         "sentence": words.sentence(verdict),
         "summary": [one._asdict() for one in summary(verdict, scenario)],
         "complete": verdict.complete,
+        "data_errors": [_plain(one) for one in verdict.data_errors],
+        "then": verdict.then,
         "causes": [_cause(one) for one in verdict.causes],
         "rivals": [_rival(one) for one in verdict.rivals],
         "probabilities": _plain(verdict.probabilities),

@@ -52,7 +52,7 @@ def belongs(figure: str, section: Section) -> bool:
 def _explanations(verdict: Verdict) -> list[str | tables.Table]:
     parts: list[str | tables.Table] = [words.cause(one) for one in verdict.causes]
     if verdict.rivals:
-        undecided = verdict.verdict == UNDECIDED
+        undecided = verdict.on_model == UNDECIDED
         what = "What the records allow" if undecided else "What else the records allow"
         beside = "what is most probable" if undecided else "what is told"
         parts += [f"{what} (D: how far from {beside}):", tables.rivals(verdict)]
@@ -112,7 +112,7 @@ def _next_trial(verdict: Verdict) -> list[str | tables.Table]:
 
 def _extended(verdict: Verdict) -> list[str | tables.Table]:
     drifts = verdict.unknown is not None and verdict.unknown.is_drift
-    new = verdict.verdict in (CAUSE_NAMED, OUTSIDE) and (not drifts or bool(verdict.extended.deviations))
+    new = verdict.on_model in (CAUSE_NAMED, OUTSIDE) and (not drifts or bool(verdict.extended.deviations))
     what = (
         "the extended model"
         if new

@@ -71,31 +71,35 @@ def summary(verdict: Verdict, scenario: str = "SCENARIO") -> tuple[Answer, ...]:
 
 def _is_new(verdict: Verdict) -> bool:
     """Say whether the extended model has anything that the nominal one has not."""
-    return verdict.verdict in (CAUSE_NAMED, OUTSIDE) and (
+    return verdict.on_model in (CAUSE_NAMED, OUTSIDE) and (
         bool(verdict.extended.deviations) or verdict.extended.missing is not None
     )
 
 
 def _wrong(verdict: Verdict) -> Iterator[str]:
-    """Give what is wrong."""
-    if verdict.verdict == CAUSE_NAMED:
+    """Give what is wrong: errors in the data first, then the model on records without them."""
+    if verdict.then or verdict.verdict == UNDECIDED:
+        yield from (words.data_error(one) for one in verdict.data_errors)
+    if verdict.then:
+        yield words.UNCHANGED
+    if verdict.on_model == CAUSE_NAMED:
         yield from (words.cause_in_short(one) for one in verdict.causes)
-    elif verdict.verdict == OUTSIDE and verdict.unknown is not None:
+    elif verdict.on_model == OUTSIDE and verdict.unknown is not None:
         yield words.unknown(verdict.unknown)
     else:
-        yield words.sentence(verdict)
+        yield words.on_model(verdict)
 
 
 def _sure(verdict: Verdict) -> Iterator[str]:
     """Give how probable it is, what comes next, and whether these records can tell the two apart."""
     probability = _probability(verdict)
-    if verdict.verdict == UNDECIDED:
+    if verdict.on_model == UNDECIDED:
         yield "Not sure enough to name one of them."
     elif probability is not None:
         yield f"{_in_words(probability)} (probability {words.probability(probability)})."
-    if verdict.verdict == NOTHING_WRONG:
+    if verdict.on_model == NOTHING_WRONG:
         yield from _not_seen(verdict)
-    elif verdict.verdict != UNDECIDED:
+    elif verdict.on_model != UNDECIDED:
         yield from _runner_up(verdict)
     if not verdict.complete:
         yield "The diagnosis was interrupted: this is as far as it came."
@@ -103,11 +107,11 @@ def _sure(verdict: Verdict) -> Iterator[str]:
 
 def _probability(verdict: Verdict) -> float | None:
     """Return the probability of what is told; of several causes that of the least sure one; None if it is not known."""
-    if verdict.verdict == CAUSE_NAMED and verdict.causes:
+    if verdict.on_model == CAUSE_NAMED and verdict.causes:
         return min(one.probability for one in verdict.causes)
-    if verdict.verdict == OUTSIDE and verdict.unknown is not None:
-        one = verdict.unknown
-        return verdict.probabilities.get(f"{words.DRIFT if one.is_drift else words.FORCE}{one.axis}")
+    if verdict.on_model == OUTSIDE and verdict.unknown is not None:
+        told = (p for name, p in verdict.probabilities.items() if words.is_told(name, verdict))
+        return next(told, None)
     return None
 
 
@@ -209,24 +213,25 @@ def _times(levels: float) -> str:
 
 
 def _next(verdict: Verdict) -> Iterator[str]:
-    """Give what to do with the vehicle and with the model."""
-    if verdict.verdict == CAUSE_NAMED:
+    """Give what to do with the records, the vehicle and the model."""
+    yield from (f"In {one.record}: {one.remedy}." for one in verdict.data_errors if verdict.then)
+    if verdict.on_model == CAUSE_NAMED:
         places = list(dict.fromkeys(filter(None, (_place(one.id) for one in verdict.causes))))
         yield from (f"Look at {place}." for place in places)
-    elif verdict.verdict == OUTSIDE and verdict.unknown is not None:
+    elif verdict.on_model == OUTSIDE and verdict.unknown is not None:
         one = verdict.unknown
         yield (
             "Look at that sensor: its drift is corrected in the comparison, not in the record."
             if one.is_drift
             else f"Look for what {words.something(one.axis, one.force).partition(' ')[2]}; the figure below says when."
         )
-    elif verdict.verdict == UNDECIDED:
+    elif verdict.on_model == UNDECIDED:
         yield (
             "Fly one more trial, below, before anything is changed."
             if verdict.next_trial
             else ("Look at what the explanations have in common, or log another channel.")
         )
-    else:
+    elif not verdict.then:
         yield "Nothing has to be done."
     if _is_new(verdict):
         yield "Until it is repaired, simulate with the extended model:"
@@ -241,14 +246,14 @@ def _settles(verdict: Verdict) -> Iterator[str]:
     """Give which trial or channel would decide what is open."""
     if verdict.next_trial is not None:
         yield words.next_trial(verdict.next_trial)
-    elif verdict.verdict == OUTSIDE:
+    elif verdict.on_model == OUTSIDE:
         yield (
             "Another trial of the same kind: what comes again belongs to the vehicle, what does not was an event. "
             "A trial with other commands says what it goes with."
         )
-    elif verdict.verdict == CAUSE_NAMED:
+    elif verdict.on_model == CAUSE_NAMED:
         yield "A trial with other commands: the extended model has to explain it without another fit."
-    elif verdict.verdict == NOTHING_WRONG:
+    elif verdict.on_model == NOTHING_WRONG:
         yield "A manoeuvre or a sensor that shows what these records could not have shown, in the last table."
     else:
         yield (

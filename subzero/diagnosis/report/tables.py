@@ -94,7 +94,7 @@ def rivals(verdict: Verdict, *, short: bool = False) -> Table:
     if short:
         rows = [_short(one) for one in _worth(verdict.rivals)]
         words = (
-            "what explains the records" if verdict.verdict == UNDECIDED else "what else explains the records"
+            "what explains the records" if verdict.on_model == UNDECIDED else "what else explains the records"
         )
         return Table((words, "probability", "D"), rows[:MOST_RIVALS])
     return Table(("explanation", "probability", "D", "parameters", "id"),

@@ -12,11 +12,13 @@ from subzero.channels import BY_NAME
 from subzero.diagnosis.hypothesis.extended_model import all_effects, plain_id
 from subzero.diagnosis.results import (
     CAUSE_NAMED,
+    DATA_ERROR,
     NOTHING_WRONG,
     OUTSIDE,
     UNDECIDED,
     Cause,
     Estimate,
+    FoundError,
     NextTrial,
     Unknown,
     Verdict,
@@ -28,6 +30,7 @@ HEADLINES = {
     CAUSE_NAMED: "The cause is named",
     UNDECIDED: "Undecided: several causes explain the records as well",
     OUTSIDE: "Something real, and outside the catalogue",
+    DATA_ERROR: "An error in the data",
 }
 
 NOTHING = "–"
@@ -45,6 +48,8 @@ PUSHES = {
 """Axis of a force or a moment → what it does where it is positive, where it is negative, and where it is both."""
 ONE_SIDED = 0.25
 """A force of one sign is never as large with the other one, as a share."""
+
+UNCHANGED = "No file was changed. All that follows is said of the records as they are once that is put right."
 
 NAMED_FROM = 0.01
 """What is less probable than that is not said to explain the records as well."""
@@ -138,6 +143,7 @@ def sentences(verdict: Verdict) -> dict[str, str]:
     told = {" + ".join(one.ids) or "none": one.sentence for one in verdict.rivals}
     told = {name: said for name, said in told.items() if not name.startswith(FORCE)}
     told |= {one.id: one.sentence for one in verdict.causes if one.start_time is None}
+    told |= {one.id: one.sentence for one in verdict.data_errors}
     if verdict.unknown is not None and not verdict.unknown.is_drift:
         told[f"{FORCE}{verdict.unknown.axis}"] = something(verdict.unknown.axis, verdict.unknown.force)
     return told
@@ -153,32 +159,54 @@ def headline(verdict: Verdict) -> str:
     named = HEADLINES[verdict.verdict]
     if verdict.verdict == CAUSE_NAMED and len(verdict.causes) > 1:
         named = f"{len(verdict.causes)} causes are named"
+    if verdict.verdict == DATA_ERROR:
+        count = len(verdict.data_errors)
+        found = f"{count} errors in the data" if count > 1 else named
+        named = f"{found}; without {'them' if count > 1 else 'it'}: {_uncapital(HEADLINES[verdict.then])}"
     return named if verdict.complete else f"{named} (interrupted: this is as far as it came)"
 
 
 def is_told(name: str, verdict: Verdict) -> bool:
     """Say whether a hypothesis is what the verdict tells: its causes, whenever they began, or its force or drift."""
-    if verdict.verdict == OUTSIDE and verdict.unknown is not None:
-        return name == f"{DRIFT if verdict.unknown.is_drift else FORCE}{verdict.unknown.axis}"
-    ids = sorted(one.partition("@")[0] for one in name.split(" + "))
+    beside = {one.id for one in verdict.data_errors} if verdict.then else set()
+    parts = [one for one in name.split(" + ") if one not in beside]
+    if verdict.on_model == OUTSIDE and verdict.unknown is not None:
+        return parts == [f"{DRIFT if verdict.unknown.is_drift else FORCE}{verdict.unknown.axis}"]
+    ids = sorted(one.partition("@")[0] for one in parts)
     begins = any(cause.start_time is not None for cause in verdict.causes)
     return ids == sorted(cause.id for cause in verdict.causes) and ("@" in name) == begins
 
 
 def title(verdict: Verdict) -> str:
     """Return what stands above a page: what was found where it has a name, else the headline."""
-    if verdict.verdict == CAUSE_NAMED and verdict.causes:
+    if verdict.data_errors and verdict.then:
+        return headline(verdict)
+    if verdict.on_model == CAUSE_NAMED and verdict.causes:
         return _capital(" and ".join(one.sentence for one in verdict.causes))
-    if verdict.verdict == OUTSIDE and verdict.unknown is not None:
-        return sentence(verdict).rstrip(".")
+    if verdict.on_model == OUTSIDE and verdict.unknown is not None:
+        return on_model(verdict).rstrip(".")
     return headline(verdict)
 
 
+def data_error(one: FoundError) -> str:
+    """Return an error in the data in words: where, what, what to change, and what else it may be."""
+    alike = "".join(f" Or, which these records cannot tell from it: {other}." for other in one.alike)
+    what = f"{one.sentence}: {one.remedy}. Probability {probability(one.probability)}."
+    return f"{one.record}: {what}{alike}"
+
+
 def sentence(verdict: Verdict) -> str:
-    """Return the verdict in a sentence without ids; of what cannot be told apart, no more than one can read."""
-    if verdict.verdict == UNDECIDED:
+    """Return the verdict in a sentence without ids; errors in the data stand before what is said of the model."""
+    if not verdict.then:
+        return on_model(verdict)
+    return " ".join([*map(data_error, verdict.data_errors), "Without that:", on_model(verdict)])
+
+
+def on_model(verdict: Verdict) -> str:
+    """Return the verdict on the model; of what cannot be told apart, no more than one can read."""
+    if verdict.on_model == UNDECIDED:
         return _undecided(verdict)
-    if verdict.verdict == OUTSIDE and verdict.unknown is not None:
+    if verdict.on_model == OUTSIDE and verdict.unknown is not None:
         one = verdict.unknown
         said = (
             f"the sensor of the {_spaced(one.axis)} drifts"
@@ -186,7 +214,7 @@ def sentence(verdict: Verdict) -> str:
             else something(one.axis, one.force)
         )
         return f"{_capital(said)}, and no cause of the catalogue explains it."
-    if verdict.verdict == NOTHING_WRONG:
+    if verdict.on_model == NOTHING_WRONG:
         return f"Nothing is wrong beyond the tolerances of the model.{_within(verdict)}"
     return verdict.sentence
 
@@ -269,3 +297,7 @@ def column(name: str) -> str:
 
 def _capital(sentence: str) -> str:
     return sentence[:1].upper() + sentence[1:]
+
+
+def _uncapital(sentence: str) -> str:
+    return sentence[:1].lower() + sentence[1:]

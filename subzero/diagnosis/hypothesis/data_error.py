@@ -1,0 +1,423 @@
+"""Errors in the data: what a logger, a file or a person made of a record that a sensor measured rightly.
+
+Each is a transformation of the record, or of the commands that are said to have been given, and so needs no physics:
+
+    sign, unit, reference        y = ±x, a x, a₀ ± x of a channel (a compass that is turned, or counts the other way)
+    step                         y = x + a from a time on
+    frozen, dropout              a value that is repeated: from a time on, or here and there
+    swapped                      two channels with each other's values
+    late_clock, clock_rate       t = t′ + δ, (1 + ρ) t′ of all channels
+    latency                      t = t′ + δ of one channel
+    command_sign, command_swap   commands with the other sign, or in each other's column
+
+`DataError.corrected` undoes the error in a record, and `DataError.planted` makes it. Probabilities of records are
+compared as they were written, so that y = a x costs log|a| a sample (`DataError.log_jacobian`).
+
+An offset of the clock within `LEAST_LATE_S`, a first-order lag, a bias or a scale of a sensor are causes of the
+catalogue and no errors in the data: they have any size, errors in the data are discrete, or large.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+import scenarios
+from subzero.channels import BY_NAME, HEADING, TURN, turned
+from subzero.diagnosis.hypothesis.logged import Logged
+from subzero.errors import UserError
+from subzero.records.consistency import MISTAKEN, REPORTED_COMMANDS
+from subzero.records.record import Record
+
+LEAST_LATE_S, LEAST_LATENCY_S, LEAST_RATE = 1.5, 1.0, 0.01
+"""Smaller delays are the catalogue's: three of its scales of a clock [s], five of a lag [s]; a clock that is wrong by
+less than that share is a good one."""
+
+REFERENCES: dict[str, tuple[float, float]] = {
+    "is 90 degrees too large": (90.0, 1.0),
+    "is 90 degrees too small": (-90.0, 1.0),
+    "is 180 degrees off": (180.0, 1.0),
+    "counts counter-clockwise from east": (90.0, -1.0),
+    "counts counter-clockwise from south": (180.0, -1.0),
+    "counts counter-clockwise from west": (270.0, -1.0),
+}
+"""How a compass is told wrongly → (a₀, b): it shows a₀ + b × heading. Counter-clockwise from north is the sign."""
+
+COMMANDS = tuple(REPORTED_COMMANDS)
+PLANES = COMMANDS[2:]
+COMMAND_GROUPS: dict[str, tuple[str, ...]] = {
+    "rudder": COMMANDS[1:2],
+    "stern_planes": PLANES,
+    "stern_plane_port": PLANES[:1],
+    "stern_plane_starboard": PLANES[1:],
+}
+"""Whose sign may be the other one."""
+SWAPS: tuple[tuple[str, str], ...] = (
+    ("rudder", "stern_plane_port"),
+    ("rudder", "stern_plane_starboard"),
+    ("rudder", "stern_planes"),
+    ("stern_plane_port", "stern_plane_starboard"),
+)
+"""Whose columns may be exchanged; of both planes the port one's stands for both."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class DataError:
+    """An error in the data of a record.
+
+    Attributes:
+        kind: a row of `KINDS`.
+        channels: that it befalls; of a clock none, of commands groups of `COMMAND_GROUPS`.
+        how: which of several: a unit of `MISTAKEN`, a row of `REFERENCES`; "" where there is one only.
+        amount: of a step [unit of the channel], a delay [s] or a rate [1].
+        since: when it begins. [s]
+        at: samples that hold no measurement, by their times; of frozen values and drop-outs. [s]
+    """
+
+    kind: str
+    channels: tuple[str, ...] = ()
+    how: str = ""
+    amount: float = 0.0
+    since: float = 0.0
+    at: tuple[float, ...] = ()
+
+    @property
+    def id(self) -> str:
+        """Such as "sign:heading", "unit:depth=feet", "late_clock"."""
+        where = f":{'/'.join(self.channels)}" if self.channels else ""
+        return f"{self.kind}{where}{f'={self.how}' if self.how else ''}"
+
+    @property
+    def numbers(self) -> int:
+        """How many of its numbers are fitted to a record: its size, and when it begins."""
+        return 2 if self.kind == "step" else int(self.amount != 0.0)
+
+    @property
+    def is_of_commands(self) -> bool:
+        """It is an error of what was commanded, not of what was measured."""
+        return self.kind in ("command_sign", "command_swap")
+
+    @property
+    def is_of_clock(self) -> bool:
+        """It befalls the times of all channels."""
+        return self.kind in ("late_clock", "clock_rate")
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """The columns of the record that it befalls."""
+        if self.is_of_commands:
+            return tuple(BY_NAME[one].column for group in self.channels for one in COMMAND_GROUPS[group])
+        return tuple(BY_NAME[one].column for one in self.channels) or ("time_s",)
+
+    @property
+    def factor(self) -> float:
+        """How many of the unit in the column make one of the right unit."""
+        return MISTAKEN[BY_NAME[self.channels[0]].unit][self.how]
+
+    @property
+    def log_jacobian(self) -> float:
+        """log|dT/dy| of a sample, T the correction."""
+        return -float(np.log(self.factor)) if self.kind == "unit" else 0.0
+
+    def corrected(self, logged: Logged) -> Logged:
+        """Return a record, with its trial, without this error."""
+        return KINDS[self.kind].correct(self, logged)
+
+    def planted(self, logged: Logged) -> Logged:
+        """Return a record, with its trial, that has this error."""
+        return KINDS[self.kind].plant(self, logged)
+
+    def sentence(self) -> str:
+        """Return what is wrong, in words."""
+        return KINDS[self.kind].sentence(self)
+
+    def remedy(self) -> str:
+        """Return what to change, in words."""
+        return KINDS[self.kind].remedy(self)
+
+
+Change = Callable[[DataError, Logged], Logged]
+Words = Callable[[DataError], str]
+
+
+class Kind(NamedTuple):
+    """A kind of error: how much of all errors it is, how to undo it and make it, what to say of it and what to do."""
+
+    share: float
+    correct: Change
+    plant: Change
+    sentence: Words
+    remedy: Words
+
+
+def _with(logged: Logged, time: np.ndarray | None = None, **values: np.ndarray) -> Logged:
+    """Return a record with some of its channels changed, or with other times."""
+    record = logged.record
+    made = Record(
+        source=record.source,
+        time=record.time if time is None else time,
+        values={**record.values, **values},
+    )
+    return dataclasses.replace(logged, record=made)
+
+
+def unturned(heading: np.ndarray) -> np.ndarray:
+    """Return a heading (n,) without the whole turns that it was given to stand beside a run: from within ±180 on."""
+    return turned(heading, 0.0)
+
+
+def _values(change: Callable[[DataError, np.ndarray, np.ndarray], np.ndarray]) -> Change:
+    """Return the change of a record whose one channel's values change: (error, time, values) → values."""
+
+    def changed(error: DataError, logged: Logged) -> Logged:
+        (channel,) = error.channels
+        new = change(error, logged.record.time, logged.record.values[channel])
+        return _with(logged, **{channel: new})
+
+    return changed
+
+
+def _negative(error: DataError, time: np.ndarray, values: np.ndarray) -> np.ndarray:
+    return -values
+
+
+def _in_right_unit(error: DataError, time: np.ndarray, values: np.ndarray) -> np.ndarray:
+    if error.channels[0] != HEADING:
+        return values / error.factor
+    known = np.isfinite(values)
+    found = unturned(values) / error.factor
+    found[known] = np.unwrap(found[known], period=TURN)
+    return found
+
+
+def _in_wrong_unit(error: DataError, time: np.ndarray, values: np.ndarray) -> np.ndarray:
+    if error.channels[0] != HEADING:
+        return values * error.factor
+    return np.mod(values + 0.5 * TURN, TURN) * error.factor - 0.5 * TURN * error.factor
+
+
+def _to_north(error: DataError, time: np.ndarray, values: np.ndarray) -> np.ndarray:
+    zero, direction = REFERENCES[error.how]
+    return direction * (values - zero)
+
+
+def _from_reference(error: DataError, time: np.ndarray, values: np.ndarray) -> np.ndarray:
+    zero, direction = REFERENCES[error.how]
+    return zero + direction * values
+
+
+def _without_step(error: DataError, time: np.ndarray, values: np.ndarray) -> np.ndarray:
+    return np.where(time >= error.since, values - error.amount, values)
+
+
+def _with_step(error: DataError, time: np.ndarray, values: np.ndarray) -> np.ndarray:
+    return np.where(time >= error.since, values + error.amount, values)
+
+
+def _among(error: DataError, time: np.ndarray) -> np.ndarray:
+    """Say which samples hold no measurement (n,)."""
+    return np.isin(np.round(time, 6), np.round(np.array(error.at), 6))
+
+
+def _as_gaps(error: DataError, time: np.ndarray, values: np.ndarray) -> np.ndarray:
+    return np.where(_among(error, time), np.nan, values)
+
+
+def _repeated(error: DataError, time: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Return values that repeat the last measured one, or with `how` a number are that, where nothing is measured."""
+    lost, found = _among(error, time), values.copy()
+    for k in np.flatnonzero(lost):
+        found[k] = float(error.how) if error.how else found[k - 1] if k else values[0]
+    return found
+
+
+def _exchanged(error: DataError, logged: Logged) -> Logged:
+    one, other = error.channels
+    values = logged.record.values
+    return _with(logged, **{one: values[other], other: values[one]})
+
+
+def _inside(logged: Logged, time: np.ndarray) -> Logged:
+    """Return a record at other times, without the samples outside its trial."""
+    kept = (time >= -1e-9) & (time <= logged.setting.trial.duration + 1e-9)
+    if not kept.any():
+        raise UserError(f"'{logged.name}' has no sample within its trial once its clock is set right.")
+    values = {name: column[kept] for name, column in logged.record.values.items()}
+    record = Record(source=logged.record.source, time=np.maximum(time[kept], 0.0), values=values)
+    return dataclasses.replace(logged, record=record)
+
+
+def _earlier(error: DataError, logged: Logged) -> Logged:
+    return _inside(logged, logged.record.time - error.amount)
+
+
+def _slower(error: DataError, logged: Logged) -> Logged:
+    return _inside(logged, logged.record.time / (1.0 + error.amount))
+
+
+def _read_at(logged: Logged, when: np.ndarray, channels: tuple[str, ...]) -> Logged:
+    """Return a record whose channels show at its times what they showed at others (n,); held at its ends."""
+    time, values = logged.record.time, logged.record.values
+    known = {name: np.isfinite(values[name]) for name in channels}
+    shown = {name: np.where(_nearest(known[name], time, when),
+                            np.interp(when, time[known[name]], values[name][known[name]]), np.nan)
+             for name in channels}  # fmt: skip
+    return _with(logged, **shown)
+
+
+def _nearest(known: np.ndarray, time: np.ndarray, when: np.ndarray) -> np.ndarray:
+    """Say whether the samples that are nearest to some times are known."""
+    at = np.clip(np.searchsorted(time, when), 1, time.size - 1)
+    at -= (when - time[at - 1]) < (time[at] - when)
+    return known[at]
+
+
+def _later(error: DataError, logged: Logged) -> Logged:
+    return _read_at(logged, logged.record.time - error.amount, tuple(logged.record.values))
+
+
+def _faster(error: DataError, logged: Logged) -> Logged:
+    return _read_at(logged, logged.record.time / (1.0 + error.amount), tuple(logged.record.values))
+
+
+def _delayed(error: DataError, logged: Logged) -> Logged:
+    return _read_at(logged, logged.record.time - error.amount, error.channels)
+
+
+def _in_time(error: DataError, logged: Logged) -> Logged:
+    """Return a record whose one channel has times of its own, earlier by the delay; all others have gaps there."""
+    (channel,) = error.channels
+    record, own = logged.record, logged.record.time - error.amount
+    inside = (own >= -1e-9) & (own <= logged.setting.trial.duration + 1e-9)
+    time, place = np.unique(np.round(np.concatenate([record.time, own[inside]]), 9), return_inverse=True)
+    values = {
+        name: _spread(column, place[: record.time.size], time.size) for name, column in record.values.items()
+    }
+    values[channel] = _spread(record.values[channel][inside], place[record.time.size :], time.size)
+    return dataclasses.replace(logged, record=Record(source=record.source, time=time, values=values))
+
+
+def _spread(values: np.ndarray, place: np.ndarray, size: int) -> np.ndarray:
+    """Return values in their places among gaps (size,)."""
+    found = np.full(size, np.nan)
+    found[place] = values
+    return found
+
+
+def _with_commands(logged: Logged, values: np.ndarray) -> Logged:
+    trial = logged.setting.trial
+    assert trial.commands is not None
+    commands = scenarios.Commands(time=trial.commands.time, values=values)
+    setting = dataclasses.replace(logged.setting, trial=dataclasses.replace(trial, commands=commands))
+    return dataclasses.replace(logged, setting=setting)
+
+
+def _columns(group: str) -> list[int]:
+    return [COMMANDS.index(one) for one in COMMAND_GROUPS[group]]
+
+
+def _commands_turned(error: DataError, logged: Logged) -> Logged:
+    assert logged.setting.trial.commands is not None
+    values = logged.setting.trial.commands.values.copy()
+    values[:, [at for group in error.channels for at in _columns(group)]] *= -1.0
+    return _with_commands(logged, values)
+
+
+def _commands_exchanged(error: DataError, logged: Logged) -> Logged:
+    assert logged.setting.trial.commands is not None
+    old = logged.setting.trial.commands.values
+    values, (one, other) = old.copy(), map(_columns, error.channels)
+    values[:, one], values[:, other] = old[:, other[:1]], old[:, one[:1]]
+    return _with_commands(logged, values)
+
+
+def _long(channel: str) -> str:
+    return BY_NAME[channel].column
+
+
+def _both(error: DataError) -> str:
+    return " and ".join(_long(one) for one in error.channels)
+
+
+def _groups(error: DataError) -> str:
+    return " and ".join(one.replace("_", " ") for one in error.channels)
+
+
+def _spans(times: tuple[float, ...]) -> str:
+    """Return how many samples these are, and from when to when."""
+    return f"{len(times)} samples between {times[0]:g} and {times[-1]:g} s" if times else "no sample"
+
+
+def _unit_remedy(error: DataError) -> str:
+    factor, unit = error.factor, BY_NAME[error.channels[0]].unit
+    how = f"divide it by {factor:.4g}" if factor >= 1.0 else f"multiply it by {1.0 / factor:.4g}"
+    return f"{how}, so that it is in {unit}"
+
+
+def _reference_remedy(error: DataError) -> str:
+    zero, direction = REFERENCES[error.how]
+    return (
+        f"subtract {zero:g} degrees"
+        if direction > 0.0
+        else f"replace it by {zero:g} degrees minus what it shows"
+    )
+
+
+KINDS: Mapping[str, Kind] = {
+    "sign": Kind(0.15, _values(_negative), _values(_negative),
+                 lambda one: f"{_both(one)} has the other sign",
+                 lambda one: f"change its sign ({BY_NAME[one.channels[0]].long_name})"),
+    "unit": Kind(0.2, _values(_in_right_unit), _values(_in_wrong_unit),
+                 lambda one: f"{_both(one)} is in {one.how}", _unit_remedy),
+    "reference": Kind(0.1, _values(_to_north), _values(_from_reference),
+                      lambda one: f"{_both(one)} {one.how}", _reference_remedy),
+    "step": Kind(0.05, _values(_without_step), _values(_with_step),
+                 lambda one: f"{_both(one)} jumps by {one.amount:.3g} {BY_NAME[one.channels[0]].unit} at "
+                             f"{one.since:.3g} s, and nothing else does",
+                 lambda one: f"subtract {one.amount:.3g} {BY_NAME[one.channels[0]].unit} from {one.since:.3g} s on, or "
+                             "leave gaps there"),
+    "frozen": Kind(0.08, _values(_as_gaps), _values(_repeated),
+                   lambda one: f"{_both(one)} is frozen from {one.since:.3g} s on",
+                   lambda one: f"leave its cells empty from {one.since:.3g} s on"),
+    "dropout": Kind(0.1, _values(_as_gaps), _values(_repeated),
+                    lambda one: f"{_both(one)} {f'shows {one.how}' if one.how else 'repeats a value'} in place of "
+                                f"measurements ({_spans(one.at)})",
+                    lambda one: "leave these cells empty"),
+    "swapped": Kind(0.08, _exchanged, _exchanged,
+                    lambda one: f"{_both(one)} have each other's values",
+                    lambda one: "exchange the headers of the two columns"),
+    "late_clock": Kind(0.08, _earlier, _later,
+                       lambda one: f"the clock of the record is {abs(one.amount):.3g} s "
+                                   f"{'late' if one.amount > 0.0 else 'early'} against the commands'",
+                       lambda one: f"{'subtract' if one.amount > 0.0 else 'add'} {abs(one.amount):.3g} s "
+                                   f"{'from' if one.amount > 0.0 else 'to'} time_s"),
+    "clock_rate": Kind(0.03, _slower, _faster,
+                       lambda one: f"the clock of the record runs {abs(100.0 * one.amount):.3g} % too "
+                                   f"{'fast' if one.amount > 0.0 else 'slow'}",
+                       lambda one: f"divide time_s by {1.0 + one.amount:.4g}"),
+    "latency": Kind(0.05, _in_time, _delayed,
+                    lambda one: f"{_both(one)} is {abs(one.amount):.3g} s {'late' if one.amount > 0.0 else 'early'} "
+                                "against the other channels",
+                    lambda one: f"shift that column by {-one.amount:+.3g} s"),
+    "command_sign": Kind(0.05, _commands_turned, _commands_turned,
+                         lambda one: f"the command of the {_groups(one)} has the other sign",
+                         lambda one: "change the sign of that command"),
+    "command_swap": Kind(0.03, _commands_exchanged, _commands_exchanged,
+                         lambda one: f"the commands of the {_groups(one)} are in each other's columns",
+                         lambda one: "exchange these columns of the commands"),
+}  # fmt: skip
+"""Kind → what it is; shares sum to one."""
+
+ANY = 0.1
+"""How probable it is beforehand that a record has an error in its data."""
+
+
+def corrected(logged: Logged, errors: tuple[DataError, ...]) -> Logged:
+    """Return a record without some errors, undone in turn."""
+    for error in errors:
+        logged = error.corrected(logged)
+    return logged

@@ -1,0 +1,169 @@
+"""Errors in the data are named with what to change, and the diagnosis goes on without them.
+
+Verifies: that each correction undoes its error, and how it stretches values; that records made by the other formulation
+of the cable, every number drawn from its tolerance, are told as what was done to them at the public face, and a record
+that nothing was done to is not; that files carry the verdict. Configuration: fig6, zigzag and dive, AR(1) noise.
+Tolerance: a delay within 0.3 s.
+"""
+
+import dataclasses
+import json
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import scenarios
+import subzero
+from subzero import Logged
+from subzero.diagnosis import Setting, catalogue, report
+from subzero.diagnosis.inference import KINDS_OF_DATA_ERRORS, DataError, repeated_values
+from subzero.records.record import Record
+from subzero.synthetic.planted import draw_tolerances, make_record
+
+CHANNELS = ("surge_speed", "heading", "yaw_rate", "pitch", "roll_angle", "depth")
+TIME = np.arange(0.0, 30.01, 0.1)
+EACH = (
+    DataError(kind="sign", channels=("heading",)),
+    DataError(kind="unit", channels=("heading",), how="radians"),
+    DataError(kind="unit", channels=("depth",), how="feet"),
+    DataError(kind="unit", channels=("surge_speed",), how="knots"),
+    DataError(kind="reference", channels=("heading",), how="is 90 degrees too large"),
+    DataError(kind="reference", channels=("heading",), how="counts counter-clockwise from east"),
+    DataError(kind="step", channels=("pitch",), amount=3.0, since=12.0),
+    DataError(kind="frozen", channels=("roll_angle",), since=20.0, at=tuple(TIME[TIME >= 20.0])),
+    DataError(kind="dropout", channels=("roll_angle",), how="-999", at=tuple(TIME[50:60])),
+    DataError(kind="dropout", channels=("depth",), at=tuple(TIME[80:95])),
+    DataError(kind="swapped", channels=("pitch", "roll_angle")),
+    DataError(kind="late_clock", amount=4.0),
+    DataError(kind="late_clock", amount=-3.0),
+    DataError(kind="clock_rate", amount=0.05),
+    DataError(kind="latency", channels=("yaw_rate",), amount=2.0),
+    DataError(kind="command_sign", channels=("rudder",)),
+    DataError(kind="command_sign", channels=("stern_planes",)),
+    DataError(kind="command_swap", channels=("rudder", "stern_plane_port")),
+)
+
+
+def smooth(scenario: str = "fig6") -> Logged:
+    """Return a record of smooth curves, another in each channel."""
+    told = scenarios.Commands(
+        time=np.array([0.0, 10.0]), values=np.array([[25.0, 0.0, 0.1, 0.1], [20.0, 0.05, -0.1, 0.02]])
+    )
+    trial = dataclasses.replace(subzero.load_scenario(scenario), commands=told)
+    values = {name: (1.0 + k) * np.sin(0.3 * TIME + k) + 0.1 * TIME for k, name in enumerate(CHANNELS)}
+    values["heading"] = values["heading"] + 150.0 + 3.0 * TIME  # beyond south
+    setting = Setting(trial=trial, model=subzero.Model.of(trial))
+    return Logged(record=Record(source="made", time=TIME, values=values), setting=setting, name=scenario)
+
+
+def test_every_kind_is_tried_here():
+    assert {one.kind for one in EACH} == set(KINDS_OF_DATA_ERRORS)
+    assert sum(kind.share for kind in KINDS_OF_DATA_ERRORS.values()) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("error", EACH, ids=lambda one: f"{one.id} {one.amount:g}")
+def test_a_correction_undoes_its_error(error):
+    """What is left is what was measured, at its time; of values that are lost, gaps."""
+    before = smooth()
+    wrong = error.planted(before)
+    after = error.corrected(wrong)
+    changed = any(
+        not np.array_equal(wrong.record.values[name], before.record.values[name]) for name in CHANNELS
+    )
+    told = wrong.setting.trial.commands.values, before.setting.trial.commands.values
+    assert changed or not np.array_equal(*told)
+    assert_allclose(after.setting.trial.commands.values, told[1], atol=1e-12)
+    for name in CHANNELS:
+        known = np.isfinite(after.record.values[name])
+        true = np.interp(after.record.time[known], TIME, before.record.values[name])
+        assert np.count_nonzero(known) > 0.5 * TIME.size
+        assert_allclose(after.record.values[name][known], true, atol=0.03)
+
+
+@pytest.mark.parametrize("error", EACH, ids=lambda one: f"{one.id} {one.amount:g}")
+def test_a_density_is_counted_in_the_units_of_the_record(error):
+    """log|dT/dy| is how far two values that are close come apart by the correction."""
+    if error.is_of_clock or error.is_of_commands or error.at or error.kind in ("swapped", "latency"):
+        assert error.log_jacobian == 0.0
+        return
+    (channel,), one = error.channels, error.planted(smooth())
+    other = dataclasses.replace(
+        one.record, values={**one.record.values, channel: one.record.values[channel] + 1e-4}
+    )
+    apart = error.corrected(dataclasses.replace(one, record=other)).record.values[channel]
+    apart = apart - error.corrected(one).record.values[channel]
+    assert error.log_jacobian == pytest.approx(np.log(np.median(np.abs(apart)) / 1e-4), abs=1e-6)
+
+
+@pytest.mark.parametrize("error", EACH, ids=lambda one: f"{one.id} {one.amount:g}")
+def test_an_error_is_told_with_its_column_and_a_remedy(error):
+    assert error.columns
+    assert error.sentence()
+    assert error.remedy()
+    if error.channels and not error.is_of_commands:
+        assert all(column in error.sentence() for column in error.columns)
+
+
+def measured(scenario: str, seed: int) -> Logged:
+    """Return a record of a healthy vehicle by the other formulation."""
+    trial = subzero.load_scenario(scenario)
+    setting = Setting(trial=trial, model=subzero.Model.of(trial))
+    true = draw_tolerances(setting, catalogue(CHANNELS).values(), seed)
+    times = np.arange(0.0, trial.duration - 0.05, 0.1)
+    return Logged(record=make_record(true, times, CHANNELS, seed=seed), setting=setting, name=scenario)
+
+
+def named(verdict) -> set[str]:
+    """Return the ids of the errors that are the verdict."""
+    return {one.id for one in verdict.data_errors} if verdict.verdict == "data_error" else set()
+
+
+def test_two_errors_at_once_are_named_at_the_public_face_and_nothing_is_converted():
+    clean = measured("fig6", 20251)
+    errors = EACH[0], EACH[2]
+    wrong = errors[1].planted(errors[0].planted(clean))
+    before = wrong.record.values["heading"].copy()
+    verdict = subzero.diagnose(wrong, budget="screen")
+    assert named(verdict) == {"sign:heading", "unit:depth=feet"}
+    assert {one.columns for one in verdict.data_errors} == {("heading_deg",), ("depth_m",)}
+    assert {"sign:heading", "unit:depth=feet"} <= set(next(iter(verdict.probabilities)).split(" + "))
+    assert_allclose(wrong.record.values["heading"], before)
+    told = json.loads(report.json_file.text(verdict))
+    assert told["verdict"] == "data_error"
+    assert told["data_errors"][0]["remedy"]
+    assert "heading_deg has the other sign" in report.words.sentence(verdict)
+
+
+@pytest.mark.slow
+def test_what_the_user_vouches_for_is_not_called_an_error():
+    wrong = EACH[2].planted(measured("fig6", 20252))
+    trusted = dataclasses.replace(wrong, trusted=frozenset(CHANNELS))
+    assert not named(subzero.diagnose(trusted, budget="verdict"))
+
+
+def flown_for(error: DataError) -> str:
+    """Return a trial in which an error is seen: a zigzag commands no stern-plane."""
+    return "dive" if error.channels == ("stern_planes",) else "zigzag"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("error", EACH, ids=lambda one: f"{one.id} {one.amount:g}")
+def test_each_error_is_named_and_the_vehicle_is_healthy_without_it(error):
+    wrong = error.planted(measured(flown_for(error), 20260 + EACH.index(error)))
+    verdict = subzero.diagnose(wrong, budget="verdict")
+    assert error.id in named(verdict), (verdict.verdict, verdict.sentence)
+    assert verdict.then in ("nothing_wrong", "undecided")
+    (found,) = [one for one in verdict.data_errors if one.id == error.id]
+    if error.kind in ("late_clock", "latency"):
+        assert found.amount == pytest.approx(error.amount, abs=0.3)
+
+
+def test_a_channel_that_is_frozen_from_the_first_sample_of_a_turn_on_is_no_value_that_stands_for_nothing():
+    """At one sample a second it is far from all before; what does not come back to a measurement is frozen."""
+    time, clean = np.arange(0.0, 40.0), smooth()
+    heading = 0.4 * np.random.default_rng(1).standard_normal(time.size)
+    heading[11:] = heading[11] + 12.0
+    record = Record(source="made", time=time, values={"heading": heading})
+    (found,) = repeated_values(dataclasses.replace(clean, record=record))
+    assert (found.kind, found.since, len(found.at)) == ("frozen", 12.0, 28)
