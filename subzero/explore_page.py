@@ -70,6 +70,7 @@ def address(port: int) -> Iterator[tuple[str, socket.socket]]:
         listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             listening.bind((HOST, port))
+            listening.listen()
         except OSError as error:
             why = "is in use" if error.errno == errno.EADDRINUSE else f"cannot be had: {error.strerror}"
             raise UserError(f"Port {port} of {HOST} {why}. Give another one, or --port 0 for any.") from None
@@ -149,11 +150,19 @@ class Page:
 
     def replay(self, run: xr.Dataset) -> dict[str, Any] | None:
         """Return the replay of a run beside the nominal one; None where there is nothing to see."""
-        from subzero.page import actors_of, encode
+        from subzero.page import Actor, encode
 
         if run.sizes["time"] < 2 or self.exploration.nominal.sizes["time"] < 2:
             return None
-        return encode(actors_of({"changed": run, "nominal": self.exploration.nominal}))
+        data = encode((Actor(name="changed", run=run),))
+        return {**data, "actors": [*data["actors"], *self.ghost["actors"]]}
+
+    @cached_property
+    def ghost(self) -> dict[str, Any]:
+        """The replay of the nominal run alone, as a ghost."""
+        from subzero.page import Actor, encode
+
+        return encode((Actor(name="nominal", run=self.exploration.nominal, ghost=True),))
 
     def look_at(self, values: Values, progress: Callable[[float], None]) -> Shown:
         """Return what a tab shows for some positions of the sliders."""
@@ -308,8 +317,10 @@ class Tab:
         if shown.summary is None:
             self.status.set_text("Refused; what is shown is the run before.")
             return
-        words = "Changed" if self.page.exploration.changes(answer.values) else "As in the file"
-        self.status.set_text(f"{words}; the run took {answer.seconds:.2f} s.")
+        changed = self.page.exploration.changes(answer.values)
+        self.status.set_text(
+            f"Changed; the run took {answer.seconds:.2f} s." if changed else "As in the file."
+        )
         self._show_numbers(shown.summary)
         if shown.replay is not None:
             self.replay = shown.replay
@@ -367,6 +378,7 @@ class Knob:
         from nicegui import ui
 
         self.slider, self._moved, self._value = slider, moved, slider.nominal
+        self._is_put = False
         unit = "" if slider.unit == "1" else f" [{slider.unit}]"
         with ui.column().classes("knob").props(f'data-name="{slider.name}"'):
             with ui.row().classes("head"):
@@ -374,6 +386,7 @@ class Knob:
                 self.back = ui.button(icon="undo", on_click=partial(self.turn, slider.nominal))
                 self.back.props(f'flat dense round size=sm aria-label="Reset {slider.words}"')
                 self.number = ui.number(value=slider.nominal, on_change=lambda event: self.turn(event.value))
+                self.number.on("blur", lambda: self.put(self._value))  # what was left empty is as it was
                 self.number.props(
                     f'dense debounce=300 input-class=text-right aria-label="{slider.words}{unit}"'
                 )
@@ -387,16 +400,17 @@ class Knob:
 
     def turn(self, value: float | None) -> None:
         """Take another value, from the slider or from the number, unless it is the one that it has."""
-        if value is None or (value := float(f"{value:.{DIGITS}g}")) == self._value:
+        if self._is_put or value is None or (value := float(f"{value:.{DIGITS}g}")) == self._value:
             return
         self.put(value)
         self._moved(self.slider.name, value)
 
     def put(self, value: float) -> None:
         """Stand at a value; the handle of one beyond the slider's ends stands at its end."""
-        self._value = value
+        self._value, self._is_put = value, True  # neither of the two has been moved by somebody
         self.number.set_value(value)
         self.handle.set_value(min(max(value, self.slider.low), self.slider.high))
+        self._is_put = False
         self.back.set_visibility(value != self.slider.nominal)
 
     def say(self, words: str) -> None:

@@ -5,7 +5,7 @@ const DARK_COLOURS = { tethered: "#56b4e9", untethered: "#ff8c42", nominal: "#9a
 const FIRST_SHOWN = [
   "surge_speed", "heading", "depth", "cable_tension", "cable_length", "rudder_angle", "propeller_speed", "pitch", "roll_angle",
 ];
-const HEIGHT = 132;
+const HEIGHT = document.body.classList.contains("bare") ? Math.min(Math.max(innerHeight / 4 - 40, 80), 160) : 132;  // inside another page four fill its frame
 
 /** Whether the reader's screen is set to dark. */
 export const isDark = () => matchMedia("(prefers-color-scheme: dark)").matches;
