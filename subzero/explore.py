@@ -19,7 +19,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
-from scenarios import ScenarioError, Trial
+from scenarios import ScenarioError, Trial, load
 from scenarios.parameters import (
     ELEMENT,
     PARTS,
@@ -32,6 +32,7 @@ from scenarios.parameters import (
 from scenarios.quantities import Quantity
 from scenarios.samples import LEFT_OPEN
 from subzero.errors import UserError, printable
+from subzero.user_file import make_toml
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -274,15 +275,20 @@ class Exploration:
             for key, words, digits in NUMBERS
         ]
 
-    def file(self, values: Values, folder: Path) -> str:
-        """Return the text of a scenario file of some positions of the sliders, which is to stand in a folder.
+    def save(self, values: Values, path: Path) -> None:
+        """Make a scenario file of some positions of the sliders, which is not there yet.
 
         Raises:
-            ScenarioError: values that are refused.
+            UserError: values that are refused, or a file that cannot be made; there is none then.
         """
         changes = self.changes(values)
         self.trial.with_changes(changes)
-        return text_with(self.trial, changes, folder)
+        make_toml(path, text_with(self.trial, changes, path.parent))
+        try:
+            load(path)  # a file of commands may end before a longer run
+        except ScenarioError:
+            path.unlink()
+            raise
 
 
 def _cells(nominal: float | None, changed: float | None, digits: int) -> tuple[str, str, str]:

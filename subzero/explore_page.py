@@ -27,7 +27,6 @@ from uuid import uuid4
 
 from subzero.errors import UserError, printable
 from subzero.explore import Answer, Exploration, Newest, Slider, Values
-from subzero.user_file import make_toml
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -102,9 +101,7 @@ class Page:
         """Serve the page in a thread until the process is interrupted; open a browser on it if asked for."""
         import uvicorn
 
-        server = uvicorn.Server(
-            uvicorn.Config(self._application(), log_level="error", ws="websockets-sansio")
-        )
+        server = uvicorn.Server(uvicorn.Config(self._application(), log_level="error"))
         thread = threading.Thread(target=server.run, kwargs={"sockets": [listening]}, daemon=True)
         thread.start()
         if browser:
@@ -301,7 +298,7 @@ class Tab:
         name = str(self.file.value or "")
         try:
             _refuse_folders(name)
-            make_toml(Path(name), self.page.exploration.file(self.values, Path()))
+            self.page.exploration.save(self.values, Path(name))
         except UserError as error:
             self.saved.set_text(str(error))
         else:
@@ -385,7 +382,11 @@ class Knob:
                 ui.label(slider.words + unit).classes("words").tooltip(slider.name)
                 self.back = ui.button(icon="undo", on_click=partial(self.turn, slider.nominal))
                 self.back.props(f'flat dense round size=sm aria-label="Reset {slider.words}"')
-                self.number = ui.number(value=slider.nominal, on_change=lambda event: self.turn(event.value))
+                self.number = ui.number(
+                    value=slider.nominal,
+                    format=f"%.{DIGITS}g",
+                    on_change=lambda event: self.turn(event.value),
+                )
                 self.number.on("blur", lambda: self.put(self._value))  # what was left empty is as it was
                 self.number.props(
                     f'dense debounce=300 input-class=text-right aria-label="{slider.words}{unit}"'
