@@ -321,9 +321,9 @@ def explore(
         from subzero.model import load
         from subzero.simulation import simulate as run
 
+        trial = load(scenario)
         with _progress(trial) as progress:
-            nominal = run(load(scenario), progress=progress)
-        page = explore_page.Page(load(scenario), nominal)
+            page = explore_page.Page(trial, run(trial, progress=progress))
         with voice.tells({"url": url}):
             print(f"Exploring {printable(trial.name)} at {url}. Ctrl-C ends it.")
         sys.stdout.flush()
