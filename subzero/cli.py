@@ -318,12 +318,14 @@ def explore(
 
     trial = scenarios.load(scenario)
     with explore_page.address(port) as (url, listening):
+        from subzero.explore import Exploration
         from subzero.model import load
         from subzero.simulation import simulate as run
 
         trial = load(scenario)
         with _progress(trial) as progress:
-            page = explore_page.Page(trial, run(trial, progress=progress))
+            nominal = run(trial, progress=progress)
+        page = explore_page.Page(Exploration(trial=trial, nominal=nominal, simulate=run))
         with voice.tells({"url": url}):
             print(f"Exploring {printable(trial.name)} at {url}. Ctrl-C ends it.")
         sys.stdout.flush()

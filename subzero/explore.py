@@ -209,10 +209,12 @@ class Exploration:
     Args:
         trial: as its file has it.
         nominal: its run.
+        simulate: runs a trial, as `subzero.simulate` does.
     """
 
     trial: Trial
     nominal: xr.Dataset
+    simulate: Callable[..., xr.Dataset]
 
     @cached_property
     def sliders(self) -> dict[str, Slider]:
@@ -235,14 +237,12 @@ class Exploration:
             values: the positions.
             progress: told the fraction that is done; what it raises ends the run.
         """
-        from subzero.simulation import simulate
-
         began, changes = perf_counter(), self.changes(values)
         run: xr.Dataset | None = self.nominal
         refusals: dict[str, str] = {}
         if changes:
             try:
-                run = simulate(self.trial.with_changes(changes), progress=progress)
+                run = self.simulate(self.trial.with_changes(changes), progress=progress)
             except UserError as error:
                 run, refusals = None, self._refusals(error)
         return Answer(values=dict(values), run=run, refusals=refusals, seconds=perf_counter() - began)

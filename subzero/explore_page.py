@@ -31,8 +31,6 @@ from subzero.explore import Answer, Exploration, Newest, Slider, Values
 if TYPE_CHECKING:
     import xarray as xr
 
-    from scenarios import Trial
-
 HOST = "127.0.0.1"
 HIGHEST_PORT = 65535
 NEEDED = ("nicegui", "tomlkit")
@@ -89,12 +87,11 @@ class Page:
     """The page of a trial.
 
     Args:
-        trial: as its file has it.
-        nominal: its run.
+        exploration: the trial, its run, and what runs others.
     """
 
-    def __init__(self, trial: Trial, nominal: xr.Dataset) -> None:
-        self.exploration = Exploration(trial=trial, nominal=nominal)
+    def __init__(self, exploration: Exploration) -> None:
+        self.exploration = exploration
         self.tabs: dict[str, Tab] = {}
 
     def serve(self, listening: socket.socket, url: str, *, browser: bool) -> None:

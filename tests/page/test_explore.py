@@ -44,7 +44,7 @@ needs_browser = pytest.mark.skipif(
 def explored(name: str | Path, duration: float | None = None) -> Exploration:
     trial = subzero.load_scenario(name)
     trial = trial if duration is None else replace(trial, duration=duration)
-    return Exploration(trial=trial, nominal=subzero.simulate(trial))
+    return Exploration(trial=trial, nominal=subzero.simulate(trial), simulate=subzero.simulate)
 
 
 @pytest.fixture(scope="module")
@@ -137,7 +137,7 @@ def test_a_saved_file_is_the_same_trial_to_the_last_bit_whatever_was_moved(name:
     from subzero.provenance import trial_digest
 
     trial = subzero.load_scenario(name)
-    one = Exploration(trial=trial, nominal=None)  # type: ignore[arg-type]  # nothing is run
+    one = Exploration(trial=trial, nominal=None, simulate=None)  # type: ignore[arg-type]  # nothing is run
     for slider in sliders_of(trial):
         if slider.section == "motion":
             continue  # the start of a prescribed motion is read from it
