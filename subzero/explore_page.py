@@ -110,16 +110,14 @@ class Page:
 
     def _application(self) -> Any:
         from fastapi import FastAPI
-        from fastapi.responses import HTMLResponse, Response
+        from fastapi.responses import HTMLResponse
         from nicegui import ui
         from starlette.middleware.trustedhost import TrustedHostMiddleware
 
         application = FastAPI()
         application.add_middleware(TrustedHostMiddleware, allowed_hosts=[HOST, "localhost"])
         application.get("/replay")(lambda: HTMLResponse(self.frame))
-        application.get("/runs/{tab}")(
-            lambda tab: Response(self.tabs[tab].replay, media_type="application/json")
-        )
+        application.get("/runs/{tab}")(self.run_of)
         ui.page("/")(self.open_tab)
         ui.run_with(
             application,
@@ -128,6 +126,13 @@ class Page:
             show_welcome_message=False,
         )
         return application
+
+    def run_of(self, tab: str) -> Any:
+        """Answer with the replay that a tab shows."""
+        from fastapi.responses import Response
+
+        known = self.tabs.get(tab)
+        return Response(known.replay if known else None, 200 if known else 404, media_type="application/json")
 
     @cached_property
     def frame(self) -> str:
