@@ -180,6 +180,7 @@ def test_a_trial_with_files_of_its_own_is_saved_elsewhere(tmp_path: Path) -> Non
     values = {"cable.diameter": 0.0041, "drum.inertia": 5e-4, "water.current_east_m_s": 0.2}
     again = saved(one, values, other / "again.toml")
     assert (again.cable["diameter"], again.drum["inertia"]) == (0.0041, 5e-4)
+    assert again.text.count("diameter") == 2, "in the head, and where it was"
     assert_alike(subzero.simulate(again), one.answer(values).run)
     with pytest.raises(scenarios.ScenarioError, match="the file ends early"):
         one.save({"run.duration_s": 9.0}, other / "longer.toml")
@@ -192,17 +193,20 @@ def test_a_trial_with_files_of_its_own_is_saved_elsewhere(tmp_path: Path) -> Non
 
 
 class Worker:
-    """Works on a request until it is told that it may end, and looks for news now and then."""
+    """Works on a request until it may end; looks for news now and then as soon as it may."""
 
     def __init__(self) -> None:
         self.found: list[int] = []
+        self.taken_up: list[int] = []
         self.errors: list[Exception] = []
-        self.begun, self.may_end, self.has_ended = (threading.Event() for _ in range(3))
+        self.begun, self.may_look, self.may_end, self.has_ended = (threading.Event() for _ in range(4))
 
     def work(self, request: int, progress: Callable[[float], None]) -> int:
         if request < 0:
             raise ZeroDivisionError
+        self.taken_up.append(request)
         self.begun.set()
+        assert self.may_look.wait(5.0)
         while not self.may_end.wait(0.005):
             progress(0.5)
         return request
@@ -223,16 +227,19 @@ def test_the_newest_request_wins_and_old_ones_are_given_up() -> None:
     assert worker.begun.wait(5.0)
     for request in (2, 3, 4):
         newest.ask(request)
+    worker.may_look.set()
     threading.Timer(0.1, worker.may_end.set).start()
     assert worker.has_ended.wait(5.0)
     newest.end()
     assert worker.found == [4]
+    assert worker.taken_up == [1, 4], "2 and 3 were forgotten while 1 was in work"
 
 
 def test_a_bug_in_one_request_is_told_and_the_next_one_is_worked_on(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     worker = Worker()
+    worker.may_look.set()
     worker.may_end.set()
     newest = Newest(worker.work, worker.done, worker.failed)
     for request in (-1, 5):
