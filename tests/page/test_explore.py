@@ -351,9 +351,15 @@ def test_a_slider_moves_the_numbers_and_the_replay_to_those_of_simulate(tmp_path
         changed = trial.with_changes({"commands.propeller_rps": value})
         assert value > 30.0
         assert shown(driver, "peak speed [m/s]")[:2] == [nominal, peak(changed)]
+        end = subzero.simulate(changed).isel(time=-1)
         at_end = "return replay.contentWindow.subzero.at(30).changed.surge_speed"
-        expected = float(subzero.simulate(changed)["surge_speed"][-1])
-        soon(driver, lambda _: driver.execute_script(at_end) == pytest.approx(expected, abs=1e-4))
+        soon(
+            driver,
+            lambda _: driver.execute_script(at_end) == pytest.approx(float(end["surge_speed"]), abs=1e-4),
+        )
+        seen = "const one = replay.contentWindow.subzero; one.seek(30); return one.shown().places.changed"
+        expected = [float(end[name]) for name in ("north", "east", "depth")]
+        assert driver.execute_script(seen) == pytest.approx(expected, abs=2e-3), "as in test_browser"
 
         driver.find_element("id", "save").click()
         soon(driver, lambda _: "subzero simulate" in driver.find_element("css selector", ".saved").text)
