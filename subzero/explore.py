@@ -128,14 +128,18 @@ class Slider:
 
 
 def sliders_of(trial: Trial) -> tuple[Slider, ...]:
-    """Return the sliders that a trial has, in the order of `ROWS`; lists that stand in a CSV file have none."""
+    """Return the sliders that a trial has, in the order of `ROWS`.
+
+    Lists that stand in a CSV file have none, and so has a value of 0 for which no file says how far it may go.
+    """
     known, ranges = parameter_names(trial), declared_ranges(trial)
     rows = [[cell.strip() for cell in line.split("|")] for line in ROWS.strip().splitlines()]
-    return tuple(
+    found = (
         _slider(trial, names.split(), words, (low, high), ranges)
         for names, words, low, high in rows
         if all(name in known and _is_in_file(trial, name) for name in names.split())
     )
+    return tuple(one for one in found if one.low < one.high)
 
 
 def _is_in_file(trial: Trial, name: str) -> bool:
@@ -149,19 +153,16 @@ def _is_in_file(trial: Trial, name: str) -> bool:
 def _slider(
     trial: Trial, names: list[str], words: str, ends: tuple[str, str], ranges: Mapping[str, Any]
 ) -> Slider:
-    values = {name: parameter_values(trial, name) for name in names}
-    nominal = max((value for column in values.values() for value in column), key=abs)
-    declared = ranges.get(names[0])
-    low, high = map(float, ends) if ends[0] else declared or (nominal / WIDER, WIDER * nominal)
-    far = (nominal / WIDER, WIDER * nominal) if declared or nominal > 0 else (WIDER * nominal, nominal)
-    low, high = _allowed(trial, names[0], min(low, *far), max(high, *far))
-    shares = {
-        name if len(column) == 1 and not _is_list(trial, name) else f"{name}[{at}]": (
-            value / nominal if nominal else 1.0
-        )
-        for name, column in values.items()
-        for at, value in enumerate(column)
+    values = {
+        key: value
+        for name in names
+        for key, value in zip(_keys(trial, name), parameter_values(trial, name), strict=True)
     }
+    nominal, declared = max(values.values(), key=abs), ranges.get(names[0])
+    far = sorted((nominal / WIDER, WIDER * nominal))
+    low, high = map(float, ends) if ends[0] else declared or far
+    low, high = _allowed(trial, names[0], min(low, far[0]), max(high, far[1]))
+    shares = {key: value / nominal if nominal else 1.0 for key, value in values.items()}
     unit = parameter_unit(trial, names[0])
     return Slider(
         name=names[0], words=words, unit=unit, low=low, high=high, nominal=nominal, shares=shares,
@@ -169,9 +170,12 @@ def _slider(
     )  # fmt: skip
 
 
-def _is_list(trial: Trial, name: str) -> bool:
+def _keys(trial: Trial, name: str) -> list[str]:
+    """Return the names of the values of a list one by one; of a number its own."""
     row = quantity_of(trial, name)
-    return isinstance(row, Quantity) and row.many
+    if not (isinstance(row, Quantity) and row.many):
+        return [name]
+    return [f"{name}[{at}]" for at in range(len(parameter_values(trial, name)))]
 
 
 def _allowed(trial: Trial, name: str, low: float, high: float) -> tuple[float, float]:

@@ -6,6 +6,7 @@ and the page in a real browser.
 
 from __future__ import annotations
 
+import re
 import signal
 import socket
 import subprocess
@@ -79,6 +80,18 @@ def test_a_list_of_commands_keeps_its_shape_over_time() -> None:
     before, after = (one.commands.values[:, 1] for one in (trial, trial.with_changes(rudder.changes(-3.0))))
     largest = before[np.argmax(np.abs(before))]
     np.testing.assert_allclose(after, before * np.radians(-3.0) / largest, rtol=1e-14)
+
+
+def test_a_cable_file_without_ranges_has_sliders_for_what_is_not_zero(tmp_path: Path) -> None:
+    assert main(["new", str(tmp_path / "bare.toml"), "--like", "table1"]) == 0
+    text = (tmp_path / "bare.toml").read_text(encoding="utf-8")
+    (tmp_path / "bare.toml").write_text(re.sub(r", range = \[[^]]*\]", "", text), encoding="utf-8")
+    text = subzero.load_scenario("fig6").text.replace('cable = "table1"', 'cable = "bare.toml"')
+    (tmp_path / "own.toml").write_text(text, encoding="utf-8")
+    sliders = {one.name: one for one in sliders_of(subzero.load_scenario(tmp_path / "own.toml"))}
+    diameter = sliders["cable.diameter"]
+    assert (diameter.low, diameter.high, diameter.declared) == (0.00125, 0.005, None)
+    assert "drum.inertia" not in sliders
 
 
 # Runs.
