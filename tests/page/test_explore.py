@@ -18,7 +18,6 @@ from contextlib import contextmanager
 from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
-from time import monotonic
 from typing import Any
 from urllib.error import HTTPError
 
@@ -288,11 +287,18 @@ def test_a_port_that_cannot_be_had_is_one_message(capsys: pytest.CaptureFixture[
     assert "0 to 65535" in capsys.readouterr().err
 
 
+def heed_again() -> None:
+    """Let interrupts through again: what is started in the background by a shell ignores them."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 @contextmanager
 def served(folder: Path) -> Iterator[tuple[subprocess.Popen[str], str]]:
     """Give the running command and the address that it has told."""
     words = [sys.executable, "-m", "subzero", "explore", "fig6", "--port", "0", "--no-browser", "--json"]
-    with subprocess.Popen(words, cwd=folder, text=True, stdout=-1, stderr=-1) as process:
+    with subprocess.Popen(
+        words, cwd=folder, text=True, stdout=-1, stderr=-1, preexec_fn=heed_again
+    ) as process:
         try:
             assert process.stdout is not None
             told = "".join(process.stdout.readline() for _ in range(3))
@@ -309,10 +315,8 @@ def test_only_this_machine_is_served_and_ctrl_c_ends_it(tmp_path: Path) -> None:
             assert b"subzero explore fig6" in page.read()
         with pytest.raises(HTTPError, match="400"):  # a name that another site has let lead to this machine
             urllib.request.urlopen(urllib.request.Request(url, headers={"Host": "example.org"}), timeout=20)
-        began = monotonic()
         process.send_signal(signal.SIGINT)
-        assert process.wait(10.0) == 130
-        assert monotonic() - began < 5.0, "or it was killed by a test that has waited"
+        assert process.wait(60.0) == 130
         assert process.stderr is not None
         said = process.stderr.read()
     assert said.endswith("Interrupted; the page is closed, and files that were saved stay.\n")
