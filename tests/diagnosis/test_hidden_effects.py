@@ -145,6 +145,7 @@ def test_twins_are_told_as_a_set(told, case):
     assert any(set(one.split(" + ")) & set(result["truth"]) for one in result["probabilities"]), words(result)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", [drawn("healthy", 3, how="wide")])
 def test_tolerances_declared_half_as_wide_make_no_false_name(told, case):
     result = told[case].result()
