@@ -17,6 +17,7 @@ import numpy as np
 import scenarios
 from cable.moving_end import Names, describe_stop, enlarged
 from subzero.convergence import Accuracy, run_converged
+from subzero.dataset import PlainRun, plain_run
 from subzero.engine import coupling
 from subzero.engine.initial_conditions import Later, checked_later, go_on_with, prepare, rows_of_changes
 from subzero.engine.recording import (
@@ -80,14 +81,34 @@ def simulate(
         scenarios.ScenarioError: the scenario cannot be used.
         UserError: a time of `later` is none of the run; a checkpoint of another simulation.
     """
+    return simulate_plainly(
+        scenario,
+        tethered=tethered,
+        model=model,
+        later=later,
+        every=every,
+        checkpoint=checkpoint,
+        progress=progress,
+    ).labelled()
+
+
+def simulate_plainly(
+    scenario: str | Path | scenarios.Trial,
+    *,
+    tethered: bool = True,
+    model: Model | None = None,
+    later: Later = (),
+    every: float | None = None,
+    checkpoint: Checkpoint | None = None,
+    progress: Progress | None = None,
+) -> PlainRun:
+    """Simulate a trial as `simulate` does, and return its result in plain arrays, by the same names."""
     trial = scenario if isinstance(scenario, scenarios.Trial) else load(scenario)
     trial = trial if every is None else dataclasses.replace(trial, every=every)
     model, tethered, later = model_of(trial, model), truth("tethered", tethered), checked_later(later)
-    from subzero.dataset import dataset_of
-
     with _kept(checkpoint, trial, model, tethered, later) as keeper:
         run, accuracy = _as_fine_as_asked(trial, model, tethered, progress, later, keeper)
-    result = dataset_of(trial, model, tethered, run, accuracy)
+    result = plain_run(trial, model, tethered, run, accuracy)
     if later:
         result.attrs["later"] = json.dumps([[time, changed.parameters()] for time, changed in later])
     return result

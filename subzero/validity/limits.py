@@ -10,11 +10,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from subzero.channels import DEGREE
+from subzero.channels import DEGREE, AnyRun
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     import scenarios
     from subzero.model import Model
 
@@ -56,14 +54,14 @@ FINS = {"rudder": "rudder_servo", "stern_plane_port": "stern_plane_port_servo",
 """Fin → its servo in the vehicle."""
 
 
-def above_surface(run: xr.Dataset, _: scenarios.Trial, model: Model) -> list[str]:
+def above_surface(run: AnyRun, _: scenarios.Trial, model: Model) -> list[str]:
     """Vehicle or cable in the air, where the equations know only water."""
     radius = 0.5 * model.vehicle.hull.diameter
     words = "though the equations know only water: what follows is wrong. Start deeper, or command less."
     return _outside(run, model, lambda depth: -depth - radius, "above the surface", words)
 
 
-def below_sea_bed(run: xr.Dataset, trial: scenarios.Trial, model: Model) -> list[str]:
+def below_sea_bed(run: AnyRun, trial: scenarios.Trial, model: Model) -> list[str]:
     """Vehicle or cable below the sea bed that the trial tells."""
     if trial.sea_bed <= 0.0:
         return []
@@ -73,7 +71,7 @@ def below_sea_bed(run: xr.Dataset, trial: scenarios.Trial, model: Model) -> list
 
 
 def _outside(
-    run: xr.Dataset, model: Model, beyond: Callable[[np.ndarray], np.ndarray], where: str, words: str
+    run: AnyRun, model: Model, beyond: Callable[[np.ndarray], np.ndarray], where: str, words: str
 ) -> list[str]:
     """Return sentences about vehicle and cable where `beyond` of their depth is above zero [m]."""
     time, said = run["time"].values, []
@@ -92,7 +90,7 @@ def _outside(
     return said
 
 
-def strength(run: xr.Dataset, _: scenarios.Trial, model: Model) -> list[str]:
+def strength(run: AnyRun, _: scenarios.Trial, model: Model) -> list[str]:
     """The cable pulls harder than it may."""
     most = model.cable.strength
     if most <= 0.0 or not run.attrs["tethered"]:
@@ -107,7 +105,7 @@ def strength(run: xr.Dataset, _: scenarios.Trial, model: Model) -> list[str]:
     ]
 
 
-def bend_radius(run: xr.Dataset, _: scenarios.Trial, model: Model) -> list[str]:
+def bend_radius(run: AnyRun, _: scenarios.Trial, model: Model) -> list[str]:
     """The cable is bent tighter than it may be."""
     least = model.cable.minimum_bend_radius
     if least <= 0.0 or not run.attrs["tethered"]:
@@ -125,7 +123,7 @@ def bend_radius(run: xr.Dataset, _: scenarios.Trial, model: Model) -> list[str]:
     ]
 
 
-def bend_radii(run: xr.Dataset) -> np.ndarray:
+def bend_radii(run: AnyRun) -> np.ndarray:
     """Return the radius of the circle through three neighbouring nodes, ∞ in slack parts (samples, nodes − 2). [m].
 
     R = abc/4A of a triangle with the sides a, b, c; 4A = 2 |a × b| = 2 √(a²b² − (a·b)²).
@@ -143,7 +141,7 @@ def bend_radii(run: xr.Dataset) -> np.ndarray:
     return np.where(pulls & bent, product / (2.0 * np.sqrt(np.where(bent, square, 1.0))), np.inf)
 
 
-def actuators(run: xr.Dataset, _: scenarios.Trial, model: Model) -> list[str]:
+def actuators(run: AnyRun, _: scenarios.Trial, model: Model) -> list[str]:
     """A command beyond what the vehicle can do, or an actuator at its limit throughout."""
     if run.attrs["prescribed"]:
         return []
@@ -151,7 +149,7 @@ def actuators(run: xr.Dataset, _: scenarios.Trial, model: Model) -> list[str]:
     return said + _propeller(run, model)
 
 
-def _fin(run: xr.Dataset, model: Model, fin: str) -> list[str]:
+def _fin(run: AnyRun, model: Model, fin: str) -> list[str]:
     """Return what is wrong with a fin: cut off, at its limit, or turning as fast as it can all the time."""
     time, servo = run["time"].values, getattr(model.vehicle, FINS[fin])
     command, angle = run[f"{fin}_command"].values, run[f"{fin}_angle"].values
@@ -177,7 +175,7 @@ def _fin(run: xr.Dataset, model: Model, fin: str) -> list[str]:
     return said
 
 
-def _propeller(run: xr.Dataset, model: Model) -> list[str]:
+def _propeller(run: AnyRun, model: Model) -> list[str]:
     """Return what is wrong with the propeller: asked for too much, or behind its command."""
     time, c = run["time"].values, model.vehicle.motor.speed_per_volt
     command, speed = run["propeller_command"].values, run["propeller_speed"].values
@@ -208,7 +206,7 @@ def _throughout(time: np.ndarray, at_limit: np.ndarray, short: float = SHORT) ->
     return f"for {percent(at_limit.mean())} of the run" if most else ""
 
 
-def _node_depths(run: xr.Dataset, model: Model) -> np.ndarray:
+def _node_depths(run: AnyRun, model: Model) -> np.ndarray:
     """Return the depths of the cable's nodes (samples, nodes). [m]."""
     pitch, roll = (np.radians(float(run[name].values[0])) for name in ("pitch", "roll_angle"))
     x, y, z = model.vehicle.tow_point.position()
