@@ -262,6 +262,7 @@ def _begun(trial: scenarios.Trial, model: Model, tethered: bool, grid: Grid) -> 
     """Return a run at its start."""
     longest = float(np.diff(grid.times).max()) / grid.parts
     setup, live = prepare(trial, model, tethered, longest_exchange=longest)
+    setup.fixed.booked = grid.booked
     rows = row_of(grid.times.size - 1, grid.stride) + 1
     nodes = 4 * rows * live.line.length.size if tethered else 0
     recording = new_recording(rows, nodes, grid.times.size)
