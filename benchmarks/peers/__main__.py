@@ -8,8 +8,8 @@ Each row is a peer with a setting, its error and its time; beside it stands the 
 accurate, and how many times as long the peer takes. Where none of ours is as accurate, the row has our most accurate
 one, marked. Errors are of the force on the vehicle, as a vector, against a run of ours with far smaller segments and
 steps, to which the peers converge, too (`benchmarks.validation`); of the end of a track for hulls; of an exact
-solution at rest. Times are those of the processor, medians, in ms per simulated second, behind a first run that compiles
-or loads.
+solution at rest. Times are those of the processor, medians, in ms per simulated second, behind a first run that
+compiles or loads.
 
 PythonVehicleSimulator is on no package index: install it from its repository, or leave it out. It has a hull of its
 own, so its error is that of its step, and ours that of ours.
