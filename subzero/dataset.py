@@ -89,17 +89,33 @@ class PlainRun:
 
 
 def plain_run(
-    trial: scenarios.Trial, model: Model, tethered: bool, run: Run, accuracy: Accuracy | None = None
+    trial: scenarios.Trial,
+    model: Model,
+    tethered: bool,
+    run: Run,
+    accuracy: Accuracy | None = None,
+    *,
+    spends: bool = False,
 ) -> PlainRun:
-    """Return a run by the names of its dataset; angles in degrees, all other channels in SI and rev/s."""
+    """Return a run by the names of its dataset; angles in degrees, all other channels in SI and rev/s.
+
+    Args:
+        trial: what was run.
+        model: with which model.
+        tethered: with the cable.
+        run: the run.
+        accuracy: how far its force can be trusted, if that is known.
+        spends: the result may take over the memory of the run's shapes: nobody looks at the run any more.
+    """
     values = channel_values(run, model)
+    diagnostics = _diagnostics(run, values, model)
     channels = {
         channel.name: Variable("time", values[channel.name] * channel.scale, channel.attributes)
         for channel in CHANNELS
     }
     result = PlainRun(
-        variables=channels | _arrays(run) | _diagnostics(run, values, model),
-        coordinates={TIME.name: Variable("time", run.times, TIME.attributes)} | _axes(run),
+        variables=channels | _arrays(run, spends) | diagnostics,
+        coordinates={TIME.name: Variable("time", run.times, TIME.attributes)} | _axes(run, spends),
         attrs=_provenance(trial, model, tethered, run) | {"accuracy": json.dumps(as_numbers(accuracy))},
     )
     result.attrs["warnings"] = as_json(check_run(result, trial, model))
@@ -170,10 +186,10 @@ def _tow_velocities(run: Run, model: Model) -> np.ndarray:
     return np.stack([np.einsum("ni,ni->n", V, axis) for axis in (t, n, b)])
 
 
-def _arrays(run: Run) -> dict[str, Variable]:
+def _arrays(run: Run, spends: bool) -> dict[str, Variable]:
     """Return the force breakdown, and the cable's nodes in rows of equal length, NaN behind the last node."""
     r = run.recording
-    position, tension = _by_node(r, r.position), _by_node(r, r.tension)
+    position, tension = _by_node(r, r.position, spends), _by_node(r, r.tension, spends)
     about = (
         "relative to the drum's place at the start; node 0 is the tow point, the last one sits at the drum"
     )
@@ -202,9 +218,9 @@ def _arrays(run: Run) -> dict[str, Variable]:
     }
 
 
-def _axes(run: Run) -> dict[str, Variable]:
+def _axes(run: Run, spends: bool) -> dict[str, Variable]:
     """Return the coordinates besides the time: labels of the axes, nodes, and the arc length of each node."""
-    nodes = max(int(run.recording.nodes.max(initial=0)), 1)
+    r, nodes = run.recording, max(int(run.recording.nodes.max(initial=0)), 1)
     named = {
         name: Variable(name, np.array(labels), {"long_name": words}) for name, (labels, words) in AXES.items()
     }
@@ -216,15 +232,31 @@ def _axes(run: Run) -> dict[str, Variable]:
     }
     return named | {
         "node": Variable("node", np.arange(nodes), count),
-        "arc_length": Variable(("time", "node"), _by_node(run.recording, run.recording.arc_length), arc),
+        "arc_length": Variable(("time", "node"), _by_node(r, r.arc_length, spends), arc),
     }
 
 
-def _by_node(r: Recording, packed: np.ndarray) -> np.ndarray:
-    """Return what is packed node by node in rows of equal length (n, nodes, …), NaN behind the last node."""
+BLOCK = 512
+"""So many rows are spread at a time. [-]"""
+
+
+def _by_node(r: Recording, packed: np.ndarray, spends: bool) -> np.ndarray:
+    """Return what is packed node by node in rows of equal length (n, nodes, …), NaN behind the last node.
+
+    What is spent is spread where it is, for there is room behind it: a long run then needs its memory once, not twice.
+    From the last row on: no row is written to where one lies that is still to be read.
+    """
     nodes = max(int(r.nodes.max(initial=0)), 1)
-    rows = np.full((r.nodes.size, nodes, *packed.shape[1:]), np.nan)
-    rows[np.arange(nodes) < r.nodes[:, None]] = packed
+    room = packed.base if spends and packed.base is not None else packed
+    if room.shape[0] < r.nodes.size * nodes or room.shape[1:] != packed.shape[1:]:
+        room = np.empty((r.nodes.size * nodes, *packed.shape[1:]))
+    rows: np.ndarray = room[: r.nodes.size * nodes].reshape(r.nodes.size, nodes, *packed.shape[1:])
+    ends = np.concatenate([[0], np.cumsum(r.nodes)])
+    for first in reversed(range(0, r.nodes.size, BLOCK)):
+        last = min(first + BLOCK, r.nodes.size)
+        some = np.full((last - first, nodes, *packed.shape[1:]), np.nan)
+        some[np.arange(nodes) < r.nodes[first:last, None]] = packed[ends[first] : ends[last]]
+        rows[first:last] = some
     return rows
 
 

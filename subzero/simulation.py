@@ -108,7 +108,7 @@ def simulate_plainly(
     model, tethered, later = model_of(trial, model), truth("tethered", tethered), checked_later(later)
     with _kept(checkpoint, trial, model, tethered, later) as keeper:
         run, accuracy = _as_fine_as_asked(trial, model, tethered, progress, later, keeper)
-    result = plain_run(trial, model, tethered, run, accuracy)
+    result = plain_run(trial, model, tethered, run, accuracy, spends=True)
     if later:
         result.attrs["later"] = json.dumps([[time, changed.parameters()] for time, changed in later])
     return result

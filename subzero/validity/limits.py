@@ -75,19 +75,35 @@ def _outside(
 ) -> list[str]:
     """Return sentences about vehicle and cable where `beyond` of their depth is above zero [m]."""
     time, said = run["time"].values, []
-    places = {"vehicle": run["depth"].values[:, None]}
+    places = {"vehicle": (run["depth"].values[:, None], 0.0)}
     if run.attrs["tethered"] and run["node_count"].values.any():
-        places["cable"] = _node_depths(run, model)
-    for name, depth in places.items():
-        out = np.nan_to_num(beyond(depth), nan=-np.inf)
-        row, node = np.unravel_index(int(out.argmax()), out.shape)
-        if out[row, node] > ROUNDING:
-            first = first_time(time, out.max(axis=1) > ROUNDING)
+        down = run["cable_position"].values[:, :, 2]
+        places["cable"] = down, _depth_of_start(run, model) - down[0, 0]
+    for name, (down, offset) in places.items():
+        farthest = np.concatenate([_farthest(beyond, down[one] + offset) for one in blocks_of(time.size)])
+        row = int(farthest.argmax())
+        if farthest[row] > ROUNDING:
+            depth, first = down[row] + offset, first_time(time, farthest > ROUNDING)
+            worst = depth[np.nanargmax(beyond(depth))]
             said.append(
-                f"The {name} is {where} from {first:g} s on, and at a depth of {depth[row, node]:.3g} m at "
-                f"{time[row]:g} s, {words}"
+                f"The {name} is {where} from {first:g} s on, and at a depth of {worst:.3g} m at {time[row]:g} s, {words}"
             )
     return said
+
+
+def _farthest(beyond: Callable[[np.ndarray], np.ndarray], depth: np.ndarray) -> np.ndarray:
+    """Return how far beyond the limit each sample's farthest node is, −∞ if there is none (samples,). [m]"""
+    farthest: np.ndarray = np.fmax(np.fmax.reduce(beyond(depth), axis=1), -np.inf)  # fmax is blind to NaN
+    return farthest
+
+
+BLOCK = 256
+"""So many samples are looked at together: all of a long run would take as much memory again. [-]"""
+
+
+def blocks_of(samples: int) -> list[slice]:
+    """Return the blocks that samples are looked at in."""
+    return [slice(at, at + BLOCK) for at in range(0, samples, BLOCK)]
 
 
 def strength(run: AnyRun, _: scenarios.Trial, model: Model) -> list[str]:
@@ -206,11 +222,9 @@ def _throughout(time: np.ndarray, at_limit: np.ndarray, short: float = SHORT) ->
     return f"for {percent(at_limit.mean())} of the run" if most else ""
 
 
-def _node_depths(run: AnyRun, model: Model) -> np.ndarray:
-    """Return the depths of the cable's nodes (samples, nodes). [m]."""
+def _depth_of_start(run: AnyRun, model: Model) -> float:
+    """Return the depth of the tow point at the start. [m]"""
     pitch, roll = (np.radians(float(run[name].values[0])) for name in ("pitch", "roll_angle"))
     x, y, z = model.vehicle.tow_point.position()
     tow = -np.sin(pitch) * x + np.cos(pitch) * (np.sin(roll) * y + np.cos(roll) * z)
-    down = run["cable_position"].values[:, :, 2]
-    depths: np.ndarray = down + (float(run["depth"].values[0]) + tow - down[0, 0])
-    return depths
+    return float(run["depth"].values[0] + tow)

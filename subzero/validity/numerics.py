@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from subzero.validity.limits import first_time, longest_span, percent
+from subzero.validity.limits import blocks_of, first_time, longest_span, percent
 
 if TYPE_CHECKING:
     import scenarios
@@ -227,8 +227,13 @@ def slack(run: AnyRun, trial: scenarios.Trial, _: Model) -> list[str]:
 
 def slack_share(run: AnyRun) -> np.ndarray:
     """Return which share of the cable is slack, or folded away in segments that are too short (samples,). [-]."""
-    S, chord, T = run["cable_length"].values, _chords(run), run["cable_node_tension"].values
-    S = np.maximum(S, 1e-9)
+    S, P, T = (run[name].values for name in ("cable_length", "cable_position", "cable_node_tension"))
+    return np.concatenate([_slack_share(S[one], P[one], T[one]) for one in blocks_of(S.size)])
+
+
+def _slack_share(S: np.ndarray, P: np.ndarray, T: np.ndarray) -> np.ndarray:
+    """Return the share of some samples, from length (samples,), places (samples, nodes, 3) and tensions."""
+    chord, S = _chords(P), np.maximum(S, 1e-9)
     folded = 1.0 - np.nansum(chord, axis=1) / S
     limp = (T[:, 1:] < LIMP) & (T[:, :-1] < LIMP)
     share = np.nansum(np.where(limp, chord, 0.0), axis=1) / S + folded
@@ -252,13 +257,14 @@ def closure(run: AnyRun, trial: scenarios.Trial, _: Model) -> list[str]:
 def push(run: AnyRun, _: scenarios.Trial, __: Model) -> list[str]:
     """The cable pushes, which no cable can."""
     T = run["cable_node_tension"].values
-    if not np.isfinite(T).any() or np.nanmin(T) >= -PUSHED * max(np.nanmax(T), NO_FORCE):
+    least, most = np.fmin.reduce(T, axis=None), np.fmax.reduce(T, axis=None)  # NaN only if all are
+    if not np.isfinite(least) or least >= -PUSHED * max(most, NO_FORCE):
         return []
-    time, least = run["time"].values, np.nanmin(np.where(np.isnan(T), np.inf, T), axis=1)
-    worst = int(least.argmin())
+    time, lowest = run["time"].values, np.nanmin(np.where(np.isnan(T), np.inf, T), axis=1)
+    worst = int(lowest.argmin())
     return [
-        f"The cable pushes, by up to {-least[worst]:.3g} N (at {time[worst]:g} s; first at "
-        f"{first_time(time, least < 0.0):g} s), which no cable can: the paper's scheme has nothing that keeps it from "
+        f"The cable pushes, by up to {-lowest[worst]:.3g} N (at {time[worst]:g} s; first at "
+        f"{first_time(time, lowest < 0.0):g} s), which no cable can: the paper's scheme has nothing that keeps it from "
         'it. Use scheme = "moving_end".'
     ]
 
@@ -271,9 +277,9 @@ def _finer(trial: scenarios.Trial) -> str:
     )
 
 
-def _chords(run: AnyRun) -> np.ndarray:
+def _chords(P: np.ndarray) -> np.ndarray:
     """Return the distances between neighbouring nodes, NaN behind the last (samples, nodes − 1). [m]."""
-    side = np.diff(run["cable_position"].values, axis=1)
+    side = np.diff(P, axis=1)
     lengths: np.ndarray = np.sqrt(np.einsum("tni,tni->tn", side, side))
     return lengths
 
