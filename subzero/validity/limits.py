@@ -86,7 +86,8 @@ def _outside(
             depth, first = down[row] + offset, first_time(time, farthest > ROUNDING)
             worst = depth[np.nanargmax(beyond(depth))]
             said.append(
-                f"The {name} is {where} from {first:g} s on, and at a depth of {worst:.3g} m at {time[row]:g} s, {words}"
+                f"The {name} is {where} from {first:g} s on, and at a depth of {worst:.3g} m at "
+                f"{time[row]:g} s, {words}"
             )
     return said
 
