@@ -37,7 +37,7 @@ from subzero.engine.time_loop import NO_ROOM, run_rows
 from subzero.errors import UserError, truth, whole
 from subzero.model import Model, load, model_of
 from subzero.provenance import code_digest, digest_of, processor, trial_digest
-from subzero.room import REMEDY, has_room, refuse_what_cannot_fit
+from subzero.room import REMEDY, has_room, most_segments, refuse_what_cannot_fit
 from subzero.run_state import Live, Setup
 
 if TYPE_CHECKING:
@@ -258,14 +258,18 @@ def run_trial(
     return run_so_far(grid, now.recording, now.behind, now.used, message, completed=completed)
 
 
+SPARE_NODES = 64
+"""A recording has room for twice the nodes that are expected, and so many more in each row. [-]"""
+
+
 def _begun(trial: scenarios.Trial, model: Model, tethered: bool, grid: Grid) -> Standing:
     """Return a run at its start."""
     longest = float(np.diff(grid.times).max()) / grid.parts
     setup, live = prepare(trial, model, tethered, longest_exchange=longest)
     setup.fixed.booked = grid.booked
     rows = row_of(grid.times.size - 1, grid.stride) + 1
-    nodes = 4 * rows * live.line.length.size if tethered else 0
-    recording = new_recording(rows, nodes, grid.times.size)
+    each = min(4 * live.line.length.size, 2 * most_segments(trial, model) + SPARE_NODES)
+    recording = new_recording(rows, rows * each if tethered else 0, grid.times.size)
     used = record_row(setup, live, recording, 0, 0.0, 0)
     note(recording, 0, 0)
     return Standing(setup, live, recording, 1, used, coupling.FINE)
