@@ -6,6 +6,7 @@
     python -m benchmarks.sweep --memory             # peak memory at 1 000 and 20 000 short members
     python -m benchmarks.sweep --kills 50           # a sweep of 5 000 that is killed at random places, and goes on
     python -m benchmarks.sweep --stores             # what a store costs: SQLite, npz, netCDF, Parquet, zarr
+    python -m benchmarks.sweep --command            # the command that runs 200 members and draws them, as often
     python -m benchmarks.sweep --member             # bytes and time of a member on its way: sent, run, kept, read
 
 A bare loop gives each member its numbers, simulates it and keeps the same outcomes; two bare loops at a time are what
@@ -177,16 +178,23 @@ def speed(members, repeats, dask):
 
 
 def command_of_200():
-    """Print how long the command takes that runs 200 members and draws them, beside two bare loops of 200."""
+    """Print how long the command takes that runs 200 members and draws them: by the clock, and of the processors."""
+    import resource
+
     spec = Path(__file__).parents[1] / "scenarios/sweeps/cable_and_current.toml"
     with tempfile.TemporaryDirectory() as folder:
-        begun = time.perf_counter()
+        begun, before = time.perf_counter(), resource.getrusage(resource.RUSAGE_CHILDREN)
         subprocess.run(
             [sys.executable, "-m", "subzero", "sweep", str(spec), "--out", f"{folder}/out"],
             check=True,
             capture_output=True,
         )
-        print(f"subzero sweep of 200 runs, all files: {time.perf_counter() - begun:.2f} s")
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        spent = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+        took = time.perf_counter() - begun
+    print(
+        f"subzero sweep of 200 runs, all files: {took:.2f} s, {spent:.2f} s of processor; load {os.getloadavg()[0]:.1f}"
+    )
 
 
 def peak_memory(members):
@@ -510,6 +518,7 @@ def main():
     parser.add_argument("--memory", action="store_true")
     parser.add_argument("--stores", action="store_true")
     parser.add_argument("--member", action="store_true")
+    parser.add_argument("--command", action="store_true")
     parser.add_argument("--kills", type=int, default=0)
     asked = parser.parse_args()
     if asked.memory:
@@ -520,6 +529,9 @@ def main():
         stores()
     elif asked.member:
         member()
+    elif asked.command:
+        for _ in range(asked.repeats):
+            command_of_200()
     elif asked.kills:
         return 0 if kills(asked.kills, 5000) else 1
     else:
