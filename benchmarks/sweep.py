@@ -254,7 +254,9 @@ def kills(count, members, seed=0):
     while True:
         run = _sweep_command(spec, home / "killed")
         _strike(run, rng, count, done)
-        if run.wait() == 0:
+        if (code := run.wait()) > 0:
+            raise RuntimeError(f"the sweep refuses to go on: exit code {code}. Were its sources changed?")
+        if code == 0:
             if sum(done.values()) >= count:
                 break
             shutil.rmtree(home / "killed")  # it got through: begin anew, for the kills that are left
