@@ -1,4 +1,4 @@
-"""What the cable costs: a node, a simulated second at a given error, other codes in the same run, an hour of pay-out.
+"""What the cable costs: a node, a simulated second at a given error, an hour of pay-out.
 
     python -m benchmarks.cable            prints the tables
     python -m benchmarks.cable --figure   draws docs/figures/cable_cost.png as well
@@ -6,14 +6,13 @@
 Times are those of the processor in a warm process, the least of several runs: machines are shared, so nothing is
 asserted. An error is that of the tow force, as a vector, against a run of the same scheme with far smaller segments and
 steps, as a share of the largest force; the worst of all recorded times but the first second and the 0.6 s about the
-kinks of the motion at 10 and 20 s. `peers_moordyn` and `peers_fsolve` say what the others do.
+kinks of the motion at 10 and 20 s. What others cost: `python -m benchmarks.peers`.
 """
 
 from __future__ import annotations
 
 import sys
 from functools import cache
-from importlib.util import find_spec
 from math import cos, radians, sin
 from pathlib import Path
 from time import process_time
@@ -161,46 +160,6 @@ def manoeuvres():
             )
 
 
-def cheapest(name):
-    """Return the least cost of those runs of `CASES` that are as exact as is asked for. [ms/s]"""
-    _, wanted, grids = CASES[name]
-    found = [measured(name, *grid) for grid in grids]
-    return min((cost for cost, error, _ in found if error <= wanted), default=np.nan)
-
-
-def peers():
-    """Yield rows: what others take for the same, and how many times as long as ours."""
-    if find_spec("moordyn"):
-        from benchmarks import peers_moordyn
-
-        for segments in (10, 30, 100):
-            _, seconds = least(
-                lambda segments=segments: peers_moordyn.tow(dive, 30.0, DURATION, segments),
-                1 if segments == 100 else 3,
-            )
-            cost, ours = 1e3 * seconds / DURATION, cheapest("tow, 30 m")
-            name = f"MoorDyn 2 (RK2, EA = 1 kN), tow of 30 m, {segments} segments; ours: 100, within 2e-4"
-            yield name, f"{cost:.2f}", f"{ours:.3f}", f"{cost / ours:.0f}"
-    else:
-        yield "MoorDyn 2", "not installed (pip install 'subzero[peers]')", "", ""
-    yield from paper()
-
-
-def paper():
-    """Yield rows: the paper's equations in a dense solver, on the same grid, one node and one step a second."""
-    from benchmarks import peers_fsolve
-
-    _, best = least(
-        lambda: cable.pull_out(dive, DURATION, scheme=cable.MovingEnd(time_step=1.0, segment_length=1.0)), 20
-    )
-    ours = 1e3 * best / DURATION
-    for boxes in (peers_fsolve.box_by_box, peers_fsolve.vectorised):
-        _, seconds = least(lambda boxes=boxes: peers_fsolve.pull_out(dive, DURATION, 1.0, boxes=boxes), 1)
-        cost = 1e3 * seconds / DURATION
-        name = f"scipy.optimize.fsolve on all unknowns, pay-out, Δt = 1 s, {boxes.__name__.replace('_', ' ')}"
-        yield name, f"{cost:.2f}", f"{ours:.3f}", f"{cost / ours:.0f}"
-
-
 def wander(t):
     """Go at 1 m/s along a gently winding way."""
     return 1.0, 0.1 * np.sin(0.05 * t), 0.0
@@ -261,8 +220,6 @@ if __name__ == "__main__":
     )
     columns += ("worst error", "within 1e-3 (pay-out), 2e-4 (tow)")
     table("Error against cost: the dive of section 4.1", columns, manoeuvres())
-    columns = ("what", "theirs, ms per simulated second", "ours", "ratio")
-    table("Others, in the same run", columns, peers())
     columns = ("minutes", "grading", "cable at the end [m]", "nodes", "seconds", "of real time", "T(0) [N]")
     rows = table("Pay-out at 1 m/s, steps of 0.5 s", columns, long_runs())
     if "--figure" in sys.argv:

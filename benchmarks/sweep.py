@@ -6,6 +6,8 @@
     python -m benchmarks.sweep --memory             # peak memory at 1 000 and 20 000 short members
     python -m benchmarks.sweep --kills 50           # a sweep of 5 000 that is killed at random places, and goes on
     python -m benchmarks.sweep --stores             # what a store costs: SQLite, npz, netCDF, Parquet, zarr
+    python -m benchmarks.sweep --command            # the command that runs 200 members and draws them, as often
+    python -m benchmarks.sweep --member             # bytes and time of a member on its way: sent, run, kept, read
 
 A bare loop gives each member its numbers, simulates it and keeps the same outcomes; two bare loops at a time are what
 two cores of this machine can do at most (two threads of one core do not do twice as much). Compiled beforehand.
@@ -176,16 +178,23 @@ def speed(members, repeats, dask):
 
 
 def command_of_200():
-    """Print how long the command takes that runs 200 members and draws them, beside two bare loops of 200."""
+    """Print how long the command takes that runs 200 members and draws them: by the clock, and of the processors."""
+    import resource
+
     spec = Path(__file__).parents[1] / "scenarios/sweeps/cable_and_current.toml"
     with tempfile.TemporaryDirectory() as folder:
-        begun = time.perf_counter()
+        begun, before = time.perf_counter(), resource.getrusage(resource.RUSAGE_CHILDREN)
         subprocess.run(
             [sys.executable, "-m", "subzero", "sweep", str(spec), "--out", f"{folder}/out"],
             check=True,
             capture_output=True,
         )
-        print(f"subzero sweep of 200 runs, all files: {time.perf_counter() - begun:.2f} s")
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        spent = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+        took = time.perf_counter() - begun
+    print(
+        f"subzero sweep of 200 runs, all files: {took:.2f} s, {spent:.2f} s of processor; load {os.getloadavg()[0]:.1f}"
+    )
 
 
 def peak_memory(members):
@@ -245,7 +254,9 @@ def kills(count, members, seed=0):
     while True:
         run = _sweep_command(spec, home / "killed")
         _strike(run, rng, count, done)
-        if run.wait() == 0:
+        if (code := run.wait()) > 0:
+            raise RuntimeError(f"the sweep refuses to go on: exit code {code}. Were its sources changed?")
+        if code == 0:
             if sum(done.values()) >= count:
                 break
             shutil.rmtree(home / "killed")  # it got through: begin anew, for the kills that are left
@@ -336,6 +347,55 @@ def stores(members=20000, batch=20):
         size = sum(path.stat().st_size for path in files) / 1e6
         print(f"{name:<10}{1e3 * wrote * batch / members:>12.2f}{size:>8.1f}{len(files):>8}{took:>11.2f}")
         shutil.rmtree(home)
+
+
+def member(count=200):
+    """Print what a member costs on its way, in time of the processor and in bytes."""
+    import pickle
+    import resource
+    from time import process_time
+
+    import cloudpickle
+
+    from subzero.sweeps.member import run_members
+    from subzero.sweeps.store import FILE, opened
+
+    one = plan(count)
+    job, rows, indices = one.job, one.points.values, np.arange(count)
+    made = run_members(job, indices[:1], rows[:1])  # loads what is compiled
+    shape = len(job.outcomes.channels), job.outcomes.times.size
+    print(
+        f"{count} members of fig6, {len(job.outcomes.scalars)} scalars, {shape[0]} channels of {shape[1]} times"
+    )
+
+    def told(what, call, number=None, per=count):
+        begun = process_time()
+        result = call()
+        size = "" if number is None else f"{number(result) / per:10.0f} bytes"
+        print(f"{what:<34}{1e3 * (process_time() - begun) / per:9.3f} ms{size}")
+        return result
+
+    told(
+        "a batch of one, sent",
+        lambda: cloudpickle.dumps((run_members, (job, indices[:1], rows[:1]), {})),
+        len,
+        1,
+    )
+    sent = told(
+        "a batch of all, sent", lambda: cloudpickle.dumps((run_members, (job, indices, rows), {})), len
+    )
+    made = told("run", lambda: run_members(job, indices, rows))
+    back = told("sent back", lambda: pickle.dumps(made, protocol=pickle.HIGHEST_PROTOCOL), len)
+    told("read by the parent", lambda: (pickle.loads(back), pickle.loads(sent)))
+    with tempfile.TemporaryDirectory() as folder:
+        with opened(Path(folder), one.manifest(), shape) as store:
+            told("kept, a member a transaction", lambda: [store.add([each]) for each in made])
+        (Path(folder) / FILE).unlink()
+        with opened(Path(folder), one.manifest(), shape) as store:
+            told("kept, all in one transaction", lambda: store.add(made))
+            told("read from the store", lambda: list(store.blocks()))
+        print(f"{'in the store':<43}{(Path(folder) / FILE).stat().st_size / count:15.0f} bytes")
+    print(f"{'a worker, at most':<43}{1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss:15.3g} bytes")
 
 
 def _stores():
@@ -459,6 +519,8 @@ def main():
     parser.add_argument("--idle", action="store_true")
     parser.add_argument("--memory", action="store_true")
     parser.add_argument("--stores", action="store_true")
+    parser.add_argument("--member", action="store_true")
+    parser.add_argument("--command", action="store_true")
     parser.add_argument("--kills", type=int, default=0)
     asked = parser.parse_args()
     if asked.memory:
@@ -467,6 +529,11 @@ def main():
         idle(asked.members, asked.repeats, asked.dask)
     elif asked.stores:
         stores()
+    elif asked.member:
+        member()
+    elif asked.command:
+        for _ in range(asked.repeats):
+            command_of_200()
     elif asked.kills:
         return 0 if kills(asked.kills, 5000) else 1
     else:

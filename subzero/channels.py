@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -172,6 +172,17 @@ def column_name(name: str) -> str:
 def channel_of_column(column: str) -> Channel | None:
     """Return the channel that a CSV column holds, ``heading_deg`` → heading; None if there is none."""
     return BY_COLUMN.get(column)
+
+
+class AnyRun(Protocol):
+    """A run by the names of its variables: the dataset of `subzero.simulate`, or a `subzero.dataset.PlainRun`."""
+
+    @property
+    def attrs(self) -> dict[Any, Any]:
+        """Where it came from, how it ended, and what may be wrong with it."""
+
+    def __getitem__(self, name: str, /) -> Any:
+        """Return a variable; its ``values`` are an array."""
 
 
 class Observation(NamedTuple):

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import sys
+import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from time import monotonic
 from typing import TYPE_CHECKING, Annotated, Any, Self
@@ -51,20 +52,30 @@ def sweep(
     plan = read_plan(spec)
     from subzero.stage import staged
     from subzero.sweeps.api import finished
-    from subzero.sweeps.tell import FILES, default_folder, tell_sweep, write_sweep
 
     if workers is not None and scheduler is not None:
         raise UserError("--workers are processes here, and --scheduler has its own. Leave out one of them.")
-    folder = out or default_folder(spec)
+    folder = out or Path(spec.stem or "sweep")
+    threading.Thread(target=_import_what_tells, daemon=True).start()
     with (
         _Bar(plan.description, len(plan.points.values), folder) as bar,
         _client(scheduler) as client,
         finished(plan, folder, workers=client or workers, progress=bar, retry=retry) as store,
-        staged(folder, FILES) as stage,
     ):
-        summary = write_sweep(plan, store, stage)
+        from subzero.sweeps.tell import FILES, tell_sweep, write_sweep
+
+        with staged(folder, FILES) as stage:
+            summary = write_sweep(plan, store, stage)
     tell_sweep(summary, stage, voice)
     return STOPPED if summary["failed"] or (voice.strict and summary["warnings"]) else FINE
+
+
+def _import_what_tells() -> None:
+    """Import what tells of a sweep while its workers run: it takes a second, which nobody then waits for."""
+    with suppress(Exception):  # whoever needs it finds out
+        import scipy.stats  # noqa: F401
+
+        import subzero.sweeps.tell  # noqa: F401
 
 
 def add_to(app: cyclopts.App) -> None:

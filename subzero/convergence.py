@@ -130,8 +130,8 @@ def run_converged(
 
 
 def _only_traced(times: np.ndarray, parts: int) -> Grid:
-    """Return the grid of a run of which nothing but the force is of use: of its rows, the first and the last stay."""
-    return Grid(times, parts, times.size)
+    """Return the grid of a run of which nothing but the force is of use: no energies, and of its rows two, its ends."""
+    return Grid(times, parts, times.size, booked=False)
 
 
 def _taken(take: Take, trial: scenarios.Trial, grid: Grid, progress: Progress | None) -> Run | None:

@@ -1,13 +1,20 @@
-"""Label a finished run: one variable per channel with its unit, arrays with named axes, and where it all came from."""
+"""Name what a finished run holds: a variable per channel with its unit, arrays with named axes, and where it came from.
+
+A `PlainRun` has all of it in plain arrays, by the names of the dataset: what looks at one array after another, as the
+checks of a run and a sweep do, needs no labels. To label them takes half as long as a short run, and what labels them,
+xarray, takes a second to import.
+"""
 
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
 from importlib.metadata import version
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-import xarray as xr
 
 import scenarios
 from subzero.channels import BY_NAME, CHANNELS, TIME
@@ -18,6 +25,8 @@ from subzero.validity import as_json, check_run
 from vehicle import BREAKDOWN
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from subzero.engine.recording import Recording, Run
 
 NO_PULL = 1e-9
@@ -46,19 +55,69 @@ AXES = {
 LIBRARIES = ("numpy", "numba", "xarray")
 
 
-def dataset_of(
-    trial: scenarios.Trial, model: Model, tethered: bool, run: Run, accuracy: Accuracy | None = None
-) -> xr.Dataset:
-    """Return a run as a labelled dataset; angles in degrees, all other channels in SI and rev/s."""
+class Variable(NamedTuple):
+    """An array of a run: names of its axes, its values and what they are."""
+
+    axes: str | tuple[str, ...]
+    values: Any
+    attributes: Mapping[str, Any]
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlainRun:
+    """A run by the names of its dataset, in plain arrays: ``run["heading"].values``, ``run.attrs["outcome"]``.
+
+    Attributes:
+        variables: by name.
+        coordinates: by name.
+        attrs: where it came from, how it ended, and what may be wrong with it.
+    """
+
+    variables: dict[str, Variable]
+    coordinates: dict[str, Variable]
+    attrs: dict[str, Any]
+
+    def __getitem__(self, name: str) -> Variable:
+        """Return a variable or a coordinate."""
+        return self.variables[name] if name in self.variables else self.coordinates[name]
+
+    def labelled(self) -> xr.Dataset:
+        """Return it as a labelled dataset, on the same arrays."""
+        import xarray as xr
+
+        return xr.Dataset(self.variables, coords=self.coordinates, attrs=self.attrs)
+
+
+def plain_run(
+    trial: scenarios.Trial,
+    model: Model,
+    tethered: bool,
+    run: Run,
+    accuracy: Accuracy | None = None,
+    *,
+    spends: bool = False,
+) -> PlainRun:
+    """Return a run by the names of its dataset; angles in degrees, all other channels in SI and rev/s.
+
+    Args:
+        trial: what was run.
+        model: with which model.
+        tethered: with the cable.
+        run: the run.
+        accuracy: how far its force can be trusted, if that is known.
+        spends: the result may take over the memory of the run's shapes: nobody looks at the run any more.
+    """
     values = channel_values(run, model)
-    data: dict[str, Any] = {
-        channel.name: ("time", values[channel.name] * channel.scale, channel.attributes)
+    diagnostics = _diagnostics(run, values, model)
+    channels = {
+        channel.name: Variable("time", values[channel.name] * channel.scale, channel.attributes)
         for channel in CHANNELS
     }
-    data |= _arrays(run) | _diagnostics(run, values, model)
-    coordinates = {TIME.name: ("time", run.times, TIME.attributes)} | _axes(run)
-    attributes = _provenance(trial, model, tethered, run) | {"accuracy": json.dumps(as_numbers(accuracy))}
-    result = xr.Dataset(data, coords=coordinates, attrs=attributes)
+    result = PlainRun(
+        variables=channels | _arrays(run, spends) | diagnostics,
+        coordinates={TIME.name: Variable("time", run.times, TIME.attributes)} | _axes(run, spends),
+        attrs=_provenance(trial, model, tethered, run) | {"accuracy": json.dumps(as_numbers(accuracy))},
+    )
     result.attrs["warnings"] = as_json(check_run(result, trial, model))
     return result
 
@@ -127,15 +186,15 @@ def _tow_velocities(run: Run, model: Model) -> np.ndarray:
     return np.stack([np.einsum("ni,ni->n", V, axis) for axis in (t, n, b)])
 
 
-def _arrays(run: Run) -> dict[str, Any]:
+def _arrays(run: Run, spends: bool) -> dict[str, Variable]:
     """Return the force breakdown, and the cable's nodes in rows of equal length, NaN behind the last node."""
     r = run.recording
-    position, tension = _by_node(r, r.position), _by_node(r, r.tension)
+    position, tension = _by_node(r, r.position, spends), _by_node(r, r.tension, spends)
     about = (
         "relative to the drum's place at the start; node 0 is the tow point, the last one sits at the drum"
     )
     return {
-        "force_breakdown": (
+        "force_breakdown": Variable(
             ("time", "term", "component"),
             r.breakdown,
             {
@@ -143,52 +202,74 @@ def _arrays(run: Run) -> dict[str, Any]:
                 "long_name": "share of every term in the force (X, Y, Z) and moment (K, M, N)",
             },
         ),
-        "cable_position": (
+        "cable_position": Variable(
             ("time", "node", "earth_axis"),
             position,
             {"units": "m", "long_name": f"place of the cable's nodes, {about}"},
         ),
-        "cable_node_tension": (
+        "cable_node_tension": Variable(
             ("time", "node"),
             tension,
             {"units": BY_NAME["cable_tension"].unit, "long_name": "tension along the cable"},
         ),
-        "node_count": ("time", r.nodes, {"units": "1", "long_name": "nodes of the cable, 0 without one"}),
+        "node_count": Variable(
+            "time", r.nodes, {"units": "1", "long_name": "nodes of the cable, 0 without one"}
+        ),
     }
 
 
-def _axes(run: Run) -> dict[str, Any]:
+def _axes(run: Run, spends: bool) -> dict[str, Variable]:
     """Return the coordinates besides the time: labels of the axes, nodes, and the arc length of each node."""
-    nodes = max(int(run.recording.nodes.max(initial=0)), 1)
-    labels = {name: (name, labels, {"long_name": words}) for name, (labels, words) in AXES.items()}
+    r, nodes = run.recording, max(int(run.recording.nodes.max(initial=0)), 1)
+    named = {
+        name: Variable(name, np.array(labels), {"long_name": words}) for name, (labels, words) in AXES.items()
+    }
     count = {"long_name": "node of the cable, 0 at the tow point, the last one at the drum", "units": "1"}
     arc = {
         "long_name": "arc length along the unstretched cable, from the tow point",
         "units": "m",
         "symbol": "s",
     }
-    return labels | {
-        "node": ("node", np.arange(nodes), count),
-        "arc_length": (("time", "node"), _by_node(run.recording, run.recording.arc_length), arc),
+    return named | {
+        "node": Variable("node", np.arange(nodes), count),
+        "arc_length": Variable(("time", "node"), _by_node(r, r.arc_length, spends), arc),
     }
 
 
-def _by_node(r: Recording, packed: np.ndarray) -> np.ndarray:
-    """Return what is packed node by node in rows of equal length (n, nodes, …), NaN behind the last node."""
+BLOCK = 512
+"""So many rows are spread at a time. [-]"""
+
+
+def _by_node(r: Recording, packed: np.ndarray, spends: bool) -> np.ndarray:
+    """Return what is packed node by node in rows of equal length (n, nodes, …), NaN behind the last node.
+
+    What is spent is spread where it is, for there is room behind it: a long run then needs its memory once, not twice.
+    From the last row on: no row is written to where one lies that is still to be read.
+    """
     nodes = max(int(r.nodes.max(initial=0)), 1)
-    rows = np.full((r.nodes.size, nodes, *packed.shape[1:]), np.nan)
-    rows[np.arange(nodes) < r.nodes[:, None]] = packed
+    room = packed.base if spends and packed.base is not None else packed
+    if room.shape[0] < r.nodes.size * nodes or room.shape[1:] != packed.shape[1:]:
+        room = np.empty((r.nodes.size * nodes, *packed.shape[1:]))
+    rows: np.ndarray = room[: r.nodes.size * nodes].reshape(r.nodes.size, nodes, *packed.shape[1:])
+    ends = np.concatenate([[0], np.cumsum(r.nodes)])
+    for first in reversed(range(0, r.nodes.size, BLOCK)):
+        last = min(first + BLOCK, r.nodes.size)
+        some = np.full((last - first, nodes, *packed.shape[1:]), np.nan)
+        some[np.arange(nodes) < r.nodes[first:last, None]] = packed[ends[first] : ends[last]]
+        rows[first:last] = some
     return rows
 
 
-def _diagnostics(run: Run, values: dict[str, np.ndarray], model: Model) -> dict[str, Any]:
+def _diagnostics(run: Run, values: dict[str, np.ndarray], model: Model) -> dict[str, Variable]:
     """Return what tells how far to trust the cable, row by row."""
     r, words = run.recording, "how far the cable, summed up from the drum, ends from the tow point"
     wave = "segments of the cable that a transverse wave crosses in an exchange, at most"
     return {
-        "closure_error": ("time", _closure_error(run, values, model), {"units": "m", "long_name": words}),
-        "courant_number": ("time", r.courant, {"units": "1", "long_name": wave}),
-        "newton_iterations": (
+        "closure_error": Variable(
+            "time", _closure_error(run, values, model), {"units": "m", "long_name": words}
+        ),
+        "courant_number": Variable("time", r.courant, {"units": "1", "long_name": wave}),
+        "newton_iterations": Variable(
             "time",
             r.iterations,
             {"units": "1", "long_name": "iterations of Newton's method on the cable since the start"},
@@ -216,8 +297,7 @@ def _provenance(trial: scenarios.Trial, model: Model, tethered: bool, run: Run) 
         "title": printable(trial.description),
         "scenario_text": trial.text,
         "parameters": json.dumps(model.parameters()),
-        "subzero_version": version("subzero"),
-        "versions": json.dumps({name: version(name) for name in LIBRARIES}),
+        **_versions(),
         "tethered": int(tethered),
         "prescribed": int(motion is not None),
         **(
@@ -229,4 +309,13 @@ def _provenance(trial: scenarios.Trial, model: Model, tethered: bool, run: Run) 
         "sea_bed_m": trial.sea_bed,
         "outcome": "completed" if run.completed else "stopped",
         "outcome_message": run.message,
+    }
+
+
+@cache
+def _versions() -> dict[str, str]:
+    """Return the versions of what computed it; looked up once, for each time a file is read."""
+    return {
+        "subzero_version": version("subzero"),
+        "versions": json.dumps({name: version(name) for name in LIBRARIES}),
     }

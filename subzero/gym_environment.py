@@ -9,23 +9,27 @@ since 1.0.)
 
 It needs the extra ``subzero[gym]``. The vehicle starts from rest as in a scenario, with a constant propeller command;
 the action is the rudder, and the reward punishes the heading error and the work of the rudder. A new heading is drawn
-at each reset.
+at each reset. ``gymnasium.make_vec("subzero/TetheredHeading-v0", num_envs=8)`` gives many, in threads of one process.
 """
 
 from __future__ import annotations
 
+import os
+from concurrent.futures import ThreadPoolExecutor
+from itertools import chain, repeat
 from math import cos, pi, radians, sin
 from typing import Any
 
 import numpy as np
 
 from subzero.channels import Observation
-from subzero.errors import UserError
+from subzero.errors import UserError, whole
 from subzero.model import load
 from subzero.simulator import RunStoppedError, Simulator
 
 try:
     import gymnasium
+    import gymnasium.vector
 except ImportError as missing:  # pragma: no cover - told to the user
     raise UserError(
         "The environment needs Gymnasium. Install it with: pip install 'subzero[gym]'"
@@ -122,10 +126,65 @@ class TetheredHeading(gymnasium.Env[np.ndarray, np.ndarray]):
         return {"wanted_heading": self._wanted, **seen._asdict()}
 
 
+class TetheredHeadings(gymnasium.vector.SyncVectorEnv):
+    """Many environments, stepped at once in threads: the compiled simulation lets go of Python's lock.
+
+    They give what ``gymnasium.vector.SyncVectorEnv`` gives, to the last bit: one that has ended begins again in the
+    step behind.
+
+    Args:
+        num_envs: how many.
+        workers: threads; one for each processor, if not given.
+        **how: of each, see `TetheredHeading`.
+    """
+
+    def __init__(self, num_envs: int = 1, *, workers: int | None = None, **how: Any) -> None:
+        super().__init__([lambda: TetheredHeading(**how)] * num_envs)
+        threads = (
+            (os.cpu_count() or 1) if workers is None else whole("TetheredHeadings: workers", workers, least=1)
+        )
+        self._shares = np.array_split(np.arange(num_envs), min(threads, num_envs))
+        self._pool = ThreadPoolExecutor(len(self._shares))
+
+    def step(
+        self, actions: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
+        """Hold each rudder for one sample time, (num_envs, 1); return the same in arrays as each environment does."""
+        seen = list(chain.from_iterable(self._pool.map(self._step_some, self._shares, repeat(actions))))
+        observed, rewards, ended, cut, told = zip(*seen, strict=True)
+        self._autoreset_envs = np.logical_or(ended, cut)
+        infos: dict[str, Any] = {}
+        for i, info in enumerate(told):
+            infos = self._add_info(infos, info, i)
+        return np.stack(observed), np.array(rewards, dtype=float), np.array(ended), np.array(cut), infos
+
+    def _step_some(self, which: np.ndarray, actions: np.ndarray) -> list[tuple[Any, ...]]:
+        """Step some environments, one after another; one whose episode is over begins again."""
+        return [
+            _begun(self.envs[i].reset()) if self._autoreset_envs[i] else self.envs[i].step(actions[i])
+            for i in which
+        ]
+
+    def close_extras(self, **kwargs: Any) -> None:
+        """Let the threads end."""
+        super().close_extras(**kwargs)
+        self._pool.shutdown()
+
+
+def _begun(first: tuple[np.ndarray, dict[str, Any]]) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
+    """Return what a step tells of an environment that has just begun again."""
+    observed, info = first
+    return observed, 0.0, False, False, info
+
+
 def register() -> None:
-    """Make the environment known to `gymnasium.make`; done when this module is imported."""
+    """Make the environment known to `gymnasium.make` and `make_vec`; done when this module is imported."""
     if ENVIRONMENT not in gymnasium.registry:
-        gymnasium.register(ENVIRONMENT, entry_point="subzero.gym_environment:TetheredHeading")
+        gymnasium.register(
+            ENVIRONMENT,
+            entry_point="subzero.gym_environment:TetheredHeading",
+            vector_entry_point="subzero.gym_environment:TetheredHeadings",
+        )
 
 
 register()

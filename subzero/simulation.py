@@ -17,6 +17,7 @@ import numpy as np
 import scenarios
 from cable.moving_end import Names, describe_stop, enlarged
 from subzero.convergence import Accuracy, run_converged
+from subzero.dataset import PlainRun, plain_run
 from subzero.engine import coupling
 from subzero.engine.initial_conditions import Later, checked_later, go_on_with, prepare, rows_of_changes
 from subzero.engine.recording import (
@@ -36,7 +37,7 @@ from subzero.engine.time_loop import NO_ROOM, run_rows
 from subzero.errors import UserError, truth, whole
 from subzero.model import Model, load, model_of
 from subzero.provenance import code_digest, digest_of, processor, trial_digest
-from subzero.room import REMEDY, has_room, refuse_what_cannot_fit
+from subzero.room import REMEDY, has_room, most_segments, refuse_what_cannot_fit
 from subzero.run_state import Live, Setup
 
 if TYPE_CHECKING:
@@ -80,14 +81,34 @@ def simulate(
         scenarios.ScenarioError: the scenario cannot be used.
         UserError: a time of `later` is none of the run; a checkpoint of another simulation.
     """
+    return simulate_plainly(
+        scenario,
+        tethered=tethered,
+        model=model,
+        later=later,
+        every=every,
+        checkpoint=checkpoint,
+        progress=progress,
+    ).labelled()
+
+
+def simulate_plainly(
+    scenario: str | Path | scenarios.Trial,
+    *,
+    tethered: bool = True,
+    model: Model | None = None,
+    later: Later = (),
+    every: float | None = None,
+    checkpoint: Checkpoint | None = None,
+    progress: Progress | None = None,
+) -> PlainRun:
+    """Simulate a trial as `simulate` does, and return its result in plain arrays, by the same names."""
     trial = scenario if isinstance(scenario, scenarios.Trial) else load(scenario)
     trial = trial if every is None else dataclasses.replace(trial, every=every)
     model, tethered, later = model_of(trial, model), truth("tethered", tethered), checked_later(later)
-    from subzero.dataset import dataset_of
-
     with _kept(checkpoint, trial, model, tethered, later) as keeper:
         run, accuracy = _as_fine_as_asked(trial, model, tethered, progress, later, keeper)
-    result = dataset_of(trial, model, tethered, run, accuracy)
+    result = plain_run(trial, model, tethered, run, accuracy, spends=True)
     if later:
         result.attrs["later"] = json.dumps([[time, changed.parameters()] for time, changed in later])
     return result
@@ -237,13 +258,18 @@ def run_trial(
     return run_so_far(grid, now.recording, now.behind, now.used, message, completed=completed)
 
 
+SPARE_NODES = 64
+"""A recording has room for twice the nodes that are expected, and so many more in each row. [-]"""
+
+
 def _begun(trial: scenarios.Trial, model: Model, tethered: bool, grid: Grid) -> Standing:
     """Return a run at its start."""
     longest = float(np.diff(grid.times).max()) / grid.parts
     setup, live = prepare(trial, model, tethered, longest_exchange=longest)
+    setup.fixed.booked = grid.booked
     rows = row_of(grid.times.size - 1, grid.stride) + 1
-    nodes = 4 * rows * live.line.length.size if tethered else 0
-    recording = new_recording(rows, nodes, grid.times.size)
+    each = min(4 * live.line.length.size, 2 * most_segments(trial, model) + SPARE_NODES)
+    recording = new_recording(rows, rows * each if tethered else 0, grid.times.size)
     used = record_row(setup, live, recording, 0, 0.0, 0)
     note(recording, 0, 0)
     return Standing(setup, live, recording, 1, used, coupling.FINE)

@@ -177,7 +177,7 @@ class Simulator:
 
     def result(self) -> xr.Dataset:
         """Return the run so far as `subzero.simulate` does: channels with units, forces, the cable's shape."""
-        from subzero.dataset import dataset_of
+        from subzero.dataset import plain_run
 
         row, used, ending = self._held.at.tolist()
         run = Run(
@@ -186,7 +186,7 @@ class Simulator:
             completed=ending in WELL,
             message=self._message(),
         )
-        return dataset_of(self.trial, self.model, self._tethered, run)
+        return plain_run(self.trial, self.model, self._tethered, run).labelled()
 
     def _checked(self, command: Command) -> tuple[float, float, float, float]:
         """Return a command as four floats."""

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from subzero.channels import BY_NAME
+from subzero.channels import BY_NAME, AnyRun
 from subzero.records.record import Fit, fits
 from subzero.validity import warnings_of
 
@@ -29,7 +29,7 @@ FORCE = ("cable_force_forward", "cable_force_starboard", "cable_force_down")
 MOMENT = ("cable_moment_roll", "cable_moment_pitch", "cable_moment_yaw")
 
 
-def summarise(run: xr.Dataset) -> dict[str, Any]:
+def summarise(run: AnyRun) -> dict[str, Any]:
     """Return the numbers of one run that one reads first; keys carry their units."""
     time, speed = run["time"].values, run["surge_speed"].values
     force, moment = magnitude(run, FORCE), magnitude(run, MOMENT)
@@ -56,7 +56,7 @@ def summarise(run: xr.Dataset) -> dict[str, Any]:
     }
 
 
-def diagnostics(run: xr.Dataset) -> dict[str, float | int | None] | None:
+def diagnostics(run: AnyRun) -> dict[str, float | int | None] | None:
     """Return the numbers that tell how far to trust the cable; None for a run without one.
 
     ``energy_residual`` is what the balance of all energies leaves unexplained at the end, as a share of the work and
@@ -106,7 +106,7 @@ def _plain(one: Fit) -> dict[str, float | int | None]:
     return {key: value if isinstance(value, int) else number(value) for key, value in asdict(one).items()}
 
 
-def energy_balance(run: xr.Dataset) -> dict[str, float | None] | None:
+def energy_balance(run: AnyRun) -> dict[str, float | None] | None:
     """Return where the propeller's work went by the end, in joules, and the unexplained share of it.
 
     None for a prescribed run, whose vehicle is moved by no propeller.
@@ -120,19 +120,19 @@ def energy_balance(run: xr.Dataset) -> dict[str, float | None] | None:
     return {"propeller_work_J": work, **parts, "unexplained_share": closure}
 
 
-def path_length(run: xr.Dataset) -> float:
+def path_length(run: AnyRun) -> float:
     """Return the length of the track of the hull centre, as a polygon through the samples. [m]"""
     track = np.array([run[name].values for name in ("north", "east", "depth")])
     return float(np.sum(np.linalg.norm(np.diff(track, axis=1), axis=0)))
 
 
-def magnitude(run: xr.Dataset, names: tuple[str, ...]) -> np.ndarray:
+def magnitude(run: AnyRun, names: tuple[str, ...]) -> np.ndarray:
     """Return the length of a vector that is stored as three channels; gaps count as zero."""
     size: np.ndarray = np.linalg.norm(np.nan_to_num([run[name].values for name in names]), axis=0)
     return size
 
 
-def at_end(run: xr.Dataset, name: str) -> float | None:
+def at_end(run: AnyRun, name: str) -> float | None:
     """Return the last value of a channel, None if it does not exist."""
     return number(run[name].values[-1])
 

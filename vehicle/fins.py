@@ -83,7 +83,12 @@ def section_force(ux: float, un: float, angle: float, fin: FinNumbers) -> tuple[
         angle: how far the leading edge is turned towards the positive normal axis. [rad]
         fin: the fin's numbers.
     """
-    c, s = math.cos(angle), math.sin(angle)
+    return _turned_force(ux, un, math.cos(angle), math.sin(angle), fin)
+
+
+@compiled
+def _turned_force(ux: float, un: float, c: float, s: float, fin: FinNumbers) -> tuple[float, float]:
+    """Return what `section_force` does, from cosine and sine of the angle."""
     Vc = ux * c + un * s
     Vm = un * c - ux * s
     V2 = Vc * Vc + Vm * Vm
@@ -117,8 +122,9 @@ def rudder(nu_r: np.ndarray, angle: float, fin: FinNumbers, out: np.ndarray) -> 
     """
     u, v, p, q, r = nu_r[0], nu_r[1], nu_r[3], nu_r[4], nu_r[5]
     x, z = fin.x, fin.arm
-    X_lower, Y_lower = section_force(u + q * z, v + r * x - p * z, -angle, fin)
-    X_upper, Y_upper = section_force(u - q * z, v + r * x + p * z, -angle, fin)
+    cosine, sine = math.cos(-angle), math.sin(-angle)
+    X_lower, Y_lower = _turned_force(u + q * z, v + r * x - p * z, cosine, sine, fin)
+    X_upper, Y_upper = _turned_force(u - q * z, v + r * x + p * z, cosine, sine, fin)
     out[0] = X_lower + X_upper
     out[1] = Y_lower + Y_upper
     out[2] = 0.0

@@ -1,4 +1,4 @@
-"""MoorDyn 2, another code by other people, tows the same wire of 30 m without added mass (`benchmarks.peers_moordyn`).
+"""MoorDyn 2, another code by other people, tows the same bare wire of 30 m (`benchmarks.peers.moordyn_wire`).
 
 What is compared is the force on the tow point, as a vector, at all times from 2 s on but for 0.6 s about each kink of
 the motion, where MoorDyn's stretch waves ring. Lumped masses with a tangent averaged over two segments are a coarse
@@ -22,7 +22,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import cable
-from benchmarks.peers_moordyn import NEUTRAL, Towed
+from benchmarks.peers.moordyn_wire import NEUTRAL, Towed
 
 from .moordyn_record import LENGTH, STIFF, TRIALS, recorded, straight
 from .row import Row, Setting, order_row

@@ -20,7 +20,7 @@ import numpy as np
 
 import cable
 from benchmarks.cable import dive
-from benchmarks.peers_moordyn import HEAVY, NEUTRAL, Bare, Towed, tow
+from benchmarks.peers.moordyn_wire import HEAVY, NEUTRAL, Bare, Towed, tow
 
 FILE = Path(__file__).parent / "data" / "moordyn_2.csv"
 COLUMNS = ("run", "time_s", "north_N", "east_N", "down_N", "end_tension_N")

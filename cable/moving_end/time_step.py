@@ -196,8 +196,9 @@ def solve_step(
     _residual(line, w, c, drum, work, near)
     merit = _merit(line)
     for iteration in range(MAX_ITERATIONS):
-        if _size(line, rounding, merit) <= 1.0:
-            return _solved(line, rounding, True, iteration)
+        size = _size(line, rounding, merit)
+        if size <= 1.0:
+            return _solved(line, iteration, size)
         if not made:
             assemble(line, w, c, drum, work)
         line.ends.solver.factored = factor_step(line, c)
@@ -214,7 +215,8 @@ def solve_step(
             fraction *= 0.5
         if not isfinite(merit):
             break
-    return _solved(line, rounding, _size(line, rounding, merit) <= 1.0, MAX_ITERATIONS)
+    size = _size(line, rounding, merit)
+    return _solved(line, MAX_ITERATIONS, size) if size <= 1.0 else _failed(line, rounding)
 
 
 @compiled
@@ -282,9 +284,17 @@ def _size(line: Line, rounding: float, merit: float) -> float:
     return max(length / strain, balance / allowed) if isfinite(merit) else np.inf
 
 
+@inlined
+def _solved(line: Line, iterations: int, size: float) -> bool:
+    """Note that it converged, in how many iterations, and how large the worst residual is, in tolerances."""
+    solved = line.ends.solved
+    solved.converged, solved.iterations, solved.residual = True, iterations, size
+    return True
+
+
 @compiled
-def _solved(line: Line, rounding: float, converged: bool, iterations: int) -> bool:
-    """Note how it ended, with the worst equation and where it stands; return whether it converged."""
+def _failed(line: Line, rounding: float) -> bool:
+    """Note that it did not converge, and where the worst equation stands."""
     strain, allowed = _tolerances(line, rounding)
     worst, node, equation = 0.0, 0, 0
     for j in range(1, line.ends.count + 1):
@@ -293,9 +303,9 @@ def _solved(line: Line, rounding: float, converged: bool, iterations: int) -> bo
             if worst == worst and not size <= worst:
                 worst, node, equation = size, j, i
     solved = line.ends.solved
-    solved.converged, solved.iterations, solved.residual = converged, iterations, worst
+    solved.converged, solved.iterations, solved.residual = False, MAX_ITERATIONS, worst
     solved.worst_node, solved.worst_equation = node, equation
-    return converged
+    return False
 
 
 @compiled

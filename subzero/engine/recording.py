@@ -87,13 +87,14 @@ class Run:
 
 
 class Grid(NamedTuple):
-    """The times of a run (n,) [s], in how many exchanges it goes from one to the next, and that every `stride` of them
-    one is kept as a row.
+    """The times of a run (n,) [s], in how many exchanges it goes from one to the next, that every `stride` of them one
+    is kept as a row, and whether energies are summed up.
     """
 
     times: np.ndarray
     parts: int = 1
     stride: int = 1
+    booked: bool = True
 
 
 class Standing(NamedTuple):

@@ -21,13 +21,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
-from scipy.integrate import cumulative_trapezoid
-from scipy.spatial.transform import Rotation
 
 from subzero.channels import BY_NAME, CHANNELS
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from subzero.records.record import Record
 
 MOST_SAMPLES, MOST_SHAPES, MOST_POINTS = 4000, 1200, 80
@@ -148,6 +147,8 @@ def _points(rows: np.ndarray, count: int, points: int) -> np.ndarray:
 
 def cable_origin(run: xr.Dataset) -> np.ndarray:
     """Return from where the cable's places count, (3,): at the start, node 0 is at the tow point. [m]"""
+    from scipy.spatial.transform import Rotation
+
     first = int(np.argmax(run["node_count"].values > 0))
     hull = np.array([run[name].values[first] for name in ("north", "east", "depth")])
     tow = json.loads(run.attrs["parameters"])["vehicle"]["tow_point"]
@@ -213,6 +214,8 @@ def as_run(record: Record, beside: xr.Dataset, used: Mapping[str, np.ndarray]) -
     place = _reckoned(time, pose, values, {name: from_run[name][0] for name in ("north", "east", "depth")})
     shown = {**from_run, **values, **pose, **place}
     data = {name: ("time", one, BY_NAME[name].attributes) for name, one in shown.items()}
+    import xarray as xr
+
     return xr.Dataset(data, coords={"time": time}, attrs={**beside.attrs, "tethered": 0})
 
 
@@ -235,6 +238,9 @@ def _reckoned(
     start: Mapping[str, float],
 ) -> dict[str, np.ndarray]:
     """Return north, east and depth: as they are measured, else the integral of the velocity from the start on. [m]"""
+    from scipy.integrate import cumulative_trapezoid
+    from scipy.spatial.transform import Rotation
+
     speeds = [values.get(name, np.zeros(time.size)) for name in ("surge_speed", "sway_speed", "heave_speed")]
     angles = np.stack([pose["heading"], pose["pitch"], pose["roll_angle"]], axis=-1)
     velocity = Rotation.from_euler("ZYX", angles, degrees=True).apply(np.stack(speeds, axis=-1))

@@ -23,7 +23,7 @@ from subzero.provenance import code_digest
 from subzero.sweeps.outcomes import Outcomes, channels_of, own_numbers, scalars_of
 
 if TYPE_CHECKING:
-    import xarray as xr
+    from subzero.dataset import PlainRun
 
 LONGEST_REASON = 1000
 """So much of a reason is kept. [characters]"""
@@ -82,14 +82,14 @@ class Job:
             told = str(error) if isinstance(error, UserError) else f"{type(error).__name__}: {error}"
             return self.failed(first, told, perf_counter() - begun)
 
-    def _run(self, index: int, row: np.ndarray) -> tuple[xr.Dataset, dict[str, float]]:
+    def _run(self, index: int, row: np.ndarray) -> tuple[PlainRun, dict[str, float]]:
         """Return the run of a member, and the indices that it is judged by."""
-        from subzero.simulation import simulate
+        from subzero.simulation import simulate_plainly
 
         trial = with_parameters(self.trial, dict(zip(self.names, row.tolist(), strict=True)))
-        return simulate(trial, tethered=self.tethered), {}
+        return simulate_plainly(trial, tethered=self.tethered), {}
 
-    def _seen(self, index: int, run: xr.Dataset, indices: dict[str, float], begun: float) -> Member:
+    def _seen(self, index: int, run: PlainRun, indices: dict[str, float], begun: float) -> Member:
         """Return what is kept of a run."""
         warned = tuple((one["check"], one["message"]) for one in json.loads(run.attrs.get("warnings", "[]")))
         if run.attrs["outcome"] != "completed":

@@ -18,11 +18,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from subzero.channels import BY_NAME
+from subzero.channels import BY_NAME, AnyRun
 from subzero.errors import UserError, real, short, suggestion
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from subzero.dataset import PlainRun
 
 Function = Callable[["xr.Dataset"], Any]
 """Of one's own: takes a run, returns a number, or numbers by name."""
@@ -203,7 +205,7 @@ def in_words(name: str) -> str:
     return plain.replace("_", " ").replace(".", ": ")
 
 
-def scalars_of(run: xr.Dataset, names: tuple[str, ...], indices: Mapping[str, float]) -> np.ndarray:
+def scalars_of(run: AnyRun, names: tuple[str, ...], indices: Mapping[str, float]) -> np.ndarray:
     """Return scalars of a run (n,); NaN for one that this run does not have, such as an energy without a propeller."""
     needs_summary = any(name in SUMMARY or name.partition(".")[0] in TABLES for name in names)
     summary: dict[str, Any] = {}
@@ -214,9 +216,7 @@ def scalars_of(run: xr.Dataset, names: tuple[str, ...], indices: Mapping[str, fl
     return np.array([_scalar(run, name, summary, indices) for name in names], dtype=float)
 
 
-def _scalar(
-    run: xr.Dataset, name: str, summary: Mapping[str, Any], indices: Mapping[str, float]
-) -> float | None:
+def _scalar(run: AnyRun, name: str, summary: Mapping[str, Any], indices: Mapping[str, float]) -> float | None:
     if name.startswith(INDEX):
         return indices.get(name.removeprefix(INDEX))
     head, _, tail = name.rpartition(".")
@@ -226,22 +226,22 @@ def _scalar(
     return (summary.get(head) or {}).get(tail) if head else summary.get(name)
 
 
-def channels_of(run: xr.Dataset, outcomes: Outcomes) -> np.ndarray:
+def channels_of(run: AnyRun, outcomes: Outcomes) -> np.ndarray:
     """Return channels of a run on the common grid (channels, times), linear between samples, float32."""
     times, at = outcomes.times, run["time"].values
     rows = [np.interp(times, at, run[name].values, right=np.nan) for name in outcomes.channels]
     return np.array(rows, dtype=np.float32).reshape(len(outcomes.channels), times.size)
 
 
-def own_numbers(run: xr.Dataset, function: Function | None) -> dict[str, float]:
-    """Return what a function of one's own makes of a run, numbers by name.
+def own_numbers(run: PlainRun, function: Function | None) -> dict[str, float]:
+    """Return what a function of one's own makes of a run, labelled for it; numbers by name.
 
     Raises:
         UserError: it returned what is no number, nor numbers by name.
     """
     if function is None:
         return {}
-    made = function(run)
+    made = function(run.labelled())
     named = made if isinstance(made, Mapping) else {OWN: made}
     try:
         return {str(name): float(value) for name, value in named.items()}

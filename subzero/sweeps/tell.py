@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import asdict
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rich import box
@@ -127,8 +126,3 @@ def _troubles(summary: dict[str, Any]) -> Iterator[str]:
             yield f"  member {member}: {' '.join(reason.split())}"
         if summary["failed"] > SHOWN_REASONS:
             yield f"  … and {summary['failed'] - SHOWN_REASONS} more, in {TABLE}."
-
-
-def default_folder(path: Path) -> Path:
-    """Return the folder that is named after the file of a sweep, here."""
-    return Path(path.stem or "sweep")

@@ -29,12 +29,11 @@ from subzero.validity.numerics import (
 )
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     import scenarios
+    from subzero.channels import AnyRun
     from subzero.model import Model
 
-    Check = Callable[[xr.Dataset, scenarios.Trial, Model], list[str]]
+    Check = Callable[[AnyRun, scenarios.Trial, Model], list[str]]
 
 
 class RunWarning(NamedTuple):
@@ -44,12 +43,12 @@ class RunWarning(NamedTuple):
     message: str
 
 
-def check_run(run: xr.Dataset, trial: scenarios.Trial, model: Model) -> list[RunWarning]:
+def check_run(run: AnyRun, trial: scenarios.Trial, model: Model) -> list[RunWarning]:
     """Return everything that may be wrong with a run of a trial with a model, in the order of `CHECKS`."""
     return [RunWarning(name, words) for name, check in CHECKS.items() for words in check(run, trial, model)]
 
 
-def warnings_of(run: xr.Dataset) -> tuple[RunWarning, ...]:
+def warnings_of(run: AnyRun) -> tuple[RunWarning, ...]:
     """Return the warnings that a run carries in its attributes; none from a version that did not know them."""
     told = json.loads(run.attrs.get("warnings", "[]"))
     return tuple(RunWarning(one["check"], one["message"]) for one in told)

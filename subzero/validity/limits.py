@@ -10,11 +10,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from subzero.channels import DEGREE
+from subzero.channels import DEGREE, AnyRun
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     import scenarios
     from subzero.model import Model
 
@@ -56,14 +54,14 @@ FINS = {"rudder": "rudder_servo", "stern_plane_port": "stern_plane_port_servo",
 """Fin → its servo in the vehicle."""
 
 
-def above_surface(run: xr.Dataset, _: scenarios.Trial, model: Model) -> list[str]:
+def above_surface(run: AnyRun, _: scenarios.Trial, model: Model) -> list[str]:
     """Vehicle or cable in the air, where the equations know only water."""
     radius = 0.5 * model.vehicle.hull.diameter
     words = "though the equations know only water: what follows is wrong. Start deeper, or command less."
     return _outside(run, model, lambda depth: -depth - radius, "above the surface", words)
 
 
-def below_sea_bed(run: xr.Dataset, trial: scenarios.Trial, model: Model) -> list[str]:
+def below_sea_bed(run: AnyRun, trial: scenarios.Trial, model: Model) -> list[str]:
     """Vehicle or cable below the sea bed that the trial tells."""
     if trial.sea_bed <= 0.0:
         return []
@@ -73,26 +71,43 @@ def below_sea_bed(run: xr.Dataset, trial: scenarios.Trial, model: Model) -> list
 
 
 def _outside(
-    run: xr.Dataset, model: Model, beyond: Callable[[np.ndarray], np.ndarray], where: str, words: str
+    run: AnyRun, model: Model, beyond: Callable[[np.ndarray], np.ndarray], where: str, words: str
 ) -> list[str]:
     """Return sentences about vehicle and cable where `beyond` of their depth is above zero [m]."""
     time, said = run["time"].values, []
-    places = {"vehicle": run["depth"].values[:, None]}
+    places = {"vehicle": (run["depth"].values[:, None], 0.0)}
     if run.attrs["tethered"] and run["node_count"].values.any():
-        places["cable"] = _node_depths(run, model)
-    for name, depth in places.items():
-        out = np.nan_to_num(beyond(depth), nan=-np.inf)
-        row, node = np.unravel_index(int(out.argmax()), out.shape)
-        if out[row, node] > ROUNDING:
-            first = first_time(time, out.max(axis=1) > ROUNDING)
+        down = run["cable_position"].values[:, :, 2]
+        places["cable"] = down, _depth_of_start(run, model) - down[0, 0]
+    for name, (down, offset) in places.items():
+        farthest = np.concatenate([_farthest(beyond, down[one] + offset) for one in blocks_of(time.size)])
+        row = int(farthest.argmax())
+        if farthest[row] > ROUNDING:
+            depth, first = down[row] + offset, first_time(time, farthest > ROUNDING)
+            worst = depth[np.nanargmax(beyond(depth))]
             said.append(
-                f"The {name} is {where} from {first:g} s on, and at a depth of {depth[row, node]:.3g} m at "
+                f"The {name} is {where} from {first:g} s on, and at a depth of {worst:.3g} m at "
                 f"{time[row]:g} s, {words}"
             )
     return said
 
 
-def strength(run: xr.Dataset, _: scenarios.Trial, model: Model) -> list[str]:
+def _farthest(beyond: Callable[[np.ndarray], np.ndarray], depth: np.ndarray) -> np.ndarray:
+    """Return how far beyond the limit each sample's farthest node is, −∞ if there is none (samples,). [m]"""
+    farthest: np.ndarray = np.fmax(np.fmax.reduce(beyond(depth), axis=1), -np.inf)  # fmax is blind to NaN
+    return farthest
+
+
+BLOCK = 256
+"""So many samples are looked at together: all of a long run would take as much memory again. [-]"""
+
+
+def blocks_of(samples: int) -> list[slice]:
+    """Return the blocks that samples are looked at in."""
+    return [slice(at, at + BLOCK) for at in range(0, samples, BLOCK)]
+
+
+def strength(run: AnyRun, _: scenarios.Trial, model: Model) -> list[str]:
     """The cable pulls harder than it may."""
     most = model.cable.strength
     if most <= 0.0 or not run.attrs["tethered"]:
@@ -107,7 +122,7 @@ def strength(run: xr.Dataset, _: scenarios.Trial, model: Model) -> list[str]:
     ]
 
 
-def bend_radius(run: xr.Dataset, _: scenarios.Trial, model: Model) -> list[str]:
+def bend_radius(run: AnyRun, _: scenarios.Trial, model: Model) -> list[str]:
     """The cable is bent tighter than it may be."""
     least = model.cable.minimum_bend_radius
     if least <= 0.0 or not run.attrs["tethered"]:
@@ -125,7 +140,7 @@ def bend_radius(run: xr.Dataset, _: scenarios.Trial, model: Model) -> list[str]:
     ]
 
 
-def bend_radii(run: xr.Dataset) -> np.ndarray:
+def bend_radii(run: AnyRun) -> np.ndarray:
     """Return the radius of the circle through three neighbouring nodes, ∞ in slack parts (samples, nodes − 2). [m].
 
     R = abc/4A of a triangle with the sides a, b, c; 4A = 2 |a × b| = 2 √(a²b² − (a·b)²).
@@ -143,7 +158,7 @@ def bend_radii(run: xr.Dataset) -> np.ndarray:
     return np.where(pulls & bent, product / (2.0 * np.sqrt(np.where(bent, square, 1.0))), np.inf)
 
 
-def actuators(run: xr.Dataset, _: scenarios.Trial, model: Model) -> list[str]:
+def actuators(run: AnyRun, _: scenarios.Trial, model: Model) -> list[str]:
     """A command beyond what the vehicle can do, or an actuator at its limit throughout."""
     if run.attrs["prescribed"]:
         return []
@@ -151,7 +166,7 @@ def actuators(run: xr.Dataset, _: scenarios.Trial, model: Model) -> list[str]:
     return said + _propeller(run, model)
 
 
-def _fin(run: xr.Dataset, model: Model, fin: str) -> list[str]:
+def _fin(run: AnyRun, model: Model, fin: str) -> list[str]:
     """Return what is wrong with a fin: cut off, at its limit, or turning as fast as it can all the time."""
     time, servo = run["time"].values, getattr(model.vehicle, FINS[fin])
     command, angle = run[f"{fin}_command"].values, run[f"{fin}_angle"].values
@@ -177,7 +192,7 @@ def _fin(run: xr.Dataset, model: Model, fin: str) -> list[str]:
     return said
 
 
-def _propeller(run: xr.Dataset, model: Model) -> list[str]:
+def _propeller(run: AnyRun, model: Model) -> list[str]:
     """Return what is wrong with the propeller: asked for too much, or behind its command."""
     time, c = run["time"].values, model.vehicle.motor.speed_per_volt
     command, speed = run["propeller_command"].values, run["propeller_speed"].values
@@ -208,11 +223,9 @@ def _throughout(time: np.ndarray, at_limit: np.ndarray, short: float = SHORT) ->
     return f"for {percent(at_limit.mean())} of the run" if most else ""
 
 
-def _node_depths(run: xr.Dataset, model: Model) -> np.ndarray:
-    """Return the depths of the cable's nodes (samples, nodes). [m]."""
+def _depth_of_start(run: AnyRun, model: Model) -> float:
+    """Return the depth of the tow point at the start. [m]"""
     pitch, roll = (np.radians(float(run[name].values[0])) for name in ("pitch", "roll_angle"))
     x, y, z = model.vehicle.tow_point.position()
     tow = -np.sin(pitch) * x + np.cos(pitch) * (np.sin(roll) * y + np.cos(roll) * z)
-    down = run["cable_position"].values[:, :, 2]
-    depths: np.ndarray = down + (float(run["depth"].values[0]) + tow - down[0, 0])
-    return depths
+    return float(run["depth"].values[0] + tow)

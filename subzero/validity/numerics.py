@@ -7,13 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from subzero.validity.limits import first_time, longest_span, percent
+from subzero.validity.limits import blocks_of, first_time, longest_span, percent
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     import scenarios
     from cable import CableProperties, DrumProperties
+    from subzero.channels import AnyRun
     from subzero.model import Model
 
 RESIDUAL = 0.01
@@ -48,7 +47,7 @@ PUSHED = 1e-3
 ENERGIES = ("propeller_work", "hull_loss", "cable_loss", "kinetic_change", "drum", "added_mass_term")
 
 
-def energy_residual(run: xr.Dataset, trial: scenarios.Trial, _: Model) -> list[str]:
+def energy_residual(run: AnyRun, trial: scenarios.Trial, _: Model) -> list[str]:
     """The balance of all energies does not close, at any time: a residual that cancels later counts too.
 
     As errors of the force are, a residual is held against the largest of the run: a cable that begins with a jolt loses
@@ -71,7 +70,7 @@ def energy_residual(run: xr.Dataset, trial: scenarios.Trial, _: Model) -> list[s
     ]
 
 
-def resolution(run: xr.Dataset, trial: scenarios.Trial, _: Model) -> list[str]:
+def resolution(run: AnyRun, trial: scenarios.Trial, _: Model) -> list[str]:
     """Steps and segments twice as long give another tow force, however fine they are: `subzero.convergence`."""
     accuracy = json.loads(run.attrs.get("accuracy", "{}"))
     if not accuracy or is_resolved(run):
@@ -104,14 +103,14 @@ def _told(share: float) -> str:
     return f"{percent(share)} of its largest value" if np.isfinite(share) else "from stopping to going on"
 
 
-def is_resolved(run: xr.Dataset) -> bool:
+def is_resolved(run: AnyRun) -> bool:
     """Say whether a coarser run has confirmed the tow force of this one within its trial's rtol."""
     accuracy = json.loads(run.attrs.get("accuracy", "{}"))
     error = accuracy.get("force_error")
     return error is not None and error <= accuracy["rtol"]
 
 
-def tow_force(run: xr.Dataset, trial: scenarios.Trial, model: Model) -> list[str]:
+def tow_force(run: AnyRun, trial: scenarios.Trial, model: Model) -> list[str]:
     """The tow force jumps from sample to sample, and no coarser run has confirmed it.
 
     A kink that a winch was asked for is none: where its setpoint changes its slope, a right force has one too.
@@ -131,7 +130,7 @@ def tow_force(run: xr.Dataset, trial: scenarios.Trial, model: Model) -> list[str
     ]
 
 
-def roughness(run: xr.Dataset) -> np.ndarray:
+def roughness(run: AnyRun) -> np.ndarray:
     """Return |F(t−h) − 2F(t) + F(t+h)| of the tow force, as a share of its largest value (samples − 3,). [-].
 
     Between evenly spaced samples an eighth of it is what a straight line misses. The first sample is left out: the
@@ -145,7 +144,7 @@ def roughness(run: xr.Dataset) -> np.ndarray:
     return jumps
 
 
-def ill_posed_drum(run: xr.Dataset, _: scenarios.Trial, model: Model) -> list[str]:
+def ill_posed_drum(run: AnyRun, _: scenarios.Trial, model: Model) -> list[str]:
     """A free drum that does not hold its cable: nothing in the equations says how the cable leaves it.
 
     One whose friction outweighs m1 U² does say: waves come back to it. A cable that unwinds there all the same is only
@@ -207,7 +206,7 @@ def drum_is_ill_posed(
     return gives_way
 
 
-def slack(run: xr.Dataset, trial: scenarios.Trial, _: Model) -> list[str]:
+def slack(run: AnyRun, trial: scenarios.Trial, _: Model) -> list[str]:
     """Part of the cable is folded: its ends, its drag and its inertia mean something, its shape does not."""
     if not run.attrs["tethered"]:
         return []
@@ -226,17 +225,22 @@ def slack(run: xr.Dataset, trial: scenarios.Trial, _: Model) -> list[str]:
     ]
 
 
-def slack_share(run: xr.Dataset) -> np.ndarray:
+def slack_share(run: AnyRun) -> np.ndarray:
     """Return which share of the cable is slack, or folded away in segments that are too short (samples,). [-]."""
-    S, chord, T = run["cable_length"].values, _chords(run), run["cable_node_tension"].values
-    S = np.maximum(S, 1e-9)
+    S, P, T = (run[name].values for name in ("cable_length", "cable_position", "cable_node_tension"))
+    return np.concatenate([_slack_share(S[one], P[one], T[one]) for one in blocks_of(S.size)])
+
+
+def _slack_share(S: np.ndarray, P: np.ndarray, T: np.ndarray) -> np.ndarray:
+    """Return the share of some samples, from length (samples,), places (samples, nodes, 3) and tensions."""
+    chord, S = _chords(P), np.maximum(S, 1e-9)
     folded = 1.0 - np.nansum(chord, axis=1) / S
     limp = (T[:, 1:] < LIMP) & (T[:, :-1] < LIMP)
     share = np.nansum(np.where(limp, chord, 0.0), axis=1) / S + folded
     return np.where(folded > FOLDED, np.clip(share, 0.0, 1.0), 0.0)
 
 
-def closure(run: xr.Dataset, trial: scenarios.Trial, _: Model) -> list[str]:
+def closure(run: AnyRun, trial: scenarios.Trial, _: Model) -> list[str]:
     """The cable does not end at the tow point."""
     gap, S = run["closure_error"].values, np.maximum.accumulate(run["cable_length"].values)
     open_ = gap > CLOSED * np.maximum(S, trial.segment_length)
@@ -250,16 +254,17 @@ def closure(run: xr.Dataset, trial: scenarios.Trial, _: Model) -> list[str]:
     ]
 
 
-def push(run: xr.Dataset, _: scenarios.Trial, __: Model) -> list[str]:
+def push(run: AnyRun, _: scenarios.Trial, __: Model) -> list[str]:
     """The cable pushes, which no cable can."""
     T = run["cable_node_tension"].values
-    if not np.isfinite(T).any() or np.nanmin(T) >= -PUSHED * max(np.nanmax(T), NO_FORCE):
+    least, most = np.fmin.reduce(T, axis=None), np.fmax.reduce(T, axis=None)  # NaN only if all are
+    if not np.isfinite(least) or least >= -PUSHED * max(most, NO_FORCE):
         return []
-    time, least = run["time"].values, np.nanmin(np.where(np.isnan(T), np.inf, T), axis=1)
-    worst = int(least.argmin())
+    time, lowest = run["time"].values, np.nanmin(np.where(np.isnan(T), np.inf, T), axis=1)
+    worst = int(lowest.argmin())
     return [
-        f"The cable pushes, by up to {-least[worst]:.3g} N (at {time[worst]:g} s; first at "
-        f"{first_time(time, least < 0.0):g} s), which no cable can: the paper's scheme has nothing that keeps it from "
+        f"The cable pushes, by up to {-lowest[worst]:.3g} N (at {time[worst]:g} s; first at "
+        f"{first_time(time, lowest < 0.0):g} s), which no cable can: the paper's scheme has nothing that keeps it from "
         'it. Use scheme = "moving_end".'
     ]
 
@@ -272,14 +277,14 @@ def _finer(trial: scenarios.Trial) -> str:
     )
 
 
-def _chords(run: xr.Dataset) -> np.ndarray:
+def _chords(P: np.ndarray) -> np.ndarray:
     """Return the distances between neighbouring nodes, NaN behind the last (samples, nodes − 1). [m]."""
-    side = np.diff(run["cable_position"].values, axis=1)
+    side = np.diff(P, axis=1)
     lengths: np.ndarray = np.sqrt(np.einsum("tni,tni->tn", side, side))
     return lengths
 
 
-def _tow_speed(run: xr.Dataset, time: np.ndarray) -> np.ndarray:
+def _tow_speed(run: AnyRun, time: np.ndarray) -> np.ndarray:
     """Return the speed of the tow point relative to the drum (samples,). [m/s]."""
     P, nodes = run["cable_position"].values, run["node_count"].values
     drum = P[np.arange(time.size), np.maximum(nodes - 1, 0)]

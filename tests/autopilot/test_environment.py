@@ -55,6 +55,27 @@ def test_the_same_seed_draws_the_same_heading(env):
     assert drawn[0] == drawn[1] != drawn[2]
 
 
+def test_many_at_once_are_those_of_one_after_another_to_the_last_bit(monkeypatch):
+    """Episodes of five steps, so that environments begin again on the way."""
+    monkeypatch.setattr(subzero.gym_environment, "STEPS", 5)
+    name = subzero.gym_environment.ENVIRONMENT
+    actions = np.random.default_rng(0).uniform(-1.0, 1.0, (13, 3, 1)).astype(np.float32)
+    told = {}
+    for mode in ("sync", None):
+        made = gymnasium.make_vec(name, num_envs=3, vectorization_mode=mode, propeller_rps=30.0)
+        told[mode] = [(*made.reset(seed=7),), *(made.step(one) for one in actions)]
+        made.close()
+    assert isinstance(made.unwrapped, subzero.gym_environment.TetheredHeadings)
+    assert any(one[3].all() for one in told[None][1:])
+    for mine, plain in zip(told[None], told["sync"], strict=True):
+        for ours, theirs in zip(mine[:-1], plain[:-1], strict=True):
+            assert ours.dtype == theirs.dtype
+            np.testing.assert_array_equal(ours, theirs)
+        assert mine[-1].keys() == plain[-1].keys()
+        for key, ours in mine[-1].items():
+            np.testing.assert_array_equal(ours, plain[-1][key])
+
+
 def test_it_can_be_made_without_its_cable():
     env = gymnasium.make(subzero.gym_environment.ENVIRONMENT, tethered=False, sample_time=0.2)
     _, info = episode(env, proportional)

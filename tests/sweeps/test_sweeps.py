@@ -358,6 +358,18 @@ def test_a_process_that_is_killed_costs_its_own_task_only():
         pool.shutdown(cancel_futures=True)
 
 
+def test_a_worker_labels_nothing_and_so_starts_a_second_sooner():
+    plan, pool = fast(2), WorkerPool(1)
+    try:
+        members = pool.submit(run_members, plan.job, [0, 1], plan.points.values).result()
+        loaded = pool.submit(eval, "set(__import__('sys').modules)").result()
+    finally:
+        pool.shutdown(cancel_futures=True)
+    assert [one.reason for one in members] == ["", ""]
+    assert "subzero.dataset" in loaded
+    assert not loaded & {"xarray", "pandas", "dask", "matplotlib", "netCDF4", "scipy.stats"}
+
+
 def _end_yourself():
     os.kill(os.getpid(), signal.SIGKILL)
 
