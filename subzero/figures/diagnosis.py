@@ -110,22 +110,30 @@ def evidence(verdict: Verdict, title: Title) -> Figure | None:
     ranked = [(name, p) for name, p in ranked if p >= LEAST]
     if not ranked:
         return None
-    known = sentences(verdict)
-    names = [_wrapped(explanation(name, known)) for name, _ in ranked]
+    names = [_wrapped(_beside_errors(name, verdict)) for name, _ in ranked]
     rows = sum(1 + name.count("\n") for name in names)
-    figure, (plain, logarithmic) = _bars(2, rows, title, left=0.42, apart=0.12)
+    figure, (plain, logarithmic) = _bars(2, rows, title, left=0.42, apart=0.2)
     colours = [style.BLUE if is_told(name, verdict) else style.GREY for name, _ in ranked]
     for axes in (plain, logarithmic):
         axes.barh(range(len(ranked)), [p for _, p in ranked], color=colours, height=0.65)
         axes.set_xlabel("probability", fontsize=style.NORMAL)
     _names(plain, names)
     plain.set_xlim(0.0, 1.0)
-    headline(plain, "Probability of each")
+    headline(plain, "Probability, data put right" if verdict.then else "Probability of each")
     logarithmic.set_xscale("log")
     logarithmic.set_xlim(LEAST, 1.3)
     _names(logarithmic, [""] * len(ranked))
-    headline(logarithmic, "The same, for the small ones")
+    headline(logarithmic, "The same, small ones too")
     return figure
+
+
+def _beside_errors(name: str, verdict: Verdict) -> str:
+    """Return a hypothesis in words, without the errors in the data that are told."""
+    told = {one.id for one in verdict.data_errors} if verdict.then else set()
+    rest = " + ".join(one for one in name.split(" + ") if one not in told)
+    if not rest and name != "none":
+        return "nothing else is wrong"
+    return explanation(rest or name, sentences(verdict))
 
 
 NAME_LENGTH = 50
@@ -142,7 +150,7 @@ def detectable(verdict: Verdict, title: Title) -> Figure | None:
     if not rows:
         return None
     known = sentences(verdict)
-    figure, (signal, apart) = _bars(2, len(rows), title, left=0.345, apart=1.95)
+    figure, (signal, apart) = _bars(2, len(rows), title, left=0.325, apart=2.05)
     size = [max(one.signal, FLOOR) for one in rows]
     signal.barh(
         range(len(rows)),
@@ -151,16 +159,18 @@ def detectable(verdict: Verdict, title: Title) -> Figure | None:
         height=0.65,
     )
     signal.axvline(SEEN_SIGNAL, color=style.INK, linewidth=0.8, linestyle=style.DASHES[1])
-    signal.set_xlabel("signal, in noise and tolerances", fontsize=style.NORMAL)
-    headline(signal, f"Seen from {SEEN_SIGNAL:g} on")
+    signal.set_xlabel("signal", fontsize=style.NORMAL)
+    headline(signal, f"Seen: from {SEEN_SIGNAL:g}")
     far = [max(one.discrimination, FLOOR) for one in rows]
     apart.barh(range(len(rows)), far, color=[_verdict_colour(one) for one in far], height=0.65)
     for limit in (CONFUSED_BELOW, CLEAR_FROM):
         apart.axvline(limit, color=style.INK, linewidth=0.8, linestyle=style.DASHES[1])
     apart.set_xlabel("D", fontsize=style.NORMAL)
-    headline(apart, f"Apart from {CLEAR_FROM:g} on")
+    headline(apart, f"Apart: from {CLEAR_FROM:g}")
+    apart.text(-0.06, 1.0, "looks most like:", ha="right", va="bottom", transform=apart.transAxes,
+               fontsize=style.TINY, color=style.GREY)  # fmt: skip
     causes = [_short(explanation(one.id, known)) for one in rows]
-    alike = [_short(f"/ {explanation(one.rival, known)}") for one in rows]
+    alike = [_short(explanation(one.rival, known)) for one in rows]
     for axes, words in ((signal, causes), (apart, alike)):
         axes.set_xscale("log")
         axes.set_xlim(left=FLOOR)
@@ -168,7 +178,7 @@ def detectable(verdict: Verdict, title: Title) -> Figure | None:
     return figure
 
 
-def _short(words: str, most: int = 46) -> str:
+def _short(words: str, most: int = 38) -> str:
     return words if len(words) <= most else f"{words[: most - 1].rstrip()}…"
 
 
@@ -221,12 +231,13 @@ def _bars(
     columns: int, rows: int, title: Title, *, left: float = 0.2, apart: float = 0.72
 ) -> tuple[Figure, list[Axes]]:
     """Return a sheet for horizontal bars, as high as they need, with room for their names."""
-    from subzero.figures.style import BOTTOM, TOP
+    from subzero.figures.style import BOTTOM, TITLE_LINE, TOP
 
     figure, panels = sheet(1, columns, title)
-    height = TOP + 0.4 + BOTTOM + 0.17 * max(rows, 3)
+    above = TOP + TITLE_LINE * (1 + figure.texts[0].get_text().count("\n"))
+    height = above + 0.24 + BOTTOM + 0.17 * max(rows, 3)
     figure.set_size_inches(style.width(), height)
-    figure.subplots_adjust(left=left, wspace=apart, bottom=BOTTOM / height, top=1.0 - (TOP + 0.2) / height)
+    figure.subplots_adjust(left=left, wspace=apart, bottom=BOTTOM / height, top=1.0 - (above + 0.04) / height)
     for text in figure.texts:
         text.set_y(1.0 - 0.09 / height)
     figure.texts[0].set_x(0.02)
@@ -274,8 +285,10 @@ def draw_diagnosis(verdict: Verdict, title: Title) -> dict[str, Figure]:
     for name, curves in verdict.curves.items():
         ending = f"_{_file(name)}" if len(verdict.curves) > 1 else ""
         drawn = Drawn(curves, verdict.misfit.get(name, {}), verdict)
-        figures[f"misfit{ending}"] = misfit(drawn, _named(title, name))
-        figures[f"rivals{ending}"] = rivals(drawn, _named(title, f"{name}: if a rival were true"))
+        several = len(verdict.curves) > 1
+        figures[f"misfit{ending}"] = misfit(drawn, _named(title, name) if several else title)
+        rival = f"{name}: if a rival were true" if several else "if a rival were true"
+        figures[f"rivals{ending}"] = rivals(drawn, _named(title, rival))
     figures["evidence"] = evidence(verdict, title)
     figures["detectable"] = detectable(verdict, title)
     figures["gain"] = gain(verdict, title)

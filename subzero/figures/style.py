@@ -300,7 +300,8 @@ def calm(axes: Axes, smallest: float = 1e-6) -> None:
 
 
 def time_label(panels: list[Axes], columns: int) -> None:
-    """Name the time axis below the lowest row only."""
+    """Name the time axis below the lowest row only; in a narrow figure, panels stand below one another."""
+    columns = columns if width() >= ONE_COLUMN else 1
     for axes in panels[-columns:]:
         axes.set_xlabel("time [s]", fontsize=NORMAL, labelpad=2)
 
