@@ -1,9 +1,9 @@
 """How large pages are and how fast their replay is drawn: ``python -m benchmarks.page [--figure]``.
 
 Sizes: of fig6, and of two runs of 10 000 samples with 300 nodes each, made by repeating samples of fig6. Frames: on
-this machine, by Chromium without a graphics card (SwiftShader), each frame drawn to its end, 1280 × 720 points: at full
-resolution, and at the coarsest to which the player goes by itself on a slow machine. What a frame takes of all processors
-together hardly depends on what else this machine does. With --figure, the pictures in ``docs/figures`` are made anew.
+this machine, by Chromium without a graphics card (SwiftShader), each frame drawn to its end, 1280 × 720 points: at
+full resolution, and at the coarsest to which the player goes by itself on a slow machine. What a frame takes of all
+processors hardly depends on what else this machine does. With --figure, the pictures in ``docs/figures`` are made anew.
 """
 
 from __future__ import annotations

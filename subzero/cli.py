@@ -288,10 +288,12 @@ def plot(
     names = [f"{run.stem}_{name}.{format}" for name in what or ()]
     with staged(out or run.parent, names) as stage:
         from subzero.accessor import figures_of, open_run
+        from subzero.output import lacking_letters_as_boxes
 
         dataset = open_run(run)
         for name, figure in figures_of(dataset, what).items():
-            figure.savefig(stage.path / f"{run.stem}_{name}.{format}")
+            with lacking_letters_as_boxes():
+                figure.savefig(stage.path / f"{run.stem}_{name}.{format}")
     with voice.tells(stage.files()):
         print(stage.words())
     return FINE

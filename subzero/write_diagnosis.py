@@ -39,6 +39,7 @@ from subzero.diagnosis.results import (
     Verdict,
 )
 from subzero.errors import printable
+from subzero.output import lacking_letters_as_boxes
 from subzero.page.replay import HULL, Actor, as_run, encode
 from subzero.page.report import Answer, Line, Report, Section, render
 from subzero.page.report import Table as Rows
@@ -380,7 +381,8 @@ def _about(one: Logged) -> dict[str, object]:
 
 def _png(figure: Figure) -> bytes:
     held = io.BytesIO()
-    figure.savefig(held, format="png", pil_kwargs={"compress_level": 3})
+    with lacking_letters_as_boxes():
+        figure.savefig(held, format="png", pil_kwargs={"compress_level": 3})
     return held.getvalue()
 
 

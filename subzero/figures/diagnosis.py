@@ -47,10 +47,10 @@ def missing_force(verdict: Verdict, title: Title) -> Figure | None:
     if unknown is None:
         return None
     figure, (axes,) = sheet(1, 1, title)
-    figure.set_size_inches(figure.get_figwidth(), 3.6)
-    figure.subplots_adjust(bottom=0.13, top=0.87)
     low, high = unknown.force - 1.96 * unknown.band, unknown.force + 1.96 * unknown.band
-    axes.fill_between(unknown.time, low, high, color=style.SKY, alpha=0.4, linewidth=0, label="95 %")
+    axes.fill_between(
+        unknown.time, low, high, color=style.SKY, alpha=0.4, linewidth=0, label="95 %", zorder=1.5
+    )
     axes.plot(
         unknown.time,
         unknown.force,
@@ -64,9 +64,8 @@ def missing_force(verdict: Verdict, title: Title) -> Figure | None:
     time_label([axes], 1)
     headline(axes, _what(unknown))
     if unknown.formula:
-        lines = textwrap.wrap(
-            "Looks like " + " + ".join(formula_term(term) for term in unknown.formula), FORMULA_LENGTH
-        )
+        formula = "Looks like " + " + ".join(formula_term(term) for term in unknown.formula)
+        lines = textwrap.wrap(formula, int(FORMULA_LENGTH * style.width() / style.WIDTH) - 3)
         place: dict[str, Any] = {"va": "top", "transform": axes.transAxes, "parse_math": False}
         axes.text(0.01, 0.98, "\n".join(lines), fontsize=style.SMALL, color=style.INK, **place)
         bottom, top = axes.get_ylim()
@@ -81,9 +80,9 @@ FORMULA_LENGTH = 110
 def _what(unknown: Unknown) -> str:
     """Return what is drawn in words: what it does, and which sign that has."""
     if unknown.is_drift:
-        return f"Drift of the {unknown.axis.replace('_', ' ')}'s sensor, that no cause explains, with its 95 % band"
+        return f"Drift of the {unknown.axis.replace('_', ' ')}'s sensor, that no cause explains"
     does = something(unknown.axis, unknown.force)
-    return f"{does[0].upper()}{does[1:]}: {AXES[unknown.axis].lower()}, with its 95 % band"
+    return f"{does[0].upper()}{does[1:]}: {AXES[unknown.axis].lower()}"
 
 
 MOST = 10
@@ -119,11 +118,11 @@ def evidence(verdict: Verdict, title: Title) -> Figure | None:
         axes.set_xlabel("probability", fontsize=style.NORMAL)
     _names(plain, names)
     plain.set_xlim(0.0, 1.0)
-    headline(plain, "Probability, data put right" if verdict.then else "Probability of each")
+    headline(plain, "Data put right" if verdict.then else "Probability")
     logarithmic.set_xscale("log")
     logarithmic.set_xlim(LEAST, 1.3)
     _names(logarithmic, [""] * len(ranked))
-    headline(logarithmic, "The same, small ones too")
+    headline(logarithmic, "Small ones too")
     return figure
 
 
@@ -136,12 +135,13 @@ def _beside_errors(name: str, verdict: Verdict) -> str:
     return explanation(rest or name, sentences(verdict))
 
 
-NAME_LENGTH = 50
-"""So many letters of an explanation fit beside its bar."""
+NAME_LENGTH, NARROW_NAME_LENGTH = 50, 36
+"""So many letters of an explanation fit beside its bar; in a narrow figure."""
 
 
 def _wrapped(words: str) -> str:
-    return textwrap.fill(words[:1].upper() + words[1:], NAME_LENGTH)
+    most = NAME_LENGTH if style.width() >= style.ONE_COLUMN else NARROW_NAME_LENGTH
+    return textwrap.fill(words[:1].upper() + words[1:], most)
 
 
 def detectable(verdict: Verdict, title: Title) -> Figure | None:
@@ -178,7 +178,9 @@ def detectable(verdict: Verdict, title: Title) -> Figure | None:
     return figure
 
 
-def _short(words: str, most: int = 38) -> str:
+def _short(words: str) -> str:
+    """Return as much of some words as fits beside a bar."""
+    most = 38 if style.width() >= style.ONE_COLUMN else 34
     return words if len(words) <= most else f"{words[: most - 1].rstrip()}…"
 
 
@@ -208,6 +210,8 @@ def _gain_bars(axes: Axes, rows: Mapping[str, ChannelGain]) -> None:
     axes.axhline(1.0, color=style.INK, linewidth=0.9, linestyle=style.DASHES[1])
     axes.set_yscale("log")
     axes.set_xticks(range(len(rows)), [_words(name) for name in rows], fontsize=style.SMALL)
+    if style.width() < style.ONE_COLUMN:
+        axes.set_xticklabels([_words(name).replace(" ", "\n") for name in rows])
     axes.set_ylabel("RMS error / noise floor", fontsize=style.NORMAL)
 
 
@@ -227,6 +231,10 @@ def _verdict_colour(discrimination: float) -> str:
     return style.AMBER if discrimination < CLEAR_FROM else style.BLUE
 
 
+BAR_ROW, NARROW_LEFT = 0.17, 0.6
+"""Height of a bar with its space [inch]; where bars begin in a narrow figure, whose panels stand below one another."""
+
+
 def _bars(
     columns: int, rows: int, title: Title, *, left: float = 0.2, apart: float = 0.72
 ) -> tuple[Figure, list[Axes]]:
@@ -234,10 +242,14 @@ def _bars(
     from subzero.figures.style import BOTTOM, TITLE_LINE, TOP
 
     figure, panels = sheet(1, columns, title)
+    stacked = columns if style.width() < style.ONE_COLUMN else 1
     above = TOP + TITLE_LINE * (1 + figure.texts[0].get_text().count("\n"))
-    height = above + 0.24 + BOTTOM + 0.17 * max(rows, 3)
+    bars = 0.2 + BAR_ROW * max(rows, 3)
+    between = BOTTOM + TOP
+    height = above + stacked * bars + (stacked - 1) * between + BOTTOM
     figure.set_size_inches(style.width(), height)
-    figure.subplots_adjust(left=left, wspace=apart, bottom=BOTTOM / height, top=1.0 - (above + 0.04) / height)
+    figure.subplots_adjust(left=left if stacked == 1 else NARROW_LEFT, wspace=apart, hspace=between / bars,
+                           bottom=BOTTOM / height, top=1.0 - above / height)  # fmt: skip
     for text in figure.texts:
         text.set_y(1.0 - 0.09 / height)
     figure.texts[0].set_x(0.02)
