@@ -25,7 +25,7 @@ from cyclopts import Parameter
 
 import scenarios
 from subzero import cli_autopilot, cli_diagnosis, cli_install, cli_sweep, cli_trials
-from subzero.cli_examples import register
+from subzero.cli_examples import EXAMPLES, register
 from subzero.errors import UserError, printable
 from subzero.interrupts import INTERRUPTED, begin, came, words
 from subzero.voice import NOT_STRICT, PLAIN, StrictVoice, Voice, speak
@@ -288,10 +288,12 @@ def plot(
     names = [f"{run.stem}_{name}.{format}" for name in what or ()]
     with staged(out or run.parent, names) as stage:
         from subzero.accessor import figures_of, open_run
+        from subzero.output import lacking_letters_as_boxes
 
         dataset = open_run(run)
         for name, figure in figures_of(dataset, what).items():
-            figure.savefig(stage.path / f"{run.stem}_{name}.{format}")
+            with lacking_letters_as_boxes():
+                figure.savefig(stage.path / f"{run.stem}_{name}.{format}")
     with voice.tells(stage.files()):
         print(stage.words())
     return FINE
@@ -356,7 +358,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         with _aloud(voice):
             return command(*bound.args, **bound.kwargs) or FINE
     except cyclopts.CycloptsError as error:
-        return _refuse(f"{_in_words(error)}\nTry 'subzero --help'.")
+        asked = " ".join(["subzero", *(error.command_chain or ())])
+        return _refuse(f"{_in_words(error)}\nTry '{asked} --help'.")
     except UserError as error:
         return _refuse(str(error))
     except KeyboardInterrupt:
@@ -421,7 +424,18 @@ def _in_words(error: cyclopts.CycloptsError) -> str:
     """Say what is wrong with the words of a command."""
     if isinstance(error, cyclopts.UnusedCliTokensError):
         return f"Unexpected argument: {' '.join(error.unused_tokens or [])}."
+    if isinstance(error, cyclopts.MissingArgumentError) and error.argument and error.command_chain:
+        return _missing(error.command_chain[0], error.argument)
     return str(error)
+
+
+def _missing(command: str, argument: cyclopts.Argument) -> str:
+    """Say what a command needs, and how it is called."""
+    if not argument.required:
+        return f"{argument.name} needs a value."
+    return (
+        f"subzero {command} needs {argument.name.removeprefix('--').upper()}, as in: {EXAMPLES[command][0]}"
+    )
 
 
 def _refuse_no_export(kinds: Sequence[str]) -> None:

@@ -140,7 +140,8 @@ def fly_step(
             progress=progress,
         )  # fmt: skip
 
-    title = f"{name}: autopilot {pilot.autopilot}, fed forward of the cable: {pilot.feed_forward}"
+    cable = "not fed forward" if pilot.feed_forward == "none" else f"fed forward by {pilot.feed_forward}"
+    title = f"{name.replace('_', ' ').capitalize()}: autopilot {pilot.autopilot}, the cable {cable}"
     shown = STEP_COMMANDS.get(name, ("heading", "rudder_command"))
     return _deliver(trial, fly, out or Path(name), title, shown, voice)
 

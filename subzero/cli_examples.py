@@ -31,7 +31,7 @@ EXAMPLES = {
         "subzero diagnose fig6 record.csv --out found",
         "subzero diagnose hidden --scenario fig6 --screen",
     ),
-    "challenge": ("subzero challenge fig6 --seed 2 --out hidden", "subzero challenge --reveal hidden"),
+    "challenge": ("subzero challenge fig6 --seed 38 --out hidden", "subzero challenge --reveal hidden"),
     "sweep": ("subzero sweep cable_and_current.toml",),
     "doctor": ("subzero doctor",),
     "warm": ("subzero warm",),

@@ -129,10 +129,14 @@ def short(value: object) -> str:
     return text if len(text) <= SHOWN_CHARACTERS else text[:SHOWN_CHARACTERS] + "..."
 
 
-def nearest(word: str, allowed: Iterable[str], count: int = 1) -> list[str]:
+NEAR_LIKENESS = 0.5
+"""A word that is less like another one was not meant for it, on `difflib`'s scale from 0 to 1."""
+
+
+def nearest(word: str, allowed: Iterable[str], count: int = 1, likeness: float = NEAR_LIKENESS) -> list[str]:
     """Return the allowed words most like `word` (case does not matter), best first; none if none is near."""
     by_lower = {candidate.lower(): candidate for candidate in allowed}
-    close = difflib.get_close_matches(word.lower()[:80], by_lower, n=count, cutoff=0.5)
+    close = difflib.get_close_matches(word.lower()[:80], by_lower, n=count, cutoff=likeness)
     return [by_lower[match] for match in close]
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -132,11 +133,19 @@ OF_KIND: dict[str, dict[str, Any]] = {
 """How a figure of a kind is written."""
 
 
+@contextmanager
+def lacking_letters_as_boxes() -> Iterator[None]:
+    """Draw figures without a word on letters that their font lacks: they are boxes, and pages say them as text."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Glyph .* missing from font", UserWarning)
+        yield
+
+
 def write_figures(figures: Mapping[str, Figure], stage: Stage, kind: str = "png") -> None:
     """Write each figure as ``name.png``, or as a drawing, ``name.svg`` or ``name.pdf``."""
     import matplotlib as mpl
 
-    with stages.told(stage.folder), mpl.rc_context(DRAWING):
+    with stages.told(stage.folder), mpl.rc_context(DRAWING), lacking_letters_as_boxes():
         for name, figure in figures.items():
             figure.savefig(stage.path / f"{name}.{kind}", **OF_KIND[kind])
 

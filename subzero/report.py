@@ -41,6 +41,16 @@ DIAGNOSTIC_ROWS = {
 """What tells how far to trust the cable: words, and how to write the number."""
 
 
+INDEX_UNITS = {"_deg_s": "degree/s", "_m_s": "m/s", "_per_s": "1/s", "_deg": "degree", "_s": "s", "_m": "m"}
+"""How the name of an index ends → its unit; without such an end it is a share, or as large as the channel."""
+
+
+def index_words(name: str) -> str:
+    """Return the name of an index of a manoeuvre in words with its unit: ``rise_time_s`` is "rise time [s]"."""
+    end = next((end for end in INDEX_UNITS if name.endswith(end)), "")
+    return name.removesuffix(end).replace("_", " ") + (f" [{INDEX_UNITS[end]}]" if end else "")
+
+
 def show(summary: Summary, console: Console) -> None:
     """Print a summary, as `subzero.comparison.summary_of` gives it."""
     console.print(f"[bold]{escape(summary['scenario'])}[/bold]: {escape(summary['title'])}", highlight=False)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import dataclasses
 import io
 import json
+import shlex
 import shutil
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from importlib.metadata import version
@@ -37,6 +38,8 @@ from subzero.diagnosis.results import (
     Extended,
     Verdict,
 )
+from subzero.errors import printable
+from subzero.output import lacking_letters_as_boxes
 from subzero.page.replay import HULL, Actor, as_run, encode
 from subzero.page.report import Answer, Line, Report, Section, render
 from subzero.page.report import Table as Rows
@@ -49,6 +52,7 @@ if TYPE_CHECKING:
     from subzero.diagnosis.hypothesis.configuration import Setting
     from subzero.diagnosis.hypothesis.effect import Effect
     from subzero.diagnosis.hypothesis.logged import Logged
+    from subzero.records.record import Record
     from subzero.stage import Stage
 
 Run = Callable[["Setting"], "xr.Dataset"]
@@ -106,7 +110,8 @@ def tell(
 
 def _tell(verdict: Verdict, stage: Stage, console: Console, scenario: str) -> None:
     console.print(f"\n[bold]{escape(words.headline(verdict))}[/bold]", highlight=False)
-    for answer in summary(verdict, scenario):
+    extended = shlex.quote(printable(str(stage.folder / "extended.toml")))
+    for answer in summary(verdict, scenario, extended):
         console.print(f"[bold]{answer.question}[/bold]", highlight=False)
         for line in answer.words:
             console.print(Padding(Text(line), (0, 0, 0, 2)))
@@ -116,7 +121,7 @@ def _tell(verdict: Verdict, stage: Stage, console: Console, scenario: str) -> No
         console.print(note, highlight=False, markup=False)
     if verdict.rivals:
         console.print(_rich(tables.rivals(verdict, short=True), console.width), highlight=False)
-    for name, table in tables.gain(verdict).items():
+    for name, table in tables.gain(verdict, short=True).items():
         console.print(f"Root mean square error, {name}:", highlight=False, markup=False)
         console.print(_rich(table, console.width), highlight=False)
     _tell_hidden(verdict, console)
@@ -247,7 +252,9 @@ def page_of_diagnosis(
             sections=[
                 _section(one, figures) for one in sections(verdict, about(logged)) if _is_there(one, figures)
             ],
-            replay=encode(actors, logged[0].record) if actors else None,
+            replay=encode(actors, _as_corrected(logged[0].record, verdict, logged[0].name))
+            if actors
+            else None,
             replay_words=said if actors else "",
             sources=_sources(logged, extended_toml),
         )
@@ -320,15 +327,24 @@ def replayed(
     found.append(Actor(name="simulated", run=nominal, ghost=bool(found)))
     said = f"{logged.name}. " + (f"Solid: the {name}. " if len(found) > 1 else "")
     curves = verdict.curves.get(logged.name)
-    measured = as_run(logged.record, nominal, curves.used if curves is not None else {})
+    record = _as_corrected(logged.record, verdict, logged.name)
+    measured = as_run(record, nominal, curves.used if curves is not None else {})
     if measured is not None:
         found.append(Actor(name="measured", run=measured, ghost=True))
         said += (
-            "White: the vehicle as the record has it; where it does not say the place, that is reckoned from its speed "
-            "and attitude. "
+            f"White: the vehicle as the record has it{', its errors put right' if verdict.then else ''}; where it does "
+            "not say the place, that is reckoned from its speed and attitude. "
         )
     said += "Orange: the simulation as it was. " if found[0].name != "simulated" else ""
     return tuple(found), f"{said}A run is what is; what sensors make of it (shifts, lags) is not in it."
+
+
+def _as_corrected(record: Record, verdict: Verdict, name: str) -> Record:
+    """Return a record as figures and words have it: with the errors in its data put right, if there are any."""
+    curves = verdict.curves.get(name)
+    if not verdict.then or curves is None:
+        return record
+    return dataclasses.replace(record, time=curves.time, values=dict(curves.measured))
 
 
 def _vehicle(run: xr.Dataset) -> dict[str, Any]:
@@ -365,7 +381,8 @@ def _about(one: Logged) -> dict[str, object]:
 
 def _png(figure: Figure) -> bytes:
     held = io.BytesIO()
-    figure.savefig(held, format="png", pil_kwargs={"compress_level": 3})
+    with lacking_letters_as_boxes():
+        figure.savefig(held, format="png", pil_kwargs={"compress_level": 3})
     return held.getvalue()
 
 

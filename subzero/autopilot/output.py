@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from rich import box
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 from subzero import output
@@ -26,7 +27,7 @@ from subzero.figures.style import (
     time_label,
     warnings_in_short,
 )
-from subzero.report import NOTHING, show_warnings
+from subzero.report import NOTHING, index_words, show_warnings
 from subzero.voice import PLAIN, Voice
 
 if TYPE_CHECKING:
@@ -76,7 +77,9 @@ def tell(summary: dict[str, Any], names: list[str], stage: Stage, voice: Voice =
         table.add_column(name, justify="right")
     for key in summary[names[0]]["indices"]:
         cells = [summary[name]["indices"][key] for name in names]
-        table.add_row(key, *(NOTHING if cell is None else f"{cell:.4g}" for cell in cells))
+        table.add_row(
+            escape(index_words(key)), *(NOTHING if cell is None else f"{cell:.4g}" for cell in cells)
+        )
     with voice.tells(summary | stage.files()):
         console = Console()
         console.print(f"{summary['scenario']}: {summary['title']}", highlight=False, markup=False)

@@ -35,11 +35,12 @@ from subzero.diagnosis.verdict.conclude import conclude
 from subzero.diagnosis.verdict.data_errors import on_records
 from subzero.diagnosis.verdict.follow_up import follow_up, ranked, refuted_rivals
 from subzero.model import Model
+from subzero.records.record import Record
 
 BUDGETS = ("screen", "verdict", "full")
 """Linear evidence only; up to the verdict and the extended model; with gain and next trial."""
 
-Given = Logged | str | Path
+Given = Logged | Record | str | Path
 Seen = Callable[[tuple[Detectability, ...]], None]
 
 
@@ -60,7 +61,7 @@ def diagnose(
         ('cause_named', ['rudder_lag'])
 
     Args:
-        records: CSV files, folders of them, or `Logged` of `read_trials`; several are fitted together.
+        records: CSV files, folders of them, records in hand, or `Logged` of `read_trials`; several are fitted together.
         model: the scenario that was flown (sidecars may name their own), or another nominal model.
         effects: causes of your own besides the catalogue: a Python file with EFFECTS, or the effects.
         commands: "record" or "scenario", if a record's commands may differ from the scenario's.
@@ -73,7 +74,7 @@ def diagnose(
         scenarios.ScenarioError: the scenario cannot be used.
     """
     own = load(effects) if isinstance(effects, str | Path) else tuple(effects)
-    logged = _logged([records] if isinstance(records, Logged | str | Path) else records, model, commands)
+    logged = _logged([records] if isinstance(records, Given) else records, model, commands)
     return diagnose_trials(logged, effects=own, progress=progress, seed=seed, budget=budget)
 
 

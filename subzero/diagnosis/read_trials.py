@@ -48,7 +48,7 @@ Simulated = Callable[[Setting, np.ndarray, Sequence[str]], Mapping[str, np.ndarr
 
 
 def read_trials(
-    paths: Sequence[str | Path] | str | Path,
+    paths: Sequence[str | Path | Record] | str | Path | Record,
     *,
     scenario: str | Path | None = None,
     commands: str | None = None,
@@ -57,7 +57,7 @@ def read_trials(
     """Read measured records, each with the trial it belongs to.
 
     Args:
-        paths: CSV files, or folders of them.
+        paths: CSV files, folders of them, or records that are in hand.
         scenario: the trial of every record whose sidecar does not name one.
         commands: "record" or "scenario", if a record's commands may differ from the scenario's.
         simulated: the nominal simulation; `subzero.diagnosis.inference.simulator.respond` if None.
@@ -66,11 +66,20 @@ def read_trials(
         UserError: a record, or its sidecar, cannot be used.
         scenarios.ScenarioError: a scenario cannot be used.
     """
-    files = _files([paths] if isinstance(paths, str | Path) else paths)
-    names = _names(files)
-    logged = [_logged(file, name, scenario, commands) for file, name in zip(files, names, strict=True)]
-    return [_checked(one, read_metadata(file.with_suffix(".toml")), simulated)
-            for one, file in zip(logged, files, strict=True)]  # fmt: skip
+    given = [paths] if isinstance(paths, str | Path | Record) else paths
+    files = _files([one for one in given if not isinstance(one, Record)])
+    in_hand = [one for one in given if isinstance(one, Record)]
+    names = [*_names(files), *(_name_in_hand(at, len(in_hand)) for at in range(len(in_hand)))]
+    sidecars = [*(read_metadata(file.with_suffix(".toml")) for file in files), *(Metadata() for _ in in_hand)]
+    records = [*map(read_record, files), *in_hand]
+    logged = [_logged(record, sidecar, name, scenario, commands)
+              for record, sidecar, name in zip(records, sidecars, names, strict=True)]  # fmt: skip
+    return [_checked(one, sidecar, simulated) for one, sidecar in zip(logged, sidecars, strict=True)]
+
+
+def _name_in_hand(at: int, count: int) -> str:
+    """Return the short name of a record that is no file."""
+    return "record" if count == 1 else f"record {at + 1}"
 
 
 def _files(paths: Sequence[str | Path]) -> list[Path]:
@@ -93,16 +102,18 @@ def _names(files: Sequence[Path]) -> list[str]:
     ]
 
 
-def _logged(path: Path, name: str, scenario: str | Path | None, commands: str | None) -> Logged:
-    """Read one record with its sidecar and its trial, and cut the trial to its length."""
-    record, sidecar = read_record(path), read_metadata(path.with_suffix(".toml"))
+def _logged(
+    record: Record, sidecar: Metadata, name: str, scenario: str | Path | None, commands: str | None
+) -> Logged:
+    """Return one record with its trial, which is cut to its length."""
     named = sidecar.scenario or scenario
     if not named:
         raise UserError(
-            f"Which trial is {path}? Give --scenario, or scenario = '…' in {path.stem}.toml beside it."
+            f"Which trial is {record.source}? Give --scenario, or scenario = '…' in {Path(record.source).stem}.toml "
+            "beside it."
         )
     trial = load(named)
-    _refuse(path, time_problems(record, trial, longer=commands == FROM_RECORD))
+    _refuse(record.source, time_problems(record, trial, longer=commands == FROM_RECORD))
     trial = cut_to(trial_with_commands(trial, record, commands), record)
     values, notes = _channels(record, sidecar)
     if scenario and sidecar.scenario and str(scenario) != sidecar.scenario:
@@ -110,7 +121,7 @@ def _logged(path: Path, name: str, scenario: str | Path | None, commands: str | 
     if HEADING in values:
         values[HEADING] = turned(values[HEADING], math.degrees(trial.start.heading))
     return Logged(
-        record=Record(source=str(path), time=record.time, values=values),
+        record=Record(source=record.source, time=record.time, values=values),
         setting=Setting(trial=trial, model=Model.of(trial), tethered=sidecar.tethered),
         noise={channel: sd for channel, sd in sidecar.noise.items() if channel in values},
         name=name,
@@ -181,7 +192,7 @@ def _columns(channels: Sequence[str] | Mapping[str, object]) -> str:
     return ", ".join(BY_NAME[channel].column for channel in channels)
 
 
-def _refuse(path: str | Path, problems: list[str]) -> None:
+def _refuse(path: str, problems: list[str]) -> None:
     if problems:
         raise UserError(listed(f"The measured record {path} cannot be diagnosed:", problems))
 

@@ -47,10 +47,10 @@ def missing_force(verdict: Verdict, title: Title) -> Figure | None:
     if unknown is None:
         return None
     figure, (axes,) = sheet(1, 1, title)
-    figure.set_size_inches(figure.get_figwidth(), 3.6)
-    figure.subplots_adjust(bottom=0.13, top=0.87)
     low, high = unknown.force - 1.96 * unknown.band, unknown.force + 1.96 * unknown.band
-    axes.fill_between(unknown.time, low, high, color=style.SKY, alpha=0.4, linewidth=0, label="95 %")
+    axes.fill_between(
+        unknown.time, low, high, color=style.SKY, alpha=0.4, linewidth=0, label="95 %", zorder=1.5
+    )
     axes.plot(
         unknown.time,
         unknown.force,
@@ -64,9 +64,8 @@ def missing_force(verdict: Verdict, title: Title) -> Figure | None:
     time_label([axes], 1)
     headline(axes, _what(unknown))
     if unknown.formula:
-        lines = textwrap.wrap(
-            "Looks like " + " + ".join(formula_term(term) for term in unknown.formula), FORMULA_LENGTH
-        )
+        formula = "Looks like " + " + ".join(formula_term(term) for term in unknown.formula)
+        lines = textwrap.wrap(formula, int(FORMULA_LENGTH * style.width() / style.WIDTH) - 3)
         place: dict[str, Any] = {"va": "top", "transform": axes.transAxes, "parse_math": False}
         axes.text(0.01, 0.98, "\n".join(lines), fontsize=style.SMALL, color=style.INK, **place)
         bottom, top = axes.get_ylim()
@@ -81,9 +80,9 @@ FORMULA_LENGTH = 110
 def _what(unknown: Unknown) -> str:
     """Return what is drawn in words: what it does, and which sign that has."""
     if unknown.is_drift:
-        return f"Drift of the {unknown.axis.replace('_', ' ')}'s sensor, that no cause explains, with its 95 % band"
+        return f"Drift of the {unknown.axis.replace('_', ' ')}'s sensor, that no cause explains"
     does = something(unknown.axis, unknown.force)
-    return f"{does[0].upper()}{does[1:]}: {AXES[unknown.axis].lower()}, with its 95 % band"
+    return f"{does[0].upper()}{does[1:]}: {AXES[unknown.axis].lower()}"
 
 
 MOST = 10
@@ -110,30 +109,39 @@ def evidence(verdict: Verdict, title: Title) -> Figure | None:
     ranked = [(name, p) for name, p in ranked if p >= LEAST]
     if not ranked:
         return None
-    known = sentences(verdict)
-    names = [_wrapped(explanation(name, known)) for name, _ in ranked]
+    names = [_wrapped(_beside_errors(name, verdict)) for name, _ in ranked]
     rows = sum(1 + name.count("\n") for name in names)
-    figure, (plain, logarithmic) = _bars(2, rows, title, left=0.42, apart=0.12)
+    figure, (plain, logarithmic) = _bars(2, rows, title, left=0.42, apart=0.2)
     colours = [style.BLUE if is_told(name, verdict) else style.GREY for name, _ in ranked]
     for axes in (plain, logarithmic):
         axes.barh(range(len(ranked)), [p for _, p in ranked], color=colours, height=0.65)
         axes.set_xlabel("probability", fontsize=style.NORMAL)
     _names(plain, names)
     plain.set_xlim(0.0, 1.0)
-    headline(plain, "Probability of each")
+    headline(plain, "Data put right" if verdict.then else "Probability")
     logarithmic.set_xscale("log")
     logarithmic.set_xlim(LEAST, 1.3)
     _names(logarithmic, [""] * len(ranked))
-    headline(logarithmic, "The same, for the small ones")
+    headline(logarithmic, "Small ones too")
     return figure
 
 
-NAME_LENGTH = 50
-"""So many letters of an explanation fit beside its bar."""
+def _beside_errors(name: str, verdict: Verdict) -> str:
+    """Return a hypothesis in words, without the errors in the data that are told."""
+    told = {one.id for one in verdict.data_errors} if verdict.then else set()
+    rest = " + ".join(one for one in name.split(" + ") if one not in told)
+    if not rest and name != "none":
+        return "nothing else is wrong"
+    return explanation(rest or name, sentences(verdict))
+
+
+NAME_LENGTH, NARROW_NAME_LENGTH = 50, 36
+"""So many letters of an explanation fit beside its bar; in a narrow figure."""
 
 
 def _wrapped(words: str) -> str:
-    return textwrap.fill(words[:1].upper() + words[1:], NAME_LENGTH)
+    most = NAME_LENGTH if style.width() >= style.ONE_COLUMN else NARROW_NAME_LENGTH
+    return textwrap.fill(words[:1].upper() + words[1:], most)
 
 
 def detectable(verdict: Verdict, title: Title) -> Figure | None:
@@ -142,7 +150,7 @@ def detectable(verdict: Verdict, title: Title) -> Figure | None:
     if not rows:
         return None
     known = sentences(verdict)
-    figure, (signal, apart) = _bars(2, len(rows), title, left=0.345, apart=1.95)
+    figure, (signal, apart) = _bars(2, len(rows), title, left=0.325, apart=2.05)
     size = [max(one.signal, FLOOR) for one in rows]
     signal.barh(
         range(len(rows)),
@@ -151,16 +159,18 @@ def detectable(verdict: Verdict, title: Title) -> Figure | None:
         height=0.65,
     )
     signal.axvline(SEEN_SIGNAL, color=style.INK, linewidth=0.8, linestyle=style.DASHES[1])
-    signal.set_xlabel("signal, in noise and tolerances", fontsize=style.NORMAL)
-    headline(signal, f"Seen from {SEEN_SIGNAL:g} on")
+    signal.set_xlabel("signal", fontsize=style.NORMAL)
+    headline(signal, f"Seen: from {SEEN_SIGNAL:g}")
     far = [max(one.discrimination, FLOOR) for one in rows]
     apart.barh(range(len(rows)), far, color=[_verdict_colour(one) for one in far], height=0.65)
     for limit in (CONFUSED_BELOW, CLEAR_FROM):
         apart.axvline(limit, color=style.INK, linewidth=0.8, linestyle=style.DASHES[1])
     apart.set_xlabel("D", fontsize=style.NORMAL)
-    headline(apart, f"Apart from {CLEAR_FROM:g} on")
+    headline(apart, f"Apart: from {CLEAR_FROM:g}")
+    apart.text(-0.06, 1.0, "looks most like:", ha="right", va="bottom", transform=apart.transAxes,
+               fontsize=style.TINY, color=style.GREY)  # fmt: skip
     causes = [_short(explanation(one.id, known)) for one in rows]
-    alike = [_short(f"/ {explanation(one.rival, known)}") for one in rows]
+    alike = [_short(explanation(one.rival, known)) for one in rows]
     for axes, words in ((signal, causes), (apart, alike)):
         axes.set_xscale("log")
         axes.set_xlim(left=FLOOR)
@@ -168,7 +178,9 @@ def detectable(verdict: Verdict, title: Title) -> Figure | None:
     return figure
 
 
-def _short(words: str, most: int = 46) -> str:
+def _short(words: str) -> str:
+    """Return as much of some words as fits beside a bar."""
+    most = 38 if style.width() >= style.ONE_COLUMN else 34
     return words if len(words) <= most else f"{words[: most - 1].rstrip()}…"
 
 
@@ -198,6 +210,8 @@ def _gain_bars(axes: Axes, rows: Mapping[str, ChannelGain]) -> None:
     axes.axhline(1.0, color=style.INK, linewidth=0.9, linestyle=style.DASHES[1])
     axes.set_yscale("log")
     axes.set_xticks(range(len(rows)), [_words(name) for name in rows], fontsize=style.SMALL)
+    if style.width() < style.ONE_COLUMN:
+        axes.set_xticklabels([_words(name).replace(" ", "\n") for name in rows])
     axes.set_ylabel("RMS error / noise floor", fontsize=style.NORMAL)
 
 
@@ -217,16 +231,25 @@ def _verdict_colour(discrimination: float) -> str:
     return style.AMBER if discrimination < CLEAR_FROM else style.BLUE
 
 
+BAR_ROW, NARROW_LEFT = 0.17, 0.6
+"""Height of a bar with its space [inch]; where bars begin in a narrow figure, whose panels stand below one another."""
+
+
 def _bars(
     columns: int, rows: int, title: Title, *, left: float = 0.2, apart: float = 0.72
 ) -> tuple[Figure, list[Axes]]:
     """Return a sheet for horizontal bars, as high as they need, with room for their names."""
-    from subzero.figures.style import BOTTOM, TOP
+    from subzero.figures.style import BOTTOM, TITLE_LINE, TOP
 
     figure, panels = sheet(1, columns, title)
-    height = TOP + 0.4 + BOTTOM + 0.17 * max(rows, 3)
+    stacked = columns if style.width() < style.ONE_COLUMN else 1
+    above = TOP + TITLE_LINE * (1 + figure.texts[0].get_text().count("\n"))
+    bars = 0.2 + BAR_ROW * max(rows, 3)
+    between = BOTTOM + TOP
+    height = above + stacked * bars + (stacked - 1) * between + BOTTOM
     figure.set_size_inches(style.width(), height)
-    figure.subplots_adjust(left=left, wspace=apart, bottom=BOTTOM / height, top=1.0 - (TOP + 0.2) / height)
+    figure.subplots_adjust(left=left if stacked == 1 else NARROW_LEFT, wspace=apart, hspace=between / bars,
+                           bottom=BOTTOM / height, top=1.0 - above / height)  # fmt: skip
     for text in figure.texts:
         text.set_y(1.0 - 0.09 / height)
     figure.texts[0].set_x(0.02)
@@ -274,8 +297,10 @@ def draw_diagnosis(verdict: Verdict, title: Title) -> dict[str, Figure]:
     for name, curves in verdict.curves.items():
         ending = f"_{_file(name)}" if len(verdict.curves) > 1 else ""
         drawn = Drawn(curves, verdict.misfit.get(name, {}), verdict)
-        figures[f"misfit{ending}"] = misfit(drawn, _named(title, name))
-        figures[f"rivals{ending}"] = rivals(drawn, _named(title, f"{name}: if a rival were true"))
+        several = len(verdict.curves) > 1
+        figures[f"misfit{ending}"] = misfit(drawn, _named(title, name) if several else title)
+        rival = f"{name}: if a rival were true" if several else "if a rival were true"
+        figures[f"rivals{ending}"] = rivals(drawn, _named(title, rival))
     figures["evidence"] = evidence(verdict, title)
     figures["detectable"] = detectable(verdict, title)
     figures["gain"] = gain(verdict, title)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -33,6 +33,9 @@ TERMS_SHOWN = 6
 VISIBLE = 1e-3
 """What never reaches this share of the largest is not worth a line."""
 
+CABLE, CABLE_COLOUR = "cable", style.GREEN
+"""The cable has one colour: what it does to the vehicle, and what it costs."""
+
 COMPONENTS = {
     "X": ("Forward force by term", "$X$ [N]"),
     "Y": ("Force to starboard by term", "$Y$ [N]"),
@@ -48,6 +51,10 @@ ENERGY_WORDS = {
     "added_mass_term": "added-mass form",
     "residual": "unexplained",
 }
+
+
+ENERGY_COLOURS = dict(zip(ENERGY_WORDS.values(), (style.BLUE, CABLE_COLOUR, style.ORANGE, style.PURPLE,
+                                                   style.AMBER, style.SKY), strict=True))  # fmt: skip
 
 
 def cable_forces(run: xr.Dataset, force: Axes, moment: Axes) -> None:
@@ -68,8 +75,10 @@ def forces(run: xr.Dataset, title: Title) -> Figure:
     """Draw what acts on the vehicle: the cable's force and moment, and every term in three components."""
     figure, panels = sheet(3, 2, title)
     cable_forces(run, panels[0], panels[1])
-    for axes, component in zip(panels[2:5], _busiest(run), strict=True):
-        _terms(run, component, axes)
+    components = _busiest(run)
+    looks = _looks(run, components)
+    for axes, component in zip(panels[2:5], components, strict=True):
+        _terms(run, component, axes, looks)
     energy(run, panels[5])
     time_label(panels, 2)
     return figure
@@ -82,7 +91,8 @@ def energy(run: xr.Dataset, axes: Axes) -> None:
     parts = {words: np.nan_to_num(values) for words, values in parts.items() if np.isfinite(values).any()}
     work = run["energy_propeller_work"].values
     seen = VISIBLE * max(np.abs(values).max() for values in parts.values())
-    for (words, values), colour in zip(parts.items(), CYCLE, strict=False):
+    for words, values in parts.items():
+        colour = ENERGY_COLOURS[words]
         if np.abs(values).max() > seen or words == ENERGY_WORDS["residual"]:
             axes.plot(time, values, color=colour, linewidth=1.2, label=words)
     axes.plot(time, work, color=style.INK, linewidth=1.4, label="propeller's work")
@@ -100,14 +110,30 @@ def _busiest(run: xr.Dataset) -> list[str]:
     return ["X", "Y", "N"] if most["N"] >= most["M"] else ["X", "Z", "M"]
 
 
-def _terms(run: xr.Dataset, component: str, axes: Axes) -> None:
-    """Draw the largest terms of one component, and the sum of the others."""
+def _looks(run: xr.Dataset, components: list[str]) -> dict[int, dict[str, Any]]:
+    """Return for each term that is shown its colour and dash, the same in every panel; the cable's are its own."""
+    shown = dict.fromkeys(at for name in components for at in _largest(run, name)[1][:TERMS_SHOWN])
+    names = run["term"].values.tolist()
+    others = [at for at in shown if names[at] != CABLE]
+    colours = [one for one in CYCLE[:TERMS_SHOWN] if one != CABLE_COLOUR]
+    looks = [{"color": colour, "linestyle": dash} for dash in DASHES for colour in colours]
+    own = {at: {"color": CABLE_COLOUR} for at in shown if names[at] == CABLE}
+    return own | dict(zip(others, looks, strict=False))
+
+
+def _largest(run: xr.Dataset, component: str) -> tuple[np.ndarray, list[int]]:
+    """Return the terms of a component over time (samples, terms), and which are worth a line, the largest first."""
     table = np.nan_to_num(run["force_breakdown"].sel(component=component).values)
     size = np.abs(table).max(axis=0)
-    order = [int(at) for at in np.argsort(-size, kind="stable") if size[at] > VISIBLE * size.max()]
+    return table, [int(at) for at in np.argsort(-size, kind="stable") if size[at] > VISIBLE * size.max()]
+
+
+def _terms(run: xr.Dataset, component: str, axes: Axes, looks: dict[int, dict[str, Any]]) -> None:
+    """Draw the largest terms of one component, and the sum of the others."""
+    table, order = _largest(run, component)
     names = [str(name).replace("_", " ") for name in run["term"].values]
-    for at, colour in zip(order[:TERMS_SHOWN], CYCLE, strict=False):
-        axes.plot(run["time"].values, table[:, at], color=colour, linewidth=1.2, label=names[at])
+    for at in order[:TERMS_SHOWN]:
+        axes.plot(run["time"].values, table[:, at], linewidth=1.2, label=names[at], **looks[at])
     if len(order) > TERMS_SHOWN:
         rest = table[:, order[TERMS_SHOWN:]].sum(axis=1)
         axes.plot(run["time"].values, rest, color=style.GREY, linewidth=1.0, label="all others")

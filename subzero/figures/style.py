@@ -156,7 +156,9 @@ def sheet(rows: int, columns: int, title: Title) -> tuple[Figure, list[Axes]]:
     if columns == 2 and width() < ONE_COLUMN:
         rows, columns = 2 * rows, 1
     words = _lines_of(title)
-    top = TOP + TITLE_LINE * len(words)
+    top = TOP + TITLE_LINE * (
+        len(words) + (width() < ONE_COLUMN)
+    )  # headlines of narrow panels may have two lines
     bottom = BOTTOM + (FOOTER if title.warnings else 0.0)
     height = rows * ROW_HEIGHT + bottom + top
     figure = Figure(figsize=(width(), height), dpi=DPI, facecolor="white")
@@ -237,7 +239,10 @@ def legend(axes: Axes, columns: int = 3, *, tight: bool = False, **where: Any) -
         rows = math.ceil(sum(1 + label.count("\n") for label in labels) / columns)
         taken = min((rows * LEGEND_ROW + LEGEND_MARGIN) / height, 0.6)
         low, high = axes.get_ylim()
-        axes.set_ylim(low, low + (high - low) / (1.0 - taken))
+        if axes.get_yscale() == "log":
+            axes.set_ylim(low, low * (high / low) ** (1.0 / (1.0 - taken)))
+        else:
+            axes.set_ylim(low, low + (high - low) / (1.0 - taken))
         where = {"loc": "upper left", "ncols": columns, "columnspacing": COLUMN_GAP, "borderaxespad": 0.2}
     look = {"framealpha": 0.85, "edgecolor": "none", "handletextpad": HANDLE_GAP}
     axes.legend(**{"fontsize": size, "handlelength": handle} | look | where)
@@ -300,7 +305,8 @@ def calm(axes: Axes, smallest: float = 1e-6) -> None:
 
 
 def time_label(panels: list[Axes], columns: int) -> None:
-    """Name the time axis below the lowest row only."""
+    """Name the time axis below the lowest row only; in a narrow figure, panels stand below one another."""
+    columns = columns if width() >= ONE_COLUMN else 1
     for axes in panels[-columns:]:
         axes.set_xlabel("time [s]", fontsize=NORMAL, labelpad=2)
 

@@ -58,8 +58,8 @@ OUT_OF_USE_S, KEPT = 30 * DAY_S, 8
 """A folder is removed that was not used for so long [s], or for a day if so many of its package are newer."""
 
 _OUR_FOLDER = re.compile(rf"({'|'.join((*PACKAGES, OTHERS))})-[0-9a-f]{{12}}")
-_NO_MATTER = re.compile("CACHE|THREAD|CUDA|GDB_BINARY|COLOR|SHOW_HELP")
-"""Settings of numba that change with the machine or the terminal, and never the code."""
+_NO_MATTER = re.compile("CACHE|THREAD|CUDA|GDB_BINARY|COLOR|SHOW_HELP|HAVE_YAML")
+"""Settings of numba that change with the machine, the terminal or what else is installed, and never the code."""
 
 
 class Home:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from subzero.page.replay import HULL, actors_of, encode
 from subzero.page.report import Line, Report, Section, Table, render
-from subzero.report import NOTHING, RUNS, fit_rows, number_groups
+from subzero.report import NOTHING, RUNS, fit_rows, index_words, number_groups
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -110,7 +110,10 @@ def _indices(summary: dict[str, Any], labels: list[str]) -> list[tuple[str, ...]
         return NOTHING if value is None else f"{value:.4g}"
 
     names = summary[labels[0]]["indices"]
-    return [(name, *(cell(summary[label]["indices"].get(name)) for label in labels)) for name in names]
+    return [
+        (index_words(name), *(cell(summary[label]["indices"].get(name)) for label in labels))
+        for name in names
+    ]
 
 
 def _sources(run: xr.Dataset) -> dict[str, str]:

@@ -11,12 +11,13 @@ import base64
 import io
 import json
 import re
-import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from importlib import resources
 from typing import TYPE_CHECKING, Any, Literal
+
+from subzero.output import lacking_letters_as_boxes
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -201,8 +202,6 @@ def _image(figure: Figure) -> str:
     import matplotlib as mpl
 
     held = io.BytesIO()
-    with mpl.rc_context(SVG_STYLE), warnings.catch_warnings():
-        # A letter that the font of figures lacks is a box there; the page itself says the same words above them.
-        warnings.filterwarnings("ignore", "Glyph .* missing from font", UserWarning)
+    with mpl.rc_context(SVG_STYLE), lacking_letters_as_boxes():
         figure.savefig(held, format="svg", metadata={"Date": None})
     return f"data:image/svg+xml;base64,{base64.b64encode(held.getvalue()).decode('ascii')}"

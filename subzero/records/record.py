@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import csv
 import io
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -25,7 +26,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from subzero.channels import BY_COLUMN, BY_NAME, HEADING, TIME, TURN, turned
-from subzero.errors import UserError, listed, printable, suggestion
+from subzero.errors import UserError, listed, nearest, printable
 from subzero.errors import short as shown
 from subzero.user_file import MOST_COLUMNS, MOST_OF_A_CSV, UnreadableFileError, read_text
 
@@ -38,6 +39,9 @@ GAPS = ("", "nan", "+nan", "-nan")
 
 LARGEST = 1e9
 """No channel measures more than this, in whatever unit; squares of it are still far from an overflow."""
+
+LATEST = 1e13
+"""A time that is larger is none; one beyond LARGEST counts from 1970, in seconds or in thousandths. [s]"""
 
 Row = tuple[int, list[str]]
 """Line number in the file (from 1), and its cells."""
@@ -125,8 +129,48 @@ def _table(path: str | Path) -> tuple[list[str], list[Row]]:
     return rows[0][1], rows[1:]
 
 
+OTHER_WORDS = {
+    TIME.column: ("time", "t", "timestamp", "seconds", "elapsed"),
+    "surge_speed_m_s": ("speed", "velocity", "stw", "log", "u"),
+    "speed_over_ground_m_s": ("sog",),
+    "heading_deg": ("heading", "hdg", "compass", "yaw", "psi", "course", "cog"),
+    "pitch_deg": ("pitch", "theta"),
+    "roll_deg": ("roll", "heel", "phi"),
+    "depth_m": ("depth", "z"),
+    "propeller_speed_rps": ("rpm", "rps", "propeller", "thruster", "shaft"),
+    "rudder_angle_deg": ("rudder",),
+    "cable_tension_N": ("tension", "load", "pull"),
+    "cable_length_m": ("cable", "tether"),
+    "battery_voltage_V": ("battery", "voltage", "volt"),
+    "north_m": ("north", "northing"),
+    "east_m": ("east", "easting"),
+}
+"""A column → what other loggers call it."""
+
+USUAL = "surge_speed_m_s, heading_deg, yaw_rate_deg_s, pitch_deg, roll_deg, depth_m, cable_tension_N"
+"""Columns that many records have."""
+
+SLIP_LIKENESS = 0.75
+"""A name that is so much like a column is that column with a slip of the pen."""
+
+SEPARATORS = {";": "semicolons", "\t": "tabs", "|": "bars"}
+"""What stands between the cells of a file that is no CSV."""
+
+
 def _header_problems(header: list[str]) -> list[str]:
+    between = next(
+        (words for mark, words in SEPARATORS.items() if len(header) == 1 and mark in header[0]), ""
+    )
+    if between:
+        return [
+            f"its columns are separated by {between}; separate them by commas, and write numbers with a point"
+        ]
     problems = [_unknown(name) for name in header if name not in BY_COLUMN]
+    if problems:
+        problems.append(
+            f"rename such a column, in the unit of its new name, or leave it out. Columns are {TIME.column}, "
+            f"{USUAL}, and more in docs/diagnosis.md"
+        )
     twice = sorted({name for name in header if header.count(name) > 1})
     problems += [f"column {shown(name)} occurs twice; keep one" for name in twice]
     if TIME.column not in header:
@@ -140,8 +184,17 @@ def _header_problems(header: list[str]) -> list[str]:
 
 def _unknown(name: str) -> str:
     """Say that a column is not known, and which might be meant: often a channel without its unit."""
-    meant = f" Did you mean '{BY_NAME[name].column}'?" if name in BY_NAME else suggestion(name, BY_COLUMN)
-    return f"unknown column {shown(name)}.{meant}"
+    meant = BY_NAME[name].column if name in BY_NAME else _meant(name)
+    guess = f" Did you mean '{meant}'?" if meant else ""
+    return f"unknown column {shown(name)}.{guess}"
+
+
+def _meant(name: str) -> str:
+    """Return the column that is probably meant: one written nearly so, else what other loggers call so; or nothing."""
+    words = re.findall(r"[a-z]+", re.sub(r"[\[(].*", "", name.lower()))  # without a unit in brackets
+    others = [column for word in words for column, names in OTHER_WORDS.items() if word in names]
+    likely = [*nearest(name, BY_COLUMN, likeness=SLIP_LIKENESS), *(others if "rate" not in words else ())]
+    return next(iter([*likely, *nearest(name, BY_COLUMN)]), "")
 
 
 def _numbers(name: str, at: int, rows: list[Row], problems: list[str]) -> np.ndarray:
@@ -156,7 +209,7 @@ def _numbers(name: str, at: int, rows: list[Row], problems: list[str]) -> np.nda
         except ValueError:
             problems.append(f"line {line}, column '{name}': {shown(cell)} is not a number; leave a gap empty")
             continue
-        if abs(value) <= LARGEST:
+        if abs(value) <= (LATEST if name == TIME.column else LARGEST):
             column[index] = value
         else:
             why = f"outside ±{LARGEST:g}" if np.isfinite(value) else "not finite"
@@ -165,7 +218,12 @@ def _numbers(name: str, at: int, rows: list[Row], problems: list[str]) -> np.nda
 
 
 def _time_problems(time: np.ndarray, rows: list[Row], at: int) -> list[str]:
-    """Time has no gaps and increases."""
+    """Time counts from the start of the trial, has no gaps and increases."""
+    if time.size and time[0] > LARGEST:
+        return [
+            f"the first time is {time[0]:.0f}, which is a time of day; '{TIME.column}' counts in seconds from the "
+            "start of the trial: subtract the time of its start"
+        ]
     gaps = [line for line, row in rows if row[at].lower() in GAPS]
     lines = [line for line, _ in rows]
     return [f"line {line}: the time is missing; every sample needs one" for line in gaps] + [

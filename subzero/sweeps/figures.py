@@ -12,6 +12,7 @@ from subzero.figures.style import (
     BLUE,
     GREY,
     INK,
+    ONE_COLUMN,
     ORANGE,
     SMALL,
     TINY,
@@ -24,6 +25,7 @@ from subzero.figures.style import (
     time_label,
     width,
 )
+from subzero.report import index_words
 from subzero.sweeps.design import Points
 from subzero.sweeps.member import Job
 from subzero.sweeps.outcomes import unit_of
@@ -121,7 +123,7 @@ def _histograms(found: Gathered, alive: list[int], title: Title) -> Figure:
         for rank, dash in ((5.0, ":"), (50.0, "-"), (95.0, ":")):
             axes.axvline(np.percentile(values, rank), color=ORANGE, linewidth=1.1, linestyle=dash)
         label(axes, f"[{unit_of(found.names[i])}]", "members")
-        headline(axes, found.names[i])
+        headline(axes, _scalar(found.names[i]))
     _hide(panels, len(shown))
     panels[0].plot([], [], color=ORANGE, label="median, 5 and 95 %")
     legend(panels[0], 1)
@@ -150,7 +152,7 @@ def _against(points: Points, found: Gathered, effects: list[Effect], title: Titl
         if row == len(scalars) - 1:
             axes.set_xlabel(f"{_short(points.names[k])}\n[{points.spreads[k].unit}]", fontsize=SMALL)
         if column == 0:
-            axes.set_ylabel(f"{_short(found.names[i], 22)}\n[{unit_of(found.names[i])}]", fontsize=SMALL)
+            axes.set_ylabel(f"{_scalar(found.names[i])}\n[{unit_of(found.names[i])}]", fontsize=SMALL)
         axes.locator_params(axis="x", nbins=4)
     figure.subplots_adjust(bottom=figure.subplotpars.bottom + 0.16 / figure.get_figheight())
     return figure
@@ -175,7 +177,7 @@ def _tornado(points: Points, effects: list[Effect], title: Title) -> Figure:
     figure, panels = sheet(len(scalars), 1, title)
     bars = min(MOST_BARS, len(points.names))
     figure.set_size_inches(width(), figure.get_figheight() + len(scalars) * 0.12 * max(bars - 5, 0))
-    figure.subplots_adjust(left=BAR_LEFT, right=0.97, hspace=0.5)
+    figure.subplots_adjust(left=BAR_LEFT if width() >= ONE_COLUMN else 2.0 * BAR_LEFT, right=0.97, hspace=0.5)
     for axes, scalar in zip(panels, scalars, strict=True):
         own = [one for one in effects if one.scalar == scalar][:MOST_BARS]
         places = np.arange(len(own))
@@ -191,11 +193,16 @@ def _tornado(points: Points, effects: list[Effect], title: Title) -> Figure:
         axes.axvline(0.0, color=GREY, linewidth=0.8)
         if points.design not in ("morris", "saltelli"):
             axes.set_xlim(-1.0, 1.0)
-        headline(axes, f"{scalar}" + (f" [{unit_of(scalar)}]" if points.design == "morris" else ""))
+        headline(axes, _scalar(scalar) + (f" [{unit_of(scalar)}]" if points.design == "morris" else ""))
     panels[-1].set_xlabel(method, fontsize=SMALL)
     if second:
         panels[0].legend(fontsize=SMALL, loc="lower right", framealpha=0.85, edgecolor="none")
     return figure
+
+
+def _scalar(name: str) -> str:
+    """Return a number of a run in words, without its unit: ``peak_speed_m_s`` is "peak speed"."""
+    return index_words(name).partition(" [")[0].replace(".", ", ")
 
 
 def _short(name: str, most: int = NAME_LENGTH) -> str:

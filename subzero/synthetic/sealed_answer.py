@@ -12,7 +12,10 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
+from subzero.diagnosis.hypothesis.extended_model import plain_id
+from subzero.diagnosis.report import words
 from subzero.errors import UserError, printable
+from subzero.external_force import FEATURES
 from subzero.user_file import MOST_OF_AN_ANSWER, UnreadableFileError, read_bytes
 
 SEALED = "answer.sealed"
@@ -50,12 +53,22 @@ class Answer:
             return "Nothing is wrong: every number is within its tolerance."
         lines = [f"{name}: {words}" for name, words in zip(self.names, self.sentences, strict=True)]
         for key, values in self.deviations.items():
-            at = f", from t = {self.starts[key]:g} s on" if key in self.starts else ""
-            sizes = ", ".join(f"{name} {value:+.4g}" for name, value in values.items())
-            lines.append(f"  {key} differs from the model by {sizes}{at}")
-        if self.axis:
-            lines.append(f"  on the axis {self.axis}" + (f", with {self.feature}" if self.feature else ""))
+            at = f", from {self.starts[key]:g} s on" if key in self.starts else ""
+            sizes = ", ".join(_size(key, name, value) for name, value in values.items())
+            lines.append(f"  against the model: {sizes}{at}")
+        if self.axis in words.PUSHES:
+            goes = f", with {FEATURES[self.feature].words}" if self.feature in FEATURES else ""
+            lines.append(f"  {words.something(self.axis)}{goes}; it is in no catalogue")
         return "\n".join(map(printable, lines))
+
+
+def _size(cause: str, parameter: str, deviation: float) -> str:
+    """Return how far a number of a cause is from the model's, with its unit."""
+    effect = words.effects().get(plain_id(cause))
+    units = {one.name: one.unit for one in effect.parameters} if effect is not None else {}
+    unit = units.get(parameter, "")
+    sign = "+" if deviation >= 0.0 and unit != "1" else ""
+    return f"{parameter.replace('_', ' ')} {sign}{words.number(deviation, unit)}"
 
 
 def seal(answer: Answer) -> str:

@@ -31,7 +31,7 @@ def test_a_manoeuvre_delivers_both_runs_and_their_indices(tmp_path, capsys):
     _, expected = autopilot.manoeuvre("zigzag", size=12.0, tethered=False)
     assert summary["untethered"]["indices"] == expected
     told = capsys.readouterr().out
-    assert "overshoot_1_deg" in told
+    assert "overshoot 1 [degree]" in told
     assert "tethered" in told
 
 
@@ -61,7 +61,9 @@ def test_an_autopilot_delivers_a_step(tmp_path, capsys):
     ]
     assert main(words) == FINE
     assert {path.name for path in (tmp_path / "s").iterdir()} == FILES
-    assert "fed forward of the cable: formula" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "Heading step: autopilot lqr, the cable fed forward by formula" in said
+    assert "rise time [s]" in said
 
 
 @pytest.mark.parametrize(

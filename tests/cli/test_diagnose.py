@@ -151,7 +151,7 @@ def test_a_healthy_record_is_told_as_one(engine, capsys):
         (["diagnose", "record.csv", "--scenario", "fig7"], "there is no such scenario"),
         (["diagnose", "record.csv", "--scenario", "fig6", "--effects", "no.py"], "There is no effects file 'no.py'"),
         (["diagnose", "record.csv", "--scenario", "fig6", "--commands", "mine"], "--commands"),
-        (["diagnose", "--scenario", "fig6"], "requires an argument"),
+        (["diagnose", "--scenario", "fig6"], "subzero diagnose needs FILES, as in: "),
         (["diagnose", ".", "--scenario", "fig4"], "prescribes the motion"),
         (["simulate", "fig6", "--with", "no.toml"], "there is no such file"),
         (["compare", "fig6", "--with", "record.csv"], "this is not valid TOML"),

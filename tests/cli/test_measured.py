@@ -44,11 +44,32 @@ def test_a_heading_that_jumps_from_360_to_0_is_made_continuous(file):
     assert_allclose(record.values["heading"], [350.0, 358.0, np.nan, 364.0, 372.0])
 
 
+RENAME = (
+    "rename such a column, in the unit of its new name, or leave it out. Columns are time_s, surge_speed_m_s, "
+    "heading_deg, yaw_rate_deg_s, pitch_deg, roll_deg, depth_m, cable_tension_N, and more in docs/diagnosis.md"
+)
 REFUSED = {
     "time_s,surge_sped_m_s,heading,x\n0,1,2,3\n": [
         "unknown column 'surge_sped_m_s'. Did you mean 'surge_speed_m_s'?",
         "unknown column 'heading'. Did you mean 'heading_deg'?",
         "unknown column 'x'.",
+        RENAME,
+    ],
+    "Time [s],Speed (kn),Hdg,Yaw rate,Depth\n0,1,2,3,4\n": [
+        "unknown column 'Time [s]'. Did you mean 'time_s'?",
+        "unknown column 'Speed (kn)'. Did you mean 'surge_speed_m_s'?",
+        "unknown column 'Hdg'. Did you mean 'heading_deg'?",
+        "unknown column 'Yaw rate'. Did you mean 'yaw_rate_deg_s'?",
+        "unknown column 'Depth'. Did you mean 'depth_m'?",
+        RENAME,
+        "column 'time_s' is missing; it is needed, in seconds since the first command",
+    ],
+    "time_s;depth_m\n0;1,5\n": [
+        "its columns are separated by semicolons; separate them by commas, and write numbers with a point"
+    ],
+    "time_s,depth_m\n1700000000,1\n1700000001,2\n": [
+        "the first time is 1700000000, which is a time of day; 'time_s' counts in seconds from the start of the "
+        "trial: subtract the time of its start"
     ],
     "depth_m,depth_m\n0,1\n": [
         "column 'depth_m' occurs twice; keep one",

@@ -13,11 +13,13 @@ from subzero.cli import MISTAKE, main
 MESSAGES = {
     "simulat fig6": 'Unknown command "simulat". Did you mean "simulate"? '
     "Available commands: list, new, show, validate, simulate, compare, plot, explore, ...\nTry 'subzero --help'.",
-    "simulate": "Command \"simulate\" parameter SCENARIO requires an argument.\nTry 'subzero --help'.",
-    "simulate fig6 --oot x": "Unknown option: --oot. Did you mean --out?\nTry 'subzero --help'.",
-    "compare fig6 --untethered": "Unknown option: --untethered.\nTry 'subzero --help'.",
-    "compare fig6 fig5": "Unexpected argument: fig5.\nTry 'subzero --help'.",
-    "compare fig6 --out": "Command \"compare\" parameter --out requires an argument.\nTry 'subzero --help'.",
+    "simulate": "subzero simulate needs SCENARIO, as in: subzero simulate fig6\nTry 'subzero simulate --help'.",
+    "autopilot": "subzero autopilot needs NAME, as in: subzero autopilot heading_step\n"
+    "Try 'subzero autopilot --help'.",
+    "simulate fig6 --oot x": "Unknown option: --oot. Did you mean --out?\nTry 'subzero simulate --help'.",
+    "compare fig6 --untethered": "Unknown option: --untethered.\nTry 'subzero compare --help'.",
+    "compare fig6 fig5": "Unexpected argument: fig5.\nTry 'subzero compare --help'.",
+    "compare fig6 --out": "--out needs a value.\nTry 'subzero compare --help'.",
     "compare fig66": "The scenario cannot be used (1 problem):\n"
     "  fig66: there is no such scenario. Did you mean 'fig6'? Or give the path of a TOML file.",
     "compare fig6 --measured no.csv": "There is no measured record no.csv. Give the path of a CSV file.",

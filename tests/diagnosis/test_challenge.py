@@ -26,7 +26,7 @@ from subzero.synthetic.planted import (
     make_record,
 )
 from subzero.synthetic.reference_run import simulate_reference, truth_of
-from subzero.synthetic.sealed_answer import SEALED, reveal
+from subzero.synthetic.sealed_answer import SEALED, Answer, reveal
 from subzero.synthetic.unmodelled_forces import KINDS, draw_unmodelled, force_along
 
 FIG6 = subzero.load_scenario("fig6")
@@ -62,7 +62,21 @@ def test_the_answer_is_told_as_it_was_hidden(made):
     assert answer.names == what.answer.names == what.hidden.names
     assert answer.deviations == what.answer.deviations
     assert answer.names[0] in str(answer)
-    assert f"{next(iter(answer.deviations[answer.names[0]].values())):+.4g}" in str(answer)
+    effect = EFFECTS[answer.names[0]]
+    for one in effect.parameters:
+        size, unit = answer.deviations[effect.id][one.name], one.unit
+        said = f"{100.0 * size:+.3g} %" if unit == "1" else f"{size:+.3g} {unit}"
+        assert f"{one.name.replace('_', ' ')} {said}" in str(answer)
+
+
+def test_what_no_catalogue_has_is_told_without_symbols():
+    leak = Answer(
+        kind="outside", names=("outside:leak",), sentences=("water came in",), axis="Z", feature="time"
+    )
+    assert (
+        "something pushes the hull up and down, with the time since the start; it is in no catalogue"
+        in str(leak)
+    )
 
 
 def test_a_changed_or_missing_answer_is_refused(made, tmp_path):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from subzero import read_trials
+from subzero import read_record, read_trials
 from subzero.errors import UserError
 
 TIME = np.arange(0.0, 30.01, 0.1)
@@ -80,6 +80,21 @@ def test_a_record_keeps_its_gaps_and_brings_the_trial_and_the_nominal_model(writ
     assert logged.setting.trial.name == "fig6"
     assert logged.setting.tethered
     assert logged.setting.model.cable.diameter > 0.0
+
+
+def test_a_record_in_hand_is_taken_as_its_file_is(write):
+    path = write(columns("surge_speed", "heading"))
+    (of_file,), (in_hand,) = read(path), read(read_record(path))
+    assert in_hand.name == "record"
+    assert in_hand.setting.trial.duration == of_file.setting.trial.duration
+    for name, values in of_file.record.values.items():
+        assert_allclose(in_hand.record.values[name], values)
+    assert [one.name for one in read([read_record(path), read_record(path), path])] == [
+        "record",
+        "record 1",
+        "record 2",
+    ]
+    assert "Which trial is record.csv?" in refusal(read_record(path), scenario=None)
 
 
 def test_a_short_record_makes_the_trial_as_short(write):

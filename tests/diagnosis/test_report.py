@@ -5,20 +5,25 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 from subzero.diagnosis import (
     CAUSE_NAMED,
+    DATA_ERROR,
     NOTHING_WRONG,
     OUTSIDE,
+    UNDECIDED,
     Cause,
     ChannelGain,
     Curves,
     Detectability,
     Estimate,
     Extended,
+    FoundError,
     Gain,
     Misfit,
     NextTrial,
@@ -30,6 +35,8 @@ from subzero.diagnosis import (
 from subzero.diagnosis.assessment import detectability
 from subzero.figures.diagnosis import draw_diagnosis
 from subzero.figures.style import Title
+from subzero.stage import Stage
+from subzero.write_diagnosis import tell
 
 TIME = np.linspace(0.0, 30.0, 301)
 LAG = Estimate(value=0.31, low=0.23, high=0.39, unit="s", nominal=0.1, deviation=0.21, deviation_sd=0.04)
@@ -216,6 +223,68 @@ def test_a_healthy_record_says_what_it_could_not_have_shown():
     assert "would have shown 2 of the 3 causes" in said["How sure is that"]
     assert "could not have shown: the water moves." in said["How sure is that"]
     assert "2.3 times the noise" in said["What it costs"]
+
+
+def other_sign(**probabilities):
+    """Return a verdict on a record whose heading has the other sign, and that is healthy once that is put right."""
+    error = FoundError(id="sign:heading", record="record", columns=("heading_deg",), probability=0.9995,
+                       sentence="heading_deg has the other sign", remedy="change its sign")  # fmt: skip
+    row = dataclasses.replace(make_misfit(0.4), rmse=3.5, nrmse=8.7)
+    curves = make_curves()
+    models = curves.models | {"tolerance": curves.models["extended"]}
+    return Verdict(
+        verdict=DATA_ERROR, then=NOTHING_WRONG, sentence="", data_errors=(error,), misfit={"record": {"heading": row}},
+        probabilities={name.replace("__", " + "): p for name, p in probabilities.items()},
+        curves={"record": dataclasses.replace(curves, models=models)},
+    )  # fmt: skip
+
+
+def test_beside_an_error_in_the_data_it_is_said_how_sure_both_are_and_what_calibration_leaves():
+    verdict = other_sign(**{"sign:heading": 0.7, "sign:heading__hull_drag": 0.3})
+    said = answers(verdict)
+    assert said["What is wrong"].endswith("Nothing is wrong beyond the tolerances of the model.")
+    assert said["How sure is that"].startswith(
+        "That heading_deg has the other sign: as sure as records can make one. That nothing else is wrong: more likely "
+        "than not (probability 0.700)."
+    )
+    assert "misses the heading by 3.5 degree, 8.7 times the noise" in said["What it costs"]
+    residual = (
+        0.4 * np.random.default_rng(0).normal(size=(2, TIME.size))[1]
+    )  # the noise that make_curves draws
+    left = report.words.number(float(np.sqrt(np.mean(np.delete(residual, 100) ** 2))), "degree")
+    assert f"With numbers bent within their tolerances that is {left}." in said["What it costs"]
+
+
+def test_what_stands_beside_an_error_in_the_data_is_drawn_without_it():
+    verdict = other_sign(**{"sign:heading": 0.7, "sign:heading__hull_drag": 0.3})
+    axes = draw_diagnosis(verdict, Title(words="a trial", scenario="fig6"))["evidence"].axes[0]
+    names = [" ".join(one.get_text().split()) for one in axes.get_yticklabels()]
+    assert names == ["Nothing else is wrong", "The hull has another drag"]
+
+
+def test_what_is_told_of_nothing_is_the_probability_of_nothing():
+    healthy = Verdict(verdict=NOTHING_WRONG, sentence="", probabilities={"none": 0.6, "hull_drag": 0.4})
+    assert (
+        "That nothing is wrong: more likely than not (probability 0.600)."
+        in answers(healthy)["How sure is that"]
+    )
+    assert report.words.is_told("none", healthy)
+    assert not report.words.is_told("none", dataclasses.replace(healthy, verdict=UNDECIDED))
+
+
+def test_a_share_is_told_as_more_or_less_than_in_the_model():
+    cause = dataclasses.replace(NAMED.causes[0], parameters={"share": INERTIA})
+    assert report.words.cause_in_short(cause) == "The rudder servo lags: 35 % more than in the model."
+    less = dataclasses.replace(cause, parameters={"share": dataclasses.replace(INERTIA, value=-0.2)})
+    assert report.words.cause_in_short(less).endswith("20 % less than in the model.")
+
+
+def test_the_terminal_names_the_file_that_is_simulated_with_and_shows_every_error(tmp_path, capsys):
+    stage = Stage(tmp_path, Path("some where"))
+    tell(NAMED, stage, Console(width=80), scenario="fig6")
+    said = capsys.readouterr().out
+    assert "subzero simulate fig6 --with 'some where/extended.toml'" in said
+    assert " ".join(said.split()).count("nominal extended best rival noise floor") == 1
 
 
 def test_an_interrupted_verdict_says_so():

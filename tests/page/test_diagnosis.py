@@ -21,11 +21,13 @@ from subzero.diagnosis.hypothesis.extended_model import all_effects, apply
 from subzero.diagnosis.hypothesis.logged import Logged
 from subzero.diagnosis.results import (
     CAUSE_NAMED,
+    DATA_ERROR,
     OUTSIDE,
     Cause,
     Curves,
     Estimate,
     Extended,
+    FoundError,
     Misfit,
     Rival,
     Unknown,
@@ -158,6 +160,23 @@ def test_the_replay_has_the_extended_model_solid_and_simulated_and_measured_as_g
     depth = np.interp(measured["time"], true["time"], true["depth"])
     np.testing.assert_allclose(measured["depth"], depth, atol=0.02, err_msg="with its outlier left out")
     assert float(measured["north"][0]) == float(true["north"][0])
+
+
+def test_a_record_with_errors_in_its_data_is_replayed_as_it_is_once_they_are_put_right(
+    verdict: Verdict, logged: Logged
+) -> None:
+    record = logged.record
+    wrong = dataclasses.replace(record, values=record.values | {"heading": -record.values["heading"]})
+    right = Curves(time=record.time, measured=record.values, models={}, used={})
+    error = FoundError(id="sign:heading", record=logged.name, columns=("heading_deg",), sentence="heading_deg has the "
+                       "other sign", remedy="change its sign", probability=1.0)  # fmt: skip
+    told = dataclasses.replace(verdict, verdict=DATA_ERROR, then=verdict.verdict, data_errors=(error,),
+                               curves={logged.name: right})  # fmt: skip
+    actors, said = replayed(told, dataclasses.replace(logged, record=wrong), run)
+    as_it_is, _ = replayed(verdict, logged, run)
+    assert actors[2].name == as_it_is[2].name == "measured"
+    assert "its errors put right" in said
+    np.testing.assert_allclose(actors[2].run["heading"][:3], as_it_is[2].run["heading"][:3], atol=1e-9)
 
 
 def test_a_record_that_does_not_say_where_it_went_has_no_ghost(verdict: Verdict, logged: Logged) -> None:

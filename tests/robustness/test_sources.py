@@ -171,7 +171,7 @@ def test_versions_and_settings_of_the_compiler_are_in_the_key(monkeypatch, owner
     assert compiler() != before
 
 
-@pytest.mark.parametrize("name", ["CACHE_DIR", "NUMBA_NUM_THREADS", "COLOR_SCHEME"])
+@pytest.mark.parametrize("name", ["CACHE_DIR", "NUMBA_NUM_THREADS", "COLOR_SCHEME", "_HAVE_YAML"])
 def test_what_changes_no_code_is_not_in_the_key(monkeypatch, name):
     before = compiler()
     monkeypatch.setattr(numba.config, name, "another")

@@ -10,6 +10,8 @@ import math
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
+import numpy as np
+
 from subzero.channels import BY_NAME
 from subzero.diagnosis.hypothesis.extended_model import plain_id
 from subzero.diagnosis.report import words
@@ -52,14 +54,17 @@ class Answer(NamedTuple):
     command: str = ""
 
 
-def summary(verdict: Verdict, scenario: str = "SCENARIO") -> tuple[Answer, ...]:
+def summary(
+    verdict: Verdict, scenario: str = "SCENARIO", extended: str = "extended.toml"
+) -> tuple[Answer, ...]:
     """Return the answers to what everybody asks.
 
     Args:
         verdict: of `subzero.diagnose`.
         scenario: the trial's name, for lines of the shell.
+        extended: path of the extended model, likewise.
     """
-    command = f"subzero simulate {scenario} --with extended.toml" if _is_new(verdict) else ""
+    command = f"subzero simulate {scenario} --with {extended}" if _is_new(verdict) else ""
     return (
         Answer("What is wrong", tuple(_wrong(verdict))),
         Answer("How sure is that", tuple(_sure(verdict))),
@@ -93,10 +98,14 @@ def _wrong(verdict: Verdict) -> Iterator[str]:
 def _sure(verdict: Verdict) -> Iterator[str]:
     """Give how probable it is, what comes next, and whether these records can tell the two apart."""
     probability = _probability(verdict)
+    for one in verdict.data_errors if verdict.then else ():
+        yield f"That {one.sentence}: {_in_words(one.probability).lower()}."
     if verdict.on_model == UNDECIDED:
         yield "Not sure enough to name one of them."
     elif probability is not None:
-        yield f"{_in_words(probability)} (probability {words.probability(probability)})."
+        sure = f"{_in_words(probability)} (probability {words.probability(probability)})."
+        nothing = f"That nothing {'else ' if verdict.then else ''}is wrong: {sure[:1].lower()}{sure[1:]}"
+        yield nothing if verdict.on_model == NOTHING_WRONG else sure
     if verdict.on_model == NOTHING_WRONG:
         yield from _not_seen(verdict)
     elif verdict.on_model != UNDECIDED:
@@ -109,13 +118,14 @@ def _probability(verdict: Verdict) -> float | None:
     """Return the probability of what is told; of several causes that of the least sure one; None if it is not known."""
     if verdict.on_model == CAUSE_NAMED and verdict.causes:
         return min(one.probability for one in verdict.causes)
-    if verdict.on_model == OUTSIDE and verdict.unknown is not None:
-        told = (p for name, p in verdict.probabilities.items() if words.is_told(name, verdict))
-        return next(told, None)
+    if verdict.on_model in (OUTSIDE, NOTHING_WRONG):
+        told = [p for name, p in verdict.probabilities.items() if words.is_told(name, verdict)]
+        return sum(told) if told else None
     return None
 
 
 def _in_words(probability: float) -> str:
+    """Return how sure a probability makes one."""
     return next((said for least, said in SURE.items() if probability >= least), "Not sure")
 
 
@@ -178,6 +188,32 @@ def _costs(verdict: Verdict) -> Iterator[str]:
             [_miss(name, rows[record, name].rmse, rows[record, name].nrmse) for record, name in worst]
         )
         yield f"Root mean square, the simulation misses {misses}."
+        yield from _best_misses(verdict, worst)
+
+
+def _best_misses(verdict: Verdict, worst: list[tuple[str, str]]) -> Iterator[str]:
+    """Give what is left of these errors where nothing is extended: of the calibrated or the most probable model."""
+    first = max(verdict.probabilities, key=lambda name: verdict.probabilities[name], default="none")
+    known = {
+        f"rival: {first}": "the most probable explanation",
+        "tolerance": "numbers bent within their tolerances",
+    }
+    for model, said in known.items():
+        left = [_left(verdict, record, name, model) for record, name in worst]
+        if all(math.isfinite(one) for one in left):
+            sizes = [words.number(one, _unit(name)) for one, (_, name) in zip(left, worst, strict=True)]
+            yield f"With {said} that is {_joined(sizes)}."
+            return
+
+
+def _left(verdict: Verdict, record: str, channel: str, model: str) -> float:
+    """Return the root mean square of what a model leaves of the samples that were used; NaN if that is not known."""
+    curves = verdict.curves.get(record)
+    if curves is None or model not in curves.models or channel not in curves.measured:
+        return math.nan
+    residual = curves.measured[channel] - curves.models[model][channel]
+    residual = residual[curves.used.get(channel, np.isfinite(residual))]
+    return float(np.sqrt(np.mean(residual**2))) if residual.size else math.nan
 
 
 def _gained(verdict: Verdict) -> Iterator[str]:
@@ -198,8 +234,8 @@ def _gained(verdict: Verdict) -> Iterator[str]:
     yield f"The extended model explains {share} of what can be explained of data that were not fitted ({gain.how})."
     if not gain.owed_low > 0.0:
         yield (
-            "Most of that is calibration within the tolerances; that the new physics adds to it is not significant "
-            "(95 % bound below 0)."
+            "Over a model without it, whose numbers are bent as far as that takes, the gain is not significant (95 % "
+            "bound below 0): it is told because far less has to be bent with it."
         )
 
 

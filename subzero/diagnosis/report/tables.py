@@ -142,15 +142,28 @@ def next_trial(one: NextTrial) -> Table | None:
     return Table(header, rows)
 
 
-def gain(verdict: Verdict) -> dict[str, Table]:
-    """Return error before and after, beside the noise: on held-out and on fitted data."""
+GAINS = {
+    "before": "nominal",
+    "tolerance": "calibrated",
+    "after": "extended",
+    "rival": "best rival",
+    "floor": "noise floor",
+}
+"""Errors of a channel → what they are called in a table; "calibrated" has no new physics."""
+
+
+def gain(verdict: Verdict, *, short: bool = False) -> dict[str, Table]:
+    """Return error before and after, beside the noise: on held-out and on fitted data; `short` for a terminal: of the
+    former, if there are such, without the calibrated model.
+    """
     if verdict.gain is None:
         return {}
-    header = ("channel", "nominal", "within tolerance", "extended", "best rival", "noise floor")
+    shown = {key: words for key, words in GAINS.items() if not (short and key == "tolerance")}
     parts = {f"held out ({verdict.gain.how})": verdict.gain.held_out, "fitted": verdict.gain.fitted}
-    return {
-        words: Table(header, [(channel(name), *(number(x) for x in (one.before, one.tolerance, one.after, one.rival,
-                                                                    one.floor))) for name, one in rows.items()])
+    found = {
+        words: Table(("channel", *shown.values()),
+                     [(channel(name), *(number(getattr(one, key)) for key in shown)) for name, one in rows.items()])
         for words, rows in parts.items()
         if rows
     }  # fmt: skip
+    return dict(list(found.items())[:1]) if short else found

@@ -82,11 +82,16 @@ def cause(one: Cause) -> str:
 
 def cause_in_short(one: Cause) -> str:
     """Return a cause in words, with its value beside that of the model."""
-    numbers = "; ".join(
-        f"{name.replace('_', ' ')} {number(p.value, p.unit)}, where the model has {number(p.nominal, p.unit)}"
-        for name, p in one.parameters.items()
-    )
+    numbers = "; ".join(_against_model(name, parameter) for name, parameter in one.parameters.items())
     return f"{_capital(one.sentence)}{_since(one)}{': ' if numbers else ''}{numbers}."
+
+
+def _against_model(name: str, one: Estimate) -> str:
+    """Return a parameter beside that of the model; a share as what is more or less than there."""
+    if name == "share" and one.unit == "1" and one.nominal == 0.0:
+        return f"{100.0 * abs(one.value):.3g} % {'more' if one.value > 0.0 else 'less'} than in the model"
+    value, nominal = number(one.value, one.unit), number(one.nominal, one.unit)
+    return f"{name.replace('_', ' ')} {value}, where the model has {nominal}"
 
 
 def _since(one: Cause) -> str:
@@ -169,7 +174,9 @@ def headline(verdict: Verdict) -> str:
 def is_told(name: str, verdict: Verdict) -> bool:
     """Say whether a hypothesis is what the verdict tells: its causes, whenever they began, or its force or drift."""
     beside = {one.id for one in verdict.data_errors} if verdict.then else set()
-    parts = [one for one in name.split(" + ") if one not in beside]
+    parts = [one for one in name.split(" + ") if one not in beside and one != "none"]
+    if verdict.on_model == UNDECIDED:
+        return False
     if verdict.on_model == OUTSIDE and verdict.unknown is not None:
         return parts == [f"{DRIFT if verdict.unknown.is_drift else FORCE}{verdict.unknown.axis}"]
     ids = sorted(one.partition("@")[0] for one in parts)
@@ -222,6 +229,8 @@ def on_model(verdict: Verdict) -> str:
 def _within(verdict: Verdict) -> str:
     """Return what the most probable hypothesis has, if it is a cause that is no larger than calibration may make it."""
     first = max(verdict.probabilities, key=lambda name: verdict.probabilities[name], default="none")
+    errors = {one.id for one in verdict.data_errors} if verdict.then else set()
+    first = " + ".join(one for one in first.split(" + ") if one not in errors) or "none"
     if first == "none":
         return ""
     return (

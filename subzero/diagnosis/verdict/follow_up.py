@@ -98,7 +98,7 @@ def follow_up(findings: Findings, known: Ranked) -> FollowUp:
         next_trial=_next_trial(findings, left, known.probabilities)
         if is_full and verdict == UNDECIDED
         else None,
-        curves=_curves(findings, verdict, new, fitted_too),
+        curves=_curves(findings, verdict, new, [one.ids for one in others if one.ids]),
     )
 
 
@@ -244,12 +244,21 @@ def _next_trial(
 
 
 def _curves(findings: Findings, verdict: str, new: Extension, rivals: Sequence[Ids]) -> dict[str, Curves]:
-    """Return record → curves of the nominal model, of the refits, and of as many rivals as are drawn."""
+    """Return record → curves of the nominal model, of the refits, and of as many rivals as are drawn, in their order:
+    causes that hold throughout, and those that began in mid-trial, each with the problem that it was fitted in.
+    """
     candidates = findings.search.candidates
+    late: dict[Ids, FittedChangePoint] = {(one.id,): one for one in _change_points(findings)}
     fits: dict[str, Fit | None] = {"nominal": None, "tolerance": candidates[()].fit}
     fits |= {"extended": new.fit} if verdict in (CAUSE_NAMED, OUTSIDE) else {}
-    fits |= {f"rival: {name(ids)}": candidates[ids].fit for ids in rivals[: RIVALS_DRAWN[verdict]]}
-    return curves(new.problem, fits)
+    drawn = [ids for ids in rivals if ids in candidates or ids in late][: RIVALS_DRAWN[verdict]]
+    fits |= {f"rival: {name(ids)}": candidates[ids].fit for ids in drawn if ids in candidates}
+    found = curves(new.problem, fits)
+    for begun in (late[ids] for ids in drawn if ids not in candidates):
+        own = curves(begun.problem, {f"rival: {begun.id}": begun.fit})
+        found = {record: replace(one, models={**one.models, **own[record].models})
+                 for record, one in found.items()}  # fmt: skip
+    return found
 
 
 def refuted_rivals(search: Search) -> frozenset[str]:

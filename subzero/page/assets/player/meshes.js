@@ -4,7 +4,7 @@ import { cross, subtract, unit } from "./vectors.js";
 
 const YELLOW = [0.98, 0.74, 0.08], DARK = [0.13, 0.15, 0.18], BLUE = [0.0, 0.45, 0.7], RED = [0.83, 0.2, 0.12];
 const BRONZE = [0.78, 0.6, 0.33], STEEL = [0.62, 0.66, 0.7], WOOD = [0.55, 0.4, 0.26], WHITE = [0.93, 0.94, 0.93];
-const AROUND = 40;
+const AROUND = 24;  // sides of a hull: at 100 pixels across it is round to half a pixel
 
 /** A body of revolution about the forward axis; `rings` are [x, radius, colour of the ring at an angle]. */
 function revolved(rings, around = AROUND) {
@@ -60,10 +60,10 @@ function hullRadius(hull, aft) {
 }
 
 function hullMesh(hull) {
-  const shares = [...Array(14).keys()].map((i) => 1 - Math.cos((Math.PI * i) / 28));
+  const shares = [...Array(10).keys()].map((i) => 1 - Math.cos((Math.PI * i) / 20));
   const nose = shares.map((share) => share * hull.nose_length);
   const bands = [0.26, 0.261, 0.3, 0.301, 0.55].map((share) => share * hull.length);
-  const tail = [...Array(16).keys()].map((i) => hull.length - hull.tail_length * (1 - i / 15));
+  const tail = [...Array(10).keys()].map((i) => hull.length - hull.tail_length * (1 - i / 9));
   const colourAt = (aft) => (angle) => {
     if (aft < 0.55 * hull.nose_length) return DARK;
     if (aft > 0.2605 * hull.length && aft < 0.3005 * hull.length) return BLUE;

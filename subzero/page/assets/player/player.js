@@ -3,7 +3,7 @@
 import { Camera } from "./camera.js";
 import { readReplay } from "./data.js";
 import { PlanView } from "./plan.js";
-import { inShort, Plots, spaced } from "./plots.js";
+import { Plots, said, spaced } from "./plots.js";
 import { Scene, webglOn } from "./scene.js";
 
 const element = (id) => document.getElementById(id);
@@ -214,8 +214,7 @@ class Player {
     this.plots.showTime(t);
     for (const { name, cells } of this.rows)
       cells.forEach((one, i) => {
-        const actor = this.replay.actors[i];
-        one.textContent = actor.has(name) && (actor.cable || !name.startsWith("cable_")) ? inShort(actor.at(name, t)) : "–";
+        one.textContent = said(this.replay.actors[i], name, t);
       });
   }
 

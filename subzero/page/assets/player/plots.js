@@ -70,7 +70,7 @@ export class Plots {
     const lines = actors.filter((actor) => actor.has(name) && !isDots(actor)).map((actor) => ({
       label: actor.name, source: actor, name, stroke: colours[actor.name] ?? colours[actors.indexOf(actor)], dash: actor.isGhost ? [6, 4] : [],
     }));
-    if (measured?.has(name)) lines.push({ label: "measured", source: measured, name, stroke: isDark() ? "#ddd" : "#333", dots: true });
+    if (measured?.has(name)) lines.push({ label: "measured", source: measured, name, stroke: isDark() ? "#dddddd" : "#333333", dots: true });
     return lines;
   }
 
@@ -103,8 +103,8 @@ export class Plots {
       cursor: { sync: { key: "replay" }, drag: { x: true, y: false, dist: 4 }, points: { size: 5 } },
       hooks: { setSelect: [(plot) => this.remember(plot)] },
       series: [{}, ...lines.map((one) => ({
-        label: one.label, stroke: one.stroke, dash: one.dash, width: one.dots ? 0 : 1.6, spanGaps: true,
-        points: { show: Boolean(one.dots), size: 3.5, fill: one.stroke },
+        label: one.label, stroke: one.stroke, dash: one.dash, width: one.dots ? 0 : 1.6, spanGaps: true, pxAlign: 0,
+        points: { show: Boolean(one.dots), size: 3.5, fill: `${one.stroke}88` },  // lines are seen through what was measured
       }))],
     };
   }
@@ -131,7 +131,7 @@ export class Plots {
       const x = plot.valToPos(t, "x");
       now.hidden = x < 0 || x > width;  // kept since the last resize: to ask the page in every frame would be slow
       now.style.transform = `translateX(${x}px)`;
-      values.forEach((value, i) => (value.textContent = inShort(lines[i].source.at(lines[i].name, t))));
+      values.forEach((value, i) => (value.textContent = said(lines[i].source, lines[i].name, t)));
     }
   }
 }
@@ -143,6 +143,10 @@ function joined(lines) {
 }
 
 export const spaced = (name) => name.replaceAll("_", " ");
+
+/** What a run has of a channel at a time; what one without a cable has of it is nothing, rather than 0. */
+export const said = (source, name, t) =>
+  source.has(name) && !(source.cable === null && name.startsWith("cable_")) ? inShort(source.at(name, t)) : "–";
 
 /** A number in four digits. */
 export function inShort(value) {

@@ -2,7 +2,7 @@
 
 import { drumMesh, standMesh, vehicleMeshes, vesselMesh } from "./meshes.js";
 import { roundNumber } from "./data.js";
-import { background, ground, line, solid, specks, surface } from "./shaders.js";
+import { background, bed, grid, line, solid, specks, surfaceFromAbove, surfaceFromBelow } from "./shaders.js";
 import { add, length, poseMatrix, product, projectionMatrix, subtract, transformed, turnAbout, viewMatrix } from "./vectors.js";
 
 const FIELD_OF_VIEW = 0.75;                   // vertical [rad]
@@ -53,7 +53,7 @@ export class Scene {
   /** @param replay of `readReplay`. */
   constructor(gl, replay) {
     this.gl = gl;
-    const shaders = { background, solid, line, ground, surface, specks };
+    const shaders = { background, solid, line, bed, grid, surfaceFromAbove, surfaceFromBelow, specks };
     this.programs = Object.fromEntries(Object.entries(shaders).map(([name, one]) => [name, programOf(gl, one)]));
     const { rudderAt, planesAt, propellerAt, ...parts } = vehicleMeshes(replay.vehicle);
     this.axes = { rudderAt, planesAt, propellerAt };
@@ -153,8 +153,7 @@ export class Scene {
     for (const [key, value] of Object.entries({ ...this.common, ...values })) {
       const at = places[key];
       if (at === undefined) continue;
-      if (typeof value === "boolean") gl.uniform1i(at, value);
-      else if (typeof value === "number") gl.uniform1f(at, value);
+      if (typeof value === "number") gl.uniform1f(at, value);
       else if (value.length === 16) gl.uniformMatrix4fv(at, false, value);
       else gl[`uniform${value.length}fv`](at, value);
     }
@@ -172,13 +171,13 @@ export class Scene {
   drawGround(isBed) {
     const middle = [this.eye[0], this.eye[1], this.groundDepth];
     this.spacing = roundNumber(Math.max(this.distance / 5, 0.1));
-    this.use("ground", { middle, reach: this.reach, spacing: this.spacing, isBed });
+    this.use(isBed ? "bed" : "grid", { middle, reach: this.reach, spacing: this.spacing });
     this.drawPlane(isBed);
   }
 
   drawSurface() {
     const middle = [this.eye[0], this.eye[1], 0];
-    this.use("surface", { middle, reach: this.reach, waveLength: 1.2 + 0.05 * this.distance });
+    this.use(this.eye[2] < 0 ? "surfaceFromAbove" : "surfaceFromBelow", { middle, reach: this.reach, waveLength: 1.2 + 0.05 * this.distance });
     this.drawPlane(false);
   }
 

@@ -152,9 +152,8 @@ void main() {
 }`,
 };
 
-/** A level plane around the eye: the bed, or a grid that stands for it. */
-export const ground = {
-  vertex: `#version 300 es
+/** A level plane around the eye. */
+const plane = `#version 300 es
 uniform mat4 toClip;
 uniform vec3 middle;
 uniform float reach;
@@ -163,37 +162,52 @@ void main() {
   vec2 corner = vec2(gl_VertexID & 1, gl_VertexID >> 1) * 2.0 - 1.0;
   place = middle + vec3(corner * reach, 0.0);
   gl_Position = toClip * vec4(place, 1.0);
-}`,
-  fragment: WATER + `
+}`;
+
+/** Squares on a level plane. */
+const SQUARES = `
 in vec3 place;
 uniform float spacing;
-uniform bool isBed;
 out vec4 pixel;
 /** How much of a pixel lies on lines between squares of side 1; none where squares are finer than pixels. */
 float gridLines(vec2 q, vec2 grain, float thick) {
   vec2 lines = clamp(thick + 0.5 - abs(fract(q - 0.5) - 0.5) / grain, 0.0, 1.0) * clamp(1.4 - 2.4 * grain, 0.0, 1.0);
   return max(lines.x, lines.y);
 }
-void main() {
+float squares() {
   vec2 q = place.xy / spacing, grain = fwidth(q);
-  float lines = max(0.45 * gridLines(q, grain, 0.5), 0.9 * gridLines(0.2 * q, 0.2 * grain, 0.9));
-  vec3 way = (place - eye) / clearness;
-  if (isBed) {
-    float rough = sin(place.x * 1.1 + 1.7 * sin(place.y * 0.37)) * sin(place.y * 0.9 + 1.3 * sin(place.x * 0.23));
-    float web = caustics(place.xy * (0.9 / max(spacing, 0.5))) * exp(-place.z / 30.0);
-    vec3 sand = vec3(0.50, 0.46, 0.35) * (0.62 + 0.06 * rough + 0.5 * web) * (0.35 + 0.65 * exp(-place.z / 40.0));
-    pixel = vec4(seenThroughWater(mix(sand, vec3(0.75, 0.86, 0.86), 0.40 * lines), place, 1.0), 1.0);
-    return;
-  }
-  float fade = 1.0 / (1.0 + 0.35 * dot(way, way));
-  pixel = vec4(vec3(0.62, 0.86, 0.92), 0.5 * lines * fade * fade);
+  return max(0.45 * gridLines(q, grain, 0.5), 0.9 * gridLines(0.2 * q, 0.2 * grain, 0.9));
+}
+`;
+
+// A machine without a graphics card carries out both sides of every branch: so what is seen in different cases, such as the
+// bed and the grid, has programs of its own.
+
+/** The bed: sand under the web of light. */
+export const bed = {
+  vertex: plane,
+  fragment: WATER + SQUARES + `
+void main() {
+  float rough = sin(place.x * 1.1 + 1.7 * sin(place.y * 0.37)) * sin(place.y * 0.9 + 1.3 * sin(place.x * 0.23));
+  float web = caustics(place.xy * (0.9 / max(spacing, 0.5))) * exp(-place.z / 30.0);
+  vec3 sand = vec3(0.50, 0.46, 0.35) * (0.62 + 0.06 * rough + 0.5 * web) * (0.35 + 0.65 * exp(-place.z / 40.0));
+  pixel = vec4(seenThroughWater(mix(sand, vec3(0.75, 0.86, 0.86), 0.40 * squares()), place, 1.0), 1.0);
 }`,
 };
 
-/** The surface, from above and from below. */
-export const surface = {
-  vertex: ground.vertex,
-  fragment: WATER + `
+/** A grid that stands for a bed that is not known. */
+export const grid = {
+  vertex: plane,
+  fragment: WATER + SQUARES + `
+void main() {
+  vec3 way = (place - eye) / clearness;
+  float fade = 1.0 / (1.0 + 0.35 * dot(way, way));
+  pixel = vec4(vec3(0.62, 0.86, 0.92), 0.5 * squares() * fade * fade);
+}`,
+};
+
+/** What the surface looks like from either side has this in common: its ripples, which are calm far away. */
+const RIPPLES = `
 in vec3 place;
 uniform float waveLength;
 out vec4 pixel;
@@ -203,23 +217,36 @@ vec2 ripples(vec2 p) {
   vec3 wave = cos(phase + vec3(1.1, 1.6, -2.2) * seconds);
   return vec2(0.8, 0.6) * wave.x + vec2(-0.4, 0.69) * wave.y + vec2(0.59, -0.12) * wave.z;
 }
+vec2 slopeAt(float far) {
+  return ripples(place.xy) * exp(-far / (60.0 * waveLength));
+}
+`;
+
+export const surfaceFromAbove = {
+  vertex: plane,
+  fragment: WATER + RIPPLES + `
 void main() {
   vec3 way = place - eye;
-  float far = length(way), calm = exp(-far / (60.0 * waveLength));
+  float far = length(way);
+  vec3 look = way / far, n = normalize(vec3(0.05 * slopeAt(far), -1.0));
+  float facing = max(dot(-look, n), 0.0), grazing = 1.0 - facing, mirror = 0.03 + 0.97 * grazing * grazing * grazing * grazing * grazing;
+  vec3 away = reflect(look, n), sky = mix(HORIZON, ZENITH, sqrt(max(-away.z, 0.0)));
+  float sunny = max(dot(away, SUN), 0.0), glitter = pow(sunny, 90.0), haze = 1.0 - exp(-far / (14.0 * clearness));
+  vec3 body = mix(vec3(0.04, 0.33, 0.44), vec3(0.02, 0.20, 0.32), facing);
+  vec3 colour = mix(mix(body, sky, mirror) + glitter * 0.9, HORIZON * 0.93, haze * 0.8);
+  pixel = vec4(colour, clamp(0.24 + 0.75 * mirror + glitter + haze, 0.0, 1.0));
+}`,
+};
+
+/** Bright straight above, where the sky shows (Snell's window, 49 degrees wide), a mirror of the deep beyond. */
+export const surfaceFromBelow = {
+  vertex: plane,
+  fragment: WATER + RIPPLES + `
+void main() {
+  vec3 way = place - eye;
+  float far = length(way);
   vec3 look = way / far;
-  vec2 slope = ripples(place.xy) * calm;
-  if (eye.z < 0.0) {
-    vec3 n = normalize(vec3(0.05 * slope, -1.0));
-    float facing = max(dot(-look, n), 0.0), grazing = 1.0 - facing, mirror = 0.03 + 0.97 * grazing * grazing * grazing * grazing * grazing;
-    vec3 away = reflect(look, n), sky = mix(HORIZON, ZENITH, sqrt(max(-away.z, 0.0)));
-    float sunny = max(dot(away, SUN), 0.0), glitter = pow(sunny, 90.0), haze = 1.0 - exp(-far / (14.0 * clearness));
-    vec3 body = mix(vec3(0.04, 0.33, 0.44), vec3(0.02, 0.20, 0.32), facing);
-    vec3 colour = mix(mix(body, sky, mirror) + glitter * 0.9, HORIZON * 0.93, haze * 0.8);
-    pixel = vec4(colour, clamp(0.24 + 0.75 * mirror + glitter + haze, 0.0, 1.0));
-    return;
-  }
-  // From below: bright straight above, where the sky shows (Snell's window, 49 degrees wide), a mirror of the deep beyond.
-  vec2 tilt = 0.45 * slope;
+  vec2 tilt = 0.45 * slopeAt(far);
   float window = smoothstep(0.45, 0.95, -look.z + 0.8 * dot(tilt, look.xy) + 0.25 * tilt.x);
   float crest = 0.5 + 0.5 * sin(5.0 * (tilt.x - 0.7 * tilt.y));
   crest *= crest * crest;

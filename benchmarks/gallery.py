@@ -1,0 +1,149 @@
+"""Every kind of figure, made anew with the command that makes it: ``python -m benchmarks.gallery``.
+
+    python -m benchmarks.gallery [--width 3.4] [FOLDER ...]
+
+Writes ``docs/gallery.md`` and its pictures in ``docs/figures``: the commands of the table are run in an empty folder,
+one after the other, and what is shown of each is taken from there; of some only, if their folders are named. Pictures
+that are not made keep their place on the page. With --width the page stays, and figures are made as narrow as one
+column of a journal page, into ``build/gallery``, to be looked at. Three diagnoses and two sweeps take some minutes.
+"""
+
+from __future__ import annotations
+
+import io
+import shlex
+import shutil
+import sys
+import tempfile
+from contextlib import chdir, nullcontext
+from dataclasses import dataclass
+from pathlib import Path
+
+import scenarios
+from subzero.figures import page_width
+from subzero.page.report import caption
+
+ROOT = Path(__file__).resolve().parent.parent
+PAGE, PICTURES = ROOT / "docs" / "gallery.md", ROOT / "docs" / "figures"
+NARROW = ROOT / "build" / "gallery"
+COLOURS = 64
+
+
+@dataclass(frozen=True, kw_only=True)
+class Shown:
+    """What a command makes: its figures as (folder, names without their ending), below a title."""
+
+    title: str
+    commands: tuple[str, ...]
+    folder: str
+    figures: tuple[str, ...]
+
+
+GALLERY = (
+    Shown(title="A trial with its cable and without", commands=("subzero compare fig6",), folder="fig6",
+          figures=("fig6", "attitude", "cable", "tension", "forces")),
+    Shown(title="Beside a record", folder="measured", figures=("measured",),
+          commands=("subzero challenge fig6 --seed 38 --out hidden",
+                    "subzero compare fig6 --measured hidden/record.csv --out measured")),
+    Shown(title="A run from its file", commands=("subzero compare fig6",
+                    "subzero plot fig6/tethered.nc --what shape3d motion heading"),
+          folder="fig6", figures=("tethered_shape3d", "tethered_motion", "tethered_heading")),
+    Shown(title="A prescribed motion that has an exact solution", commands=("subzero simulate fig4",), folder="fig4",
+          figures=("fig4",)),
+    Shown(title="A prescribed dive", commands=("subzero simulate fig5",), folder="fig5", figures=("fig5",)),
+    Shown(title="A winch on a vessel", commands=("subzero simulate rov_umbilical",), folder="rov_umbilical",
+          figures=("deployment", "cable")),
+    Shown(title="A manoeuvre", commands=("subzero manoeuvre zigzag",), folder="zigzag", figures=("manoeuvre",)),
+    Shown(title="An autopilot", commands=("subzero autopilot heading_step --autopilot lqr --feed-forward model",),
+          folder="heading_step", figures=("manoeuvre",)),
+    Shown(title="A sweep", commands=("subzero sweep cable_and_current.toml --out sweep",), folder="sweep",
+          figures=("bands", "histograms", "against")),
+    Shown(title="What matters", commands=("subzero sweep what_matters.toml --out matters",), folder="matters",
+          figures=("tornado",)),
+    Shown(title="A diagnosis that names the cause", folder="found",
+          commands=("subzero challenge fig6 --seed 38 --out hidden",
+                    "subzero diagnose fig6 hidden/record.csv --out found"),
+          figures=("misfit", "evidence", "gain", "detectable")),
+    Shown(title="A diagnosis that leaves several explanations", folder="several", figures=("rivals",),
+          commands=("subzero challenge fig6 --seed 27 --out rubs",
+                    "subzero diagnose fig6 rubs/record.csv --out several")),
+    Shown(title="A diagnosis of something in no catalogue", folder="strange", figures=("missing_force",),
+          commands=("subzero challenge fig6 --seed 31 --out lowered",
+                    "subzero diagnose fig6 lowered/record.csv --out strange")),
+)  # fmt: skip
+"""Every command that draws, in the order of the page, behind those that it needs: each is run once."""
+
+HEAD = """# Gallery
+
+Every kind of figure, with the command that makes it. Each command also writes `report.html`, with these figures and a
+replay ([what it shows](page.md)). `simulate` and `compare` take `--width 3.4` for one column of a journal page, and
+`--figures pdf` or `svg`; in Python every figure takes `with subzero.figures.page_width(3.4):`.
+`python -m benchmarks.gallery` runs the commands and makes this page anew.
+
+![The replay of a page](figures/page_follows.png)
+"""
+
+
+def main() -> None:
+    words = sys.argv[1:]
+    narrow = float(words.pop(words.index("--width") + 1)) if "--width" in words else None
+    wanted = [one for one in GALLERY if not set(words) - {"--width"} or one.folder in words]
+    out = NARROW if narrow else PICTURES
+    out.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory() as folder, chdir(folder):
+        for sweep in (Path(scenarios.__file__).parent / "sweeps").glob("*.toml"):
+            shutil.copy(sweep, folder)
+        with page_width(narrow) if narrow else nullcontext():
+            for command in dict.fromkeys(command for one in wanted for command in one.commands):
+                run(command)
+        for one in wanted:
+            for name in one.figures:
+                (out / picture(one, name)).write_bytes(small(Path(one.folder) / f"{name}.png"))
+    if not narrow:
+        PAGE.write_text(page(), encoding="utf-8")
+
+
+def run(command: str) -> None:
+    """Carry out a line of the shell."""
+    from subzero.cli import FINE, main
+
+    print(command, flush=True)
+    if main([*shlex.split(command)[1:], "--quiet"]) != FINE:
+        raise SystemExit(f"This failed: {command}")
+
+
+def picture(shown: Shown, figure: str) -> str:
+    """Return the file name of a figure's picture."""
+    return f"gallery_{shown.folder}_{figure}.png"
+
+
+def small(path: Path) -> bytes:
+    """Return a picture with few colours, as a PNG."""
+    from PIL import Image
+
+    held = io.BytesIO()
+    image = (
+        Image.open(path)
+        .convert("RGB")
+        .quantize(COLOURS, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
+    )
+    image.save(held, format="PNG", optimize=True)
+    return held.getvalue()
+
+
+def page() -> str:
+    """Return the page: commands and pictures of every part, as far as they are there."""
+    parts = [HEAD]
+    for one in GALLERY:
+        lines = "\n".join(one.commands)
+        parts.append(f"## {one.title}\n\n```sh\n{lines}\n```\n")
+        parts += [
+            f"![{caption(name.removeprefix('tethered_'))}](figures/{picture(one, name)})\n"
+            for name in one.figures
+            if (PICTURES / picture(one, name)).exists()
+        ]
+    return "\n".join(parts)
+
+
+if __name__ == "__main__":
+    main()
