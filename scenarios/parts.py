@@ -30,7 +30,7 @@ from subzero.errors import short as shown
 PATTERNS = {"vehicle": ("vehicles", "subzero2"), "cable": ("cables", "table1")}
 """Kind of part → the folder of its files, and the file that is the pattern."""
 
-LEAF_KEYS = ("value", "unit", "range", "limits", "source")
+LEAF_KEYS = ("value", "unit", "range", "tolerance", "limits", "source")
 
 SERVOS = ("rudder_servo", "stern_plane_port_servo", "stern_plane_starboard_servo")
 OPTIONAL = {
