@@ -24,7 +24,17 @@ import numpy as np
 
 from scenarios.errors import Problem, ScenarioError, nearest_or_all
 from scenarios.files import Source
-from scenarios.parts import PATTERNS, Leaf, changeable, leaves, read_changes, read_part, value_complaint
+from scenarios.parts import (
+    PATTERNS,
+    Leaf,
+    Part,
+    changeable,
+    leaves,
+    read_changes,
+    read_part,
+    read_tolerances,
+    value_complaint,
+)
 from scenarios.quantities import (
     BED,
     COMMANDS,
@@ -141,7 +151,7 @@ def part_file(trial: Trial, kind: str) -> Source:
     if not isinstance(named, str):
         why = f"it does not say which {kind} it has, so no ranges are known"
         raise ScenarioError([Problem(file=trial.name, key=kind, why=why, remedy="Give the ranges.")])
-    return _part_file(source, kind, named)
+    return _part(source, kind, named)[1]
 
 
 def with_vehicle(trial: Trial, named: str | Path) -> tuple[Trial, Source]:
@@ -155,10 +165,13 @@ def with_vehicle(trial: Trial, named: str | Path) -> tuple[Trial, Source]:
         ScenarioError: there is no such vehicle, or it cannot be used.
     """
     here = replace(_source_of(trial), folder=Path())
-    part = _part_file(here, "vehicle", str(named))
-    values = {f"vehicle.{key}": float(leaf["value"]) for key, leaf in leaves(part.table)}
+    part, file = _part(here, "vehicle", str(named))
+    values = {f"vehicle.{key}": one for key, one in part.values.items()}
     changes, _ = read_changes(here)
-    return with_parameters(trial, values | {key: one for key, one in changes.items() if key in values}), part
+    changed = with_parameters(trial, values | {key: one for key, one in changes.items() if key in values})
+    tolerances = {key: one for key, one in trial.tolerances.items() if not key.startswith("vehicle.")}
+    tolerances |= {f"vehicle.{key}": one for key, one in part.tolerances.items()} | read_tolerances(here)[0]
+    return replace(changed, tolerances=tolerances), file
 
 
 def changes_of(trial: Trial) -> dict[str, float]:
@@ -166,11 +179,11 @@ def changes_of(trial: Trial) -> dict[str, float]:
     return read_changes(_source_of(trial))[0]
 
 
-def _part_file(source: Source, kind: str, named: str) -> Source:
+def _part(source: Source, kind: str, named: str) -> tuple[Part, Source]:
     part, problems = read_part(source, kind, named)
     if part.source is None or problems:
         raise ScenarioError(problems)
-    return part.source
+    return part, part.source
 
 
 def _source_of(trial: Trial) -> Source:

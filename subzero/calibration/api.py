@@ -120,10 +120,11 @@ class _Work:
         """Return the calibration of some records."""
         files = files_of(logged[0], names, vehicle)
         ranges = {name: one for part in files.values() for name, one in part.ranges.items()}
-        numbers = numbers_of(logged[0].setting, names, ranges)
         with self._part("fit", 0.0, 0.5) as progress:
-            problem, D = with_free_numbers(pose(logged), numbers)
-            work = fitted(problem, D, progress)
+            whole = pose(logged)
+            numbers = numbers_of(whole, names, ranges)
+            problem, D = with_free_numbers(whole, numbers)
+            work = fitted(problem, len(numbers), D, progress)
         with self._part("held out", 0.5, 0.6) as progress:
             held = assessment.held_out(work, progress)
         profiles: dict[str, Profile] = {}

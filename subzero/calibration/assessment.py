@@ -23,7 +23,7 @@ from subzero.diagnosis.assessment.residuals import whiteness
 from subzero.diagnosis.assessment.trial_library import LIBRARY, rows_of
 from subzero.diagnosis.hypothesis.catalogue import START
 from subzero.diagnosis.hypothesis.catalogue.sensors import SPECS
-from subzero.diagnosis.inference.map_fit import bounded_step, bounds, objective
+from subzero.diagnosis.inference.map_fit import bounded_step, bounds, objective, secant
 from subzero.diagnosis.inference.problem import Problem, Progress
 
 SIGMAS_95 = float(ndtri(0.975))
@@ -44,7 +44,7 @@ def estimates(numbers: Sequence[Number], work: Fitted) -> tuple[Estimate, ...]:
         found.append(Estimate(name=number.name, unit=number.unit, before=number.nominal,
                               value=number.nominal + z, sd=sd,
                               low=float(number.nominal + ends[0]), high=float(number.nominal + ends[1]),
-                              prior_sd=number.prior_sd, tolerance=float(np.hypot(number.step, sd)),
+                              prior_sd=number.prior_sd, tolerance=float(np.hypot(number.tolerance, sd)),
                               is_determined=sd < UNDETERMINED_ABOVE * number.prior_sd,
                               is_at_bound=min(z - number.low, number.high - z) < AT_BOUND))  # fmt: skip
     return tuple(found)
@@ -88,8 +88,8 @@ def _change(number: Number, change: float) -> str:
 
 PROFILE_SIGMAS = (-3.0, -1.5, 1.5, 3.0)
 """Where a profile is made, in standard deviations from the estimate."""
-PROFILE_STEPS = 2
-"""Steps of the fit of all others, from the linear one."""
+MAX_PROFILE_STEPS, PROFILE_GAIN = 5, 0.1
+"""Steps of the fit of all others, and the gain that is worth one more. [nat]"""
 RISE_95 = SIGMAS_95**2
 """Rise of −2 log posterior at the ends of an interval of 95 %."""
 
@@ -114,17 +114,19 @@ def profiles(numbers: Sequence[Number], work: Fitted, progress: Progress) -> dic
 
 def _held_at(work: Fitted, k: int, offset: float) -> float:
     """Return the rise of −2 log posterior with entry k held at an offset from the best, others fitted again."""
-    problem, fit = work.problem, work.fit
+    problem, J, D = work.problem, work.fit.J, work.fit.D
     low, high = bounds(problem)
-    low[k] = high[k] = fit.z[k] + offset
-    z, r, best = fit.z, fit.r, math.inf
-    for _ in range(PROFILE_STEPS):
-        z = z + bounded_step(fit.J, r, z, fit.D, low, high)
-        r = problem.residual(z)
-        best = min(best, objective(r, z, fit.D))
-        if not np.isfinite(best):
+    low[k] = high[k] = work.fit.z[k] + offset
+    z, r, best = work.fit.z, work.fit.r, math.inf
+    for _ in range(MAX_PROFILE_STEPS):
+        step = bounded_step(J, r, z, D, low, high)
+        after = problem.residual(z + step)
+        now = objective(after, z + step, D)
+        if not now < best - PROFILE_GAIN:
             break
-    return max(2.0 * (best - fit.objective), 0.0)
+        J = secant(J, step, after - r, D)
+        z, r, best = z + step, after, now
+    return max(2.0 * (best - work.fit.objective), 0.0)
 
 
 def _ends(values: np.ndarray, rise: np.ndarray) -> tuple[float, float]:

@@ -26,6 +26,8 @@ MAX_ROUNDS = 6
 """A fit is begun again at most so often where it stopped, with sensitivities of its own."""
 SETTLED_GAIN = 0.5
 """A fit that the linear problem promises less than this has settled. [nat]"""
+OWN_WITHIN = 0.3
+"""Sensitivities are a fit's own if they were made so close to it, in tolerances."""
 MAX_NOISE_ROUNDS = 2
 """How often the noise is estimated."""
 
@@ -47,20 +49,27 @@ class Fitted:
     settled: bool
 
 
-def fitted(problem: Problem, D: np.ndarray, progress: Progress) -> Fitted:
-    """Return the most probable deviations under prior variances D (k,), with the noise behind them."""
+def fitted(problem: Problem, free: int, D: np.ndarray, progress: Progress) -> Fitted:
+    """Return the most probable deviations, with the noise behind them.
+
+    Args:
+        problem: records, and what is free.
+        free: so many entries, the first ones, are the numbers that are calibrated.
+        D: prior variances of all entries (k,).
+        progress: told the fraction that is done, and what is being done.
+    """
     progress(0.05, "first fit, with more noise than there is")
-    z = _settled(with_more_noise(problem, FIRST_NOISE), np.zeros(D.size), D)[0].z
-    progress(0.15, "fit with usual noise")
+    z = _first(problem, free, D)
+    progress(0.25, "fit with usual noise")
     fit, settled = _settled(problem, z, D)
     for round in range(MAX_NOISE_ROUNDS):
-        progress(0.25 + 0.1 * round, "noise behind the fit")
+        progress(0.5 + 0.15 * round, "noise behind the fit")
         again = with_noise_behind(problem, fit.z, D)
         if again is None:
             break
         problem = again
         fit, settled = _settled(problem, fit.z, D)
-    progress(0.45, "errors of the time steps")
+    progress(0.85, "errors of the time steps")
     corrected = with_finer_steps(problem, fit.z)
     if corrected is not None:
         problem = corrected
@@ -68,13 +77,24 @@ def fitted(problem: Problem, D: np.ndarray, progress: Progress) -> Fitted:
     return Fitted(problem=problem, fit=fit, M=covariance(problem, fit), settled=settled)
 
 
+def _first(problem: Problem, free: int, D: np.ndarray) -> np.ndarray:
+    """Return where the fit begins (k,): the numbers and the starts alone, with more noise than there is."""
+    core = [k for k, entry in enumerate(problem.entries) if k < free or entry.record >= 0]
+    few = replace(with_more_noise(problem, FIRST_NOISE), entries=tuple(problem.entries[k] for k in core))
+    z = np.zeros(D.size)
+    z[core] = _settled(few, z[core], D[core])[0].z
+    return z
+
+
 def _settled(problem: Problem, z: np.ndarray, D: np.ndarray) -> tuple[Fit, bool]:
-    """Return a fit with sensitivities of its own, and whether a further step would gain nothing."""
+    """Return a fit with sensitivities made close by, and whether a further step would gain nothing."""
     fit = refit(problem, z, problem.jacobian(z), D, most_fresh=2, made_at=z)
     for _ in range(MAX_ROUNDS):
+        if fit.converged and fit.moved(problem) < OWN_WITHIN:
+            return fit, True
         before = fit.objective
         fit = refit(problem, fit.z, problem.jacobian(fit.z), D, r=fit.r, most_fresh=0, made_at=fit.z)
-        if before - fit.objective < SETTLED_GAIN:
+        if before - fit.objective < SETTLED_GAIN and fit.moved(problem) < OWN_WITHIN:
             return fit, True
     return fit, False
 

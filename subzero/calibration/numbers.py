@@ -18,7 +18,7 @@ from scenarios.parts import changeable
 from subzero.diagnosis.hypothesis.catalogue import START
 from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.effect import Effect, Parameter
-from subzero.diagnosis.hypothesis.hypotheses import Entry, entries_of
+from subzero.diagnosis.hypothesis.hypotheses import Entry, entries_of, number_of, small_deviation
 from subzero.diagnosis.inference.problem import Problem
 from subzero.errors import UserError, suggestion
 
@@ -60,6 +60,7 @@ class Number:
         unit: of its file.
         nominal: what the file has.
         prior_sd: standard deviation of its deviation, beforehand.
+        tolerance: how far a healthy vehicle may be from a number that is known.
         step: a deviation that is noticeable.
         low, high: deviations that are possible.
     """
@@ -68,6 +69,7 @@ class Number:
     unit: str
     nominal: float
     prior_sd: float
+    tolerance: float
     step: float
     low: float
     high: float
@@ -89,14 +91,6 @@ def with_deviation(name: str, setting: Setting, deviation: float) -> Setting:
     return change(**{key: getattr(getattr(setting.model, part), key) + deviation})
 
 
-def value_of(name: str, setting: Setting) -> float:
-    """Return a number of a setting's vehicle, cable or drum."""
-    value = setting.model
-    for key in name.split("."):
-        value = getattr(value, key)
-    return float(value)  # type: ignore[arg-type]
-
-
 def full_name(name: str) -> str:
     """Return the dotted name of a number, for which "vehicle." may be left out.
 
@@ -114,34 +108,50 @@ def full_name(name: str) -> str:
 
 
 def numbers_of(
-    setting: Setting, names: Sequence[str], ranges: Mapping[str, tuple[float, float]]
+    problem: Problem, names: Sequence[str], ranges: Mapping[str, tuple[float, float]]
 ) -> list[Number]:
     """Return the numbers that are free.
 
     Args:
-        setting: the nominal one.
+        problem: of the records, with the whole catalogue.
         names: dotted, as `full_name` gives them.
         ranges: dotted name → least and greatest plausible value, of the files.
 
     Raises:
         UserError: nothing says how far a number that is zero may be off.
     """
-    return [_number(setting, name, ranges.get(name)) for name in names]
+    return [_number(problem, name, ranges.get(name)) for name in names]
 
 
-def _number(setting: Setting, name: str, declared: tuple[float, float] | None) -> Number:
-    nominal, leaf = value_of(name, setting), changeable()[name]
+def _number(problem: Problem, name: str, declared: tuple[float, float] | None) -> Number:
+    nominal, leaf = number_of(name, problem.records[0].setting), changeable()[name]
     low, high = declared if declared is not None else (nominal, nominal)
     width = high - low
     if nominal == 0.0 and not width > 0.0:
         raise UserError(f"'{name}' is 0 and its file gives no range, so nothing says how far it may be off. Add "
                         "range = [least, greatest] to it, or leave it out of the free ones.")  # fmt: skip
-    prior = max(width, LEAST_PRIOR_SHARE * abs(nominal))
+    step = STEP_SHARE * (abs(nominal) or width)
     at_least, at_most = _bounds(nominal, low, high)
     limits = leaf.get("limits", (-math.inf, math.inf))
-    return Number(name=name, unit=str(leaf["unit"]), nominal=nominal, prior_sd=prior,
-                  step=max(STEP_SHARE * abs(nominal), STEP_SHARE * width if nominal == 0.0 else 0.0),
+    prior = max(width, LEAST_PRIOR_SHARE * abs(nominal))
+    return Number(name=name, unit=str(leaf["unit"]), nominal=nominal, prior_sd=prior, step=step,
+                  tolerance=_tolerance(problem, name) or step,
                   low=max(at_least, limits[0] - nominal), high=min(at_most, limits[1] - nominal))  # fmt: skip
+
+
+def _tolerance(problem: Problem, name: str) -> float:
+    """Return by how much a number may be off in a diagnosis: what is declared, or what causes that move it may."""
+    setting = problem.records[0].setting
+    if name in setting.trial.tolerances:
+        return float(setting.trial.tolerances[name])
+    effects = dict.fromkeys(entry.effect for entry in problem.entries if entry.record < 0)
+    return max((abs(number_of(name, _moved(effect, setting)) - number_of(name, setting)) for effect in effects),
+               default=0.0)  # fmt: skip
+
+
+def _moved(effect: Effect, setting: Setting) -> Setting:
+    """Return a setting with an effect as large as its tolerance."""
+    return effect.apply(setting, *map(small_deviation, effect.parameters))
 
 
 def _bounds(nominal: float, low: float, high: float) -> tuple[float, float]:
@@ -175,6 +185,5 @@ def prior_variances(entries: Sequence[Entry], numbers: Sequence[Number]) -> np.n
 
 def _touches(effect: Effect, setting: Setting, names: Sequence[str]) -> bool:
     """Say whether an effect moves one of some numbers."""
-    moved = effect.apply(setting, *(max(one.low, min(one.tolerance, one.high)) for one in effect.parameters))
-    before, after = ([value_of(name, one) for name in names] for one in (setting, moved))
+    before, after = ([number_of(name, one) for name in names] for one in (setting, _moved(effect, setting)))
     return any(abs(b - a) > MOVED * max(abs(a), abs(b)) for a, b in zip(before, after, strict=True))

@@ -106,10 +106,11 @@ def profiles(found: Calibration, title: Title) -> Figure:
     figure, panels = sheet(rows, COLUMNS, title)
     for axes, (name, one) in zip(panels, found.profiles.items(), strict=False):
         _profile(axes, one, found[name])
-        headline(axes, name.rpartition(".")[2].replace("_", " "))
+        section, _, key = name.removeprefix("vehicle.").replace("_", " ").rpartition(".")
+        axes.set_title(f"{section}:\n{key}", loc="left", fontsize=style.TINY, pad=3)
     for axes in panels[len(found.profiles) :]:
         axes.remove()
-    figure.subplots_adjust(hspace=0.42)
+    figure.subplots_adjust(hspace=0.55, wspace=0.34)
     return figure
 
 
@@ -118,12 +119,19 @@ def _profile(axes: Axes, one: Profile, estimate: Estimate) -> None:
     grid = np.linspace(one.values[0], one.values[-1], 80)
     axes.plot(grid, ((grid - estimate.value) / estimate.sd) ** 2, color=style.GREY, linewidth=1.0,
               linestyle=style.DASHES[1])  # fmt: skip
-    axes.plot(one.values, one.rise, "o-", color=style.BLUE, markersize=3.0, linewidth=1.2)
+    axes.plot(one.values, one.rise, "o", color=style.BLUE, markersize=3.0)
+    axes.plot(grid, _between(one, grid), color=style.BLUE, linewidth=1.2)
     axes.axhline(RISE_95, color=style.ORANGE, linewidth=0.8)
     axes.set_ylim(0.0, 14.0)
     axes.xaxis.set_major_locator(MaxNLocator(3))
     unit = "" if estimate.unit == "1" else f"[{estimate.unit}]"
     axes.set_xlabel(unit, fontsize=style.SMALL, labelpad=1)
+
+
+def _between(one: Profile, grid: np.ndarray) -> np.ndarray:
+    """Return a profile between its points, from its signed root, which is nearly linear."""
+    root = np.sqrt(one.rise) * np.where(np.arange(one.rise.size) < int(np.argmin(one.rise)), -1.0, 1.0)
+    return np.interp(grid, one.values, root) ** 2
 
 
 def _resize(figure: Figure, height: float, left: float) -> None:
