@@ -1,6 +1,6 @@
 """How easy the code is to carry on, in figures: sizes, import chains, circles, parameters, docstrings, tests.
 
-    python -m benchmarks.house                   # one table; what stands behind its counts with --list
+    python -m benchmarks.house                   # figures and targets; what stands behind them with --list, --lone
     python -m benchmarks.house --json house.json
 
 figure            what it counts
@@ -11,14 +11,16 @@ floors            modules on the longest chain of imports inside the package; im
                   types only (``TYPE_CHECKING``) do not; a name that a face hands on counts as an import of the module
                   that defines it; a circle counts as one
 circles           sets of modules that import one another, by any import
-lone              modules with exactly one importer in the whole product (faces, ``__init__``, left out)
+lone              modules with exactly one importer in the whole product (faces, ``__init__``, left out): fine if they
+                  are a whole concept, which a file of fewer than 80 lines is not
 > 7 parameters    functions outside compiled kernels, ``self`` left out
 doc/source        lines of docstrings by lines
 test/source       lines of tests by lines; those of a test file are shared out over the packages that it imports
 below the face    share of the tests of a package whose file imports more of it than its face (a face: ``cable``,
                   ``subzero``, ``subzero.autopilot``, …, what a user imports)
 
-"subzero, rest" is what stands in no package of its own row. The last row is the whole product.
+"subzero, rest" is what stands in no package of its own row. The last row is the whole product. Below the table stands
+what is asked for, with its target.
 """
 
 from __future__ import annotations
@@ -49,6 +51,8 @@ ROWS = (
 REST, ALL = "subzero, rest", "all"
 COMPILERS = {"compiled", "inner", "inlined", "allocating", "intrinsic"}
 MOST_PARAMETERS = 7
+SHORT_LINES = 80
+"""A file with one importer and fewer lines than this is no whole concept, but a part of its importer."""
 
 Graph = dict[str, set[str]]
 
@@ -63,12 +67,17 @@ class Figures:
     floors: int
     chain: list[str]
     circles: list[list[str]]
-    lone: list[str]
+    lone: dict[str, int]
     many_parameters: list[str]
     doc_by_source: float
     test_by_source: float
     tests: int
     tests_below_face: int
+
+    @property
+    def short_lone(self) -> list[str]:
+        """The lone modules that are too short to be a whole concept by themselves."""
+        return [name for name, lines in self.lone.items() if lines < SHORT_LINES]
 
 
 class Module:
@@ -266,11 +275,11 @@ def _figures(
         floors=len(chain),
         chain=chain,
         circles=circles(own),
-        lone=[
-            name
+        lone={
+            name: product[name].lines
             for name in inside
             if len(importers[name]) == 1 and product[name].path.name not in ("__init__.py", "__main__.py")
-        ],
+        },
         many_parameters=[each for name in inside for each in product[name].long_signatures()],
         doc_by_source=sum(product[name].docstring_lines for name in inside) / lines,
         test_by_source=shared / lines,
@@ -294,16 +303,100 @@ def table(found: dict[str, Figures]) -> str:
     return "\n".join([head, *rows])
 
 
+@dataclass(frozen=True, kw_only=True)
+class Goal:
+    """What is asked of a figure: its name, what was found, and the most that it may be; `places` has what is over."""
+
+    name: str
+    found: float
+    most: float
+    places: tuple[str, ...] = ()
+
+    def line(self) -> str:
+        """Return a line of the table of targets."""
+        met = "met" if self.found <= self.most else "NOT"
+        places = f"  {', '.join(self.places)}" if self.places and met == "NOT" else ""
+        return f"{self.name:<58}{self.found:>7.3g}{self.most:>7.3g}  {met}{places}"
+
+
+MOST_FILES_PER_1000 = 7.5
+SMALL_FILES = ("vehicle",)
+"""Packages of many small parts that are alike, a file for each: a force, an actuator."""
+FEW_FILES = 5
+"""A package of no more files than a reader follows to understand one thing is not scattered, however short they are."""
+
+
+def scattered(found: dict[str, Figures]) -> dict[str, Figures]:
+    """Return the packages that have more files for their lines than is asked for."""
+    return {
+        row: one
+        for row, one in found.items()
+        if one.files > FEW_FILES and one.files_per_1000 > MOST_FILES_PER_1000
+    }
+
+
+def goals(found: dict[str, Figures]) -> list[Goal]:
+    """Return what is asked for, with the figures that stand."""
+    whole, diagnosis = found[ALL], found["subzero.diagnosis"]
+    counted = {
+        row: one for row, one in found.items() if row not in (ALL, *SMALL_FILES) and one.files > FEW_FILES
+    }
+    over = scattered(counted)
+    densest = max(one.files_per_1000 for one in counted.values())
+    return [
+        Goal(name="files of the diagnosis", found=diagnosis.files, most=60),
+        Goal(name="floors of the diagnosis", found=diagnosis.floors, most=15),
+        Goal(name="floors of the whole product", found=whole.floors, most=22),
+        Goal(
+            name="files per 1000 lines, most in a package (vehicle left out)",
+            found=densest,
+            most=MOST_FILES_PER_1000,
+            places=tuple(over),
+        ),
+        Goal(name="circles", found=len(whole.circles), most=0),
+        Goal(
+            name=f"lone modules of fewer than {SHORT_LINES} lines",
+            found=len(whole.short_lone),
+            most=0,
+            places=tuple(whole.short_lone),
+        ),
+        Goal(
+            name=f"functions with more than {MOST_PARAMETERS} parameters",
+            found=len(whole.many_parameters),
+            most=0,
+            places=tuple(row for row, one in found.items() if row != ALL and one.many_parameters),
+        ),
+        Goal(
+            name="% of diagnosis tests below the face",
+            found=100.0 * diagnosis.tests_below_face / max(diagnosis.tests, 1),
+            most=25,
+        ),
+    ]
+
+
+def targets(found: dict[str, Figures]) -> str:
+    """Return the targets as lines of a table."""
+    head = f"{'asked for':<58}{'is':>7}{'target':>7}"
+    return "\n".join([head, *(goal.line() for goal in goals(found))])
+
+
 def main() -> None:
-    """Print the table, and write it as JSON if asked for."""
+    """Print the tables, and write the figures as JSON if asked for."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--json", type=Path, help="file for all figures, with the names behind the counts")
     parser.add_argument("--list", action="store_true", help="print the names behind the counts too")
+    parser.add_argument(
+        "--lone", action="store_true", help="print the lone modules of each row, with their lines"
+    )
     asked = parser.parse_args()
     found = figures()
-    print(table(found))
+    print(table(found), targets(found), sep="\n\n")
+    if asked.lone:
+        for row, one in found.items():
+            if row != ALL:
+                print(f"\n{row}:", *(f"  {lines:>4} {name}" for name, lines in one.lone.items()), sep="\n")
     if asked.list:
         for name in ("chain", "circles", "lone", "many_parameters"):
             print(f"\n{name}:", *(f"  {each}" for each in getattr(found[ALL], name)), sep="\n")

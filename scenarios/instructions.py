@@ -4,7 +4,8 @@ Commands are sampled and held: `Commands.at` says what holds at a time, and noth
 
 The paper evaluates the cable from the states (u, v, w, p, q, r, φ, θ, ψ) of the vehicle, "measured by the on-board
 sensors or predicted by the dynamical model" (section 3, step 2), and shows it on an idealised vehicle (section 4.1),
-whose motion is linear between a few times. Both are a `Motion`. `subzero.knots` makes a smooth one of its samples.
+whose motion is linear between a few times. Both are a `Motion`.
+`subzero.engine.prescribed_motion` makes a smooth one of its samples.
 """
 
 from __future__ import annotations
@@ -72,9 +73,10 @@ class Motion:
     yaw rates are the slopes of pitch and heading.
 
     *Smooth* between the samples, and known as far as the last one: so is a motion that says more. Its angles and its
-    place are cubics through the samples with the rates and speeds given as slopes (`subzero.knots`). What is not given:
-    sway, heave and roll are zero, rates the slopes of the angles, and the place is where the speeds lead. A place that
-    is given is believed: its noise is noise in the speed of the tow point. Heading and roll may jump by whole turns.
+    place are cubics through the samples with the rates and speeds given as slopes
+    (`subzero.engine.prescribed_motion`). What is not given: sway, heave and roll are zero, rates the slopes of the
+    angles, and the place is where the speeds lead. A place that is given is believed: its noise is noise in the speed
+    of the tow point. Heading and roll may jump by whole turns.
 
     Attributes:
         time: starts at 0 and increases. Shape (samples,). [s]

@@ -35,7 +35,7 @@ _HOME = {
     "compare": ("subzero.comparison", "compare"),
     "diagnose": ("subzero.diagnosis.api", "diagnose"),
     "draw": ("subzero.figures", "draw"),
-    "load_scenario": ("subzero.trials", "load"),
+    "load_scenario": ("subzero.model", "load"),
     "read_record": ("subzero.records.record", "read_record"),
     "read_trials": ("subzero.diagnosis.read_trials", "read_trials"),
     "simulate": ("subzero.simulation", "simulate"),

@@ -13,6 +13,7 @@ from __future__ import annotations
 import shlex
 import sys
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -34,6 +35,42 @@ if TYPE_CHECKING:
 
 Flag = cli_autopilot.Flag
 FINE, MISTAKE, STOPPED = 0, 2, 3
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class Inputs:
+    """What is simulated besides the scenario.
+
+    Attributes:
+        with_: extended model that a diagnosis has written (extended.toml).
+        effects: Python file with causes of your own that the extended model names; it is run.
+        commands: CSV file of commands, instead of those of the scenario.
+        motion: CSV file of the vehicle's measured states, such as a run's own tethered.csv, which it then follows.
+    """
+
+    with_: cli_diagnosis.With = None
+    effects: cli_diagnosis.Own = None
+    commands: Path | None = None
+    motion: Path | None = None
+
+    def read(self, scenario: str) -> scenarios.Trial:
+        """Read the trial, without the vehicle's own check."""
+        return scenarios.load(scenario, commands_csv=self.commands, motion_csv=self.motion)
+
+    def checked(self, scenario: str) -> tuple[scenarios.Trial, dict[str, Any]]:
+        """Read the trial again with the vehicle's own check, which needs the compiler and so comes late.
+
+        Returns:
+            the trial, and the extended model as arguments of a run.
+        """
+        from subzero.model import load
+
+        trial = load(scenario, commands_csv=self.commands, motion_csv=self.motion)
+        return cli_diagnosis.extended_run(trial, self.with_, self.effects)
+
+
+NO_INPUTS = Inputs()
 
 
 def _version() -> str:
@@ -69,10 +106,7 @@ def simulate(
     /,
     *,
     untethered: Annotated[bool, Parameter(negative=())] = False,
-    with_: cli_diagnosis.With = None,
-    effects: cli_diagnosis.Own = None,
-    commands: Path | None = None,
-    motion: Path | None = None,
+    inputs: Inputs = NO_INPUTS,
     out: Path | None = None,
     check: Flag = False,
     strict: Flag = False,
@@ -82,10 +116,7 @@ def simulate(
     Args:
         scenario: name of a scenario (see "subzero list"), or path of a scenario file.
         untethered: leave the cable away.
-        with_: extended model that a diagnosis has written (extended.toml).
-        effects: Python file with causes of your own that the extended model names; it is run.
-        commands: CSV file of commands, instead of those of the scenario.
-        motion: CSV file of the vehicle's measured states, such as a run's own tethered.csv, which it then follows.
+        inputs: what is simulated besides the scenario.
         out: folder for the files; by default one named after the scenario, here.
         check: run it once more with half the steps and half the segment length, and say what changes.
         strict: end with exit code 3 if the run ends with warnings.
@@ -93,9 +124,9 @@ def simulate(
     from subzero import write_results
     from subzero.output import staged
 
-    trial = scenarios.load(scenario, commands_csv=commands, motion_csv=motion)
+    trial = inputs.read(scenario)
     with staged(out or write_results.default_folder(trial)) as stage:
-        trial, extended = cli_diagnosis.extended_run(_checked(scenario, commands, motion), with_, effects)
+        trial, extended = inputs.checked(scenario)
         with _progress(trial) as progress:
             from subzero.simulation import simulate as run
 
@@ -112,10 +143,7 @@ def compare(
     /,
     *,
     measured: Path | None = None,
-    with_: cli_diagnosis.With = None,
-    effects: cli_diagnosis.Own = None,
-    commands: Path | None = None,
-    motion: Path | None = None,
+    inputs: Inputs = NO_INPUTS,
     out: Path | None = None,
     check: Flag = False,
     strict: Flag = False,
@@ -125,10 +153,7 @@ def compare(
     Args:
         scenario: name of a scenario (see "subzero list"), or path of a scenario file.
         measured: CSV file of measured channels, to set beside both runs.
-        with_: extended model that a diagnosis has written (extended.toml).
-        effects: Python file with causes of your own that the extended model names; it is run.
-        commands: CSV file of commands, instead of those of the scenario.
-        motion: CSV file of the vehicle's measured states, such as a run's own tethered.csv, which it then follows.
+        inputs: what is simulated besides the scenario.
         out: folder for the files; by default one named after the scenario, here.
         check: run both once more with half the steps and half the segment length, and say what changes.
         strict: end with exit code 3 if a run ends with warnings.
@@ -137,10 +162,10 @@ def compare(
     from subzero.output import staged
     from subzero.records.record import read_record
 
-    trial = scenarios.load(scenario, commands_csv=commands, motion_csv=motion)
+    trial = inputs.read(scenario)
     record = read_record(measured) if measured is not None else None
     with staged(out or write_results.default_folder(trial)) as stage:
-        trial, extended = cli_diagnosis.extended_run(_checked(scenario, commands, motion), with_, effects)
+        trial, extended = inputs.checked(scenario)
         with _progress(trial) as progress:
             from subzero.comparison import compare as run
 
@@ -206,13 +231,6 @@ def _in_words(error: cyclopts.CycloptsError) -> str:
     if isinstance(error, cyclopts.UnusedCliTokensError):
         return f"Unexpected argument: {' '.join(error.unused_tokens or [])}."
     return str(error)
-
-
-def _checked(scenario: str, commands: Path | None, motion: Path | None) -> scenarios.Trial:
-    """Read the scenario again with the vehicle's own check, which needs the compiler and so comes late."""
-    from subzero.trials import load
-
-    return load(scenario, commands_csv=commands, motion_csv=motion)
 
 
 def _refined(runs: Runs, trial: scenarios.Trial, extended: dict[str, Any]) -> Runs:

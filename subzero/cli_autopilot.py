@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import warnings
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -37,6 +38,27 @@ STEP_COMMANDS = {
     "speed_step": ("heading", "propeller_command"),
 }
 """What the figure shows: the answer of the vehicle and the command."""
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class Pilot:
+    """Who flies.
+
+    Attributes:
+        autopilot: pid, lqr, or the path of a Python file with one (see subzero/autopilot/registry.py).
+        feed_forward: none, formula or model: what it knows of the cable.
+        noisy: through estimated sensors instead of perfect ones.
+        seed: of the sensors.
+    """
+
+    autopilot: str = "pid"
+    feed_forward: str = "none"
+    noisy: Flag = False
+    seed: int = 0
+
+
+PID = Pilot()
 
 
 def manoeuvre(
@@ -80,12 +102,9 @@ def fly_step(
     /,
     *,
     scenario: str = "fig6",
-    autopilot: str = "pid",
-    feed_forward: str = "none",
+    pilot: Pilot = PID,
     size: float | None = None,
     speed: float = 1.0,
-    noisy: Flag = False,
-    seed: int = 0,
     out: Path | None = None,
     strict: Flag = False,
 ) -> int:
@@ -94,12 +113,9 @@ def fly_step(
     Args:
         name: heading_step, depth_step or speed_step.
         scenario: whose vehicle, cable and start: a name (see "subzero list") or a path.
-        autopilot: pid, lqr, or the path of a Python file with one (see subzero/autopilot/registry.py).
-        feed_forward: none, formula or model: what it knows of the cable.
+        pilot: who flies.
         size: of the step, in degrees, m or m/s.
         speed: to hold, in m/s.
-        noisy: through estimated sensors instead of perfect ones.
-        seed: of the sensors.
         out: folder for the files; by default one named after the step, here.
         strict: end with exit code 3 if a run ends with warnings.
     """
@@ -109,12 +125,12 @@ def fly_step(
 
     def fly(label: str, progress: Progress) -> tuple[xr.Dataset, dict[str, float]]:
         return run(
-            name, scenario, autopilot=autopilot, feed_forward=feed_forward if label == "tethered" else "none",
-            size=size, speed=speed, tethered=label == "tethered", seed=seed,
-            sensors=ESTIMATED if noisy else PERFECT, progress=progress,
+            name, scenario, autopilot=pilot.autopilot, size=size, speed=speed, tethered=label == "tethered",
+            feed_forward=pilot.feed_forward if label == "tethered" else "none", seed=pilot.seed,
+            sensors=ESTIMATED if pilot.noisy else PERFECT, progress=progress,
         )  # fmt: skip
 
-    title = f"{name}: autopilot {autopilot}, fed forward of the cable: {feed_forward}"
+    title = f"{name}: autopilot {pilot.autopilot}, fed forward of the cable: {pilot.feed_forward}"
     shown = STEP_COMMANDS.get(name, ("heading", "rudder_command"))
     return _deliver(trial, fly, out or Path(name), title, shown, strict)
 

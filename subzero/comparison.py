@@ -8,13 +8,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import scenarios
-from subzero.model import Model
-from subzero.model_changes import Later
-from subzero.records.goodness_of_fit import Fit, beside, fits
-from subzero.records.record import Record, read_record
+from subzero.engine.initial_conditions import Later
+from subzero.model import Model, load
+from subzero.records.record import Fit, Record, beside, fits, read_record
 from subzero.simulation import simulate
 from subzero.summary import summary_of
-from subzero.trials import load
 
 if TYPE_CHECKING:
     import xarray as xr

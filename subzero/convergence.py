@@ -32,7 +32,7 @@ from scenarios import ScenarioError
 from subzero.errors import UserError
 
 if TYPE_CHECKING:
-    from subzero.recording import Run
+    from subzero.engine.recording import Run
 
 MOST_HALVINGS = 2
 """Steps and segments a quarter as long cost sixteen times as much; what they do not settle, is not settled by more."""

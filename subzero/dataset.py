@@ -18,7 +18,7 @@ from subzero.model import Model
 from subzero.validity import as_json, check_run
 
 if TYPE_CHECKING:
-    from subzero.recording import Recording, Run
+    from subzero.engine.recording import Recording, Run
 
 NO_PULL = 1e-9
 """A tow force below this has no direction; then the cable is taken to lie straight behind the vehicle. [N]"""
@@ -32,7 +32,7 @@ ENERGY_CHANNELS = (
     "energy_added_mass_term",
     "energy_residual",
 )
-"""In the order of `subzero.energy`."""
+"""In the order of `subzero.engine.energy`."""
 
 AXES = {
     "term": list(vehicle.BREAKDOWN),
@@ -85,11 +85,12 @@ def channel_values(run: Run, model: Model) -> dict[str, np.ndarray]:
 
 def _tow_tension(r: Recording) -> np.ndarray:
     """Return T(0) (n,), negative where the cable pushes, as it may in the paper's scheme. [N]."""
-    size = np.linalg.norm(r.tow_force, axis=1)
+    size: np.ndarray = np.linalg.norm(r.tow_force, axis=1)
     if not r.nodes.any():
         return size
     first = np.cumsum(r.nodes) - r.nodes
-    return np.where(r.tension[first] < 0.0, -size, size)
+    signed: np.ndarray = np.where(r.tension[first] < 0.0, -size, size)
+    return signed
 
 
 def _attitudes(attitude: np.ndarray) -> np.ndarray:
@@ -179,7 +180,8 @@ def _closure_error(run: Run, values: dict[str, np.ndarray], model: Model) -> np.
     hull = np.stack([values[name] for name in ("north", "east", "depth")], axis=1)
     tow = hull + r.rotation @ model.vehicle.tow_point.position()
     gap = tow - r.position[np.cumsum(r.nodes) - r.nodes]
-    return np.linalg.norm(gap - gap[0], axis=1)
+    opened: np.ndarray = np.linalg.norm(gap - gap[0], axis=1)
+    return opened
 
 
 def _provenance(trial: scenarios.Trial, model: Model, tethered: bool, run: Run) -> dict[str, Any]:

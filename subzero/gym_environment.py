@@ -20,8 +20,8 @@ from typing import Any
 import numpy as np
 
 from subzero.errors import UserError
+from subzero.model import load
 from subzero.simulator import Observation, RunStoppedError, Simulator
-from subzero.trials import load
 
 try:
     import gymnasium

@@ -132,7 +132,7 @@ def _listen() -> None:
     """Let numba say when it compiles, from now on."""
     from numba.core import event
 
-    class Count(event.Listener):
+    class Count(event.Listener):  # type: ignore[misc]  # numba has no types
         def on_start(self, event: object) -> None:
             _compilations[0] += 1
 

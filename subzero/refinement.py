@@ -20,11 +20,10 @@ import xarray as xr
 
 import scenarios
 from subzero.channels import BY_NAME, CHANNELS
-from subzero.model import Model
-from subzero.model_changes import Later
+from subzero.engine.initial_conditions import Later
+from subzero.model import Model, load
 from subzero.simulation import simulate
 from subzero.summary import FORCE, MOMENT
-from subzero.trials import load
 from subzero.validity import RunWarning, as_json, warnings_of
 
 Progress = Callable[[float], None]

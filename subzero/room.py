@@ -13,8 +13,8 @@ import numpy as np
 import scenarios
 from cable.memory import fits, refuse_unless_it_fits
 from cable.tow_path import segments_needed
+from subzero.engine.recording import new_recording
 from subzero.model import Model
-from subzero.recording import new_recording
 
 BYTES_A_NODE = 4 * 8
 """Place and tension."""

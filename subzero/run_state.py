@@ -44,7 +44,7 @@ class Ledger:
     """Sums since the start, and the flows at both ends of the last step.
 
     Attributes:
-        total: (7,), rows as in `subzero.energy`. [J]
+        total: (7,), rows as in `subzero.engine.energy`. [J]
         hull_old, hull_new: powers of `vehicle.power` (4,). [W]
         cable_old, cable_new: flows of `cable.moving_end.energy.energy_flow` (FLOWS,).
         kinetic: kinetic energy of the hull at the last accepted time. [J]

@@ -11,17 +11,15 @@ import numpy as np
 
 import scenarios
 from cable.moving_end import Names, describe_stop, enlarged
-from subzero import coupling
 from subzero.convergence import Accuracy, run_converged
+from subzero.engine import coupling
+from subzero.engine.initial_conditions import Later, checked_later, go_on_with, prepare, rows_of_changes
+from subzero.engine.recording import Pace, Recording, Run, cut, new_recording, record_row
+from subzero.engine.time_loop import NO_ROOM, run_rows
 from subzero.errors import truth
-from subzero.initial_conditions import prepare
-from subzero.loop import NO_ROOM, run_rows
-from subzero.model import Model, model_of
-from subzero.model_changes import Later, checked_later, go_on_with, rows_of_changes
-from subzero.recording import Pace, Recording, Run, cut, new_recording, record_row
+from subzero.model import Model, load, model_of
 from subzero.room import REMEDY, has_room, refuse_what_cannot_fit
 from subzero.run_state import Live, Setup
-from subzero.trials import load
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -105,7 +103,7 @@ def run_trial(
     times = trial.times() if times is None else times
     changes = rows_of_changes(trial, tethered, times, later)
     if tethered and trial.scheme != "moving_end":
-        from subzero.paper.run import run_as_printed
+        from subzero.paper import run_as_printed
 
         return run_as_printed(trial, model, progress)
     setup, live = prepare(trial, model, tethered, longest_exchange=float(np.diff(times).max()) / parts)

@@ -24,16 +24,14 @@ import numpy as np
 
 import scenarios
 from scenarios.steps import whole_steps
-from subzero import coupling
+from subzero.engine import coupling
+from subzero.engine.initial_conditions import prepare
+from subzero.engine.recording import Recording, Run, cut, new_recording, record_row
+from subzero.engine.time_loop import ENDING, NO_ROOM, ROW, USED, advance, hold, observe
 from subzero.errors import UserError, real, short, truth
-from subzero.initial_conditions import prepare
-from subzero.loop import NO_ROOM
-from subzero.model import Model, model_of
-from subzero.recording import Recording, Run, cut, new_recording, record_row
-from subzero.run_handle import ENDING, ROW, USED, advance, hold, observe
+from subzero.model import Model, load, model_of
 from subzero.run_state import Live, Orders, Setup
 from subzero.simulation import WENT_WELL, in_words, more_room
-from subzero.trials import load
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -86,9 +84,9 @@ WELL = (coupling.FINE, NO_ROOM)
 
 
 class Held(NamedTuple):
-    """A run: its arrays, times of its rows (n,) [s], where it stands (`subzero.run_handle`), what is seen, and the
-    handle that machine code knows the arrays by. It is exchanged as a whole: an interrupt finds the old one or the new
-    one.
+    """A run: its arrays, times of its rows (n,) [s], where it stands (`subzero.engine.time_loop`), what is seen,
+    and the handle that machine code knows the arrays by. It is exchanged as a whole: an interrupt finds the old one
+    or the new one.
     """
 
     setup: Setup

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from subzero.channels import BY_NAME
-from subzero.records.goodness_of_fit import Fit, fits
+from subzero.records.record import Fit, fits
 from subzero.validity import warnings_of
 
 if TYPE_CHECKING:
@@ -128,7 +128,8 @@ def path_length(run: xr.Dataset) -> float:
 
 def magnitude(run: xr.Dataset, names: tuple[str, ...]) -> np.ndarray:
     """Return the length of a vector that is stored as three channels; gaps count as zero."""
-    return np.linalg.norm(np.nan_to_num([run[name].values for name in names]), axis=0)
+    size: np.ndarray = np.linalg.norm(np.nan_to_num([run[name].values for name in names]), axis=0)
+    return size
 
 
 def at_end(run: xr.Dataset, name: str) -> float | None:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from subzero.diagnosis.hypothesis.effect import Effect
     from subzero.diagnosis.hypothesis.logged import Logged
-    from subzero.output import Stage
+    from subzero.stage import Stage
 
 MOST_ROWS = 12
 """So many causes that cannot be told apart are shown on the terminal; the report has them all."""
@@ -95,7 +95,7 @@ def write_all(
 def _write_report(verdict: Verdict, logged: Sequence[Logged], stage: Stage) -> None:
     from subzero.diagnosis.report import html as report
     from subzero.figures.diagnosis import draw_diagnosis
-    from subzero.figures.sheet import Title
+    from subzero.figures.style import Title
 
     names = ", ".join(dict.fromkeys(one.setting.trial.name for one in logged))
     records = ", ".join(one.name for one in logged)

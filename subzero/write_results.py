@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
     import scenarios
-    from subzero.output import Stage
     from subzero.records.record import Record
+    from subzero.stage import Stage
 
 
 def default_folder(trial: scenarios.Trial) -> Path:

@@ -226,8 +226,8 @@ def feed_forward() -> str:
         "## The cable fed forward\n\nRoot mean squares after the transients, at equal gains. `fig6`: straight on at"
         " 1 m/s for 60 s; `wide_turn`: 200° at 8°/s, then straight on. The last line of each block is the transplant:"
         " the same feedback on board the bare hull. What is asked for: five times in speed on `fig6`, three times in"
-        " heading in `wide_turn`. The formula has one angle for the whole cable (`autopilot/cable_in_turn.py`): of the"
-        " heading error in the wide turn it takes less than the model does.\n\n" + table(head, rows)
+        " heading in `wide_turn`. The formula has one angle for the whole cable (`subzero/autopilot/feed_forward.py`):"
+        " of the heading error in the wide turn it takes less than the model does.\n\n" + table(head, rows)
     )
 
 

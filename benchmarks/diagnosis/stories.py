@@ -27,7 +27,7 @@ from subzero.diagnosis.report import tables, words
 from subzero.diagnosis.report.html import table
 from subzero.diagnosis.results import Verdict
 from subzero.figures.diagnosis import draw_diagnosis
-from subzero.figures.sheet import Title
+from subzero.figures.style import Title
 from subzero.output import staged
 from subzero.synthetic.challenge import SAMPLE_S
 from subzero.synthetic.planted import Hidden, draw_deviations, hide, make_record

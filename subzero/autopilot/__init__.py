@@ -21,15 +21,15 @@ are through the water. Names come from their modules when they are first used: p
 symbol       name                                    unit        file
 -----------  --------------------------------------  ----------  ---------------------
 x, u         states and inputs of a plant            SI          hull_state_space
-F_c          pull of the cable in steady motion      N           steady_cable_force
+F_c          force of the cable in steady motion     N           trim_point
 x₀, u₀       trim: steady state and its command      SI          trim_point
 A, B, C, D   linear model about it                   SI          linear, cable_modes
 A_k, B_k     linear model along a run                SI          along
 λ L/U, ζ     poles in the vehicle's time scale       1           linear
-k, k_I       feedback and integral gains             SI          design, lqr_weights
+k, k_I       feedback and integral gains             SI          design
 δ_ff         feed-forward, against hull and cable    SI          standard
 
-`hull_state_space`, `steady_cable_force` and `trim_point` stand in `subzero.steady_motion`: a run may start in trim.
+`hull_state_space` and `trim_point` stand in `subzero.steady_motion`: a run may start in trim.
 """
 
 from importlib import import_module
@@ -67,9 +67,9 @@ _HOME = {
     "Tuning": "subzero.autopilot.tuning",
     "TwinCable": "subzero.autopilot.feed_forward",
     "UNITS": "subzero.steady_motion.hull_state_space",
-    "WEIGHTS": "subzero.autopilot.lqr_weights",
+    "WEIGHTS": "subzero.autopilot.design",
     "Wanted": "subzero.autopilot.standard",
-    "Weights": "subzero.autopilot.lqr_weights",
+    "Weights": "subzero.autopilot.design",
     "design_gains": "subzero.autopilot.design",
     "estimates": "subzero.autopilot.estimator",
     "fly": "subzero.autopilot.flight",
@@ -80,13 +80,13 @@ _HOME = {
     "manoeuvre": "subzero.autopilot.manoeuvres",
     "margins": "subzero.autopilot.stability_margins",
     "modes": "subzero.autopilot.linear",
-    "plant": "subzero.autopilot.plants",
+    "plant": "subzero.autopilot.coupled_plant",
     "reduced": "subzero.autopilot.design",
     "step": "subzero.autopilot.steps",
     "subsystem": "subzero.autopilot.linear",
     "trim": "subzero.steady_motion.trim_point",
     "tune": "subzero.autopilot.tuning",
-    "with_weights": "subzero.autopilot.lqr_weights",
+    "with_weights": "subzero.autopilot.design",
 }
 """Public name → its module; no module of this package may be called like a public name."""
 

@@ -1,17 +1,16 @@
-"""A linear model along a run, for what no steady motion stands for: a cable that grows, a turn, a winch, a current.
+"""A linear time-varying model along a run: a cable that grows, a turn, a winch, a current, without steady motion.
 
     δx_{k+1} = A_k δx_k + B_k δu_k,   A_k = ∂Φ/∂x, B_k = ∂Φ/∂u at (x_k, u_k) of the run
 
 with Φ one exchange of the coupled simulation (`coupled_plant`): hull, actuators as they are, the cable's shape at two
-times, its drum. A_k has thousands of entries that nobody needs by themselves, so it is never written down: its product
-with a deviation is a central difference along that deviation,
+times, its drum. A_k is large and never formed: its product with a deviation is a directional central difference,
 
     A_k δx_k + B_k δu_k = (Φ(x_k + h δx_k, u_k + h δu_k) − Φ(x_k − h δx_k, u_k − h δu_k))/2h
 
-The result is linear in δu, and what a run does when it is disturbed by so little that nothing is quadratic. How little
-that is, the cable says: its normal drag ½ρdC_n |V_n| V_n has no linear part where it is straight, and outweighs its
-inertia from some millimetres a second on. After 2 s of rudder at 1 m/s on 20 m of cable, the largest error is 2 % of
-the largest deviation for 0.06° of rudder, 13 % for 0.6°, 37 % for 5°.
+The result is linear in δu, and holds for small disturbances. How small is set by the cable: its normal drag
+½ρdC_n |V_n| V_n has no linear part where the cable is straight, and outweighs inertia from a few millimetres a second
+on. After 2 s of rudder at 1 m/s on 20 m of cable, the largest error is 2 % of the largest deviation for 0.06° of
+rudder, 13 % for 0.6°, 37 % for 5°.
 """
 
 from __future__ import annotations
@@ -27,10 +26,9 @@ from scenarios.steps import whole_steps
 from subzero.autopilot.coupled_plant import CABLE_OUTPUTS, HULL_SIZE, NoRoomError, Tethered, blank_trial
 from subzero.channels import BY_NAME
 from subzero.errors import UserError
-from subzero.model import Model
+from subzero.model import Model, load
 from subzero.steady_motion.hull_state_space import INPUT_NAMES, STATE_NAMES, UNITS
 from subzero.steady_motion.trim_point import Trim
-from subzero.trials import load
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -107,7 +105,8 @@ class Along:
                 for s in (1.0, -1.0)
             ]
             if self.step.events(ends[0]) == self.step.events(ends[1]):
-                return (ends[0] - ends[1]) / (2.0 * h)
+                column: np.ndarray = (ends[0] - ends[1]) / (2.0 * h)
+                return column
             size *= 0.1
         raise UserError(
             f"linearise_along: at t = {self.time[k]:g} s the drum begins or stops to turn, or the cable is split, just"
@@ -121,7 +120,8 @@ class Along:
             return np.zeros(len(STATE_NAMES) + len(CABLE_OUTPUTS))
         h, x, u = SIZE / largest, self.states[k], self.commands[min(k, len(self.commands) - 1)]
         ends = [self.step.output(self.time[k], x + s * h * dx, u, {}) for s in (1.0, -1.0)]
-        return (ends[0] - ends[1]) / (2.0 * h)
+        column: np.ndarray = (ends[0] - ends[1]) / (2.0 * h)
+        return column
 
     def _checked(self, values: np.ndarray, what: str, shape: tuple[int, ...]) -> np.ndarray:
         """Return deviations as an array of a shape, or refuse them."""

@@ -1,6 +1,6 @@
-"""The sideways motion of a straight cable that pays out steadily, as a few ordinary differential equations.
+"""Transverse modes of a straight cable under steady pay-out: a Galerkin model of low order.
 
-Equation (7) for a cable that lies straight behind a vehicle of speed U, to first order in its sideways displacement
+Equation (7) for a cable that lies straight behind a vehicle of speed U, to first order in its transverse displacement
 y(s, t), s from the tow point, S the length in the water, k_t = ½ρπdC_t, T_d the drum's friction:
 
     T ∂²y/∂s² = m₁ ∂²y/∂t² + ρA U ∂²y/∂s∂t + c (∂y/∂t + U ∂y/∂s),   T = k_t U² (S − s) + T_d,   y(S, t) = 0
@@ -35,18 +35,18 @@ from numpy.polynomial import Legendre, Polynomial
 from subzero.model import Model
 
 BENDS = 6
-"""Shapes beside the straight line."""
+"""Number of shape functions beside the straight line."""
 LOST_OVER = 1.0
-"""Waves shorter than about this are lost in their own length. [m]"""
+"""Waves shorter than about this are damped within their own length. [m]"""
 NEAR_DRUM = 0.5
 """The cable is kept taut over about this length before the drum, a segment of the simulation. [m]"""
 HARMONIC = 8.0 / (3.0 * pi)
-"""What |v| v of a sine is worth as W v, W its amplitude. [-]"""
+"""Harmonic linearisation: |v| v of a sine of amplitude W is equivalent to this times W v. [-]"""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class CableModes:
-    """One sideways direction of a cable, z = (b, q_1 … q_K, q_1' … q_K') [rad, rad/s].
+    """One transverse direction of a cable, z = (b, q_1 … q_K, q_1' … q_K') [rad, rad/s].
 
     With the tow point's velocity V [m/s] and acceleration a [m/s²] in that direction,
 
@@ -95,7 +95,8 @@ def _matrices(
     f, g, h = (np.array([shape.deriv(n)(sigma) for shape in _shapes(bends)]) for n in (0, 1, 2))
 
     def integral(left: np.ndarray, right: np.ndarray, by: np.ndarray | float = 1.0) -> np.ndarray:
-        return (left * (weight * by)) @ right.T
+        rates: np.ndarray = (left * (weight * by)) @ right.T
+        return rates
 
     M = S * S * m1 * integral(f, f)
     C = S * U * (2.0 * m1 * (integral(f, f) - integral(f, g, sigma)) + added * integral(f, g))

@@ -9,20 +9,24 @@ angle, its rate and its integral is a PID. The largest acceptable deviations are
 Numbers that change with the speed are designed at several speeds (`Schedule`). A rudder is worth u², so one set of
 gains is too weak at half the speed and too strong at twice. Arrays of any shape are kept at a few speeds and read
 linearly in between; beyond the ends the last ones hold.
+
+`WEIGHTS` says what each loop of the standard autopilots feeds back, and its largest acceptable deviations.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from math import radians
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from subzero.errors import UserError
+from subzero.errors import UserError, suggestion
 
 if TYPE_CHECKING:
     import control
+
 
 INTEGRAL = "integral"
 """Name of ∫e among the weights."""
@@ -231,3 +235,64 @@ class Schedule:
         high = min(low + 1, self.speeds.size - 1)
         values = self.values[low] + (place - low) * (self.values[high] - self.values[low])
         return np.asarray(values)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Weights:
+    """What a loop feeds back, the tracked state last, and the largest acceptable deviations (`design_gains`).
+
+    `foreseen`: whether what is wanted is fed forward too, with the steady command that it needs.
+    """
+
+    part: str
+    measured: tuple[str, ...]
+    largest: Mapping[str, float]
+    largest_command: float
+    foreseen: bool = False
+
+
+WEIGHTS: dict[str, Weights] = {
+    "speed": Weights(
+        part="surge",
+        measured=("surge_speed",),
+        largest={"surge_speed": 0.1, "integral": 0.2},
+        largest_command=4.0,
+        foreseen=True,
+    ),
+    "heading": Weights(
+        part="yaw_sway",
+        measured=("yaw_rate", "heading"),
+        largest={"yaw_rate": radians(20.0), "heading": radians(8.0), "integral": radians(16.0)},
+        largest_command=radians(10.0),
+    ),
+    "pitch": Weights(
+        part="pitch_heave",
+        measured=("pitch_rate", "pitch"),
+        largest={"pitch_rate": radians(20.0), "pitch": radians(8.0), "integral": radians(16.0)},
+        largest_command=radians(10.0),
+    ),
+    "roll": Weights(
+        part="roll",
+        measured=("roll_rate", "roll"),
+        largest={"roll_rate": radians(60.0), "roll": radians(8.0), "integral": radians(16.0)},
+        largest_command=radians(6.0),
+    ),
+}
+"""Loop → its weights."""
+
+
+def with_weights(name: str, **changes: float | Mapping[str, float]) -> dict[str, Weights]:
+    """Return one loop's weights with changes, for `tune(weights=...)`."""
+    return {name: replace(WEIGHTS[name], **changes)}  # type: ignore[arg-type]
+
+
+def checked(weights: dict[str, Weights]) -> dict[str, Weights]:
+    """Return weights, or refuse what they are not."""
+    for name, value in weights.items():
+        if name not in WEIGHTS:
+            raise UserError(
+                f"tune: there is no loop '{name}'.{suggestion(name, WEIGHTS)} Allowed: {', '.join(WEIGHTS)}."
+            )
+        if not isinstance(value, Weights) or value.measured != WEIGHTS[name].measured:
+            raise UserError(f"tune: the weights of '{name}' are {value!r}. Allowed: those of `with_weights`.")
+    return weights

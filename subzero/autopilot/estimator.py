@@ -1,11 +1,11 @@
-"""The heading by full state feedback: LQR on a linear model, with a Kalman filter for what is not measured.
+"""The LQG heading loop: full state feedback (LQR) on the estimate of a Kalman filter.
 
     δ = limited(δ_ff − k·(x̂ − x_w) + I),   x = (v, r, ψ, δ_r)
     x̂ ← A_d x̂ + B_d (δ − δ_ff) + L (y − C x̂),   y = (r, ψ)
 
-Sway speed and rudder angle are estimated; the gains are those of `control.lqr` on the printed matrices (`Gains`), the
-filter that of `control.dlqe` on the model sampled at the controller's rate. Matrices are scheduled on the speed. What
-the feed-forward path cancels is no part of the filter's model; what it leaves is learned by the integral.
+Sway speed and rudder angle are not measured. The gains come from `control.lqr` with the matrices in `Gains`, the filter
+from `control.dlqe` on the model sampled at the controller's rate. Both are scheduled on the speed. The force of the
+cable is not in the filter's model: feed-forward cancels it, and the integral takes what is left.
 """
 
 from __future__ import annotations
@@ -27,16 +27,16 @@ TRACKED = ("yaw_rate", "heading")
 MEASURED = np.array([[0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]])
 LARGEST = {"yaw_rate": radians(20.0), "heading": radians(8.0), "integral": radians(16.0)}
 LARGEST_COMMAND = radians(10.0)
-UNREST = np.diag([0.05, 0.05, 0.01, 0.02]) ** 2
-"""Covariance of what moves the hull beside the model, per second: sway [m/s], yaw rate, heading, rudder [rad …]."""
-NOISE = np.diag([radians(0.5), radians(0.5)]) ** 2
+PROCESS_NOISE = np.diag([0.05, 0.05, 0.01, 0.02]) ** 2
+"""Covariance of the process noise, per second: sway speed [m/s], yaw rate [rad/s], heading, rudder [rad]."""
+MEASUREMENT_NOISE = np.diag([radians(0.5), radians(0.5)]) ** 2
 """Covariance of the measured yaw rate and heading [rad2/s2, rad2]."""
 LARGEST_ERROR = radians(25.0)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Estimates:
-    """The heading loop's matrices over speed.
+    """The matrices of the heading loop, scheduled on the speed.
 
     Attributes:
         designs: the LQR design at each speed.
@@ -80,8 +80,9 @@ def estimates(
         for part in parts
     )
     sampled = [control.c2d(part, sample_time) for part in parts]
+    process = PROCESS_NOISE * sample_time
     filters = [
-        np.asarray(control.dlqe(np.asarray(one.A), np.eye(4), MEASURED, UNREST * sample_time, NOISE)[0])
+        np.asarray(control.dlqe(np.asarray(one.A), np.eye(4), MEASURED, process, MEASUREMENT_NOISE)[0])
         for one in sampled
     ]
     speeds = np.array(tuning.speeds)
@@ -96,7 +97,7 @@ def estimates(
 
 
 class EstimatorLoop:
-    """The full-state heading loop at work; the interface is that of `loops.Loop`.
+    """The LQG heading loop with its state; the interface is that of `loops.Loop`.
 
     Args:
         matrices: from `estimates`, for the same sample time.
@@ -108,7 +109,7 @@ class EstimatorLoop:
         self.reset()
 
     def reset(self) -> None:
-        """Forget the estimate and what was integrated."""
+        """Set the integral to 0, and drop the estimate."""
         self.integral = 0.0
         self.estimate: np.ndarray | None = None
         self._wanted: float | None = None
@@ -122,7 +123,7 @@ class EstimatorLoop:
         command: float,
         rate: float = 0.0,
     ) -> None:
-        """Take over from a command without a jump: the next command, unlimited, is this one."""
+        """Set the integral so that the next command, before limits, is this one (bumpless transfer)."""
         refuse_unknown(reading, TRACKED, wanted=wanted, command=command, feed_forward=feed_forward)
         self.estimate = np.array([0.0, reading.yaw_rate, reading.heading, command - feed_forward])
         self.integral = command - feed_forward - self._feedback(wanted, speed, rate)[0]
@@ -154,7 +155,7 @@ class EstimatorLoop:
         return command
 
     def _feedback(self, wanted: float, speed: float, rate: float) -> tuple[float, float]:
-        """Return −k·(x̂ − x_w) and how the integral grows in this sample."""
+        """Return −k·(x̂ − x_w), and the increment of the integral."""
         assert self.estimate is not None
         *k, k_integral, _ = self.matrices.feedback.at(speed).tolist()
         sway, rudder = (self.matrices.turn.at(speed) * rate).tolist()
@@ -163,23 +164,23 @@ class EstimatorLoop:
         return -float(np.dot(k, off)), self.sample_time * k_integral * error
 
     def _jump(self, wanted: float, speed: float, rate: float) -> float:
-        """Return what a jump of what is wanted takes off the integral, as in `loops`."""
+        """Return what a jump of the set-point takes off the integral, as in `loops`."""
         assert self.estimate is not None
         before = wanted if self._wanted is None else self._wanted + rate * self.sample_time
         self._wanted = wanted
         k, b = self.matrices.feedback.at(speed)[[2, 5]].tolist()
         now = float(self.estimate[2])
-        return (1.0 - b) * k * (_limited(wanted - now) - _limited(before - now))
+        return float((1.0 - b) * k * (_limited(wanted - now) - _limited(before - now)))
 
     def _predict(self, reading: Observation, speed: float, command: float) -> None:
-        """Move the estimate on by a sample, corrected by what was measured."""
+        """Move the estimate on by a sample: prediction, and correction by the innovation."""
         assert self.estimate is not None
         model, gain = self.matrices.model.at(speed), self.matrices.filter.at(speed)
-        surprise = np.array([reading.yaw_rate, reading.heading]) - MEASURED @ self.estimate
-        surprise[1] -= 2.0 * pi * round(surprise[1] / (2.0 * pi)) if abs(surprise[1]) > pi else 0.0
-        self.estimate = model[:, :4] @ self.estimate + model[:, 4] * command + gain @ surprise
+        innovation = np.array([reading.yaw_rate, reading.heading]) - MEASURED @ self.estimate
+        innovation[1] -= 2.0 * pi * round(innovation[1] / (2.0 * pi)) if abs(innovation[1]) > pi else 0.0
+        self.estimate = model[:, :4] @ self.estimate + model[:, 4] * command + gain @ innovation
 
 
 def _limited(error: float) -> float:
-    """Return an error, no larger than counts [rad]."""
+    """Return an error within ±`LARGEST_ERROR`. [rad]"""
     return max(-LARGEST_ERROR, min(LARGEST_ERROR, error))

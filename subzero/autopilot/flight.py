@@ -1,4 +1,4 @@
-"""Fly: a simulation, sensors and an autopilot in a loop."""
+"""Closed-loop simulation: the simulator, sensors and an autopilot in a loop."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 class Autopilot(Protocol):
-    """What can fly; a user's own is any object that:
+    """The interface of an autopilot; one of your own is any object that
 
     1. has a `name` and a `sample_time`, a whole number of the trial's cable steps [s];
     2. begins again on `reset()`;
@@ -44,11 +44,11 @@ class Autopilot(Protocol):
 
 
 class AutopilotError(UserError):
-    """An autopilot that broke: it raised an error of its own, which is this one's cause."""
+    """An autopilot raised an error of its own, which is this one's cause."""
 
 
 class AutopilotWarning(UserWarning):
-    """A flight that its autopilot ended early: it had no command, or one that is none."""
+    """A flight ended early: its autopilot gave no valid command."""
 
 
 LONGEST = 86400.0
@@ -67,16 +67,16 @@ def fly(
     seed: int = 0,
     progress: Progress | None = None,
 ) -> xr.Dataset:
-    """Return a run of a scenario whose commands come from an autopilot.
+    """Simulate a scenario with its commands from an autopilot, and return the run.
 
     Args:
         scenario: where it starts, in what water, with what cable; its commands are not used.
-        autopilot: what flies.
-        wanted: what to hold, at a time [s].
+        autopilot: gives the commands.
+        wanted: the set-point as a function of time [s].
         tethered: with the cable.
-        model: another model than the scenario's: what is true, whatever the autopilot believes.
+        model: the true model, if not the scenario's; the autopilot may be designed for another.
         duration: how long, to the first sample that reaches it; the scenario's by default. [s]
-        sensors: what the autopilot is told.
+        sensors: through which the autopilot sees the run.
         seed: of the sensors.
         progress: told the fraction that is done.
 

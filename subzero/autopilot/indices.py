@@ -1,6 +1,6 @@
-"""What a manoeuvre says in a few numbers: turning circle, zig-zag, step, spiral, crash stop.
+"""Indices of manoeuvres: turning circle, zig-zag, step response, spiral, crash stop.
 
-Plain arrays in, plain numbers out; SI and radians. A number that the run did not last for is NaN. Definitions after the
+Plain arrays in, plain numbers out; SI and radians. An index that the run is too short for is NaN. Definitions after the
 IMO standards for ship manoeuvrability, MSC.137(76): advance and transfer are those of the hull centre when the heading
 has changed by 90°, along and across the first heading; the tactical diameter is the transfer at 180°.
 """

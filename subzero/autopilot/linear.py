@@ -28,10 +28,8 @@ import vehicle
 from subzero.autopilot.cable_modes import BENDS, CableModes
 from subzero.errors import UserError, suggestion
 from subzero.model import Model
-from subzero.steady_motion.actuators import ideal
-from subzero.steady_motion.hull_state_space import INPUT_NAMES, STATE_NAMES, VELOCITY, rate, to_vehicle
-from subzero.steady_motion.steady_cable_force import SteadyPull
-from subzero.steady_motion.trim_point import Trim
+from subzero.steady_motion.hull_state_space import INPUT_NAMES, STATE_NAMES, VELOCITY, ideal, rate, to_vehicle
+from subzero.steady_motion.trim_point import SteadyPull, Trim
 from vehicle.rigid_body import skew
 
 if TYPE_CHECKING:

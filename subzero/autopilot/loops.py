@@ -1,11 +1,12 @@
-"""One loop of an autopilot, in discrete time: state feedback with integral action.
+"""One control loop in discrete time: state feedback with integral action, anti-windup and set-point weighting.
 
-    δ = limited(δ_ff + k_y (y_w − y) + k_r (y_w' − r) + I),   I ← I + T k_I (y_w − y), not further into a limit
-    and when what is wanted jumps by Δ, more than it was said to move on:  I ← I − (1 − b) k_y Δ
+    δ = limited(δ_ff + k_y (y_w − y) + k_r (y_w' − r) + I),   I ← I + T k_I (y_w − y), but not further into a limit
+    when the set-point y_w jumps by Δ (beyond y_w' T):   I ← I − (1 − b) k_y Δ
 
-y is what is measured: the speed for the propeller (a PI), an angle y and its rate r for a fin (a PID). The integral is
-kept in units of the command, so gains that change with the speed change nothing by themselves, and the loop can take
-over from any command without a jump (`engage`).
+y is measured: the speed for the propeller (PI), or an angle y and its rate r for a fin (PID). b is the set-point weight
+(`Gains.share`): only b Δ of a step acts at once, the integral brings the rest. I is kept in units of the command, so a
+change of the scheduled gains does not make it jump, and the loop can take over from any command (`engage`, bumpless
+transfer).
 """
 
 from __future__ import annotations
@@ -20,13 +21,13 @@ from subzero.simulator import Observation
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Law:
-    """What a loop does; frozen, to be shared.
+    """The control law of a loop: what is fed back, with which gains. Frozen, so that loops can share it.
 
     Attributes:
         measured: channels that are fed back: the tracked one alone, or its rate and it.
         gains: (k of each, k_I, b) over speed, (n + 2,) at a speed, from `Gains.numbers`.
-        largest_error: errors beyond this count as this, so that a far goal asks for no more than the fins can do
-            [unit of the tracked channel].
+        largest_error: the error is limited to this, so that a far set-point does not saturate the fins.
+            [unit of the tracked channel]
     """
 
     measured: tuple[str, ...]
@@ -43,15 +44,15 @@ class Law:
 
 
 def refuse_unknown(reading: Observation, measured: tuple[str, ...], **given: float) -> None:
-    """Refuse what is not a finite number: the limits of a command would make a full deflection of it, unseen.
+    """Refuse NaN and infinity: the command limits would turn them silently into full deflection.
 
     Args:
-        reading: what the sensors tell.
+        reading: the measurements.
         measured: channels that the loop feeds back, the tracked one last.
-        given: what else it takes, by name.
+        given: other inputs of the loop, by name.
 
     Raises:
-        UserError: names what is no number.
+        UserError: one of them is not finite; the message names it.
     """
     values = {name: getattr(reading, name) for name in measured} | given
     unknown = [name for name, value in values.items() if not isfinite(value)]
@@ -63,10 +64,10 @@ def refuse_unknown(reading: Observation, measured: tuple[str, ...], **given: flo
 
 
 class Loop:
-    """A law at work.
+    """A control law with its state: the integral and the last set-point.
 
     Args:
-        law: what to do.
+        law: of the loop.
         sample_time: T. [s]
     """
 
@@ -75,7 +76,7 @@ class Loop:
         self.reset()
 
     def reset(self) -> None:
-        """Forget what was integrated."""
+        """Set the integral to 0."""
         self.integral = 0.0
         self._wanted: float | None = None
 
@@ -88,7 +89,7 @@ class Loop:
         command: float,
         rate: float = 0.0,
     ) -> None:
-        """Take over from a command without a jump: the next command, unlimited, is this one."""
+        """Set the integral so that the next command, before limits, is this one (bumpless transfer)."""
         refuse_unknown(reading, self.law.measured, wanted=wanted, command=command, feed_forward=feed_forward)
         feedback, _ = self._feedback(reading, wanted, speed, rate)
         self.integral = command - feed_forward - feedback
@@ -107,16 +108,16 @@ class Loop:
         """Return the command for the next sample.
 
         Args:
-            reading: what is measured.
-            wanted: y_w, of the tracked channel, the last of `Law.measured`.
-            speed: that the gains belong to. [m/s]
+            reading: the measurements.
+            wanted: y_w, set-point of the tracked channel, which is the last of `Law.measured`.
+            speed: at which the scheduled gains are taken. [m/s]
             feed_forward: δ_ff, added before the limits.
             limits: of the command; the integral does not wind up beyond them.
-            integrate: whether to; a fin without flow has nothing to learn from its error.
-            rate: y_w', how fast what is wanted moves on.
+            integrate: False holds the integral, as for a fin without flow.
+            rate: y_w', rate of the set-point.
 
         Raises:
-            UserError: something of this is not a finite number.
+            UserError: an input is not a finite number.
         """
         refuse_unknown(reading, self.law.measured, wanted=wanted, rate=rate, feed_forward=feed_forward)
         self.integral -= self._jump(reading, wanted, speed, rate)
@@ -129,21 +130,21 @@ class Loop:
         return min(high, max(low, feed_forward + feedback + self.integral))
 
     def _jump(self, reading: Observation, wanted: float, speed: float, rate: float) -> float:
-        """Return what a jump of what is wanted takes off the integral, (1 − b) k_y Δ."""
+        """Return what a jump of the set-point takes off the integral, (1 − b) k_y Δ."""
         before = wanted if self._wanted is None else self._wanted + rate * self.sample_time
         self._wanted = wanted
         *_, k, _, b = self.law.gains.at(speed).tolist()
         measured = getattr(reading, self.law.measured[-1])
-        return (1.0 - b) * k * (self._limited(wanted - measured) - self._limited(before - measured))
+        return float((1.0 - b) * k * (self._limited(wanted - measured) - self._limited(before - measured)))
 
     def _limited(self, error: float) -> float:
-        """Return an error, no larger than counts."""
+        """Return an error within ±`largest_error`."""
         return max(-self.law.largest_error, min(self.law.largest_error, error))
 
     def _feedback(
         self, reading: Observation, wanted: float, speed: float, rate: float
     ) -> tuple[float, float]:
-        """Return k·(what is wanted − what is measured) and how the integral grows in this sample."""
+        """Return the proportional and rate feedback, and the increment of the integral."""
         *gains, k_integral, _ = self.law.gains.at(speed).tolist()
         *others, tracked = self.law.measured
         error = self._limited(wanted - getattr(reading, tracked))

@@ -1,9 +1,9 @@
-"""Manoeuvres: each a program of commands, and the numbers that are read off its run, with and without the cable.
+"""Standard manoeuvres: a program of commands each, and the indices that are computed from its run.
 
-Each begins with a straight run at the trim of the bare hull, so that both vehicles come to the manoeuvre as they would
-in water: the tethered one with cable behind it, and slower for it. To add one: a program (a final class with `after`:
-commands that look at the vehicle, flown like an autopilot), a function that measures it (`indices`), and a line in
-`MANOEUVRES`.
+Each begins with a straight run at the trim of the bare hull, with and without the cable, as in a sea trial: the
+tethered vehicle then enters the manoeuvre with cable behind it, and slower. To add one: a program (a final class with
+`after`, which gives the commands from what it sees, like an autopilot), a function for its indices (`indices`), and a
+line in `MANOEUVRES`.
 """
 
 from __future__ import annotations
@@ -21,12 +21,11 @@ from subzero.autopilot import indices
 from subzero.autopilot.flight import fly
 from subzero.autopilot.standard import Wanted
 from subzero.errors import UserError, checked, chosen
-from subzero.model import Model, model_of
+from subzero.model import Model, load, model_of
 from subzero.simulation import Progress
 from subzero.simulator import Observation
 from subzero.steady_motion.hull_state_space import INPUT_NAMES
 from subzero.steady_motion.trim_point import trim
-from subzero.trials import load
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -39,7 +38,7 @@ Command = tuple[float, float, float, float]
 
 @dataclass(kw_only=True)
 class Program(ABC):
-    """What all manoeuvres have: the straight run. Final classes say what comes then, in `after`.
+    """The straight run that all manoeuvres begin with; final classes add the rest in `after`.
 
     Attributes:
         straight: command of the straight run: propeller [rev/s], rudder, port and starboard plane [rad].
@@ -75,7 +74,7 @@ class Program(ABC):
         change = self.side * (getattr(now, channel) - getattr(begun, channel))
         if change != change:
             raise UserError(f"at t = {now.time:g} s the {channel} is not a number: no sensor measures it.")
-        return change
+        return float(change)
 
     def with_rudder(self, angle: float) -> Command:
         """Return the straight command with a rudder [rad]."""

@@ -1,4 +1,7 @@
-"""What the commands of manoeuvres and autopilots leave behind: files, and one table of indices."""
+"""What the commands of manoeuvres and autopilots leave behind: files, a table of indices, and one figure.
+
+The figure shows track, heading, speed and command, with the cable and without.
+"""
 
 from __future__ import annotations
 
@@ -11,12 +14,27 @@ from rich.table import Table
 
 from subzero import output
 from subzero.errors import printable
+from subzero.figures.style import (
+    LINES,
+    Runs,
+    Title,
+    channel_panel,
+    headline,
+    label,
+    legend,
+    sheet,
+    time_label,
+    warnings_in_short,
+)
 from subzero.report import NOTHING, show_warnings
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
-    from subzero.output import Stage
+    from subzero.stage import Stage
+
 
 Measured = dict[str, tuple["xr.Dataset", dict[str, float]]]
 """Name of a run, tethered or untethered → the run and its indices."""
@@ -32,7 +50,6 @@ def write(measured: Measured, title: str, answer: str, command: str, stage: Stag
         command: channel that was commanded.
         stage: where to.
     """
-    from subzero.autopilot.manoeuvre_figure import picture
     from subzero.page import page_of_runs
     from subzero.summary import summary_of
 
@@ -74,3 +91,46 @@ def tell(summary: dict[str, Any], names: list[str], stage: Stage) -> list[str]:
 def _number(value: float) -> float | None:
     """Return a plain float that JSON can hold: None for what does not exist."""
     return float(value) if math.isfinite(value) else None
+
+
+HEADLINES = {
+    "heading": "Heading, clockwise from north",
+    "depth": "Depth",
+    "pitch": "Pitch, positive nose up",
+    "surge_speed": "Forward speed",
+    "rudder_command": "Rudder command, positive to starboard",
+    "stern_plane_port_command": "Port plane command, positive nose up",
+    "propeller_command": "Propeller command",
+}
+
+
+def picture(runs: Runs, title: str, answer: str, command: str) -> Figure:
+    """Return the figure of a manoeuvre.
+
+    Args:
+        runs: tethered, untethered or both.
+        title: above it.
+        answer: the channel that shows the answer of the vehicle.
+        command: the channel that was commanded.
+    """
+    first = next(iter(runs.values()))
+    figure, panels = sheet(
+        2, 2, Title(words=title, scenario=first.attrs["scenario"], warnings=warnings_in_short(runs))
+    )
+    _track(panels[0], runs)
+    for axes, name in zip(panels[1:], (answer, "surge_speed", command), strict=True):
+        channel_panel(axes, runs, name)
+        headline(axes, HEADLINES[name])
+    legend(panels[1])
+    time_label(panels, 2)
+    panels[2].set_xlabel(panels[3].get_xlabel())
+    return figure
+
+
+def _track(axes: Axes, runs: Runs) -> None:
+    """Draw the ways of the hull centre, seen from above, with equal scales."""
+    for name, run in runs.items():
+        axes.plot(run["east"].values, run["north"].values, label=name, **LINES[name])
+    axes.set_aspect("equal", adjustable="datalim")
+    label(axes, "east [m]", "north [m]")
+    headline(axes, "Track from above")

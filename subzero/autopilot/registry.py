@@ -51,7 +51,8 @@ def from_file(path: str | Path) -> Build:
             f"'{path}' has no function 'make'. Allowed: def make(tuning, sample_time, cable), which returns an"
             " autopilot."
         )
-    return build
+    make: Build = build
+    return make
 
 
 def built(path: str | Path, build: Build, tuning: Tuning, sample_time: float, cable: CableModel) -> Autopilot:

@@ -1,9 +1,9 @@
-"""Sensors: from what is true to what a controller is told.
+"""Sensors: from the true state to the measurements that a controller gets.
 
-    sample = quantised(truth + bias + drift + noise), every period, told after the delay, or dropped
+    sample = quantised(truth + bias + drift + noise), every period, delivered after the delay, or dropped
 
 Each stage has a neutral value that switches it off exactly. Between samples, and when one is dropped, the last sample
-stands. Every sensor has random numbers of its own, from one seed: another sensor beside it changes nothing, and the
+holds. Every sensor has its own random numbers, all from one seed: adding a sensor does not change the others, and the
 same seed gives the same run.
 """
 
@@ -124,7 +124,7 @@ class Sensors:
 
 
 class _Running:
-    """A sensor with its memory."""
+    """A sensor with its state: drift, and samples that have not arrived yet."""
 
     def __init__(self, sensor: Sensor, seed: int) -> None:
         self.sensor = sensor
@@ -143,7 +143,7 @@ class _Running:
         return self._told
 
     def _take(self, seen: Observation) -> None:
-        """Take a sample, and set the time of the next; the first one is told at once, and never lost."""
+        """Take a sample, and set the time of the next; the first one is delivered at once, and never dropped."""
         first = math.isnan(self._last_time)
         passed = 0.0 if first else seen.time - self._last_time
         sample = self._sample(getattr(seen, self.sensor.channel), passed)

@@ -1,11 +1,11 @@
-"""How far a loop is from instability, as it flies: sampled, with servo, unmeasured states and cable.
+"""Gain, phase and delay margins of a loop as flown: sampled, with servo lag, unmeasured states and cable.
 
-Gain and phase margin are read off the frequency response of
+They are read off the frequency response of
 
     L(z) = −C(z) P(z),   P the hull on its cable (`linearise`), sampled; C the controller, opened at the plant's input
 
-The design leaves out the servo's lag, the sway behind a PID, the sampling and the cable. Here they are all in; the
-gains are those of the bare hull at the same speed.
+The design neglects the servo lag, sway (in the PID), sampling and the cable. Here all are included; the gains are those
+of the bare hull at the same speed.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from subzero.autopilot.design import WEIGHTS
 from subzero.autopilot.estimator import MEASURED, STATES, Estimates
 from subzero.autopilot.linear import linearise, subsystem
-from subzero.autopilot.lqr_weights import WEIGHTS
 from subzero.autopilot.tuning import Tuning
 from subzero.errors import UserError, suggestion
 from subzero.model import Model
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Margins:
-    """How far a loop is from instability, opened at the plant's input.
+    """Stability margins of a loop, opened at the plant's input.
 
     Attributes:
         gain: factor that the gain may grow by; infinite where none is too much.

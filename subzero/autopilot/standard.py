@@ -1,11 +1,11 @@
-"""The standard autopilot: speed, heading, depth over pitch, and roll; feedback of the bare hull, cable fed forward.
+"""The standard autopilot: speed, heading, depth (through pitch) and roll loops, and feed-forward of the cable.
 
     n   = n(u, D(u_w) − X_c) + PI of the speed            δ_r = rudder against (Y_c, N_c) + loop of the heading
     θ_w = −(z_w − z)/(T_z u), limited                     δ_e = trim + planes against (Z_c, M_c) + PID of the pitch
     port = δ_e − δ_d, starboard = δ_e + δ_d               δ_d = trim + PID of the roll
 
-n(u, F) is the propeller speed that gives the thrust F. The feed-forward path alone knows the cable: without it, or
-without a cable, the feedback is the same.
+n(u, F) is the propeller speed that gives the thrust F, δ_e the mean of the stern-planes (pitch) and δ_d half their
+difference (roll). The feedback gains are those of the bare hull. Only the feed-forward path knows of the cable.
 """
 
 from __future__ import annotations
@@ -15,33 +15,33 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
+from subzero.autopilot.design import WEIGHTS
 from subzero.autopilot.feed_forward import CableModel, NoCable
 from subzero.autopilot.loops import Law, Loop
-from subzero.autopilot.lqr_weights import WEIGHTS
 from subzero.autopilot.tuning import Tuning
 from subzero.errors import UserError
 from subzero.simulator import Observation
 from vehicle import Servo
 
 SLOWEST = 0.2
-"""Below this speed fins have no flow: their loops do not integrate. [m/s]"""
+"""Below this speed the fins have no effect, and their loops do not integrate. [m/s]"""
 STEEPEST = radians(30.0)
 """Largest pitch that the depth loop asks for. [rad]"""
 DEPTH_TIME = 4.0
-"""T_z: a depth error shrinks to 37 % in this time, four times as long as the pitch loop takes. [s]"""
+"""T_z, time constant of the depth loop: four times that of the pitch loop inside it. [s]"""
 LARGEST_ERRORS = {"speed": 1.0, "heading": radians(25.0), "pitch": radians(25.0), "roll": radians(25.0)}
-"""Errors beyond these count as these [m/s, rad]."""
+"""Errors are limited to these. [m/s, rad]"""
 
 
 class Wanted(NamedTuple):
-    """What an autopilot has to hold.
+    """The set-point of an autopilot.
 
     Attributes:
         speed: forward, through the water as far as the speed log knows. [m/s]
         heading: continuous. [rad]
-        depth: NaN asks for level motion instead. [m]
+        depth: NaN for level motion instead. [m]
         roll: [rad]
-        turn_rate: how fast the wanted heading itself turns. [rad/s]
+        turn_rate: rate of the wanted heading. [rad/s]
     """
 
     speed: float
@@ -52,7 +52,7 @@ class Wanted(NamedTuple):
 
 
 class HeadingLoop(Protocol):
-    """What steers: `loops.Loop`, or `estimator.EstimatorLoop`."""
+    """The interface of a heading controller: `loops.Loop` and `estimator.EstimatorLoop` have it."""
 
     def reset(self) -> None:
         """Begin again."""
@@ -66,7 +66,7 @@ class HeadingLoop(Protocol):
         command: float,
         rate: float = ...,
     ) -> None:
-        """Take over from a command without a jump."""
+        """Take over from a command without a jump (bumpless transfer)."""
 
     def update(
         self,
@@ -82,12 +82,12 @@ class HeadingLoop(Protocol):
 
 
 class StandardAutopilot:
-    """All four loops, with a heading loop of choice.
+    """The four loops together, with a heading loop of choice.
 
     Args:
         tuning: from `tune`.
         sample_time: of the controller. [s]
-        cable: what is fed forward; nothing by default.
+        cable: estimator of the cable's force, for feed-forward; none by default.
         heading: the heading loop; the tuning's PID by default.
         name: for tables and messages.
     """
@@ -127,7 +127,7 @@ class StandardAutopilot:
         self._last = None
 
     def engage(self, reading: Observation, wanted: Wanted, command: np.ndarray) -> None:
-        """Take over from a command (4,), such as a person's, without a jump."""
+        """Take over from a command (4,), such as a pilot's, without a jump (bumpless transfer)."""
         ahead, u = self._feed_forward(reading, wanted), reading.surge_speed
         together, unlike = 0.5 * (command[3] + command[2]), 0.5 * (command[3] - command[2])
         self.speed_loop.engage(reading, wanted.speed, wanted.speed, ahead[0], command[0])
@@ -140,9 +140,9 @@ class StandardAutopilot:
         """Return propeller [rev/s], rudder, port and starboard plane [rad] for the next sample.
 
         Args:
-            reading: what the sensors tell: surge_speed, heading, attitude, rates, depth and, for feed-forward, the
-                cable_length at the drum.
-            wanted: what to hold.
+            reading: measured surge_speed, heading, attitude, rates, depth and, for feed-forward, the cable_length at
+                the drum.
+            wanted: the set-point.
         """
         ahead, u = self._feed_forward(reading, wanted), reading.surge_speed
         flows = u > SLOWEST
@@ -159,7 +159,7 @@ class StandardAutopilot:
         return n, rudder, together - unlike, together + unlike
 
     def _feed_forward(self, reading: Observation, wanted: Wanted) -> tuple[float, float, float, float]:
-        """Return what the commands are expected to be: propeller, rudder, planes together and unlike."""
+        """Return the feed-forward commands: propeller, rudder, mean and half difference of the planes."""
         pull, tuning, u = self.cable.wrench(reading, self._last), self.tuning, reading.surge_speed
         thrust = float(tuning.hull_drag.at(wanted.speed)) * _beyond(wanted.speed, tuning.speeds) - pull[0]
         together, unlike = tuning.planes.at(u).tolist()
@@ -171,7 +171,7 @@ class StandardAutopilot:
         return propeller_for(thrust, wanted.speed, self._propeller), rudder, together, unlike
 
     def _wanted_pitch(self, reading: Observation, wanted: Wanted) -> float:
-        """Return the pitch that takes the hull to its depth [rad]; level without one."""
+        """Return the pitch that takes the hull to the wanted depth; 0 if none is wanted. [rad]"""
         if wanted.depth != wanted.depth:
             return 0.0
         if reading.depth != reading.depth:
@@ -181,7 +181,7 @@ class StandardAutopilot:
 
 
 def propeller_for(force: float, u: float, numbers: object) -> float:
-    """Return n [rev/s] that gives a thrust [N] at a surge speed [m/s]: a n|n| − b |n| u − c u|u| = F, solved ahead."""
+    """Return n [rev/s] that gives a thrust [N] at a surge speed [m/s]: the root n of a n|n| − b |n| u − c u|u| = F."""
     a, b, c = numbers.thrust_nn, numbers.thrust_nu, numbers.thrust_uu  # type: ignore[attr-defined]
     if a == 0.0:
         return 0.0
@@ -190,11 +190,11 @@ def propeller_for(force: float, u: float, numbers: object) -> float:
 
 
 def _beyond(speed: float, speeds: tuple[float, ...]) -> float:
-    """Return how much more drag than at the nearest end a speed outside the schedule has: as its square."""
+    """Return drag over drag at the nearest end of the schedule, for a speed outside it: drag goes with u²."""
     nearest = min(max(speed, speeds[0]), speeds[-1])
     return (speed / nearest) ** 2
 
 
 def _limit(servo: Servo) -> float:
-    """Return the largest command worth giving to a servo [rad]."""
+    """Return the command at which a servo reaches its stop. [rad]"""
     return servo.deflection_limit + servo.dead_band

@@ -14,10 +14,9 @@ from subzero.autopilot.sensors import PERFECT, Sensor
 from subzero.autopilot.standard import Wanted
 from subzero.autopilot.tuning import Tuning
 from subzero.errors import UserError, checked, chosen, real, short
-from subzero.model import Model, model_of
+from subzero.model import Model, load, model_of
 from subzero.simulation import Progress
 from subzero.steady_motion.trim_point import trim
-from subzero.trials import load
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -1,7 +1,7 @@
-"""Everything that the standard autopilots know of a vehicle, at several speeds: gains, trims, what its fins are worth.
+"""The gain schedule of the standard autopilots: gains, trim and fin effectiveness of a vehicle at several speeds.
 
-Only the hull alone is designed for: the cable is no part of it, so what is fed back moves unchanged on board when the
-cable is cut. `WEIGHTS` are the largest acceptable deviations of each loop; call `tune` with others.
+The design is for the bare hull. The cable is not part of it, so the feedback stays valid when the cable is cut.
+`WEIGHTS` are the largest acceptable deviations of each loop (Bryson's rule); give others to `tune`.
 """
 
 from __future__ import annotations
@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from subzero.autopilot.design import Gains, Schedule, design_gains, reduced
+from subzero.autopilot.design import WEIGHTS, Gains, Schedule, Weights, checked, design_gains, reduced
 from subzero.autopilot.linear import linearise, subsystem
-from subzero.autopilot.lqr_weights import WEIGHTS, Weights, checked
 from subzero.model import Model
 from subzero.steady_motion.trim_point import Trim, trim
 from vehicle.propeller import thrust
@@ -28,7 +27,7 @@ SPEEDS = (0.4, 0.6, 0.8, 1.0, 1.2, 1.4)
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Tuning:
-    """A vehicle at several speeds.
+    """Models, gains and trim of a vehicle, scheduled on its speed.
 
     Attributes:
         model: the hull that was designed for.
@@ -36,10 +35,10 @@ class Tuning:
         linear: the linear model of the bare hull at each speed.
         designs: loop → the design at each speed.
         gains: loop → (k of each measured, k_I, b) over speed.
-        hull_drag: thrust that the hull alone needs over speed. [N]
-        planes: trim of the planes, together and unlike, over speed (2,). [rad]
-        rudder_for: rudder that cancels a sway force and a yaw moment from outside (2,). [rad/N, rad/(N m)]
-        planes_for: planes together that cancel a heave force and a pitch moment (2,). [rad/N, rad/(N m)]
+        hull_drag: thrust that the bare hull needs, over speed. [N]
+        planes: trim of the planes, mean and half difference, over speed (2,). [rad]
+        rudder_for: rudder per external sway force and yaw moment that it cancels (2,). [rad/N, rad/(N m)]
+        planes_for: mean of the planes per external heave force and pitch moment (2,). [rad/N, rad/(N m)]
         sway_per_yaw: sway speed of a steady turn over its yaw rate. [m]
         rudder_per_yaw: rudder of a steady turn over its yaw rate. [s]
     """
@@ -60,16 +59,16 @@ class Tuning:
 def tune(
     model: Model, *, speeds: tuple[float, ...] = SPEEDS, weights: Mapping[str, Weights] | None = None
 ) -> Tuning:
-    """Return the tuning of a vehicle: linear models and gains at several speeds.
+    """Return the gain schedule of a vehicle: linear models and gains at several speeds.
 
     Args:
-        model: whose hull; its cable is not looked at.
-        speeds: increasing; speeds beyond them get the gains of the ends. [m/s]
+        model: of the vehicle; its cable is not used.
+        speeds: increasing; beyond them the gains of the ends hold. [m/s]
         weights: loop → weights that replace those of `WEIGHTS`.
 
     Raises:
         NoTrimError: the vehicle has no steady motion at one of the speeds.
-        UserError: weights that mean nothing.
+        UserError: there is no such loop or weight, or a weight is not above 0.
     """
     weights = WEIGHTS | checked(dict(weights or {}))
     trims = [trim(model, speed=speed) for speed in speeds]
@@ -119,13 +118,13 @@ def _thrust(model: Model, steady: Trim) -> float:
 
 
 def _mixed_planes(steady: Trim) -> np.ndarray:
-    """Return the planes together and unlike [rad]."""
+    """Return mean and half difference of the planes. [rad]"""
     port, starboard = steady.state[14], steady.state[15]
     return np.array([0.5 * (starboard + port), 0.5 * (starboard - port)])
 
 
 def _against(linear: control.StateSpace, name: str, inverse_mass: np.ndarray) -> np.ndarray:
-    """Return the fin angle per force and moment (2,) that leaves the turn rate at rest: sway (or heave) follows.
+    """Return the fin angle per external force and moment (2,) at which the turn rate stays 0 in steady sway (heave).
 
     A = [a_v  a_vr; a_rv  a_r], b by the fin: with v' = 0 and r = 0, r' = (1, −a_rv/a_v)·(d_r + b_r δ, d_v + b_v δ).
     """
@@ -134,7 +133,8 @@ def _against(linear: control.StateSpace, name: str, inverse_mass: np.ndarray) ->
     fin = labels[-1]
     v, r, f = 0, 1, labels.index(fin)
     row = np.array([-A[r, v] / A[v, v], 1.0])
-    return -(row @ inverse_mass) / float(row @ A[[v, r], f])
+    shares: np.ndarray = -(row @ inverse_mass) / float(row @ A[[v, r], f])
+    return shares
 
 
 def _steady_turn(linear: control.StateSpace) -> np.ndarray:

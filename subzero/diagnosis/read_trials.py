@@ -23,14 +23,22 @@ from subzero.diagnosis.hypothesis.catalogue.sensors import NOISE, SPECS
 from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.logged import Logged
 from subzero.errors import UserError, listed
-from subzero.model import Model
-from subzero.records.commands import FROM_RECORD, REPORTED_COMMANDS, trial_with_commands
-from subzero.records.goodness_of_fit import fits, modelled
+from subzero.model import Model, load
+from subzero.records.consistency import (
+    FROM_RECORD,
+    REPORTED_COMMANDS,
+    cut_to,
+    epoch_problems,
+    is_constant,
+    repeating,
+    stuck,
+    time_problems,
+    trial_with_commands,
+    unit_questions,
+    without_repeats,
+)
 from subzero.records.metadata import Metadata, read_metadata
-from subzero.records.record import HEADING, Record, read_record, turned
-from subzero.records.time_base import cut_to, epoch_problems, time_problems, without_repeats
-from subzero.records.unit_checks import is_constant, repeating, stuck, unit_questions
-from subzero.trials import load
+from subzero.records.record import HEADING, Record, fits, modelled, read_record, turned
 
 if TYPE_CHECKING:
     import xarray as xr

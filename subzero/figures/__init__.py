@@ -10,13 +10,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from subzero.figures.cable import shape
-from subzero.figures.deployment import deployment, is_deployed
+from subzero.figures.cable import deployment, is_deployed, shape
 from subzero.figures.forces import forces
 from subzero.figures.motion import attitude, figure_6, measured
 from subzero.figures.prescribed import exact_tension, figure_4, figure_5, is_straight
-from subzero.figures.sheet import Title
-from subzero.figures.style import Runs, warnings_in_short
+from subzero.figures.style import Runs, Title, warnings_in_short
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

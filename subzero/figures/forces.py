@@ -8,9 +8,18 @@ import numpy as np
 
 from subzero.channels import BY_NAME
 from subzero.figures import style
-from subzero.figures.panel import calm, headline, in_time, label, legend, time_label
-from subzero.figures.sheet import Title, sheet
-from subzero.figures.style import CYCLE, DASHES
+from subzero.figures.style import (
+    CYCLE,
+    DASHES,
+    Title,
+    calm,
+    headline,
+    in_time,
+    label,
+    legend,
+    sheet,
+    time_label,
+)
 from subzero.summary import ENERGY_PARTS, FORCE, MOMENT
 
 if TYPE_CHECKING:

@@ -9,9 +9,17 @@ import numpy as np
 
 from subzero.channels import BY_NAME
 from subzero.figures import style
-from subzero.figures.panel import channel_panel, headline, in_time, label, legend, time_label
-from subzero.figures.sheet import Title, sheet
-from subzero.figures.style import Runs
+from subzero.figures.style import (
+    Runs,
+    Title,
+    channel_panel,
+    headline,
+    in_time,
+    label,
+    legend,
+    sheet,
+    time_label,
+)
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -11,9 +11,19 @@ from subzero.channels import BY_NAME
 from subzero.figures import style
 from subzero.figures.cable import DOWN, EAST, configurations, longest
 from subzero.figures.forces import cable_forces
-from subzero.figures.panel import calm, headline, in_time, label, legend, spread, time_label
-from subzero.figures.sheet import Title, sheet
-from subzero.figures.style import CYCLE, DASHES
+from subzero.figures.style import (
+    CYCLE,
+    DASHES,
+    Title,
+    calm,
+    headline,
+    in_time,
+    label,
+    legend,
+    sheet,
+    spread,
+    time_label,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -65,7 +75,8 @@ def exact_tension(run: xr.Dataset) -> np.ndarray:
     S = run["cable_length"].values[0] + way
     drag = 0.5 * cable["water_density"] * np.pi * cable["diameter"] * cable["tangential_drag_coefficient"]
     at_drum = (drum["inertia"] * slope / drum["radius"] + drum["friction_torque"]) / drum["radius"]
-    return (cable["mass_per_length"] * slope + drag * u * np.abs(u)) * S + at_drum * (u > 0.0)
+    exact: np.ndarray = (cable["mass_per_length"] * slope + drag * u * np.abs(u)) * S + at_drum * (u > 0.0)
+    return exact
 
 
 def figure_4(run: xr.Dataset, title: Title) -> Figure:

@@ -1,13 +1,33 @@
-"""The one style of all figures: tethered solid, untethered dashed, measured as dots, colour-blind safe."""
+"""The one style of all figures: tethered solid, untethered dashed, measured as dots, colour-blind safe.
+
+`sheet` gives an empty figure with its title and a grid of styled, lettered panels; the functions behind it fill a
+panel: channels over time, headline, units, legend, and axes that do not mislead.
+
+Figures are made with matplotlib's objects alone (no pyplot: half the import time, no window, nothing global
+is changed) and drawn by Agg. Layout is by hand, because an automatic layout draws everything twice.
+"""
 
 from __future__ import annotations
 
+import math
+import textwrap
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from subzero.channels import BY_NAME
 from subzero.validity import warnings_of
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.axes import Axes
+
+    from subzero.records.record import Record
+
 
 Runs = dict[str, "xr.Dataset"]
 """Runs of one trial by name: tethered, untethered or both."""
@@ -45,3 +65,141 @@ def warnings_in_short(runs: Runs) -> str:
         if checks
     ]
     return f"{count} warning{'s' if count > 1 else ''} ({'; '.join(parts)}), see summary.json"
+
+
+WIDTH, ROW_HEIGHT = 7.2, 2.1
+"""Two columns of a journal page; one row of panels with its time axis. [inch]"""
+
+LEFT, RIGHT = 0.1, 0.985
+"""Where the panels begin and end, as shares of the width."""
+
+BOTTOM, TOP, TITLE_LINE = 0.42, 0.31, 0.16
+"""Below the panels; above them without the title; one line of the title. [inch]"""
+
+FOOTER, FOOTER_LENGTH = 0.16, 110
+"""Height of the line of warnings below the panels [inch], and how many letters fit on it."""
+
+TITLE_LENGTH = 86
+"""So many letters of a title fit on a line, with the scenario's name to its right."""
+
+LETTERS = 26
+"""More panels than this are not lettered."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Title:
+    """What stands above a figure: the trial in words, and the name of its scenario; and what warns of it, below."""
+
+    words: str
+    scenario: str
+    warnings: str = ""
+
+
+def sheet(rows: int, columns: int, title: Title) -> tuple[Figure, list[Axes]]:
+    """Return a figure and its empty, styled panels in reading order, lettered if there are several."""
+    words = textwrap.wrap(title.words, TITLE_LENGTH)[:2]
+    top = TOP + TITLE_LINE * len(words)
+    bottom = BOTTOM + (FOOTER if title.warnings else 0.0)
+    height = rows * ROW_HEIGHT + bottom + top
+    figure = Figure(figsize=(WIDTH, height), dpi=DPI, facecolor="white")
+    FigureCanvasAgg(figure)
+    figure.subplots_adjust(left=LEFT, right=RIGHT, bottom=bottom / height, top=1.0 - top / height)
+    figure.subplots_adjust(wspace=0.28, hspace=0.36)
+    y = 1.0 - 0.09 / height
+    figure.text(LEFT, y, "\n".join(words), va="top", fontsize=LARGE, parse_math=False)
+    corner: dict[str, Any] = {"ha": "right", "fontsize": SMALL, "color": GREY}
+    figure.text(RIGHT, y, title.scenario, va="top", parse_math=False, **corner)
+    if title.warnings:
+        footer = textwrap.shorten(title.warnings, FOOTER_LENGTH, placeholder=" …")
+        figure.text(LEFT, 0.06 / height, footer, fontsize=SMALL, color=ORANGE, parse_math=False)
+    panels = [figure.add_subplot(rows, columns, at + 1) for at in range(rows * columns)]
+    for at, axes in enumerate(panels):
+        _style(axes)
+        if 1 < len(panels) <= LETTERS:
+            axes.set_title(f"({chr(ord('a') + at)})", loc="left", fontsize=NORMAL, pad=3)
+    return figure, panels
+
+
+def _style(axes: Axes) -> None:
+    """Thin axes, a faint grid, ticks small enough to keep out of the way."""
+    axes.grid(visible=True, color=PALE, linewidth=0.6)
+    axes.set_axisbelow(True)
+    axes.yaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 5, 10]))
+    axes.tick_params(labelsize=SMALL, length=3, width=0.6, color=GREY)
+    for side in axes.spines.values():
+        side.set_linewidth(0.6)
+        side.set_color(GREY)
+
+
+LEGEND_ROW, LEGEND_MARGIN = 0.145, 0.1
+"""Height of one row of a legend and of the space around it. [inch]"""
+
+
+def headline(axes: Axes, text: str) -> None:
+    """Say in words what a panel shows, behind its letter."""
+    letter = axes.get_title(loc="left")
+    axes.set_title(f"{letter} {text}".strip(), loc="left", fontsize=NORMAL, pad=3)
+
+
+def label(axes: Axes, x: str | None, y: str) -> None:
+    """Name the axes, with units."""
+    if x is not None:
+        axes.set_xlabel(x, fontsize=NORMAL, labelpad=2)
+    axes.set_ylabel(y, fontsize=NORMAL)
+    axes.yaxis.set_label_coords(-0.17, 0.5)
+
+
+def legend(axes: Axes, columns: int = 3, *, tight: bool = False, **where: Any) -> None:
+    """Show the legend, small; if no place is given, above the curves, where room is made for it."""
+    if not where:
+        rows = math.ceil(len(axes.get_legend_handles_labels()[1]) / columns)
+        height = axes.get_window_extent().height / DPI
+        taken = min((rows * LEGEND_ROW + LEGEND_MARGIN) / height, 0.6)
+        low, high = axes.get_ylim()
+        axes.set_ylim(low, low + (high - low) / (1.0 - taken))
+        where = {"loc": "upper left", "ncols": columns, "columnspacing": 0.9, "borderaxespad": 0.2}
+    size = {"fontsize": TINY, "handlelength": 1.3} if tight else {"fontsize": SMALL, "handlelength": 2.0}
+    axes.legend(**size | {"framealpha": 0.85, "edgecolor": "none", "handletextpad": 0.5} | where)
+
+
+def channel_panel(axes: Axes, runs: Runs, name: str, record: Record | None = None) -> None:
+    """Draw one channel of all runs over time, and what was measured of it."""
+    channel = BY_NAME[name]
+    for run_name, run in runs.items():
+        axes.plot(run["time"].values, run[name].values, label=run_name, **LINES[run_name])
+    if record is not None and name in record.values:
+        axes.plot(record.time, record.values[name], label="measured", zorder=1.5, **DOTS)
+    label(axes, None, f"${channel.symbol}$ [{channel.unit}]")
+    in_time(axes, runs)
+    calm(axes, smallest=1e-3)
+
+
+def in_time(axes: Axes, runs: Runs) -> None:
+    """Let the time axis be the simulated time, whatever was measured besides."""
+    end = max(float(run["time"].values[-1]) for run in runs.values())
+    axes.set_xlim(0.0, end if end > 0.0 else 1.0)
+
+
+def calm(axes: Axes, smallest: float = 1e-6) -> None:
+    """Do not blow up rounding errors: a curve that is constant is shown as a straight line."""
+    low, high = axes.get_ylim()
+    middle, span = 0.5 * (low + high), high - low
+    least = max(smallest, 1e-4 * abs(middle))
+    if span < least:
+        half = max(0.05 * abs(middle), 0.5 * smallest, 0.5 * least)
+        axes.set_ylim(middle - half, middle + half)
+
+
+def time_label(panels: list[Axes], columns: int) -> None:
+    """Name the time axis below the lowest row only."""
+    for axes in panels[-columns:]:
+        axes.set_xlabel("time [s]", fontsize=NORMAL, labelpad=2)
+
+
+def spread(count: int, size: int) -> np.ndarray:
+    """Return `count` indices spread evenly over a sequence, its end included, its start not."""
+    return (
+        np.unique(np.linspace(0, size - 1, count + 1).round().astype(int)[1:])
+        if size > 1
+        else np.zeros(1, int)
+    )

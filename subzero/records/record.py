@@ -9,6 +9,8 @@ A heading is known but for whole turns: one compass begins at 359 degrees where 
 run's heading is counted from its trial's start, without a jump wherever that lies, and a record's from the run's.
 
 The files that a run writes are themselves records, so one run can be compared with another.
+
+`fit` says how well a run explains a record: the error of a model, channel by channel.
 """
 
 from __future__ import annotations
@@ -16,8 +18,9 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -25,6 +28,10 @@ from subzero.channels import BY_COLUMN, BY_NAME, TIME
 from subzero.errors import UserError, listed, printable, suggestion
 from subzero.errors import short as shown
 from subzero.user_file import MOST_COLUMNS, MOST_OF_A_CSV, UnreadableFileError, read_text
+
+if TYPE_CHECKING:
+    import xarray as xr
+
 
 HEADING = "heading"
 TURN = 360.0
@@ -197,3 +204,54 @@ def _continuous(angle: np.ndarray) -> np.ndarray:
     smooth = angle.copy()
     smooth[known] = np.unwrap(angle[known], period=TURN)
     return smooth
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fit:
+    """How well a model explains one measured channel, in the channel's unit; error = model − measured.
+
+    Args:
+        samples: number of samples compared: measured, and inside the simulated time.
+        rmse: root of the mean squared error.
+        bias: mean error; positive if the model gives too much.
+        fit_percent: 100 (1 − |error| / |measured − its mean|): 100 is perfect, 0 no better than the mean;
+            NaN if what was measured does not vary.
+    """
+
+    samples: int
+    rmse: float
+    bias: float
+    fit_percent: float
+
+
+def modelled(run: xr.Dataset, name: str, time: np.ndarray) -> np.ndarray:
+    """Return a channel of a run at other times: linear between its samples, NaN outside."""
+    values: np.ndarray = np.interp(time, run["time"].values, run[name].values, left=np.nan, right=np.nan)
+    return values
+
+
+def fit(run: xr.Dataset, record: Record, name: str) -> Fit:
+    """Compare one channel of a run with what was measured."""
+    measured = record.values[name]
+    error = modelled(run, name, record.time) - measured
+    known = np.isfinite(error)
+    if not known.any():
+        return Fit(samples=0, rmse=np.nan, bias=np.nan, fit_percent=np.nan)
+    error, measured = error[known], measured[known]
+    spread = float(np.linalg.norm(measured - measured.mean()))
+    share = float(np.linalg.norm(error)) / spread if spread > 0.0 else np.nan
+    rmse = float(np.sqrt(np.mean(error**2)))
+    return Fit(samples=error.size, rmse=rmse, bias=float(error.mean()), fit_percent=100.0 * (1.0 - share))
+
+
+def fits(runs: dict[str, xr.Dataset], record: Record) -> dict[str, dict[str, Fit]]:
+    """Return channel → run → how well that run explains the record."""
+    return {name: {label: fit(run, record, name) for label, run in runs.items()} for name in record.values}
+
+
+def beside(record: Record, run: xr.Dataset) -> Record:
+    """Return the record with its heading shifted by whole turns, so that it starts next to the run's."""
+    if HEADING not in record.values:
+        return record
+    heading = turned(record.values[HEADING], modelled(run, HEADING, record.time))
+    return replace(record, values={**record.values, HEADING: heading})

@@ -8,23 +8,170 @@ motion that cannot be had is told with the limit that is in its way. Speeds are 
 only carries the track.
 
 A motion that cannot be had is refused with what is in the way, and how far one can go (`NoTrimError`).
+
+The force of the cable in steady motion is (`SteadyPull`)
+
+    F_c = −(½ρπdC_t |V|² S + C_f/R_d) V/|V|,   M_c = r_c × F_c          (37), with the drum's friction
+
+V is the velocity of the tow point through the water, v + ω × r_c. The cable lies along the way that the tow point
+came: exact for a straight way (the discrete cable has this solution at every step); in a turn it is the limit of a
+cable that cannot be dragged sideways, C_n ≫ C_t, and the real one cuts the corner. A cable with weight is not in the
+formula. Where that matters, `from_cable_model` pulls the cable itself along the way.
+
+A vehicle that speeds up takes its cable along: m S more of mass at the tow point, along V.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from math import cos, degrees, floor, radians, sin
+from math import cos, degrees, floor, radians, sin, sqrt
 from typing import NoReturn
 
 import numpy as np
 
+import cable
 from subzero.errors import UserError, real, short
 from subzero.model import Model
-from subzero.steady_motion.actuators import commands, demands, ideal
-from subzero.steady_motion.equilibrium import Motion, level_propeller
-from subzero.steady_motion.hull_state_space import STATE_NAMES, VELOCITY, to_vehicle
-from subzero.steady_motion.steady_cable_force import SteadyPull, from_cable_model
-from vehicle import Vehicle, rotation
+from subzero.steady_motion.hull_state_space import (
+    DEPTH,
+    PITCH,
+    ROLL,
+    STATE_NAMES,
+    VELOCITY,
+    commands,
+    demands,
+    ideal,
+    rate,
+    to_vehicle,
+)
+from vehicle import Vehicle, VehicleNumbers, rotation
+
+NO_WAY = 1e-9
+"""Below this speed of the tow point there is no direction to pull against. [m/s]"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SteadyPull:
+    """The cable of a model at a fixed length.
+
+    Attributes:
+        drag: ½ρπdC_t S. [kg/m]
+        friction: C_f/R_d. [N]
+        mass: m S. [kg]
+        tow_point: r_c, body axes (3,). [m]
+    """
+
+    drag: float
+    friction: float
+    mass: float
+    tow_point: np.ndarray
+
+    @classmethod
+    def of(cls, model: Model, wet_length: float) -> SteadyPull:
+        """Return the cable of a model with `wet_length` metres in the water; none pulls with none."""
+        pulls = 1.0 if wet_length > 0.0 else 0.0
+        return cls(
+            drag=model.cable.tangential_drag * wet_length,
+            friction=pulls * model.drum.friction_torque / model.drum.radius,
+            mass=model.cable.mass_per_length * wet_length,
+            tow_point=model.vehicle.tow_point.position(),
+        )
+
+    def wrench(self, nu: np.ndarray) -> np.ndarray:
+        """Return force and moment on the hull (6,), body axes [N, N m], at nu (6,) through the water."""
+        V = nu[:3] + np.cross(nu[3:], self.tow_point)
+        speed = float(np.linalg.norm(V))
+        if speed < NO_WAY:
+            return np.zeros(6)
+        F = -(self.drag * speed + self.friction / speed) * V
+        return np.concatenate([F, np.cross(self.tow_point, F)])
+
+
+def from_cable_model(
+    model: Model, velocity_n: Callable[[float], np.ndarray], R_nb: np.ndarray, duration: float
+) -> np.ndarray:
+    """Return the pull of the cable itself, wrench (6,) in body axes [N, N m], at the end of a way.
+
+    Args:
+        model: whose cable, drum and tow point.
+        velocity_n: velocity of the tow point through the water at a time, earth axes. [m/s]
+        R_nb: attitude of the hull at the end of the way (3, 3).
+        duration: how long cable has been paid out. [s]
+
+    Raises:
+        UserError: the cable could not be solved along this way.
+    """
+    from subzero.errors import UserError
+
+    step = min(0.1, duration / 20.0)
+    run = cable.pull_out(
+        velocity_n, duration, cable=model.cable, drum=model.drum, scheme=cable.MovingEnd(time_step=step)
+    )
+    if not run.outcome.completed:
+        raise UserError(f"The cable has no steady pull along this way. {run.outcome.message}")
+    F = R_nb.T @ run.tow_force[-1]
+    return np.concatenate([F, np.cross(model.vehicle.tow_point.position(), F)])
+
+
+RESIDUAL = 1e-9
+"""What may be left of accelerations and depth rate. [m/s2, rad/s2, m/s]"""
+FARTHEST = 1.2
+"""Fin and pitch angles beyond this are another balance than the one that is looked for. [rad]"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Motion:
+    """What is asked for, of which hull (its numbers without limits), with which pull beyond the formula's."""
+
+    numbers: VehicleNumbers
+    pull: SteadyPull
+    speed: float
+    depth_rate: float
+    turn_rate: float
+    roll: float
+    extra: np.ndarray
+
+    def part(self, share: float) -> Motion:
+        """Return the same with a share of everything that is not straight and level."""
+        asked = {name: share * getattr(self, name) for name in ("depth_rate", "turn_rate", "roll", "extra")}
+        return replace(self, **asked)
+
+    def state(self, y: np.ndarray) -> np.ndarray:
+        """Return x (16,) for the unknowns n, δ_r, δ_e, δ_d, θ, v, w."""
+        n, rudder, together, unlike, pitch, v, w = y
+        x = np.zeros(16)
+        x[ROLL], x[PITCH] = self.roll, pitch
+        spin = (-sin(pitch), cos(pitch) * sin(self.roll), cos(pitch) * cos(self.roll))
+        x[VELOCITY] = self.speed, v, w, *(self.turn_rate * part for part in spin)
+        x[12:] = n, rudder, together - unlike, together + unlike
+        return x
+
+    def left(self, y: np.ndarray) -> np.ndarray:
+        """Return what is left of the seven equations."""
+        x = self.state(y)
+        rates = rate(x, x[12:], self.numbers, self.pull.wrench(x[VELOCITY]) + self.extra)
+        return np.append(rates[VELOCITY], rates[DEPTH] - self.depth_rate)
+
+    def solved(self, y: np.ndarray) -> np.ndarray | None:
+        """Return the unknowns from a guess; None if they are not found."""
+        from scipy.optimize import root
+
+        found = root(self.left, y, tol=1e-13).x
+        near = np.max(np.abs(found[1:5])) < FARTHEST
+        return found if near and np.max(np.abs(self.left(found))) < RESIDUAL else None
+
+
+def level_propeller(motion: Motion) -> float:
+    """Return n at which thrust balances drag and pull straight ahead with central fins, a n² − b n u − c u² = R."""
+    p, u = motion.numbers.propeller, motion.speed
+    x = motion.part(0.0).state(np.zeros(7))
+    rates = rate(x, x[12:], motion.numbers, motion.pull.wrench(x[VELOCITY]))
+    brake = -float(motion.numbers.mass_matrix[0] @ rates[VELOCITY])  # with the propeller standing still
+    if p.thrust_nn == 0.0:
+        return 0.0
+    return (p.thrust_nu * u + sqrt((p.thrust_nu * u) ** 2 + 4.0 * p.thrust_nn * brake)) / (2.0 * p.thrust_nn)
+
 
 STEPS = 20
 """A motion that is not found at once is approached in so many steps."""
@@ -209,7 +356,7 @@ def _cable_pull(model: Model, x: np.ndarray, turn_rate: float, wet_length: float
 
 CABLES = ("formula", "model")
 FASTEST = 50.0
-"""A run that is faster is stopped as absurd, `subzero.coupling.FASTEST`. [m/s]"""
+"""A run that is faster is stopped as absurd, `subzero.engine.coupling.FASTEST`. [m/s]"""
 STEEPEST = radians(80.0)
 """Pitch beyond which Euler angles are no use any more. [rad]"""
 

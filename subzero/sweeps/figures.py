@@ -8,9 +8,23 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from subzero.channels import BY_NAME
-from subzero.figures.panel import calm, headline, label, legend, time_label
-from subzero.figures.sheet import RIGHT, WIDTH, Title, sheet
-from subzero.figures.style import BLUE, GREY, INK, ORANGE, SMALL, TINY
+from subzero.figures.style import (
+    BLUE,
+    GREY,
+    INK,
+    ORANGE,
+    RIGHT,
+    SMALL,
+    TINY,
+    WIDTH,
+    Title,
+    calm,
+    headline,
+    label,
+    legend,
+    sheet,
+    time_label,
+)
 from subzero.sweeps.design import Points
 from subzero.sweeps.member import Job
 from subzero.sweeps.outcomes import unit_of

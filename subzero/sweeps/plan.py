@@ -34,10 +34,10 @@ import scenarios
 from scenarios.files import Source, read_toml
 from scenarios.parameters import with_parameters
 from subzero.errors import UserError, listed, printable, short, suggestion, truth
+from subzero.model import load
 from subzero.sweeps.design import Points, points_of
 from subzero.sweeps.member import Job, canonical, code_digest
 from subzero.sweeps.outcomes import Function, outcomes_of
-from subzero.trials import load
 
 KEYS = {
     "": (

@@ -13,7 +13,7 @@ from rich.console import Console
 from rich.table import Table
 
 from subzero.errors import printable
-from subzero.figures.sheet import Title
+from subzero.figures.style import Title
 from subzero.sweeps.figures import draw_sweep
 from subzero.sweeps.outcomes import unit_of
 from subzero.sweeps.plan import Plan

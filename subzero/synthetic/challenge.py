@@ -11,20 +11,20 @@ from pathlib import Path
 import numpy as np
 
 import scenarios
+from scenarios.steps import sample_times
 from subzero.channels import TIME, column_name
 from subzero.diagnosis.hypothesis.catalogue import START, catalogue
 from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.effect import Effect
 from subzero.diagnosis.hypothesis.hypotheses import with_tolerances
 from subzero.errors import UserError, printable
-from subzero.model import Model
-from subzero.records.commands import REPORTED_COMMANDS
+from subzero.model import Model, load
+from subzero.records.consistency import REPORTED_COMMANDS
 from subzero.records.record import HEADING, TURN, Record
 from subzero.synthetic.planted import Hidden, draw_deviations, draw_effect, hide, make_record
 from subzero.synthetic.reference_run import NoTruthError
 from subzero.synthetic.sealed_answer import SEALED, Answer, seal
 from subzero.synthetic.unmodelled_forces import draw_unmodelled
-from subzero.trials import load
 
 BASIC = ("surge_speed", "heading", "yaw_rate", "pitch", "roll", "depth")
 """Channels that a challenge measures."""
@@ -91,7 +91,7 @@ def challenge(
     nominal = Setting(trial=trial, model=Model.of(trial))
     effects = {key: with_tolerances(effect, nominal) for key, effect in catalogue(BASIC).items()}
     both = (*effects.values(), *START)
-    times = np.arange(0.0, trial.duration + 1e-9, SAMPLE_S)
+    times = sample_times(trial.duration, SAMPLE_S)
     for attempt in range(10):
         rng = np.random.default_rng([seed, attempt])
         hidden, tolerances = draw_hidden(nominal, effects, rng, kind), draw_deviations(both, rng, spread)
@@ -163,8 +163,7 @@ def _write_csv(made: Challenge, path: Path) -> None:
     shown = {**record.values, HEADING: record.values[HEADING] % TURN}
     columns = {column_name(TIME.name): record.time} | {column_name(k): v for k, v in shown.items()}
     if commands is not None:
-        rows = np.searchsorted(commands.time, record.time + 1e-9, side="right") - 1
-        told = commands.values[rows]
+        told = commands.at(record.time)
         scales = [scale for _, _, scale in REPORTED_COMMANDS.values()]
         columns |= {column_name(name): told[:, i] * scales[i] for i, name in enumerate(REPORTED_COMMANDS)}
     with path.open("w", newline="", encoding="utf-8") as file:

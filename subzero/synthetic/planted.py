@@ -119,6 +119,37 @@ def _allowed(parameter: Parameter, deviation: float) -> float:
 OUTLIER = (8.0, 25.0)
 """Outliers lie so many noise levels off."""
 
+
+@dataclass(frozen=True, kw_only=True)
+class SensorErrors:
+    """What sensors and their logger do to a true value.
+
+    Attributes:
+        noise: channel → standard deviation in its display unit, or a factor on that of usual sensors.
+        rho: correlation of the noise from sample to sample.
+        outliers: share of samples far off.
+        missing: share of samples that are not there.
+        dropout: length of a gap in every channel, somewhere. [s]
+        quantum: channel → smallest step that its sensor shows.
+    """
+
+    noise: Mapping[str, float] | float = 1.0
+    rho: float = 0.5
+    outliers: float = 0.01
+    missing: float = 0.02
+    dropout: float = 0.0
+    quantum: Mapping[str, float] = field(default_factory=dict)
+
+    def levels(self) -> dict[str, float]:
+        """Return channel → standard deviation of the noise, in its display unit."""
+        if isinstance(self.noise, Mapping):
+            return {**NOISE, **self.noise}
+        return {name: self.noise * level for name, level in NOISE.items()}
+
+
+USUAL = SensorErrors()
+"""Errors of usual sensors."""
+
 Simulate = Callable[[Setting, np.ndarray, Iterable[str]], Mapping[str, np.ndarray]]
 
 
@@ -128,12 +159,7 @@ def make_record(
     channels: Iterable[str],
     *,
     seed: int | np.random.Generator,
-    noise: Mapping[str, float] | float = 1.0,
-    rho: float = 0.5,
-    outliers: float = 0.01,
-    missing: float = 0.02,
-    dropout: float = 0.0,
-    quantum: Mapping[str, float] | None = None,
+    errors: SensorErrors = USUAL,
     simulate: Simulate = simulate_reference,
     source: str = "simulated",
 ) -> Record:
@@ -144,29 +170,20 @@ def make_record(
         times: of the samples (n,). [s]
         channels: names of `subzero.channels`.
         seed: of the noise.
-        noise: channel → standard deviation in its display unit, or a factor on that of usual sensors.
-        rho: correlation of the noise from sample to sample.
-        outliers: share of samples far off.
-        missing: share of samples that are not there.
-        dropout: length of a gap in every channel, somewhere. [s]
-        quantum: channel → smallest step that its sensor shows.
+        errors: noise, outliers and gaps.
         simulate: what gives the truth.
         source: of the record, in words.
     """
     rng, channels = np.random.default_rng(seed), tuple(channels)
-    factor = noise if isinstance(noise, float | int) else 1.0
-    levels = {
-        **{name: factor * level for name, level in NOISE.items()},
-        **(noise if isinstance(noise, Mapping) else {}),
-    }
+    levels, dropout = errors.levels(), errors.dropout
     truth, values = simulate(setting, times, channels), {}
     for name in channels:
-        shown = truth[name] + levels[name] * _coloured(rng, times.size, rho)
-        far = rng.random(times.size) < outliers
+        shown = truth[name] + levels[name] * _coloured(rng, times.size, errors.rho)
+        far = rng.random(times.size) < errors.outliers
         shown += far * rng.choice([-1.0, 1.0], times.size) * rng.uniform(*OUTLIER, times.size) * levels[name]
-        step = (quantum or {}).get(name, 0.0)
+        step = errors.quantum.get(name, 0.0)
         shown = np.round(shown / step) * step if step > 0.0 else shown
-        gone = rng.random(times.size) < missing
+        gone = rng.random(times.size) < errors.missing
         begins = rng.uniform(0.0, max(times[-1] - dropout, 0.0))
         gone |= (dropout > 0.0) & (times >= begins) & (times < begins + dropout)
         values[name] = np.where(gone, np.nan, shown)

@@ -14,9 +14,9 @@ import numpy as np
 
 from cable.drum_motion import lead_drum
 from cable.lumped import GAMMA, REST, STATE, Rope, accept_step, try_step
-from subzero.coupling import _move, _solve_three, hull_steps
+from subzero.engine.coupling import _move, _solve_three, hull_steps
+from subzero.engine.recording import Recording, record_row
 from subzero.jit import allocating, compiled
-from subzero.recording import Recording, record_row
 from subzero.run_state import Live, Setup
 from vehicle import STATE_SIZE
 

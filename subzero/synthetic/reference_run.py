@@ -11,7 +11,7 @@ Deliberately left out: a motion that is prescribed.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,11 +22,11 @@ from cable.task import START_LENGTH
 from scenarios.steps import fitting_step
 from subzero.channels import BY_NAME
 from subzero.diagnosis.hypothesis.configuration import Sensing, Setting
-from subzero.environment import drum_of, water_of
+from subzero.engine.environment import drum_of, water_of
+from subzero.engine.initial_conditions import go_on_with, prepare, rows_of_changes
+from subzero.engine.recording import Run, new_recording, record_row
 from subzero.errors import UserError
-from subzero.initial_conditions import prepare
-from subzero.model_changes import go_on_with, rows_of_changes
-from subzero.recording import Run, new_recording, record_row
+from subzero.model import Model
 from subzero.run_state import Live, Setup
 from subzero.simulation import run_trial
 from subzero.synthetic.reference_coupling import FINE, Led, follow_rope
@@ -58,15 +58,17 @@ def _true(name: str, setting: Setting, truth: Truth) -> np.ndarray:
     if name == "heading":
         continuous = np.unwrap(r.attitude[:, 2])
         whole = np.round((setting.trial.start.heading - continuous[0]) / (2.0 * np.pi))
-        return scale * (continuous + 2.0 * np.pi * whole)
-    return {
+        heading: np.ndarray = scale * (continuous + 2.0 * np.pi * whole)
+        return heading
+    others: dict[str, Callable[[], np.ndarray]] = {
         "surge_speed": lambda: r.state[:, 7] - _water(setting, truth)[:, 0],
         "speed_over_ground": lambda: np.sqrt(np.sum(r.state[:, 7:10] ** 2, axis=1)),
         "cable_tension": lambda: np.sqrt(np.sum(truth.pull**2, axis=1)),
         "cable_length": lambda: truth.length,
         "rudder_angle": lambda: scale * r.fins[:, 0],
         "battery_voltage": lambda: r.voltage,
-    }[name]()
+    }
+    return others[name]()
 
 
 def _water(setting: Setting, truth: Truth) -> np.ndarray:
@@ -80,7 +82,8 @@ def _water(setting: Setting, truth: Truth) -> np.ndarray:
         waters[max(row, 0)].at(place, time)
         for row, place, time in zip(rows, r.state[:, :3], times, strict=True)
     ]
-    return np.einsum("nji,nj->ni", r.rotation, np.array(north_east_down))
+    body: np.ndarray = np.einsum("nji,nj->ni", r.rotation, np.array(north_east_down))
+    return body
 
 
 def _sensor(sensor: Sensing, grid: np.ndarray, truth: np.ndarray) -> np.ndarray:
@@ -190,7 +193,7 @@ def truth_of(setting: Setting) -> Truth:
     return Truth(run=run, pull=history[:, :3], drum_tension=history[:, 3], length=history[:, 4])
 
 
-def _within(setting: Setting, trial: scenarios.Trial) -> tuple:
+def _within(setting: Setting, trial: scenarios.Trial) -> tuple[tuple[float, Model], ...]:
     """Return the changes of a setting that come before the end of a trial."""
     return tuple((time, model) for time, model in setting.later if time < trial.duration - 1e-9)
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from subzero.diagnosis.hypothesis.configuration import Setting
-from subzero.environment import water_of
+from subzero.engine.environment import water_of
 from subzero.external_force import AXES, FACTORS, MissingForce, Term, feature_value, fill_factors, history_at
 from subzero.synthetic.reference_run import Truth
 

@@ -1,4 +1,7 @@
-"""Where the equations do not hold, or what was asked for cannot be: air, sea bed, strength, bends and actuators."""
+"""Where the equations do not hold, or what was asked for cannot be: air, sea bed, strength, bends and actuators.
+
+Also the words for when and for how long, which all warnings share.
+"""
 
 from __future__ import annotations
 
@@ -8,13 +11,33 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from subzero.channels import DEGREE
-from subzero.validity.spans import first_time, longest_span, percent
 
 if TYPE_CHECKING:
     import xarray as xr
 
     import scenarios
     from subzero.model import Model
+
+
+def longest_span(time: np.ndarray, holds: np.ndarray) -> tuple[float, float]:
+    """Return how long something holds at a stretch, at most, and when that stretch begins. [s]."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], holds, [False]]).astype(int)))
+    begin, end = edges[::2], edges[1::2] - 1
+    if not begin.size:
+        return 0.0, 0.0
+    spans = time[end] - time[begin]
+    return float(spans.max()), float(time[begin[spans.argmax()]])
+
+
+def first_time(time: np.ndarray, holds: np.ndarray) -> float:
+    """Return when something first holds. [s]."""
+    return float(time[int(np.argmax(holds))])
+
+
+def percent(share: float) -> str:
+    """Return a share as a percentage."""
+    return f"{100.0 * share:.3g} %"
+
 
 ROUNDING = 1e-6
 """What is beyond surface or bed by less than this is at it. [m]"""
@@ -191,4 +214,5 @@ def _node_depths(run: xr.Dataset, model: Model) -> np.ndarray:
     x, y, z = model.vehicle.tow_point.position()
     tow = -np.sin(pitch) * x + np.cos(pitch) * (np.sin(roll) * y + np.cos(roll) * z)
     down = run["cable_position"].values[:, :, 2]
-    return down + (float(run["depth"].values[0]) + tow - down[0, 0])
+    depths: np.ndarray = down + (float(run["depth"].values[0]) + tow - down[0, 0])
+    return depths

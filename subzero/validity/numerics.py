@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from subzero.validity.spans import first_time, longest_span, percent
+from subzero.validity.limits import first_time, longest_span, percent
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -141,7 +141,8 @@ def roughness(run: xr.Dataset) -> np.ndarray:
     largest = np.linalg.norm(F, axis=0).max()
     if largest < NO_FORCE or F.shape[1] < 4:
         return np.zeros(0)
-    return np.linalg.norm(F[:, 3:] - 2.0 * F[:, 2:-1] + F[:, 1:-2], axis=0) / largest
+    jumps: np.ndarray = np.linalg.norm(F[:, 3:] - 2.0 * F[:, 2:-1] + F[:, 1:-2], axis=0) / largest
+    return jumps
 
 
 def ill_posed_drum(run: xr.Dataset, _: scenarios.Trial, model: Model) -> list[str]:
@@ -196,7 +197,8 @@ def drum_is_ill_posed(
     swings = (tension < cable.virtual_mass_per_length * square) & (
         abs(cable.weight_in_water) > SAGGING * cable.tangential_drag * square
     )
-    return (payout > SLOWEST) & (unwinds | swings)
+    gives_way: np.ndarray = (payout > SLOWEST) & (unwinds | swings)
+    return gives_way
 
 
 def slack(run: xr.Dataset, trial: scenarios.Trial, _: Model) -> list[str]:
@@ -267,11 +269,13 @@ def _finer(trial: scenarios.Trial) -> str:
 def _chords(run: xr.Dataset) -> np.ndarray:
     """Return the distances between neighbouring nodes, NaN behind the last (samples, nodes − 1). [m]."""
     side = np.diff(run["cable_position"].values, axis=1)
-    return np.sqrt(np.einsum("tni,tni->tn", side, side))
+    lengths: np.ndarray = np.sqrt(np.einsum("tni,tni->tn", side, side))
+    return lengths
 
 
 def _tow_speed(run: xr.Dataset, time: np.ndarray) -> np.ndarray:
     """Return the speed of the tow point relative to the drum (samples,). [m/s]."""
     P, nodes = run["cable_position"].values, run["node_count"].values
     drum = P[np.arange(time.size), np.maximum(nodes - 1, 0)]
-    return np.linalg.norm(np.gradient(P[:, 0] - drum, time, axis=0), axis=1)
+    speed: np.ndarray = np.linalg.norm(np.gradient(P[:, 0] - drum, time, axis=0), axis=1)
+    return speed

@@ -99,7 +99,7 @@ def test_help_imports_nothing_heavy(words):
 
 @pytest.mark.parametrize("command", ["rudder_command", "stern_plane_port_command", "propeller_command"])
 def test_the_headlines_of_the_figure_are_on_the_sheet(command):
-    from subzero.autopilot.manoeuvre_figure import picture
+    from subzero.autopilot.output import picture
 
     run, _ = autopilot.manoeuvre("crash_stop", tethered=False)
     figure = picture({"untethered": run}, "title", "heading", command)

@@ -16,9 +16,9 @@ import pytest
 
 import subzero
 from subzero.channels import BY_NAME
-from subzero.initial_conditions import prepare
-from subzero.loop import run_rows
-from subzero.recording import new_recording
+from subzero.engine.initial_conditions import prepare
+from subzero.engine.recording import new_recording
+from subzero.engine.time_loop import run_rows
 
 
 def identical(one, other):

@@ -10,8 +10,7 @@ from numpy.testing import assert_allclose
 
 from subzero.cli import FINE, MISTAKE, main
 from subzero.errors import UserError
-from subzero.records.goodness_of_fit import beside, fit
-from subzero.records.record import Record, read_record
+from subzero.records.record import Record, beside, fit, read_record
 
 
 @pytest.fixture
@@ -202,3 +201,17 @@ def test_a_comparison_of_no_sample_is_refused(file, rails, capsys):
     text = "time_s,surge_speed_m_s\n0,\n29,\n31,1\n32,1\n"
     assert main(["compare", "fig6", "--measured", file(text)]) == MISTAKE
     assert "none of its samples can be compared: where the runs are, it has gaps" in capsys.readouterr().err
+
+
+def test_the_files_given_to_a_command_are_what_is_simulated(rails, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "log.csv").write_text("time_s,surge_speed_m_s,pitch_deg,heading_deg\n0,0.7,0,0\n30,0.7,0,0\n")
+    (tmp_path / "told.csv").write_text(
+        "time_s,propeller_rps,rudder_deg,stern_plane_port_deg,stern_plane_starboard_deg\n0,12.5,0,0,0\n30,12.5,0,0,0\n"
+    )
+    assert main(["simulate", "fig6", "--motion", "log.csv", "--out", "moved"]) == FINE
+    assert main(["simulate", "fig6", "--commands", "told.csv", "--untethered", "--out", "told"]) == FINE
+    (moved, tethered), (told, bare) = rails
+    assert (tethered, bare) == (True, False)
+    assert_allclose(moved.motion.surge_speed, 0.7)
+    assert_allclose(told.commands.at(10.0), [12.5, 0.0, 0.0, 0.0])

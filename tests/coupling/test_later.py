@@ -1,8 +1,8 @@
 """A model that changes in mid-run: nothing before, everything behind, and nothing at all for the same model.
 
-Verifies: `subzero.model_changes`. Configuration: fig6, 30 s, changed at 12 s. Tolerance: identity to the last bit
-where nothing may change; the energy balance keeps the 1e-3 of the work that every run keeps (a sudden mass is not
-booked).
+Verifies: `subzero.engine.initial_conditions`. Configuration: fig6, 30 s, changed at 12 s. Tolerance: identity to
+the last bit where nothing may change; the energy balance keeps the 1e-3 of the work that every run keeps (a sudden
+mass is not booked).
 """
 
 import dataclasses

@@ -18,7 +18,15 @@ from subzero.errors import UserError
 from subzero.external_force import AXES
 from subzero.records.record import read_record
 from subzero.synthetic.challenge import BASIC, KIND_PROBABILITIES, challenge, draw_hidden
-from subzero.synthetic.planted import Hidden, apply_all, draw_deviations, draw_effect, hide, make_record
+from subzero.synthetic.planted import (
+    Hidden,
+    SensorErrors,
+    apply_all,
+    draw_deviations,
+    draw_effect,
+    hide,
+    make_record,
+)
 from subzero.synthetic.reference_run import simulate_reference, truth_of
 from subzero.synthetic.sealed_answer import SEALED, reveal
 from subzero.synthetic.unmodelled_forces import KINDS, draw_unmodelled, force_along
@@ -87,14 +95,20 @@ def test_the_hidden_effect_shows(made):
 
 def test_noise_has_its_level_its_colour_its_outliers_and_its_gaps():
     times = 0.1 * np.arange(20_000)
-    record = make_record(NOMINAL, times, ["depth"], seed=1, simulate=still, outliers=0.0, missing=0.0)
+    record = make_record(
+        NOMINAL, times, ["depth"], seed=1, simulate=still, errors=SensorErrors(outliers=0.0, missing=0.0)
+    )
     values = record.values["depth"]
     assert values.std() == pytest.approx(NOISE["depth"], rel=0.03)
     assert np.corrcoef(values[1:], values[:-1])[0, 1] == pytest.approx(0.5, abs=0.03)
-    full = make_record(NOMINAL, times, ["depth"], seed=1, simulate=still, dropout=100.0).values["depth"]
+    full = make_record(
+        NOMINAL, times, ["depth"], seed=1, simulate=still, errors=SensorErrors(dropout=100.0)
+    ).values["depth"]
     assert np.isnan(full).mean() == pytest.approx(0.02 + 0.05, abs=0.006)
     assert (np.abs(full) > 7.0 * NOISE["depth"]).mean() == pytest.approx(0.0095, abs=0.002)
-    coarse = make_record(NOMINAL, times, ["heading"], seed=1, simulate=still, quantum={"heading": 1.0})
+    coarse = make_record(
+        NOMINAL, times, ["heading"], seed=1, simulate=still, errors=SensorErrors(quantum={"heading": 1.0})
+    )
     assert set(np.unique(coarse.values["heading"][np.isfinite(coarse.values["heading"])]) % 1.0) == {0.0}
 
 

@@ -18,8 +18,8 @@ from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.logged import Logged
 from subzero.diagnosis.inference.measurement import respond
 from subzero.diagnosis.inference.problem import pose
+from subzero.records.consistency import unit_questions
 from subzero.records.record import Record, read_record, turned
-from subzero.records.unit_checks import unit_questions
 from subzero.synthetic.challenge import Challenge, write
 from subzero.synthetic.planted import Hidden
 from subzero.synthetic.reference_run import simulate_reference

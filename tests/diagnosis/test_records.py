@@ -150,6 +150,14 @@ def test_the_records_commands_replace_the_scenarios_when_that_is_said(write):
     commands = logged.setting.trial.commands
     assert_allclose(np.degrees(commands.values[:, 1]).min(), -6.0)
     assert commands.time[0] == 0.0
+    assert_allclose(
+        np.degrees(commands.at(TIME)[:, 1]), rudder, atol=1e-12
+    )  # at every sample what it says then
+    rudder[TIME < 0.25] = np.nan  # a gap at the start; the next one holds what was before it
+    rudder[(TIME > 6.0) & (TIME < 8.0)] = np.nan
+    (logged,) = read(write(columns("surge_speed", rudder_command_deg=rudder)), commands="record")
+    held = np.degrees(logged.setting.trial.commands.at(np.array([0.0, 5.9, 7.9, 8.1]))[:, 1])
+    assert_allclose(held, [0.0, -6.0, -6.0, 0.0], atol=1e-12)
     assert_allclose(commands.values[:, 0], 25.0)  # a column that the record lacks stays the scenario's
 
 

@@ -29,7 +29,7 @@ from subzero.diagnosis.results import (
     Verdict,
 )
 from subzero.figures.diagnosis import draw_diagnosis
-from subzero.figures.sheet import Title
+from subzero.figures.style import Title
 
 TIME = np.linspace(0.0, 30.0, 301)
 LAG = Estimate(value=0.31, low=0.23, high=0.39, unit="s", nominal=0.1, deviation=0.21, deviation_sd=0.04)

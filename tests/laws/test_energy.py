@@ -1,9 +1,9 @@
 """Where the propeller's work goes: the ledger closes, and each of its terms has the sign that its words say.
 
-Verifies: W = L_hull + L_cable + ΔE + W_drum + W_added mass + residual (`subzero.energy`, `cable.moving_end.energy`).
-Tolerance: the issue's 1e-3 of the work at every time, not only at the end; measured: 2e-6 on fig6, 6e-5 in tight
-turns, 3e-4 in the cross current, whose cable hangs slack at the start. What is recomputed here from the recorded
-forces is sampled at 0.1 s and summed by the trapezoidal rule: 2e-3 of the work.
+Verifies: W = L_hull + L_cable + ΔE + W_drum + W_added mass + residual (`subzero.engine.energy`,
+`cable.moving_end.energy`). Tolerance: the issue's 1e-3 of the work at every time, not only at the end; measured:
+2e-6 on fig6, 6e-5 in tight turns, 3e-4 in the cross current, whose cable hangs slack at the start. What is recomputed
+here from the recorded forces is sampled at 0.1 s and summed by the trapezoidal rule: 2e-3 of the work.
 """
 
 import dataclasses

@@ -21,4 +21,8 @@ def test_the_page_names_all_parts_of_the_default_scheme():
     parts = {"segment_load", "assembly", "bdf2", "block_solver", "time_step", "remeshing", "slack_law",
              "chord_correction", "energy"}  # fmt: skip
     assert {f"cable/moving_end/{part}.py" for part in parts} | {"cable/drum.py"} <= named
-    assert {"subzero/coupling.py", "subzero/vehicle_step.py", "subzero/energy.py"} <= named
+    assert {
+        "subzero/engine/coupling.py",
+        "subzero/engine/vehicle_step.py",
+        "subzero/engine/energy.py",
+    } <= named

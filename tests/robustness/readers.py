@@ -25,10 +25,10 @@ import scenarios
 from subzero.diagnosis.read_trials import read_trials
 from subzero.diagnosis.report.toml_file import read_extended
 from subzero.errors import UserError
+from subzero.model import load
 from subzero.records.metadata import read_metadata
 from subzero.records.record import read_record
 from subzero.synthetic.sealed_answer import SEALED, Answer, reveal, seal
-from subzero.trials import load
 from subzero.user_file import INCOMPLETE, read_bytes
 
 LONGEST = 20.0

@@ -57,7 +57,7 @@ def test_neither_what_shows_results_nor_an_autopilot_is_in_any_key():
     assert {
         "cable/moving_end/state.py",
         "vehicle/state.py",
-        "subzero/coupling.py",
+        "subzero/engine/coupling.py",
         "subzero/run_state.py",
     } <= names
     assert (

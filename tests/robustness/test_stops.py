@@ -83,7 +83,7 @@ def test_a_run_that_outgrows_the_memory_keeps_what_it_has(fig6, monkeypatch):
 
 
 def with_little_room(rows, nodes):
-    from subzero.recording import new_recording
+    from subzero.engine.recording import new_recording
 
     return new_recording(rows, min(nodes, 2000))
 

@@ -21,7 +21,6 @@ from subzero.diagnosis.inference.linear_gaussian import Terms, log_sum
 from subzero.diagnosis.inference.problem import Problem
 from subzero.diagnosis.inference.simulator import LENGTH, RUDDER, WATER, simulate_track
 from subzero.external_force import AXES, FACTORS, FEATURES, feature_value, fill_factors
-from subzero.records.commands import held_commands
 from vehicle.dynamics import relative_velocity
 from vehicle.kinematics import rotation
 from vehicle.motor import shaft_speed
@@ -76,7 +75,7 @@ def factors_along(setting: Setting, times: np.ndarray) -> np.ndarray:
     rows = track[np.searchsorted(grid, times + 1e-9, side="right") - 1]
     commands = setting.trial.commands
     assert commands is not None
-    told = np.column_stack([held_commands(commands.time, column, times) for column in commands.values.T])
+    told = commands.at(times)
     found, numbers = np.zeros((times.size, len(FACTORS))), setting.model.vehicle.numbers()
     R, nu_r = np.zeros((3, 3)), np.zeros(6)
     for out, row, command, time in zip(found, rows, told, times, strict=True):

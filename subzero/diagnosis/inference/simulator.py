@@ -1,7 +1,7 @@
 """A simulation as a diagnosis needs it: a compiled loop that keeps what sensors see, resumed where runs part, cached.
 
-As `subzero.loop`, without forces, energies and shapes, but with the hull's states inside an exchange: a rudder moves
-faster than cable and hull exchange their forces.
+As `subzero.engine.time_loop`, without forces, energies and shapes, but with the hull's states inside an exchange: a
+rudder moves faster than cable and hull exchange their forces.
 
 A force that begins at 20 s changes nothing before: its sensitivity needs the last 10 of 30 s only. Runs are kept for a
 while: fits come back to where they were, and sensors change no run.
@@ -19,16 +19,15 @@ import numpy as np
 
 import vehicle
 from cable.moving_end import enlarged
-from subzero import coupling
-from subzero.coupling import FINE, exchange, hull_steps
 from subzero.diagnosis.hypothesis.configuration import Setting
-from subzero.initial_conditions import most_hull_steps, prepare
+from subzero.engine import coupling
+from subzero.engine.coupling import FINE, exchange, hull_steps
+from subzero.engine.initial_conditions import go_on_with, most_hull_steps, prepare
+from subzero.engine.time_loop import NO_ROOM, SPARE
+from subzero.engine.vehicle_step import feel_current, row_at
 from subzero.jit import compiled, inner
-from subzero.loop import NO_ROOM, SPARE
 from subzero.model import Model
-from subzero.model_changes import go_on_with
 from subzero.run_state import Live, Setup
-from subzero.vehicle_step import feel_current, row_at
 from vehicle import STATE_SIZE
 
 RUDDER, VOLTAGE, TENSION, LENGTH, WATER = (STATE_SIZE + i for i in range(5))

@@ -8,6 +8,10 @@ along the way, the hull's balance closes only as far as it may be taken as stead
 what the current does to the cable is booked with its added mass. The terms of the cable are those of
 `cable.moving_end.energy`. Powers are summed up by the trapezoidal rule over hull steps (hull) and exchanges (cable),
 so the residual is of second order in both. In a prescribed run the "propeller" is whatever moves the tow point.
+
+A prescribed motion that is linear between its times has jumps in the rates of pitch and heading there. The tow point,
+r_c from the centre, then changes its velocity at once, by R (ΔΩ × r_c), and the cable takes that as an impulse
+(`cable.moving_end.jolt`). Its work is booked here, too. A smooth motion has no such jumps.
 """
 
 from __future__ import annotations
@@ -25,11 +29,13 @@ from cable.moving_end import (
     STORED,
     STRAINED,
     TOWED,
+    energy_flow,
+    take_jolt,
 )
+from subzero.engine.vehicle_step import feel_current, row_at, tow_wrench
 from subzero.external_force import add_missing
-from subzero.jit import inlined
-from subzero.run_state import Live, Setup
-from subzero.vehicle_step import feel_current, row_at, tow_wrench
+from subzero.jit import allocating, inlined, inner
+from subzero.run_state import HEADING, LINEAR_ROWS, PITCH, TIME, Live, Setup
 
 PROPELLER, HULL_LOSS, CABLE_LOSS, KINETIC, DRUM, ADDED, RESIDUAL = range(7)
 """Rows of `Ledger.total`, in the order of the energy channels. [J]"""
@@ -54,7 +60,7 @@ def book(setup: Setup, live: Live, start: float, span: float, steps: int) -> Non
     total[ADDED] += span * new[CARRIED]
     total[KINETIC] += new[STORED] - old[STORED] - half * (old[GRAVITY_WORK] + new[GRAVITY_WORK])
     for i in range(FLOWS):
-        old[i] = new[i]
+        old[i] = new[i]  # the trapezium of the next exchange begins where this one ends
     total[RESIDUAL] = total[PROPELLER]
     for i in range(HULL_LOSS, RESIDUAL):
         total[RESIDUAL] -= total[i]
@@ -79,6 +85,7 @@ def _book_hull(setup: Setup, live: Live, start: float, span: float, steps: int) 
         total[KINETIC] -= 0.5 * h * (old[P_RESTORING] + new[P_RESTORING])
     if setup.fixed.prescribed:
         return
+    # A difference of states, not a sum of powers: exact, so that the residual shows the errors of the other terms.
     kinetic = vehicle.kinetic_energy(live.path[steps], live.now.hull.current, setup.fixed.vehicle)
     total[KINETIC] += kinetic - ledger.kinetic
     ledger.kinetic = kinetic
@@ -103,3 +110,45 @@ def _hull_power(
         if setup.fixed.lacking:
             add_missing(setup, live, live.path[row], command, time, hull)
     vehicle.power(live.path[row], command, hull.current, hull.wrench, setup.fixed.vehicle, out)
+
+
+AT_KNOT = 1e-9
+"""A time this near to one of the motion's is that time. [s]"""
+
+
+@allocating
+def take_jolt_of_motion(setup: Setup, live: Live, start: float) -> None:
+    """Give the cable the velocities just after `start`, if the motion jolts there; its work goes into the ledger."""
+    row, track = row_at(setup.track[TIME], start), setup.track
+    if track.shape[0] != LINEAR_ROWS:
+        return
+    if row == 0 or abs(track[TIME, row] - start) > AT_KNOT or live.now.last_step <= 0.0:
+        return
+    change, impulse, ledger = np.zeros(3), np.zeros(3), live.now.ledger
+    _jump_of_tow_point(setup, live, row, change)
+    if take_jolt(live.line, change, setup.fixed.cable, setup.fixed.drum, live.load, impulse):
+        stored = ledger.cable_old[STORED]
+        energy_flow(live.line, setup.fixed.cable, live.load, ledger.cable_old)
+        ledger.total[PROPELLER] += ledger.cable_old[STORED] - stored
+        ledger.total[KINETIC] += ledger.cable_old[STORED] - stored
+
+
+@inner
+def _rate(track: np.ndarray, angle: int, row: int) -> float:
+    """Return the rate of pitch or heading from a row to the next, 0 behind the last. [rad/s]."""
+    if row >= track.shape[1] - 1:
+        return 0.0
+    return (track[angle, row + 1] - track[angle, row]) / (track[TIME, row + 1] - track[TIME, row])
+
+
+@inner
+def _jump_of_tow_point(setup: Setup, live: Live, row: int, out: np.ndarray) -> None:
+    """Fill out (3,) with R (ΔΩ × r_c) at a row of the motion, earth axes. [m/s]."""
+    track, r, R = setup.track, setup.fixed.r_c, live.now.hull.rotation
+    dive = _rate(track, PITCH, row) - _rate(track, PITCH, row - 1)
+    turn = _rate(track, HEADING, row) - _rate(track, HEADING, row - 1)
+    p, q, yaw = -turn * np.sin(track[PITCH, row]), dive, turn * np.cos(track[PITCH, row])
+    x, y, z = q * r[2] - yaw * r[1], yaw * r[0] - p * r[2], p * r[1] - q * r[0]
+    vehicle.rotation(live.state[3:7], R)
+    for i in range(3):
+        out[i] = R[i, 0] * x + R[i, 1] * y + R[i, 2] * z

@@ -10,9 +10,9 @@ import numpy as np
 
 import vehicle
 from cable.moving_end import NOW
+from subzero.engine.vehicle_step import feel_current, row_at, tow_wrench
 from subzero.jit import compiled
 from subzero.run_state import Live, Setup
-from subzero.vehicle_step import feel_current, row_at, tow_wrench
 from vehicle import BREAKDOWN, STATE_SIZE
 
 BREATH_S = 0.1
@@ -35,7 +35,7 @@ class Recording(NamedTuple):
         courant: √(T/m1) Δt/ℓ, how many segments a transverse wave crosses in an exchange, at most (n,). [-]
         iterations: of Newton's method on the cable since the start (n,).
         breakdown: every term of the hull (n, terms, 6). [N, N m]
-        energy: rows of `subzero.energy` (n, 7). [J]
+        energy: rows of `subzero.engine.energy` (n, 7). [J]
         nodes: how many (n,), 0 without a cable.
         position, tension: nodes of all rows, relative to the drum (all, 3) [m]; tension there (all,). [N]
     """
@@ -114,7 +114,7 @@ def record_row(setup: Setup, live: Live, recording: Recording, row: int, time: f
     """Write a row for the present state; return how many nodes are in use after it (`used` before)."""
     state, r = live.state, recording
     command = setup.orders.values[row_at(setup.orders.time, time)]
-    tow_wrench(state, live.now.force, setup.fixed.r_c, live.now.hull)
+    tow_wrench(state, live.now.force, setup.fixed.r_c, live.now.hull)  # fills hull.rotation, too
     for i in range(STATE_SIZE):
         r.state[row, i] = state[i]
     for i in range(4):
@@ -152,6 +152,7 @@ def _record_cable(live: Live, r: Recording, row: int, used: int, m1: float) -> i
             r.position[used + j, i] = line.position[NOW, j, i]
         r.tension[used + j] = line.node_tension[j]
         if 0 < j < N:
+            # speed √(T/m₁) of a transverse wave; m₁ with the water that moves along
             wave = np.sqrt(max(line.tension[NOW, j], 0.0) / m1)
             r.courant[row] = max(r.courant[row], wave * step / line.length[j])
     r.nodes[row] = N + 1

@@ -1,8 +1,8 @@
 """How a cable lies behind a vehicle that turns, from four sums, is how the cable itself lies.
 
-Verifies: `autopilot.behind` against `cable.pull_out` along straight and circular ways. Tolerance: 1e-12 for the
-straight pull of equation (37); in a turn 8 % of the angle and 15 % of the tension: the sums leave out the change of
-V_n along the cable, which is an eighth of ψ' here, and weight and acceleration of the cable.
+Verifies: `autopilot.feed_forward.CableInTurn` against `cable.pull_out` along straight and circular ways. Tolerance:
+1e-12 for the straight pull of equation (37); in a turn 8 % of the angle and 15 % of the tension: the sums leave out the
+change of V_n along the cable, which is an eighth of ψ' here, and weight and acceleration of the cable.
 """
 
 import numpy as np
@@ -10,7 +10,7 @@ import pytest
 
 import cable
 import subzero
-from subzero.autopilot.cable_in_turn import Behind
+from subzero.autopilot.feed_forward import CableInTurn
 
 STEP, DURATION = 0.1, 30.0
 
@@ -21,7 +21,7 @@ def model():
 
 
 def behind(model):
-    return Behind(model.cable, model.drum.friction_torque / model.drum.radius)
+    return CableInTurn(model.cable, model.drum.friction_torque / model.drum.radius)
 
 
 def test_on_a_straight_way_it_pulls_as_equation_37_says(model):

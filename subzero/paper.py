@@ -46,15 +46,14 @@ from cable.feng_allen import (
     tangent,
     told,
 )
-from subzero.coupling import ABSURD, CABLE_FAILED, FASTEST, FINE, _move, hull_steps
-from subzero.energy import CABLE_LOSS, book
-from subzero.initial_conditions import prepare
+from subzero.engine.coupling import ABSURD, CABLE_FAILED, FASTEST, FINE, _move, hull_steps
+from subzero.engine.energy import CABLE_LOSS, book
+from subzero.engine.initial_conditions import first_state, prepare
+from subzero.engine.recording import Pace, Recording, Run, cut, new_recording, record_row
+from subzero.engine.vehicle_step import tow_point, way_of_tow_point
 from subzero.jit import compiled
 from subzero.model import Model
-from subzero.recording import Pace, Recording, Run, cut, new_recording, record_row
 from subzero.run_state import Live, Setup
-from subzero.steady_start import first_state
-from subzero.vehicle_step import tow_point, way_of_tow_point
 from vehicle import STATE_SIZE
 
 
@@ -77,7 +76,7 @@ def run_printed_rows(
     last: int,
     used: int,
 ) -> tuple[int, int, int, tuple[int, int, float, int, int]]:
-    """Fill rows first … last − 1 of a recording; arguments as `subzero.loop.run_rows`.
+    """Fill rows first … last − 1 of a recording; arguments as `subzero.engine.time_loop.run_rows`.
 
     Returns:
         rows that are filled, nodes in use, how it ended, and the cable's last `NewtonReport` as a tuple.

@@ -20,11 +20,10 @@ import numpy as np
 
 from cable.drum_motion import lead_drum
 from cable.moving_end import NOW, accept, energy_flow, impedance, try_step
-from subzero.energy import book
+from subzero.engine.energy import book, take_jolt_of_motion
+from subzero.engine.vehicle_step import advance_hull, follow_track, tow_point
 from subzero.jit import compiled, inlined, inner, scratch
-from subzero.jolt import take_jolt_of_motion
 from subzero.run_state import Live, Now, Setup
-from subzero.vehicle_step import advance_hull, follow_track, tow_point
 from vehicle import STATE_SIZE
 
 MOST_EXCHANGES = 60
@@ -46,6 +45,7 @@ def exchange(setup: Setup, live: Live, start: float, span: float) -> int:
         take_jolt_of_motion(setup, live, start)
     while True:
         last = done + step >= span * (1.0 - 1e-9)
+        # A failed try may have let the drum go or stopped it; the next, shorter one must begin from what was true.
         mode = live.line.ends.drum_mode
         ending = _agree(setup, live, start + done, step)
         if ending == FINE:
@@ -53,7 +53,9 @@ def exchange(setup: Setup, live: Live, start: float, span: float) -> int:
             done += step
             if last:
                 return FINE
-            step = min(2.0 * step, span - done)
+            step = min(
+                2.0 * step, span - done
+            )  # what was hard may be behind: never stay at short steps for good
         else:
             live.line.ends.drum_mode = mode
             step *= 0.5
@@ -70,6 +72,7 @@ def hull_steps(setup: Setup, span: float) -> int:
 @inlined
 def _agree(setup: Setup, live: Live, start: float, span: float) -> int:
     """Find the force at the end of an exchange with which hull and cable agree; nothing is made real yet."""
+    # First guess: the force goes on with the slope of the exchange before, F_n + h F', F' = (F_n − F_{n−1})/h_n.
     ratio = span / live.now.last_step if live.now.last_step > 0.0 else 0.0
     for i in range(3):
         live.now.guess[i] = live.now.force[i] + ratio * (live.now.force[i] - live.now.force_before[i])
@@ -93,6 +96,7 @@ def _agree(setup: Setup, live: Live, start: float, span: float) -> int:
         live.now.iterations += live.line.ends.solved.iterations
         if not converged:
             return CABLE_FAILED
+        # Before the test of agreement: how stiff the cable is says how well two forces can agree at all.
         impedance(live.line, live.now.Z)
         if setup.fixed.prescribed or _forces_agree(live.now, live.line.ends.tow_force, setup.fixed.agreement):
             return FINE
@@ -133,6 +137,8 @@ def _forces_agree(now: Now, F: np.ndarray, agreement: float) -> bool:
         reach = max(reach, abs(now.tow[i]))
         for k in range(3):
             stiffness = max(stiffness, abs(now.Z[i, k]))
+    # A taut cable is stiff: the last digit of the tow point's place (ROUNDING · reach) is already this much force. No
+    # iteration can do better, and a stricter test would halve the step for nothing.
     return gap <= agreement * size + 1e-11 + ROUNDING * stiffness * reach
 
 
@@ -153,7 +159,7 @@ def _improve(span: float, now: Now, F: np.ndarray, last_size: float) -> float:
             M[i, k] = (1.0 if i == k else 0.0) - 0.5 * span * span * total
     _solve_three(M, b)
     size = max(abs(b[0]), abs(b[1]), abs(b[2]))
-    too_far = not size < last_size
+    too_far = not size < last_size  # written so that NaN counts as too far
     for i in range(3):
         now.change[i] = 0.5 * now.change[i] if too_far else b[i]
         now.guess[i] += -now.change[i] if too_far else b[i]
@@ -211,6 +217,7 @@ def _accept(setup: Setup, live: Live, start: float, span: float) -> None:
     if live.now.last_step == 0.0:
         for i in range(3):  # the force at the start is a guess: it gives no slope
             live.now.force_before[i] = live.now.force[i]
+    # The cable is accepted first: the energies booked below are those of its new time level.
     live.now.last_step = span
     if setup.fixed.tethered:
         accept(live.line, span, setup.fixed.cable, live.load)

@@ -6,7 +6,8 @@ turned into the body's axes with the attitude of that stage, equations (12)-(13)
     F_c = Rᵀ F,    M_c = r_c × F_c
 
 A prescribed run follows its motion instead: that of an "idealised vehicle" without dynamics (section 4.1 of the paper),
-linear between its samples, or one that was measured (section 3, step 2), smooth between them (`subzero.knots`).
+linear between its samples, or one that was measured (section 3, step 2), smooth between them
+(`subzero.engine.prescribed_motion`).
 """
 
 from __future__ import annotations
@@ -108,10 +109,12 @@ def advance_hull(setup: Setup, live: Live, start: float, span: float, steps: int
         state, new = live.path[n], live.path[n + 1]
         command = orders.values[row_at(orders.time, start + n * h)]
         for s in range(4):
-            part = 0.0 if s == 0 else (h if s == 3 else 0.5 * h)
+            part = 0.0 if s == 0 else (h if s == 3 else 0.5 * h)  # stages at t, t + h/2, t + h/2, t + h
             for i in range(STATE_SIZE):
                 stage[i] = state[i] + (part * k[s - 1, i] if s > 0 else 0.0)
             along = (n * h + part) / span
+            # The pull ends at the force that is sought, with a slope that is known: only so does the hull's answer to
+            # the guess stay linear, ∂x/∂F = (h²/2) A, and the exchange stable on a heavy cable (see `coupling`).
             for i in range(3):
                 work.pull[i] = now.guess[i] + (along - 1.0) * ratio * (now.force[i] - now.force_before[i])
             tow_wrench(stage, work.pull, setup.fixed.r_c, work)
@@ -121,7 +124,9 @@ def advance_hull(setup: Setup, live: Live, start: float, span: float, steps: int
             vehicle.derivative(stage, command, work.current, work.wrench, setup.fixed.vehicle, k[s])
         for i in range(STATE_SIZE):
             new[i] = state[i] + h / 6.0 * (k[0, i] + 2.0 * k[1, i] + 2.0 * k[2, i] + k[3, i])
-        vehicle.finish_step(new, command, setup.fixed.vehicle)
+        vehicle.finish_step(
+            new, command, setup.fixed.vehicle
+        )  # quaternion to length one, linkages behind their servos
 
 
 @compiled

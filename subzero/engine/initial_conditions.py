@@ -1,9 +1,21 @@
 """The start of a run: from a trial and a model to what stays and what changes.
 
 The cable is laid straight behind the vehicle, or hangs at rest between it and a drum that is somewhere else.
+
+The vehicle starts in the state that the trial gives, or in trim: the steady level motion (`subzero.steady_motion`) at
+the start's speed over ground, with the wet cable in steady tow. Pitch, heave, propeller and fins are those that hold
+it. The water around the vehicle is taken as uniform.
+
+A model may change in mid-run (a fin is struck, the cable is caught, a current sets in): the run then starts again
+from where it stands, with other numbers. Vehicle, cable and drum keep position and speed. The energy that a sudden
+change of a mass would take is not booked.
 """
 
 from __future__ import annotations
+
+from collections.abc import Sequence
+from math import degrees
+from typing import Any
 
 import numpy as np
 
@@ -15,6 +27,7 @@ from cable.hold import hold
 from cable.moving_end import (
     FLOWS,
     NOW,
+    STORED,
     Line,
     energy_flow,
     lay_held,
@@ -24,14 +37,15 @@ from cable.moving_end import (
     start_in_water,
 )
 from cable.task import START_LENGTH
-from subzero.environment import drum_of, water_of, way_of_drum
+from subzero.engine.environment import drum_of, water_of, way_of_drum
+from subzero.engine.prescribed_motion import knots
+from subzero.engine.vehicle_step import feel_current, pose, tow_point, way_of_tow_point
+from subzero.errors import BadValueError, UserError, printable, real, short
 from subzero.external_force import MissingForce
-from subzero.jit import compiled, packed
-from subzero.knots import knots
+from subzero.jit import allocating, compiled, packed
 from subzero.model import Model
 from subzero.run_state import LINEAR_ROWS, Fixed, Live, Orders, Setup, new_now
-from subzero.steady_start import first_state
-from subzero.vehicle_step import feel_current, pose, tow_point, way_of_tow_point
+from vehicle.state import LINKAGE, POSITION, SERVO, VELOCITY
 
 FORCE_TOLERANCE = 1e-9
 """Hull and cable agree when their forces differ by less than this fraction (and 1e-11 N)."""
@@ -220,3 +234,136 @@ def begin_at_rest(setup: Setup, live: Live) -> None:
     energy_flow(live.line, setup.fixed.cable, live.load, live.now.ledger.cable_new)
     for i in range(FLOWS):
         live.now.ledger.cable_old[i] = live.now.ledger.cable_new[i]
+
+
+PASSES = 4
+"""The speed through the water depends on the pitch, and that on the speed: three digits a pass."""
+FINS = ("rudder", "stern_plane_port", "stern_plane_starboard")
+
+
+def first_state(trial: scenarios.Trial, model: Model, tethered: bool) -> np.ndarray:
+    """Return the vehicle's state at t = 0, as in `vehicle.STATE` (of a prescribed run, its place only).
+
+    Raises:
+        UserError: a fin that stands where its servo cannot take it; no steady motion (`autopilot.NoTrimError`).
+    """
+    start = trial.start
+    if start.at_trim:
+        return _steady(trial, model, tethered)
+    _check_fins(start, model)
+    state = vehicle.initial_state(
+        position=(0.0, 0.0, start.depth),
+        roll=start.roll,
+        pitch=start.pitch,
+        heading=start.heading,
+        velocity=start.velocity,
+        propeller_speed=start.propeller_speed,
+    )
+    state[SERVO : SERVO + 3] = state[LINKAGE : LINKAGE + 3] = start.fins
+    return state
+
+
+def _check_fins(start: scenarios.Start, model: Model) -> None:
+    """Refuse fins beyond what their servos reach."""
+    for fin, angle in zip(FINS, start.fins, strict=True):
+        most = getattr(model.vehicle, f"{fin}_servo").deflection_limit
+        if abs(angle) > most * (1.0 + 1e-12):
+            raise UserError(
+                f"The run starts with {fin}_angle at {degrees(angle):.4g} degrees; its servo reaches "
+                f"{degrees(most):.4g} degrees either way. Allowed: an angle within that."
+            )
+
+
+def _steady(trial: scenarios.Trial, model: Model, tethered: bool) -> np.ndarray:
+    """Return the state of a trial that starts in trim."""
+    from subzero.steady_motion.hull_state_space import to_vehicle
+    from subzero.steady_motion.trim_point import trim
+
+    start, water = trial.start, _water_at_the_start(model, trial.start.depth)
+    wet, speed, R = start.wet_length if tethered else 0.0, start.surge_speed, np.empty((3, 3))
+    for _ in range(PASSES if water.any() else 1):
+        try:
+            x = trim(model, speed=speed, wet_length=wet, roll=start.roll).state.copy()
+        except UserError as error:
+            what = f"'{printable(trial.name)}' cannot start in trim at {start.surge_speed:g} m/s over ground"
+            raise type(error)(f"{what}: {error}") from None
+        x[5] = start.heading
+        state = to_vehicle(x)
+        vehicle.rotation(state[3:7], R)
+        speed = start.surge_speed - float(R[:, 0] @ water)
+    state[POSITION : POSITION + 3] = 0.0, 0.0, start.depth
+    state[VELOCITY : VELOCITY + 3] += R.T @ water
+    return state
+
+
+def _water_at_the_start(model: Model, depth: float) -> np.ndarray:
+    """Return the velocity of the water at the vehicle, north, east, down (3,). [m/s]."""
+    water = np.array(model.current, dtype=float)
+    if model.profile is not None:
+        water += [
+            np.interp(depth, model.profile.depth, axis) for axis in np.transpose(model.profile.velocity)
+        ]
+    return water
+
+
+Later = Sequence[tuple[float, Model]]
+"""(time [s], model) from which on another model holds."""
+
+CLOSE = 1e-6
+"""A time of a change is that of a row if it is as near as this. [s]"""
+
+
+def checked_later(later: object) -> Later:
+    """Return times and models; refuse what are none."""
+    pairs: list[Any] = list(later) if isinstance(later, Sequence) else [later]
+    for pair in pairs:
+        good = isinstance(pair, Sequence) and len(pair) == 2
+        if not (good and real(pair[0]) is not None and isinstance(pair[1], Model)):
+            raise BadValueError(f"later holds {short(pair)}; it must hold pairs of a time [s] and a Model.")
+    return pairs
+
+
+def rows_of_changes(
+    trial: scenarios.Trial, tethered: bool, times: np.ndarray, later: Later
+) -> dict[int, Model]:
+    """Return the rows from which on other models hold; refuse what cannot be done.
+
+    Raises:
+        UserError: a scheme that cannot change, or a time that is none of the run's.
+    """
+    if later and tethered and trial.scheme != "moving_end":
+        raise UserError(
+            f"'{trial.name}' has the scheme '{trial.scheme}'; only 'moving_end' can go on with another model."
+        )
+    changes = {}
+    for time, model in checked_later(later):
+        row = int(np.argmin(np.abs(times - time)))
+        if not abs(times[row] - time) < CLOSE:
+            raise UserError(
+                f"Another model holds from t = {time!r} s on, which is no time of a result of '{trial.name}'. "
+                f"Allowed: whole multiples of {times[1]:g} s, from 0 to {times[-1]:g} s."
+            )
+        changes[row] = model
+    return changes
+
+
+def go_on_with(
+    model: Model, setup: Setup, live: Live, trial: scenarios.Trial, tethered: bool, time: float
+) -> Setup:
+    """Return what stays in a run that goes on with another model from `time` [s] on; `live` is made ready for it."""
+    other = setup_of(trial, model, tethered)
+    other.fixed.drum_place[:] = setup.fixed.drum_place
+    other.water.points[:3] = setup.water.points[:3]
+    begin_again(other, live, time)
+    return other
+
+
+@allocating
+def begin_again(setup: Setup, live: Live, time: float) -> None:
+    """Take the energies that are stored now, with the numbers that hold from now on, as those of the start."""
+    ledger, flows = live.now.ledger, np.zeros(FLOWS)
+    feel_current(setup, live.state, time, live.now.hull)
+    ledger.kinetic = vehicle.kinetic_energy(live.state, live.now.hull.current, setup.fixed.vehicle)
+    if setup.fixed.tethered:
+        energy_flow(live.line, setup.fixed.cable, live.load, flows)
+        ledger.cable_old[STORED] = flows[STORED]

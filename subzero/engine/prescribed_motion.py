@@ -87,7 +87,8 @@ def _or_zero(motion: scenarios.Motion, name: str) -> np.ndarray:
 
 def _slope(t: np.ndarray, y: np.ndarray) -> np.ndarray:
     """Return the slopes of parabolas through three neighbours. Shape (samples,)."""
-    return np.gradient(y, t, edge_order=2 if t.size > 2 else 1)
+    slopes: np.ndarray = np.gradient(y, t, edge_order=2 if t.size > 2 else 1)
+    return slopes
 
 
 def _integral(t: np.ndarray, rate: np.ndarray) -> np.ndarray:

@@ -1,7 +1,8 @@
-"""A run held by one reference, so that a step from Python costs microseconds.
+"""The compiled time loop: exchange after exchange, row after row, no Python inside.
 
-Compiled functions take a named tuple apart, array by array, each time Python calls them: with some fifty arrays that
-costs more than the step itself. A `Handle` is taken apart once and then passed as one pointer.
+Stepped from outside (`subzero.simulator`), a run is held by one reference, so that a step from Python costs
+microseconds: compiled functions unpack a named tuple, array by array, each time Python calls them, and with some fifty
+arrays that costs more than the step itself. A `Handle` is unpacked once and then passed as one pointer.
 """
 
 from __future__ import annotations
@@ -14,11 +15,58 @@ import numpy as np
 from numba import types
 from numba.experimental import structref
 
-from subzero.jit import allocating
+from subzero.engine.coupling import FINE, exchange
+from subzero.engine.recording import Recording, record_row
+from subzero.jit import allocating, compiled
 from subzero.jit.unbroken import unbroken
-from subzero.loop import run_rows
-from subzero.recording import Recording, record_row
 from subzero.run_state import Live, Setup
+
+NO_ROOM = 4
+"""The room that was reserved is nearly full: enlarge it and go on. The other endings are in `coupling`."""
+SPARE = 8
+"""Nodes that one exchange may add. (A tow point at 40 segments a second would need more: `coupling.FASTEST`.)"""
+
+
+@compiled
+def run_rows(
+    setup: Setup,
+    live: Live,
+    recording: Recording,
+    times: np.ndarray,
+    first: int,
+    last: int,
+    used: int,
+    parts: int,
+) -> tuple[int, int, int]:
+    """Fill rows first … last − 1 of a recording.
+
+    Args:
+        setup: what stays.
+        live: what changes; at times[first − 1] when called.
+        recording: filled.
+        times: of all rows (n,). [s]
+        first: row to begin with.
+        last: row to end before.
+        used: nodes of the recording in use.
+        parts: exchanges from a row to the next.
+
+    Returns:
+        rows that are filled, nodes in use, and how it ended (`coupling.FINE` …); `line.ends.solved` tells how the
+        cable's last step was solved.
+    """
+    for row in range(first, last):
+        # Arrays cannot grow in here: stop before they are full, and let Python enlarge them and call again.
+        nodes = live.line.ends.count + 1 + SPARE * parts
+        if nodes > live.line.length.size or used + live.line.length.size > recording.tension.size:
+            return row, used, NO_ROOM
+        span = (times[row] - times[row - 1]) / parts
+        for part in range(parts):
+            ending = exchange(setup, live, times[row - 1] + part * span, span)
+            if ending != FINE:
+                return row, used, ending
+        used = record_row(setup, live, recording, row, times[row], used)
+    return last, used, FINE
+
 
 FIELDS = ("setup", "live", "recording", "times")
 
@@ -100,7 +148,7 @@ def advance(
     command = handle.setup.orders.values
     command[0, 0], command[0, 1], command[0, 2], command[0, 3] = n, rudder, port, starboard
     row = at[ROW]
-    before = at[USED] - handle.recording.nodes[row]
+    before = at[USED] - handle.recording.nodes[row]  # the present row is written again, under the new command
     used = record_row(handle.setup, handle.live, handle.recording, row, handle.times[row], before)
     after, used, ending = run_rows(
         handle.setup, handle.live, handle.recording, handle.times, row + 1, row + 1 + count, used, 1

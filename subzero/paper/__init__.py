@@ -1,1 +1,0 @@
-"""A vehicle on the paper's own scheme, as printed: imported, and compiled, only when a trial asks for it."""
