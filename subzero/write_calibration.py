@@ -35,7 +35,7 @@ def files_of(out: Path) -> tuple[str, ...]:
 def write_all(found: Calibration, stage: Stage, stem: str) -> None:
     """Write the vehicle (and the cable), the JSON file and the figures, under a common name."""
     from subzero.figures.calibration import draw_calibration
-    from subzero.figures.sheet import Title
+    from subzero.figures.style import Title
     from subzero.output import write_figures
 
     for kind, text in found.files.items():
@@ -52,9 +52,10 @@ def write_all(found: Calibration, stage: Stage, stem: str) -> None:
 def tell(found: Calibration, stage: Stage, out: Path, console: Console | None = None) -> None:
     """Print the numbers, what the records do not determine, and where the files are."""
     console = console or Console()
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0))
     for name in ("number", "before", "calibrated", "95 %", "change"):
-        table.add_column(name, justify="left" if name in ("number", "change") else "right", overflow="fold")
+        words = name in ("number", "change")
+        table.add_column(name, justify="left" if words else "right", overflow="fold", no_wrap=not words)
     for row in report.rows(found):
         table.add_row(*row)
     console.print(table, highlight=False)

@@ -10,8 +10,7 @@ from matplotlib.ticker import MaxNLocator
 
 from subzero.calibration.results import Calibration, Estimate, Profile
 from subzero.figures import style
-from subzero.figures.panel import headline, legend
-from subzero.figures.sheet import BOTTOM, TOP, WIDTH, Title, sheet
+from subzero.figures.style import BOTTOM, TOP, WIDTH, Title, headline, legend, sheet
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -131,7 +130,8 @@ def _profile(axes: Axes, one: Profile, estimate: Estimate) -> None:
 def _between(one: Profile, grid: np.ndarray) -> np.ndarray:
     """Return a profile between its points, from its signed root, which is nearly linear."""
     root = np.sqrt(one.rise) * np.where(np.arange(one.rise.size) < int(np.argmin(one.rise)), -1.0, 1.0)
-    return np.interp(grid, one.values, root) ** 2
+    between: np.ndarray = np.interp(grid, one.values, root)
+    return between**2
 
 
 def _resize(figure: Figure, height: float, left: float) -> None:
