@@ -60,11 +60,11 @@ def calibrate(
         UserError: a record, a name or the vehicle cannot be used.
         scenarios.ScenarioError: a scenario cannot be used.
     """
-    names = [full_name(name) for name in free] or list(USUAL)
+    names = list(dict.fromkeys(full_name(name) for name in free)) or list(USUAL)
     logged = read(
         [records] if isinstance(records, Logged | str | Path) else records, scenario, vehicle, commands
     )
-    _check_one_vehicle(logged)
+    _check(logged)
     work = _Work(progress or (lambda share, words: None))
     with threadpool_limits(limits=1, user_api="blas"):  # runs have the cores; matrices are small
         return work.calibration(logged, names, vehicle, quick)
@@ -94,8 +94,13 @@ def _with_vehicle(one: Logged, vehicle: str | Path) -> Logged:
     return dataclasses.replace(one, setting=setting)
 
 
-def _check_one_vehicle(logged: Sequence[Logged]) -> None:
+def _check(logged: Sequence[Logged]) -> None:
+    """Refuse records that no number of one vehicle can be estimated from."""
     first = logged[0]
+    for one in logged:
+        if one.setting.trial.commands is None:
+            raise UserError(f"The trial of '{one.name}' prescribes the motion: with any numbers the vehicle moves alike. "
+                            "Calibrate with trials that give commands.")  # fmt: skip
     for one in logged[1:]:
         if one.setting.model.vehicle != first.setting.model.vehicle:
             raise UserError(f"'{first.name}' and '{one.name}' were flown with different vehicles. Calibrate records of "

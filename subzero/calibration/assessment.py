@@ -214,16 +214,15 @@ def strange(work: Fitted) -> tuple[str, ...]:
         for name, noise in record.noise.items():
             r = work.fit.r[at : at + noise.count]
             at += noise.count
-            words, usual = name.replace("_", " "), record.known.get(name, SPECS[name].noise)
+            words, level = name.replace("_", " "), record.known.get(name, SPECS[name].noise)
+            times = noise.sd / max(level, noise.resolution)
             p = whiteness(r)
             if p < STRANGE_P:
                 found.append(
                     f"What is left of the {words} in {record.name} is no noise (Ljung and Box: p = {p:.1g})."
                 )
-            elif noise.sd > STRANGE_NOISE * usual and noise.resolution < usual:
-                found.append(
-                    f"The {words} in {record.name} is {noise.sd / usual:.1f} times as noisy as usual."
-                )
+            elif times > STRANGE_NOISE:
+                found.append(f"The {words} in {record.name} is {times:.1f} times as noisy as usual.")
     return tuple(found)
 
 

@@ -18,6 +18,7 @@ import scenarios
 import subzero
 from scenarios.parameters import with_parameters
 from subzero.channels import column_name
+from subzero.cli import main
 from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.model import Model
 from subzero.synthetic.planted import make_record
@@ -186,6 +187,54 @@ def test_records_of_two_vehicles_are_refused(records):
     )
     with pytest.raises(subzero.UserError, match="different vehicles"):
         subzero.calibrate([one, replace(other, setting=replace(other.setting, model=heavier))])
+
+
+def test_a_prescribed_motion_is_refused(records):
+    (one,) = subzero.read_trials(records[0])
+    still = replace(one.setting, trial=replace(one.setting.trial, commands=None))
+    with pytest.raises(subzero.UserError, match="prescribes the motion"):
+        subzero.calibrate(replace(one, setting=still))
+
+
+@pytest.fixture
+def command(found, records, tmp_path, monkeypatch, capsys):
+    """The command line with a calibration that is done already: words → exit code, what it says, its folder."""
+    asked = {}
+
+    def done(logged, **options):
+        asked.update(options, names=[one.name for one in logged])
+        return found
+
+    def run(*words):
+        monkeypatch.setattr("subzero.calibration.api.calibrate", done)
+        monkeypatch.chdir(tmp_path)
+        code = main(["calibrate", *map(str, records), *words])
+        said = capsys.readouterr()
+        return code, said.out + said.err, tmp_path, asked
+
+    return run
+
+
+def test_the_command_writes_vehicle_numbers_and_figures_and_tells(command, found):
+    code, said, folder, asked = command("--free", FREE[0], FREE[1], "--out", "flown/mine.toml")
+    assert code == 0
+    assert asked["free"] == [f"vehicle.{name}" for name in FREE[:2]]
+    assert (folder / "flown/mine.toml").read_text(encoding="utf-8") == found.vehicle
+    names = {"mine.toml", "mine.json", "mine_numbers.png", "mine_errors.png", "mine_profiles.png"}
+    assert {path.name for path in (folder / "flown").iterdir()} == names
+    assert UNSEEN.rpartition(".")[2] in said
+    assert "not determined" in said
+    assert 'vehicle = "mine.toml"' in said
+
+
+@pytest.mark.parametrize(("words", "message"), [(("--out", "mine.txt"), "ends in .toml"),
+                                                (("--free", "rudder.lift_slop"), "Did you mean")])  # fmt: skip
+def test_the_command_refuses_before_it_reads(command, words, message):
+    code, said, folder, asked = command(*words)
+    assert code == 2
+    assert message in said
+    assert not asked
+    assert list(folder.iterdir()) == []
 
 
 @pytest.mark.slow
