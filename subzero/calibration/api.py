@@ -99,7 +99,7 @@ def _check(logged: Sequence[Logged]) -> None:
     first = logged[0]
     for one in logged:
         if one.setting.trial.commands is None:
-            raise UserError(f"The trial of '{one.name}' prescribes the motion: with any numbers the vehicle moves alike. "
+            raise UserError(f"The trial of '{one.name}' prescribes the motion: it moves alike with any numbers. "
                             "Calibrate with trials that give commands.")  # fmt: skip
     for one in logged[1:]:
         if one.setting.model.vehicle != first.setting.model.vehicle:

@@ -17,15 +17,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from subzero.diagnosis.inference.linear_gaussian import posterior
-from subzero.diagnosis.inference.map_fit import Fit, refit
+from subzero.diagnosis.inference.map_fit import Fit, bounds, objective, quadratic_step, secant
 from subzero.diagnosis.inference.problem import Problem, Progress, with_finer_steps, with_noise_behind
 
-FIRST_NOISE = 8.0
-"""Factor on the noise of the first fit. [-]"""
-MAX_ROUNDS = 6
-"""A fit is begun again at most so often where it stopped, with sensitivities of its own."""
-SETTLED_GAIN = 0.5
+FIRST_NOISE, FIRST_MISFIT, NOISE_STEP = 8.0, 2.0, 4.0
+"""Factor on the noise of the first fit, at least; so many levels off it leaves the nominal vehicle; and by what the
+factor falls from one fit to the next. [-]"""
+MAX_STEPS = 40
+"""Steps of a fit, at most."""
+SETTLED_GAIN = 0.3
 """A fit that the linear problem promises less than this has settled. [nat]"""
+LEAST_SHARE, FRESH_SHARE = 0.05, 0.5
+"""A step that gains less than the first share of what was promised is not taken; behind one that gains less than the
+second, sensitivities are made again. [-]"""
+FIRST_DAMPING, LEAST_DAMPING = 1.0, 0.1
+"""Damping of a step that failed, in inverse prior variances, and that which is none any more. [-]"""
 OWN_WITHIN = 0.3
 """Sensitivities are a fit's own if they were made so close to it, in tolerances."""
 MAX_NOISE_ROUNDS = 2
@@ -78,25 +84,59 @@ def fitted(problem: Problem, free: int, D: np.ndarray, progress: Progress) -> Fi
 
 
 def _first(problem: Problem, free: int, D: np.ndarray) -> np.ndarray:
-    """Return where the fit begins (k,): the numbers and the starts alone, with more noise than there is."""
+    """Return where the fit begins (k,): numbers and starts alone, with less and less more noise than there is."""
     core = [k for k, entry in enumerate(problem.entries) if k < free or entry.record >= 0]
-    few = replace(with_more_noise(problem, FIRST_NOISE), entries=tuple(problem.entries[k] for k in core))
-    z = np.zeros(D.size)
-    z[core] = _settled(few, z[core], D[core])[0].z
-    return z
+    few = replace(problem, entries=tuple(problem.entries[k] for k in core))
+    z, misfit = np.zeros(len(core)), few.residual(np.zeros(len(core)))
+    factor = max(FIRST_NOISE, float(np.sqrt(np.mean(misfit**2))) / FIRST_MISFIT)
+    while factor > 1.0 / NOISE_STEP:
+        z = _settled(with_more_noise(few, max(factor, 1.0)), z, D[core])[0].z
+        factor /= NOISE_STEP
+    whole = np.zeros(D.size)
+    whole[core] = z
+    return whole
 
 
 def _settled(problem: Problem, z: np.ndarray, D: np.ndarray) -> tuple[Fit, bool]:
-    """Return a fit with sensitivities made close by, and whether a further step would gain nothing."""
-    fit = refit(problem, z, problem.jacobian(z), D, most_fresh=2, made_at=z)
-    for _ in range(MAX_ROUNDS):
-        if fit.converged and fit.moved(problem) < OWN_WITHIN:
-            return fit, True
-        before = fit.objective
-        fit = refit(problem, fit.z, problem.jacobian(fit.z), D, r=fit.r, most_fresh=0, made_at=fit.z)
-        if before - fit.objective < SETTLED_GAIN and fit.moved(problem) < OWN_WITHIN:
-            return fit, True
-    return fit, False
+    """Return a fit with sensitivities made close by, and whether a further step would gain nothing.
+
+    Levenberg's and Marquardt's method within bounds (Nielsen 1999): where numbers trade against each other the best fit
+    lies at the end of a curved valley, and a whole step of Gauss and Newton, or a part of it, leaves it.
+    """
+    low, high = bounds(problem)
+    r, J, made_at = problem.residual(z), problem.jacobian(z), z
+    now, damping, harder, left = objective(r, z, D), 0.0, 2.0, 0.0
+    for _ in range(MAX_STEPS):
+        P, g = J.T @ J + np.diag((1.0 + damping) / D), J.T @ r - z / D
+        step = quadratic_step(P, g, low - z, high - z)
+        left = now - objective(r - J @ step, z + step, D)
+        fresh = made_at is z
+        if left < SETTLED_GAIN and damping < 1.0:
+            if fresh or _apart(problem, z, made_at) < OWN_WITHIN:
+                break
+            J, made_at = problem.jacobian(z), z
+            continue
+        r_there = problem.residual(z + step)
+        then = objective(r_there, z + step, D)
+        share = (now - then) / left if left > 0.0 else 0.0
+        if share > LEAST_SHARE:
+            J = secant(J, step, r_there - r, D)
+            z, r, now = z + step, r_there, then
+            damping *= max(1.0 / 3.0, 1.0 - (2.0 * share - 1.0) ** 3)
+            damping, harder = (damping if damping > LEAST_DAMPING else 0.0), 2.0
+        elif fresh:
+            damping, harder = max(damping, FIRST_DAMPING) * harder, 2.0 * harder
+        if share < FRESH_SHARE and not fresh:
+            J, made_at = problem.jacobian(z), z
+    fit = Fit(z=z, r=r, J=J, D=D, objective=now, converged=left < SETTLED_GAIN, predicted_gain=left, fresh=0,
+              made_at=made_at)  # fmt: skip
+    return fit, fit.converged
+
+
+def _apart(problem: Problem, z: np.ndarray, other: np.ndarray) -> float:
+    """Return how far two points are apart, in tolerances."""
+    tolerance = np.array([entry.parameter.tolerance for entry in problem.entries])
+    return float(np.max(np.abs(z - other) / tolerance))
 
 
 def with_more_noise(problem: Problem, factor: float) -> Problem:

@@ -223,7 +223,7 @@ def test_the_command_writes_vehicle_numbers_and_figures_and_tells(command, found
     names = {"mine.toml", "mine.json", "mine_numbers.png", "mine_errors.png", "mine_profiles.png"}
     assert {path.name for path in (folder / "flown").iterdir()} == names
     assert UNSEEN.rpartition(".")[2] in said
-    assert "not determined" in said
+    assert "Not determined by these records" in said
     assert 'vehicle = "mine.toml"' in said
 
 
