@@ -2,6 +2,7 @@
 
     python -m benchmarks.trust 60 --seed 0 --jobs 2          # trials 0 … 59; prints the tables
     python -m benchmarks.trust 1 --seed 17 --show            # one of them, in full
+    python -m benchmarks.trust 1000 --keep trials.jsonl      # each verdict kept as it comes; run again, it goes on
 
 Trial n is drawn from the generator of seed n alone, so an offender is reproduced by its number, `draw(n)`. Each is run
 as finely as its rtol asks for, and with all steps and segments a quarter as long as these. The error of the force is
@@ -24,7 +25,7 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import json
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -370,13 +371,37 @@ def _line(one: Verdict) -> str:
     )
 
 
-def judged_all(seeds: Iterable[int], jobs: int) -> list[Verdict]:
-    """Judge trials, in so many processes."""
+def judged_all(seeds: Iterable[int], jobs: int, keep: Path | None = None) -> list[Verdict]:
+    """Judge trials, in so many processes; those that a file keeps are read from it, and others are added to it."""
     seeds = list(seeds)
+    found = {one.seed: one for one in kept(keep)} if keep else {}
+    for verdict in _judged([seed for seed in seeds if seed not in found], jobs):
+        found[verdict.seed] = verdict
+        if keep:
+            with keep.open("a", encoding="utf-8") as file:
+                file.write(json.dumps(asdict(verdict)) + "\n")
+    return [found[seed] for seed in seeds]
+
+
+def _judged(seeds: list[int], jobs: int) -> Iterator[Verdict]:
+    """Give verdicts as they come, in the order of the seeds."""
     if jobs <= 1:
-        return [judge(seed) for seed in seeds]
+        yield from map(judge, seeds)
+        return
     with ProcessPoolExecutor(jobs) as pool:
-        return list(pool.map(judge, seeds, chunksize=4))
+        yield from pool.map(judge, seeds)
+
+
+def kept(path: Path) -> list[Verdict]:
+    """Return the verdicts that a file keeps, one a line."""
+    if not path.exists():
+        return []
+    lines = map(json.loads, path.read_text(encoding="utf-8").splitlines())
+    return [Verdict(**{name: _hashable(value) for name, value in line.items()}) for line in lines]
+
+
+def _hashable(value: object) -> object:
+    return tuple(value) if isinstance(value, list) else value
 
 
 def main() -> None:
@@ -386,13 +411,15 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0, help="of the first trial")
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--show", action="store_true", help="one line for every trial")
-    parser.add_argument("--json", type=Path, help="file for all verdicts")
+    parser.add_argument("--keep", type=Path, help="file for all verdicts, one a line, as they come")
+    parser.add_argument("--kept", action="store_true", help="only print the tables of what the file keeps")
     asked = parser.parse_args()
-    verdicts = judged_all(range(asked.seed, asked.seed + asked.count), asked.jobs)
+    if asked.kept:
+        verdicts = kept(asked.keep)
+    else:
+        verdicts = judged_all(range(asked.seed, asked.seed + asked.count), asked.jobs, asked.keep)
     if asked.show:
         print(*(_line(one) for one in verdicts), sep="\n")
-    if asked.json:
-        asked.json.write_text(json.dumps([asdict(one) for one in verdicts], indent=1), encoding="utf-8")
     print(report(verdicts))
 
 

@@ -145,14 +145,16 @@ class Motion:
 
 def interpolation_of(given: Collection[str], asked: str | None) -> str:
     """Return how a motion that gives some fields goes on between its samples."""
-    return asked or (SMOOTH if set(given) - set(REQUIRED) else LINEAR)
+    if asked is not None:
+        return asked
+    return SMOOTH if set(given) - set(REQUIRED) else LINEAR
 
 
 def motion_faults(given: Collection[str], asked: str | None) -> list[tuple[str, str, str]]:
     """Return what does not fit in a motion that gives some fields: the field, why, and what to do."""
     faults = []
     more = [name for name in given if name not in REQUIRED]
-    if asked not in (None, *INTERPOLATIONS):
+    if not (asked is None or (isinstance(asked, str) and asked in INTERPOLATIONS)):  # asked may be an array
         allowed = f"Allowed: {', '.join(INTERPOLATIONS)}."
         faults.append(("interpolation", f"a motion knows no interpolation {shown(asked)}", allowed))
     elif asked == LINEAR and more:

@@ -8,7 +8,8 @@
 Names come from their modules when they are first used, so that ``import subzero`` costs nothing:
 `simulate` and `compare` run a trial, `Comparison` holds two runs, `load_scenario` reads a trial,
 `warnings_of` says what may be wrong with a run, `check` how much it changes with half the steps,
-`read_record` a measured record, `draw` makes the figures, `Simulator` steps a run for a controller of your own,
+`read_record` a measured record, `draw` makes the figures, `export` writes a run for other programs,
+`Simulator` steps a run for a controller of your own,
 `diagnose` says what a simulation gets wrong in measured records, `calibrate` estimates numbers of a vehicle from them,
 `read_trials` reads those as `Logged`, `challenge` hides an effect in a record to try that out,
 `autopilot` leads to linear models and controllers, `CHANNELS` is the table of everything that a run gives.
@@ -35,6 +36,7 @@ _HOME = {
     "compare": ("subzero.comparison", "compare"),
     "diagnose": ("subzero.diagnosis.api", "diagnose"),
     "draw": ("subzero.figures", "draw"),
+    "export": ("subzero.exports", "export"),
     "load_scenario": ("subzero.model", "load"),
     "read_record": ("subzero.records.record", "read_record"),
     "read_trials": ("subzero.diagnosis.read_trials", "read_trials"),

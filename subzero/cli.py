@@ -15,7 +15,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import cyclopts
 from cyclopts import Parameter
@@ -34,7 +34,37 @@ if TYPE_CHECKING:
     Runs = dict[str, xr.Dataset]
 
 Flag = cli_autopilot.Flag
+Export = Annotated[tuple[str, ...], Parameter(negative=())]
 FINE, MISTAKE, STOPPED = 0, 2, 3
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class Outputs:
+    """Which files are made, and how.
+
+    Attributes:
+        export: further files, for other programs: mcap, mat, parquet or cf; more than one may be given.
+        width: of the figures in inches: 7.2 for two columns of a journal page, 3.4 for one.
+        figures: png, svg or pdf.
+        animate: film the replay of report.html as a gif or an mp4; needs Chromium and the extra [animate].
+    """
+
+    export: Export = ()
+    width: float | None = None
+    figures: Literal["png", "svg", "pdf"] = "png"
+    animate: Literal["gif", "mp4"] | None = None
+
+    def check(self) -> None:
+        """Refuse what cannot be made, before anything is simulated."""
+        from subzero.write_results import check_pictures
+
+        _refuse_no_export(self.export)
+        check_pictures(self.width, self.animate)
+
+    def kinds(self) -> dict[str, Any]:
+        """Return what `subzero.write_results.write_all` is to make."""
+        return {"width": self.width, "kind": self.figures, "exports": self.export}
 
 
 @Parameter(name="*")
@@ -70,7 +100,7 @@ class Inputs:
         return cli_diagnosis.extended_run(trial, self.with_, self.effects)
 
 
-NO_INPUTS = Inputs()
+NO_INPUTS, USUAL_OUTPUTS = Inputs(), Outputs()
 
 
 def _version() -> str:
@@ -110,6 +140,7 @@ def simulate(
     out: Path | None = None,
     check: Flag = False,
     strict: Flag = False,
+    outputs: Outputs = USUAL_OUTPUTS,
 ) -> int:
     """Simulate one run, and write its channels, a summary and figures.
 
@@ -120,11 +151,13 @@ def simulate(
         out: folder for the files; by default one named after the scenario, here.
         check: run it once more with half the steps and half the segment length, and say what changes.
         strict: end with exit code 3 if the run ends with warnings.
+        outputs: which files are made, and how.
     """
     from subzero import write_results
     from subzero.output import staged
 
     trial = inputs.read(scenario)
+    outputs.check()
     with staged(out or write_results.default_folder(trial)) as stage:
         trial, extended = inputs.checked(scenario)
         with _progress(trial) as progress:
@@ -133,7 +166,8 @@ def simulate(
             result = run(trial, tethered=not untethered, **extended, progress=progress)
         runs = {"untethered" if untethered else "tethered": result}
         runs = _refined(runs, trial, extended) if check else runs
-        summary = write_results.write_all(runs, None, stage)
+        summary = write_results.write_all(runs, None, stage, **outputs.kinds())
+        write_results.write_film(outputs.animate, stage)
     return FINE if write_results.tell(summary, stage, strict=strict) else STOPPED
 
 
@@ -147,6 +181,7 @@ def compare(
     out: Path | None = None,
     check: Flag = False,
     strict: Flag = False,
+    outputs: Outputs = USUAL_OUTPUTS,
 ) -> int:
     """Simulate with the cable and without, and set both side by side.
 
@@ -157,6 +192,7 @@ def compare(
         out: folder for the files; by default one named after the scenario, here.
         check: run both once more with half the steps and half the segment length, and say what changes.
         strict: end with exit code 3 if a run ends with warnings.
+        outputs: which files are made, and how.
     """
     from subzero import write_results
     from subzero.output import staged
@@ -164,6 +200,7 @@ def compare(
 
     trial = inputs.read(scenario)
     record = read_record(measured) if measured is not None else None
+    outputs.check()
     with staged(out or write_results.default_folder(trial)) as stage:
         trial, extended = inputs.checked(scenario)
         with _progress(trial) as progress:
@@ -171,7 +208,8 @@ def compare(
 
             result = run(trial, measured=record, **extended, progress=progress)
         runs = _refined(result.runs, trial, extended) if check else result.runs
-        summary = write_results.write_all(runs, result.measured, stage)
+        summary = write_results.write_all(runs, result.measured, stage, **outputs.kinds())
+        write_results.write_film(outputs.animate, stage)
     return FINE if write_results.tell(summary, stage, strict=strict) else STOPPED
 
 
@@ -207,10 +245,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _note_command(words: Sequence[str]) -> None:
-    """Keep the line that is carried out, for the pages that tell how to do it again."""
+    """Keep the line that is carried out, for the pages that tell how to do it again; where it writes to is no part."""
     from subzero.output import COMMAND
 
-    COMMAND.set(printable(shlex.join(["subzero", *words])))
+    kept = [word for before, word in zip(["", *words], words, strict=False)
+            if "--out" not in (before, word) and not word.startswith("--out=")]  # fmt: skip
+    COMMAND.set(printable(shlex.join(["subzero", *kept])))
 
 
 def _never_choke(*streams: Any) -> None:
@@ -231,6 +271,15 @@ def _in_words(error: cyclopts.CycloptsError) -> str:
     if isinstance(error, cyclopts.UnusedCliTokensError):
         return f"Unexpected argument: {' '.join(error.unused_tokens or [])}."
     return str(error)
+
+
+def _refuse_no_export(kinds: Sequence[str]) -> None:
+    """Refuse a kind of file that nothing here writes, before the run."""
+    if kinds:
+        from subzero.exports import writer_of
+
+        for kind in kinds:
+            writer_of(kind)
 
 
 def _refined(runs: Runs, trial: scenarios.Trial, extended: dict[str, Any]) -> Runs:

@@ -16,6 +16,9 @@ from subzero.interrupts import INTERRUPTED, patience
 from subzero.progress import progress_bar
 
 if TYPE_CHECKING:
+    import xarray as xr
+
+    from subzero.diagnosis.hypothesis.configuration import Setting
     from subzero.diagnosis.hypothesis.effect import Effect
     from subzero.diagnosis.hypothesis.logged import Logged
     from subzero.diagnosis.results import Verdict
@@ -68,8 +71,10 @@ def diagnose(
 
         with patience(LAST_WORDS_S):
             verdict = _ask(logged, own, seed, "screen" if screen else "full")
-            write_diagnosis.write_all(verdict, logged, stage, effects=own, effects_file=effects)
-    write_diagnosis.tell(verdict, stage)
+            write_diagnosis.write_all(
+                verdict, logged, stage, run=simulated, effects=own, effects_file=effects
+            )
+    write_diagnosis.tell(verdict, stage, scenario=logged[0].setting.trial.name)
     if not verdict.complete:
         print("Interrupted; what it has is written.", file=sys.stderr)
     return FINE if verdict.complete else INTERRUPTED
@@ -202,10 +207,20 @@ def _read(paths: list[Path], scenario: str | None, commands: str | None) -> list
         return read_trials(paths, scenario=scenario, commands=commands)
 
 
+def simulated(setting: Setting) -> xr.Dataset:
+    """Return what the vehicle does in a setting, with the steps that the diagnosis took."""
+    from subzero.simulation import simulate
+
+    trial = dataclasses.replace(setting.trial, rtol=0.0)
+    return simulate(trial, tethered=setting.tethered, model=setting.model, later=setting.later)
+
+
 def _ask(logged: list[Logged], own: tuple[Effect, ...], seed: int, budget: str) -> Verdict:
     """Diagnose under a progress bar; an interrupt ends it with what it has, if it has anything."""
-    from subzero.diagnosis.api import diagnose as run
+    from subzero.diagnosis.api import diagnose_trials
     from subzero.write_diagnosis import tell_before
 
     with progress_bar("Diagnosing", lambda: COSTS) as progress:
-        return run(logged, effects=own, progress=progress, seed=seed, budget=budget, seen=tell_before)
+        return diagnose_trials(
+            logged, effects=own, progress=progress, seed=seed, budget=budget, seen=tell_before
+        )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
@@ -22,8 +22,10 @@ COMMAND: ContextVar[str] = ContextVar("COMMAND", default="")
 """The line of the shell that is being carried out; a page says it, so that its reader can do it again."""
 
 RUN_FILES = (*("tethered.nc", "tethered.csv", "untethered.nc", "untethered.csv", "summary.json", "report.html"),
-             *("fig4.png", "fig5.png", "fig6.png", "attitude.png", "cable.png", "forces.png"),
-             *("deployment.png", "measured.png", "manoeuvre.png"))  # fmt: skip
+             *(f"{name}.{kind}" for kind in ("png", "svg", "pdf")
+               for name in ("fig4", "fig5", "fig6", "attitude", "cable", "tension", "forces", "deployment", "measured",
+                            "manoeuvre")),
+             *("replay.gif", "replay.mp4"))  # fmt: skip
 """Files of runs; `subzero.figures.draw` names the figures."""
 
 DIAGNOSIS_FILES = ("diagnosis.json", "extended.toml", "report.md", "report.html", "record.csv", "record.toml",
@@ -45,11 +47,11 @@ def staged(folder: Path) -> Iterator[Stage]:
 def write_run(run: xr.Dataset, stage: Stage, name: str) -> None:
     """Write a run as ``name.nc`` (everything, with units and provenance) and ``name.csv`` (the channels)."""
     with stages.told(stage.folder):
-        _write_netcdf(run, stage.path / f"{name}.nc")
+        write_netcdf(run, stage.path / f"{name}.nc")
         write_csv(run, stage.path / f"{name}.csv")
 
 
-def _write_netcdf(run: xr.Dataset, path: Path) -> None:
+def write_netcdf(run: xr.Dataset, path: Path) -> None:
     """Write a run as netCDF; its library says a full disk as it says everything else."""
     try:
         run.to_netcdf(path, engine="netcdf4")
@@ -84,11 +86,23 @@ def write_page(page: str, stage: Stage) -> None:
         (stage.path / "report.html").write_text(page, encoding="utf-8")
 
 
-def write_figures(figures: dict[str, Figure], stage: Stage) -> None:
-    """Write each figure as ``name.png``."""
-    with stages.told(stage.folder):
+DRAWING: dict[Any, Any] = {"svg.hashsalt": "subzero", "svg.fonttype": "path", "pdf.fonttype": 42}
+"""Two drawings of one figure are alike to the last letter; letters of a PDF are letters."""
+OF_KIND: dict[str, dict[str, Any]] = {
+    "png": {"pil_kwargs": {"compress_level": 3}},
+    "svg": {"metadata": {"Date": None}},
+    "pdf": {"metadata": {"CreationDate": None}},
+}
+"""How a figure of a kind is written."""
+
+
+def write_figures(figures: Mapping[str, Figure], stage: Stage, kind: str = "png") -> None:
+    """Write each figure as ``name.png``, or as a drawing, ``name.svg`` or ``name.pdf``."""
+    import matplotlib as mpl
+
+    with stages.told(stage.folder), mpl.rc_context(DRAWING):
         for name, figure in figures.items():
-            figure.savefig(stage.path / f"{name}.png", pil_kwargs={"compress_level": 3})
+            figure.savefig(stage.path / f"{name}.{kind}", **OF_KIND[kind])
 
 
 def _cell(value: float) -> str:

@@ -1,27 +1,57 @@
-"""Deliver a diagnosis: all its files, and what is told on the terminal, before it and after it."""
+"""Deliver a diagnosis: all its files, its page, and what is told on the terminal, before it and after it.
+
+In the replay of the page the model that explains the first record best is solid, with its cable; the nominal simulation
+and the measured vehicle are ghosts.
+"""
 
 from __future__ import annotations
 
+import dataclasses
 import io
+import json
 import shutil
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rich import box
 from rich.console import Console
 from rich.markup import escape
+from rich.padding import Padding
 from rich.table import Table
+from rich.text import Text
 
-from subzero.diagnosis.report import tables, words
-from subzero.diagnosis.results import Detectability, Verdict
+from subzero.diagnosis.hypothesis.extended_model import all_effects, apply, plain_id
+from subzero.diagnosis.report import json_file, tables, words
+from subzero.diagnosis.report.sections import Section as Told
+from subzero.diagnosis.report.sections import belongs, markdown, sections
+from subzero.diagnosis.report.summary import summary
+from subzero.diagnosis.report.toml_file import text_of
+from subzero.diagnosis.results import (
+    CAUSE_NAMED,
+    NOTHING_WRONG,
+    OUTSIDE,
+    UNDECIDED,
+    Detectability,
+    Extended,
+    Verdict,
+)
+from subzero.page.replay import HULL, Actor, as_run, encode
+from subzero.page.report import Answer, Line, Report, Section, render
+from subzero.page.report import Table as Rows
 
 if TYPE_CHECKING:
+    import xarray as xr
     from matplotlib.figure import Figure
 
+    from subzero.diagnosis.hypothesis.configuration import Setting
     from subzero.diagnosis.hypothesis.effect import Effect
     from subzero.diagnosis.hypothesis.logged import Logged
     from subzero.stage import Stage
+
+Run = Callable[["Setting"], "xr.Dataset"]
+"""Simulates a setting as the diagnosis has simulated it."""
 
 MOST_ROWS = 12
 """So many causes that cannot be told apart are shown on the terminal; the report has them all."""
@@ -44,12 +74,27 @@ def tell_before(rows: Sequence[Detectability], console: Console | None = None) -
         console.print(f"… and {len(hidden.rows) - MOST_ROWS} more in the report.", highlight=False)
 
 
-def tell(verdict: Verdict, stage: Stage, console: Console | None = None) -> None:
-    """Print a verdict in words, and where the files are."""
+def tell(
+    verdict: Verdict, stage: Stage, console: Console | None = None, *, scenario: str = "SCENARIO"
+) -> None:
+    """Print a verdict in words, and where the files are.
+
+    Args:
+        verdict: of `subzero.diagnose`.
+        stage: where the files are.
+        console: where to print.
+        scenario: the trial's name, for lines of the shell.
+    """
     console = console or Console()
     console.print(f"\n[bold]{escape(words.headline(verdict))}[/bold]", highlight=False)
-    for line in words.story(verdict):
-        console.print(line, highlight=False, markup=False)
+    for answer in summary(verdict, scenario):
+        console.print(f"[bold]{answer.question}[/bold]", highlight=False)
+        for line in answer.words:
+            console.print(Padding(Text(line), (0, 0, 0, 2)))
+        if answer.command:
+            console.print(f"    {answer.command}", highlight=False, markup=False, soft_wrap=True)
+    for note in verdict.notes:
+        console.print(note, highlight=False, markup=False)
     if verdict.rivals:
         console.print(_rich(tables.rivals(verdict, short=True)), highlight=False)
     for name, table in tables.gain(verdict).items():
@@ -72,13 +117,21 @@ def write_all(
     logged: Sequence[Logged],
     stage: Stage,
     *,
+    run: Run,
     effects: Iterable[Effect] = (),
     effects_file: Path | None = None,
 ) -> None:
-    """Write ``diagnosis.json``, ``extended.toml``, figures, and the report as ``report.md`` and ``report.html``."""
-    from subzero.diagnosis.hypothesis.extended_model import all_effects
-    from subzero.diagnosis.report import json_file
-    from subzero.diagnosis.report.toml_file import text_of
+    """Write ``diagnosis.json``, ``extended.toml``, figures, and the report as ``report.md`` and ``report.html``.
+
+    Args:
+        verdict: of `subzero.diagnose`.
+        logged: the records that were explained.
+        stage: where to.
+        run: simulates what the page replays.
+        effects: causes of the user's own.
+        effects_file: where they are from.
+    """
+    from subzero import output
 
     stage.failed = not verdict.complete
     if effects_file is not None:
@@ -88,12 +141,19 @@ def write_all(
     extended = text_of(verdict.extended, logged[0].setting, effects=all_effects(effects), effects_file=own,
                        source=sources)  # fmt: skip
     _write(stage, "extended.toml", extended)
-    _write(stage, "diagnosis.json", json_file.text(verdict, {one.name: _about(one) for one in logged}))
-    _write_report(verdict, logged, stage)
+    told = {one.name: _about(one) for one in logged}
+    _write(stage, "diagnosis.json", json_file.text(verdict, told, logged[0].setting.trial.name))
+    figures = _draw(verdict, logged, stage)
+    _write(stage, "report.md", markdown(verdict, about(logged), tuple(figures), logged[0].setting.trial.name))
+    command = output.COMMAND.get()
+    page = page_of_diagnosis(
+        verdict, logged, figures, command=command, run=run, extended_toml=extended, effects=effects
+    )
+    _write(stage, "report.html", page)
 
 
-def _write_report(verdict: Verdict, logged: Sequence[Logged], stage: Stage) -> None:
-    from subzero.diagnosis.report import html as report
+def _draw(verdict: Verdict, logged: Sequence[Logged], stage: Stage) -> dict[str, Figure]:
+    """Draw the figures, write each as a picture, and return them by name."""
     from subzero.figures.diagnosis import draw_diagnosis
     from subzero.figures.style import Title
 
@@ -101,16 +161,148 @@ def _write_report(verdict: Verdict, logged: Sequence[Logged], stage: Stage) -> N
     records = ", ".join(one.name for one in logged)
     title = f"Diagnosis of {records}: {words.headline(verdict)}"
     figures = draw_diagnosis(verdict, Title(words=title, scenario=names))
-    pictures = {name: _png(figure) for name, figure in figures.items()}
-    for name, picture in pictures.items():
-        (stage.path / f"{name}.png").write_bytes(picture)
-    about = {
-        one.name: f"{one.record.source}, trial {one.setting.trial.name}. {' '.join(one.notes)}"
+    for name, figure in figures.items():
+        (stage.path / f"{name}.png").write_bytes(_png(figure))
+    return figures
+
+
+def page_of_diagnosis(
+    verdict: Verdict,
+    logged: Sequence[Logged],
+    figures: Mapping[str, Figure],
+    *,
+    command: str,
+    run: Run,
+    extended_toml: str = "",
+    effects: Iterable[Effect] = (),
+) -> str:
+    """Return ``report.html`` of a diagnosis.
+
+    Args:
+        verdict: of `subzero.diagnose`.
+        logged: the records that were explained; the first one is replayed.
+        figures: by name.
+        command: the line that does it again.
+        run: simulates what is replayed.
+        extended_toml: text of the extended model's file.
+        effects: causes of the user's own.
+    """
+    trials = list(dict.fromkeys(one.setting.trial.name for one in logged))
+    actors, said = replayed(verdict, logged[0], run, effects)
+    return render(
+        Report(
+            command_name="diagnose",
+            scenario=", ".join(trials),
+            title=words.title(verdict),
+            version=version("subzero"),
+            outcome=_outcome(verdict, logged),
+            command=command,
+            answers=[Answer(**one._asdict()) for one in summary(verdict, trials[0])],
+            warnings={"What else to know": verdict.notes} if verdict.notes else {},
+            sections=[
+                _section(one, figures) for one in sections(verdict, about(logged)) if _is_there(one, figures)
+            ],
+            replay=encode(actors, logged[0].record) if actors else None,
+            replay_words=said if actors else "",
+            sources=_sources(logged, extended_toml),
+        )
+    )
+
+
+def about(logged: Sequence[Logged]) -> dict[str, str]:
+    """Return what records are, each in a line."""
+    return {
+        one.name: f"{one.record.source}, trial {one.setting.trial.name}. {' '.join(one.notes)}".strip()
         for one in logged
     }
-    text = report.markdown(verdict, about, tuple(pictures))
-    _write(stage, "report.md", text)
-    _write(stage, "report.html", report.page(text, pictures, title))
+
+
+def _outcome(verdict: Verdict, logged: Sequence[Logged]) -> list[Line]:
+    """Return the verdict, and what it is about."""
+    kind: Any = "good" if verdict.verdict in (NOTHING_WRONG, CAUSE_NAMED) and verdict.complete else "bad"
+    records = [
+        Line(text=f"{one.name}: {one.record.time.size} samples, {len(one.record.values)} channels")
+        for one in logged
+    ]
+    return [Line(text=words.headline(verdict), kind=kind), *records]
+
+
+def _is_there(one: Told, figures: Mapping[str, Figure]) -> bool:
+    return bool(one.parts) or any(belongs(name, one) for name in figures)
+
+
+def _section(one: Told, figures: Mapping[str, Figure]) -> Section:
+    """Return a section of the page: a table has the paragraph above it as its title."""
+    text: list[str] = []
+    shown: list[Rows] = []
+    for part in one.parts:
+        if isinstance(part, tables.Table):
+            title = text.pop().rstrip(":") if text and text[-1].endswith(":") else ""
+            shown.append(Rows(title=title, header=part.header, groups=[part.rows], is_of_words=True))
+        else:
+            text.append(part)
+    own = {name: figure for name, figure in figures.items() if belongs(name, one)}
+    return Section(title=one.title, text=text, tables=shown, figures=own, is_folded=one.is_folded)
+
+
+def _sources(logged: Sequence[Logged], extended_toml: str) -> dict[str, str]:
+    texts = {f"The trial {one.setting.trial.name}, as it was read": one.setting.trial.text for one in logged}
+    extended = {"The extended model, extended.toml": extended_toml} if extended_toml else {}
+    libraries = ("subzero", "numpy", "scipy", "numba", "xarray")
+    return {**extended, **texts, "Versions": "\n".join(f"{name} {version(name)}" for name in libraries)}
+
+
+def replayed(
+    verdict: Verdict, logged: Logged, run: Run, effects: Iterable[Effect] = ()
+) -> tuple[tuple[Actor, ...], str]:
+    """Return who moves in the replay of a record, and what is said of them; nobody if there is nothing to see.
+
+    Args:
+        verdict: of the diagnosis; of one that was interrupted there is no replay.
+        logged: the record with its nominal setting.
+        run: simulates a setting.
+        effects: causes of the user's own.
+    """
+    if not verdict.complete:
+        return (), ""
+    known = all_effects(effects)
+    name, extended = _best(verdict, known)
+    nominal = run(logged.setting)
+    if nominal.sizes["time"] < 2 or not all(part in _vehicle(nominal) for part in HULL):
+        return (), ""
+    best = run(apply(extended, logged.setting, known)) if extended is not None else None
+    found = [Actor(name=name, run=best)] if best is not None and best.sizes["time"] > 1 else []
+    found.append(Actor(name="simulated", run=nominal, ghost=bool(found)))
+    said = f"{logged.name}. " + (f"Solid: the {name}. " if len(found) > 1 else "")
+    curves = verdict.curves.get(logged.name)
+    measured = as_run(logged.record, nominal, curves.used if curves is not None else {})
+    if measured is not None:
+        found.append(Actor(name="measured", run=measured, ghost=True))
+        said += (
+            "White: the vehicle as the record has it; where it does not say the place, that is reckoned from its speed "
+            "and attitude. "
+        )
+    said += "Orange: the simulation as it was. " if found[0].name != "simulated" else ""
+    return tuple(found), f"{said}A run is what is; what sensors make of it (shifts, lags) is not in it."
+
+
+def _vehicle(run: xr.Dataset) -> dict[str, Any]:
+    return dict(json.loads(run.attrs["parameters"]).get("vehicle", {}))
+
+
+def _best(verdict: Verdict, known: Mapping[str, Effect]) -> tuple[str, Extended | None]:
+    """Return the model that explains the records best, as the figures have it, and its name."""
+    extended = verdict.extended
+    if verdict.verdict in (CAUSE_NAMED, OUTSIDE):
+        return "extended model", extended
+    first = verdict.rivals[0] if verdict.verdict == UNDECIDED and verdict.rivals else None
+    if first is not None and first.ids and all(plain_id(one) in known for one in first.ids):
+        deviations = {
+            cause: {name: one.deviation for name, one in numbers.items()}
+            for cause, numbers in first.parameters.items()
+        }
+        return "most probable model", dataclasses.replace(extended, deviations=deviations)
+    return ("calibrated model", extended) if extended.calibration else ("", None)
 
 
 def _about(one: Logged) -> dict[str, object]:

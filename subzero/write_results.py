@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,9 +25,28 @@ def default_folder(trial: scenarios.Trial) -> Path:
     return Path(re.sub(r"[^\w.-]+", "_", trial.name).strip(".") or "run")
 
 
-def write_all(runs: dict[str, xr.Dataset], record: Record | None, stage: Stage) -> dict[str, Any]:
-    """Write everything that belongs to some runs of one trial, and return their summary."""
-    from subzero.figures import draw
+def write_all(
+    runs: dict[str, xr.Dataset],
+    record: Record | None,
+    stage: Stage,
+    *,
+    width: float | None = None,
+    kind: str = "png",
+    exports: Sequence[str] = (),
+) -> dict[str, Any]:
+    """Write everything that belongs to some runs of one trial, and return their summary.
+
+    Args:
+        runs: by label.
+        record: what was measured, if anything was.
+        stage: where to.
+        width: of the figures; None for two columns of a page. [inch]
+        kind: of the figures: png, svg or pdf.
+        exports: kinds of files for other programs (`subzero.exports`).
+    """
+    from subzero.exports import write_exports
+    from subzero.figures import draw, page_width
+    from subzero.figures.style import WIDTH
     from subzero.page import page_of_runs
     from subzero.summary import summary_of
 
@@ -34,13 +54,39 @@ def write_all(runs: dict[str, xr.Dataset], record: Record | None, stage: Stage) 
     stage.failed = any(run.attrs["outcome"] != "completed" for run in runs.values())
     for label, run in runs.items():
         output.write_run(run, stage, label)
+        write_exports(run, label, exports, stage)
     output.write_summary(summary, stage)
-    figures = draw(runs, record)
-    output.write_figures(figures, stage)
+    with page_width(WIDTH if width is None else width):
+        figures = draw(runs, record)
+        output.write_figures(figures, stage, kind)
     output.write_page(
         page_of_runs(runs, summary, figures, command=output.COMMAND.get(), record=record), stage
     )
     return summary
+
+
+def check_pictures(width: float | None, film: str | None) -> None:
+    """Refuse figures that cannot be so wide, and a film that cannot be made here, before anything is simulated."""
+    if width is not None:
+        from subzero.figures import page_width
+
+        with page_width(width):
+            pass
+    if film is not None:
+        from subzero.page.browser import check_film
+
+        check_film()
+
+
+def write_film(kind: str | None, stage: Stage) -> None:
+    """Write the replay of ``report.html`` as ``replay.gif`` or ``replay.mp4``, if it is asked for."""
+    if kind is None:
+        return
+    from subzero.page.browser import film
+    from subzero.progress import progress_bar
+
+    with progress_bar("Filming") as progress:
+        film(stage.path / "report.html", stage.path / f"replay.{kind}", progress)
 
 
 def tell(summary: dict[str, Any], stage: Stage, *, strict: bool = False) -> bool:

@@ -17,11 +17,10 @@ from pathlib import Path
 import cyclopts
 
 from subzero.diagnosis.api import diagnose_trials
-from subzero.diagnosis.assessment.next_trial import DECISIVE_DISCRIMINATION, next_trial, outlooks
-from subzero.diagnosis.assessment.trial_library import LIBRARY, flown
+from subzero.diagnosis.assessment import DECISIVE_DISCRIMINATION, LIBRARY, flown, next_trial, outlooks
 from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.logged import Logged
-from subzero.diagnosis.inference.out_of_catalogue import Findings
+from subzero.diagnosis.inference import Findings
 from subzero.diagnosis.results import UNDECIDED, NextTrial
 
 from .cases import AFTER, SEED, Case, Made, cases

@@ -11,8 +11,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.stats import chi2
 
-from subzero.diagnosis.inference.noise import Noise
-from subzero.diagnosis.inference.problem import Observed, Problem
+from subzero.diagnosis.inference import Noise, Observed, Problem
 
 from .distance import sensitivities
 

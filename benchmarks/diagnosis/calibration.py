@@ -27,7 +27,7 @@ import subzero
 from scenarios.parameters import with_vehicle
 from subzero.calibration.numbers import USUAL, with_deviation
 from subzero.calibration.results import Calibration
-from subzero.diagnosis.assessment.trial_library import LIBRARY
+from subzero.diagnosis.assessment import LIBRARY
 from subzero.diagnosis.hypothesis.catalogue import START, catalogue
 from subzero.diagnosis.hypothesis.catalogue.sensors import NOISE
 from subzero.diagnosis.hypothesis.configuration import Setting

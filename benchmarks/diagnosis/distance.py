@@ -11,13 +11,19 @@ from dataclasses import replace
 
 import numpy as np
 
-from subzero.diagnosis.assessment.identifiability import information, marginal, separation
+from subzero.diagnosis.assessment import information, marginal, separation
 from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.effect import Effect, with_onset
 from subzero.diagnosis.hypothesis.hypotheses import columns_of, nameable, variances
-from subzero.diagnosis.inference.change_point_scan import BaseRun, change_point_columns
-from subzero.diagnosis.inference.linear_gaussian import ForceInformation, Quadratic, posterior, seen
-from subzero.diagnosis.inference.problem import Problem
+from subzero.diagnosis.inference import (
+    BaseRun,
+    ForceInformation,
+    Problem,
+    Quadratic,
+    change_point_columns,
+    posterior,
+    seen,
+)
 
 ABOUT = (-4.0, -3.0, -2.0, -1.0, 0.0, 1.0, 2.0, 3.0, 4.0)
 """Rivals of what begins in mid-trial begin about then. [s]"""

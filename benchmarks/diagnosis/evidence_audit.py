@@ -13,9 +13,7 @@ import numpy as np
 from scipy.stats import norm
 
 from subzero.diagnosis.hypothesis.hypotheses import variances
-from subzero.diagnosis.inference.laplace import laplace
-from subzero.diagnosis.inference.map_fit import refit
-from subzero.diagnosis.inference.problem import Problem, pose
+from subzero.diagnosis.inference import Problem, laplace, pose, refit
 
 from .world import Drawn, record_of
 

@@ -11,12 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from subzero.diagnosis.hypothesis.catalogue.sensors import SPECS
+from subzero.diagnosis.hypothesis.catalogue import SPECS
 from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.hypotheses import nameable
-from subzero.diagnosis.inference.map_fit import Fit
-from subzero.diagnosis.inference.measurement import economical, respond
-from subzero.diagnosis.inference.out_of_catalogue import Findings
+from subzero.diagnosis.inference import Findings, Fit, economical, respond
 from subzero.diagnosis.results import Verdict
 
 from .cases import Case, Made

@@ -9,7 +9,7 @@ from functools import cache
 import numpy as np
 
 import subzero
-from subzero.diagnosis.assessment.trial_library import rich
+from subzero.diagnosis.assessment import rich
 from subzero.diagnosis.hypothesis.catalogue import START, catalogue
 from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.effect import Effect

@@ -25,7 +25,7 @@ from subzero.diagnosis.hypothesis.catalogue import ONSETS
 from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.effect import Effect, with_onset
 from subzero.diagnosis.hypothesis.logged import Logged
-from subzero.diagnosis.inference.problem import pose
+from subzero.diagnosis.inference import pose
 from subzero.records.record import Record
 
 from .distance import sensitivities, sudden_distance

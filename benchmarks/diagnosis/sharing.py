@@ -10,9 +10,8 @@ import numpy as np
 
 from subzero.diagnosis import api as engine
 from subzero.diagnosis.hypothesis.configuration import Setting
+from subzero.diagnosis.inference import Findings, model_fits, problem
 from subzero.diagnosis.inference import measurement as response
-from subzero.diagnosis.inference import model_fits, problem
-from subzero.diagnosis.inference.out_of_catalogue import Findings
 from subzero.diagnosis.results import Verdict
 
 ROOM = 600
@@ -38,10 +37,10 @@ class Shared:
             self.runs.popitem(last=False)
         return self.runs[key]
 
-    def told(self, work: Findings) -> Verdict:
+    def told(self, work: Findings, *more: Any) -> Verdict:
         """As `conclude`, and keep the work."""
         self.work = work
-        return self.tell(work)
+        return self.tell(work, *more)
 
 
 def share(threads: int | None = None) -> Shared:

@@ -20,11 +20,13 @@ import subzero
 from benchmarks.diagnosis.story_cases import STORIES, Story
 from subzero import write_diagnosis
 from subzero.channels import BY_NAME
+from subzero.cli_diagnosis import simulated
 from subzero.diagnosis.hypothesis.catalogue import START, catalogue
 from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.logged import Logged
 from subzero.diagnosis.report import tables, words
-from subzero.diagnosis.report.html import table
+from subzero.diagnosis.report.sections import table
+from subzero.diagnosis.report.summary import summary
 from subzero.diagnosis.results import Verdict
 from subzero.figures.diagnosis import draw_diagnosis
 from subzero.figures.style import Title
@@ -63,7 +65,8 @@ def tell(story: Story, verdict: Verdict) -> str:
     ]
     missed = "" if verdict.verdict == story.expected else f" *It should have been {story.expected}.*"
     lines += [f"**{words.headline(verdict)}.**{missed}", ""]
-    lines += [f"> {line}\n>" for line in words.story(verdict)[:6]]
+    for answer in summary(verdict, story.trial.__name__):
+        lines += [f"> *{answer.question}?* {' '.join(answer.words)}\n>"]
     lines += ["", *(table(tables.rivals(verdict, short=True)) if verdict.rivals else [])]
     for name in story.figures:
         if name in drawn:
@@ -93,7 +96,7 @@ def keep(logged: Logged, verdict: Verdict, folder: Path) -> None:
         header = ",".join(["time_s", *(BY_NAME[name].column for name in names)])
         columns = np.column_stack([logged.record.time, *(logged.record.values[name] for name in names)])
         np.savetxt(stage.path / "record.csv", columns, fmt="%.6g", delimiter=",", header=header, comments="")
-        write_diagnosis.write_all(verdict, [logged], stage)
+        write_diagnosis.write_all(verdict, [logged], stage, run=simulated)
 
 
 def main() -> None:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from benchmarks.diagnosis.manoeuvres import braked_rich
-from subzero.diagnosis.assessment.trial_library import cruise, flown, rudder_doublets
+from subzero.diagnosis.assessment import cruise, flown, rudder_doublets
 from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.results import CAUSE_NAMED, NOTHING_WRONG, OUTSIDE, UNDECIDED
 from subzero.external_force import MissingForce

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from subzero.diagnosis.api import diagnose_trials
-from subzero.diagnosis.assessment.identifiability import separation
-from subzero.diagnosis.inference.problem import Problem, pose
+from subzero.diagnosis.assessment import separation
+from subzero.diagnosis.inference import Problem, pose
 from subzero.diagnosis.results import Verdict
 
 from . import baselines

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from subzero.diagnosis.hypothesis.catalogue.sensors import SPECS
+from subzero.diagnosis.hypothesis.catalogue import SPECS
 from subzero.diagnosis.hypothesis.configuration import Setting
-from subzero.diagnosis.inference.problem import Problem
+from subzero.diagnosis.inference import Problem
 from subzero.records.record import Record
 from subzero.synthetic.reference_run import NoTruthError, simulate_reference
 

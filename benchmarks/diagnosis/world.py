@@ -26,11 +26,10 @@ import numpy as np
 import scenarios
 import subzero
 from subzero.diagnosis.api import diagnose_trials
-from subzero.diagnosis.hypothesis.catalogue.sensors import NOISE
+from subzero.diagnosis.hypothesis.catalogue import NOISE
 from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.logged import Logged
-from subzero.diagnosis.inference.noise import Noise
-from subzero.diagnosis.inference.problem import Problem, pose
+from subzero.diagnosis.inference import Noise, Problem, pose
 from subzero.model import Model
 from subzero.records.record import Record
 
@@ -159,6 +158,11 @@ def seen_by(
     family: Family, name: str, column: np.ndarray, times: np.ndarray, rng: np.random.Generator
 ) -> np.ndarray:
     """Return what a sensor with noise of a family shows of a channel (n,), with outliers, NaN in gaps."""
+    return shown(family, name, column + NOISE[name] * noise_of(family, times, rng), rng)
+
+
+def noise_of(family: Family, times: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Return noise of a family in usual levels (n,), with outliers."""
     noise, kept = np.zeros(times.size), np.exp(-family.step / family.time)
     new = rng.standard_normal(times.size)
     for i in range(times.size):
@@ -166,18 +170,21 @@ def seen_by(
         noise[i] = before + family.slow * (np.sqrt(1.0 - kept**2) if i else 1.0) * new[i]
     white = rng.standard_t(family.freedom, times.size) if family.freedom else rng.standard_normal(times.size)
     noise += family.white * white
-    noise += np.where(rng.random(times.size) < OUTLIERS, FAR * rng.choice([-1.0, 1.0], times.size), 0.0)
-    shown = column + NOISE[name] * noise
-    shown = np.round(shown / ROUNDED[name]) * ROUNDED[name] if family.rounded else shown
-    return np.where(rng.random(times.size) < GAPS, np.nan, shown)
+    return noise + np.where(rng.random(times.size) < OUTLIERS, FAR * rng.choice([-1.0, 1.0], times.size), 0.0)
+
+
+def shown(family: Family, name: str, noisy: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Return noisy values (n,) with a sensor's resolution, NaN in gaps."""
+    rounded = np.round(noisy / ROUNDED[name]) * ROUNDED[name] if family.rounded else noisy
+    return np.where(rng.random(noisy.size) < GAPS, np.nan, rounded)
 
 
 def with_true_noise(problem: Problem, family: Family) -> Problem:
-    """Return the problem of a record with the noise that it has."""
-    (one,) = problem.records
+    """Return the problem of records with the noise that they have."""
     spread = np.sqrt(family.freedom / (family.freedom - 2.0)) if family.freedom else 1.0
-    noise = {
-        name: Noise(
+
+    def noise(name: str, old: Noise) -> Noise:
+        return Noise(
             white=family.white * spread * NOISE[name],
             slow=family.slow * NOISE[name],
             correlation_time=family.time,
@@ -185,9 +192,12 @@ def with_true_noise(problem: Problem, family: Family) -> Problem:
             used=old.used,
             time=old.time,
         )
-        for name, old in one.noise.items()
-    }
-    return replace(problem, records=(replace(one, noise=noise),))
+
+    records = tuple(
+        replace(one, noise={name: noise(name, old) for name, old in one.noise.items()})
+        for one in problem.records
+    )
+    return replace(problem, records=records)
 
 
 def result_of(one: Drawn) -> dict[str, Any]:
@@ -228,10 +238,10 @@ def is_false_alarm(one: Mapping[str, Any]) -> bool:
     return not one["cause"] and one["verdict"] in ("cause_named", "outside_catalogue")
 
 
-def table(results: Sequence[Mapping[str, Any]]) -> str:
+def table(results: Sequence[Mapping[str, Any]], families: Sequence[str] = tuple(FAMILIES)) -> str:
     """Return a row for every family: counts of healthy ones, of single causes with D above CLEAR, of all."""
     head = "family          healthy  right  alarms  clear  right  sure, wrong"
-    return "\n".join([head, *(_row(name, results) for name in (*FAMILIES, "all"))])
+    return "\n".join([head, *(_row(name, results) for name in (*families, "all"))])
 
 
 def _row(name: str, results: Sequence[Mapping[str, Any]]) -> str:

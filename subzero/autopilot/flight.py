@@ -122,7 +122,7 @@ def _goal(wanted: Callable[[float], Wanted], time: float) -> Wanted:
     given = wanted(time)
     try:
         goal = Wanted(*map(float, given))
-    except (TypeError, ValueError, OverflowError):
+    except Exception:  # whatever somebody's __float__ does
         goal = None
     if goal is None or any(map(isinf, goal)):
         raise BadValueError(

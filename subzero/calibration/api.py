@@ -20,9 +20,9 @@ from subzero.calibration import assessment, vehicle_file
 from subzero.calibration.fit import Fitted, fitted
 from subzero.calibration.numbers import USUAL, Number, full_name, numbers_of, with_free_numbers
 from subzero.calibration.results import Advice, Calibration, Profile, Source
-from subzero.diagnosis.assessment.residuals import curves
+from subzero.diagnosis.assessment import curves
 from subzero.diagnosis.hypothesis.logged import Logged
-from subzero.diagnosis.inference.problem import Progress, pose
+from subzero.diagnosis.inference import Progress, pose
 from subzero.diagnosis.read_trials import read_trials
 from subzero.errors import UserError
 from subzero.model import Model

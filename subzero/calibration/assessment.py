@@ -17,14 +17,11 @@ from scipy.special import ndtri
 from subzero.calibration.fit import Fitted
 from subzero.calibration.numbers import Number
 from subzero.calibration.results import Advice, Direction, Estimate, Held, Profile
-from subzero.diagnosis.assessment import cross_validation
-from subzero.diagnosis.assessment.next_trial import MAX_DEEPER_M, MIN_DEPTH_M, prepared_trial
-from subzero.diagnosis.assessment.residuals import whiteness
-from subzero.diagnosis.assessment.trial_library import LIBRARY, rows_of
+from subzero.diagnosis import assessment as judged
+from subzero.diagnosis.assessment import LIBRARY, is_safe, prepared_trial, rows_of, trial_rows, whiteness
 from subzero.diagnosis.hypothesis.catalogue import START
 from subzero.diagnosis.hypothesis.catalogue.sensors import SPECS
-from subzero.diagnosis.inference.map_fit import bounded_step, bounds, objective, secant
-from subzero.diagnosis.inference.problem import Problem, Progress
+from subzero.diagnosis.inference import Problem, Progress, bounded_step, bounds, broyden_update, objective
 
 SIGMAS_95 = float(ndtri(0.975))
 """Half an interval of 95 % in standard deviations."""
@@ -124,7 +121,7 @@ def _held_at(work: Fitted, k: int, offset: float) -> float:
         now = objective(after, z + step, D)
         if not now < best - PROFILE_GAIN:
             break
-        J = secant(J, step, after - r, D)
+        J = broyden_update(J, step, after - r, D)
         z, r, best = z + step, after, now
     return max(2.0 * (best - work.fit.objective), 0.0)
 
@@ -163,7 +160,7 @@ def _without(work: Fitted, record: int) -> np.ndarray:
     """Return the whitened residual (m,) with a record predicted by a fit of all others and its own start."""
     problem, fit = work.problem, work.fit
     own = np.array([entry.record == record for entry in problem.entries])
-    rows = cross_validation.rows_of(problem).record == record
+    rows = rows_of(problem).record == record
     low, high = bounds(problem)
     z, r = fit.z, fit.r
     for _ in range(HELD_STEPS):
@@ -179,8 +176,8 @@ def _without(work: Fitted, record: int) -> np.ndarray:
 def _held_blocks(work: Fitted) -> dict[str, dict[str, Held]]:
     """Return the errors of the only record, blocks of it held out in the linear problem."""
     problem = work.problem
-    parts = cross_validation.parts_of(problem, cross_validation.rows_of(problem))
-    held = cross_validation.held_out(cross_validation.Fitted(problem, work.fit), parts)
+    parts = judged.parts_of(problem, rows_of(problem))
+    held = judged.held_out(judged.Fitted(problem, work.fit), parts)
     nominal = problem.residual(np.zeros(work.fit.z.size))
     return {problem.records[0].name: _errors(problem, 0, nominal, held, work.fit.r)}
 
@@ -189,8 +186,8 @@ def _errors(
     problem: Problem, record: int, before: np.ndarray, after: np.ndarray, fitted: np.ndarray
 ) -> dict[str, Held]:
     """Return channel → errors of whitened residuals (m,) in a record, in levels of its noise."""
-    rows = cross_validation.rows_of(problem)
-    raw = [cross_validation.raw(problem, one) for one in (before, after, fitted)]
+    rows = rows_of(problem)
+    raw = [judged.raw(problem, one) for one in (before, after, fitted)]
     found = {}
     for name, noise in problem.records[record].noise.items():
         own = (rows.record == record) & (rows.channel == name)
@@ -236,7 +233,7 @@ def advice(numbers: Sequence[Number], work: Fitted, progress: Progress) -> tuple
     for at, (name, (sentence, make)) in enumerate(LIBRARY.items()):
         progress(at / len(LIBRARY), f"would {name.replace('_', ' ')} help?")
         coming = prepared_trial(problem, make(problem.records[0].setting))
-        if not _is_safe(coming, z):
+        if not is_safe(coming, coming.tracks([(0, z)])):
             continue
         after = np.linalg.inv(np.linalg.inv(M) + _information(coming, z))
         old, new = M[:count, :count], after[:count, :count]
@@ -244,7 +241,7 @@ def advice(numbers: Sequence[Number], work: Fitted, progress: Progress) -> tuple
         shrinks = np.sqrt(np.diag(old) / np.diag(new))
         sharper = {numbers[i].name: float(shrinks[i]) for i in np.argsort(-shrinks)}
         found.append(Advice(name=name, sentence=sentence, information=information, sharper=sharper,
-                            commands=rows_of(coming.records[0].setting)))  # fmt: skip
+                            commands=trial_rows(coming.records[0].setting)))  # fmt: skip
     return tuple(sorted(found, key=lambda one: -one.information))
 
 
@@ -261,14 +258,6 @@ def _with_new_start(M: np.ndarray) -> np.ndarray:
     whole[: M.shape[0], : M.shape[0]] = M
     whole[range(M.shape[0], whole.shape[0]), range(M.shape[0], whole.shape[0])] = start
     return whole
-
-
-def _is_safe(coming: Problem, z: np.ndarray) -> bool:
-    """Say whether a trial to come stays within safe depths."""
-    depth = coming.tracks([(0, z)])[0][1][:, 2]
-    start = coming.records[0].setting.trial.start.depth
-    return bool(np.isfinite(depth).all() and depth.min() >= min(MIN_DEPTH_M, start)
-                and depth.max() <= start + MAX_DEEPER_M)  # fmt: skip
 
 
 def nuisances(work: Fitted, count: int) -> dict[str, tuple[float, float]]:

@@ -16,9 +16,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from subzero.diagnosis.inference.linear_gaussian import posterior
-from subzero.diagnosis.inference.map_fit import Fit, bounds, objective, quadratic_step, secant
-from subzero.diagnosis.inference.problem import Problem, Progress, with_finer_steps, with_noise_behind
+from subzero.diagnosis.inference import (
+    Fit,
+    Problem,
+    Progress,
+    bounds,
+    broyden_update,
+    objective,
+    posterior,
+    quadratic_step,
+    with_finer_steps,
+    with_noise_behind,
+)
 
 FIRST_NOISE, FIRST_MISFIT, NOISE_STEP = 8.0, 2.0, 4.0
 """Factor on the noise of the first fit, at least; so many levels off it leaves the nominal vehicle; and by what the
@@ -120,7 +129,7 @@ def _settled(problem: Problem, z: np.ndarray, D: np.ndarray) -> tuple[Fit, bool]
         then = objective(r_there, z + step, D)
         share = (now - then) / left if left > 0.0 else 0.0
         if share > LEAST_SHARE:
-            J = secant(J, step, r_there - r, D)
+            J = broyden_update(J, step, r_there - r, D)
             z, r, now = z + step, r_there, then
             damping *= max(1.0 / 3.0, 1.0 - (2.0 * share - 1.0) ** 3)
             damping, harder = (damping if damping > LEAST_DAMPING else 0.0), 2.0

@@ -19,7 +19,7 @@ from subzero.diagnosis.hypothesis.catalogue import START
 from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.effect import Effect, Parameter
 from subzero.diagnosis.hypothesis.hypotheses import Entry, entries_of, number_of, small_deviation
-from subzero.diagnosis.inference.problem import Problem
+from subzero.diagnosis.inference import Problem
 from subzero.errors import UserError, suggestion
 
 USUAL = (

@@ -16,7 +16,7 @@ from time import perf_counter
 
 from threadpoolctl import threadpool_limits
 
-from subzero.diagnosis.assessment.identifiability import detectability, refuted_rivals, with_secants
+from subzero.diagnosis.assessment.identifiability import detectability, with_whole_effects
 from subzero.diagnosis.assessment.residuals import misfits
 from subzero.diagnosis.hypothesis.catalogue import load
 from subzero.diagnosis.hypothesis.effect import Effect
@@ -24,10 +24,12 @@ from subzero.diagnosis.hypothesis.logged import Logged
 from subzero.diagnosis.inference.measurement import respond
 from subzero.diagnosis.inference.model_search import Search
 from subzero.diagnosis.inference.out_of_catalogue import Findings, explanations_outside, is_explained
-from subzero.diagnosis.inference.problem import Progress, pose
+from subzero.diagnosis.inference.posing import pose
+from subzero.diagnosis.inference.problem import Progress
 from subzero.diagnosis.read_trials import read_trials
 from subzero.diagnosis.results import Detectability, Verdict
 from subzero.diagnosis.verdict.conclude import conclude
+from subzero.diagnosis.verdict.follow_up import follow_up, ranked, refuted_rivals
 from subzero.model import Model
 
 BUDGETS = ("screen", "verdict", "full")
@@ -46,7 +48,6 @@ def diagnose(
     progress: Progress | None = None,
     seed: int = 0,
     budget: str = "full",
-    seen: Seen | None = None,
 ) -> Verdict:
     """Say what a simulation gets wrong, name the cause, extend the model and measure the gain.
 
@@ -62,7 +63,6 @@ def diagnose(
         progress: told the fraction that is done, and what is being tried.
         seed: of everything random.
         budget: "full", "verdict" without gain and next trial, or "screen" for the first look of a few seconds.
-        seen: told what the records can show, before they are looked at.
 
     Raises:
         UserError: a record, a sidecar or an effects file cannot be used.
@@ -70,7 +70,7 @@ def diagnose(
     """
     own = load(effects) if isinstance(effects, str | Path) else tuple(effects)
     logged = _logged([records] if isinstance(records, Logged | str | Path) else records, model, commands)
-    return diagnose_trials(logged, effects=own, progress=progress, seed=seed, budget=budget, seen=seen)
+    return diagnose_trials(logged, effects=own, progress=progress, seed=seed, budget=budget)
 
 
 def _logged(records: Sequence[Given], model: str | Path | Model | None, commands: str | None) -> list[Logged]:
@@ -116,7 +116,8 @@ def diagnose_trials(
         findings.complete = False
         if () not in search.candidates:
             raise
-    return conclude(findings)
+    known = ranked(findings)
+    return conclude(findings, known, follow_up(findings, known))
 
 
 def _find(findings: Findings, seen: Seen) -> None:
@@ -128,7 +129,9 @@ def _find(findings: Findings, seen: Seen) -> None:
 
     search.begin()
     _measure_misfit(findings)
-    findings.detectable = detectability(findings.problem, with_secants(findings.problem, search.nominal[1]))
+    findings.detectable = detectability(
+        findings.problem, with_whole_effects(findings.problem, search.nominal[1])
+    )
     seen(findings.detectable)
     if search.is_far and findings.budget != "screen":
         _from_afar(findings)
@@ -138,16 +141,16 @@ def _find(findings: Findings, seen: Seen) -> None:
         search.fit(())
         return
     search.first_fits()
-    if search.is_lost() and not findings.foreign:
+    if search.is_poor() and not findings.out_of_catalogue:
         search.progress(0.6, "forces, and causes that begin in mid-trial")
-        findings.foreign = explanations_outside(search)
-    if not is_explained(search, findings.foreign):
-        search.races()
+        findings.out_of_catalogue = explanations_outside(search)
+    if not is_explained(search, findings.out_of_catalogue):
+        search.refine_first()
         search.grow()
         search.settle()
         done("fits")
         search.progress(0.8, "forces that no cause explains")
-        findings.foreign = explanations_outside(search)
+        findings.out_of_catalogue = explanations_outside(search)
     findings.refuted = refuted_rivals(search)
     _measure_misfit(findings)
     done("outside")
@@ -163,6 +166,6 @@ def _from_afar(findings: Findings) -> None:
     """Let a force, or a cause that begins in mid-trial, take the run along the records, and look from there."""
     findings.search.progress(0.2, "forces, and causes that begin in mid-trial")
     findings.search.only_nothing()
-    findings.foreign = explanations_outside(findings.search)
-    if findings.foreign[0].place:
-        findings.search.go_near(findings.foreign[0].place.fit)
+    findings.out_of_catalogue = explanations_outside(findings.search)
+    if findings.out_of_catalogue[0].point:
+        findings.search.go_near(findings.out_of_catalogue[0].point.fit)

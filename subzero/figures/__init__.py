@@ -1,22 +1,24 @@
 """Figures of runs and comparisons, fit to print: units on every axis, one style, the trial named on each.
 
 `draw` gives the figures that belong to some runs. A run that follows commands gets the four panels of
-Fig. 6 of Feng and Allen (2004), actuators and attitude, the cable's shape and tension, forces and energy.
-A prescribed run gets Fig. 4 if it is straight, with its exact solution, and Fig. 5 if it is not, besides
-the cable. A winch, or a vessel that carries the drum, adds a figure of what it does.
+Fig. 6 of Feng and Allen (2004), actuators and attitude, the cable's shape, the tension along it over time,
+forces and energy. A prescribed run gets Fig. 4 if it is straight, with its exact solution, and Fig. 5 if it
+is not, besides the cable. A winch, or a vessel that carries the drum, adds a figure of what it does. Inside
+`page_width` they are as narrow as a column of a page.
 """
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from subzero.figures.cable import deployment, is_deployed, shape
+from subzero.figures.cable import deployment, is_deployed, shape, tension
 from subzero.figures.forces import forces
 from subzero.figures.motion import attitude, figure_6, measured
 from subzero.figures.prescribed import exact_tension, figure_4, figure_5, is_straight
-from subzero.figures.style import Runs, Title, warnings_in_short
+from subzero.figures.style import Runs, Title, page_width, warnings_in_short
 
 if TYPE_CHECKING:
+    import xarray as xr
     from matplotlib.figure import Figure
 
     from subzero.records.record import Record
@@ -31,7 +33,9 @@ __all__ = [
     "figure_6",
     "forces",
     "measured",
+    "page_width",
     "shape",
+    "tension",
 ]
 
 
@@ -57,7 +61,7 @@ def _commanded(runs: Runs, record: Record | None, title: Title) -> dict[str, Fig
     """Return the figures of a vehicle that follows commands."""
     figures = {"fig6": figure_6(runs, record, title), "attitude": attitude(runs, record, title)}
     if "tethered" in runs:
-        figures["cable"] = shape(runs["tethered"], title)
+        figures |= _cable(runs["tethered"], title)
     figures["forces"] = forces(runs.get("tethered", next(iter(runs.values()))), title)
     return figures
 
@@ -68,4 +72,10 @@ def _prescribed(runs: Runs, title: Title) -> dict[str, Figure]:
         return {}
     run = runs["tethered"]
     main = {"fig4": figure_4(run, title)} if is_straight(run) else {"fig5": figure_5(run, title)}
-    return {**main, "cable": shape(run, title)}
+    return {**main, **_cable(run, title)}
+
+
+def _cable(run: xr.Dataset, title: Title) -> dict[str, Figure]:
+    """Return the figures of the cable."""
+    along = tension(run, title)
+    return {"cable": shape(run, title)} | ({"tension": along} if along is not None else {})

@@ -1,5 +1,6 @@
 """The cable: where it lies, how it pulls along its length, and what it does to the vehicle.
 
+`tension` shows the pull along the whole cable at all times, and between which values it has been (a range graph).
 `deployment` shows what a winch does, or a vessel that carries the drum: cable and distance, pay-out, tension, tracks.
 """
 
@@ -31,6 +32,11 @@ RESTING = 1e-6
 SHORTEST = 0.1
 """A view shows at least this much, even if nothing has moved. [m]"""
 
+FLAT = 8.0
+"""A view that is so many times as wide as what it shows is high is stretched upwards, and says so. [-]"""
+ALONG, OVER = 240, 400
+"""Points along the cable and times of an image of the tension, at most. [-]"""
+
 SHAPES = 5
 """So many shapes tell how a cable grows, and can still be told apart."""
 
@@ -50,16 +56,77 @@ def shape(run: xr.Dataset, title: Title) -> Figure:
     for axes, right, up in views:
         _track(run, axes, right, up, times, colours)
         label(axes, f"{names[right]} [m]", f"{names[up]} [m]")
-        in_scale(axes)
+    in_scale(panels[0])
+    stretched = in_scale(panels[1], stretch=True)
     panels[1].invert_yaxis()
     headline(panels[0], "The cable from above")
-    headline(panels[1], "The cable from the east" if along == NORTH else "The cable from the south")
+    side = "east" if along == NORTH else "south"
+    far = f"From the {side}; depth stretched {stretched:.0f} times"
+    headline(panels[1], far if stretched > 1.0 else f"The cable from the {side}")
     headline(panels[2], "Tension along the cable")
     label(panels[2], "distance from the vehicle $s$ [m]", "$T$ [N]")
-    hangs = float(run["drum_tension"].values[-1]) > float(run["cable_tension"].values[-1])
-    legend(panels[2], loc="upper left" if hangs else "upper right")
+    legend(panels[2])
     _pull(run, panels[3])
     return figure
+
+
+def tension(run: xr.Dataset, title: Title) -> Figure | None:
+    """Draw the tension along the cable over time as an image, and the largest and the smallest that was anywhere.
+
+    None without a cable that has two nodes at two times.
+    """
+    along, values = tension_along(run)
+    if along.size < 2 or values.shape[0] < 2:
+        return None
+    figure, (image, graph) = sheet(1, 2, title)
+    left, bottom, width, height = image.get_position().bounds
+    image.set_position((left, bottom, 0.84 * width, height))  # a bar of colours stands to its right
+    times = run["time"].values[spread(OVER, run.sizes["time"])]
+    drawn = image.pcolormesh(along, times, values, cmap=style.TENSION, shading="nearest", rasterized=True)
+    image.grid(visible=False)
+    bar = figure.colorbar(drawn, cax=image.inset_axes((1.03, 0.0, 0.05, 1.0)))
+    bar.ax.tick_params(labelsize=style.SMALL, length=2)
+    bar.ax.set_title("$T$ [N]", fontsize=style.SMALL, pad=3)
+    headline(image, "Tension along the cable")
+    label(image, "distance from the vehicle $s$ [m]", "time [s]")
+    _range(graph, along, values)
+    return figure
+
+
+def tension_along(run: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
+    """Return distances from the vehicle (points,) [m] and the tension there (times, points) [N], NaN beyond the drum.
+
+    Times are those of `OVER`; a cable that has no more than one node has no tension anywhere.
+    """
+    times = spread(OVER, run.sizes["time"])
+    place, pull = run["cable_position"].values[times], run["cable_node_tension"].values[times]
+    pieces = np.linalg.norm(np.diff(place, axis=1), axis=2)
+    arc = np.concatenate([np.zeros((times.size, 1)), np.cumsum(pieces, axis=1)], axis=1)
+    longest = float(np.nanmax(arc, initial=0.0))
+    if longest <= SHORTEST:
+        return np.empty(0), np.empty((0, 0))
+    along = np.linspace(0.0, longest, ALONG)
+    values = np.full((times.size, ALONG), np.nan)
+    for row, (s, T) in enumerate(zip(arc, pull, strict=True)):
+        known = np.isfinite(s) & np.isfinite(T)
+        if known.sum() > 1:
+            values[row] = np.interp(along, s[known], T[known], right=np.nan)
+    return along, values
+
+
+def _range(axes: Axes, along: np.ndarray, values: np.ndarray) -> None:
+    """Draw the range graph: between which tensions every place along the cable has been."""
+    here = np.isfinite(values).any(axis=0)
+    low, high = np.nanmin(values[:, here], axis=0), np.nanmax(values[:, here], axis=0)
+    axes.fill_between(along[here], low, high, color=style.PALE, linewidth=0)
+    axes.plot(along[here], high, color=style.ORANGE, linewidth=1.5, label="largest")
+    axes.plot(along[here], low, color=style.BLUE, linewidth=1.3, linestyle=style.DASHES[1], label="smallest")
+    axes.plot(along, values[-1], color=style.INK, linewidth=1.0, label="at the end")
+    headline(axes, "Largest and smallest tension")
+    label(axes, "distance from the vehicle $s$ [m]", "$T$ [N]")
+    axes.set_xlim(0.0, float(along[-1]))
+    calm(axes)
+    legend(axes)
 
 
 def configurations(run: xr.Dataset, axes: Axes, times: list[float]) -> None:
@@ -94,14 +161,27 @@ def longest(run: xr.Dataset, *candidates: int) -> int:
     return candidates[int(np.argmax(reach))]
 
 
-def in_scale(axes: Axes) -> None:
-    """Show both directions in the same scale, by widening the one that has room to spare."""
+def in_scale(axes: Axes, *, stretch: bool = False) -> float:
+    """Show both directions in the same scale, by widening the one that has room to spare.
+
+    Args:
+        axes: a view of the cable.
+        stretch: leave what would be a flat line as high as the panel.
+
+    Returns:
+        how many times the vertical is stretched: 1 of an equal scale.
+    """
     (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
     width, height = axes.get_window_extent().size
+    if stretch and right - left > FLAT * max(top - bottom, SHORTEST) * width / height:
+        middle, half = 0.5 * (bottom + top), 0.5 * max(top - bottom, SHORTEST)
+        axes.set_ylim(middle - half, middle + half)
+        return (right - left) / (2.0 * half) * height / width
     scale = max((right - left) / width, (top - bottom) / height, SHORTEST / width)
     x, y = 0.5 * (left + right), 0.5 * (bottom + top)
     axes.set_xlim(x - 0.5 * scale * width, x + 0.5 * scale * width)
     axes.set_ylim(y - 0.5 * scale * height, y + 0.5 * scale * height)
+    return 1.0
 
 
 def _one_shape(place: np.ndarray, axes: Axes, right: int, up: int, colour: Colour) -> None:
@@ -189,5 +269,5 @@ def _tracks(run: xr.Dataset, axes: Axes) -> None:
     names = axes_of(run)
     label(axes, f"{names[EAST]} [m]", f"{names[NORTH]} [m]")
     headline(axes, f"Both from above, a dot every {spacing:g} s")
+    legend(axes)
     in_scale(axes)
-    legend(axes, loc="best")

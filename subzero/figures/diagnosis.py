@@ -8,14 +8,21 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from subzero.channels import BY_NAME
-from subzero.diagnosis.report.tables import CLEAR_FROM, CONFUSED_BELOW, SEEN_SIGNAL
-from subzero.diagnosis.report.words import formula_term
-from subzero.diagnosis.results import ChannelGain, Curves, Misfit, Unknown, Verdict
+from subzero.diagnosis.report.tables import CLEAR_FROM, CONFUSED_BELOW, SEEN_SIGNAL, WORTH_A_LINE
+from subzero.diagnosis.report.words import (
+    explanation,
+    formula_term,
+    is_told,
+    number,
+    sentences,
+    something,
+)
+from subzero.diagnosis.results import UNDECIDED, ChannelGain, Curves, Misfit, Unknown, Verdict
 from subzero.figures import style
 from subzero.figures.style import Title, headline, label, legend, sheet, time_label
 
@@ -25,9 +32,9 @@ if TYPE_CHECKING:
 
 
 AXES = {
-    "X": "Force, forward",
-    "Y": "Force, to starboard",
-    "Z": "Force, down",
+    "X": "Force, positive forward",
+    "Y": "Force, positive to starboard",
+    "Z": "Force, positive down",
     "K": "Roll moment, positive to starboard",
     "M": "Pitch moment, positive nose up",
     "N": "Yaw moment, positive to starboard",
@@ -54,25 +61,29 @@ def missing_force(verdict: Verdict, title: Title) -> Figure | None:
     axes.axhline(0.0, color=style.GREY, linewidth=0.7)
     axes.set_xlim(float(unknown.time[0]), float(unknown.time[-1]))
     label(axes, None, f"[{unknown.unit}]")
-    axes.yaxis.set_label_coords(-0.07, 0.5)
     time_label([axes], 1)
-    headline(axes, f"{_what(unknown)}, that no cause explains, with its 95 % band")
+    headline(axes, _what(unknown))
     if unknown.formula:
-        words = "Looks like " + " + ".join(formula_term(term) for term in unknown.formula)
-        words = textwrap.fill(words, 110)
-        axes.text(
-            0.01, 0.98, words, va="top", fontsize=style.SMALL, color=style.INK, transform=axes.transAxes
+        lines = textwrap.wrap(
+            "Looks like " + " + ".join(formula_term(term) for term in unknown.formula), FORMULA_LENGTH
         )
+        place: dict[str, Any] = {"va": "top", "transform": axes.transAxes, "parse_math": False}
+        axes.text(0.01, 0.98, "\n".join(lines), fontsize=style.SMALL, color=style.INK, **place)
         bottom, top = axes.get_ylim()
-        axes.set_ylim(bottom, top + 0.2 * (top - bottom))
+        axes.set_ylim(bottom, top + (0.08 + 0.08 * len(lines)) * (top - bottom))
     return figure
 
 
+FORMULA_LENGTH = 110
+"""So many letters of a formula fit on a line."""
+
+
 def _what(unknown: Unknown) -> str:
-    """Return what is drawn in words."""
-    return (
-        f"Drift of the {unknown.axis.replace('_', ' ')}'s sensor" if unknown.is_drift else AXES[unknown.axis]
-    )
+    """Return what is drawn in words: what it does, and which sign that has."""
+    if unknown.is_drift:
+        return f"Drift of the {unknown.axis.replace('_', ' ')}'s sensor, that no cause explains, with its 95 % band"
+    does = something(unknown.axis, unknown.force)
+    return f"{does[0].upper()}{does[1:]}: {AXES[unknown.axis].lower()}, with its 95 % band"
 
 
 MOST = 10
@@ -85,10 +96,10 @@ FLOOR = 0.05
 """Where the logarithmic axis of D begins."""
 
 GAINS = {
-    "before": (style.ORANGE, "nominal"),
-    "tolerance": (style.AMBER, "refit within tolerance"),
+    "before": (style.ORANGE, "simulated"),
+    "tolerance": (style.AMBER, "calibrated within tolerances"),
     "rival": (style.GREEN, "best rival"),
-    "after": (style.BLUE, "extended"),
+    "after": (style.BLUE, "extended model"),
 }
 """Errors of a channel → colour and words; the floor is a line."""
 
@@ -99,13 +110,15 @@ def evidence(verdict: Verdict, title: Title) -> Figure | None:
     ranked = [(name, p) for name, p in ranked if p >= LEAST]
     if not ranked:
         return None
-    figure, (plain, logarithmic) = _bars(2, len(ranked), title, left=0.34, apart=0.12)
-    named = " + ".join(sorted(cause.id for cause in verdict.causes))
-    colours = [style.BLUE if _sorted(name) == named else style.GREY for name, _ in ranked]
+    known = sentences(verdict)
+    names = [_wrapped(explanation(name, known)) for name, _ in ranked]
+    rows = sum(1 + name.count("\n") for name in names)
+    figure, (plain, logarithmic) = _bars(2, rows, title, left=0.42, apart=0.12)
+    colours = [style.BLUE if is_told(name, verdict) else style.GREY for name, _ in ranked]
     for axes in (plain, logarithmic):
         axes.barh(range(len(ranked)), [p for _, p in ranked], color=colours, height=0.65)
         axes.set_xlabel("probability", fontsize=style.NORMAL)
-    _names(plain, [name.replace(" + ", " +\n") for name, _ in ranked])
+    _names(plain, names)
     plain.set_xlim(0.0, 1.0)
     headline(plain, "Probability of each")
     logarithmic.set_xscale("log")
@@ -115,12 +128,21 @@ def evidence(verdict: Verdict, title: Title) -> Figure | None:
     return figure
 
 
+NAME_LENGTH = 50
+"""So many letters of an explanation fit beside its bar."""
+
+
+def _wrapped(words: str) -> str:
+    return textwrap.fill(words[:1].upper() + words[1:], NAME_LENGTH)
+
+
 def detectable(verdict: Verdict, title: Title) -> Figure | None:
     """Draw signal and discrimination of every cause, the least distinct one on top."""
     rows = sorted(verdict.detectable, key=lambda one: one.discrimination)
     if not rows:
         return None
-    figure, (signal, apart) = _bars(2, len(rows), title)
+    known = sentences(verdict)
+    figure, (signal, apart) = _bars(2, len(rows), title, left=0.345, apart=1.95)
     size = [max(one.signal, FLOOR) for one in rows]
     signal.barh(
         range(len(rows)),
@@ -130,25 +152,32 @@ def detectable(verdict: Verdict, title: Title) -> Figure | None:
     )
     signal.axvline(SEEN_SIGNAL, color=style.INK, linewidth=0.8, linestyle=style.DASHES[1])
     signal.set_xlabel("signal, in noise and tolerances", fontsize=style.NORMAL)
-    headline(signal, f"Seen from {SEEN_SIGNAL:g} on (usual size)")
+    headline(signal, f"Seen from {SEEN_SIGNAL:g} on")
     far = [max(one.discrimination, FLOOR) for one in rows]
     apart.barh(range(len(rows)), far, color=[_verdict_colour(one) for one in far], height=0.65)
     for limit in (CONFUSED_BELOW, CLEAR_FROM):
         apart.axvline(limit, color=style.INK, linewidth=0.8, linestyle=style.DASHES[1])
     apart.set_xlabel("D", fontsize=style.NORMAL)
-    headline(apart, f"Told apart from {CLEAR_FROM:g} on")
-    for axes, words in ((signal, [one.id for one in rows]), (apart, [f"/ {one.rival}" for one in rows])):
+    headline(apart, f"Apart from {CLEAR_FROM:g} on")
+    causes = [_short(explanation(one.id, known)) for one in rows]
+    alike = [_short(f"/ {explanation(one.rival, known)}") for one in rows]
+    for axes, words in ((signal, causes), (apart, alike)):
         axes.set_xscale("log")
         axes.set_xlim(left=FLOOR)
         _names(axes, words)
     return figure
 
 
+def _short(words: str, most: int = 46) -> str:
+    return words if len(words) <= most else f"{words[: most - 1].rstrip()}…"
+
+
 def gain(verdict: Verdict, title: Title) -> Figure | None:
     """Draw errors before and after by channel, in units of the noise floor: held out, and fitted."""
     if verdict.gain is None:
         return None
-    parts = {f"Not fitted: {verdict.gain.how}": verdict.gain.held_out, "Fitted": verdict.gain.fitted}
+    none = "" if verdict.gain.total > 0.0 else "; the extended model is no better there"
+    parts = {f"Not fitted: {verdict.gain.how}{none}": verdict.gain.held_out, "Fitted": verdict.gain.fitted}
     parts = {words: rows for words, rows in parts.items() if rows}
     figure, panels = sheet(len(parts), 1, title)
     top = max(_high(rows) for rows in parts.values())
@@ -188,19 +217,15 @@ def _verdict_colour(discrimination: float) -> str:
     return style.AMBER if discrimination < CLEAR_FROM else style.BLUE
 
 
-def _sorted(name: str) -> str:
-    return " + ".join(sorted(name.split(" + ")))
-
-
 def _bars(
     columns: int, rows: int, title: Title, *, left: float = 0.2, apart: float = 0.72
 ) -> tuple[Figure, list[Axes]]:
     """Return a sheet for horizontal bars, as high as they need, with room for their names."""
-    from subzero.figures.style import BOTTOM, TOP, WIDTH
+    from subzero.figures.style import BOTTOM, TOP
 
     figure, panels = sheet(1, columns, title)
     height = TOP + 0.4 + BOTTOM + 0.17 * max(rows, 3)
-    figure.set_size_inches(WIDTH, height)
+    figure.set_size_inches(style.width(), height)
     figure.subplots_adjust(left=left, wspace=apart, bottom=BOTTOM / height, top=1.0 - (TOP + 0.2) / height)
     for text in figure.texts:
         text.set_y(1.0 - 0.09 / height)
@@ -220,8 +245,14 @@ MODELS: dict[str, dict[str, Any]] = {
     "extended": {"color": style.BLUE, "linestyle": style.DASHES[0], "linewidth": 1.4},
 }
 """Models that are drawn over what was measured, the best one last."""
-CALIBRATED = "tolerance", "within tolerances"
-"""The nominal model refitted within its tolerances, drawn where nothing is extended; its label."""
+CALIBRATED = "tolerance"
+"""The nominal model refitted within its tolerances, drawn where nothing is extended."""
+MODEL_WORDS = {
+    "nominal": "simulated",
+    "extended": "extended model",
+    CALIBRATED: "calibrated within tolerances",
+}
+"""What the models are called wherever they are drawn."""
 
 RIVAL = "rival: "
 MOST_RIVALS = 2
@@ -242,8 +273,9 @@ def draw_diagnosis(verdict: Verdict, title: Title) -> dict[str, Figure]:
     figures: dict[str, Figure | None] = {}
     for name, curves in verdict.curves.items():
         ending = f"_{_file(name)}" if len(verdict.curves) > 1 else ""
-        figures[f"misfit{ending}"] = misfit(curves, verdict.misfit.get(name, {}), title, name)
-        figures[f"rivals{ending}"] = rivals(curves, verdict.misfit.get(name, {}), title, name)
+        drawn = Drawn(curves, verdict.misfit.get(name, {}), verdict)
+        figures[f"misfit{ending}"] = misfit(drawn, _named(title, name))
+        figures[f"rivals{ending}"] = rivals(drawn, _named(title, f"{name}: if a rival were true"))
     figures["evidence"] = evidence(verdict, title)
     figures["detectable"] = detectable(verdict, title)
     figures["gain"] = gain(verdict, title)
@@ -251,125 +283,187 @@ def draw_diagnosis(verdict: Verdict, title: Title) -> dict[str, Figure]:
     return {name: figure for name, figure in figures.items() if figure is not None}
 
 
-def misfit(curves: Curves, noise: Mapping[str, Misfit], title: Title, name: str) -> Figure | None:
+class Drawn(NamedTuple):
+    """What is drawn of a record: its curves, the noise of its channels, and the verdict that they belong to."""
+
+    curves: Curves
+    noise: Mapping[str, Misfit]
+    verdict: Verdict
+
+    def words(self, model: str) -> str:
+        """Return what a model is called."""
+        if model in MODEL_WORDS and not (model == CALIBRATED and self._is_rival):
+            return MODEL_WORDS[model]
+        model = model.replace(CALIBRATED, "none")
+        return textwrap.fill(f"if {explanation(model.removeprefix(RIVAL), sentences(self.verdict))}", 44)
+
+    @property
+    def ranked(self) -> list[str]:
+        """The explanations that have curves, the most probable first; where none has, the calibrated model."""
+        found = [model for model in self.curves.models if model.startswith(RIVAL)]
+        if CALIBRATED in self.curves.models and (not found or self._is_rival):
+            found.append(CALIBRATED)
+        return sorted(found, key=lambda model: -self._probability(model)) or [CALIBRATED]
+
+    @property
+    def _is_rival(self) -> bool:
+        """Whether "nothing is wrong", which the calibrated model stands for, is among what is left."""
+        return self.verdict.verdict == UNDECIDED and self._probability(CALIBRATED) >= WORTH_A_LINE
+
+    def _probability(self, model: str) -> float:
+        return self.verdict.probabilities.get(model.removeprefix(RIVAL).replace(CALIBRATED, "none"), 0.0)
+
+    @property
+    def best(self) -> str:
+        """The extended model; without one the most probable explanation that has curves."""
+        return "extended" if "extended" in self.curves.models else self.ranked[0]
+
+    @property
+    def shown(self) -> dict[str, dict[str, Any]]:
+        """The models that are drawn over what was measured, and how."""
+        looks = {"nominal": MODELS["nominal"], self.best: MODELS["extended"]}
+        return {name: look for name, look in looks.items() if name in self.curves.models}
+
+    def used(self, channel: str) -> np.ndarray:
+        """Return which samples of a channel were used."""
+        return self.curves.used.get(channel, np.isfinite(self.curves.measured[channel]))
+
+    def left(self, channel: str, model: str) -> np.ndarray:
+        """Return what a model leaves unexplained of the samples that were used."""
+        residual = self.curves.measured[channel] - self.curves.models[model][channel]
+        used: np.ndarray = residual[self.used(channel)]
+        return used
+
+
+def misfit(drawn: Drawn, title: Title) -> Figure | None:
     """Draw every channel: measured over models on the left, what they leave unexplained on the right."""
-    if not curves.measured:
+    measured = drawn.curves.measured
+    if not measured:
         return None
-    figure, panels = sheet(len(curves.measured), 2, _named(title, name))
-    for at, channel in enumerate(curves.measured):
+    figure, panels = sheet(len(measured), 2, title)
+    for at, channel in enumerate(measured):
         left, right = panels[2 * at : 2 * at + 2]
-        _overlay(left, curves, channel)
-        _residuals(right, curves, channel, noise.get(channel), _shown(curves))
+        _overlay(left, drawn, channel)
+        _residuals(right, drawn, channel)
         words = BY_NAME[channel].long_name
         headline(left, words[0].upper() + words[1:])
-        headline(right, "Measured − simulated" if at else "Measured − simulated; grey: noise, 95 %")
-    legend(panels[0])
+    legend(panels[0], columns=2)
     time_label(panels, 2)
     return figure
 
 
-def rivals(curves: Curves, noise: Mapping[str, Misfit], title: Title, name: str) -> Figure | None:
+def rivals(drawn: Drawn, title: Title) -> Figure | None:
     """Draw what it would have looked like if a rival were true: what was measured would lie on the rival's line."""
-    best = _best(curves)
-    names = [model for model in curves.models if model.startswith(RIVAL) and model != best][:MOST_RIVALS]
-    if not names:
+    curves, best = drawn.curves, drawn.best
+    names = [model for model in drawn.ranked if model in curves.models and model != best][:MOST_RIVALS]
+    if not names or not any(name.startswith(RIVAL) for name in (best, *names)):
         return None
-    worst = sorted(curves.measured, key=lambda channel: -_apart(curves, channel, names, noise.get(channel)))[
-        :6
-    ]
-    figure, panels = sheet((len(worst) + 1) // 2, 2, _named(title, f"{name}: if a rival were true"))
+    worst = sorted(curves.measured, key=lambda channel: -_apart(drawn, channel, names))[:6]
+    figure, panels = sheet((len(worst) + 1) // 2, 2, title)
     for axes, channel in zip(panels, worst, strict=False):
-        _beside(axes, curves, channel, noise.get(channel), names)
-        model = "extended model" if best == "extended" else best.removeprefix(RIVAL)
+        _beside(axes, drawn, channel, names)
+        model = "extended model" if best == "extended" else "most probable"
         headline(axes, f"{BY_NAME[channel].name.replace('_', ' ').capitalize()} − {model}")
-    legend(panels[0], columns=2)
+    legend(panels[0], columns=1)
     for axes in panels[len(worst) :]:
         axes.remove()
     time_label(panels[: len(worst)], 2)
     return figure
 
 
-def _apart(curves: Curves, channel: str, names: list[str], misfit: Misfit | None) -> float:
+def _apart(drawn: Drawn, channel: str, names: list[str]) -> float:
     """Return how far rivals and the best model lie apart in a channel, in its noise."""
-    best = curves.models[_best(curves)][channel]
-    gaps = [np.sqrt(np.nanmean((curves.models[name][channel] - best) ** 2)) for name in names]
-    return float(max(gaps)) / (misfit.noise_sd if misfit else 1.0)
+    models, noise = drawn.curves.models, drawn.noise.get(channel)
+    best = models[drawn.best][channel]
+    gaps = [np.sqrt(np.nanmean((models[name][channel] - best) ** 2)) for name in names]
+    return float(max(gaps)) / (noise.noise_sd if noise else 1.0)
 
 
-def _beside(axes: Axes, curves: Curves, channel: str, misfit: Misfit | None, names: list[str]) -> None:
+def _beside(axes: Axes, drawn: Drawn, channel: str, names: list[str]) -> None:
     """Draw rivals and what was measured, smoothed, less the best model."""
-    best, used = curves.models[_best(curves)][channel], _used(curves, channel)
-    _band(axes, misfit)
-    smooth = _smooth(curves.time[used], (curves.measured[channel] - best)[used])
-    axes.plot(curves.time[used], smooth, color=style.INK, linewidth=0.9, alpha=0.6, label="measured")
-    axes.axhline(0.0, **MODELS["extended"], label=_best(curves).removeprefix(RIVAL))
+    curves, best = drawn.curves, drawn.best
+    time = curves.time[drawn.used(channel)]
+    _band(axes, drawn.noise.get(channel))
+    smooth = _smooth(time, drawn.left(channel, best))
+    axes.plot(time, smooth, color=style.INK, linewidth=0.9, alpha=0.6, label="measured")
+    axes.axhline(0.0, **MODELS["extended"], label=drawn.words(best))
     looks = zip(names, (style.GREEN, style.PURPLE), style.DASHES[1:], strict=False)
     for name, colour, dash in looks:
-        words = name.removeprefix(RIVAL)
-        axes.plot(curves.time, curves.models[name][channel] - best, color=colour, linestyle=dash, label=words)
+        apart = curves.models[name][channel] - curves.models[best][channel]
+        axes.plot(curves.time, apart, color=colour, linestyle=dash, label=drawn.words(name))
     label(axes, None, f"[{BY_NAME[channel].unit}]")
     _in_time(axes, curves)
 
 
-def _best(curves: Curves) -> str:
-    """Return the extended model; without one the first rival, the most probable; or the calibrated one."""
-    rivals = [model for model in curves.models if model.startswith(RIVAL)]
-    return next((model for model in ("extended", *rivals) if model in curves.models), CALIBRATED[0])
-
-
-def _shown(curves: Curves) -> dict[str, dict[str, Any]]:
-    """Return the models that are drawn, and how."""
-    looks = {"nominal": MODELS["nominal"], _best(curves): MODELS["extended"]}
-    return {name: look for name, look in looks.items() if name in curves.models}
-
-
-def _overlay(axes: Axes, curves: Curves, channel: str) -> None:
+def _overlay(axes: Axes, drawn: Drawn, channel: str) -> None:
     """Draw a channel as it was measured, and as models have it."""
-    values = curves.measured[channel]
-    used = _used(curves, channel)
-    axes.plot(curves.time[used], values[used], label="measured", zorder=1.5, **style.DOTS | {"alpha": 0.35})
+    curves, values, used = drawn.curves, drawn.curves.measured[channel], drawn.used(channel)
+    dots = style.DOTS | {"alpha": 0.35, "rasterized": True}
+    axes.plot(curves.time[used], values[used], label="measured", zorder=1.5, **dots)
     left_out = np.isfinite(values) & ~used
     if left_out.any():
         axes.plot(
             curves.time[left_out], values[left_out], "x", color=style.GREY, markersize=4, label="left out"
         )
-    for name, look in _shown(curves).items():
-        words = CALIBRATED[1] if name == CALIBRATED[0] else name.removeprefix(RIVAL)
-        axes.plot(curves.time, curves.models[name][channel], label=words, **look)
+    for name, look in drawn.shown.items():
+        axes.plot(curves.time, curves.models[name][channel], label=drawn.words(name), **look)
     label(axes, None, f"${BY_NAME[channel].symbol}$ [{BY_NAME[channel].unit}]")
     _in_time(axes, curves)
     if left_out.any():
         _fit_to(axes, [values[used], *(one[channel] for one in curves.models.values())])
 
 
-def _residuals(
-    axes: Axes,
-    curves: Curves,
-    channel: str,
-    misfit: Misfit | None,
-    shown: Mapping[str, dict[str, Any]],
-) -> None:
-    """Draw what models leave unexplained, smoothed, over the band of the noise."""
-    values = curves.measured[channel]
-    used = _used(curves, channel)
-    _band(axes, misfit)
+def _residuals(axes: Axes, drawn: Drawn, channel: str) -> None:
+    """Draw what models leave unexplained, smoothed, beside the noise of the sensor and the step of its values."""
+    time, noise = drawn.curves.time[drawn.used(channel)], drawn.noise.get(channel)
+    _band(axes, noise)
     axes.axhline(0.0, color=style.GREY, linewidth=0.7)
-    for name, look in shown.items():
-        left = (values - curves.models[name][channel])[used]
-        axes.plot(curves.time[used], left, "o", color=look["color"], markersize=1.4, alpha=0.35)
-        axes.plot(curves.time[used], _smooth(curves.time[used], left), label=name, **look)
-    label(axes, None, f"[{BY_NAME[channel].unit}]")
-    _in_time(axes, curves)
+    for name, look in drawn.shown.items():
+        left = drawn.left(channel, name)
+        axes.plot(time, left, "o", color=look["color"], markersize=1.4, alpha=0.35, rasterized=True)
+        axes.plot(time, _smooth(time, left), label=drawn.words(name), **look)
+    unit = BY_NAME[channel].unit
+    label(axes, None, f"[{unit}]")
+    _in_time(axes, drawn.curves)
+    headline(axes, f"Measured − simulated{_behind(noise)}")
+    if noise is not None:
+        _show_noise(axes, drawn, channel, noise.noise_sd, unit)
 
 
-def _used(curves: Curves, channel: str) -> np.ndarray:
-    return curves.used.get(channel, np.isfinite(curves.measured[channel]))
+def _behind(noise: Misfit | None) -> str:
+    """Return what stands behind the residuals."""
+    if noise is None:
+        return ""
+    return "; grey: noise, 95 %" + ("; dotted: step" if noise.resolution > 0.0 else "")
+
+
+def _show_noise(axes: Axes, drawn: Drawn, channel: str, noise: float, unit: str) -> None:
+    """Let the noise and what the best model leaves be seen, even where the nominal model is far off: then say so."""
+    best = np.abs(drawn.left(channel, drawn.best)) if drawn.best in drawn.curves.models else np.zeros(1)
+    most = NOISE_SHARE * max(BAND * noise, float(best.max(initial=0.0)))
+    nominal = drawn.curves.models.get("nominal")
+    off = float(np.abs(drawn.left(channel, "nominal")).max(initial=0.0)) if nominal is not None else 0.0
+    if off > OFF_SCALE * most > 0.0:
+        axes.set_ylim(-most, most)
+        words = f"simulated: off by as much as {number(off, unit)}"
+        place: dict[str, Any] = {"ha": "right", "va": "bottom", "transform": axes.transAxes}
+        behind = {"facecolor": "white", "alpha": 0.8, "edgecolor": "none", "pad": 1.0}
+        axes.text(0.985, 0.02, words, fontsize=style.SMALL, color=style.ORANGE, bbox=behind, **place)
+
+
+NOISE_SHARE, OFF_SCALE = 1.5, 3.0
+"""A panel reaches so many times beyond the noise or the best residual; a model this far beyond that is cut off. [-]"""
 
 
 def _band(axes: Axes, misfit: Misfit | None) -> None:
-    """Draw where the noise of a channel lies."""
-    if misfit is not None:
-        axes.axhspan(-BAND * misfit.noise_sd, BAND * misfit.noise_sd, color=style.PALE, zorder=0.5)
+    """Draw where the noise of a channel lies, and between which values its sensor shows none."""
+    if misfit is None:
+        return
+    axes.axhspan(-BAND * misfit.noise_sd, BAND * misfit.noise_sd, color=style.PALE, zorder=0.5)
+    if misfit.resolution > 0.0:
+        for edge in (-0.5, 0.5):
+            look: dict[str, Any] = {"color": style.INK, "linewidth": 0.8, "linestyle": style.DASHES[2]}
+            axes.axhline(edge * misfit.resolution, **look)
 
 
 def _smooth(time: np.ndarray, values: np.ndarray) -> np.ndarray:

@@ -11,15 +11,21 @@ from __future__ import annotations
 
 import math
 import textwrap
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
+from matplotlib.textpath import TextPath
 from matplotlib.ticker import MaxNLocator
 
 from subzero.channels import BY_NAME
+from subzero.errors import UserError
 from subzero.validity import warnings_of
 
 if TYPE_CHECKING:
@@ -36,6 +42,11 @@ BLUE, ORANGE, GREEN, PURPLE, AMBER, SKY = "#0072B2", "#D55E00", "#009E73", "#AA4
 INK, GREY, PALE = "#222222", "#8A8A8A", "#E3E3E3"
 """Okabe and Ito's colours for all kinds of sight, purple after Tol; ink for text, grey for what is behind."""
 
+TENSION = LinearSegmentedColormap.from_list(
+    "tension", [(0.0, "#FFFACC"), (0.33, "#FFB833"), (0.7, "#F24721"), (1.0, "#C70547")]
+)
+"""Tension as a colour, as in the replay of a page."""
+
 CYCLE = (BLUE, ORANGE, GREEN, PURPLE, AMBER, SKY, INK, GREY)
 DASHES = ("-", (0, (5, 2)), (0, (1, 1)))
 """Three curves of one panel differ in colour and in dash, to survive a grey print."""
@@ -48,7 +59,7 @@ COMMAND: dict[str, Any] = {"color": INK, "linestyle": "-", "linewidth": 1.2}
 DOTS: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 2.6, "color": INK, "alpha": 0.6}
 
 DPI = 150
-TINY, SMALL, NORMAL, LARGE = 6.8, 7.5, 8.5, 9.5
+TINY, SMALL, NORMAL, LARGE = 7.0, 7.5, 8.5, 9.5
 """Font sizes. [pt]"""
 
 
@@ -70,17 +81,26 @@ def warnings_in_short(runs: Runs) -> str:
 WIDTH, ROW_HEIGHT = 7.2, 2.1
 """Two columns of a journal page; one row of panels with its time axis. [inch]"""
 
-LEFT, RIGHT = 0.1, 0.985
-"""Where the panels begin and end, as shares of the width."""
+NARROWEST, WIDEST = 3.0, 20.0
+"""So wide may a figure be: 3.4 is one column of a journal page. [inch]"""
+
+ONE_COLUMN = 5.0
+"""A figure that is not as wide has panels that stand beside one another else below one another. [inch]"""
+
+LEFT, RIGHT = 0.72, 0.11
+"""Room to the left and to the right of the panels. [inch]"""
+
+LETTERS_PER_INCH = 15.5
+"""So many letters of a headline fit on an inch."""
 
 BOTTOM, TOP, TITLE_LINE = 0.42, 0.31, 0.16
 """Below the panels; above them without the title; one line of the title. [inch]"""
 
-FOOTER, FOOTER_LENGTH = 0.16, 110
-"""Height of the line of warnings below the panels [inch], and how many letters fit on it."""
+FOOTER, FOOTER_LENGTH = 0.16, 15.3
+"""Height of the line of warnings below the panels [inch], and how many letters of it fit on an inch."""
 
-TITLE_LENGTH = 86
-"""So many letters of a title fit on a line, with the scenario's name to its right."""
+TITLE_LENGTH, MOST_TITLE_LINES = 14.0, 2
+"""So many letters of a title fit on an inch; so many lines are shown of it, one more in a narrow figure."""
 
 LETTERS = 26
 """More panels than this are not lettered."""
@@ -95,23 +115,61 @@ class Title:
     warnings: str = ""
 
 
+_width: ContextVar[float] = ContextVar("width of figures [inch]", default=WIDTH)
+
+
+def width() -> float:
+    """Return how wide figures are. [inch]."""
+    return _width.get()
+
+
+@contextmanager
+def page_width(inches: float) -> Iterator[None]:
+    """Let figures that are drawn inside be so wide: 7.2 for two columns of a journal page, 3.4 for one. [inch].
+
+    Text keeps its size; panels beside one another stand below one another where the page is narrow.
+
+    Raises:
+        UserError: no page is as narrow, or as wide.
+    """
+    if not NARROWEST <= inches <= WIDEST:
+        raise UserError(
+            f"A figure cannot be {inches:g} inches wide. Allowed: {NARROWEST:g} to {WIDEST:g}, such as 3.4 for one "
+            f"column of a page and {WIDTH:g} for two."
+        )
+    before = _width.set(inches)
+    try:
+        yield
+    finally:
+        _width.reset(before)
+
+
+def _lines_of(title: Title) -> list[str]:
+    """Return the lines of a title, the first one beside the scenario's name."""
+    room = TITLE_LENGTH * (width() - LEFT) - len(title.scenario)
+    return textwrap.wrap(title.words, max(int(room), 12))[: MOST_TITLE_LINES + (width() < ONE_COLUMN)]
+
+
 def sheet(rows: int, columns: int, title: Title) -> tuple[Figure, list[Axes]]:
     """Return a figure and its empty, styled panels in reading order, lettered if there are several."""
-    words = textwrap.wrap(title.words, TITLE_LENGTH)[:2]
+    if columns == 2 and width() < ONE_COLUMN:
+        rows, columns = 2 * rows, 1
+    words = _lines_of(title)
     top = TOP + TITLE_LINE * len(words)
     bottom = BOTTOM + (FOOTER if title.warnings else 0.0)
     height = rows * ROW_HEIGHT + bottom + top
-    figure = Figure(figsize=(WIDTH, height), dpi=DPI, facecolor="white")
+    figure = Figure(figsize=(width(), height), dpi=DPI, facecolor="white")
     FigureCanvasAgg(figure)
-    figure.subplots_adjust(left=LEFT, right=RIGHT, bottom=bottom / height, top=1.0 - top / height)
-    figure.subplots_adjust(wspace=0.28, hspace=0.36)
+    left, right = LEFT / width(), 1.0 - RIGHT / width()
+    figure.subplots_adjust(left=left, right=right, bottom=bottom / height, top=1.0 - top / height)
+    figure.subplots_adjust(wspace=0.28, hspace=0.36 if width() >= ONE_COLUMN else 0.5)
     y = 1.0 - 0.09 / height
-    figure.text(LEFT, y, "\n".join(words), va="top", fontsize=LARGE, parse_math=False)
+    figure.text(left, y, "\n".join(words), va="top", fontsize=LARGE, parse_math=False)
     corner: dict[str, Any] = {"ha": "right", "fontsize": SMALL, "color": GREY}
-    figure.text(RIGHT, y, title.scenario, va="top", parse_math=False, **corner)
+    figure.text(right, y, title.scenario, va="top", parse_math=False, **corner)
     if title.warnings:
-        footer = textwrap.shorten(title.warnings, FOOTER_LENGTH, placeholder=" …")
-        figure.text(LEFT, 0.06 / height, footer, fontsize=SMALL, color=ORANGE, parse_math=False)
+        footer = textwrap.shorten(title.warnings, int(FOOTER_LENGTH * width()), placeholder=" …")
+        figure.text(left, 0.06 / height, footer, fontsize=SMALL, color=ORANGE, parse_math=False)
     panels = [figure.add_subplot(rows, columns, at + 1) for at in range(rows * columns)]
     for at, axes in enumerate(panels):
         _style(axes)
@@ -138,7 +196,9 @@ LEGEND_ROW, LEGEND_MARGIN = 0.145, 0.1
 def headline(axes: Axes, text: str) -> None:
     """Say in words what a panel shows, behind its letter."""
     letter = axes.get_title(loc="left")
-    axes.set_title(f"{letter} {text}".strip(), loc="left", fontsize=NORMAL, pad=3)
+    room = LETTERS_PER_INCH * _inches(axes)[0]
+    lines = textwrap.wrap(f"{letter} {text}".strip(), max(int(room), 12)) if width() < ONE_COLUMN else []
+    axes.set_title("\n".join(lines) or f"{letter} {text}".strip(), loc="left", fontsize=NORMAL, pad=3)
 
 
 def label(axes: Axes, x: str | None, y: str) -> None:
@@ -146,20 +206,55 @@ def label(axes: Axes, x: str | None, y: str) -> None:
     if x is not None:
         axes.set_xlabel(x, fontsize=NORMAL, labelpad=2)
     axes.set_ylabel(y, fontsize=NORMAL)
-    axes.yaxis.set_label_coords(-0.17, 0.5)
+    axes.yaxis.set_label_coords(-LABEL / _inches(axes)[0], 0.5)
+
+
+LABEL = 0.5
+"""So far to the left of a panel stands what its vertical axis is. [inch]"""
+
+
+def _inches(axes: Axes) -> tuple[float, float]:
+    """Return width and height of a panel. [inch]."""
+    extent = axes.get_window_extent()
+    return float(extent.width) / DPI, float(extent.height) / DPI
 
 
 def legend(axes: Axes, columns: int = 3, *, tight: bool = False, **where: Any) -> None:
-    """Show the legend, small; if no place is given, above the curves, where room is made for it."""
+    """Show the legend, small; if no place is given, above the curves, where room is made for it.
+
+    Args:
+        axes: a panel with labelled curves.
+        columns: at most; fewer where labels are long.
+        tight: with smaller letters and shorter lines.
+        where: of matplotlib, in the place of all that.
+    """
+    size, handle = (TINY, 1.3) if tight else (SMALL, 2.0)
     if not where:
-        rows = math.ceil(len(axes.get_legend_handles_labels()[1]) / columns)
-        height = axes.get_window_extent().height / DPI
+        labels = axes.get_legend_handles_labels()[1]
+        across, height = _inches(axes)
+        columns = _columns(labels, columns, across, size, handle)
+        rows = math.ceil(sum(1 + label.count("\n") for label in labels) / columns)
         taken = min((rows * LEGEND_ROW + LEGEND_MARGIN) / height, 0.6)
         low, high = axes.get_ylim()
         axes.set_ylim(low, low + (high - low) / (1.0 - taken))
-        where = {"loc": "upper left", "ncols": columns, "columnspacing": 0.9, "borderaxespad": 0.2}
-    size = {"fontsize": TINY, "handlelength": 1.3} if tight else {"fontsize": SMALL, "handlelength": 2.0}
-    axes.legend(**size | {"framealpha": 0.85, "edgecolor": "none", "handletextpad": 0.5} | where)
+        where = {"loc": "upper left", "ncols": columns, "columnspacing": COLUMN_GAP, "borderaxespad": 0.2}
+    look = {"framealpha": 0.85, "edgecolor": "none", "handletextpad": HANDLE_GAP}
+    axes.legend(**{"fontsize": size, "handlelength": handle} | look | where)
+
+
+COLUMN_GAP, HANDLE_GAP = 0.9, 0.5
+"""Of a legend: between its columns, and between a line and its label, in letter heights."""
+
+
+def _columns(labels: list[str], most: int, across: float, size: float, handle: float) -> int:
+    """Return into how many columns of a legend some labels fit; they fill one column after the other."""
+    beside = (handle + COLUMN_GAP + HANDLE_GAP) * size / 72.0
+    wide = [TextPath((0.0, 0.0), one or " ", size=size).get_extents().width / 72.0 for one in labels]
+    for columns in range(min(most, max(len(labels), 1)), 1, -1):
+        rows = math.ceil(len(labels) / columns)
+        if sum(max(wide[at : at + rows]) + beside for at in range(0, len(wide), rows)) <= across:
+            return columns
+    return 1
 
 
 def channel_panel(axes: Axes, runs: Runs, name: str, record: Record | None = None) -> None:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING, Any
 
-from subzero.page.replay import actors_of, encode
-from subzero.page.report import Line, Report, Table, render
+from subzero.page.replay import HULL, actors_of, encode
+from subzero.page.report import Line, Report, Section, Table, render
 from subzero.report import NOTHING, RUNS, fit_rows, number_groups
 
 if TYPE_CHECKING:
@@ -48,18 +48,17 @@ def page_of_runs(
             outcome=[line for label in labels for line in _outcome(label, summary[label])],
             command=command,
             warnings=_warnings(summary, labels),
-            tables=_tables(summary, labels),
-            figures=figures,
-            replay=encode(actors_of(runs), record) if _moves(runs) else None,
+            sections=_sections(_tables(summary, labels), figures),
+            replay=encode(actors_of(runs), record) if _can_be_replayed(first) else None,
             sources=_sources(first),
         )
     )
 
 
-def _moves(runs: dict[str, xr.Dataset]) -> bool:
-    """Say whether there is anything to replay: two samples of the first run or more, of a vehicle that is told."""
-    first = next(iter(runs.values()))
-    return first.sizes["time"] > 1 and "hull" in json.loads(first.attrs["parameters"]).get("vehicle", {})
+def _can_be_replayed(run: xr.Dataset) -> bool:
+    """Say whether there is anything to replay: at least two samples, of a vehicle whose shape is known."""
+    shape = json.loads(run.attrs["parameters"]).get("vehicle", {})
+    return run.sizes["time"] > 1 and all(name in shape for name in HULL)
 
 
 def _second_word(command: str) -> str:
@@ -84,6 +83,12 @@ def _warnings(summary: dict[str, Any], labels: list[str]) -> dict[str, list[str]
         for label in labels
         if summary[label]["warnings"]
     }
+
+
+def _sections(tables: list[Table], figures: Mapping[str, Figure]) -> list[Section]:
+    """Return the numbers, each table a section of its own, and the figures behind them."""
+    numbers = [Section(title=table.title, tables=[table]) for table in tables]
+    return [*numbers, Section(title="Figures", figures=figures)] if figures else numbers
 
 
 def _tables(summary: dict[str, Any], labels: list[str]) -> list[Table]:

@@ -16,20 +16,21 @@ from __future__ import annotations
 
 import base64
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import xarray as xr
+from scipy.integrate import cumulative_trapezoid
 from scipy.spatial.transform import Rotation
 
 from subzero.channels import BY_NAME, CHANNELS
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from subzero.records.record import Record
 
-MOST_SAMPLES, MOST_SHAPES, MOST_POINTS = 5000, 1500, 96
+MOST_SAMPLES, MOST_SHAPES, MOST_POINTS = 4000, 1200, 80
 """Samples of channels, shapes of the cable and points of a shape that a page carries of one run."""
 
 MISSING, LOWEST, STEPS = -32768, 32767, 65534
@@ -37,6 +38,10 @@ MISSING, LOWEST, STEPS = -32768, 32767, 65534
 
 HULL = ("hull", "rudder", "stern_planes", "propeller", "tow_point")
 """Sections of a vehicle's parameters that say what it looks like."""
+
+POSE = ("north", "east", "depth", "roll", "pitch", "heading")
+ACTUATORS = ("propeller_speed", "rudder_angle", "stern_plane_port_angle", "stern_plane_starboard_angle")
+"""Channels that a vehicle is drawn from."""
 
 Packed = dict[str, Any]
 """A series as the page reads it: n, low, step, and data unless the series is constant."""
@@ -118,7 +123,7 @@ def _cable(run: xr.Dataset) -> dict[str, Any]:
     kept = _spread(run.sizes["time"], MOST_SHAPES)
     counts = run["node_count"].values[kept].astype(int)
     points = min(int(counts.max()), MOST_POINTS)
-    position = run["cable_position"].values[kept] + _start_of_cable(run)
+    position = run["cable_position"].values[kept] + cable_origin(run)
     tension = run["cable_node_tension"].values[kept]
     along = np.concatenate([position, tension[:, :, None]], axis=2)
     shapes = np.stack([_points(rows, count, points) for rows, count in zip(along, counts, strict=True)])
@@ -140,7 +145,7 @@ def _points(rows: np.ndarray, count: int, points: int) -> np.ndarray:
     return (1.0 - share) * rows[before] + share * rows[before + 1]
 
 
-def _start_of_cable(run: xr.Dataset) -> np.ndarray:
+def cable_origin(run: xr.Dataset) -> np.ndarray:
     """Return from where the cable's places count, (3,): at the start, node 0 is at the tow point. [m]"""
     first = int(np.argmax(run["node_count"].values > 0))
     hull = np.array([run[name].values[first] for name in ("north", "east", "depth")])
@@ -179,3 +184,60 @@ def pack_exactly(values: np.ndarray) -> Packed:
 
 def _base64(values: np.ndarray) -> str:
     return base64.b64encode(values.tobytes()).decode("ascii")
+
+
+def as_run(record: Record, beside: xr.Dataset, used: Mapping[str, np.ndarray]) -> xr.Dataset | None:
+    """Return a record as a run at its own times, to be shown as a vehicle; None if it does not say where that went.
+
+        dx/dt = R(roll, pitch, heading) (u, v, w),    from where the run beside it is at the first sample
+
+    Places that were measured are taken as they are; else they are reckoned so, with v and w as measured, 0 where they
+    are not. A record with neither places nor speed and heading does not say where the vehicle went.
+
+    Args:
+        record: what was measured.
+        beside: a run of the same trial, which lends its fins, its propeller and the angles that were not measured.
+        used: channel → which samples are no outliers, (samples,) of bool; all of them where it has none.
+    """
+    end = float(beside["time"].values[-1])
+    time = record.time[(record.time >= 0.0) & (record.time <= end)]
+    values = {name: _filled(record, name, time, used.get(name)) for name in record.values if name in BY_NAME}
+    if time.size < 2 or not ({"north", "east"} <= set(values) or {"surge_speed", "heading"} <= set(values)):
+        return None
+    from_run = {
+        name: np.interp(time, beside["time"], beside[name]) for name in (*POSE, *ACTUATORS) if name in beside
+    }
+    pose = {name: values.get(name, from_run[name]) for name in ("roll", "pitch", "heading")}
+    place = _reckoned(time, pose, values, {name: from_run[name][0] for name in ("north", "east", "depth")})
+    shown = {**from_run, **values, **pose, **place}
+    data = {name: ("time", one, BY_NAME[name].attributes) for name, one in shown.items()}
+    return xr.Dataset(data, coords={"time": time}, attrs={**beside.attrs, "tethered": 0})
+
+
+def _filled(record: Record, name: str, time: np.ndarray, used: np.ndarray | None) -> np.ndarray:
+    """Return a channel at some times, linear across its gaps and outliers; zero if it has no samples."""
+    known = np.isfinite(record.values[name])
+    if used is not None and used.shape == known.shape:
+        known &= used
+    return (
+        np.interp(time, record.time[known], record.values[name][known])
+        if known.any()
+        else np.zeros(time.size)
+    )
+
+
+def _reckoned(
+    time: np.ndarray,
+    pose: Mapping[str, np.ndarray],
+    values: Mapping[str, np.ndarray],
+    start: Mapping[str, float],
+) -> dict[str, np.ndarray]:
+    """Return north, east and depth: as they are measured, else the integral of the velocity from the start on. [m]"""
+    speeds = [values.get(name, np.zeros(time.size)) for name in ("surge_speed", "sway_speed", "heave_speed")]
+    angles = np.stack([pose["heading"], pose["pitch"], pose["roll"]], axis=-1)
+    velocity = Rotation.from_euler("ZYX", angles, degrees=True).apply(np.stack(speeds, axis=-1))
+    way = cumulative_trapezoid(velocity, time, axis=0, initial=0.0)
+    return {
+        name: values.get(name, start[name] + way[:, axis])
+        for axis, name in enumerate(("north", "east", "depth"))
+    }

@@ -1,4 +1,4 @@
-"""One page of some runs: what was run, the replay, warnings, numbers, figures, and how to do it again.
+"""The one page of all commands: what came out, in words; the replay; warnings, numbers, figures; how to do it again.
 
 The page is one file that loads nothing. It is made of a template (`assets/template.html`), whose engine escapes every
 text that comes from a user; of figures as SVG, inside as images, so that nothing in them can act; and of the player's
@@ -11,6 +11,7 @@ import base64
 import io
 import json
 import re
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
@@ -29,12 +30,23 @@ FIGURES = {
     "fig6": "Propeller command, forward speed, rudder and heading over time",
     "attitude": "Actuators and attitude over time",
     "cable": "Shape of the cable, and tension along it",
+    "tension": "Tension along the cable over time, and between which values it has been",
     "forces": "Forces on the vehicle, and where the energy went",
     "deployment": "What the drum does",
     "measured": "Other channels that were measured, beside the runs",
     "manoeuvre": "The manoeuvre",
+    "bands": "Channels over time: the median of all members, and where 50 and 90 % of them lie",
+    "histograms": "How often each number has which value",
+    "against": "Numbers against parameters, those that matter most first",
+    "tornado": "How much each parameter moves each number",
+    "misfit": "Measured and simulated, and what is left between them beside the noise and the step of the sensor",
+    "evidence": "How probable each explanation is",
+    "rivals": "What it would have looked like if another explanation were true",
+    "detectable": "What these records could show of each cause",
+    "gain": "Error of the simulation before and after, in noise of the sensors",
+    "missing_force": "What no cause of the catalogue explains, over time",
 }
-"""What a figure shows, by its name."""
+"""What a figure shows, by its name or the beginning of it."""
 
 SVG_STYLE: dict[Any, Any] = {
     "svg.hashsalt": "subzero",
@@ -46,11 +58,12 @@ SVG_STYLE: dict[Any, Any] = {
 
 @dataclass(frozen=True, kw_only=True)
 class Table:
-    """Rows in groups; the first cell of a row says what the others are."""
+    """Rows in groups; the first cell of a row says what the others are: numbers, or words that begin at the left."""
 
     title: str
     header: Sequence[str]
     groups: Sequence[Sequence[Sequence[str]]]
+    is_of_words: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,6 +72,34 @@ class Line:
 
     text: str
     kind: Literal["good", "bad"] = "good"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Answer:
+    """A question that every reader has, answered in words; perhaps with a line of the shell that acts on it."""
+
+    question: str
+    words: Sequence[str]
+    command: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Section:
+    """A part of a page: paragraphs, then tables, then figures.
+
+    Args:
+        title: above it.
+        text: paragraphs.
+        tables: the numbers; a title of the section's own stands above each.
+        figures: by name, see `FIGURES`.
+        is_folded: shown when it is asked for, and on paper.
+    """
+
+    title: str
+    text: Sequence[str] = ()
+    tables: Sequence[Table] = ()
+    figures: Mapping[str, Figure] = field(default_factory=dict)
+    is_folded: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,10 +113,11 @@ class Report:
         version: of subzero.
         outcome: what one reads first.
         command: the line that does it again.
+        answers: what a reader who was not there asks first.
         warnings: what may be wrong, by run.
-        tables: the numbers.
-        figures: by name, see `FIGURES`.
+        sections: numbers and figures, in the order in which one reads them.
         replay: of `subzero.page.replay.encode`; None without one.
+        replay_words: what the replay shows that its controls do not say.
         sources: texts to unfold at the end, by name.
     """
 
@@ -85,10 +127,11 @@ class Report:
     version: str
     outcome: Sequence[Line]
     command: str
+    answers: Sequence[Answer] = ()
     warnings: Mapping[str, Sequence[str]] = field(default_factory=dict)
-    tables: Sequence[Table] = ()
-    figures: Mapping[str, Figure] = field(default_factory=dict)
+    sections: Sequence[Section] = ()
     replay: Mapping[str, Any] | None = None
+    replay_words: str = ""
     sources: Mapping[str, str] = field(default_factory=dict)
 
 
@@ -96,18 +139,24 @@ def render(report: Report) -> str:
     """Return the page as HTML; the same report gives the same page."""
     from markupsafe import Markup
 
-    figures = [
-        {"source": _image(figure), "words": FIGURES.get(name, name.replace("_", " "))}
-        for name, figure in report.figures.items()
-    ]
     return _template().render(
         report=report,
-        figures=figures,
+        image=_image,
+        caption=caption,
         styles=Markup(asset("page.css") + "\n" + _vendored("uPlot.min.css")),
         replay_data=Markup(_in_script(report.replay)),
         uplot=Markup(_vendored("uPlot.iife.min.js")),
         player=Markup(player()),
     )
+
+
+def caption(name: str) -> str:
+    """Return what a figure shows; of one of several of a kind, the record behind its kind's name."""
+    known = next((kind for kind in FIGURES if name == kind or name.startswith(f"{kind}_")), None)
+    if known is None:
+        return name.replace("_", " ")
+    which = name.removeprefix(known).strip("_")
+    return FIGURES[known] + (f": {which}" if which else "")
 
 
 def player() -> str:
@@ -149,6 +198,8 @@ def _image(figure: Figure) -> str:
     import matplotlib as mpl
 
     held = io.BytesIO()
-    with mpl.rc_context(SVG_STYLE):
+    with mpl.rc_context(SVG_STYLE), warnings.catch_warnings():
+        # A letter that the font of figures lacks is a box there; the page itself says the same words above them.
+        warnings.filterwarnings("ignore", "Glyph .* missing from font", UserWarning)
         figure.savefig(held, format="svg", metadata={"Date": None})
     return f"data:image/svg+xml;base64,{base64.b64encode(held.getvalue()).decode('ascii')}"

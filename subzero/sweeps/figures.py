@@ -13,10 +13,8 @@ from subzero.figures.style import (
     GREY,
     INK,
     ORANGE,
-    RIGHT,
     SMALL,
     TINY,
-    WIDTH,
     Title,
     calm,
     headline,
@@ -24,6 +22,7 @@ from subzero.figures.style import (
     legend,
     sheet,
     time_label,
+    width,
 )
 from subzero.sweeps.design import Points
 from subzero.sweeps.member import Job
@@ -175,8 +174,8 @@ def _tornado(points: Points, effects: list[Effect], title: Title) -> Figure:
     method, first, second = words_of(points.design)
     figure, panels = sheet(len(scalars), 1, title)
     bars = min(MOST_BARS, len(points.names))
-    figure.set_size_inches(WIDTH, figure.get_figheight() + len(scalars) * 0.12 * max(bars - 5, 0))
-    figure.subplots_adjust(left=BAR_LEFT, right=RIGHT, hspace=0.5)
+    figure.set_size_inches(width(), figure.get_figheight() + len(scalars) * 0.12 * max(bars - 5, 0))
+    figure.subplots_adjust(left=BAR_LEFT, right=0.97, hspace=0.5)
     for axes, scalar in zip(panels, scalars, strict=True):
         own = [one for one in effects if one.scalar == scalar][:MOST_BARS]
         places = np.arange(len(own))

@@ -172,21 +172,25 @@ def scalar_names() -> list[str]:
     ]
 
 
+UNIT_ENDINGS = {"_N_m": "N m", "_m_s": "m/s", "_deg": "degree", "_m": "m", "_s": "s", "_N": "N", "_J": "J"}
+"""How the name of a number of a summary ends → its unit."""
+
+
 def unit_of(name: str) -> str:
     """Return the unit of a scalar, as its name or its channel says."""
     head, _, tail = name.rpartition(".")
     if head in BY_NAME and tail in STATISTICS:
         return BY_NAME[head].unit
-    endings = (
-        ("_N_m", "N m"),
-        ("_m_s", "m/s"),
-        ("_deg", "degree"),
-        ("_m", "m"),
-        ("_s", "s"),
-        ("_N", "N"),
-        ("_J", "J"),
-    )
-    return next((unit for ending, unit in endings if name.endswith(ending)), "1")
+    return next((unit for ending, unit in UNIT_ENDINGS.items() if name.endswith(ending)), "1")
+
+
+def in_words(name: str) -> str:
+    """Return a scalar as one says it, without its unit: "largest cable force", "end of heading"."""
+    head, _, tail = name.rpartition(".")
+    if head in BY_NAME and tail in STATISTICS:
+        return f"{tail} of {head}".replace("_", " ")
+    plain = next((name.removesuffix(ending) for ending in UNIT_ENDINGS if name.endswith(ending)), name)
+    return plain.replace("_", " ").replace(".", ": ")
 
 
 def scalars_of(run: xr.Dataset, names: tuple[str, ...], indices: Mapping[str, float]) -> np.ndarray:

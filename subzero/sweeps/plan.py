@@ -25,7 +25,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -64,11 +64,13 @@ class Plan:
         job: what a worker needs.
         points: which members there are.
         description: one line.
+        text: of the file that says so; empty without one.
     """
 
     job: Job
     points: Points
     description: str
+    text: str = ""
 
     def manifest(self) -> dict[str, str]:
         """Return what its members belong to: anything that could change a number, by its digest."""
@@ -162,7 +164,7 @@ def _plan_in(source: Source, name: str) -> Plan:
             f'{name}: it does not say which trial is swept. Add trial = "fig6", or the path of a trial file.'
         )
     try:
-        return plan_of(
+        plan = plan_of(
             _trial_of(table["trial"], source.folder),
             _dotted(table.get("parameters", {})),
             design=table.get("design", "grid"),
@@ -175,6 +177,7 @@ def _plan_in(source: Source, name: str) -> Plan:
             tethered=not truth("untethered", table.get("untethered", False)),
             description=str(table.get("description", "")),
         )
+        return replace(plan, text=source.text)
     except scenarios.ScenarioError:
         raise
     except UserError as error:

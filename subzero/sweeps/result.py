@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import csv
 import json
+import math
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -37,8 +38,9 @@ COMPRESSION = 4
 """Of zlib; more costs time and gains nothing. [-]"""
 TAKEN = ("member", "time", "failed", "reason", "warnings")
 """Names of variables that no number of one's own may have."""
-MOST_DRAWN = 4000
-"""So many members, evenly spaced, are kept in memory for the bands of a figure: a percentile is then known to 0.7 %."""
+MOST_DRAWN = 1000
+"""So many members are kept in memory for the bands of a figure: the rank of what is drawn as the median is then right
+within 1.6 %, that of the outer percentiles within 0.7 % (one standard deviation)."""
 RANKS = (5.0, 25.0, 50.0, 75.0, 95.0)
 """Percentiles that are told and drawn."""
 
@@ -137,9 +139,13 @@ def _own_names(store: Store, job: Job) -> tuple[str, ...]:
 
 
 def _drawn(members: int) -> np.ndarray:
-    """Return which members are kept for the bands (members,), evenly spaced."""
+    """Return which members are kept for the bands (members,): all, or of many a random choice, always the same.
+
+    Those evenly spaced would be in step with the columns of a grid: of every other member, half the values are missing.
+    """
     drawn = np.zeros(members, dtype=bool)
-    drawn[np.unique(np.linspace(0, members - 1, min(members, MOST_DRAWN)).astype(int))] = True
+    chosen = np.random.default_rng(0).choice(members, min(members, MOST_DRAWN), replace=False)
+    drawn[chosen] = True
     return drawn
 
 
@@ -147,7 +153,7 @@ def _head(file: Any, job: Job, points: Points, names: tuple[str, ...], attribute
     """Write dimensions, units, parameters and attributes."""
     members, times = len(points.values), job.outcomes.times
     file.createDimension("member", members)
-    file.setncatts({"Conventions": "CF-1.11", "parameters": json.dumps(points.names), **attributes})
+    file.setncatts({"parameters": json.dumps(points.names), **attributes})
     _variable(file, "member", "i4", ("member",), {"long_name": "number of the run, from 0"})[:] = np.arange(
         members
     )
@@ -175,6 +181,10 @@ def _variable(
 ) -> Any:
     packing = {} if kind is str else {"zlib": True, "complevel": COMPRESSION, "shuffle": True}
     variable = file.createVariable(name, kind, axes, chunksizes=chunks, **packing)
+    if chunks is not None:
+        variable.set_var_chunk_cache(
+            size=2 * 4 * math.prod(chunks)
+        )  # netCDF keeps 16 MB of each variable otherwise
     variable.setncatts(about)
     return variable
 

@@ -1,4 +1,4 @@
-"""What the command leaves behind: dataset, table, summary, figures; and tells: numbers and what matters."""
+"""What the command leaves behind: dataset, table, summary, figures, page; and tells: numbers and what matters."""
 
 from __future__ import annotations
 
@@ -10,29 +10,30 @@ from typing import TYPE_CHECKING, Any
 
 from rich import box
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 from subzero.errors import printable
 from subzero.figures.style import Title
 from subzero.sweeps.figures import draw_sweep
 from subzero.sweeps.outcomes import unit_of
+from subzero.sweeps.page import numbers, page_of_sweep, warning_lines, what_matters
 from subzero.sweeps.plan import Plan
 from subzero.sweeps.result import RESULT, TABLE, Gathered, percentiles, write_result
 from subzero.sweeps.sensitivity import Effect, effects_of, words_of
 from subzero.sweeps.store import FILE, Store
 
 if TYPE_CHECKING:
+    from subzero.page.report import Table as Rows
     from subzero.stage import Stage
 
 FIGURES = ("bands", "histograms", "against", "tornado")
-FILES = (RESULT, TABLE, "summary.json", *(f"{name}.png" for name in FIGURES))
+FILES = (RESULT, TABLE, "summary.json", "report.html", *(f"{name}.png" for name in FIGURES))
 """What a sweep writes beside its store."""
 SHOWN_REASONS = 5
 """So many members that failed are told with their reason. [-]"""
 KEPT_REASONS = 100
 """So many stand in the summary; the table has all."""
-SHOWN_EFFECTS = 5
-"""So many parameters are told for each scalar. [-]"""
 
 
 def write_sweep(plan: Plan, store: Store, stage: Stage) -> dict[str, Any]:
@@ -46,7 +47,9 @@ def write_sweep(plan: Plan, store: Store, stage: Stage) -> dict[str, Any]:
     summary = summary_of(plan, store, found, effects)
     output.write_summary(summary, stage)
     words = Title(words=plan.description, scenario=plan.job.trial.name, warnings=_in_short(summary))
-    output.write_figures(draw_sweep(plan.points, plan.job, found, effects, words), stage)
+    figures = draw_sweep(plan.points, plan.job, found, effects, words)
+    output.write_figures(figures, stage)
+    output.write_page(page_of_sweep(plan, summary, figures, output.COMMAND.get()), stage)
     return summary
 
 
@@ -88,51 +91,31 @@ def tell_sweep(summary: dict[str, Any], stage: Stage) -> None:
     """Print what came of a sweep."""
     console = Console()
     console.print(f"{summary['scenario']}: {summary['title']}", highlight=False, markup=False)
-    console.print(_numbers(summary), highlight=False)
+    console.print(_rich(numbers(summary), words=1), highlight=False)
     if summary["sensitivity"]["effects"]:
-        console.print(_what_matters(summary), highlight=False)
+        matters = what_matters(summary)
+        console.print(matters.title, highlight=False, markup=False)
+        console.print(_rich(matters, words=2), highlight=False)
     for line in _troubles(summary):
         console.print(printable(line), highlight=False, markup=False, soft_wrap=True)
     kept = f"{FILE} keeps its members: the same command does not run them again."
     console.print(f"{stage.words()}\n{kept}", highlight=False, markup=False)
 
 
-def _numbers(summary: dict[str, Any]) -> Table:
-    """Return the table of all scalars."""
+def _rich(rows: Rows, *, words: int) -> Table:
+    """Return rows as the terminal shows them: `words` columns of words, and numbers behind."""
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    table.add_column(f"{summary['members'] - summary['failed']} members")
-    columns = ("min", "p5", "p50", "p95", "max", "mean", "standard_deviation")
-    for name in columns:
-        table.add_column({"standard_deviation": "deviation"}.get(name, name), justify="right")
-    for scalar, one in summary["scalars"].items():
-        unit = "" if one["unit"] == "1" else f" [{one['unit']}]"
-        table.add_row(
-            printable(f"{scalar}{unit}").replace("[", r"\["), *(f"{one[name]:.4g}" for name in columns)
-        )
-    return table
-
-
-def _what_matters(summary: dict[str, Any]) -> Table:
-    """Return the table of the parameters that matter most for each scalar."""
-    method, first, second = words_of(summary["design"]["name"])
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, title=f"What matters: {method}", title_justify="left")
-    for name in ("scalar", "parameter"):
-        table.add_column(name)
-    for name in filter(None, (first, second)):
-        table.add_column(name, justify="right")
-    for scalar in summary["scalars"]:
-        own = [one for one in summary["sensitivity"]["effects"] if one["scalar"] == scalar][:SHOWN_EFFECTS]
-        for i, one in enumerate(own):
-            numbers = [one["size"], *([one["other"]] if second else [])]
-            cells = ("–" if value is None else f"{value:.3g}" for value in numbers)
-            table.add_row(printable(scalar) if i == 0 else "", one["parameter"], *cells)
+    for at, name in enumerate(rows.header):
+        table.add_column(escape(name), justify="left" if at < words else "right", overflow="fold")
+    for group in rows.groups:
+        for row in group:
+            table.add_row(*(escape(printable(cell)) for cell in row))
     return table
 
 
 def _troubles(summary: dict[str, Any]) -> Iterator[str]:
     """Give the lines on members that warn or failed."""
-    for check, count in summary["warnings"].items():
-        yield f"Warning: {count} of {summary['members']} members' runs warn of {check.replace('_', ' ')}."
+    yield from (f"Warning: {line}" for line in warning_lines(summary))
     if summary["failed"]:
         yield f"{summary['failed']} of {summary['members']} members failed:"
         for member, reason in list(summary["reasons"].items())[:SHOWN_REASONS]:

@@ -189,8 +189,16 @@ def test_a_zigzag_that_does_not_see_its_angle_is_told(fig6, program, channel):
     assert float(run["time"][-1]) == pytest.approx(12.0)
 
 
+class NoNumber:
+    """What raises an error of its own when it is asked for its number."""
+
+    def __float__(self):
+        raise RuntimeError("no number")
+
+
 @pytest.mark.parametrize(
-    "goal", [None, (1.0,), ("fast", 0.0), Wanted(1.0, np.inf), Wanted(10**400, 0.0), 3.0]
+    "goal",
+    [None, (1.0,), ("fast", 0.0), Wanted(1.0, np.inf), Wanted(10**400, 0.0), 3.0, Wanted(1.0, NoNumber())],
 )
 def test_a_goal_that_is_none_is_refused(fig6, goal):
     with pytest.raises(subzero.UserError, match=r"what is wanted at t = 0 s is .* Allowed: a Wanted"):

@@ -51,7 +51,7 @@ def engine(monkeypatch, tmp_path):
     """An engine that knows its answer, and a simulation on rails; gives what it was asked with."""
     asked = {}
 
-    def diagnose(records, *, seen, progress, **more):
+    def diagnose(records, *, progress, seen=lambda rows: None, **more):
         asked.update(more, records=records)
         seen(ROWS)
         progress(0.5, "trying rudder_lag")
@@ -165,11 +165,11 @@ def test_a_mistake_is_told_in_one_message_and_leaves_nothing(engine, tmp_path, c
 def test_the_same_in_python_takes_files_records_and_models(engine):
     import subzero
 
-    verdict = subzero.diagnose("record.csv", "fig6", seen=print, progress=lambda fraction, words: None)
+    verdict = subzero.diagnose("record.csv", "fig6", progress=lambda fraction, words: None)
     assert verdict.causes[0].id == "rudder_lag"
     (logged,) = subzero.read_trials("record.csv", scenario="fig6")
     model = replace(logged.setting.model, current=(0.1, 0.0, 0.0))
-    subzero.diagnose(logged, model, seen=print, progress=lambda fraction, words: None)
+    subzero.diagnose(logged, model, progress=lambda fraction, words: None)
     assert engine["records"][0].setting.model.current == (0.1, 0.0, 0.0)
 
 

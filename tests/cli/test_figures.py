@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
+from matplotlib.text import Text
 from numpy.testing import assert_allclose
 
-from subzero.figures import draw, exact_tension
+from subzero.errors import UserError
+from subzero.figures import draw, exact_tension, page_width
 from subzero.records.record import Record
 
 
@@ -189,3 +193,79 @@ def test_an_untethered_prescribed_run_has_nothing_to_show(make_run):
 def test_a_title_is_plain_text_whatever_it_holds(make_run, tmp_path):
     run = make_run().assign_attrs(title=r"costs $5 and $6_{ [bold] \alpha", scenario="a_$b_{$")
     draw({"tethered": run})["fig6"].savefig(tmp_path / "money.png")
+
+
+def test_the_range_graph_has_the_largest_and_smallest_tension_of_every_place(make_run):
+    """A straight pull: the tension rises linearly from the drum to the vehicle and grows with time, so the largest is
+    that of the end, and the smallest at s that of the moment when so much cable was out: 0.
+    """
+    run = make_run(prescribed="straight")
+    image, graph = draw({"tethered": run})["tension"].axes[:2]
+    s, high = line(graph, "largest").get_data()
+    pieces = np.linalg.norm(np.diff(run["cable_position"].values[-1], axis=0), axis=1)
+    arc = np.concatenate([[0.0], np.cumsum(pieces[np.isfinite(pieces)])])
+    T = run["cable_node_tension"].values[-1][: arc.size]
+    assert_allclose(high, np.interp(s, arc, T), atol=1e-3 * T.max())
+    assert_allclose(line(graph, "at the end").get_ydata(), high, atol=1e-3 * T.max())
+    assert line(graph, "smallest").get_ydata().max() < 0.05 * T.max()
+    drawn = image.collections[0].get_array()
+    assert float(np.ma.max(drawn)) == pytest.approx(T.max(), rel=1e-6)
+    assert np.ma.getmaskarray(drawn)[0].mean() > 0.9, "there is no cable yet where it is not out"
+
+
+@pytest.mark.parametrize("width", [3.4, 7.2])
+def test_at_every_width_letters_are_legible_and_no_legend_hides_a_curve(width, comparison, make_run):
+    with page_width(width):
+        figures = [*draw(comparison).values(), *draw({"tethered": make_run(prescribed="dive")}).values()]
+    for figure in figures:
+        assert figure.get_figwidth() == width
+        figure.draw_without_rendering()
+        for words in figure.findobj(Text):
+            assert not words.get_text() or words.get_fontsize() >= 7.0, words
+        for axes in figure.axes:
+            box = axes.get_legend().get_window_extent() if axes.get_legend() else None
+            for curve in axes.get_lines() if box else ():
+                x, y = axes.transData.transform(np.column_stack(curve.get_data()).astype(float)).T
+                inside = (x > box.x0) & (x < box.x1) & (y > box.y0) & (y < box.y1)
+                assert not inside.any(), (axes.get_title(loc="left"), curve.get_label())
+
+
+def test_a_narrow_figure_has_its_panels_below_one_another(comparison):
+    with page_width(3.4):
+        panels = draw(comparison)["fig6"].axes
+    assert len({round(axes.get_position().x0, 3) for axes in panels}) == 1
+    assert len({round(axes.get_position().x0, 3) for axes in draw(comparison)["fig6"].axes}) == 2
+
+
+def test_a_width_that_no_page_has_is_refused():
+    with pytest.raises(UserError, match=r"cannot be 1 inches wide\. Allowed: 3 to 20"), page_width(1.0):
+        pass
+
+
+def test_a_cable_that_would_be_a_flat_line_is_stretched_and_says_how_much(make_run):
+    run = make_run(prescribed="straight")
+    flat = run["cable_position"].values.copy()
+    flat[..., 2] = 0.002 * flat[..., 0]
+    run["cable_position"] = (run["cable_position"].dims, flat)
+    side = draw({"tethered": run})["cable"].axes[1]
+    found = re.search(r"depth stretched (\d+) times", side.get_title(loc="left"))
+    assert found
+    box = side.get_window_extent()
+    real = (box.height / np.ptp(side.get_ylim())) / (box.width / np.ptp(side.get_xlim()))
+    assert float(found[1]) == pytest.approx(real, rel=0.02)
+    steep = draw({"tethered": make_run(prescribed="dive")})["cable"].axes[1]
+    assert "stretched" not in steep.get_title(loc="left")
+
+
+@pytest.mark.parametrize("kind", ["svg", "pdf"])
+def test_figures_are_drawings_if_asked_for_and_two_are_alike_to_the_last_byte(kind, rails, tmp_path):
+    from subzero.cli import FINE, main
+
+    for folder in ("one", "two"):
+        words = ["simulate", "fig6", "--figures", kind, "--width", "3.4", "--out", str(tmp_path / folder)]
+        assert main(words) == FINE
+    drawn = sorted(path.name for path in (tmp_path / "one").glob(f"*.{kind}"))
+    assert drawn == [f"{name}.{kind}" for name in ("attitude", "cable", "fig6", "forces", "tension")]
+    assert not list((tmp_path / "one").glob("*.png"))
+    for name in drawn:
+        assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes(), name

@@ -8,13 +8,10 @@ import pytest
 
 import subzero
 from subzero.diagnosis.hypothesis import catalogue as effects
-from subzero.diagnosis.hypothesis.catalogue.sensors import NOISE
+from subzero.diagnosis.hypothesis.catalogue import NOISE
 from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.hypotheses import entries_of, variances
-from subzero.diagnosis.inference.map_fit import Fit, refit
-from subzero.diagnosis.inference.measurement import economical, respond
-from subzero.diagnosis.inference.noise import Noise
-from subzero.diagnosis.inference.problem import Observed, Problem
+from subzero.diagnosis.inference import Fit, Noise, Observed, Problem, economical, refit, respond
 
 CHANNELS = ("surge_speed", "heading", "yaw_rate", "pitch", "roll", "depth")
 COLOUR = 0.5

@@ -7,7 +7,7 @@ import pytest
 
 from subzero.diagnosis.hypothesis.catalogue import catalogue
 from subzero.diagnosis.hypothesis.effect import with_free_onset, with_onset
-from subzero.diagnosis.inference.measurement import respond
+from subzero.diagnosis.inference import respond
 
 EFFECTS = catalogue(("heading",))
 DRAG = EFFECTS["hull_drag"]

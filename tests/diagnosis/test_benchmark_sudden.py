@@ -6,7 +6,7 @@ from benchmarks.diagnosis.cases import GRID, cases, make
 from benchmarks.diagnosis.distance import sensitivities, sudden_distance
 from benchmarks.diagnosis.draws import with_begun
 from benchmarks.diagnosis.manoeuvres import nominal, sudden
-from subzero.diagnosis.inference.problem import pose
+from subzero.diagnosis.inference import pose
 
 
 def test_what_begins_in_mid_trial_adds_to_what_the_tolerances_have_drawn():

@@ -7,17 +7,15 @@ import numpy as np
 import pytest
 
 from subzero.diagnosis.hypothesis.hypotheses import variances
-from subzero.diagnosis.inference.basis import one_terms
-from subzero.diagnosis.inference.input_estimation import latent_force_candidates, relinearised_force
-from subzero.diagnosis.inference.laplace import Candidate, candidate_of
-from subzero.diagnosis.inference.latent_force import force_columns, knots_of, without_force
-from subzero.diagnosis.inference.linear_gaussian import KAPPAS
-from subzero.diagnosis.inference.map_fit import refit
-from subzero.diagnosis.inference.out_of_catalogue import (
-    FAR_LOG_POSTERIOR,
-    MAX_RELINEARISED,
-    NEAR_LOG_POSTERIOR,
-    _worth_a_look,
+from subzero.diagnosis.inference import (
+    candidate_of,
+    force_columns,
+    knots_of,
+    latent_force_candidates,
+    one_terms,
+    refit,
+    relinearised_force,
+    without_force,
 )
 from subzero.external_force import MissingForce, Term
 
@@ -64,24 +62,3 @@ def test_a_compass_that_wanders_is_more_probable_than_any_force_that_turns_the_v
     log = {name: relinearised_force(problem, fit, name, 1.0, knots, terms).log_posterior
            for name in ("sensor_drift:heading", "unknown_force:N", "unknown_force:Y")}  # fmt: skip
     assert log["sensor_drift:heading"] > max(log["unknown_force:N"], log["unknown_force:Y"]) + 10.0
-
-
-def best_with(ids, kappa):
-    """Return a candidate with log posterior 0, under a scale of the tolerances."""
-    evidence = {one: 0.0 if one == kappa else -50.0 for one in KAPPAS}
-    return Candidate(ids=ids, fit=None, log_evidence=evidence, log_posterior=0.0)
-
-
-def test_where_one_cause_explains_it_all_only_the_first_force_is_looked_at_from_afar():
-    hope = {
-        "unknown_force:X": -9.0,
-        "unknown_force:N": -12.0,
-        "sensor_drift:roll": -14.0,
-        "unknown_force:Y": -15.0,
-    }
-    assert _worth_a_look(hope, best_with(("a",), 1.0)) == ["unknown_force:X"]
-    assert _worth_a_look(hope, best_with(("a", "b"), 1.0)) == list(hope)[:MAX_RELINEARISED]
-    assert _worth_a_look(hope, best_with(("a",), 4.0)) == list(hope)[:MAX_RELINEARISED]
-    near = {**hope, "unknown_force:N": 1.0 - NEAR_LOG_POSTERIOR, "unknown_force:X": 3.0}
-    assert _worth_a_look(near, best_with(("a",), 1.0)) == ["unknown_force:X", "unknown_force:N"]
-    assert _worth_a_look({"unknown_force:X": -1.0 - FAR_LOG_POSTERIOR}, best_with(("a",), 4.0)) == []

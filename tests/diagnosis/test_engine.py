@@ -14,19 +14,24 @@ from scipy.optimize import lsq_linear
 from scipy.stats import multivariate_normal
 
 import subzero
-from subzero.diagnosis.assessment.identifiability import separation
+from subzero.diagnosis.assessment import separation
 from subzero.diagnosis.hypothesis import catalogue as effects
-from subzero.diagnosis.hypothesis.catalogue.sensors import NOISE
+from subzero.diagnosis.hypothesis.catalogue import NOISE
 from subzero.diagnosis.hypothesis.configuration import Setting
+from subzero.diagnosis.hypothesis.effect import Parameter
 from subzero.diagnosis.hypothesis.hypotheses import columns_of, entries_of
-from subzero.diagnosis.inference import simulator as tracks
-from subzero.diagnosis.inference.linear_gaussian import Quadratic, freed, posterior
-from subzero.diagnosis.inference.map_fit import quadratic_step
-from subzero.diagnosis.inference.measurement import TRUTHS, economical, respond
-from subzero.diagnosis.inference.noise import Noise
-from subzero.diagnosis.inference.problem import Observed, Problem
-from subzero.diagnosis.inference.simulator import simulate_track
-from subzero.external_force import MissingForce, Term
+from subzero.diagnosis.inference import (
+    TRUTHS,
+    Noise,
+    Observed,
+    Problem,
+    Quadratic,
+    economical,
+    freed,
+    posterior,
+    quadratic_step,
+    respond,
+)
 
 BASIC = ("surge_speed", "heading", "yaw_rate", "pitch", "roll", "depth")
 KINDS = ("scale", "bias", "lag")
@@ -114,22 +119,6 @@ def test_economical_steps_cost_less_than_a_tenth_of_the_noise():
     exact, cheap = respond(FIG6, times, BASIC), respond(economical(FIG6, 30.0), times, BASIC)
     for name in BASIC:
         assert np.abs(exact[name] - cheap[name]).max() < 0.1 * NOISE[name], name
-
-
-def test_a_run_without_its_energies_is_the_same_run(monkeypatch):
-    """Bit for bit, with forces that depend on the wet length: nothing in the loop reads what the ledger fills."""
-    force = MissingForce(terms=(Term("X", "wet_length*u2", -0.02), Term("N", "time*u2", 0.01)))
-    trial = dataclasses.replace(TRIAL, duration=4.0)
-    setting = economical(Setting(trial=trial, model=dataclasses.replace(FIG6.model, missing=force)), 4.0)
-    without, eased = simulate_track(setting)[1], tracks._ease
-
-    def ease(setup):
-        eased(setup)
-        assert not setup.fixed.booked
-        setup.fixed.booked = True
-
-    monkeypatch.setattr(tracks, "_ease", ease)
-    assert np.array_equal(simulate_track(setting)[1], without)
 
 
 def test_the_catalogue_has_the_ids_that_are_promised():
@@ -223,3 +212,21 @@ def test_D_under_wide_tolerances_is_that_of_a_model_with_such_tolerances(plant):
     found, who = separation(problem, J, z, ("rudder_offset",), 2.0)
     assert (found, who) == (pytest.approx(separation(doubled, J, z, ("rudder_offset",))[0]), who)
     assert 9.0 < found < separation(problem, J, z, ("rudder_offset",))[0]
+
+
+def test_several_residuals_are_those_of_each(plant):
+    problem = plant(duration=6.0).problem
+    random = np.random.default_rng(2)
+    several = [0.01 * random.normal(size=len(problem.entries)) for _ in range(3)]
+    several = [np.where([one.parameter.low == 0.0 for one in problem.entries], abs(z), z) for z in several]
+    for z, r in zip(several, problem.residuals(several), strict=True):
+        assert np.array_equal(r, problem.residual(z))
+
+
+def test_a_bound_on_the_whole_value_follows_the_nominal_model():
+    made = Parameter(
+        name="x", unit="s", tolerance=0.1, scale=1.0, low=-9.0, nominal=lambda _: 0.15, least=0.06
+    )
+    assert made.within(FIG6).low == pytest.approx(-0.09)
+    quick = dataclasses.replace(made, nominal=lambda _: 0.02)
+    assert quick.within(FIG6).low == 0.0, "a model below the least stays as it is"

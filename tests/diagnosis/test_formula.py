@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from subzero.diagnosis.inference import ForceInformation, estimate_force, without_force
 from subzero.diagnosis.inference.basis import (
     Shape,
     all_shapes,
@@ -14,9 +15,6 @@ from subzero.diagnosis.inference.basis import (
     windowed,
 )
 from subzero.diagnosis.inference.force_formula import as_missing, choose, describe
-from subzero.diagnosis.inference.input_estimation import estimate_force
-from subzero.diagnosis.inference.latent_force import without_force
-from subzero.diagnosis.inference.linear_gaussian import ForceInformation
 from subzero.external_force import FEATURES, MissingForce, Term, feature_value, history_at
 
 TIMES, KNOTS = samples_of(30.0), np.linspace(0.0, 30.0, 31)

@@ -4,18 +4,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from subzero.diagnosis.assessment.cross_validation import (
-    BLOCKS,
-    Fitted,
-    gain,
-    held_out,
-    parts_of,
-    raw,
-    rows_of,
-    share,
-)
+from subzero.diagnosis.assessment import BLOCKS, Fitted, gain, held_out, parts_of, raw, rows_of, share
 from subzero.diagnosis.hypothesis.catalogue import catalogue
-from subzero.diagnosis.inference.noise import Noise
+from subzero.diagnosis.inference import Noise
 
 
 def hidden(name, size):

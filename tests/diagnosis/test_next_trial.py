@@ -5,16 +5,18 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from subzero.diagnosis.assessment.next_trial import Belief, next_trial, outlook
-from subzero.diagnosis.assessment.trial_library import (
+from subzero.diagnosis.assessment import (
     LIBRARY,
     PLANE_AMPLITUDE,
     RUDDER_AMPLITUDE,
+    Belief,
     cruise,
     fastest,
+    next_trial,
+    outlook,
 )
 from subzero.diagnosis.hypothesis.catalogue import catalogue
-from subzero.diagnosis.inference.map_fit import Fit
+from subzero.diagnosis.inference import Fit
 
 
 class Survivor(NamedTuple):

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from subzero.diagnosis.inference.noise import Behind, Noise, Usual, estimate, resolution_of, spikes
+from subzero.diagnosis.inference import Behind, Noise, Usual, estimate, resolution_of, spikes
 
 LEVEL = 0.3
 RECORDS = 24

@@ -16,8 +16,7 @@ import subzero
 from subzero.diagnosis.hypothesis.catalogue import START
 from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.logged import Logged
-from subzero.diagnosis.inference.measurement import respond
-from subzero.diagnosis.inference.problem import pose
+from subzero.diagnosis.inference import pose, respond
 from subzero.records.consistency import unit_questions
 from subzero.records.record import Record, read_record, turned
 from subzero.synthetic.challenge import Challenge, write

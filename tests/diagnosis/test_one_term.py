@@ -10,16 +10,18 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.stats import multivariate_normal
 
-from subzero.diagnosis.inference.basis import one_terms
-from subzero.diagnosis.inference.input_estimation import latent_force_candidates
-from subzero.diagnosis.inference.laplace import candidate_of
-from subzero.diagnosis.inference.latent_force import FORCE, force_columns, knots_of
-from subzero.diagnosis.inference.linear_gaussian import (
+from subzero.diagnosis.inference import (
+    FORCE,
     ForceInformation,
     Scale,
     Terms,
+    candidate_of,
+    force_columns,
+    knots_of,
+    latent_force_candidates,
     log_evidence_term,
     mixed,
+    one_terms,
 )
 from subzero.external_force import AXES, MissingForce, Term
 

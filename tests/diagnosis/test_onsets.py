@@ -11,20 +11,20 @@ from numpy.testing import assert_allclose
 
 import subzero
 from subzero import diagnose
-from subzero.diagnosis.hypothesis.catalogue.sensors import SPECS
+from subzero.diagnosis.hypothesis.catalogue import SPECS
 from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.effect import with_onset
 from subzero.diagnosis.hypothesis.extended_model import all_effects
-from subzero.diagnosis.inference.change_point_scan import (
+from subzero.diagnosis.inference import (
     BaseRun,
     change_point_columns,
     grown,
+    pose,
+    respond,
     spacing_of,
+    special_cases_folded,
     times_of,
 )
-from subzero.diagnosis.inference.measurement import respond
-from subzero.diagnosis.inference.out_of_catalogue import special_cases_folded
-from subzero.diagnosis.inference.problem import pose
 from subzero.model import Model
 from subzero.synthetic.reference_run import simulate_reference
 
@@ -109,7 +109,7 @@ def test_what_grows_is_a_sum_of_steps_in_the_scan():
 def fitted_change_point(name, log_posterior):
     """A change point with nothing but what folding looks at."""
     point = SimpleNamespace(effect=all_effects()[name], record=0)
-    return SimpleNamespace(begun=point, log_posterior=log_posterior)
+    return SimpleNamespace(change_point=point, log_posterior=log_posterior)
 
 
 @pytest.mark.parametrize(
@@ -119,7 +119,7 @@ def test_a_jam_that_is_not_needed_is_told_as_the_offset(ahead, told):
     """Four times as probable (1.4 nats) is what it needs; the offset has the probability of both then."""
     both = [fitted_change_point("rudder_offset", -3.0), fitted_change_point("rudder_jam", ahead - 3.0)]
     kept = special_cases_folded(both)
-    assert [one.begun.effect.id for one, _ in kept][-1:] == told
+    assert [one.change_point.effect.id for one, _ in kept][-1:] == told
     total = np.logaddexp(-3.0, ahead - 3.0)
     assert kept[0][1] == pytest.approx(total if told == ["rudder_offset"] else -3.0)
 

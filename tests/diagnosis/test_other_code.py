@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import subzero
-from subzero.diagnosis.hypothesis.catalogue.sensors import NOISE
+from subzero.diagnosis.hypothesis.catalogue import NOISE
 from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.external_force import MissingForce, Term
 from subzero.simulation import run_trial
@@ -78,7 +78,7 @@ def test_on_fig6_the_tow_force_agrees_to_a_thousandth():
 
 
 def test_the_sensors_are_those_of_the_diagnosis():
-    from subzero.diagnosis.inference.measurement import respond
+    from subzero.diagnosis.inference import respond
 
     setting = PLAIN.with_sensor("heading", scale=0.02, bias=1.5, lag=0.4).with_sensor("surge_speed", lag=0.05)
     setting = setting.with_sensor("roll", lag=1e-9)  # a drawn tolerance may be that small

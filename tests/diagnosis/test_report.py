@@ -9,8 +9,9 @@ import math
 import numpy as np
 import pytest
 
-from subzero.diagnosis.report import html as report
 from subzero.diagnosis.report import json_file, tables, words
+from subzero.diagnosis.report.sections import markdown
+from subzero.diagnosis.report.summary import summary
 from subzero.diagnosis.results import (
     CAUSE_NAMED,
     NOTHING_WRONG,
@@ -142,14 +143,73 @@ def test_a_force_is_told_with_what_else_it_may_be_made_of():
     assert "ruled out" not in words.unknown(dataclasses.replace(FORCE.unknown, features={"u|u|": 1.0}))
 
 
-def test_the_story_ends_with_what_to_do_next():
-    told = words.story(NAMED)
-    assert any("explains 99.1 % of what can be explained" in line for line in told)
+def answers(verdict):
+    return {one.question: " ".join(one.words) for one in summary(verdict, "fig6")}
+
+
+def test_the_summary_says_what_is_wrong_how_sure_what_it_costs_what_to_do_and_what_would_settle_it():
+    said = answers(NAMED)
+    assert said["What is wrong"] == "The rudder servo lags: time constant 0.31 s, where the model has 0.1 s."
+    assert said["How sure is that"].startswith("Very sure (probability 0.970).")
     assert (
-        "Next trial: fly rudder doublets of 10 degrees (rudder_doublets); it decides with probability 0.93."
-        in told[-2]
+        "What comes next: the yaw inertia differs (probability 0.020); these records can tell"
+        in said["How sure is that"]
     )
-    assert "Log rudder_angle_deg too." in told[-2]
+    assert "misses the heading by 3 degree, 7.5 times the noise of its sensor" in said["What it costs"]
+    assert "explains 99.1 % of what can be explained" in said["What it costs"]
+    assert "Look at the fins, their servos and linkages." in said["What to do next"]
+    assert [one.command for one in summary(NAMED, "fig6")][3] == "subzero simulate fig6 --with extended.toml"
+    assert (
+        "Next trial: fly rudder doublets of 10 degrees (rudder_doublets); it decides with probability 0.93. "
+        "Log rudder_angle_deg too." in said["What would settle it"]
+    )
+
+
+def test_a_force_is_said_as_what_it_does_and_a_push_of_both_signs_as_both():
+    assert answers(FORCE)["What is wrong"].startswith(
+        "Something holds the hull back that no cause explains, with a force"
+    )
+    wave = dataclasses.replace(FORCE.unknown, axis="K", force=np.sin(TIME[::20]))
+    assert words.unknown(wave).startswith("Something rolls the hull that no cause explains, with a moment of")
+    assert words.something("K", np.array([0.0, -0.3, 0.02])) == "something rolls the hull to port"
+    assert words.something("K", np.array([0.0, 0.3])) == "something rolls the hull to starboard"
+
+
+@pytest.mark.parametrize("verdict", [NAMED, FORCE, DRIFT], ids=["named", "force", "drift"])
+def test_the_answers_have_no_ids(verdict):
+    said = " ".join(line for one in summary(verdict) for line in one.words).replace("(rudder_doublets)", "")
+    assert "rudder_lag" not in said
+    assert "unknown_force" not in said
+    assert "sensor_drift" not in said
+
+
+def test_a_hypothesis_of_any_kind_has_words():
+    assert words.explanation("none") == "nothing is wrong"
+    assert (
+        words.explanation("rudder_lag + hull_drag") == "the rudder servo lags and the hull has another drag"
+    )
+    assert words.explanation("hull_drag@12.5") == "from 12.5 s on the hull has another drag"
+    assert words.explanation("unknown_force:N") == "something turns the hull from side to side"
+    assert words.explanation("sensor_drift:yaw_rate") == "the sensor of the yaw rate drifts"
+    assert words.explanation("mine", {"mine": "weed hangs on it"}) == "weed hangs on it"
+    assert words.explanation("an_effect_of_tomorrow") == "an effect of tomorrow"
+
+
+def test_a_gain_that_is_none_is_called_none():
+    worse = dataclasses.replace(NAMED, gain=dataclasses.replace(NAMED.gain, total=-0.2))
+    assert "no better than the nominal one" in answers(worse)["What it costs"]
+    vain = dataclasses.replace(NAMED, gain=dataclasses.replace(NAMED.gain, owed_low=-0.1))
+    assert "not significant" in answers(vain)["What it costs"]
+    assert "not significant" not in answers(NAMED)["What it costs"]
+
+
+def test_a_healthy_record_says_what_it_could_not_have_shown():
+    healthy = Verdict(verdict=NOTHING_WRONG, sentence="", detectable=NAMED.detectable, misfit=NAMED.misfit)
+    said = answers(healthy)
+    assert said["What is wrong"] == "Nothing is wrong beyond the tolerances of the model."
+    assert "would have shown 2 of the 3 causes" in said["How sure is that"]
+    assert "could not have shown: the water moves." in said["How sure is that"]
+    assert "2.3 times the noise" in said["What it costs"]
 
 
 def test_an_interrupted_verdict_says_so():
@@ -160,14 +220,20 @@ def test_an_interrupted_verdict_says_so():
 
 def test_the_table_of_what_can_be_seen_shows_what_would_be_missed_or_mixed_up_worst_first():
     shown = tables.detectable(NAMED)
-    assert [row[0] for row in shown.rows] == ["current", "surge_added_mass"]
-    assert [row[-1] for row in shown.rows] == ["not seen", "not told apart"]
+    assert [row[0] for row in shown.rows] == [
+        "the water moves",
+        "the hull carries another mass of water forward",
+    ]
+    assert [row[-2:] for row in shown.rows] == [
+        ("not seen", "current"),
+        ("not told apart", "surge_added_mass"),
+    ]
     assert len(tables.detectable(NAMED, every=True).rows) == 3
 
 
 def test_the_misfit_names_the_command_it_follows():
     row = tables.misfit(NAMED.misfit["record"]).rows[1]
-    assert row[0] == "heading_deg"
+    assert row[0] == "heading [degree]"
     assert row[-2:] == ("rudder +0.61 at 0.4 s", "1.2–3.9 s")
 
 
@@ -198,9 +264,9 @@ def test_json_holds_a_force_and_an_empty_verdict():
     assert empty["next_trial"] is None
 
 
-def test_the_report_tells_all_of_it_and_its_page_stands_alone():
+def test_the_report_tells_all_of_it():
     figures = draw_diagnosis(NAMED, Title(words="a trial", scenario="fig6"))
-    text = report.markdown(NAMED, {"record": "record.csv, fig6"}, tuple(figures))
+    text = markdown(NAMED, {"record": "record.csv, fig6"}, tuple(figures))
     for part in (
         "# The cause is named",
         "## What is wrong",
@@ -210,22 +276,22 @@ def test_the_report_tells_all_of_it_and_its_page_stands_alone():
         "Seed 7",
     ):
         assert part in text
-    page = report.page(text, dict.fromkeys(figures, b"png"), "a trial")
-    assert page.count("data:image/png;base64,") == len(figures)
-    assert ".png" not in page.replace("image/png", "")
-    assert "<td>hull" not in page  # no column is torn by a letter of ours
+    assert all(text.count(f"![{name}]({name}.png)") == 1 for name in figures)
 
 
 def test_the_report_tells_what_is_wrong_before_the_long_table_of_what_could_be_seen():
-    text = report.markdown(NAMED, {"record": "record.csv, fig6"})
+    text = markdown(NAMED, {"record": "record.csv, fig6"})
     at = [line[3:] for line in text.splitlines() if line.startswith("## ")].index
     assert at("What is wrong") < at("The gain") < at("What these records could show")
 
 
-def test_what_a_file_is_called_cannot_put_markup_into_the_page():
-    text = report.markdown(NAMED, {"record": "<script>alert(1)</script>|*x*"})
-    assert "<script>" not in report.page(text, {}, "<b>t</b>")
-    assert "<b>" not in report.page(text, {}, "<b>t</b>")
+def test_what_a_file_is_called_cannot_put_markup_into_the_report():
+    from markdown_it import MarkdownIt
+
+    text = markdown(NAMED, {"record": "<script>alert(1)</script>|*x*&amp;"})
+    page = str(MarkdownIt("commonmark").enable("table").render(text))
+    assert "&lt;script&gt;alert(1)&lt;/script&gt;|*x*&amp;amp;" in page
+    assert "<script" not in page
 
 
 def test_every_verdict_has_the_figures_that_belong_to_it():
@@ -244,7 +310,7 @@ def test_the_names_of_a_long_pair_are_within_their_figure():
 
 def test_a_drift_has_the_unit_of_its_channel_in_words_figure_and_file():
     assert words.unknown(DRIFT.unknown) == (
-        "A drift of the heading's sensor that no cause explains: 6 ± 0.98 degree at t = 30 s, where it is largest."
+        "The sensor of the heading drifts as no cause explains: 6 ± 0.98 degree at t = 30 s, where it is largest."
     )
     axes = draw_diagnosis(DRIFT, Title(words="a trial", scenario="fig6"))["missing_force"].axes[0]
     assert "Drift of the heading's sensor" in axes.get_title(loc="left") + "".join(
@@ -252,10 +318,10 @@ def test_a_drift_has_the_unit_of_its_channel_in_words_figure_and_file():
     )
     assert axes.get_ylabel() == "[degree]"
     assert json.loads(json_file.text(DRIFT))["unknown"]["unit"] == "degree"
-    assert "nothing new in it" in report.markdown(DRIFT, {})
-    assert "nothing new in it" not in report.markdown(FORCE, {})
+    assert "nothing new in it" in markdown(DRIFT, {})
+    assert "nothing new in it" not in markdown(FORCE, {})
     beside = dataclasses.replace(DRIFT, extended=Extended(deviations={"hull_drag": {"share": 0.4}}))
-    assert "nothing new in it" not in report.markdown(beside, {}), "a cause stands beside the drift"
+    assert "nothing new in it" not in markdown(beside, {}), "a cause stands beside the drift"
 
 
 def test_forces_and_moments_have_their_units():

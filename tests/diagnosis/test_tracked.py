@@ -7,11 +7,10 @@ import pytest
 
 from subzero.diagnosis.hypothesis.catalogue import catalogue
 from subzero.diagnosis.hypothesis.effect import with_onset
+from subzero.diagnosis.inference import history, simulator, without_force
 from subzero.diagnosis.inference import problem as problem_module
-from subzero.diagnosis.inference import simulator
-from subzero.diagnosis.inference.latent_force import history, without_force
-from subzero.diagnosis.inference.model_search import Search
 from subzero.diagnosis.inference.simulator import simulate_on, simulate_track, with_stops
+from subzero.external_force import MissingForce, Term
 
 from .conftest import CHANNELS, nominal
 
@@ -110,20 +109,20 @@ def test_old_runs_are_forgotten_when_there_is_no_room(plant, counted, monkeypatc
     assert len(counted) == 3
 
 
-def test_fits_side_by_side_are_those_that_come_one_after_the_other(plant):
-    planted = plant(lambda setting: CATALOGUE["rudder_offset"].apply(setting, 2.0), duration=6.0)
-    several = [(), ("rudder_offset",), ("hull_drag",), ("hull_drag", "rudder_offset")]
-    found = []
-    for alone in (False, True):
-        search = Search(problem=planted.problem, progress=lambda share, words: None)
-        search.begin()
-        if alone:
-            for ids in several:
-                search.fit(ids)
-        else:
-            search.fit_all(several)
-        found.append({ids: one.log_posterior for ids, one in search.candidates.items()})
-    assert found[0] == found[1]
+def test_a_run_without_its_energies_is_the_same_run(monkeypatch):
+    """Bit for bit, with forces that depend on the wet length: nothing in the loop reads what the ledger fills."""
+    force = MissingForce(terms=(Term("X", "wet_length*u2", -0.02), Term("N", "time*u2", 0.01)))
+    trial = dataclasses.replace(SETTING.trial, duration=4.0)
+    setting = dataclasses.replace(SETTING, trial=trial).with_model(missing=force)
+    without, eased = simulate_track(setting)[1], simulator._ease
+
+    def ease(setup):
+        eased(setup)
+        assert not setup.fixed.booked
+        setup.fixed.booked = True
+
+    monkeypatch.setattr(simulator, "_ease", ease)
+    assert np.array_equal(simulate_track(setting)[1], without)
 
 
 def test_a_setting_refuses_what_a_model_does_not_have():

@@ -7,25 +7,21 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from subzero.diagnosis.inference.basis import one_terms
-from subzero.diagnosis.inference.input_estimation import (
+from subzero.diagnosis.inference import (
+    AXIS_WORDS,
+    ForceInformation,
+    Scale,
+    all_columns,
     estimate_drift,
     estimate_force,
-    latent_force_candidates,
-)
-from subzero.diagnosis.inference.latent_force import (
-    AXIS_WORDS,
-    all_columns,
     force_columns,
     history,
     knots_of,
-    without_force,
-)
-from subzero.diagnosis.inference.linear_gaussian import (
-    ForceInformation,
-    Scale,
+    latent_force_candidates,
     log_evidence_process,
     log_gains,
+    one_terms,
+    without_force,
 )
 
 TIME = np.arange(0.0, 30.05, 0.1)

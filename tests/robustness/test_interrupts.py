@@ -216,7 +216,7 @@ def interrupt_commands(seed, count, names, made, folder, cold=False):
 
 def short(name):
     """Return how long a short command lasts at least, and the files that it leaves."""
-    figures = ("attitude", "cable", "fig6", "forces")
+    figures = ("attitude", "cable", "fig6", "forces", "tension")
     files = [
         "report.html",
         "summary.json",

@@ -4,7 +4,7 @@ Verifies: trials and their parts, models, vehicles, cables, drums, currents, win
 simulators, sensors, autopilots, trims, manoeuvres (`values.py` draws the cases: good, at the edge, absurd), in a
 process whose heap is checked and filled with rubbish. Tolerance: none; no crash, no exception but a `UserError`.
 
-The long form is 10 000 cases:  pytest -m slow tests/robustness/test_values.py -s
+The long form is 10 000 cases, and each odd value in each place:  pytest -m slow tests/robustness/test_values.py -s
 """
 
 from __future__ import annotations
@@ -42,30 +42,43 @@ def checking_heap():
     return os.environ | preload | {"MALLOC_CHECK_": "3", "MALLOC_PERTURB_": "85"}
 
 
-def tried(seed, count, folder):
-    """Try so many cases in a child process; return what came out."""
+def tried(which, count, folder):
+    """Try so many cases of a seed in a child process, or every odd value in every place; return what came out."""
     log = folder / "cases.txt"
     done = subprocess.run(
-        [sys.executable, "-W", "ignore", "-X", "faulthandler", str(CASES), str(seed), str(count), str(log)],
+        [sys.executable, "-W", "ignore", "-X", "faulthandler", str(CASES), str(which), str(count), str(log)],
         env=checking_heap(), capture_output=True, text=True, check=False,
     )  # fmt: skip
     last = log.read_text(encoding="utf-8").splitlines()[-1:] if log.exists() else []
     assert done.returncode == 0, f"died of {last}: {done.stderr[-3000:]}"
     found = json.loads(done.stdout.splitlines()[-1])
-    assert found["wrong"] == []
-    assert sum(found["counts"].values()) == count
-    assert min(found["counts"]["ran"], found["counts"]["refused"]) > 0.05 * count
+    assert not found["wrong"], "\n".join(map(str, found["wrong"]))
     return found["counts"]
 
 
+def drawn(seed, count, folder):
+    """Try so many random cases, many of which run and many of which are refused; return how many did what."""
+    counts = tried(seed, count, folder)
+    assert sum(counts.values()) == count
+    assert min(counts["ran"], counts["refused"]) > 0.05 * count
+    return counts
+
+
 def test_whatever_value_is_made_works_or_is_refused(tmp_path):
-    tried(0, SHORT, tmp_path)
+    drawn(0, SHORT, tmp_path)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("piece", range(1, 1 + PIECES))
 def test_ten_thousand_values_work_or_are_refused(piece, tmp_path):
-    print(f"\n{piece}: {tried(piece, LONG, tmp_path)}")
+    print(f"\n{piece}: {drawn(piece, LONG, tmp_path)}")
+
+
+@pytest.mark.slow
+def test_each_odd_value_in_each_place_works_or_is_refused(tmp_path):
+    counts = tried("every", 0, tmp_path)
+    print(f"\n{counts}")
+    assert counts["refused"] > 10_000
 
 
 @pytest.fixture(scope="module")

@@ -1,6 +1,7 @@
 """Make values of everything that a user can make, good, at the edge and absurd: run as a child process by the tests.
 
-    python tests/robustness/values.py SEED COUNT LOG
+    python tests/robustness/values.py SEED COUNT LOG        # random cases
+    python tests/robustness/values.py every 0 LOG           # each odd value in each place, one by one
 
 Hypothesis draws the cases: some thing that can be made or called, with one to three of its values exchanged. What is
 accepted is run for a moment. Prints, as JSON, how often what came out, and what should not have: an exception that is
@@ -21,7 +22,7 @@ import traceback
 from collections import Counter
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 import numpy as np
 from hypothesis import HealthCheck, Phase, given, seed, settings
@@ -265,7 +266,7 @@ def scheme_of(arguments: dict[str, Any], duration: Any, length: float) -> Any:
     options = {name: arguments.pop(name) for name in list(arguments) if name in OPTIONS}
     check_work(duration, options.get("time_step", 0.1), options.get("segment_length", 0.5), length)
     scheme = arguments.get("scheme", "moving_end")
-    return cable.MovingEnd(**options) if scheme == "moving_end" else scheme
+    return cable.MovingEnd(**options) if isinstance(scheme, str) and scheme == "moving_end" else scheme
 
 
 def number(value: Any) -> float:
@@ -503,11 +504,29 @@ def text_of(target: Target, changed: Mapping[str, Any]) -> str:
     return f"{target.name}({', '.join(words)})"[:500].replace("\n", " ")
 
 
-def main(number_of_seed: int, count: int, log: Path) -> None:
-    counts: Counter[str] = Counter()
-    by_target: Counter[str] = Counter()
-    wrong: list[list[str]] = []
-    with open(log, "w", encoding="utf-8", errors="backslashreplace") as file:
+class Tally:
+    """Tries cases, and keeps what came out; each is written to a log before."""
+
+    def __init__(self, file: TextIO) -> None:
+        self.file = file
+        self.counts: Counter[str] = Counter()
+        self.by_target: Counter[str] = Counter()
+        self.wrong: list[list[str]] = []
+
+    def look(self, target: Target, changed: Mapping[str, Any]) -> None:
+        self.file.write(text_of(target, changed) + "\n")
+        self.file.flush()
+        self.by_target[target.name] += 1
+        try:
+            self.counts[outcome(target, changed)] += 1
+        except Exception as error:
+            self.counts["wrong"] += 1
+            where = traceback.extract_tb(error.__traceback__)[-1]
+            place = f"{Path(where.filename).name}:{where.lineno}"
+            self.wrong.append([text_of(target, changed), f"{type(error).__name__}: {error}"[:300], place])
+
+    def drawn(self, number_of_seed: int, count: int) -> None:
+        """Try so many random cases."""
 
         @seed(number_of_seed)
         @settings(
@@ -516,20 +535,27 @@ def main(number_of_seed: int, count: int, log: Path) -> None:
         )  # fmt: skip
         @given(cases())
         def look(case: Any) -> None:
-            file.write(text_of(*case) + "\n")
-            file.flush()
-            by_target[case[0].name] += 1
-            try:
-                counts[outcome(*case)] += 1
-            except Exception as error:
-                counts["wrong"] += 1
-                where = traceback.extract_tb(error.__traceback__)[-1]
-                place = f"{Path(where.filename).name}:{where.lineno}"
-                wrong.append([text_of(*case), f"{type(error).__name__}: {error}"[:300], place])
+            self.look(*case)
 
         look()
-    print(json.dumps({"counts": counts, "targets": by_target, "wrong": wrong[:200]}))
+
+    def every(self) -> None:
+        """Put each odd value in each place of each target, one by one."""
+        for target in TARGETS:
+            for name in sorted(target.good):
+                for value in ODD:
+                    self.look(target, {name: value})
+
+
+def main(which: str, count: int, log: Path) -> None:
+    with open(log, "w", encoding="utf-8", errors="backslashreplace") as file:
+        tally = Tally(file)
+        if which == "every":
+            tally.every()
+        else:
+            tally.drawn(int(which), count)
+    print(json.dumps({"counts": tally.counts, "targets": tally.by_target, "wrong": tally.wrong[:200]}))
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]), int(sys.argv[2]), Path(sys.argv[3]))
+    main(sys.argv[1], int(sys.argv[2]), Path(sys.argv[3]))

@@ -282,6 +282,7 @@ def test_a_motion_made_in_python_is_checked_like_one_of_a_file():
         ({"roll_rate": one}, "a roll rate is given, and no roll"),
         ({"heave_speed": one, "interpolation": "linear"}, "and here is heave_speed too"),
         ({"interpolation": "cubic"}, "a motion knows no interpolation 'cubic'"),
+        ({"interpolation": np.array([1, "a", None], dtype=object)}, "a motion knows no interpolation"),
         (
             {"sway_speed": one, "time": np.where(time > 20.0, time + 5.0, time)},
             "nothing is known for 5.1 s before it",

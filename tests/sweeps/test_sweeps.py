@@ -23,8 +23,9 @@ from subzero.summary import summarise
 from subzero.sweeps.api import finished
 from subzero.sweeps.design import points_of
 from subzero.sweeps.member import OtherVersionError, run_members
+from subzero.sweeps.page import page_of_sweep
 from subzero.sweeps.plan import plan_of
-from subzero.sweeps.result import Gathered, write_result
+from subzero.sweeps.result import MOST_DRAWN, Gathered, _drawn, write_result
 from subzero.sweeps.schedule import MOST_DEATHS, Schedule
 from subzero.sweeps.sensitivity import effects_of
 from subzero.sweeps.workers import WorkerDiedError, WorkerPool
@@ -367,6 +368,7 @@ def test_the_command_writes_everything_and_goes_on_where_it_was(tmp_path, monkey
         "members.csv",
         "members.sqlite",
         "summary.json",
+        "report.html",
         "bands.png",
         "histograms.png",
         "against.png",
@@ -376,6 +378,10 @@ def test_the_command_writes_everything_and_goes_on_where_it_was(tmp_path, monkey
     assert (summary["members"], summary["failed"]) == (6, 0)
     with xr.open_dataset(here / "sweep.nc") as runs:
         assert summary["scalars"]["peak_speed_m_s"]["max"] == float(runs["peak_speed_m_s"].max())
+    page = (here / "report.html").read_text(encoding="utf-8")
+    assert f"<td>{summary['scalars']['peak_speed_m_s']['max']:.4g}</td>" in page
+    assert "cable.diameter = &#34;declared&#34;" in page, "the file, as it was read"
+    assert "subzero sweep mine.toml --workers 1" in page
     before = (here / "sweep.nc").read_bytes()
     with sqlite3.connect(here / "members.sqlite") as file:
         file.execute("DELETE FROM members WHERE member IN (0, 5)")
@@ -383,6 +389,37 @@ def test_the_command_writes_everything_and_goes_on_where_it_was(tmp_path, monkey
     assert main(["sweep", "mine.toml", "--workers", "1"]) == 0
     assert (here / "sweep.nc").read_bytes() == before
     assert "peak_speed_m_s" in capsys.readouterr().out
+
+
+def test_the_page_tells_what_failed_and_what_matters_and_shows_texts_of_users_as_text():
+    plan = plan_of(
+        "fig6", {"start.wet_length_m": [0.0, 20.0], "cable.diameter": "declared"}, design="monte_carlo", samples=8,
+        description="<script>alert(1)</script> $x$",
+    )  # fmt: skip
+    row = dict.fromkeys(("min", "p5", "p50", "p95", "max", "mean", "standard_deviation"), 1.25)
+    effect = {
+        "scalar": "heading.end",
+        "parameter": "cable.diameter",
+        "size": -0.75,
+        "other": None,
+        "error": None,
+    }
+    summary = {
+        "scenario": "fig6", "title": plan.description, "subzero_version": "1", "members": 8, "failed": 2,
+        "design": {"name": "monte_carlo", "samples": 8, "seed": 3},
+        "parameters": {"cable.diameter": {"unit": "m", "from": 0.001, "to": 0.002}},
+        "reasons": {"4": "the <b>cable</b> broke at 3 s"}, "warnings": {"tow_force": 2},
+        "scalars": {"heading.end": {"unit": "degree", **row}},
+        "sensitivity": {"method": "", "effects": [effect]},
+    }  # fmt: skip
+    page = page_of_sweep(plan, summary, {}, "subzero sweep mine.toml")
+    assert "6 of 8 members completed" in page
+    assert '<th scope="row">member 4</th><td>the &lt;b&gt;cable&lt;/b&gt; broke at 3 s</td>' in page
+    assert "1 more stand in members.csv." in page
+    assert "End of heading: cable.diameter (correlation -0.75)." in page
+    assert "End of heading: 1.25 degree in the middle" in page
+    assert "2 of 8 members&#39; runs warn of tow force." in page
+    assert "<script" not in page
 
 
 @pytest.mark.parametrize(
@@ -439,6 +476,16 @@ def test_a_sweep_that_is_killed_time_after_time_loses_nothing():
     from benchmarks.sweep import kills
 
     assert kills(8, 600, seed=5)
+
+
+@pytest.mark.parametrize("columns", [2, 3, 10])
+def test_the_members_of_a_large_grid_that_bands_are_drawn_from_have_all_its_values_alike(columns):
+    """Binomial: within five standard deviations. Every second member of a grid of two columns is of one of them."""
+    drawn = np.flatnonzero(_drawn(2 * MOST_DRAWN))
+    assert drawn.size == MOST_DRAWN
+    counts = np.bincount(drawn % columns, minlength=columns)
+    share = 1.0 / columns
+    assert np.abs(counts - share * MOST_DRAWN).max() < 5.0 * np.sqrt(MOST_DRAWN * share * (1.0 - share))
 
 
 def test_batches_get_as_long_as_they_should_and_shrink_towards_the_end():

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import subzero
+from benchmarks import trust
 from benchmarks.trust import Verdict, draw, force_errors, interval, judge, refined, residual_of, tags_of
 
 
@@ -84,6 +85,28 @@ def test_none_of_so_many_is_no_more_than_chance_allows():
     """The rule of three, exactly: 1 − 0.025^(1/n)."""
     assert interval(0, 100) == f"0.0 %, 95 %: 0.0 to {100.0 * (1.0 - 0.025**0.01):.1f} %"
     assert interval(0, 0) == "of none"
+
+
+def test_verdicts_are_kept_as_they_come_and_a_trial_that_is_kept_is_not_run_again(tmp_path, monkeypatch):
+    ran = []
+
+    def judged(seed):
+        if seed == 12:
+            raise KeyboardInterrupt
+        ran.append(seed)
+        return Verdict(
+            seed=seed, tags=("vessel",), outcome="completed", force_error=0.1 * seed, warnings=("slack",)
+        )
+
+    monkeypatch.setattr(trust, "judge", judged)
+    keep = tmp_path / "trials.jsonl"
+    with pytest.raises(KeyboardInterrupt):
+        trust.judged_all(range(10, 14), 1, keep)
+    verdicts = trust.judged_all([9, 10, 11], 1, keep)
+    assert ran == [10, 11, 9]
+    assert [(one.seed, one.force_error, one.tags, one.wrong) for one in verdicts] == [
+        (seed, 0.1 * seed, ("vessel",), True) for seed in (9, 10, 11)
+    ]
 
 
 @pytest.mark.slow

@@ -1,1 +1,56 @@
-"""How good a fit is, what the records can show at all, and which trial would show more."""
+"""What records can show, how the nominal model fails, what the extended one gains, and what to fly next.
+
+what is computed                                          file
+--------------------------------------------------------  ----------------
+signal of a cause, and D to its closest rival             identifiability
+residuals of the nominal model, channel by channel        residuals
+gain on data that were not fitted                         cross_validation
+the trial that best tells hypotheses apart                next_trial, trial_library
+
+What others may use stands in `__all__` (for what stands outside the diagnosis, a contract holds it).
+"""
+
+from subzero.diagnosis.assessment.cross_validation import (
+    BLOCKS,
+    Fitted,
+    gain,
+    held_out,
+    parts_of,
+    raw,
+    rows_of,
+    share,
+)
+from subzero.diagnosis.assessment.identifiability import (
+    detectability,
+    information,
+    marginal,
+    separation,
+    with_whole_effects,
+)
+from subzero.diagnosis.assessment.next_trial import (
+    DECISIVE_DISCRIMINATION,
+    Belief,
+    is_safe,
+    next_trial,
+    outlook,
+    outlooks,
+    prepared_trial,
+)
+from subzero.diagnosis.assessment.residuals import curves, misfits, whiteness
+from subzero.diagnosis.assessment.trial_library import (
+    LIBRARY,
+    PLANE_AMPLITUDE,
+    RUDDER_AMPLITUDE,
+    cruise,
+    fastest,
+    flown,
+    rich,
+    rudder_doublets,
+)
+from subzero.diagnosis.assessment.trial_library import rows_of as trial_rows
+
+__all__ = ["BLOCKS", "DECISIVE_DISCRIMINATION", "LIBRARY", "PLANE_AMPLITUDE", "RUDDER_AMPLITUDE", "Belief", "Fitted",
+           "cruise", "curves", "detectability", "fastest", "flown", "gain", "held_out", "information", "is_safe",
+           "marginal", "misfits", "next_trial", "outlook", "outlooks", "parts_of", "prepared_trial", "raw", "rich",
+           "rows_of", "rudder_doublets", "separation", "share", "trial_rows", "whiteness",
+           "with_whole_effects"]  # fmt: skip

@@ -14,42 +14,36 @@ from collections.abc import Collection
 import numpy as np
 
 from subzero.diagnosis.hypothesis.hypotheses import Entry, columns_of, nameable
-from subzero.diagnosis.inference.model_average import MIN_DISCRIMINATION
-from subzero.diagnosis.inference.model_search import Search
+from subzero.diagnosis.inference import settings
 from subzero.diagnosis.inference.problem import Problem
 from subzero.diagnosis.results import Detectability
 
-FLAT_SIGNAL = 1.0
-"""A cause of one scale that seems to do less than this, in noise, has no slope at the nominal model."""
 SEEN_SIGNAL = 4.0
 """A signal that would be seen."""
-MAX_REFUTED, REFUTED_NATS = 3, 16.0
-"""So many close rivals of the best are simulated; one that is so far behind in log posterior, as good as a better fit
-might have it, is none: where D is 9, luck would have to be worth three standard deviations. [nat]"""
 
 
-def with_secants(problem: Problem, J: np.ndarray, z: np.ndarray | None = None) -> np.ndarray:
+def with_whole_effects(problem: Problem, J: np.ndarray, z: np.ndarray | None = None) -> np.ndarray:
     """Return sensitivities at z (the nominal model, if none) with those of a whole effect, beside nothing else, for
     causes that do nothing when small: they would act in the place of others, not on top of them.
     """
     zero = np.zeros(len(problem.entries))
     here, J = zero if z is None else z, J.copy()
-    dull = [k for k, entry in enumerate(problem.entries) if _is_dull(entry, here[k], J[:, k])]
-    scales = [problem.entries[k].parameter.scale for k in dull]
+    flat = [k for k, entry in enumerate(problem.entries) if _is_flat(entry, here[k], J[:, k])]
+    scales = [problem.entries[k].parameter.scale for k in flat]
     moved = [
-        np.concatenate([zero[:k], [scale], zero[k + 1 :]]) for k, scale in zip(dull, scales, strict=True)
+        np.concatenate([zero[:k], [scale], zero[k + 1 :]]) for k, scale in zip(flat, scales, strict=True)
     ]
     r, *there = problem.residuals([zero, *moved])
-    for k, scale, r_k in zip(dull, scales, there, strict=True):
+    for k, scale, r_k in zip(flat, scales, there, strict=True):
         J[:, k] = np.nan_to_num(r - r_k) / scale
     return J
 
 
-def _is_dull(entry: Entry, value: float, column: np.ndarray) -> bool:
+def _is_flat(entry: Entry, value: float, column: np.ndarray) -> bool:
     """Say whether a parameter at its bound seems to do nothing."""
     parameter = entry.parameter
     at_rest = entry.record < 0 and parameter.low == 0.0 and value < parameter.tolerance
-    return bool(at_rest and np.linalg.norm(column) * parameter.scale < FLAT_SIGNAL)
+    return bool(at_rest and np.linalg.norm(column) * parameter.scale < settings.FLAT_SIGNAL)
 
 
 def marginal(problem: Problem, J: np.ndarray, kappa: float = 1.0) -> np.ndarray:
@@ -146,21 +140,3 @@ def separation(
             D = against(problem, M, own, z[own], columns_of(problem.entries, (other,)), kappa)[0]
             best, who = (D, other) if best > D else (best, who)
     return best, who
-
-
-def refuted_rivals(search: Search) -> frozenset[str]:
-    """Return the rivals of the best hypothesis that only the linear problem has close, as simulations show.
-
-    A play of the rudder may look like its offset from where there is none, and explain nothing of a record.
-    """
-    best, problem, found = search.best(), search.problem, set[str]()
-    J = with_secants(problem, best.fit.J, best.fit.z)
-    for _ in range(MAX_REFUTED if best.ids else 0):
-        D, rival = separation(problem, J, best.fit.z, best.ids, best.kappa, found)
-        if rival == "none" or D >= MIN_DISCRIMINATION:
-            break
-        search.fit((rival,), best.fit)
-        if search.candidates[(rival,)].optimistic_log_posterior > best.log_posterior - REFUTED_NATS:
-            break
-        found.add(rival)
-    return frozenset(found)

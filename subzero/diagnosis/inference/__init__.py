@@ -1,1 +1,171 @@
-"""Bayesian inference on simulations: noise, likelihood, MAP fits, evidence, model search, latent forces."""
+"""Which explanations fit the records, and how probable each is: from the noise of a channel to model averaging.
+
+what is computed                                          file
+--------------------------------------------------------  -----------------
+noise of a channel, whitening, its estimate               noise
+h(z): what the sensors would have measured                measurement
+one simulation, from its start or from a stop             simulator
+r(z) and J of all records                                 problem
+records → problem                                         posing
+evidence and posterior of the linear problem              linear_gaussian
+MAP fit with real simulations                             map_fit
+evidence around a fit                                     laplace
+linear evidence of all hypotheses                         screening
+the pool of fitted hypotheses                             model_fits
+add, drop, swap and merge causes                          model_search
+probabilities, decision rule                              model_average
+onsets, ranked by linear evidence                         change_point_scan
+onsets, fitted                                            change_point_fit
+a force or a drift as a process over time                 latent_force
+its evidence and its history                              input_estimation
+features and shapes of a formula                          basis
+a formula for a latent force                              force_formula
+change points, forces and drifts beside the hypotheses    out_of_catalogue
+all that only steers the search                           settings
+
+What others may use stands in `__all__`; everything else is the engine's own (a contract in ``pyproject.toml`` holds
+it for what stands outside the diagnosis).
+"""
+
+# ruff: noqa: I001 - in the order in which they stand on one another, not in that of the alphabet
+
+from subzero.diagnosis.inference.noise import Behind, Noise, Usual, estimate, resolution_of, spikes
+from subzero.diagnosis.inference.measurement import TRUTHS, economical, respond
+from subzero.diagnosis.inference.problem import Observed, Problem, Progress
+from subzero.diagnosis.inference.posing import pose, with_finer_steps, with_noise_behind
+from subzero.diagnosis.inference.linear_gaussian import (
+    KAPPAS,
+    ForceInformation,
+    Quadratic,
+    Scale,
+    Terms,
+    freed,
+    log_evidence_process,
+    log_evidence_term,
+    log_gains,
+    mixed,
+    posterior,
+    seen,
+)
+from subzero.diagnosis.inference.map_fit import (
+    Fit,
+    at_bad_minimum,
+    bounded_step,
+    bounds,
+    broyden_update,
+    is_poor_fit,
+    objective,
+    quadratic_step,
+    refit,
+    restarted_where_smooth,
+)
+from subzero.diagnosis.inference.laplace import Candidate, candidate_of, laplace
+from subzero.diagnosis.inference.change_point_scan import (
+    BaseRun,
+    LinearisationPoint,
+    change_point_columns,
+    grown,
+    scan,
+    spacing_of,
+    times_of,
+)
+from subzero.diagnosis.inference.change_point_fit import fit_change_points, linearised_at
+from subzero.diagnosis.inference.latent_force import (
+    AXIS_WORDS,
+    FORCE,
+    all_columns,
+    force_columns,
+    history,
+    knots_of,
+    without_force,
+)
+from subzero.diagnosis.inference.basis import one_terms
+from subzero.diagnosis.inference.input_estimation import (
+    estimate_drift,
+    estimate_force,
+    latent_force_candidates,
+    relinearised_force,
+)
+from subzero.diagnosis.inference.screening import Screening
+from subzero.diagnosis.inference.model_average import (
+    UNTRIED_LOG_POSTERIOR,
+    Beliefs,
+    ChangePointSummary,
+    decide,
+    occam_folded,
+    practical_causes,
+)
+from subzero.diagnosis.inference.out_of_catalogue import Findings, special_cases_folded
+
+__all__ = [
+    "AXIS_WORDS",
+    "FORCE",
+    "KAPPAS",
+    "TRUTHS",
+    "UNTRIED_LOG_POSTERIOR",
+    "BaseRun",
+    "Behind",
+    "Beliefs",
+    "Candidate",
+    "ChangePointSummary",
+    "Findings",
+    "Fit",
+    "ForceInformation",
+    "LinearisationPoint",
+    "Noise",
+    "Observed",
+    "Problem",
+    "Progress",
+    "Quadratic",
+    "Scale",
+    "Screening",
+    "Terms",
+    "Usual",
+    "all_columns",
+    "at_bad_minimum",
+    "bounded_step",
+    "bounds",
+    "broyden_update",
+    "candidate_of",
+    "change_point_columns",
+    "decide",
+    "economical",
+    "estimate",
+    "estimate_drift",
+    "estimate_force",
+    "fit_change_points",
+    "force_columns",
+    "freed",
+    "grown",
+    "history",
+    "is_poor_fit",
+    "knots_of",
+    "laplace",
+    "latent_force_candidates",
+    "linearised_at",
+    "log_evidence_process",
+    "log_evidence_term",
+    "log_gains",
+    "mixed",
+    "objective",
+    "occam_folded",
+    "one_terms",
+    "pose",
+    "posterior",
+    "practical_causes",
+    "quadratic_step",
+    "refit",
+    "relinearised_force",
+    "resolution_of",
+    "respond",
+    "restarted_where_smooth",
+    "scan",
+    "seen",
+    "spacing_of",
+    "special_cases_folded",
+    "spikes",
+    "times_of",
+    "with_finer_steps",
+    "with_noise_behind",
+    "without_force",
+]

@@ -18,6 +18,7 @@ import numpy as np
 
 from subzero.diagnosis.hypothesis.effect import Effect
 from subzero.diagnosis.hypothesis.hypotheses import log_prior, nameable, variances
+from subzero.diagnosis.inference import settings
 from subzero.diagnosis.inference.change_point_scan import (
     BaseRun,
     ChangePoint,
@@ -33,26 +34,19 @@ from subzero.diagnosis.inference.linear_gaussian import KAPPAS, Quadratic, log_s
 from subzero.diagnosis.inference.map_fit import Fit, bounds, continued, is_poor_fit, refit, with_own_jacobian
 from subzero.diagnosis.inference.problem import Problem
 
-MAX_CHANGE_POINT_ROUNDS, MAX_FITTED_PER_ROUND, WORTH_FITTING_LOG_POSTERIOR = 3, 3, 6.0
-"""Rounds of trying; in each at most so many are fitted that the linear problem has this close to the best."""
-NON_LINEAR_SLACK, NON_LINEAR_SLACK_OF_LEADER = 0.05, 0.75
-"""Where a cause gains much, what is not linear may be this share of it; of the cause that gains most, so much."""
-REFIT_LOG_POSTERIOR = 2.0
-"""What was fitted is fitted again where the linear problem promises so much more, in log posterior."""
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FittedChangePoint:
     """A sudden cause with a fit of its own.
 
     Attributes:
-        begun: what and when, as fitted.
+        change_point: what and when, as fitted.
         log_posterior: of it beside nothing, but for its own prior.
         problem: with its parameters and its time behind the entries.
         fit: of that problem.
     """
 
-    begun: ChangePoint
+    change_point: ChangePoint
     log_posterior: float
     problem: Problem
     fit: Fit
@@ -60,12 +54,12 @@ class FittedChangePoint:
     @property
     def id(self) -> str:
         """Such as "rudder_offset@12"."""
-        return self.begun.id
+        return self.change_point.id
 
 
 def fit_change_points(
     problem: Problem,
-    places: Sequence[LinearisationPoint],
+    points: Sequence[LinearisationPoint],
     able: Sequence[Effect],
     record: int,
     least: float,
@@ -76,7 +70,7 @@ def fit_change_points(
 
     Args:
         problem: records and parameters.
-        places: where they are tried at first.
+        points: where they are tried at first.
         able: effects that may begin in mid-trial.
         record: in which they begin.
         least: log posterior of what is known else, on the scale of `FittedChangePoint`.
@@ -84,65 +78,69 @@ def fit_change_points(
         large: hypotheses whose causes are tried as large as they are there.
     """
     done: dict[str, FittedChangePoint] = {}
-    hopes = [one for place in places for one in ranked_in(problem, place, able, record)]
-    hopes += [one for each in large for one in ranked_by_runs(problem, each, able, record)]
-    for _ in range(MAX_CHANGE_POINT_ROUNDS):
-        worth = _worth(hopes, done, least)
+    candidates = [one for point in points for one in ranked_in(problem, point, able, record)]
+    candidates += [one for each in large for one in ranked_by_runs(problem, each, able, record)]
+    for _ in range(settings.MAX_ROUNDS):
+        worth = _worth(candidates, done, least)
         if not worth:
             break
         for one in side.map(partial(_fitted, problem), worth):
-            name = one.begun.effect.id
+            name = one.change_point.effect.id
             done[name] = max(one, done.get(name, one), key=lambda each: each.log_posterior)
         best = max(done.values(), key=lambda one: one.log_posterior)
-        hopes = [one for one in hopes if not any(one is each for each in worth)]
+        candidates = [one for one in candidates if not any(one is each for each in worth)]
         if not is_poor_fit(best.fit):
-            hopes = ranked_in(problem, linearised_at(problem, best), able, record)
+            candidates = ranked_in(problem, linearised_at(problem, best), able, record)
     return list(done.values())
 
 
 def _worth(
-    hopes: Sequence[RankedChangePoint], done: dict[str, FittedChangePoint], least: float
+    candidates: Sequence[RankedChangePoint], done: dict[str, FittedChangePoint], least: float
 ) -> list[RankedChangePoint]:
     """Return what is worth a fit: each cause where it comes out best, if it may come close to the best, known or hoped
     for, and is promised more than what is known of it.
     """
-    ranked = sorted(hopes, key=lambda one: -one.log_posterior)
-    first = {one.begun.effect.id: one for one in reversed(ranked)}
+    ranked = sorted(candidates, key=lambda one: -one.log_posterior)
+    first = {one.change_point.effect.id: one for one in reversed(ranked)}
     known = {name: one.log_posterior for name, one in done.items()}
-    bar = (
-        max([least, *known.values(), *(one.log_posterior for one in ranked[:1])])
-        - WORTH_FITTING_LOG_POSTERIOR
-    )
+    bar = max([least, *known.values(), *(one.log_posterior for one in ranked[:1])]) - settings.HOPELESS_NATS
     found = [one for name, one in first.items()
-             if one.at_most(NON_LINEAR_SLACK_OF_LEADER if one is ranked[0] else NON_LINEAR_SLACK) > bar
-             and one.log_posterior > known.get(name, -np.inf) + REFIT_LOG_POSTERIOR]  # fmt: skip
-    return sorted(found, key=lambda one: -one.log_posterior)[:MAX_FITTED_PER_ROUND]
+             if one.at_most(settings.NON_LINEAR_SHARE_OF_FIRST if one is ranked[0] else settings.NON_LINEAR_SHARE) > bar
+             and one.log_posterior > known.get(name, -np.inf) + settings.CLOSE_NATS]  # fmt: skip
+    return sorted(found, key=lambda one: -one.log_posterior)[: settings.MAX_TRIED]
 
 
-def _fitted(problem: Problem, hope: RankedChangePoint) -> FittedChangePoint:
+def _fitted(problem: Problem, candidate: RankedChangePoint) -> FittedChangePoint:
     """Return a sudden cause fitted by real runs, all else within declared tolerances."""
-    place, begun = hope.place, hope.begun
-    more, n = with_change_point(problem, begun), len(problem.entries)
-    start = _begin(problem, more, hope) if hope.start is None else hope.start
+    point, change_point = candidate.point, candidate.change_point
+    more, n = with_change_point(problem, change_point), len(problem.entries)
+    start = _begin(problem, more, candidate) if candidate.start is None else candidate.start
     start = np.clip(np.append(start, 0.0), *bounds(more))
     slopes = more.jacobian(start, range(n, start.size))[:, n:]
-    D, J = _prior(problem, more, 1.0), np.hstack([place.fit.J[:, :n], slopes])
+    D, J = _prior(problem, more, 1.0), np.hstack([point.fit.J[:, :n], slopes])
     fit = continued(more, with_own_jacobian(more, refit(more, start, J, D, most_fresh=1)))
     under = {kappa: _prior(problem, more, kappa) for kappa in KAPPAS}
     log = laplace(more.entries, fit, under)
     mixed = log_sum([float(np.log(prior)) + log[kappa] for kappa, prior in KAPPAS.items()])
     kappa = max(KAPPAS, key=lambda kappa: np.log(KAPPAS[kappa]) + log[kappa])
-    begun = replace(begun, time=round(begun.time + float(fit.z[-1]), 2), mean=fit.z[n:-1], kappa=kappa)
+    change_point = replace(
+        change_point, time=round(change_point.time + float(fit.z[-1]), 2), mean=fit.z[n:-1], kappa=kappa
+    )
     total = mixed + log_prior((), len(nameable(problem.entries)))
     return FittedChangePoint(
-        begun=begun, log_posterior=total if np.isfinite(fit.objective) else -np.inf, problem=more, fit=fit
+        change_point=change_point,
+        log_posterior=total if np.isfinite(fit.objective) else -np.inf,
+        problem=more,
+        fit=fit,
     )
 
 
-def _begin(problem: Problem, more: Problem, hope: RankedChangePoint) -> np.ndarray:
+def _begin(problem: Problem, more: Problem, candidate: RankedChangePoint) -> np.ndarray:
     """Return the best deviations in the linear problem of a place with a sudden cause."""
-    fit, begun, D = hope.place.fit, hope.begun, _prior(problem, more, 1.0)[:-1]
-    (C,) = change_point_columns(hope.place.along, [(begun.effect, begun.time)], begun.record)
+    fit, change_point, D = candidate.point.fit, candidate.change_point, _prior(problem, more, 1.0)[:-1]
+    (C,) = change_point_columns(
+        candidate.point.along, [(change_point.effect, change_point.time)], change_point.record
+    )
     n = len(problem.entries)
     J, whole = np.hstack([fit.J[:, :n], C]), fit.r + fit.J @ fit.z
     return posterior(Quadratic(A=J.T @ J, b=J.T @ whole, rr=float(whole @ whole)), D).z

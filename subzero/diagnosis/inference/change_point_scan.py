@@ -17,6 +17,7 @@ import numpy as np
 from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.effect import MINUTE_S, Effect, with_free_onset, with_onset
 from subzero.diagnosis.hypothesis.hypotheses import Entry, columns_of, log_prior, nameable, variances
+from subzero.diagnosis.inference import settings
 from subzero.diagnosis.inference.laplace import Candidate, possible
 from subzero.diagnosis.inference.linear_gaussian import KAPPAS, ForceInformation, Quadratic, posterior, seen
 from subzero.diagnosis.inference.map_fit import Fit, bounds
@@ -25,8 +26,6 @@ from subzero.diagnosis.inference.simulator import Stop, Track, simulate_on, simu
 
 COARSE_ONSETS, FINE_PER_COARSE, MIN_ONSET_SPACING_S = 15, 4, 1.0
 """A record has so many steps of times to begin at, each so many finer ones, but none is shorter than the last. [s]"""
-MIN_SCAN_GAIN = 3.0
-"""What gains less, in log evidence, is not tried on the finer grid."""
 SECANT_SCALES = 0.25
 """Step of a sensitivity, in effect scales."""
 
@@ -54,14 +53,14 @@ class ChangePoint:
     kappa: float = 1.0
 
     @property
-    def begun(self) -> Effect:
+    def with_onset(self) -> Effect:
         """The effect as it begins at that time."""
         return with_onset(self.effect, self.time)
 
     @property
     def id(self) -> str:
         """Such as "rudder_offset@12"."""
-        return self.begun.id
+        return self.with_onset.id
 
 
 class BaseRun(NamedTuple):
@@ -95,7 +94,7 @@ def times_of(problem: Problem, record: int) -> list[float]:
 
 
 def scan(
-    place: LinearisationPoint,
+    point: LinearisationPoint,
     D: np.ndarray,
     effects: Sequence[Effect],
     record: int = 0,
@@ -105,24 +104,24 @@ def scan(
     """Return every sudden effect at its best time, most probable first; the `best` of them with finer times.
 
     Args:
-        place: close to the data.
+        point: close to the data.
         D: prior variances of the entries (k,).
         effects: of the catalogue; those that are not sudden are left out.
         record: in which they begin.
         best: how many are tried on the finer grid.
     """
     able = [effect for effect in effects if effect.sudden]
-    spacing, coarse = spacing_of(place.along.problem, record), times_of(place.along.problem, record)
+    spacing, coarse = spacing_of(point.along.problem, record), times_of(point.along.problem, record)
     steps = [(one, time) for one in able if not one.grows for time in coarse]
-    columns = dict(zip(steps, change_point_columns(place.along, steps, record), strict=True))
+    columns = dict(zip(steps, change_point_columns(point.along, steps, record), strict=True))
     columns |= grown([one for one in able if one.grows], columns, spacing)
-    found = _strongest(_tried(place, D, columns, record))
-    worth = [one for one in found[:best] if one.log_gain > MIN_SCAN_GAIN]
+    found = _strongest(_tried(point, D, columns, record))
+    worth = [one for one in found[:best] if one.log_gain > settings.SCAN_GAIN_NATS]
     finer = [(one.effect, time) for one in worth for time in _around(one.time, spacing)]
     if not finer:
         return found
-    columns = dict(zip(finer, change_point_columns(place.along, finer, record), strict=True))
-    return _strongest(found + _tried(place, D, columns, record))
+    columns = dict(zip(finer, change_point_columns(point.along, finer, record), strict=True))
+    return _strongest(found + _tried(point, D, columns, record))
 
 
 Begun = tuple[Effect, float]
@@ -176,10 +175,10 @@ def _between(best: ChangePoint, found: list[ChangePoint]) -> float:
 
 
 def _tried(
-    place: LinearisationPoint, D: np.ndarray, columns: Mapping[Begun, np.ndarray], record: int
+    point: LinearisationPoint, D: np.ndarray, columns: Mapping[Begun, np.ndarray], record: int
 ) -> list[ChangePoint]:
     """Return the linear evidence of effects that begin at times, from their whitened sensitivities."""
-    fit, made = place.fit, list(columns.values())
+    fit, made = point.fit, list(columns.values())
     q, whole = fit.quadratic, fit.r + fit.J @ fit.z
     sizes, data = (
         np.cumsum([0, *(C.shape[1] for C in made)]),
@@ -250,15 +249,13 @@ def _rows(problem: Problem, record: int) -> tuple[int, int]:
     return sum(sizes[:record]), sum(sizes)
 
 
-def with_change_point(problem: Problem, begun: ChangePoint) -> Problem:
+def with_change_point(problem: Problem, change_point: ChangePoint) -> Problem:
     """Return the problem with a sudden effect's parameters and its time behind its entries."""
-    effect = with_free_onset(begun.effect, begun.time, float(problem.records[begun.record].time[-1]))
-    more = tuple(Entry(effect, i, begun.record) for i in range(len(effect.parameters)))
+    effect = with_free_onset(
+        change_point.effect, change_point.time, float(problem.records[change_point.record].time[-1])
+    )
+    more = tuple(Entry(effect, i, change_point.record) for i in range(len(effect.parameters)))
     return replace(problem, entries=(*problem.entries, *more))
-
-
-LARGER_SIZES = (1.0, 1.5)
-"""A cause that begins late is larger than one that holds throughout."""
 
 
 class RankedChangePoint(NamedTuple):
@@ -267,22 +264,22 @@ class RankedChangePoint(NamedTuple):
     """
 
     log_posterior: float
-    begun: ChangePoint
-    place: LinearisationPoint
+    change_point: ChangePoint
+    point: LinearisationPoint
     start: np.ndarray | None = None
 
-    def at_most(self, bent: float) -> float:
+    def at_most(self, share: float) -> float:
         """Return the log posterior that its fit may have, if that share of what it gains is not linear."""
-        return self.log_posterior + self.begun.between + bent * max(self.begun.log_gain, 0.0)
+        return self.log_posterior + self.change_point.between + share * max(self.change_point.log_gain, 0.0)
 
 
 def ranked_in(
-    problem: Problem, place: LinearisationPoint, able: Sequence[Effect], record: int
+    problem: Problem, point: LinearisationPoint, able: Sequence[Effect], record: int
 ) -> list[RankedChangePoint]:
     """Return every sudden cause at its best time, in the linear problem of a place."""
-    here = _log_none(problem, place.fit, record)
-    found = scan(place, variances(problem.entries, (), 1.0), able, record)
-    return [RankedChangePoint(here + one.log_gain, one, place) for one in found]
+    here = _log_none(problem, point.fit, record)
+    found = scan(point, variances(problem.entries, (), 1.0), able, record)
+    return [RankedChangePoint(here + one.log_gain, one, point) for one in found]
 
 
 def ranked_by_runs(
@@ -301,11 +298,11 @@ def _large(problem: Problem, fit: Fit, effect: Effect, record: int) -> RankedCha
     without = fit.z.copy()
     without[own] = 0.0
     first = ChangePoint(effect=effect, time=times[0], record=record, log_gain=-np.inf, mean=fit.z[own])
-    sizes = [np.clip(share * fit.z[own], low[own], high[own]) for share in LARGER_SIZES]
+    sizes = [np.clip(share * fit.z[own], low[own], high[own]) for share in settings.LATER_SIZES]
     jobs = [replace(first, time=time, mean=size) for time in times for size in sizes]
     at = [np.concatenate([without, one.mean, [one.time - first.time]]) for one in jobs]
-    place, none = LinearisationPoint(fit, BaseRun(problem, fit.z)), _log_none(problem, fit, record)
-    tried = [_at_size(problem, RankedChangePoint(none, one, place), without, r)
+    point, none = LinearisationPoint(fit, BaseRun(problem, fit.z)), _log_none(problem, fit, record)
+    tried = [_at_size(problem, RankedChangePoint(none, one, point), without, r)
              for one, r in zip(jobs, with_change_point(problem, first).residuals(at), strict=True)]  # fmt: skip
     return max(tried, key=lambda one: one.log_posterior)
 
@@ -313,17 +310,17 @@ def _large(problem: Problem, fit: Fit, effect: Effect, record: int) -> RankedCha
 def _at_size(
     problem: Problem, none: RankedChangePoint, without: np.ndarray, r: np.ndarray
 ) -> RankedChangePoint:
-    """Return the hope of a cause at a time and a size, with the residual there; `none` has that of nothing."""
+    """Return a cause at an onset and a size, ranked by the residual there; `none` is the model without it."""
     if not np.isfinite(r).all():
         return none._replace(log_posterior=-np.inf)
-    begun, D = none.begun, variances(problem.entries, (), 1.0)
-    there = posterior(Quadratic.at(without, r, none.place.fit.J), D)
-    scale = np.array([one.scale for one in begun.effect.parameters])
-    far = 0.5 * float(np.sum((begun.mean / scale) ** 2)) + scale.size
-    nothing = posterior(none.place.fit.quadratic, D).log_evidence
+    change_point, D = none.change_point, variances(problem.entries, (), 1.0)
+    there = posterior(Quadratic.at(without, r, none.point.fit.J), D)
+    scale = np.array([one.scale for one in change_point.effect.parameters])
+    far = 0.5 * float(np.sum((change_point.mean / scale) ** 2)) + scale.size
+    nothing = posterior(none.point.fit.quadratic, D).log_evidence
     gain = there.log_evidence - far - nothing
-    begun, start = replace(begun, log_gain=gain), np.append(there.z, begun.mean)
-    return RankedChangePoint(none.log_posterior + gain, begun, none.place, start)
+    change_point, start = replace(change_point, log_gain=gain), np.append(there.z, change_point.mean)
+    return RankedChangePoint(none.log_posterior + gain, change_point, none.point, start)
 
 
 def _log_none(problem: Problem, fit: Fit, record: int) -> float:

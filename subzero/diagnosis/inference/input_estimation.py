@@ -197,7 +197,7 @@ def estimate_force(
     k = D.size
     force, covariance = L @ done.z[k:], L @ found.M[k:, k:] @ L.T
     at_knots = np.linalg.solve(L.T, done.J[:, k:].T).T
-    return _recovered(axis, more, done, knots, force, covariance, at_knots, D)
+    return _estimated(axis, more, done, D, History(knots, force, covariance, at_knots))
 
 
 def estimate_drift(
@@ -211,7 +211,7 @@ def estimate_drift(
     whole, J = np.concatenate([D, np.ones(L.shape[1])]), np.hstack([fit.J, C @ L])
     found, k = _linear(fit, J, whole), D.size
     force, covariance = L @ found.z[k:], L @ found.M[k:, k:] @ L.T
-    return _recovered(channel, problem, fit, knots, force, covariance, C, D)
+    return _estimated(channel, problem, fit, D, History(knots, force, covariance, C))
 
 
 def _seen(fit: Fit, D: np.ndarray, columns: np.ndarray) -> ForceInformation:
@@ -236,17 +236,18 @@ def _best_modes(data: ForceInformation, knots: Knots, size: float) -> np.ndarray
     return modes(knots.time, knots.record, ProcessShape(amplitudes[j], CORRELATION_TIMES_S[i]))
 
 
-def _recovered(
-    axis: str,
-    problem: Problem,
-    fit: Fit,
-    knots: Knots,
-    force: np.ndarray,
-    covariance: np.ndarray,
-    columns: np.ndarray,
-    D: np.ndarray,
-) -> EstimatedForce:
-    """Return it all, told for the record where the force is largest."""
+class History(NamedTuple):
+    """A history at knots: force or drift (n,), its covariance (n, n), and sensitivities to it (m, n)."""
+
+    knots: Knots
+    force: np.ndarray
+    covariance: np.ndarray
+    columns: np.ndarray
+
+
+def _estimated(axis: str, problem: Problem, fit: Fit, D: np.ndarray, found: History) -> EstimatedForce:
+    """Return a force or a drift, reported for the record in which it is largest."""
+    knots, force, covariance, columns = found
     size = [float(np.sqrt(np.mean(force[knots.record == i] ** 2))) for i in range(len(problem.records))]
     record = int(np.argmax(size))
     own = knots.record == record
@@ -263,14 +264,14 @@ class RelinearisedForce(NamedTuple):
     Attributes:
         log_posterior: of it beside nothing, but for its own prior.
         what: it is.
-        place: the linear problem there, without it, and the run, with it.
-        is_lost: it does not explain the records.
+        point: the linear problem there, without it, and the run, with it.
+        is_poor: it does not explain the records.
     """
 
     log_posterior: float
     what: LatentForceCandidate
-    place: LinearisationPoint
-    is_lost: bool
+    point: LinearisationPoint
+    is_poor: bool
 
 
 def relinearised_force(
@@ -295,8 +296,8 @@ def relinearised_force(
         knots, done = found.knots, fit_beside_drift(problem, found, D)
     fit = _without(found, done, D.size)
     ((log, what),) = linear_candidates(problem, fit, {name: found.columns}, knots, terms, [kappa])
-    place = LinearisationPoint(fit=fit, along=BaseRun(found.problem, done.z))
-    return RelinearisedForce(log + _possible(problem, done), what, place, is_poor_fit(done))
+    point = LinearisationPoint(fit=fit, along=BaseRun(found.problem, done.z))
+    return RelinearisedForce(log + _possible(problem, done), what, point, is_poor_fit(done))
 
 
 def linear_candidates(

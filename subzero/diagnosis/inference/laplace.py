@@ -12,12 +12,10 @@ import numpy as np
 from scipy.stats import norm
 
 from subzero.diagnosis.hypothesis.hypotheses import Entry, Ids, log_prior, nameable, variances
+from subzero.diagnosis.inference import settings
 from subzero.diagnosis.inference.linear_gaussian import KAPPAS, Scale, Scales, log_sum, posterior
 from subzero.diagnosis.inference.map_fit import Fit
 from subzero.diagnosis.inference.problem import Problem
-
-MAX_PREDICTED_GAIN = 300.0
-"""A gain predicted by old sensitivities counts up to this much."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -39,7 +37,7 @@ class Candidate:
     @property
     def optimistic_log_posterior(self) -> float:
         """The log posterior that a better fit might have."""
-        return self.log_posterior + min(self.fit.predicted_gain, MAX_PREDICTED_GAIN)
+        return self.log_posterior + min(self.fit.predicted_gain, settings.MAX_PREDICTED_GAIN_NATS)
 
     @property
     def log_mixed(self) -> float:

@@ -2,10 +2,10 @@
 
     objective = ½ |r(z)|² + ½ zᵀ D⁻¹ z,   low ≤ z ≤ high
 
-A step is the best of the linear model within bounds, or the part of it that gains, and its secant updates J.
+A step is the best of the linear model within bounds, or the part of it that gains, and its broyden_update updates J.
 
 Where a drum stops, a cable falls slack or a gear has play, simulations have non-smooth points, and a fit may end in a
-local minimum beyond one. `restarted_off_kinks` fits once more with all one-sided parameters as they are in most
+local minimum beyond one. `restarted_where_smooth` fits once more with all one-sided parameters as they are in most
 vehicles, but for those of named causes. `fit_wide` is the fit with κ = 4, close to the records whatever is wrong; the
 noise is estimated behind it.
 """
@@ -17,20 +17,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from subzero.diagnosis.hypothesis.hypotheses import Ids, variances
+from subzero.diagnosis.hypothesis.hypotheses import Ids
+from subzero.diagnosis.inference import settings
 from subzero.diagnosis.inference.linear_gaussian import Quadratic
-from subzero.diagnosis.inference.problem import Problem, Progress, with_noise_behind
-
-MIN_GAIN = 0.1
-"""A step that would gain less than this in the objective is not taken: no evidence hangs on it."""
+from subzero.diagnosis.inference.problem import Problem
 
 
 class Step(NamedTuple):
-    """A step: what the linear model promised, and promises of what is left; the share of it that was gained; where it
+    """A step: what the linear model predicted, and promises of what is left; the share of it that was gained; where it
     leads, the residual and the objective there.
     """
 
-    promised: float
+    predicted: float
     left: float
     share: float
     z: np.ndarray
@@ -38,33 +36,35 @@ class Step(NamedTuple):
     now: float
 
 
-def stride(problem: Problem, z: np.ndarray, r: np.ndarray, now: float, J: np.ndarray, D: np.ndarray) -> Step:
+def damped_step(
+    problem: Problem, z: np.ndarray, r: np.ndarray, now: float, J: np.ndarray, D: np.ndarray
+) -> Step:
     """Return the step that is best for the linear model within bounds; if that gains nothing, the one that holds what
-    has kinks; none where no more than MIN_GAIN is promised.
+    has kinks; none where no more than settings.NEGLIGIBLE_GAIN_NATS is predicted.
     """
     low, high = bounds(problem)
-    promised = 0.0
+    predicted = 0.0
     for bound in ((low, high), _held(z, low, high)):
         step = bounded_step(J, r, z, D, *bound)
         left = now - objective(r - J @ step, z + step, D)
-        promised = max(promised, left)
-        if left < MIN_GAIN:
+        predicted = max(predicted, left)
+        if left < settings.NEGLIGIBLE_GAIN_NATS:
             break
         share, there, r_there, then = _walk(problem, z, r, now, step, left, D)
         if share > 0.0:
-            return Step(promised, left, share, there, r_there, then)
-    return Step(promised, left, 0.0, z, r, now)
+            return Step(predicted, left, share, there, r_there, then)
+    return Step(predicted, left, 0.0, z, r, now)
 
 
 def _held(z: np.ndarray, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return bounds that hold where they are all entries that are possible on one side only: where a drum stops, a
     cable falls slack or a gear has play, runs have kinks, and a step across one spoils what the others would gain.
     """
-    kinked = low == 0.0
-    return np.where(kinked, z, low), np.where(kinked, z, high)
+    one_sided = low == 0.0
+    return np.where(one_sided, z, low), np.where(one_sided, z, high)
 
 
-def secant(J: np.ndarray, step: np.ndarray, change: np.ndarray, D: np.ndarray) -> np.ndarray:
+def broyden_update(J: np.ndarray, step: np.ndarray, change: np.ndarray, D: np.ndarray) -> np.ndarray:
     """Return sensitivities that explain the change of the residual along a step, otherwise as they were (Broyden
     1965), with steps measured in prior deviations: J + (−Δr − J s) (D⁻¹s)ᵀ/(sᵀD⁻¹s).
     """
@@ -78,16 +78,16 @@ def _walk(
     r: np.ndarray,
     now: float,
     step: np.ndarray,
-    promised: float,
+    predicted: float,
     D: np.ndarray,
 ) -> tuple[float, np.ndarray, np.ndarray, float]:
-    """Return the share of what was promised that a step, or a part of it, gains; and where it leads."""
+    """Return the share of what was predicted that a step, or a part of it, gains; and where it leads."""
     for part in (1.0, 0.4, 0.1):
         there = z + part * step
         r_there = problem.residual(there)
         then = objective(r_there, there, D)
         if then < now:
-            return (now - then) / promised, there, r_there, then
+            return (now - then) / predicted, there, r_there, then
     return 0.0, z, r, now
 
 
@@ -129,19 +129,6 @@ def quadratic_step(P: np.ndarray, g: np.ndarray, least: np.ndarray, most: np.nda
         x = np.clip(x, least, most)
         held = (held | out) & ~back
     return np.clip(x, least, most)
-
-
-CONVERGED_GAIN = 0.5
-"""A fit that no step improves although the linear model promises less than this has converged, too."""
-OWN_JACOBIAN_WITHIN = 1.0
-"""Sensitivities are a fit's own if they were made so close to it, in tolerances."""
-POOR_FIT_SIGMAS = 2.0
-"""A fit whose square is this many of its standard deviations above that of noise leaves more than noise."""
-MAX_RESTARTS, RESTART_GAIN = 3, 30.0
-"""A fit goes on, so often, while the linear problem where it stopped promises so much more."""
-MAX_STEPS = 8
-STALE_GAIN_SHARE = 0.5
-"""A step that gains less than this share of what the linear model promised has old sensitivities."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -186,20 +173,20 @@ class Fit:
 def is_poor_fit(fit: Fit) -> bool:
     """Say whether a fit leaves more than noise."""
     count = fit.r.size
-    return bool(fit.r @ fit.r > count + POOR_FIT_SIGMAS * np.sqrt(2.0 * count))
+    return bool(fit.r @ fit.r > count + settings.POOR_FIT_SIGMAS * np.sqrt(2.0 * count))
 
 
 def with_own_jacobian(problem: Problem, fit: Fit) -> Fit:
     """Return a fit again with sensitivities of its own, if it has moved from where its sensitivities were made."""
-    if fit.moved(problem) < OWN_JACOBIAN_WITHIN:
+    if fit.moved(problem) < settings.OWN_JACOBIAN_TOLERANCES:
         return fit
     return refit(problem, fit.z, problem.jacobian(fit.z), fit.D, r=fit.r, most_fresh=0, made_at=fit.z)
 
 
 def continued(problem: Problem, fit: Fit) -> Fit:
-    """Return a fit that has gone on, with sensitivities of its own, while much is promised."""
-    for _ in range(MAX_RESTARTS):
-        if fit.predicted_gain < RESTART_GAIN:
+    """Return a fit that has gone on, with sensitivities of its own, while much is predicted."""
+    for _ in range(settings.MAX_ROUNDS):
+        if fit.predicted_gain < settings.DECISIVE_NATS:
             break
         J = problem.jacobian(fit.z)
         fit = refit(problem, fit.z, J, fit.D, r=fit.r, most_fresh=2, made_at=fit.z)
@@ -229,15 +216,19 @@ def refit(
     """
     z, r = _runnable(problem, np.clip(z, *bounds(problem)), r)
     now, fresh, converged, left = objective(r, z, D), 0, False, 0.0
-    for _ in range(MAX_STEPS):
-        one = stride(problem, z, r, now, J, D)
+    for _ in range(settings.MAX_STEPS):
+        one = damped_step(problem, z, r, now, J, D)
         if one.share > 0.0:
-            J = secant(J, one.z - z, one.r - r, D)
+            J = broyden_update(J, one.z - z, one.r - r, D)
         z, r, now, left = one.z, one.r, one.now, one.left
-        if one.share < STALE_GAIN_SHARE and one.promised > CONVERGED_GAIN and fresh < most_fresh:
+        if (
+            one.share < settings.STALE_GAIN_SHARE
+            and one.predicted > settings.CONVERGED_GAIN_NATS
+            and fresh < most_fresh
+        ):
             J, fresh, made_at = problem.jacobian(z), fresh + 1, z.copy()
         elif one.share <= 0.0:
-            converged = left < CONVERGED_GAIN
+            converged = left < settings.CONVERGED_GAIN_NATS
             break
     return Fit(
         z=z,
@@ -263,12 +254,6 @@ def _runnable(problem: Problem, z: np.ndarray, r: np.ndarray | None) -> tuple[np
     return z, r
 
 
-STRAYED_TOLERANCES = 2.0
-"""A fit that bends what has kinks by so many tolerances has gone astray."""
-RESTART_TOLERANCES = 0.5
-"""What has kinks is begun again with so many tolerances: off the kinks, where most vehicles are."""
-
-
 def non_smooth(problem: Problem, but: Ids) -> list[int]:
     """Return the entries of causes on one side only, but for sensors' and some causes': drums stop, cables fall slack,
     gears have play.
@@ -281,10 +266,10 @@ def at_bad_minimum(problem: Problem, fit: Fit, ids: Ids) -> bool:
     """Say whether the fit of a hypothesis bends what has kinks farther than it should."""
     at = non_smooth(problem, ids)
     tolerance = np.array([problem.entries[k].parameter.tolerance for k in at])
-    return bool(np.any(np.abs(fit.z[at]) > STRAYED_TOLERANCES * tolerance))
+    return bool(np.any(np.abs(fit.z[at]) > settings.STRAYED_TOLERANCES * tolerance))
 
 
-def restarted_off_kinks(problem: Problem, fit: Fit, ids: Ids, D: np.ndarray | None = None) -> Fit:
+def restarted_where_smooth(problem: Problem, fit: Fit, ids: Ids, D: np.ndarray | None = None) -> Fit:
     """Return the fit of a hypothesis from where what has kinks is RESTART_TOLERANCES, and all else best for that.
 
     Args:
@@ -295,40 +280,6 @@ def restarted_off_kinks(problem: Problem, fit: Fit, ids: Ids, D: np.ndarray | No
     """
     at, D = non_smooth(problem, ids), fit.D if D is None else D
     low, high = bounds(problem)
-    low[at] = high[at] = [RESTART_TOLERANCES * problem.entries[k].parameter.tolerance for k in at]
+    low[at] = high[at] = [settings.RESTART_TOLERANCES * problem.entries[k].parameter.tolerance for k in at]
     z = fit.z + bounded_step(fit.J, fit.r, fit.z, D, low, high)
     return refit(problem, z, problem.jacobian(z), D, most_fresh=1, made_at=z)
-
-
-KAPPA_WIDE = 4.0
-"""κ of the fit that the linear evidence is made at."""
-MAX_NOISE_ROUNDS = 2
-"""How often the noise may be estimated again, behind the fit."""
-Nominal = tuple[np.ndarray, np.ndarray]
-"""Residual (m,) and sensitivities (m, k) of the nominal model."""
-
-
-def fit_wide(problem: Problem, progress: Progress) -> tuple[Problem, Fit, Nominal]:
-    """Return the problem with the noise that is left behind the fit, the fit, and what the nominal model leaves."""
-    progress(0.05, "sensitivities of the nominal model")
-    zero = np.zeros(len(problem.entries))
-    J = problem.jacobian(zero)
-    fit = _from(problem, zero, J, progress)
-    for _ in range(MAX_NOISE_ROUNDS):
-        D = variances(problem.entries, (), KAPPA_WIDE)
-        again = with_noise_behind(problem, fit.z, D) if np.isfinite(fit.r).all() else None
-        if again is None:
-            break
-        problem, J = again, again.jacobian(zero)
-        fit = _from(problem, fit.z, problem.jacobian(fit.z), progress)
-    return problem, fit, (problem.residual(zero), J)
-
-
-def _from(problem: Problem, z: np.ndarray, J: np.ndarray, progress: Progress) -> Fit:
-    """Return the fit from z, with the sensitivities there; or if it went astray, a better one from off its kinks."""
-    progress(0.15, "fit within wide tolerances")
-    fit = refit(problem, z, J, variances(problem.entries, (), KAPPA_WIDE), most_fresh=2, made_at=z)
-    if not at_bad_minimum(problem, fit, ()):
-        return fit
-    again = restarted_off_kinks(problem, fit, ())
-    return again if again.objective < fit.objective else fit

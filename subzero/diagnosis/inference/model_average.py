@@ -12,7 +12,7 @@ cause counts only if it could be named (Occam fold).
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations
 from typing import NamedTuple, TypeVar
@@ -21,7 +21,7 @@ import numpy as np
 
 from subzero.diagnosis.hypothesis.hypotheses import Entry, Ids, columns_of
 from subzero.diagnosis.inference.laplace import Candidate
-from subzero.diagnosis.inference.linear_gaussian import log_sum
+from subzero.diagnosis.inference.linear_gaussian import KAPPAS, log_sum
 from subzero.diagnosis.inference.problem import Problem
 from subzero.diagnosis.inference.screening import Screening
 from subzero.diagnosis.results import CAUSE_NAMED, NOTHING_WRONG, OUTSIDE, UNDECIDED
@@ -81,7 +81,7 @@ class ChangePointSummary(NamedTuple):
 
 def decide(
     probabilities: Mapping[Ids, float],
-    foreign: float,
+    outside: float,
     practical: bool,
     apart: float,
     late: ChangePointSummary | None = None,
@@ -90,14 +90,14 @@ def decide(
 
     Args:
         probabilities: hypothesis → probability; with those outside the catalogue they sum to 1.
-        foreign: probability of a force or a drift that no cause explains.
+        outside: probability of a force or a drift that no cause explains.
         practical: the most probable hypothesis' causes are all of a practical size.
         apart: D of the most probable hypothesis against its closest rival.
         late: what begins in mid-trial.
     """
     late = late or ChangePointSummary()
     best = max(probabilities, key=lambda ids: probabilities[ids])
-    if foreign >= OUT_OF_CATALOGUE_PROBABILITY:
+    if outside >= OUT_OF_CATALOGUE_PROBABILITY:
         return OUTSIDE
     if late.is_named:
         return CAUSE_NAMED
@@ -123,13 +123,13 @@ class Beliefs:
     Attributes:
         candidates: hypothesis → its real fit.
         screen: what the linear problem at the wide fit says.
-        beside: hypothesis → log posterior, estimated at the fit of one with a cause less.
+        one_more: hypothesis → log posterior, estimated at the fit of one with a cause less.
         behind: hypothesis → how far its fit was behind the best when it was given up, in log posterior.
     """
 
     candidates: Mapping[Ids, Candidate]
     screen: Screening
-    beside: Mapping[Ids, float]
+    one_more: Mapping[Ids, float]
     behind: Mapping[Ids, float] = field(default_factory=dict)
 
     def log_posteriors(self) -> dict[Ids, float]:
@@ -158,8 +158,8 @@ class Beliefs:
         """Return the log posterior of a hypothesis without a fit: of the best fit of a part of it, and what the linear
         problem there, or else the screen, says that the rest adds.
         """
-        if ids in self.beside:
-            return self.beside[ids]
+        if ids in self.one_more:
+            return self.one_more[ids]
         parts = [one for size in range(len(ids)) for one in combinations(ids, size) if one in fitted]
         part = max(parts, key=lambda one: fitted[one], default=())
         return fitted[part] + self.screen.adds(ids, part)
@@ -185,3 +185,16 @@ def occam_folded(probabilities: Mapping[Ids, float]) -> dict[Ids, float]:
             if probabilities.get(part, 0.0) * FURTHER_CAUSE_ODDS > probabilities[ids]:
                 found[part] += found.pop(ids)
     return dict(sorted(found.items(), key=lambda pair: -pair[1]))
+
+
+def tolerance_scale(candidates: Collection[Candidate]) -> dict[float, float]:
+    """Return κ → probability, over all candidates."""
+    top = max(one.log_posterior for one in candidates)
+    weight = dict.fromkeys(KAPPAS, 0.0)
+    for candidate in candidates:
+        parts = {kappa: np.log(prior) + candidate.log_evidence[kappa] for kappa, prior in KAPPAS.items()}
+        mixed = log_sum(list(parts.values()))
+        for kappa, value in parts.items():
+            weight[kappa] += float(np.exp(candidate.log_posterior - top + value - mixed))
+    total = sum(weight.values())
+    return {kappa: value / total for kappa, value in weight.items()}

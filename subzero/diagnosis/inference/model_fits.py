@@ -17,28 +17,16 @@ from typing import TypeVar
 import numpy as np
 
 from subzero.diagnosis.hypothesis.hypotheses import Ids, columns_of, variances
+from subzero.diagnosis.inference import settings
 from subzero.diagnosis.inference.laplace import Candidate, candidate_of
 from subzero.diagnosis.inference.linear_gaussian import posterior
-from subzero.diagnosis.inference.map_fit import CONVERGED_GAIN, MIN_GAIN, Fit, refit
-from subzero.diagnosis.inference.problem import (
-    Problem,
-    Progress,
-    whitened_again,
-    with_finer_steps,
-    with_noise_behind,
-)
+from subzero.diagnosis.inference.map_fit import Fit, refit
+from subzero.diagnosis.inference.posing import whitened_again, with_finer_steps, with_noise_behind
+from subzero.diagnosis.inference.problem import Problem, Progress
 from subzero.diagnosis.inference.screening import Screening, is_flat, screening_of
 
 Asked = TypeVar("Asked")
 Made = TypeVar("Made")
-MAX_REFINED, HOPELESS_LOG_POSTERIOR = 6, 6.0
-"""At most so many fits with sensitivities of their own in a race; none for what is this far behind in log posterior."""
-JACOBIAN_WITHIN = 4.0
-"""Sensitivities hold as far as this from where they were made, in tolerances."""
-MAX_RUNS_PER_RECORD = 800
-"""After so many runs of each record only what hopes to be the best is fitted again."""
-MAX_CROSSINGS = 2
-"""So often close rivals are fitted from where the others are."""
 
 
 @dataclass(kw_only=True, eq=False)
@@ -51,7 +39,7 @@ class Fits:
         wide: the fit with wide tolerances.
         screen: what the linear problem at the wide fit says.
         candidates: hypothesis → its real fit.
-        raced: hypotheses that were fitted with sensitivities of their own.
+        refined: hypotheses that were fitted with sensitivities of their own.
         side: threads for fits side by side, whose runs may use those of the problem.
     """
 
@@ -60,7 +48,7 @@ class Fits:
     wide: Fit = field(init=False)
     screen: Screening = field(default_factory=Screening)
     candidates: dict[Ids, Candidate] = field(default_factory=dict)
-    raced: set[Ids] = field(default_factory=set)
+    refined: set[Ids] = field(default_factory=set)
     side: ThreadPoolExecutor = field(default_factory=lambda: ThreadPoolExecutor(cpu_count() or 1))
 
     def best(self) -> Candidate:
@@ -80,7 +68,9 @@ class Fits:
         known of; or from another fit, and keep what is better.
         """
         wanted = [ids for ids in dict.fromkeys(several) if start or ids not in self.candidates]
-        for ids, found in zip(wanted, self._aside(partial(self._fitted, start=start), wanted), strict=True):
+        for ids, found in zip(
+            wanted, self._in_parallel(partial(self._fitted, start=start), wanted), strict=True
+        ):
             if words:
                 self._say(0.3, words, ids)
             self._take(found)
@@ -90,11 +80,11 @@ class Fits:
         known = self.candidates.get(found.ids)
         if known is None or found.log_posterior > known.log_posterior:
             self.candidates[found.ids] = found
-            self.raced.discard(found.ids)
+            self.refined.discard(found.ids)
 
     def _fitted(self, ids: Ids, start: Fit | None) -> Candidate:
         """Return a hypothesis with its fit from another, or from the wide one."""
-        D, z = variances(self.problem.entries, ids, 1.0), None if start else self.screen.secants.get(ids)
+        D, z = variances(self.problem.entries, ids, 1.0), None if start else self.screen.starts.get(ids)
         start = start or self.wide
         z = posterior(start.quadratic, D).z if z is None else z
         J = self._with_slopes(start.J, ids)
@@ -102,17 +92,18 @@ class Fits:
             self.problem, ids, refit(self.problem, z, J, D, most_fresh=0, made_at=start.made_at)
         )
 
-    def race(self, most: int = MAX_REFINED, hopeless: float = HOPELESS_LOG_POSTERIOR) -> None:
+    def refine(self, most: int | None = None, hopeless: float | None = None) -> None:
         """Fit candidates again with sensitivities of their own, the best first, until the next is hopeless."""
-        for _ in range(most):
-            self.raced |= {one.ids for one in self.candidates.values() if self._settled(one.fit)}
-            waiting = [one for one in self.candidates.values() if one.ids not in self.raced]
+        hopeless = settings.HOPELESS_NATS if hopeless is None else hopeless
+        runs = settings.MAX_RUNS_PER_RECORD * len(self.problem.records)
+        for _ in range(settings.MAX_REFINED if most is None else most):
+            self.refined |= {one.ids for one in self.candidates.values() if self._settled(one.fit)}
+            waiting = [one for one in self.candidates.values() if one.ids not in self.refined]
             if not waiting:
                 return
             now = max(waiting, key=lambda one: one.optimistic_log_posterior)
-            done = [self.candidates[ids].log_posterior for ids in self.raced]
-            most = MAX_RUNS_PER_RECORD * len(self.problem.records)
-            behind = 0.0 if self.problem.kept.asked > most else hopeless
+            done = [self.candidates[ids].log_posterior for ids in self.refined]
+            behind = 0.0 if self.problem.kept.asked > runs else hopeless
             if len(done) >= 2 and now.optimistic_log_posterior < max(done) - behind:
                 return
             self._say(0.5, "fitting again", now.ids)
@@ -122,20 +113,20 @@ class Fits:
         """Fit the close rivals of the best candidate from where that is, and it from where they are, and keep what is
         better: where a drum stops or a cable falls slack runs have kinks, and a fit may end in a hollow of its own.
         """
-        for _ in range(MAX_CROSSINGS):
+        for _ in range(settings.MAX_REPEATS):
             best = self.best()
-            close = [ids for ids in self._ranked()[1:MAX_REFINED]
-                     if self.candidates[ids].log_posterior > best.log_posterior - HOPELESS_LOG_POSTERIOR]  # fmt: skip
+            close = [ids for ids in self._ranked()[1:settings.MAX_REFINED]
+                     if self.candidates[ids].log_posterior > best.log_posterior - settings.HOPELESS_NATS]  # fmt: skip
             self.fit_all(close, best.fit)
             starts = [self.candidates[ids].fit for ids in close]
-            for found in self._aside(partial(self._fitted, best.ids), starts):
+            for found in self._in_parallel(partial(self._fitted, best.ids), starts):
                 self._take(found)
-            if self.best().log_posterior < best.log_posterior + CONVERGED_GAIN:
+            if self.best().log_posterior < best.log_posterior + settings.CONVERGED_GAIN_NATS:
                 return
 
     def _again(self, one: Candidate) -> None:
         """Fit a candidate with sensitivities of its own, under its most probable κ; again if that turns out another."""
-        self.raced.add(one.ids)
+        self.refined.add(one.ids)
         J, D = self.problem.jacobian(one.fit.z), variances(self.problem.entries, one.ids, one.kappa)
         fit = refit(self.problem, one.fit.z, J, D, r=one.fit.r, most_fresh=1, made_at=one.fit.z)
         now = self._keep(one.ids, fit)
@@ -156,11 +147,11 @@ class Fits:
         D = variances(self.problem.entries, ids, known.kappa if known else 1.0)
         z = posterior(fit.quadratic, D).z
         found = refit(self.problem, z, fit.J, D, most_fresh=0, made_at=fit.made_at)
-        if known is None or found.objective < known.fit.objective - MIN_GAIN:
+        if known is None or found.objective < known.fit.objective - settings.NEGLIGIBLE_GAIN_NATS:
             self._keep(ids, found)
-            self.raced.discard(ids)
+            self.refined.discard(ids)
 
-    def _settled(self, fit: Fit, near: float = JACOBIAN_WITHIN) -> bool:
+    def _settled(self, fit: Fit, near: float = settings.JACOBIAN_HOLDS_TOLERANCES) -> bool:
         """Say whether a fit has converged close to where its sensitivities were made, or has not left from there."""
         moved = fit.moved(self.problem)
         return moved == 0.0 or (fit.converged and moved < near)
@@ -173,7 +164,7 @@ class Fits:
                 J[:, k] = self.screen.columns[k]
         return J
 
-    def _aside(self, make: Callable[[Asked], Made], several: Sequence[Asked]) -> Iterator[Made]:
+    def _in_parallel(self, make: Callable[[Asked], Made], several: Sequence[Asked]) -> Iterator[Made]:
         """Return what is made of each of several, side by side: the runs of one fit come one after the other."""
         return self.side.map(make, several)
 
@@ -233,7 +224,7 @@ class SharpFits(Fits):
     def _give_up(self, best: Candidate) -> None:
         """Give up what is hopelessly behind the best candidate and no part of it."""
         kept = {ids: one for ids, one in self.candidates.items()
-                if one.log_posterior > best.log_posterior - HOPELESS_LOG_POSTERIOR
+                if one.log_posterior > best.log_posterior - settings.HOPELESS_NATS
                 or set(ids) <= set(best.ids)}  # fmt: skip
         self.behind |= {ids: one.log_posterior - best.log_posterior for ids, one in self.candidates.items()
                         if ids not in kept}  # fmt: skip
@@ -242,10 +233,10 @@ class SharpFits(Fits):
     def _go_on(self) -> None:
         """Fit all candidates from where they are, with the sensitivities at hand."""
         ids_of = list(self.candidates)
-        for ids, fit in zip(ids_of, self._aside(self._going_on, ids_of), strict=True):
+        for ids, fit in zip(ids_of, self._in_parallel(self._going_on, ids_of), strict=True):
             self._keep(ids, fit)
-            self.raced -= set() if fit.converged else {ids}
-        self.raced &= set(self.candidates)
+            self.refined -= set() if fit.converged else {ids}
+        self.refined &= set(self.candidates)
 
     def _going_on(self, ids: Ids) -> Fit:
         """Return the fit of a candidate from where it is, with the sensitivities at hand."""

@@ -13,23 +13,23 @@ from itertools import chain, combinations
 import numpy as np
 
 from subzero.diagnosis.hypothesis.hypotheses import Ids, columns_of, nameable, variances
+from subzero.diagnosis.inference import settings
 from subzero.diagnosis.inference.laplace import Candidate, candidate_of
 from subzero.diagnosis.inference.linear_gaussian import KAPPAS
 from subzero.diagnosis.inference.map_fit import (
-    MIN_GAIN,
     Fit,
     at_bad_minimum,
     continued,
-    fit_wide,
     is_poor_fit,
     non_smooth,
     refit,
-    restarted_off_kinks,
+    restarted_where_smooth,
 )
 from subzero.diagnosis.inference.model_average import Beliefs
 from subzero.diagnosis.inference.model_fits import SharpFits
 from subzero.diagnosis.inference.screening import (
     TriedSize,
+    fit_wide,
     is_close,
     screening_of,
     with_one_added,
@@ -37,48 +37,37 @@ from subzero.diagnosis.inference.screening import (
     with_sizes_tried,
 )
 
-MAX_ADDED, MAX_SWAPPED, MIN_ADDED_LOG_POSTERIOR = 2, 3, -4.0
-"""At most so many with a cause more, of a log posterior that adds at least MIN_ADDED_LOG_POSTERIOR; so many with
-another cause.
-"""
-BAD_MINIMUM_LOG_POSTERIOR = 6.0
-"""A fit with so much less log posterior than the linear problem at another promises may have gone astray."""
-MIN_MERGED_LOG_POSTERIOR, MERGED_SCALES = -15.0, (0.5, 1.5)
-"""One cause in the place of two is fitted if its log posterior adds at least that, at one of these effect scales."""
-MOST_CAUSES, MAX_GROWING_ROUNDS = 3, 4
-"""Causes of a hypothesis, and rounds of growing."""
-
 
 @dataclass(kw_only=True, eq=False)
 class GrowingFits(SharpFits):
     """Fits that more are made around.
 
     Attributes:
-        beside: hypothesis → log posterior, estimated at the fit of one with a cause less.
-        begun: hypotheses that were fitted from off their kinks.
+        one_more: hypothesis → log posterior, estimated at the fit of one with a cause less.
+        restarted: hypotheses that were fitted from off their kinks.
     """
 
-    beside: dict[Ids, float] = field(default_factory=dict)
-    begun: set[Ids] = field(default_factory=set)
+    one_more: dict[Ids, float] = field(default_factory=dict)
+    restarted: set[Ids] = field(default_factory=set)
 
     def grow(self) -> None:
         """Look beside the best candidate for one more cause, in the place of each for another, and below it for one
         less, until the best stays.
         """
         looked: set[Ids] = set()
-        for _ in range(MAX_GROWING_ROUNDS):
-            best = self.begin_again(self.best())
+        for _ in range(settings.MAX_GROWING_ROUNDS):
+            best = self.restart(self.best())
             if best.ids in looked:
                 return
             looked.add(best.ids)
             self._say(0.7, "a further cause beside", best.ids)
-            self.fit_all(self._more(best) if len(best.ids) < MOST_CAUSES else [], best.fit)
+            self.fit_all(self._more(best) if len(best.ids) < settings.MAX_CAUSES else [], best.fit)
             for without in best.ids:
                 self._without(best, without)
-            self._aside_of(best)
-            self._kinked(best)
+            self._beside_others(best)
+            self._non_smooth(best)
             self._parts_again(best)
-            self.race(2, 2.0)
+            self.refine(settings.MAX_ADDED, settings.CLOSE_NATS)
             self.cross()
             self.sharpen()
             if self.best().ids == best.ids:
@@ -87,40 +76,40 @@ class GrowingFits(SharpFits):
     def _more(self, best: Candidate) -> list[Ids]:
         """Return the hypotheses with one cause more that the linear problem at the best fit finds best."""
         found = self._unknown(with_one_added(self.problem, best))
-        self.beside |= found
-        return _best_of(found, best.log_posterior + MIN_ADDED_LOG_POSTERIOR)
+        self.one_more |= found
+        return _best_of(found, best.log_posterior - settings.FURTHER_CAUSE_NATS)
 
     def _without(self, best: Candidate, without: str) -> None:
         """Fit the best hypothesis without one of its causes, and with others in its place."""
         rest = tuple(one for one in best.ids if one != without)
         self._below(rest, best.fit)
         found = self._unknown(with_one_swapped(self.problem, best, rest))
-        self.fit_all(sorted(found, key=lambda ids: -found[ids])[:MAX_SWAPPED], best.fit)
+        self.fit_all(sorted(found, key=lambda ids: -found[ids])[: settings.MAX_TRIED], best.fit)
 
-    def _aside_of(self, best: Candidate) -> None:
+    def _beside_others(self, best: Candidate) -> None:
         """Fit what comes out best beside the other candidates, if the linear problem there has it before the best: a
         right pair may be far from a wrong cause that is as good as any by itself.
         """
         found: dict[Ids, tuple[float, Fit]] = {}
         for one in self.candidates.values():
-            if one is not best and len(one.ids) < MOST_CAUSES:
+            if one is not best and len(one.ids) < settings.MAX_CAUSES:
                 for ids, log in self._unknown(with_one_added(self.problem, one)).items():
                     if log > max(best.log_posterior, found.get(ids, (-np.inf,))[0]):
                         found[ids] = log, one.fit
-        for ids in sorted(found, key=lambda ids: -found[ids][0])[:MAX_ADDED]:
+        for ids in sorted(found, key=lambda ids: -found[ids][0])[: settings.MAX_ADDED]:
             self.fit(ids, found[ids][1])
 
-    def _kinked(self, best: Candidate) -> None:
+    def _non_smooth(self, best: Candidate) -> None:
         """Fit causes that runs have kinks in beside the best, or in the place of one of its causes."""
         found = dict[Ids, TriedSize]()
         rests = [tuple(one for one in best.ids if one != without) for without in best.ids]
-        for rest in [best.ids, *rests] if len(best.ids) < MOST_CAUSES else rests:
+        for rest in [best.ids, *rests] if len(best.ids) < settings.MAX_CAUSES else rests:
             for ids, one in with_sizes_tried(
                 self.problem, best, rest, non_smooth(self.problem, rest)
             ).items():
                 if ids not in found or one.log_posterior > found[ids].log_posterior:
                     found[ids] = one
-        for ids in self._worth_fitting(found, best, MIN_ADDED_LOG_POSTERIOR):
+        for ids in self._worth_fitting(found, best, -settings.FURTHER_CAUSE_NATS):
             D = variances(self.problem.entries, ids, best.kappa)
             fit = refit(self.problem, found[ids].z, found[ids].J, D, most_fresh=0)
             self._take(candidate_of(self.problem, ids, fit))
@@ -134,26 +123,26 @@ class GrowingFits(SharpFits):
             entries, tuple(one for one in nameable(self.problem.entries) if one not in best.ids)
         )
         for rest in combinations(best.ids, len(best.ids) - 2) if len(best.ids) > 1 else ():
-            found |= with_sizes_tried(self.problem, best, rest, others, MERGED_SCALES)
-        worth = self._worth_fitting(found, best, MIN_MERGED_LOG_POSTERIOR)
+            found |= with_sizes_tried(self.problem, best, rest, others, settings.MERGED_SCALES)
+        worth = self._worth_fitting(found, best, -settings.MERGED_NATS)
         for ids in worth:
             z, D = found[ids].z, variances(entries, ids, best.kappa)
             fit = refit(self.problem, z, self.problem.jacobian(z), D, most_fresh=2, made_at=z)
             self._take(candidate_of(self.problem, ids, fit))
-        self.race(2 if worth else 0)
+        self.refine(2 if worth else 0)
 
     def _worth_fitting(self, found: Mapping[Ids, TriedSize], best: Candidate, least: float) -> list[Ids]:
         """Return the best of what was tried that no fit is known of, if its log posterior adds `least` to the best."""
         new = self._unknown({ids: one.log_posterior for ids, one in found.items() if ids != best.ids})
         return _best_of(new, best.log_posterior + least)
 
-    def begin_again(self, one: Candidate) -> Candidate:
+    def restart(self, one: Candidate) -> Candidate:
         """Fit a candidate from off its kinks, once, and return what is best then."""
-        if one.ids not in self.begun:
-            self.begun.add(one.ids)
+        if one.ids not in self.restarted:
+            self.restarted.add(one.ids)
             D = variances(self.problem.entries, one.ids, one.kappa)
             self._take(
-                candidate_of(self.problem, one.ids, restarted_off_kinks(self.problem, one.fit, one.ids, D))
+                candidate_of(self.problem, one.ids, restarted_where_smooth(self.problem, one.fit, one.ids, D))
             )
         return self.best()
 
@@ -163,38 +152,20 @@ class GrowingFits(SharpFits):
             ids = tuple(one for one in best.ids if one != without)
             fit, D = self.candidates[ids].fit, variances(self.problem.entries, ids, 1.0)
             if at_bad_minimum(self.problem, fit, ids):
-                self._take(candidate_of(self.problem, ids, restarted_off_kinks(self.problem, fit, ids, D)))
+                self._take(candidate_of(self.problem, ids, restarted_where_smooth(self.problem, fit, ids, D)))
 
     def _unknown(self, found: dict[Ids, float]) -> dict[Ids, float]:
         """Return those of estimated log posteriors that no fit is known of, or only one that went astray from afar."""
         known = {ids: one.log_posterior for ids, one in self.candidates.items()}
         return {
-            ids: log
-            for ids, log in found.items()
-            if known.get(ids, -np.inf) < log - BAD_MINIMUM_LOG_POSTERIOR
+            ids: log for ids, log in found.items() if known.get(ids, -np.inf) < log - settings.HOPELESS_NATS
         }
 
 
 def _best_of(found: Mapping[Ids, float], least: float) -> list[Ids]:
     """Return the best hypotheses, at most MAX_ADDED, of those whose log posterior is above the least."""
-    ranked = sorted(found, key=lambda ids: -found[ids])[:MAX_ADDED]
+    ranked = sorted(found, key=lambda ids: -found[ids])[: settings.MAX_ADDED]
     return [ids for ids in ranked if found[ids] > least]
-
-
-KEEP_LOG_EVIDENCE, MAX_SINGLES, MAX_PAIRS = 12.0, 7, 4
-"""Refit hypotheses whose log evidence is this close to the best of their kind, and at most so many."""
-MAX_BENT, BENT_TOLERANCES = 2, 10.0
-"""So many causes that the wide fit bends by at least so many tolerances are fitted by themselves."""
-MAX_SWEPT = 4
-"""So many causes are fitted by themselves if the wide fit is not close."""
-MAX_RESTARTED, MAX_SETTLING_ROUNDS, SETTLED_JACOBIAN_WITHIN = 3, 3, 1.0
-"""So many are fitted from off their kinks; rounds of settling; so close, in tolerances, the sensitivities of what is
-told were made.
-"""
-RIVAL_LOG_POSTERIOR, AKIN_LOG_POSTERIOR = 2.0, 6.0
-"""What is so close to the best in log posterior is settled, too; what has a cause more or less, from farther behind;
-the first within AKIN_LOG_POSTERIOR are fitted from off their kinks, too.
-"""
 
 
 @dataclass(kw_only=True, eq=False)
@@ -227,22 +198,22 @@ class Search(GrowingFits):
     def first_fits(self) -> None:
         """Fit nothing, and the best causes and pairs of the screen, with real runs and the sensitivities at hand."""
         first = self._first()
-        for ids, fit in zip(first, self._aside(self._alone, first), strict=True):
+        for ids, fit in zip(first, self._in_parallel(self._alone, first), strict=True):
             self._say(0.3, "fitting", ids, " by itself")
             self._keep(ids, fit)
         best = (
-            self.screen.best(1, MAX_SINGLES, KEEP_LOG_EVIDENCE),
-            self.screen.best(2, MAX_PAIRS, KEEP_LOG_EVIDENCE),
+            self.screen.best(1, settings.MAX_SINGLES, settings.SCREENED_NATS),
+            self.screen.best(2, settings.MAX_PAIRS, settings.SCREENED_NATS),
         )
         self.fit_all(list(chain([()], *best)), words="fitting")
 
-    def races(self) -> None:
+    def refine_first(self) -> None:
         """Fit what came out best again, with sensitivities of its own."""
-        self.race(2)
+        self.refine(2)
         self.sharpen()
-        self.race()
+        self.refine()
 
-    def is_lost(self) -> bool:
+    def is_poor(self) -> bool:
         """Say whether nothing that was fitted so far explains the records, within declared tolerances."""
         return is_poor_fit(self.best().fit) or self.best().kappa > min(KAPPAS)
 
@@ -252,58 +223,62 @@ class Search(GrowingFits):
         """
         self._once_more()
         stuck: set[Ids] = set()
-        for _ in range(MAX_SETTLING_ROUNDS):
+        for _ in range(settings.MAX_ROUNDS):
             best = self.best()
             for one in [one for one in self.candidates.values() if self._is_open(one, best)]:
                 if one.ids in stuck:
                     continue
                 self._say(0.75, "settling", one.ids)
                 self._again(one)
-                if self.candidates[one.ids].log_posterior < one.log_posterior + MIN_GAIN:
+                if self.candidates[one.ids].log_posterior < one.log_posterior + settings.NEGLIGIBLE_GAIN_NATS:
                     stuck.add(one.ids)
         self.cross()
         self._nothing()
 
     def _once_more(self) -> None:
         """Fit the first candidates from off their kinks, if they are close to the best and were not so begun before."""
-        for ids in self._ranked()[:MAX_RESTARTED]:
-            close = self.candidates[ids].log_posterior > self.best().log_posterior - AKIN_LOG_POSTERIOR
-            if close and ids not in self.begun:
+        for ids in self._ranked()[: settings.MAX_TRIED]:
+            close = self.candidates[ids].log_posterior > self.best().log_posterior - settings.HOPELESS_NATS
+            if close and ids not in self.restarted:
                 self._say(0.75, "once more", ids)
-                self.begin_again(self.candidates[ids])
+                self.restart(self.candidates[ids])
 
     def _is_open(self, one: Candidate, best: Candidate) -> bool:
         """Say whether a candidate that is as good as the best, or might still catch up with it, has not settled."""
         behind = best.log_posterior - one.optimistic_log_posterior
-        if behind < RIVAL_LOG_POSTERIOR:
-            return not self._settled(one.fit, SETTLED_JACOBIAN_WITHIN)
-        akin = behind < AKIN_LOG_POSTERIOR and _akin(one.ids, best.ids)
+        if behind < settings.CLOSE_NATS:
+            return not self._settled(one.fit, settings.OWN_JACOBIAN_TOLERANCES)
+        akin = behind < settings.HOPELESS_NATS and _akin(one.ids, best.ids)
         return akin and not one.fit.converged and not self._settled(one.fit)
 
     @property
     def beliefs(self) -> Beliefs:
         """What is known of all hypotheses by now."""
-        return Beliefs(candidates=self.candidates, screen=self.screen, beside=self.beside, behind=self.behind)
+        return Beliefs(
+            candidates=self.candidates, screen=self.screen, one_more=self.one_more, behind=self.behind
+        )
 
     def _first(self) -> list[Ids]:
         """Return the causes that are fitted by themselves: those that the wide fit bends most, of which the linear
         problem says little; and if it is not close to the records, the best of those that were swept.
         """
         if self.screen.far:
-            return self.screen.best(1, MAX_SWEPT, np.inf)
-        bent: dict[Ids, float] = {}
+            return self.screen.best(1, settings.MAX_PAIRS, np.inf)
+        moved: dict[Ids, float] = {}
         for z, entry in zip(self.wide.z, self.problem.entries, strict=True):
             if entry.record < 0:
                 size, ids = abs(float(z)) / entry.parameter.tolerance, (entry.effect.id,)
-                bent[ids] = max(size, bent.get(ids, 0.0))
+                moved[ids] = max(size, moved.get(ids, 0.0))
         return [
-            ids for ids in sorted(bent, key=lambda ids: -bent[ids])[:MAX_BENT] if bent[ids] > BENT_TOLERANCES
+            ids
+            for ids in sorted(moved, key=lambda ids: -moved[ids])[: settings.MAX_ADDED]
+            if moved[ids] > settings.BENT_TOLERANCES
         ]
 
     def _alone(self, ids: Ids) -> Fit:
         """Return the fit of a cause from where the wide fit has it, all else nominal, with the sensitivities there."""
         z, at = np.zeros(len(self.problem.entries)), columns_of(self.problem.entries, ids)
-        z[at] = self.screen.secants.get(ids, self.wide.z)[at]
+        z[at] = self.screen.starts.get(ids, self.wide.z)[at]
         D = variances(self.problem.entries, ids, 1.0)
         return continued(
             self.problem, refit(self.problem, z, self.problem.jacobian(z), D, most_fresh=2, made_at=z)

@@ -14,6 +14,7 @@ from functools import partial
 import numpy as np
 
 from subzero.diagnosis.hypothesis.hypotheses import PRIOR, Ids
+from subzero.diagnosis.inference import settings
 from subzero.diagnosis.inference.basis import one_terms
 from subzero.diagnosis.inference.change_point_fit import FittedChangePoint, fit_change_points, linearised_at
 from subzero.diagnosis.inference.change_point_scan import BaseRun, LinearisationPoint
@@ -41,13 +42,6 @@ from subzero.diagnosis.inference.problem import Problem
 from subzero.diagnosis.results import Detectability, Misfit
 from subzero.external_force import AXES
 
-MAX_FORCES = 2
-"""Along the runs of at most so many forces."""
-ALIKE_LOG_POSTERIOR = 10.0
-"""Forces and hypotheses whose log posteriors differ by less."""
-MAX_LARGE = 2
-"""As large as in at most so many hypotheses."""
-
 
 def linearisation_points(
     search: Search, close: Sequence[RelinearisedForce], prior: float
@@ -61,29 +55,17 @@ def linearisation_points(
     """
     best = search.best()
     here = LinearisationPoint(fit=best.fit, along=BaseRun(search.problem, best.fit.z))
-    known = [] if search.is_lost() else [best.log_posterior - prior]
-    least = max([*(one.log_posterior for one in close), *known], default=0.0) - ALIKE_LOG_POSTERIOR
-    alike = [one.place for one in close[:MAX_FORCES] if one.log_posterior > least]
+    known = [] if search.is_poor() else [best.log_posterior - prior]
+    least = max([*(one.log_posterior for one in close), *known], default=0.0) - settings.LINEAR_NATS
+    alike = [one.point for one in close[: settings.MAX_ADDED] if one.log_posterior > least]
     return [here, *alike]
 
 
 def largest_hypotheses(search: Search) -> list[Candidate]:
     """Return the hypotheses whose causes may be what begins in mid-trial: the best that have any."""
-    least = search.best().log_posterior - ALIKE_LOG_POSTERIOR
+    least = search.best().log_posterior - settings.LINEAR_NATS
     ranked = sorted(search.candidates.values(), key=lambda one: -one.log_posterior)
-    return [one for one in ranked if one.log_posterior > least and one.ids][:MAX_LARGE]
-
-
-ALIKE_FORCES_LOG_POSTERIOR = 10.0
-"""Forces whose log posteriors differ by less are told apart with finer knots."""
-NEAR_LOG_POSTERIOR, FAR_LOG_POSTERIOR, MAX_RELINEARISED = 6.0, 45.0, 3
-"""No force that is further behind the best than FAR_LOG_POSTERIOR, in log posterior, is looked at
-around its own fit, and at most so many; where one cause explains the record within declared tolerances, what is linear
-is nearly true there: besides the most probable force only those that are as close as NEAR_LOG_POSTERIOR."""
-DECISIVE_LOG_POSTERIOR = 30.0
-"""No sum of causes gains more than this, in log posterior, over one cause that leaves nothing but noise."""
-CLOSER_LOOK_LOG_POSTERIOR = 2.0
-"""A force that is no further behind the best, in log posterior, is worth a closer look."""
+    return [one for one in ranked if one.log_posterior > least and one.ids][: settings.MAX_ADDED]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -91,16 +73,16 @@ class OutOfCatalogue:
     """An explanation from outside the list of hypotheses.
 
     Attributes:
-        beside: the causes that hold as well.
+        causes: those that hold as well.
         what: a force or a drift, or a cause that begins in mid-trial.
         log_posterior: on the scale of `Candidate.log_posterior`.
-        place: where it was fitted, if that explains the records.
+        point: where it was fitted, if that explains the records.
     """
 
-    beside: Ids
+    causes: Ids
     what: LatentForceCandidate | FittedChangePoint
     log_posterior: float
-    place: LinearisationPoint | None = None
+    point: LinearisationPoint | None = None
 
     @property
     def id(self) -> str:
@@ -114,10 +96,10 @@ def explanations_outside(search: Search) -> list[OutOfCatalogue]:
     columns, terms = all_columns(problem, best.fit.z, knots), one_terms(problem, best.fit.z, knots)
     found = _suspected(search, columns, knots, terms)
     close = _around_themselves(search, found, columns, knots, terms)
-    own = [OutOfCatalogue(beside=(), what=one.what, log_posterior=one.log_posterior + _log_prior(problem),
-                   place=None if one.is_lost else one.place) for one in close]  # fmt: skip
+    own = [OutOfCatalogue(causes=(), what=one.what, log_posterior=one.log_posterior + _log_prior(problem),
+                   point=None if one.is_poor else one.point) for one in close]  # fmt: skip
     sudden = _sudden(search, close, max(_most(found + own), best.log_posterior))
-    if _most(found + own) > max(_most(sudden), best.log_posterior) - CLOSER_LOOK_LOG_POSTERIOR:
+    if _most(found + own) > max(_most(sudden), best.log_posterior) - settings.CLOSE_NATS:
         found = _finer(search, found, own)
     ranked = _sorted(found, own + sudden)
     _nothing_again(search, ranked[0])
@@ -128,8 +110,8 @@ def _nothing_again(search: Search, first: OutOfCatalogue) -> None:
     """Fit "nothing is wrong" from where what explains the records is, beside nothing, if that seems more probable than
     every hypothesis: it may only have begun in a better place.
     """
-    if first.place and first.log_posterior > search.best().log_posterior:
-        search.fit((), first.place.fit)
+    if first.point and first.log_posterior > search.best().log_posterior:
+        search.fit((), first.point.fit)
 
 
 def _finer(search: Search, found: list[OutOfCatalogue], own: list[OutOfCatalogue]) -> list[OutOfCatalogue]:
@@ -144,21 +126,21 @@ def _finer(search: Search, found: list[OutOfCatalogue], own: list[OutOfCatalogue
     return [one for one in found if one.id not in columns] + _suspected(search, columns, finer, terms)
 
 
-def is_explained(search: Search, foreign: Sequence[OutOfCatalogue]) -> bool:
+def is_explained(search: Search, out_of_catalogue: Sequence[OutOfCatalogue]) -> bool:
     """Say whether a sudden cause leaves nothing but noise, and is so far before the best hypothesis that no sum of
     causes that hold throughout can come close.
     """
-    best = max(foreign, key=lambda one: one.log_posterior, default=None)
+    best = max(out_of_catalogue, key=lambda one: one.log_posterior, default=None)
     if best is None or not isinstance(best.what, FittedChangePoint) or is_poor_fit(best.what.fit):
         return False
-    return best.log_posterior > search.best().log_posterior + DECISIVE_LOG_POSTERIOR
+    return best.log_posterior > search.best().log_posterior + settings.DECISIVE_NATS
 
 
 def _sorted(found: list[OutOfCatalogue], own: list[OutOfCatalogue]) -> list[OutOfCatalogue]:
-    """Return it all, the most probable first; of what was asked in two places, the more probable."""
+    """Return it all, the most probable first; of what was asked at two linearisation points, the more probable."""
     kept: dict[tuple[str, Ids], OutOfCatalogue] = {}
     for one in sorted(found + own, key=lambda one: -one.log_posterior):
-        kept.setdefault((one.id, one.beside), one)
+        kept.setdefault((one.id, one.causes), one)
     return list(kept.values())
 
 
@@ -170,7 +152,7 @@ def _suspected(
     found: list[OutOfCatalogue] = []
     for candidate in _bases(search):
         scales = candidate.scales(problem)
-        found += [OutOfCatalogue(beside=candidate.ids, what=one,
+        found += [OutOfCatalogue(causes=candidate.ids, what=one,
                                  log_posterior=candidate.log_posterior + one.log_gain + prior)
                   for one in latent_force_candidates(problem, columns, candidate.fit, scales, knots,
                                                      terms)]  # fmt: skip
@@ -190,22 +172,22 @@ def _around_themselves(
     problem, best, prior = search.problem, search.best(), _log_prior(search.problem)
     if not best.ids and best.kappa == min(KAPPAS):
         return []
-    hope = {one.id: one.log_posterior for one in found if not one.beside}
+    predicted = {one.id: one.log_posterior for one in found if not one.causes}
     for log, what in linear_candidates(problem, best.fit, columns, knots, terms, list(KAPPAS)):
-        hope[what.id] = max(hope[what.id], log + prior)
+        predicted[what.id] = max(predicted[what.id], log + prior)
     finer = knots_of(problem, FINE_SPACING_S)
     terms = one_terms(problem, best.fit.z, finer)
     look = partial(relinearised_force, problem, best.fit, kappa=1.0, knots=finer, terms=terms)
-    return sorted(search.side.map(look, _worth_a_look(hope, best)), key=lambda one: -one.log_posterior)
+    return sorted(search.side.map(look, _worth_a_look(predicted, best)), key=lambda one: -one.log_posterior)
 
 
-def _worth_a_look(hope: dict[str, float], best: Candidate) -> list[str]:
+def _worth_a_look(predicted: dict[str, float], best: Candidate) -> list[str]:
     """Return the forces and drifts that are looked at around their own fits, of hoped-for log posteriors."""
-    ranked = sorted(hope, key=lambda name: -hope[name])[:MAX_RELINEARISED]
-    least = max(best.log_posterior - FAR_LOG_POSTERIOR, hope[ranked[0]] - ALIKE_FORCES_LOG_POSTERIOR)
+    ranked = sorted(predicted, key=lambda name: -predicted[name])[: settings.MAX_TRIED]
+    least = max(best.log_posterior - settings.FAR_NATS, predicted[ranked[0]] - settings.LINEAR_NATS)
     plain = best.kappa == min(KAPPAS) and len(best.ids) == 1
-    further = max(least, best.log_posterior - NEAR_LOG_POSTERIOR) if plain else least
-    return [name for i, name in enumerate(ranked) if hope[name] > (further if i else least)]
+    further = max(least, best.log_posterior - settings.HOPELESS_NATS) if plain else least
+    return [name for i, name in enumerate(ranked) if predicted[name] > (further if i else least)]
 
 
 def _log_prior(problem: Problem) -> float:
@@ -221,7 +203,7 @@ def _most(found: Sequence[OutOfCatalogue]) -> float:
 def _close(found: list[OutOfCatalogue]) -> list[OutOfCatalogue]:
     """Return what is about as probable as the best."""
     best = _most(found)
-    return [one for one in found if one.log_posterior > best - ALIKE_FORCES_LOG_POSTERIOR]
+    return [one for one in found if one.log_posterior > best - settings.LINEAR_NATS]
 
 
 def _bases(search: Search) -> list[Candidate]:
@@ -236,12 +218,12 @@ def _sudden(search: Search, close: Sequence[RelinearisedForce], known: float) ->
     if not effects:
         return []
     prior = float(np.log(PRIOR["sudden"] / (len(effects) * len(problem.records))))
-    places, large = linearisation_points(search, close, _log_prior(problem)), largest_hypotheses(search)
+    points, large = linearisation_points(search, close, _log_prior(problem)), largest_hypotheses(search)
     made = [one for record in range(len(problem.records))
-            for one in fit_change_points(problem, places, effects, record, known - prior, search.side,
+            for one in fit_change_points(problem, points, effects, record, known - prior, search.side,
                                          large)]  # fmt: skip
-    return [OutOfCatalogue(beside=(), what=one, log_posterior=log + prior,
-                    place=None if is_poor_fit(one.fit) else linearised_at(problem, one))
+    return [OutOfCatalogue(causes=(), what=one, log_posterior=log + prior,
+                    point=None if is_poor_fit(one.fit) else linearised_at(problem, one))
             for one, log in special_cases_folded(made)]  # fmt: skip
 
 
@@ -252,42 +234,35 @@ def special_cases_folded(made: Sequence[FittedChangePoint]) -> list[tuple[Fitted
     As with a further cause (`occam_folded`): what is not FURTHER_CAUSE_ODDS times as probable as its special case is
     told as that, which has the probability of both.
     """
-    log = {(one.begun.effect.id, one.begun.record): one.log_posterior for one in made}
+    log = {(one.change_point.effect.id, one.change_point.record): one.log_posterior for one in made}
     for one in made:
-        own = one.begun.effect.id, one.begun.record
+        own = one.change_point.effect.id, one.change_point.record
         for special in {
-            (parameter.also_of, own[1]) for parameter in one.begun.effect.parameters
+            (parameter.also_of, own[1]) for parameter in one.change_point.effect.parameters
         } & log.keys():
             if log[own] < log[special] + np.log(FURTHER_CAUSE_ODDS):
                 log[special] = log_sum([log[special], log.pop(own)])
                 break
-    return [(one, log[key]) for one in made if (key := (one.begun.effect.id, one.begun.record)) in log]
+    return [
+        (one, log[key])
+        for one in made
+        if (key := (one.change_point.effect.id, one.change_point.record)) in log
+    ]
 
 
-def shares(search: Search, foreign: list[OutOfCatalogue]) -> tuple[dict[Ids, float], dict[str, float]]:
+def shares(
+    search: Search, out_of_catalogue: list[OutOfCatalogue]
+) -> tuple[dict[Ids, float], dict[str, float]]:
     """Return the probabilities of hypotheses, and of everything outside by id; together they sum to 1."""
     inside = search.beliefs.probabilities(search.problem)
     scale = search.beliefs.log_total()
-    outside = log_sum([one.log_posterior for one in foreign]) if foreign else -np.inf
+    outside = log_sum([one.log_posterior for one in out_of_catalogue]) if out_of_catalogue else -np.inf
     total = log_sum([scale, outside])
     found: dict[str, float] = {}
-    for one in foreign:
+    for one in out_of_catalogue:
         found[one.id] = found.get(one.id, 0.0) + float(np.exp(one.log_posterior - total))
     kept = float(np.exp(scale - total))
     return {ids: kept * p for ids, p in inside.items()}, found
-
-
-def tolerance_scale(search: Search) -> dict[float, float]:
-    """Return κ → probability, over all candidates."""
-    top = search.best().log_posterior
-    weight = dict.fromkeys(KAPPAS, 0.0)
-    for candidate in search.candidates.values():
-        parts = {kappa: np.log(prior) + candidate.log_evidence[kappa] for kappa, prior in KAPPAS.items()}
-        mixed = log_sum(list(parts.values()))
-        for kappa, value in parts.items():
-            weight[kappa] += float(np.exp(candidate.log_posterior - top + value - mixed))
-    total = sum(weight.values())
-    return {kappa: value / total for kappa, value in weight.items()}
 
 
 @dataclass(kw_only=True, eq=False)
@@ -298,7 +273,7 @@ class Findings:
         search: over hypotheses.
         detectable: what could be seen at all.
         misfit: record → channel → how the nominal model fails.
-        foreign: what lies outside the list.
+        out_of_catalogue: what lies outside the list.
         refuted: rivals of the best that simulations refute, however alike the linear problem has them.
         seconds: how long each part took.
         complete: nothing was left out.
@@ -309,7 +284,7 @@ class Findings:
     search: Search
     detectable: tuple[Detectability, ...] = ()
     misfit: dict[str, dict[str, Misfit]] = field(default_factory=dict)
-    foreign: list[OutOfCatalogue] = field(default_factory=list)
+    out_of_catalogue: list[OutOfCatalogue] = field(default_factory=list)
     refuted: frozenset[str] = frozenset()
     seconds: dict[str, float] = field(default_factory=dict)
     complete: bool = True

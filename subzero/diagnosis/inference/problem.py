@@ -2,8 +2,7 @@
 
     r(z) = W (y − h(z)),    J = ∂(W h)/∂z by finite differences
 
-`pose` makes it from records: settings in economical steps, usual noise, all effects free; `with_noise_behind` puts the
-noise in that is estimated behind a fit, and `with_finer_steps` corrects for the discretisation.
+`posing` makes it from records.
 """
 
 from __future__ import annotations
@@ -16,21 +15,12 @@ from os import cpu_count
 
 import numpy as np
 
-from subzero.diagnosis.hypothesis.catalogue import ONSETS, START, catalogue
-from subzero.diagnosis.hypothesis.catalogue.sensors import SPECS
 from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.effect import Effect
-from subzero.diagnosis.hypothesis.hypotheses import Entry, entries_of, grouped, moves_nothing, with_tolerances
-from subzero.diagnosis.hypothesis.logged import Logged
-from subzero.diagnosis.inference.measurement import economical, finer, respond, sensed, truth
+from subzero.diagnosis.hypothesis.hypotheses import Entry, grouped
+from subzero.diagnosis.inference.measurement import sensed, truth
 from subzero.diagnosis.inference.noise import (
-    Behind,
     Noise,
-    Usual,
-    estimate,
-    resolution_of,
-    spikes,
-    usual_noise,
 )
 from subzero.diagnosis.inference.simulator import (
     RunCache,
@@ -40,8 +30,6 @@ from subzero.diagnosis.inference.simulator import (
     simulate_track,
     with_stops,
 )
-from subzero.errors import UserError
-from subzero.records.record import HEADING, turned
 
 JACOBIAN_STEP = 0.2
 """Step of a sensitivity, in tolerances; a whole one from a state of rest (a play, a friction), where slopes jump."""
@@ -215,164 +203,3 @@ class Problem:
 
 Progress = Callable[[float, str], None]
 """Called with the fraction that is done and what is being tried."""
-
-
-VISIBLE_ERROR = 1.0
-"""Squared size, in noise, of an error of the steps that is worth correcting."""
-LEVEL_CHANGE = 0.1
-"""Change of a noise level, as a logarithm, that is worth beginning again; of its slow part,
-SLOW_CHANGE_FACTOR times as much."""
-SLOW_CHANGE_FACTOR = 2.0
-
-
-def pose(records: Sequence[Logged], more: Iterable[Effect] = ()) -> Problem:
-    """Return the problem of some records of one vehicle.
-
-    Args:
-        records: what was measured, with the trials.
-        more: causes besides the catalogue.
-
-    Raises:
-        UserError: the nominal model cannot be run through a trial.
-    """
-    observed = tuple(_observed(one) for one in records)
-    channels = list(dict.fromkeys(name for one in observed for name in one.noise))
-    nominal = observed[0].setting
-    effects = [
-        replace(effect, parameters=tuple(one.within(nominal) for one in effect.parameters))
-        for effect in (with_tolerances(one, nominal) for one in catalogue(channels, more).values())
-        if _possible(effect, observed) and not moves_nothing(effect, nominal)
-    ]
-    onsets = tuple(effect for effect in ONSETS if _possible(effect, observed))
-    return Problem(records=observed, entries=entries_of(effects, START, len(observed)), onsets=onsets)
-
-
-def _possible(effect: Effect, observed: Sequence[Observed]) -> bool:
-    """Say whether a cause can be in these trials: without a cable or a free drum, some cannot."""
-    tethered = any(one.setting.tethered for one in observed)
-    winch = any(one.setting.model.winch is not None for one in observed)
-    return (effect.slot not in ("cable", "drum") or tethered) and not (effect.slot == "drum" and winch)
-
-
-def _observed(one: Logged) -> Observed:
-    """Return a record with its noise."""
-    time = one.record.time
-    setting = economical(one.setting, float(time[-1]))
-    values = {name: column for name, column in one.record.values.items()
-              if name in SPECS and np.isfinite(column).any()}  # fmt: skip
-    if not values:
-        raise UserError(f"'{one.name}' has no measured sample in any channel that can be diagnosed.")
-    simulated = respond(setting, time, values)
-    if not all(np.isfinite(column).all() for column in simulated.values()):
-        raise UserError(
-            f"The nominal model cannot be run through '{one.name}'. Try `subzero simulate` on its scenario."
-        )
-    if HEADING in values:
-        values[HEADING] = turned(values[HEADING], simulated[HEADING])
-    noise = {name: _usual(time, column, column - simulated[name], usual_of(name, column, one.noise))
-             for name, column in values.items()}  # fmt: skip
-    return Observed(name=one.name, time=time, values=values, noise=noise, setting=setting, known=one.noise)
-
-
-def usual_of(channel: str, values: np.ndarray, known: Mapping[str, float]) -> Usual:
-    """Return what a channel's sensor is like, before anything is fitted: its level as known or usual, its resolution as
-    its values (n,) show it.
-    """
-    level = known.get(channel, SPECS[channel].noise)
-    return Usual(level, resolution_of(values, level), channel in known)
-
-
-def _usual(time: np.ndarray, values: np.ndarray, difference: np.ndarray, usual: Usual) -> Noise:
-    """Return a usual sensor's noise, without the samples that lie far off in measured − simulated (n,)."""
-    return usual_noise(time, _used(values, difference, usual), usual)
-
-
-def _used(values: np.ndarray, difference: np.ndarray, usual: Usual) -> np.ndarray:
-    """Return which samples are measured, and no outliers (n,)."""
-    used = np.isfinite(values)
-    used[used] = ~spikes(difference[used], max(usual.level, usual.resolution))
-    return used
-
-
-def with_noise_behind(
-    problem: Problem, z: np.ndarray, D: np.ndarray, *, again: bool = False
-) -> Problem | None:
-    """Return the problem with the noise that is left behind deviations z; None if that is as good as known.
-
-    Args:
-        problem: records and parameters.
-        z: the best fit so far (k,).
-        D: prior variances of the parameters in it (k,).
-        again: outliers are known already, behind another fit that is close.
-    """
-    records = tuple(
-        one if again else _without_outliers(problem, i, z) for i, one in enumerate(problem.records)
-    )
-    plain = replace(problem, records=tuple(replace(one, noise=_unit(one)) for one in records))
-    r, J = plain.residual(z), plain.jacobian(z)
-    rest, at, found = r + J @ z, 0, []
-    for one in records:
-        noise = {}
-        for name, old in one.noise.items():
-            own = slice(at, at + old.count)
-            noise[name] = _behind(one, name, Behind(residual=rest[own], J=J[own], D=D))
-            at += old.count
-        found.append(replace(one, noise=noise))
-    if all(_alike(one.noise[name], new.noise[name]) for one, new in zip(problem.records, found, strict=True)
-           for name in one.noise):  # fmt: skip
-        return None
-    return replace(problem, records=tuple(found))
-
-
-def whitened_again(before: Problem, after: Problem, white: np.ndarray) -> np.ndarray:
-    """Return what the noise of a problem has made white (m, …), made white by that of another, of the same samples."""
-    found, at = [], 0
-    for old, new in zip(before.records, after.records, strict=True):
-        for name, noise in old.noise.items():
-            found.append(new.noise[name].whiten_again(white[at : at + noise.count], noise))
-            at += noise.count
-    return np.concatenate(found)
-
-
-def _without_outliers(problem: Problem, record: int, z: np.ndarray) -> Observed:
-    """Return a record without the samples that lie far off behind deviations z."""
-    one = problem.records[record]
-    shown = respond(problem.setting(record, z), one.time, one.noise)
-    noise = {}
-    for name, old in one.noise.items():
-        usual = Usual(one.known.get(name, SPECS[name].noise), old.resolution, name in one.known)
-        used = _used(one.values[name], one.values[name] - shown[name], usual)
-        noise[name] = replace(old, used=used, time=one.time[used])
-    return replace(one, noise=noise)
-
-
-def _unit(one: Observed) -> dict[str, Noise]:
-    """Return noise that leaves values in their units, without outliers and gaps."""
-    return {name: Noise(white=1.0, used=noise.used, time=noise.time) for name, noise in one.noise.items()}
-
-
-def _behind(one: Observed, name: str, behind: Behind) -> Noise:
-    """Return the noise of a channel behind a fit."""
-    old, level = one.noise[name], one.known.get(name, SPECS[name].noise)
-    return replace(estimate(old.time, behind, Usual(level, old.resolution, name in one.known)), used=old.used)
-
-
-def _alike(old: Noise, new: Noise) -> bool:
-    """Say whether two noises of a channel make no difference to a fit."""
-    if not np.array_equal(old.used, new.used):
-        return False
-    level = abs(np.log(new.sd / old.sd))
-    lasting = abs(np.log(new.lasting / old.lasting))
-    return bool(level < LEVEL_CHANGE and lasting < SLOW_CHANGE_FACTOR * LEVEL_CHANGE)
-
-
-def with_finer_steps(problem: Problem, z: np.ndarray) -> Problem | None:
-    """Return the problem with the error of economical steps at z made good; None if that is not seen."""
-    records, size = [], 0.0
-    for i, one in enumerate(problem.records):
-        setting = problem.setting(i, z)
-        coarse, fine = (respond(made, one.time, one.noise) for made in (setting, finer(setting)))
-        wrong = {name: fine[name] - coarse[name] for name in one.noise}
-        size += sum(float(np.sum(one.noise[name].whiten(column) ** 2)) for name, column in wrong.items())
-        records.append(one.corrected(wrong))
-    return replace(problem, records=tuple(records)) if VISIBLE_ERROR < size < np.inf else None

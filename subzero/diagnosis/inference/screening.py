@@ -23,6 +23,7 @@ from subzero.diagnosis.hypothesis.hypotheses import (
     pairs_of,
     variances,
 )
+from subzero.diagnosis.inference import settings
 from subzero.diagnosis.inference.laplace import Candidate, possible
 from subzero.diagnosis.inference.linear_gaussian import (
     KAPPAS,
@@ -32,18 +33,9 @@ from subzero.diagnosis.inference.linear_gaussian import (
     log_sum,
     posterior,
 )
-from subzero.diagnosis.inference.map_fit import Fit
-from subzero.diagnosis.inference.problem import Problem
-
-POOR_MEAN_SQUARE = 1.08
-"""A wide fit that leaves a greater mean square, in noise, is not close to the records."""
-STRAINED_TOLERANCES, MAX_STRAINED = 5.0, 6
-"""Nor is one that bends MAX_STRAINED parameters of the model by more than STRAINED_TOLERANCES tolerances: it is
-close by chance."""
-SWEEP_SCALES = (0.25, 0.5, 1.0, 2.0)
-"""Sizes, in effect scales, that causes are tried at by real runs, either way."""
-FLAT_SIGNAL = 1.0
-"""An effect of one scale that seems to do no more than this, in noise, has no slope there."""
+from subzero.diagnosis.inference.map_fit import Fit, at_bad_minimum, refit, restarted_where_smooth
+from subzero.diagnosis.inference.posing import with_noise_behind
+from subzero.diagnosis.inference.problem import Problem, Progress
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -52,14 +44,14 @@ class Screening:
 
     Attributes:
         log_posterior: hypothesis → log (evidence, mixed over κ, times prior).
-        secants: hypothesis → where its fit begins, for causes without a slope.
+        starts: hypothesis → where its fit begins, for causes without a slope.
         columns: place of an entry without a slope → its sensitivities, by the secant up to there (m,).
         count: of causes that can be named.
         far: the wide fit was not close to the records: sums of causes are no more than guesses.
     """
 
     log_posterior: dict[Ids, float] = field(default_factory=dict)
-    secants: dict[Ids, np.ndarray] = field(default_factory=dict)
+    starts: dict[Ids, np.ndarray] = field(default_factory=dict)
     columns: dict[int, np.ndarray] = field(default_factory=dict)
     count: int = 1
     far: bool = False
@@ -79,13 +71,12 @@ class Screening:
 
 def is_close(problem: Problem, wide: Fit) -> bool:
     """Say whether a wide fit leaves nothing but noise, and bends little."""
-    bent = np.abs(wide.z) > STRAINED_TOLERANCES * np.array(
+    bent = np.abs(wide.z) > settings.STRAINED_TOLERANCES * np.array(
         [entry.parameter.tolerance for entry in problem.entries]
     )
     model = np.array([entry.record < 0 for entry in problem.entries])
-    return bool(
-        wide.r @ wide.r < POOR_MEAN_SQUARE * wide.r.size and np.count_nonzero(bent & model) < MAX_STRAINED
-    )
+    is_poor = wide.r @ wide.r >= settings.POOR_MEAN_SQUARE * wide.r.size
+    return bool(not is_poor and np.count_nonzero(bent & model) < settings.MAX_STRAINED)
 
 
 def screening_of(
@@ -145,7 +136,7 @@ def _without_slope(problem: Problem, J: np.ndarray) -> list[int]:
 
 def is_flat(entry: Entry, column: np.ndarray) -> bool:
     """Say whether sensitivities to an entry (m,) are none."""
-    return bool(np.linalg.norm(column) * entry.parameter.scale <= FLAT_SIGNAL)
+    return bool(np.linalg.norm(column) * entry.parameter.scale <= settings.FLAT_SIGNAL)
 
 
 def _sweep(
@@ -154,20 +145,20 @@ def _sweep(
     """Try sizes of entries about z, side by side, with the residual `here` there; keep the best of every cause."""
     jobs = [(k, size) for k in columns_of for size in sizes_tried(problem.entries[k].parameter)]
     moved = [np.concatenate([z[:k], [size], z[k + 1 :]]) for k, size in jobs]
-    best, dull = dict[Ids, float](), _without_slope(problem, J)
+    best, flat = dict[Ids, float](), _without_slope(problem, J)
     for (k, size), there, r in zip(jobs, moved, problem.residuals(moved), strict=True):
         ids: Ids = (problem.entries[k].effect.id,)
         value = _at_size(problem, k, size, there, r, J)
         if value > best.get(ids, -np.inf) or ids not in best:
-            best[ids], found.secants[ids] = value, there
-            if k in dull and np.isfinite(r).all():
+            best[ids], found.starts[ids] = value, there
+            if k in flat and np.isfinite(r).all():
                 found.columns[k] = (here - r) / (size - z[k])
     found.log_posterior.update(
         {ids: best[ids] + log_prior(ids, len(nameable(problem.entries))) for ids in best}
     )
 
 
-def sizes_tried(parameter: Parameter, scales: Sequence[float] = SWEEP_SCALES) -> list[float]:
+def sizes_tried(parameter: Parameter, scales: Sequence[float] = settings.SWEEP_SCALES) -> list[float]:
     """Return the deviations that are tried, at some effect scales either way."""
     both = [side * size * parameter.scale for size in scales for side in (1.0, -1.0)]
     return [size for size in both if parameter.low <= size <= parameter.high]
@@ -223,7 +214,11 @@ class TriedSize(NamedTuple):
 
 
 def with_sizes_tried(
-    problem: Problem, one: Candidate, rest: Ids, at: Sequence[int], scales: Sequence[float] = SWEEP_SCALES
+    problem: Problem,
+    one: Candidate,
+    rest: Ids,
+    at: Sequence[int],
+    scales: Sequence[float] = settings.SWEEP_SCALES,
 ) -> dict[Ids, TriedSize]:
     """Return hypothesis → its best size, for the causes of entries beside the rest of a candidate.
 
@@ -252,3 +247,35 @@ def with_sizes_tried(
 
 def _lowest(problem: Problem) -> np.ndarray:
     return np.array([entry.parameter.low for entry in problem.entries])
+
+
+KAPPA_WIDE = 4.0
+"""κ of the fit that the linear evidence is made at."""
+Nominal = tuple[np.ndarray, np.ndarray]
+"""Residual (m,) and sensitivities (m, k) of the nominal model."""
+
+
+def fit_wide(problem: Problem, progress: Progress) -> tuple[Problem, Fit, Nominal]:
+    """Return the problem with the noise that is left behind the fit, the fit, and what the nominal model leaves."""
+    progress(0.05, "sensitivities of the nominal model")
+    zero = np.zeros(len(problem.entries))
+    J = problem.jacobian(zero)
+    fit = _from(problem, zero, J, progress)
+    for _ in range(settings.MAX_REPEATS):
+        D = variances(problem.entries, (), KAPPA_WIDE)
+        again = with_noise_behind(problem, fit.z, D) if np.isfinite(fit.r).all() else None
+        if again is None:
+            break
+        problem, J = again, again.jacobian(zero)
+        fit = _from(problem, fit.z, problem.jacobian(fit.z), progress)
+    return problem, fit, (problem.residual(zero), J)
+
+
+def _from(problem: Problem, z: np.ndarray, J: np.ndarray, progress: Progress) -> Fit:
+    """Return the fit from z, with the sensitivities there; or if it went astray, a better one from off its kinks."""
+    progress(0.15, "fit within wide tolerances")
+    fit = refit(problem, z, J, variances(problem.entries, (), KAPPA_WIDE), most_fresh=2, made_at=z)
+    if not at_bad_minimum(problem, fit, ()):
+        return fit
+    again = restarted_where_smooth(problem, fit, ())
+    return again if again.objective < fit.objective else fit

@@ -11,27 +11,35 @@ from typing import Any
 import numpy as np
 
 from subzero.channels import BY_NAME
+from subzero.diagnosis.report import words
+from subzero.diagnosis.report.summary import summary
 from subzero.diagnosis.results import Cause, ChannelGain, Gain, Rival, Verdict
 
 FORMAT = "subzero diagnosis 1"
 NUMBERS = ("value", "low", "high", "unit", "nominal", "deviation", "deviation_sd")
 
 
-def mapping(verdict: Verdict, records: Mapping[str, Mapping[str, Any]] | None = None) -> dict[str, Any]:
+def mapping(
+    verdict: Verdict, records: Mapping[str, Mapping[str, Any]] | None = None, scenario: str = "SCENARIO"
+) -> dict[str, Any]:
     """Return a verdict in plain numbers and texts, ready for JSON.
 
     Args:
         verdict: of `subzero.diagnose`.
         records: name → what to say of a record, such as its file and its scenario.
+        scenario: the trial's name, for lines of the shell.
     """
+    known = words.sentences(verdict)
     return {
         "format": FORMAT,
         "verdict": verdict.verdict,
-        "sentence": verdict.sentence,
+        "sentence": words.sentence(verdict),
+        "summary": [one._asdict() for one in summary(verdict, scenario)],
         "complete": verdict.complete,
         "causes": [_cause(one) for one in verdict.causes],
         "rivals": [_rival(one) for one in verdict.rivals],
         "probabilities": _plain(verdict.probabilities),
+        "explanations": {name: words.explanation(name, known) for name in verdict.probabilities},
         "tolerance_scale": {f"{scale:g}": p for scale, p in verdict.tolerance_scale.items()},
         "gain": _gain(verdict.gain),
         "gain_overall": _overall(verdict.gain),
@@ -48,10 +56,15 @@ def mapping(verdict: Verdict, records: Mapping[str, Mapping[str, Any]] | None = 
     }
 
 
-def text(verdict: Verdict, records: Mapping[str, Mapping[str, Any]] | None = None) -> str:
+def text(
+    verdict: Verdict, records: Mapping[str, Mapping[str, Any]] | None = None, scenario: str = "SCENARIO"
+) -> str:
     """Return a verdict as JSON."""
     return (
-        json.dumps(_finite(mapping(verdict, records)), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+        json.dumps(
+            _finite(mapping(verdict, records, scenario)), indent=2, ensure_ascii=False, allow_nan=False
+        )
+        + "\n"
     )
 
 

@@ -2,11 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
-from subzero.diagnosis.report.words import NOTHING, column, estimate, number, probability
-from subzero.diagnosis.results import UNDECIDED, Detectability, Misfit, Rival, Verdict
+from subzero.diagnosis.report.words import (
+    NOTHING,
+    channel,
+    estimate,
+    explanation,
+    number,
+    probability,
+    sentences,
+)
+from subzero.diagnosis.results import UNDECIDED, Detectability, Misfit, NextTrial, Rival, Verdict
 
 CONFUSED_BELOW, CLEAR_FROM = 9.0, 16.0
 """Discrimination D below which two causes cannot be told apart, and above which they can."""
@@ -32,11 +41,13 @@ class Table(NamedTuple):
 def detectable(verdict: Verdict | Sequence[Detectability], *, every: bool = False) -> Table:
     """Return what the records could show: causes that would be missed or mixed up, or all of them."""
     rows = verdict.detectable if isinstance(verdict, Verdict) else verdict
+    known = sentences(verdict) if isinstance(verdict, Verdict) else {}
     shown = [one for one in rows if every or one.signal < SEEN_SIGNAL or one.discrimination < CLEAR_FROM]
     shown = sorted(shown, key=lambda one: one.discrimination)
-    header = ("cause", "signal", "smallest that is seen", "looks most like", "D", "")
-    return Table(header, [(one.id, f"{one.signal:.3g}", _smallest(one), one.rival or NOTHING,
-                           f"{one.discrimination:.3g}", _told(one)) for one in shown])  # fmt: skip
+    header = ("cause", "signal", "smallest that is seen", "looks most like", "D", "", "id")
+    return Table(header, [(explanation(one.id, known), f"{one.signal:.3g}", _smallest(one),
+                           explanation(one.rival, known) if one.rival else NOTHING, f"{one.discrimination:.3g}",
+                           _told(one), one.id) for one in shown])  # fmt: skip
 
 
 def _smallest(one: Detectability) -> str:
@@ -61,7 +72,7 @@ def _told(one: Detectability) -> str:
 def misfit(rows: Mapping[str, Misfit]) -> Table:
     """Return how the nominal model fails in each channel of one record."""
     header = ("channel", "RMSE", "in noise", "fit %", "bias", "white?", "follows", "when")
-    return Table(header, [(column(name), f"{one.rmse:.3g}", f"{one.nrmse:.2f}", f"{one.fit_percent:.1f}",
+    return Table(header, [(channel(name), f"{one.rmse:.3g}", f"{one.nrmse:.2f}", f"{one.fit_percent:.1f}",
                            f"{one.bias:.2g}", probability(one.whiteness_p), _follows(one), _when(one))
                           for name, one in rows.items()])  # fmt: skip
 
@@ -86,9 +97,9 @@ def rivals(verdict: Verdict, *, short: bool = False) -> Table:
             "what explains the records" if verdict.verdict == UNDECIDED else "what else explains the records"
         )
         return Table((words, "probability", "D"), rows[:MOST_RIVALS])
-    return Table(("explanation", "probability", "D", "parameters"),
-                 [(rival_words(one), probability(one.probability), number(one.discrimination), _numbers(one))
-                  for one in verdict.rivals])  # fmt: skip
+    return Table(("explanation", "probability", "D", "parameters", "id"),
+                 [(rival_words(one), probability(one.probability), number(one.discrimination), _numbers(one),
+                   _id(one)) for one in verdict.rivals])  # fmt: skip
 
 
 def _short(one: Rival) -> tuple[str, ...]:
@@ -101,14 +112,34 @@ def _worth(found: Sequence[Rival]) -> Sequence[Rival]:
 
 
 def rival_words(one: Rival) -> str:
-    """Return a rival by its ids and in words."""
-    return f"{' + '.join(one.ids) or 'none'}: {one.sentence}"
+    """Return a rival in words; a force or a drift as everybody understands it."""
+    return explanation(_id(one), {_id(one): one.sentence} if ":" not in _id(one) else {})
+
+
+def _id(one: Rival) -> str:
+    return " + ".join(one.ids) or "none"
 
 
 def _numbers(one: Rival) -> str:
     return "; ".join(
         estimate(name, parameter) for table in one.parameters.values() for name, parameter in table.items()
     )
+
+
+def next_trial(one: NextTrial) -> Table | None:
+    """Return the commands of a trial that is not in any file; None without them."""
+    if not one.commands:
+        return None
+    header = (
+        "time [s]",
+        "propeller [rev/s]",
+        "rudder [degree]",
+        "port plane [degree]",
+        "starboard plane [degree]",
+    )
+    rows = [(f"{time:.4g}", f"{speed:.4g}", *(f"{math.degrees(angle) + 0.0:.3g}" for angle in angles))
+            for time, speed, *angles in one.commands]  # fmt: skip
+    return Table(header, rows)
 
 
 def gain(verdict: Verdict) -> dict[str, Table]:
@@ -118,7 +149,7 @@ def gain(verdict: Verdict) -> dict[str, Table]:
     header = ("channel", "nominal", "within tolerance", "extended", "best rival", "noise floor")
     parts = {f"held out ({verdict.gain.how})": verdict.gain.held_out, "fitted": verdict.gain.fitted}
     return {
-        words: Table(header, [(column(name), *(number(x) for x in (one.before, one.tolerance, one.after, one.rival,
+        words: Table(header, [(channel(name), *(number(x) for x in (one.before, one.tolerance, one.after, one.rival,
                                                                     one.floor))) for name, one in rows.items()])
         for words, rows in parts.items()
         if rows

@@ -3,8 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from functools import cache
+
+import numpy as np
 
 from subzero.channels import BY_NAME
+from subzero.diagnosis.hypothesis.extended_model import all_effects, plain_id
 from subzero.diagnosis.results import (
     CAUSE_NAMED,
     NOTHING_WRONG,
@@ -26,6 +31,20 @@ HEADLINES = {
 }
 
 NOTHING = "–"
+FORCE, DRIFT = "unknown_force:", "sensor_drift:"
+"""How ids of what is outside the catalogue begin."""
+
+PUSHES = {
+    "X": ("pushes the hull forward", "holds the hull back", "pushes the hull forward and back"),
+    "Y": ("pushes the hull to starboard", "pushes the hull to port", "pushes the hull from side to side"),
+    "Z": ("pushes the hull down", "lifts the hull", "pushes the hull up and down"),
+    "K": ("rolls the hull to starboard", "rolls the hull to port", "rolls the hull"),
+    "M": ("raises the nose", "lowers the nose", "pitches the hull up and down"),
+    "N": ("turns the hull to starboard", "turns the hull to port", "turns the hull from side to side"),
+}
+"""Axis of a force or a moment → what it does where it is positive, where it is negative, and where it is both."""
+ONE_SIDED = 0.25
+"""A force of one sign is never as large with the other one, as a share."""
 
 MAX_NAMED = 5
 """So many explanations are named in a sentence."""
@@ -50,11 +69,76 @@ def estimate(name: str, one: Estimate) -> str:
 
 def cause(one: Cause) -> str:
     """Return a cause in words, with its parameters and its probability."""
-    since = (
-        "" if one.start_time is None else f", since t = {one.start_time:.3g} ± {1.96 * one.start_sd:.2g} s"
-    )
     numbers = "; ".join(estimate(name, parameter) for name, parameter in one.parameters.items())
-    return f"{_capital(one.sentence)}{since}: {numbers}. Probability {probability(one.probability)}."
+    return f"{_capital(one.sentence)}{_since(one)}: {numbers}. Probability {probability(one.probability)}."
+
+
+def cause_in_short(one: Cause) -> str:
+    """Return a cause in words, with its value beside that of the model."""
+    numbers = "; ".join(
+        f"{name.replace('_', ' ')} {number(p.value, p.unit)}, where the model has {number(p.nominal, p.unit)}"
+        for name, p in one.parameters.items()
+    )
+    return f"{_capital(one.sentence)}{_since(one)}: {numbers}." if numbers else f"{_capital(one.sentence)}."
+
+
+def _since(one: Cause) -> str:
+    return "" if one.start_time is None else f", since t = {one.start_time:.3g} ± {1.96 * one.start_sd:.2g} s"
+
+
+def something(axis: str, force: np.ndarray | None = None) -> str:
+    """Return what a force or a moment that nobody explains does, such as "something rolls the hull to port"."""
+    forward, back, both = PUSHES[axis]
+    if force is None:
+        return f"something {both}"
+    high, low = max(float(np.max(force)), 0.0), max(float(-np.min(force)), 0.0)
+    if min(high, low) > ONE_SIDED * max(high, low):
+        return f"something {both}"
+    return f"something {forward if high >= low else back}"
+
+
+def explanation(name: str, known: Mapping[str, str] | None = None) -> str:
+    """Return a hypothesis of a verdict in words.
+
+    Args:
+        name: as in `Verdict.probabilities`: "none", "rudder_lag", "a + b", "hull_drag@12.5", "unknown_force:X".
+        known: id → sentence of causes that the catalogue does not have.
+    """
+    return " and ".join(_explained(one, known or {}) for one in name.split(" + "))
+
+
+def _explained(one: str, known: Mapping[str, str]) -> str:
+    """Return a single cause, force or drift in words."""
+    if one in known:
+        return known[one]
+    if one in ("none", ""):
+        return "nothing is wrong"
+    if one.startswith(FORCE) and one.removeprefix(FORCE) in PUSHES:
+        return something(one.removeprefix(FORCE))
+    if one.startswith(DRIFT):
+        return f"the sensor of the {_spaced(one.removeprefix(DRIFT))} drifts"
+    what, _, since = one.partition("@")
+    effect = effects().get(plain_id(one))
+    sentence = known.get(what) or (effect.sentence if effect is not None else _spaced(what))
+    return f"from {since} s on {sentence}" if since else sentence
+
+
+effects = cache(all_effects)
+"""Every effect of the catalogue, by id."""
+
+
+def _spaced(name: str) -> str:
+    return name.replace("_", " ").replace(":", ": ")
+
+
+def sentences(verdict: Verdict) -> dict[str, str]:
+    """Return what a verdict itself says of its causes and rivals: hypothesis → sentence."""
+    told = {" + ".join(one.ids) or "none": one.sentence for one in verdict.rivals}
+    told = {name: said for name, said in told.items() if not name.startswith(FORCE)}
+    told |= {one.id: one.sentence for one in verdict.causes if one.start_time is None}
+    if verdict.unknown is not None and not verdict.unknown.is_drift:
+        told[f"{FORCE}{verdict.unknown.axis}"] = something(verdict.unknown.axis, verdict.unknown.force)
+    return told
 
 
 def probability(value: float) -> str:
@@ -70,44 +154,73 @@ def headline(verdict: Verdict) -> str:
     return named if verdict.complete else f"{named} (interrupted: this is as far as it came)"
 
 
-def story(verdict: Verdict) -> list[str]:
-    """Return the verdict in sentences: what it is, the causes, what is missing, the next trial."""
-    told = [_sentence(verdict)] if verdict.sentence and not verdict.causes else []
-    told += [cause(one) for one in verdict.causes]
-    told += [unknown(verdict.unknown)] if verdict.unknown else []
-    if verdict.gain and math.isfinite(verdict.gain.total):
-        share = f"{100.0 * verdict.gain.total:.1f} %"
-        told.append(
-            f"The extended model explains {share} of what can be explained of data that were not fitted "
-            f"({verdict.gain.how})."
+def is_told(name: str, verdict: Verdict) -> bool:
+    """Say whether a hypothesis is what the verdict tells: its causes, whenever they began, or its force or drift."""
+    if verdict.verdict == OUTSIDE and verdict.unknown is not None:
+        return name == f"{DRIFT if verdict.unknown.is_drift else FORCE}{verdict.unknown.axis}"
+    ids = sorted(one.partition("@")[0] for one in name.split(" + "))
+    begins = any(cause.start_time is not None for cause in verdict.causes)
+    return ids == sorted(cause.id for cause in verdict.causes) and ("@" in name) == begins
+
+
+def title(verdict: Verdict) -> str:
+    """Return what stands above a page: what was found where it has a name, else the headline."""
+    if verdict.verdict == CAUSE_NAMED and verdict.causes:
+        return _capital(" and ".join(one.sentence for one in verdict.causes))
+    if verdict.verdict == OUTSIDE and verdict.unknown is not None:
+        return sentence(verdict).rstrip(".")
+    return headline(verdict)
+
+
+def sentence(verdict: Verdict) -> str:
+    """Return the verdict in a sentence without ids; of what cannot be told apart, no more than one can read."""
+    if verdict.verdict == UNDECIDED:
+        return _undecided(verdict)
+    if verdict.verdict == OUTSIDE and verdict.unknown is not None:
+        one = verdict.unknown
+        said = (
+            f"the sensor of the {_spaced(one.axis)} drifts"
+            if one.is_drift
+            else something(one.axis, one.force)
         )
-    told += [next_trial(verdict.next_trial)] if verdict.next_trial else []
-    return [*told, *verdict.notes]
+        return f"{_capital(said)}, and no cause of the catalogue explains it."
+    if verdict.verdict == NOTHING_WRONG:
+        return f"Nothing is wrong beyond the tolerances of the model.{_within(verdict)}"
+    return verdict.sentence
 
 
-def _sentence(verdict: Verdict) -> str:
-    """Return the verdict's own sentence; of what cannot be told apart, no more than one can read."""
-    if verdict.verdict != UNDECIDED:
-        return verdict.sentence
-    ranked = sorted(verdict.probabilities.items(), key=lambda item: -item[1])
-    shown = ", ".join(f"{name} ({probability(p)})" for name, p in ranked[:MAX_NAMED])
-    rest = (
-        f", and {len(verdict.rivals) - MAX_NAMED} more that are less probable"
-        if len(verdict.rivals) > MAX_NAMED
-        else ""
+def _within(verdict: Verdict) -> str:
+    """Return what the most probable hypothesis has, if it is a cause that is no larger than calibration may make it."""
+    first = max(verdict.probabilities, key=lambda name: verdict.probabilities[name], default="none")
+    if first == "none":
+        return ""
+    return (
+        f" The best fit has that {explanation(first, sentences(verdict))}, by no more than calibration may."
     )
+
+
+def _undecided(verdict: Verdict) -> str:
+    """Return what the records allow, the most probable first."""
+    ranked = sorted(verdict.probabilities.items(), key=lambda item: -item[1])
+    known = sentences(verdict)
+    shown = "; ".join(f"{explanation(name, known)} ({probability(p)})" for name, p in ranked[:MAX_NAMED])
+    more = len(verdict.rivals) - MAX_NAMED
+    rest = f"; and {more} more that are less probable" if more > 0 else ""
     return f"These records cannot tell apart: {shown}{rest}."
 
 
 def unknown(one: Unknown) -> str:
-    """Return the force outside the catalogue in words: axis, size, formula; or the drift of a sensor."""
+    """Return what is outside the catalogue in words: what it does, its size, its formula; or the drift of a sensor."""
     most = max(range(len(one.force)), key=lambda at: abs(one.force[at]))
-    kind = f"{'force' if one.unit == 'N' else 'moment'} along {one.axis}"
-    kind = f"drift of the {one.axis.replace('_', ' ')}'s sensor" if one.is_drift else kind
-    what = (
-        f"A {kind} that no cause explains: {one.force[most]:.3g} ± {1.96 * one.band[most]:.2g} {one.unit} "
-        f"at t = {one.time[most]:.3g} s, where it is largest."
+    size = (
+        f"{one.force[most]:.3g} ± {1.96 * one.band[most]:.2g} {one.unit} at t = {one.time[most]:.3g} s, where it is "
+        "largest."
     )
+    if one.is_drift:
+        what = f"The sensor of the {_spaced(one.axis)} drifts as no cause explains: {size}"
+    else:
+        kind = "force" if one.unit == "N" else "moment"
+        what = f"{_capital(something(one.axis, one.force))} that no cause explains, with a {kind} of {size}"
     if not one.formula:
         return what
     return f"{what} It looks like {' + '.join(formula_term(term) for term in one.formula)}.{_other_features(one)}"
@@ -139,6 +252,11 @@ def next_trial(one: NextTrial) -> str:
     adds = f" Log {column(one.channel)} too." if one.channel else ""
     sentence = one.sentence.rstrip(".")
     return f"Next trial: {sentence} ({one.name}); it decides with probability {one.decides:.2f}.{adds}"
+
+
+def channel(name: str) -> str:
+    """Return a channel in words with its unit."""
+    return f"{_spaced(name)} [{BY_NAME[name].unit}]" if name in BY_NAME else _spaced(name)
 
 
 def column(name: str) -> str:

@@ -1,23 +1,18 @@
-"""What the verdict says of an explanation: estimates with intervals, rivals, and the extended model.
+"""The extended model of a verdict: the nominal one with the named causes, a latent force, or a cause from its onset on.
 
-The extended model is the nominal one with the named causes, a latent force, or a cause from its onset on; all other
-deviations that the fit found within tolerance are its calibration. An interval is ±1.96 standard deviations of the
-posterior, mixed over κ.
+All other deviations that the fit found within tolerance are its calibration. A latent force is fitted here, by
+simulations; everything else is taken from fits that are there.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from subzero.diagnosis.assessment.cross_validation import Fitted, gain
-from subzero.diagnosis.assessment.identifiability import against, information, marginal
-from subzero.diagnosis.assessment.next_trial import Survivor, next_trial
 from subzero.diagnosis.hypothesis.catalogue.sensors import SPECS
-from subzero.diagnosis.hypothesis.effect import Parameter
-from subzero.diagnosis.hypothesis.hypotheses import Ids, columns_of, variances
+from subzero.diagnosis.hypothesis.hypotheses import Ids, variances
 from subzero.diagnosis.inference.basis import samples_of
 from subzero.diagnosis.inference.change_point_fit import FittedChangePoint
 from subzero.diagnosis.inference.force_formula import Formula, describe
@@ -30,150 +25,13 @@ from subzero.diagnosis.inference.input_estimation import (
 )
 from subzero.diagnosis.inference.laplace import Candidate
 from subzero.diagnosis.inference.latent_force import FORCE, MAX_DRIFT_LEVELS
-from subzero.diagnosis.inference.linear_gaussian import KAPPAS, log_sum, posterior
 from subzero.diagnosis.inference.map_fit import Fit
-from subzero.diagnosis.inference.model_average import practical_causes
-from subzero.diagnosis.inference.out_of_catalogue import Findings, OutOfCatalogue
 from subzero.diagnosis.inference.problem import Problem
-from subzero.diagnosis.results import Cause, Estimate, Extended, Gain, NextTrial, Rival, Unknown
+from subzero.diagnosis.results import Cause, Extended, Unknown
 
-HALF_INTERVAL_95 = 1.96
-"""Half a 95 % interval, in standard deviations."""
+if TYPE_CHECKING:
+    from subzero.diagnosis.inference.out_of_catalogue import Findings, OutOfCatalogue
 
-
-def name(ids: Ids) -> str:
-    """Return a hypothesis' name: "none", an id, or ids with plus signs."""
-    return " + ".join(ids) or "none"
-
-
-def deviations(work: Findings, best: Candidate) -> dict[str, tuple[float, float]]:
-    """Return parameter → (mean, standard deviation), in tolerances."""
-    entries, sd = work.problem.entries, _spread(work.problem, best)
-    return {
-        entry.name: (float(z) / entry.parameter.tolerance, float(s) / entry.parameter.tolerance)
-        for entry, z, s in zip(entries, best.fit.z, sd, strict=True)
-    }
-
-
-def _spread(problem: Problem, candidate: Candidate) -> np.ndarray:
-    """Return the standard deviations of all entries about a candidate's fit (k,), mixed over κ."""
-    log = {kappa: np.log(prior) + candidate.log_evidence[kappa] for kappa, prior in KAPPAS.items()}
-    square, total = np.zeros(len(problem.entries)), log_sum(list(log.values()))
-    for kappa, weight in log.items():
-        found = posterior(candidate.fit.quadratic, variances(problem.entries, candidate.ids, kappa))
-        square += np.exp(weight - total) * (np.diag(found.M) + (found.z - candidate.fit.z) ** 2)
-    return np.sqrt(square)
-
-
-def estimate(parameter: Parameter, nominal: float, mean: float, sd: float) -> Estimate:
-    """Return a parameter with its 95 % interval, inside its bounds."""
-    low, high = (
-        float(np.clip(mean + side * HALF_INTERVAL_95 * sd, parameter.low, parameter.high)) for side in (-1, 1)
-    )
-    return Estimate(
-        value=nominal + mean,
-        low=nominal + low,
-        high=nominal + high,
-        unit=parameter.unit,
-        nominal=nominal,
-        deviation=mean,
-        deviation_sd=sd,
-    )
-
-
-def estimates(work: Findings, candidate: Candidate, one: str) -> dict[str, Estimate]:
-    """Return the parameters of a cause in a candidate's fit."""
-    problem, sd = work.problem, _spread(work.problem, candidate)
-    setting, found = problem.records[0].setting, {}
-    for k in columns_of(problem.entries, (one,)):
-        parameter = problem.entries[k].parameter
-        found[parameter.name] = estimate(
-            parameter, parameter.nominal(setting), float(candidate.fit.z[k]), float(sd[k])
-        )
-    return found
-
-
-def sentence_of(problem: Problem, one: str) -> str:
-    """Return what a cause is, in words."""
-    return next(entry.effect.sentence for entry in problem.entries if entry.effect.id == one)
-
-
-def practical_of(work: Findings, candidate: Candidate) -> Ids:
-    """Return those causes of a candidate that are of a practical size."""
-    return practical_causes(work.problem.entries, candidate.ids, candidate.fit.z, candidate.kappa)
-
-
-def causes(work: Findings, best: Candidate, inside: Mapping[Ids, float], ids: Ids) -> tuple[Cause, ...]:
-    """Return the named causes of a candidate, each with the probability that it is among those of the truth."""
-    found = []
-    for one in ids:
-        p = sum(share for ids, share in inside.items() if one in ids)
-        found.append(
-            Cause(
-                id=one,
-                sentence=sentence_of(work.problem, one),
-                probability=min(p, 1.0),
-                parameters=estimates(work, best, one),
-            )
-        )
-    return tuple(found)
-
-
-def rivals(
-    work: Findings,
-    best: Candidate,
-    inside: Mapping[Ids, float],
-    left: Sequence[Ids],
-    told: Ids | None,
-    most: int = 8,
-) -> tuple[Rival, ...]:
-    """Return the hypotheses that are left beside the one that is told, if one is, at most so many; or else the
-    runner-up.
-    """
-    listed = [ids for ids in left if ids != told][:most]
-    ranked: Sequence[Ids] = sorted(inside, key=lambda ids: -inside[ids])
-    listed = listed or [ids for ids in ranked if ids != told][:1]
-    return tuple(_rival(work, best, ids, inside.get(ids, 0.0)) for ids in listed)
-
-
-def _rival(work: Findings, best: Candidate, ids: Ids, p: float) -> Rival:
-    candidate = work.search.candidates.get(ids)
-    words = " and ".join(sentence_of(work.problem, one) for one in ids)
-    numbers = {one: estimates(work, candidate, one) for one in ids} if candidate else {}
-    return Rival(
-        ids=ids,
-        sentence=words or "nothing is wrong",
-        probability=p,
-        discrimination=between(work.problem, best.fit, best.ids, ids) if ids != best.ids else np.nan,
-        parameters=numbers,
-    )
-
-
-def between(problem: Problem, fit: Fit, ids: Ids, others: Ids) -> float:
-    """Return D of causes as they are in a fit against others; of nothing, against what they would be in full size."""
-    if not ids:
-        return between(problem, _scaled(problem, fit, others), others, ids) if others else 0.0
-    own = columns_of(problem.entries, ids)
-    M = marginal(problem, fit.J[:, : len(problem.entries)])
-    other = columns_of(problem.entries, tuple(one for one in others if one not in ids))
-    step = fit.z[own]
-    if not other:
-        return float(step @ information(problem, M, own) @ step)
-    return against(problem, M, own, step, other)[0]
-
-
-def _scaled(problem: Problem, fit: Fit, ids: Ids) -> Fit:
-    """Return a fit with causes of one effect scale in it."""
-    from dataclasses import replace
-
-    z = fit.z.copy()
-    for k in columns_of(problem.entries, ids):
-        z[k] = problem.entries[k].parameter.scale
-    return replace(fit, z=z)
-
-
-MAX_SURVIVORS = 4
-"""At most so many hypotheses are to be told apart by the next trial."""
 MENTIONED_PROBABILITY = 0.01
 """Features that are less probable in a formula are not mentioned."""
 
@@ -227,18 +85,18 @@ def of_nothing(work: Findings, best: Candidate) -> Extension:
 
 def of_unknown(work: Findings) -> Extension:
     """Return the extension by the most probable force; beside the drift of a sensor there is nothing new but causes."""
-    foreign = next(one for one in work.foreign if isinstance(one.what, LatentForceCandidate))
-    found = _recovered(work, foreign)
+    explanation = next(one for one in work.out_of_catalogue if isinstance(one.what, LatentForceCandidate))
+    found = _estimated(work, explanation)
     if found.missing is None:
         found = replace(found, fit=fit_beside_drift(work.problem, found, found.fit.D))
-    deviations = by_effect(work.problem, found.fit.z, foreign.beside)
-    calibration = by_effect(work.problem, found.fit.z, None, but=foreign.beside)
+    deviations = by_effect(work.problem, found.fit.z, explanation.causes)
+    calibration = by_effect(work.problem, found.fit.z, None, but=explanation.causes)
     extended = Extended(deviations=deviations, calibration=calibration, missing=found.missing)
-    unknown = found.unknown if found.missing is None else _told(found.unknown, describe(found))
+    unknown = found.unknown if found.missing is None else _as_formula(found.unknown, describe(found))
     return Extension(fit=found.fit, problem=found.problem, extended=extended, unknown=unknown)
 
 
-def _told(unknown: Unknown, formula: Formula) -> Unknown:
+def _as_formula(unknown: Unknown, formula: Formula) -> Unknown:
     """Return a force as its formula tells it, if there is one: far closer to what acts than the free history."""
     if not formula.shapes or formula.log_gain <= 0.0:
         return unknown
@@ -249,12 +107,12 @@ def _told(unknown: Unknown, formula: Formula) -> Unknown:
                    features={one: p for one, p in formula.features.items() if p >= MENTIONED_PROBABILITY})  # fmt: skip
 
 
-def _recovered(work: Findings, foreign: OutOfCatalogue) -> EstimatedForce:
+def _estimated(work: Findings, explanation: OutOfCatalogue) -> EstimatedForce:
     """Return a force or a drift, fitted beside the causes that it stands beside."""
-    base = work.search.candidates[foreign.beside]
-    assert isinstance(foreign.what, LatentForceCandidate)
-    D = variances(work.problem.entries, base.ids, foreign.what.kappa)
-    kind, _, which = foreign.id.partition(":")
+    base = work.search.candidates[explanation.causes]
+    assert isinstance(explanation.what, LatentForceCandidate)
+    D = variances(work.problem.entries, base.ids, explanation.what.kappa)
+    kind, _, which = explanation.id.partition(":")
     if kind + ":" == FORCE:
         return estimate_force(work.problem, base.fit, which, D)
     return estimate_drift(work.problem, base.fit, which, MAX_DRIFT_LEVELS * SPECS[which].noise, D)
@@ -264,7 +122,7 @@ def of_sudden(work: Findings, what: FittedChangePoint, cause: Cause) -> Extensio
     """Return the extension by a cause that begins in mid-trial, as it is fitted."""
     extended = Extended(
         deviations={cause.id: {parameter: one.deviation for parameter, one in cause.parameters.items()}},
-        start_times={cause.id: what.begun.time},
+        start_times={cause.id: what.change_point.time},
         calibration=by_effect(work.problem, what.fit.z, None, but=(cause.id,)),
     )
     return Extension(fit=what.fit, problem=what.problem, extended=extended, cause=cause)
@@ -278,21 +136,3 @@ def by_effect(problem: Problem, z: np.ndarray, ids: Ids | None, but: Ids = ()) -
         if entry.record < 0 and one not in but and (ids is None or one in ids):
             found.setdefault(one, {})[entry.parameter.name] = float(value)
     return found
-
-
-def gained(work: Findings, new: Extension, rival: Fit | None) -> Gain:
-    """Return what an extension explains of held-out data, beside a refit within tolerances and the best rival."""
-    tolerance = Fitted(work.problem, work.search.candidates[()].fit)
-    other = Fitted(work.problem, rival) if rival else None
-    return gain(work.search.nominal[0], tolerance, Fitted(new.problem, new.fit), other, seed=work.seed)
-
-
-def ahead(
-    work: Findings, survivors: Sequence[Survivor], probabilities: Mapping[Ids, float]
-) -> NextTrial | None:
-    """Return the trial that would best tell apart the most probable of what is left."""
-    left = sorted(survivors, key=lambda one: -probabilities.get(one.ids, 0.0))[:MAX_SURVIVORS]
-    work.search.progress(0.92, "the next trial, for " + ", ".join(name(one.ids) for one in left))
-    return next_trial(
-        work.problem, left, probabilities=[probabilities.get(one.ids, 0.0) for one in left], seed=work.seed
-    )

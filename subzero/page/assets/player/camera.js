@@ -32,7 +32,7 @@ export class Camera {
     const [low, high] = this.extent, size = length(subtract(high, low));
     this.mode = "stay";
     this.target = mixed(low, high, 0.5);
-    this.distance = Math.max(0.95 * size, 3);
+    this.distance = Math.max(1.1 * size, 3);
     this.elevation = 0.5;
     this.azimuth = Math.atan2(high[1] - low[1], high[0] - low[0]) - 1.0;
   }

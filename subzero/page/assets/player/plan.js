@@ -46,7 +46,7 @@ export class PlanView {
   }
 
   drawActor(actor, t, at) {
-    const { paper } = this, colour = actor.isGhost ? PLAN_COLOURS.ghost : PLAN_COLOURS.solid;
+    const { paper } = this, colour = actor.name === "measured" ? PLAN_COLOURS.ink : actor.isGhost ? PLAN_COLOURS.ghost : PLAN_COLOURS.solid;
     const [north, east, depth] = ["north", "east", "depth"].map((name) => actor.values(name));
     const track = [...actor.time].flatMap((time, i) => (time <= t ? [[north[i], east[i], depth[i]]] : []));
     this.polyline([...track, actor.place(t)].map(at), colour, actor.isGhost);

@@ -67,7 +67,7 @@ class Player {
 
   /** A box to tick for each vehicle, and the table of what holds now. */
   prepareActors() {
-    const names = [...this.replay.actors.map((actor) => actor.name), ...(this.replay.measured ? ["measured"] : [])];
+    const names = [...new Set([...this.replay.actors.map((actor) => actor.name), ...(this.replay.measured ? ["measured"] : [])])];
     for (const name of names.length > 1 ? names : []) {
       const label = document.createElement("label"), box = document.createElement("input");
       Object.assign(box, { type: "checkbox", checked: true });
@@ -151,6 +151,8 @@ class Player {
 
   resize() {
     const { clientWidth, clientHeight } = this.canvas;
+    this.size = [clientWidth, clientHeight];
+    this.view.pixelsPerPoint = this.fineness;
     this.canvas.width = Math.max(1, Math.round(clientWidth * this.fineness));
     this.canvas.height = Math.max(1, Math.round(clientHeight * this.fineness));
     this.changed();
@@ -178,9 +180,8 @@ class Player {
   spare(passed) {
     this.slowness = 0.9 * (this.slowness ?? 16) + 0.1 * passed;
     if (this.slowness < SLOWEST_FRAME_MS || this.fineness <= COARSEST) return;
-    this.fineness = Math.max(COARSEST, 0.8 * this.fineness);
     this.slowness = 16;
-    this.resize();
+    this.setFineness(Math.max(COARSEST, 0.8 * this.fineness));
   }
 
   draw(now) {
@@ -210,7 +211,7 @@ class Player {
     if (!this.view.onScreen) return;
     const { shown, hidden } = this.view, wanted = new Map();
     for (const actor of this.replay.actors)
-      if (shown[actor.name] && !hidden.has(actor.name) && this.replay.actors.length > 1) wanted.set(actor.name, shown[actor.name].middle);
+      if (shown[actor.name] && !hidden.has(actor.name) && this.replay.actors.length > 1) wanted.set(actor.name, this.besideHull(actor));
     if (shown.drum) wanted.set(this.replay.drum_on_vessel ? "vessel" : "drum", shown.drum.position);
     this.labels ??= new Map();
     for (const [name, place] of wanted) this.putLabel(name, this.view.onScreen(place));
@@ -220,16 +221,24 @@ class Player {
     element("scale").textContent = `${bed}, squares of ${this.view.spacing} m${large}`;
   }
 
+  /** A place just above a vehicle, just below a ghost: so two that are close keep their names apart. */
+  besideHull(actor) {
+    const [north, east, down] = this.view.shown[actor.name].middle, off = 0.9 * this.replay.vehicle.hull.diameter * this.view.scale;
+    return [north, east, down + (actor.isGhost ? off : -off)];
+  }
+
   putLabel(name, at) {
     if (!this.labels.has(name)) {
       const label = cell("div", name);
-      label.className = "label";
+      label.className = this.replay.actors.some((actor) => actor.name === name && actor.isGhost) ? "label below" : "label";
       element("labels").append(label);
       this.labels.set(name, label);
     }
-    const label = this.labels.get(name), inside = at && at.every((share) => share > 0.01 && share < 0.97);
+    const label = this.labels.get(name), ghosts = this.replay.actors.filter((actor) => actor.isGhost).map((actor) => actor.name);
+    label.style.marginTop = `${1.7 * Math.max(0, ghosts.indexOf(name))}em`;  // ghosts that are close keep their names apart
+    const inside = at && at.every((share) => share > 0.01 && share < 0.97);
     label.hidden = !inside;
-    if (inside) label.style.transform = `translate(${at[0] * this.canvas.clientWidth}px, ${at[1] * this.canvas.clientHeight}px)`;
+    if (inside) label.style.transform = `translate(${at[0] * this.size[0]}px, ${at[1] * this.size[1]}px)`;
   }
 
   /** Where everything is at a time, from the data: name → channel → value. */
@@ -245,13 +254,29 @@ class Player {
     return { time: this.time, places: Object.fromEntries(places), camera: this.camera.mode, isPlaying: this.isPlaying };
   }
 
+  /** Draw with so many pixels a point. */
+  setFineness(fineness) {
+    this.fineness = fineness;
+    this.resize();
+  }
+
+  /** Show the moment `t` in a picture of so many points, and nothing around it: for films and still pictures. */
+  filmAt(t, width, height) {
+    const picture = this.canvas.parentElement;
+    picture.style.cssText = `position: fixed; left: 0; top: 0; width: ${width}px; height: ${height}px; z-index: 9; border-radius: 0`;
+    if (this.size[0] !== this.canvas.clientWidth || this.size[1] !== this.canvas.clientHeight) this.resize();
+    this.waves = t;
+    this.seek(t);
+  }
+
   /** Draw so many frames of a whole replay one after the other, each to its end, and return how many a second. */
   framesPerSecond(frames = 60) {
+    this.seek(0);
     const gl = this.view.gl, pixel = new Uint8Array(4), began = performance.now();
     for (let i = 0; i < frames; i++) {
       this.time = (this.replay.end * i) / frames;
       this.draw(performance.now());
-      gl?.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
+      gl?.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel); // waits until all is drawn
     }
     return (1000 * frames) / (performance.now() - began);
   }
@@ -272,6 +297,8 @@ window.subzero = {
   seek: (t) => player.seek(t),
   shown: () => player.shown(),
   look: (mode) => player.look(mode),
+  setFineness: (fineness) => player.setFineness(fineness),
+  filmAt: (t, width, height) => player.filmAt(t, width, height),
   framesPerSecond: (frames) => player.framesPerSecond(frames),
   camera: player.camera,
   end: player.replay.end,

@@ -60,14 +60,15 @@ export class Plots {
     plot.over.addEventListener("click", (event) => {
       if (!plot.wasDragged) this.seek(plot.posToVal(event.clientX - plot.over.getBoundingClientRect().left, "x"));
     });
-    this.plots.push({ plot, now, lines, values, figure });
+    this.plots.push({ plot, now, lines, values, width: plot.over.clientWidth });
     this.showTime(this.time ?? 0);
   }
 
   linesOf(name) {
     const colours = isDark() ? DARK_COLOURS : COLOURS, { actors, measured } = this.replay;
-    const lines = actors.filter((actor) => actor.has(name)).map((actor, i) => ({
-      label: actor.name, source: actor, name, stroke: colours[actor.name] ?? colours[i], dash: actor.isGhost ? [6, 4] : [],
+    const isDots = (actor) => actor.name === "measured" && measured?.has(name);
+    const lines = actors.filter((actor) => actor.has(name) && !isDots(actor)).map((actor) => ({
+      label: actor.name, source: actor, name, stroke: colours[actor.name] ?? colours[actors.indexOf(actor)], dash: actor.isGhost ? [6, 4] : [],
     }));
     if (measured?.has(name)) lines.push({ label: "measured", source: measured, name, stroke: isDark() ? "#ddd" : "#333", dots: true });
     return lines;
@@ -107,16 +108,19 @@ export class Plots {
 
   resize() {
     const width = Math.max(this.holder.firstElementChild?.clientWidth ?? 0, 200);
-    for (const { plot } of this.plots) plot.setSize({ width, height: HEIGHT });
+    for (const one of this.plots) {
+      one.plot.setSize({ width, height: HEIGHT });
+      one.width = one.plot.over.clientWidth;
+    }
     this.showTime(this.time ?? 0);
   }
 
   /** Move the line of the present, and say what holds then. */
   showTime(t) {
     this.time = t;
-    for (const { plot, now, lines, values } of this.plots) {
+    for (const { plot, now, lines, values, width } of this.plots) {
       const x = plot.valToPos(t, "x");
-      now.hidden = x < 0 || x > plot.over.clientWidth;
+      now.hidden = x < 0 || x > width;  // kept since the last resize: to ask the page in every frame would be slow
       now.style.transform = `translateX(${x}px)`;
       values.forEach((value, i) => (value.textContent = inShort(lines[i].source.at(lines[i].name, t))));
     }

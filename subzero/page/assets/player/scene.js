@@ -9,7 +9,11 @@ const FIELD_OF_VIEW = 0.75;                   // vertical [rad]
 const SMALLEST_VEHICLE = 0.055;               // a vehicle is never drawn shorter than this share of the distance to the target
 const PROPELLER_SLOWED = 12;                  // a screen shows 25 turns a second as anything but that
 const GHOST = [1.0, 0.76, 0.50, 0.36], GHOST_TRACK = [1.0, 0.66, 0.36, 0.95], TRACK = [0.75, 0.93, 1.0, 0.85], DOTS = [1, 1, 1, 0.9];
+const MEASURED_GHOST = [0.93, 0.98, 1.0, 0.45], MEASURED_TRACK = [1, 1, 1, 0.95];   // what was measured is white, all else that is no more than a ghost orange
 const SPECKS = 500;
+const BACKGROUND_TILES = [24, 24];
+
+const isMeasured = (actor) => actor.name === "measured";
 
 /** WebGL2 on a canvas, or null where there is none. */
 export function webglOn(canvas) {
@@ -63,6 +67,7 @@ export class Scene {
     this.tracks = new Map(replay.actors.map((actor) => [actor, trackOf(actor)]));
     this.measured = measuredTrack(replay.measured);
     this.groundDepth = replay.sea_bed ?? depthOfGrid(replay.extent);
+    this.pixelsPerPoint = 1;
     this.shown = {};
     this.hidden = new Set();
   }
@@ -152,9 +157,9 @@ export class Scene {
   drawBackground() {
     const gl = this.gl;
     gl.disable(gl.DEPTH_TEST);
-    this.use("background", { toWorld: inverse(this.toClip) });
+    this.use("background", { toWorld: inverse(this.toClip), tiles: BACKGROUND_TILES });
     gl.bindVertexArray(this.nothing);
-    gl.drawArrays(gl.TRIANGLES, 0, 3);
+    gl.drawArrays(gl.TRIANGLES, 0, 6 * BACKGROUND_TILES[0] * BACKGROUND_TILES[1]);
     gl.enable(gl.DEPTH_TEST);
   }
 
@@ -201,10 +206,10 @@ export class Scene {
     const gl = this.gl;
     for (const actor of this.visible(true)) {
       gl.colorMask(false, false, false, false);
-      this.drawVehicle(actor, t, GHOST);
+      this.drawVehicle(actor, t, isMeasured(actor) ? MEASURED_GHOST : GHOST);
       gl.colorMask(true, true, true, true);
       gl.depthFunc(gl.LEQUAL);
-      this.drawVehicle(actor, t, GHOST);
+      this.drawVehicle(actor, t, isMeasured(actor) ? MEASURED_GHOST : GHOST);
       gl.depthFunc(gl.LESS);
     }
   }
@@ -251,12 +256,12 @@ export class Scene {
   }
 
   drawLines(t, width, height) {
-    const pixels = this.gl.canvas.width / (this.gl.canvas.clientWidth || this.gl.canvas.width);
+    const pixels = this.pixelsPerPoint;
     const common = { screen: [width, height], nearest: this.near * 1.05, highest: this.replay.highestTension || 1 };
     if (this.measured && !this.hidden.has("measured")) this.drawLine(this.measured, { ...common, colour: DOTS, width: 1.2 * pixels, dash: 0.002 * this.distance + 0.01, opacity: 0.9 });
     for (const actor of this.visible(true)) {
       const dash = 0.012 * this.distance;
-      this.drawLine(this.trackUntil(actor, t), { ...common, colour: GHOST_TRACK, width: 1.3 * pixels, dash, opacity: 0.9 });
+      this.drawLine(this.trackUntil(actor, t), { ...common, colour: isMeasured(actor) ? MEASURED_TRACK : GHOST_TRACK, width: 1.3 * pixels, dash, opacity: 0.9 });
       this.drawCable(actor, t, { ...common, width: 2.2 * pixels, dash: 0, opacity: 0.4 });
     }
     for (const actor of this.visible(false)) {

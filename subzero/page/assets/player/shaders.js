@@ -41,28 +41,32 @@ vec3 seenThroughWater(vec3 colour, vec3 place, float share) {
 }
 `;
 
-/** All that is seen where nothing is: sky above, water below. */
+/** All that is seen where nothing is: sky above, water below. It changes slowly over the picture, so that it is
+    computed at the corners of tiles only: a machine without a graphics card is thankful. */
 export const background = {
-  vertex: `#version 300 es
+  vertex: WATER + `
 uniform mat4 toWorld;
-out vec3 far;
+uniform vec2 tiles;
+out vec3 colour;
 void main() {
-  vec2 corner = vec2(gl_VertexID & 1, gl_VertexID >> 1) * 4.0 - 1.0;
-  gl_Position = vec4(corner, 1.0, 1.0);
-  vec4 place = toWorld * gl_Position;
-  far = place.xyz / place.w;
-}`,
-  fragment: WATER + `
-in vec3 far;
-out vec4 pixel;
-void main() {
-  vec3 direction = normalize(far - eye);
+  int tile = gl_VertexID / 6, corner = int[6](0, 1, 2, 2, 1, 3)[gl_VertexID % 6], across = int(tiles.x);
+  vec2 at = vec2(tile % across + (corner & 1), tile / across + (corner >> 1)) / tiles * 2.0 - 1.0;
+  gl_Position = vec4(at, 0.0, 1.0);
+  vec4 far = toWorld * vec4(at, 1.0, 1.0);
+  vec3 direction = normalize(far.xyz / far.w - eye);
   if (eye.z < 0.0) {
-    pixel = vec4(-direction.z > 0.0 ? skyAlong(direction) : mix(HORIZON * 0.8, MIDDLE, smoothstep(0.0, 0.35, direction.z)), 1.0);
+    colour = -direction.z > 0.0 ? skyAlong(direction) : mix(HORIZON * 0.8, MIDDLE, smoothstep(0.0, 0.35, direction.z));
     return;
   }
   float shafts = sin(direction.x * 23.0 + 0.25 * seconds) * sin(direction.y * 17.0 - 0.2 * seconds);
-  pixel = vec4(waterAlong(direction) * (1.0 + 0.07 * shafts * smoothstep(-0.2, 0.6, -direction.z)), 1.0);
+  colour = waterAlong(direction) * (1.0 + 0.07 * shafts * smoothstep(-0.2, 0.6, -direction.z));
+}`,
+  fragment: `#version 300 es
+precision mediump float;
+in vec3 colour;
+out vec4 pixel;
+void main() {
+  pixel = vec4(colour, 1.0);
 }`,
 };
 
@@ -165,16 +169,15 @@ in vec3 place;
 uniform float spacing;
 uniform bool isBed;
 out vec4 pixel;
-float gridLine(vec2 p, float every, float thick) {
-  vec2 q = p / every, grain = fwidth(q);
-  vec2 lines = smoothstep(grain * (thick + 0.7), grain * (thick - 0.3), abs(fract(q - 0.5) - 0.5));
-  vec2 fading = 1.0 - smoothstep(0.15, 0.6, grain);
-  return max(lines.x * fading.x, lines.y * fading.y);
+/** How much of a pixel lies on lines between squares of side 1; none where squares are finer than pixels. */
+float gridLines(vec2 q, vec2 grain, float thick) {
+  vec2 lines = clamp(thick + 0.5 - abs(fract(q - 0.5) - 0.5) / grain, 0.0, 1.0) * clamp(1.4 - 2.4 * grain, 0.0, 1.0);
+  return max(lines.x, lines.y);
 }
 void main() {
-  float thin = gridLine(place.xy, spacing, 0.6), bold = gridLine(place.xy, 5.0 * spacing, 1.1);
-  float lines = max(0.45 * thin, 0.9 * bold);
-  vec3 way = place - eye;
+  vec2 q = place.xy / spacing, grain = fwidth(q);
+  float lines = max(0.45 * gridLines(q, grain, 0.5), 0.9 * gridLines(0.2 * q, 0.2 * grain, 0.9));
+  vec3 way = (place - eye) / clearness;
   if (isBed) {
     float rough = sin(place.x * 1.1 + 1.7 * sin(place.y * 0.37)) * sin(place.y * 0.9 + 1.3 * sin(place.x * 0.23));
     float web = caustics(place.xy * (0.9 / max(spacing, 0.5))) * exp(-place.z / 30.0);
@@ -182,8 +185,8 @@ void main() {
     pixel = vec4(seenThroughWater(mix(sand, vec3(0.75, 0.86, 0.86), 0.40 * lines), place, 1.0), 1.0);
     return;
   }
-  float fade = exp(-length(way) / (1.4 * clearness));
-  pixel = vec4(vec3(0.62, 0.86, 0.92), 0.55 * lines * fade);
+  float fade = 1.0 / (1.0 + 0.35 * dot(way, way));
+  pixel = vec4(vec3(0.62, 0.86, 0.92), 0.5 * lines * fade * fade);
 }`,
 };
 
@@ -194,35 +197,34 @@ export const surface = {
 in vec3 place;
 uniform float waveLength;
 out vec4 pixel;
-vec3 rippled(vec2 p) {
-  vec2 q = p / waveLength;
-  vec2 slope = vec2(0.0);
-  slope += vec2(0.8, 0.6) * cos(dot(q, vec2(0.8, 0.6)) * 6.3 + 1.1 * seconds);
-  slope += vec2(-0.5, 0.86) * 0.8 * cos(dot(q, vec2(-0.5, 0.86)) * 9.7 + 1.6 * seconds + 0.8 * sin(q.x));
-  slope += vec2(0.98, -0.2) * 0.6 * cos(dot(q, vec2(0.98, -0.2)) * 17.0 - 2.2 * seconds + sin(1.9 * q.y));
-  slope += vec2(0.17, 0.98) * 0.5 * cos(dot(q, vec2(0.17, 0.98)) * 27.0 + 2.9 * seconds + 1.4 * sin(2.3 * q.x));
-  return normalize(vec3(0.05 * slope, -1.0));
+vec2 ripples(vec2 p) {
+  vec2 q = 6.3 * p / waveLength + 0.6 * sin(1.7 * p.yx / waveLength + vec2(0.4, 0.7) * seconds);
+  vec3 phase = vec3(dot(q, vec2(0.8, 0.6)), dot(q, vec2(-0.77, 1.32)), dot(q, vec2(2.65, -0.54)));
+  vec3 wave = cos(phase + vec3(1.1, 1.6, -2.2) * seconds);
+  return vec2(0.8, 0.6) * wave.x + vec2(-0.4, 0.69) * wave.y + vec2(0.59, -0.12) * wave.z;
 }
 void main() {
   vec3 way = place - eye;
   float far = length(way), calm = exp(-far / (60.0 * waveLength));
-  vec3 look = way / far, n = normalize(mix(vec3(0.0, 0.0, -1.0), rippled(place.xy), calm));
+  vec3 look = way / far;
+  vec2 slope = ripples(place.xy) * calm;
   if (eye.z < 0.0) {
-    float facing = max(dot(-look, n), 0.0), mirror = 0.03 + 0.97 * pow(1.0 - facing, 5.0);
-    vec3 sky = skyAlong(reflect(look, n));
+    vec3 n = normalize(vec3(0.05 * slope, -1.0));
+    float facing = max(dot(-look, n), 0.0), grazing = 1.0 - facing, mirror = 0.03 + 0.97 * grazing * grazing * grazing * grazing * grazing;
+    vec3 away = reflect(look, n), sky = mix(HORIZON, ZENITH, sqrt(max(-away.z, 0.0)));
+    float sunny = max(dot(away, SUN), 0.0), glitter = pow(sunny, 90.0), haze = 1.0 - exp(-far / (14.0 * clearness));
     vec3 body = mix(vec3(0.04, 0.33, 0.44), vec3(0.02, 0.20, 0.32), facing);
-    float glitter = pow(max(dot(reflect(look, n), SUN), 0.0), 90.0);
-    float haze = 1.0 - exp(-far / (14.0 * clearness));
     vec3 colour = mix(mix(body, sky, mirror) + glitter * 0.9, HORIZON * 0.93, haze * 0.8);
     pixel = vec4(colour, clamp(0.24 + 0.75 * mirror + glitter + haze, 0.0, 1.0));
     return;
   }
   // From below: bright straight above, where the sky shows (Snell's window, 49 degrees wide), a mirror of the deep beyond.
-  vec2 tilt = 9.0 * n.xy * calm;
+  vec2 tilt = 0.45 * slope;
   float window = smoothstep(0.45, 0.95, -look.z + 0.8 * dot(tilt, look.xy) + 0.25 * tilt.x);
-  float crest = pow(0.5 + 0.5 * sin(5.0 * (tilt.x - 0.7 * tilt.y)), 3.0);
+  float crest = 0.5 + 0.5 * sin(5.0 * (tilt.x - 0.7 * tilt.y));
+  crest *= crest * crest;
   vec3 mirrored = mix(MIDDLE * 1.15, GLOW * 0.72, 0.35 + 0.4 * crest);
-  vec3 light = mix(mirrored, vec3(0.84, 0.97, 0.97), window) + vec3(0.16) * crest * window;
+  vec3 light = mix(mirrored, vec3(0.84, 0.97, 0.97), window) + 0.16 * crest * window;
   float fade = exp(-far / (1.2 * clearness));
   pixel = vec4(light, fade * (0.55 + 0.3 * crest + 0.15 * window));
 }`,

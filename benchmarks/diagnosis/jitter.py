@@ -1,0 +1,123 @@
+"""Does a verdict survive a rounding? ``python -m benchmarks.diagnosis.jitter``.
+
+Records of `benchmarks.diagnosis.world` are diagnosed again as copies that say the same: with seven significant digits,
+as a file has them, and with a hundredth of a noise level added to every sample. A verdict of a copy repeats if it has
+the verdict and the first name of the original. What is more probable than it repeats is sure of the way of the search.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import cyclopts
+import numpy as np
+
+from subzero.diagnosis.api import diagnose_trials
+from subzero.diagnosis.hypothesis.catalogue.sensors import NOISE
+from subzero.diagnosis.hypothesis.logged import Logged
+
+from .results import line, read
+from .world import Drawn, drawn, record_of
+
+DIGITS = 7
+SHARE = 0.01
+"""Of a noise level that is added to every sample. [-]"""
+SURE = 0.95
+app = cyclopts.App(name="python -m benchmarks.diagnosis.jitter", help_format="plaintext", version_flags=[])
+Said = tuple[str, str, float]
+"""Verdict, first name, and its probability."""
+
+
+def copies(logged: Logged, count: int, rng: np.random.Generator) -> list[Logged]:
+    """Return a copy with DIGITS digits, and so many with a little noise."""
+    values = logged.record.values
+    rounded = {name: np.array([float(f"{x:.{DIGITS}g}") for x in column]) for name, column in values.items()}
+    shaken = [
+        {
+            name: column + SHARE * NOISE[name] * rng.standard_normal(column.size)
+            for name, column in values.items()
+        }
+        for _ in range(count)
+    ]
+    return [replace(logged, record=replace(logged.record, values=one)) for one in (rounded, *shaken)]
+
+
+def result_of(one: Drawn, count: int) -> dict[str, Any]:
+    """Return what is said of a record and of its copies."""
+    logged, _ = record_of(one)
+    rng = np.random.default_rng([one.seed, one.index, 9])
+    said = [_said(each, one.index) for each in (logged, *copies(logged, count, rng))]
+    return {"index": one.index, "flown": one.flown, "family": one.family, "cause": one.cause, "said": said}
+
+
+def _said(logged: Logged, seed: int) -> Said:
+    verdict = diagnose_trials([logged], seed=seed, budget="verdict")
+    first, p = next(iter(verdict.probabilities.items()))
+    return verdict.verdict, first, p
+
+
+def repeats(result: Mapping[str, Any]) -> list[bool]:
+    """Say of every copy whether it has the verdict and the first name of the original."""
+    original, *others = result["said"]
+    return [tuple(one[:2]) == tuple(original[:2]) for one in others]
+
+
+def summary(results: Sequence[Mapping[str, Any]]) -> str:
+    """Return how many copies repeat, of all and of originals that were sure."""
+    sure = [one for one in results if one["said"][0][2] >= SURE]
+    return "\n".join(
+        f"{name:<24}{sum(sum(repeats(one)) for one in some):5d} of {sum(len(repeats(one)) for one in some):5d} repeat"
+        for name, some in (("all", results), (f"originals of p >= {SURE:g}", sure))
+    )
+
+
+def line_of(result: Mapping[str, Any]) -> str:
+    """Return a result as a line: the original, and the copies that differ."""
+    original, *others = ((verdict, f"{first} {p:.2f}") for verdict, first, p in result["said"])
+    differ = [" ".join(one) for one, same in zip(others, repeats(result), strict=True) if not same]
+    return (f"{result['index']:4d} {result['flown']:14} {result['family']:12} {result['cause'] or 'healthy'} → "
+            f"{' '.join(original)}{'; BUT ' + ', '.join(differ) if differ else ''}")  # fmt: skip
+
+
+@app.default
+def benchmark(
+    *,
+    count: int = 18,
+    copies: int = 5,
+    seed: int = 101,
+    workers: int = 2,
+    results: Path | None = None,
+    resume: bool = False,
+) -> None:
+    """Diagnose records and copies of them that say the same, and print whether the verdicts do.
+
+    Args:
+        count: how many records.
+        copies: with a little noise, of each.
+        seed: of all records.
+        workers: processes.
+        results: where they are kept, one JSON object a line; nowhere if not given.
+        resume: keep the results of an interrupted run, and go on behind them.
+    """
+    if results and not resume:
+        results.unlink(missing_ok=True)
+    known = read(results) if results else []
+    done = {one["index"] for one in known}
+    wanted = [(one, copies) for one in drawn(seed, count) if one.index not in done]
+    with multiprocessing.get_context("fork").Pool(workers) as pool:
+        jobs = [pool.apply_async(result_of, one) for one in wanted]
+        for job in jobs:
+            known.append(one := job.get())
+            print(line_of(one), flush=True)
+            if results:
+                with results.open("a") as file:
+                    file.write(line(one))
+    print(summary(known))
+
+
+if __name__ == "__main__":
+    app()

@@ -1,0 +1,96 @@
+"""Everything that only steers the search: how far it looks, how often it tries, and when it lets go.
+
+None of these numbers belongs to the statistical model: with an endless budget, and simulations without non-smooth
+points, the verdict would not depend on them. They buy time. What belongs to the model stands with its concept: prior
+probabilities (`hypotheses`), priors of noise (`noise`) and of latent forces (`linear_gaussian`), rules for a verdict
+(`model_average`). So do the steps of differences and grids (`problem`, `change_point_scan`, `latent_force`).
+
+Log posteriors are in nats: 2 nats are odds of 7 to 1, 6 of 400 to 1. Distances of parameters are in tolerances τ.
+"""
+
+# Differences of log posterior, or of the objective of a fit. [nat]
+NEGLIGIBLE_GAIN_NATS = 0.1
+"""A step or a fit that gains less is not taken: no probability would change in its second digit."""
+CONVERGED_GAIN_NATS = 0.5
+"""A fit has converged if its linear model predicts a smaller gain and no step gains anything."""
+CLOSE_NATS = 2.0
+"""Explanations this close to the best may turn out better once they have settled: they are refined, and refitted where
+the linear model predicts this much more."""
+SCAN_GAIN_NATS = 3.0
+"""A change point that gains less on the coarse grid of onsets is not scanned on the fine one."""
+FURTHER_CAUSE_NATS = 4.0
+"""A further cause is fitted even if the linear evidence is against it by this much: linear evidence errs."""
+HOPELESS_NATS = 6.0
+"""What is this far behind the best is given up; what the linear model has this far before its own fit was fitted into
+a local minimum, and is fitted again."""
+LINEAR_NATS = 10.0
+"""Linear evidence far from a fit may err by this much: forces and hypotheses within it are looked at again."""
+SCREENED_NATS = 12.0
+"""Screened hypotheses this close to the best of as many causes are fitted."""
+MERGED_NATS = 15.0
+"""One cause in the place of two is fitted even if it looks this much worse: far away, linear evidence says little."""
+REFUTED_NATS = 16.0
+"""A rival whose fit is this far behind the best is refuted: where D is 9, luck would have to be worth 3 σ."""
+DECISIVE_NATS = 30.0
+"""No sum of causes gains more over an explanation that leaves only noise; a fit that predicts this much more is
+continued."""
+FAR_NATS = 45.0
+"""A latent force is not linearised at its own fit if its linear evidence is this far behind the best."""
+MAX_PREDICTED_GAIN_NATS = 300.0
+"""A gain predicted with an old Jacobian counts up to this much."""
+
+# Distances of parameters. [τ]
+RESTART_TOLERANCES = 0.5
+"""Non-smooth parameters are restarted here: off the kink, where most vehicles are."""
+OWN_JACOBIAN_TOLERANCES = 1.0
+"""A Jacobian made this close to a fit is its own."""
+STRAYED_TOLERANCES = 2.0
+"""A fit that moves non-smooth parameters of no named cause farther sits at a bad local minimum."""
+JACOBIAN_HOLDS_TOLERANCES = 4.0
+"""A Jacobian serves to compare fits this far from where it was made."""
+STRAINED_TOLERANCES, MAX_STRAINED = 5.0, 6
+"""A wide fit that moves MAX_STRAINED parameters by more than this is close to the records by chance."""
+BENT_TOLERANCES = 10.0
+"""A cause that the wide fit moves by more than this is fitted by itself: linear evidence says little there."""
+
+# Sizes and shares. [-]
+POOR_FIT_SIGMAS = 2.0
+"""A fit whose sum of squares is this many of its standard deviations above that of noise is poor."""
+POOR_MEAN_SQUARE = 1.08
+"""A wide fit with a larger mean square of the whitened residual is not close to the records."""
+FLAT_SIGNAL = 1.0
+"""A cause that does less than this at one effect scale, in noise levels, has no slope there."""
+STALE_GAIN_SHARE = 0.5
+"""A step that gains less than this share of its predicted gain asks for a new Jacobian."""
+NON_LINEAR_SHARE, NON_LINEAR_SHARE_OF_FIRST = 0.05, 0.75
+"""Non-linearity may hide this share of a change point's linear gain, and this share of that of the first."""
+SWEEP_SCALES = (0.25, 0.5, 1.0, 2.0)
+"""Effect scales, either way, at which causes without a slope are simulated."""
+MERGED_SCALES = (0.5, 1.5)
+"""Effect scales, either way, at which one cause is simulated in the place of two."""
+LATER_SIZES = (1.0, 1.5)
+"""A cause of a hypothesis is simulated from an onset on at these multiples of its size there."""
+
+# Counts.
+MAX_CAUSES = 3
+"""Most causes of a hypothesis."""
+MAX_STEPS = 8
+"""Most steps of a fit."""
+MAX_ADDED = 2
+"""Most fits with something more: a further cause, a bent cause by itself, along a force, from a large hypothesis."""
+MAX_TRIED = 3
+"""Most fits of one kind in one look: swapped causes, restarts, change points, forces, rivals to refute."""
+MAX_REPEATS = 2
+"""How often rivals are fitted from one another's optimum, and the noise is estimated behind the wide fit."""
+MAX_ROUNDS = 3
+"""How often the search settles, tries change points, and continues a fit."""
+MAX_GROWING_ROUNDS = 4
+"""How often it adds, drops, swaps and merges causes of the best."""
+MAX_PAIRS = 4
+"""Most screened pairs that are fitted; from afar, most causes by themselves."""
+MAX_REFINED = 6
+"""Most fits that one refinement gives a Jacobian of their own."""
+MAX_SINGLES = 7
+"""Most screened causes that are fitted."""
+MAX_RUNS_PER_RECORD = 800
+"""After so many simulations of each record only what predicts to be the best is refined."""

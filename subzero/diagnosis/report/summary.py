@@ -1,0 +1,270 @@
+"""What a reader who was not there asks of a diagnosis, answered in words that need no glossary.
+
+Five questions: what is wrong, how sure that is, what it costs, what to do next, what would settle it. The terminal, the
+page, ``report.md`` and ``diagnosis.json`` say the same answers; ids and tables stand below.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
+
+from subzero.channels import BY_NAME
+from subzero.diagnosis.hypothesis.extended_model import plain_id
+from subzero.diagnosis.report import words
+from subzero.diagnosis.report.tables import CLEAR_FROM, CONFUSED_BELOW, SEEN_SIGNAL
+from subzero.diagnosis.results import CAUSE_NAMED, NOTHING_WRONG, OUTSIDE, UNDECIDED, Verdict
+
+SURE = {
+    0.999: "As sure as records can make one",
+    0.95: "Very sure",
+    0.8: "Fairly sure",
+    0.5: "More likely than not",
+}
+"""Probability from which on → how one says it."""
+WITHIN_NOISE = 1.2
+"""A root mean square error of so many noise levels is what the noise alone may leave. [-]"""
+MOST_CHANNELS, MOST_EXPLANATIONS = 2, 4
+"""So many channels, and explanations, are told in a sentence."""
+MOST_HIDDEN = 5
+"""So many causes that could not have been seen are named."""
+
+LOOK_AT = {
+    "propulsion": "the propeller, its motor and the battery",
+    "fins": "the fins, their servos and linkages",
+    "cable": "the cable",
+    "drum": "the drum and its bearings",
+    "water": "the current: measure it, or log the speed over ground too",
+    "hull": "the hull: its skin, its weight and where that lies",
+    "sensors": "the sensor and its calibration",
+    "clock": "the clocks of the commands and of the sensors",
+    "start": "how the trial began",
+}
+"""Where a cause of the catalogue acts → what to look at."""
+
+
+class Answer(NamedTuple):
+    """A question, sentences that answer it, and perhaps a line of the shell that acts on it."""
+
+    question: str
+    words: tuple[str, ...]
+    command: str = ""
+
+
+def summary(verdict: Verdict, scenario: str = "SCENARIO") -> tuple[Answer, ...]:
+    """Return the answers to what everybody asks.
+
+    Args:
+        verdict: of `subzero.diagnose`.
+        scenario: the trial's name, for lines of the shell.
+    """
+    command = f"subzero simulate {scenario} --with extended.toml" if _is_new(verdict) else ""
+    return (
+        Answer("What is wrong", tuple(_wrong(verdict))),
+        Answer("How sure is that", tuple(_sure(verdict))),
+        Answer("What it costs", tuple(_costs(verdict))),
+        Answer("What to do next", tuple(_next(verdict)), command),
+        Answer("What would settle it", tuple(_settles(verdict))),
+    )
+
+
+def _is_new(verdict: Verdict) -> bool:
+    """Say whether the extended model has anything that the nominal one has not."""
+    return verdict.verdict in (CAUSE_NAMED, OUTSIDE) and (
+        bool(verdict.extended.deviations) or verdict.extended.missing is not None
+    )
+
+
+def _wrong(verdict: Verdict) -> Iterator[str]:
+    """Give what is wrong."""
+    if verdict.verdict == CAUSE_NAMED:
+        yield from (words.cause_in_short(one) for one in verdict.causes)
+    elif verdict.verdict == OUTSIDE and verdict.unknown is not None:
+        yield words.unknown(verdict.unknown)
+    else:
+        yield words.sentence(verdict)
+
+
+def _sure(verdict: Verdict) -> Iterator[str]:
+    """Give how probable it is, what comes next, and whether these records can tell the two apart."""
+    probability = _probability(verdict)
+    if verdict.verdict == UNDECIDED:
+        yield "Not sure enough to name one of them."
+    elif probability is not None:
+        yield f"{_in_words(probability)} (probability {words.probability(probability)})."
+    if verdict.verdict == NOTHING_WRONG:
+        yield from _not_seen(verdict)
+    elif verdict.verdict != UNDECIDED:
+        yield from _runner_up(verdict)
+    if not verdict.complete:
+        yield "The diagnosis was interrupted: this is as far as it came."
+
+
+def _probability(verdict: Verdict) -> float | None:
+    """Return the probability of what is told; of several causes that of the least sure one; None if it is not known."""
+    if verdict.verdict == CAUSE_NAMED and verdict.causes:
+        return min(one.probability for one in verdict.causes)
+    if verdict.verdict == OUTSIDE and verdict.unknown is not None:
+        one = verdict.unknown
+        return verdict.probabilities.get(f"{words.DRIFT if one.is_drift else words.FORCE}{one.axis}")
+    return None
+
+
+def _in_words(probability: float) -> str:
+    return next((said for least, said in SURE.items() if probability >= least), "Not sure")
+
+
+def _not_seen(verdict: Verdict) -> Iterator[str]:
+    """Give what these records could not have shown, which "nothing is wrong" says nothing of."""
+    rows = verdict.detectable
+    hidden = [words.explanation(one.id) for one in rows if one.signal < SEEN_SIGNAL]
+    if not rows:
+        return
+    yield (
+        f"These records would have shown {len(rows) - len(hidden)} of the {len(rows)} causes of the catalogue at "
+        "their usual size."
+    )
+    if hidden:
+        more = f", and {len(hidden) - MOST_HIDDEN} more" if len(hidden) > MOST_HIDDEN else ""
+        yield f"They could not have shown: {'; '.join(hidden[:MOST_HIDDEN])}{more}."
+
+
+def _runner_up(verdict: Verdict) -> Iterator[str]:
+    """Give what is most probable beside what is told, and how far it is where that is known."""
+    others = [name for name in verdict.probabilities if not words.is_told(name, verdict)]
+    if not others:
+        return
+    first = max(others, key=lambda name: verdict.probabilities[name])
+    said = words.explanation(first, words.sentences(verdict))
+    said = f"What comes next: {said} (probability {words.probability(verdict.probabilities[first])})"
+    D = next(
+        (one.discrimination for one in verdict.rivals if (" + ".join(one.ids) or "none") == first), math.nan
+    )
+    yield f"{said}{_apart(D)}."
+
+
+def _apart(D: float) -> str:
+    """Return whether these records can tell two explanations apart; nothing where that is not known."""
+    if not math.isfinite(D):
+        return ""
+    apart = (
+        "cannot tell the two apart"
+        if D < CONFUSED_BELOW
+        else "can hardly tell the two apart" if D < CLEAR_FROM else "can tell the two apart"
+    )  # fmt: skip
+    return f"; these records {apart} (D {D:.3g})"
+
+
+def _costs(verdict: Verdict) -> Iterator[str]:
+    """Give by how much the simulation is wrong, on data that were not fitted if there are such, and what is gained."""
+    if verdict.gain is not None and (verdict.gain.held_out or verdict.gain.fitted):
+        yield from _gained(verdict)
+        return
+    rows = {
+        (record, name): one for record, channels in verdict.misfit.items() for name, one in channels.items()
+    }
+    worst = sorted(rows, key=lambda key: -_finite(rows[key].nrmse))[:MOST_CHANNELS]
+    if not worst:
+        yield "That was not measured."
+    elif rows[worst[0]].nrmse < WITHIN_NOISE:
+        yield "Nothing: what the simulation leaves unexplained is the noise of the sensors."
+    else:
+        misses = _joined(
+            [_miss(name, rows[record, name].rmse, rows[record, name].nrmse) for record, name in worst]
+        )
+        yield f"Root mean square, the simulation misses {misses}."
+
+
+def _gained(verdict: Verdict) -> Iterator[str]:
+    """Give the error before and after; a gain that is none is called that."""
+    gain = verdict.gain
+    if gain is None:
+        return
+    rows = gain.held_out or gain.fitted
+    ratio: Callable[[str], float] = lambda name: _finite(rows[name].before / rows[name].floor)  # noqa: E731
+    worst = sorted(rows, key=lambda name: -ratio(name))[:MOST_CHANNELS]
+    misses = _joined([_miss(name, rows[name].before, ratio(name)) for name in worst])
+    after = _joined([words.number(rows[name].after, _unit(name)) for name in worst])
+    yield f"Root mean square, the simulation misses {misses}; with the extended model it is {after}."
+    if not gain.total > 0.0:
+        yield "On data that were not fitted the extended model is no better than the nominal one: predict with neither."
+        return
+    share = f"{100.0 * gain.total:.1f} %"
+    yield f"The extended model explains {share} of what can be explained of data that were not fitted ({gain.how})."
+    if not gain.owed_low > 0.0:
+        yield (
+            "Most of that is calibration within the tolerances; that the new physics adds to it is not significant "
+            "(95 % bound below 0)."
+        )
+
+
+def _miss(channel: str, error: float, levels: float) -> str:
+    times = f", {_times(levels)} times the noise of its sensor" if math.isfinite(levels) else ""
+    return f"the {channel.replace('_', ' ')} by {words.number(error, _unit(channel))}{times}"
+
+
+def _times(levels: float) -> str:
+    return f"{levels:.0f}" if levels >= 9.5 else f"{levels:.2g}"
+
+
+def _next(verdict: Verdict) -> Iterator[str]:
+    """Give what to do with the vehicle and with the model."""
+    if verdict.verdict == CAUSE_NAMED:
+        places = list(dict.fromkeys(filter(None, (_place(one.id) for one in verdict.causes))))
+        yield from (f"Look at {place}." for place in places)
+    elif verdict.verdict == OUTSIDE and verdict.unknown is not None:
+        one = verdict.unknown
+        yield (
+            "Look at that sensor: its drift is corrected in the comparison, not in the record."
+            if one.is_drift
+            else f"Look for what {words.something(one.axis, one.force).partition(' ')[2]}; the figure below says when."
+        )
+    elif verdict.verdict == UNDECIDED:
+        yield (
+            "Fly one more trial, below, before anything is changed."
+            if verdict.next_trial
+            else ("Look at what the explanations have in common, or log another channel.")
+        )
+    else:
+        yield "Nothing has to be done."
+    if _is_new(verdict):
+        yield "Until it is repaired, simulate with the extended model:"
+
+
+def _place(cause: str) -> str:
+    effect = words.effects().get(plain_id(cause))
+    return LOOK_AT.get(effect.slot, "") if effect is not None else ""
+
+
+def _settles(verdict: Verdict) -> Iterator[str]:
+    """Give which trial or channel would decide what is open."""
+    if verdict.next_trial is not None:
+        yield words.next_trial(verdict.next_trial)
+    elif verdict.verdict == OUTSIDE:
+        yield (
+            "Another trial of the same kind: what comes again belongs to the vehicle, what does not was an event. "
+            "A trial with other commands says what it goes with."
+        )
+    elif verdict.verdict == CAUSE_NAMED:
+        yield "A trial with other commands: the extended model has to explain it without another fit."
+    elif verdict.verdict == NOTHING_WRONG:
+        yield "A manoeuvre or a sensor that shows what these records could not have shown, in the last table."
+    else:
+        yield (
+            "A longer look: the verdict is of the first one."
+            if not verdict.complete
+            else "Another manoeuvre, or another sensor."
+        )
+
+
+def _unit(channel: str) -> str:
+    return BY_NAME[channel].unit if channel in BY_NAME else ""
+
+
+def _finite(value: float) -> float:
+    return value if math.isfinite(value) else 0.0
+
+
+def _joined(parts: list[str]) -> str:
+    return " and ".join(parts)

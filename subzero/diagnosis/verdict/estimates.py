@@ -1,0 +1,215 @@
+"""What a verdict says of an explanation: estimates with intervals, named causes, and rivals, all from known fits.
+
+An interval is ±1.96 standard deviations of the posterior, mixed over κ. No simulation is made here.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from subzero.diagnosis.assessment.identifiability import against, information, marginal
+from subzero.diagnosis.hypothesis.catalogue.sensors import SPECS
+from subzero.diagnosis.hypothesis.effect import Parameter
+from subzero.diagnosis.hypothesis.hypotheses import Ids, columns_of, variances
+from subzero.diagnosis.inference.change_point_fit import FittedChangePoint
+from subzero.diagnosis.inference.laplace import Candidate
+from subzero.diagnosis.inference.latent_force import AXIS_WORDS, DRIFT, FORCE
+from subzero.diagnosis.inference.linear_gaussian import KAPPAS, log_sum, posterior
+from subzero.diagnosis.inference.map_fit import Fit
+from subzero.diagnosis.inference.model_average import practical_causes
+from subzero.diagnosis.inference.problem import Problem
+from subzero.diagnosis.results import Cause, Estimate, Rival
+
+if TYPE_CHECKING:
+    from subzero.diagnosis.inference.out_of_catalogue import Findings
+
+HALF_INTERVAL_95 = 1.96
+"""Half a 95 % interval, in standard deviations."""
+
+
+def name(ids: Ids) -> str:
+    """Return a hypothesis' name: "none", an id, or ids with plus signs."""
+    return " + ".join(ids) or "none"
+
+
+def deviations(work: Findings, best: Candidate) -> dict[str, tuple[float, float]]:
+    """Return parameter → (mean, standard deviation), in tolerances."""
+    entries, sd = work.problem.entries, _spread(work.problem, best)
+    return {
+        entry.name: (float(z) / entry.parameter.tolerance, float(s) / entry.parameter.tolerance)
+        for entry, z, s in zip(entries, best.fit.z, sd, strict=True)
+    }
+
+
+def _spread(problem: Problem, candidate: Candidate) -> np.ndarray:
+    """Return the standard deviations of all entries about a candidate's fit (k,), mixed over κ."""
+    log = {kappa: np.log(prior) + candidate.log_evidence[kappa] for kappa, prior in KAPPAS.items()}
+    square, total = np.zeros(len(problem.entries)), log_sum(list(log.values()))
+    for kappa, weight in log.items():
+        found = posterior(candidate.fit.quadratic, variances(problem.entries, candidate.ids, kappa))
+        square += np.exp(weight - total) * (np.diag(found.M) + (found.z - candidate.fit.z) ** 2)
+    return np.sqrt(square)
+
+
+def estimate(parameter: Parameter, nominal: float, mean: float, sd: float) -> Estimate:
+    """Return a parameter with its 95 % interval, inside its bounds."""
+    low, high = (
+        float(np.clip(mean + side * HALF_INTERVAL_95 * sd, parameter.low, parameter.high)) for side in (-1, 1)
+    )
+    return Estimate(
+        value=nominal + mean,
+        low=nominal + low,
+        high=nominal + high,
+        unit=parameter.unit,
+        nominal=nominal,
+        deviation=mean,
+        deviation_sd=sd,
+    )
+
+
+def estimates(work: Findings, candidate: Candidate, one: str) -> dict[str, Estimate]:
+    """Return the parameters of a cause in a candidate's fit."""
+    problem, sd = work.problem, _spread(work.problem, candidate)
+    setting, found = problem.records[0].setting, {}
+    for k in columns_of(problem.entries, (one,)):
+        parameter = problem.entries[k].parameter
+        found[parameter.name] = estimate(
+            parameter, parameter.nominal(setting), float(candidate.fit.z[k]), float(sd[k])
+        )
+    return found
+
+
+def sentence_of(problem: Problem, one: str) -> str:
+    """Return what a cause is, in words."""
+    return next(entry.effect.sentence for entry in problem.entries if entry.effect.id == one)
+
+
+def practical_of(work: Findings, candidate: Candidate) -> Ids:
+    """Return those causes of a candidate that are of a practical size."""
+    return practical_causes(work.problem.entries, candidate.ids, candidate.fit.z, candidate.kappa)
+
+
+def causes(work: Findings, best: Candidate, inside: Mapping[Ids, float], ids: Ids) -> tuple[Cause, ...]:
+    """Return the named causes of a candidate, each with the probability that it is among those of the truth."""
+    found = []
+    for one in ids:
+        p = sum(share for ids, share in inside.items() if one in ids)
+        found.append(
+            Cause(
+                id=one,
+                sentence=sentence_of(work.problem, one),
+                probability=min(p, 1.0),
+                parameters=estimates(work, best, one),
+            )
+        )
+    return tuple(found)
+
+
+def cause_of(work: Findings, what: FittedChangePoint, probability: float) -> Cause:
+    """Return a sudden cause in words and numbers."""
+    fit, effect, n = what.fit, what.change_point.effect, len(work.problem.entries)
+    sd = np.sqrt(np.diag(posterior(fit.quadratic, fit.D).M))
+    setting = what.problem.records[what.change_point.record].setting
+    numbers = {
+        p.name: estimate(p, p.nominal(setting), float(fit.z[n + i]), float(sd[n + i]))
+        for i, p in enumerate(effect.parameters)
+    }
+    return Cause(id=effect.id, sentence=effect.sentence, probability=probability, parameters=numbers,
+                 start_time=what.change_point.time, start_sd=float(sd[-1]))  # fmt: skip
+
+
+def rivals(
+    work: Findings,
+    best: Candidate,
+    inside: Mapping[Ids, float],
+    left: Sequence[Ids],
+    told: Ids | None,
+    most: int = 8,
+) -> tuple[Rival, ...]:
+    """Return the hypotheses that are left beside the one that is told, if one is, at most so many; or else the
+    runner-up.
+    """
+    listed = [ids for ids in left if ids != told][:most]
+    ranked: Sequence[Ids] = sorted(inside, key=lambda ids: -inside[ids])
+    listed = listed or [ids for ids in ranked if ids != told][:1]
+    return tuple(_rival(work, best, ids, inside.get(ids, 0.0)) for ids in listed)
+
+
+def _rival(work: Findings, best: Candidate, ids: Ids, p: float) -> Rival:
+    candidate = work.search.candidates.get(ids)
+    words = " and ".join(sentence_of(work.problem, one) for one in ids)
+    numbers = {one: estimates(work, candidate, one) for one in ids} if candidate else {}
+    return Rival(
+        ids=ids,
+        sentence=words or "nothing is wrong",
+        probability=p,
+        discrimination=between(work.problem, best.fit, best.ids, ids) if ids != best.ids else np.nan,
+        parameters=numbers,
+    )
+
+
+def between(problem: Problem, fit: Fit, ids: Ids, others: Ids) -> float:
+    """Return D of causes as they are in a fit against others; of nothing, against what they would be in full size."""
+    if not ids:
+        return between(problem, _scaled(problem, fit, others), others, ids) if others else 0.0
+    own = columns_of(problem.entries, ids)
+    M = marginal(problem, fit.J[:, : len(problem.entries)])
+    other = columns_of(problem.entries, tuple(one for one in others if one not in ids))
+    step = fit.z[own]
+    if not other:
+        return float(step @ information(problem, M, own) @ step)
+    return against(problem, M, own, step, other)[0]
+
+
+def _scaled(problem: Problem, fit: Fit, ids: Ids) -> Fit:
+    """Return a fit with causes of one effect scale in it."""
+    z = fit.z.copy()
+    for k in columns_of(problem.entries, ids):
+        z[k] = problem.entries[k].parameter.scale
+    return replace(fit, z=z)
+
+
+def rival_of(work: Findings, what: FittedChangePoint, probability: float) -> Rival:
+    """Return a sudden cause as a rival of what is told."""
+    cause = cause_of(work, what, probability)
+    sentence = what.change_point.with_onset.sentence
+    return Rival(ids=(what.id,), sentence=sentence, probability=probability, discrimination=np.nan,
+                 parameters={what.id: cause.parameters})  # fmt: skip
+
+
+def closest_rival(work: Findings, inside: Mapping[Ids, float], D: float, ids: Ids) -> Rival:
+    """Return what comes closest to the most probable sudden cause, at a distance D, as a rival."""
+    words = " and ".join(_words(work, one) for one in ids) or "nothing is wrong"
+    return Rival(ids=ids, sentence=words, probability=inside.get(ids, 0.0), discrimination=D)
+
+
+def _words(work: Findings, one: str) -> str:
+    """Return a cause in words, also one that begins in mid-trial."""
+    which, _, time = one.partition("@")
+    begins = {effect.id: effect.sentence for effect in work.problem.sudden_effects}
+    sentence = begins[which] if which in begins else sentence_of(work.problem, which)
+    return f"from {time} s on {sentence}" if time else sentence
+
+
+OUTSIDE_SENTENCES = {
+    **{FORCE + axis: f"a {what} acts that no cause explains" for axis, what in AXIS_WORDS.items()},
+    **{DRIFT + name: f"the sensor of the {name.replace('_', ' ')} drifts" for name in SPECS},
+}
+"""Forces and drifts in words."""
+
+
+def force_rival(key: str, probability: float) -> Rival:
+    """Return a force or a drift as a rival."""
+    return Rival(
+        ids=(key,), sentence=OUTSIDE_SENTENCES[key], probability=probability, discrimination=math.nan
+    )
+
+
+def names_of(whole: Sequence[Ids], others: Sequence[Rival]) -> list[str]:
+    """Return the names of all that the records cannot tell apart."""
+    return list(dict.fromkeys([*map(name, whole), *(name(one.ids) for one in others)]))

@@ -1,0 +1,205 @@
+"""``report.html`` of a sweep: in a few sentences what was varied, what came out and what matters; then all of it.
+
+The tables are those of the terminal (`subzero.sweeps.tell`), from the numbers of ``summary.json``.
+"""
+
+from __future__ import annotations
+
+import sys
+from importlib.metadata import version
+from typing import TYPE_CHECKING, Any
+
+from subzero.page.report import Answer, Line, Report, Section, Table, render
+from subzero.sweeps.outcomes import in_words
+from subzero.sweeps.result import TABLE
+from subzero.sweeps.sensitivity import words_of
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from matplotlib.figure import Figure
+
+    from subzero.sweeps.plan import Plan
+
+Summary = dict[str, Any]
+"""Of `subzero.sweeps.tell.summary_of`."""
+
+COLUMNS = {"min": "min", "p5": "5 %", "p50": "median", "p95": "95 %", "max": "max", "mean": "mean",
+           "standard_deviation": "deviation"}  # fmt: skip
+"""Statistics of a scalar, and what they are called."""
+SHOWN_EFFECTS = 5
+"""So many parameters are told for each scalar. [-]"""
+IN_WORDS = 4
+"""So many parameters or scalars are told in a sentence of their own; the tables have all of them. [-]"""
+NOTHING = "–"
+LIBRARIES = ("numpy", "numba", "scipy", "xarray")
+
+
+def page_of_sweep(plan: Plan, summary: Summary, figures: Mapping[str, Figure], command: str) -> str:
+    """Return ``report.html`` of a finished sweep.
+
+    Args:
+        plan: the sweep.
+        summary: its numbers.
+        figures: by name.
+        command: the line that does it again.
+    """
+    return render(
+        Report(
+            command_name="sweep",
+            scenario=summary["scenario"],
+            title=summary["title"],
+            version=summary["subzero_version"],
+            outcome=_outcome(summary),
+            command=command,
+            answers=_answers(summary),
+            warnings={"Members": list(warning_lines(summary))} if summary["warnings"] else {},
+            sections=_sections(summary, figures),
+            sources={
+                **({"The sweep's file, as it was read": plan.text} if plan.text else {}),
+                "The trial, as it was read": plan.job.trial.text,
+                "Versions": _versions(summary),
+            },
+        )
+    )
+
+
+def numbers(summary: Summary) -> Table:
+    """Return the statistics of all scalars."""
+    rows = [
+        (f"{scalar}{_bracket(one['unit'])}", *(f"{one[name]:.4g}" for name in COLUMNS))
+        for scalar, one in summary["scalars"].items()
+    ]
+    header = (f"{summary['members'] - summary['failed']} members", *COLUMNS.values())
+    return Table(title="Numbers", header=header, groups=[rows])
+
+
+def what_matters(summary: Summary) -> Table:
+    """Return the parameters that move each scalar most: a group of rows for each."""
+    method, *columns = words_of(summary["design"]["name"])
+    columns = [one for one in columns if one]
+    groups = []
+    for scalar in summary["scalars"]:
+        own = _effects(summary, scalar)[:SHOWN_EFFECTS]
+        sizes = [[one["size"], one["other"]][: len(columns)] for one in own]
+        groups.append([
+            (scalar if i == 0 else "", one["parameter"], *map(_cell, size))
+            for i, (one, size) in enumerate(zip(own, sizes, strict=True))
+        ])  # fmt: skip
+    return Table(
+        title=f"What matters: {method}",
+        header=("number", "parameter", *columns),
+        groups=[one for one in groups if one],
+        is_of_words=True,
+    )
+
+
+def warning_lines(summary: Summary) -> list[str]:
+    """Return what members' runs warn of."""
+    return [
+        f"{count} of {summary['members']} members' runs warn of {check.replace('_', ' ')}."
+        for check, count in summary["warnings"].items()
+    ]
+
+
+def _effects(summary: Summary, scalar: str) -> list[Summary]:
+    """Return what moves a scalar, the greatest first."""
+    return [one for one in summary["sensitivity"]["effects"] if one["scalar"] == scalar]
+
+
+def _cell(value: float | None) -> str:
+    return NOTHING if value is None else f"{value:.3g}"
+
+
+def _with_unit(value: float, unit: str) -> str:
+    return f"{value:.4g}" if unit in ("", "1") else f"{value:.4g} {unit}"
+
+
+def _bracket(unit: str) -> str:
+    return "" if unit in ("", "1") else f" [{unit}]"
+
+
+def _outcome(summary: Summary) -> list[Line]:
+    members, failed, warned = summary["members"], summary["failed"], len(summary["warnings"])
+    lines = [
+        Line(text=f"{members - failed} of {members} members completed", kind="bad" if failed else "good")
+    ]
+    return (
+        [*lines, Line(text=f"warnings of {warned} kind{'s' if warned > 1 else ''}", kind="bad")]
+        if warned
+        else lines
+    )
+
+
+def _answers(summary: Summary) -> list[Answer]:
+    """Return in words what was varied, what came out, and what matters."""
+    found = [Answer(question="What was varied", words=_varied(summary))]
+    if summary["scalars"]:
+        found.append(Answer(question="What came out", words=_came_out(summary)))
+    if summary["sensitivity"]["effects"]:
+        found.append(Answer(question="What matters most", words=_matters(summary)))
+    return found
+
+
+def _varied(summary: Summary) -> list[str]:
+    design, parameters = summary["design"], summary["parameters"]
+    spans = [
+        f"{name} from {one['from']:.4g} to {_with_unit(one['to'], one['unit'])}"
+        for name, one in parameters.items()
+    ]
+    more = f"; and {len(spans) - IN_WORDS} more parameters" if len(spans) > IN_WORDS else ""
+    return [
+        f"{'; '.join(spans[:IN_WORDS])}{more}.",
+        f"{summary['members']} members, {design['name'].replace('_', ' ')}, seed {design['seed']}.",
+    ]
+
+
+def _came_out(summary: Summary) -> list[str]:
+    """Return of some scalars where most members lie."""
+    return [
+        f"{in_words(name).capitalize()}: {_with_unit(one['p50'], one['unit'])} in the middle; "
+        f"nine of ten members lie between {one['p5']:.4g} and {one['p95']:.4g}."
+        for name, one in list(summary["scalars"].items())[:IN_WORDS]
+    ]
+
+
+def _matters(summary: Summary) -> list[str]:
+    """Return of some scalars which parameter moves it most, and how much by the design's own measure."""
+    method, first, _ = words_of(summary["design"]["name"])
+    most = {scalar: _effects(summary, scalar)[:1] for scalar in list(summary["scalars"])[:IN_WORDS]}
+    return [
+        f"{in_words(scalar).capitalize()}: {own[0]['parameter']} ({first} {own[0]['size']:.3g})."
+        for scalar, own in most.items()
+        if own and own[0]["size"] is not None
+    ] or [f"No parameter moves these numbers ({method})."]
+
+
+def _sections(summary: Summary, figures: Mapping[str, Figure]) -> list[Section]:
+    effects = bool(summary["sensitivity"]["effects"])
+    tornado = {name: one for name, one in figures.items() if name == "tornado"}
+    others = {name: one for name, one in figures.items() if name != "tornado"}
+    matters = Section(
+        title="What matters", tables=[what_matters(summary)] if effects else (), figures=tornado
+    )
+    found = [
+        Section(title="Numbers", tables=[numbers(summary)]),
+        *([matters] if effects or tornado else []),
+        Section(title="Figures", figures=others),
+    ]
+    return [*([_failures(summary)] if summary["failed"] else []), *found]
+
+
+def _failures(summary: Summary) -> Section:
+    """Return the members that could not go on, each with its reason."""
+    rows = [(f"member {member}", " ".join(reason.split())) for member, reason in summary["reasons"].items()]
+    more = summary["failed"] - len(rows)
+    text = [f"{more} more stand in {TABLE}."] if more > 0 else []
+    table = Table(title="", header=("", "why it could not go on"), groups=[rows], is_of_words=True)
+    return Section(title=f"{summary['failed']} members failed", text=text, tables=[table])
+
+
+def _versions(summary: Summary) -> str:
+    rows = {"subzero": summary["subzero_version"], "python": sys.version.split()[0]}
+    return "\n".join(
+        f"{name} {number}" for name, number in (rows | {one: version(one) for one in LIBRARIES}).items()
+    )

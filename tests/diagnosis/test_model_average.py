@@ -1,0 +1,96 @@
+"""Probabilities from evidence: what was fitted, given up, or never tried; and when a cause is named.
+
+Verifies: further causes are reported only if they are needed; nothing that was given up or never tried comes first by
+a guess; the thresholds of the decision rule.
+"""
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from subzero.diagnosis.hypothesis.catalogue import catalogue
+from subzero.diagnosis.inference import (
+    UNTRIED_LOG_POSTERIOR,
+    Beliefs,
+    Candidate,
+    ChangePointSummary,
+    Screening,
+    decide,
+    occam_folded,
+    practical_causes,
+)
+from subzero.diagnosis.results import CAUSE_NAMED, NOTHING_WRONG, OUTSIDE, UNDECIDED
+
+
+def fitted(**log_posteriors):
+    """Return candidates of single causes, and of nothing as `none`."""
+    found = {}
+    for name, value in log_posteriors.items():
+        ids = () if name == "none" else tuple(name.split("__"))
+        found[ids] = Candidate(ids=ids, fit=None, log_evidence={}, log_posterior=value)
+    return found
+
+
+def screen(far=False, **log_posteriors):
+    names = {
+        () if name == "none" else tuple(name.split("__")): value for name, value in log_posteriors.items()
+    }
+    return Screening(log_posterior=names, count=30, far=far)
+
+
+def test_a_further_cause_is_told_only_if_it_is_needed():
+    assert occam_folded({("a",): 0.21, ("a", "b"): 0.79}) == {("a",): 1.0}
+    needed = occam_folded({("a",): 0.19, ("a", "b"): 0.81})
+    assert list(needed) == [("a", "b"), ("a",)]
+    assert sum(needed.values()) == pytest.approx(1.0)
+
+
+def test_what_was_given_up_stays_behind():
+    beliefs = Beliefs(candidates=fitted(none=-50.0, a=-10.0), screen=screen(none=0.0, a=5.0, b=99.0), one_more={},
+                      behind={("b",): -30.0})  # fmt: skip
+    assert beliefs.log_posteriors()[("b",)] == -40.0, "not what the screen said"
+
+
+def test_what_was_never_tried_comes_no_closer_than_a_guess_may():
+    beliefs = Beliefs(
+        candidates=fitted(none=-50.0, a=-10.0), screen=screen(none=0.0, a=5.0, b=99.0), one_more={}
+    )
+    assert beliefs.log_posteriors()[("b",)] == -10.0 - UNTRIED_LOG_POSTERIOR
+    assert beliefs.log_total() == pytest.approx(
+        -10.0 + math.log1p(math.exp(-UNTRIED_LOG_POSTERIOR)), abs=1e-6
+    )
+
+
+def test_a_pair_is_estimated_from_the_better_of_its_parts():
+    seen = screen(none=0.0, a=5.0, b=1.0, a__b=3.0)
+    beliefs = Beliefs(candidates=fitted(none=-50.0, a=-10.0), screen=seen, one_more={})
+    assert beliefs.log_posteriors()[("a", "b")] == -12.0
+    beside = Beliefs(candidates=fitted(none=-50.0, a=-10.0), screen=seen, one_more={("a", "b"): -17.0})
+    assert beside.log_posteriors()[("a", "b")] == -17.0, "estimated at a fit, that counts more"
+
+
+def test_only_causes_beyond_four_tolerances_are_large():
+    effects = [catalogue(("heading",))[name] for name in ("rudder_offset", "rudder_lag")]
+    entries = [SimpleNamespace(effect=one, record=-1, parameter=one.parameters[0]) for one in effects]
+    tolerance = np.array([one.parameters[0].tolerance for one in effects])
+    ids = ("rudder_lag", "rudder_offset")
+    assert practical_causes(entries, ids, tolerance * [-5.0, 3.0], 1.0) == ("rudder_offset",)
+    assert practical_causes(entries, ids, tolerance * [-5.0, 3.0], 2.0) == (), "tolerances twice as wide"
+
+
+@pytest.mark.parametrize(
+    ("late", "verdict"),
+    [
+        (ChangePointSummary(0.85, True, 20.0), CAUSE_NAMED),
+        (ChangePointSummary(0.75, True, 20.0), UNDECIDED),
+        (ChangePointSummary(0.85, False, 20.0), UNDECIDED),
+        (ChangePointSummary(0.85, True, 5.0), UNDECIDED),
+        (ChangePointSummary(0.3, True, 20.0), NOTHING_WRONG),
+    ],
+)
+def test_it_is_named_only_if_it_is_probable_large_and_apart(late, verdict):
+    inside = {(): 0.7 if late.probability < 0.5 else 0.1, ("a",): 0.05}
+    assert decide(inside, 0.0, True, 20.0, late) == verdict
+    assert decide(inside, 0.85, True, 20.0, late) == OUTSIDE
