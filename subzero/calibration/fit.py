@@ -5,9 +5,9 @@
 M is right if the whitened residual r is white. What a noise model of one slow part leaves of other colours is in Ω,
 estimated by sums over blocks of each channel (Liang and Zeger 1986); variances are inflated by what that is more.
 
-A vehicle whose numbers are off by 40 % leaves records far off, where the linear problem says little. So the
-fit begins with noise `FIRST_NOISE` times as large, and goes on with the usual one, the estimated one, and the error of
-the economical steps made good.
+A vehicle whose numbers are off by 40 % leaves records far off, where the linear problem says little. So the fit begins
+with the beginnings of the records and with more noise than there is, and goes on with all of them, the usual noise, the
+estimated one, and the error of the economical steps made good.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from subzero.diagnosis.inference import (
     Progress,
     bounds,
     broyden_update,
+    economical,
     objective,
     posterior,
     quadratic_step,
@@ -29,10 +30,13 @@ from subzero.diagnosis.inference import (
     with_noise_behind,
 )
 
-FIRST_NOISE, FIRST_MISFIT, NOISE_STEP = 8.0, 2.0, 4.0
-"""Factor on the noise of the first fit, at least; so many levels off it leaves the nominal vehicle; and by what the
-factor falls from one fit to the next. [-]"""
-MAX_STEPS = 40
+HORIZONS = (0.3, 0.6, 1.0)
+"""Shares of the records that are fitted, one behind the other. [-]"""
+FIRST_MISFIT = 2.0
+"""A fit begins with so much noise that it leaves the vehicle so many levels off. [-]"""
+MAX_LOWERINGS, FAILED_SHARE = 5, 0.9
+"""Noise is lowered so often; no more where the misfit stays above this share of what it was. [-]"""
+MAX_STEPS = 25
 """Steps of a fit, at most."""
 SETTLED_GAIN = 0.3
 """A fit that the linear problem promises less than this has settled. [nat]"""
@@ -93,17 +97,39 @@ def fitted(problem: Problem, free: int, D: np.ndarray, progress: Progress) -> Fi
 
 
 def _first(problem: Problem, free: int, D: np.ndarray) -> np.ndarray:
-    """Return where the fit begins (k,): numbers and starts alone, with less and less more noise than there is."""
+    """Return where the fit begins (k,): numbers and starts alone, from the beginnings of the records to all of them.
+
+    Noise is raised so that what is left is a few levels of it, and lowered as the fit comes closer.
+    """
     core = [k for k, entry in enumerate(problem.entries) if k < free or entry.record >= 0]
     few = replace(problem, entries=tuple(problem.entries[k] for k in core))
-    z, misfit = np.zeros(len(core)), few.residual(np.zeros(len(core)))
-    factor = max(FIRST_NOISE, float(np.sqrt(np.mean(misfit**2))) / FIRST_MISFIT)
-    while factor > 1.0 / NOISE_STEP:
-        z = _settled(with_more_noise(few, max(factor, 1.0)), z, D[core])[0].z
-        factor /= NOISE_STEP
+    z = np.zeros(len(core))
+    for share in HORIZONS:
+        short = beginnings(few, share)
+        for _ in range(MAX_LOWERINGS):
+            misfit = float(np.sqrt(np.mean(short.residual(z) ** 2)))
+            factor = max(misfit / FIRST_MISFIT, 1.0)
+            z = _settled(with_more_noise(short, factor), z, D[core])[0].z
+            if factor == 1.0 or np.sqrt(np.mean(short.residual(z) ** 2)) > FAILED_SHARE * misfit:
+                break
     whole = np.zeros(D.size)
     whole[core] = z
     return whole
+
+
+def beginnings(problem: Problem, share: float) -> Problem:
+    """Return the problem of the first part of every record, a share of its length."""
+    if share >= 1.0:
+        return problem
+    records = []
+    for one in problem.records:
+        end = share * float(one.time[-1])
+        noise = {}
+        for name, old in one.noise.items():
+            used = old.used & (one.time <= end)
+            noise[name] = replace(old, used=used, time=one.time[used])
+        records.append(replace(one, noise=noise, setting=economical(one.setting, end)))
+    return replace(problem, records=tuple(records))
 
 
 def _settled(problem: Problem, z: np.ndarray, D: np.ndarray) -> tuple[Fit, bool]:

@@ -10,13 +10,15 @@ import numpy as np
 from subzero.channels import BY_NAME
 from subzero.external_force import MissingForce
 
-NOTHING_WRONG, CAUSE_NAMED, UNDECIDED, OUTSIDE = (
+NOTHING_WRONG, CALIBRATED, CAUSE_NAMED, UNDECIDED, OUTSIDE, NOTHING_NEAR = (
     "nothing_wrong",
+    "calibrated",
     "cause_named",
     "undecided",
     "outside_catalogue",
+    "nothing_near",
 )
-"""The four verdicts."""
+"""The six verdicts."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -255,7 +257,7 @@ class Verdict:
     """The outcome of `subzero.diagnose`.
 
     Attributes:
-        verdict: one of the four.
+        verdict: one of the six.
         sentence: the verdict in words.
         causes: what is named.
         rivals: what else the records allow, most probable first; all of it where the records do not decide.

@@ -11,7 +11,9 @@ import numpy as np
 from subzero.channels import BY_NAME
 from subzero.diagnosis.hypothesis.extended_model import all_effects, plain_id
 from subzero.diagnosis.results import (
+    CALIBRATED,
     CAUSE_NAMED,
+    NOTHING_NEAR,
     NOTHING_WRONG,
     OUTSIDE,
     UNDECIDED,
@@ -25,6 +27,8 @@ from subzero.external_force import FEATURES
 
 HEADLINES = {
     NOTHING_WRONG: "Nothing is wrong beyond tolerance",
+    CALIBRATED: "No cause, but the model wants calibration",
+    NOTHING_NEAR: "Nothing comes near these records",
     CAUSE_NAMED: "The cause is named",
     UNDECIDED: "Undecided: several causes explain the records as well",
     OUTSIDE: "Something real, and outside the catalogue",

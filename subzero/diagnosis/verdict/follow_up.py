@@ -35,7 +35,9 @@ from subzero.diagnosis.inference.model_average import MIN_DISCRIMINATION
 from subzero.diagnosis.inference.model_search import Search
 from subzero.diagnosis.inference.out_of_catalogue import Findings, shares
 from subzero.diagnosis.results import (
+    CALIBRATED,
     CAUSE_NAMED,
+    NOTHING_NEAR,
     NOTHING_WRONG,
     OUTSIDE,
     UNDECIDED,
@@ -55,7 +57,7 @@ from subzero.diagnosis.verdict.conclude import (
 from subzero.diagnosis.verdict.estimates import cause_of, name, practical_of
 from subzero.diagnosis.verdict.extension import Extension, of_causes, of_nothing, of_sudden, of_unknown
 
-RIVALS_DRAWN = {CAUSE_NAMED: 1, OUTSIDE: 1, UNDECIDED: 3, NOTHING_WRONG: 0}
+RIVALS_DRAWN = {CAUSE_NAMED: 1, OUTSIDE: 1, UNDECIDED: 3, NOTHING_NEAR: 1, CALIBRATED: 0, NOTHING_WRONG: 0}
 """Verdict → so many rivals are drawn: of what is undecided, the best and two more."""
 MAX_SURVIVORS = 4
 """At most so many hypotheses are to be told apart by the next trial."""
