@@ -2,15 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import nan
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cable.current import Current
 from cable.properties import CableProperties
 from subzero.errors import BadValueError, real, short
+from subzero.overview import Overview
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+LABELS = {
+    "time": ("s", "time since the start"),
+    "node": ("1", "node of the cable, 0 at the tow point, the last one at the drum"),
+    "earth_axis": ("", "axis of the earth-fixed frame"),
+    "arc_length": ("m", "distance along the nodes, from the tow point"),
+    "tow_tension": ("N", "tension at the tow point"),
+    "drum_tension": ("N", "tension at the drum"),
+    "length": ("m", "length of cable in the water"),
+    "tow_force": ("N", "force of the cable on the vehicle"),
+    "tow_point": ("m", "place of the tow point relative to the drum"),
+    "tow_impulse": ("N s", "impulse of the cable on the vehicle just after this time"),
+    "position": ("m", "place of the nodes relative to the drum"),
+    "tension": ("N", "tension at the nodes"),
+}
+"""Name in the dataset of a `History` → unit and words."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,6 +125,70 @@ class History:
             "energy_residual": self.outcome.energy_residual,
         }
 
+    def to_dataset(self) -> xr.Dataset:
+        """Return the run as an xarray dataset: time, node and axis named, units and words on everything.
+
+        Variables are the fields of this class; the shapes are ``position``, the tensions ``tension`` (time, node), with
+        the coordinate ``arc_length``, the distance along the nodes from the tow point. Rows have room for the most
+        nodes, and NaN behind the last one.
+
+        >>> import cable
+        >>> run = cable.pull_out(lambda t: (1.0, 0.0, 0.0), 2.0).to_dataset()
+        >>> run["tension"].dims, run["tension"].attrs["units"]
+        (('time', 'node'), 'N')
+        """
+        import xarray as xr  # heavy, and nothing else of a cable needs it
+
+        position, tension = _filled(self.shapes), _filled(self.tensions)
+        sides = np.linalg.norm(np.diff(position, axis=1), axis=2)
+        arc = np.hstack([np.zeros((self.time.size, 1)), np.cumsum(sides, axis=1)])
+        vectors = {"tow_force": self.tow_force, "tow_point": self.tow_point}
+        vectors |= {"tow_impulse": self.tow_impulse} if self.tow_impulse.size else {}
+        values = {
+            **{name: (("time",), getattr(self, name)) for name in ("tow_tension", "drum_tension", "length")},
+            **{name: (("time", "earth_axis"), vector) for name, vector in vectors.items()},
+            "position": (("time", "node", "earth_axis"), position),
+            "tension": (("time", "node"), tension),
+        }
+        coordinates = {
+            "time": ("time", self.time),
+            "node": ("node", np.arange(tension.shape[1])),
+            "earth_axis": ("earth_axis", ["north", "east", "down"]),
+            "arc_length": (("time", "node"), arc),
+        }
+        how = {
+            "scheme": self.scheme,
+            "completed": int(self.outcome.completed),
+            "message": self.outcome.message,
+        }
+        run = xr.Dataset(values, coords=coordinates, attrs=how | dict(self.diagnostics()))
+        for name, (unit, words) in LABELS.items():
+            if name in run.variables:
+                run[name].attrs.update({"units": unit, "long_name": words} if unit else {"long_name": words})
+        return run
+
+    def __repr__(self) -> str:
+        """Return the run in a few lines."""
+        return self._overview().text()
+
+    def _repr_html_(self) -> str:
+        """Return the same for a notebook."""
+        return self._overview().html()
+
+    def _overview(self) -> Overview:
+        """Return how far it came, how much cable there is, and how it pulls."""
+        largest = int(np.argmax(self.tow_tension))
+        rows = [
+            ("time", f"{self.time[0]:g} to {self.time[-1]:g} s, {self.time.size} rows"),
+            ("length", f"{self.length[0]:.4g} m at the start, {self.length[-1]:.4g} m at the end"),
+            ("tow tension", f"{self.tow_tension[-1]:.4g} N at the end, at most {self.tow_tension[largest]:.4g} N "
+                            f"at {self.time[largest]:.4g} s"),
+            ("drum tension", f"{self.drum_tension[-1]:.4g} N at the end"),
+            ("outcome", self.outcome.message),
+            ("more", "shape(t), tension(t), diagnostics(), to_dataset()"),
+        ]  # fmt: skip
+        return Overview(f"Cable run, scheme {self.scheme}", rows)
+
     def _row(self, t: float) -> int:
         """Return the row whose time is nearest to t."""
         first, last = self.time[0], self.time[-1]
@@ -112,6 +197,14 @@ class History:
             message = f"There is no shape at t = {short(t)} s: the run covers {first:g} to {last:g} s."
             raise BadValueError(message)
         return int(np.abs(self.time - t).argmin())
+
+
+def _filled(rows: Sequence[np.ndarray]) -> np.ndarray:
+    """Return arrays of nodes (nodes, …) in rows of equal length (n, most nodes, …), NaN behind the last node."""
+    filled = np.full((len(rows), max(map(len, rows)), *rows[0].shape[1:]), np.nan)
+    for row, values in zip(filled, rows, strict=True):
+        row[: len(values)] = values
+    return filled
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -116,6 +116,26 @@ def parameter_unit(trial: Trial, name: str) -> str:
     return row.unit if isinstance(row, Quantity) else str(row["unit"])
 
 
+def parameter_values(trial: Trial, name: str) -> list[float]:
+    """Return all values of a number or a list of a trial, in the unit of the files.
+
+    Raises:
+        ScenarioError: the trial has no such number.
+    """
+    parameter(trial, name)
+    return [float(value) for value in _known(trial)[_list_of(name)][1]]
+
+
+def quantity_of(trial: Trial, name: str) -> Row:
+    """Return what is known of a number: a row of the table of quantities, or a leaf of the pattern of a part.
+
+    Raises:
+        ScenarioError: the trial has no such number.
+    """
+    parameter(trial, name)
+    return _known(trial)[_list_of(name)][0]
+
+
 def declared_ranges(trial: Trial) -> dict[str, tuple[float, float]]:
     """Return what the files of vehicle, cable and drum declare as plausible: dotted name → least, greatest value.
 

@@ -1,13 +1,13 @@
 """What a vehicle is told, as it stands in files: columns of numbers over time, inline in the trial or in a CSV file.
 
-Inline lists are *switch points*: the last value holds to the end of the run. The rows of a CSV file are
-*samples of a log*: a row holds until the next, and the last for one sampling interval more, at most
-`LONGEST_HOLD`. A log that ends before the run does is refused, because what was commanded after it is not
+Inline lists are *switch points*: the last value holds to the end of the run. The rows of a CSV file are *samples of
+a log*: a row of a file holds until the next, the last one for one sampling interval more, at most 1 s (`LONGEST_HOLD`).
+A log that ends before the run does is refused, because what was commanded after it is not
 known. A smooth motion is known only as far as its last sample, and not where samples are missing, inline or not.
 
 A CSV file has one header line with the columns of `scenarios.quantities`, in any order, then one row a sample. Empty
-lines and lines that start with ``#`` are remarks. A motion may stand in the file that a run writes: the channels that
-say nothing of the motion are passed over.
+lines and lines that start with ``#`` are remarks. Commands and a motion may stand in the file that a run writes
+(``rudder_command_deg`` is the ``rudder_deg`` that was commanded): its other channels are passed over.
 """
 
 from __future__ import annotations
@@ -53,6 +53,17 @@ LONGEST_HOLD = 1.0
 
 NUMERICAL = 1e-9
 """Times that differ by less than this are the same: decimal fractions are not exact in binary. [s]"""
+
+WRITTEN: dict[str, dict[str, str]] = {
+    "commands": {
+        "propeller_command_rps": "propeller_rps",
+        "rudder_command_deg": "rudder_deg",
+        "stern_plane_port_command_deg": "stern_plane_port_deg",
+        "stern_plane_starboard_command_deg": "stern_plane_starboard_deg",
+    },
+    "motion": {},
+}
+"""Section → the column of a file that a run writes → the column of the section that it is."""
 
 Row = tuple[int, list[str]]
 """Line in the file, from 1, and the cells."""
@@ -276,11 +287,12 @@ def read_csv(path: Path, name: str, section: str) -> tuple[Samples | None, list[
     """
     name = printable(name)
     try:
-        header, rows = _table(read_text(path, name, MOST_OF_A_CSV), name)
+        (line, given), rows = _table(read_text(path, name, MOST_OF_A_CSV), name)
     except ScenarioError as error:
         return None, list(error.problems)
+    header = line, [WRITTEN[section].get(column, column) for column in given]
     columns, problems = _columns(name, header[1], rows, SECTIONS[section])
-    problems += _header_problems(name, header, SECTIONS[section], BY_COLUMN if section == "motion" else ())
+    problems += _header_problems(name, header, SECTIONS[section], BY_COLUMN)
     problems += _shape_problems(name, header[1], rows)
     problems.sort(key=lambda problem: problem.line or 0)
     whole = _whole(header[1], rows)

@@ -1,6 +1,6 @@
 """What a trial is, as values: everything a run needs, checked, in SI units and radians.
 
-A `Trial` comes from `scenarios.load`. To change one, make a new one, as in
+A `Trial` comes from `scenarios.load`. To change one, make a new one, with `Trial.with_changes` or
 ``dataclasses.replace(trial, duration=60.0)``: values are checked where they are made, with the limits of the files, and
 a `ScenarioError` tells all that is wrong. Propeller speeds are in revolutions per second, the one unit here that is not
 SI.
@@ -12,12 +12,14 @@ turns the heading to starboard (it increases); positive stern-planes (both) pitc
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from importlib import import_module
 from typing import Any
 
 import numpy as np
 
 from scenarios.checks import Checks
+from scenarios.errors import Problem, ScenarioError
 from scenarios.instructions import REACH_THE_END, Commands, Motion, ends_early
 from scenarios.quantities import (
     BED,
@@ -32,6 +34,8 @@ from scenarios.quantities import (
     by_field,
 )
 from scenarios.steps import even_times, misfits, run_times
+from subzero.errors import short
+from subzero.overview import Overview
 
 SETPOINT = dict(zip(CONTROLS, (*WINCH[1:], None), strict=True))
 """Control of a winch → the quantity that it follows."""
@@ -310,6 +314,61 @@ class Trial:
         if self.scheme != SCHEMES[0] and asked:
             check.say("scheme", ONLY_DEFAULT, only_default(asked), self.scheme)
         check.refuse()
+
+    def with_changes(self, changes: Mapping[str, float]) -> Trial:
+        """Return a trial with other values for some of its numbers; this one stays as it is.
+
+        >>> import scenarios
+        >>> thick = scenarios.load("fig6").with_changes({"cable.diameter": 0.003, "start.heading_deg": 90.0})
+        >>> thick.cable["diameter"]
+        0.003
+
+        Args:
+            changes: dotted name → value, in the units of the files: "vehicle.rigid_body.mass", "run.duration_s",
+                "water.current_east_m_s", "commands.rudder_deg[1]" (`scenarios.parameters` has them all).
+
+        Raises:
+            ScenarioError: as the reader of files says it, all that is wrong at once: names that the trial does not
+                have, values outside their limits, values that do not fit together.
+        """
+        # The names of all numbers stand above trials, and are fetched only where they are needed.
+        with_parameters = import_module("scenarios.parameters").with_parameters
+        if not isinstance(changes, Mapping) or not all(isinstance(name, str) for name in changes):
+            why, remedy = "this is no mapping of names to values", 'Write {"cable.diameter": 0.003}.'
+            raise ScenarioError([Problem(file=self.name, found=short(changes), why=why, remedy=remedy)])
+        changed: Trial = with_parameters(self, changes)
+        told = "".join(f"# changed: {name} = {float(value)!r}\n" for name, value in changes.items())
+        return replace(changed, text=f"{self.text.rstrip()}\n{told}" if told else self.text)
+
+    def __repr__(self) -> str:
+        """Return the trial in a few lines."""
+        return self._overview().text()
+
+    def _repr_html_(self) -> str:
+        """Return the same for a notebook."""
+        return self._overview().html()
+
+    def _overview(self) -> Overview:
+        """Return what it is, how long it lasts, how it starts, and what the vehicle is told."""
+        start, cable = self.start, self.cable
+        heading, speed = np.degrees(start.heading), start.surge_speed
+        told = self.commands if self.commands is not None else self.motion
+        rows = [
+            ("duration", f"{self.duration:g} s, hull in steps of {self.hull_step:g} s"),
+            ("start", f"heading {heading:g}°, depth {start.depth:g} m, speed {speed:g} m/s, "
+                      f"{start.wet_length:g} m of cable out"),
+            ("cable", f"{1e3 * cable.get('diameter', 0.0):g} mm, {1e3 * cable.get('mass_per_length', 0.0):g} g/m, "
+                      f"segments of {self.segment_length:g} m, scheme {self.scheme}"),
+            ("current", f"north {self.current[0]:g}, east {self.current[1]:g} m/s"
+                        + (", with a profile" if self.profile else "")),
+            ("drum", (self.winch.control.replace("_", " ") if self.winch else "free")
+                     + (", on a vessel" if self.vessel else "")),
+        ]  # fmt: skip
+        if told is not None:
+            kind = "commands" if told is self.commands else "motion"
+            rows.append((kind, f"{len(told.time)} rows, to {float(told.time[-1]):g} s"))
+        rows.append(("change it", 'trial.with_changes({"cable.diameter": 0.003})'))
+        return Overview(f"Trial {self.name}: {self.description}", rows)
 
     def times(self) -> np.ndarray:
         """Return the times of the results (n,): whole cable steps from 0, and a last step that ends the run. [s]."""

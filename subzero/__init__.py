@@ -7,6 +7,7 @@
 
 Names come from their modules when they are first used, so that ``import subzero`` costs nothing:
 `simulate` and `compare` run a trial, `Comparison` holds two runs, `load_scenario` reads a trial,
+`open_run` reads its file again, and ``run.subzero.plot`` draws it (`subzero.accessor`),
 `warnings_of` says what may be wrong with a run, `check` how much it changes with half the steps,
 `read_record` a measured record, `draw` makes the figures, `export` writes a run for other programs,
 `Simulator` steps a run for a controller of your own,
@@ -38,6 +39,7 @@ _HOME = {
     "draw": ("subzero.figures", "draw"),
     "export": ("subzero.exports", "export"),
     "load_scenario": ("subzero.model", "load"),
+    "open_run": ("subzero.accessor", "open_run"),
     "read_record": ("subzero.records.record", "read_record"),
     "read_trials": ("subzero.diagnosis.read_trials", "read_trials"),
     "simulate": ("subzero.simulation", "simulate"),
@@ -49,11 +51,16 @@ _HOME = {
 _PACKAGES = ("autopilot",)
 """Packages inside, fetched as a whole."""
 
+_GIVE_RUNS = ("Comparison", "Simulator", "autopilot", "compare", "open_run", "simulate")
+"""Names that lead to runs; with the first of them, datasets get their accessor ``.subzero``."""
+
 __all__ = sorted([*_HOME, *_PACKAGES, "__version__"])
 
 
 def __getattr__(name: str) -> Any:
     """Fetch a public name from its module, once."""
+    if name in _GIVE_RUNS:
+        import_module("subzero.accessor")
     if name == "__version__":
         from importlib.metadata import version
 

@@ -35,6 +35,26 @@ UNITS: dict[str, tuple[str, float]] = {
 """Display unit → (suffix of the CSV column, display units per unit used inside: SI, but rev/s)."""
 
 
+STANDARD_NAMES = {
+    "depth": "depth",
+    "roll_angle": "platform_roll_starboard_down",
+    "pitch": "platform_pitch_fore_up",
+    "heading": "platform_orientation",
+    "speed_over_ground": "platform_speed_wrt_ground",
+}
+"""Channel → its name in the CF conventions. Theirs for rates are about the horizontal, not about the body's axes."""
+
+
+COLUMN_STEMS = {"roll_angle": "roll"}
+"""Channel → what its column is called before the unit, where that is not its name.
+
+``run.roll`` is a method of xarray, so the variable is ``roll_angle``; the column ``roll_deg`` hides nothing, and stays.
+"""
+
+RENAMED_CHANNELS = {"roll": "roll_angle"}
+"""Name of a channel in version 0.2 → its name today."""
+
+
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Channel:
     """One scalar that a run gives at every time.
@@ -64,12 +84,13 @@ class Channel:
     @property
     def column(self) -> str:
         """Name of the CSV column, such as ``surge_speed_m_s``."""
-        return f"{self.name}_{self.suffix}"
+        return f"{COLUMN_STEMS.get(self.name, self.name)}_{self.suffix}"
 
     @property
     def attributes(self) -> dict[str, str]:
-        """What a variable of a dataset carries: units, long name, symbol."""
-        return {"units": self.unit, "long_name": self.long_name, "symbol": self.symbol}
+        """What a variable of a dataset carries: units, long name, symbol, and CF's standard name where it has one."""
+        named = {"standard_name": STANDARD_NAMES[self.name]} if self.name in STANDARD_NAMES else {}
+        return {"units": self.unit, "long_name": self.long_name, "symbol": self.symbol, **named}
 
 
 def _read(table: str) -> tuple[Channel, ...]:
@@ -88,7 +109,7 @@ CHANNELS: tuple[Channel, ...] = _read(r"""
 north                         | m        | x           | position, north
 east                          | m        | y           | position, east
 depth                         | m        | z           | depth of the hull centre, positive down
-roll                          | degree   | \phi        | roll angle, positive starboard side down
+roll_angle                    | degree   | \phi        | roll angle, positive starboard side down
 pitch                         | degree   | \theta      | pitch angle, positive nose up
 heading                       | degree   | \psi        | heading, clockwise from north, continuous
 # how the hull centre moves, over ground, in body axes

@@ -1,5 +1,6 @@
-"""The command line: ``subzero list``, ``simulate``, ``compare``; ``manoeuvre`` and ``autopilot`` (`cli_autopilot`);
-``diagnose`` and ``challenge`` (`cli_diagnosis`).
+"""The command line: ``subzero simulate``, ``compare``, ``plot``; ``list``, ``new``, ``show``, ``validate``
+(`cli_trials`); ``manoeuvre``, ``autopilot`` (`cli_autopilot`); ``diagnose``, ``challenge`` (`cli_diagnosis`); ``sweep``
+(`cli_sweep`); ``doctor``, ``warm``, ``completion`` (`cli_install`).
 
 Exit codes: 0 all is well; 2 the user has to change something (one clean message on standard error,
 nothing is written); 3 a run could not go on (what it has is written, the message says when, where and
@@ -12,19 +13,22 @@ from __future__ import annotations
 
 import shlex
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from time import perf_counter
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import cyclopts
 from cyclopts import Parameter
-from rich.console import Console
 
 import scenarios
-from subzero import cli_autopilot, cli_diagnosis, cli_sweep
+from subzero import cli_autopilot, cli_diagnosis, cli_install, cli_sweep, cli_trials
+from subzero.cli_examples import register
 from subzero.errors import UserError, printable
 from subzero.interrupts import INTERRUPTED, begin, came, words
+from subzero.voice import PLAIN, Voice, speak
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -117,20 +121,6 @@ app = cyclopts.App(
 )
 
 
-@app.command(name="list")
-def list_scenarios() -> int:
-    """List the scenarios that are shipped."""
-    from rich.markup import escape
-    from rich.table import Table
-
-    table = Table.grid(padding=(0, 2))
-    for name in scenarios.names():
-        table.add_row(f"[bold]{escape(name)}[/bold]", escape(scenarios.describe(name)))
-    Console(highlight=False).print(table)
-    return FINE
-
-
-@app.command
 def simulate(
     scenario: str,
     /,
@@ -141,6 +131,7 @@ def simulate(
     check: Flag = False,
     strict: Flag = False,
     outputs: Outputs = USUAL_OUTPUTS,
+    voice: Voice = PLAIN,
 ) -> int:
     """Simulate one run, and write its channels, a summary and figures.
 
@@ -152,6 +143,7 @@ def simulate(
         check: run it once more with half the steps and half the segment length, and say what changes.
         strict: end with exit code 3 if the run ends with warnings.
         outputs: which files are made, and how.
+        voice: how the command speaks.
     """
     from subzero import write_results
     from subzero.output import staged
@@ -168,10 +160,9 @@ def simulate(
         runs = _refined(runs, trial, extended) if check else runs
         summary = write_results.write_all(runs, None, stage, **outputs.kinds())
         write_results.write_film(outputs.animate, stage)
-    return FINE if write_results.tell(summary, stage, strict=strict) else STOPPED
+    return FINE if write_results.tell(summary, stage, strict=strict, voice=voice) else STOPPED
 
 
-@app.command
 def compare(
     scenario: str,
     /,
@@ -182,6 +173,7 @@ def compare(
     check: Flag = False,
     strict: Flag = False,
     outputs: Outputs = USUAL_OUTPUTS,
+    voice: Voice = PLAIN,
 ) -> int:
     """Simulate with the cable and without, and set both side by side.
 
@@ -193,6 +185,7 @@ def compare(
         check: run both once more with half the steps and half the segment length, and say what changes.
         strict: end with exit code 3 if a run ends with warnings.
         outputs: which files are made, and how.
+        voice: how the command speaks.
     """
     from subzero import write_results
     from subzero.output import staged
@@ -210,12 +203,46 @@ def compare(
         runs = _refined(result.runs, trial, extended) if check else result.runs
         summary = write_results.write_all(runs, result.measured, stage, **outputs.kinds())
         write_results.write_film(outputs.animate, stage)
-    return FINE if write_results.tell(summary, stage, strict=strict) else STOPPED
+    return FINE if write_results.tell(summary, stage, strict=strict, voice=voice) else STOPPED
 
 
-cli_autopilot.add_to(app)
-cli_diagnosis.add_to(app)
-cli_sweep.add_to(app)
+def plot(
+    run: Path,
+    /,
+    *,
+    what: Annotated[list[str] | None, Parameter(consume_multiple=True, negative=())] = None,
+    out: Path | None = None,
+    format: Literal["png", "svg", "pdf"] = "png",
+    voice: Voice = PLAIN,
+) -> int:
+    """Draw a run from its file again: figures by name, or any channel over time.
+
+    Args:
+        run: tethered.nc or untethered.nc of an earlier command.
+        what: tension, shape3d, motion, forces, attitude, cable; or channels, such as heading. Without it, all six.
+        out: folder for the figures; by default the folder of the run.
+        format: of the files.
+        voice: how the command speaks.
+    """
+    from subzero.stage import staged
+
+    names = [f"{run.stem}_{name}.{format}" for name in what or ()]
+    with staged(out or run.parent, names) as stage:
+        from subzero.accessor import figures_of, open_run
+
+        dataset = open_run(run)
+        for name, figure in figures_of(dataset, what).items():
+            figure.savefig(stage.path / f"{run.stem}_{name}.{format}")
+    with voice.tells(stage.files()):
+        print(stage.words())
+    return FINE
+
+
+cli_trials.add_to(app)
+for _command in (simulate, compare, plot):
+    register(app, _command)
+for _module in (cli_autopilot, cli_diagnosis, cli_sweep, cli_install):
+    _module.add_to(app)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -229,7 +256,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     _note_command(sys.argv[1:] if arguments is None else arguments)
     try:
         command, bound, _ = app.parse_args(arguments, exit_on_error=False, print_error=False)
-        return command(*bound.args, **bound.kwargs) or FINE
+        voice = next((one for one in bound.kwargs.values() if isinstance(one, Voice)), PLAIN)
+        with _aloud(voice):
+            return command(*bound.args, **bound.kwargs) or FINE
     except cyclopts.CycloptsError as error:
         return _refuse(f"{_in_words(error)}\nTry 'subzero --help'.")
     except UserError as error:
@@ -242,6 +271,32 @@ def main(arguments: Sequence[str] | None = None) -> int:
             raise
         print(words(), file=sys.stderr)
         return INTERRUPTED
+
+
+@contextmanager
+def _aloud(voice: Voice) -> Iterator[None]:
+    """Let a command speak as it was asked to; with --verbose, say what runs, and in the end how long it took."""
+    speak(voice)
+    began = perf_counter()
+    if voice.verbose:
+        import platform
+
+        print(f"subzero {_version()}, Python {platform.python_version()}, {sys.executable}", file=sys.stderr)
+    try:
+        yield
+    finally:
+        speak(PLAIN)
+        if voice.verbose:
+            print(f"{_effort()}{perf_counter() - began:.1f} s in all.", file=sys.stderr)
+
+
+def _effort() -> str:
+    """Return what was compiled by this command and where it is kept, as far as it has needed any machine code."""
+    if "subzero.jit.machine_code" not in sys.modules:
+        return ""
+    from subzero.jit.machine_code import base_folder, made
+
+    return f"{made()} functions compiled; machine code is kept in {printable(str(base_folder()))}. "
 
 
 def _note_command(words: Sequence[str]) -> None:

@@ -12,6 +12,8 @@ import cyclopts
 from cyclopts import Parameter
 
 import scenarios
+from subzero.cli_examples import register
+from subzero.voice import PLAIN, Voice
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -63,14 +65,14 @@ PID = Pilot()
 
 def manoeuvre(
     name: str,
-    /,
-    *,
     scenario: str = "fig6",
+    *,
     rudder: float | None = None,
     planes: float | None = None,
     speed: float = 1.0,
     out: Path | None = None,
     strict: Flag = False,
+    voice: Voice = PLAIN,
 ) -> int:
     """Fly a manoeuvre with the cable and without, and measure it.
 
@@ -82,6 +84,7 @@ def manoeuvre(
         speed: of the bare hull before it, in m/s.
         out: folder for the files; by default one named after the manoeuvre, here.
         strict: end with exit code 3 if a run ends with warnings.
+        voice: how the command speaks.
     """
     trial = scenarios.load(scenario)  # a mistake in it answers at once
     from subzero.autopilot.manoeuvres import MANOEUVRES
@@ -94,19 +97,19 @@ def manoeuvre(
 
     meaning = f": {MANOEUVRES[name].meaning}" if name in MANOEUVRES else ""
     shown = MANOEUVRE_COMMANDS.get(name, ("heading", "rudder_command"))
-    return _deliver(trial, fly, out or Path(name), f"{name}{meaning}", shown, strict)
+    return _deliver(trial, fly, out or Path(name), f"{name}{meaning}", shown, strict, voice)
 
 
 def fly_step(
     name: str,
-    /,
-    *,
     scenario: str = "fig6",
+    *,
     pilot: Pilot = PID,
     size: float | None = None,
     speed: float = 1.0,
     out: Path | None = None,
     strict: Flag = False,
+    voice: Voice = PLAIN,
 ) -> int:
     """Let an autopilot follow a step, with the cable and without, and measure it.
 
@@ -118,6 +121,7 @@ def fly_step(
         speed: to hold, in m/s.
         out: folder for the files; by default one named after the step, here.
         strict: end with exit code 3 if a run ends with warnings.
+        voice: how the command speaks.
     """
     trial = scenarios.load(scenario)  # a mistake in it answers at once
     from subzero.autopilot import ESTIMATED, PERFECT
@@ -132,13 +136,13 @@ def fly_step(
 
     title = f"{name}: autopilot {pilot.autopilot}, fed forward of the cable: {pilot.feed_forward}"
     shown = STEP_COMMANDS.get(name, ("heading", "rudder_command"))
-    return _deliver(trial, fly, out or Path(name), title, shown, strict)
+    return _deliver(trial, fly, out or Path(name), title, shown, strict, voice)
 
 
 def add_to(app: cyclopts.App) -> None:
     """Add the commands to the command line."""
-    app.command(manoeuvre)
-    app.command(fly_step, name="autopilot")
+    register(app, manoeuvre)
+    register(app, fly_step, name="autopilot")
 
 
 def _size(name: str, rudder: float | None, planes: float | None) -> float | None:
@@ -153,7 +157,13 @@ def _size(name: str, rudder: float | None, planes: float | None) -> float | None
 
 
 def _deliver(
-    trial: scenarios.Trial, fly: Fly, folder: Path, title: str, shown: tuple[str, str], strict: bool
+    trial: scenarios.Trial,
+    fly: Fly,
+    folder: Path,
+    title: str,
+    shown: tuple[str, str],
+    strict: bool,
+    voice: Voice,
 ) -> int:
     """Fly with the cable and without, write and tell; return the exit code."""
     from subzero.autopilot import AutopilotWarning, output
@@ -169,7 +179,7 @@ def _deliver(
                 with progress_bar(f"Flying {trial.name}, {label}", lambda: costs_of(trial)) as progress:
                     measured[label] = fly(label, progress)
         summary = output.write(measured, title, *shown, stage)
-    stopped = output.tell(summary, list(measured), stage)
+    stopped = output.tell(summary, list(measured), stage, voice)
     for message in stopped:
         print(message, file=sys.stderr)
     return STOPPED if stopped or (strict and refuse_warnings(summary)) else FINE

@@ -11,9 +11,11 @@ import cyclopts
 from cyclopts import Parameter
 
 import scenarios
-from subzero.errors import UserError
+from subzero.cli_examples import register
+from subzero.errors import UserError, printable
 from subzero.interrupts import INTERRUPTED, patience
 from subzero.progress import progress_bar
+from subzero.voice import PLAIN, Voice
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -39,7 +41,7 @@ Own = Annotated[Path | None, Parameter(name="--effects")]
 
 
 def diagnose(
-    records: Annotated[list[Path], Parameter(negative=())],
+    files: Annotated[list[Path], Parameter(negative=())],
     /,
     *,
     scenario: str | None = None,
@@ -48,20 +50,24 @@ def diagnose(
     commands: Literal["record", "scenario"] | None = None,
     seed: int = 0,
     screen: Flag = False,
+    voice: Voice = PLAIN,
 ) -> int:
     """Say what the simulation gets wrong in measured records, name the cause, extend the model and measure the gain.
 
     Args:
-        records: CSV files of one vehicle, or folders of them; they are explained together.
-        scenario: what was flown: a name (see "subzero list") or a path; a record's sidecar may name another.
+        files: the scenario that was flown, a name (see "subzero list") or a TOML file; a record's sidecar may name it
+            instead. And CSV files of one vehicle, or folders of them, which are explained together.
+        scenario: the scenario, if it does not stand among the files.
         out: folder for the files.
         effects: Python file with causes of your own (EFFECTS = [...]), besides the catalogue.
         commands: whose commands hold if the record and the scenario differ.
         seed: of everything random.
         screen: only the first look, in a few seconds.
+        voice: how the command speaks.
     """
     from subzero.output import staged
 
+    scenario, records = _sorted(files, scenario)
     if scenario is not None:
         scenarios.load(scenario)  # a mistake in it answers at once
     with staged(out) as stage:
@@ -70,11 +76,11 @@ def diagnose(
         from subzero import write_diagnosis
 
         with patience(LAST_WORDS_S):
-            verdict = _ask(logged, own, seed, "screen" if screen else "full")
+            verdict = _ask(logged, own, seed, "screen" if screen else "full", voice)
             write_diagnosis.write_all(
                 verdict, logged, stage, run=simulated, effects=own, effects_file=effects
             )
-    write_diagnosis.tell(verdict, stage, scenario=logged[0].setting.trial.name)
+    write_diagnosis.tell(verdict, stage, scenario=logged[0].setting.trial.name, voice=voice)
     if not verdict.complete:
         print("Interrupted; what it has is written.", file=sys.stderr)
     return FINE if verdict.complete else INTERRUPTED
@@ -90,6 +96,7 @@ def calibrate(
     out: Path = Path("my_vehicle.toml"),
     commands: Literal["record", "scenario"] | None = None,
     quick: Flag = False,
+    voice: Voice = PLAIN,
 ) -> int:
     """Estimate numbers of a vehicle from measured records, all at once, and write the vehicle they make.
 
@@ -101,6 +108,7 @@ def calibrate(
         out: file of the calibrated vehicle; figures and a JSON file go beside it.
         commands: whose commands hold if the record and the scenario differ.
         quick: the numbers only, without profiles and without what to fly next.
+        voice: how the command speaks.
     """
     from subzero.calibration.numbers import full_name
     from subzero.stage import staged
@@ -117,16 +125,17 @@ def calibrate(
         with progress_bar("Calibrating", lambda: COSTS) as progress:
             found = run(logged, free=wanted, vehicle=vehicle, progress=progress, quick=quick)
         write_all(found, stage, out.stem)
-    tell(found, stage, out)
+    tell(found, stage, out, voice=voice)
     return FINE
 
 
 def challenge(
-    *,
     scenario: str = "fig6",
+    *,
     seed: int = 0,
     out: Path = Path("hidden"),
     reveal: Path | None = None,
+    voice: Voice = PLAIN,
 ) -> int:
     """Hide an effect in a record, to find it with "subzero diagnose"; --reveal tells afterwards what it was.
 
@@ -135,11 +144,14 @@ def challenge(
         seed: draws the effect, its size, and every number within its tolerance.
         out: folder for the record.
         reveal: folder of a challenge, to be told what is hidden in it.
+        voice: how the command speaks.
     """
     if reveal is not None:
         from subzero.synthetic.sealed_answer import reveal as told
 
-        print(told(reveal))
+        answer = told(reveal)
+        with voice.tells({"answer": answer}):
+            print(answer)
         return FINE
     scenarios.load(scenario)
     from subzero.output import staged
@@ -147,17 +159,40 @@ def challenge(
 
     with staged(out) as stage, progress_bar("Hiding an effect"):
         hide(scenario, seed, stage.path)
-    print(stage.words())
-    print(f"Find it: subzero diagnose {out / 'record.csv'} --scenario {scenario}")
-    print(f"Be told: subzero challenge --reveal {out}")
+    with voice.tells(stage.files()):
+        print(stage.words())
+        print(f"Find it: subzero diagnose {scenario} {out / 'record.csv'}")
+        print(f"Be told: subzero challenge --reveal {out}")
     return FINE
 
 
 def add_to(app: cyclopts.App) -> None:
     """Add the commands to the command line."""
-    app.command(diagnose)
-    app.command(calibrate)
-    app.command(challenge)
+    register(app, diagnose)
+    register(app, calibrate)
+    register(app, challenge)
+
+
+def _sorted(files: list[Path], scenario: str | None) -> tuple[str | None, list[Path]]:
+    """Return the scenario among what was named, and the records.
+
+    A TOML file is a scenario, and so is the name of a shipped one beside a record, even if a folder here has that name:
+    `subzero compare fig6` makes one. With --scenario, or alone, such a folder is one of records.
+    """
+    named = [file for file in files if file.suffix == ".toml"]
+    if scenario is None and not named:
+        named = [
+            file for file in files if str(file) in scenarios.names() and (len(files) > 1 or not file.exists())
+        ]
+    if len(named) + (scenario is not None) > 1:
+        every = [str(file) for file in named] + ([scenario] if scenario else [])
+        raise UserError(f"One scenario is flown, and these are several: {', '.join(map(printable, every))}.")
+    records = [file for file in files if file not in named]
+    if not records:
+        raise UserError(
+            "There is no record to diagnose. Give the path of a CSV file, or of a folder of them."
+        )
+    return (str(named[0]) if named else scenario), records
 
 
 def extended_run(
@@ -215,12 +250,11 @@ def simulated(setting: Setting) -> xr.Dataset:
     return simulate(trial, tethered=setting.tethered, model=setting.model, later=setting.later)
 
 
-def _ask(logged: list[Logged], own: tuple[Effect, ...], seed: int, budget: str) -> Verdict:
+def _ask(logged: list[Logged], own: tuple[Effect, ...], seed: int, budget: str, voice: Voice) -> Verdict:
     """Diagnose under a progress bar; an interrupt ends it with what it has, if it has anything."""
     from subzero.diagnosis.api import diagnose_trials
     from subzero.write_diagnosis import tell_before
 
+    seen = None if voice.as_json or voice.quiet else tell_before
     with progress_bar("Diagnosing", lambda: COSTS) as progress:
-        return diagnose_trials(
-            logged, effects=own, progress=progress, seed=seed, budget=budget, seen=tell_before
-        )
+        return diagnose_trials(logged, effects=own, progress=progress, seed=seed, budget=budget, seen=seen)

@@ -12,7 +12,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Self
 import cyclopts
 from cyclopts import Parameter
 
+from subzero.cli_examples import register
 from subzero.errors import UserError, printable
+from subzero.voice import PLAIN, Voice
 
 if TYPE_CHECKING:
     from subzero.sweeps.api import Standing
@@ -31,6 +33,7 @@ def sweep(
     scheduler: str | None = None,
     retry: Flag = False,
     strict: Flag = False,
+    voice: Voice = PLAIN,
 ) -> int:
     """Run a trial with many values of its parameters, and show what they do.
 
@@ -43,6 +46,7 @@ def sweep(
         scheduler: address of a Dask scheduler, such as tcp://host:8786, to run on its workers instead.
         retry: run members again that failed.
         strict: end with exit code 3 if a member's run ends with warnings.
+        voice: how the command speaks.
     """
     from subzero.sweeps.plan import read_plan
 
@@ -61,13 +65,13 @@ def sweep(
         staged(folder, FILES) as stage,
     ):
         summary = write_sweep(plan, store, stage)
-    tell_sweep(summary, stage)
+    tell_sweep(summary, stage, voice)
     return STOPPED if summary["failed"] or (strict and summary["warnings"]) else FINE
 
 
 def add_to(app: cyclopts.App) -> None:
     """Add the command to the command line."""
-    app.command(sweep)
+    register(app, sweep)
 
 
 LINE_EVERY_S = 30.0

@@ -8,14 +8,26 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import scenarios
+from subzero.channels import UNITS
 from subzero.engine.initial_conditions import Later
 from subzero.model import Model, load
+from subzero.overview import Overview
 from subzero.records.record import Fit, Record, beside, fits, read_record
 from subzero.simulation import simulate
-from subzero.summary import summary_of
+from subzero.summary import summarise, summary_of
 
 if TYPE_CHECKING:
     import xarray as xr
+
+SHOWN = {
+    "peak_speed_m_s": "m/s",
+    "speed_at_end_m_s": "m/s",
+    "heading_at_end_deg": "degree",
+    "path_length_m": "m",
+    "cable_length_at_end_m": "m",
+    "largest_cable_force_N": "N",
+}
+"""Key of a summary that is shown of both runs → its unit."""
 
 Progress = Callable[[float], None]
 """Called now and then with the fraction that is done, 0 to 1."""
@@ -36,6 +48,26 @@ class Comparison:
     untethered: xr.Dataset
     trial: scenarios.Trial
     measured: Record | None = None
+
+    def __repr__(self) -> str:
+        """Return both runs in a few lines."""
+        return self._overview().text()
+
+    def _repr_html_(self) -> str:
+        """Return the same for a notebook."""
+        return self._overview().html()
+
+    def _overview(self) -> Overview:
+        """Return the numbers that one reads first, one column a run."""
+        both = [summarise(run) for run in self.runs.values()]
+        rows: list[tuple[str, ...]] = [("", *self.runs)]
+        for key, unit in SHOWN.items():
+            words = key.removesuffix(f"_{UNITS[unit][0]}").replace("_", " ")
+            rows.append((words, *("–" if one[key] is None else f"{one[key]:.4g} {unit}" for one in both)))
+        rows.append(("warnings", *(str(len(one["warnings"])) for one in both)))
+        if self.measured is not None:
+            rows.append(("measured", f"{', '.join(self.measured.values)} ({self.measured.source})"))
+        return Overview(f"{self.trial.name}: {self.trial.description}", rows)
 
     @property
     def runs(self) -> dict[str, xr.Dataset]:

@@ -35,10 +35,14 @@ ENERGY_CHANNELS = (
 """In the order of `subzero.engine.energy`."""
 
 AXES = {
-    "term": list(vehicle.BREAKDOWN),
-    "component": ["X", "Y", "Z", "K", "M", "N"],
-    "earth_axis": ["north", "east", "down"],
+    "term": (list(vehicle.BREAKDOWN), "named force of the equation of motion, see vehicle.TERMS"),
+    "component": (
+        list("XYZKMN"),
+        "force X, Y, Z [N] and moment K, M, N [N m], body axes, about the hull centre",
+    ),
+    "earth_axis": (["north", "east", "down"], "axis of the earth-fixed frame"),
 }
+"""Named axes of the arrays: their labels, and what they are."""
 LIBRARIES = ("numpy", "numba", "xarray")
 
 
@@ -52,7 +56,7 @@ def dataset_of(
         for channel in CHANNELS
     }
     data |= _arrays(run) | _diagnostics(run, values, model)
-    coordinates = {TIME.name: ("time", run.times, TIME.attributes)} | AXES
+    coordinates = {TIME.name: ("time", run.times, TIME.attributes)} | _axes(run)
     attributes = _provenance(trial, model, tethered, run) | {"accuracy": json.dumps(as_numbers(accuracy))}
     result = xr.Dataset(data, coords=coordinates, attrs=attributes)
     result.attrs["warnings"] = as_json(check_run(result, trial, model))
@@ -63,7 +67,7 @@ def channel_values(run: Run, model: Model) -> dict[str, np.ndarray]:
     """Return every channel by name, in SI units (propeller speeds in rev/s)."""
     r = run.recording
     attitude, velocity = _attitudes(r.attitude), r.state[:, 7:13]
-    names = ("north", "east", "depth", "roll", "pitch", "heading")
+    names = ("north", "east", "depth", "roll_angle", "pitch", "heading")
     values = dict(zip(names, (*r.state[:, :3].T, *attitude), strict=True))
     rates = ("surge_speed", "sway_speed", "heave_speed", "roll_rate", "pitch_rate", "yaw_rate")
     values |= dict(zip(rates, velocity.T, strict=True))
@@ -126,11 +130,7 @@ def _tow_velocities(run: Run, model: Model) -> np.ndarray:
 def _arrays(run: Run) -> dict[str, Any]:
     """Return the force breakdown, and the cable's nodes in rows of equal length, NaN behind the last node."""
     r = run.recording
-    nodes = max(int(r.nodes.max(initial=0)), 1)
-    position = np.full((run.times.size, nodes, 3), np.nan)
-    tension = np.full((run.times.size, nodes), np.nan)
-    filled = np.arange(nodes) < r.nodes[:, None]
-    position[filled], tension[filled] = r.position, r.tension
+    position, tension = _by_node(r, r.position), _by_node(r, r.tension)
     about = (
         "relative to the drum's place at the start; node 0 is the tow point, the last one sits at the drum"
     )
@@ -155,6 +155,30 @@ def _arrays(run: Run) -> dict[str, Any]:
         ),
         "node_count": ("time", r.nodes, {"units": "1", "long_name": "nodes of the cable, 0 without one"}),
     }
+
+
+def _axes(run: Run) -> dict[str, Any]:
+    """Return the coordinates besides the time: labels of the axes, nodes, and the arc length of each node."""
+    nodes = max(int(run.recording.nodes.max(initial=0)), 1)
+    labels = {name: (name, labels, {"long_name": words}) for name, (labels, words) in AXES.items()}
+    count = {"long_name": "node of the cable, 0 at the tow point, the last one at the drum", "units": "1"}
+    arc = {
+        "long_name": "arc length along the unstretched cable, from the tow point",
+        "units": "m",
+        "symbol": "s",
+    }
+    return labels | {
+        "node": ("node", np.arange(nodes), count),
+        "arc_length": (("time", "node"), _by_node(run.recording, run.recording.arc_length), arc),
+    }
+
+
+def _by_node(r: Recording, packed: np.ndarray) -> np.ndarray:
+    """Return what is packed node by node in rows of equal length (n, nodes, …), NaN behind the last node."""
+    nodes = max(int(r.nodes.max(initial=0)), 1)
+    rows = np.full((r.nodes.size, nodes, *packed.shape[1:]), np.nan)
+    rows[np.arange(nodes) < r.nodes[:, None]] = packed
+    return rows
 
 
 def _diagnostics(run: Run, values: dict[str, np.ndarray], model: Model) -> dict[str, Any]:

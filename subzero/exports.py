@@ -164,7 +164,7 @@ WARNING, ERROR = 3, 4
 def _poses(run: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
     """Return where the hull's centre is (n, 3) [m], and quaternions (x, y, z, w) from its axes to north, east, down."""
     place = np.stack([run[name].values for name in ("north", "east", "depth")], axis=1)
-    angles = np.stack([run[name].values for name in ("heading", "pitch", "roll")], axis=1)
+    angles = np.stack([run[name].values for name in ("heading", "pitch", "roll_angle")], axis=1)
     return place, Rotation.from_euler("ZYX", np.nan_to_num(angles), degrees=True).as_quat()
 
 
@@ -297,7 +297,7 @@ def _lists(run: xr.Dataset) -> Iterator[tuple[str, str, list[np.ndarray]]]:
 STANDARD_NAMES = {
     "time": "time",
     "depth": "depth",
-    "roll": "platform_roll_starboard_down",
+    "roll_angle": "platform_roll_starboard_down",
     "pitch": "platform_pitch_fore_up",
     "heading": "platform_orientation",
     "roll_rate": "platform_roll_rate_starboard_down",

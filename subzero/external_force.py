@@ -158,6 +158,8 @@ class MissingForce:
             raise BadValueError("A missing force has times that decrease; they must be in order.")
         if not isinstance(self.terms, tuple) or not all(isinstance(term, Term) for term in self.terms):
             raise BadValueError("A missing force has terms that are none; they must be a tuple of Term.")
+        object.__setattr__(self, "time", tuple(time.astype(float).tolist()))
+        object.__setattr__(self, "wrench", tuple(map(tuple, wrench.astype(float).tolist())))
 
     def __add__(self, other: MissingForce | None) -> MissingForce:
         """Return both forces together."""

@@ -175,6 +175,9 @@ def _record_cable(w: BoxWorkspace, e: float, r: Recording, row: int, used: int) 
             r.position[used + j - 1, i] = r.position[used + j, i] - piece * t[i]
         r.length[row] += w.length[j]
         r.tension[used + j - 1] = near[0]
+    r.arc_length[used] = 0.0
+    for j in range(1, n):
+        r.arc_length[used + j] = r.arc_length[used + j - 1] + w.length[j]
     return end + 1
 
 

@@ -2,7 +2,7 @@
 where the work stands still, or will take hours: where it stands, what costs, what to change.
 
 A thread looks after the work, so that it is told even while machine code does not come back. Compiling is no standing
-still.
+still: it is counted, function by function, on the bar, or where there is no terminal on a line that grows.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 
 from subzero.errors import printable
+from subzero.voice import voice_of_command
 
 if TYPE_CHECKING:
     from rich.progress import Progress
@@ -41,7 +42,7 @@ def progress_bar(words: str, costs: Callable[[], str] = str) -> ProgressBar:
     """
     from subzero.jit.machine_code import before_compiling
 
-    console = Console(stderr=True, highlight=False)
+    console = Console(stderr=True, highlight=False, quiet=voice_of_command().quiet)
     before_compiling(lambda: console.print(COMPILING))
     return ProgressBar(words, console, costs)
 
@@ -62,6 +63,7 @@ class ProgressBar:
         self._bar: Progress | None = None
         self._fraction, self._begun, self._moved = 0.0, monotonic(), monotonic()
         self._told: set[str] = set()
+        self._counting, self._made, self._opening = False, -1, threading.Lock()
         self._ended = threading.Event()
 
     def __call__(self, fraction: float, words: str = "") -> None:
@@ -69,7 +71,7 @@ class ProgressBar:
         if fraction != self._fraction or (words and words != self._words):
             self._moved = monotonic()
         self._words, self._fraction = words or self._words, fraction
-        if self._bar is None and monotonic() - self._begun > PATIENCE_S and self._console.is_terminal:
+        if monotonic() - self._begun > PATIENCE_S:
             self._open()
         if self._bar is not None:
             self._bar.update(self._bar.task_ids[0], completed=fraction, description=self._words)
@@ -79,7 +81,9 @@ class ProgressBar:
         now = monotonic()
         if _compiling():
             self._begun, self._moved = self._begun + LOOK_S, now
+            self._count()
             return
+        self._end_count()
         ran = now - self._begun
         left = ran * (1.0 / self._fraction - 1.0) if self._fraction > 0.0 else 0.0
         if now - self._moved >= STANDSTILL_S:
@@ -95,12 +99,44 @@ class ProgressBar:
                 printable(line.rstrip()), soft_wrap=True, highlight=False, markup=False, emoji=False
             )
 
-    def _open(self) -> None:
-        from rich.progress import Progress
+    def _count(self) -> None:
+        """Show how many functions are compiled."""
+        from subzero.jit.machine_code import counting, made
 
-        self._bar = Progress(console=self._console, transient=True)
-        self._bar.add_task(self._words, total=1.0)
-        self._bar.start()
+        self._counting = True
+        self._open()
+        if self._bar is not None:
+            words = f"{self._words}: {made()} functions compiled"
+            self._bar.update(self._bar.task_ids[0], description=words)
+        else:
+            now = made()
+            self._console.print(f" {now}" if now != self._made else ".", end="", soft_wrap=True)
+            self._console.file.flush()
+            self._made, counting[0] = now, True
+
+    def _end_count(self) -> None:
+        """Go back to what is being done, once nothing is compiled any more."""
+        if self._counting:
+            self._counting = False
+            if self._bar is not None:
+                self._bar.update(self._bar.task_ids[0], description=self._words)
+            else:
+                from subzero.jit.machine_code import counting
+
+                counting[0] = False
+                self._console.print(" functions.", soft_wrap=True)
+
+    def _open(self) -> None:
+        """Show a bar with the time that has passed, if there is a terminal for it."""
+        from rich.progress import Progress, SpinnerColumn, TimeElapsedColumn
+
+        with self._opening:
+            if self._bar is None and self._console.is_terminal and not self._ended.is_set():
+                columns = (SpinnerColumn("line"), *Progress.get_default_columns(), TimeElapsedColumn())
+                bar = Progress(*columns, console=self._console, transient=True)
+                bar.add_task(self._words, total=1.0)
+                bar.start()
+                self._bar = bar
 
     def _watch(self) -> None:
         while not self._ended.wait(LOOK_S):
@@ -115,8 +151,10 @@ class ProgressBar:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._ended.set()
-        if self._bar is not None:
-            self._bar.stop()
+        self._end_count()
+        with self._opening:
+            if self._bar is not None:
+                self._bar.stop()
 
 
 _compilations = [0]

@@ -16,8 +16,8 @@ from cable.tow_path import segments_needed
 from subzero.engine.recording import new_recording
 from subzero.model import Model
 
-BYTES_A_NODE = 4 * 8
-"""Place and tension."""
+BYTES_A_NODE = 5 * 8
+"""Place, tension and arc length."""
 COPIES = 2
 """The recording, and the labelled result that is made of it."""
 SHARE_OF_FREE_RUNNING = 0.3

@@ -14,7 +14,7 @@ from cable.moving_end import Names, describe_stop, enlarged
 from subzero.convergence import Accuracy, run_converged
 from subzero.engine import coupling
 from subzero.engine.initial_conditions import Later, checked_later, go_on_with, prepare, rows_of_changes
-from subzero.engine.recording import Pace, Recording, Run, cut, new_recording, record_row
+from subzero.engine.recording import BY_NODE, Pace, Recording, Run, cut, new_recording, record_row
 from subzero.engine.time_loop import NO_ROOM, run_rows
 from subzero.errors import truth
 from subzero.model import Model, load, model_of
@@ -134,11 +134,12 @@ def more_room(live: Live, recording: Recording, used: int) -> tuple[Live, Record
     """Return the same run with twice the room for nodes."""
     capacity = 2 * live.line.length.size
     nodes = 2 * max(recording.tension.size, used + 64 * capacity)
-    position, tension = np.zeros((nodes, 3)), np.zeros(nodes)
-    position[:used], tension[:used] = recording.position[:used], recording.tension[:used]
-    return live._replace(line=enlarged(live.line, capacity)), recording._replace(
-        position=position, tension=tension
-    )
+    larger = {}
+    for name in BY_NODE:
+        old = getattr(recording, name)
+        larger[name] = np.zeros((nodes, *old.shape[1:]))
+        larger[name][:used] = old[:used]
+    return live._replace(line=enlarged(live.line, capacity)), recording._replace(**larger)
 
 
 NAMES = Names(

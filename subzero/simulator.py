@@ -45,7 +45,8 @@ COMMANDED = ("propeller [rev/s]", "rudder [rad]", "port stern-plane [rad]", "sta
 class Observation(NamedTuple):
     """What is true at one time, by the names of `subzero.channels`, in SI units, radians and rev/s.
 
-    The heading is continuous: no jump at a full turn. Forces and moments of the cable are those on the hull, body axes.
+    The roll angle is `roll` here, ``roll_angle`` there, where `roll` is a method of xarray. The heading is continuous:
+    no jump at a full turn. Forces and moments of the cable are those on the hull, body axes.
     """
 
     time: float

@@ -27,6 +27,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from subzero.errors import UserError, printable
 from subzero.user_file import INCOMPLETE, MOST_OF_AN_ANSWER, read_bytes
@@ -71,6 +72,10 @@ class Stage:
     folder: Path
     written: list[str] = field(default_factory=list)
     failed: bool = False
+
+    def files(self) -> dict[str, Any]:
+        """Return what was written where, ready for JSON."""
+        return {"folder": printable(str(self.folder)), "files": list(self.written)}
 
     def words(self) -> str:
         """Return what was written where, as it is told on the terminal."""

@@ -77,8 +77,26 @@ def read_bytes(path: str | Path, most: int) -> bytes:
     Raises:
         UnreadableFileError: as `read_text`.
     """
+    data = _begin(path, most + 1)
+    if len(data) > most:
+        why = f"it is larger than {most // MEGABYTE} MB, the most that is read"
+        raise UnreadableFileError(str(path), why, "Leave out what is not needed, or split it.")
+    return data
+
+
+def check_readable(path: str | Path) -> None:
+    """Refuse a file that cannot be read, for formats that a library opens itself.
+
+    Raises:
+        UnreadableFileError: as `read_text`; of any size.
+    """
+    _begin(path, 1)
+
+
+def _begin(path: str | Path, count: int) -> bytes:
+    """Return the first bytes of a plain file that holds one result."""
     try:
-        data = _first_bytes(Path(path), most + 1)
+        data = _first_bytes(Path(path), count)
     except FileNotFoundError:
         raise UnreadableFileError(
             str(path), "there is no such file", "Check the path.", is_missing=True
@@ -96,9 +114,6 @@ def read_bytes(path: str | Path, most: int) -> bytes:
             "Save what it gives to a file first.",
         )
         raise UnreadableFileError(str(path), why, remedy)
-    if len(data) > most:
-        why = f"it is larger than {most // MEGABYTE} MB, the most that is read"
-        raise UnreadableFileError(str(path), why, "Leave out what is not needed, or split it.")
     _refuse_half_written(Path(path))
     return data
 

@@ -12,6 +12,7 @@ from rich.table import Table
 from subzero.calibration import report
 from subzero.calibration.results import Calibration
 from subzero.errors import UserError, printable
+from subzero.voice import PLAIN, Voice
 
 if TYPE_CHECKING:
     from subzero.stage import Stage
@@ -49,9 +50,13 @@ def write_all(found: Calibration, stage: Stage, stem: str) -> None:
     write_figures({f"{stem}_{name}": figure for name, figure in figures.items()}, stage)
 
 
-def tell(found: Calibration, stage: Stage, out: Path, console: Console | None = None) -> None:
+def tell(found: Calibration, stage: Stage, out: Path, *, voice: Voice = PLAIN) -> None:
     """Print the numbers, what the records do not determine, and where the files are."""
-    console = console or Console()
+    with voice.tells(report.plain(report.mapping(found)) | stage.files()):
+        _tell(found, stage, out, Console())
+
+
+def _tell(found: Calibration, stage: Stage, out: Path, console: Console) -> None:
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0))
     for name in ("number", "before", "calibrated", "95 %", "change"):
         words = name in ("number", "change")

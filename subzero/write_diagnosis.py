@@ -40,6 +40,7 @@ from subzero.diagnosis.results import (
 from subzero.page.replay import HULL, Actor, as_run, encode
 from subzero.page.report import Answer, Line, Report, Section, render
 from subzero.page.report import Table as Rows
+from subzero.voice import PLAIN, Voice
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -58,7 +59,7 @@ MOST_ROWS = 12
 
 
 def tell_before(rows: Sequence[Detectability], console: Console | None = None) -> None:
-    """Print what the records cannot show, or not tell apart, before anything is compared."""
+    """Print how much the records cannot show, or not tell apart, before anything is compared."""
     console = console or Console()
     hidden = tables.detectable(rows)
     if not hidden.rows:
@@ -69,23 +70,41 @@ def tell_before(rows: Sequence[Detectability], console: Console | None = None) -
         f"told from another (D below {tables.CLEAR_FROM:g}).",
         highlight=False,
     )
-    console.print(_rich(tables.Table(hidden.header, hidden.rows[:MOST_ROWS])), highlight=False)
+
+
+def _tell_hidden(verdict: Verdict, console: Console) -> None:
+    """Print which causes these records cannot show, or not tell apart, behind what they do show."""
+    hidden = tables.detectable(verdict)
+    if not hidden.rows:
+        return
+    console.print("Not seen in these records, or hardly told from another:", highlight=False)
+    console.print(_rich(tables.Table(hidden.header, hidden.rows[:MOST_ROWS]), console.width), highlight=False)
     if len(hidden.rows) > MOST_ROWS:
         console.print(f"… and {len(hidden.rows) - MOST_ROWS} more in the report.", highlight=False)
 
 
 def tell(
-    verdict: Verdict, stage: Stage, console: Console | None = None, *, scenario: str = "SCENARIO"
+    verdict: Verdict,
+    stage: Stage,
+    console: Console | None = None,
+    *,
+    scenario: str = "SCENARIO",
+    voice: Voice = PLAIN,
 ) -> None:
-    """Print a verdict in words, and where the files are.
+    """Print a verdict in words, what cannot be told, and where the files are.
 
     Args:
         verdict: of `subzero.diagnose`.
         stage: where the files are.
         console: where to print.
         scenario: the trial's name, for lines of the shell.
+        voice: how the command speaks.
     """
-    console = console or Console()
+    with voice.tells(json_file.mapping(verdict) | stage.files()):
+        _tell(verdict, stage, console or Console(), scenario)
+
+
+def _tell(verdict: Verdict, stage: Stage, console: Console, scenario: str) -> None:
     console.print(f"\n[bold]{escape(words.headline(verdict))}[/bold]", highlight=False)
     for answer in summary(verdict, scenario):
         console.print(f"[bold]{answer.question}[/bold]", highlight=False)
@@ -96,20 +115,46 @@ def tell(
     for note in verdict.notes:
         console.print(note, highlight=False, markup=False)
     if verdict.rivals:
-        console.print(_rich(tables.rivals(verdict, short=True)), highlight=False)
+        console.print(_rich(tables.rivals(verdict, short=True), console.width), highlight=False)
     for name, table in tables.gain(verdict).items():
         console.print(f"Root mean square error, {name}:", highlight=False, markup=False)
-        console.print(_rich(table), highlight=False)
+        console.print(_rich(table, console.width), highlight=False)
+    _tell_hidden(verdict, console)
     console.print(stage.words(), highlight=False, markup=False)
 
 
-def _rich(table: tables.Table) -> Table:
+COLUMN_GAP = 3
+"""So many letters stand between two columns, at most."""
+SENTENCE_LETTERS = 20
+"""A line of a sentence has at least so many, where there is room."""
+
+
+def _rich(table: tables.Table, width: int) -> Table:
+    """Return a table for a terminal of some letters: no word and no id is broken, sentences between their words.
+
+    Where there is no room for every column to be readable, the longest ones in the middle are left out; the report has
+    them.
+    """
+    columns = [(name, [row[at] for row in table.rows]) for at, name in enumerate(table.header)]
+    while len(columns) > 2 and sum(_readable(*one) + COLUMN_GAP for one in columns) > width:
+        columns.remove(max(columns[1:-1], key=lambda one: sum(map(len, one[1]))))
     shown = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    for name in table.header:
-        shown.add_column(name, overflow="fold")
-    for row in table.rows:
+    for name, cells in columns:
+        is_one_word = not any(" " in cell for cell in (name, *cells))
+        shown.add_column(name, overflow="fold", no_wrap=is_one_word, min_width=_readable(name, cells))
+    for row in zip(*(cells for _, cells in columns), strict=True):
         shown.add_row(*map(escape, row))
     return shown
+
+
+def _readable(name: str, cells: Sequence[str]) -> int:
+    """Return how many letters a column needs to be read: its longest word, of sentences a few words a line."""
+    return max(_longest_word(name, cells), min(SENTENCE_LETTERS, max(map(len, (name, *cells)), default=1)))
+
+
+def _longest_word(name: str, cells: Sequence[str]) -> int:
+    """Return how many letters the longest word of a column has."""
+    return max((len(word) for cell in (name, *cells) for word in cell.split()), default=1)
 
 
 def write_all(

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from rich.console import Console
 
 from subzero import output
+from subzero.voice import PLAIN, Voice
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -89,7 +90,7 @@ def write_film(kind: str | None, stage: Stage) -> None:
         film(stage.path / "report.html", stage.path / f"replay.{kind}", progress)
 
 
-def tell(summary: dict[str, Any], stage: Stage, *, strict: bool = False) -> bool:
+def tell(summary: dict[str, Any], stage: Stage, *, strict: bool = False, voice: Voice = PLAIN) -> bool:
     """Print the summary and where the files are; say why runs could not go on, and if `strict`, that some warn.
 
     Returns:
@@ -97,9 +98,10 @@ def tell(summary: dict[str, Any], stage: Stage, *, strict: bool = False) -> bool
     """
     from subzero.report import RUNS, show
 
-    console = Console()
-    show(summary, console)
-    console.print(stage.words(), highlight=False, markup=False)
+    with voice.tells(summary | stage.files()):
+        console = Console()
+        show(summary, console)
+        console.print(stage.words(), highlight=False, markup=False)
     stopped = [label for label in RUNS if summary.get(label, {}).get("outcome") == "stopped"]
     for label in stopped:
         print(f"The {label} run stopped: {summary[label]['outcome_message']}", file=sys.stderr)

@@ -59,7 +59,7 @@ TERMS = (
     Term("rudder", "upper and lower rudder", LOSS),
     Term("stern_plane_port", "port stern-plane", LOSS),
     Term("stern_plane_starboard", "starboard stern-plane", LOSS),
-    Term("external", "force and moment from outside: the cable", EXTERNAL),
+    Term("cable", "force and moment from outside: the pull of the cable", EXTERNAL),
 )
 
 BREAKDOWN = tuple(term.name for term in TERMS)

@@ -7,9 +7,9 @@ the verdict and the first name of the original. What is more probable than it re
 
 from __future__ import annotations
 
-import multiprocessing
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +20,7 @@ from subzero.diagnosis.api import diagnose_trials
 from subzero.diagnosis.hypothesis.catalogue.sensors import NOISE
 from subzero.diagnosis.hypothesis.logged import Logged
 
-from .results import line, read
+from .results import results_of
 from .world import Drawn, drawn, record_of
 
 DIGITS = 7
@@ -103,19 +103,8 @@ def benchmark(
         results: where they are kept, one JSON object a line; nowhere if not given.
         resume: keep the results of an interrupted run, and go on behind them.
     """
-    if results and not resume:
-        results.unlink(missing_ok=True)
-    known = read(results) if results else []
-    done = {one["index"] for one in known}
-    wanted = [(one, copies) for one in drawn(seed, count) if one.index not in done]
-    with multiprocessing.get_context("fork").Pool(workers) as pool:
-        jobs = [pool.apply_async(result_of, one) for one in wanted]
-        for job in jobs:
-            known.append(one := job.get())
-            print(line_of(one), flush=True)
-            if results:
-                with results.open("a") as file:
-                    file.write(line(one))
+    made = partial(result_of, count=copies)
+    known = results_of(drawn(seed, count), made, tell=line_of, workers=workers, path=results, resume=resume)
     print(summary(known))
 
 

@@ -15,7 +15,7 @@ from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.effect import Effect
 from subzero.model import Model
 
-CHANNELS = ("surge_speed", "heading", "yaw_rate", "pitch", "roll", "depth")
+CHANNELS = ("surge_speed", "heading", "yaw_rate", "pitch", "roll_angle", "depth")
 """The six basic ones."""
 FEW = ("surge_speed", "heading")
 BRAKE = 0.1

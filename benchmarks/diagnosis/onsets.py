@@ -9,7 +9,6 @@ noise. Run it:
 
 from __future__ import annotations
 
-import multiprocessing
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -31,7 +30,7 @@ from subzero.records.record import Record
 from .distance import sensitivities, sudden_distance
 from .draws import nuisances, with_values
 from .manoeuvres import CHANNELS
-from .results import line, read
+from .results import results_of
 from .truth import NoRunError, agreed
 from .world import (
     AFTER,
@@ -168,17 +167,7 @@ def benchmark(*, count: int = 24, seed: int = 7, workers: int = 2, results: Path
         workers: processes.
         results: where they are kept, one JSON object a line, and gone on with if it is there; nowhere if not given.
     """
-    known = read(results) if results else []
-    done = {one["index"] for one in known}
-    with multiprocessing.get_context("fork").Pool(workers) as pool:
-        for one in pool.imap_unordered(
-            result_of, [one for one in drawn(seed, count) if one.index not in done]
-        ):
-            known.append(one)
-            print(line_of(one), flush=True)
-            if results:
-                with results.open("a") as file:
-                    file.write(line(one))
+    known = results_of(drawn(seed, count), result_of, tell=line_of, workers=workers, path=results)
     print(table(known))
 
 

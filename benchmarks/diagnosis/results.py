@@ -3,13 +3,23 @@
 from __future__ import annotations
 
 import json
+import multiprocessing
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from .trial_of import Result
 
 DIGITS = 6
 """Significant ones that are kept."""
+
+
+class Numbered(Protocol):
+    """What has a number."""
+
+    @property
+    def index(self) -> int:
+        """Its number."""
 
 
 def place(seed: int, which: str = "") -> Path:
@@ -27,6 +37,40 @@ def read(path: Path) -> list[Result]:
     if not path.exists():
         return []
     return [json.loads(line) for line in path.read_text().splitlines() if line.endswith("}")]
+
+
+def results_of(
+    wanted: Sequence[Numbered],
+    result_of: Callable[[Any], Result],
+    *,
+    tell: Callable[[Result], str],
+    workers: int,
+    path: Path | None = None,
+    resume: bool = True,
+) -> list[Result]:
+    """Return a result of each, those that are kept first; the others are made now, told and kept as they come.
+
+    Args:
+        wanted: what is drawn; each has a number, its `index`.
+        result_of: makes the result, which has that `index` too; it can be pickled.
+        tell: result → its line on the terminal.
+        workers: processes.
+        path: where they are kept; nowhere if None.
+        resume: go on behind what is kept there; else begin anew.
+    """
+    if path and not resume:
+        path.unlink(missing_ok=True)
+    known = read(path) if path else []
+    done = {one["index"] for one in known}
+    left = [one for one in wanted if one.index not in done]
+    with multiprocessing.get_context("fork").Pool(workers) as pool:
+        for one in pool.imap_unordered(result_of, left):
+            known.append(one)
+            print(tell(one), flush=True)
+            if path:
+                with path.open("a") as file:
+                    file.write(line(one))
+    return known
 
 
 def _short(value: Any) -> Any:

@@ -11,7 +11,7 @@ from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.results import CAUSE_NAMED, NOTHING_WRONG, OUTSIDE, UNDECIDED
 from subzero.external_force import MissingForce
 
-BASIC = ("surge_speed", "heading", "yaw_rate", "pitch", "roll", "depth")
+BASIC = ("surge_speed", "heading", "yaw_rate", "pitch", "roll_angle", "depth")
 
 
 def fig6(setting: Setting) -> Setting:

@@ -15,7 +15,6 @@ D is of the declared tolerances and the true noise (white with the same deviatio
 
 from __future__ import annotations
 
-import multiprocessing
 import tempfile
 from collections import Counter
 from dataclasses import dataclass, replace
@@ -40,7 +39,7 @@ from .cases import AFTER
 from .distance import discriminations, sensitivities
 from .draws import Values, hidden, nuisances, with_values
 from .manoeuvres import CHANNELS, ids
-from .results import line, read
+from .results import results_of
 from .sensor_noise import cut
 from .truth import NoRunError, agreed
 from .world import FAMILIES, FLOWN, Drawn, Family, flown, line_of, noise_of, shown, table, with_true_noise
@@ -181,7 +180,7 @@ def _steered(
 def result_of(one: Wide) -> dict[str, Any]:
     """Return what was drawn and what the diagnosis says of it."""
     found = {"index": one.index, "flown": "+".join(one.flown), "family": one.family, "vehicle": one.vehicle,
-             "step": one.step, "spread": one.spread, "cause": "+".join(one.causes)}  # fmt: skip
+             "step": one.step, "spread": one.spread, "cause": " + ".join(one.causes)}  # fmt: skip
     try:
         records, planted = records_of(one)
         problem = with_true_noise(pose(records), one.noise())
@@ -215,18 +214,8 @@ def benchmark(
         results: where they are kept, one JSON object a line; nowhere if not given.
         resume: keep the results of an interrupted run, and go on behind them.
     """
-    if results and not resume:
-        results.unlink(missing_ok=True)
-    known = read(results) if results else []
-    done = {one["index"] for one in known}
-    wanted = [drawn(seed, index) for index in range(count) if index not in done]
-    with multiprocessing.get_context("fork").Pool(workers) as pool:
-        for one in pool.imap_unordered(result_of, wanted):
-            known.append(one)
-            print(line_of(one), flush=True)
-            if results:
-                with results.open("a") as file:
-                    file.write(line(one))
+    wanted = [drawn(seed, index) for index in range(count)]
+    known = results_of(wanted, result_of, tell=line_of, workers=workers, path=results, resume=resume)
     print(
         Counter(one["error"] for one in known if "error" in one) or "", table(known, list(NOISES)), sep="\n"
     )

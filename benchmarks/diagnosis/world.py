@@ -11,7 +11,6 @@ formulation, all numbers drawn from their tolerances. D is measured with the tru
 
 from __future__ import annotations
 
-import multiprocessing
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -37,12 +36,19 @@ from .cases import AFTER
 from .distance import discriminations, sensitivities
 from .draws import Values, hidden, nuisances, with_values
 from .manoeuvres import CHANNELS, ids, nominal
-from .results import line, read
+from .results import read, results_of
 from .truth import FAR, GAPS, OUTLIERS, NoRunError, agreed
 
 FLOWN = ("fig6", "rich", "zigzag", "dive", "turning_circle", "stop_and_drift", "spiral", "current", "random")
 """Manoeuvres; "random" draws its commands."""
-ROUNDED = {"heading": 1.0, "surge_speed": 0.05, "depth": 0.1, "pitch": 0.5, "roll": 0.5, "yaw_rate": 0.5}
+ROUNDED = {
+    "heading": 1.0,
+    "surge_speed": 0.05,
+    "depth": 0.1,
+    "pitch": 0.5,
+    "roll_angle": 0.5,
+    "yaw_rate": 0.5,
+}
 """Resolution of coarse sensors, in the channels' units."""
 CLEAR = 25.0
 """A cause with at least this D should be named. [-]"""
@@ -225,7 +231,7 @@ def result_of(one: Drawn) -> dict[str, Any]:
 
 def is_right(one: Mapping[str, Any]) -> bool:
     """Say whether the most probable is what is true."""
-    return one["first"] == (one["cause"] or "none")
+    return set(one["first"].split(" + ")) == set((one["cause"] or "none").split(" + "))
 
 
 def is_confidently_wrong(one: Mapping[str, Any]) -> bool:
@@ -304,19 +310,8 @@ def benchmark(
         families: only these, with commas between; all if empty.
         against: results that were kept; what is no more as it was is listed, and the exit code is 1.
     """
-    if results and not resume:
-        results.unlink(missing_ok=True)
-    known = read(results) if results else []
-    done = {one["index"] for one in known}
-    wanted = [one for one in drawn(seed, count) if one.index not in done]
-    wanted = [one for one in wanted if not families or one.family in families.split(",")]
-    with multiprocessing.get_context("fork").Pool(workers) as pool:
-        for one in pool.imap_unordered(result_of, wanted):
-            known.append(one)
-            print(line_of(one), flush=True)
-            if results:
-                with results.open("a") as file:
-                    file.write(line(one))
+    chosen = [one for one in drawn(seed, count) if not families or one.family in families.split(",")]
+    known = results_of(chosen, result_of, tell=line_of, workers=workers, path=results, resume=resume)
     print(Counter(one["error"] for one in known if "error" in one) or "", table(known), sep="\n")
     changed = differences(read(against), known) if against else []
     print(*changed, sep="\n")

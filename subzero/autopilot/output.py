@@ -27,6 +27,7 @@ from subzero.figures.style import (
     warnings_in_short,
 )
 from subzero.report import NOTHING, show_warnings
+from subzero.voice import PLAIN, Voice
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -67,7 +68,7 @@ def write(measured: Measured, title: str, answer: str, command: str, stage: Stag
     return summary
 
 
-def tell(summary: dict[str, Any], names: list[str], stage: Stage) -> list[str]:
+def tell(summary: dict[str, Any], names: list[str], stage: Stage, voice: Voice = PLAIN) -> list[str]:
     """Print indices, warnings and where the files are; return the messages of runs that could not go on."""
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     table.add_column("")
@@ -76,11 +77,12 @@ def tell(summary: dict[str, Any], names: list[str], stage: Stage) -> list[str]:
     for key in summary[names[0]]["indices"]:
         cells = [summary[name]["indices"][key] for name in names]
         table.add_row(key, *(NOTHING if cell is None else f"{cell:.4g}" for cell in cells))
-    console = Console()
-    console.print(f"{summary['scenario']}: {summary['title']}", highlight=False, markup=False)
-    console.print(table, highlight=False)
-    show_warnings({name: summary[name] for name in names}, console)
-    console.print(stage.words(), highlight=False, markup=False)
+    with voice.tells(summary | stage.files()):
+        console = Console()
+        console.print(f"{summary['scenario']}: {summary['title']}", highlight=False, markup=False)
+        console.print(table, highlight=False)
+        show_warnings({name: summary[name] for name in names}, console)
+        console.print(stage.words(), highlight=False, markup=False)
     return [
         f"The {name} run stopped: {summary[name]['outcome_message']}"
         for name in names

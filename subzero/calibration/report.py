@@ -75,7 +75,7 @@ def _short(name: str) -> str:
 
 def text(found: Calibration) -> str:
     """Return a calibration as JSON."""
-    return json.dumps(_plain(mapping(found)), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    return json.dumps(plain(mapping(found)), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def mapping(found: Calibration) -> dict[str, Any]:
@@ -102,14 +102,14 @@ def mapping(found: Calibration) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
     """Return a value as JSON takes it: arrays as lists, numbers that do not exist as null."""
     if isinstance(value, Mapping):
-        return {key: _plain(one) for key, one in value.items()}
+        return {key: plain(one) for key, one in value.items()}
     if isinstance(value, np.ndarray):
-        return _plain(value.tolist())
+        return plain(value.tolist())
     if isinstance(value, Sequence) and not isinstance(value, str):
-        return [_plain(one) for one in value]
+        return [plain(one) for one in value]
     if isinstance(value, np.generic):
-        return _plain(value.item())
+        return plain(value.item())
     return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from math import isfinite
 
 import numpy as np
 
 from subzero.channels import BY_NAME
 from subzero.external_force import MissingForce
+from subzero.overview import Overview
 
 NOTHING_WRONG, CALIBRATED, CAUSE_NAMED, UNDECIDED, OUTSIDE, NOTHING_NEAR = (
     "nothing_wrong",
@@ -19,6 +21,9 @@ NOTHING_WRONG, CALIBRATED, CAUSE_NAMED, UNDECIDED, OUTSIDE, NOTHING_NEAR = (
     "nothing_near",
 )
 """The six verdicts."""
+
+SHOWN_PROBABILITIES = 3
+"""So many hypotheses stand in the overview of a verdict."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -295,3 +300,34 @@ class Verdict:
     seconds: Mapping[str, float] = field(default_factory=dict)
     seed: int = 0
     complete: bool = True
+
+    def __repr__(self) -> str:
+        """Return the verdict in a few lines."""
+        return self._overview().text()
+
+    def _repr_html_(self) -> str:
+        """Return the same for a notebook."""
+        return self._overview().html()
+
+    def _overview(self) -> Overview:
+        """Return the verdict, what is named, what else is probable, what it gains and what to do next."""
+        rows = [
+            ("cause", f"{one.id}: {one.sentence} (probability {one.probability:.3f})") for one in self.causes
+        ]
+        if self.unknown is not None:
+            rows.append(
+                ("unknown", f"{'drift of' if self.unknown.is_drift else 'force along'} {self.unknown.axis}")
+            )
+        ranked = sorted(self.probabilities.items(), key=lambda item: -item[1])[:SHOWN_PROBABILITIES]
+        rows.append(("probable", ", ".join(f"{name} {share:.3f}" for name, share in ranked)))
+        if self.gain is not None and isfinite(self.gain.total):
+            rows.append(
+                ("gain", f"{100.0 * self.gain.total:.1f} % of what can be explained of data not fitted")
+            )
+        if self.next_trial is not None:
+            rows.append(("next trial", f"{self.next_trial.name}: {self.next_trial.sentence}"))
+        rows.append(("records", ", ".join(self.misfit)))
+        incomplete = "" if self.complete else " (interrupted)"
+        return Overview(
+            f"Verdict {self.verdict}{incomplete}: {self.sentence}", [row for row in rows if row[1]]
+        )

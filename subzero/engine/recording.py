@@ -38,6 +38,7 @@ class Recording(NamedTuple):
         energy: rows of `subzero.engine.energy` (n, 7). [J]
         nodes: how many (n,), 0 without a cable.
         position, tension: nodes of all rows, relative to the drum (all, 3) [m]; tension there (all,). [N]
+        arc_length: s of those nodes, unstretched cable between the tow point and the node (all,). [m]
     """
 
     state: np.ndarray
@@ -57,6 +58,7 @@ class Recording(NamedTuple):
     nodes: np.ndarray
     position: np.ndarray
     tension: np.ndarray
+    arc_length: np.ndarray
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,7 +106,8 @@ def new_recording(rows: int, nodes: int) -> Recording:
         "energy": (rows, 7),
         "position": (nodes, 3),
     }
-    flat = dict.fromkeys(("voltage", "drum_tension", "length", "courant"), rows) | {"tension": nodes}
+    flat = dict.fromkeys(("voltage", "drum_tension", "length", "courant"), rows)
+    flat |= dict.fromkeys(("tension", "arc_length"), nodes)
     arrays = {name: np.zeros(shape) for name, shape in (shapes | flat).items()}
     return Recording(**arrays, nodes=np.zeros(rows, np.int64), iterations=np.zeros(rows, np.int64))
 
@@ -147,10 +150,14 @@ def _record_cable(live: Live, r: Recording, row: int, used: int, m1: float) -> i
     N, step = line.ends.count, line.ends.previous_step
     r.drum_tension[row] = line.node_tension[N]
     r.length[row] = line.ends.settled + line.ends.last_length[NOW]
+    r.arc_length[used] = 0.0
     for j in range(N + 1):
         for i in range(3):
             r.position[used + j, i] = line.position[NOW, j, i]
         r.tension[used + j] = line.node_tension[j]
+        if j > 0:
+            piece = line.length[j] if j < N else line.ends.last_length[NOW]
+            r.arc_length[used + j] = r.arc_length[used + j - 1] + piece
         if 0 < j < N:
             # speed √(T/m₁) of a transverse wave; m₁ with the water that moves along
             wave = np.sqrt(max(line.tension[NOW, j], 0.0) / m1)
@@ -159,8 +166,12 @@ def _record_cable(live: Live, r: Recording, row: int, used: int, m1: float) -> i
     return used + N + 1
 
 
+BY_NODE = ("position", "tension", "arc_length")
+"""Fields that have one row a node, and not one a time."""
+
+
 def cut(recording: Recording, rows: int, used: int) -> Recording:
     """Return the part of a recording that is filled."""
-    packed = {"position": recording.position[:used], "tension": recording.tension[:used]}
+    packed = {name: getattr(recording, name)[:used] for name in BY_NODE}
     by_row = {name: values[:rows] for name, values in recording._asdict().items() if name not in packed}
     return Recording(**by_row | packed)

@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-WORDS = {"external": "cable"}
 TERMS_SHOWN = 6
 """The largest terms are drawn each, the others as their sum: more lines cannot be told apart."""
 
@@ -106,7 +105,7 @@ def _terms(run: xr.Dataset, component: str, axes: Axes) -> None:
     table = np.nan_to_num(run["force_breakdown"].sel(component=component).values)
     size = np.abs(table).max(axis=0)
     order = [int(at) for at in np.argsort(-size, kind="stable") if size[at] > VISIBLE * size.max()]
-    names = [WORDS.get(str(name), str(name)).replace("_", " ") for name in run["term"].values]
+    names = [str(name).replace("_", " ") for name in run["term"].values]
     for at, colour in zip(order[:TERMS_SHOWN], CYCLE, strict=False):
         axes.plot(run["time"].values, table[:, at], color=colour, linewidth=1.2, label=names[at])
     if len(order) > TERMS_SHOWN:

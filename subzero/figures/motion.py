@@ -32,7 +32,7 @@ ATTITUDE = {
     "propeller_speed": "Propeller speed",
     "depth": "Depth",
     "rudder_angle": "Rudder angle, positive to starboard",
-    "roll": "Roll, positive starboard side down",
+    "roll_angle": "Roll, positive starboard side down",
     "stern_plane_port_angle": "Stern-planes, positive raises the nose",
     "pitch": "Pitch, positive nose up",
 }

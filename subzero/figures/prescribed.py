@@ -44,7 +44,7 @@ DOTS_SHOWN = 61
 
 def is_straight(run: xr.Dataset) -> bool:
     """Say whether the run pulls a neutral cable straight off a free drum in still water: that has an exact solution."""
-    turns = max(float(np.ptp(run[name].values)) for name in ("pitch", "heading", "roll"))
+    turns = max(float(np.ptp(run[name].values)) for name in ("pitch", "heading", "roll_angle"))
     slides = max(float(np.abs(run[name].values).max()) for name in ("sway_speed", "heave_speed"))
     told = json.loads(run.attrs["parameters"])
     cable = told["cable"]

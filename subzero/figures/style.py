@@ -15,6 +15,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -249,12 +250,25 @@ COLUMN_GAP, HANDLE_GAP = 0.9, 0.5
 def _columns(labels: list[str], most: int, across: float, size: float, handle: float) -> int:
     """Return into how many columns of a legend some labels fit; they fill one column after the other."""
     beside = (handle + COLUMN_GAP + HANDLE_GAP) * size / 72.0
-    wide = [TextPath((0.0, 0.0), one or " ", size=size).get_extents().width / 72.0 for one in labels]
     for columns in range(min(most, max(len(labels), 1)), 1, -1):
         rows = math.ceil(len(labels) / columns)
-        if sum(max(wide[at : at + rows]) + beside for at in range(0, len(wide), rows)) <= across:
+        parts = [labels[at : at + rows] for at in range(0, len(labels), rows)]
+        at_most = sum(max(map(len, part)) * WIDEST_LETTER * size / 72.0 + beside for part in parts)
+        if at_most <= across:
+            return columns
+        if sum(max(_wide(one, size) for one in part) + beside for part in parts) <= across:
             return columns
     return 1
+
+
+WIDEST_LETTER = 0.66
+"""No word of a legend has letters that are wider than this on average, in letter heights: it need not be measured."""
+
+
+@cache
+def _wide(label: str, size: float) -> float:
+    """Return how wide a label is. [inch]."""
+    return float(TextPath((0.0, 0.0), label or " ", size=size).get_extents().width) / 72.0
 
 
 def channel_panel(axes: Axes, runs: Runs, name: str, record: Record | None = None) -> None:

@@ -287,7 +287,8 @@ class MachineCode(_Cache):  # type: ignore[misc]  # numba has no types
         return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        """Keep what was compiled for a signature; not what holds addresses of this process."""
+        """Count what was compiled for a signature, and keep it; not what holds addresses of this process."""
+        _made[0] += 1
         if self._function.__closure__ is None and not data.lifted and not data.library.has_dynamic_globals:
             self._home.keep(self._name(sig, data.codegen), dumps(data._reduce()))
 
@@ -310,6 +311,17 @@ class MachineCode(_Cache):  # type: ignore[misc]  # numba has no types
 
 COMPILING = "compiling"
 
+counting = [False]
+"""Whether a line with the number of compiled functions stands open on standard error, and has to be ended first."""
+_made = [0]
+"""How many functions this process has compiled."""
+
+
+def made() -> int:
+    """Return how many functions this process has compiled so far."""
+    return _made[0]
+
+
 _told: set[str] = set()
 _announcements: list[Callable[[], None]] = []
 
@@ -331,4 +343,4 @@ def tell(kind: str, line: str) -> None:
     if kind not in _told:
         _told.add(kind)
         with suppress(OSError, ValueError):  # nobody reads it any more
-            print(line, file=sys.stderr, flush=True)
+            print("\n" * counting[0] + line, file=sys.stderr, flush=True)

@@ -39,7 +39,7 @@ MISSING, LOWEST, STEPS = -32768, 32767, 65534
 HULL = ("hull", "rudder", "stern_planes", "propeller", "tow_point")
 """Sections of a vehicle's parameters that say what it looks like."""
 
-POSE = ("north", "east", "depth", "roll", "pitch", "heading")
+POSE = ("north", "east", "depth", "roll_angle", "pitch", "heading")
 ACTUATORS = ("propeller_speed", "rudder_angle", "stern_plane_port_angle", "stern_plane_starboard_angle")
 """Channels that a vehicle is drawn from."""
 
@@ -151,7 +151,7 @@ def cable_origin(run: xr.Dataset) -> np.ndarray:
     hull = np.array([run[name].values[first] for name in ("north", "east", "depth")])
     tow = json.loads(run.attrs["parameters"])["vehicle"]["tow_point"]
     arm = np.array([tow["x"], tow["y"], tow["z"]])
-    angles = [run[name].values[first] for name in ("heading", "pitch", "roll")]
+    angles = [run[name].values[first] for name in ("heading", "pitch", "roll_angle")]
     to_earth = Rotation.from_euler("ZYX", angles, degrees=True)
     return hull + to_earth.apply(arm) - run["cable_position"].values[first, 0]
 
@@ -207,7 +207,7 @@ def as_run(record: Record, beside: xr.Dataset, used: Mapping[str, np.ndarray]) -
     from_run = {
         name: np.interp(time, beside["time"], beside[name]) for name in (*POSE, *ACTUATORS) if name in beside
     }
-    pose = {name: values.get(name, from_run[name]) for name in ("roll", "pitch", "heading")}
+    pose = {name: values.get(name, from_run[name]) for name in ("roll_angle", "pitch", "heading")}
     place = _reckoned(time, pose, values, {name: from_run[name][0] for name in ("north", "east", "depth")})
     shown = {**from_run, **values, **pose, **place}
     data = {name: ("time", one, BY_NAME[name].attributes) for name, one in shown.items()}
@@ -234,7 +234,7 @@ def _reckoned(
 ) -> dict[str, np.ndarray]:
     """Return north, east and depth: as they are measured, else the integral of the velocity from the start on. [m]"""
     speeds = [values.get(name, np.zeros(time.size)) for name in ("surge_speed", "sway_speed", "heave_speed")]
-    angles = np.stack([pose["heading"], pose["pitch"], pose["roll"]], axis=-1)
+    angles = np.stack([pose["heading"], pose["pitch"], pose["roll_angle"]], axis=-1)
     velocity = Rotation.from_euler("ZYX", angles, degrees=True).apply(np.stack(speeds, axis=-1))
     way = cumulative_trapezoid(velocity, time, axis=0, initial=0.0)
     return {

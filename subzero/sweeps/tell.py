@@ -22,6 +22,7 @@ from subzero.sweeps.plan import Plan
 from subzero.sweeps.result import RESULT, TABLE, Gathered, percentiles, write_result
 from subzero.sweeps.sensitivity import Effect, effects_of, words_of
 from subzero.sweeps.store import FILE, Store
+from subzero.voice import PLAIN, Voice
 
 if TYPE_CHECKING:
     from subzero.page.report import Table as Rows
@@ -87,9 +88,13 @@ def _in_short(summary: dict[str, Any]) -> str:
     return "; ".join([*failed, *warned])
 
 
-def tell_sweep(summary: dict[str, Any], stage: Stage) -> None:
+def tell_sweep(summary: dict[str, Any], stage: Stage, voice: Voice = PLAIN) -> None:
     """Print what came of a sweep."""
-    console = Console()
+    with voice.tells(summary | stage.files()):
+        _tell(summary, stage, Console())
+
+
+def _tell(summary: dict[str, Any], stage: Stage, console: Console) -> None:
     console.print(f"{summary['scenario']}: {summary['title']}", highlight=False, markup=False)
     console.print(_rich(numbers(summary), words=1), highlight=False)
     if summary["sensitivity"]["effects"]:

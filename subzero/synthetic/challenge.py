@@ -26,7 +26,7 @@ from subzero.synthetic.reference_run import NoTruthError
 from subzero.synthetic.sealed_answer import SEALED, Answer, seal
 from subzero.synthetic.unmodelled_forces import draw_unmodelled
 
-BASIC = ("surge_speed", "heading", "yaw_rate", "pitch", "roll", "depth")
+BASIC = ("surge_speed", "heading", "yaw_rate", "pitch", "roll_angle", "depth")
 """Channels that a challenge measures."""
 SAMPLE_S = 0.1
 """Time between samples. [s]"""

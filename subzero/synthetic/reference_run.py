@@ -53,8 +53,8 @@ def _true(name: str, setting: Setting, truth: Truth) -> np.ndarray:
     r, scale = truth.run.recording, BY_NAME[name].scale
     if name in STATE:
         return scale * r.state[:, STATE[name]]
-    if name in ("roll", "pitch"):
-        return scale * r.attitude[:, ("roll", "pitch").index(name)]
+    if name in ("roll_angle", "pitch"):
+        return scale * r.attitude[:, ("roll_angle", "pitch").index(name)]
     if name == "heading":
         continuous = np.unwrap(r.attitude[:, 2])
         whole = np.round((setting.trial.start.heading - continuous[0]) / (2.0 * np.pi))

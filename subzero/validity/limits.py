@@ -210,7 +210,7 @@ def _throughout(time: np.ndarray, at_limit: np.ndarray, short: float = SHORT) ->
 
 def _node_depths(run: xr.Dataset, model: Model) -> np.ndarray:
     """Return the depths of the cable's nodes (samples, nodes). [m]."""
-    pitch, roll = (np.radians(float(run[name].values[0])) for name in ("pitch", "roll"))
+    pitch, roll = (np.radians(float(run[name].values[0])) for name in ("pitch", "roll_angle"))
     x, y, z = model.vehicle.tow_point.position()
     tow = -np.sin(pitch) * x + np.cos(pitch) * (np.sin(roll) * y + np.cos(roll) * z)
     down = run["cable_position"].values[:, :, 2]

@@ -146,16 +146,22 @@ def roughness(run: xr.Dataset) -> np.ndarray:
 
 
 def ill_posed_drum(run: xr.Dataset, _: scenarios.Trial, model: Model) -> list[str]:
-    """A free drum that does not hold its cable: nothing in the equations says how the cable leaves it."""
+    """A free drum that does not hold its cable: nothing in the equations says how the cable leaves it.
+
+    One whose friction outweighs m1 U² does say: waves come back to it. A cable that unwinds there all the same is only
+    doubted as long as no coarser run has confirmed its force.
+    """
     time, S = run["time"].values, run["cable_length"].values
     if not run.attrs["tethered"] or model.winch is not None or time.size < 3:
         return []
     T, payout, away = run["drum_tension"].values, np.gradient(S, time), _tow_speed(run, time)
     ill = drum_is_ill_posed(T, payout, away, model.cable, model.drum)
+    momentum = model.cable.virtual_mass_per_length * payout**2
+    if is_resolved(run):
+        ill &= momentum > T
     longest, begin = longest_span(time, ill)
     if longest <= ILL_POSED_TIME:
         return []
-    momentum = model.cable.virtual_mass_per_length * payout**2
     here = ill & (time >= begin) & (time <= begin + longest)
     worst = int(np.where(here, payout, -np.inf).argmax())
     return [

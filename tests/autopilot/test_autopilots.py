@@ -146,7 +146,7 @@ def test_every_autopilot_holds_speed_heading_depth_and_roll_of_the_bare_hull(fig
     assert float(end["surge_speed"]) == pytest.approx(0.8, abs=1e-3)
     assert float(end["heading"]) == pytest.approx(float(end["wanted_heading"]), abs=0.05)
     assert float(end["depth"]) == pytest.approx(fig6.start.depth + 2.0, abs=0.01)
-    assert float(end["roll"]) == pytest.approx(0.0, abs=0.1)
+    assert float(end["roll_angle"]) == pytest.approx(0.0, abs=0.1)
     limit = np.degrees(tuning.model.vehicle.rudder_servo.deflection_limit)
     assert np.max(np.abs(run["rudder_command"])) <= limit + 1e-9
 

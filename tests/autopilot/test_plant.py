@@ -13,6 +13,7 @@ import pytest
 import subzero
 import vehicle
 from subzero import autopilot
+from subzero.channels import RENAMED_CHANNELS
 from subzero.steady_motion.hull_state_space import INPUT_NAMES, PLACE, STATE_NAMES, from_vehicle
 
 
@@ -80,8 +81,9 @@ def test_hull_and_cable_run_like_the_simulation(model):
     response, time = fig6_on_the_plant(model)
     run = subzero.simulate("fig6").isel(time=slice(0, time.size))
     for name in response.output_labels:
-        scale = np.radians(1.0) if run[name].attrs["units"].startswith("degree") else 1.0
-        expected = run[name].values * scale
+        channel = run[RENAMED_CHANNELS.get(name, name)]
+        scale = np.radians(1.0) if channel.attrs["units"].startswith("degree") else 1.0
+        expected = channel.values * scale
         found = np.asarray(response.outputs)[response.output_labels.index(name)]
         size = np.max(np.abs(expected)) + 1e-3
         assert found[1:] == pytest.approx(expected[1:], abs=1e-9 * size), name

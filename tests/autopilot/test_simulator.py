@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import subzero
-from subzero.channels import BY_NAME
+from subzero.channels import BY_NAME, RENAMED_CHANNELS
 from subzero.engine.initial_conditions import prepare
 from subzero.engine.recording import new_recording
 from subzero.engine.time_loop import run_rows
@@ -74,7 +74,10 @@ def test_an_observation_is_the_last_row_in_inner_units():
     row = sim.result().isel(time=-1)
     assert seen.time == float(row["time"]) == sim.time
     for name, value in list(seen._asdict().items())[1:]:
-        assert value * BY_NAME[name].scale == pytest.approx(float(row[name]), rel=1e-14, abs=1e-14), name
+        channel = RENAMED_CHANNELS.get(name, name)
+        assert value * BY_NAME[channel].scale == pytest.approx(float(row[channel]), rel=1e-14, abs=1e-14), (
+            name
+        )
     assert seen.heading > 2 * np.pi, "the heading goes on after a full turn"
 
 

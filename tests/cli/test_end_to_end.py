@@ -76,7 +76,10 @@ def test_a_vehicle_that_cannot_be_built_is_a_mistake_not_a_bug(tmp_path, monkeyp
     assert [path.name for path in tmp_path.iterdir()] == ["mine.toml"]
 
 
-def test_the_python_of_the_readme_runs():
+def test_the_python_of_the_readme_runs(tmp_path, monkeypatch):
+    """Behind the command of its first lines, whose files it opens."""
+    monkeypatch.chdir(tmp_path)
+    assert main(["compare", "fig6"]) == FINE
     names: dict[str, object] = {}
     for block in re.findall(r"```python\n(.*?)```", README.read_text(encoding="utf-8"), re.DOTALL):
         exec(block, names)

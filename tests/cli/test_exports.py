@@ -100,7 +100,7 @@ def test_a_viewer_sees_the_vehicle_where_it_is_and_the_cable_at_its_tow_point(ru
     for row in (0, 150, 300):
         now, (at, pose), (also_at, cable) = run.isel(time=row), poses[row], lines[row]
         assert at == also_at == pytest.approx(float(now["time"]), abs=1e-9)
-        roll, pitch, heading = (np.radians(float(now[name])) for name in ("roll", "pitch", "heading"))
+        roll, pitch, heading = (np.radians(float(now[name])) for name in ("roll_angle", "pitch", "heading"))
         ahead = [np.cos(pitch) * np.cos(heading), np.cos(pitch) * np.sin(heading), -np.sin(pitch)]
         np.testing.assert_allclose(turned(pose, [1, 0, 0]), ahead, atol=1e-9)
         assert turned(pose, [0, 1, 0])[2] == pytest.approx(np.sin(roll) * np.cos(pitch), abs=1e-9)

@@ -20,7 +20,7 @@ COUPLED = ("fig6", "wide_turn", "spiral", "dive")
 
 def attitudes(run):
     """Return R_nb at every row (n, 3, 3): roll, then pitch, then heading."""
-    angles = [run[name].values for name in ("heading", "pitch", "roll")]
+    angles = [run[name].values for name in ("heading", "pitch", "roll_angle")]
     return Rotation.from_euler("ZYX", np.transpose(angles), degrees=True).as_matrix()
 
 
@@ -210,7 +210,7 @@ def test_the_coupled_run_does_not_depend_on_the_heading_it_starts_at(turn, simul
         "surge_speed",
         "depth",
         "pitch",
-        "roll",
+        "roll_angle",
         "yaw_rate",
         "cable_tension",
         "cable_moment_pitch",

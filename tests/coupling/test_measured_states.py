@@ -19,6 +19,7 @@ from numpy.testing import assert_allclose
 import scenarios
 import subzero
 from subzero import autopilot
+from subzero.channels import RENAMED_CHANNELS
 from subzero.output import write_csv
 
 FORCES = [f"cable_force_{axis}" for axis in ("forward", "starboard", "down")]
@@ -67,7 +68,7 @@ def test_fig6_replayed_from_its_own_record_pulls_alike(replay):
         "north",
         "east",
         "depth",
-        "roll",
+        "roll_angle",
         "pitch",
         "heading",
         "surge_speed",
@@ -210,8 +211,9 @@ def test_a_run_starts_in_every_state_that_its_start_names(simulate, trial_of):
     }  # fmt: skip
     first = simulate(trial_of(start=start, duration=0.2)).isel(time=0)
     for name, value in start.items():
-        in_degrees = first[name].attrs["units"].startswith("degree")
-        assert float(first[name]) == pytest.approx(degrees(value) if in_degrees else value, abs=1e-9), name
+        channel = first[RENAMED_CHANNELS.get(name, name)]
+        in_degrees = channel.attrs["units"].startswith("degree")
+        assert float(channel) == pytest.approx(degrees(value) if in_degrees else value, abs=1e-9), name
 
 
 def test_a_fin_cannot_start_where_its_servo_does_not_reach(trial_of):

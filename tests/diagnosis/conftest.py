@@ -13,7 +13,7 @@ from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.hypotheses import entries_of, variances
 from subzero.diagnosis.inference import Fit, Noise, Observed, Problem, economical, refit, respond
 
-CHANNELS = ("surge_speed", "heading", "yaw_rate", "pitch", "roll", "depth")
+CHANNELS = ("surge_speed", "heading", "yaw_rate", "pitch", "roll_angle", "depth")
 COLOUR = 0.5
 
 

@@ -33,7 +33,7 @@ from subzero.diagnosis.inference import (
     respond,
 )
 
-BASIC = ("surge_speed", "heading", "yaw_rate", "pitch", "roll", "depth")
+BASIC = ("surge_speed", "heading", "yaw_rate", "pitch", "roll_angle", "depth")
 KINDS = ("scale", "bias", "lag")
 IDS = {
     *("propeller_thrust_gain", "propeller_thrust_slope", "motor_lag", "battery_sag", "propeller_torque"),

@@ -40,7 +40,7 @@ def test_the_right_cause_is_sure_to_gain_and_a_wrong_one_is_not(plant, seed):
     assert wrong.owed < right.owed - 0.2
     assert wrong.owed_low < 0.05
     assert right.how == BLOCKS
-    roll = right.held_out["roll"]
+    roll = right.held_out["roll_angle"]
     assert roll.after < min(roll.rival, roll.tolerance)
     assert roll.after == pytest.approx(roll.floor, rel=0.25)
 

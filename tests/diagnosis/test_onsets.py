@@ -28,7 +28,7 @@ from subzero.diagnosis.inference import (
 from subzero.model import Model
 from subzero.synthetic.reference_run import simulate_reference
 
-CHANNELS = ("surge_speed", "heading", "yaw_rate", "pitch", "roll", "depth")
+CHANNELS = ("surge_speed", "heading", "yaw_rate", "pitch", "roll_angle", "depth")
 SAMPLES = np.arange(0.0, 30.01, 0.1)
 
 

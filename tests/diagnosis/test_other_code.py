@@ -21,7 +21,7 @@ from subzero.synthetic.reference_run import NoTruthError, seen, simulate_referen
 FIG6 = subzero.load_scenario("fig6")
 PLAIN = Setting(trial=FIG6, model=subzero.Model.of(FIG6))
 TIMES = np.linspace(0.0, 30.0, 301)
-CHANNELS = ("surge_speed", "heading", "yaw_rate", "pitch", "roll", "depth")
+CHANNELS = ("surge_speed", "heading", "yaw_rate", "pitch", "roll_angle", "depth")
 BENT = PLAIN.with_vehicle(rudder_servo__offset=0.03).with_cable(tangential_drag_coefficient=0.02).model
 FORCE = MissingForce(
     time=(8.0, 15.0), wrench=((-0.2, 0.05, 0, 0, 0, 0),) * 2, terms=(Term("X", "wet_length*u2", -0.02),)
@@ -81,7 +81,7 @@ def test_the_sensors_are_those_of_the_diagnosis():
     from subzero.diagnosis.inference import respond
 
     setting = PLAIN.with_sensor("heading", scale=0.02, bias=1.5, lag=0.4).with_sensor("surge_speed", lag=0.05)
-    setting = setting.with_sensor("roll", lag=1e-9)  # a drawn tolerance may be that small
+    setting = setting.with_sensor("roll_angle", lag=1e-9)  # a drawn tolerance may be that small
     setting = dataclasses.replace(setting, clock_offset=0.23)
     other, own = (ask(setting, TIMES, CHANNELS) for ask in (simulate_reference, respond))
     for channel in CHANNELS:

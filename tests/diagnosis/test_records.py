@@ -17,7 +17,7 @@ SHAPE = {
     "heading": 27.0 + 8.0 / (1.0 + np.exp(-(TIME - 3.0))),
     "yaw_rate": 4.0 * np.exp(-((TIME - 3.0) ** 2)),
     "pitch": 3.0 * np.sin(TIME),
-    "roll": 2.0 * np.exp(-TIME / 3.0),
+    "roll_angle": 2.0 * np.exp(-TIME / 3.0),
     "depth": 1.0 + 0.02 * TIME,
     "speed_over_ground": 1.1 * (1.0 - np.exp(-TIME / 2.0)),
     "cable_tension": 0.3 * TIME,
@@ -27,7 +27,7 @@ SHAPE = {
 
 COLUMN = {
     "surge_speed": "surge_speed_m_s", "heading": "heading_deg", "yaw_rate": "yaw_rate_deg_s", "pitch": "pitch_deg",
-    "roll": "roll_deg", "depth": "depth_m", "speed_over_ground": "speed_over_ground_m_s",
+    "roll_angle": "roll_deg", "depth": "depth_m", "speed_over_ground": "speed_over_ground_m_s",
     "cable_tension": "cable_tension_N", "propeller_speed": "propeller_speed_rps",
 }  # fmt: skip
 
@@ -201,7 +201,7 @@ def test_odd_units_are_asked_about_once_and_believed_when_confirmed(write):
 
 def test_a_vehicle_that_is_merely_wrong_is_not_asked_about(write):
     for share in (0.7, 1.3, 1.5):
-        read(write(columns(surge_speed=share * SHAPE["surge_speed"], roll=-0.4 * SHAPE["roll"])))
+        read(write(columns(surge_speed=share * SHAPE["surge_speed"], roll_angle=-0.4 * SHAPE["roll_angle"])))
 
 
 def test_a_trial_without_commands_and_a_record_without_scenario_are_refused(write):

@@ -93,7 +93,7 @@ def test_the_breakdown_adds_up_to_mass_times_acceleration(subzero2, rate, nu, fi
     scale = 1.0 + max(np.abs(values).max() for values in table.values())
     assert_allclose(subzero2.numbers().mass_matrix @ acceleration, total, rtol=0, atol=1e-12 * scale)
     assert tuple(table) == vehicle.BREAKDOWN
-    assert_allclose(table["external"], wrench)
+    assert_allclose(table["cable"], wrench)
 
 
 @quick

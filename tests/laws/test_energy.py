@@ -160,10 +160,10 @@ def test_the_ledger_is_what_the_recorded_forces_say(name):
 
     work = energy(name, "propeller_work")
     np.testing.assert_allclose(work_of("propeller"), work, rtol=0, atol=2e-3 * work[-1])
-    assert "external" in vehicle.BREAKDOWN
+    assert "cable" in vehicle.BREAKDOWN
     taken = sum(energy(name, term) for term in ("cable_loss", "drum", "added_mass_term"))
     in_cable = (
-        -work_of("external") - taken
+        -work_of("cable") - taken
     )  # what is left is the kinetic energy of the moving cable, and the residual
     assert np.abs(in_cable).max() < 4e-3 * work[-1]
 

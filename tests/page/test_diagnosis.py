@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 from html.parser import HTMLParser
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -33,6 +34,7 @@ from subzero.diagnosis.results import (
 from subzero.figures.diagnosis import draw_diagnosis
 from subzero.figures.style import Title
 from subzero.model import Model
+from subzero.page import browser
 from subzero.records.record import Record
 from subzero.write_diagnosis import page_of_diagnosis, replayed
 
@@ -54,7 +56,7 @@ def truth() -> Any:
 def logged(truth: Any) -> Logged:
     setting, true = truth
     time = np.arange(0.0, 6.01, 0.1)
-    names = ("surge_speed", "heading", "pitch", "roll", "depth")
+    names = ("surge_speed", "heading", "pitch", "roll_angle", "depth")
     values = {name: np.interp(time, true["time"], true[name]) for name in names}
     values["heading"][7] = np.nan
     values["depth"][20] += 5.0
@@ -183,3 +185,29 @@ def test_what_acts_is_said_as_what_it_does(verdict: Verdict, logged: Logged) -> 
     assert "Something rolls the hull to port, and no cause of the catalogue explains it" in read.text
     assert "with a moment of -0.3 ± 0.039 N m at t = 3.5 s" in read.text
     assert "acts on K" not in read.text
+
+
+@pytest.mark.skipif(browser.installed() is None, reason="needs Debian's chromium and chromium-driver")
+def test_in_a_browser_the_ghosts_are_where_their_runs_and_the_record_say(
+    verdict: Verdict, logged: Logged, tmp_path: Path
+) -> None:
+    """One box to tick for what was measured, one value of it beside a plot, no error, and nothing of a user acts."""
+    page = tmp_path / "report.html"
+    page.write_text(page_of(verdict, logged), encoding="utf-8")
+    actors, _ = replayed(verdict, logged, run)
+    with browser.opened(page) as driver:
+        shown = driver.execute_script("subzero.seek(4.0); return subzero.shown().places")
+        assert {"extended model", "simulated", "measured"} <= set(shown)
+        for one in actors:
+            place = [float(one.run[name].interp(time=4.0)) for name in ("north", "east", "depth")]
+            np.testing.assert_allclose(shown[one.name], place, atol=2e-3, err_msg=one.name)
+        boxes = [label.text.strip() for label in driver.find_elements("css selector", "#actors label")]
+        assert boxes == ["extended model", "simulated", "measured"]
+        titles = [one.text for one in driver.find_elements("css selector", ".plot figcaption")]
+        heading = next(at for at, words in enumerate(titles) if words.startswith("heading"))
+        values = driver.find_elements("css selector", ".plot")[heading].find_elements(
+            "css selector", "output"
+        )
+        assert [one.get_attribute("title") for one in values] == ["extended model", "simulated", "measured"]
+        assert driver.get_log("browser") == []
+        assert driver.execute_script("return window.acted === undefined")

@@ -77,8 +77,8 @@ def test_f3_the_speed_falls_from_20_to_30_s_because_the_cable_gets_longer():
 def test_f3_what_the_vehicle_loses_is_what_the_cable_takes():
     """In the slow fall thrust, hull drag and pull balance but for m u': the cable's share is a sixth or more."""
     terms = comparison().tethered["force_breakdown"].sel(component="X").isel(time=-1)
-    assert float(terms.sel(term="external")) == pytest.approx(tethered("cable_force_forward")[-1], rel=1e-9)
-    assert -float(terms.sel(term="external")) > 0.16 * float(terms.sel(term="propeller"))
+    assert float(terms.sel(term="cable")) == pytest.approx(tethered("cable_force_forward")[-1], rel=1e-9)
+    assert -float(terms.sel(term="cable")) > 0.16 * float(terms.sel(term="propeller"))
 
 
 def test_f4_the_untethered_model_does_not_fall():

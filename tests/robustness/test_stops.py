@@ -137,7 +137,17 @@ def test_compiling_is_no_standing_still(bar, clock, monkeypatch):
     for clock[0] in range(100):
         bar.look()
     monkeypatch.undo()
-    assert bar.text.getvalue() == ""
+    assert "has not moved" not in bar.text.getvalue()
+
+
+def test_while_functions_are_compiled_their_number_grows_on_a_line_every_second(bar, clock, monkeypatch):
+    monkeypatch.setattr("subzero.progress._compiling", lambda: True)
+    for count in (1, 1, 12):
+        monkeypatch.setattr("subzero.jit.machine_code._made", [count])
+        bar.look()
+    monkeypatch.setattr("subzero.progress._compiling", lambda: False)
+    bar.look()
+    assert bar.text.getvalue() == " 1. 12 functions.\n"
 
 
 def test_a_command_whose_run_stands_still_says_so_while_it_computes(tmp_path, monkeypatch, capsys):

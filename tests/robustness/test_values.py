@@ -25,6 +25,7 @@ import cable
 import scenarios
 import subzero
 from subzero import autopilot
+from subzero.external_force import MissingForce
 
 CASES = Path(__file__).with_name("values.py")
 SHORT, PIECES, LONG = 200, 5, 2000
@@ -153,6 +154,15 @@ def test_values_cannot_be_changed_behind_the_checks(fig6):
 
 def ahead(_):
     return (1.0, 0.0, 0.0)
+
+
+def test_numbers_of_numpy_in_a_missing_force_are_numbers(fig6):
+    """JSON does not take them, and a run keeps its parameters as JSON."""
+    row = (np.uint8(3), 0.1, 0.0, 0.0, 0.0, np.float32(0.0))
+    force = MissingForce(time=np.array([0, 1]), wrench=(row, row))
+    model = dataclasses.replace(subzero.Model.of(fig6), missing=force)
+    run = subzero.simulate(dataclasses.replace(fig6, duration=0.2), tethered=False, model=model)
+    assert json.loads(run.attrs["parameters"])["missing"]["wrench"][0] == [3.0, 0.1, 0.0, 0.0, 0.0, 0.0]
 
 
 HEAVY = cable.CableProperties(mass_per_length=0.02)

@@ -128,7 +128,7 @@ TRUTHS: Mapping[str, Callable[[np.ndarray], np.ndarray]] = {
     "north": _column(0),
     "east": _column(1),
     "depth": _column(2),
-    "roll": _roll,
+    "roll_angle": _roll,
     "pitch": _pitch,
     "heading": _heading,
     "surge_speed": _surge_through_water,

@@ -17,6 +17,7 @@ import numpy as np
 
 from scenarios import ScenarioError
 from scenarios.files import Source, read_toml
+from subzero.channels import RENAMED_CHANNELS
 from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.effect import Effect, Parameter
 from subzero.diagnosis.hypothesis.extended_model import (
@@ -189,8 +190,8 @@ def _effects(
         problems.append(f"{_at(source, section)}: this is not a section; write [{section}.rudder_lag]")
         return {}
     found: dict[str, dict[str, float]] = {}
-    for name, numbers in table.items():
-        at = _at(source, f"{section}.{name}")
+    for said, numbers in table.items():
+        at, name = _at(source, f"{section}.{said}"), _todays_id(said)
         if plain_id(name) not in known:
             problems.append(f"{at}: there is no effect '{name}'.{suggestion(name, known)}{_of_whom(source)}")
         elif "@" in name and not _is_time(name.partition("@")[2]):
@@ -201,6 +202,13 @@ def _effects(
             began = {} if starts is None else starts
             found[name] = _numbers(at, name, known[plain_id(name)], numbers, began, problems)
     return found
+
+
+def _todays_id(name: str) -> str:
+    """Return the id of an effect by today's name of its channel: ``sensor_bias:roll`` is now ``…:roll_angle``."""
+    effect, at, time = name.partition("@")
+    kind, colon, channel = effect.partition(":")
+    return f"{kind}{colon}{RENAMED_CHANNELS.get(channel, channel)}{at}{time}"
 
 
 def _of_whom(source: Source) -> str:

@@ -50,6 +50,8 @@ PUSHES = {
 ONE_SIDED = 0.25
 """A force of one sign is never as large with the other one, as a share."""
 
+NAMED_FROM = 0.01
+"""What is less probable than that is not said to explain the records as well."""
 MAX_NAMED = 5
 """So many explanations are named in a sentence."""
 ALTERNATIVE_PROBABILITY = 0.1
@@ -83,7 +85,7 @@ def cause_in_short(one: Cause) -> str:
         f"{name.replace('_', ' ')} {number(p.value, p.unit)}, where the model has {number(p.nominal, p.unit)}"
         for name, p in one.parameters.items()
     )
-    return f"{_capital(one.sentence)}{_since(one)}: {numbers}." if numbers else f"{_capital(one.sentence)}."
+    return f"{_capital(one.sentence)}{_since(one)}{': ' if numbers else ''}{numbers}."
 
 
 def _since(one: Cause) -> str:
@@ -207,7 +209,8 @@ def _undecided(verdict: Verdict) -> str:
     """Return what the records allow, the most probable first."""
     ranked = sorted(verdict.probabilities.items(), key=lambda item: -item[1])
     known = sentences(verdict)
-    shown = "; ".join(f"{explanation(name, known)} ({probability(p)})" for name, p in ranked[:MAX_NAMED])
+    worth = sum(p >= NAMED_FROM for _, p in ranked[:MAX_NAMED])
+    shown = "; ".join(f"{explanation(name, known)} ({probability(p)})" for name, p in ranked[: max(worth, 2)])
     more = len(verdict.rivals) - MAX_NAMED
     rest = f"; and {more} more that are less probable" if more > 0 else ""
     return f"These records cannot tell apart: {shown}{rest}."

@@ -24,7 +24,7 @@ SPECS: dict[str, Spec] = {
     "heading": Spec(0.4, 0.3, "compass"),
     "yaw_rate": Spec(0.3, 0.05, "yaw gyro"),
     "pitch": Spec(0.2, 0.1, "pitch sensor"),
-    "roll": Spec(0.3, 0.15, "roll sensor"),
+    "roll_angle": Spec(0.3, 0.15, "roll sensor"),
     "depth": Spec(0.015, 0.01, "depth gauge"),
     "roll_rate": Spec(0.3, 0.05, "roll gyro"),
     "pitch_rate": Spec(0.3, 0.05, "pitch gyro"),

@@ -80,7 +80,7 @@ export class Actor extends Channels {
 
   /** Roll, pitch and heading. [degree] */
   attitude(t) {
-    return ["roll", "pitch", "heading"].map((name) => this.at(name, t));
+    return ["roll_angle", "pitch", "heading"].map((name) => this.at(name, t));
   }
 
   /** How often the propeller has turned since the start. */

@@ -3,7 +3,7 @@
 const COLOURS = { tethered: "#0072b2", untethered: "#d55e00", 0: "#0072b2", 1: "#d55e00", 2: "#009e73", 3: "#aa4499" };
 const DARK_COLOURS = { tethered: "#56b4e9", untethered: "#ff8c42", 0: "#56b4e9", 1: "#ff8c42", 2: "#3fc79a", 3: "#d98ccf" };
 const FIRST_SHOWN = [
-  "surge_speed", "heading", "depth", "cable_tension", "cable_length", "rudder_angle", "propeller_speed", "pitch", "roll",
+  "surge_speed", "heading", "depth", "cable_tension", "cable_length", "rudder_angle", "propeller_speed", "pitch", "roll_angle",
 ];
 const HEIGHT = 132;
 

@@ -1,0 +1,50 @@
+"""An example for every command, shown below its help, and the way commands come to the command line.
+
+Every example is parsed by a test.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import cyclopts
+
+EXAMPLES = {
+    "list": ("subzero list", "subzero list --vehicles --cables"),
+    "new": ("subzero new my_trial.toml", "subzero new my_vehicle.toml --like remus100"),
+    "show": ("subzero show fig6", "subzero show subzero2"),
+    "validate": ("subzero validate my_trial.toml", "subzero validate record.csv"),
+    "simulate": ("subzero simulate fig6", "subzero simulate my_trial.toml --untethered --out here"),
+    "compare": ("subzero compare fig6", "subzero compare fig6 --measured record.csv --json"),
+    "plot": (
+        "subzero plot fig6/tethered.nc --what tension shape3d",
+        "subzero plot fig6/tethered.nc --what heading --format svg",
+    ),
+    "manoeuvre": ("subzero manoeuvre zigzag", "subzero manoeuvre turning_circle fig6 --rudder 10"),
+    "autopilot": (
+        "subzero autopilot heading_step",
+        "subzero autopilot depth_step fig6 --autopilot lqr --feed-forward model",
+    ),
+    "diagnose": (
+        "subzero diagnose fig6 record.csv --out found",
+        "subzero diagnose hidden --scenario fig6 --screen",
+    ),
+    "calibrate": (
+        "subzero calibrate zigzag.csv dive.csv --scenario fig6 --out my_vehicle.toml",
+        "subzero calibrate flown --free rudder.lift_slope rudder_servo.lag --quick",
+    ),
+    "challenge": ("subzero challenge fig6 --seed 2 --out hidden", "subzero challenge --reveal hidden"),
+    "sweep": ("subzero sweep cable_and_current.toml",),
+    "doctor": ("subzero doctor",),
+    "warm": ("subzero warm",),
+    "completion": ("subzero completion bash > ~/.local/share/bash-completion/completions/subzero",),
+}
+"""Name of a command → lines of the shell."""
+
+
+def register(app: cyclopts.App, command: Callable[..., Any], name: str | None = None) -> None:
+    """Add a command to the command line, with its examples below its help."""
+    name = name or command.__name__
+    lines = "\n".join(f"  {line}" for line in EXAMPLES[name])
+    app.command(command, name=name, help_epilogue=f"Examples:\n\n{lines}\n")

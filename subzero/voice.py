@@ -1,0 +1,61 @@
+"""How a command speaks: in tables, as JSON, not at all, or with more about itself."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+import sys
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+from cyclopts import Parameter
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class Voice:
+    """How the command speaks.
+
+    Attributes:
+        as_json: print the result as one JSON object, and nothing else, on standard output.
+        quiet: print no table and no progress; errors and the exit code stay.
+        verbose: say on standard error which versions run, where machine code is kept, and how long it took.
+    """
+
+    as_json: Annotated[bool, Parameter(name="--json", negative=())] = False
+    quiet: Annotated[bool, Parameter(name=("--quiet", "-q"), negative=())] = False
+    verbose: Annotated[bool, Parameter(name=("--verbose", "-v"), negative=())] = False
+
+    @contextmanager
+    def tells(self, result: Mapping[str, Any]) -> Iterator[None]:
+        """Let what is printed inside be read; with --json the result instead, with --quiet nothing.
+
+        Args:
+            result: plain numbers, texts, lists and mappings.
+        """
+        if not (self.as_json or self.quiet):
+            yield
+            return
+        with contextlib.redirect_stdout(io.StringIO()):
+            yield
+        if self.as_json:
+            json.dump(result, sys.stdout, indent=2, ensure_ascii=False, allow_nan=False)
+            print()
+
+
+PLAIN = Voice()
+_VOICE: ContextVar[Voice] = ContextVar("VOICE", default=PLAIN)
+
+
+def voice_of_command() -> Voice:
+    """Return how the command that is carried out was asked to speak."""
+    return _VOICE.get()
+
+
+def speak(voice: Voice) -> None:
+    """Let the command that is carried out speak so."""
+    _VOICE.set(voice)

@@ -1,0 +1,171 @@
+"""The figures of a diagnosis show what its text and its file say: the same explanations, in the same order, as large.
+
+Verdicts are those that the benchmark keeps of challenges (`benchmarks/diagnosis/kept`), with their probabilities as
+they were found; every one is told in words, written as JSON and drawn, and what is drawn is read back.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from subzero.diagnosis.report import json_file, words
+from subzero.diagnosis.report.summary import summary
+from subzero.diagnosis.results import (
+    CAUSE_NAMED,
+    OUTSIDE,
+    UNDECIDED,
+    Cause,
+    Curves,
+    Misfit,
+    Rival,
+    Unknown,
+    Verdict,
+)
+from subzero.figures.diagnosis import draw_diagnosis, evidence
+from subzero.figures.style import BLUE, Title
+
+KEPT = Path(__file__).parents[2] / "benchmarks" / "diagnosis" / "kept"
+TITLE = Title(words="a trial", scenario="fig6")
+TIME = np.linspace(0.0, 9.9, 100)
+
+
+def kept(count):
+    """Return so many challenges of all kinds, evenly out of those that are kept."""
+    rows = [json.loads(line) for line in (KEPT / "seed_59.jsonl").read_text(encoding="utf-8").splitlines()]
+    rows = [row for row in rows if row.get("probabilities")]
+    return rows[:: max(1, len(rows) // count)][:count]
+
+
+def verdict_of(row):
+    """Return what a diagnosis said, as a value."""
+    probabilities = row["probabilities"]
+    first = max(probabilities, key=lambda name: probabilities[name])
+    unknown = None
+    if row["verdict"] == OUTSIDE:
+        axis = first.partition(":")[2]
+        unknown = Unknown(axis=axis, time=TIME, force=np.sin(TIME), band=np.ones(TIME.size))
+    causes = [
+        Cause(id=one["id"], sentence=words.explanation(one["id"]), probability=probabilities[first], parameters={},
+              start_time=one.get("start"))
+        for one in row["causes"]
+    ]  # fmt: skip
+    rivals = [
+        Rival(ids=tuple(name.split(" + ")) if name != "none" else (), sentence=words.explanation(name),
+              probability=p, discrimination=5.0)
+        for name, p in probabilities.items() if name != first or row["verdict"] == UNDECIDED
+    ]  # fmt: skip
+    return Verdict(
+        verdict=row["verdict"],
+        sentence=" and ".join(one.sentence for one in causes),
+        causes=tuple(causes),
+        rivals=tuple(rivals),
+        probabilities=probabilities,
+        unknown=unknown,
+    )
+
+
+def drawn(verdict):
+    """Return what the figure shows: (words, probability, colour) from the top."""
+    plain = evidence(verdict, TITLE).axes[0]
+    names = [" ".join(label.get_text().split()) for label in plain.get_yticklabels()]
+    bars = [(bar.get_width(), bar.get_facecolor()) for bar in plain.patches]
+    assert plain.yaxis_inverted()
+    return [(name, *bar) for name, bar in zip(names, bars, strict=True)]
+
+
+def check(row):
+    verdict = verdict_of(row)
+    shown, told = drawn(verdict), json_file.mapping(verdict)
+    ranked = sorted(row["probabilities"].items(), key=lambda item: -item[1])
+    for (name, width, _), (hypothesis, p) in zip(shown, ranked, strict=False):
+        assert width == p == told["probabilities"][hypothesis]
+        assert name.lower() == told["explanations"][hypothesis].lower()
+    said = {one.question: " ".join(one.words).lower() for one in summary(verdict)}
+    assert said == {one["question"]: " ".join(one["words"]).lower() for one in told["summary"]}
+    names = [name.lower() for name, *_ in shown]
+    blue = [name for name, (_, _, colour) in zip(names, shown, strict=True) if colour[:3] == rgb(BLUE)]
+    if verdict.verdict == UNDECIDED:
+        assert not blue
+        assert said["What is wrong"].startswith(f"these records cannot tell apart: {names[0]} (")
+    if verdict.verdict in (CAUSE_NAMED, OUTSIDE):
+        assert blue == names[:1]
+        wrong = since(said["What is wrong"].replace(" as no cause explains", ""))
+        for one in ranked[0][0].split(" + "):
+            assert since(words.explanation(one, words.sentences(verdict)).lower()) in wrong
+        if len(names) > 1:
+            assert f"what comes next: {names[1]} (" in said["How sure is that"]
+
+
+def since(text):
+    """Return a text that says once and alike when a cause began."""
+    text = re.sub(r"^from ([\d.]+) s on (.*)$", r"\2, since t = \1", text)
+    return re.sub(r"since t = ([\d.]+)", lambda found: f"since {float(found[1]):.3g}", text)
+
+
+def rgb(colour):
+    return tuple(int(colour[at : at + 2], 16) / 255.0 for at in (1, 3, 5))
+
+
+@pytest.mark.parametrize("row", kept(20), ids=lambda row: f"{row['kind']}_{row['index']}")
+def test_text_file_and_figure_agree(row):
+    check(row)
+
+
+@pytest.mark.slow
+def test_text_file_and_figure_agree_over_two_hundred_challenges():
+    rows = kept(200)
+    assert len(rows) == 200
+    assert len({row["verdict"] for row in rows}) == 4
+    for row in rows:
+        check(row)
+
+
+def curves(**models):
+    heading = np.sin(TIME)
+    sizes = {name.replace("__", ": "): size for name, size in {"nominal": 1.5, **models}.items()}
+    return Curves(time=TIME, measured={"heading": heading}, used={"heading": np.ones(TIME.size, bool)},
+                  models={name: {"heading": size * heading} for name, size in sizes.items()})  # fmt: skip
+
+
+def undecided(probabilities, shown, **misfit):
+    rivals = [
+        Rival(ids=(name,) if name != "none" else (), sentence=words.explanation(name), probability=p,
+              discrimination=1.0)
+        for name, p in probabilities.items()
+    ]  # fmt: skip
+    return Verdict(verdict=UNDECIDED, sentence="", rivals=tuple(rivals), probabilities=probabilities,
+                   curves={"record": shown}, misfit={"record": misfit})  # fmt: skip
+
+
+def labels(figure, panel=0):
+    return [text.get_text() for text in figure.axes[panel].get_legend().get_texts()]
+
+
+def test_nothing_is_wrong_comes_first_where_it_is_the_most_probable():
+    shown = curves(tolerance=1.01, rival__hull_drag=1.1)
+    figures = draw_diagnosis(undecided({"none": 0.5, "hull_drag": 0.4}, shown), TITLE)
+    assert labels(figures["misfit"])[-1] == "if nothing is wrong"
+    assert labels(figures["rivals"])[1:] == ["if nothing is wrong", "if the hull has another drag"]
+    other = draw_diagnosis(undecided({"hull_drag": 0.5, "none": 0.4}, shown), TITLE)
+    assert labels(other["misfit"])[-1] == "if the hull has another drag"
+
+
+def test_residuals_are_those_of_the_curves_beside_noise_and_the_step_of_the_sensor():
+    row = Misfit(rmse=0.4, nrmse=20.0, fit_percent=0.0, bias=0.0, whiteness_p=0.0, command_correlation={},
+                 windows=(), noise_sd=0.02, noise_slow=0.0, noise_time=1.0, resolution=0.03, outliers=0,
+                 gaps=0)  # fmt: skip
+    verdict = undecided({"hull_drag": 0.9, "yaw_inertia": 0.1}, curves(rival__hull_drag=0.99), heading=row)
+    right = draw_diagnosis(verdict, TITLE)["misfit"].axes[1]
+    dots = [one.get_ydata() for one in right.get_lines() if one.get_marker() == "o"]
+    np.testing.assert_allclose(dots, [-0.5 * np.sin(TIME), 0.01 * np.sin(TIME)], atol=1e-12)
+    low, high = right.transData.inverted().transform(right.patches[0].get_window_extent().get_points())[:, 1]
+    np.testing.assert_allclose((low, high), (-1.96 * 0.02, 1.96 * 0.02), rtol=1e-6)
+    steps = sorted(one.get_ydata()[0] for one in right.get_lines() if len(set(one.get_ydata())) == 1)
+    np.testing.assert_allclose(steps, [-0.015, 0.0, 0.015])
+    assert right.get_ylim()[1] < 0.1, "what is left of the best model and the noise are seen"
+    assert "simulated: off by as much as 0.5 degree" in [text.get_text() for text in right.texts]
