@@ -192,6 +192,10 @@ def sentence(verdict: Verdict) -> str:
         return f"{_capital(said)}, and no cause of the catalogue explains it."
     if verdict.verdict == NOTHING_WRONG:
         return f"Nothing is wrong beyond the tolerances of the model.{_within(verdict)}"
+    if verdict.verdict == CALIBRATED:
+        return "No part is at fault, but numbers of the model are off beyond their tolerances: it wants calibration."
+    if verdict.verdict == NOTHING_NEAR:
+        return "Nothing explains these records: what the best explanation leaves of them is more than noise."
     return verdict.sentence
 
 
