@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from subzero.diagnosis.hypothesis.logged import Logged
     from subzero.diagnosis.results import Verdict
 
-FINE = 0
+FINE, NO_CALIBRATION = 0, 3
 LAST_WORDS_S = 60.0
 """An interrupted diagnosis has so long to tell and write what it has. [s]"""
 
@@ -126,7 +126,7 @@ def calibrate(
             found = run(logged, free=wanted, vehicle=vehicle, progress=progress, quick=quick)
         write_all(found, stage, out.stem)
     tell(found, stage, out, voice=voice)
-    return FINE
+    return NO_CALIBRATION if found.refused else FINE
 
 
 def challenge(

@@ -67,4 +67,5 @@ def _tell(found: Calibration, stage: Stage, out: Path, console: Console) -> None
     for line in (report.headline(found), *report.story(found)):
         console.print(printable(line), highlight=False, markup=False)
     console.print(stage.words(), highlight=False, markup=False)
-    console.print(f'Fly it: vehicle = "{out.name}" in a trial beside it.', highlight=False, markup=False)
+    if not found.refused:
+        console.print(f'Fly it: vehicle = "{out.name}" in a trial beside it.', highlight=False, markup=False)

@@ -2,8 +2,9 @@
 
 Truth by the other formulation: twelve numbers of a vehicle off by up to 40 %, uniformly at random; everything else of
 the catalogue drawn from its tolerance. Three records: a rudder, a propeller and a stern-plane manoeuvre, drawn. Four
-families of noise, both vehicles, in turn. The drum rubs, as in `manoeuvres`: slack cable behind a free drum has no one
-truth.
+families of noise, both vehicles, in turn. What leaves the water or rolls over is drawn again; REMUS without its
+autopilot still dives to 50 m at 60 degrees, and its heading runs away: simulations part from it within seconds. The
+drum rubs, as in `manoeuvres`: slack cable behind a free drum has no one truth.
 
 Counted: how many intervals of 95 % hold the truth; the error in records that were not fitted, in levels of the true
 noise; and, of `--diagnose` cases, whether a fourth trial with a cause planted on top gets its name with the calibrated
@@ -57,6 +58,8 @@ CAUSES = ("rudder_offset", "net_buoyancy", "stern_plane_offset", "drum_friction"
 """Causes that may be planted; none moves a number that was calibrated."""
 CAUSE_SCALES = 1.5
 """Size of a planted cause, in its usual size. [-]"""
+LEAST_DEPTH, STEEPEST, MOST_ROLL = 0.2, 80.0, 90.0
+"""What a flight keeps to: least depth [m], steepest pitch and largest roll [degree]."""
 RATE = 10.0
 """Samples a second. [Hz]"""
 TARGETS = {"coverage": (0.93, 0.97), "held out": 1.2}
@@ -126,8 +129,19 @@ def logged_of(setting: Setting, true: Setting, flown: str, noise: str, rng: np.r
     times = np.arange(round(setting.trial.duration * RATE) + 1) / RATE
     longer = replace(true, trial=replace(true.trial, duration=true.trial.duration + 4.0))
     shown = shown_by(longer, times, CHANNELS)
+    if not is_flight(shown):
+        raise NoRunError(flown)
     values = {name: seen_by(FAMILIES[noise], name, column, times, rng) for name, column in shown.items()}
     return Logged(record=Record(source=flown, time=times, values=values), setting=setting, name=flown)
+
+
+def is_flight(shown: Mapping[str, np.ndarray]) -> bool:
+    """Say whether a trial stays in the water and the right way up; nobody calibrates with another."""
+    return (
+        float(np.min(shown["depth"])) > LEAST_DEPTH
+        and float(np.max(np.abs(shown["pitch"]))) < STEEPEST
+        and float(np.max(np.abs(shown["roll_angle"]))) < MOST_ROLL
+    )
 
 
 def result_of(case: Case) -> dict[str, Any]:

@@ -130,11 +130,12 @@ class _Work:
             numbers = numbers_of(whole, names, ranges)
             problem, D = with_free_numbers(whole, numbers)
             work = fitted(problem, len(numbers), D, progress)
+        refused = assessment.refused(work)
         with self._part("held out", 0.5, 0.6) as progress:
             held = assessment.held_out(work, progress)
         profiles: dict[str, Profile] = {}
         advice: tuple[Advice, ...] = ()
-        if not quick:
+        if not (quick or refused):
             with self._part("profiles", 0.6, 0.8) as progress:
                 profiles = assessment.profiles(numbers, work, progress)
             with self._part("advice", 0.8, 1.0) as progress:
@@ -152,6 +153,7 @@ class _Work:
             advice=advice,
             nuisances=assessment.nuisances(work, len(numbers)),
             strange=assessment.strange(work),
+            refused=refused,
             curves=curves(assessment.at_nominal(work.problem), {"before": None, "calibrated": work.fit}),
             records=sources,
             files={},
@@ -159,6 +161,8 @@ class _Work:
             converged=work.settled,
             seconds=self.seconds,
         )
+        if made.refused:
+            return made
         return dataclasses.replace(made, files={kind: part.text(made) for kind, part in files.items()})
 
     @contextmanager

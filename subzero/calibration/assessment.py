@@ -21,7 +21,15 @@ from subzero.diagnosis import assessment as judged
 from subzero.diagnosis.assessment import LIBRARY, is_safe, prepared_trial, rows_of, trial_rows, whiteness
 from subzero.diagnosis.hypothesis.catalogue import START
 from subzero.diagnosis.hypothesis.catalogue.sensors import SPECS
-from subzero.diagnosis.inference import Problem, Progress, bounded_step, bounds, broyden_update, objective
+from subzero.diagnosis.inference import (
+    Problem,
+    Progress,
+    bounded_step,
+    bounds,
+    broyden_update,
+    is_noise,
+    objective,
+)
 
 SIGMAS_95 = float(ndtri(0.975))
 """Half an interval of 95 % in standard deviations."""
@@ -196,6 +204,33 @@ def _errors(
         )
         found[name] = Held(before=b, after=a, fitted=f, noise=noise.sd, samples=int(own.sum()))
     return found
+
+
+MOST_WANDER = 2.5
+"""Where what is left wanders by more than so many usual levels, it is a misfit and no noise. [-]"""
+
+
+def refused(work: Fitted) -> tuple[str, ...]:
+    """Say in sentences why a fit is no calibration: what it leaves is more than noise, or it has found no minimum.
+
+    Noise is estimated behind the fit, and a misfit would pass for slow noise: so its size is held to the sensor's.
+    """
+    found, at = [], 0
+    for record in work.problem.records:
+        for name, noise in record.noise.items():
+            r = work.fit.r[at : at + noise.count]
+            at += noise.count
+            level = math.hypot(record.known.get(name, SPECS[name].noise), noise.resolution / math.sqrt(12.0))
+            words = f"{name.replace('_', ' ')} in {record.name}"
+            if not is_noise(r):
+                found.append(f"The best fit misses the {words} by more than its noise.")
+            elif noise.slow > MOST_WANDER * level:
+                found.append(
+                    f"The best fit leaves the {words} wandering by {noise.slow / level:.1f} times the usual noise."
+                )
+    if not work.settled:
+        found.append("The fit found no minimum: another step would still gain.")
+    return tuple(found)
 
 
 STRANGE_P = 1e-4

@@ -6,8 +6,8 @@ M is right if the whitened residual r is white. What a noise model of one slow p
 estimated by sums over blocks of each channel (Liang and Zeger 1986); variances are inflated by what that is more.
 
 A vehicle whose numbers are off by 40 % leaves records far off, where the linear problem says little. So the fit begins
-with the beginnings of the records and with more noise than there is, and goes on with all of them, the usual noise, the
-estimated one, and the error of the economical steps made good.
+with simulations that are led along what was measured (`state_correction`), and goes on with free ones, the usual noise,
+the estimated one, and the error of the economical steps made good.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from subzero.calibration.state_correction import led
 from subzero.diagnosis.inference import (
     Fit,
     Problem,
     Progress,
     bounds,
     broyden_update,
-    economical,
     objective,
     posterior,
     quadratic_step,
@@ -30,12 +30,12 @@ from subzero.diagnosis.inference import (
     with_noise_behind,
 )
 
-HORIZONS = (0.3, 0.6, 1.0)
-"""Shares of the records that are fitted, one behind the other. [-]"""
+LAGS_S = (0.3, 1.5, np.inf)
+"""Within so long simulations are led back to what was measured, one fit behind the other. [s]"""
 FIRST_MISFIT = 2.0
 """A fit begins with so much noise that it leaves the vehicle so many levels off. [-]"""
-MAX_LOWERINGS, FAILED_SHARE = 5, 0.9
-"""Noise is lowered so often; no more where the misfit stays above this share of what it was. [-]"""
+FIRST_STEPS = 10
+"""Steps of a fit that only leads to the next, at most."""
 MAX_STEPS = 25
 """Steps of a fit, at most."""
 SETTLED_GAIN = 0.3
@@ -97,42 +97,23 @@ def fitted(problem: Problem, free: int, D: np.ndarray, progress: Progress) -> Fi
 
 
 def _first(problem: Problem, free: int, D: np.ndarray) -> np.ndarray:
-    """Return where the fit begins (k,): numbers and starts alone, from the beginnings of the records to all of them.
+    """Return where the fit begins (k,): numbers and starts alone, of records whose simulation is led less and less.
 
-    Noise is raised so that what is left is a few levels of it, and lowered as the fit comes closer.
+    Noise is raised so that what is left is a few levels of it.
     """
     core = [k for k, entry in enumerate(problem.entries) if k < free or entry.record >= 0]
     few = replace(problem, entries=tuple(problem.entries[k] for k in core))
     z = np.zeros(len(core))
-    for share in HORIZONS:
-        short = beginnings(few, share)
-        for _ in range(MAX_LOWERINGS):
-            misfit = float(np.sqrt(np.mean(short.residual(z) ** 2)))
-            factor = max(misfit / FIRST_MISFIT, 1.0)
-            z = _settled(with_more_noise(short, factor), z, D[core])[0].z
-            if factor == 1.0 or np.sqrt(np.mean(short.residual(z) ** 2)) > FAILED_SHARE * misfit:
-                break
+    for lag in LAGS_S:
+        part = led(few, lag) if np.isfinite(lag) else few
+        misfit = float(np.sqrt(np.mean(part.residual(z) ** 2)))
+        z = _settled(with_more_noise(part, max(misfit / FIRST_MISFIT, 1.0)), z, D[core], FIRST_STEPS)[0].z
     whole = np.zeros(D.size)
     whole[core] = z
     return whole
 
 
-def beginnings(problem: Problem, share: float) -> Problem:
-    """Return the problem of the first part of every record, a share of its length."""
-    if share >= 1.0:
-        return problem
-    records = []
-    for one in problem.records:
-        end = share * float(one.time[-1])
-        noise = {}
-        for name, old in one.noise.items():
-            used = old.used & (one.time <= end)
-            noise[name] = replace(old, used=used, time=one.time[used])
-        records.append(replace(one, noise=noise, setting=economical(one.setting, end)))
-    return replace(problem, records=tuple(records))
-
-
-def _settled(problem: Problem, z: np.ndarray, D: np.ndarray) -> tuple[Fit, bool]:
+def _settled(problem: Problem, z: np.ndarray, D: np.ndarray, most: int = MAX_STEPS) -> tuple[Fit, bool]:
     """Return a fit with sensitivities made close by, and whether a further step would gain nothing.
 
     Levenberg's and Marquardt's method within bounds (Nielsen 1999): where numbers trade against each other the best fit
@@ -141,7 +122,7 @@ def _settled(problem: Problem, z: np.ndarray, D: np.ndarray) -> tuple[Fit, bool]
     low, high = bounds(problem)
     r, J, made_at = problem.residual(z), problem.jacobian(z), z
     now, damping, harder, left = objective(r, z, D), 0.0, 2.0, 0.0
-    for _ in range(MAX_STEPS):
+    for _ in range(most):
         P, g = J.T @ J + np.diag((1.0 + damping) / D), J.T @ r - z / D
         step = quadratic_step(P, g, low - z, high - z)
         left = now - objective(r - J @ step, z + step, D)

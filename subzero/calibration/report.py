@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from subzero.calibration.results import Advice, Calibration, Estimate
+from subzero.calibration.results import REMEDY, Advice, Calibration, Estimate
 
 FORMAT = "subzero calibration 1"
 STRONG = 0.9
@@ -35,14 +35,19 @@ def _mark(one: Estimate) -> str:
 
 
 def headline(found: Calibration) -> str:
-    """Return what was gained, in one sentence."""
+    """Return what was gained, in one sentence; or that nothing was."""
+    if found.refused:
+        return "Nothing comes near these records: the numbers above are no calibration, and no vehicle is written."
     count, moved = len(found.estimates), sum(one.is_determined for one in found.estimates)
     return (f"{moved} of {count} numbers are determined; on {found.how}, not fitted, the error goes from "
             f"{found.error('before'):.3g} to {found.error():.3g} noise levels.")  # fmt: skip
 
 
 def story(found: Calibration) -> Iterator[str]:
-    """Give the lines that belong below the table."""
+    """Give the lines that belong below the table; where nothing came near, why, and what to do."""
+    if found.refused:
+        yield from (*found.refused[:MOST_TOLD], REMEDY, *found.notes)
+        return
     for one in found.directions[:MOST_TOLD]:
         yield f"Not determined by these records: {one.sentence}."
     for a, b, rho in correlations(found)[:MOST_TOLD]:
@@ -82,7 +87,9 @@ def mapping(found: Calibration) -> dict[str, Any]:
     """Return a calibration in plain numbers and texts."""
     return {
         "format": FORMAT,
+        "verdict": found.verdict,
         "sentence": headline(found),
+        "refused": list(found.refused),
         "converged": found.converged,
         "numbers": {one.name: {**asdict(one), "change": one.change} for one in found.estimates},
         "correlation": {"names": [one.name for one in found.estimates], "matrix": found.correlation},

@@ -7,7 +7,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from subzero.diagnosis.results import Curves
+from subzero.diagnosis.results import CALIBRATED, NOTHING_NEAR, Curves
+from subzero.errors import UserError
+
+REMEDY = (
+    "Hold records and trials together first: units, signs, commands, clock, cable. Then free what may be far off "
+    "(--free), begin with a vehicle that is nearer (--vehicle), or leave the worst record out."
+)
+"""What to do where nothing comes near."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -139,9 +146,10 @@ class Calibration:
         advice: what to fly next, the best first.
         nuisances: parameter → (mean, standard deviation) in tolerances, of sensors, clock, current, cable and start.
         strange: sentences on what the calibrated vehicle leaves that is no noise; empty if all is.
+        refused: sentences on why the fit is no calibration, the verdict "nothing_near"; empty if it is one.
         curves: record → what was measured, and what the vehicle does before and after.
         records: what it was made of.
-        files: name → text of the calibrated vehicle (and cable).
+        files: name → text of the calibrated vehicle (and cable); empty where nothing came near.
         notes: what else to know.
         converged: the fit found a minimum.
         seconds: what was done → how long it took. [s]
@@ -159,6 +167,7 @@ class Calibration:
     curves: Mapping[str, Curves]
     records: tuple[Source, ...]
     files: Mapping[str, str]
+    refused: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     converged: bool = True
     seconds: Mapping[str, float] = field(default_factory=dict)
@@ -180,6 +189,17 @@ class Calibration:
         return float(np.sqrt(sum(squares) / max(sum(one.samples for one in rows), 1)))
 
     @property
+    def verdict(self) -> str:
+        """What was found: "calibrated", or "nothing_near" where no numbers leave noise."""
+        return NOTHING_NEAR if self.refused else CALIBRATED
+
+    @property
     def vehicle(self) -> str:
-        """The text of the calibrated vehicle's file."""
+        """The text of the calibrated vehicle's file.
+
+        Raises:
+            UserError: nothing came near, so that there is no such vehicle.
+        """
+        if self.refused:
+            raise UserError(f"There is no calibrated vehicle: {' '.join(self.refused)} {REMEDY}")
         return self.files["vehicle"]

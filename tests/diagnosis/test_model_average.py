@@ -20,8 +20,8 @@ from subzero.diagnosis.inference import (
     decide,
     occam_folded,
     practical_causes,
+    qualified,
 )
-from subzero.diagnosis.inference.model_average import qualified
 from subzero.diagnosis.results import (
     CALIBRATED,
     CAUSE_NAMED,

@@ -92,8 +92,10 @@ from subzero.diagnosis.inference.model_average import (
     Beliefs,
     ChangePointSummary,
     decide,
+    is_noise,
     occam_folded,
     practical_causes,
+    qualified,
 )
 from subzero.diagnosis.inference.out_of_catalogue import Findings, special_cases_folded
 
@@ -138,6 +140,7 @@ __all__ = [
     "freed",
     "grown",
     "history",
+    "is_noise",
     "is_poor_fit",
     "knots_of",
     "laplace",
@@ -154,6 +157,7 @@ __all__ = [
     "posterior",
     "practical_causes",
     "quadratic_step",
+    "qualified",
     "refit",
     "relinearised_force",
     "resolution_of",
