@@ -46,7 +46,7 @@ second, sensitivities are made again. [-]"""
 FIRST_DAMPING, LEAST_DAMPING = 1.0, 0.1
 """Damping of a step that failed, in inverse prior variances, and that which is none any more. [-]"""
 OWN_WITHIN = 0.3
-"""Sensitivities are a fit's own if they were made so close to it, in tolerances."""
+"""Sensitivities will do for a first fit if they were made so close to it, in tolerances."""
 MAX_NOISE_ROUNDS = 2
 """How often the noise is estimated."""
 
@@ -107,30 +107,33 @@ def _first(problem: Problem, free: int, D: np.ndarray) -> np.ndarray:
     for lag in LAGS_S:
         part = led(few, lag) if np.isfinite(lag) else few
         misfit = float(np.sqrt(np.mean(part.residual(z) ** 2)))
-        z = _settled(with_more_noise(part, max(misfit / FIRST_MISFIT, 1.0)), z, D[core], FIRST_STEPS)[0].z
+        z = _settled(with_more_noise(part, max(misfit / FIRST_MISFIT, 1.0)), z, D[core], is_first=True)[0].z
     whole = np.zeros(D.size)
     whole[core] = z
     return whole
 
 
-def _settled(problem: Problem, z: np.ndarray, D: np.ndarray, most: int = MAX_STEPS) -> tuple[Fit, bool]:
-    """Return a fit with sensitivities made close by, and whether a further step would gain nothing.
+def _settled(problem: Problem, z: np.ndarray, D: np.ndarray, *, is_first: bool = False) -> tuple[Fit, bool]:
+    """Return a fit with sensitivities of its own, and whether a further step would gain nothing.
+
+    A first one, which only leads to the next, takes fewer steps, and makes do with one-sided sensitivities close by.
 
     Levenberg's and Marquardt's method within bounds (Nielsen 1999): where numbers trade against each other the best fit
     lies at the end of a curved valley, and a whole step of Gauss and Newton, or a part of it, leaves it.
     """
     low, high = bounds(problem)
-    r, J, made_at = problem.residual(z), problem.jacobian(z), z
+    slopes, within = (problem.jacobian, OWN_WITHIN) if is_first else (problem.central_jacobian, 0.0)
+    r, J, made_at = problem.residual(z), slopes(z), z
     now, damping, harder, left = objective(r, z, D), 0.0, 2.0, 0.0
-    for _ in range(most):
+    for _ in range(FIRST_STEPS if is_first else MAX_STEPS):
         P, g = J.T @ J + np.diag((1.0 + damping) / D), J.T @ r - z / D
         step = quadratic_step(P, g, low - z, high - z)
         left = now - objective(r - J @ step, z + step, D)
         fresh = made_at is z
         if left < SETTLED_GAIN and damping < 1.0:
-            if fresh or _apart(problem, z, made_at) < OWN_WITHIN:
+            if fresh or _apart(problem, z, made_at) < within:
                 break
-            J, made_at = problem.jacobian(z), z
+            J, made_at = slopes(z), z
             continue
         r_there = problem.residual(z + step)
         then = objective(r_there, z + step, D)
@@ -143,7 +146,7 @@ def _settled(problem: Problem, z: np.ndarray, D: np.ndarray, most: int = MAX_STE
         elif fresh:
             damping, harder = max(damping, FIRST_DAMPING) * harder, 2.0 * harder
         if share < FRESH_SHARE and not fresh:
-            J, made_at = problem.jacobian(z), z
+            J, made_at = slopes(z), z
     fit = Fit(z=z, r=r, J=J, D=D, objective=now, converged=left < SETTLED_GAIN, predicted_gain=left, fresh=0,
               made_at=made_at)  # fmt: skip
     return fit, fit.converged

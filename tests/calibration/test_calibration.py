@@ -26,7 +26,7 @@ from subzero.synthetic.planted import make_record
 FREE = ("axial_drag.drag_coefficient", "rudder.lift_slope", "propeller.reaction_torque_factor")
 UNSEEN = "quadratic_damping.roll_per_roll"
 """No record of these shows it."""
-CHANNELS = ("surge_speed", "heading", "yaw_rate", "pitch", "roll", "depth")
+CHANNELS = ("surge_speed", "heading", "yaw_rate", "pitch", "roll_angle", "depth")
 COMMANDS = {"turn": [(0.0, 25.0, 0.0, 0.0), (6.0, 25.0, 6.0, 0.0), (11.0, 25.0, -6.0, 0.0)],
             "plane": [(0.0, 25.0, 0.0, 0.0), (7.0, 15.0, 0.0, 1.5), (12.0, 15.0, 3.0, -1.5)]}  # fmt: skip
 """Trial → time [s], propeller [rev/s], rudder and stern-planes [degree]."""
@@ -196,16 +196,50 @@ def test_a_prescribed_motion_is_refused(records):
         subzero.calibrate(replace(one, setting=still))
 
 
+@pytest.fixture(scope="module")
+def refused(records):
+    """What a calibration says of a turn that no vehicle makes: compass and gyro go the other way."""
+    one, other = subzero.read_trials(records)
+    values = dict(one.record.values)
+    values["heading"] = 2.0 * values["heading"][0] - values["heading"]
+    values["yaw_rate"] = -values["yaw_rate"]
+    turned = replace(one, record=replace(one.record, values=values))
+    return subzero.calibrate([turned, other], free=FREE)
+
+
+def test_records_that_no_numbers_explain_make_no_vehicle(refused):
+    assert refused.verdict == "nothing_near"
+    assert refused.files == {}
+    assert any("heading" in why or "yaw rate" in why for why in refused.refused)
+    with pytest.raises(subzero.UserError, match="There is no calibrated vehicle") as caught:
+        _ = refused.vehicle
+    assert "--vehicle" in str(caught.value)
+
+
+def test_a_calibration_that_holds_is_not_refused(found):
+    assert found.verdict == "calibrated"
+    assert not found.refused
+
+
+def test_the_command_writes_no_vehicle_where_nothing_comes_near(command, refused):
+    code, said, folder, _ = command("--out", "flown/mine.toml", answer=refused)
+    assert code == 3
+    assert "no vehicle is written" in " ".join(said.split())
+    assert "--vehicle" in said
+    assert {path.suffix for path in (folder / "flown").iterdir()} == {".json", ".png"}
+    assert json.loads((folder / "flown/mine.json").read_text())["verdict"] == "nothing_near"
+
+
 @pytest.fixture
 def command(found, records, tmp_path, monkeypatch, capsys):
     """The command line with a calibration that is done already: words → exit code, what it says, its folder."""
     asked = {}
 
-    def done(logged, **options):
-        asked.update(options, names=[one.name for one in logged])
-        return found
+    def run(*words, answer=found):
+        def done(logged, **options):
+            asked.update(options, names=[one.name for one in logged])
+            return answer
 
-    def run(*words):
         monkeypatch.setattr("subzero.calibration.api.calibrate", done)
         monkeypatch.chdir(tmp_path)
         code = main(["calibrate", *map(str, records), *words])
@@ -235,6 +269,12 @@ def test_the_command_refuses_before_it_reads(command, words, message):
     assert message in said
     assert not asked
     assert list(folder.iterdir()) == []
+
+
+def test_the_command_speaks_json(command, found):
+    code, said, _, _ = command("--json")
+    assert code == 0
+    assert json.loads(said)["numbers"][f"vehicle.{FREE[0]}"]["value"] == pytest.approx(found[FREE[0]].value)
 
 
 @pytest.mark.slow
