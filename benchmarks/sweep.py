@@ -39,10 +39,12 @@ GRID = {
 
 def plan(members, changes=None):
     """Return a sweep of fig6 over cable length and current, of so many members."""
-    from subzero.sweeps.plan import plan_of
+    from subzero.sweeps.design import Design
+    from subzero.sweeps.plan import plan_sweep
 
     spreads = {name: {"from": one["from"], "to": one["to"]} for name, one in GRID.items()}
-    return plan_of("fig6", spreads, design="latin_hypercube", samples=members, changes=changes)
+    design = Design(kind="latin_hypercube", samples=members)
+    return plan_sweep("fig6", spreads, design=design, changes=changes)
 
 
 def bare_loop(members, changes=None, share=(0, 1)):
@@ -79,13 +81,13 @@ def one_thread():
     return os.environ | ONE_THREAD
 
 
-def timed(one, workers=None, client=None):
+def timed(one, workers=None):
     """Return how long a sweep takes from its call to its end, with the start of its workers and their end [s]."""
     from subzero.sweeps.api import finished
 
     with tempfile.TemporaryDirectory() as folder:
         begun = time.perf_counter()
-        with finished(one, Path(folder), workers=workers, client=client):
+        with finished(one, Path(folder), workers=workers):
             pass
         return time.perf_counter() - begun
 
@@ -112,16 +114,15 @@ def idle(members, repeats, dask):
     one = plan(members)
     with ExitStack() as held:
         client = held.enter_context(cluster()) if dask else None
-        asked = {"1 worker": {"workers": 1}, "2 workers": {"workers": 2}}
-        asked |= {"Dask, 2 workers": {"client": client}} if dask else {}
-        for name, how in asked.items():
-            shares = [_idle_share(one, how.get("workers", 2), how) for _ in range(repeats)]
+        asked = {"1 worker": (1, 1), "2 workers": (2, 2)} | ({"Dask, 2 workers": (2, client)} if dask else {})
+        for name, (count, workers) in asked.items():
+            shares = [_idle_share(one, count, workers) for _ in range(repeats)]
             print(
                 f"{name:<18}{100 * statistics.median(shares):6.1f} %   ({', '.join(f'{100 * x:.1f}' for x in shares)})"
             )
 
 
-def _idle_share(one, workers, how):
+def _idle_share(one, count, workers):
     from subzero.sweeps import api
 
     stamps, kept = [], []
@@ -134,12 +135,12 @@ def _idle_share(one, workers, how):
 
     before, api._Tally = api._Tally, Tally
     try:
-        with tempfile.TemporaryDirectory() as folder, api.finished(one, Path(folder), **how):
+        with tempfile.TemporaryDirectory() as folder, api.finished(one, Path(folder), workers=workers):
             pass
     finally:
         api._Tally = before
-    first = workers  # the first batch of each worker is in before the clock starts
-    return 1.0 - sum(kept[first:]) / (workers * (stamps[-1] - stamps[first - 1]))
+    # the first batch of each worker is in before the clock starts
+    return 1.0 - sum(kept[count:]) / (count * (stamps[-1] - stamps[count - 1]))
 
 
 def speed(members, repeats, dask):
@@ -156,7 +157,7 @@ def speed(members, repeats, dask):
                 "sweep, 2 workers": timed(one, workers=2),
             }
             if client is not None:
-                row["sweep, Dask"] = timed(one, client=client)
+                row["sweep, Dask"] = timed(one, workers=client)
             rows.append(row)
     middle = {name: statistics.median(row[name] for row in rows) for name in rows[0]}
     for name, seconds in middle.items():

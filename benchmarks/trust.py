@@ -38,7 +38,7 @@ from scipy.stats import binomtest
 import scenarios
 import subzero
 from scenarios import CONTROLS
-from subzero.refinement import MOST, refine
+from subzero.comparison import MOST, refine
 
 WRONG, RIGHT = 0.03, 0.01
 """Error of the force from which a run is wrong, and up to which it is right. [-]"""

@@ -19,13 +19,13 @@ printed there: 0 makes the tension at a frictionless drum exactly zero.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import isfinite, sqrt
 
 import numpy as np
 
 from subzero.errors import BadValueError, checked
-from subzero.jit import inner, packed
+from subzero.jit import Record, inner
 
 TURNING, STANDING, SPINNING = 0, 1, 2
 
@@ -38,8 +38,7 @@ HELD = 1e-12
 """A tension or pay-out rate below this is none. [N], [m/s]"""
 
 
-@dataclass
-class DrumNumbers:
+class DrumNumbers(Record):
     """The drum as compiled code sees it, at the cable.
 
     Attributes:
@@ -54,8 +53,13 @@ class DrumNumbers:
     friction: float
     control: int
     setpoint: float
-    place: np.ndarray = field(default_factory=lambda: np.zeros(3))
-    velocity: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    place: np.ndarray
+    velocity: np.ndarray
+
+    @classmethod
+    def at_rest(cls, *, inertia: float = 0.0, friction: float = 0.0, control: int = FREE) -> DrumNumbers:
+        """Return the numbers of a drum that stands where it stood at the start."""
+        return cls(inertia, friction, control, 0.0, np.zeros(3), np.zeros(3))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -90,7 +94,7 @@ class DrumProperties:
             raise BadValueError(
                 f"DrumProperties: radius is {self.radius:g}; so small that inertia and friction are not finite."
             )
-        return packed(DrumNumbers(inertia, friction, 0, 0.0))
+        return DrumNumbers.at_rest(inertia=inertia, friction=friction)
 
 
 @inner

@@ -114,7 +114,7 @@ def _search(line: Line, nodes: np.ndarray | None, water: Water, cable: CableProp
 def _in_units_of(scale: float, cable: CableProperties) -> Any:
     """Return the cable's numbers for forces in units of `scale` newtons."""
     c = cable.numbers()
-    for name in c.dtype.names:
+    for name in c.names:
         c[name] = c[name] * scale if name == "compliance" else c[name] / scale
     return c
 
@@ -208,7 +208,7 @@ def _between(places: np.ndarray, length: float, count: int) -> Line:
     """Return a line of even segments, with its ends where they are held."""
     line = new_line(count)
     line.ends.count = count
-    line.length[1 : count + 1] = line.ends.segment_length = length / count
+    line.length[1 : count + 1] = line.ends.layout.segment_length = length / count
     line.ends.last_length[:] = length / count
     line.ends.settled = length - length / count
     line.position[:, 0] = places[0] - places[1]
@@ -240,7 +240,7 @@ def _found(
         length=float(length),
         shape=line.position[NOW, : N + 1] + places[1],
         tensions=scale * line.node_tension[: N + 1],
-        tow_force=scale * line.ends.tow_force,
+        tow_force=scale * line.ends.tow.force,
         drum_force=-scale * line.ends.drum_force,
         segment_lengths=np.append(line.length[1:N], line.ends.last_length[NOW]),
         segment_tensions=scale * line.tension[NOW, 1 : N + 1],

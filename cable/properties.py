@@ -7,16 +7,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 from math import isfinite, sqrt
-from typing import Any, NamedTuple
 
 from subzero.errors import BadValueError, checked
-from subzero.jit import packed
+from subzero.jit import Record
 
 GRAVITY = 9.81
 """Gravitational acceleration g, as printed in section 2.2 of the source. [m/s²]"""
 
 
-class CableNumbers(NamedTuple):
+class CableNumbers(Record):
     """The cable as compiled code sees it: m, ρA, w_c, e, the drag constants ½ρdπC_t and ½ρdC_n."""
 
     mass: float
@@ -27,18 +26,10 @@ class CableNumbers(NamedTuple):
     normal_drag: float
 
 
-class StiffCableNumbers(NamedTuple):
-    """`CableNumbers` of a cable that resists bending, with EI, which stands first: a record that begins like
-    `CableNumbers` would pass for one, and its EI would be overlooked.
-    """
+class StiffCableNumbers(CableNumbers):
+    """The same of a cable that resists bending, with EI [N m²]."""
 
     bending_stiffness: float
-    mass: float
-    added_mass: float
-    weight: float
-    compliance: float
-    tangential_drag: float
-    normal_drag: float
 
 
 ABOVE_ZERO = ("water_density", "mass_per_length", "cross_section_area", "diameter")
@@ -111,23 +102,20 @@ class CableProperties:
         ratio = abs(self.weight_in_water) / (2.0 * self.normal_drag * speed * speed)
         return acos(sqrt(1.0 + ratio * ratio) - ratio)
 
-    def numbers(self) -> Any:
+    def numbers(self) -> CableNumbers:
         """Return the plain numbers that compiled code takes: `CableNumbers` or `StiffCableNumbers`."""
-        numbers = CableNumbers(
-            mass=self.mass_per_length,
-            added_mass=self.water_density * self.cross_section_area,
-            weight=self.weight_in_water,
-            compliance=self.compliance,
-            tangential_drag=self.tangential_drag,
-            normal_drag=self.normal_drag,
-        )
+        values = {
+            "mass": self.mass_per_length,
+            "added_mass": self.water_density * self.cross_section_area,
+            "weight": self.weight_in_water,
+            "compliance": self.compliance,
+            "tangential_drag": self.tangential_drag,
+            "normal_drag": self.normal_drag,
+        }
+        if not all(isfinite(number) for number in values.values()):
+            raise BadValueError(
+                "CableProperties: its numbers are so large that masses, weights or drags are not finite."
+            )
         if self.bending_stiffness > 0.0:
-            return _finite("CableProperties", StiffCableNumbers(self.bending_stiffness, *numbers))
-        return _finite("CableProperties", numbers)
-
-
-def _finite(name: str, numbers: Any) -> Any:
-    """Return what follows from the fields as compiled code takes it; refuse what is not finite."""
-    if all(isfinite(number) for number in numbers):
-        return packed(numbers)
-    raise BadValueError(f"{name}: its numbers are so large that masses, weights or drags are not finite.")
+            return StiffCableNumbers(**values, bending_stiffness=self.bending_stiffness)
+        return CableNumbers(**values)

@@ -17,7 +17,6 @@ import numpy as np
 
 from cable.drum import LENGTH, TENSION, DrumNumbers
 from subzero.errors import BadValueError, checked, real, short
-from subzero.jit import packed
 
 Schedule = float | Callable[[float], float]
 """A number, or a function of time [s]."""
@@ -42,7 +41,7 @@ class PayOutRate:
 
     def numbers(self) -> DrumNumbers:
         """Return the plain numbers that compiled code takes."""
-        return packed(DrumNumbers(0.0, 0.0, LENGTH, 0.0))
+        return DrumNumbers.at_rest(control=LENGTH)
 
     def setpoints(self, times: np.ndarray, start: float) -> np.ndarray:
         """Return the length asked for at `times` (n,), from `start` on; Simpson's rule within a step. [m]."""
@@ -61,7 +60,7 @@ class Brake:
 
     def numbers(self) -> DrumNumbers:
         """Return the plain numbers that compiled code takes."""
-        return packed(DrumNumbers(0.0, 0.0, LENGTH, 0.0))
+        return DrumNumbers.at_rest(control=LENGTH)
 
     def setpoints(self, times: np.ndarray, start: float) -> np.ndarray:
         """Return the length at `times` (n,): always `start`. [m]."""
@@ -84,7 +83,7 @@ class ConstantTension:
 
     def numbers(self) -> DrumNumbers:
         """Return the plain numbers that compiled code takes."""
-        return packed(DrumNumbers(0.0, 0.0, TENSION, 0.0))
+        return DrumNumbers.at_rest(control=TENSION)
 
     def setpoints(self, times: np.ndarray, start: float) -> np.ndarray:
         """Return the tension asked for at `times` (n,). [N].

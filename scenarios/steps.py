@@ -55,6 +55,8 @@ def misfits(numbers: Numbers, words: Mapping[str, str] | None = None) -> list[Mi
         ("hull_step", "duration"): _endless,
         ("segment_length", "wet_length"): _countless,
     }
+    if numbers.get("every", 0.0) > 0.0:
+        checks["every", "cable_step"] = _not_whole
     known = [(names, check) for names, check in checks.items() if set(names) <= set(numbers)]
     found = [check(*names, numbers, words) for names, check in known]
     return [misfit for misfit in found if misfit]

@@ -243,6 +243,9 @@ class Trial:
         cable_step: time step of the cable and of the exchange, a whole number of hull steps. [s]
         segment_length: length of a cable segment, at the vehicle. [m]
         grading: segments get longer by this much per metre of cable from the vehicle. [-]
+        far_length: farther than this from both ends of the cable, they are joined to longer ones: [m]
+        far_grading: by this much per metre; 0 leaves them as they are. [-]
+        every: time between results that are kept, a whole number of cable steps; 0 keeps all. The last is kept. [s]
         rtol: error of the tow force that is allowed, as a share of its largest: where the run and a coarser one differ
             by more, steps and segments are halved (`subzero.convergence`); 0 takes them as they are. [-]
         scheme: one of `SCHEMES`.
@@ -270,6 +273,9 @@ class Trial:
     cable_step: float = 0.1
     segment_length: float = 0.5
     grading: float = 0.0
+    far_length: float = 40.0
+    far_grading: float = 0.2
+    every: float = 0.0
     rtol: float = 0.02
     scheme: str = "moving_end"
     start: Start
@@ -314,6 +320,11 @@ class Trial:
         if self.scheme != SCHEMES[0] and asked:
             check.say("scheme", ONLY_DEFAULT, only_default(asked), self.scheme)
         check.refuse()
+
+    @property
+    def stride(self) -> int:
+        """Every so many times a result is kept. [-]"""
+        return max(1, round(self.every / self.cable_step))
 
     def with_changes(self, changes: Mapping[str, float]) -> Trial:
         """Return a trial with other values for some of its numbers; this one stays as it is.
@@ -371,7 +382,7 @@ class Trial:
         return Overview(f"Trial {self.name}: {self.description}", rows)
 
     def times(self) -> np.ndarray:
-        """Return the times of the results (n,): whole cable steps from 0, and a last step that ends the run. [s]."""
+        """Return the times of a run (n,): whole cable steps from 0, and a last step that ends the run. [s]."""
         return run_times(self.duration, self.cable_step)
 
     def even_times(self) -> np.ndarray:

@@ -6,13 +6,15 @@
     >>> comparison.summary()["tethered"]["peak_speed_m_s"]
 
 Names come from their modules when they are first used, so that ``import subzero`` costs nothing:
-`simulate` and `compare` run a trial, `Comparison` holds two runs, `load_scenario` reads a trial,
+`simulate` and `compare` run a trial, `simulate_many` many at once, `Checkpoint` keeps where a long run stands,
+`Comparison` holds two runs, `load_scenario` reads a trial,
 `open_run` reads its file again, and ``run.subzero.plot`` draws it (`subzero.accessor`),
 `warnings_of` says what may be wrong with a run, `check` how much it changes with half the steps,
 `read_record` a measured record, `draw` makes the figures, `export` writes a run for other programs,
 `Simulator` steps a run for a controller of your own,
 `diagnose` says what a simulation gets wrong in measured records, `calibrate` estimates numbers of a vehicle from them,
 `read_trials` reads those as `Logged`, `challenge` hides an effect in a record to try that out,
+`sweep` runs a trial with many values of its parameters (`plan_sweep` says which without running them),
 `autopilot` leads to linear models and controllers, `CHANNELS` is the table of everything that a run gives.
 """
 
@@ -21,34 +23,37 @@ from typing import Any
 
 _HOME = {
     "CHANNELS": ("subzero.channels", "CHANNELS"),
+    "Checkpoint": ("subzero.checkpoint", "Checkpoint"),
     "Comparison": ("subzero.comparison", "Comparison"),
     "Logged": ("subzero.diagnosis.hypothesis.logged", "Logged"),
     "Model": ("subzero.model", "Model"),
-    "Observation": ("subzero.simulator", "Observation"),
+    "Observation": ("subzero.channels", "Observation"),
     "Record": ("subzero.records.record", "Record"),
-    "Refinement": ("subzero.refinement", "Refinement"),
+    "Refinement": ("subzero.comparison", "Refinement"),
     "RunWarning": ("subzero.validity", "RunWarning"),
     "RunStoppedError": ("subzero.simulator", "RunStoppedError"),
     "Simulator": ("subzero.simulator", "Simulator"),
     "UserError": ("subzero.errors", "UserError"),
     "calibrate": ("subzero.calibration.api", "calibrate"),
     "challenge": ("subzero.synthetic.challenge", "challenge"),
-    "check": ("subzero.refinement", "check"),
+    "check": ("subzero.comparison", "check"),
     "compare": ("subzero.comparison", "compare"),
     "diagnose": ("subzero.diagnosis.api", "diagnose"),
     "draw": ("subzero.figures", "draw"),
     "export": ("subzero.exports", "export"),
     "load_scenario": ("subzero.model", "load"),
     "open_run": ("subzero.accessor", "open_run"),
+    "plan_sweep": ("subzero.sweeps.plan", "plan_sweep"),
     "read_record": ("subzero.records.record", "read_record"),
     "read_trials": ("subzero.diagnosis.read_trials", "read_trials"),
     "simulate": ("subzero.simulation", "simulate"),
+    "simulate_many": ("subzero.simulation", "simulate_many"),
     "sweep": ("subzero.sweeps.api", "sweep"),
     "warnings_of": ("subzero.validity", "warnings_of"),
 }
 """Public name → (module, name there)."""
 
-_PACKAGES = ("autopilot",)
+_PACKAGES = ("autopilot", "sweeps")
 """Packages inside, fetched as a whole."""
 
 _GIVE_RUNS = ("Comparison", "Simulator", "autopilot", "compare", "open_run", "simulate")

@@ -147,7 +147,7 @@ class RunPlots:
 
     def shape3d(self) -> Figure:
         """Return the cable at five times in three dimensions, with the way of the tow point."""
-        from subzero.figures.space import shape_3d
+        from subzero.figures.cable import shape_3d
 
         return shape_3d(self._run, self._title())
 

@@ -16,6 +16,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
 
 DEGREE = 180.0 / math.pi
 REVOLUTION = 1.0
@@ -169,3 +172,54 @@ def column_name(name: str) -> str:
 def channel_of_column(column: str) -> Channel | None:
     """Return the channel that a CSV column holds, ``heading_deg`` → heading; None if there is none."""
     return BY_COLUMN.get(column)
+
+
+class Observation(NamedTuple):
+    """What is true at one time, by the names of `CHANNELS`, in SI units, radians and rev/s.
+
+    The roll angle is `roll` here, ``roll_angle`` there, where `roll` is a method of xarray. The heading is continuous:
+    no jump at a full turn. Forces and moments of the cable are those on the hull, body axes.
+    """
+
+    time: float
+    north: float
+    east: float
+    depth: float
+    roll: float
+    pitch: float
+    heading: float
+    surge_speed: float
+    sway_speed: float
+    heave_speed: float
+    roll_rate: float
+    pitch_rate: float
+    yaw_rate: float
+    propeller_speed: float
+    rudder_angle: float
+    stern_plane_port_angle: float
+    stern_plane_starboard_angle: float
+    battery_voltage: float
+    cable_length: float
+    cable_tension: float
+    drum_tension: float
+    cable_force_forward: float
+    cable_force_starboard: float
+    cable_force_down: float
+    cable_moment_roll: float
+    cable_moment_pitch: float
+    cable_moment_yaw: float
+
+
+HEADING = "heading"
+TURN = 360.0
+FIRST = 9
+"""Samples that say where a record begins: a few of them may be outliers."""
+
+
+def turned(heading: np.ndarray, like: np.ndarray | float) -> np.ndarray:
+    """Return a heading (n,) with the whole turns more or less that bring its first samples close to those of another,
+    (n,) or one. [degree]
+    """
+    apart = np.asarray(like - heading)
+    first = apart[np.isfinite(apart)][:FIRST]
+    return heading + TURN * np.round(np.median(first) / TURN) if first.size else heading

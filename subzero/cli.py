@@ -15,7 +15,7 @@ import shlex
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -28,7 +28,7 @@ from subzero import cli_autopilot, cli_diagnosis, cli_install, cli_sweep, cli_tr
 from subzero.cli_examples import register
 from subzero.errors import UserError, printable
 from subzero.interrupts import INTERRUPTED, begin, came, words
-from subzero.voice import PLAIN, Voice, speak
+from subzero.voice import NOT_STRICT, PLAIN, StrictVoice, Voice, speak
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -104,7 +104,64 @@ class Inputs:
         return cli_diagnosis.extended_run(trial, self.with_, self.effects)
 
 
-NO_INPUTS, USUAL_OUTPUTS = Inputs(), Outputs()
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class Kept:
+    """What is kept of it, and where.
+
+    Attributes:
+        out: folder for the files; by default one named after the scenario, here.
+        every: seconds between results that are kept, a whole number of cable steps; without it all are.
+        float64: write all numbers in double precision; shapes and forces by name have 7 digits without it.
+        checkpoint: minutes after which it is kept again how far the run is; the same command goes on from there.
+    """
+
+    out: Path | None = None
+    every: float | None = None
+    float64: Flag = False
+    checkpoint: float | None = None
+
+    def of(self, trial: scenarios.Trial) -> scenarios.Trial:
+        """Return a trial with the results that are asked for."""
+        return trial if self.every is None else replace(trial, every=self.every)
+
+    def folder(self, trial: scenarios.Trial) -> Path:
+        """Return where the files go."""
+        from subzero import write_results
+
+        return self.out or write_results.default_folder(trial)
+
+    @contextmanager
+    def kept_in(self, folder: Path) -> Iterator[dict[str, Any]]:
+        """Give the checkpoint of a command as an argument of a run; it is removed when all is delivered."""
+        if self.checkpoint is None:
+            yield {}
+            return
+        from subzero.checkpoint import Checkpoint
+        from subzero.interrupts import leaves
+
+        kept = Checkpoint(folder=folder / "checkpoint", minutes=self.checkpoint)
+        where = printable(str(kept.folder))
+
+        def left() -> str:
+            time = kept.stands_at()
+            if time is None:
+                return "nothing was kept yet"
+            return f"the run up to t = {time:g} s is kept in {where}; the same command goes on from there"
+
+        leaves(left)
+        if (time := kept.stands_at()) is not None:
+            print(f"Going on from t = {time:g} s, which is kept in {where}.", file=sys.stderr)
+        try:
+            yield {"checkpoint": kept}
+        except BaseException:
+            if kept.stands_at() is None:
+                kept.remove()
+            raise
+        kept.remove()
+
+
+NO_INPUTS, USUAL_OUTPUTS, ALL_KEPT = Inputs(), Outputs(), Kept()
 
 
 def _version() -> str:
@@ -127,11 +184,10 @@ def simulate(
     *,
     untethered: Annotated[bool, Parameter(negative=())] = False,
     inputs: Inputs = NO_INPUTS,
-    out: Path | None = None,
+    kept: Kept = ALL_KEPT,
     check: Flag = False,
-    strict: Flag = False,
     outputs: Outputs = USUAL_OUTPUTS,
-    voice: Voice = PLAIN,
+    voice: StrictVoice = NOT_STRICT,
 ) -> int:
     """Simulate one run, and write its channels, a summary and figures.
 
@@ -139,9 +195,8 @@ def simulate(
         scenario: name of a scenario (see "subzero list"), or path of a scenario file.
         untethered: leave the cable away.
         inputs: what is simulated besides the scenario.
-        out: folder for the files; by default one named after the scenario, here.
+        kept: what is kept of it, and where.
         check: run it once more with half the steps and half the segment length, and say what changes.
-        strict: end with exit code 3 if the run ends with warnings.
         outputs: which files are made, and how.
         voice: how the command speaks.
     """
@@ -150,17 +205,19 @@ def simulate(
 
     trial = inputs.read(scenario)
     outputs.check()
-    with staged(out or write_results.default_folder(trial)) as stage:
+    folder = kept.folder(kept.of(trial))
+    with kept.kept_in(folder) as checkpoint, staged(folder) as stage:
         trial, extended = inputs.checked(scenario)
+        trial = kept.of(trial)
         with _progress(trial) as progress:
             from subzero.simulation import simulate as run
 
-            result = run(trial, tethered=not untethered, **extended, progress=progress)
+            result = run(trial, tethered=not untethered, **extended, **checkpoint, progress=progress)
         runs = {"untethered" if untethered else "tethered": result}
         runs = _refined(runs, trial, extended) if check else runs
-        summary = write_results.write_all(runs, None, stage, **outputs.kinds())
+        summary = write_results.write_all(runs, None, stage, **outputs.kinds(), float64=kept.float64)
         write_results.write_film(outputs.animate, stage)
-    return FINE if write_results.tell(summary, stage, strict=strict, voice=voice) else STOPPED
+    return FINE if write_results.tell(summary, stage, strict=voice.strict, voice=voice) else STOPPED
 
 
 def compare(
@@ -169,11 +226,10 @@ def compare(
     *,
     measured: Path | None = None,
     inputs: Inputs = NO_INPUTS,
-    out: Path | None = None,
+    kept: Kept = ALL_KEPT,
     check: Flag = False,
-    strict: Flag = False,
     outputs: Outputs = USUAL_OUTPUTS,
-    voice: Voice = PLAIN,
+    voice: StrictVoice = NOT_STRICT,
 ) -> int:
     """Simulate with the cable and without, and set both side by side.
 
@@ -181,9 +237,8 @@ def compare(
         scenario: name of a scenario (see "subzero list"), or path of a scenario file.
         measured: CSV file of measured channels, to set beside both runs.
         inputs: what is simulated besides the scenario.
-        out: folder for the files; by default one named after the scenario, here.
+        kept: what is kept of it, and where.
         check: run both once more with half the steps and half the segment length, and say what changes.
-        strict: end with exit code 3 if a run ends with warnings.
         outputs: which files are made, and how.
         voice: how the command speaks.
     """
@@ -194,16 +249,20 @@ def compare(
     trial = inputs.read(scenario)
     record = read_record(measured) if measured is not None else None
     outputs.check()
-    with staged(out or write_results.default_folder(trial)) as stage:
+    folder = kept.folder(kept.of(trial))
+    with kept.kept_in(folder) as checkpoint, staged(folder) as stage:
         trial, extended = inputs.checked(scenario)
+        trial = kept.of(trial)
         with _progress(trial) as progress:
             from subzero.comparison import compare as run
 
-            result = run(trial, measured=record, **extended, progress=progress)
+            result = run(trial, measured=record, **extended, **checkpoint, progress=progress)
         runs = _refined(result.runs, trial, extended) if check else result.runs
-        summary = write_results.write_all(runs, result.measured, stage, **outputs.kinds())
+        summary = write_results.write_all(
+            runs, result.measured, stage, **outputs.kinds(), float64=kept.float64
+        )
         write_results.write_film(outputs.animate, stage)
-    return FINE if write_results.tell(summary, stage, strict=strict, voice=voice) else STOPPED
+    return FINE if write_results.tell(summary, stage, strict=voice.strict, voice=voice) else STOPPED
 
 
 def plot(
@@ -339,7 +398,7 @@ def _refuse_no_export(kinds: Sequence[str]) -> None:
 
 def _refined(runs: Runs, trial: scenarios.Trial, extended: dict[str, Any]) -> Runs:
     """Return runs that know how much they change with half the steps."""
-    from subzero.refinement import refine
+    from subzero.comparison import refine
 
     marked = {}
     for label, run in runs.items():

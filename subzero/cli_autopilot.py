@@ -13,7 +13,7 @@ from cyclopts import Parameter
 
 import scenarios
 from subzero.cli_examples import register
-from subzero.voice import PLAIN, Voice
+from subzero.voice import NOT_STRICT, StrictVoice
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from subzero.autopilot.output import Measured
+    from subzero.autopilot.steps import Pilot
     from subzero.simulation import Progress
 
     Fly = Callable[[str, Progress], tuple[xr.Dataset, dict[str, float]]]
@@ -44,7 +45,7 @@ STEP_COMMANDS = {
 
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
-class Pilot:
+class PilotOptions:
     """Who flies.
 
     Attributes:
@@ -59,8 +60,19 @@ class Pilot:
     noisy: Flag = False
     seed: int = 0
 
+    def of(self, label: str) -> Pilot:
+        """Return who flies with the cable or without it."""
+        from subzero.autopilot.sensors import ESTIMATED, PERFECT, Sensors
+        from subzero.autopilot.steps import Pilot
 
-PID = Pilot()
+        return Pilot(
+            autopilot=self.autopilot,
+            feed_forward=self.feed_forward if label == "tethered" else "none",
+            sensors=Sensors(ESTIMATED if self.noisy else PERFECT, seed=self.seed),
+        )
+
+
+PID = PilotOptions()
 
 
 def manoeuvre(
@@ -71,8 +83,7 @@ def manoeuvre(
     planes: float | None = None,
     speed: float = 1.0,
     out: Path | None = None,
-    strict: Flag = False,
-    voice: Voice = PLAIN,
+    voice: StrictVoice = NOT_STRICT,
 ) -> int:
     """Fly a manoeuvre with the cable and without, and measure it.
 
@@ -83,7 +94,6 @@ def manoeuvre(
         planes: size of a manoeuvre with the stern-planes, in degrees.
         speed: of the bare hull before it, in m/s.
         out: folder for the files; by default one named after the manoeuvre, here.
-        strict: end with exit code 3 if a run ends with warnings.
         voice: how the command speaks.
     """
     trial = scenarios.load(scenario)  # a mistake in it answers at once
@@ -97,19 +107,18 @@ def manoeuvre(
 
     meaning = f": {MANOEUVRES[name].meaning}" if name in MANOEUVRES else ""
     shown = MANOEUVRE_COMMANDS.get(name, ("heading", "rudder_command"))
-    return _deliver(trial, fly, out or Path(name), f"{name}{meaning}", shown, strict, voice)
+    return _deliver(trial, fly, out or Path(name), f"{name}{meaning}", shown, voice)
 
 
 def fly_step(
     name: str,
     scenario: str = "fig6",
     *,
-    pilot: Pilot = PID,
+    pilot: PilotOptions = PID,
     size: float | None = None,
     speed: float = 1.0,
     out: Path | None = None,
-    strict: Flag = False,
-    voice: Voice = PLAIN,
+    voice: StrictVoice = NOT_STRICT,
 ) -> int:
     """Let an autopilot follow a step, with the cable and without, and measure it.
 
@@ -120,23 +129,20 @@ def fly_step(
         size: of the step, in degrees, m or m/s.
         speed: to hold, in m/s.
         out: folder for the files; by default one named after the step, here.
-        strict: end with exit code 3 if a run ends with warnings.
         voice: how the command speaks.
     """
     trial = scenarios.load(scenario)  # a mistake in it answers at once
-    from subzero.autopilot import ESTIMATED, PERFECT
     from subzero.autopilot.steps import step as run
 
     def fly(label: str, progress: Progress) -> tuple[xr.Dataset, dict[str, float]]:
         return run(
-            name, scenario, autopilot=pilot.autopilot, size=size, speed=speed, tethered=label == "tethered",
-            feed_forward=pilot.feed_forward if label == "tethered" else "none", seed=pilot.seed,
-            sensors=ESTIMATED if pilot.noisy else PERFECT, progress=progress,
+            name, scenario, pilot=pilot.of(label), size=size, speed=speed, tethered=label == "tethered",
+            progress=progress,
         )  # fmt: skip
 
     title = f"{name}: autopilot {pilot.autopilot}, fed forward of the cable: {pilot.feed_forward}"
     shown = STEP_COMMANDS.get(name, ("heading", "rudder_command"))
-    return _deliver(trial, fly, out or Path(name), title, shown, strict, voice)
+    return _deliver(trial, fly, out or Path(name), title, shown, voice)
 
 
 def add_to(app: cyclopts.App) -> None:
@@ -162,8 +168,7 @@ def _deliver(
     folder: Path,
     title: str,
     shown: tuple[str, str],
-    strict: bool,
-    voice: Voice,
+    voice: StrictVoice,
 ) -> int:
     """Fly with the cable and without, write and tell; return the exit code."""
     from subzero.autopilot import AutopilotWarning, output
@@ -182,4 +187,4 @@ def _deliver(
     stopped = output.tell(summary, list(measured), stage, voice)
     for message in stopped:
         print(message, file=sys.stderr)
-    return STOPPED if stopped or (strict and refuse_warnings(summary)) else FINE
+    return STOPPED if stopped or (voice.strict and refuse_warnings(summary)) else FINE

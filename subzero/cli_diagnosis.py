@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -40,6 +41,28 @@ With = Annotated[Path | None, Parameter(name="--with")]
 Own = Annotated[Path | None, Parameter(name="--effects")]
 
 
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class Search:
+    """How it is searched.
+
+    Attributes:
+        seed: of everything random.
+        screen: only the first look, in a few seconds.
+    """
+
+    seed: int = 0
+    screen: Flag = False
+
+    @property
+    def budget(self) -> str:
+        """The same in the words of `subzero.diagnose`."""
+        return "screen" if self.screen else "full"
+
+
+FULL_SEARCH = Search()
+
+
 def diagnose(
     files: Annotated[list[Path], Parameter(negative=())],
     /,
@@ -48,8 +71,7 @@ def diagnose(
     out: Path = Path("found"),
     effects: Path | None = None,
     commands: Literal["record", "scenario"] | None = None,
-    seed: int = 0,
-    screen: Flag = False,
+    search: Search = FULL_SEARCH,
     voice: Voice = PLAIN,
 ) -> int:
     """Say what the simulation gets wrong in measured records, name the cause, extend the model and measure the gain.
@@ -61,8 +83,7 @@ def diagnose(
         out: folder for the files.
         effects: Python file with causes of your own (EFFECTS = [...]), besides the catalogue.
         commands: whose commands hold if the record and the scenario differ.
-        seed: of everything random.
-        screen: only the first look, in a few seconds.
+        search: how it is searched.
         voice: how the command speaks.
     """
     from subzero.output import staged
@@ -76,7 +97,7 @@ def diagnose(
         from subzero import write_diagnosis
 
         with patience(LAST_WORDS_S):
-            verdict = _ask(logged, own, seed, "screen" if screen else "full", voice)
+            verdict = _ask(logged, own, search, voice)
             write_diagnosis.write_all(
                 verdict, logged, stage, run=simulated, effects=own, effects_file=effects
             )
@@ -250,11 +271,13 @@ def simulated(setting: Setting) -> xr.Dataset:
     return simulate(trial, tethered=setting.tethered, model=setting.model, later=setting.later)
 
 
-def _ask(logged: list[Logged], own: tuple[Effect, ...], seed: int, budget: str, voice: Voice) -> Verdict:
+def _ask(logged: list[Logged], own: tuple[Effect, ...], search: Search, voice: Voice) -> Verdict:
     """Diagnose under a progress bar; an interrupt ends it with what it has, if it has anything."""
     from subzero.diagnosis.api import diagnose_trials
     from subzero.write_diagnosis import tell_before
 
     seen = None if voice.as_json or voice.quiet else tell_before
     with progress_bar("Diagnosing", lambda: COSTS) as progress:
-        return diagnose_trials(logged, effects=own, progress=progress, seed=seed, budget=budget, seen=seen)
+        return diagnose_trials(
+            logged, effects=own, progress=progress, seed=search.seed, budget=search.budget, seen=seen
+        )

@@ -14,7 +14,7 @@ from cyclopts import Parameter
 
 from subzero.cli_examples import register
 from subzero.errors import UserError, printable
-from subzero.voice import PLAIN, Voice
+from subzero.voice import NOT_STRICT, StrictVoice
 
 if TYPE_CHECKING:
     from subzero.sweeps.api import Standing
@@ -32,8 +32,7 @@ def sweep(
     workers: int | None = None,
     scheduler: str | None = None,
     retry: Flag = False,
-    strict: Flag = False,
-    voice: Voice = PLAIN,
+    voice: StrictVoice = NOT_STRICT,
 ) -> int:
     """Run a trial with many values of its parameters, and show what they do.
 
@@ -45,7 +44,6 @@ def sweep(
         workers: processes on this machine; by default one for each of its cores.
         scheduler: address of a Dask scheduler, such as tcp://host:8786, to run on its workers instead.
         retry: run members again that failed.
-        strict: end with exit code 3 if a member's run ends with warnings.
         voice: how the command speaks.
     """
     from subzero.sweeps.plan import read_plan
@@ -61,12 +59,12 @@ def sweep(
     with (
         _Bar(plan.description, len(plan.points.values), folder) as bar,
         _client(scheduler) as client,
-        finished(plan, folder, workers=workers, client=client, progress=bar, retry=retry) as store,
+        finished(plan, folder, workers=client or workers, progress=bar, retry=retry) as store,
         staged(folder, FILES) as stage,
     ):
         summary = write_sweep(plan, store, stage)
     tell_sweep(summary, stage, voice)
-    return STOPPED if summary["failed"] or (strict and summary["warnings"]) else FINE
+    return STOPPED if summary["failed"] or (voice.strict and summary["warnings"]) else FINE
 
 
 def add_to(app: cyclopts.App) -> None:
@@ -136,11 +134,12 @@ def _client(scheduler: str | None) -> Iterator[Any]:
         yield None
         return
     try:
-        from distributed import Client
+        import distributed
     except ImportError:
         raise UserError("--scheduler needs Dask: pip install 'subzero[cluster]'.") from None
+    connect: Any = distributed.Client
     try:
-        client = Client(scheduler, timeout=CONNECT_S)
+        client = connect(scheduler, timeout=CONNECT_S)
     except (OSError, ValueError, TypeError) as error:
         raise UserError(
             f"No Dask scheduler answers at {scheduler} ({error}). Start one with 'dask scheduler',"

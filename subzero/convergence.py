@@ -29,6 +29,7 @@ import numpy as np
 
 import scenarios
 from scenarios import ScenarioError
+from subzero.engine.recording import Grid
 from subzero.errors import UserError
 
 if TYPE_CHECKING:
@@ -47,8 +48,8 @@ SMALLEST_FORCE = 1e-6
 """Forces are compared with at least this: what is smaller means nothing. [N]"""
 
 Progress = Callable[[float], None]
-Take = Callable[[scenarios.Trial, np.ndarray, int, Progress | None], "Run"]
-"""(trial, times of rows, exchanges a row, progress) → a run."""
+Take = Callable[[scenarios.Trial, Grid, Progress | None], "Run"]
+"""(trial, its times and what is kept, progress) → a run."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -103,10 +104,11 @@ def run_converged(
     times = trial.times()
     coarse_times = _every_other(times)
     coarser = _resolved(trial, 2.0)
+    whole = Grid(times, 1, trial.stride)
     if coarser is None or coarse_times.size < 3:
-        return take(trial, times, 1, progress), None
-    coarse = _taken(take, coarser, coarse_times, 1, _share(progress, 0.0, 0.2))
-    run = take(trial, times, 1, _share(progress, 0.2, 0.8))
+        return take(trial, whole, progress), None
+    coarse = _taken(take, coarser, _only_traced(coarse_times, 1), _share(progress, 0.0, 0.2))
+    run = take(trial, whole, _share(progress, 0.2, 0.8))
     if coarse is None:
         return run, None
     change = _after_start(coarse, run)
@@ -115,7 +117,7 @@ def run_converged(
         finer = _resolved(trial, 0.5**halvings)
         if accuracy.converged or finer is None or _work(run) * 4**halvings > MOST_WORK:
             break
-        fine = _taken(take, finer, times, 2**halvings, progress)
+        fine = _taken(take, finer, whole._replace(parts=2**halvings), progress)
         if fine is None or (run.completed and not fine.completed):
             break
         run, before, change = fine, change, _after_start(run, fine)
@@ -123,12 +125,15 @@ def run_converged(
     return run, accuracy
 
 
-def _taken(
-    take: Take, trial: scenarios.Trial, times: np.ndarray, parts: int, progress: Progress | None
-) -> Run | None:
+def _only_traced(times: np.ndarray, parts: int) -> Grid:
+    """Return the grid of a run of which nothing but the force is of use: of its rows, the first and the last stay."""
+    return Grid(times, parts, times.size)
+
+
+def _taken(take: Take, trial: scenarios.Trial, grid: Grid, progress: Progress | None) -> Run | None:
     """Return a run beside the one that was asked for; None where it is refused, for memory or a start that fails."""
     try:
-        return take(trial, times, parts, progress)
+        return take(trial, grid, progress)
     except UserError:
         return None
 
@@ -140,6 +145,7 @@ def _resolved(trial: scenarios.Trial, factor: float) -> scenarios.Trial | None:
             trial,
             segment_length=factor * trial.segment_length,
             grading=factor * trial.grading,
+            far_grading=factor * trial.far_grading,
             hull_step=min(factor, 1.0) * trial.hull_step,
         )
     except ScenarioError:
@@ -178,44 +184,44 @@ def _accuracy(
 def _after_start(coarse: Run, fine: Run) -> Change:
     """Return the change from a run to a finer one, after the start; infinite if only the finer one reaches the end."""
     if fine.completed and not coarse.completed:
-        return Change(size=inf, time=float(coarse.times[-1]))
+        return Change(size=inf, time=float(coarse.all_times[-1]))
     return _change(coarse, fine, START_ROWS + 1, _largest(fine))
 
 
 def _start(trial: scenarios.Trial, take: Take, run: Run, halvings: int) -> Change:
     """Return what finer steps and segments change in the first samples; nothing where no finer run gets so far."""
-    times = run.times[: START_ROWS + 1]
+    times = run.all_times[: START_ROWS + 1]
     for finer in START_REFINEMENTS if times.size > 1 else ():
         other = _resolved(trial, 0.5**halvings / finer)
-        fine = None if other is None else _taken(take, other, times, finer * 2**halvings, None)
+        fine = None if other is None else _taken(take, other, _only_traced(times, finer * 2**halvings), None)
         if fine is not None and fine.completed:
             return _change(run, fine, 1, _largest(run))
     return Change(size=0.0, time=0.0)
 
 
 def _change(one: Run, fine: Run, first: int, largest: float) -> Change:
-    """Return the change from a run to a finer one, at their common times from row `first` of the finer one on.
+    """Return the change from a run to a finer one, at their common times from number `first` of the finer one on.
 
-    The force of row 0 is a guess. Forces are compared with the `largest` of the run. [N]
+    The force of time 0 is a guess. Forces are compared with the `largest` of the run. [N]
     """
-    rows = np.searchsorted(fine.times, one.times - 1e-9)
-    here = (rows < fine.times.size) & (rows >= first)
+    rows = np.searchsorted(fine.all_times, one.all_times - 1e-9)
+    here = (rows < fine.all_times.size) & (rows >= first)
     if not here.any():
         return Change(size=0.0, time=0.0)
-    gap = fine.recording.wrench[rows[here], :3] - one.recording.wrench[here, :3]
+    gap = fine.recording.trace[rows[here], :3] - one.recording.trace[here, :3]
     size = np.linalg.norm(gap, axis=1)
     worst = int(np.argmax(size))
-    return Change(size=float(size[worst]) / largest, time=float(one.times[here][worst]))
+    return Change(size=float(size[worst]) / largest, time=float(one.all_times[here][worst]))
 
 
 def _largest(run: Run) -> float:
     """Return the largest force of a run, at least what means something. [N]."""
-    return max(float(np.linalg.norm(run.recording.wrench[:, :3], axis=1).max()), SMALLEST_FORCE)
+    return max(float(np.linalg.norm(run.recording.trace[:, :3], axis=1).max()), SMALLEST_FORCE)
 
 
 def _work(run: Run) -> float:
-    """Return nodes times rows of a run, summed up as it grows. [-]"""
-    return float(run.recording.nodes.sum())
+    """Return nodes times times of a run, summed up as it grows. [-]"""
+    return float(run.recording.trace[:, 3].sum())
 
 
 def _share(progress: Progress | None, start: float, size: float) -> Progress | None:

@@ -10,12 +10,12 @@ import numpy as np
 import xarray as xr
 
 import scenarios
-import vehicle
 from subzero.channels import BY_NAME, CHANNELS, TIME
 from subzero.convergence import Accuracy, as_numbers
 from subzero.errors import printable
 from subzero.model import Model
 from subzero.validity import as_json, check_run
+from vehicle import BREAKDOWN
 
 if TYPE_CHECKING:
     from subzero.engine.recording import Recording, Run
@@ -35,7 +35,7 @@ ENERGY_CHANNELS = (
 """In the order of `subzero.engine.energy`."""
 
 AXES = {
-    "term": (list(vehicle.BREAKDOWN), "named force of the equation of motion, see vehicle.TERMS"),
+    "term": (list(BREAKDOWN), "named force of the equation of motion, see vehicle.TERMS"),
     "component": (
         list("XYZKMN"),
         "force X, Y, Z [N] and moment K, M, N [N m], body axes, about the hull centre",

@@ -87,7 +87,7 @@ def write_mcap(run: xr.Dataset, path: Path) -> None:
     from mcap.writer import Writer
 
     with open(path, "wb") as stream:
-        log = Writer(stream)
+        log: Any = Writer(stream)
         log.start(profile="", library=f"subzero {run.attrs.get('subzero_version', '')}".strip())
         log.add_metadata("run", {name: str(value) for name, value in run.attrs.items()})
         topics = {topic: _topic(log, topic, *about) for topic, about in _topics(run).items()}
@@ -315,7 +315,7 @@ def write_cf(run: xr.Dataset, path: Path) -> None:
     """Write a run as netCDF by the CF conventions."""
     from subzero.output import write_netcdf
 
-    write_netcdf(as_cf(run), path)
+    write_netcdf(as_cf(run), path, float64=True)
 
 
 def as_cf(run: xr.Dataset) -> xr.Dataset:

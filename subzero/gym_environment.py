@@ -19,9 +19,10 @@ from typing import Any
 
 import numpy as np
 
+from subzero.channels import Observation
 from subzero.errors import UserError
 from subzero.model import load
-from subzero.simulator import Observation, RunStoppedError, Simulator
+from subzero.simulator import RunStoppedError, Simulator
 
 try:
     import gymnasium

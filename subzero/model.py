@@ -19,11 +19,10 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import scenarios
-import vehicle
 from cable import CableProperties, DrumProperties
 from subzero.errors import BadValueError, real, short, suggestion
 from subzero.external_force import MissingForce
-from vehicle import Vehicle, from_mapping, to_mapping
+from vehicle import Vehicle, VehicleError, from_mapping, to_mapping
 
 Part = TypeVar("Part", CableProperties, DrumProperties)
 
@@ -164,7 +163,7 @@ def load(
 def _complaints(numbers: Mapping[str, Any]) -> Iterable[Any]:
     """Return what the vehicle's own equations find wrong with its numbers."""
     try:
-        vehicle.from_mapping(numbers)
-    except vehicle.VehicleError as error:
+        from_mapping(numbers)
+    except VehicleError as error:
         return error.problems
     return ()

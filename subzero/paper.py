@@ -48,9 +48,9 @@ from cable.feng_allen import (
 )
 from subzero.engine.coupling import ABSURD, CABLE_FAILED, FASTEST, FINE, _move, hull_steps
 from subzero.engine.energy import CABLE_LOSS, book
+from subzero.engine.external_wrench import tow_point, way_of_tow_point
 from subzero.engine.initial_conditions import first_state, prepare
-from subzero.engine.recording import Pace, Recording, Run, cut, new_recording, record_row
-from subzero.engine.vehicle_step import tow_point, way_of_tow_point
+from subzero.engine.recording import Pace, Recording, Run, cut, new_recording, record_row, thinned
 from subzero.jit import compiled
 from subzero.model import Model
 from subzero.run_state import Live, Setup
@@ -210,9 +210,10 @@ def run_as_printed(
         if progress is not None:
             progress(row / times.size)
     message = "The run reached its end." if ending == FINE else in_words(trial, ending, report, times[row])
-    return Run(
+    run = Run(
         times=times[:row], recording=cut(recording, row, used), completed=ending == FINE, message=message
     )
+    return thinned(run, trial.stride)
 
 
 def lay_cable(trial: scenarios.Trial, model: Model, setup: Setup, live: Live, rows: int) -> Printed:

@@ -13,16 +13,21 @@ import numpy as np
 import scenarios
 from cable.memory import fits, refuse_unless_it_fits
 from cable.tow_path import segments_needed
-from subzero.engine.recording import new_recording
+from subzero.engine.recording import Grid, new_recording, row_of
 from subzero.model import Model
 
-BYTES_A_NODE = 5 * 8
-"""Place, tension and arc length."""
+BYTES_A_NODE, BYTES_OF_TRACE = 5 * 8, 4 * 8
+"""Place, tension and arc length of a node in a row; force and nodes of every time."""
 COPIES = 2
 """The recording, and the labelled result that is made of it."""
 SHARE_OF_FREE_RUNNING = 0.3
 """A vehicle goes at no less than about this share of the speed at which its propeller has no thrust. [-]"""
-REMEDY = "Try a longer cable_step_s or segment_length_m, a grading, or a shorter duration_s."
+JOINED = 1.5
+"""Far segments are joined two by two: so many of them there are for one that is as long as it may be, about. [-]"""
+REMEDY = (
+    "Keep fewer results (every_s in the trial, or --every), or try a longer cable_step_s or segment_length_m, a "
+    "grading, or a shorter duration_s."
+)
 
 
 class Work(NamedTuple):
@@ -48,21 +53,33 @@ def work_of(trial: scenarios.Trial, model: Model, tethered: bool) -> Work:
 def most_segments(trial: scenarios.Trial, model: Model) -> int:
     """Return how many segments the cable has at most, about."""
     longest = max(trial.start.wet_length, _last_length(trial, model))
-    return segments_needed(longest, trial.segment_length, trial.grading)
+    return segments_of(trial, longest)
 
 
-def refuse_what_cannot_fit(trial: scenarios.Trial, model: Model, tethered: bool) -> None:
-    """Raise a UserError if a run will not fit into memory."""
-    rows = trial.duration / trial.cable_step + 2.0
-    size = COPIES * rows * bytes_a_row()
+def segments_of(trial: scenarios.Trial, length: float) -> int:
+    """Return how many segments a cable of some length [m] has, about, see `cable.moving_end.remeshing.join_far`."""
+    even = segments_needed(length, trial.segment_length, trial.grading)
+    near = min(2.0 * trial.far_length, length)
+    if trial.far_grading == 0.0 or near == length:
+        return even
+    growth = np.log1p(0.5 * trial.far_grading * (length - near) / trial.segment_length)
+    far = JOINED * 2.0 * growth / np.log1p(trial.far_grading)
+    return min(even, segments_needed(near, trial.segment_length, trial.grading) + int(far))
+
+
+def refuse_what_cannot_fit(trial: scenarios.Trial, model: Model, tethered: bool, grid: Grid) -> None:
+    """Raise a UserError if what a run keeps will not fit into memory."""
+    rows = row_of(grid.times.size - 1, grid.stride) + 1.0
+    size = COPIES * rows * bytes_a_row() + BYTES_OF_TRACE * grid.times.size
     if tethered:
         lengths = (trial.start.wet_length, _last_length(trial, model))
-        nodes = [1 + segments_needed(length, trial.segment_length, trial.grading) for length in lengths]
+        nodes = [1 + segments_of(trial, length) for length in lengths]
         size += (
             rows * BYTES_A_NODE * (0.5 * sum(nodes) + max(nodes))
         )  # the result has room for the most at all times
+    kept = f", kept every {trial.every:g} s," if grid.stride > 1 else ","
     refuse_unless_it_fits(
-        size, f"'{trial.name}', {trial.duration:g} s in steps of {trial.cable_step:g} s,", REMEDY
+        size, f"'{trial.name}', {trial.duration:g} s in steps of {trial.cable_step:g} s{kept}", REMEDY
     )
 
 

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from cable.current import Water
 from cable.drum import DrumNumbers
-from cable.moving_end import FLOWS, Line, Load
+from cable.moving_end import Line, Load
 from cable.properties import CableNumbers
-from subzero.jit import packed
+from subzero.jit import Record
 from vehicle import VehicleNumbers
 
 
@@ -30,7 +29,7 @@ PLACE, SLOPE, KNOT_ROWS = 1, 7, 13
 """Rows of a smooth one (13, n), behind that of time: x, y, z [m], φ, θ, ψ [rad], and how fast each of them changes."""
 
 
-class HullWork(NamedTuple):
+class HullWork(Record):
     """Work space of the hull: rotation R_nb, pull of the cable in earth axes and its wrench, the water around it."""
 
     rotation: np.ndarray
@@ -39,8 +38,7 @@ class HullWork(NamedTuple):
     current: np.ndarray
 
 
-@dataclass(kw_only=True)
-class Ledger:
+class Ledger(Record):
     """Sums since the start, and the flows at both ends of the last step.
 
     Attributes:
@@ -58,7 +56,7 @@ class Ledger:
     kinetic: float
 
 
-class Fixed(NamedTuple):
+class Fixed(Record):
     """The numbers that do not change during a run.
 
     `drum_place` is the drum at the start, earth axes (3,) [m]; hull and cable agree when their forces differ by less
@@ -79,8 +77,7 @@ class Fixed(NamedTuple):
     lacking: bool
 
 
-@dataclass(kw_only=True)
-class Now:
+class Now(Record):
     """Where a run stands.
 
     Attributes:
@@ -149,21 +146,3 @@ class Live(NamedTuple):
     stages: np.ndarray
     line: Line
     load: Load
-
-
-def new_now() -> Now:
-    """Return the beginning of a run, with a cable that does not pull."""
-    work = HullWork(np.zeros((3, 3)), np.zeros(3), np.zeros(6), np.zeros(3))
-    ledger = Ledger(
-        total=np.zeros(7),
-        hull_old=np.zeros(4),
-        hull_new=np.zeros(4),
-        cable_old=np.zeros(FLOWS),
-        cable_new=np.zeros(FLOWS),
-        kinetic=0.0,
-    )
-    vectors = {name: np.zeros(3) for name in ("force", "force_before", "guess", "change", "tow")}
-    matrices = {name: np.zeros((3, 3)) for name in ("Z", "mobility")}
-    return packed(
-        Now(**vectors, **matrices, last_step=0.0, iterations=0, length=0.0, hull=work, ledger=ledger)
-    )

@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
-from collections.abc import Callable
+import os
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,15 +19,30 @@ from cable.moving_end import Names, describe_stop, enlarged
 from subzero.convergence import Accuracy, run_converged
 from subzero.engine import coupling
 from subzero.engine.initial_conditions import Later, checked_later, go_on_with, prepare, rows_of_changes
-from subzero.engine.recording import BY_NODE, Pace, Recording, Run, cut, new_recording, record_row
+from subzero.engine.recording import (
+    BY_NODE,
+    Grid,
+    Pace,
+    Recording,
+    Run,
+    Standing,
+    new_recording,
+    note,
+    record_row,
+    row_of,
+    run_so_far,
+)
 from subzero.engine.time_loop import NO_ROOM, run_rows
-from subzero.errors import truth
+from subzero.errors import UserError, truth, whole
 from subzero.model import Model, load, model_of
+from subzero.provenance import code_digest, digest_of, processor, trial_digest
 from subzero.room import REMEDY, has_room, refuse_what_cannot_fit
 from subzero.run_state import Live, Setup
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from subzero.checkpoint import Checkpoint, Keeper
 
 Progress = Callable[[float], None]
 """Called now and then with the fraction that is done, 0 to 1."""
@@ -34,6 +54,8 @@ def simulate(
     tethered: bool = True,
     model: Model | None = None,
     later: Later = (),
+    every: float | None = None,
+    checkpoint: Checkpoint | None = None,
     progress: Progress | None = None,
 ) -> xr.Dataset:
     """Simulate a trial and return its labelled result.
@@ -43,6 +65,10 @@ def simulate(
         tethered: with the cable; the same code runs without.
         model: another model than the one that the scenario describes.
         later: times of results [s] and the model that holds from each of them on, such as one with a bent rudder.
+        every: time between results that are kept, a whole number of cable steps; what the trial says if not given [s].
+            They are the same as without, to the last bit, and the last result is always kept.
+        checkpoint: keeps where the run stands, now and then; the same call then goes on from there, and gives the same
+            result, to the last bit.
         progress: told the fraction that is done.
 
     Returns:
@@ -52,28 +78,99 @@ def simulate(
 
     Raises:
         scenarios.ScenarioError: the scenario cannot be used.
-        UserError: a time of `later` is none of the run.
+        UserError: a time of `later` is none of the run; a checkpoint of another simulation.
     """
     trial = scenario if isinstance(scenario, scenarios.Trial) else load(scenario)
+    trial = trial if every is None else dataclasses.replace(trial, every=every)
     model, tethered, later = model_of(trial, model), truth("tethered", tethered), checked_later(later)
     from subzero.dataset import dataset_of
 
-    run, accuracy = _as_fine_as_asked(trial, model, tethered, progress, later)
+    with _kept(checkpoint, trial, model, tethered, later) as keeper:
+        run, accuracy = _as_fine_as_asked(trial, model, tethered, progress, later, keeper)
     result = dataset_of(trial, model, tethered, run, accuracy)
     if later:
         result.attrs["later"] = json.dumps([[time, changed.parameters()] for time, changed in later])
     return result
 
 
+@contextmanager
+def _kept(
+    checkpoint: Checkpoint | None, trial: scenarios.Trial, model: Model, tethered: bool, later: Later
+) -> Iterator[Keeper | None]:
+    """Give what keeps the runs of a simulation, None without a checkpoint."""
+    if checkpoint is None:
+        yield None
+        return
+    from subzero.checkpoint import opened
+
+    if tethered and trial.scheme != "moving_end":
+        raise UserError(f"'{trial.name}' has the scheme '{trial.scheme}'; only 'moving_end' has checkpoints.")
+    manifest = {
+        "trial": trial_digest(trial),
+        "model": digest_of(model.parameters()),
+        "later models": digest_of([[time, changed.parameters()] for time, changed in later]),
+        "version of subzero": f"{version('subzero')} {code_digest()}",
+        "processor": processor(),
+    }
+    with opened(checkpoint, "tethered" if tethered else "untethered", manifest) as keeper:
+        yield keeper
+
+
+def simulate_many(
+    trials: Sequence[str | Path | scenarios.Trial],
+    *,
+    tethered: bool = True,
+    every: float | None = None,
+    workers: int | None = None,
+    progress: Progress | None = None,
+) -> list[xr.Dataset]:
+    """Simulate many trials at once, in threads of this process: compiled code lets go of Python's lock.
+
+    For thousands of runs of which only a few numbers matter, `subzero.sweep` keeps these alone, in processes.
+
+    Args:
+        trials: names, paths or trials.
+        tethered: with the cable.
+        every: time between results that are kept, as of `simulate`. [s]
+        workers: how many threads; one for each processor if not given.
+        progress: told the fraction that is done.
+
+    Returns:
+        what `simulate` gives for each trial, in their order, the same to the last bit.
+
+    Raises:
+        UserError: the first trial that cannot be used; nothing is simulated then.
+    """
+    threads = os.cpu_count() if workers is None else whole("simulate_many: workers", workers, least=1)
+    known = [one if isinstance(one, scenarios.Trial) else load(one) for one in trials]
+    found: list[xr.Dataset] = []
+    with ThreadPoolExecutor(threads) as pool:
+        begun = [pool.submit(simulate, trial, tethered=tethered, every=every) for trial in known]
+        try:
+            for run in begun:
+                found.append(run.result())
+                if progress is not None:
+                    progress(len(found) / len(begun))
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+    return found
+
+
 def _as_fine_as_asked(
-    trial: scenarios.Trial, model: Model, tethered: bool, progress: Progress | None, later: Later
+    trial: scenarios.Trial,
+    model: Model,
+    tethered: bool,
+    progress: Progress | None,
+    later: Later,
+    keeper: Keeper | None,
 ) -> tuple[Run, Accuracy | None]:
     """Run a trial, and finer where its `rtol` asks for it: a tethered one of the default scheme and of one model."""
     if not tethered or trial.scheme != "moving_end" or trial.rtol == 0.0 or later:
-        return run_trial(trial, model, tethered, progress, later=later), None
+        return run_trial(trial, model, tethered, progress, later=later, keeper=keeper), None
     return run_converged(
         trial,
-        lambda one, times, parts, told: run_trial(one, model, True, told, times=times, parts=parts),
+        lambda one, grid, told: run_trial(one, model, True, told, grid=grid, keeper=keeper),
         progress,
     )
 
@@ -85,8 +182,8 @@ def run_trial(
     progress: Progress | None = None,
     *,
     later: Later = (),
-    times: np.ndarray | None = None,
-    parts: int = 1,
+    grid: Grid | None = None,
+    keeper: Keeper | None = None,
 ) -> Run:
     """Run a trial with steps and segments as they are, in plain arrays.
 
@@ -96,38 +193,65 @@ def run_trial(
         tethered: with the cable.
         progress: told the fraction that is done.
         later: times of rows and the models that hold from them on.
-        times: of the rows (n,); those of the trial when not given. [s]
-        parts: exchanges of hull and cable from a row to the next.
+        grid: its times and what is kept; as the trial says when not given.
+        keeper: keeps where the run stands, now and then, so that it can go on from there.
     """
-    refuse_what_cannot_fit(trial, model, tethered)
-    times = trial.times() if times is None else times
-    changes = rows_of_changes(trial, tethered, times, later)
+    grid = Grid(trial.times(), 1, trial.stride) if grid is None else grid
+    refuse_what_cannot_fit(trial, model, tethered, grid)
+    changes = rows_of_changes(trial, tethered, grid.times, later)
     if tethered and trial.scheme != "moving_end":
         from subzero.paper import run_as_printed
 
         return run_as_printed(trial, model, progress)
-    setup, live = prepare(trial, model, tethered, longest_exchange=float(np.diff(times).max()) / parts)
-    recording = new_recording(times.size, 4 * times.size * live.line.length.size if tethered else 0)
-    used = record_row(setup, live, recording, 0, 0.0, 0)
-    row, ending, pace = 1, coupling.FINE, Pace()
-    while row < times.size and ending in (coupling.FINE, NO_ROOM):
-        if row - 1 in changes:
-            setup = go_on_with(changes.pop(row - 1), setup, live, trial, tethered, float(times[row - 1]))
-        last = min(times.size, row + pace.rows, *(change + 1 for change in changes))
+    kept = keeper.next_run() if keeper is not None else None
+    now = _begun(trial, model, tethered, grid)
+    now = kept.go_on(now) if kept is not None else now
+    pace = Pace()
+    while now.behind < grid.times.size and now.ending in (coupling.FINE, NO_ROOM):
+        start = now.behind - 1
+        if start in changes:
+            now = now._replace(
+                setup=go_on_with(
+                    changes[start], now.setup, now.live, trial, tethered, float(grid.times[start])
+                )
+            )
+        last = min([now.behind + pace.rows, *(row + 1 for row in changes if row > start)])
         with pace:
-            row, used, ending = run_rows(setup, live, recording, times, row, last, used, parts)
-        if ending == NO_ROOM:
-            if not has_room(4 * max(recording.tension.size, used)):
+            now = _further(now, grid, min(last, grid.times.size))
+        if now.ending == NO_ROOM:
+            if not has_room(4 * max(now.recording.tension.size, now.used)):
                 break
-            live, recording = more_room(live, recording, used)
+            live, recording = more_room(now.live, now.recording, now.used)
+            now = now._replace(live=live, recording=recording)
+        if kept is not None:
+            kept.keep(now, grid.times, grid.stride)
         if progress is not None:
-            progress(row / times.size)
-    return Run(
-        times=times[:row],
-        recording=cut(recording, row, used),
-        completed=ending == coupling.FINE,
-        message=in_words(ending, float(times[row - 1]), setup, live),
+            progress(now.behind / grid.times.size)
+    if kept is not None:
+        kept.keep(now, grid.times, grid.stride, at_once=True)
+    message = in_words(now.ending, float(grid.times[now.behind - 1]), now.setup, now.live)
+    completed = now.ending == coupling.FINE
+    return run_so_far(grid, now.recording, now.behind, now.used, message, completed=completed)
+
+
+def _begun(trial: scenarios.Trial, model: Model, tethered: bool, grid: Grid) -> Standing:
+    """Return a run at its start."""
+    longest = float(np.diff(grid.times).max()) / grid.parts
+    setup, live = prepare(trial, model, tethered, longest_exchange=longest)
+    rows = row_of(grid.times.size - 1, grid.stride) + 1
+    nodes = 4 * rows * live.line.length.size if tethered else 0
+    recording = new_recording(rows, nodes, grid.times.size)
+    used = record_row(setup, live, recording, 0, 0.0, 0)
+    note(recording, 0, 0)
+    return Standing(setup, live, recording, 1, used, coupling.FINE)
+
+
+def _further(now: Standing, grid: Grid, last: int) -> Standing:
+    """Go on until `last` times are behind, or it cannot go on."""
+    behind, used, ending = run_rows(
+        now.setup, now.live, now.recording, grid.times, now.behind, last, now.used, grid.parts, grid.stride
     )
+    return now._replace(behind=behind, used=used, ending=ending)
 
 
 def more_room(live: Live, recording: Recording, used: int) -> tuple[Live, Recording]:

@@ -24,6 +24,7 @@ import numpy as np
 
 import scenarios
 from scenarios.steps import whole_steps
+from subzero.channels import Observation
 from subzero.engine import coupling
 from subzero.engine.initial_conditions import prepare
 from subzero.engine.recording import Recording, Run, cut, new_recording, record_row
@@ -40,42 +41,6 @@ Command = Sequence[float] | np.ndarray
 """Propeller [rev/s], rudder, port and starboard stern-plane [rad]."""
 
 COMMANDED = ("propeller [rev/s]", "rudder [rad]", "port stern-plane [rad]", "starboard stern-plane [rad]")
-
-
-class Observation(NamedTuple):
-    """What is true at one time, by the names of `subzero.channels`, in SI units, radians and rev/s.
-
-    The roll angle is `roll` here, ``roll_angle`` there, where `roll` is a method of xarray. The heading is continuous:
-    no jump at a full turn. Forces and moments of the cable are those on the hull, body axes.
-    """
-
-    time: float
-    north: float
-    east: float
-    depth: float
-    roll: float
-    pitch: float
-    heading: float
-    surge_speed: float
-    sway_speed: float
-    heave_speed: float
-    roll_rate: float
-    pitch_rate: float
-    yaw_rate: float
-    propeller_speed: float
-    rudder_angle: float
-    stern_plane_port_angle: float
-    stern_plane_starboard_angle: float
-    battery_voltage: float
-    cable_length: float
-    cable_tension: float
-    drum_tension: float
-    cable_force_forward: float
-    cable_force_starboard: float
-    cable_force_down: float
-    cable_moment_roll: float
-    cable_moment_pitch: float
-    cable_moment_yaw: float
 
 
 MOST_EXCHANGES = 1e6

@@ -47,7 +47,19 @@ class Voice:
             print()
 
 
-PLAIN = Voice()
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class StrictVoice(Voice):
+    """How a command that runs trials speaks, and what it makes of warnings.
+
+    Attributes:
+        strict: end with exit code 3 if a run ends with warnings.
+    """
+
+    strict: Annotated[bool, Parameter(negative=())] = False
+
+
+PLAIN, NOT_STRICT = Voice(), StrictVoice()
 _VOICE: ContextVar[Voice] = ContextVar("VOICE", default=PLAIN)
 
 

@@ -34,6 +34,7 @@ def write_all(
     width: float | None = None,
     kind: str = "png",
     exports: Sequence[str] = (),
+    float64: bool = False,
 ) -> dict[str, Any]:
     """Write everything that belongs to some runs of one trial, and return their summary.
 
@@ -44,6 +45,7 @@ def write_all(
         width: of the figures; None for two columns of a page. [inch]
         kind: of the figures: png, svg or pdf.
         exports: kinds of files for other programs (`subzero.exports`).
+        float64: as of `output.write_run`.
     """
     from subzero.exports import write_exports
     from subzero.figures import draw, page_width
@@ -54,7 +56,7 @@ def write_all(
     summary = summary_of(runs, record)
     stage.failed = any(run.attrs["outcome"] != "completed" for run in runs.values())
     for label, run in runs.items():
-        output.write_run(run, stage, label)
+        output.write_run(run, stage, label, float64=float64)
         write_exports(run, label, exports, stage)
     output.write_summary(summary, stage)
     with page_width(WIDTH if width is None else width):

@@ -42,9 +42,9 @@ from vehicle.dynamics import (
     relative_velocity,
 )
 from vehicle.free_run import FreeRun, free_run
-from vehicle.kinematics import euler_angles, normalise, quaternion_from_euler, rotation
+from vehicle.kinematics import euler_angles, initial_state, normalise, quaternion_from_euler, rotation
 from vehicle.parameters import Problem, VehicleError
-from vehicle.state import STATE, STATE_SIZE, initial_state
+from vehicle.state import STATE, STATE_SIZE
 from vehicle.terms import BREAKDOWN, TERMS
 from vehicle.vehicle import SECTIONS, Vehicle, VehicleNumbers, from_mapping, to_mapping
 

@@ -29,16 +29,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import astuple, dataclass
-from typing import NamedTuple
 
 import numpy as np
 
-from subzero.jit import compiled
+from subzero.jit import Record, compiled
 from vehicle.parameters import Section, parameter
 from vehicle.state import LINKAGE, QUICKEST, SERVO
 
 
-class ServoNumbers(NamedTuple):
+class ServoNumbers(Record):
     """The parameters of one servo, as the compiled functions take them."""
 
     dead_band: float

@@ -49,6 +49,8 @@ def munk_correction(nu_r: np.ndarray, added_mass: np.ndarray, excess: float, out
     """Fill out (6,) with (munk_factor − 1) times the Munk moment [N, N m]; `excess` is munk_factor − 1."""
     u, v, w = nu_r[0], nu_r[1], nu_r[2]
     A11, A22, A33 = added_mass[0, 0], added_mass[1, 1], added_mass[2, 2]
+    # The signs of `coriolis`: drifting to starboard, v > 0, turns the nose to port while A22 > A11, further across the
+    # flow. Fins and lift of the hull have to outweigh that.
     out[0] = out[1] = out[2] = 0.0
     out[3] = -excess * (A33 - A22) * v * w
     out[4] = excess * (A33 - A11) * u * w

@@ -20,18 +20,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
-from subzero.jit import compiled
+from subzero.jit import Record, compiled
 from vehicle.parameters import Section, parameter
 
 STILL = 1e-16
 """Square of a speed below which a fin feels nothing [m2/s2]: forces there are under 1e-16 N."""
 
 
-class FinNumbers(NamedTuple):
+class FinNumbers(Record):
     """Place of the centre of pressure on starboard or below, ½ρS, and the shape of lift and drag."""
 
     x: float

@@ -11,10 +11,12 @@ positive nose up; roll is positive starboard side down.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
 from subzero.jit import allocating, compiled
+from vehicle.state import SHAFT, STATE_SIZE
 
 
 @compiled
@@ -79,3 +81,30 @@ def normalise(state: np.ndarray) -> None:
     scale = 1.0 / math.sqrt(norm2)
     for i in range(3, 7):
         state[i] *= scale
+
+
+def initial_state(
+    *,
+    position: Sequence[float] = (0.0, 0.0, 0.0),
+    roll: float = 0.0,
+    pitch: float = 0.0,
+    heading: float = 0.0,
+    velocity: Sequence[float] = (0.0,) * 6,
+    propeller_speed: float = 0.0,
+) -> np.ndarray:
+    """Return a state with central fins and a full battery.
+
+    Args:
+        position: of the hull centre, north, east, depth (positive down). [m]
+        roll: starboard side down is positive. [rad]
+        pitch: nose up is positive. [rad]
+        heading: from north, clockwise seen from above. [rad]
+        velocity: u, v, w, p, q, r over ground in body axes. [m/s, rad/s]
+        propeller_speed: n. [rev/s]
+    """
+    state = np.zeros(STATE_SIZE)
+    state[0:3] = position
+    state[3:7] = quaternion_from_euler(float(roll), float(pitch), float(heading))
+    state[7:13] = velocity
+    state[SHAFT] = propeller_speed
+    return state

@@ -14,15 +14,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import astuple, dataclass
-from typing import NamedTuple
 
-from subzero.jit import compiled
+from subzero.jit import Record, compiled
 from vehicle.parameters import Section, parameter
 from vehicle.propeller import PropellerNumbers, torque
 from vehicle.state import QUICKEST
 
 
-class MotorNumbers(NamedTuple):
+class MotorNumbers(Record):
     """The parameters of motor and battery, as the compiled functions take them."""
 
     lag: float

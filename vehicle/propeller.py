@@ -14,15 +14,14 @@ propeller, seen turning clockwise from astern, rolls it to port).
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
-from subzero.jit import compiled
+from subzero.jit import Record, compiled
 from vehicle.parameters import Section, parameter
 
 
-class PropellerNumbers(NamedTuple):
+class PropellerNumbers(Record):
     """Coefficients of n|n|, |n|u and u|u| in the thrust on the hull and in the shaft torque."""
 
     thrust_nn: float

@@ -10,18 +10,18 @@ the potential −W z(G) + B z(B), hence free of loss.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from subzero.jit import compiled
+from subzero.jit import Record, compiled
 from vehicle.parameters import Section, parameter
 
 if TYPE_CHECKING:
     from vehicle.rigid_body import RigidBody
 
 
-class RestoringNumbers(NamedTuple):
+class RestoringNumbers(Record):
     """W − B [N] and the three arms of r_G W − r_B B [N m]; W, B, r_G, r_B for the potential."""
 
     net_weight: float

@@ -72,6 +72,8 @@ def coriolis(mass_matrix: np.ndarray, nu: np.ndarray, out: np.ndarray) -> None:
         L0 += mass_matrix[3, j] * nu[j]
         L1 += mass_matrix[4, j] * nu[j]
         L2 += mass_matrix[5, j] * nu[j]
+    # On the right-hand side of M ν̇ = Σ stands −C(ν)ν = [P × ω ; P × v + L × ω]. P of the added mass is not along v: its
+    # P × v is Munk's moment, and no term for it is added anywhere else.
     u, v, w, p, q, r = nu[0], nu[1], nu[2], nu[3], nu[4], nu[5]
     out[0] = r * P1 - q * P2
     out[1] = p * P2 - r * P0

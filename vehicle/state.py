@@ -4,17 +4,12 @@ Position and attitude are of the hull centre in earth axes (north, east, down); 
 the hull over ground in body axes (forward, starboard, down). The linkages hold the fins' positions inside
 their backlash; without backlash they only repeat the servo angles.
 
-If you add an entry, also look at `dynamics.derivative` and `initial_state`.
+If you add an entry, also look at `dynamics.derivative` and `kinematics.initial_state`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
-
-import numpy as np
-
-from vehicle.kinematics import quaternion_from_euler
 
 STATE_SIZE = 21
 POSITION, QUATERNION, VELOCITY = 0, 3, 7
@@ -45,30 +40,3 @@ STATE = (
     StateEntry("charge drawn from the battery", "q_e", "C", slice(17, 18)),
     StateEntry("linkages (rudder, port, starboard)", "δ_l", "rad", slice(18, 21)),
 )
-
-
-def initial_state(
-    *,
-    position: Sequence[float] = (0.0, 0.0, 0.0),
-    roll: float = 0.0,
-    pitch: float = 0.0,
-    heading: float = 0.0,
-    velocity: Sequence[float] = (0.0,) * 6,
-    propeller_speed: float = 0.0,
-) -> np.ndarray:
-    """Return a state with central fins and a full battery.
-
-    Args:
-        position: of the hull centre, north, east, depth (positive down). [m]
-        roll: starboard side down is positive. [rad]
-        pitch: nose up is positive. [rad]
-        heading: from north, clockwise seen from above. [rad]
-        velocity: u, v, w, p, q, r over ground in body axes. [m/s, rad/s]
-        propeller_speed: n. [rev/s]
-    """
-    state = np.zeros(STATE_SIZE)
-    state[0:3] = position
-    state[3:7] = quaternion_from_euler(float(roll), float(pitch), float(heading))
-    state[7:13] = velocity
-    state[SHAFT] = propeller_speed
-    return state

@@ -70,6 +70,8 @@ TERM_COUNT = len(TERMS)
 @compiled
 def turning_current(nu: np.ndarray, nu_r: np.ndarray, mass_matrix: np.ndarray, out: np.ndarray) -> None:
     """Fill out (6,) with −M (ω × v_c, 0) [N, N m]; v_c = ν − ν_r in body axes."""
+    # All other terms belong to M ν̇_r, and the state is ν: a current that is steady on earth turns in body axes,
+    # v̇_c = −ω × v_c, so M ν̇ = M ν̇_r + M (v̇_c, 0).
     a, b, c = nu[0] - nu_r[0], nu[1] - nu_r[1], nu[2] - nu_r[2]
     p, q, r = nu[3], nu[4], nu[5]
     x, y, z = q * c - r * b, r * a - p * c, p * b - q * a

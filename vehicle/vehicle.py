@@ -9,12 +9,12 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from subzero.errors import short
-from subzero.jit import packed
+from subzero.jit import Record
 from vehicle.actuators import Servo, Servos
 from vehicle.added_mass import AddedMass
 from vehicle.axial_drag import AxialDrag
@@ -30,7 +30,7 @@ from vehicle.restoring import Buoyancy, RestoringNumbers
 from vehicle.rigid_body import RigidBody
 
 
-class VehicleNumbers(NamedTuple):
+class VehicleNumbers(Record):
     """Everything the compiled equations need, derived once from a Vehicle."""
 
     mass_matrix: np.ndarray
@@ -112,7 +112,7 @@ class Vehicle:
             why = "some are so large or so small that masses, areas or forces are not finite"
             problem = Problem(key="vehicle", found="its numbers", why=why, allowed="those of a real vehicle")
             raise VehicleError((problem,))
-        return packed(numbers)
+        return numbers
 
     def _numbers(self) -> VehicleNumbers:
         density = self.water.density
@@ -150,7 +150,7 @@ class Vehicle:
 
 def _arrays(numbers: VehicleNumbers) -> list[Any]:
     """Return the parts that follow from several numbers and have no infinite value that means something."""
-    return [part for part in numbers if isinstance(part, float | np.ndarray)] + [
+    return [part for part in numbers if part.dtype.kind == "f"] + [
         *numbers.restoring,
         *numbers.propeller,
         *numbers.rudder,

@@ -48,7 +48,8 @@ turned = along.respond(change)["heading"]
 
 goal = autopilot.Wanted(speed=1.0, heading=trial.start.heading + 0.2, depth=2.0)
 pilot = autopilot.make("lqr", trial, feed_forward="model")      # ready-made, with the cable fed forward
-run = autopilot.fly(trial, pilot, lambda t: goal, sensors=autopilot.ESTIMATED, seed=1)
+sensors = autopilot.Sensors(autopilot.ESTIMATED, seed=1)
+run = autopilot.fly(trial, pilot, lambda t: goal, sensors=sensors)
 
 
 class Mine:                                                     # or one of your own

@@ -236,12 +236,13 @@ def transplant() -> str:
     rows = []
     for name, line in autopilot.STEPS.items():
         for pilot in autopilot.AUTOPILOTS:
-            for words, options in (
-                ("cable, fed forward", {"feed_forward": "model"}),
-                ("cable, feedback alone", {}),
-                ("no cable", {"tethered": False}),
+            for words, ahead, tethered in (
+                ("cable, fed forward", "model", True),
+                ("cable, feedback alone", "none", True),
+                ("no cable", "none", False),
             ):
-                _, found = autopilot.step(name, autopilot=pilot, tuning=tuning(), **options)
+                who = autopilot.Pilot(autopilot=pilot, feed_forward=ahead, tuning=tuning())
+                _, found = autopilot.step(name, pilot=who, tethered=tethered)
                 rows.append((f"{name} ({line.size:g})", pilot, words, *found.values()))
     head = (
         "step",

@@ -80,8 +80,8 @@ def flown(
     wanted, duration = FLIGHTS[name]
     made = autopilot.make(pilot, trial(name), feed_forward=feed_forward, tuning=tuning())
     return autopilot.fly(
-        trial(name), made, wanted, tethered=tethered, duration=duration, model=wrong.model(name),
-        sensors=wrong.sensors, seed=wrong.seed,
+        replace(trial(name), duration=duration), made, wanted, tethered=tethered, model=wrong.model(name),
+        sensors=autopilot.Sensors(wrong.sensors, seed=wrong.seed),
     )  # fmt: skip
 
 

@@ -10,8 +10,7 @@ import numpy as np
 
 from subzero.diagnosis import api as engine
 from subzero.diagnosis.hypothesis.configuration import Setting
-from subzero.diagnosis.inference import Findings, model_fits, problem
-from subzero.diagnosis.inference import measurement as response
+from subzero.diagnosis.inference import Findings, model_fits, problem, simulator
 from subzero.diagnosis.results import Verdict
 
 ROOM = 600
@@ -23,7 +22,7 @@ class Shared:
 
     def __init__(self) -> None:
         self.runs: OrderedDict[bytes, Track] = OrderedDict()
-        self.plain = response.simulate_track
+        self.plain = simulator.simulate_track
         self.work: Findings | None = None
         self.tell = engine.conclude
 
@@ -45,7 +44,7 @@ class Shared:
 
 def share(threads: int | None = None) -> Shared:
     """Let this process share runs, with so many threads for each diagnosis, and keep the engine's work."""
-    shared, modules = Shared(), (problem, response)
+    shared, modules = Shared(), (problem, simulator)
     for module in modules:
         patch: Any = module
         patch.simulate_track = shared.tracked

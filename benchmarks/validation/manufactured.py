@@ -93,7 +93,7 @@ def errors(segment_length: float, step: float) -> tuple[float, ...]:
     return (
         float(np.abs(cable.positions - exact("place", sigma, DURATION)).max() / length),
         float(np.abs(cable.tensions - tensions).max() / scale),
-        float(np.abs(cable.line.ends.tow_force - pull[0]).max() / scale),
+        float(np.abs(cable.line.ends.tow.force - pull[0]).max() / scale),
         float(abs(cable.line.ends.drum_pull - np.linalg.norm(pull[1])) / scale),
     )
 

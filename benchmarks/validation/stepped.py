@@ -61,9 +61,9 @@ class Stepped:
         line.position[:, : n + 1] = position
         line.length[1 : n + 1] = length
         line.tension[:, 1 : n + 1] = tension
-        line.ends.count, line.ends.free_end = n, free_end
+        line.ends.count, line.ends.layout.free_end = n, free_end
         line.ends.last_length[:], line.ends.settled = length[-1], length[:-1].sum()
-        line.ends.segment_length = length[0]
+        line.ends.layout.segment_length = length[0]
         made = cls(line, cable, brake, current.numbers(), new_load())
         made.begin()
         return made

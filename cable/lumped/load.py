@@ -14,11 +14,10 @@ A node that is folded has a tangent shorter than one (`shorten`): its drag becom
 from __future__ import annotations
 
 from math import sqrt
-from typing import NamedTuple
 
 import numpy as np
 
-from subzero.jit import inner, packed
+from subzero.jit import Record, inner
 
 FOLD = 0.3
 """δ in `shorten`."""
@@ -26,7 +25,7 @@ STILL = 1e-12
 """A speed that is none. [m/s]"""
 
 
-class NodeLoad(NamedTuple):
+class NodeLoad(Record):
     """Work space: p and f (3,), the drag in f (3,), ∂h/∂V and ∂h/∂t (3, 3), and the tangent with its slope."""
 
     momentum: np.ndarray
@@ -44,9 +43,7 @@ class NodeLoad(NamedTuple):
 def new_node_load() -> NodeLoad:
     """Return empty work space."""
     matrices = ("by_velocity", "by_tangent", "turning")
-    return packed(
-        NodeLoad(**{name: np.zeros((3, 3) if name in matrices else 3) for name in NodeLoad._fields})
-    )
+    return NodeLoad(**{name: np.zeros((3, 3) if name in matrices else 3) for name in NodeLoad.names})
 
 
 @inner

@@ -11,14 +11,13 @@ positions. The last term lets what they drift apart (third order in a step) fade
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from cable.lumped.band_solver import WIDTH
 from cable.lumped.load import NodeLoad, new_node_load
-from subzero.jit import compiled, packed
+from subzero.jit import Record, compiled
 
 NEW, OLD, MIDDLE = 0, 1, 2
 """Levels: being solved for, start of the step, end of its first stage."""
@@ -33,8 +32,7 @@ FADING = 0.5
 """τ. [s]"""
 
 
-@dataclass(kw_only=True)
-class RopeEnds:
+class RopeEnds(Record):
     """What a lumped cable has once.
 
     Attributes:
@@ -111,7 +109,7 @@ def new_rope(capacity: int) -> Rope:
         by_payout=0.0, wanted=0.0,
     )  # fmt: skip
     return Rope(
-        ends=packed(ends),
+        ends=ends,
         position=np.zeros((3, n, 3)),
         velocity=np.zeros((3, n, 3)),
         momentum=np.zeros((3, n, 3)),

@@ -42,11 +42,9 @@ from cable.moving_end.segment_load import (
     Load,
     differentiate_load,
     evaluate_load,
-    fading_rate,
     take_segment,
-    turning_rate,
 )
-from cable.moving_end.slack_law import slack_law
+from cable.moving_end.slack_law import fading_rate, slack_law, turning_rate
 from cable.moving_end.state import (
     BEFORE,
     DIAGONAL,
@@ -66,16 +64,20 @@ from subzero.jit import compiled, inlined, inner
 def node_velocities(line: Line, w: Weights) -> None:
     """Fill the velocities of all nodes and the pay-out rate at level NEW by backward differences."""
     x, V, N = line.position, line.velocity, line.ends.count
+    # Nodes before the drum are material points: the rate of their place is the velocity of the cable there.
     for j in range(min(held_node(line), N + 1)):
         for i in range(3):
             V[NEW, j, i] = w.b0 * x[NEW, j, i] + w.b1 * x[NOW, j, i] + w.b2 * x[BEFORE, j, i]
             V[NEW, j, i] += w.b_now * V[NOW, j, i]
+    # So is the rate of the last segment's length the pay-out rate, dℓ_N/dt = dS/dt = U (14)-(19).
     last, U = line.ends.last_length, line.ends.payout
     U[NEW] = w.b0 * last[NEW] + w.b1 * last[NOW] + w.b2 * last[BEFORE] + w.b_now * U[NOW]
     if line.ends.drum_mode == STANDING:
         line.ends.payout[NEW] = 0.0
-    if line.ends.free_end:
+    if line.ends.layout.free_end:
         return
+    # The end at the drum is a place, not a point of the cable: what passes it moves along the cable (9)-(10), towards
+    # the tow point. d/ℓ and not t: a stretched cable is (1 + ε) longer than what left the drum.
     for i in range(3):
         chord = x[NEW, N, i] - x[NEW, N - 1, i]
         V[NEW, N, i] = line.ends.drum_velocity[i] - U[NEW] * chord / last[NEW]
@@ -106,6 +108,8 @@ def _fill(line: Line, w: Weights, c: CableNumbers, drum: DrumNumbers, work: Load
         evaluate_load(length, T, line.slip[j], line.normal_gain[j], w.a0, c, work)
         for i in range(3):
             work.q[i] -= line.forcing[j, i]
+            # d(ℓp)/dt of the whole segment, and not ℓ dp/dt: only so does the one that grows keep its momentum. q has
+            # the newest of the three levels, a₀p, already.
             line.momentum[NEW, j, i] = length * work.momentum[i]
             history = w.a1 * line.momentum[NOW, j, i] + w.a2 * line.momentum[BEFORE, j, i]
             line.load[j, i] = length * work.q[i] + history
@@ -125,11 +129,11 @@ def _fill(line: Line, w: Weights, c: CableNumbers, drum: DrumNumbers, work: Load
     add_bending(line, c)
     if N > 1:
         _sharpen_tow_force(line)
-    if line.ends.free_end:
+    if line.ends.layout.free_end:
         add_drogue(line, w, slopes)
     else:
         drum_row(line, w, drum, work, slopes)
-    if N == 1 and drum.control == FREE and not line.ends.free_end:
+    if N == 1 and drum.control == FREE and not line.ends.layout.free_end:
         write_single_segment(line, work.chord)
 
 
@@ -162,6 +166,8 @@ def _differentiate_segment(length: float, w: Weights, T: float, c: CableNumbers,
 def _add_balance(line: Line, j: int, T: float, work: Load) -> None:
     """Add segment j to the balances of its two nodes: f + ½Q to the far one, −f + ½Q to the near one."""
     held, t, r = held_node(line), work.tangent, line.rows[RESIDUAL]
+    # t points to the drum: T t pulls the near node on, and the far node back. Segment 1 has no near node to balance:
+    # what it does there is the force on the vehicle (12). Nor has the last one a far node, where a drum is.
     for i in range(3):
         f, half = T * t[i], 0.5 * line.load[j, i]
         if j < held:
@@ -169,7 +175,7 @@ def _add_balance(line: Line, j: int, T: float, work: Load) -> None:
         if j > 1:
             r[j - 1, 1 + i] += half - f
         else:
-            line.ends.tow_force[i] = f - half
+            line.ends.tow.force[i] = f - half
 
 
 @inlined
@@ -186,22 +192,25 @@ def _scatter_balance(line: Line, j: int, T: float, length: float, work: Load) ->
         if j > 1:
             U[j - 1, 1 + i, 0] -= t[i]
         else:
-            line.ends.tow_by_block[i, 0] = t[i]
+            line.ends.tow.by_block[i, 0] = t[i]
         for k in range(4):
             far = 0.5 * by_far[i, k]
+            # ∂f/∂x = T ∂t/∂x: a taut chord can only turn, T (I − t tᵀ)/|d|; of a folded one t gets longer, too (g < 1).
             pull = (
                 stiffness * ((1.0 if i == k - 1 else 0.0) - g * t[i] * t[k - 1])
                 if j < held and k > 0
                 else 0.0
             )
-            if j == held and k == 1:
+            if (
+                j == held and k == 1
+            ):  # its far node is fixed, and its second unknown the length ℓ, not a place
                 pull = -fading * T * t[i]
             if j < held:
                 D[j, 1 + i, k] += far + pull
             if j > 1:
                 U[j - 1, 1 + i, k] += far - pull
             else:
-                line.ends.tow_by_block[i, k] = (t[i] if k == 0 else 0.0) + pull - far
+                line.ends.tow.by_block[i, k] = (t[i] if k == 0 else 0.0) + pull - far
         for k in range(3):
             near = 0.5 * by_near[i, k]
             pull = stiffness * ((1.0 if i == k else 0.0) - g * t[i] * t[k])
@@ -210,7 +219,7 @@ def _scatter_balance(line: Line, j: int, T: float, length: float, work: Load) ->
             if j > 1:
                 D[j - 1, 1 + i, 1 + k] += near + pull
             else:
-                line.ends.tow_by_tow[i, k] = -pull - near
+                line.ends.tow.by_tow[i, k] = -pull - near
 
 
 @inlined
@@ -218,9 +227,11 @@ def _sharpen_tow_force(line: Line) -> None:
     """Take the load of the first half segment at its own middle, a quarter into the segment, by extrapolation."""
     first = line.length[1]
     second = line.ends.last_length[NEW] if line.ends.count == 2 else line.length[2]
+    # q(ℓ₁/4) on the line through q(ℓ₁/2) and q(ℓ₁ + ℓ₂/2), times ℓ₁/2, less what `_add_balance` took. Its slopes are
+    # left out of `by_tow` and `by_block`: hull and cable agree on the force itself, those only say where to look.
     share = 0.25 * first * first / (first + second)
     for i in range(3):
-        line.ends.tow_force[i] -= share * (line.load[1, i] / first - line.load[2, i] / second)
+        line.ends.tow.force[i] -= share * (line.load[1, i] / first - line.load[2, i] / second)
 
 
 @inlined
@@ -230,7 +241,7 @@ def _length_equation(
     """Write the length equation of segment j, the first row of its block; return ∂φ/∂σ."""
     square = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) / (length * length)
     stretch = 1.0 + c.compliance * T
-    phi, by_T, by_strain = slack_law(T, 0.5 * (stretch * stretch - square), line.ends.smoothing)
+    phi, by_T, by_strain = slack_law(T, 0.5 * (stretch * stretch - square), line.ends.solver.smoothing)
     line.rows[RESIDUAL, j, 0] = phi
     if slopes:
         line.blocks[DIAGONAL, j, 0, 0] = by_T + by_strain * stretch * c.compliance
@@ -260,10 +271,12 @@ def write_single_segment(line: Line, d: np.ndarray) -> None:
     """Replace both rows of the only block, whose second row holds the drum's equation (11)."""
     D, L = line.blocks[DIAGONAL, 1], line.blocks[LOWER, 1]
     r, T = line.rows[RESIDUAL, 1], line.tension[NEW, 1]
+    # ℓ = max(|d|, ℓ_now): as long as the way to the drum, or slack and as long as it was.
     chord = sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2] + CORNER * CORNER)
     longer, by_chord = _maximum(chord, line.ends.last_length[NOW])
     r[0] = line.ends.last_length[NEW] - longer
     D[0, 0], D[0, 1] = 0.0, 1.0
+    # The drum's residual is T less what turns the drum: T − r is what (11) asks the segment for, and it cannot push.
     pull, by_pull = _maximum(T - r[1], 0.0)
     r[1] = T - pull
     D[1, 0] = 1.0 - by_pull * (1.0 - D[1, 0])
@@ -283,7 +296,7 @@ def _maximum(a: float, b: float) -> tuple[float, float]:
 @inner
 def add_drogue(line: Line, w: Weights, slopes: bool) -> None:
     """Add the drag of a drogue, ½ρC_dA |U| U, to the balance of the free end."""
-    N, k, square = line.ends.count, line.ends.tail_drag, 0.0
+    N, k, square = line.ends.count, line.ends.layout.tail_drag, 0.0
     J = line.water[NEW, N]
     for i in range(3):
         square += (line.velocity[NEW, N, i] - J[i]) ** 2
@@ -307,6 +320,8 @@ def add_influx(line: Line, c: CableNumbers, work: Load) -> None:
     for i in range(3):  # the water at the drum, as the drum sees it
         J[i] = line.water[NEW, N, i] - line.ends.drum_velocity[i]
     Jt = J[0] * t[0] + J[1] * t[1] + J[2] * t[2]
+    # p(S) = mV + ρA P (V − J). What enters moves along t but for the drum's own motion, and P leaves nothing that is
+    # along t: of the added mass only the water that passes the drum is left.
     for i in range(3):
         entering = c.mass * line.velocity[NEW, N, i] - c.added_mass * (J[i] - Jt * t[i])
         line.load[N, i] -= U * entering
@@ -356,7 +371,9 @@ def drum_row(line: Line, w: Weights, drum: DrumNumbers, work: Load, slopes: bool
     else:
         held, slope = friction(drum, U[NEW])
         r[1] = -held - drum.inertia * (w.a0 * U[NEW] + w.a1 * U[NOW] + w.a2 * U[BEFORE])
-        by_length = -(slope + drum.inertia * w.a0) * w.b0
+        by_length = (
+            -(slope + drum.inertia * w.a0) * w.b0
+        )  # ∂U/∂ℓ = b₀: the rate is differenced from the length
     pulled = pulled and line.ends.drum_mode != SPINNING
     if pulled:
         r[1] += line.ends.drum_pull
@@ -369,7 +386,7 @@ def _differentiate_drum(line: Line, by_length: float, pulled: bool, Qt: float, w
     """Write the derivatives of the drum's equation; of the pull Q_N·t + T_N only if the drum is `pulled`."""
     N, t, by_near, by_far = line.ends.count, work.tangent, work.by_near, work.by_far
     D, L = line.blocks[DIAGONAL, N], line.blocks[LOWER, N]
-    D[1, 1], D[2, 2], D[3, 3] = by_length, 1.0, 1.0
+    D[1, 1], D[2, 2], D[3, 3] = by_length, 1.0, 1.0  # the last block has two unknowns: the others are 0 = 0
     if not pulled:
         return
     D[1, 0] = 1.0

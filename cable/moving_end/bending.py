@@ -103,7 +103,7 @@ def _add_to_balances(line: Line, j: int, i: int, q: float) -> None:
     if j > 1:
         line.rows[RESIDUAL, j - 1, 1 + i] += q
     else:
-        line.ends.tow_force[i] -= q
+        line.ends.tow.force[i] -= q
 
 
 @compiled
@@ -124,9 +124,9 @@ def _add_to_matrix(line: Line, j: int, i: int, k: int, A: float, B: float, C: fl
         if j + 1 < held:
             line.blocks[UPPER2, j - 1, row, column] += C
     else:
-        line.ends.tow_by_tow[i, k] += B
+        line.ends.tow.by_tow[i, k] += B
         if j < held:
-            line.ends.tow_by_block[i, column] -= B - C
+            line.ends.tow.by_block[i, column] -= B - C
 
 
 @inner
@@ -205,7 +205,7 @@ def keep_tow_answer(line: Line) -> None:
     """Keep W_1 of the elimination (`block_solver`), before the next assembly overwrites it."""
     for k in range(3):
         for m in range(4):
-            line.ends.tow_answer[k, m] = line.blocks[LOWER, 1, 1 + k, m]
+            line.ends.tow.answer[k, m] = line.blocks[LOWER, 1, 1 + k, m]
 
 
 add_bending = by_field("bending_stiffness", _add_bending, _no_bending)

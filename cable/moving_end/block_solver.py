@@ -10,7 +10,7 @@ itself. The first column of every L_j is zero (a node knows its neighbour's posi
 The elimination ends at the tow point, so W_1 = D_1⁻¹ L_1 tells how the first block answers to a displacement of
 the tow point, all cable behind it included: the coupling to a vehicle gets that derivative for nothing.
 
-Solve a block pentadiagonal system with 4×4 blocks: what bending makes of the tridiagonal one of `block_solver`.
+Bending makes it pentadiagonal (`factor_wide`): a balance then knows the places of five nodes.
 
     K_j z_{j−2} + L_j z_{j−1} + D_j z_j + U_j z_{j+1} + V_j z_{j+2} = r_j,   j = 1 … N
 
@@ -18,8 +18,8 @@ Elimination from the drum to the tow point leaves z_j = b_j − W_j z_{j−1} �
 
     U' = U_j − V_j W_{j+2},   D' = D_j − V_j X_{j+2} − U' W_{j+1},   W_j = D'⁻¹ (L_j − U' X_{j+1}),   X_j = D'⁻¹ K_j
 
-W replaces L and X replaces K, both transposed as in `block_solver`, so W_1 still tells how the first block answers to
-the tow point.
+W replaces L and X replaces K, both transposed as above, so W_1 still tells how the first block answers to the tow
+point.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ def factor_block(D: np.ndarray, pivots: np.ndarray) -> bool:
             for c in range(k, SIZE):
                 D[k, c], D[best, c] = D[best, c], D[k, c]
         inverse = 1.0 / D[k, k]
-        D[k, k] = inverse
+        D[k, k] = inverse  # what solves with it, many times, multiplies
         for i in range(k + 1, SIZE):
             D[i, k] *= inverse
             for c in range(k + 1, SIZE):
@@ -82,6 +82,8 @@ def factor(L: np.ndarray, D: np.ndarray, U: np.ndarray, pivots: np.ndarray, last
     """
     for j in range(last, 0, -1):
         if j < last:
+            # D_j − U_j W_{j+1}, without what is zero: a length knows the ends of its own segment only (row 0 of U), and
+            # nobody knows the tension of the segment before (column 0 of L, and so of W).
             for row in range(1, SIZE):
                 for column in range(1, SIZE):
                     total = 0.0

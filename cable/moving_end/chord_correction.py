@@ -30,12 +30,16 @@ on a cable held across a current in 100 segments, from 1.4e-4 to 3e-5.
 from __future__ import annotations
 
 from math import sqrt
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cable.moving_end.segment_load import Load, chord_length
+from cable.moving_end.slack_law import chord_length
 from cable.moving_end.state import NEW, NOW, Line
 from subzero.jit import inlined, inner
+
+if TYPE_CHECKING:
+    from cable.moving_end.segment_load import Load
 
 MOST_BENT = 1.0
 """Segments that turn by more than this do not know their curvature; the corrections stop growing there. [rad]"""

@@ -84,8 +84,8 @@ def _flow_at_ends(line: Line, c: CableNumbers, out: np.ndarray) -> None:
         along += d * U
         size += d * d
         square += U * U
-        out[TOWED] -= line.ends.tow_force[i] * (line.velocity[NOW, 0, i] - line.water[NOW, 0, i])
-    if line.ends.free_end:
+        out[TOWED] -= line.ends.tow.force[i] * (line.velocity[NOW, 0, i] - line.water[NOW, 0, i])
+    if line.ends.layout.free_end:
         out[AT_DRUM] = T * np.sqrt(square)
         return
     along /= np.sqrt(max(size, 1e-30))

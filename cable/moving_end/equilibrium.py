@@ -296,17 +296,17 @@ def _step_from_rest(
     w = Weights(a, -a, 0.0, a, -a, 0.0, 0.0)
     for tolerance in (TOLERANCE, LOOSER):
         _guess(line, water, work)
-        line.ends.tolerance = tolerance
+        line.ends.solver.tolerance = tolerance
         if solve_step(line, w, c, drum, work, False):
             return True
     _guess(line, water, work)
-    line.ends.smoothing = SOFTEST
+    line.ends.solver.smoothing = SOFTEST
     while True:
         converged = solve_step(line, w, c, drum, work, False)
-        if not converged or line.ends.smoothing <= SMOOTHING:
+        if not converged or line.ends.solver.smoothing <= SMOOTHING:
             break
-        line.ends.smoothing = max(0.1 * line.ends.smoothing, SMOOTHING)
-    line.ends.smoothing = SMOOTHING
+        line.ends.solver.smoothing = max(0.1 * line.ends.solver.smoothing, SMOOTHING)
+    line.ends.solver.smoothing = SMOOTHING
     return converged
 
 

@@ -62,7 +62,7 @@ def _pull_straight(
                 line.position[level, j, i] = along * direction[i]
                 line.velocity[level, j, i] = velocity
     for i in range(3):
-        line.ends.tow_force[i] = -per_metre * wet_length * direction[i]
+        line.ends.tow.force[i] = -per_metre * wet_length * direction[i]
 
 
 def lay_held(line: Line, held: Equilibrium, tow: np.ndarray, drum: np.ndarray, payout: float) -> None:
@@ -84,7 +84,7 @@ def lay_held(line: Line, held: Equilibrium, tow: np.ndarray, drum: np.ndarray, p
     line.position[:, : N + 1] = held.shape - held.shape[-1]
     line.velocity[:, : N + 1] = tow + along[:, None] * (drum - tow)
     line.tension[:, 1 : N + 1], line.node_tension[: N + 1] = held.segment_tensions, held.tensions
-    ends.tow_force[:], ends.drum_pull = held.tow_force, held.tensions[-1]
+    ends.tow.force[:], ends.drum_pull = held.tow_force, held.tensions[-1]
 
 
 @compiled
@@ -132,7 +132,7 @@ def set_steady_tow(
     chords = np.array(lengths) * (1.0 + cable.compliance * np.array(middles[::-1]))
     behind = np.cumsum(chords[::-1])[::-1]
     line.position[:, :N] = line.position[NOW, N] - behind[:, None] * t
-    line.ends.tow_force[:], line.ends.drum_pull = pulls[-1] * t, pulls[0]
+    line.ends.tow.force[:], line.ends.drum_pull = pulls[-1] * t, pulls[0]
 
 
 def _grown(T: float, length: float, drag: float, weight: float, e: float) -> float:

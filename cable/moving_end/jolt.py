@@ -20,7 +20,8 @@ import numpy as np
 
 from cable.drum import LENGTH, STANDING, TENSION, DrumNumbers
 from cable.moving_end.block_solver import factor, solve
-from cable.moving_end.segment_load import Load, chord_length, segment_momentum
+from cable.moving_end.segment_load import Load, segment_momentum
+from cable.moving_end.slack_law import chord_length
 from cable.moving_end.state import BEFORE, DIAGONAL, LOWER, NOW, RESIDUAL, UPPER, Line
 from cable.properties import CableNumbers
 from subzero.jit import allocating, inner
@@ -48,13 +49,13 @@ def take_jolt(
     for i in range(3):
         out[i] = 0.0
     size = max(abs(change[0]), abs(change[1]), abs(change[2]))
-    if size < FELT or c.compliance > 0.0 or line.ends.count < 2 or line.ends.free_end:
+    if size < FELT or c.compliance > 0.0 or line.ends.count < 2 or line.ends.layout.free_end:
         return False
     tangents, masses = np.zeros((line.ends.count + 1, 3)), np.zeros((3, 3))
     _fill_tangents(line, tangents)
     _assemble(line, tangents, change, c, drum, masses)
     blocks, jump = line.blocks, line.rows[RESIDUAL]
-    line.ends.factored = False
+    line.ends.solver.factored = False
     if factor(blocks[LOWER], blocks[DIAGONAL], blocks[UPPER], line.pivots, line.ends.count) > 0:
         return False
     solve(blocks[LOWER], blocks[DIAGONAL], blocks[UPPER], line.pivots, line.ends.count, jump)

@@ -1,7 +1,8 @@
 """Make a solved step real; put a node in at the drum, or take one out, where the last segment asks for it.
 
-There is a new node at the drum when the last segment has become long, and one less when it has become short. Both
-happen between two steps, at levels NOW and BEFORE, and leave length, shape and motion of the cable as they are.
+There is a new node at the drum when the last segment has become long, and one less when it has become short. In a long
+cable, nodes far from both ends are taken out where it is nearly straight. All of this happens between two steps, at
+levels NOW and BEFORE, and leaves length, shape and motion of the cable as they are.
 """
 
 from __future__ import annotations
@@ -16,6 +17,8 @@ from cable.moving_end.state import BEFORE, NEW, NOW, SPLIT_AT, Line, spacing
 from cable.properties import CableNumbers
 from subzero.jit import compiled, inner
 
+STRAIGHT = 2e-5
+"""Far segments are joined where that shortens them by no more than this share: they turn by 0.7 degrees. [-]"""
 MERGE_AT = 0.5
 """While cable is reeled in, a last segment shorter than this fraction of the one before is joined to it."""
 
@@ -24,7 +27,7 @@ MERGE_AT = 0.5
 def accept(line: Line, step: float, c: CableNumbers, work: Load) -> None:
     """Make level NEW the present one; split the last segment while it is too long, join it while it is too short."""
     N = line.ends.count
-    for level in (BEFORE, NOW):
+    for level in (BEFORE, NOW):  # the oldest first: each takes over what the next newer one has
         for j in range(N + 1):
             for i in range(3):
                 line.position[level, j, i] = line.position[level - 1, j, i]
@@ -39,13 +42,15 @@ def accept(line: Line, step: float, c: CableNumbers, work: Load) -> None:
     fill_node_tensions(line)
     line.ends.previous_step = step
     line.ends.time += step
-    if line.ends.free_end:
+    if line.ends.layout.free_end:
         return
     last = line.ends.last_length
     while last[NOW] > SPLIT_AT * spacing(line) and line.ends.count < line.length.size - 1:
         split_last(line, spacing(line), c, work)
     while line.ends.count > 1 and last[NOW] < MERGE_AT * line.length[line.ends.count - 1]:
         merge_last(line, c, work)
+    if line.ends.layout.far_grading > 0.0:
+        join_far(line, c, work)
 
 
 @inner
@@ -64,6 +69,8 @@ def split_last(line: Line, segment_length: float, c: CableNumbers, work: Load) -
         _insert_between(line.position[level], N, fraction, beyond)
         _insert_between(line.velocity[level], N, fraction, beyond)
         _insert_between(line.water[level], N, fraction, beyond)
+        # The same off both levels: a backward difference of the length, the pay-out rate, sees no jump. At level BEFORE
+        # it may be negative, for a node that was still on the drum.
         line.ends.last_length[level] -= segment_length
         if level == NOW:
             near, end = line.node_tension[N - 1], line.node_tension[N]
@@ -73,6 +80,7 @@ def split_last(line: Line, segment_length: float, c: CableNumbers, work: Load) -
     line.length[N] = segment_length
     line.ends.count = N + 1
     line.ends.settled += segment_length
+    # Momenta are remembered for whole segments (d(ℓp)/dt in `assembly`), so both parts need theirs at both levels.
     for level in (NOW, BEFORE):
         segment_momentum(line, level, N, segment_length, c, work)
         segment_momentum(line, level, N + 1, line.ends.last_length[level], c, work)
@@ -129,6 +137,63 @@ def merge_last(line: Line, c: CableNumbers, work: Load) -> None:
         segment_momentum(line, level, N - 1, last[level], c, work)
 
 
+@inner
+def join_far(line: Line, c: CableNumbers, work: Load) -> None:
+    """Join pairs of segments far from both ends to one, where the cable is taut and nearly straight.
+
+    b metres beyond `far_length` from the nearer end, a segment may be Δs + g s + g₁ b long. The ends stay fine: there a
+    cable bends, the vehicle by its turns, a current or the cable's weight beside the drum, where it hardly pulls.
+    """
+    ends, layout, along, j = line.ends, line.ends.layout, 0.0, 1
+    while j < ends.count - 1:
+        whole = line.length[j] + line.length[j + 1]
+        beyond = min(along, ends.settled + ends.last_length[NOW] - along - whole) - layout.far_length
+        longest = layout.segment_length + layout.grading * along + layout.far_grading * beyond
+        if beyond > 0.0 and whole <= longest and min(line.tension[NOW, j], line.tension[NOW, j + 1]) > KNOWN:
+            cut_off = _cut_off(line, j)
+            if cut_off <= STRAIGHT:
+                _join(line, j, whole, cut_off)
+                for level in (NOW, BEFORE):
+                    segment_momentum(line, level, j, line.length[j], c, work)
+        along += line.length[j]
+        j += 1
+
+
+@compiled
+def _cut_off(line: Line, j: int) -> float:
+    """Return by which share the chord over segments j and j + 1 is shorter than theirs. [-]"""
+    square = 0.0
+    for i in range(3):
+        square += (line.position[NOW, j + 1, i] - line.position[NOW, j - 1, i]) ** 2
+    return 1.0 - np.sqrt(square) / max(_chord(line, j) + _chord(line, j + 1), 1e-12)
+
+
+@compiled
+def _join(line: Line, j: int, whole: float, cut_off: float) -> None:
+    """Take node j out: segments j and j + 1 become one, as long as its chord; the rest goes back to the drum."""
+    N, share = line.ends.count, line.length[j] / whole
+    line.slip[j] += (1.0 - share) * (line.slip[j + 1] - line.slip[j])
+    line.normal_gain[j] += (1.0 - share) * (line.normal_gain[j + 1] - line.normal_gain[j])
+    for level in (NOW, BEFORE):
+        line.tension[level, j] += (1.0 - share) * (line.tension[level, j + 1] - line.tension[level, j])
+        for n in range(j, N):
+            for i in range(3):
+                line.position[level, n, i] = line.position[level, n + 1, i]
+                line.velocity[level, n, i] = line.velocity[level, n + 1, i]
+                line.water[level, n, i] = line.water[level, n + 1, i]
+                line.momentum[level, n, i] = line.momentum[level, n + 1, i]
+        for n in range(j + 1, N):
+            line.tension[level, n] = line.tension[level, n + 1]
+    for n in range(j, N):
+        line.node_tension[n] = line.node_tension[n + 1]
+    for n in range(j + 1, N):
+        line.length[n] = line.length[n + 1]
+        line.slip[n], line.normal_gain[n] = line.slip[n + 1], line.normal_gain[n + 1]
+    line.length[j] = whole * (1.0 - cut_off)
+    line.ends.settled -= whole * cut_off
+    line.ends.count = N - 1
+
+
 @compiled
 def _chord(line: Line, j: int) -> float:
     """Return the distance of the ends of segment j at level NOW. [m]."""
@@ -145,7 +210,7 @@ def end_tensions(line: Line) -> tuple[float, float]:
     T(0) is the size of the force (12); T(S) is the tension that drives the drum (11), with the drag and the inertia
     of the last half segment; a slack end has none.
     """
-    F = line.ends.tow_force
+    F = line.ends.tow.force
     return sqrt(F[0] * F[0] + F[1] * F[1] + F[2] * F[2]), max(line.ends.drum_pull, 0.0)
 
 

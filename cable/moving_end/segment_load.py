@@ -15,22 +15,18 @@ whose components along t, n, b are the six scalar equations of Feng & Allen (200
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
 from math import sqrt
 from typing import Any
 
 import numpy as np
 
+from cable.moving_end.slack_law import chord_length, turning_rate
 from cable.moving_end.state import NOW, Line
 from cable.properties import CableNumbers
-from subzero.jit import inlined, inner, packed
-
-FOLDING = 0.3
-"""How early a heaped segment loses its direction, see `chord_length`; without any effect on a taut one."""
+from subzero.jit import Record, inlined, inner
 
 
-@dataclass(kw_only=True)
-class Load:
+class Load(Record):
     """Work space for one segment: what is known of it, its load q, and derivatives.
 
     Attributes:
@@ -67,35 +63,10 @@ class Load:
 
 def new_load() -> Load:
     """Return empty work space for one segment."""
-    parts: dict[str, Any] = {field.name: np.zeros(3) for field in fields(Load)}
+    parts: dict[str, Any] = {name: np.zeros(3) for name in Load.names}
     parts |= {name: np.zeros((3, 3)) for name in ("q_V", "q_d", "G", "by_near")}
     parts |= dict.fromkeys(("along", "side", "chord_length", "kt", "kn"), 0.0)
-    return packed(Load(**parts | {"by_far": np.zeros((3, 4))}))
-
-
-@inlined
-def chord_length(d: np.ndarray, length: float) -> float:
-    """Return r with r² = |d|² + F² max(1 − |d|²/ℓ², 0)² ℓ², the length that the tangent t = d/r is made with. [m].
-
-    For a taut or stretched segment r = |d|, and t is a unit vector. A slack one (|d| < ℓ) is a folded cable: its t gets
-    shorter than one, smoothly to 0 when both ends meet, and P = I − t tᵀ then tends to equal drag in all directions.
-    """
-    square = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) / (length * length)
-    return length * sqrt(square + (FOLDING * max(1.0 - square, 0.0)) ** 2)
-
-
-@inlined
-def turning_rate(d: np.ndarray, length: float) -> float:
-    """Return g in ∂t/∂d = (I − g t tᵀ)/r; 1 for a taut segment. [-]."""
-    square = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) / (length * length)
-    return 1.0 - 2.0 * FOLDING * FOLDING * max(1.0 - square, 0.0)
-
-
-@inlined
-def fading_rate(d: np.ndarray, length: float, r: float) -> float:
-    """Return f in ∂t/∂ℓ = −f t; 0 for a taut segment. [1/m]."""
-    square = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) / (length * length)
-    return FOLDING * FOLDING * length * max(1.0 - square * square, 0.0) / (r * r)
+    return Load(**parts | {"by_far": np.zeros((3, 4))})
 
 
 @inlined

@@ -18,6 +18,8 @@ from __future__ import annotations
 
 from math import sqrt
 
+import numpy as np
+
 from subzero.jit import inlined
 
 TENSION_SCALE = 1e-3
@@ -29,14 +31,43 @@ SOFTEST = 1e-4
 """T₀ that a difficult step starts with, a tenth at a time down to `SMOOTHING`. [N]"""
 KNOWN = 1e-4
 """A cable with more tension than this is taut, and its tension is foreseen from the steps before. [N]"""
+FOLDING = 0.3
+"""How early a heaped segment loses its direction, see `chord_length`; without any effect on a taut one."""
 
 
 @inlined
 def slack_law(T: float, shortening: float, smoothing: float) -> tuple[float, float, float]:
     """Return φ and its derivatives by the tension T [N] and the shortening σ [-], for T₀ = `smoothing` [N]."""
+    # φ = 0 says a b = μ with a, b ≥ 0. Newton's method likes its slopes: a taut segment has ∂φ/∂T ≈ 0 and a row that
+    # says σ = 0, a slack one ∂φ/∂σ ≈ 0 and a row that says T = 0, and nobody has to guess which of the two it is.
     a, b = T / TENSION_SCALE, shortening / STRAIN_SCALE
     mu = smoothing / (TENSION_SCALE * STRAIN_SCALE)
     s = sqrt(a * a + b * b + 2.0 * mu)
     # a + b − s, without cancellation when one of the two is large
     phi = 2.0 * (a * b - mu) / (a + b + s) if a + b > 0.0 else a + b - s
     return phi, (1.0 - a / s) / TENSION_SCALE, (1.0 - b / s) / STRAIN_SCALE
+
+
+@inlined
+def chord_length(d: np.ndarray, length: float) -> float:
+    """Return r with r² = |d|² + F² max(1 − |d|²/ℓ², 0)² ℓ², the length that the tangent t = d/r is made with. [m].
+
+    For a taut or stretched segment r = |d|, and t is a unit vector. A slack one (|d| < ℓ) is a folded cable: its t gets
+    shorter than one, smoothly to 0 when both ends meet, and P = I − t tᵀ then tends to equal drag in all directions.
+    """
+    square = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) / (length * length)
+    return length * sqrt(square + (FOLDING * max(1.0 - square, 0.0)) ** 2)
+
+
+@inlined
+def turning_rate(d: np.ndarray, length: float) -> float:
+    """Return g in ∂t/∂d = (I − g t tᵀ)/r; 1 for a taut segment. [-]."""
+    square = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) / (length * length)
+    return 1.0 - 2.0 * FOLDING * FOLDING * max(1.0 - square, 0.0)
+
+
+@inlined
+def fading_rate(d: np.ndarray, length: float, r: float) -> float:
+    """Return f in ∂t/∂ℓ = −f t; 0 for a taut segment. [1/m]."""
+    square = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) / (length * length)
+    return FOLDING * FOLDING * length * max(1.0 - square * square, 0.0) / (r * r)

@@ -9,7 +9,6 @@ NEW as often as needed and becomes real only by `accept`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -18,7 +17,7 @@ from cable.current import Water, water_velocity
 from cable.drum import TURNING
 from cable.moving_end.slack_law import SMOOTHING
 from cable.schemes import TOLERANCE
-from subzero.jit import inlined, inner, packed
+from subzero.jit import Record, inlined, inner
 
 NEW, NOW, BEFORE = 0, 1, 2
 
@@ -26,8 +25,42 @@ SPLIT_AT = 1.5
 """The last segment is split when it has grown to this many segment lengths."""
 
 
-@dataclass(kw_only=True)
-class Solved:
+class Layout(Record):
+    """How a cable is divided, and what its far end is: chosen at the start.
+
+    Attributes:
+        segment_length, grading: new segments are `segment_length` + `grading` s long, s from the tow point. [m], [-]
+        far_length, far_grading: farther than this from both ends, segments are joined to longer ones, by so much per
+            metre (`remeshing.join_far`); 0: none are. [m], [-]
+        run_in: length L₀ beside the tow point in which segments are shorter (`spacing`), 0 for none. [m]
+        free_end: whether the far end is a free tail instead of the drum.
+        tail_drag: ½ρC_dA of a drogue there. [kg/m]
+    """
+
+    segment_length: float = 1.0
+    grading: float = 0.0
+    far_length: float = 0.0
+    far_grading: float = 0.0
+    run_in: float = 0.0
+    free_end: bool = False
+    tail_drag: float = 0.0
+
+
+class Solver(Record):
+    """How a step is solved, and whether its matrix can be used again.
+
+    Attributes:
+        tolerance: how exactly, see `time_step`. [-]
+        smoothing: T₀ of the slack law in force. [N]
+        factored: whether the blocks hold the factors of the last Newton matrix.
+    """
+
+    tolerance: float = TOLERANCE
+    smoothing: float = SMOOTHING
+    factored: bool = False
+
+
+class Solved(Record):
     """How the last iteration ended.
 
     Attributes:
@@ -45,61 +78,60 @@ class Solved:
     worst_equation: int = 0
 
 
-@dataclass(kw_only=True)
-class Ends:
-    """What a cable has once: its growing end at the drum, its tow point, and how it is solved.
+class Tow(Record):
+    """The force on the vehicle, and how it answers to the place of the tow point.
+
+    Attributes:
+        force: at level NEW (3,). [N]
+        past: the same at levels NOW and BEFORE (2, 3). [N]
+        largest: the largest so far. [N]
+        by_tow, by_block: derivatives of the force by the tow point's position (3, 3) and by the unknowns of the first
+            block (3, 4).
+        answer: minus the answer of the first block's unknowns (columns) to a displacement of the tow point (rows)
+            (3, 4), from the last Newton matrix.
+    """
+
+    force: np.ndarray
+    past: np.ndarray
+    largest: float
+    by_tow: np.ndarray
+    by_block: np.ndarray
+    answer: np.ndarray
+
+
+class Ends(Record):
+    """What a cable has once: its growing end at the drum, its tow point, and how it is divided and solved.
 
     Attributes:
         count: number of segments.
+        settled: length of all segments but the last. [m]
         last_length: length of the last, growing segment (3 levels,). [m]
         payout: rate dS/dt at which cable enters the water (3 levels,). [m/s]
-        free_end: whether the far end is a free tail instead of the drum.
-        tail_drag: ½ρC_dA of a drogue there. [kg/m]
         drum_mode: what the drum does (`cable.drum`).
         drum_pull: tension at the drum at level NEW. [N]
         drum_force: the cable's pull on it, with what acts across the last half segment (3,). [N]
-        previous_step: t_now − t_before, 0 after a start. [s]
-        smoothing: T₀ of the slack law in force. [N]
-        tolerance: how exactly a step is solved, see `time_step`. [-]
-        time: of level NOW. [s]
-        segment_length, grading: new segments are `segment_length` + `grading` s long, s from the tow point. [m], [-]
-        run_in: length L₀ beside the tow point in which segments are shorter (`spacing`), 0 for none. [m]
-        settled: length of all segments but the last. [m]
         drum_velocity: of the drum at level NEW (3,). [m/s]
-        tow_force: force on the vehicle at level NEW (3,). [N]
-        past_force: the same at levels NOW and BEFORE (2, 3), and `largest_force`, the largest so far. [N]
-        tow_by_tow, tow_by_block: derivatives of the tow force by the tow point's position (3, 3) and by the
-            unknowns of the first block (3, 4).
-        tow_answer: minus the answer of the first block's unknowns (columns) to a displacement of the tow point
-            (rows) (3, 4), from the last Newton matrix.
-        factored: whether the blocks hold the factors of that matrix.
+        time: of level NOW. [s]
+        previous_step: t_now − t_before, 0 after a start. [s]
+        layout: how the cable is divided, and what its far end is.
+        tow: the force on the vehicle.
+        solver: how a step is solved.
         solved: how the last step that was tried was solved.
     """
 
     count: int
-    free_end: bool
-    tail_drag: float
+    settled: float
     last_length: np.ndarray
     payout: np.ndarray
     drum_mode: int
     drum_pull: float
     drum_force: np.ndarray
-    previous_step: float
-    smoothing: float
-    tolerance: float
-    time: float
-    segment_length: float
-    grading: float
-    run_in: float
-    settled: float
     drum_velocity: np.ndarray
-    tow_force: np.ndarray
-    past_force: np.ndarray
-    largest_force: float
-    tow_by_tow: np.ndarray
-    tow_by_block: np.ndarray
-    tow_answer: np.ndarray
-    factored: bool
+    time: float
+    previous_step: float
+    layout: Layout
+    tow: Tow
+    solver: Solver
     solved: Solved
 
 
@@ -150,36 +182,33 @@ LOWER, DIAGONAL, UPPER, LOWER2, UPPER2 = range(5)
 def new_line(capacity: int) -> Line:
     """Return an empty line with room for `capacity` segments."""
     n = capacity + 1
+    tow = Tow(
+        force=np.zeros(3),
+        past=np.zeros((2, 3)),
+        largest=0.0,
+        by_tow=np.zeros((3, 3)),
+        by_block=np.zeros((3, 4)),
+        answer=np.zeros((3, 4)),
+    )
     ends = Ends(
         count=0,
-        free_end=False,
-        tail_drag=0.0,
+        settled=0.0,
         last_length=np.zeros(3),
         payout=np.zeros(3),
         drum_mode=TURNING,
         drum_pull=0.0,
         drum_force=np.zeros(3),
-        previous_step=0.0,
-        smoothing=SMOOTHING,
-        tolerance=TOLERANCE,
-        time=0.0,
-        segment_length=1.0,
-        grading=0.0,
-        run_in=0.0,
-        settled=0.0,
         drum_velocity=np.zeros(3),
-        tow_force=np.zeros(3),
-        past_force=np.zeros((2, 3)),
-        largest_force=0.0,
-        tow_by_tow=np.zeros((3, 3)),
-        tow_by_block=np.zeros((3, 4)),
-        tow_answer=np.zeros((3, 4)),
-        factored=False,
+        time=0.0,
+        previous_step=0.0,
+        layout=Layout(),
+        tow=tow,
+        solver=Solver(),
         solved=Solved(),
     )
     per_node = {name: np.zeros((3, n, 3)) for name in ("position", "velocity", "momentum", "water")}
     return Line(
-        ends=packed(ends),
+        ends=ends,
         **per_node,
         tension=np.zeros((3, n)),
         length=np.zeros(n),
@@ -205,7 +234,7 @@ def enlarged(line: Line, capacity: int) -> Line:
 @inlined
 def held_node(line: Line) -> int:
     """Return the index of the node that the drum holds; with a free end, one beyond the last."""
-    return line.ends.count + 1 if line.ends.free_end else line.ends.count
+    return line.ends.count + 1 if line.ends.layout.free_end else line.ends.count
 
 
 @inner
@@ -215,11 +244,11 @@ def spacing(line: Line) -> float:
     Δs + g s; and, within the first metres L₀ (`run_in`), Δs (√(s/L₀) + Δs/4L₀) + g s: then, without grading, node j is
     at s = (jΔs)²/4L₀. So a cable that begins with no length soon has as many segments as it needs.
     """
-    ends = line.ends
+    layout, settled = line.ends.layout, line.ends.settled
     share = 1.0
-    if ends.run_in > 0.0:
-        share = min(1.0, np.sqrt(ends.settled / ends.run_in) + 0.25 * ends.segment_length / ends.run_in)
-    return share * ends.segment_length + ends.grading * ends.settled
+    if layout.run_in > 0.0:
+        share = min(1.0, np.sqrt(settled / layout.run_in) + 0.25 * layout.segment_length / layout.run_in)
+    return share * layout.segment_length + layout.grading * settled
 
 
 @inner

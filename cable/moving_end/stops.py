@@ -82,8 +82,8 @@ def _remedy(line: Line, drum: DrumNumbers, c: CableNumbers, words: Names) -> str
     if hasattr(c, "bending_stiffness"):
         return f"a longer {words.segment}, or bending_stiffness = 0"
     length = float(line.ends.settled + line.ends.last_length[NOW])
-    if drum.control == TENSION and length < SHORT_SEGMENTS * float(line.ends.segment_length):
+    if drum.control == TENSION and length < SHORT_SEGMENTS * float(line.ends.layout.segment_length):
         return f"more {words.wet}, or a shorter {words.step}"
-    if drum.control == LENGTH and not line.ends.free_end:
+    if drum.control == LENGTH and not line.ends.layout.free_end:
         return f"{words.yielding}, compliance = 1e-3, or a higher {words.rate}"
     return f"a shorter {words.step}, or a longer {words.segment}"

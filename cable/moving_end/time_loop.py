@@ -202,7 +202,7 @@ def write_row(line: Line, record: Record, k: int, used: int, c: CableNumbers) ->
     record.length[k] = line.ends.settled + line.ends.last_length[NOW]
     record.segments[k] = N
     for i in range(3):
-        record.tow_force[k, i] = line.ends.tow_force[i]
+        record.tow_force[k, i] = line.ends.tow.force[i]
     for j in range(N + 1):
         for i in range(3):
             record.position[used + j, i] = line.position[NOW, j, i]
@@ -222,8 +222,8 @@ def pull_out(task: PullOut, scheme: MovingEnd) -> History:
     direction = first_direction(path.leaving - led[:, VELOCITY:SETPOINT])
     path.place[:] += start.shape[0] - start.shape[-1] if isinstance(start, Equilibrium) else wet * direction
     line = new_line(_capacity(task, path, led, segment_length, scheme))
-    line.ends.segment_length, line.ends.grading = segment_length, scheme.grading
-    line.ends.tolerance, line.ends.run_in = scheme.tolerance, scheme.run_in
+    line.ends.layout.segment_length, line.ends.layout.grading = segment_length, scheme.grading
+    line.ends.solver.tolerance, line.ends.layout.run_in = scheme.tolerance, scheme.run_in
     c, drum = task.cable.numbers(), task.drum.numbers()
     drum.velocity[:] = led[0, VELOCITY:SETPOINT]
     if isinstance(start, Equilibrium):
@@ -243,9 +243,10 @@ def tow(task: Tow, scheme: MovingEnd) -> History:
     line, c, idle = new_line(count), task.cable.numbers(), DrumProperties().numbers()
     J, tail_drag = task.current.at((0.0, 0.0, 0.0)), task.tail_drag
     uphill = steady_direction(path.leaving, J, task.cable, tail_drag)
-    line.ends.segment_length = task.length / count
+    line.ends.layout.segment_length = task.length / count
     lay_straight(line, task.length, uphill, path.leaving[0], idle, c)
-    line.ends.free_end, line.ends.tail_drag, line.ends.tolerance = True, tail_drag, scheme.tolerance
+    line.ends.layout.free_end, line.ends.layout.tail_drag = True, tail_drag
+    line.ends.solver.tolerance = scheme.tolerance
     set_steady_tow(line, path.leaving[0], J, task.cable, tail_drag)
     path.place[:] += line.position[NOW, 0]
     origin = -line.position[NOW, 0]
@@ -340,8 +341,8 @@ def estimate_error(line: Line, step: float) -> float:
     """Return the relative error of the tow force on level NEW; 0 when there is no history to tell. [-]."""
     if line.ends.previous_step <= 0.0:
         return 0.0
-    ratio, F, past = step / line.ends.previous_step, line.ends.tow_force, line.ends.past_force
-    gap, size = 0.0, line.ends.largest_force * line.ends.largest_force
+    ratio, F, past = step / line.ends.previous_step, line.ends.tow.force, line.ends.tow.past
+    gap, size = 0.0, line.ends.tow.largest * line.ends.tow.largest
     for i in range(3):
         gap += (F[i] - past[0, i] - ratio * (past[0, i] - past[1, i])) ** 2
     return sqrt(gap / max(size, 1e-30)) / 3.0
@@ -350,12 +351,12 @@ def estimate_error(line: Line, step: float) -> float:
 @inner
 def note_force(line: Line) -> None:
     """Remember the tow force of an accepted step."""
-    square, F = 0.0, line.ends.tow_force
+    square, F = 0.0, line.ends.tow.force
     for i in range(3):
-        line.ends.past_force[1, i] = line.ends.past_force[0, i]
-        line.ends.past_force[0, i] = F[i]
+        line.ends.tow.past[1, i] = line.ends.tow.past[0, i]
+        line.ends.tow.past[0, i] = F[i]
         square += F[i] * F[i]
-    line.ends.largest_force = max(line.ends.largest_force, sqrt(square))
+    line.ends.tow.largest = max(line.ends.tow.largest, sqrt(square))
 
 
 @inner

@@ -84,7 +84,7 @@ def try_step(
     failed, converged = 0, False
     for change in range(MOST_DRUM_CHANGES):
         converged = _solve_softly(line, step, tow, water, c, drum, work, again and change == 0)
-        if line.ends.count == 1 or drum.control != FREE or line.ends.free_end:
+        if line.ends.count == 1 or drum.control != FREE or line.ends.layout.free_end:
             break
         mode = next_mode(line.ends.drum_mode, converged, line.ends.payout[NEW], line.ends.drum_pull, drum)
         if not converged:
@@ -103,7 +103,7 @@ def try_step(
 def _takes_up(line: Line, drum: DrumNumbers) -> bool:
     """Say whether a free drum would have taken up cable."""
     taken_up = line.ends.last_length[NOW] - line.ends.last_length[NEW] > TAKEN_UP
-    return taken_up and drum.control == FREE and not line.ends.free_end
+    return taken_up and drum.control == FREE and not line.ends.layout.free_end
 
 
 @compiled
@@ -136,14 +136,14 @@ def _solve_softly(
     for j in range(1, line.ends.count + 1):
         line.tension[NEW, j] = max(line.tension[NEW, j], pull)
     spent = line.ends.solved.iterations
-    line.ends.smoothing = SOFTEST
+    line.ends.solver.smoothing = SOFTEST
     while True:
         converged = solve_step(line, w, c, drum, work, False)
         spent += line.ends.solved.iterations
-        if not converged or line.ends.smoothing <= SMOOTHING:
+        if not converged or line.ends.solver.smoothing <= SMOOTHING:
             break
-        line.ends.smoothing = max(0.1 * line.ends.smoothing, SMOOTHING)
-    line.ends.smoothing = SMOOTHING
+        line.ends.solver.smoothing = max(0.1 * line.ends.solver.smoothing, SMOOTHING)
+    line.ends.solver.smoothing = SMOOTHING
     line.ends.solved.iterations = spent
     return converged
 
@@ -168,7 +168,7 @@ def _predict(
     rate, last = line.ends.payout, line.ends.last_length
     growth = step * (rate[NOW] + 0.5 * ratio * (rate[NOW] - rate[BEFORE]))
     last[NEW] = max(last[NOW] + (0.0 if line.ends.drum_mode == STANDING else growth), 0.5 * last[NOW])
-    if not line.ends.free_end:
+    if not line.ends.layout.free_end:
         pull = max(line.node_tension[N], 0.0)
         line.tension[NEW, N] = max(pull + (line.tension[NOW, N] - pull) * last[NEW] / last[NOW], KNOWN)
     feel_water(line, water, line.ends.time + step)
@@ -200,8 +200,8 @@ def solve_step(
             return _solved(line, rounding, True, iteration)
         if not made:
             assemble(line, w, c, drum, work)
-        line.ends.factored = factor_step(line, c)
-        if not line.ends.factored:
+        line.ends.solver.factored = factor_step(line, c)
+        if not line.ends.solver.factored:
             break
         solve_factored(line, c)
         last_length, before, fraction = save_guess(line), merit, 1.0
@@ -224,7 +224,7 @@ def _residual(line: Line, w: Weights, c: CableNumbers, drum: DrumNumbers, work: 
         assemble_residual(line, w, c, drum, work)
     else:
         assemble(line, w, c, drum, work)
-        line.ends.factored = False
+        line.ends.solver.factored = False
 
 
 @compiled
@@ -248,7 +248,7 @@ def go_from_guess(line: Line, last_length: float, fraction: float) -> None:
         if j < held:
             for i in range(3):
                 line.position[NEW, j, i] = guess[j, 1 + i] - fraction * step[j, 1 + i]
-    if line.ends.free_end:
+    if line.ends.layout.free_end:
         return
     line.ends.last_length[NEW] = max(last_length - fraction * step[N, 1], 0.1 * last_length, SMALLEST_SEGMENT)
 
@@ -257,16 +257,18 @@ def go_from_guess(line: Line, last_length: float, fraction: float) -> None:
 def _tolerances(line: Line, rounding: float) -> tuple[float, float]:
     """Return by how much a length equation [-] and a balance [N] may be off.
 
-    `ends.tolerance` is the share of the largest tension in the cable for balances, and of `slack_law.STRAIN_SCALE` for
-    lengths: 1e-9 is a strain of 1e-12.
+    `Solver.tolerance` is the share of the largest tension in the cable for balances, and of `slack_law.STRAIN_SCALE`
+    for lengths: 1e-9 is a strain of 1e-12.
     """
     tension, reach, x = 0.0, 0.0, line.position
     for j in range(1, line.ends.count + 1):
         tension = max(tension, abs(line.tension[NEW, j]))
         reach = max(reach, abs(x[NEW, j, 0]), abs(x[NEW, j, 1]), abs(x[NEW, j, 2]))
     known = 2.0 * ROUNDING / STRAIN_SCALE * reach / max(line.length[1], SMALLEST_SEGMENT)
-    strain = line.ends.tolerance + known
-    return strain, line.ends.tolerance * tension + ABSOLUTE_TOLERANCE + rounding * line.length[1] * reach
+    strain = line.ends.solver.tolerance + known
+    return strain, line.ends.solver.tolerance * tension + ABSOLUTE_TOLERANCE + rounding * line.length[
+        1
+    ] * reach
 
 
 @compiled
@@ -321,9 +323,9 @@ def impedance(line: Line, Z: np.ndarray) -> None:
     """
     for i in range(3):
         for k in range(3):
-            Z[i, k] = line.ends.tow_by_tow[i, k]
+            Z[i, k] = line.ends.tow.by_tow[i, k]
             for m in range(4):
-                Z[i, k] -= line.ends.tow_by_block[i, m] * line.ends.tow_answer[k, m]
+                Z[i, k] -= line.ends.tow.by_block[i, m] * line.ends.tow.answer[k, m]
 
 
 @inner
@@ -333,7 +335,7 @@ def follow_tow(line: Line, tow: np.ndarray) -> bool:
     False, and nothing has moved, if there are none.
     """
     step, at, L = line.rows[RESIDUAL], line.position[NEW, 0], line.blocks[LOWER]
-    if not line.ends.factored:
+    if not line.ends.solver.factored:
         return False
     for j in range(1, line.ends.count + 1):
         for m in range(SIZE):

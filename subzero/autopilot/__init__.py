@@ -29,7 +29,7 @@ A_k, B_k     linear model along a run                SI          along
 k, k_I       feedback and integral gains             SI          design
 δ_ff         feed-forward, against hull and cable    SI          standard
 
-`hull_state_space` and `trim_point` stand in `subzero.steady_motion`: a run may start in trim.
+`hull_state_space`, `trim_point` and `trim` stand in `subzero.steady_motion`: a run may start in trim.
 """
 
 from importlib import import_module
@@ -42,6 +42,7 @@ _HOME = {
     "AutopilotError": "subzero.autopilot.flight",
     "AutopilotWarning": "subzero.autopilot.flight",
     "CableModel": "subzero.autopilot.feed_forward",
+    "Discretisation": "subzero.autopilot.coupled_plant",
     "ESTIMATED": "subzero.autopilot.sensors",
     "EstimatorLoop": "subzero.autopilot.estimator",
     "FEED_FORWARD": "subzero.autopilot.registry",
@@ -56,6 +57,7 @@ _HOME = {
     "NoCable": "subzero.autopilot.feed_forward",
     "NoTrimError": "subzero.steady_motion.trim_point",
     "PERFECT": "subzero.autopilot.sensors",
+    "Pilot": "subzero.autopilot.steps",
     "STATES": "subzero.steady_motion.hull_state_space",
     "STEPS": "subzero.autopilot.steps",
     "SUBSYSTEMS": "subzero.autopilot.linear",
@@ -84,7 +86,7 @@ _HOME = {
     "reduced": "subzero.autopilot.design",
     "step": "subzero.autopilot.steps",
     "subsystem": "subzero.autopilot.linear",
-    "trim": "subzero.steady_motion.trim_point",
+    "trim": "subzero.steady_motion.trim",
     "tune": "subzero.autopilot.tuning",
     "with_weights": "subzero.autopilot.design",
 }

@@ -13,19 +13,19 @@ stored, restored and stepped again from anywhere.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass, fields
 from math import remainder, tau
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-import vehicle
 from cable.moving_end import enlarged
 from scenarios import Start, Trial
 from subzero.engine.coupling import FINE
 from subzero.engine.initial_conditions import RUN_IN, prepare
 from subzero.engine.recording import new_recording
 from subzero.engine.time_loop import NO_ROOM, SPARE, run_rows
-from subzero.errors import UserError
+from subzero.errors import UserError, checked
 from subzero.model import Model
 from subzero.run_state import Live, Orders
 from subzero.simulation import in_words
@@ -38,6 +38,7 @@ from subzero.steady_motion.hull_state_space import (
     to_vehicle,
 )
 from subzero.steady_motion.trim_point import Trim
+from vehicle import rotation
 from vehicle.state import CHARGE, LINKAGE
 
 if TYPE_CHECKING:
@@ -105,7 +106,7 @@ class Tethered:
         self._setup, live = prepare(trial, model, True)
         self._setup = self._setup._replace(orders=Orders(np.zeros(1), np.zeros((1, 4))))
         if exact:
-            live.line.ends.tolerance, self._setup.fixed.agreement = EXACT, EXACT  # type: ignore[misc]  # a record
+            live.line.ends.solver.tolerance, self._setup.fixed.agreement = EXACT, EXACT
         room = int((longest + RUN_IN) / trial.segment_length) + SPARE + 4
         self._live = live._replace(line=enlarged(live.line, max(room, live.line.length.size)))
         self._memory = Memory(self._live)
@@ -141,7 +142,7 @@ class Tethered:
         self._memory.write(x[HULL_SIZE:])
         self._setup.orders.values[0] = u
         times = np.array([t, t + self.sample_time])
-        _, _, ending = run_rows(self._setup, live, self._recording, times, 1, 2, 0, 1)
+        _, _, ending = run_rows(self._setup, live, self._recording, times, 1, 2, 0, 1, 1)
         if ending == NO_ROOM:
             raise NoRoomError(
                 f"plant: at t = {t:g} s there is no room for more than longest = {self._longest:g} m of cable."
@@ -164,7 +165,7 @@ class Tethered:
         levels = flat[places["last_length"]]
         length = levels[1] + flat[places["length"]][1:count].sum()
         F, R = flat[places["force"]], np.empty((3, 3))
-        vehicle.rotation(to_vehicle(x[: len(STATE_NAMES)])[3:7], R)
+        rotation(to_vehicle(x[: len(STATE_NAMES)])[3:7], R)
         pull = R.T @ F
         tensions = (np.linalg.norm(F), flat[places["node_tension"]][count])
         return np.concatenate([x[: len(STATE_NAMES)], [length, *tensions], pull, np.cross(self._r_c, pull)])
@@ -204,16 +205,67 @@ class Memory:
             view[...] = values if view.dtype.kind == "f" else np.rint(values).astype(view.dtype)
 
 
+def _numbers_of(name: str, memory: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
+    """Walk through the numbers in a field: the field itself, or those of the record that it is."""
+    if memory.dtype.names is None:
+        yield name, memory
+    for part in memory.dtype.names or ():
+        yield f"{name}.{part}", memory[part]
+
+
 def _views(live: Live) -> Iterator[tuple[str, np.ndarray]]:
     """Walk through what is kept: name, view of the memory."""
     for name in OF_NOW:
-        yield name, live.now.base[name]  # type: ignore[attr-defined]  # a packed record
-    for name in live.line.ends.base.dtype.names:  # type: ignore[attr-defined]
+        yield name, live.now.memory_of(name)
+    for name in live.line.ends.names:
         if name not in NOT_KEPT:
-            yield name, live.line.ends.base[name]  # type: ignore[attr-defined]
+            yield from _numbers_of(name, live.line.ends.memory_of(name))
     for name, values in zip(live.line._fields[1:], live.line[1:], strict=True):
         if name not in NOT_KEPT:
             yield name, values
+
+
+@dataclass(frozen=True, kw_only=True)
+class Discretisation:
+    """How a tethered plant is made discrete.
+
+    Attributes:
+        sample_time: of the plant: one exchange of hull and cable. [s]
+        hull_step: time step of the hull. [s]
+        segment_length: of the cable. [m]
+        longest: length of cable that there is room for. [m]
+
+    Raises:
+        UserError: what is no positive number; a sample time shorter than the hull's step.
+    """
+
+    sample_time: float = 0.1
+    hull_step: float = 0.02
+    segment_length: float = 0.5
+    longest: float = 50.0
+
+    def __post_init__(self) -> None:
+        """Refuse what is no step and no length, and a sample without a step of the hull."""
+        for field in fields(self):
+            value = checked("Discretisation", field.name, getattr(self, field.name), above=0.0)
+            object.__setattr__(self, field.name, value)
+        if self.sample_time < self.hull_step:
+            raise UserError(
+                f"plant: a sample time of {self.sample_time:g} s is shorter than the hull's step of"
+                f" {self.hull_step:g} s. Allowed: at least one hull step."
+            )
+
+    @property
+    def steps(self) -> dict[str, float]:
+        """The steps by the names of a trial."""
+        return {
+            "cable_step": self.sample_time,
+            "hull_step": self.hull_step,
+            "segment_length": self.segment_length,
+        }
+
+
+AS_USUAL = Discretisation()
 
 
 def plant(
@@ -223,10 +275,7 @@ def plant(
     start: Trim | None = None,
     depth: float = 0.0,
     heading: float = 0.0,
-    sample_time: float = 0.1,
-    hull_step: float = 0.02,
-    segment_length: float = 0.5,
-    longest: float = 50.0,
+    discretisation: Discretisation = AS_USUAL,
 ) -> control.NonlinearIOSystem:
     """Return a model as a system for python-control, with named inputs, outputs and states (`INPUTS`, `STATES`).
 
@@ -240,28 +289,19 @@ def plant(
         start: the steady motion to begin with, its length of cable laid straight behind; at rest by default.
         depth: to begin at. [m]
         heading: to begin with. [rad]
-        sample_time: of the tethered plant: one exchange of hull and cable. [s]
-        hull_step: of the tethered plant. [s]
-        segment_length: of the cable. [m]
-        longest: length of cable that there is room for. [m]
+        discretisation: steps of the tethered plant, and its room for cable.
 
     Raises:
-        UserError: a sample time shorter than the hull's step; a start with more cable than `longest`.
+        UserError: a start with more cable than there is room for.
     """
     x = np.zeros(len(STATE_NAMES)) if start is None else start.state.copy()
     x[PLACE["depth"]], x[PLACE["heading"]] = depth, heading
     if not tethered:
         return _hull(model, x)
-    if sample_time < hull_step:
-        raise UserError(
-            f"plant: a sample time of {sample_time:g} s is shorter than the hull's step of {hull_step:g} s. Allowed:"
-            " at least one hull step."
-        )
-    wet = 0.0 if start is None else start.wet_length
+    wet, longest = 0.0 if start is None else start.wet_length, discretisation.longest
     if wet > longest:
         raise UserError(f"plant: {wet:g} m of cable to begin with are more than longest = {longest:g} m.")
-    steps = {"cable_step": sample_time, "hull_step": hull_step, "segment_length": segment_length}
-    return Tethered(blank_trial(model, x, wet, steps), model, longest, x=x).system()
+    return Tethered(blank_trial(model, x, wet, discretisation.steps), model, longest, x=x).system()
 
 
 def _hull(model: Model, initial: np.ndarray) -> control.NonlinearIOSystem:

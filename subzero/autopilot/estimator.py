@@ -19,8 +19,8 @@ from subzero.autopilot.design import Gains, Schedule, design_gains
 from subzero.autopilot.linear import linearise, subsystem
 from subzero.autopilot.loops import refuse_unknown
 from subzero.autopilot.tuning import Tuning
-from subzero.simulator import Observation
-from subzero.steady_motion.trim_point import trim
+from subzero.channels import Observation
+from subzero.steady_motion.trim import trim
 
 STATES = ("sway_speed", "yaw_rate", "heading", "rudder_angle")
 TRACKED = ("yaw_rate", "heading")

@@ -31,9 +31,10 @@ import scenarios
 from cable.properties import CableProperties
 from subzero.autopilot.sensors import UNKNOWN
 from subzero.autopilot.tuning import Tuning
+from subzero.channels import Observation
 from subzero.errors import UserError
 from subzero.model import Model
-from subzero.simulator import Observation, RunStoppedError, Simulator
+from subzero.simulator import RunStoppedError, Simulator
 
 SHORTEST_STEP = 0.01
 """The angle is moved on in steps of at most this. [s]"""

@@ -14,11 +14,11 @@ import scenarios
 from scenarios.steps import holding_rows
 from subzero.autopilot.sensors import PERFECT, Sensor, Sensors
 from subzero.autopilot.standard import Wanted
-from subzero.channels import DEGREE
-from subzero.errors import BadValueError, UserError, real, short
+from subzero.channels import DEGREE, Observation
+from subzero.errors import BadValueError, UserError, short
 from subzero.model import Model
 from subzero.simulation import Progress
-from subzero.simulator import COMMANDED, CommandError, Observation, RunStoppedError, Simulator
+from subzero.simulator import COMMANDED, CommandError, RunStoppedError, Simulator
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -51,10 +51,6 @@ class AutopilotWarning(UserWarning):
     """A flight ended early: its autopilot gave no valid command."""
 
 
-LONGEST = 86400.0
-"""A flight lasts a day at most, as a trial does. [s]"""
-
-
 def fly(
     scenario: str | Path | scenarios.Trial,
     autopilot: Autopilot,
@@ -62,22 +58,19 @@ def fly(
     *,
     tethered: bool = True,
     model: Model | None = None,
-    duration: float | None = None,
-    sensors: Sequence[Sensor] = PERFECT,
-    seed: int = 0,
+    sensors: Sensors | Sequence[Sensor] = PERFECT,
     progress: Progress | None = None,
 ) -> xr.Dataset:
     """Simulate a scenario with its commands from an autopilot, and return the run.
 
     Args:
-        scenario: where it starts, in what water, with what cable; its commands are not used.
+        scenario: where it starts, in what water, with what cable, and how long it lasts, to the first sample that
+            reaches its end (``dataclasses.replace(trial, duration=60.0)`` is another); its commands are not used.
         autopilot: gives the commands.
         wanted: the set-point as a function of time [s].
         tethered: with the cable.
         model: the true model, if not the scenario's; the autopilot may be designed for another.
-        duration: how long, to the first sample that reaches it; the scenario's by default. [s]
-        sensors: through which the autopilot sees the run.
-        seed: of the sensors.
+        sensors: through which the autopilot sees the run; `Sensors` have a seed, which is 0 for plain ones.
         progress: told the fraction that is done.
 
     Returns:
@@ -87,16 +80,15 @@ def fly(
 
     Raises:
         AutopilotError: the autopilot raised an error of its own.
-        UserError: a sample time that does not fit the trial's cable step, what is no autopilot, a duration of nothing,
-            a goal that is none.
+        UserError: a sample time that does not fit the trial's cable step, what is no autopilot, a goal that is none.
     """
-    _check(autopilot, duration)
+    _check(autopilot)
     sim = Simulator(scenario, tethered=tethered, model=model, sample_time=autopilot.sample_time)
-    told = Sensors(sensors, seed=seed)
+    told = sensors if isinstance(sensors, Sensors) else Sensors(sensors)
     autopilot.reset()
-    end = sim.trial.duration if duration is None else duration
+    told.reset()
     goals, trouble, seen = [(0.0, *_goal(wanted, 0.0)[:3])], "", sim.observation
-    samples = max(1, ceil(end / sim.sample_time - 1e-9))
+    samples = max(1, ceil(sim.trial.duration / sim.sample_time - 1e-9))
     for sample in range(samples):
         goal = _goal(wanted, seen.time)
         goals.append((seen.time, *goal[:3]))
@@ -154,17 +146,12 @@ def _command(autopilot: Autopilot, reading: Observation, goal: Wanted) -> Sequen
     return command
 
 
-def _check(autopilot: Autopilot, duration: float | None) -> None:
+def _check(autopilot: Autopilot) -> None:
     """Refuse what cannot fly."""
     missing = [name for name in ("name", "sample_time", "reset", "update") if not hasattr(autopilot, name)]
     if missing:
         raise UserError(
             f"{type(autopilot).__name__} has no {', '.join(missing)}. Allowed: an object as `Autopilot` says."
-        )
-    time = 1.0 if duration is None else real(duration)
-    if time is None or not 0.0 < time <= LONGEST:
-        raise UserError(
-            f"fly: the duration is {short(duration)}. Allowed: a time above 0 s, up to {LONGEST:g} s."
         )
 
 

@@ -24,12 +24,12 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-import vehicle
 from subzero.autopilot.cable_modes import BENDS, CableModes
 from subzero.errors import UserError, suggestion
 from subzero.model import Model
 from subzero.steady_motion.hull_state_space import INPUT_NAMES, STATE_NAMES, VELOCITY, ideal, rate, to_vehicle
 from subzero.steady_motion.trim_point import SteadyPull, Trim
+from vehicle import rotation
 from vehicle.rigid_body import skew
 
 if TYPE_CHECKING:
@@ -194,7 +194,7 @@ def _way(model: Model, steady: Trim) -> np.ndarray:
 def _rotation(x: np.ndarray) -> np.ndarray:
     """Return R_nb (3, 3) of a state (16,)."""
     R = np.empty((3, 3))
-    vehicle.rotation(to_vehicle(x)[3:7], R)
+    rotation(to_vehicle(x)[3:7], R)
     return R
 
 

@@ -15,8 +15,8 @@ from dataclasses import dataclass
 from math import inf, isfinite
 
 from subzero.autopilot.design import Schedule
+from subzero.channels import Observation
 from subzero.errors import UserError
-from subzero.simulator import Observation
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -20,12 +20,12 @@ import scenarios
 from subzero.autopilot import indices
 from subzero.autopilot.flight import fly
 from subzero.autopilot.standard import Wanted
+from subzero.channels import Observation
 from subzero.errors import UserError, checked, chosen
 from subzero.model import Model, load, model_of
 from subzero.simulation import Progress
-from subzero.simulator import Observation
 from subzero.steady_motion.hull_state_space import INPUT_NAMES
-from subzero.steady_motion.trim_point import trim
+from subzero.steady_motion.trim import trim
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -268,11 +268,8 @@ def manoeuvre(
     inner = _checked_size(line, asked, model)
     straight = tuple(trim(model, speed=speed).command.tolist())
     program = line.program(straight=straight, size=inner, name=name, sample_time=trial.cable_step)
-    begin = replace(trial, start=replace(trial.start, surge_speed=speed))
-    run = fly(
-        begin, program, lambda t: _NOTHING, tethered=tethered, model=model, duration=RUN_IN + line.duration,
-        progress=progress,
-    )  # fmt: skip
+    begin = replace(trial, start=replace(trial.start, surge_speed=speed), duration=RUN_IN + line.duration)
+    run = fly(begin, program, lambda t: _NOTHING, tethered=tethered, model=model, progress=progress)
     run = run.drop_vars(["wanted_speed", "wanted_heading", "wanted_depth"])
     return run, line.measure(_inner(run), inner)
 

@@ -16,8 +16,8 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
+from subzero.channels import Observation
 from subzero.errors import UserError, real, short, suggestion, whole
-from subzero.simulator import Observation
 
 GRACE = 1e-9
 """Times that differ by less than this are the same. [s]"""

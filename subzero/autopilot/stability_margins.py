@@ -21,7 +21,7 @@ from subzero.autopilot.linear import linearise, subsystem
 from subzero.autopilot.tuning import Tuning
 from subzero.errors import UserError, suggestion
 from subzero.model import Model
-from subzero.steady_motion.trim_point import trim
+from subzero.steady_motion.trim import trim
 
 if TYPE_CHECKING:
     import control

@@ -19,9 +19,10 @@ from subzero.autopilot.design import WEIGHTS
 from subzero.autopilot.feed_forward import CableModel, NoCable
 from subzero.autopilot.loops import Law, Loop
 from subzero.autopilot.tuning import Tuning
+from subzero.channels import Observation
 from subzero.errors import UserError
-from subzero.simulator import Observation
 from vehicle import Servo
+from vehicle.propeller import PropellerNumbers
 
 SLOWEST = 0.2
 """Below this speed the fins have no effect, and their loops do not integrate. [m/s]"""
@@ -180,9 +181,9 @@ class StandardAutopilot:
         return max(-STEEPEST, min(STEEPEST, climb))
 
 
-def propeller_for(force: float, u: float, numbers: object) -> float:
+def propeller_for(force: float, u: float, numbers: PropellerNumbers) -> float:
     """Return n [rev/s] that gives a thrust [N] at a surge speed [m/s]: the root n of a n|n| − b |n| u − c u|u| = F."""
-    a, b, c = numbers.thrust_nn, numbers.thrust_nu, numbers.thrust_uu  # type: ignore[attr-defined]
+    a, b, c = numbers.thrust_nn, numbers.thrust_nu, numbers.thrust_uu
     if a == 0.0:
         return 0.0
     root = (b * u) ** 2 + 4.0 * a * (force + c * u * abs(u))

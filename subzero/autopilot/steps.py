@@ -7,16 +7,16 @@ from math import radians
 from typing import TYPE_CHECKING
 
 import scenarios
-from subzero.autopilot.flight import fly
+from subzero.autopilot.flight import Autopilot, fly
 from subzero.autopilot.indices import step_response
 from subzero.autopilot.registry import make
-from subzero.autopilot.sensors import PERFECT, Sensor
+from subzero.autopilot.sensors import PERFECT, Sensor, Sensors
 from subzero.autopilot.standard import Wanted
 from subzero.autopilot.tuning import Tuning
 from subzero.errors import UserError, checked, chosen, real, short
-from subzero.model import Model, load, model_of
+from subzero.model import Model, load
 from subzero.simulation import Progress
-from subzero.steady_motion.trim_point import trim
+from subzero.steady_motion.trim import trim
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -45,19 +45,43 @@ STEPS = {
 """Step by name: degrees, m, m/s."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class Pilot:
+    """Who flies a step, with what knowledge.
+
+    Attributes:
+        autopilot: one of `AUTOPILOTS`, or the path of a Python file with one.
+        feed_forward: one of `FEED_FORWARD`: what it knows of the cable.
+        tuning: gains; those of `tune` on what is believed by default.
+        believed: what it believes of vehicle, cable and water; the scenario's by default, which is what is true.
+        sensors: what it is told; `Sensors` have a seed.
+    """
+
+    autopilot: str = "pid"
+    feed_forward: str = "none"
+    tuning: Tuning | None = None
+    believed: Model | None = None
+    sensors: Sensors | Sequence[Sensor] = PERFECT
+
+    def made(self, trial: scenarios.Trial) -> Autopilot:
+        """Return the autopilot for a trial, with a sample for each cable step."""
+        return make(
+            self.autopilot, trial, feed_forward=self.feed_forward, sample_time=trial.cable_step, tuning=self.tuning,
+            believed=self.believed,
+        )  # fmt: skip
+
+
+PID = Pilot()
+
+
 def step(
     name: str,
     scenario: str | scenarios.Trial = "fig6",
     *,
-    autopilot: str = "pid",
-    feed_forward: str = "none",
+    pilot: Pilot = PID,
     size: float | None = None,
     speed: float = 1.0,
     tethered: bool = True,
-    model: Model | None = None,
-    tuning: Tuning | None = None,
-    sensors: Sequence[Sensor] = PERFECT,
-    seed: int = 0,
     progress: Progress | None = None,
 ) -> tuple[xr.Dataset, dict[str, float]]:
     """Return the run of a step and its indices: rise, overshoot, settling, steady error (in the channel's unit).
@@ -65,15 +89,10 @@ def step(
     Args:
         name: one of `STEPS`.
         scenario: whose vehicle, cable and start; its commands are not used.
-        autopilot: one of `AUTOPILOTS`.
-        feed_forward: one of `FEED_FORWARD`.
+        pilot: who flies; a PID autopilot that knows nothing of the cable by default.
         size: of the step, in degrees, m or m/s; the table's by default.
         speed: to hold. [m/s]
         tethered: with the cable.
-        model: what is true; the autopilot believes the scenario's.
-        tuning: gains.
-        sensors: what the autopilot is told.
-        seed: of the sensors.
         progress: told the fraction that is done.
 
     Raises:
@@ -89,12 +108,11 @@ def step(
     before = Wanted(speed, trial.start.heading, trial.start.depth)
     goal = before._replace(**{line.field: getattr(before, line.field) + size * line.scale})
     for fast in sorted({before.speed, goal.speed}):
-        trim(model_of(trial, model), speed=fast)  # refuses a speed that the bare hull does not reach
-    pilot = make(autopilot, trial, feed_forward=feed_forward, sample_time=trial.cable_step, tuning=tuning)
-    begin = replace(trial, start=replace(trial.start, surge_speed=speed))
+        trim(Model.of(trial), speed=fast)  # refuses a speed that the bare hull does not reach
+    begin = replace(trial, start=replace(trial.start, surge_speed=speed), duration=DURATION)
     run = fly(
-        begin, pilot, lambda t: goal if t >= STEP_AT - 1e-9 else before,
-        tethered=tethered, model=model, duration=DURATION, sensors=sensors, seed=seed, progress=progress,
+        begin, pilot.made(trial), lambda t: goal if t >= STEP_AT - 1e-9 else before,
+        tethered=tethered, sensors=pilot.sensors, progress=progress,
     )  # fmt: skip
     values = run[line.channel].values
     wanted = getattr(goal, line.field) / line.scale

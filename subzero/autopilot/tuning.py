@@ -15,7 +15,8 @@ import numpy as np
 from subzero.autopilot.design import WEIGHTS, Gains, Schedule, Weights, checked, design_gains, reduced
 from subzero.autopilot.linear import linearise, subsystem
 from subzero.model import Model
-from subzero.steady_motion.trim_point import Trim, trim
+from subzero.steady_motion.trim import trim
+from subzero.steady_motion.trim_point import Trim
 from vehicle.propeller import thrust
 
 if TYPE_CHECKING:

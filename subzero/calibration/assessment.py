@@ -58,7 +58,8 @@ def estimates(numbers: Sequence[Number], work: Fitted) -> tuple[Estimate, ...]:
 def correlation(M: np.ndarray) -> np.ndarray:
     """Return the correlations of a covariance (n, n)."""
     sd = np.sqrt(np.diag(M))
-    return M / np.outer(sd, sd)
+    found: np.ndarray = M / np.outer(sd, sd)
+    return found
 
 
 def directions(numbers: Sequence[Number], M: np.ndarray) -> tuple[Direction, ...]:
@@ -283,7 +284,8 @@ def advice(numbers: Sequence[Number], work: Fitted, progress: Progress) -> tuple
 def _information(coming: Problem, z: np.ndarray) -> np.ndarray:
     """Return JᵀJ of a trial to come (k, k)."""
     J = coming.jacobian(z)
-    return J.T @ J
+    information: np.ndarray = J.T @ J
+    return information
 
 
 def _with_new_start(M: np.ndarray) -> np.ndarray:

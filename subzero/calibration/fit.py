@@ -187,7 +187,8 @@ def covariance(problem: Problem, fit: Fit) -> np.ndarray:
     scores = block_scores(problem, fit)
     robust = M @ (np.diag(1.0 / fit.D) + scores.T @ scores) @ M
     factor = np.sqrt(np.maximum(np.diag(robust) / np.diag(M), 1.0))
-    return factor[:, None] * M * factor
+    inflated: np.ndarray = factor[:, None] * M * factor
+    return inflated
 
 
 def block_scores(problem: Problem, fit: Fit) -> np.ndarray:

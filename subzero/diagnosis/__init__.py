@@ -10,12 +10,75 @@ symbol       name                                                     unit      
 -----------  -------------------------------------------------------  ------------  --------------------------
 z            deviations of all parameters from the nominal model      their own     hypothesis.effect
 τ, s         prior standard deviations: tolerance, size of an effect  as z          hypothesis.effect
-h(z)         what the sensors would have measured                     channel's     inference.measurement
+h(z)         what the sensors would have measured                     channel's     inference.simulator
 W            whitening by the noise: level, colour, gaps              1             inference.noise
 r, J         whitened residual W (y − h(z)), and ∂(W h)/∂z            1             inference.problem
 κ            scale of all tolerances, mixed over 1, 2, 4              1             inference.linear_gaussian
 D            squared Mahalanobis distance to the closest rival        1             assessment.identifiability
 
-`api` is the way in; `results` are the values that come out. Reading order: hypothesis, inference, assessment, verdict,
-report.
+Reading order: `api`, the way in; `results`, the values that come out; then hypothesis, inference, assessment, verdict,
+report. What a user needs has its name here, and comes from its file when it is first used: compiled code imports the
+configuration, and an edit of a report must not compile it again. The engine's parts have faces of their own,
+`subzero.diagnosis.inference` and `subzero.diagnosis.assessment`.
 """
+
+from importlib import import_module
+from typing import Any
+
+_HOME = {
+    "CALIBRATED": ("results", "CALIBRATED"),
+    "CAUSE_NAMED": ("results", "CAUSE_NAMED"),
+    "Cause": ("results", "Cause"),
+    "ChannelGain": ("results", "ChannelGain"),
+    "Curves": ("results", "Curves"),
+    "Detectability": ("results", "Detectability"),
+    "Effect": ("hypothesis.effect", "Effect"),
+    "Estimate": ("results", "Estimate"),
+    "Extended": ("results", "Extended"),
+    "Gain": ("results", "Gain"),
+    "Logged": ("hypothesis.logged", "Logged"),
+    "Misfit": ("results", "Misfit"),
+    "NOISE": ("hypothesis.catalogue", "NOISE"),
+    "NOTHING_NEAR": ("results", "NOTHING_NEAR"),
+    "NOTHING_WRONG": ("results", "NOTHING_WRONG"),
+    "NextTrial": ("results", "NextTrial"),
+    "ONSETS": ("hypothesis.catalogue", "ONSETS"),
+    "OUTSIDE": ("results", "OUTSIDE"),
+    "Parameter": ("hypothesis.effect", "Parameter"),
+    "Rival": ("results", "Rival"),
+    "SPECS": ("hypothesis.catalogue", "SPECS"),
+    "START": ("hypothesis.catalogue", "START"),
+    "Sensing": ("hypothesis.configuration", "Sensing"),
+    "Setting": ("hypothesis.configuration", "Setting"),
+    "UNDECIDED": ("results", "UNDECIDED"),
+    "Unknown": ("results", "Unknown"),
+    "Verdict": ("results", "Verdict"),
+    "all_effects": ("hypothesis.extended_model", "all_effects"),
+    "apply_extended": ("hypothesis.extended_model", "apply"),
+    "catalogue": ("hypothesis.catalogue", "catalogue"),
+    "diagnose": ("api", "diagnose"),
+    "diagnose_trials": ("api", "diagnose_trials"),
+    "extended_toml": ("report.toml_file", "text_of"),
+    "load_effects": ("hypothesis.catalogue", "load"),
+    "read_extended": ("report.toml_file", "read_extended"),
+    "unseen": ("hypothesis.extended_model", "unseen"),
+    "with_free_onset": ("hypothesis.effect", "with_free_onset"),
+    "with_onset": ("hypothesis.effect", "with_onset"),
+}
+"""Public name → (file, name there)."""
+
+__all__ = sorted(_HOME)
+
+
+def __getattr__(name: str) -> Any:
+    """Fetch a public name from its file, once."""
+    if name not in _HOME:
+        raise AttributeError(f"module '{__name__}' has no attribute '{name}'; it has {', '.join(__all__)}")
+    file, inner = _HOME[name]
+    value = getattr(import_module(f"{__name__}.{file}"), inner)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return __all__

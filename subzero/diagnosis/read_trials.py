@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 import scenarios
-from subzero.channels import BY_NAME
+from subzero.channels import BY_NAME, HEADING, turned
 from subzero.diagnosis.hypothesis.catalogue.sensors import NOISE, SPECS
 from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.logged import Logged
@@ -38,7 +38,7 @@ from subzero.records.consistency import (
     without_repeats,
 )
 from subzero.records.metadata import Metadata, read_metadata
-from subzero.records.record import HEADING, Record, fits, modelled, read_record, turned
+from subzero.records.record import Record, fits, modelled, read_record
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -60,7 +60,7 @@ def read_trials(
         paths: CSV files, or folders of them.
         scenario: the trial of every record whose sidecar does not name one.
         commands: "record" or "scenario", if a record's commands may differ from the scenario's.
-        simulated: the nominal simulation; `subzero.diagnosis.inference.measurement.respond` if None.
+        simulated: the nominal simulation; `subzero.diagnosis.inference.simulator.respond` if None.
 
     Raises:
         UserError: a record, or its sidecar, cannot be used.
@@ -159,7 +159,7 @@ def _checked(logged: Logged, sidecar: Metadata, simulated: Simulated | None) -> 
 
 def _nominal() -> Simulated:
     """Return the simulation itself; the compiler comes only with it."""
-    from subzero.diagnosis.inference.measurement import respond
+    from subzero.diagnosis.inference.simulator import respond
 
     return respond
 

@@ -21,7 +21,8 @@ import numpy as np
 from cable.drum_motion import lead_drum
 from cable.moving_end import NOW, accept, energy_flow, impedance, try_step
 from subzero.engine.energy import book, take_jolt_of_motion
-from subzero.engine.vehicle_step import advance_hull, follow_track, tow_point
+from subzero.engine.external_wrench import tow_point
+from subzero.engine.vehicle_step import advance_hull, follow_track
 from subzero.jit import compiled, inlined, inner, scratch
 from subzero.run_state import Live, Now, Setup
 from vehicle import STATE_SIZE
@@ -98,12 +99,12 @@ def _agree(setup: Setup, live: Live, start: float, span: float) -> int:
             return CABLE_FAILED
         # Before the test of agreement: how stiff the cable is says how well two forces can agree at all.
         impedance(live.line, live.now.Z)
-        if setup.fixed.prescribed or _forces_agree(live.now, live.line.ends.tow_force, setup.fixed.agreement):
+        if setup.fixed.prescribed or _forces_agree(live.now, live.line.ends.tow.force, setup.fixed.agreement):
             return FINE
         _mobility(
             setup.fixed.r_c, live.now.hull.rotation, setup.fixed.vehicle.inverse_mass, live.now.mobility
         )
-        size = _improve(span, live.now, live.line.ends.tow_force, size)
+        size = _improve(span, live.now, live.line.ends.tow.force, size)
     return DISAGREED
 
 
@@ -149,6 +150,8 @@ def _improve(span: float, now: Now, F: np.ndarray, last_size: float) -> float:
     A cable between slack and taut is a stiff and bent spring: a step after which the next one would be longer than
     itself (`last_size`) went too far. Returns the size of the step that stands. [N]
     """
+    # G(F + δ) ≈ G + (Z ∂x/∂F − I) δ = 0. The pull of the whole exchange is moved by δ, for its slope is known: so the
+    # tow point moves by ½h²A δ, and the cable answers with Z times that.
     M, b, Z, A = scratch(3, 3), scratch(1, 3)[0], now.Z, now.mobility
     for i in range(3):
         b[i] = F[i] - now.guess[i]
@@ -211,7 +214,7 @@ def _accept(setup: Setup, live: Live, start: float, span: float) -> None:
     steps = hull_steps(setup, span)
     for i in range(3):
         live.now.force_before[i] = live.now.force[i]
-        live.now.force[i] = live.line.ends.tow_force[i] if setup.fixed.tethered else 0.0
+        live.now.force[i] = live.line.ends.tow.force[i] if setup.fixed.tethered else 0.0
     for i in range(STATE_SIZE):
         live.state[i] = live.path[steps, i]
     if live.now.last_step == 0.0:

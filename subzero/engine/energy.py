@@ -18,7 +18,6 @@ from __future__ import annotations
 
 import numpy as np
 
-import vehicle
 from cable.moving_end import (
     ADDED_MASS,
     AT_DRUM,
@@ -32,10 +31,10 @@ from cable.moving_end import (
     energy_flow,
     take_jolt,
 )
-from subzero.engine.vehicle_step import feel_current, row_at, tow_wrench
-from subzero.external_force import add_missing
+from subzero.engine.external_wrench import add_missing, feel_current, row_at, tow_wrench
 from subzero.jit import allocating, inlined, inner
 from subzero.run_state import HEADING, LINEAR_ROWS, PITCH, TIME, Live, Setup
+from vehicle import kinetic_energy, power, rotation
 
 PROPELLER, HULL_LOSS, CABLE_LOSS, KINETIC, DRUM, ADDED, RESIDUAL = range(7)
 """Rows of `Ledger.total`, in the order of the energy channels. [J]"""
@@ -70,12 +69,17 @@ def book(setup: Setup, live: Live, start: float, span: float, steps: int) -> Non
 def _book_hull(setup: Setup, live: Live, start: float, span: float, steps: int) -> None:
     """Add the hull's share of an exchange."""
     ledger = live.now.ledger
-    h, old, new, total = span / steps, ledger.hull_old, ledger.hull_new, ledger.total
+    h, old, new, total, before = span / steps, ledger.hull_old, ledger.hull_new, ledger.total, -1
     for n in range(steps):
-        command = setup.orders.values[row_at(setup.orders.time, start + n * h)]
-        for end in range(2):
-            row = n + end
-            _hull_power(setup, live, row, start + row * h, row / steps, command, new if end else old)
+        held = row_at(setup.orders.time, start + n * h)
+        command = setup.orders.values[held]
+        if held == before:  # a step begins as the one before ended, unless another command holds
+            for i in range(old.size):
+                old[i] = new[i]
+        else:
+            _hull_power(setup, live, n, start + n * h, n / steps, command, old)
+        row, before = n + 1, held
+        _hull_power(setup, live, row, start + row * h, row / steps, command, new)
         if setup.fixed.prescribed:
             total[PROPELLER] -= 0.5 * h * (old[P_EXTERNAL] + new[P_EXTERNAL])
             continue
@@ -86,7 +90,7 @@ def _book_hull(setup: Setup, live: Live, start: float, span: float, steps: int) 
     if setup.fixed.prescribed:
         return
     # A difference of states, not a sum of powers: exact, so that the residual shows the errors of the other terms.
-    kinetic = vehicle.kinetic_energy(live.path[steps], live.now.hull.current, setup.fixed.vehicle)
+    kinetic = kinetic_energy(live.path[steps], live.now.hull.current, setup.fixed.vehicle)
     total[KINETIC] += kinetic - ledger.kinetic
     ledger.kinetic = kinetic
 
@@ -109,7 +113,7 @@ def _hull_power(
             hull.wrench[i] = 0.0
         if setup.fixed.lacking:
             add_missing(setup, live, live.path[row], command, time, hull)
-    vehicle.power(live.path[row], command, hull.current, hull.wrench, setup.fixed.vehicle, out)
+    power(live.path[row], command, hull.current, hull.wrench, setup.fixed.vehicle, out)
 
 
 AT_KNOT = 1e-9
@@ -149,6 +153,6 @@ def _jump_of_tow_point(setup: Setup, live: Live, row: int, out: np.ndarray) -> N
     turn = _rate(track, HEADING, row) - _rate(track, HEADING, row - 1)
     p, q, yaw = -turn * np.sin(track[PITCH, row]), dive, turn * np.cos(track[PITCH, row])
     x, y, z = q * r[2] - yaw * r[1], yaw * r[0] - p * r[2], p * r[1] - q * r[0]
-    vehicle.rotation(live.state[3:7], R)
+    rotation(live.state[3:7], R)
     for i in range(3):
         out[i] = R[i, 0] * x + R[i, 1] * y + R[i, 2] * z

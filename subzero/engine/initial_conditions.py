@@ -20,7 +20,6 @@ from typing import Any
 import numpy as np
 
 import scenarios
-import vehicle
 from cable.drum import FREE, LENGTH
 from cable.drum_motion import SETPOINT, lead_drum
 from cable.hold import hold
@@ -38,13 +37,15 @@ from cable.moving_end import (
 )
 from cable.task import START_LENGTH
 from subzero.engine.environment import drum_of, water_of, way_of_drum
+from subzero.engine.external_wrench import feel_current, tow_point, way_of_tow_point
 from subzero.engine.prescribed_motion import knots
-from subzero.engine.vehicle_step import feel_current, pose, tow_point, way_of_tow_point
+from subzero.engine.vehicle_step import pose
 from subzero.errors import BadValueError, UserError, printable, real, short
 from subzero.external_force import MissingForce
-from subzero.jit import allocating, compiled, packed
+from subzero.jit import allocating, compiled
 from subzero.model import Model
-from subzero.run_state import LINEAR_ROWS, Fixed, Live, Orders, Setup, new_now
+from subzero.run_state import LINEAR_ROWS, Fixed, HullWork, Ledger, Live, Now, Orders, Setup
+from vehicle import STATE_SIZE, initial_state, kinetic_energy, rotation
 from vehicle.state import LINKAGE, POSITION, SERVO, VELOCITY
 
 FORCE_TOLERANCE = 1e-9
@@ -80,12 +81,12 @@ def prepare(
     Raises:
         UserError: a start that cannot be.
     """
-    wet, size = _wet_length(trial), vehicle.STATE_SIZE
+    wet, size = _wet_length(trial), STATE_SIZE
     longest = longest_exchange or max(trial.cable_step, float(np.diff(trial.times()).max()))
     steps = most_hull_steps(longest, trial.hull_step)
     setup = setup_of(trial, model, tethered)
     live = Live(
-        now=new_now(),
+        now=_new_now(),
         state=first_state(trial, model, tethered) if state is None else state,
         path=np.zeros((steps + 1, size)),
         stages=np.zeros((5, size)),
@@ -93,14 +94,32 @@ def prepare(
         load=new_load(),
     )
     live.now.length = wet if tethered else 0.0
-    live.line.ends.segment_length, live.line.ends.grading = trial.segment_length, trial.grading
-    live.line.ends.run_in = run_in if wet < run_in and _can_run_in(setup.fixed) else 0.0
+    layout = live.line.ends.layout
+    layout.segment_length, layout.grading = trial.segment_length, trial.grading
+    layout.far_length, layout.far_grading = trial.far_length, trial.far_grading
+    layout.run_in = run_in if wet < run_in and _can_run_in(setup.fixed) else 0.0
     lay_out(setup, live, wet)
     if trial.start.drum is not None:
         hang_between(setup, live, trial, model)
     elif setup.fixed.drum.control != FREE:
         _hang(live.line, float(live.now.guess[2] * setup.fixed.cable.weight))
     return setup, live
+
+
+def _new_now() -> Now:
+    """Return the beginning of a run, with a cable that does not pull."""
+    work = HullWork(np.zeros((3, 3)), np.zeros(3), np.zeros(6), np.zeros(3))
+    ledger = Ledger(
+        total=np.zeros(7),
+        hull_old=np.zeros(4),
+        hull_new=np.zeros(4),
+        cable_old=np.zeros(FLOWS),
+        cable_new=np.zeros(FLOWS),
+        kinetic=0.0,
+    )
+    vectors = {name: np.zeros(3) for name in ("force", "force_before", "guess", "change", "tow")}
+    matrices = {name: np.zeros((3, 3)) for name in ("Z", "mobility")}
+    return Now(**vectors, **matrices, last_step=0.0, iterations=0, length=0.0, hull=work, ledger=ledger)
 
 
 def _can_run_in(fixed: Fixed) -> bool:
@@ -157,7 +176,7 @@ def lay_out(setup: Setup, live: Live, wet: float) -> None:
     for i in range(FLOWS):
         now.ledger.cable_old[i] = now.ledger.cable_new[i]
     feel_current(setup, state, 0.0, now.hull)
-    now.ledger.kinetic = vehicle.kinetic_energy(state, now.hull.current, fixed.vehicle)
+    now.ledger.kinetic = kinetic_energy(state, now.hull.current, fixed.vehicle)
 
 
 def _hang(line: Line, weight: float) -> None:
@@ -171,7 +190,7 @@ def _hang(line: Line, weight: float) -> None:
 
 def _fixed(trial: scenarios.Trial, model: Model, tethered: bool, lacking: bool) -> Fixed:
     """Return the numbers of a run; the drum's place is still to be filled in."""
-    fixed = Fixed(
+    return Fixed(
         vehicle=model.vehicle.numbers(),
         cable=model.cable.numbers(),
         drum=drum_of(model).numbers(),
@@ -184,7 +203,6 @@ def _fixed(trial: scenarios.Trial, model: Model, tethered: bool, lacking: bool) 
         booked=True,
         lacking=lacking,
     )
-    return packed(fixed)
 
 
 def _orders(trial: scenarios.Trial) -> Orders:
@@ -222,7 +240,7 @@ def hang_between(setup: Setup, live: Live, trial: scenarios.Trial, model: Model)
         else 0.0
     )
     lay_held(live.line, held, now.change.copy(), fixed.drum.velocity, rate)
-    live.line.ends.segment_length = trial.segment_length
+    live.line.ends.layout.segment_length = trial.segment_length
     now.force[:] = held.tow_force
     begin_at_rest(setup, live)
 
@@ -251,7 +269,7 @@ def first_state(trial: scenarios.Trial, model: Model, tethered: bool) -> np.ndar
     if start.at_trim:
         return _steady(trial, model, tethered)
     _check_fins(start, model)
-    state = vehicle.initial_state(
+    state = initial_state(
         position=(0.0, 0.0, start.depth),
         roll=start.roll,
         pitch=start.pitch,
@@ -277,19 +295,19 @@ def _check_fins(start: scenarios.Start, model: Model) -> None:
 def _steady(trial: scenarios.Trial, model: Model, tethered: bool) -> np.ndarray:
     """Return the state of a trial that starts in trim."""
     from subzero.steady_motion.hull_state_space import to_vehicle
-    from subzero.steady_motion.trim_point import trim
+    from subzero.steady_motion.trim_point import Asked, steady_motion
 
     start, water = trial.start, _water_at_the_start(model, trial.start.depth)
     wet, speed, R = start.wet_length if tethered else 0.0, start.surge_speed, np.empty((3, 3))
     for _ in range(PASSES if water.any() else 1):
         try:
-            x = trim(model, speed=speed, wet_length=wet, roll=start.roll).state.copy()
+            x = steady_motion(model, Asked(speed=speed, wet_length=wet, roll=start.roll)).state.copy()
         except UserError as error:
             what = f"'{printable(trial.name)}' cannot start in trim at {start.surge_speed:g} m/s over ground"
             raise type(error)(f"{what}: {error}") from None
         x[5] = start.heading
         state = to_vehicle(x)
-        vehicle.rotation(state[3:7], R)
+        rotation(state[3:7], R)
         speed = start.surge_speed - float(R[:, 0] @ water)
     state[POSITION : POSITION + 3] = 0.0, 0.0, start.depth
     state[VELOCITY : VELOCITY + 3] += R.T @ water
@@ -363,7 +381,7 @@ def begin_again(setup: Setup, live: Live, time: float) -> None:
     """Take the energies that are stored now, with the numbers that hold from now on, as those of the start."""
     ledger, flows = live.now.ledger, np.zeros(FLOWS)
     feel_current(setup, live.state, time, live.now.hull)
-    ledger.kinetic = vehicle.kinetic_energy(live.state, live.now.hull.current, setup.fixed.vehicle)
+    ledger.kinetic = kinetic_energy(live.state, live.now.hull.current, setup.fixed.vehicle)
     if setup.fixed.tethered:
         energy_flow(live.line, setup.fixed.cable, live.load, flows)
         ledger.cable_old[STORED] = flows[STORED]

@@ -1,19 +1,22 @@
-"""What a run keeps: one row per exchange, shapes packed one behind another."""
+"""What a run keeps: one row per time of the run, or per so many, shapes packed one behind another.
+
+Every time writes its row. Where only every so many are kept (`stride`), the next one writes over it: so the rows that
+are kept are the same to the last bit as without, and the last one is where the run ended.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from time import perf_counter
 from typing import NamedTuple
 
 import numpy as np
 
-import vehicle
 from cable.moving_end import NOW
-from subzero.engine.vehicle_step import feel_current, row_at, tow_wrench
+from subzero.engine.external_wrench import feel_current, row_at, tow_wrench
 from subzero.jit import compiled
 from subzero.run_state import Live, Setup
-from vehicle import BREAKDOWN, STATE_SIZE
+from vehicle import BREAKDOWN, STATE_SIZE, battery_voltage, breakdown, deflections, euler_angles
 
 BREATH_S = 0.1
 """Compiled code computes for about so long before Python moves the progress bar and heeds an interrupt. [s]"""
@@ -23,6 +26,8 @@ class Recording(NamedTuple):
     """The rows of a run, filled up to some row.
 
     Attributes:
+        trace: force of the cable on the hull, body axes [N], and number of nodes at every time of the run, of rows that
+            are not kept, too (times, 4).
         state: (n, STATE_SIZE), as in `vehicle.STATE`.
         attitude: roll, pitch, heading (n, 3). [rad]
         rotation: R_nb (n, 3, 3).
@@ -41,6 +46,7 @@ class Recording(NamedTuple):
         arc_length: s of those nodes, unstretched cable between the tow point and the node (all,). [m]
     """
 
+    trace: np.ndarray
     state: np.ndarray
     attitude: np.ndarray
     rotation: np.ndarray
@@ -63,12 +69,49 @@ class Recording(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class Run:
-    """A finished run in plain arrays: `rows` rows of a recording at `times`, and how it ended in words."""
+    """A finished run in plain arrays.
+
+    Attributes:
+        times: of the rows that are kept (n,). [s]
+        recording: these rows.
+        all_times: of the recording's trace, with rows that are not kept; empty where it has none. [s]
+        completed: it reached its end.
+        message: how it ended, in words.
+    """
 
     times: np.ndarray
     recording: Recording
+    all_times: np.ndarray = field(default_factory=lambda: np.zeros(0))
     completed: bool
     message: str
+
+
+class Grid(NamedTuple):
+    """The times of a run (n,) [s], in how many exchanges it goes from one to the next, and that every `stride` of them
+    one is kept as a row.
+    """
+
+    times: np.ndarray
+    parts: int = 1
+    stride: int = 1
+
+
+class Standing(NamedTuple):
+    """Where a run stands between two calls of `subzero.engine.time_loop.run_rows`.
+
+    Attributes:
+        setup, live, recording: the run.
+        behind: how many of its times are behind.
+        used: nodes of the recording in use, in rows that are kept.
+        ending: how the last call ended.
+    """
+
+    setup: Setup
+    live: Live
+    recording: Recording
+    behind: int
+    used: int
+    ending: int
 
 
 class Pace:
@@ -92,9 +135,10 @@ class Pace:
         self.rows = max(1, int(self.rows * min(share, 4.0)))
 
 
-def new_recording(rows: int, nodes: int) -> Recording:
-    """Return an empty recording of `rows` rows, with room for `nodes` nodes in all."""
+def new_recording(rows: int, nodes: int, times: int = 0) -> Recording:
+    """Return an empty recording of `rows` rows, with room for `nodes` nodes in all, and a trace of `times` times."""
     shapes = {
+        "trace": (times, 4),
         "state": (rows, STATE_SIZE),
         "attitude": (rows, 3),
         "rotation": (rows, 3, 3),
@@ -122,7 +166,7 @@ def record_row(setup: Setup, live: Live, recording: Recording, row: int, time: f
         r.state[row, i] = state[i]
     for i in range(4):
         r.command[row, i] = command[i]
-    angles = vehicle.euler_angles(state[3:7])
+    angles = euler_angles(state[3:7])
     for i in range(3):
         r.attitude[row, i] = angles[i]
         r.tow_force[row, i] = live.now.force[i]
@@ -132,12 +176,12 @@ def record_row(setup: Setup, live: Live, recording: Recording, row: int, time: f
         r.wrench[row, i] = live.now.hull.wrench[i]
     for i in range(7):
         r.energy[row, i] = live.now.ledger.total[i]
-    r.fins[row, 0], r.fins[row, 1], r.fins[row, 2] = vehicle.deflections(state, command, setup.fixed.vehicle)
+    r.fins[row, 0], r.fins[row, 1], r.fins[row, 2] = deflections(state, command, setup.fixed.vehicle)
     if not setup.fixed.prescribed:
         water, wrench = live.now.hull.current, live.now.hull.wrench
         feel_current(setup, state, time, live.now.hull)
-        vehicle.breakdown(state, command, water, wrench, setup.fixed.vehicle, r.breakdown[row])
-        r.voltage[row] = vehicle.battery_voltage(state, command, water, setup.fixed.vehicle)
+        breakdown(state, command, water, wrench, setup.fixed.vehicle, r.breakdown[row])
+        r.voltage[row] = battery_voltage(state, command, water, setup.fixed.vehicle)
     r.iterations[row] = live.now.iterations
     m1 = setup.fixed.cable.mass + setup.fixed.cable.added_mass
     return _record_cable(live, r, row, used, m1) if setup.fixed.tethered else used
@@ -148,6 +192,7 @@ def _record_cable(live: Live, r: Recording, row: int, used: int, m1: float) -> i
     """Write the cable's part of a row."""
     line = live.line
     N, step = line.ends.count, line.ends.previous_step
+    r.courant[row] = 0.0
     r.drum_tension[row] = line.node_tension[N]
     r.length[row] = line.ends.settled + line.ends.last_length[NOW]
     r.arc_length[used] = 0.0
@@ -166,12 +211,56 @@ def _record_cable(live: Live, r: Recording, row: int, used: int, m1: float) -> i
     return used + N + 1
 
 
-BY_NODE = ("position", "tension", "arc_length")
-"""Fields that have one row a node, and not one a time."""
+@compiled
+def note(recording: Recording, row: int, time: int) -> None:
+    """Enter a row that was just written in the trace, as that of time number `time`; if there is a trace."""
+    if time < recording.trace.shape[0]:
+        for i in range(3):
+            recording.trace[time, i] = recording.wrench[row, i]
+        recording.trace[time, 3] = recording.nodes[row]
+
+
+@compiled
+def row_of(time: int, stride: int) -> int:
+    """Return the row that time number `time` is written to, where every `stride` times one is kept."""
+    return (time + stride - 1) // stride
+
+
+BY_NODE, BY_TIME = ("position", "tension", "arc_length"), ("trace",)
+"""Fields that have one line a node, or one a time of the run; the others have one a row."""
 
 
 def cut(recording: Recording, rows: int, used: int) -> Recording:
-    """Return the part of a recording that is filled."""
-    packed = {name: getattr(recording, name)[:used] for name in BY_NODE}
-    by_row = {name: values[:rows] for name, values in recording._asdict().items() if name not in packed}
-    return Recording(**by_row | packed)
+    """Return the part of a recording that is filled; its trace stays as it is."""
+    filled = {name: getattr(recording, name)[:used] for name in BY_NODE}
+    filled |= {name: getattr(recording, name) for name in BY_TIME}
+    by_row = {name: values[:rows] for name, values in recording._asdict().items() if name not in filled}
+    return Recording(**by_row | filled)
+
+
+def thinned(run: Run, stride: int) -> Run:
+    """Return every so many rows of a run, and its last one."""
+    rows = np.arange(run.times.size)
+    stays = (rows % stride == 0) | (rows == rows[-1])
+    nodes = np.repeat(stays, run.recording.nodes)
+    kept = {name: getattr(run.recording, name)[nodes] for name in BY_NODE}
+    kept |= {name: getattr(run.recording, name) for name in BY_TIME}
+    by_row = {name: values[stays] for name, values in run.recording._asdict().items() if name not in kept}
+    return replace(run, times=run.times[stays], recording=Recording(**by_row | kept))
+
+
+def run_so_far(
+    grid: Grid, recording: Recording, behind: int, used: int, message: str, *, completed: bool
+) -> Run:
+    """Return a run of which so many times are behind, with `used` nodes in the rows that are kept for good."""
+    times, last = grid.times[:behind], row_of(behind - 1, grid.stride)
+    if (behind - 1) % grid.stride:
+        used += int(recording.nodes[last])
+    rows = cut(recording, last + 1, used)
+    return Run(
+        times=np.append(times[: -1 : grid.stride], times[-1:]),
+        recording=rows._replace(trace=recording.trace[:behind]),
+        all_times=times,
+        completed=completed,
+        message=message,
+    )

@@ -16,7 +16,7 @@ from numba import types
 from numba.experimental import structref
 
 from subzero.engine.coupling import FINE, exchange
-from subzero.engine.recording import Recording, record_row
+from subzero.engine.recording import Recording, note, record_row, row_of
 from subzero.jit import allocating, compiled
 from subzero.jit.unbroken import unbroken
 from subzero.run_state import Live, Setup
@@ -37,34 +37,40 @@ def run_rows(
     last: int,
     used: int,
     parts: int,
+    stride: int,
 ) -> tuple[int, int, int]:
-    """Fill rows first … last − 1 of a recording.
+    """Go from times[first − 1] to times[last − 1], and fill the rows of a recording on the way.
 
     Args:
         setup: what stays.
         live: what changes; at times[first − 1] when called.
         recording: filled.
-        times: of all rows (n,). [s]
-        first: row to begin with.
-        last: row to end before.
-        used: nodes of the recording in use.
-        parts: exchanges from a row to the next.
+        times: of the run (n,). [s]
+        first: time to begin with.
+        last: time to end before.
+        used: nodes of the recording in use, in rows that are kept.
+        parts: exchanges from a time to the next.
+        stride: every so many times are kept as a row, see `recording`.
 
     Returns:
-        rows that are filled, nodes in use, and how it ended (`coupling.FINE` …); `line.ends.solved` tells how the
-        cable's last step was solved.
+        times that are behind, nodes in use in rows that are kept, and how it ended (`coupling.FINE` …);
+        `line.ends.solved` tells how the cable's last step was solved.
     """
-    for row in range(first, last):
+    for at in range(first, last):
         # Arrays cannot grow in here: stop before they are full, and let Python enlarge them and call again.
         nodes = live.line.ends.count + 1 + SPARE * parts
         if nodes > live.line.length.size or used + live.line.length.size > recording.tension.size:
-            return row, used, NO_ROOM
-        span = (times[row] - times[row - 1]) / parts
+            return at, used, NO_ROOM
+        span = (times[at] - times[at - 1]) / parts
         for part in range(parts):
-            ending = exchange(setup, live, times[row - 1] + part * span, span)
+            ending = exchange(setup, live, times[at - 1] + part * span, span)
             if ending != FINE:
-                return row, used, ending
-        used = record_row(setup, live, recording, row, times[row], used)
+                return at, used, ending
+        row = row_of(at, stride)
+        after = record_row(setup, live, recording, row, times[at], used)
+        note(recording, row, at)
+        if at % stride == 0:  # the row stays; else the next one is written over it
+            used = after
     return last, used, FINE
 
 
@@ -151,7 +157,7 @@ def advance(
     before = at[USED] - handle.recording.nodes[row]  # the present row is written again, under the new command
     used = record_row(handle.setup, handle.live, handle.recording, row, handle.times[row], before)
     after, used, ending = run_rows(
-        handle.setup, handle.live, handle.recording, handle.times, row + 1, row + 1 + count, used, 1
+        handle.setup, handle.live, handle.recording, handle.times, row + 1, row + 1 + count, used, 1, 1
     )
     at[ROW], at[USED], at[ENDING] = after - 1, used, ending
     observe(handle, after - 1, seen)

@@ -1,9 +1,7 @@
 """Advance the hull over one exchange with the cable, pulled by a force that changes linearly in time.
 
 Classic Runge-Kutta of fourth order in fixed steps. The cable's force is given in earth axes; at every stage it is
-turned into the body's axes with the attitude of that stage, equations (12)-(13):
-
-    F_c = Rᵀ F,    M_c = r_c × F_c
+turned into the body's axes with the attitude of that stage (`subzero.engine.external_wrench`).
 
 A prescribed run follows its motion instead: that of an "idealised vehicle" without dynamics (section 4.1 of the paper),
 linear between its samples, or one that was measured (section 3, step 2), smooth between them
@@ -14,80 +12,13 @@ from __future__ import annotations
 
 import numpy as np
 
-import vehicle
-from cable.current import water_velocity
-from subzero.external_force import add_missing
+from subzero.engine.external_wrench import add_missing, feel_current, row_at, tow_wrench
 from subzero.jit import allocating, compiled, inlined, inner, scratch
-from subzero.run_state import HEADING, LINEAR_ROWS, PITCH, PLACE, SLOPE, SPEED, TIME, HullWork, Live, Setup
-from vehicle import STATE_SIZE
+from subzero.run_state import HEADING, LINEAR_ROWS, PITCH, PLACE, SLOPE, SPEED, TIME, Live, Setup
+from vehicle import STATE_SIZE, derivative, finish_step, quaternion_from_euler, rotation
 
 GAUSS_OFFSET = 0.5 * np.sqrt(0.6)
 """Three-point Gauss quadrature: nodes at the middle and this fraction of a step before and behind it."""
-
-
-@inner
-def row_at(time: np.ndarray, t: float) -> int:
-    """Return the last row whose time is not later than t (with a nanosecond of grace for rounding)."""
-    low, high = 0, time.size - 1
-    while low < high:
-        middle = (low + high + 1) // 2
-        if time[middle] <= t + 1e-9:
-            low = middle
-        else:
-            high = middle - 1
-    return low
-
-
-@inner
-def tow_wrench(state: np.ndarray, F: np.ndarray, r_c: np.ndarray, work: HullWork) -> None:
-    """Fill work.wrench (6,) with the force (12) and the moment (13) of a pull F in earth axes (3,). [N, N m]."""
-    R, w = work.rotation, work.wrench
-    vehicle.rotation(state[3:7], R)
-    for i in range(3):
-        w[i] = R[0, i] * F[0] + R[1, i] * F[1] + R[2, i] * F[2]
-    w[3] = r_c[1] * w[2] - r_c[2] * w[1]
-    w[4] = r_c[2] * w[0] - r_c[0] * w[2]
-    w[5] = r_c[0] * w[1] - r_c[1] * w[0]
-
-
-@inlined
-def feel_current(setup: Setup, state: np.ndarray, time: float, work: HullWork) -> None:
-    """Fill work.current (3,) with the water's velocity at the hull's centre. [m/s].
-
-    Departs from source: where the water changes along the vehicle's way, the hull takes every instant as steady and
-    uniform; the pressure of the accelerating water, (m + M_A) dJ/dt, is left out.
-    """
-    drum, J = setup.fixed.drum_place, work.current
-    place = state[0] - drum[0], state[1] - drum[1], state[2] - drum[2]
-    J[0], J[1], J[2] = water_velocity(setup.water, place[0], place[1], place[2], time)
-
-
-@compiled
-def tow_point(state: np.ndarray, r_c: np.ndarray, R: np.ndarray, out: np.ndarray) -> None:
-    """Fill out (3,) with the place of the tow point in earth axes, η + R r_c. [m]."""
-    vehicle.rotation(state[3:7], R)
-    for i in range(3):
-        out[i] = state[i] + R[i, 0] * r_c[0] + R[i, 1] * r_c[1] + R[i, 2] * r_c[2]
-
-
-@compiled
-def way_of_tow_point(state: np.ndarray, r_c: np.ndarray, R: np.ndarray, out: np.ndarray) -> float:
-    """Fill out (3,) with the unit vector along which the tow point goes, forward where it goes straight or rests.
-
-    R is R_nb of the state. Returns its speed along that vector, negative astern. [m/s]
-    """
-    x = state[7] + state[11] * r_c[2] - state[12] * r_c[1]
-    y = state[8] + state[12] * r_c[0] - state[10] * r_c[2]
-    z = state[9] + state[10] * r_c[1] - state[11] * r_c[0]
-    if y == 0.0 and z == 0.0:
-        for i in range(3):
-            out[i] = R[i, 0]
-        return x
-    speed = np.sqrt(x * x + y * y + z * z)
-    speed = -speed if x < 0.0 else speed
-    for i in range(3):
-        out[i] = (R[i, 0] * x + R[i, 1] * y + R[i, 2] * z) / speed
-    return speed
 
 
 @inlined
@@ -121,10 +52,10 @@ def advance_hull(setup: Setup, live: Live, start: float, span: float, steps: int
             feel_current(setup, stage, start + n * h + part, work)
             if setup.fixed.lacking:
                 add_missing(setup, live, stage, command, start + n * h + part, work)
-            vehicle.derivative(stage, command, work.current, work.wrench, setup.fixed.vehicle, k[s])
+            derivative(stage, command, work.current, work.wrench, setup.fixed.vehicle, k[s])
         for i in range(STATE_SIZE):
             new[i] = state[i] + h / 6.0 * (k[0, i] + 2.0 * k[1, i] + 2.0 * k[2, i] + k[3, i])
-        vehicle.finish_step(
+        finish_step(
             new, command, setup.fixed.vehicle
         )  # quaternion to length one, linkages behind their servos
 
@@ -158,7 +89,7 @@ def pose(track: np.ndarray, t: float, state: np.ndarray) -> None:
         _pose_between_knots(track, t, state)
         return
     u, pitch, heading, dive, turn = _attitude(track, t)
-    q = vehicle.quaternion_from_euler(0.0, pitch, heading)
+    q = quaternion_from_euler(0.0, pitch, heading)
     for i in range(4):
         state[3 + i] = q[i]
     for i in range(6):
@@ -182,8 +113,8 @@ def _pose_between_knots(track: np.ndarray, t: float, state: np.ndarray) -> None:
         b, c = 3.0 * rise - 2.0 * a - end, a + end - 2.0 * rise
         place[i] = first + x * (a + x * (b + x * c))
         rate[i] = (a + x * (2.0 * b + x * 3.0 * c)) / h
-    q = vehicle.quaternion_from_euler(place[3], place[4], place[5])
-    vehicle.rotation(q, R)
+    q = quaternion_from_euler(place[3], place[4], place[5])
+    rotation(q, R)
     for i in range(4):
         state[3 + i] = q[i]
     for i in range(3):

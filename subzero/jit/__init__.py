@@ -5,7 +5,7 @@
 name                                            what for                                              file
 ----------------------------------------------  ----------------------------------------------------  ------------
 compiled, allocating, inner, inlined, by_field  how a function is compiled                            decorators
-packed                                          numbers as one record in memory, a single pointer     record
+Record                                          numbers as one record in memory, a single pointer     record
 scratch                                         a small array on the stack of a compiled function     stack
 -                                               machine code kept for the next run, never stale       machine_code
 -                                               which files a piece of machine code is made of        sources
@@ -13,7 +13,7 @@ scratch                                         a small array on the stack of a 
 """
 
 from subzero.jit.decorators import allocating, by_field, compiled, inlined, inner
-from subzero.jit.record import packed
+from subzero.jit.record import Record
 from subzero.jit.stack import scratch
 
-__all__ = ["allocating", "by_field", "compiled", "inlined", "inner", "packed", "scratch"]
+__all__ = ["Record", "allocating", "by_field", "compiled", "inlined", "inner", "scratch"]

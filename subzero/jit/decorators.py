@@ -20,6 +20,10 @@ from subzero.jit.machine_code import MachineCode
 from subzero.jit.unbroken import unbroken
 
 Function = TypeVar("Function", bound=Callable[..., Any])
+Line = TypeVar("Line")
+Special = TypeVar("Special")
+General = TypeVar("General")
+Result = TypeVar("Result")
 
 numba.config.OPT = type(numba.config.OPT)(
     1
@@ -77,7 +81,9 @@ def _unbroken(compile_for: Callable[..., Any]) -> Callable[..., Any]:
     return lambda *arguments, **named: unbroken(partial(compile_for, *arguments, **named))
 
 
-def by_field(field: str, yes: Function, no: Function) -> Function:
+def by_field(
+    field: str, yes: Callable[[Line, Special], Result], no: Callable[[Line, General], Result]
+) -> Callable[[Line, General], Result]:
     """Return a function (line, c) that is `yes` where the record c has a field, else `no`; only one is compiled.
 
     What few runs need so does not lengthen the first compilation of all others.
@@ -87,10 +93,11 @@ def by_field(field: str, yes: Function, no: Function) -> Function:
         return (yes if field in c.dtype.names else no)(line, c)
 
     def typed(line, c):  # type: ignore[no-untyped-def]
-        chosen: Any = (yes if field in c.fields else no).py_func  # type: ignore[attr-defined]
+        chosen: Any = yes if field in c.fields else no
+        function = chosen.py_func
         return FunctionType(
-            chosen.__code__, chosen.__globals__
-        )  # without the annotations, which numba compares too
+            function.__code__, function.__globals__
+        )  # no annotations: numba compares them, too
 
     numba.extending.overload(choose)(typed)
-    return choose  # type: ignore[return-value]
+    return choose

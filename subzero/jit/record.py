@@ -1,95 +1,140 @@
-"""Numbers as records in memory, which compiled functions take as a single pointer."""
+"""Numbers as records in memory, which compiled functions take as a single pointer.
+
+    >>> class Spring(Record):
+    ...     stiffness: float
+    ...     place: np.ndarray
+    ...     is_taut: bool = True
+    >>> spring = Spring(2.0, np.zeros(3))
+    >>> spring.place[1] = 5.0
+    >>> spring
+    Spring(stiffness=2.0, place=[0. 5. 0.], is_taut=True)
+
+A compiled function takes a named tuple field by field, and a record as one pointer: that halves the first compilation.
+"""
 
 from __future__ import annotations
 
-import dataclasses
-from functools import cache
-from typing import Any, TypeVar, cast
+from collections.abc import Iterator
+from inspect import get_annotations
+from typing import TYPE_CHECKING, Any, ClassVar, Self, dataclass_transform
 
 import numpy as np
 
-Numbers = TypeVar("Numbers")
+if TYPE_CHECKING:
+
+    class Memory:
+        """What is used here of ``numpy.void``, which is final in numpy's stubs, and only there."""
+
+        base: Any
+        dtype: np.dtype[Any]
+
+        def tobytes(self) -> bytes:
+            """Return the memory as bytes."""
+
+        def __getitem__(self, name: str) -> Any: ...
+        def __setitem__(self, name: str, value: Any) -> None: ...
+else:
+    Memory = np.void
 
 
-class Packed(np.void):  # type: ignore[misc]  # final in numpy's stubs only
-    """A record in memory whose fields are attributes.
+@dataclass_transform()
+class Record(Memory):
+    """Numbers, arrays, records and tuples of records in one piece of memory; a class declares them as a dataclass does.
+
+    What is put into a record is copied. Fields are read and written by their names; an array among them is a view of
+    the record's memory. Records of a class whose arrays differ in shape or kind differ in layout, and a function is
+    compiled for each layout. Fields that a subclass adds stand before those of its base: so the memory of one is never
+    taken for the memory of the other.
 
     ``numpy.record`` is the same but for a lookup of attributes in Python, through which numba, too, asks for the
     record's memory: an interrupt in there ends the interpreter.
+
+    Raises:
+        TypeError: an argument too many, too few, or of no such name.
     """
 
-    def __getattr__(self, name: str) -> Any:
-        """Return a field; what every record has is found before this is asked."""
-        try:
-            return self[name]
-        except ValueError:
-            raise AttributeError(self._unknown(name)) from None
+    names: ClassVar[tuple[str, ...]] = ()
+    """Names of the fields, in the order of the memory."""
+    defaults: ClassVar[dict[str, Any]] = {}
 
-    def __setattr__(self, name: str, value: Any) -> None:
-        """Set a field."""
-        try:
-            self[name] = value
-        except ValueError:
-            raise AttributeError(self._unknown(name)) from None
+    def __init_subclass__(cls) -> None:
+        """Read the fields that a class declares."""
+        added = [name for name, kind in get_annotations(cls).items() if "ClassVar" not in str(kind)]
+        taken = [name for name in added if hasattr(np.void, name)]
+        if taken:
+            raise TypeError(f"{cls.__name__}: every record has {', '.join(taken)} already. Take other names.")
+        cls.names = (*added, *cls.names)
+        cls.defaults = cls.defaults | {name: cls.__dict__[name] for name in added if name in cls.__dict__}
+        for name in cls.defaults.keys() & cls.__dict__.keys():
+            delattr(cls, name)  # else it would be found before the field
+
+    def __new__(cls, *values: Any, **named: Any) -> Self:
+        """Return a record of these values, by their order or their names."""
+        given = cls.defaults | dict(zip(cls.names, values, strict=False)) | named
+        if len(values) > len(cls.names) or given.keys() != set(cls.names):
+            raise TypeError(f"{cls.__name__} takes {', '.join(cls.names)}; it got {', '.join(given)}.")
+        parts = [_read(given[name]) for name in cls.names]
+        made_of = (cls, *(kind for _, kind in parts))
+        if made_of not in _layouts:
+            fields = [(name, _layout(given[name])) for name in cls.names]
+            _layouts[made_of] = np.dtype((cls, fields))
+        memory = np.zeros(1, dtype=_layouts[made_of])
+        memory[0] = tuple(value for value, _ in parts)
+        made: Self = memory[0]
+        return made
+
+    def memory_of(self, name: str) -> np.ndarray:
+        """Return the memory of a field as an array, that of a single number with one element."""
+        view: np.ndarray = self.base[name]
+        return view
+
+    def __iter__(self) -> Iterator[Any]:
+        """Give the values in their order."""
+        return (self[name] for name in self.names)
+
+    def __repr__(self) -> str:
+        """Show the fields."""
+        return f"{type(self).__name__}({', '.join(f'{name}={self[name]}' for name in self.names)})"
+
+    if not TYPE_CHECKING:  # to a type checker, fields are those that the class declares and no others
+
+        def __getattr__(self, name: str) -> Any:
+            """Return a field; what every record has is found before this is asked."""
+            try:
+                return self[name]
+            except ValueError:
+                raise AttributeError(self._unknown(name)) from None
+
+        def __setattr__(self, name: str, value: Any) -> None:
+            """Set a field."""
+            try:
+                self[name] = value
+            except ValueError:
+                raise AttributeError(self._unknown(name)) from None
 
     def _unknown(self, name: str) -> str:
         """Return what is wrong with the name of a field."""
-        return f"This record has no field {name!r}; it has {', '.join(self.dtype.names or ())}."
+        return f"This record has no field {name!r}; it has {', '.join(self.names)}."
 
 
 _layouts: dict[Any, np.dtype[Any]] = {}
-"""What a value of `packed` is made of → its dtype."""
-
-
-def packed(values: Numbers) -> Numbers:
-    """Return a named tuple or dataclass of numbers, arrays, and more of its kind as one record in memory.
-
-    Fields are read and written by the same names. Compiled functions take a record as a single pointer where
-    they take a named tuple field by field: that halves the first compilation.
-    """
-    inside, shape = _read(values)
-    if shape not in _layouts:
-        _layouts[shape] = _layout(values)
-    out: Any = np.zeros(1, dtype=_layouts[shape])
-    out[0] = inside
-    return cast(
-        Numbers, out[0]
-    )  # it is a `Packed`, and to whoever reads and writes its fields what it was made of
-
-
-@cache
-def _names(kind: type) -> tuple[str, ...] | None:
-    """Return the names of the fields of a kind of named tuple or dataclass; None for anything else."""
-    if dataclasses.is_dataclass(kind):
-        return tuple(field.name for field in dataclasses.fields(kind))
-    return getattr(kind, "_fields", None)
-
-
-def _fields(value: Any) -> tuple[str, ...] | None:
-    """Return the names of the fields of a named tuple or dataclass; None for anything else."""
-    kind: Any = type(value)
-    return _names(kind)
+"""What a record is made of → its dtype: always the same one, by which numba knows it at once."""
 
 
 def _read(value: Any) -> tuple[Any, Any]:
-    """Return a value of `packed` as numpy takes it (records as tuples, rows as lists), and what it is made of."""
-    if isinstance(value, Packed):
+    """Return the value of a field as numpy takes it (rows as lists), and what it is made of."""
+    if isinstance(value, Record):
         return value, value.dtype
-    names = _fields(value)
-    if names is None and not isinstance(value, tuple):
-        return value, (value.dtype, value.shape) if isinstance(value, np.ndarray) else type(value)
-    parts = [_read(part) for part in (value if names is None else [getattr(value, name) for name in names])]
-    inside = [part for part, _ in parts]
-    return inside if names is None else tuple(inside), (type(value), *(shape for _, shape in parts))
+    if isinstance(value, tuple):
+        parts = [_read(part) for part in value]
+        return [part for part, _ in parts], tuple(kind for _, kind in parts)
+    return value, (value.dtype, value.shape) if isinstance(value, np.ndarray) else type(value)
 
 
 def _layout(value: Any) -> np.dtype[Any]:
-    """Return the dtype that holds a value of `packed`."""
-    if isinstance(value, Packed):
+    """Return the dtype that holds the value of a field."""
+    if isinstance(value, Record):
         return value.dtype
-    names = _fields(value)
-    if names is not None:
-        return np.dtype((Packed, [(name, _layout(getattr(value, name))) for name in names]))
     if isinstance(value, tuple):
         return np.dtype((_layout(value[0]), (len(value),)))
     array = np.asarray(value)

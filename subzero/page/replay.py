@@ -142,7 +142,8 @@ def _points(rows: np.ndarray, count: int, points: int) -> np.ndarray:
     at = np.linspace(0.0, count - 1.0, points)
     before = np.minimum(at.astype(int), count - 2)
     share = (at - before)[:, None]
-    return (1.0 - share) * rows[before] + share * rows[before + 1]
+    between: np.ndarray = (1.0 - share) * rows[before] + share * rows[before + 1]
+    return between
 
 
 def cable_origin(run: xr.Dataset) -> np.ndarray:
@@ -153,7 +154,8 @@ def cable_origin(run: xr.Dataset) -> np.ndarray:
     arm = np.array([tow["x"], tow["y"], tow["z"]])
     angles = [run[name].values[first] for name in ("heading", "pitch", "roll_angle")]
     to_earth = Rotation.from_euler("ZYX", angles, degrees=True)
-    return hull + to_earth.apply(arm) - run["cable_position"].values[first, 0]
+    place: np.ndarray = hull + to_earth.apply(arm) - run["cable_position"].values[first, 0]
+    return place
 
 
 def _spread(size: int, most: int) -> np.ndarray:

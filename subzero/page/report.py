@@ -139,7 +139,7 @@ def render(report: Report) -> str:
     """Return the page as HTML; the same report gives the same page."""
     from markupsafe import Markup
 
-    return _template().render(
+    html: str = _template().render(
         report=report,
         image=_image,
         caption=caption,
@@ -148,6 +148,7 @@ def render(report: Report) -> str:
         uplot=Markup(_vendored("uPlot.iife.min.js")),
         player=Markup(player()),
     )
+    return html
 
 
 def caption(name: str) -> str:

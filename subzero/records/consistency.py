@@ -17,9 +17,9 @@ import numpy as np
 
 import scenarios
 from scenarios.steps import held
-from subzero.channels import BY_NAME, DEGREE
+from subzero.channels import BY_NAME, DEGREE, HEADING, TURN, turned
 from subzero.errors import UserError
-from subzero.records.record import HEADING, TURN, Record, turned
+from subzero.records.record import Record
 
 MISTAKEN: dict[str, dict[str, float]] = {
     "m/s": {"knots": 1.944, "km/h": 3.6, "feet per second": 3.281, "cm/s": 100.0},

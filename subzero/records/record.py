@@ -24,28 +24,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from subzero.channels import BY_COLUMN, BY_NAME, TIME
+from subzero.channels import BY_COLUMN, BY_NAME, HEADING, TIME, TURN, turned
 from subzero.errors import UserError, listed, printable, suggestion
 from subzero.errors import short as shown
 from subzero.user_file import MOST_COLUMNS, MOST_OF_A_CSV, UnreadableFileError, read_text
 
 if TYPE_CHECKING:
     import xarray as xr
-
-
-HEADING = "heading"
-TURN = 360.0
-FIRST = 9
-"""Samples that say where a record begins: a few of them may be outliers."""
-
-
-def turned(heading: np.ndarray, like: np.ndarray | float) -> np.ndarray:
-    """Return a heading (n,) with the whole turns more or less that bring its first samples close to those of another,
-    (n,) or one. [degree]
-    """
-    apart = np.asarray(like - heading)
-    first = apart[np.isfinite(apart)][:FIRST]
-    return heading + TURN * np.round(np.median(first) / TURN) if first.size else heading
 
 
 GAPS = ("", "nan", "+nan", "-nan")

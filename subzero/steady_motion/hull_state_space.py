@@ -19,8 +19,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-import vehicle
-from vehicle import Servo, Vehicle
+from vehicle import (
+    STATE_SIZE,
+    Servo,
+    Vehicle,
+    VehicleNumbers,
+    derivative,
+    euler_angles,
+    quaternion_from_euler,
+)
 from vehicle.motor import battery_current, motor_numbers, voltage
 from vehicle.state import LINKAGE, QUICKEST, SERVO, SHAFT
 
@@ -80,9 +87,9 @@ NO_CURRENT, NO_WRENCH = np.zeros(3), np.zeros(6)
 
 def to_vehicle(x: np.ndarray) -> np.ndarray:
     """Return the state of `vehicle.STATE` for a state x (16,)."""
-    state = np.zeros(vehicle.STATE_SIZE)
+    state = np.zeros(STATE_SIZE)
     state[:3] = x[:3]
-    state[3:7] = vehicle.quaternion_from_euler(float(x[ROLL]), float(x[PITCH]), float(x[HEADING]))
+    state[3:7] = quaternion_from_euler(float(x[ROLL]), float(x[PITCH]), float(x[HEADING]))
     state[7:13] = x[VELOCITY]
     state[SHAFT : SHAFT + 4] = x[ACTUATORS]
     state[LINKAGE : LINKAGE + 3] = state[SERVO : SERVO + 3]
@@ -91,7 +98,7 @@ def to_vehicle(x: np.ndarray) -> np.ndarray:
 
 def from_vehicle(state: np.ndarray, heading_near: float = 0.0) -> np.ndarray:
     """Return x (16,) for a state of `vehicle.STATE`; the heading within half a turn of `heading_near` [rad]."""
-    roll, pitch, heading = vehicle.euler_angles(state[3:7])
+    roll, pitch, heading = euler_angles(state[3:7])
     turns = round((heading_near - heading) / (2.0 * pi))
     angles = (roll, pitch, heading + 2.0 * pi * turns)
     return np.concatenate([state[:3], angles, state[7:13], state[SHAFT : SHAFT + 4]])
@@ -100,7 +107,7 @@ def from_vehicle(state: np.ndarray, heading_near: float = 0.0) -> np.ndarray:
 def rate(
     x: np.ndarray,
     command: np.ndarray,
-    numbers: vehicle.VehicleNumbers,
+    numbers: VehicleNumbers,
     wrench_b: np.ndarray = NO_WRENCH,
     current_n: np.ndarray = NO_CURRENT,
 ) -> np.ndarray:
@@ -113,8 +120,8 @@ def rate(
         wrench_b: external force and moment about the hull centre, body axes (6,). [N, N m]
         current_n: velocity of the water, earth axes (3,). [m/s]
     """
-    out = np.empty(vehicle.STATE_SIZE)
-    vehicle.derivative(to_vehicle(x), command, current_n, wrench_b, numbers, out)
+    out = np.empty(STATE_SIZE)
+    derivative(to_vehicle(x), command, current_n, wrench_b, numbers, out)
     p, q, r = x[9:12]
     sr, cr = sin(x[ROLL]), cos(x[ROLL])
     turning = q * sr + r * cr

@@ -16,7 +16,7 @@ The force of the cable in steady motion is (`SteadyPull`)
 V is the velocity of the tow point through the water, v + ω × r_c. The cable lies along the way that the tow point
 came: exact for a straight way (the discrete cable has this solution at every step); in a turn it is the limit of a
 cable that cannot be dragged sideways, C_n ≫ C_t, and the real one cuts the corner. A cable with weight is not in the
-formula. Where that matters, `from_cable_model` pulls the cable itself along the way.
+formula. Where that matters, `subzero.steady_motion.trim` pulls the cable itself along the way.
 
 A vehicle that speeds up takes its cable along: m S more of mass at the tow point, along V.
 """
@@ -24,13 +24,12 @@ A vehicle that speeds up takes its cable along: m S more of mass at the tow poin
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from math import cos, degrees, floor, radians, sin, sqrt
 from typing import NoReturn
 
 import numpy as np
 
-import cable
 from subzero.errors import UserError, real, short
 from subzero.model import Model
 from subzero.steady_motion.hull_state_space import (
@@ -43,9 +42,8 @@ from subzero.steady_motion.hull_state_space import (
     demands,
     ideal,
     rate,
-    to_vehicle,
 )
-from vehicle import Vehicle, VehicleNumbers, rotation
+from vehicle import Vehicle, VehicleNumbers
 
 NO_WAY = 1e-9
 """Below this speed of the tow point there is no direction to pull against. [m/s]"""
@@ -88,62 +86,92 @@ class SteadyPull:
         return np.concatenate([F, np.cross(self.tow_point, F)])
 
 
-def from_cable_model(
-    model: Model, velocity_n: Callable[[float], np.ndarray], R_nb: np.ndarray, duration: float
-) -> np.ndarray:
-    """Return the pull of the cable itself, wrench (6,) in body axes [N, N m], at the end of a way.
-
-    Args:
-        model: whose cable, drum and tow point.
-        velocity_n: velocity of the tow point through the water at a time, earth axes. [m/s]
-        R_nb: attitude of the hull at the end of the way (3, 3).
-        duration: how long cable has been paid out. [s]
-
-    Raises:
-        UserError: the cable could not be solved along this way.
-    """
-    from subzero.errors import UserError
-
-    step = min(0.1, duration / 20.0)
-    run = cable.pull_out(
-        velocity_n, duration, cable=model.cable, drum=model.drum, scheme=cable.MovingEnd(time_step=step)
-    )
-    if not run.outcome.completed:
-        raise UserError(f"The cable has no steady pull along this way. {run.outcome.message}")
-    F = R_nb.T @ run.tow_force[-1]
-    return np.concatenate([F, np.cross(model.vehicle.tow_point.position(), F)])
-
-
 RESIDUAL = 1e-9
 """What may be left of accelerations and depth rate. [m/s2, rad/s2, m/s]"""
 FARTHEST = 1.2
 """Fin and pitch angles beyond this are another balance than the one that is looked for. [rad]"""
 
 
+FASTEST = 50.0
+"""A run that is faster is stopped as absurd, `subzero.engine.coupling.FASTEST`. [m/s]"""
+STEEPEST = radians(80.0)
+"""Pitch beyond which Euler angles are no use any more. [rad]"""
+
+
+class NoTrimError(UserError):
+    """There is no such steady motion; the message names the limit that is hit."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Asked:
+    """Which steady motion.
+
+    Attributes:
+        speed: u, forward speed through the water. [m/s]
+        depth_rate: z', positive down. [m/s]
+        turn_rate: ψ', positive to starboard. [rad/s]
+        wet_length: cable in the water; its pull is taken as steady although it grows. [m]
+        roll: φ, held by unlike stern-planes. [rad]
+
+    Raises:
+        NoTrimError: a depth rate that is too steep at this speed.
+        UserError: a number that means nothing here.
+    """
+
+    speed: float
+    depth_rate: float = 0.0
+    turn_rate: float = 0.0
+    wet_length: float = 0.0
+    roll: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be asked for."""
+        for field in fields(self):
+            number = real(value := getattr(self, field.name))
+            if number is None:
+                raise UserError(f"trim: {field.name} is {short(value)}; it must be a finite number.")
+            object.__setattr__(self, field.name, number)
+        if self.speed <= 0.0:
+            raise UserError(f"trim: speed is {self.speed:g} m/s; fins need a flow, so it must be above 0.")
+        if self.speed > FASTEST:
+            raise UserError(
+                f"trim: speed is {self.speed:g} m/s; it must be at most {FASTEST:g}, as runs are stopped beyond."
+            )
+        if self.wet_length < 0.0:
+            raise UserError(f"trim: wet_length is {self.wet_length:g} m; it must be 0 or more.")
+        most = self.speed * sin(STEEPEST)
+        if abs(self.depth_rate) > most:
+            raise NoTrimError(
+                f"There is no steady motion at {self.speed:g} m/s with a depth rate of {self.depth_rate:g} m/s: the"
+                f" pitch angle would pass {degrees(STEEPEST):.0f} degrees. At this speed ±{most:.2g} m/s is the most."
+            )
+
+    def part(self, share: float) -> Asked:
+        """Return the same with a share of everything that is not straight and level."""
+        asked = {name: share * getattr(self, name) for name in ("depth_rate", "turn_rate", "roll")}
+        return replace(self, **asked)
+
+
 @dataclass(frozen=True, kw_only=True)
 class Motion:
     """What is asked for, of which hull (its numbers without limits), with which pull beyond the formula's."""
 
+    asked: Asked
     numbers: VehicleNumbers
     pull: SteadyPull
-    speed: float
-    depth_rate: float
-    turn_rate: float
-    roll: float
     extra: np.ndarray
 
     def part(self, share: float) -> Motion:
         """Return the same with a share of everything that is not straight and level."""
-        asked = {name: share * getattr(self, name) for name in ("depth_rate", "turn_rate", "roll", "extra")}
-        return replace(self, **asked)
+        return replace(self, asked=self.asked.part(share), extra=share * self.extra)
 
     def state(self, y: np.ndarray) -> np.ndarray:
         """Return x (16,) for the unknowns n, δ_r, δ_e, δ_d, θ, v, w."""
         n, rudder, together, unlike, pitch, v, w = y
-        x = np.zeros(16)
-        x[ROLL], x[PITCH] = self.roll, pitch
-        spin = (-sin(pitch), cos(pitch) * sin(self.roll), cos(pitch) * cos(self.roll))
-        x[VELOCITY] = self.speed, v, w, *(self.turn_rate * part for part in spin)
+        x, roll = np.zeros(16), self.asked.roll
+        x[ROLL], x[PITCH] = roll, pitch
+        spin = (-sin(pitch), cos(pitch) * sin(roll), cos(pitch) * cos(roll))
+        x[VELOCITY] = self.asked.speed, v, w, *(self.asked.turn_rate * part for part in spin)
         x[12:] = n, rudder, together - unlike, together + unlike
         return x
 
@@ -151,7 +179,7 @@ class Motion:
         """Return what is left of the seven equations."""
         x = self.state(y)
         rates = rate(x, x[12:], self.numbers, self.pull.wrench(x[VELOCITY]) + self.extra)
-        return np.append(rates[VELOCITY], rates[DEPTH] - self.depth_rate)
+        return np.append(rates[VELOCITY], rates[DEPTH] - self.asked.depth_rate)
 
     def solved(self, y: np.ndarray) -> np.ndarray | None:
         """Return the unknowns from a guess; None if they are not found."""
@@ -164,7 +192,7 @@ class Motion:
 
 def level_propeller(motion: Motion) -> float:
     """Return n at which thrust balances drag and pull straight ahead with central fins, a n² − b n u − c u² = R."""
-    p, u = motion.numbers.propeller, motion.speed
+    p, u = motion.numbers.propeller, motion.asked.speed
     x = motion.part(0.0).state(np.zeros(7))
     rates = rate(x, x[12:], motion.numbers, motion.pull.wrench(x[VELOCITY]))
     brake = -float(motion.numbers.mass_matrix[0] @ rates[VELOCITY])  # with the propeller standing still
@@ -225,42 +253,30 @@ class Trim:
         return dict(zip(STATE_NAMES, self.state.tolist(), strict=True))
 
 
-def trim(
-    model: Model,
-    *,
-    speed: float,
-    depth_rate: float = 0.0,
-    turn_rate: float = 0.0,
-    wet_length: float = 0.0,
-    roll: float = 0.0,
-    cable: str = "formula",
-) -> Trim:
-    """Return the steady motion of a model at a speed.
+Pull = Callable[[np.ndarray, Asked], np.ndarray]
+"""(state (16,), what is asked for) → wrench of the cable (6,), body axes [N, N m]."""
+
+
+def steady_motion(model: Model, asked: Asked, pull_of: Pull | None = None) -> Trim:
+    """Return the steady motion of a model.
 
     Args:
         model: vehicle and cable.
-        speed: u, forward speed through the water. [m/s]
-        depth_rate: z', positive down. [m/s]
-        turn_rate: ψ', positive to starboard. [rad/s]
-        wet_length: cable in the water; its pull is taken as steady although it grows. [m]
-        roll: φ, held by unlike stern-planes. [rad]
-        cable: "formula", ½ρπdC_t U² S and friction along the way of the tow point; or "model", the cable itself,
-            pulled along a way of that length. (In a turn less of it stays in the water: it cuts the corner.)
+        asked: which motion.
+        pull_of: what the cable pulls in it, if not what the formula says.
 
     Raises:
         NoTrimError: there is none: which limit is hit, and how far one can go.
-        UserError: a number that means nothing here.
+        UserError: the pull cannot be had.
     """
-    speed, depth_rate, turn_rate, wet_length, roll = check_request(
-        speed, depth_rate, turn_rate, wet_length, roll, cable
-    )
     try:
-        return _trim(model, speed, depth_rate, turn_rate, wet_length, roll, cable)
+        return _trim(model, asked, pull_of)
     except NoTrimError as error:
-        most = 0.0 if depth_rate or turn_rate or roll else fastest(model, speed, wet_length)
+        is_level = not (asked.depth_rate or asked.turn_rate or asked.roll)
+        most = fastest(model, asked.speed, asked.wet_length) if is_level else 0.0
         if not most:
             raise
-        behind = f" on {wet_length:g} m of cable" if wet_length else ""
+        behind = f" on {asked.wet_length:g} m of cable" if asked.wet_length else ""
         raise NoTrimError(
             f"{error} Straight ahead{behind} the hull holds {floor(1e3 * most) / 1e3:g} m/s at most."
         ) from None
@@ -278,45 +294,28 @@ def fastest(model: Model, above: float, wet_length: float = 0.0) -> float:
     while high - low > 1e-3 * high and high > SLOWEST:
         middle = 0.5 * (low + high)
         try:
-            _trim(model, middle, 0.0, 0.0, wet_length, 0.0, "formula")
+            _trim(model, Asked(speed=middle, wet_length=wet_length))
             low = middle
         except NoTrimError:
             high = middle
     return low
 
 
-def _trim(
-    model: Model,
-    speed: float,
-    depth_rate: float,
-    turn_rate: float,
-    wet_length: float,
-    roll: float,
-    cable: str,
-) -> Trim:
-    """Return the steady motion of a checked request."""
-    hull, pull = model.vehicle, SteadyPull.of(model, wet_length)
-    motion = Motion(
-        numbers=ideal(hull).numbers(),
-        pull=pull,
-        speed=speed,
-        depth_rate=depth_rate,
-        turn_rate=turn_rate,
-        roll=roll,
-        extra=np.zeros(6),
-    )
+def _trim(model: Model, asked: Asked, pull_of: Pull | None = None) -> Trim:
+    """Return the steady motion; refused with the limit alone."""
+    hull, pull = model.vehicle, SteadyPull.of(model, asked.wet_length)
+    motion = Motion(asked=asked, numbers=ideal(hull).numbers(), pull=pull, extra=np.zeros(6))
     x = _balanced(hull, motion)
-    if cable == "model" and wet_length > 0.0:
+    if pull_of is not None and asked.wet_length > 0.0:
         for _ in range(PASSES):
-            extra = _cable_pull(model, x, turn_rate, wet_length) - pull.wrench(x[VELOCITY])
-            motion = replace(motion, extra=extra)
+            motion = replace(motion, extra=pull_of(x, asked) - pull.wrench(x[VELOCITY]))
             x = _balanced(hull, motion)
     check_limits(hull, x)
     return Trim(
-        speed=speed,
-        depth_rate=depth_rate,
-        turn_rate=turn_rate,
-        wet_length=wet_length,
+        speed=asked.speed,
+        depth_rate=asked.depth_rate,
+        turn_rate=asked.turn_rate,
+        wet_length=asked.wet_length,
         length=hull.hull.length,
         state=x,
         command=commands(hull, x),
@@ -337,66 +336,6 @@ def _balanced(hull: Vehicle, motion: Motion) -> np.ndarray:
             say_how_far(hull, motion.part(reached).state(guess), reached)
         guess, reached = found, share
     return motion.state(guess)
-
-
-def _cable_pull(model: Model, x: np.ndarray, turn_rate: float, wet_length: float) -> np.ndarray:
-    """Return the pull of the cable itself at the end of a steady way of the tow point, `wet_length` long."""
-    nu, r_c = x[VELOCITY], model.vehicle.tow_point.position()
-    V = nu[:3] + np.cross(nu[3:], r_c)
-    duration = wet_length / float(np.linalg.norm(V))
-    R = np.empty((3, 3))
-    rotation(to_vehicle(x)[3:7], R)
-
-    def turned(time: float) -> np.ndarray:
-        c, s = cos(turn_rate * time), sin(turn_rate * time)
-        return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]) @ R
-
-    return from_cable_model(model, lambda t: turned(t) @ V, turned(duration), duration)
-
-
-CABLES = ("formula", "model")
-FASTEST = 50.0
-"""A run that is faster is stopped as absurd, `subzero.engine.coupling.FASTEST`. [m/s]"""
-STEEPEST = radians(80.0)
-"""Pitch beyond which Euler angles are no use any more. [rad]"""
-
-
-class NoTrimError(UserError):
-    """There is no such steady motion; the message names the limit that is hit."""
-
-
-def check_request(
-    speed: float, depth_rate: float, turn_rate: float, wet_length: float, roll: float, cable: str
-) -> tuple[float, float, float, float, float]:
-    """Return the numbers of a request as floats; refuse what cannot be asked for."""
-    asked = {
-        "speed": speed,
-        "depth_rate": depth_rate,
-        "turn_rate": turn_rate,
-        "wet_length": wet_length,
-        "roll": roll,
-    }
-    numbers = {name: real(value) for name, value in asked.items()}
-    for name, number in numbers.items():
-        if number is None:
-            raise UserError(f"trim: {name} is {short(asked[name])}; it must be a finite number.")
-    speed, depth_rate, turn_rate, wet_length, roll = (number or 0.0 for number in numbers.values())
-    if speed <= 0.0:
-        raise UserError(f"trim: speed is {speed:g} m/s; fins need a flow, so it must be above 0.")
-    if speed > FASTEST:
-        raise UserError(
-            f"trim: speed is {speed:g} m/s; it must be at most {FASTEST:g}, as runs are stopped beyond."
-        )
-    if wet_length < 0.0:
-        raise UserError(f"trim: wet_length is {wet_length:g} m; it must be 0 or more.")
-    if not isinstance(cable, str) or cable not in CABLES:
-        raise UserError(f"trim: cable is {short(cable)}; it must be one of {', '.join(CABLES)}.")
-    if abs(depth_rate) > speed * sin(STEEPEST):
-        raise NoTrimError(
-            f"There is no steady motion at {speed:g} m/s with a depth rate of {depth_rate:g} m/s: the pitch angle would"
-            f" pass {degrees(STEEPEST):.0f} degrees. At this speed ±{speed * sin(STEEPEST):.2g} m/s is the most."
-        )
-    return speed, depth_rate, turn_rate, wet_length, roll
 
 
 def check_limits(hull: Vehicle, x: np.ndarray) -> None:

@@ -1,7 +1,8 @@
 """Sweeps: a trial with many values of its parameters, on all cores or a cluster, into one dataset, never lost.
 
     >>> import subzero
-    >>> runs = subzero.sweep("fig6", {"water.current_east_m_s": [0.0, 0.1]}, changes={"run.duration_s": 2.0})
+    >>> currents = {"water.current_east_m_s": [0.0, 0.1]}
+    >>> runs = subzero.sweep("fig6", currents, changes={"run.duration_s": 2.0})
     >>> runs["heading"].dims
     ('member', 'time')
 
@@ -10,3 +11,8 @@ members anywhere. A schedule (`schedule`) hands them to an executor, of processe
 a store (`store`) keeps what comes back. In the end one dataset is written (`result`), and looked at (`sensitivity`,
 `figures`). `api` does it all; the command is ``subzero sweep``.
 """
+
+from subzero.sweeps.design import Design
+from subzero.sweeps.outcomes import Kept
+
+__all__ = ["Design", "Kept"]

@@ -10,15 +10,14 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from time import monotonic
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 
 import scenarios
-from subzero.errors import UserError, short, whole
+from subzero.errors import UserError, short, suggestion, whole
 from subzero.sweeps.member import Member
-from subzero.sweeps.outcomes import Function
-from subzero.sweeps.plan import Plan, plan_of
+from subzero.sweeps.plan import Plan, Planned, plan_sweep
 from subzero.sweeps.result import RESULT, Gathered, open_result, write_result
 from subzero.sweeps.schedule import Schedule
 from subzero.sweeps.store import Store, opened
@@ -55,22 +54,14 @@ Progress = Callable[[Standing], None]
 
 
 def sweep(
-    scenario: str | Path | scenarios.Trial,
-    parameters: Mapping[str, Any],
+    scenario: str | Path | scenarios.Trial | Plan,
+    parameters: Mapping[str, Any] | None = None,
     *,
-    design: str = "grid",
-    samples: int | None = None,
-    seed: int = 0,
-    changes: Mapping[str, float] | None = None,
-    scalars: Sequence[str] | None = None,
-    channels: Sequence[str] | None = None,
-    every: float | None = None,
-    function: Function | None = None,
-    tethered: bool = True,
     out: str | Path | None = None,
-    workers: int | None = None,
+    workers: int | Executor | None = None,
     client: Any = None,
     progress: Progress | None = None,
+    **how: Unpack[Planned],
 ) -> xr.Dataset:
     """Run a trial with many values of its parameters, and return one labelled dataset.
 
@@ -80,26 +71,14 @@ def sweep(
     3
 
     Args:
-        scenario: name of a shipped scenario, path of a scenario file, or a trial.
-        parameters: dotted name (`scenarios.parameters`) → a list of values, ``{"from": a, "to": b}`` with or without
-            ``"count": n`` and ``"log": True``, ``{"normal": [mean, deviation]}``, or ``"declared"``, the range that the
-            vehicle's or the cable's file declares; ``"vehicle.*"`` stands for all that have one.
-        design: ``grid``, ``together`` (lists whose values belong together), ``latin_hypercube``, ``sobol``,
-            ``monte_carlo``, ``morris`` or ``saltelli`` (sensitivities, extra [sensitivity]).
-        samples: how many points; trajectories of ``morris``; a power of two of ``saltelli``.
-        seed: of the points.
-        changes: dotted name → value that holds for all members.
-        scalars: what is kept of each run: numbers of its summary, or ``cable_tension.max``
-            (`subzero.sweeps.outcomes`).
-        channels: kept over time, on a common grid.
-        every: interval of that grid. [s]
-        function: of one's own: takes a run, returns a number, or numbers by name.
-        tethered: with the cable.
+        scenario: name of a shipped scenario, path of a scenario file, a trial, or a whole plan (`plan_sweep`).
+        parameters: their values, as of `plan_sweep`; none beside a plan, which has them.
         out: folder that keeps the members. The same call with it goes on where another was killed; without one, nothing
             is kept.
-        workers: processes on this machine, by default one for each of its cores.
-        client: a Dask client, or any `concurrent.futures.Executor`, to run on instead.
+        workers: processes on this machine, by default one for each of its cores; or a `concurrent.futures.Executor`.
+        client: Dask client to run on instead.
         progress: told after every batch how far it is.
+        **how: `design`, `changes`, `kept`, `tethered`, `description`, as of `plan_sweep`.
 
     Returns:
         parameters as coordinates on ``member``; scalars (member), channels (member, time); ``failed``, ``reason`` and
@@ -107,21 +86,42 @@ def sweep(
         ``runs.set_index(member=[...]).unstack()`` gives a grid one dimension for each parameter.
 
     Raises:
-        UserError: a plan that cannot be; a folder with another sweep.
+        UserError: what can be no plan; a folder with another sweep; workers that are none.
     """
-    plan = plan_of(
-        scenario, parameters, design=design, samples=samples, seed=seed, changes=changes, scalars=scalars,
-        channels=channels, every=every, function=function, tethered=tethered,
-    )  # fmt: skip
+    plan = _plan(scenario, parameters, how)
+    if client is not None and workers is not None:
+        raise UserError("sweep: workers and client are both given. Give one of them.")
+    workers = workers if client is None else client
     if out is not None:
-        with finished(plan, Path(out), workers=workers, client=client, progress=progress) as store:
+        with finished(plan, Path(out), workers=workers, progress=progress) as store:
             deliver(plan, store, Path(out))
         return open_result(Path(out) / RESULT)
     with tempfile.TemporaryDirectory(prefix="subzero-sweep-") as folder:
-        with finished(plan, Path(folder), workers=workers, client=client, progress=progress) as store:
+        with finished(plan, Path(folder), workers=workers, progress=progress) as store:
             deliver(plan, store, Path(folder))
         with open_result(Path(folder) / RESULT) as runs:
             return runs.load()
+
+
+def _plan(
+    scenario: str | Path | scenarios.Trial | Plan, parameters: Mapping[str, Any] | None, how: Planned
+) -> Plan:
+    """Return the plan that is meant."""
+    if not isinstance(scenario, Plan):
+        unknown = sorted(set(how) - set(Planned.__annotations__))
+        if unknown:
+            near = suggestion(unknown[0], Planned.__annotations__)
+            raise UserError(f"sweep: there is no argument {unknown[0]!r}.{near}")
+        if parameters is None:
+            raise UserError(
+                'sweep: no parameters are given. Give their values, as in {"start.wet_length_m": [0, 20, 40]}.'
+            )
+        return plan_sweep(scenario, parameters, **how)
+    if parameters is not None or how:
+        raise UserError(
+            "sweep: a plan has its parameters already. Leave them out, or give the trial and not a plan."
+        )
+    return scenario
 
 
 @contextmanager
@@ -129,8 +129,7 @@ def finished(
     plan: Plan,
     folder: Path,
     *,
-    workers: int | None = None,
-    client: Any = None,
+    workers: Any = None,
     progress: Progress | None = None,
     retry: bool = False,
 ) -> Iterator[Store]:
@@ -140,15 +139,13 @@ def finished(
         plan: the sweep.
         folder: where the store is, or will be.
         workers: as of `sweep`.
-        client: as of `sweep`.
         progress: as of `sweep`.
         retry: run members again that failed.
 
     Raises:
         UserError: as of `sweep`, or workers that cannot go on; what is finished is kept.
     """
-    if workers is not None:  # before there is a folder
-        whole("workers", workers, least=1)
+    check_workers(workers)  # before there is a folder
     job, rows = plan.job, plan.points.values
     shape = len(job.outcomes.channels), job.outcomes.times.size
     with opened(folder, plan.manifest(), shape) as store:
@@ -157,7 +154,7 @@ def finished(
         done = store.finished(len(rows))
         tally = _Tally(store, len(rows), int(done.sum()), progress)
         if not done.all():
-            with _executor(workers, client, len(rows) - int(done.sum())) as (executor, count):
+            with _executor(workers, len(rows) - int(done.sum())) as (executor, count):
                 Schedule(job, rows, np.flatnonzero(~done), count, tally.keep).run(executor)
         yield store
 
@@ -195,23 +192,41 @@ def deliver(plan: Plan, store: Store, folder: Path) -> Gathered:
 
 
 @contextmanager
-def _executor(workers: int | None, client: Any, members: int) -> Iterator[tuple[Executor, int]]:
+def _executor(workers: Any, members: int) -> Iterator[tuple[Executor, int]]:
     """Give what runs members, and how many it runs at a time."""
-    if client is None:
-        count = min(whole("workers", workers, least=1) if workers is not None else cores(), members)
+    if isinstance(workers, Executor):
+        yield workers, cores()
+    elif _is_client(workers):
+        yield workers.get_executor(), _cluster_size(workers)
+    else:
+        count = min(cores() if workers is None else workers, members)
         pool = WorkerPool(count)
         try:
             yield pool, count
         finally:
             pool.shutdown(cancel_futures=True)
-    elif isinstance(client, Executor):
-        yield client, whole("workers", workers, least=1) if workers is not None else cores()
-    elif hasattr(client, "get_executor") and hasattr(client, "ncores"):
-        yield client.get_executor(), _cluster_size(client)
+
+
+def check_workers(workers: Any) -> None:
+    """Refuse what runs no members.
+
+    Raises:
+        UserError: neither a number of processes, nor a Dask client, nor an executor.
+    """
+    if workers is None or isinstance(workers, Executor) or _is_client(workers):
+        return
+    if isinstance(workers, (int, float, str)):
+        whole("workers", workers, least=1)
     else:
         raise UserError(
-            f"client is {short(client)}. Allowed: a Dask client, or a concurrent.futures.Executor."
+            f"workers is {short(workers)}. Allowed: a number of processes, a Dask client, or a"
+            " concurrent.futures.Executor."
         )
+
+
+def _is_client(workers: Any) -> bool:
+    """Say whether this is a Dask client; Dask itself need not be there."""
+    return hasattr(workers, "get_executor") and hasattr(workers, "ncores")
 
 
 CLUSTER_WAIT_S = 30
@@ -226,7 +241,8 @@ def _cluster_size(client: Any) -> int:
         raise UserError(
             f"The Dask scheduler has no worker after {CLUSTER_WAIT_S} s. Start some: dask worker ADDRESS --nthreads 1"
         ) from None
-    return max(1, sum(client.ncores().values()))
+    cores: dict[str, int] = client.ncores()
+    return max(1, sum(cores.values()))
 
 
 def cores() -> int:

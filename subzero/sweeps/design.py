@@ -101,34 +101,6 @@ def spreads_of(trial: scenarios.Trial, parameters: Mapping[str, Any]) -> tuple[S
     return tuple(_spread(trial, name, said) for name, said in named.items())
 
 
-def points_of(
-    trial: scenarios.Trial,
-    parameters: Mapping[str, Any],
-    *,
-    design: str = "grid",
-    samples: int | None = None,
-    seed: int = 0,
-) -> Points:
-    """Return the points of a plan.
-
-    Args:
-        trial: what is swept.
-        parameters: dotted name → spread, as this module says.
-        design: one of `DESIGNS`.
-        samples: how many points; trajectories of ``morris``, a power of two of ``saltelli``. Grids have their own.
-        seed: of random designs.
-
-    Raises:
-        UserError: what cannot be a plan: no such parameter, value or design; too many points.
-    """
-    make = chosen(DESIGNS, design, "design")
-    spreads = spreads_of(trial, parameters)
-    _check_ends(trial, spreads)
-    count = _samples(design, samples)
-    unit, values = make(spreads, count, whole("seed", seed))
-    return Points(spreads=spreads, values=values, design=design, samples=count, seed=seed, unit=unit)
-
-
 # Spreads.
 
 
@@ -387,3 +359,51 @@ DESIGNS: dict[str, Callable[[tuple[Spread, ...], int, int], Made]] = {
 
 COUNT_THEMSELVES = ("grid", "together")
 """Designs whose values say how many points they have."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Design:
+    """How the points of a sweep are chosen.
+
+    Attributes:
+        kind: one of `DESIGNS`: ``grid``, ``together`` (lists whose values belong together), ``latin_hypercube``,
+            ``sobol``, ``monte_carlo``, ``morris`` or ``saltelli`` (sensitivities, extra [sensitivity]).
+        samples: how many points; trajectories of ``morris``, a power of two of ``saltelli``. Lists have their own.
+        seed: of random designs.
+
+    Raises:
+        UserError: there is no such design; a number of samples or a seed that it cannot have.
+    """
+
+    kind: str = "grid"
+    samples: int | None = None
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        """Refuse what is no design."""
+        chosen(DESIGNS, self.kind, "design")
+        object.__setattr__(self, "seed", whole("seed", self.seed))
+        _samples(self.kind, self.samples)
+
+
+GRID = Design()
+
+
+def points_of(trial: scenarios.Trial, parameters: Mapping[str, Any], design: Design = GRID) -> Points:
+    """Return the points of a plan.
+
+    Args:
+        trial: what is swept.
+        parameters: dotted name → spread, as this module says.
+        design: which points.
+
+    Raises:
+        UserError: what cannot be a plan: no such parameter or value; too many points.
+    """
+    spreads = spreads_of(trial, parameters)
+    _check_ends(trial, spreads)
+    count = _samples(design.kind, design.samples)
+    unit, values = DESIGNS[design.kind](spreads, count, design.seed)
+    return Points(
+        spreads=spreads, values=values, design=design.kind, samples=count, seed=design.seed, unit=unit
+    )

@@ -11,16 +11,15 @@ import json
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
-from importlib.metadata import version
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 import scenarios
 from scenarios.parameters import with_parameters
 from subzero.errors import UserError, printable
+from subzero.provenance import code_digest
 from subzero.sweeps.outcomes import Outcomes, channels_of, own_numbers, scalars_of
 
 if TYPE_CHECKING:
@@ -142,35 +141,3 @@ def run_members(job: Job, indices: Sequence[int], rows: np.ndarray) -> list[Memb
             " Install the same on all machines, and start the workers again."
         )
     return [job.run(int(index), row) for index, row in zip(indices, rows, strict=True)]
-
-
-@cache
-def code_digest() -> str:
-    """Return a digest of all that the numbers of a run depend on: our sources, and the libraries' versions."""
-    import hashlib
-    from pathlib import Path
-
-    root = Path(__file__).resolve().parents[2]
-    digest = hashlib.sha256()
-    for package in ("cable", "scenarios", "subzero", "vehicle"):
-        for path in sorted((root / package).rglob("*")):
-            if path.suffix in (".py", ".toml"):
-                digest.update(str(path.relative_to(root)).encode() + b"\0" + path.read_bytes())
-    for library in ("numpy", "scipy", "numba", "xarray"):
-        digest.update(f"{library} {version(library)}".encode())
-    return digest.hexdigest()
-
-
-def canonical(value: Any) -> Any:
-    """Return a value of a trial as JSON can hold it, floats to the last bit."""
-    from dataclasses import fields, is_dataclass
-
-    if is_dataclass(value):
-        return {one.name: canonical(getattr(value, one.name)) for one in fields(value)}
-    if isinstance(value, np.ndarray):
-        return value.tolist()
-    if isinstance(value, dict):
-        return {str(key): canonical(inside) for key, inside in sorted(value.items())}
-    if isinstance(value, list | tuple):
-        return [canonical(one) for one in value]
-    return value

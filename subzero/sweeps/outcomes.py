@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from types import CodeType
 from typing import TYPE_CHECKING, Any
@@ -67,8 +67,28 @@ DEFAULT_INTERVALS = 100
 
 
 @dataclass(frozen=True, kw_only=True)
+class Kept:
+    """What is asked for of each run.
+
+    Attributes:
+        scalars: names of numbers, such as ``peak_speed_m_s`` or ``cable_tension.max``; `DEFAULT_SCALARS` if not given.
+        channels: kept over time, on a common grid; `DEFAULT_CHANNELS` when not given.
+        every: interval of that grid; a hundredth of the run when not given. [s]
+        function: of one's own: takes a run, returns a number, or numbers by name.
+    """
+
+    scalars: Sequence[str] | None = None
+    channels: Sequence[str] | None = None
+    every: float | None = None
+    function: Function | None = None
+
+
+AS_USUAL = Kept()
+
+
+@dataclass(frozen=True, kw_only=True)
 class Outcomes:
-    """What is kept of each run.
+    """What is kept of each run, checked.
 
     Attributes:
         scalars: names, as this module says.
@@ -99,41 +119,31 @@ class Outcomes:
         return hashlib.sha256(repr(parts).encode()).hexdigest()
 
 
-def outcomes_of(
-    scalars: Any = None,
-    channels: Any = None,
-    every: float | None = None,
-    *,
-    duration: float,
-    function: Function | None = None,
-) -> Outcomes:
+def outcomes_of(kept: Kept, duration: float) -> Outcomes:
     """Return what is kept, checked.
 
     Args:
-        scalars: names; `DEFAULT_SCALARS` when not given.
-        channels: names; `DEFAULT_CHANNELS` when not given.
-        every: interval of the common grid; a hundredth of the run when not given. [s]
+        kept: what is asked for.
         duration: of the nominal run. [s]
-        function: of one's own.
 
     Raises:
         UserError: no such name, an interval that is none.
     """
-    names = _names("scalars", scalars, DEFAULT_SCALARS)
-    kept = _names("channels", channels, DEFAULT_CHANNELS)
-    for name in names:
+    scalars = _names("scalars", kept.scalars, DEFAULT_SCALARS)
+    channels = _names("channels", kept.channels, DEFAULT_CHANNELS)
+    for name in scalars:
         _check_scalar(name)
-    for name in kept:
+    for name in channels:
         if name not in BY_NAME or name == "time":
             raise UserError(f"There is no channel {short(name)}.{suggestion(name, BY_NAME)}")
-    if function is not None and not callable(function):
-        raise UserError(f"function is {short(function)}; it must be a function of a run.")
-    step = duration / DEFAULT_INTERVALS if every is None else real(every)
+    if kept.function is not None and not callable(kept.function):
+        raise UserError(f"function is {short(kept.function)}; it must be a function of a run.")
+    step = duration / DEFAULT_INTERVALS if kept.every is None else real(kept.every)
     if step is None or not step > 0.0 or duration / step > MOST_GRID_TIMES:
         raise UserError(
-            f"every is {short(every)}. Allowed: a time from {duration / MOST_GRID_TIMES:g} s on, above 0."
+            f"every is {short(kept.every)}. Allowed: a time from {duration / MOST_GRID_TIMES:g} s on, above 0."
         )
-    return Outcomes(scalars=names, channels=kept, every=step, until=duration, function=function)
+    return Outcomes(scalars=scalars, channels=channels, every=step, until=duration, function=kept.function)
 
 
 def _names(what: str, given: Any, default: tuple[str, ...]) -> tuple[str, ...]:

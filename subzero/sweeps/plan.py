@@ -22,22 +22,22 @@ A file names data only: it holds no program and starts none.
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict
 
 import scenarios
 from scenarios.files import Source, read_toml
 from scenarios.parameters import with_parameters
 from subzero.errors import UserError, listed, printable, short, suggestion, truth
 from subzero.model import load
-from subzero.sweeps.design import Points, points_of
-from subzero.sweeps.member import Job, canonical, code_digest
-from subzero.sweeps.outcomes import Function, outcomes_of
+from subzero.provenance import code_digest, trial_digest
+from subzero.sweeps.design import DISTRIBUTION_KEYS, GRID, Design, Points, points_of
+from subzero.sweeps.member import Job
+from subzero.sweeps.outcomes import AS_USUAL, Kept, outcomes_of
 
 KEYS = {
     "": (
@@ -74,11 +74,8 @@ class Plan:
 
     def manifest(self) -> dict[str, str]:
         """Return what its members belong to: anything that could change a number, by its digest."""
-        values = canonical(self.job.trial)
-        for words in ("name", "description", "text", "source"):
-            values.pop(words)
         return {
-            "trial": hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest(),
+            "trial": trial_digest(self.job.trial),
             "parameters": json.dumps(self.points.names),
             "points": self.points.digest,
             "outcomes": self.job.outcomes.digest(),
@@ -100,22 +97,45 @@ class Plan:
         }
 
 
-def plan_of(
+class Planned(TypedDict, total=False):
+    """What a sweep may be told besides its trial and parameters, see `plan_sweep`."""
+
+    design: Design
+    changes: Mapping[str, float] | None
+    kept: Kept
+    tethered: bool
+    description: str
+
+
+def plan_sweep(
     scenario: str | Path | scenarios.Trial,
     parameters: Mapping[str, Any],
     *,
-    design: str = "grid",
-    samples: int | None = None,
-    seed: int = 0,
+    design: Design = GRID,
     changes: Mapping[str, float] | None = None,
-    scalars: Any = None,
-    channels: Any = None,
-    every: float | None = None,
-    function: Function | None = None,
+    kept: Kept = AS_USUAL,
     tethered: bool = True,
     description: str = "",
 ) -> Plan:
-    """Return a sweep, checked; arguments as of `subzero.sweep`.
+    """Return a sweep, checked, as `subzero.sweep` takes it.
+
+    >>> import subzero
+    >>> from subzero.sweeps import Design, Kept
+    >>> lengths = {"start.wet_length_m": {"from": 0.0, "to": 40.0}}
+    >>> kept = Kept(scalars=["cable_tension.max"], channels=["surge_speed"], every=0.5)
+    >>> subzero.plan_sweep("fig6", lengths, design=Design(kind="sobol", samples=64), kept=kept).description
+    '64 members of fig6, sobol'
+
+    Args:
+        scenario: name of a shipped scenario, path of a scenario file, or a trial.
+        parameters: dotted name (`scenarios.parameters`) → a list of values, ``{"from": a, "to": b}`` with or without
+            ``"count": n`` and ``"log": True``, ``{"normal": [mean, deviation]}``, or ``"declared"``, the range that the
+            vehicle's or the cable's file declares; ``"vehicle.*"`` stands for all that have one.
+        design: which points; every combination of the lists by default.
+        changes: dotted name → value that holds for all members.
+        kept: what is kept of each run; the usual numbers and channels by default.
+        tethered: with the cable.
+        description: one line.
 
     Raises:
         UserError: anything in it that cannot be.
@@ -125,11 +145,11 @@ def plan_of(
     both = sorted(set(changes or {}) & set(parameters)) if isinstance(parameters, Mapping) else []
     if both:
         raise UserError(f"{', '.join(both)}: in changes and in parameters too. Keep one of them.")
-    points = points_of(trial, parameters, design=design, samples=samples, seed=seed)
+    points = points_of(trial, parameters, design)
     job = Job(
         trial=trial,
         names=points.names,
-        outcomes=outcomes_of(scalars, channels, every, duration=trial.duration, function=function),
+        outcomes=outcomes_of(kept, trial.duration),
         tethered=truth("tethered", tethered),
         code=code_digest(),
     )
@@ -164,16 +184,14 @@ def _plan_in(source: Source, name: str) -> Plan:
             f'{name}: it does not say which trial is swept. Add trial = "fig6", or the path of a trial file.'
         )
     try:
-        plan = plan_of(
+        plan = plan_sweep(
             _trial_of(table["trial"], source.folder),
             _dotted(table.get("parameters", {})),
-            design=table.get("design", "grid"),
-            samples=table.get("samples"),
-            seed=table.get("seed", 0),
+            design=Design(
+                kind=table.get("design", "grid"), samples=table.get("samples"), seed=table.get("seed", 0)
+            ),
             changes=_dotted(table.get("changes", {})),
-            scalars=kept.get("scalars"),
-            channels=kept.get("channels"),
-            every=kept.get("every_s"),
+            kept=Kept(scalars=kept.get("scalars"), channels=kept.get("channels"), every=kept.get("every_s")),
             tethered=not truth("untethered", table.get("untethered", False)),
             description=str(table.get("description", "")),
         )
@@ -216,6 +234,4 @@ def _dotted(table: Mapping[str, Any], above: str = "") -> dict[str, Any]:
 
 def _says_spread(table: Mapping[str, Any]) -> bool:
     """Say whether a table is a spread, and no section without quotes."""
-    from subzero.sweeps.design import DISTRIBUTION_KEYS
-
     return any(key in DISTRIBUTION_KEYS for key in table)

@@ -12,7 +12,7 @@ import numpy as np
 
 import scenarios
 from scenarios.steps import sample_times
-from subzero.channels import TIME, column_name
+from subzero.channels import HEADING, TIME, TURN, column_name
 from subzero.diagnosis.hypothesis.catalogue import START, catalogue
 from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.effect import Effect
@@ -20,7 +20,7 @@ from subzero.diagnosis.hypothesis.hypotheses import with_tolerances
 from subzero.errors import UserError, printable
 from subzero.model import Model, load
 from subzero.records.consistency import REPORTED_COMMANDS
-from subzero.records.record import HEADING, TURN, Record
+from subzero.records.record import Record
 from subzero.synthetic.planted import Hidden, draw_deviations, draw_effect, hide, make_record
 from subzero.synthetic.reference_run import NoTruthError
 from subzero.synthetic.sealed_answer import SEALED, Answer, seal

@@ -1,7 +1,7 @@
 """The truth of a setting by the other cable formulation, lumped masses and springs, and what sensors show of it.
 
 Another cable (`cable.lumped`), another way to couple it (`reference_coupling`), finer steps, and sensors written
-independently of `inference.measurement`. Only the hull is the same; without the cable it is the hull alone in finer
+independently of `hypothesis.measurement`. Only the hull is the same; without the cable it is the hull alone in finer
 steps.
 
     y' = (x − y)/lag,   shown = (1 + scale) y + bias,   at t − clock offset
@@ -152,7 +152,7 @@ def simulate_reference(
     last = float(np.max(times)) + max(-setting.clock_offset, 0.0)
     steps = int(np.ceil(min(last, setting.trial.duration) / cable_step - 1e-6))
     trial = replace(setting.trial, cable_step=cable_step, segment_length=segment_length,
-                    hull_step=fitting_step(cable_step, hull_step), grading=0.0,
+                    hull_step=fitting_step(cable_step, hull_step), grading=0.0, far_grading=0.0, every=0.0,
                     duration=max(steps, 1) * cable_step)  # fmt: skip
     fine = replace(setting, trial=trial, later=_within(setting, trial))
     return seen(fine, truth_of(fine), times, channels)

@@ -5,7 +5,7 @@ transfer and schedule of the loops alone. Tolerance: the factors of 5 (speed) an
 to reach, measured after the transients; 10 % between the nonlinear hull and the linear closed loop it was designed as.
 """
 
-import dataclasses
+from dataclasses import replace
 
 import control
 import numpy as np
@@ -13,7 +13,7 @@ import pytest
 
 import subzero
 from subzero import autopilot
-from subzero.autopilot import Loop, Schedule, Sensor, Wanted
+from subzero.autopilot import Loop, Schedule, Sensor, Sensors, Wanted
 from subzero.autopilot.loops import Law
 from subzero.autopilot.sensors import UNKNOWN
 
@@ -67,7 +67,9 @@ def rms(values):
 def test_feed_forward_makes_the_speed_error_five_times_smaller(fig6, tuning, feed_forward):
     fed = {
         name: autopilot.fly(
-            fig6, autopilot.make("pid", fig6, feed_forward=name, tuning=tuning), straight(fig6), duration=60.0
+            replace(fig6, duration=60.0),
+            autopilot.make("pid", fig6, feed_forward=name, tuning=tuning),
+            straight(fig6),
         )
         for name in ("none", feed_forward)
     }
@@ -82,7 +84,7 @@ def test_the_cable_model_makes_the_heading_error_in_a_wide_turn_three_times_smal
     for feed_forward in ("none", "model"):
         pilot = autopilot.make(name, wide_turn, feed_forward=feed_forward, tuning=tuning)
         errors[feed_forward] = error(
-            autopilot.fly(wide_turn, pilot, turning(wide_turn), duration=45.0), "heading"
+            autopilot.fly(replace(wide_turn, duration=45.0), pilot, turning(wide_turn)), "heading"
         )
     assert rms(errors["none"]) > 3.0 * rms(errors["model"])
 
@@ -92,7 +94,7 @@ def test_the_formula_knows_that_the_cable_cuts_the_corner(wide_turn, tuning):
     runs = {}
     for feed_forward in ("none", "formula"):
         pilot = autopilot.make("pid", wide_turn, feed_forward=feed_forward, tuning=tuning)
-        runs[feed_forward] = autopilot.fly(wide_turn, pilot, turning(wide_turn), duration=45.0)
+        runs[feed_forward] = autopilot.fly(replace(wide_turn, duration=45.0), pilot, turning(wide_turn))
     for name, factor in (("speed", 5.0), ("heading", 2.5)):
         alone, helped = (rms(error(run, name)) for run in runs.values())
         assert alone > factor * helped
@@ -101,12 +103,11 @@ def test_the_formula_knows_that_the_cable_cuts_the_corner(wide_turn, tuning):
 def test_the_same_gains_move_on_board_when_the_cable_is_cut(wide_turn, tuning):
     """With its cable fed forward the tethered vehicle answers like the bare one with the same feedback."""
     fed = autopilot.make("pid", wide_turn, feed_forward="model", tuning=tuning)
-    tethered = autopilot.fly(wide_turn, fed, turning(wide_turn), duration=45.0)
+    tethered = autopilot.fly(replace(wide_turn, duration=45.0), fed, turning(wide_turn))
     bare = autopilot.fly(
-        wide_turn,
+        replace(wide_turn, duration=45.0),
         autopilot.make("pid", wide_turn, tuning=tuning),
         turning(wide_turn),
-        duration=45.0,
         tethered=False,
     )
     assert np.max(np.abs(tethered["heading"] - bare["heading"])) < 0.5
@@ -115,12 +116,12 @@ def test_the_same_gains_move_on_board_when_the_cable_is_cut(wide_turn, tuning):
 
 def test_a_small_step_of_the_bare_hull_is_the_one_it_was_designed_for(fig6, tuning):
     """Two degrees of heading: the flight against the linear closed loop of the same gains, held for 0.1 s a sample."""
-    model = dataclasses.replace(tuning.model, vehicle=tuning.model.vehicle.with_parameter("motor.lag", 0.0))
-    trial = dataclasses.replace(fig6, start=dataclasses.replace(fig6.start, surge_speed=1.0, heading=0.0))
+    model = replace(tuning.model, vehicle=tuning.model.vehicle.with_parameter("motor.lag", 0.0))
+    trial = replace(fig6, start=replace(fig6.start, surge_speed=1.0, heading=0.0))
     step = np.radians(2.0)
     pilot = autopilot.make("pid", trial, tuning=tuning)
     run = autopilot.fly(
-        trial, pilot, lambda t: Wanted(1.0, step, 1.0), tethered=False, duration=8.0, model=model
+        replace(trial, duration=8.0), pilot, lambda t: Wanted(1.0, step, 1.0), tethered=False, model=model
     )
     part = autopilot.subsystem(
         autopilot.linearise(tuning.model, autopilot.trim(tuning.model, speed=1.0)), "yaw_sway"
@@ -141,7 +142,7 @@ def test_a_small_step_of_the_bare_hull_is_the_one_it_was_designed_for(fig6, tuni
 def test_every_autopilot_holds_speed_heading_depth_and_roll_of_the_bare_hull(fig6, tuning, name):
     goal = Wanted(0.8, fig6.start.heading + 1.0, fig6.start.depth + 2.0)
     pilot = autopilot.make(name, fig6, tuning=tuning)
-    run = autopilot.fly(fig6, pilot, lambda t: goal, tethered=False, duration=60.0)
+    run = autopilot.fly(replace(fig6, duration=60.0), pilot, lambda t: goal, tethered=False)
     end = run.isel(time=-1)
     assert float(end["surge_speed"]) == pytest.approx(0.8, abs=1e-3)
     assert float(end["heading"]) == pytest.approx(float(end["wanted_heading"]), abs=0.05)
@@ -252,9 +253,10 @@ def test_unknown_names_are_told(fig6):
 def test_a_flight_with_noisy_sensors_repeats_with_its_seed(fig6, tuning):
     pilot = autopilot.make("lqr", fig6, tuning=tuning)
     noisy = [Sensor(channel=one.channel, noise=0.01) for one in autopilot.PERFECT]
+    seeds = Sensors(noisy, seed=1), Sensors(noisy, seed=2)
     first, again, other = (
-        autopilot.fly(fig6, pilot, straight(fig6), duration=5.0, sensors=noisy, seed=seed)
-        for seed in (1, 1, 2)
+        autopilot.fly(replace(fig6, duration=5.0), pilot, straight(fig6), sensors=sensors)
+        for sensors in (seeds[0], *seeds)
     )
     assert np.array_equal(first["heading"], again["heading"])
     assert not np.array_equal(first["heading"], other["heading"])

@@ -118,8 +118,9 @@ def test_a_deviation_at_the_start_goes_on_like_that_of_the_run():
     found = autopilot.linearise_along("fig6", start=start, duration=8.0).respond(np.zeros((80, 4)), off)
     fig6 = subzero.load_scenario("fig6").start
     plant = autopilot.plant(
-        tuning().model, tethered=True, start=start, depth=fig6.depth, heading=fig6.heading, longest=40.0
-    )
+        tuning().model, tethered=True, start=start, depth=fig6.depth, heading=fig6.heading,
+        discretisation=autopilot.Discretisation(longest=40.0),
+    )  # fmt: skip
     ends = []
     for sign in (1.0, -1.0):
         x = plant.initial_state.copy()

@@ -164,7 +164,8 @@ def test_the_spiral_of_the_bare_hull_is_that_of_its_linear_model(mirrored):
 @pytest.mark.parametrize("name", autopilot.STEPS)
 def test_a_step_settles_without_a_cable_and_with_one_that_is_fed_forward(name, tuning):
     for tethered, feed_forward in ((False, "none"), (True, "formula")):
-        _, found = autopilot.step(name, feed_forward=feed_forward, tethered=tethered, tuning=tuning)
+        pilot = autopilot.Pilot(feed_forward=feed_forward, tuning=tuning)
+        _, found = autopilot.step(name, pilot=pilot, tethered=tethered)
         assert found["settling_time_s"] < 30.0
         assert abs(found["steady_error"]) < 0.01 * abs(autopilot.STEPS[name].size)
         assert found["overshoot"] < 0.5

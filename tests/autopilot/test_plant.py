@@ -68,8 +68,9 @@ def test_a_linearisation_of_python_control_is_our_linear_model(model, steady):
 def fig6_on_the_plant(model, longest=40.0):
     trial = subzero.load_scenario("fig6")
     plant = autopilot.plant(
-        model, tethered=True, depth=trial.start.depth, heading=trial.start.heading, longest=longest
-    )
+        model, tethered=True, depth=trial.start.depth, heading=trial.start.heading,
+        discretisation=autopilot.Discretisation(longest=longest),
+    )  # fmt: skip
     time = np.linspace(0.0, 15.0, 151)
     rows = np.searchsorted(trial.commands.time, time + 1e-9, side="right") - 1
     return control.input_output_response(
@@ -140,7 +141,8 @@ def test_plants_can_be_interconnected(model, tethered):
 def test_a_tethered_plant_has_a_linearisation(model):
     """Of a short cable; the surge column is that of our linear model over one sample, to 5 %."""
     steady = autopilot.trim(model, speed=1.0, wet_length=2.0)
-    plant = autopilot.plant(model, tethered=True, start=steady, longest=4.0)
+    room = autopilot.Discretisation(longest=4.0)
+    plant = autopilot.plant(model, tethered=True, start=steady, discretisation=room)
     linear = control.linearize(plant, plant.initial_state, steady.command)
     assert linear.dt == 0.1
     assert np.all(np.isfinite(linear.A))
@@ -150,7 +152,7 @@ def test_a_tethered_plant_has_a_linearisation(model):
 
 def test_bad_plants_are_refused(model):
     with pytest.raises(subzero.UserError, match="shorter than the hull's step"):
-        autopilot.plant(model, tethered=True, sample_time=0.01)
+        autopilot.Discretisation(sample_time=0.01)
     long = autopilot.trim(model, speed=1.0, wet_length=60.0)
     with pytest.raises(subzero.UserError, match="longest = 50 m"):
         autopilot.plant(model, tethered=True, start=long)

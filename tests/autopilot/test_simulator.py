@@ -151,14 +151,14 @@ def test_a_step_costs_little_beside_the_physics():
     trial = dataclasses.replace(sim.trial, commands=None)
     setup, live = prepare(trial, sim.model, False)
     recording, times = new_recording(601, 10_000), np.linspace(0.0, 60.0, 601)
-    run_rows(setup, live, recording, times, 1, 2, 0, 1)
+    run_rows(setup, live, recording, times, 1, 2, 0, 1, 1)
     stepped, inside = [], []
     for k in range(11):
         begin = time.perf_counter()
         for _ in range(batch):
             sim.step(command)
         middle = time.perf_counter()
-        run_rows(setup, live, recording, times, 2 + k * batch, 2 + (k + 1) * batch, 0, 1)
+        run_rows(setup, live, recording, times, 2 + k * batch, 2 + (k + 1) * batch, 0, 1, 1)
         stepped.append((middle - begin) / batch)
         inside.append((time.perf_counter() - middle) / batch)
     assert min(stepped) - min(inside) < 20e-6

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from subzero.cli import FINE, INTERRUPTED, MISTAKE, main
-from subzero.diagnosis.results import (
+from subzero.diagnosis import (
     CAUSE_NAMED,
     NOTHING_WRONG,
     OUTSIDE,
@@ -64,7 +64,7 @@ def engine(monkeypatch, tmp_path):
         return dict.fromkeys(channels, np.interp(times, TIME, SPEED))
 
     monkeypatch.setattr("subzero.diagnosis.api.diagnose_trials", diagnose)
-    monkeypatch.setattr("subzero.diagnosis.inference.measurement.respond", respond)
+    monkeypatch.setattr("subzero.diagnosis.inference.simulator.respond", respond)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "200")
     rows = "\n".join(f"{t:.1f},{v:.5f}" for t, v in zip(TIME, SPEED, strict=True))

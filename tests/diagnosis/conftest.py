@@ -7,11 +7,18 @@ import numpy as np
 import pytest
 
 import subzero
-from subzero.diagnosis.hypothesis import catalogue as effects
-from subzero.diagnosis.hypothesis.catalogue import NOISE
-from subzero.diagnosis.hypothesis.configuration import Setting
-from subzero.diagnosis.hypothesis.hypotheses import entries_of, variances
-from subzero.diagnosis.inference import Fit, Noise, Observed, Problem, economical, refit, respond
+from subzero.diagnosis import NOISE, START, Setting, catalogue
+from subzero.diagnosis.inference import (
+    Fit,
+    Noise,
+    Observed,
+    Problem,
+    economical,
+    entries_of,
+    refit,
+    respond,
+    variances,
+)
 
 CHANNELS = ("surge_speed", "heading", "yaw_rate", "pitch", "roll_angle", "depth")
 COLOUR = 0.5
@@ -66,7 +73,7 @@ def plant():
         for name, added in (drift or {}).items():
             seen[name] = seen[name] + added(time)
         record = Observed(name="planted", time=time, values=seen, noise=noise, setting=setting)
-        entries = entries_of(tuple(effects.catalogue(CHANNELS).values()), effects.START, 1)
+        entries = entries_of(tuple(catalogue(CHANNELS).values()), START, 1)
         problem = Problem(records=(record,), entries=entries)
         zero = np.zeros(len(entries))
         return Planted(problem, problem.residual(zero), problem.jacobian(zero))

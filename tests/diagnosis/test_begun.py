@@ -5,8 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from subzero.diagnosis.hypothesis.catalogue import catalogue
-from subzero.diagnosis.hypothesis.effect import with_free_onset, with_onset
+from subzero.diagnosis import catalogue, with_free_onset, with_onset
 from subzero.diagnosis.inference import respond
 
 EFFECTS = catalogue(("heading",))

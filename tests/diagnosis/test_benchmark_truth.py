@@ -9,7 +9,7 @@ import pytest
 
 from benchmarks.diagnosis import manoeuvres, truth
 from benchmarks.diagnosis.cases import HEAVY, cases
-from subzero.diagnosis.hypothesis.catalogue import SPECS
+from subzero.diagnosis import SPECS
 from subzero.synthetic.reference_run import NoTruthError
 
 TIMES, CHANNELS = np.linspace(0.0, 10.0, 101), ("heading",)

@@ -11,8 +11,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import subzero
-from subzero.diagnosis.hypothesis.catalogue import NOISE, START, catalogue
-from subzero.diagnosis.hypothesis.configuration import Setting
+from subzero.diagnosis import NOISE, START, Setting, catalogue
 from subzero.errors import UserError
 from subzero.external_force import AXES
 from subzero.records.record import read_record

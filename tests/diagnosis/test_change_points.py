@@ -12,9 +12,7 @@ import numpy as np
 import pytest
 
 import subzero
-from subzero.diagnosis.hypothesis.catalogue import catalogue
-from subzero.diagnosis.hypothesis.effect import with_onset
-from subzero.diagnosis.hypothesis.hypotheses import variances
+from subzero.diagnosis import catalogue, with_onset
 from subzero.diagnosis.inference import (
     BaseRun,
     LinearisationPoint,
@@ -29,6 +27,7 @@ from subzero.diagnosis.inference import (
     relinearised_force,
     scan,
     times_of,
+    variances,
     without_force,
 )
 from subzero.records.record import Record

@@ -6,7 +6,6 @@ Configuration: fig6, 30 s, six channels with coloured noise, all parameters nomi
 import numpy as np
 import pytest
 
-from subzero.diagnosis.hypothesis.hypotheses import variances
 from subzero.diagnosis.inference import (
     candidate_of,
     force_columns,
@@ -15,6 +14,7 @@ from subzero.diagnosis.inference import (
     one_terms,
     refit,
     relinearised_force,
+    variances,
     without_force,
 )
 from subzero.external_force import MissingForce, Term

@@ -14,19 +14,17 @@ from scipy.optimize import lsq_linear
 from scipy.stats import multivariate_normal
 
 import subzero
+from subzero.diagnosis import NOISE, START, Parameter, Setting, catalogue
 from subzero.diagnosis.assessment import separation
-from subzero.diagnosis.hypothesis import catalogue as effects
-from subzero.diagnosis.hypothesis.catalogue import NOISE
-from subzero.diagnosis.hypothesis.configuration import Setting
-from subzero.diagnosis.hypothesis.effect import Parameter
-from subzero.diagnosis.hypothesis.hypotheses import columns_of, entries_of
 from subzero.diagnosis.inference import (
     TRUTHS,
     Noise,
     Observed,
     Problem,
     Quadratic,
+    columns_of,
     economical,
+    entries_of,
     freed,
     posterior,
     quadratic_step,
@@ -53,8 +51,8 @@ IDS = {
 }
 TRIAL = subzero.load_scenario("fig6")
 FIG6 = Setting(trial=TRIAL, model=subzero.Model.of(TRIAL))
-CATALOGUE = effects.catalogue(BASIC)
-ALL = {**CATALOGUE, **{effect.id: effect for effect in effects.START}}
+CATALOGUE = catalogue(BASIC)
+ALL = {**CATALOGUE, **{effect.id: effect for effect in START}}
 
 
 def linear_problem(seed, m=40, k=6):
@@ -148,7 +146,7 @@ def problem():
     record = Observed(
         name="fig6", time=times, values=respond(setting, times, BASIC), noise=noise, setting=setting
     )
-    return Problem(records=(record,), entries=entries_of(tuple(CATALOGUE.values()), effects.START, 1))
+    return Problem(records=(record,), entries=entries_of(tuple(CATALOGUE.values()), START, 1))
 
 
 CURVED = {

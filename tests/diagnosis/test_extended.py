@@ -9,11 +9,16 @@ import pytest
 from numpy.testing import assert_allclose
 
 import subzero
-from subzero.diagnosis.hypothesis import catalogue as effects
-from subzero.diagnosis.hypothesis.configuration import Setting
-from subzero.diagnosis.hypothesis.extended_model import all_effects, apply, unseen
-from subzero.diagnosis.report.toml_file import read_extended, text_of
-from subzero.diagnosis.results import Extended
+from subzero.diagnosis import (
+    Extended,
+    Setting,
+    all_effects,
+    apply_extended,
+    extended_toml,
+    load_effects,
+    read_extended,
+    unseen,
+)
 from subzero.errors import UserError
 from subzero.external_force import MissingForce, Term
 from subzero.model import Model
@@ -48,13 +53,13 @@ def written(tmp_path, text):
 
 
 def test_what_is_written_is_read_back_the_same(setting, tmp_path):
-    found = read_extended(written(tmp_path, text_of(FOUND, setting, source="record.csv")))
+    found = read_extended(written(tmp_path, extended_toml(FOUND, setting, source="record.csv")))
     assert found.extended == FOUND
     assert found.scenario == "fig6"
 
 
 def test_the_file_carries_units_in_its_keys_and_tells_the_whole_value_beside_the_nominal_one(setting):
-    text = text_of(FOUND, setting)
+    text = extended_toml(FOUND, setting)
     table = tomllib.loads(text)
     assert table["effects"]["rudder_lag"] == {"time_constant_s": 0.21}
     assert table["effects"]["stern_plane_offset"]["starts_at_s"] == 12.0
@@ -65,12 +70,12 @@ def test_the_file_carries_units_in_its_keys_and_tells_the_whole_value_beside_the
 
 
 def test_nothing_found_is_the_nominal_model(setting, tmp_path):
-    found = read_extended(written(tmp_path, text_of(Extended(), setting)))
-    assert apply(found.extended, setting, found.effects) == setting
+    found = read_extended(written(tmp_path, extended_toml(Extended(), setting)))
+    assert apply_extended(found.extended, setting, found.effects) == setting
 
 
 def test_an_extended_model_is_applied_each_part_in_its_place(setting):
-    changed = apply(FOUND, setting, all_effects())
+    changed = apply_extended(FOUND, setting, all_effects())
     old, new = setting.model.vehicle, changed.model.vehicle
     assert_allclose(new.rudder_servo.lag - old.rudder_servo.lag, 0.21)
     assert new.stern_plane_port_servo.offset == old.stern_plane_port_servo.offset  # not yet
@@ -85,8 +90,8 @@ def test_an_extended_model_is_applied_each_part_in_its_place(setting):
 
 def test_a_cause_whose_id_says_when_it_began_is_written_and_applied_too(setting, tmp_path):
     found = Extended(deviations={"hull_drag": {"share": 0.1}, "hull_drag@12": {"share": 0.3}})
-    back = read_extended(written(tmp_path, text_of(found, setting)))
-    changed = apply(back.extended, setting, back.effects)
+    back = read_extended(written(tmp_path, extended_toml(found, setting)))
+    changed = apply_extended(back.extended, setting, back.effects)
     ((start, later),) = changed.later
     assert start == pytest.approx(12.0)
     assert later != changed.model != setting.model
@@ -97,7 +102,7 @@ def test_two_causes_that_begin_one_after_the_other_add_up(setting):
         deviations={"rudder_offset": {"angle": 2.0}, "hull_drag": {"share": 0.3}},
         start_times={"rudder_offset": 20.04, "hull_drag": 10.0},
     )
-    changed = apply(found, setting, all_effects())
+    changed = apply_extended(found, setting, all_effects())
     (first, dragged), (second, both) = changed.later
     assert_allclose((first, second), (10.0, 20.0))  # on the grid of the exchange
     assert dragged.vehicle.rudder_servo.offset == setting.model.vehicle.rudder_servo.offset
@@ -109,7 +114,7 @@ def test_effects_of_sensors_are_told_apart_for_a_run_does_not_show_them():
 
 
 OWN = """
-from subzero.diagnosis.hypothesis.effect import Effect, Parameter
+from subzero.diagnosis import Effect, Parameter
 
 def lost(setting, mass):
     return setting.with_vehicle(rigid_body__mass=lambda old: old - mass)
@@ -122,8 +127,8 @@ LOST = 'effects_file = "mine.py"\n[effects.lost_ballast]\nmass_kg = 0.4\n'
 
 def test_effects_of_the_users_own_are_those_that_are_given(setting, tmp_path):
     (tmp_path / "mine.py").write_text(OWN)
-    found = read_extended(written(tmp_path, LOST), effects.load(tmp_path / "mine.py"))
-    changed = apply(found.extended, setting, found.effects)
+    found = read_extended(written(tmp_path, LOST), load_effects(tmp_path / "mine.py"))
+    changed = apply_extended(found.extended, setting, found.effects)
     assert_allclose(changed.model.vehicle.rigid_body.mass, setting.model.vehicle.rigid_body.mass - 0.4)
 
 
@@ -163,5 +168,5 @@ def test_a_file_that_is_not_there_is_refused():
 
 def test_numbers_keep_more_digits_than_they_are_good_for(setting, tmp_path):
     found = Extended(deviations={"rudder_lag": {"time_constant": 0.1 / 3.0}})
-    back = read_extended(written(tmp_path, text_of(found, setting)))
+    back = read_extended(written(tmp_path, extended_toml(found, setting)))
     assert_allclose(back.extended.deviations["rudder_lag"]["time_constant"], 0.1 / 3.0, rtol=1e-7)

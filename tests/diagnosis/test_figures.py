@@ -13,9 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from subzero.diagnosis.report import json_file, words
-from subzero.diagnosis.report.summary import summary
-from subzero.diagnosis.results import (
+from subzero.diagnosis import (
     CAUSE_NAMED,
     OUTSIDE,
     UNDECIDED,
@@ -25,6 +23,7 @@ from subzero.diagnosis.results import (
     Rival,
     Unknown,
     Verdict,
+    report,
 )
 from subzero.figures.diagnosis import draw_diagnosis, evidence
 from subzero.figures.style import BLUE, Title
@@ -50,12 +49,12 @@ def verdict_of(row):
         axis = first.partition(":")[2]
         unknown = Unknown(axis=axis, time=TIME, force=np.sin(TIME), band=np.ones(TIME.size))
     causes = [
-        Cause(id=one["id"], sentence=words.explanation(one["id"]), probability=probabilities[first], parameters={},
-              start_time=one.get("start"))
+        Cause(id=one["id"], sentence=report.words.explanation(one["id"]), probability=probabilities[first],
+              parameters={}, start_time=one.get("start"))
         for one in row["causes"]
     ]  # fmt: skip
     rivals = [
-        Rival(ids=tuple(name.split(" + ")) if name != "none" else (), sentence=words.explanation(name),
+        Rival(ids=tuple(name.split(" + ")) if name != "none" else (), sentence=report.words.explanation(name),
               probability=p, discrimination=5.0)
         for name, p in probabilities.items() if name != first or row["verdict"] == UNDECIDED
     ]  # fmt: skip
@@ -80,12 +79,12 @@ def drawn(verdict):
 
 def check(row):
     verdict = verdict_of(row)
-    shown, told = drawn(verdict), json_file.mapping(verdict)
+    shown, told = drawn(verdict), report.json_file.mapping(verdict)
     ranked = sorted(row["probabilities"].items(), key=lambda item: -item[1])
     for (name, width, _), (hypothesis, p) in zip(shown, ranked, strict=False):
         assert width == p == told["probabilities"][hypothesis]
         assert name.lower() == told["explanations"][hypothesis].lower()
-    said = {one.question: " ".join(one.words).lower() for one in summary(verdict)}
+    said = {one.question: " ".join(one.words).lower() for one in report.summary(verdict)}
     assert said == {one["question"]: " ".join(one["words"]).lower() for one in told["summary"]}
     names = [name.lower() for name, *_ in shown]
     blue = [name for name, (_, _, colour) in zip(names, shown, strict=True) if colour[:3] == rgb(BLUE)]
@@ -96,7 +95,7 @@ def check(row):
         assert blue == names[:1]
         wrong = since(said["What is wrong"].replace(" as no cause explains", ""))
         for one in ranked[0][0].split(" + "):
-            assert since(words.explanation(one, words.sentences(verdict)).lower()) in wrong
+            assert since(report.words.explanation(one, report.words.sentences(verdict)).lower()) in wrong
         if len(names) > 1:
             assert f"what comes next: {names[1]} (" in said["How sure is that"]
 
@@ -134,7 +133,7 @@ def curves(**models):
 
 def undecided(probabilities, shown, **misfit):
     rivals = [
-        Rival(ids=(name,) if name != "none" else (), sentence=words.explanation(name), probability=p,
+        Rival(ids=(name,) if name != "none" else (), sentence=report.words.explanation(name), probability=p,
               discrimination=1.0)
         for name, p in probabilities.items()
     ]  # fmt: skip

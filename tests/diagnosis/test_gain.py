@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from subzero.diagnosis import catalogue
 from subzero.diagnosis.assessment import BLOCKS, Fitted, gain, held_out, parts_of, raw, rows_of, share
-from subzero.diagnosis.hypothesis.catalogue import catalogue
 from subzero.diagnosis.inference import Noise
 
 

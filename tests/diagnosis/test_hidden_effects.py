@@ -2,8 +2,8 @@
 
 Verifies: the whole diagnosis. Configuration: fig6, six channels at 10 Hz, coloured noise, outliers, gaps, and
 every parameter drawn from its tolerance. Cases are drawn from a seed (benchmarks/diagnosis); chosen are
-those that the trial can tell at all, D ≥ 25, whatever comes out. Slow: more of each kind, and every id of the
-catalogue with both signs.
+those that the trial can tell at all, D ≥ 25, whatever comes out. Slow: more of each kind, those that take longest (a
+minute), and every id of the catalogue with both signs. What begins in mid-trial is in `test_verdicts`, too.
 """
 
 import dataclasses
@@ -20,7 +20,7 @@ from benchmarks.diagnosis import draws, manoeuvres
 from benchmarks.diagnosis.cases import Case, cases
 from benchmarks.diagnosis.sharing import share
 from benchmarks.diagnosis.trial_of import briefly
-from subzero.diagnosis.hypothesis.catalogue import catalogue
+from subzero.diagnosis import catalogue
 
 SEED = 7
 CLEAR = 25.0
@@ -56,7 +56,7 @@ def told(request):
     here = [item for item in request.session.items if item.path == request.path]
     asked = {item.callspec.params["case"] for item in here if hasattr(item, "callspec")}
     if any(item.name == "test_hidden_effects_are_named" for item in here):
-        asked |= {one.values[0] for one in SINGLES}
+        asked |= {one.values[0] for one in (*SINGLES, *LONG)}
     with ProcessPoolExecutor(2, multiprocessing.get_context("spawn"), share, (1,)) as pool:
         yield {
             case: pool.submit(briefly, case)
@@ -76,11 +76,12 @@ def words(result):
     return f"{truth}, D {result['D']}: {result['verdict']}, {', '.join(first)}"
 
 
-SINGLES = [drawn("single", number) for number in (5, 9, 12, 18)]
+SINGLES = [drawn("single", number) for number in (12, 18)]
+LONG = slow("single", 5, 9)
 MORE = slow("single", 8, 11, 13, 16, 19, 25)
 
 
-@pytest.mark.parametrize("case", SINGLES + MORE)
+@pytest.mark.parametrize("case", SINGLES + LONG + MORE)
 def test_a_hidden_effect_gets_no_wrong_name(told, case):
     """And what is true is never ruled out."""
     result = told[case].result()
@@ -89,9 +90,10 @@ def test_a_hidden_effect_gets_no_wrong_name(told, case):
     assert result["probabilities"][case.causes[0]] > 0.01, words(result)
 
 
+@pytest.mark.slow
 def test_hidden_effects_are_named(told):
     """All but one: tolerances that are wider than declared explain a record now and then, and that is said, too."""
-    results = [told[one.values[0]].result() for one in SINGLES]
+    results = [told[one.values[0]].result() for one in (*SINGLES, *LONG)]
     missed = [words(one) for one in results if names(one) != set(one["truth"])]
     assert len(missed) <= 1, missed
 
@@ -109,7 +111,7 @@ def test_two_hidden_effects_are_named(told, case):
     assert names(result) == set(result["truth"]), words(result)
 
 
-@pytest.mark.parametrize("case", [drawn("sudden", 0), *slow("sudden", 4)])
+@pytest.mark.parametrize("case", slow("sudden", 0, 4))
 def test_what_begins_in_mid_trial_is_named_with_its_time(told, case):
     result = told[case].result()
     assert min(result["D"].values()) >= CLEAR

@@ -10,13 +10,14 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from subzero.diagnosis.hypothesis.hypotheses import columns_of, variances
 from subzero.diagnosis.inference import (
     Fit,
     at_bad_minimum,
     broyden_update,
+    columns_of,
     refit,
     restarted_where_smooth,
+    variances,
 )
 
 DRUM = ("drum_inertia",)

@@ -10,7 +10,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from subzero.diagnosis.hypothesis.catalogue import catalogue
+from subzero.diagnosis import (
+    CALIBRATED,
+    CAUSE_NAMED,
+    NOTHING_NEAR,
+    NOTHING_WRONG,
+    OUTSIDE,
+    UNDECIDED,
+    catalogue,
+)
 from subzero.diagnosis.inference import (
     UNTRIED_LOG_POSTERIOR,
     Beliefs,
@@ -21,14 +29,6 @@ from subzero.diagnosis.inference import (
     occam_folded,
     practical_causes,
     qualified,
-)
-from subzero.diagnosis.results import (
-    CALIBRATED,
-    CAUSE_NAMED,
-    NOTHING_NEAR,
-    NOTHING_WRONG,
-    OUTSIDE,
-    UNDECIDED,
 )
 
 

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
+from subzero.diagnosis import catalogue
 from subzero.diagnosis.assessment import (
     LIBRARY,
     PLANE_AMPLITUDE,
@@ -15,7 +16,6 @@ from subzero.diagnosis.assessment import (
     next_trial,
     outlook,
 )
-from subzero.diagnosis.hypothesis.catalogue import catalogue
 from subzero.diagnosis.inference import Fit
 
 

@@ -13,12 +13,11 @@ import pytest
 from numpy.testing import assert_allclose
 
 import subzero
-from subzero.diagnosis.hypothesis.catalogue import START
-from subzero.diagnosis.hypothesis.configuration import Setting
-from subzero.diagnosis.hypothesis.logged import Logged
+from subzero.channels import turned
+from subzero.diagnosis import START, Logged, Setting
 from subzero.diagnosis.inference import pose, respond
 from subzero.records.consistency import unit_questions
-from subzero.records.record import Record, read_record, turned
+from subzero.records.record import Record, read_record
 from subzero.synthetic.challenge import Challenge, write
 from subzero.synthetic.planted import Hidden
 from subzero.synthetic.reference_run import simulate_reference

@@ -11,10 +11,7 @@ from numpy.testing import assert_allclose
 
 import subzero
 from subzero import diagnose
-from subzero.diagnosis.hypothesis.catalogue import SPECS
-from subzero.diagnosis.hypothesis.configuration import Setting
-from subzero.diagnosis.hypothesis.effect import with_onset
-from subzero.diagnosis.hypothesis.extended_model import all_effects
+from subzero.diagnosis import SPECS, Setting, all_effects, with_onset
 from subzero.diagnosis.inference import (
     BaseRun,
     change_point_columns,
@@ -126,8 +123,9 @@ def test_a_jam_that_is_not_needed_is_told_as_the_offset(ahead, told):
 
 @pytest.mark.parametrize(
     "name, values, trial",
-    [("rudder_jam", (1.0, 4.0), "zigzag"), pytest.param("flooding", (-3.0,), "dive", marks=pytest.mark.slow)],
+    [("rudder_jam", (1.0, 4.0), "zigzag"), ("flooding", (-3.0,), "dive")],
 )
+@pytest.mark.slow
 def test_it_is_named_for_what_it_is(name, values, trial):
     rng, time = np.random.default_rng([5, len(name)]), 12.0
     flown = subzero.load_scenario(trial)

@@ -12,8 +12,7 @@ import numpy as np
 import pytest
 
 import subzero
-from subzero.diagnosis.hypothesis.catalogue import NOISE
-from subzero.diagnosis.hypothesis.configuration import Setting
+from subzero.diagnosis import NOISE, Setting
 from subzero.external_force import MissingForce, Term
 from subzero.simulation import run_trial
 from subzero.synthetic.reference_run import NoTruthError, seen, simulate_reference, truth_of

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from subzero.diagnosis.read_trials import read_trials
+from subzero import read_trials
 from subzero.errors import UserError
 
 TIME = np.arange(0.0, 30.01, 0.1)

@@ -9,10 +9,7 @@ import math
 import numpy as np
 import pytest
 
-from subzero.diagnosis.report import json_file, tables, words
-from subzero.diagnosis.report.sections import markdown
-from subzero.diagnosis.report.summary import summary
-from subzero.diagnosis.results import (
+from subzero.diagnosis import (
     CALIBRATED,
     CAUSE_NAMED,
     NOTHING_NEAR,
@@ -30,7 +27,9 @@ from subzero.diagnosis.results import (
     Rival,
     Unknown,
     Verdict,
+    report,
 )
+from subzero.diagnosis.assessment import detectability
 from subzero.figures.diagnosis import draw_diagnosis
 from subzero.figures.style import Title
 
@@ -127,26 +126,26 @@ DRIFT = dataclasses.replace(
 
 
 def test_a_cause_is_named_in_words_with_value_interval_unit_and_model():
-    said = words.cause(NAMED.causes[0])
+    said = report.words.cause(NAMED.causes[0])
     assert (
         said
         == "The rudder servo lags: time constant 0.31 s (95 %: 0.23 s to 0.39 s; model: 0.1 s). Probability 0.970."
     )
-    assert "+35 % (95 %: +20 % to +50 %; model: +0 %)" in words.estimate("share", INERTIA)
+    assert "+35 % (95 %: +20 % to +50 %; model: +0 %)" in report.words.estimate("share", INERTIA)
 
 
 def test_a_force_is_told_with_what_else_it_may_be_made_of():
-    said = words.unknown(FORCE.unknown)
+    said = report.words.unknown(FORCE.unknown)
     assert "It looks like -1.2 (-1.5 to -0.9) × u|u|, the square of the speed through the water." in said
     assert (
         "not ruled out: wave (an oscillation of its own; probability 0.20), time*u2 (the time since" in said
     )
     assert "0.05" not in said, "too improbable"
-    assert "ruled out" not in words.unknown(dataclasses.replace(FORCE.unknown, features={"u|u|": 1.0}))
+    assert "ruled out" not in report.words.unknown(dataclasses.replace(FORCE.unknown, features={"u|u|": 1.0}))
 
 
 def answers(verdict):
-    return {one.question: " ".join(one.words) for one in summary(verdict, "fig6")}
+    return {one.question: " ".join(one.words) for one in report.summary(verdict, "fig6")}
 
 
 def test_the_summary_says_what_is_wrong_how_sure_what_it_costs_what_to_do_and_what_would_settle_it():
@@ -160,7 +159,9 @@ def test_the_summary_says_what_is_wrong_how_sure_what_it_costs_what_to_do_and_wh
     assert "misses the heading by 3 degree, 7.5 times the noise of its sensor" in said["What it costs"]
     assert "explains 99.1 % of what can be explained" in said["What it costs"]
     assert "Look at the fins, their servos and linkages." in said["What to do next"]
-    assert [one.command for one in summary(NAMED, "fig6")][3] == "subzero simulate fig6 --with extended.toml"
+    assert [one.command for one in report.summary(NAMED, "fig6")][
+        3
+    ] == "subzero simulate fig6 --with extended.toml"
     assert (
         "Next trial: fly rudder doublets of 10 degrees (rudder_doublets); it decides with probability 0.93. "
         "Log rudder_angle_deg too." in said["What would settle it"]
@@ -172,29 +173,34 @@ def test_a_force_is_said_as_what_it_does_and_a_push_of_both_signs_as_both():
         "Something holds the hull back that no cause explains, with a force"
     )
     wave = dataclasses.replace(FORCE.unknown, axis="K", force=np.sin(TIME[::20]))
-    assert words.unknown(wave).startswith("Something rolls the hull that no cause explains, with a moment of")
-    assert words.something("K", np.array([0.0, -0.3, 0.02])) == "something rolls the hull to port"
-    assert words.something("K", np.array([0.0, 0.3])) == "something rolls the hull to starboard"
+    assert report.words.unknown(wave).startswith(
+        "Something rolls the hull that no cause explains, with a moment of"
+    )
+    assert report.words.something("K", np.array([0.0, -0.3, 0.02])) == "something rolls the hull to port"
+    assert report.words.something("K", np.array([0.0, 0.3])) == "something rolls the hull to starboard"
 
 
 @pytest.mark.parametrize("verdict", [NAMED, FORCE, DRIFT], ids=["named", "force", "drift"])
 def test_the_answers_have_no_ids(verdict):
-    said = " ".join(line for one in summary(verdict) for line in one.words).replace("(rudder_doublets)", "")
+    said = " ".join(line for one in report.summary(verdict) for line in one.words).replace(
+        "(rudder_doublets)", ""
+    )
     assert "rudder_lag" not in said
     assert "unknown_force" not in said
     assert "sensor_drift" not in said
 
 
 def test_a_hypothesis_of_any_kind_has_words():
-    assert words.explanation("none") == "nothing is wrong"
+    assert report.words.explanation("none") == "nothing is wrong"
     assert (
-        words.explanation("rudder_lag + hull_drag") == "the rudder servo lags and the hull has another drag"
+        report.words.explanation("rudder_lag + hull_drag")
+        == "the rudder servo lags and the hull has another drag"
     )
-    assert words.explanation("hull_drag@12.5") == "from 12.5 s on the hull has another drag"
-    assert words.explanation("unknown_force:N") == "something turns the hull from side to side"
-    assert words.explanation("sensor_drift:yaw_rate") == "the sensor of the yaw rate drifts"
-    assert words.explanation("mine", {"mine": "weed hangs on it"}) == "weed hangs on it"
-    assert words.explanation("an_effect_of_tomorrow") == "an effect of tomorrow"
+    assert report.words.explanation("hull_drag@12.5") == "from 12.5 s on the hull has another drag"
+    assert report.words.explanation("unknown_force:N") == "something turns the hull from side to side"
+    assert report.words.explanation("sensor_drift:yaw_rate") == "the sensor of the yaw rate drifts"
+    assert report.words.explanation("mine", {"mine": "weed hangs on it"}) == "weed hangs on it"
+    assert report.words.explanation("an_effect_of_tomorrow") == "an effect of tomorrow"
 
 
 def test_a_gain_that_is_none_is_called_none():
@@ -222,18 +228,18 @@ def test_numbers_that_are_far_off_lead_to_a_calibration(verdict, wrong, sure):
     assert wrong in said["What is wrong"]
     assert sure in said["How sure is that"]
     assert "Nothing has to be done" not in said["What to do next"]
-    (command,) = [one.command for one in summary(found, "zigzag") if one.command]
+    (command,) = [one.command for one in report.summary(found, "zigzag") if one.command]
     assert command.startswith("subzero calibrate RECORDS --scenario zigzag")
 
 
 def test_an_interrupted_verdict_says_so():
     from dataclasses import replace
 
-    assert "interrupted" in words.headline(replace(NAMED, complete=False))
+    assert "interrupted" in report.words.headline(replace(NAMED, complete=False))
 
 
 def test_the_table_of_what_can_be_seen_shows_what_would_be_missed_or_mixed_up_worst_first():
-    shown = tables.detectable(NAMED)
+    shown = report.tables.detectable(NAMED)
     assert [row[0] for row in shown.rows] == [
         "the water moves",
         "the hull carries another mass of water forward",
@@ -242,22 +248,32 @@ def test_the_table_of_what_can_be_seen_shows_what_would_be_missed_or_mixed_up_wo
         ("not seen", "current"),
         ("not told apart", "surge_added_mass"),
     ]
-    assert len(tables.detectable(NAMED, every=True).rows) == 3
+    assert len(report.tables.detectable(NAMED, every=True).rows) == 3
+
+
+def test_what_can_be_seen_has_its_unit(plant):
+    planted = plant(duration=12.0)
+    found = detectability(planted.problem, planted.J)
+    rows = {row[-1]: row[2] for row in report.tables.detectable(found, every=True).rows}
+    assert rows["rudder_offset"].endswith(" degree")
+    assert rows["rudder_lag"].startswith("time constant ")
+    assert rows["rudder_lag"].endswith(" s")
+    assert not rows["hull_drag"].endswith(" 1"), "a share has no unit"
 
 
 def test_the_misfit_names_the_command_it_follows():
-    row = tables.misfit(NAMED.misfit["record"]).rows[1]
+    row = report.tables.misfit(NAMED.misfit["record"]).rows[1]
     assert row[0] == "heading [degree]"
     assert row[-2:] == ("rudder +0.61 at 0.4 s", "1.2–3.9 s")
 
 
 def test_json_has_the_promised_keys_and_no_nan():
-    found = json.loads(json_file.text(NAMED))
+    found = json.loads(report.json_file.text(NAMED))
     assert found["verdict"] == "cause_named"
     (cause,) = found["causes"]
     assert (cause["id"], cause["probability"]) == ("rudder_lag", 0.97)
     assert cause["parameters"]["time_constant"]["value"] == 0.31
-    assert set(cause["parameters"]["time_constant"]) == set(json_file.NUMBERS)
+    assert set(cause["parameters"]["time_constant"]) == set(report.json_file.NUMBERS)
     assert found["rivals"][0]["parameters"]["share"]["unit"] == "1"
     assert found["rivals"][1]["id"] == "none"
     assert found["rivals"][1]["discrimination"] is None
@@ -269,18 +285,18 @@ def test_json_has_the_promised_keys_and_no_nan():
 
 
 def test_json_holds_a_force_and_an_empty_verdict():
-    found = json.loads(json_file.text(FORCE))
+    found = json.loads(report.json_file.text(FORCE))
     assert found["unknown"]["axis"] == "X"
     assert found["unknown"]["formula"][0]["feature"] == "u|u|"
     assert list(found["unknown"]["features"]) == ["u|u|", "wave", "time*u2", "u"], "the most probable first"
-    empty = json.loads(json_file.text(Verdict(verdict=NOTHING_WRONG, sentence="")))
+    empty = json.loads(report.json_file.text(Verdict(verdict=NOTHING_WRONG, sentence="")))
     assert empty["gain"] == {}
     assert empty["next_trial"] is None
 
 
 def test_the_report_tells_all_of_it():
     figures = draw_diagnosis(NAMED, Title(words="a trial", scenario="fig6"))
-    text = markdown(NAMED, {"record": "record.csv, fig6"}, tuple(figures))
+    text = report.markdown(NAMED, {"record": "record.csv, fig6"}, tuple(figures))
     for part in (
         "# The cause is named",
         "## What is wrong",
@@ -294,7 +310,7 @@ def test_the_report_tells_all_of_it():
 
 
 def test_the_report_tells_what_is_wrong_before_the_long_table_of_what_could_be_seen():
-    text = markdown(NAMED, {"record": "record.csv, fig6"})
+    text = report.markdown(NAMED, {"record": "record.csv, fig6"})
     at = [line[3:] for line in text.splitlines() if line.startswith("## ")].index
     assert at("What is wrong") < at("The gain") < at("What these records could show")
 
@@ -302,7 +318,7 @@ def test_the_report_tells_what_is_wrong_before_the_long_table_of_what_could_be_s
 def test_what_a_file_is_called_cannot_put_markup_into_the_report():
     from markdown_it import MarkdownIt
 
-    text = markdown(NAMED, {"record": "<script>alert(1)</script>|*x*&amp;"})
+    text = report.markdown(NAMED, {"record": "<script>alert(1)</script>|*x*&amp;"})
     page = str(MarkdownIt("commonmark").enable("table").render(text))
     assert "&lt;script&gt;alert(1)&lt;/script&gt;|*x*&amp;amp;" in page
     assert "<script" not in page
@@ -323,7 +339,7 @@ def test_the_names_of_a_long_pair_are_within_their_figure():
 
 
 def test_a_drift_has_the_unit_of_its_channel_in_words_figure_and_file():
-    assert words.unknown(DRIFT.unknown) == (
+    assert report.words.unknown(DRIFT.unknown) == (
         "The sensor of the heading drifts as no cause explains: 6 ± 0.98 degree at t = 30 s, where it is largest."
     )
     axes = draw_diagnosis(DRIFT, Title(words="a trial", scenario="fig6"))["missing_force"].axes[0]
@@ -331,11 +347,11 @@ def test_a_drift_has_the_unit_of_its_channel_in_words_figure_and_file():
         t.get_text() for t in axes.texts
     )
     assert axes.get_ylabel() == "[degree]"
-    assert json.loads(json_file.text(DRIFT))["unknown"]["unit"] == "degree"
-    assert "nothing new in it" in markdown(DRIFT, {})
-    assert "nothing new in it" not in markdown(FORCE, {})
+    assert json.loads(report.json_file.text(DRIFT))["unknown"]["unit"] == "degree"
+    assert "nothing new in it" in report.markdown(DRIFT, {})
+    assert "nothing new in it" not in report.markdown(FORCE, {})
     beside = dataclasses.replace(DRIFT, extended=Extended(deviations={"hull_drag": {"share": 0.4}}))
-    assert "nothing new in it" not in markdown(beside, {}), "a cause stands beside the drift"
+    assert "nothing new in it" not in report.markdown(beside, {}), "a cause stands beside the drift"
 
 
 def test_forces_and_moments_have_their_units():

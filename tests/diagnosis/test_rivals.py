@@ -7,17 +7,7 @@ import dataclasses
 
 import numpy as np
 
-from subzero.diagnosis.report import sections as report
-from subzero.diagnosis.report import tables
-from subzero.diagnosis.results import (
-    CAUSE_NAMED,
-    NOTHING_WRONG,
-    UNDECIDED,
-    Curves,
-    Estimate,
-    Rival,
-    Verdict,
-)
+from subzero.diagnosis import CAUSE_NAMED, NOTHING_WRONG, UNDECIDED, Curves, Estimate, Rival, Verdict, report
 from subzero.figures import Title
 from subzero.figures.diagnosis import draw_diagnosis
 
@@ -49,7 +39,7 @@ def test_the_report_says_what_the_records_allow_and_that_nothing_is_new_in_the_m
     assert "nothing new in it" in text
     named = dataclasses.replace(undecided(rivals=(SLOPE, NONE)), verdict=CAUSE_NAMED)
     assert "What else the records allow (D: how far from what is told):" in report.markdown(named, {})
-    assert tables.rivals(undecided(), short=True).header[0] == "what explains the records"
+    assert report.tables.rivals(undecided(), short=True).header[0] == "what explains the records"
 
 
 def test_the_others_are_drawn_beside_the_most_probable():

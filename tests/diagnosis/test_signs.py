@@ -9,11 +9,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from subzero.diagnosis.assessment import detectability, with_whole_effects
-from subzero.diagnosis.hypothesis.catalogue import START, catalogue
-from subzero.diagnosis.hypothesis.hypotheses import entries_of
-from subzero.diagnosis.inference import Noise, Observed, Problem, respond
-from subzero.diagnosis.report.tables import detectable
+from subzero.diagnosis import START, catalogue
+from subzero.diagnosis.assessment import with_whole_effects
+from subzero.diagnosis.inference import Noise, Observed, Problem, entries_of, respond
 
 from .conftest import CHANNELS, nominal
 
@@ -95,16 +93,6 @@ def test_secants_mean_by_a_column_what_sensitivities_mean():
     J = with_whole_effects(made, np.zeros((made.residual(zero).size, zero.size)))
     assert np.linalg.norm(J[:, k]) > 0.0
     assert_allclose(made.residual(there), made.residual(zero) - scale * J[:, k], atol=1e-9)
-
-
-def test_what_can_be_seen_has_its_unit():
-    made = problem(PLAIN)
-    found = {one.id: one for one in detectability(made, made.jacobian(np.zeros(len(made.entries))))}
-    rows = {row[-1]: row[2] for row in detectable(tuple(found.values()), every=True).rows}
-    assert rows["rudder_offset"].endswith(" degree")
-    assert rows["rudder_lag"].startswith("time constant ")
-    assert rows["rudder_lag"].endswith(" s")
-    assert not rows["hull_drag"].endswith(" 1"), "a share has no unit"
 
 
 def test_a_correction_is_added_to_what_is_simulated():

@@ -10,7 +10,7 @@ import zlib
 import pytest
 
 from subzero.cli import MISTAKE, main
-from subzero.diagnosis.report.toml_file import read_extended
+from subzero.diagnosis import read_extended
 from subzero.errors import UserError
 from subzero.records.metadata import read_metadata
 from subzero.synthetic.sealed_answer import SEALED, Answer, reveal, seal

@@ -5,11 +5,16 @@ import dataclasses
 import numpy as np
 import pytest
 
-from subzero.diagnosis.hypothesis.catalogue import catalogue
-from subzero.diagnosis.hypothesis.effect import with_onset
-from subzero.diagnosis.inference import history, simulator, without_force
+from subzero.diagnosis import catalogue, with_onset
+from subzero.diagnosis.inference import (
+    history,
+    simulate_on,
+    simulate_track,
+    simulator,
+    with_stops,
+    without_force,
+)
 from subzero.diagnosis.inference import problem as problem_module
-from subzero.diagnosis.inference.simulator import simulate_on, simulate_track, with_stops
 from subzero.external_force import MissingForce, Term
 
 from .conftest import CHANNELS, nominal

@@ -99,7 +99,7 @@ def test_columns_add_up_to_what_a_force_does(healthy):
     columns = force_columns(problem, zero, ("X",), knots)["X"].sum(axis=1)
     small = without_force(problem.records[0].setting, history("X", np.array([0.0, 30.0]), np.full(2, 0.05)))
     tracks = problem.tracks([(0, zero)])[0]
-    from subzero.diagnosis.inference.simulator import simulate_track
+    from subzero.diagnosis.inference import simulate_track
 
     change = problem.whitened(0, small, simulate_track(small)) - problem.whitened(
         0, problem.setting(0, zero), tracks

@@ -7,6 +7,8 @@ Tolerance: from D = 25 on the truth comes first, from 50 on if it begins in mid-
 is 8 nats less probable beforehand than nothing, and D is worth D/2); below, anything may, but nothing wrong with 95 %.
 """
 
+from functools import cache
+from pathlib import Path
 from typing import NamedTuple
 
 import pytest
@@ -44,12 +46,26 @@ MORE = [
 ]
 
 
-def judged(case: Case, folder):
-    """Return what is hidden, the verdict, and what comes first with its probability."""
-    hidden = subzero.challenge(case.scenario, case.seed, folder).answer
-    verdict = subzero.diagnose(folder / "record.csv", case.scenario, budget="verdict")
-    first, p = max(verdict.probabilities.items(), key=lambda pair: pair[1])
-    return hidden, verdict, first, p
+class Judged(NamedTuple):
+    """What is hidden, where its record is, and the verdict."""
+
+    hidden: object
+    record: Path
+    verdict: object
+
+
+@pytest.fixture(scope="module")
+def judged(tmp_path_factory):
+    """Return what makes a challenge and its verdict, once for each case."""
+
+    @cache
+    def judge(case: Case) -> Judged:
+        folder = tmp_path_factory.mktemp("challenge")
+        hidden = subzero.challenge(case.scenario, case.seed, folder).answer
+        record = folder / "record.csv"
+        return Judged(hidden, record, subzero.diagnose(record, case.scenario, budget="verdict"))
+
+    return judge
 
 
 def is_true(first: str, hidden) -> bool:
@@ -70,9 +86,10 @@ def is_part(first: str, hidden) -> bool:
     }
 
 
-def check(case: Case, folder) -> None:
-    """Judge a case."""
-    hidden, verdict, first, p = judged(case, folder)
+def check(case: Case, judged: Judged) -> None:
+    """Hold what comes first against what is hidden."""
+    hidden, _, verdict = judged
+    first, p = max(verdict.probabilities.items(), key=lambda pair: pair[1])
     if hidden.kind == "none":
         assert verdict.verdict in ("nothing_wrong", "undecided"), verdict.sentence
         assert first == "none"
@@ -83,18 +100,19 @@ def check(case: Case, folder) -> None:
 
 
 @pytest.mark.parametrize("case", QUICK, ids=lambda case: f"{case.scenario}-{case.seed}")
-def test_a_verdict_is_true_or_not_sure(case, tmp_path):
-    check(case, tmp_path)
+def test_a_verdict_is_true_or_not_sure(case, judged):
+    check(case, judged(case))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("case", MORE, ids=lambda case: f"{case.scenario}-{case.seed}")
-def test_more_verdicts_are_true_or_not_sure(case, tmp_path):
-    check(case, tmp_path)
+def test_more_verdicts_are_true_or_not_sure(case, judged):
+    check(case, judged(case))
 
 
-def test_a_record_diagnosed_twice_has_the_same_verdict(tmp_path):
-    subzero.challenge("fig6", 12, tmp_path)
-    one, other = (subzero.diagnose(tmp_path / "record.csv", "fig6", budget="verdict") for _ in range(2))
+def test_a_record_diagnosed_twice_has_the_same_verdict(judged):
+    case = QUICK[1]
+    one = judged(case).verdict
+    other = subzero.diagnose(judged(case).record, case.scenario, budget="verdict")
     assert one.verdict == other.verdict
     assert one.probabilities == other.probabilities

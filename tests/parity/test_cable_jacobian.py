@@ -50,7 +50,7 @@ def bent_line(segments, mode, seed, slackness=1e-4, c=CABLE):
     """Return a moving cable of half-metre segments with nodes shaken at all levels, and work space."""
     rng = np.random.default_rng(seed)
     line, work = new_line(segments + 2), new_load()
-    line.ends.segment_length = 0.5
+    line.ends.layout.segment_length = 0.5
     line.ends.drum_velocity[:] = 0.1, 0.3, -0.2
     north = np.array([1.0, 0.0, 0.0])
     lay_straight(line, 0.5 * segments + 0.1, north, north, DRUM, c)
@@ -91,7 +91,7 @@ def residual(line, work, values, weights, c=CABLE):
     line.position[NEW, 1:N] = blocks[:-1, 1:]
     line.ends.last_length[NEW] = blocks[-1, 1]
     assemble(line, weights, c, DRUM, work)
-    return line.rows[RESIDUAL, 1 : N + 1].ravel().copy(), line.ends.tow_force.copy()
+    return line.rows[RESIDUAL, 1 : N + 1].ravel().copy(), line.ends.tow.force.copy()
 
 
 def dense(line):
@@ -184,5 +184,5 @@ def test_the_tow_force_answers_to_the_first_block_as_told(segments):
     """
     line, work = bent_line(segments, TURNING, 1)
     _, pulls = differences(line, work, backward_weights.py_func(0.1, 0.1))
-    told = line.ends.tow_by_block.copy()
+    told = line.ends.tow.by_block.copy()
     assert_allclose(told, pulls[:, :4], rtol=0, atol=0.1 * np.abs(told).max())

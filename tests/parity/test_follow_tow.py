@@ -56,7 +56,7 @@ def towed():
 def pulled(c):
     """Return a cable with the answer to the next place of its tow point, work space, and that place."""
     line, work = new_line(60), new_load()
-    line.ends.segment_length = 0.5
+    line.ends.layout.segment_length = 0.5
     north = np.array([1.0, 0.0, 0.0])
     lay_straight(line, LENGTH, north, 0.9 * north, DRUM, c)
     start_in_water(line, WATER, c, work)
@@ -92,12 +92,12 @@ def test_the_answer_is_the_same_from_the_last_one_as_from_a_prediction(towed):
     line, work, tow = towed
     there = tow + 1e-4 * ASIDE
     again = asked(line, work, there, again=True)
-    from_last, force = state(line), line.ends.tow_force.copy()
+    from_last, force = state(line), line.ends.tow.force.copy()
     anew = asked(line, work, there)
     assert again.converged
     assert again.iterations < anew.iterations
     np.testing.assert_allclose(from_last, state(line), rtol=1e-6)  # arcs are those of each one's prediction
-    np.testing.assert_allclose(force, line.ends.tow_force, rtol=1e-6)
+    np.testing.assert_allclose(force, line.ends.tow.force, rtol=1e-6)
 
 
 def test_the_same_tow_point_again_takes_no_iteration(towed):
@@ -109,7 +109,7 @@ def test_the_same_tow_point_again_takes_no_iteration(towed):
 
 def test_without_factors_nothing_moves_and_the_step_begins_with_a_prediction(towed):
     line, work, tow = towed
-    line.ends.factored = False
+    line.ends.solver.factored = False
     before = state(line)
     assert not follow(line, tow + ASIDE)
     np.testing.assert_array_equal(before, state(line))

@@ -22,8 +22,8 @@ from typing import Any
 import numpy as np
 
 import scenarios
+from subzero.diagnosis import read_extended
 from subzero.diagnosis.read_trials import read_trials
-from subzero.diagnosis.report.toml_file import read_extended
 from subzero.errors import UserError
 from subzero.model import load
 from subzero.records.metadata import read_metadata

@@ -17,8 +17,7 @@ import pytest
 
 import scenarios
 from subzero.cli import MISTAKE, main
-from subzero.diagnosis.hypothesis.catalogue import load
-from subzero.diagnosis.report.toml_file import read_extended
+from subzero.diagnosis import load_effects, read_extended
 from subzero.errors import UserError
 
 # pytest imports test files one by one, without their folder; this is a module beside this one.
@@ -80,7 +79,7 @@ def baited(reader, folder, mark):
 
 
 def test_the_canaries_would_sing(mark, tmp_path):
-    load(tmp_path / "notes.txt")
+    load_effects(tmp_path / "notes.txt")
     assert mark.exists()
     mark.rmdir()
     pickle.loads((tmp_path / "canary.pkl").read_bytes())

@@ -17,7 +17,7 @@ import pytest
 
 import scenarios
 from subzero.autopilot.registry import from_file
-from subzero.diagnosis.hypothesis import catalogue as effects
+from subzero.diagnosis import load_effects
 from subzero.errors import UserError
 
 # pytest imports test files one by one, without their folder; this is a module beside this one.
@@ -115,7 +115,7 @@ def test_what_is_no_plain_file_is_refused_at_once(name, make, tmp_path):
 
 
 @pytest.mark.parametrize("make", [zero, pipe, connection, folder, loop, nowhere, huge, binary])
-@pytest.mark.parametrize("read", [from_file, effects.load])
+@pytest.mark.parametrize("read", [from_file, load_effects])
 def test_a_file_that_would_be_run_is_refused_if_it_is_none(read, make, tmp_path):
     make(tmp_path / "mine.py")
     with readers.limited(), pytest.raises(UserError) as caught:

@@ -38,28 +38,30 @@ def little_memory(monkeypatch):
     monkeypatch.setattr("cable.memory.free_memory", lambda: 1e8)
 
 
-def test_ten_hours_at_default_steps_are_refused_with_what_to_change(fig6):
+def test_ten_hours_at_default_steps_are_refused_with_what_to_change(fig6, little_memory):
     with pytest.raises(subzero.UserError) as caught:
         subzero.simulate(dataclasses.replace(fig6, duration=36000.0))
     said = str(caught.value)
     assert re.fullmatch(
         r"'fig6', 36000 s in steps of 0\.1 s, needs [0-9.e+]+ GiB of memory, and [0-9.]+ GiB are free\. "
-        r"Try a longer cable_step_s or segment_length_m, a grading, or a shorter duration_s\.",
+        r"Keep fewer results \(every_s in the trial, or --every\), or try a longer cable_step_s or segment_length_m, "
+        r"a grading, or a shorter duration_s\.",
         said,
     ), said
 
 
 def test_what_is_advised_makes_a_long_run_fit(fig6, little_memory):
-    long = dataclasses.replace(fig6, duration=600.0)
+    long = dataclasses.replace(fig6, duration=1200.0, cable_step=0.2, rtol=0.0)
     with pytest.raises(subzero.UserError, match="GiB of memory"):
         subzero.simulate(long)
+    assert subzero.simulate(long, every=60.0).attrs["outcome"] == "completed"
     shorter = dataclasses.replace(fig6, duration=30.0)
     assert subzero.simulate(shorter).attrs["outcome"] == "completed"
     with pytest.raises(subzero.UserError, match="GiB of memory"):
         cable.pull_out(lambda t: (1.0, 0.0, 0.0), 1000.0)
 
 
-def test_the_command_line_refuses_what_does_not_fit(tmp_path, monkeypatch, capsys):
+def test_the_command_line_refuses_what_does_not_fit(tmp_path, monkeypatch, capsys, little_memory):
     text = scenarios.path("fig6").read_text(encoding="utf-8")
     text, count = re.subn(r"duration_s = \d+", "duration_s = 36000", text)
     assert count == 1
@@ -82,10 +84,10 @@ def test_a_run_that_outgrows_the_memory_keeps_what_it_has(fig6, monkeypatch):
     np.testing.assert_array_equal(run["surge_speed"], whole["surge_speed"][:rows])
 
 
-def with_little_room(rows, nodes):
+def with_little_room(rows, nodes, times):
     from subzero.engine.recording import new_recording
 
-    return new_recording(rows, min(nodes, 2000))
+    return new_recording(rows, min(nodes, 2000), times)
 
 
 @pytest.fixture

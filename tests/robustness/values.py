@@ -309,14 +309,15 @@ def flown(**arguments: Any) -> str:
     wanted = autopilot.Wanted(*(arguments.pop(name) for name in autopilot.Wanted._fields))
     sensor = autopilot.Sensor(channel="surge_speed", noise=arguments.pop("noise"))
     pilot = autopilot.make("pid", FIG6, tuning=TUNING, sample_time=arguments.pop("sample_time"))
-    if number(arguments["duration"]) > 60.0:
+    trial = dataclasses.replace(FIG6, duration=arguments.pop("duration"))
+    if trial.duration > 60.0:
         raise WorkError
-    run = autopilot.fly(FIG6, pilot, lambda _: wanted, sensors=(sensor, *autopilot.PERFECT[1:]), **arguments)
+    sensors = autopilot.Sensors((sensor, *autopilot.PERFECT[1:]), seed=arguments.pop("seed"))
+    run = autopilot.fly(trial, pilot, lambda _: wanted, sensors=sensors, **arguments)
     if run.attrs["outcome"] != "completed":
         check_message(run.attrs["outcome_message"])
         return "stopped"
-    asked = FIG6.duration if arguments["duration"] is None else float(arguments["duration"])
-    beyond = float(run["time"][-1]) - asked
+    beyond = float(run["time"][-1]) - trial.duration
     assert -1e-9 < beyond <= pilot.sample_time, "the flight ends elsewhere than asked"
     return "ran"
 
@@ -335,7 +336,9 @@ def trimmed(**arguments: Any) -> str:
 
 
 def stepping(**arguments: Any) -> str:
-    run, _ = autopilot.step(scenario=FIG6, tuning=TUNING, tethered=False, **arguments)
+    sensors = autopilot.Sensors(autopilot.ESTIMATED, seed=arguments.pop("seed"))
+    pilot = autopilot.Pilot(tuning=TUNING, sensors=sensors)
+    run, _ = autopilot.step(scenario=FIG6, pilot=pilot, tethered=False, **arguments)
     return "ran" if run.attrs["outcome"] == "completed" else "stopped"
 
 

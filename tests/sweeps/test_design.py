@@ -11,6 +11,7 @@ import pytest
 
 import scenarios
 import subzero
+from subzero.sweeps import Design
 from subzero.sweeps.design import DESIGNS, points_of
 
 SPREADS = {
@@ -37,13 +38,13 @@ def test_a_grid_has_every_value_with_every_other(fig6):
 
 def test_lists_that_belong_together_are_rows(fig6):
     spreads = {"start.wet_length_m": [1.0, 2.0], "water.current_east_m_s": [0.3, 0.1]}
-    assert points_of(fig6, spreads, design="together").values.tolist() == [[1.0, 0.3], [2.0, 0.1]]
+    assert points_of(fig6, spreads, Design(kind="together")).values.tolist() == [[1.0, 0.3], [2.0, 0.1]]
 
 
 @pytest.mark.parametrize("design", SIZED)
 def test_the_same_seed_gives_the_same_points_and_another_seed_others(design, fig6):
     first, again, other = (
-        points_of(fig6, SPREADS, design=design, samples=16, seed=seed) for seed in (3, 3, 4)
+        points_of(fig6, SPREADS, Design(kind=design, samples=16, seed=seed)) for seed in (3, 3, 4)
     )
     assert first.digest == again.digest
     assert first.digest != other.digest
@@ -51,7 +52,7 @@ def test_the_same_seed_gives_the_same_points_and_another_seed_others(design, fig
 
 def test_a_latin_hypercube_has_one_point_in_each_slice_of_each_parameter(fig6):
     found = points_of(
-        fig6, {name: SPREADS[name] for name in list(SPREADS)[:2]}, design="latin_hypercube", samples=50
+        fig6, {name: SPREADS[name] for name in list(SPREADS)[:2]}, Design(kind="latin_hypercube", samples=50)
     )
     length, diameter = found.values.T
     for slices in (length / 40.0, np.log(diameter / 0.001) / np.log(100.0)):
@@ -59,7 +60,7 @@ def test_a_latin_hypercube_has_one_point_in_each_slice_of_each_parameter(fig6):
 
 
 def test_sobol_points_halve_every_parameter_evenly(fig6):
-    found = points_of(fig6, SPREADS, design="sobol", samples=64)
+    found = points_of(fig6, SPREADS, Design(kind="sobol", samples=64))
     assert (found.values[:, 0] < 20.0).sum() == 32
     assert (found.values[:, 1] < 0.01).sum() == 32
     assert (found.values[:, 2] < 0.1).sum() == 32
@@ -67,14 +68,14 @@ def test_sobol_points_halve_every_parameter_evenly(fig6):
 
 def test_monte_carlo_has_the_mean_and_the_deviation_that_were_asked_for(fig6):
     n = 4000
-    values = points_of(fig6, SPREADS, design="monte_carlo", samples=n).values[:, 2]
+    values = points_of(fig6, SPREADS, Design(kind="monte_carlo", samples=n)).values[:, 2]
     assert abs(values.mean() - 0.1) < 4.0 * 0.02 / np.sqrt(n)
     assert abs(values.std() - 0.02) < 4.0 * 0.02 / np.sqrt(2 * n)
 
 
 def test_a_declared_range_is_that_of_the_file_and_a_star_stands_for_all_that_have_one(fig6):
     found = points_of(
-        fig6, {"vehicle.axial_drag.*": "declared", "cable.*": "declared"}, design="sobol", samples=8
+        fig6, {"vehicle.axial_drag.*": "declared", "cable.*": "declared"}, Design(kind="sobol", samples=8)
     )
     assert "vehicle.axial_drag.drag_coefficient" in found.names
     assert "cable.diameter" in found.names
@@ -92,15 +93,15 @@ def test_a_declared_range_is_that_of_the_file_and_a_star_stands_for_all_that_hav
         ({"start.wet_length_m": {"from": 1.0, "too": 2.0}}, {}, "Did you mean 'to'?"),
         ({"start.wet_length_m": {"from": 2.0, "to": 1.0}}, {}, "is not below"),
         ({"start.wet_length_m": {"from": 1.0, "to": 2.0}}, {}, "needs values"),
-        ({"start.wet_length_m": [1.0]}, {"design": "gird"}, "Did you mean 'grid'?"),
-        ({"start.wet_length_m": [1.0]}, {"design": "sobol"}, "needs samples"),
+        ({"start.wet_length_m": [1.0]}, {"kind": "gird"}, "Did you mean 'grid'?"),
+        ({"start.wet_length_m": [1.0]}, {"kind": "sobol"}, "needs samples"),
         ({"start.wet_length_m": [1.0]}, {"samples": 5}, "Leave it out"),
-        ({"start.heading_deg": "declared"}, {"design": "sobol", "samples": 4}, "no file declares a range"),
-        ({"start.wet_length_m": [1.0, 2.0], "start.depth_m": [1.0]}, {"design": "together"}, "same length"),
-        ({"start.wet_length_m": {"from": 1, "to": 2}}, {"design": "saltelli", "samples": 12}, "power of two"),
+        ({"start.heading_deg": "declared"}, {"kind": "sobol", "samples": 4}, "no file declares a range"),
+        ({"start.wet_length_m": [1.0, 2.0], "start.depth_m": [1.0]}, {"kind": "together"}, "same length"),
+        ({"start.wet_length_m": {"from": 1, "to": 2}}, {"kind": "saltelli", "samples": 12}, "power of two"),
     ],
 )
 def test_what_cannot_be_a_plan_is_refused_with_what_to_do(spreads, options, said, fig6):
     with pytest.raises(subzero.UserError) as caught:
-        points_of(fig6, spreads, **options)
+        points_of(fig6, spreads, Design(**options))
     assert said in str(caught.value)

@@ -8,6 +8,7 @@ looked at. Tolerance: none; channels are float32.
 import json
 import os
 import random
+import re
 import signal
 import sqlite3
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
@@ -20,11 +21,12 @@ import subzero
 from scenarios.parameters import with_parameters
 from subzero.cli import main
 from subzero.summary import summarise
+from subzero.sweeps import Design, Kept
 from subzero.sweeps.api import finished
 from subzero.sweeps.design import points_of
 from subzero.sweeps.member import OtherVersionError, run_members
 from subzero.sweeps.page import page_of_sweep
-from subzero.sweeps.plan import plan_of
+from subzero.sweeps.plan import plan_sweep
 from subzero.sweeps.result import MOST_DRAWN, Gathered, _drawn, write_result
 from subzero.sweeps.schedule import MOST_DEATHS, Schedule
 from subzero.sweeps.sensitivity import effects_of
@@ -65,15 +67,21 @@ class Dying(Here):
 
 def fast(members, function=None):
     """Return a plan whose members cost little."""
-    return plan_of(
-        "fig6", {"start.wet_length_m": np.linspace(0.0, 20.0, members).tolist()}, function=function,
-        changes={"run.duration_s": 0.2, "run.rtol": 0.0}, scalars=["speed_at_end_m_s"], channels=["heading"], every=0.1,
+    return plan_sweep(
+        "fig6", {"start.wet_length_m": np.linspace(0.0, 20.0, members).tolist()},
+        changes={"run.duration_s": 0.2, "run.rtol": 0.0},
+        kept=Kept(scalars=["speed_at_end_m_s"], channels=["heading"], every=0.1, function=function),
     )  # fmt: skip
 
 
+def swept(parameters, changes=SHORT, **kept):
+    """Return the dataset of a sweep of fig6 that runs in this process."""
+    return subzero.sweep(plan_sweep("fig6", parameters, changes=changes, kept=Kept(**kept)), workers=Here())
+
+
 def test_a_member_is_a_run_of_its_own():
-    runs = subzero.sweep(
-        "fig6", {"start.wet_length_m": LENGTHS}, changes=SHORT, client=Here(),
+    runs = swept(
+        {"start.wet_length_m": LENGTHS},
         scalars=["peak_speed_m_s", "cable_tension.max"], channels=["surge_speed", "heading"], every=0.1,
         function=lambda run: {"early": run["surge_speed"].values[3]},
     )  # fmt: skip
@@ -92,12 +100,26 @@ def test_a_member_is_a_run_of_its_own():
             np.testing.assert_allclose(mine[channel], alone[channel], rtol=1e-6, atol=1e-7)
 
 
+def test_one_line_and_a_plan_give_the_same_members_and_neither_takes_what_is_not_its_own():
+    lengths = {"start.wet_length_m": LENGTHS}
+    plan = plan_sweep("fig6", lengths, changes=SHORT, tethered=False)
+    one_line = subzero.sweep("fig6", lengths, changes=SHORT, tethered=False, workers=Here())
+    assert one_line.identical(subzero.sweep(plan, workers=Here()))
+    for told, arguments, options in (
+        ("Did you mean 'changes'?", ("fig6", lengths), {"change": SHORT}),
+        ("no parameters are given", ("fig6",), {}),
+        ("a plan has its parameters already", (plan, lengths), {}),
+        ("a plan has its parameters already", (plan,), {"changes": SHORT}),
+        ("both given", (plan,), {"workers": 2, "client": Here()}),
+    ):
+        with pytest.raises(subzero.UserError, match=re.escape(told)):
+            subzero.sweep(*arguments, **options)
+
+
 def test_a_statistic_of_a_channel_is_that_of_its_samples():
     kinds = ("max", "min", "mean", "end", "range", "rms")
-    runs = subzero.sweep(
-        "fig6", {"start.wet_length_m": [15.0]}, changes=SHORT, client=Here(), channels=[],
-        scalars=[f"cable_force_forward.{kind}" for kind in kinds],
-    )  # fmt: skip
+    scalars = [f"cable_force_forward.{kind}" for kind in kinds]
+    runs = swept({"start.wet_length_m": [15.0]}, channels=[], scalars=scalars)
     trial = with_parameters(subzero.load_scenario("fig6"), {**SHORT, "start.wet_length_m": 15.0})
     force = subzero.simulate(trial)["cable_force_forward"].values
     assert force[-1] < force[0]  # the cable pulls back, and harder as the vehicle gets faster
@@ -114,7 +136,7 @@ def test_a_statistic_of_a_channel_is_that_of_its_samples():
 
 
 def test_longer_cable_is_slower_and_pulls_more():
-    runs = subzero.sweep("fig6", {"start.wet_length_m": LENGTHS}, changes=SHORT, client=Here(), channels=[])
+    runs = swept({"start.wet_length_m": LENGTHS}, channels=[])
     assert np.all(np.diff(runs["peak_speed_m_s"]) < 0.0)
     assert np.all(np.diff(runs["largest_cable_force_N"]) > 0.0)
 
@@ -122,7 +144,7 @@ def test_longer_cable_is_slower_and_pulls_more():
 def test_a_cable_as_stiff_as_a_rod_cannot_be_bent_by_what_pulls_it_and_the_other_member_can():
     spread = {"cable.bending_stiffness": [0.0, 10.0]}
     changes = SHORT | {"run.duration_s": 3.0}
-    runs = subzero.sweep("fig6", spread, changes=changes, channels=[], client=Here())
+    runs = swept(spread, changes, channels=[])
     assert runs["failed"].values.tolist() == [0, 1]
     assert np.isfinite(runs["peak_speed_m_s"].values).tolist() == [True, False]
     assert "could not be solved" in runs["reason"].values[1]
@@ -130,7 +152,7 @@ def test_a_cable_as_stiff_as_a_rod_cannot_be_bent_by_what_pulls_it_and_the_other
 
 def test_a_grid_gets_a_dimension_for_each_parameter():
     spreads = {"start.wet_length_m": [0.0, 5.0], "water.current_east_m_s": [0.0, 0.02, 0.04]}
-    runs = subzero.sweep("fig6", spreads, changes={"run.duration_s": 0.2, "run.rtol": 0.0}, client=Here())
+    runs = swept(spreads, {"run.duration_s": 0.2, "run.rtol": 0.0})
     table = runs[["path_length_m"]].set_index(member=list(spreads)).unstack()
     assert table["path_length_m"].sizes == {"start.wet_length_m": 2, "water.current_east_m_s": 3}
     assert float(table["path_length_m"][1, 2]) == float(runs["path_length_m"][5])
@@ -139,7 +161,7 @@ def test_a_grid_gets_a_dimension_for_each_parameter():
 def test_order_batches_and_accidents_do_not_change_a_byte_of_the_result(tmp_path):
     plan = fast(12)
     for name, executor in (("calm", Here()), ("struck", Dying(once={0, 3, 7}))):
-        with finished(plan, tmp_path / name, client=executor) as store:
+        with finished(plan, tmp_path / name, workers=executor) as store:
             write_result(store, plan.job, plan.points, plan.attributes, tmp_path / name)
     order = list(range(12))
     random.Random(1).shuffle(order)
@@ -159,7 +181,7 @@ def subzero_store(plan, folder):
 
 def test_a_member_that_kills_its_worker_each_time_is_given_up_and_the_others_are_not(tmp_path):
     executor = Dying(always={4})
-    with finished(fast(9), tmp_path, client=executor, workers=1) as store:
+    with finished(fast(9), tmp_path, workers=executor) as store:
         assert store.finished(9).all()
         ((member, reason),) = store.reasons(10)
     assert member == 4
@@ -173,9 +195,7 @@ def test_a_member_that_fails_is_recorded_with_its_reason_and_the_sweep_goes_on()
             raise ValueError("too long for me")
         return 1.0
 
-    runs = subzero.sweep(
-        "fig6", {"start.wet_length_m": LENGTHS}, changes=SHORT, client=Here(), function=function
-    )
+    runs = swept({"start.wet_length_m": LENGTHS}, function=function)
     assert runs["failed"].values.tolist() == [0, 1, 1]
     assert runs["reason"].values.tolist() == ["", *["ValueError: too long for me"] * 2]
     assert np.isnan(runs["peak_speed_m_s"].values).tolist() == [False, True, True]
@@ -183,9 +203,9 @@ def test_a_member_that_fails_is_recorded_with_its_reason_and_the_sweep_goes_on()
 
 
 def test_a_value_that_only_the_tail_of_a_distribution_has_fails_alone():
-    plan = plan_of(
-        "fig6", {"start.depth_m": {"normal": [0.31, 0.1]}}, design="monte_carlo", samples=5000, tethered=False,
-        changes={"run.duration_s": 0.1, "run.rtol": 0.0},
+    plan = plan_sweep(
+        "fig6", {"start.depth_m": {"normal": [0.31, 0.1]}}, design=Design(kind="monte_carlo", samples=5000),
+        changes={"run.duration_s": 0.1, "run.rtol": 0.0}, tethered=False,
     )  # fmt: skip
     depth = plan.points.values[
         :, 0
@@ -201,7 +221,7 @@ def test_a_value_that_only_the_tail_of_a_distribution_has_fails_alone():
 
 def test_threads_that_run_at_a_time_give_the_same_members(tmp_path):
     plan = fast(6)
-    with ThreadPoolExecutor(2) as threads, finished(plan, tmp_path, client=threads) as store:
+    with ThreadPoolExecutor(2) as threads, finished(plan, tmp_path, workers=threads) as store:
         mine = [one for block in store.blocks() for one in block]
     for one in mine:
         (alone,) = run_members(plan.job, [one.index], plan.points.values[[one.index]])
@@ -214,7 +234,7 @@ def test_what_is_finished_is_not_run_again(tmp_path):
     with subzero_store(plan, tmp_path) as store:
         store.add(run_members(plan.job, [1, 4], plan.points.values[[1, 4]]))
     executor = Dying()
-    with finished(plan, tmp_path, client=executor) as store:
+    with finished(plan, tmp_path, workers=executor) as store:
         assert store.finished(6).all()
     assert sorted(member for ran in executor.ran for member in ran) == [0, 2, 3, 5]
 
@@ -231,7 +251,7 @@ OTHER = {
     "trial": {"changes": {"run.duration_s": 0.3, "run.rtol": 0.0}},
     "points": {"parameters": {"start.wet_length_m": [0.0, 1.0, 3.0]}},
     "parameters": {"parameters": {"start.depth_m": [0.0, 1.0, 2.0]}},
-    "outcomes": {"function": lambda run: 2.0},
+    "outcomes": {"kept": Kept(function=lambda run: 2.0)},
     "tethered": {"tethered": False},
 }
 
@@ -241,15 +261,15 @@ def test_another_sweep_does_not_mix_with_what_is_there(what, tmp_path):
     asked = {
         "parameters": {"start.wet_length_m": [0.0, 1.0, 2.0]},
         "changes": {"run.duration_s": 0.2, "run.rtol": 0.0},
-        "function": lambda run: 1.0,
+        "kept": Kept(function=lambda run: 1.0),
     }
-    with subzero_store(plan_of("fig6", **asked), tmp_path):
+    with subzero_store(plan_sweep("fig6", **asked), tmp_path):
         pass
-    with subzero_store(plan_of("fig6", **asked), tmp_path):
+    with subzero_store(plan_sweep("fig6", **asked), tmp_path):
         pass  # the same goes on
     with (
         pytest.raises(subzero.UserError, match=rf"another sweep: its .*{what}"),
-        subzero_store(plan_of("fig6", **(asked | OTHER[what])), tmp_path),
+        subzero_store(plan_sweep("fig6", **(asked | OTHER[what])), tmp_path),
     ):
         pass
 
@@ -286,7 +306,7 @@ def test_a_full_disk_is_told_and_what_was_kept_before_is_still_there(tmp_path):
         with pytest.raises(subzero.UserError, match=r"full\. What it has is kept: make room"):
             store.add([_longer(one) for one in members[1:]])
         assert store.finished(4)[0]
-    with finished(plan, tmp_path, client=Here()) as store:
+    with finished(plan, tmp_path, workers=Here()) as store:
         assert store.finished(4).all()
         assert store.failures() == 0
 
@@ -303,7 +323,7 @@ def test_effects_of_a_linear_outcome_are_those_of_algebra():
     spreads = {"start.wet_length_m": {"from": 0.0, "to": 2.0}, "start.depth_m": {"from": 0.0, "to": 4.0}}
     sizes = {}
     for design, samples in (("morris", 8), ("saltelli", 1024), ("sobol", 1024)):
-        points = points_of(trial, spreads, design=design, samples=samples, seed=2)
+        points = points_of(trial, spreads, Design(kind=design, samples=samples, seed=2))
         y = points.values @ np.array([3.0, 1.0])
         found = Gathered(
             names=("y",),
@@ -392,9 +412,9 @@ def test_the_command_writes_everything_and_goes_on_where_it_was(tmp_path, monkey
 
 
 def test_the_page_tells_what_failed_and_what_matters_and_shows_texts_of_users_as_text():
-    plan = plan_of(
-        "fig6", {"start.wet_length_m": [0.0, 20.0], "cable.diameter": "declared"}, design="monte_carlo", samples=8,
-        description="<script>alert(1)</script> $x$",
+    plan = plan_sweep(
+        "fig6", {"start.wet_length_m": [0.0, 20.0], "cable.diameter": "declared"},
+        design=Design(kind="monte_carlo", samples=8), description="<script>alert(1)</script> $x$",
     )  # fmt: skip
     row = dict.fromkeys(("min", "p5", "p50", "p95", "max", "mean", "standard_deviation"), 1.25)
     effect = {
@@ -463,7 +483,7 @@ def test_two_dask_workers_give_the_same_bytes_as_processes_here(tmp_path):
     with (
         LocalCluster(n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address=None) as cluster,
         Client(cluster) as client,
-        finished(plan, tmp_path / "dask", client=client) as store,
+        finished(plan, tmp_path / "dask", workers=client) as store,
     ):
         write_result(store, plan.job, plan.points, plan.attributes, tmp_path / "dask")
     with finished(plan, tmp_path / "here", workers=2) as store:

@@ -13,7 +13,7 @@ import xarray as xr
 import scenarios
 import subzero
 from subzero.cli import FINE, STOPPED, main
-from subzero.refinement import halved
+from subzero.comparison import halved
 
 SHORT = dataclasses.replace(subzero.load_scenario("fig6"), duration=4.0, rtol=0.0)
 

@@ -13,7 +13,7 @@ import pytest
 
 import scenarios
 import subzero
-from subzero.refinement import halved
+from subzero.comparison import halved
 from subzero.validity import CHECKS
 from subzero.validity.limits import bend_radii
 from subzero.validity.numerics import drum_is_ill_posed, is_resolved, roughness

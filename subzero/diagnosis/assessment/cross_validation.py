@@ -10,13 +10,15 @@ over the nominal model is mostly owed to tolerances; G1 is what is owed to the n
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from subzero.diagnosis.inference.map_fit import Fit, bounds
-from subzero.diagnosis.inference.problem import Problem
 from subzero.diagnosis.results import ChannelGain, Gain
+
+if TYPE_CHECKING:
+    from subzero.diagnosis.inference.problem import Problem
 
 BLOCK_S, FOLDS = 2.0, 5
 """Length of a block [s], and in how many parts a trial is held out."""

@@ -10,13 +10,16 @@ can. A cause of another size v has (v/s)² times as much.
 from __future__ import annotations
 
 from collections.abc import Collection
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from subzero.diagnosis.hypothesis.hypotheses import Entry, columns_of, nameable
 from subzero.diagnosis.inference import settings
-from subzero.diagnosis.inference.problem import Problem
 from subzero.diagnosis.results import Detectability
+
+if TYPE_CHECKING:
+    from subzero.diagnosis.inference.problem import Problem
 
 SEEN_SIGNAL = 4.0
 """A signal that would be seen."""

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -32,15 +32,17 @@ from subzero.diagnosis.assessment.trial_library import (
 )
 from subzero.diagnosis.hypothesis.catalogue import START
 from subzero.diagnosis.hypothesis.catalogue.sensors import NOISE
-from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.hypotheses import entries_of
 from subzero.diagnosis.inference.linear_gaussian import posterior
-from subzero.diagnosis.inference.map_fit import Fit
-from subzero.diagnosis.inference.measurement import economical
 from subzero.diagnosis.inference.noise import Usual, usual_noise
 from subzero.diagnosis.inference.problem import Observed, Problem
-from subzero.diagnosis.inference.simulator import Track
+from subzero.diagnosis.inference.simulator import economical
 from subzero.diagnosis.results import NextTrial
+
+if TYPE_CHECKING:
+    from subzero.diagnosis.hypothesis.configuration import Setting
+    from subzero.diagnosis.inference.map_fit import Fit
+    from subzero.diagnosis.inference.simulator import Track
 
 
 class Survivor(Protocol):

@@ -6,15 +6,18 @@ residual = measured − simulated;   nrmse = rms(W residual);   whiteness by Lju
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.stats import chi2
 
-from subzero.diagnosis.inference.map_fit import Fit
-from subzero.diagnosis.inference.measurement import respond
-from subzero.diagnosis.inference.noise import Noise
-from subzero.diagnosis.inference.problem import Observed, Problem
+from subzero.diagnosis.inference.simulator import respond
 from subzero.diagnosis.results import Curves, Misfit
+
+if TYPE_CHECKING:
+    from subzero.diagnosis.inference.map_fit import Fit
+    from subzero.diagnosis.inference.noise import Noise
+    from subzero.diagnosis.inference.problem import Observed, Problem
 
 LJUNG_BOX_LAGS = 25
 WINDOW_S = 2.0

@@ -9,11 +9,14 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from math import pi, radians
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 import scenarios
-from subzero.diagnosis.hypothesis.configuration import Setting
+
+if TYPE_CHECKING:
+    from subzero.diagnosis.hypothesis.configuration import Setting
 
 RUDDER_AMPLITUDE, PLANE_AMPLITUDE = radians(8.0), radians(1.5)
 """Amplitudes of rudder and stern-planes. [rad]"""

@@ -117,6 +117,8 @@ Ids = tuple[str, ...]
 _ODDS = {"none": 0.50, "single": 0.40, "pair": 0.06, "unknown": 0.04, "sudden": 0.04, "more": 0.004}
 PRIOR = {kind: odds / sum(_ODDS.values()) for kind, odds in _ODDS.items()}
 """Probability of each kind, shared by all hypotheses of the kind; they sum to one."""
+MAX_CAUSES = 3
+"""Most causes of a hypothesis; "more" are as many."""
 
 
 def nameable(entries: Sequence[Entry]) -> list[str]:

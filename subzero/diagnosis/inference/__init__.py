@@ -2,8 +2,9 @@
 
 what is computed                                          file
 --------------------------------------------------------  -----------------
+parameter vector z, its prior, prior of hypotheses        ../hypothesis/hypotheses
 noise of a channel, whitening, its estimate               noise
-h(z): what the sensors would have measured                measurement
+h(z): what the sensors would have measured                ../hypothesis/measurement
 one simulation, from its start or from a stop             simulator
 r(z) and J of all records                                 problem
 records → problem                                         posing
@@ -29,8 +30,17 @@ it for what stands outside the diagnosis).
 
 # ruff: noqa: I001 - in the order in which they stand on one another, not in that of the alphabet
 
+from subzero.diagnosis.hypothesis.hypotheses import PRIOR, columns_of, entries_of, log_prior, variances
 from subzero.diagnosis.inference.noise import Behind, Noise, Usual, estimate, resolution_of, spikes
-from subzero.diagnosis.inference.measurement import TRUTHS, economical, respond
+from subzero.diagnosis.hypothesis.measurement import TRUTHS
+from subzero.diagnosis.inference.simulator import (
+    RunCache,
+    economical,
+    respond,
+    simulate_on,
+    simulate_track,
+    with_stops,
+)
 from subzero.diagnosis.inference.problem import Observed, Problem, Progress
 from subzero.diagnosis.inference.posing import pose, with_finer_steps, with_noise_behind
 from subzero.diagnosis.inference.linear_gaussian import (
@@ -103,6 +113,7 @@ __all__ = [
     "AXIS_WORDS",
     "FORCE",
     "KAPPAS",
+    "PRIOR",
     "TRUTHS",
     "UNTRIED_LOG_POSTERIOR",
     "BaseRun",
@@ -119,6 +130,7 @@ __all__ = [
     "Problem",
     "Progress",
     "Quadratic",
+    "RunCache",
     "Scale",
     "Screening",
     "Terms",
@@ -130,8 +142,10 @@ __all__ = [
     "broyden_update",
     "candidate_of",
     "change_point_columns",
+    "columns_of",
     "decide",
     "economical",
+    "entries_of",
     "estimate",
     "estimate_drift",
     "estimate_force",
@@ -149,6 +163,7 @@ __all__ = [
     "log_evidence_process",
     "log_evidence_term",
     "log_gains",
+    "log_prior",
     "mixed",
     "objective",
     "occam_folded",
@@ -165,11 +180,15 @@ __all__ = [
     "restarted_where_smooth",
     "scan",
     "seen",
+    "simulate_on",
+    "simulate_track",
     "spacing_of",
     "special_cases_folded",
     "spikes",
     "times_of",
+    "variances",
     "with_finer_steps",
     "with_noise_behind",
+    "with_stops",
     "without_force",
 ]

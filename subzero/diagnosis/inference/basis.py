@@ -11,20 +11,24 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 import vehicle
-from subzero.diagnosis.hypothesis.configuration import Setting
-from subzero.diagnosis.inference.latent_force import Knots
+from subzero.diagnosis.hypothesis.measurement import LENGTH, RUDDER, WATER
 from subzero.diagnosis.inference.linear_gaussian import Terms, log_sum
-from subzero.diagnosis.inference.problem import Problem
-from subzero.diagnosis.inference.simulator import LENGTH, RUDDER, WATER, simulate_track
+from subzero.diagnosis.inference.simulator import simulate_track
 from subzero.external_force import AXES, FACTORS, FEATURES, feature_value, fill_factors
 from vehicle.dynamics import relative_velocity
 from vehicle.kinematics import rotation
 from vehicle.motor import shaft_speed
 from vehicle.state import CHARGE, SHAFT
+
+if TYPE_CHECKING:
+    from subzero.diagnosis.hypothesis.configuration import Setting
+    from subzero.diagnosis.inference.latent_force import Knots
+    from subzero.diagnosis.inference.problem import Problem
 
 SHAPE_STEP_S = 0.1
 """Shapes are sampled so often. [s]"""

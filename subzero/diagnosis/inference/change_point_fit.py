@@ -13,10 +13,10 @@ from collections.abc import Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from subzero.diagnosis.hypothesis.effect import Effect
 from subzero.diagnosis.hypothesis.hypotheses import log_prior, nameable, variances
 from subzero.diagnosis.inference import settings
 from subzero.diagnosis.inference.change_point_scan import (
@@ -32,7 +32,10 @@ from subzero.diagnosis.inference.change_point_scan import (
 from subzero.diagnosis.inference.laplace import Candidate, laplace
 from subzero.diagnosis.inference.linear_gaussian import KAPPAS, Quadratic, log_sum, posterior
 from subzero.diagnosis.inference.map_fit import Fit, bounds, continued, is_poor_fit, refit, with_own_jacobian
-from subzero.diagnosis.inference.problem import Problem
+
+if TYPE_CHECKING:
+    from subzero.diagnosis.hypothesis.effect import Effect
+    from subzero.diagnosis.inference.problem import Problem
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -80,7 +83,7 @@ def fit_change_points(
     done: dict[str, FittedChangePoint] = {}
     candidates = [one for point in points for one in ranked_in(problem, point, able, record)]
     candidates += [one for each in large for one in ranked_by_runs(problem, each, able, record)]
-    for _ in range(settings.MAX_ROUNDS):
+    for _ in range(settings.MAX_TRIED):
         worth = _worth(candidates, done, least)
         if not worth:
             break

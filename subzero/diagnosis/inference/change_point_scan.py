@@ -10,19 +10,21 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.effect import MINUTE_S, Effect, with_free_onset, with_onset
 from subzero.diagnosis.hypothesis.hypotheses import Entry, columns_of, log_prior, nameable, variances
 from subzero.diagnosis.inference import settings
 from subzero.diagnosis.inference.laplace import Candidate, possible
 from subzero.diagnosis.inference.linear_gaussian import KAPPAS, ForceInformation, Quadratic, posterior, seen
 from subzero.diagnosis.inference.map_fit import Fit, bounds
-from subzero.diagnosis.inference.problem import Problem
 from subzero.diagnosis.inference.simulator import Stop, Track, simulate_on, simulate_track, with_stops
+
+if TYPE_CHECKING:
+    from subzero.diagnosis.hypothesis.configuration import Setting
+    from subzero.diagnosis.inference.problem import Problem
 
 COARSE_ONSETS, FINE_PER_COARSE, MIN_ONSET_SPACING_S = 15, 4, 1.0
 """A record has so many steps of times to begin at, each so many finer ones, but none is shorter than the last. [s]"""

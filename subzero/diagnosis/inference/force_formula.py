@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -26,10 +27,12 @@ from subzero.diagnosis.inference.basis import (
     shifted,
     size_of,
 )
-from subzero.diagnosis.inference.input_estimation import EstimatedForce
 from subzero.diagnosis.inference.latent_force import history, usual_force
 from subzero.diagnosis.inference.linear_gaussian import AMPLITUDE_SHARES, ForceInformation, log_sum
 from subzero.external_force import MissingForce, Term
+
+if TYPE_CHECKING:
+    from subzero.diagnosis.inference.input_estimation import EstimatedForce
 
 NORMAL_95 = 1.96
 

@@ -12,13 +12,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from subzero.channels import BY_NAME
 from subzero.diagnosis.hypothesis.catalogue.sensors import SPECS
-from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.hypotheses import log_prior, nameable, variances
 from subzero.diagnosis.inference.change_point_scan import BaseRun, LinearisationPoint
 from subzero.diagnosis.inference.laplace import possible
@@ -56,9 +55,12 @@ from subzero.diagnosis.inference.linear_gaussian import (
     seen,
 )
 from subzero.diagnosis.inference.map_fit import Fit, is_poor_fit, refit, with_own_jacobian
-from subzero.diagnosis.inference.problem import Problem
 from subzero.diagnosis.results import Unknown
-from subzero.external_force import MissingForce
+
+if TYPE_CHECKING:
+    from subzero.diagnosis.hypothesis.configuration import Setting
+    from subzero.diagnosis.inference.problem import Problem
+    from subzero.external_force import MissingForce
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

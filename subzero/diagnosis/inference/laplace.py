@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.stats import norm
@@ -14,8 +15,10 @@ from scipy.stats import norm
 from subzero.diagnosis.hypothesis.hypotheses import Entry, Ids, log_prior, nameable, variances
 from subzero.diagnosis.inference import settings
 from subzero.diagnosis.inference.linear_gaussian import KAPPAS, Scale, Scales, log_sum, posterior
-from subzero.diagnosis.inference.map_fit import Fit
-from subzero.diagnosis.inference.problem import Problem
+
+if TYPE_CHECKING:
+    from subzero.diagnosis.inference.map_fit import Fit
+    from subzero.diagnosis.inference.problem import Problem
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -12,15 +12,17 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 from functools import partial
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.effect import Effect, Parameter
 from subzero.diagnosis.hypothesis.hypotheses import Entry
-from subzero.diagnosis.inference.problem import Problem
 from subzero.external_force import AXES, MissingForce
+
+if TYPE_CHECKING:
+    from subzero.diagnosis.hypothesis.configuration import Setting
+    from subzero.diagnosis.inference.problem import Problem
 
 COARSE_SPACING_S, FINE_SPACING_S = 2.0, 1.0
 """Of knots: to look for a force, and to tell its history. [s]"""

@@ -13,14 +13,19 @@ noise is estimated behind it.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from subzero.diagnosis.hypothesis.hypotheses import Ids
 from subzero.diagnosis.inference import settings
 from subzero.diagnosis.inference.linear_gaussian import Quadratic
-from subzero.diagnosis.inference.problem import Problem
+
+if TYPE_CHECKING:
+    from subzero.diagnosis.hypothesis.hypotheses import Ids
+    from subzero.diagnosis.inference.problem import Problem
+
+POOR_FIT_SIGMAS = 2.0
+"""A fit whose sum of squares is this many of its standard deviations above that of noise is poor."""
 
 
 class Step(NamedTuple):
@@ -173,7 +178,7 @@ class Fit:
 def is_poor_fit(fit: Fit) -> bool:
     """Say whether a fit leaves more than noise."""
     count = fit.r.size
-    return bool(fit.r @ fit.r > count + settings.POOR_FIT_SIGMAS * np.sqrt(2.0 * count))
+    return bool(fit.r @ fit.r > count + POOR_FIT_SIGMAS * np.sqrt(2.0 * count))
 
 
 def with_own_jacobian(problem: Problem, fit: Fit) -> Fit:
@@ -185,7 +190,7 @@ def with_own_jacobian(problem: Problem, fit: Fit) -> Fit:
 
 def continued(problem: Problem, fit: Fit) -> Fit:
     """Return a fit that has gone on, with sensitivities of its own, while much is predicted."""
-    for _ in range(settings.MAX_ROUNDS):
+    for _ in range(settings.MAX_TRIED):
         if fit.predicted_gain < settings.DECISIVE_NATS:
             break
         J = problem.jacobian(fit.z)

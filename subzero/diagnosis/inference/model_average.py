@@ -18,15 +18,12 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations
-from typing import NamedTuple, TypeVar
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 import numpy as np
 
 from subzero.diagnosis.hypothesis.hypotheses import Entry, Ids, columns_of
-from subzero.diagnosis.inference.laplace import Candidate
 from subzero.diagnosis.inference.linear_gaussian import KAPPAS, log_sum
-from subzero.diagnosis.inference.problem import Problem
-from subzero.diagnosis.inference.screening import Screening
 from subzero.diagnosis.results import (
     CALIBRATED,
     CAUSE_NAMED,
@@ -35,6 +32,11 @@ from subzero.diagnosis.results import (
     OUTSIDE,
     UNDECIDED,
 )
+
+if TYPE_CHECKING:
+    from subzero.diagnosis.inference.laplace import Candidate
+    from subzero.diagnosis.inference.problem import Problem
+    from subzero.diagnosis.inference.screening import Screening
 
 Key = TypeVar("Key")
 NAMED_PROBABILITY, HEALTHY_PROBABILITY, OUT_OF_CATALOGUE_PROBABILITY, CREDIBLE_SET_PROBABILITY = (

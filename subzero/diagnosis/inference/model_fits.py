@@ -12,7 +12,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import partial
 from os import cpu_count
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
@@ -22,8 +22,10 @@ from subzero.diagnosis.inference.laplace import Candidate, candidate_of
 from subzero.diagnosis.inference.linear_gaussian import posterior
 from subzero.diagnosis.inference.map_fit import Fit, refit
 from subzero.diagnosis.inference.posing import whitened_again, with_finer_steps, with_noise_behind
-from subzero.diagnosis.inference.problem import Problem, Progress
 from subzero.diagnosis.inference.screening import Screening, is_flat, screening_of
+
+if TYPE_CHECKING:
+    from subzero.diagnosis.inference.problem import Problem, Progress
 
 Asked = TypeVar("Asked")
 Made = TypeVar("Made")
@@ -97,7 +99,11 @@ class Fits:
         hopeless = settings.HOPELESS_NATS if hopeless is None else hopeless
         runs = settings.MAX_RUNS_PER_RECORD * len(self.problem.records)
         for _ in range(settings.MAX_REFINED if most is None else most):
-            self.refined |= {one.ids for one in self.candidates.values() if self._settled(one.fit)}
+            self.refined |= {
+                one.ids
+                for one in self.candidates.values()
+                if self._settled(one.fit, settings.JACOBIAN_HOLDS_TOLERANCES)
+            }
             waiting = [one for one in self.candidates.values() if one.ids not in self.refined]
             if not waiting:
                 return
@@ -113,7 +119,7 @@ class Fits:
         """Fit the close rivals of the best candidate from where that is, and it from where they are, and keep what is
         better: where a drum stops or a cable falls slack runs have kinks, and a fit may end in a hollow of its own.
         """
-        for _ in range(settings.MAX_REPEATS):
+        for _ in range(settings.MAX_ADDED):
             best = self.best()
             close = [ids for ids in self._ranked()[1:settings.MAX_REFINED]
                      if self.candidates[ids].log_posterior > best.log_posterior - settings.HOPELESS_NATS]  # fmt: skip
@@ -151,7 +157,7 @@ class Fits:
             self._keep(ids, found)
             self.refined.discard(ids)
 
-    def _settled(self, fit: Fit, near: float = settings.JACOBIAN_HOLDS_TOLERANCES) -> bool:
+    def _settled(self, fit: Fit, near: float) -> bool:
         """Say whether a fit has converged close to where its sensitivities were made, or has not left from there."""
         moved = fit.moved(self.problem)
         return moved == 0.0 or (fit.converged and moved < near)

@@ -12,7 +12,7 @@ from itertools import chain, combinations
 
 import numpy as np
 
-from subzero.diagnosis.hypothesis.hypotheses import Ids, columns_of, nameable, variances
+from subzero.diagnosis.hypothesis.hypotheses import MAX_CAUSES, Ids, columns_of, nameable, variances
 from subzero.diagnosis.inference import settings
 from subzero.diagnosis.inference.laplace import Candidate, candidate_of
 from subzero.diagnosis.inference.linear_gaussian import KAPPAS
@@ -61,7 +61,7 @@ class GrowingFits(SharpFits):
                 return
             looked.add(best.ids)
             self._say(0.7, "a further cause beside", best.ids)
-            self.fit_all(self._more(best) if len(best.ids) < settings.MAX_CAUSES else [], best.fit)
+            self.fit_all(self._more(best) if len(best.ids) < MAX_CAUSES else [], best.fit)
             for without in best.ids:
                 self._without(best, without)
             self._beside_others(best)
@@ -92,7 +92,7 @@ class GrowingFits(SharpFits):
         """
         found: dict[Ids, tuple[float, Fit]] = {}
         for one in self.candidates.values():
-            if one is not best and len(one.ids) < settings.MAX_CAUSES:
+            if one is not best and len(one.ids) < MAX_CAUSES:
                 for ids, log in self._unknown(with_one_added(self.problem, one)).items():
                     if log > max(best.log_posterior, found.get(ids, (-np.inf,))[0]):
                         found[ids] = log, one.fit
@@ -103,9 +103,9 @@ class GrowingFits(SharpFits):
         """Fit causes that runs have kinks in beside the best, or in the place of one of its causes."""
         found = dict[Ids, TriedSize]()
         rests = [tuple(one for one in best.ids if one != without) for without in best.ids]
-        for rest in [best.ids, *rests] if len(best.ids) < settings.MAX_CAUSES else rests:
+        for rest in [best.ids, *rests] if len(best.ids) < MAX_CAUSES else rests:
             for ids, one in with_sizes_tried(
-                self.problem, best, rest, non_smooth(self.problem, rest)
+                self.problem, best, rest, non_smooth(self.problem, rest), settings.SWEEP_SCALES
             ).items():
                 if ids not in found or one.log_posterior > found[ids].log_posterior:
                     found[ids] = one
@@ -223,7 +223,7 @@ class Search(GrowingFits):
         """
         self._once_more()
         stuck: set[Ids] = set()
-        for _ in range(settings.MAX_ROUNDS):
+        for _ in range(settings.MAX_TRIED):
             best = self.best()
             for one in [one for one in self.candidates.values() if self._is_open(one, best)]:
                 if one.ids in stuck:
@@ -249,7 +249,9 @@ class Search(GrowingFits):
         if behind < settings.CLOSE_NATS:
             return not self._settled(one.fit, settings.OWN_JACOBIAN_TOLERANCES)
         akin = behind < settings.HOPELESS_NATS and _akin(one.ids, best.ids)
-        return akin and not one.fit.converged and not self._settled(one.fit)
+        return (
+            akin and not one.fit.converged and not self._settled(one.fit, settings.JACOBIAN_HOLDS_TOLERANCES)
+        )
 
     @property
     def beliefs(self) -> Beliefs:

@@ -108,7 +108,7 @@ class Noise:
 
 
 @compiled
-def gains_of(kept, white, slow, gain, scale):
+def gains_of(kept: np.ndarray, white: float, slow: float, gain: np.ndarray, scale: np.ndarray) -> None:
     """Fill the gain of the filter, and the standard deviation of its innovations, at every sample (m,)."""
     left = slow  # variance of the slow part before the sample is seen
     for i in range(kept.size):
@@ -119,7 +119,9 @@ def gains_of(kept, white, slow, gain, scale):
 
 
 @compiled
-def innovations(kept, gain, scale, values, white):
+def innovations(
+    kept: np.ndarray, gain: np.ndarray, scale: np.ndarray, values: np.ndarray, white: np.ndarray
+) -> None:
     """Fill what the values before do not tell of each value, over its standard deviation: (m, columns) → the same."""
     for j in range(values.shape[1]):
         expected = 0.0
@@ -130,7 +132,9 @@ def innovations(kept, gain, scale, values, white):
 
 
 @compiled
-def coloured(kept, gain, scale, white, values):
+def coloured(
+    kept: np.ndarray, gain: np.ndarray, scale: np.ndarray, white: np.ndarray, values: np.ndarray
+) -> None:
     """Fill the values that have innovations: (m, columns) → the same."""
     for j in range(white.shape[1]):
         expected = 0.0

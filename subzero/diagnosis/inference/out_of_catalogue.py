@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -25,7 +26,6 @@ from subzero.diagnosis.inference.input_estimation import (
     linear_candidates,
     relinearised_force,
 )
-from subzero.diagnosis.inference.laplace import Candidate
 from subzero.diagnosis.inference.latent_force import (
     FINE_SPACING_S,
     FORCE,
@@ -37,10 +37,13 @@ from subzero.diagnosis.inference.latent_force import (
 from subzero.diagnosis.inference.linear_gaussian import KAPPAS, Terms, log_sum
 from subzero.diagnosis.inference.map_fit import is_poor_fit
 from subzero.diagnosis.inference.model_average import FURTHER_CAUSE_ODDS
-from subzero.diagnosis.inference.model_search import Search
-from subzero.diagnosis.inference.problem import Problem
-from subzero.diagnosis.results import Detectability, Misfit
 from subzero.external_force import AXES
+
+if TYPE_CHECKING:
+    from subzero.diagnosis.inference.laplace import Candidate
+    from subzero.diagnosis.inference.model_search import Search
+    from subzero.diagnosis.inference.problem import Problem
+    from subzero.diagnosis.results import Detectability, Misfit
 
 
 def linearisation_points(

@@ -10,15 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from subzero.channels import HEADING, turned
 from subzero.diagnosis.hypothesis.catalogue import ONSETS, START, catalogue
 from subzero.diagnosis.hypothesis.catalogue.sensors import SPECS
-from subzero.diagnosis.hypothesis.effect import Effect
 from subzero.diagnosis.hypothesis.hypotheses import entries_of, moves_nothing, with_tolerances
-from subzero.diagnosis.hypothesis.logged import Logged
-from subzero.diagnosis.inference.measurement import economical, finer, respond
 from subzero.diagnosis.inference.noise import (
     Behind,
     Noise,
@@ -29,8 +28,12 @@ from subzero.diagnosis.inference.noise import (
     usual_noise,
 )
 from subzero.diagnosis.inference.problem import Observed, Problem
+from subzero.diagnosis.inference.simulator import economical, finer, respond
 from subzero.errors import UserError
-from subzero.records.record import HEADING, turned
+
+if TYPE_CHECKING:
+    from subzero.diagnosis.hypothesis.effect import Effect
+    from subzero.diagnosis.hypothesis.logged import Logged
 
 VISIBLE_STEP_ERROR = 1.0
 """Squared size, in noise, of an error of the steps that is worth correcting."""

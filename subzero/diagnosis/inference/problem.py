@@ -12,16 +12,12 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from os import cpu_count
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from subzero.diagnosis.hypothesis.configuration import Setting
-from subzero.diagnosis.hypothesis.effect import Effect
 from subzero.diagnosis.hypothesis.hypotheses import Entry, grouped
-from subzero.diagnosis.inference.measurement import sensed, truth
-from subzero.diagnosis.inference.noise import (
-    Noise,
-)
+from subzero.diagnosis.hypothesis.measurement import sensed, truth
 from subzero.diagnosis.inference.simulator import (
     RunCache,
     Stop,
@@ -30,6 +26,13 @@ from subzero.diagnosis.inference.simulator import (
     simulate_track,
     with_stops,
 )
+
+if TYPE_CHECKING:
+    from subzero.diagnosis.hypothesis.configuration import Setting
+    from subzero.diagnosis.hypothesis.effect import Effect
+    from subzero.diagnosis.inference.noise import (
+        Noise,
+    )
 
 JACOBIAN_STEP = 0.2
 """Step of a sensitivity, in tolerances; a whole one from a state of rest (a play, a friction), where slopes jump."""

@@ -9,11 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from subzero.diagnosis.hypothesis.effect import Parameter
 from subzero.diagnosis.hypothesis.hypotheses import (
     Entry,
     Ids,
@@ -35,7 +34,10 @@ from subzero.diagnosis.inference.linear_gaussian import (
 )
 from subzero.diagnosis.inference.map_fit import Fit, at_bad_minimum, refit, restarted_where_smooth
 from subzero.diagnosis.inference.posing import with_noise_behind
-from subzero.diagnosis.inference.problem import Problem, Progress
+
+if TYPE_CHECKING:
+    from subzero.diagnosis.hypothesis.effect import Parameter
+    from subzero.diagnosis.inference.problem import Problem, Progress
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -143,7 +145,11 @@ def _sweep(
     problem: Problem, z: np.ndarray, J: np.ndarray, columns_of: list[int], found: Screening, here: np.ndarray
 ) -> None:
     """Try sizes of entries about z, side by side, with the residual `here` there; keep the best of every cause."""
-    jobs = [(k, size) for k in columns_of for size in sizes_tried(problem.entries[k].parameter)]
+    jobs = [
+        (k, size)
+        for k in columns_of
+        for size in sizes_tried(problem.entries[k].parameter, settings.SWEEP_SCALES)
+    ]
     moved = [np.concatenate([z[:k], [size], z[k + 1 :]]) for k, size in jobs]
     best, flat = dict[Ids, float](), _without_slope(problem, J)
     for (k, size), there, r in zip(jobs, moved, problem.residuals(moved), strict=True):
@@ -158,7 +164,7 @@ def _sweep(
     )
 
 
-def sizes_tried(parameter: Parameter, scales: Sequence[float] = settings.SWEEP_SCALES) -> list[float]:
+def sizes_tried(parameter: Parameter, scales: Sequence[float]) -> list[float]:
     """Return the deviations that are tried, at some effect scales either way."""
     both = [side * size * parameter.scale for size in scales for side in (1.0, -1.0)]
     return [size for size in both if parameter.low <= size <= parameter.high]
@@ -218,7 +224,7 @@ def with_sizes_tried(
     one: Candidate,
     rest: Ids,
     at: Sequence[int],
-    scales: Sequence[float] = settings.SWEEP_SCALES,
+    scales: Sequence[float],
 ) -> dict[Ids, TriedSize]:
     """Return hypothesis → its best size, for the causes of entries beside the rest of a candidate.
 
@@ -261,7 +267,7 @@ def fit_wide(problem: Problem, progress: Progress) -> tuple[Problem, Fit, Nomina
     zero = np.zeros(len(problem.entries))
     J = problem.jacobian(zero)
     fit = _from(problem, zero, J, progress)
-    for _ in range(settings.MAX_REPEATS):
+    for _ in range(settings.MAX_ADDED):
         D = variances(problem.entries, (), KAPPA_WIDE)
         again = with_noise_behind(problem, fit.z, D) if np.isfinite(fit.r).all() else None
         if again is None:

@@ -2,8 +2,9 @@
 
 None of these numbers belongs to the statistical model: with an endless budget, and simulations without non-smooth
 points, the verdict would not depend on them. They buy time. What belongs to the model stands with its concept: prior
-probabilities (`hypotheses`), priors of noise (`noise`) and of latent forces (`linear_gaussian`), rules for a verdict
-(`model_average`). So do the steps of differences and grids (`problem`, `change_point_scan`, `latent_force`).
+probabilities and the most causes (`hypotheses`), what a poor fit is (`map_fit`), priors of noise (`noise`) and of
+latent forces (`linear_gaussian`), rules for a verdict (`model_average`). So do the steps of differences and grids
+(`problem`, `change_point_scan`, `latent_force`). `benchmarks/diagnosis/settings.py` halves and doubles each.
 
 Log posteriors are in nats: 2 nats are odds of 7 to 1, 6 of 400 to 1. Distances of parameters are in tolerances τ.
 """
@@ -54,8 +55,6 @@ BENT_TOLERANCES = 10.0
 """A cause that the wide fit moves by more than this is fitted by itself: linear evidence says little there."""
 
 # Sizes and shares. [-]
-POOR_FIT_SIGMAS = 2.0
-"""A fit whose sum of squares is this many of its standard deviations above that of noise is poor."""
 POOR_MEAN_SQUARE = 1.08
 """A wide fit with a larger mean square of the whitened residual is not close to the records."""
 FLAT_SIGNAL = 1.0
@@ -72,18 +71,14 @@ LATER_SIZES = (1.0, 1.5)
 """A cause of a hypothesis is simulated from an onset on at these multiples of its size there."""
 
 # Counts.
-MAX_CAUSES = 3
-"""Most causes of a hypothesis."""
 MAX_STEPS = 8
 """Most steps of a fit."""
 MAX_ADDED = 2
-"""Most fits with something more: a further cause, a bent cause by itself, along a force, from a large hypothesis."""
+"""Most fits with something more (a further cause, a bent cause by itself, along a force, from a large hypothesis), and
+how often one is repeated with what it showed: rivals from one another's optimum, the noise behind the wide fit."""
 MAX_TRIED = 3
-"""Most fits of one kind in one look: swapped causes, restarts, change points, forces, rivals to refute."""
-MAX_REPEATS = 2
-"""How often rivals are fitted from one another's optimum, and the noise is estimated behind the wide fit."""
-MAX_ROUNDS = 3
-"""How often the search settles, tries change points, and continues a fit."""
+"""Most fits of one kind in one look (swapped causes, restarts, change points, forces, rivals to refute), and most
+looks: at change points, at what has not settled, and where a fit might go on."""
 MAX_GROWING_ROUNDS = 4
 """How often it adds, drops, swaps and merges causes of the best."""
 MAX_PAIRS = 4

@@ -11,29 +11,38 @@ from __future__ import annotations
 
 import math
 from collections import OrderedDict
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import replace
 from threading import Lock
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 import vehicle
 from cable.moving_end import enlarged
-from subzero.diagnosis.hypothesis.configuration import Setting
+from scenarios.steps import fitting_step
+from subzero.diagnosis.hypothesis.measurement import (
+    COLUMNS,
+    LENGTH,
+    RUDDER,
+    TENSION,
+    VOLTAGE,
+    WATER,
+    sensed,
+    truth,
+)
 from subzero.engine import coupling
 from subzero.engine.coupling import FINE, exchange, hull_steps
+from subzero.engine.external_wrench import feel_current, row_at
 from subzero.engine.initial_conditions import go_on_with, most_hull_steps, prepare
 from subzero.engine.time_loop import NO_ROOM, SPARE
-from subzero.engine.vehicle_step import feel_current, row_at
 from subzero.jit import compiled, inner
-from subzero.model import Model
-from subzero.run_state import Live, Setup
 from vehicle import STATE_SIZE
 
-RUDDER, VOLTAGE, TENSION, LENGTH, WATER = (STATE_SIZE + i for i in range(5))
-"""Columns of a track behind the state: rudder [rad], battery [V], tension at the tow point [N], wet length [m], and the
-velocity of the water in earth axes (three). [m/s]"""
-COLUMNS = STATE_SIZE + 7
+if TYPE_CHECKING:
+    from subzero.diagnosis.hypothesis.configuration import Setting
+    from subzero.model import Model
+    from subzero.run_state import Live, Setup
 
 
 @compiled
@@ -94,6 +103,11 @@ def _write(setup: Setup, live: Live, time: float, state: np.ndarray, out: np.nda
     out[LENGTH] = live.now.length
 
 
+HULL_STEP_S, CABLE_STEP_S, SEGMENT_M = 0.05, 0.2, 1.0
+"""Steps of a diagnosis: errors of 1e-4 m/s and 0.03 degrees on fig6, a twentieth of the sensors' noise, in a third of
+the time."""
+FINE_STEPS = (0.025, 0.1, 0.25)
+"""Hull step, cable step [s] and segment length [m] to measure their errors with."""
 AGREEMENT = 1e-6
 """Fraction within which the forces of hull and cable agree, in the place of 1e-9: a quarter faster, nothing seen. With
 1e-5, and the cable's balances to 1e-6, a fit of 12 m more cable ended 122 nats behind: sensitivities need it."""
@@ -203,6 +217,53 @@ def _roomy(live: Live, length: float, segment: float) -> Live:
 def _copied(value: Any) -> Any:
     """Return arrays and records, in named tuples or not, as they are now."""
     return type(value)(*map(_copied, value)) if hasattr(value, "_fields") else value.copy()
+
+
+def economical(setting: Setting, duration: float) -> Setting:
+    """Return a setting in the steps of a diagnosis, no longer than needed; commands stay at their times."""
+    trial = setting.trial
+    on_grid = trial.commands is None or multiples(trial.commands.time, HULL_STEP_S)
+    hull_step = max(trial.hull_step, HULL_STEP_S) if on_grid else trial.hull_step
+    cable_step = max(trial.cable_step, CABLE_STEP_S)
+    steps = int(np.ceil(min(duration, trial.duration) / cable_step - 1e-9))
+    made = replace(trial, hull_step=fitting_step(cable_step, hull_step), cable_step=cable_step,
+                   duration=steps * cable_step, segment_length=max(trial.segment_length, SEGMENT_M),
+                   every=0.0)  # fmt: skip
+    return replace(setting, trial=made)
+
+
+def finer(setting: Setting) -> Setting:
+    """Return a setting in steps that are fine, to see what economical ones get wrong."""
+    hull_step, cable_step, segment = FINE_STEPS
+    trial = setting.trial
+    cable_step = min(trial.cable_step, cable_step)
+    made = replace(trial, hull_step=fitting_step(cable_step, min(trial.hull_step, hull_step)), cable_step=cable_step,
+                   segment_length=min(trial.segment_length, segment), every=0.0)  # fmt: skip
+    return replace(setting, trial=made)
+
+
+def multiples(times: np.ndarray, step: float) -> bool:
+    """Say whether all times are whole multiples of a step."""
+    return bool(np.all(np.abs(times / step - np.round(times / step)) < 1e-6))
+
+
+def respond(setting: Setting, times: np.ndarray, channels: Iterable[str]) -> dict[str, np.ndarray]:
+    """Return what the sensors would show.
+
+    Args:
+        setting: of the trial.
+        times: when they are read (n,). [s]
+        channels: names of `subzero.channels`, of those in `TRUTHS`.
+
+    Returns:
+        channel → values (n,) in its display unit; NaN from where the run could not go on. Behind its end the last hold.
+    """
+    grid, track = simulate_track(setting)
+    earlier = times - setting.clock_offset
+    return {
+        name: np.interp(earlier, grid, sensed(setting.sensing.get(name), grid, truth(setting, track, name)))
+        for name in channels
+    }
 
 
 CACHE_BYTES = 64_000_000

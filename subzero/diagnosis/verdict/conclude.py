@@ -13,9 +13,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 from subzero.diagnosis.hypothesis.catalogue.sensors import SPECS
-from subzero.diagnosis.hypothesis.hypotheses import Ids
-from subzero.diagnosis.inference.change_point_fit import FittedChangePoint
-from subzero.diagnosis.inference.laplace import Candidate
 from subzero.diagnosis.inference.model_average import (
     HEALTHY_PROBABILITY,
     PRACTICAL_TOLERANCES,
@@ -54,6 +51,9 @@ from subzero.diagnosis.verdict.estimates import (
 )
 
 if TYPE_CHECKING:
+    from subzero.diagnosis.hypothesis.hypotheses import Ids
+    from subzero.diagnosis.inference.change_point_fit import FittedChangePoint
+    from subzero.diagnosis.inference.laplace import Candidate
     from subzero.diagnosis.inference.out_of_catalogue import Findings
     from subzero.diagnosis.verdict.extension import Extension
 

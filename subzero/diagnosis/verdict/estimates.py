@@ -14,19 +14,19 @@ import numpy as np
 
 from subzero.diagnosis.assessment.identifiability import against, information, marginal
 from subzero.diagnosis.hypothesis.catalogue.sensors import SPECS
-from subzero.diagnosis.hypothesis.effect import Parameter
 from subzero.diagnosis.hypothesis.hypotheses import Ids, columns_of, variances
-from subzero.diagnosis.inference.change_point_fit import FittedChangePoint
-from subzero.diagnosis.inference.laplace import Candidate
 from subzero.diagnosis.inference.latent_force import AXIS_WORDS, DRIFT, FORCE
 from subzero.diagnosis.inference.linear_gaussian import KAPPAS, log_sum, posterior
-from subzero.diagnosis.inference.map_fit import Fit
 from subzero.diagnosis.inference.model_average import practical_causes
-from subzero.diagnosis.inference.problem import Problem
 from subzero.diagnosis.results import Cause, Estimate, Rival
 
 if TYPE_CHECKING:
+    from subzero.diagnosis.hypothesis.effect import Parameter
+    from subzero.diagnosis.inference.change_point_fit import FittedChangePoint
+    from subzero.diagnosis.inference.laplace import Candidate
+    from subzero.diagnosis.inference.map_fit import Fit
     from subzero.diagnosis.inference.out_of_catalogue import Findings
+    from subzero.diagnosis.inference.problem import Problem
 
 HALF_INTERVAL_95 = 1.96
 """Half a 95 % interval, in standard deviations."""

@@ -14,7 +14,6 @@ import numpy as np
 from subzero.diagnosis.hypothesis.catalogue.sensors import SPECS
 from subzero.diagnosis.hypothesis.hypotheses import Ids, variances
 from subzero.diagnosis.inference.basis import samples_of
-from subzero.diagnosis.inference.change_point_fit import FittedChangePoint
 from subzero.diagnosis.inference.force_formula import Formula, describe
 from subzero.diagnosis.inference.input_estimation import (
     EstimatedForce,
@@ -23,14 +22,15 @@ from subzero.diagnosis.inference.input_estimation import (
     estimate_force,
     fit_beside_drift,
 )
-from subzero.diagnosis.inference.laplace import Candidate
 from subzero.diagnosis.inference.latent_force import FORCE, MAX_DRIFT_LEVELS
-from subzero.diagnosis.inference.map_fit import Fit
-from subzero.diagnosis.inference.problem import Problem
 from subzero.diagnosis.results import Cause, Extended, Unknown
 
 if TYPE_CHECKING:
+    from subzero.diagnosis.inference.change_point_fit import FittedChangePoint
+    from subzero.diagnosis.inference.laplace import Candidate
+    from subzero.diagnosis.inference.map_fit import Fit
     from subzero.diagnosis.inference.out_of_catalogue import Findings, OutOfCatalogue
+    from subzero.diagnosis.inference.problem import Problem
 
 MENTIONED_PROBABILITY = 0.01
 """Features that are less probable in a formula are not mentioned."""

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -29,10 +30,7 @@ from subzero.diagnosis.hypothesis.hypotheses import Ids, columns_of, nameable
 from subzero.diagnosis.inference import settings
 from subzero.diagnosis.inference.change_point_fit import FittedChangePoint
 from subzero.diagnosis.inference.change_point_scan import BaseRun, change_point_columns
-from subzero.diagnosis.inference.laplace import Candidate
-from subzero.diagnosis.inference.map_fit import Fit
 from subzero.diagnosis.inference.model_average import MIN_DISCRIMINATION
-from subzero.diagnosis.inference.model_search import Search
 from subzero.diagnosis.inference.out_of_catalogue import Findings, shares
 from subzero.diagnosis.results import (
     CALIBRATED,
@@ -56,6 +54,11 @@ from subzero.diagnosis.verdict.conclude import (
 )
 from subzero.diagnosis.verdict.estimates import cause_of, name, practical_of
 from subzero.diagnosis.verdict.extension import Extension, of_causes, of_nothing, of_sudden, of_unknown
+
+if TYPE_CHECKING:
+    from subzero.diagnosis.inference.laplace import Candidate
+    from subzero.diagnosis.inference.map_fit import Fit
+    from subzero.diagnosis.inference.model_search import Search
 
 RIVALS_DRAWN = {CAUSE_NAMED: 1, OUTSIDE: 1, UNDECIDED: 3, NOTHING_NEAR: 1, CALIBRATED: 0, NOTHING_WRONG: 0}
 """Verdict → so many rivals are drawn: of what is undecided, the best and two more."""

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import radians
 
 from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.effect import Effect, Parameter
 
 
-def _turned(key: str):
+def _turned(key: str) -> Callable[[Setting, float], Setting]:
     def apply(setting: Setting, angle: float) -> Setting:
         return setting.with_start(**{key: getattr(setting.trial.start, key) + radians(angle)})
 
     return apply
 
 
-def _moved(key: str):
+def _moved(key: str) -> Callable[[Setting, float], Setting]:
     def apply(setting: Setting, amount: float) -> Setting:
         return setting.with_start(**{key: getattr(setting.trial.start, key) + amount})
 

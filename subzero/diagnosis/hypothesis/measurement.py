@@ -1,73 +1,25 @@
-"""What the sensors would measure in a setting, without their noise: h(z) of the diagnosis.
+"""What sensors make of the track of a simulation, without their noise.
 
 The record's `surge_speed` is what a speed log shows: through the water.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import replace
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from scenarios.steps import fitting_step
-from subzero.channels import DEGREE
-from subzero.diagnosis.hypothesis.configuration import Sensing, Setting
-from subzero.diagnosis.inference.simulator import LENGTH, RUDDER, TENSION, VOLTAGE, WATER, simulate_track
-from subzero.records.record import HEADING, turned
-from vehicle.state import QUATERNION, SHAFT, VELOCITY
+from subzero.channels import DEGREE, HEADING, turned
+from vehicle.state import QUATERNION, SHAFT, STATE_SIZE, VELOCITY
 
-HULL_STEP_S, CABLE_STEP_S, SEGMENT_M = 0.05, 0.2, 1.0
-"""Steps of a diagnosis: errors of 1e-4 m/s and 0.03 degrees on fig6, a twentieth of the sensors' noise, in a third of
-the time."""
-FINE_STEPS = (0.025, 0.1, 0.25)
-"""Hull step, cable step [s] and segment length [m] to measure their errors with."""
+if TYPE_CHECKING:
+    from subzero.diagnosis.hypothesis.configuration import Sensing, Setting
 
-
-def economical(setting: Setting, duration: float) -> Setting:
-    """Return a setting in the steps of a diagnosis, no longer than needed; commands stay at their times."""
-    trial = setting.trial
-    on_grid = trial.commands is None or multiples(trial.commands.time, HULL_STEP_S)
-    hull_step = max(trial.hull_step, HULL_STEP_S) if on_grid else trial.hull_step
-    cable_step = max(trial.cable_step, CABLE_STEP_S)
-    steps = int(np.ceil(min(duration, trial.duration) / cable_step - 1e-9))
-    made = replace(trial, hull_step=fitting_step(cable_step, hull_step), cable_step=cable_step,
-                   duration=steps * cable_step, segment_length=max(trial.segment_length, SEGMENT_M))  # fmt: skip
-    return replace(setting, trial=made)
-
-
-def finer(setting: Setting) -> Setting:
-    """Return a setting in steps that are fine, to see what economical ones get wrong."""
-    hull_step, cable_step, segment = FINE_STEPS
-    trial = setting.trial
-    cable_step = min(trial.cable_step, cable_step)
-    made = replace(trial, hull_step=fitting_step(cable_step, min(trial.hull_step, hull_step)), cable_step=cable_step,
-                   segment_length=min(trial.segment_length, segment))  # fmt: skip
-    return replace(setting, trial=made)
-
-
-def multiples(times: np.ndarray, step: float) -> bool:
-    """Say whether all times are whole multiples of a step."""
-    return bool(np.all(np.abs(times / step - np.round(times / step)) < 1e-6))
-
-
-def respond(setting: Setting, times: np.ndarray, channels: Iterable[str]) -> dict[str, np.ndarray]:
-    """Return what the sensors would show.
-
-    Args:
-        setting: of the trial.
-        times: when they are read (n,). [s]
-        channels: names of `subzero.channels`, of those in `TRUTHS`.
-
-    Returns:
-        channel → values (n,) in its display unit; NaN from where the run could not go on. Behind its end the last hold.
-    """
-    grid, track = simulate_track(setting)
-    earlier = times - setting.clock_offset
-    return {
-        name: np.interp(earlier, grid, sensed(setting.sensing.get(name), grid, truth(setting, track, name)))
-        for name in channels
-    }
+RUDDER, VOLTAGE, TENSION, LENGTH, WATER = (STATE_SIZE + i for i in range(5))
+"""Columns of a track behind the state: rudder [rad], battery [V], tension at the tow point [N], wet length [m], and the
+velocity of the water in earth axes (three). [m/s]"""
+COLUMNS = STATE_SIZE + 7
 
 
 def truth(setting: Setting, track: np.ndarray, channel: str) -> np.ndarray:

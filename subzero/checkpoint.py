@@ -1,0 +1,308 @@
+"""Checkpoints of long runs: a run that was killed goes on from there, and ends as if nothing had happened.
+
+A checkpoint is a folder. `simulate` makes several runs of a trial (`subzero.convergence`), always in the same order:
+each has a numbered folder in it, with
+
+    rows-000000.npz, …   the rows of its recording, as many as came between two checkpoints, and
+    state.npz            where it stands: all that changes in a run, and of how many of those files it is the end.
+
+Every file is written beside its place, forced to the disk and renamed, the state last; so whenever the process is
+killed, the state and the rows that it names are whole. What is read back are the same bits, and a run does not know how
+many of its steps were taken at a time: so the rest of the run is the same to the last bit, too.
+
+The files hold numbers only (``allow_pickle=False``); what they belong to stands in ``manifest.json``, as digests.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+import shutil
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from time import monotonic
+from typing import Any
+from zipfile import BadZipFile
+
+import numpy as np
+
+from subzero.engine.recording import BY_NODE, BY_TIME, Recording, Standing, new_recording, row_of
+from subzero.errors import UserError, checked, printable
+from subzero.jit import Record
+from subzero.stage import FULL
+
+MANIFEST, STATE, LOCK = "manifest.json", "state.npz", "lock"
+MINUTE_S = 60.0
+
+
+class _UnreadableError(Exception):
+    """A file of a checkpoint is not what was written."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Checkpoint:
+    """Where a run keeps where it stands, and how often.
+
+    >>> Checkpoint(folder="transect.checkpoint", minutes=10.0).minutes
+    10.0
+
+    Attributes:
+        folder: new, or that of the same simulation, which then goes on from there.
+        minutes: from one checkpoint to the next, of the clock on the wall. [min]
+    """
+
+    folder: str | Path
+    minutes: float = 5.0
+
+    def __post_init__(self) -> None:
+        """Refuse what is no time."""
+        object.__setattr__(self, "minutes", checked("Checkpoint", "minutes", self.minutes, least=0.0))
+        object.__setattr__(self, "folder", Path(self.folder))
+
+    def stands_at(self) -> float | None:
+        """Return up to when the run that is under way is kept, None if nothing is. [s]"""
+        states = sorted(Path(self.folder).glob(f"*/*/{STATE}"), key=lambda path: path.stat().st_mtime_ns)
+        try:
+            return _read(states[-1])["time"].item() if states else None
+        except _UnreadableError:
+            return None
+
+    def remove(self) -> None:
+        """Remove its files, when the result is safe; others that are in the folder stay."""
+        for manifest in Path(self.folder).glob(f"*/{MANIFEST}"):
+            shutil.rmtree(manifest.parent)
+        with suppress(OSError):
+            Path(self.folder).rmdir()
+
+
+class Keeper:
+    """Keeps the runs that one simulation makes, in their order; `opened` gives one.
+
+    Args:
+        folder: where to.
+        every: from one checkpoint to the next. [s]
+    """
+
+    def __init__(self, folder: Path, every: float) -> None:
+        self._folder, self._every, self._runs = folder, every, 0
+
+    def next_run(self) -> KeptRun:
+        """Return what keeps the next run."""
+        self._runs += 1
+        return KeptRun(self._folder / f"run-{self._runs}", self._every)
+
+
+class KeptRun:
+    """Keeps where one run stands.
+
+    Args:
+        folder: of this run alone.
+        every: from one checkpoint to the next. [s]
+    """
+
+    def __init__(self, folder: Path, every: float) -> None:
+        self._folder, self._every, self._kept = folder, every, monotonic()
+        self._files, self._rows, self._nodes, self._times = 0, 0, 0, 0
+        folder.mkdir(exist_ok=True)
+
+    def go_on(self, begun: Standing) -> Standing:
+        """Return where the run stands that was kept here; what has `begun` where none was."""
+        if not (self._folder / STATE).exists():
+            return begun
+        state = _read(self._folder / STATE)
+        room = new_recording(
+            begun.recording.state.shape[0], state["room"].item(), begun.recording.trace.shape[0]
+        )
+        for number in range(state["files"].item()):
+            self._fill(room, _read(self._folder / _rows_file(number)))
+        try:
+            self._files, self._rows, self._nodes, self._times = (
+                state[name].item() for name in ("files", "rows", "nodes", "times")
+            )
+            return Standing(
+                setup=_restored(begun.setup, "setup", state),
+                live=_restored(begun.live, "live", state),
+                recording=room,
+                **{name: state[name].item() for name in ("behind", "used", "ending")},
+            )
+        except (KeyError, ValueError) as error:
+            raise _UnreadableError(self._folder / STATE) from error
+
+    def keep(self, now: Standing, times: np.ndarray, stride: int, *, at_once: bool = False) -> None:
+        """Keep where the run stands, if it is time for that, or at once."""
+        is_due = at_once or monotonic() - self._kept >= self._every
+        if not is_due or now.behind == self._times:
+            return
+        last = row_of(now.behind - 1, stride)
+        is_whole = (now.behind - 1) % stride == 0  # else the next time is written over the last row
+        nodes = now.used if is_whole else now.used + int(now.recording.nodes[last])
+        rows = {
+            "rows": slice(self._rows, last + 1),
+            "nodes": slice(self._nodes, nodes),
+            "times": slice(self._times, now.behind),
+        }
+        kept = {name: values[rows[_kind(name)]] for name, values in now.recording._asdict().items()}
+        _write(
+            self._folder / _rows_file(self._files),
+            kept | {f"first of {kind}": np.array(part.start) for kind, part in rows.items()},
+        )
+        self._files += 1
+        self._rows, self._nodes, self._times = (last + 1 if is_whole else last), now.used, now.behind
+        self._write_state(now, float(times[now.behind - 1]))
+        self._kept = monotonic()
+
+    def _write_state(self, now: Standing, time: float) -> None:
+        numbers = {
+            "files": self._files, "rows": self._rows, "nodes": self._nodes, "times": self._times,
+            "behind": now.behind, "used": now.used, "ending": now.ending,
+            "room": now.recording.tension.size, "time": time,
+        }  # fmt: skip
+        arrays = {name: np.array(number) for name, number in numbers.items()}
+        _write(self._folder / STATE, arrays | _arrays(now.setup, "setup") | _arrays(now.live, "live"))
+
+    def _fill(self, room: Recording, kept: Mapping[str, np.ndarray]) -> None:
+        """Put rows that were kept back to their place; the last of a file may stand in the next one again."""
+        try:
+            for name, values in room._asdict().items():
+                first = kept[f"first of {_kind(name)}"].item()
+                values[first : first + kept[name].shape[0]] = kept[name]
+        except (KeyError, ValueError) as error:
+            raise _UnreadableError(self._folder) from error
+
+
+def _kind(name: str) -> str:
+    """Return what the lines of an array of a recording are."""
+    return "nodes" if name in BY_NODE else "times" if name in BY_TIME else "rows"
+
+
+def _rows_file(number: int) -> str:
+    return f"rows-{number:06d}.npz"
+
+
+def _arrays(value: Any, name: str) -> dict[str, np.ndarray]:
+    """Return the arrays and records that a value of a run is made of, by their path; records as bytes."""
+    if isinstance(value, Record):
+        return {name: np.frombuffer(value.tobytes(), np.uint8)}
+    if isinstance(value, np.ndarray):
+        return {name: value}
+    parts = [_arrays(getattr(value, field), f"{name}.{field}") for field in value._fields]
+    return {path: array for part in parts for path, array in part.items()}
+
+
+def _restored(like: Any, name: str, arrays: Mapping[str, np.ndarray]) -> Any:
+    """Return a value from its arrays, made as another one of its kind."""
+    if isinstance(like, Record):
+        return np.frombuffer(arrays[name].tobytes(), like.dtype).copy()[0]
+    if isinstance(like, np.ndarray):
+        found = arrays[name]
+        found.flags.writeable = like.flags.writeable
+        return found
+    return type(like)(*(_restored(getattr(like, field), f"{name}.{field}", arrays) for field in like._fields))
+
+
+def _write(path: Path, arrays: Mapping[str, np.ndarray]) -> None:
+    """Write arrays to a file: whole, or not at all."""
+    beside = path.with_suffix(".new")
+    with open(beside, "wb") as file:
+        np.savez(file, allow_pickle=False, **arrays)
+        file.flush()
+        os.fsync(file.fileno())
+    _rename(beside, path)
+
+
+def _rename(beside: Path, path: Path) -> None:
+    os.replace(beside, path)
+    handle = os.open(path.parent, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+def _read(path: Path) -> dict[str, np.ndarray]:
+    """Return the arrays of a file."""
+    try:
+        with open(path, "rb") as whole, np.load(whole, allow_pickle=False) as file:
+            return {name: file[name] for name in file.files}
+    except (BadZipFile, ValueError, EOFError, FileNotFoundError) as error:
+        raise _UnreadableError(path) from error
+
+
+@contextmanager
+def opened(checkpoint: Checkpoint, label: str, manifest: Mapping[str, str]) -> Iterator[Keeper]:
+    """Give what keeps the runs of a simulation.
+
+    Args:
+        checkpoint: where and how often.
+        label: of this simulation among those that share the folder.
+        manifest: what they belong to: what → its digest.
+
+    Raises:
+        UserError: it holds another simulation, another command has it, it cannot be written or read.
+    """
+    folder = Path(checkpoint.folder) / label
+    with _told(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+        with _locked(folder):
+            _refuse_another(folder, manifest)
+            yield Keeper(folder, MINUTE_S * checkpoint.minutes)
+
+
+@contextmanager
+def _locked(folder: Path) -> Iterator[None]:
+    """Lock a folder as long as this process lives, or the block lasts."""
+    handle = os.open(folder / LOCK, os.O_RDWR | os.O_CREAT, 0o600)
+    try:
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise UserError(
+                f"Another command is at work with the checkpoint {printable(str(folder))}. Wait for it, or give"
+                " another folder."
+            ) from None
+        yield
+    finally:
+        os.close(handle)
+
+
+def _refuse_another(folder: Path, manifest: Mapping[str, str]) -> None:
+    """Refuse the checkpoint of another simulation; mark a new one as this one's."""
+    path = folder / MANIFEST
+    if not path.exists():
+        beside = path.with_suffix(".new")
+        beside.write_text(json.dumps(dict(manifest), indent=1) + "\n", encoding="utf-8")
+        _rename(beside, path)
+        return
+    try:
+        known = json.loads(path.read_text(encoding="utf-8"))
+        differ = [what for what in manifest if known.get(what) != manifest[what]]
+    except (ValueError, AttributeError) as error:
+        raise _UnreadableError(path) from error
+    if differ:
+        raise UserError(
+            f"The checkpoint {printable(str(folder))} belongs to another simulation: its {', '.join(differ)}"
+            f" {'differ' if len(differ) > 1 else 'differs'}. Give another folder, or remove it to begin anew."
+        )
+
+
+@contextmanager
+def _told(folder: Path) -> Iterator[None]:
+    """Turn a refusal of the disk, or a file that is damaged, into a clean message."""
+    name = printable(str(folder))
+    try:
+        yield
+    except _UnreadableError as error:
+        raise UserError(
+            f"The checkpoint {name} is damaged ({printable(str(error))}). Remove it to begin anew, or give another"
+            " folder."
+        ) from error
+    except OSError as error:
+        if error.filename is None and error.errno not in FULL:
+            raise
+        raise UserError(
+            f"The checkpoint {name} cannot be written: {error.strerror}. What it has is kept: make room, and start the"
+            " same again, or give another folder."
+        ) from error

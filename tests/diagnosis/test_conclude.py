@@ -1,0 +1,95 @@
+"""A verdict is concluded from findings alone, and is as sure as its fits are.
+
+Configuration: 12 s of fig6 with a rudder that is off its centre; and linear problems made by hand. Tolerance: none for
+the verdict; linear algebra to 1e-8.
+"""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from subzero.diagnosis import START, catalogue
+from subzero.diagnosis.inference import (
+    Candidate,
+    Findings,
+    Problem,
+    Quadratic,
+    entries_of,
+    posterior,
+    variances,
+)
+from subzero.diagnosis.inference.model_search import Search
+from subzero.diagnosis.verdict.conclude import conclude, decided, remaining_models
+from subzero.diagnosis.verdict.estimates import deviations
+from subzero.diagnosis.verdict.follow_up import follow_up, ranked
+
+OFFSET = 3.0
+"""Of the rudder. [degree]"""
+
+
+@pytest.fixture(scope="module")
+def found(plant):
+    """Return findings, their explanations by probability, and what simulations said of them."""
+    planted = plant(
+        lambda setting: catalogue(("heading",))["rudder_offset"].apply(setting, OFFSET), duration=12.0
+    )
+    search = Search(problem=planted.problem, progress=lambda share, words: None)
+    search.begin()
+    search.look()
+    search.fit_all([(), ("rudder_offset",), ("yaw_damping",)])
+    search.refine()
+    findings = Findings(search=search, budget="verdict")
+    known = ranked(findings)
+    return findings, known, follow_up(findings, known)
+
+
+@pytest.fixture
+def no_simulation(monkeypatch):
+    """Let every simulation, and every fit, which needs some or kept ones, be an error."""
+
+    def simulated(*_args, **_options):
+        raise AssertionError("a conclusion simulates nothing")
+
+    monkeypatch.setattr("subzero.diagnosis.inference.simulator._run", simulated)
+    monkeypatch.setattr(Problem, "tracks", simulated)
+
+
+def test_a_verdict_needs_no_simulation_behind_its_findings(found, no_simulation):
+    findings, known, more = found
+    with pytest.raises(AssertionError, match="simulates nothing"):
+        findings.problem.residual(np.zeros(len(findings.problem.entries)))
+    verdict = conclude(findings, known, more)
+    (cause,) = verdict.causes
+    assert (verdict.verdict, cause.id) == ("cause_named", "rudder_offset")
+    angle = cause.parameters["angle"]
+    assert angle.low < OFFSET < angle.high
+    assert decided(findings, known) == verdict.verdict
+    assert ("rudder_offset",) in remaining_models(known).hypotheses
+
+
+def test_a_verdict_is_the_same_however_often_it_is_concluded(found, no_simulation):
+    findings, known, more = found
+    one, other = conclude(findings, known, more), conclude(findings, known, more)
+    assert (one.sentence, one.probabilities, one.causes) == (
+        other.sentence,
+        other.probabilities,
+        other.causes,
+    )
+    assert one.rivals == other.rivals
+    assert one.deviations == other.deviations
+
+
+@pytest.mark.parametrize("sure", [1.0, 4.0])
+def test_an_interval_is_that_of_the_scale_that_is_believed(sure):
+    random, entries = np.random.default_rng(4), entries_of(tuple(catalogue(("heading",)).values()), START, 1)
+    J, r = random.normal(size=(90, len(entries))), random.normal(size=90)
+    ids = ("rudder_offset",)
+    found = posterior(Quadratic.at(np.zeros(len(entries)), r, J), variances(entries, ids, sure))
+    fit = SimpleNamespace(z=found.z, quadratic=Quadratic.at(found.z, r - J @ found.z, J))
+    log = {kappa: 0.0 if kappa == sure else -500.0 for kappa in (1.0, 2.0, 4.0)}
+    one = Candidate(ids=ids, fit=fit, log_evidence=log, log_posterior=0.0)
+    told = deviations(SimpleNamespace(problem=SimpleNamespace(entries=entries)), one)
+    tolerance = np.array([entry.parameter.tolerance for entry in entries])
+    assert_allclose([sd for _, sd in told.values()] * tolerance, np.sqrt(np.diag(found.M)), rtol=1e-8)
