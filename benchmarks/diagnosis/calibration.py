@@ -28,6 +28,7 @@ import subzero
 from scenarios.parameters import with_vehicle
 from subzero.calibration.numbers import USUAL, with_deviation
 from subzero.calibration.results import Calibration
+from subzero.diagnosis import CALIBRATED
 from subzero.diagnosis.assessment import LIBRARY
 from subzero.diagnosis.hypothesis.catalogue import START, catalogue
 from subzero.diagnosis.hypothesis.catalogue.sensors import NOISE
@@ -161,7 +162,8 @@ def result_of(case: Case) -> dict[str, Any]:
             found = subzero.calibrate(logged, vehicle=case.vehicle, quick=True)
             said |= _held_to(case, found, numbers) | {"flown": flown}
             said |= {"seconds": perf_counter() - start, "cpu": process_time() - cpu}
-            return said | (diagnosed(case, found, logged, numbers, shared, rng) if case.diagnosed else {})
+            also = case.diagnosed and not found.refused
+            return said | (diagnosed(case, found, logged, numbers, shared, rng) if also else {})
         except Exception as error:
             return said | {"flown": flown, "error": repr(error)}
     return said | {"error": "no truth"}
@@ -186,6 +188,7 @@ def _held_to(case: Case, found: Calibration, numbers: Mapping[str, float]) -> di
         },
         "error": {when: error_in_true_noise(case, found, when) for when in ("before", "after", "fitted")},
         "converged": found.converged,
+        "verdict": found.verdict,
         "strange": len(found.strange),
     }  # fmt: skip
 
@@ -247,7 +250,7 @@ def line_of(one: Mapping[str, Any]) -> str:
     ]
     held, error = sum(row["held"] for row in rows), one["error"]
     text = f"{head} {held}/{len(rows)} error {error['before']:.3g} → {error['after']:.3f} ({error['fitted']:.3f})"
-    text += f" {one['cpu']:.0f} s {', '.join(missed)}"
+    text += f" {one['cpu']:.0f} s {', '.join(missed)}{'' if is_told(one) else ' refused'}"
     if "diagnosed" in one:
         said = one["diagnosed"]
         text += f" | before {said['before']['verdict']} | {said['cause']}: true {said['true']['first']}"
@@ -257,13 +260,14 @@ def line_of(one: Mapping[str, Any]) -> str:
 
 def table(results: Sequence[Mapping[str, Any]]) -> str:
     """Return a row for every family and vehicle: coverage, errors before and after, verdicts, names."""
-    head = "                 cases  in 95 %   of   share  before   after  above 1.2  strange"
+    head = "                 cases refused  in 95 %   of   share (95 %)         before   after  above 1.2  strange"
     rows = [_row(name, results) for name in (*NOISES, *VEHICLES, "all")]
     return "\n".join([head, *rows, *_diagnosed_rows(results)])
 
 
 def _row(name: str, results: Sequence[Mapping[str, Any]]) -> str:
-    own = [one for one in results if name in (one["noise"], one["vehicle"], "all") and "numbers" in one]
+    every = [one for one in results if name in (one["noise"], one["vehicle"], "all") and "numbers" in one]
+    own = [one for one in every if is_told(one)]
     held = [row["held"] for one in own for row in one["numbers"].values()]
     error = {when: [one["error"][when] for one in own] for when in ("before", "after")}
     before, after = (float(np.median(error[when])) if own else np.nan for when in error)
@@ -272,8 +276,23 @@ def _row(name: str, results: Sequence[Mapping[str, Any]]) -> str:
         sum(one["strange"] > 0 for one in own),
     )
     share = sum(held) / max(len(held), 1)
-    return (f"{name:16s} {len(own):5d} {sum(held):8d} {len(held):4d} {share:7.3f} {before:7.2f} {after:7.3f} "
-            f"{above:10d} {strange:8d}")  # fmt: skip
+    low, high = _interval(own)
+    return (f"{name:16s} {len(every):5d} {len(every) - len(own):7d} {sum(held):8d} {len(held):4d} {share:7.3f} "
+            f"({low:.3f}-{high:.3f}) {before:8.2f} {after:7.3f} {above:10d} {strange:8d}")  # fmt: skip
+
+
+def is_told(one: Mapping[str, Any]) -> bool:
+    """Say whether a calibration was made, and not refused."""
+    return bool(one["verdict"] == CALIBRATED)
+
+
+def _interval(results: Sequence[Mapping[str, Any]]) -> tuple[float, float]:
+    """Return the interval of 95 % of the coverage, from how cases differ: within one, numbers go together."""
+    shares = [np.mean([row["held"] for row in one["numbers"].values()]) for one in results]
+    if len(shares) < 2:
+        return 0.0, 1.0
+    half = 1.96 * float(np.std(shares, ddof=1)) / np.sqrt(len(shares))
+    return max(float(np.mean(shares)) - half, 0.0), min(float(np.mean(shares)) + half, 1.0)
 
 
 def _diagnosed_rows(results: Sequence[Mapping[str, Any]]) -> list[str]:
