@@ -29,6 +29,7 @@ from subzero.diagnosis.inference import (
     broyden_update,
     is_noise,
     objective,
+    runnable,
 )
 
 SIGMAS_95 = float(ndtri(0.975))
@@ -173,10 +174,10 @@ def _without(work: Fitted, record: int) -> np.ndarray:
     low, high = bounds(problem)
     z, r = fit.z, fit.r
     for _ in range(HELD_STEPS):
-        z = z + bounded_step(fit.J[~rows], r[~rows], z, fit.D, low, high)
-        r = problem.residual(z)
+        step = bounded_step(fit.J[~rows], r[~rows], z, fit.D, low, high)
+        z, r = runnable(problem, z + step, None)
     held = np.where(own, 0.0, z)
-    r = problem.residual(held)
+    held, r = runnable(problem, held, None)
     hold = np.where(own, low, held), np.where(own, high, held)
     start = held + bounded_step(fit.J[rows], r[rows], held, fit.D, *hold)
     return problem.residual(start)

@@ -12,6 +12,7 @@ the estimated one, and the error of the economical steps made good.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -26,12 +27,16 @@ from subzero.diagnosis.inference import (
     objective,
     posterior,
     quadratic_step,
+    runnable,
     with_finer_steps,
     with_noise_behind,
 )
 
 LAGS_S = (0.3, 1.5, np.inf)
 """Within so long simulations are led back to what was measured, one fit behind the other. [s]"""
+NOT_LED = (np.inf, np.inf, np.inf)
+"""The same of another start, where the first one leads into a corner: only the noise is raised, less and less."""
+AT_BOUND = 1e-9
 FIRST_MISFIT = 2.0
 """A fit begins with so much noise that it leaves the vehicle so many levels off. [-]"""
 FIRST_STEPS = 10
@@ -78,9 +83,13 @@ def fitted(problem: Problem, free: int, D: np.ndarray, progress: Progress) -> Fi
         progress: told the fraction that is done, and what is being done.
     """
     progress(0.05, "first fit, with more noise than there is")
-    z = _first(problem, free, D)
+    z = _first(problem, free, D, LAGS_S)
     progress(0.25, "fit with usual noise")
     fit, settled = _settled(problem, z, D)
+    if not settled or _in_corner(problem, fit, free):
+        progress(0.35, "fit from another start")
+        other = _settled(problem, _first(problem, free, D, NOT_LED), D)
+        fit, settled = min((fit, settled), other, key=lambda one: one[0].objective)
     for round in range(MAX_NOISE_ROUNDS):
         progress(0.5 + 0.15 * round, "noise behind the fit")
         again = with_noise_behind(problem, fit.z, D)
@@ -96,20 +105,31 @@ def fitted(problem: Problem, free: int, D: np.ndarray, progress: Progress) -> Fi
     return Fitted(problem=problem, fit=fit, M=covariance(problem, fit), settled=settled)
 
 
-def _first(problem: Problem, free: int, D: np.ndarray) -> np.ndarray:
+def _in_corner(problem: Problem, fit: Fit, free: int) -> bool:
+    """Say whether a number stands at its bound: that may be a wrong minimum, where it makes up for another."""
+    low, high = bounds(problem)
+    return bool(np.any(np.minimum(fit.z - low, high - fit.z)[:free] < AT_BOUND))
+
+
+def _first(problem: Problem, free: int, D: np.ndarray, lags: Sequence[float]) -> np.ndarray:
     """Return where the fit begins (k,): numbers and starts alone, of records whose simulation is led less and less.
 
-    Noise is raised so that what is left is a few levels of it.
+    Noise is raised so that what is left is a few levels of it. Where that led farther off than the vehicle as it was,
+    as with a record that contradicts its trial, the fit begins there.
     """
     core = [k for k, entry in enumerate(problem.entries) if k < free or entry.record >= 0]
     few = replace(problem, entries=tuple(problem.entries[k] for k in core))
     z = np.zeros(len(core))
-    for lag in LAGS_S:
+    for lag in lags:
         part = led(few, lag) if np.isfinite(lag) else few
-        misfit = float(np.sqrt(np.mean(part.residual(z) ** 2)))
+        z, r = runnable(part, z, None)
+        misfit = float(np.sqrt(np.mean(r**2)))
+        if not np.isfinite(misfit):
+            continue
         z = _settled(with_more_noise(part, max(misfit / FIRST_MISFIT, 1.0)), z, D[core], is_first=True)[0].z
+    there, here = (objective(few.residual(one), one, D[core]) for one in (z, np.zeros(len(core))))
     whole = np.zeros(D.size)
-    whole[core] = z
+    whole[core] = z if there < here else 0.0
     return whole
 
 
@@ -123,7 +143,8 @@ def _settled(problem: Problem, z: np.ndarray, D: np.ndarray, *, is_first: bool =
     """
     low, high = bounds(problem)
     slopes, within = (problem.jacobian, OWN_WITHIN) if is_first else (problem.central_jacobian, 0.0)
-    r, J, made_at = problem.residual(z), slopes(z), z
+    z, r = runnable(problem, z, None)
+    J, made_at = slopes(z), z
     now, damping, harder, left = objective(r, z, D), 0.0, 2.0, 0.0
     for _ in range(FIRST_STEPS if is_first else MAX_STEPS):
         P, g = J.T @ J + np.diag((1.0 + damping) / D), J.T @ r - z / D

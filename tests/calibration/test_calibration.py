@@ -196,29 +196,36 @@ def test_a_prescribed_motion_is_refused(records):
         subzero.calibrate(replace(one, setting=still))
 
 
-@pytest.fixture(scope="module")
-def refused(records):
-    """What a calibration says of a turn that no vehicle makes: compass and gyro go the other way."""
+def test_a_calibration_that_holds_is_not_refused(found):
+    assert found.verdict == "calibrated"
+    assert not found.refused
+
+
+def test_where_nothing_comes_near_there_is_no_vehicle(refused):
+    assert refused.verdict == "nothing_near"
+    with pytest.raises(subzero.UserError, match="There is no calibrated vehicle: The heading") as caught:
+        _ = refused.vehicle
+    assert "--vehicle" in str(caught.value)
+
+
+@pytest.mark.slow
+def test_records_that_no_numbers_explain_are_refused(records):
+    """A turn that no vehicle makes: compass and gyro go the other way."""
     one, other = subzero.read_trials(records)
     values = dict(one.record.values)
     values["heading"] = 2.0 * values["heading"][0] - values["heading"]
     values["yaw_rate"] = -values["yaw_rate"]
     turned = replace(one, record=replace(one.record, values=values))
-    return subzero.calibrate([turned, other], free=FREE)
+    found = subzero.calibrate([turned, other], free=FREE)
+    assert found.verdict == "nothing_near"
+    assert found.files == {}
+    assert any("heading" in why or "yaw rate" in why for why in found.refused)
 
 
-def test_records_that_no_numbers_explain_make_no_vehicle(refused):
-    assert refused.verdict == "nothing_near"
-    assert refused.files == {}
-    assert any("heading" in why or "yaw rate" in why for why in refused.refused)
-    with pytest.raises(subzero.UserError, match="There is no calibrated vehicle") as caught:
-        _ = refused.vehicle
-    assert "--vehicle" in str(caught.value)
-
-
-def test_a_calibration_that_holds_is_not_refused(found):
-    assert found.verdict == "calibrated"
-    assert not found.refused
+@pytest.fixture
+def refused(found):
+    """A calibration that was refused."""
+    return replace(found, refused=("The heading is missed.",), files={}, profiles={}, advice=())
 
 
 def test_the_command_writes_no_vehicle_where_nothing_comes_near(command, refused):

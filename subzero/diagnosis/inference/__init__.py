@@ -68,6 +68,7 @@ from subzero.diagnosis.inference.map_fit import (
     quadratic_step,
     refit,
     restarted_where_smooth,
+    runnable,
 )
 from subzero.diagnosis.inference.laplace import Candidate, candidate_of, laplace
 from subzero.diagnosis.inference.change_point_scan import (
@@ -178,6 +179,7 @@ __all__ = [
     "resolution_of",
     "respond",
     "restarted_where_smooth",
+    "runnable",
     "scan",
     "seen",
     "simulate_on",
