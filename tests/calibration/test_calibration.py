@@ -19,7 +19,7 @@ import subzero
 from scenarios.parameters import with_parameters
 from subzero.channels import column_name
 from subzero.cli import main
-from subzero.diagnosis.hypothesis.configuration import Setting
+from subzero.diagnosis import Setting
 from subzero.model import Model
 from subzero.synthetic.planted import make_record
 

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from subzero.diagnosis import Effect, Parameter
-from subzero.diagnosis.hypothesis.hypotheses import Entry
-from subzero.diagnosis.inference import Problem
+from subzero.diagnosis.inference import Problem, entries_of
 
 LOW, HIGH = -1.0, 2.0
 
@@ -30,14 +29,10 @@ def problem(count):
     def nothing(setting, size):
         return setting
 
-    entries = []
-    for k in range(count):
-        parameter = Parameter(name="size", unit="1", tolerance=0.1, scale=1.0, low=LOW, high=HIGH)
-        effect = Effect(
-            id=f"e{k}", sentence="it is another", slot="hull", apply=nothing, parameters=(parameter,)
-        )
-        entries.append(Entry(effect=effect, place=0, record=-1))
-    return Squares(records=(None,), entries=tuple(entries))
+    parameter = Parameter(name="size", unit="1", tolerance=0.1, scale=1.0, low=LOW, high=HIGH)
+    effects = [Effect(id=f"e{k}", sentence="it is another", slot="hull", apply=nothing, parameters=(parameter,))
+               for k in range(count)]  # fmt: skip
+    return Squares(records=(None,), entries=entries_of(effects, (), 1))
 
 
 def test_central_differences_are_exact_on_a_parabola_and_one_sided_ones_are_not():

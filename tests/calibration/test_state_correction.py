@@ -14,8 +14,7 @@ from scipy.spatial.transform import Rotation
 import subzero
 from subzero.calibration.state_correction import led, velocities
 from subzero.channels import DEGREE
-from subzero.diagnosis.hypothesis.configuration import Setting
-from subzero.diagnosis.hypothesis.logged import Logged
+from subzero.diagnosis import Logged, Setting
 from subzero.diagnosis.inference import pose, respond
 from subzero.model import Model
 from subzero.records.record import Record

@@ -10,9 +10,8 @@ import pytest
 
 import scenarios
 import subzero
-from subzero.diagnosis.hypothesis.catalogue import catalogue
-from subzero.diagnosis.hypothesis.configuration import Setting
-from subzero.diagnosis.hypothesis.hypotheses import moves_nothing, with_tolerances
+from subzero.diagnosis import Setting, catalogue
+from subzero.diagnosis.inference import moves_nothing, with_tolerances
 from subzero.model import Model
 
 FIG6 = scenarios.path("fig6").read_text(encoding="utf-8")

@@ -30,7 +30,15 @@ it for what stands outside the diagnosis).
 
 # ruff: noqa: I001 - in the order in which they stand on one another, not in that of the alphabet
 
-from subzero.diagnosis.hypothesis.hypotheses import PRIOR, columns_of, entries_of, log_prior, variances
+from subzero.diagnosis.hypothesis.hypotheses import (
+    PRIOR,
+    columns_of,
+    entries_of,
+    log_prior,
+    moves_nothing,
+    variances,
+    with_tolerances,
+)
 from subzero.diagnosis.inference.noise import Behind, Noise, Usual, estimate, resolution_of, spikes
 from subzero.diagnosis.hypothesis.measurement import TRUTHS
 from subzero.diagnosis.inference.simulator import (
@@ -166,6 +174,7 @@ __all__ = [
     "log_gains",
     "log_prior",
     "mixed",
+    "moves_nothing",
     "objective",
     "occam_folded",
     "one_terms",
@@ -192,5 +201,6 @@ __all__ = [
     "with_finer_steps",
     "with_noise_behind",
     "with_stops",
+    "with_tolerances",
     "without_force",
 ]
