@@ -38,9 +38,11 @@ def little_memory(monkeypatch):
     monkeypatch.setattr("cable.memory.free_memory", lambda: 1e8)
 
 
-def test_ten_hours_at_default_steps_are_refused_with_what_to_change(fig6, little_memory):
+def test_ten_hours_at_default_steps_are_refused_at_once_with_what_to_change(fig6, little_memory):
+    steps = []
     with pytest.raises(subzero.UserError) as caught:
-        subzero.simulate(dataclasses.replace(fig6, duration=36000.0))
+        subzero.simulate(dataclasses.replace(fig6, duration=36000.0), progress=steps.append)
+    assert not steps, "nothing is simulated before it is refused"
     said = str(caught.value)
     assert re.fullmatch(
         r"'fig6', 36000 s in steps of 0\.1 s, needs [0-9.e+]+ GiB of memory, and [0-9.]+ GiB are free\. "

@@ -28,7 +28,7 @@ from subzero import autopilot
 from subzero.external_force import MissingForce
 
 CASES = Path(__file__).with_name("values.py")
-SHORT, PIECES, LONG = 200, 5, 2000
+SHORT, PIECES, LONG = 100, 5, 2000
 HEAP = "libc_malloc_debug.so.0"
 """Where glibc keeps the checks of its heap since 2.34; before, they are in the library itself."""
 
