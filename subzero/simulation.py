@@ -168,7 +168,9 @@ def _as_fine_as_asked(
     """Run a trial, and finer where its `rtol` asks for it: a tethered one of the default scheme and of one model."""
     if not tethered or trial.scheme != "moving_end" or trial.rtol == 0.0 or later:
         return run_trial(trial, model, tethered, progress, later=later, keeper=keeper), None
-    refuse_what_cannot_fit(trial, model, tethered, Grid(trial.times(), 1, trial.stride))  # before a coarser run
+    refuse_what_cannot_fit(
+        trial, model, tethered, Grid(trial.times(), 1, trial.stride)
+    )  # before a coarser run
     return run_converged(
         trial,
         lambda one, grid, told: run_trial(one, model, True, told, grid=grid, keeper=keeper),

@@ -130,7 +130,7 @@ class _Work:
             numbers = numbers_of(whole, names, ranges)
             problem, D = with_free_numbers(whole, numbers)
             work = fitted(problem, len(numbers), D, progress)
-        refused = assessment.refused(work)
+        refused = assessment.refused(numbers, work)
         with self._part("held out", 0.5, 0.6) as progress:
             held = assessment.held_out(work, progress)
         profiles: dict[str, Profile] = {}

@@ -212,10 +212,12 @@ MOST_WANDER = 2.5
 """Where what is left wanders by more than so many usual levels, it is a misfit and no noise. [-]"""
 
 
-def refused(work: Fitted) -> tuple[str, ...]:
-    """Say in sentences why a fit is no calibration: what it leaves is more than noise, or it has found no minimum.
+def refused(numbers: Sequence[Number], work: Fitted) -> tuple[str, ...]:
+    """Say in sentences why a fit is no calibration: it leaves what is no noise, or found no minimum within bounds.
 
-    Noise is estimated behind the fit, and a misfit would pass for slow noise: so its size is held to the sensor's.
+    A wrong minimum has intervals as narrow as the right one; what gives it away is the colour of what it leaves, and a
+    number at its bound that makes up for another. Noise is estimated behind the fit, and a misfit would pass for slow
+    noise: so its size is held to the sensor's.
     """
     found, at = [], 0
     for record in work.problem.records:
@@ -226,10 +228,15 @@ def refused(work: Fitted) -> tuple[str, ...]:
             words = f"{name.replace('_', ' ')} in {record.name}"
             if not is_noise(r):
                 found.append(f"The best fit misses the {words} by more than its noise.")
+            elif (p := whiteness(r)) < STRANGE_P:
+                found.append(f"What is left of the {words} is no noise (Ljung and Box: p = {p:.1g}).")
             elif noise.slow > MOST_WANDER * level:
                 found.append(
                     f"The best fit leaves the {words} wandering by {noise.slow / level:.1f} times the usual noise."
                 )
+    for one, z in zip(numbers, work.fit.z, strict=False):
+        if min(z - one.low, one.high - z) < AT_BOUND:
+            found.append(f"{one.name} stands at its bound: it makes up for something else.")
     if not work.settled:
         found.append("The fit found no minimum: another step would still gain.")
     return tuple(found)
@@ -242,20 +249,13 @@ STRANGE_NOISE = 3.0
 
 
 def strange(work: Fitted) -> tuple[str, ...]:
-    """Say in sentences what the calibrated vehicle leaves of records that is no noise."""
-    found, at = [], 0
+    """Say in sentences which sensors are many times as noisy as usual."""
+    found = []
     for record in work.problem.records:
         for name, noise in record.noise.items():
-            r = work.fit.r[at : at + noise.count]
-            at += noise.count
             words, level = name.replace("_", " "), record.known.get(name, SPECS[name].noise)
             times = noise.sd / max(level, noise.resolution)
-            p = whiteness(r)
-            if p < STRANGE_P:
-                found.append(
-                    f"What is left of the {words} in {record.name} is no noise (Ljung and Box: p = {p:.1g})."
-                )
-            elif times > STRANGE_NOISE:
+            if times > STRANGE_NOISE:
                 found.append(f"The {words} in {record.name} is {times:.1f} times as noisy as usual.")
     return tuple(found)
 
