@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 
 from subzero.diagnosis import (
+    CALIBRATED,
     CAUSE_NAMED,
+    NOTHING_NEAR,
     NOTHING_WRONG,
     OUTSIDE,
     Cause,
@@ -216,6 +218,18 @@ def test_a_healthy_record_says_what_it_could_not_have_shown():
     assert "would have shown 2 of the 3 causes" in said["How sure is that"]
     assert "could not have shown: the water moves." in said["How sure is that"]
     assert "2.3 times the noise" in said["What it costs"]
+
+
+@pytest.mark.parametrize(("verdict", "wrong", "sure"), [(CALIBRATED, "wants calibration", "could not have shown"),
+                                                        (NOTHING_NEAR, "more than noise", "do not fit")])  # fmt: skip
+def test_numbers_that_are_far_off_lead_to_a_calibration(verdict, wrong, sure):
+    found = Verdict(verdict=verdict, sentence="", detectable=NAMED.detectable, misfit=NAMED.misfit)
+    said = answers(found)
+    assert wrong in said["What is wrong"]
+    assert sure in said["How sure is that"]
+    assert "Nothing has to be done" not in said["What to do next"]
+    (command,) = [one.command for one in report.summary(found, "zigzag") if one.command]
+    assert command.startswith("subzero calibrate RECORDS --scenario zigzag")
 
 
 def test_an_interrupted_verdict_says_so():

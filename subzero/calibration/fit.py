@@ -1,0 +1,229 @@
+"""The most probable numbers, the noise behind them, and the covariance of both together.
+
+    M = P⁻¹,  P = D⁻¹ + Jᵀ J;        honest:  M' = P⁻¹ (D⁻¹ + Jᵀ Ω J) P⁻¹,   Ω = cov(r)
+
+M is right if the whitened residual r is white. What a noise model of one slow part leaves of other colours is in Ω,
+estimated by sums over blocks of each channel (Liang and Zeger 1986); variances are inflated by what that is more.
+
+A vehicle whose numbers are off by 40 % leaves records far off, where the linear problem says little. So the fit begins
+with simulations that are led along what was measured (`state_correction`), and goes on with free ones, the usual noise,
+the estimated one, and the error of the economical steps made good.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from subzero.calibration.state_correction import led
+from subzero.diagnosis.inference import (
+    Fit,
+    Problem,
+    Progress,
+    bounds,
+    broyden_update,
+    objective,
+    posterior,
+    quadratic_step,
+    runnable,
+    with_finer_steps,
+    with_noise_behind,
+)
+
+LAGS_S = (0.3, 1.5, np.inf)
+"""Within so long simulations are led back to what was measured, one fit behind the other. [s]"""
+NOT_LED = (np.inf, np.inf, np.inf)
+"""The same of another start, where the first one leads into a corner: only the noise is raised, less and less."""
+AT_BOUND = 1e-9
+FIRST_MISFIT = 2.0
+"""A fit begins with so much noise that it leaves the vehicle so many levels off. [-]"""
+FIRST_STEPS = 10
+"""Steps of a fit that only leads to the next, at most."""
+MAX_STEPS = 25
+"""Steps of a fit, at most."""
+SETTLED_GAIN = 0.3
+"""A fit that the linear problem promises less than this has settled. [nat]"""
+LEAST_SHARE, FRESH_SHARE = 0.05, 0.5
+"""A step that gains less than the first share of what was promised is not taken; behind one that gains less than the
+second, sensitivities are made again. [-]"""
+FIRST_DAMPING, LEAST_DAMPING = 1.0, 0.1
+"""Damping of a step that failed, in inverse prior variances, and that which is none any more. [-]"""
+OWN_WITHIN = 0.3
+"""Sensitivities will do for a first fit if they were made so close to it, in tolerances."""
+MAX_NOISE_ROUNDS = 2
+"""How often the noise is estimated."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Fitted:
+    """The fit of a calibration.
+
+    Attributes:
+        problem: with the noise that was estimated behind the fit.
+        fit: the most probable deviations.
+        M: their covariance (k, k), inflated.
+        settled: no step would gain more.
+    """
+
+    problem: Problem
+    fit: Fit
+    M: np.ndarray
+    settled: bool
+
+
+def fitted(problem: Problem, free: int, D: np.ndarray, progress: Progress) -> Fitted:
+    """Return the most probable deviations, with the noise behind them.
+
+    Args:
+        problem: records, and what is free.
+        free: so many entries, the first ones, are the numbers that are calibrated.
+        D: prior variances of all entries (k,).
+        progress: told the fraction that is done, and what is being done.
+    """
+    progress(0.05, "first fit, with more noise than there is")
+    z = _first(problem, free, D, LAGS_S)
+    progress(0.25, "fit with usual noise")
+    fit, settled = _settled(problem, z, D)
+    if not settled or _in_corner(problem, fit, free):
+        progress(0.35, "fit from another start")
+        other = _settled(problem, _first(problem, free, D, NOT_LED), D)
+        fit, settled = min((fit, settled), other, key=lambda one: one[0].objective)
+    for round in range(MAX_NOISE_ROUNDS):
+        progress(0.5 + 0.15 * round, "noise behind the fit")
+        again = with_noise_behind(problem, fit.z, D)
+        if again is None:
+            break
+        problem = again
+        fit, settled = _settled(problem, fit.z, D)
+    progress(0.85, "errors of the time steps")
+    corrected = with_finer_steps(problem, fit.z)
+    if corrected is not None:
+        problem = corrected
+        fit, settled = _settled(problem, fit.z, D)
+    return Fitted(problem=problem, fit=fit, M=covariance(problem, fit), settled=settled)
+
+
+def _in_corner(problem: Problem, fit: Fit, free: int) -> bool:
+    """Say whether a number stands at its bound: that may be a wrong minimum, where it makes up for another."""
+    low, high = bounds(problem)
+    return bool(np.any(np.minimum(fit.z - low, high - fit.z)[:free] < AT_BOUND))
+
+
+def _first(problem: Problem, free: int, D: np.ndarray, lags: Sequence[float]) -> np.ndarray:
+    """Return where the fit begins (k,): numbers and starts alone, of records whose simulation is led less and less.
+
+    Noise is raised so that what is left is a few levels of it. Where that led farther off than the vehicle as it was,
+    as with a record that contradicts its trial, the fit begins there.
+    """
+    core = [k for k, entry in enumerate(problem.entries) if k < free or entry.record >= 0]
+    few = replace(problem, entries=tuple(problem.entries[k] for k in core))
+    z = np.zeros(len(core))
+    for lag in lags:
+        part = led(few, lag) if np.isfinite(lag) else few
+        z, r = runnable(part, z, None)
+        misfit = float(np.sqrt(np.mean(r**2)))
+        if not np.isfinite(misfit):
+            continue
+        z = _settled(with_more_noise(part, max(misfit / FIRST_MISFIT, 1.0)), z, D[core], is_first=True)[0].z
+    there, here = (objective(few.residual(one), one, D[core]) for one in (z, np.zeros(len(core))))
+    whole = np.zeros(D.size)
+    whole[core] = z if there < here else 0.0
+    return whole
+
+
+def _settled(problem: Problem, z: np.ndarray, D: np.ndarray, *, is_first: bool = False) -> tuple[Fit, bool]:
+    """Return a fit with sensitivities of its own, and whether a further step would gain nothing.
+
+    A first one, which only leads to the next, takes fewer steps, and makes do with one-sided sensitivities close by.
+
+    Levenberg's and Marquardt's method within bounds (Nielsen 1999): where numbers trade against each other the best fit
+    lies at the end of a curved valley, and a whole step of Gauss and Newton, or a part of it, leaves it.
+    """
+    low, high = bounds(problem)
+    slopes, within = (problem.jacobian, OWN_WITHIN) if is_first else (problem.central_jacobian, 0.0)
+    z, r = runnable(problem, z, None)
+    J, made_at = slopes(z), z
+    now, damping, harder, left = objective(r, z, D), 0.0, 2.0, 0.0
+    for _ in range(FIRST_STEPS if is_first else MAX_STEPS):
+        P, g = J.T @ J + np.diag((1.0 + damping) / D), J.T @ r - z / D
+        step = quadratic_step(P, g, low - z, high - z)
+        left = now - objective(r - J @ step, z + step, D)
+        fresh = made_at is z
+        if left < SETTLED_GAIN and damping < 1.0:
+            if fresh or _apart(problem, z, made_at) < within:
+                break
+            J, made_at = slopes(z), z
+            continue
+        r_there = problem.residual(z + step)
+        then = objective(r_there, z + step, D)
+        share = (now - then) / left if left > 0.0 else 0.0
+        if share > LEAST_SHARE:
+            J = broyden_update(J, step, r_there - r, D)
+            z, r, now = z + step, r_there, then
+            damping *= max(1.0 / 3.0, 1.0 - (2.0 * share - 1.0) ** 3)
+            damping, harder = (damping if damping > LEAST_DAMPING else 0.0), 2.0
+        elif fresh:
+            damping, harder = max(damping, FIRST_DAMPING) * harder, 2.0 * harder
+        if share < FRESH_SHARE and not fresh:
+            J, made_at = slopes(z), z
+    fit = Fit(z=z, r=r, J=J, D=D, objective=now, converged=left < SETTLED_GAIN, predicted_gain=left, fresh=0,
+              made_at=made_at)  # fmt: skip
+    return fit, fit.converged
+
+
+def _apart(problem: Problem, z: np.ndarray, other: np.ndarray) -> float:
+    """Return how far two points are apart, in tolerances."""
+    tolerance = np.array([entry.parameter.tolerance for entry in problem.entries])
+    return float(np.max(np.abs(z - other) / tolerance))
+
+
+def with_more_noise(problem: Problem, factor: float) -> Problem:
+    """Return the problem with noise that is a factor larger in every channel."""
+    records = tuple(
+        replace(
+            one,
+            noise={
+                name: replace(
+                    old, white=factor * old.white, slow=factor * old.slow, resolution=factor * old.resolution
+                )
+                for name, old in one.noise.items()
+            },
+        )
+        for one in problem.records
+    )
+    return replace(problem, records=records)
+
+
+BLOCK_CORRELATIONS = 5.0
+"""A block of the residual lasts so many correlation times of the channel's slow part …"""
+LEAST_BLOCK_S = 2.0
+"""… and no less than this. [s]"""
+
+
+def covariance(problem: Problem, fit: Fit) -> np.ndarray:
+    """Return the covariance of the deviations (k, k), inflated where the residual is not white."""
+    M = posterior(fit.quadratic, fit.D).M
+    scores = block_scores(problem, fit)
+    robust = M @ (np.diag(1.0 / fit.D) + scores.T @ scores) @ M
+    factor = np.sqrt(np.maximum(np.diag(robust) / np.diag(M), 1.0))
+    inflated: np.ndarray = factor[:, None] * M * factor
+    return inflated
+
+
+def block_scores(problem: Problem, fit: Fit) -> np.ndarray:
+    """Return Σ over a block of J r, for every block of every channel of every record (blocks, k)."""
+    found, at = [], 0
+    for record in problem.records:
+        for noise in record.noise.values():
+            own = slice(at, at + noise.count)
+            at += noise.count
+            if noise.count:
+                length = max(
+                    LEAST_BLOCK_S, BLOCK_CORRELATIONS * noise.correlation_time if noise.slow else 0.0
+                )
+                block = ((noise.time - noise.time[0]) // length).astype(int)
+                score = fit.J[own] * fit.r[own][:, None]
+                found.append(np.stack([score[block == one].sum(axis=0) for one in np.unique(block)]))
+    return np.concatenate(found)
