@@ -234,8 +234,9 @@ def refused(numbers: Sequence[Number], work: Fitted) -> tuple[str, ...]:
                 found.append(
                     f"The best fit leaves the {words} wandering by {noise.slow / level:.1f} times the usual noise."
                 )
-    for one, z in zip(numbers, work.fit.z, strict=False):
-        if min(z - one.low, one.high - z) < AT_BOUND:
+    for k, (one, z) in enumerate(zip(numbers, work.fit.z, strict=False)):
+        is_determined = np.sqrt(work.M[k, k]) < UNDETERMINED_ABOVE * one.prior_sd
+        if is_determined and min(z - one.low, one.high - z) < AT_BOUND:
             found.append(f"{one.name} stands at its bound: it makes up for something else.")
     if not work.settled:
         found.append("The fit found no minimum: another step would still gain.")

@@ -15,7 +15,7 @@ from subzero.diagnosis.inference import Noise
 
 USUAL = SPECS["heading"].noise
 TIME = np.arange(0.0, 40.0, 0.1)
-NUMBER = SimpleNamespace(name="rudder.lift_slope", low=-1.0, high=2.0)
+NUMBER = SimpleNamespace(name="rudder.lift_slope", low=-1.0, high=2.0, prior_sd=1.0)
 
 
 def fitted(size=1.0, slow=1.0, resolution=0.0, known=None, **more):
@@ -26,7 +26,8 @@ def fitted(size=1.0, slow=1.0, resolution=0.0, known=None, **more):
     r[1:] += more.get("coloured", 0.0) * r[:-1]
     fit = SimpleNamespace(r=r, z=np.array([more.get("at", 0.0), -7.0]))
     problem = SimpleNamespace(records=[record])
-    return SimpleNamespace(problem=problem, fit=fit, settled=more.get("settled", True))
+    M = np.eye(2) * more.get("sd", 0.1) ** 2
+    return SimpleNamespace(problem=problem, fit=fit, M=M, settled=more.get("settled", True))
 
 
 @pytest.mark.parametrize(("work", "words"), [
@@ -39,6 +40,7 @@ def fitted(size=1.0, slow=1.0, resolution=0.0, known=None, **more):
     (fitted(slow=1.5, known={"heading": 0.5 * USUAL}), "wandering by 3.0 times"),
     (fitted(at=-1.0), "rudder.lift_slope stands at its bound"),
     (fitted(at=2.0), "rudder.lift_slope stands at its bound"),
+    (fitted(at=2.0, sd=0.9), ""),
     (fitted(settled=False), "found no minimum"),
 ])  # fmt: skip
 def test_what_is_left_is_held_to_the_noise_of_the_sensor(work, words):
