@@ -1,4 +1,4 @@
-"""The command line: ``subzero simulate``, ``compare``, ``plot``; ``list``, ``new``, ``show``, ``validate``
+"""The command line: ``subzero simulate``, ``compare``, ``plot``, ``explore``; ``list``, ``new``, ``show``, ``validate``
 (`cli_trials`); ``manoeuvre``, ``autopilot`` (`cli_autopilot`); ``diagnose``, ``challenge`` (`cli_diagnosis`); ``sweep``
 (`cli_sweep`); ``doctor``, ``warm``, ``completion`` (`cli_install`).
 
@@ -297,8 +297,45 @@ def plot(
     return FINE
 
 
+def explore(
+    scenario: str,
+    /,
+    *,
+    port: int = 8642,
+    no_browser: Annotated[bool, Parameter(negative=())] = False,
+    voice: Voice = PLAIN,
+) -> int:
+    """Open a page on this machine, with sliders that say at once what the trial would do otherwise.
+
+    Args:
+        scenario: name of a scenario (see "subzero list"), or path of a scenario file.
+        port: of the page's address, http://127.0.0.1:PORT; 0 is any that is free.
+        no_browser: say the address, and open no browser.
+        voice: how the command speaks.
+    """
+    from subzero import explore_page
+    from subzero.interrupts import leaves
+
+    trial = scenarios.load(scenario)
+    with explore_page.address(port) as (url, listening):
+        from subzero.explore import Exploration
+        from subzero.model import load
+        from subzero.simulation import simulate as run
+
+        trial = load(scenario)
+        with _progress(trial) as progress:
+            nominal = run(trial, progress=progress)
+        page = explore_page.Page(Exploration(trial=trial, nominal=nominal, simulate=run))
+        with voice.tells({"url": url}):
+            print(f"Exploring {printable(trial.name)} at {url}. Ctrl-C ends it.")
+        sys.stdout.flush()
+        leaves(lambda: "the page is closed, and files that were saved stay")
+        page.serve(listening, url, browser=not no_browser)
+    return FINE
+
+
 cli_trials.add_to(app)
-for _command in (simulate, compare, plot):
+for _command in (simulate, compare, plot, explore):
     register(app, _command)
 for _module in (cli_autopilot, cli_diagnosis, cli_sweep, cli_install):
     _module.add_to(app)

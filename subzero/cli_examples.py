@@ -21,6 +21,7 @@ EXAMPLES = {
         "subzero plot fig6/tethered.nc --what tension shape3d",
         "subzero plot fig6/tethered.nc --what heading --format svg",
     ),
+    "explore": ("subzero explore fig6", "subzero explore my_trial.toml --port 9000 --no-browser"),
     "manoeuvre": ("subzero manoeuvre zigzag", "subzero manoeuvre turning_circle fig6 --rudder 10"),
     "autopilot": (
         "subzero autopilot heading_step",

@@ -61,26 +61,14 @@ def new(path: Path, /, *, like: str = "fig6", voice: Voice = PLAIN) -> int:
         voice: how the command speaks.
     """
     from scenarios.contents import locate
+    from subzero.user_file import make_toml
 
-    if path.suffix != ".toml":
-        raise UserError(
-            f"{printable(str(path))} must end in .toml, such as {printable(path.stem or 'my_trial')}.toml."
-        )
     if like.endswith(".toml"):
         raise UserError(
             f"--like takes the name of something shipped, and {short(like)} is a path. Copy that file itself."
         )
     kind, source = locate(like)
-    try:
-        with open(path, "x", encoding="utf-8") as file:
-            file.write(source.text)
-    except FileExistsError:
-        raise UserError(f"{printable(str(path))} exists and is left alone. Give another name.") from None
-    except OSError as error:
-        where = printable(str(path))
-        raise UserError(
-            f"{where} cannot be made: {error.strerror}. Give a path that you may write."
-        ) from None
+    make_toml(path, source.text)
     told = {"path": printable(str(path)), "kind": kind, "like": like}
     with voice.tells(told):
         print(f"Wrote {told['path']}, a {kind} like {like}. Edit it, then:")

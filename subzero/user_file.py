@@ -159,3 +159,23 @@ def _names_in(folder: Path) -> list[str]:
         return os.listdir(folder)
     except OSError:
         return []
+
+
+def make_toml(path: Path, text: str) -> None:
+    """Make a TOML file that is not there yet; one that exists is left alone.
+
+    Raises:
+        UserError: its name ends otherwise, it exists, or it cannot be made.
+    """
+    where = printable(str(path))
+    if path.suffix != ".toml":
+        raise UserError(f"{where} must end in .toml, such as {printable(path.stem or 'my_trial')}.toml.")
+    try:
+        with open(path, "x", encoding="utf-8") as file:
+            file.write(text)
+    except FileExistsError:
+        raise UserError(f"{where} exists and is left alone. Give another name.") from None
+    except OSError as error:
+        raise UserError(
+            f"{where} cannot be made: {error.strerror}. Give a path that you may write."
+        ) from None

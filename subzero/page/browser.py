@@ -81,11 +81,11 @@ def _needed() -> tuple[str, str]:
 
 
 @contextmanager
-def opened(page: Path, *flags: str, width: int = 1400, height: int = 1000) -> Iterator[Any]:
+def opened(page: Path | str, *flags: str, width: int = 1400, height: int = 1000) -> Iterator[Any]:
     """Give a Selenium driver that has opened a page, with a profile of its own that is gone afterwards.
 
     Args:
-        page: the file.
+        page: the file, or an address.
         flags: more flags of Chromium.
         width: of the window. [pixels]
         height: of the window. [pixels]
@@ -105,7 +105,7 @@ def opened(page: Path, *flags: str, width: int = 1400, height: int = 1000) -> It
         options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
         driver = webdriver.Chrome(options=options, service=Service(driver_path))
         try:
-            driver.get(page.absolute().as_uri())
+            driver.get(page if isinstance(page, str) else page.absolute().as_uri())
             yield driver
         finally:
             driver.quit()

@@ -119,6 +119,7 @@ class Report:
         replay: of `subzero.page.replay.encode`; None without one.
         replay_words: what the replay shows that its controls do not say.
         sources: texts to unfold at the end, by name.
+        is_bare: show the replay alone, to stand in another page.
     """
 
     command_name: str
@@ -133,6 +134,7 @@ class Report:
     replay: Mapping[str, Any] | None = None
     replay_words: str = ""
     sources: Mapping[str, str] = field(default_factory=dict)
+    is_bare: bool = False
 
 
 def render(report: Report) -> str:

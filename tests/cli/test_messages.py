@@ -12,7 +12,7 @@ from subzero.cli import MISTAKE, main
 
 MESSAGES = {
     "simulat fig6": 'Unknown command "simulat". Did you mean "simulate"? '
-    "Available commands: list, new, show, validate, simulate, compare, plot, manoeuvre, ...\nTry 'subzero --help'.",
+    "Available commands: list, new, show, validate, simulate, compare, plot, explore, ...\nTry 'subzero --help'.",
     "simulate": "Command \"simulate\" parameter SCENARIO requires an argument.\nTry 'subzero --help'.",
     "simulate fig6 --oot x": "Unknown option: --oot. Did you mean --out?\nTry 'subzero --help'.",
     "compare fig6 --untethered": "Unknown option: --untethered.\nTry 'subzero --help'.",

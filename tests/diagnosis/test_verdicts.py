@@ -29,7 +29,7 @@ class Case(NamedTuple):
     D: float = 0.0
 
 
-QUICK = [Case("zigzag", 3), Case("fig6", 2, 158232.0), Case("current", 9, 211.0)]
+QUICK = [Case("zigzag", 3), Case("fig6", 2, 158232.0)]
 MORE = [
     *(Case(name, 3) for name in ("fig6", "dive", "spiral", "turning_circle", "current")),
     *(Case(name, 11) for name in ("fig6", "zigzag", "dive", "spiral", "stop_and_drift")),
@@ -42,6 +42,7 @@ MORE = [
     *(Case(name, 12, D) for name, D in (("zigzag", 15.0), ("spiral", 13.0))),
     *(Case(name, 4, D) for name, D in (("fig6", 2164.0), ("dive", 2368.0), ("current", 2286.0))),
     Case("zigzag", 7, 1360.0),
+    Case("current", 9, 211.0),
     *(Case(name, 9, D) for name, D in (("zigzag", 457.0), ("spiral", 488.0))),
     *(Case(name, 10, D) for name, D in (("fig6", 595.0), ("dive", 874.0))),
 ]

@@ -23,6 +23,7 @@ from subzero.diagnosis.hypothesis.data_error import DataError, corrected
 from subzero.diagnosis.hypothesis.logged import Logged
 from subzero.diagnosis.inference import settings
 from subzero.diagnosis.inference.data_error_scan import (
+    FAR_BEHIND,
     OUTLIER_LOG_DENSITY,
     Suspect,
     Yardstick,
@@ -223,9 +224,9 @@ class Look(Protocol):
 def compared(suspicion: Suspicion, records: Sequence[Logged], look: Look) -> list[tuple[Explained, float]]:
     """Return what errors the data may have, with what explains the records besides and its log evidence.
 
-    The records without what no vehicle does get a first look. Unless that explains them, and what else is suspected is
-    far behind even in the linear problem, this gets one, too. The most probable is finished, then what is not
-    hopelessly behind.
+    The records without what no vehicle does get a first look, and a whole one if that does not explain them and
+    something else is suspected. This gets a first look, too, unless it is far behind in the linear problem: by 30 nats
+    of what explains them, by 100 of what does not. The most probable is finished, then what is not hopelessly behind.
 
     Args:
         suspicion: what a scan says.
@@ -235,13 +236,18 @@ def compared(suspicion: Suspicion, records: Sequence[Logged], look: Look) -> lis
     firm, tried = suspicion.subset(), list[Explained]()
     try:
         tried.append(_explained(firm, records, look.begin(without(records, firm))))
-        is_known, bar = is_explained(tried[0].work), tried[0].log_evidence(0.0) - settings.DECISIVE_NATS
-        count = sum(map(is_soft, suspicion.errors))
-        more = [suspicion.subset(soft=k + 1) for k in range(count)]
-        _race(tried, [one for one in more if not is_known or suspicion.log_linear(one) > bar], records, look)
+        more = [suspicion.subset(soft=k + 1) for k in range(sum(map(is_soft, suspicion.errors)))]
+        if is_finished := bool(more) and not is_explained(tried[0].work):
+            look.finish(
+                tried[0].work
+            )  # what begins in mid-trial may explain it, and looks like a step or a clock
+        behind = settings.DECISIVE_NATS if is_explained(tried[0].work) else FAR_BEHIND
+        bar = tried[0].log_evidence(0.0) - behind
+        more = [one for one in more if suspicion.log_linear(one) > bar]
+        _race(tried, more, records, look, new=[] if is_finished else tried[:])
         if firm and not is_clear(firm, _first(tried).work) and _is_complete(tried):
             tried.append(_explained((), records, look.begin(records)))
-            _race(tried, [], records, look)
+            _race(tried, [], records, look, new=tried[-1:])
     except KeyboardInterrupt:  # before anything was found of one of them
         if not tried:
             raise
@@ -255,9 +261,10 @@ def _race(
     more: Sequence[tuple[SuspectedError, ...]],
     records: Sequence[Logged],
     look: Look,
+    *,
+    new: list[Explained],
 ) -> None:
-    """Give further sets of errors a first look, and finish what may be the most probable, also of the last before."""
-    new = tried[-1:]
+    """Give further sets of errors a first look, and finish what may be the most probable, also of what is new."""
     for errors in more:
         if _is_complete(tried):
             new.append(_explained(errors, records, look.begin(without(records, errors))))

@@ -11,15 +11,13 @@ from collections.abc import Iterable
 from importlib.metadata import entry_points
 from pathlib import Path
 
-from subzero.diagnosis.hypothesis.catalogue import cable, fins, hull, propulsion, sensors, start
-from subzero.diagnosis.hypothesis.catalogue.sensors import NOISE, SPECS
+from subzero.diagnosis.hypothesis.catalogue import cable, fins, hull, propulsion, sensors
+from subzero.diagnosis.hypothesis.catalogue.sensors import NOISE, SPECS, START
 from subzero.diagnosis.hypothesis.effect import Effect
 from subzero.errors import UserError
 from subzero.user_file import MOST_OF_A_PROGRAM, read_bytes
 
 __all__ = ["NOISE", "ONSETS", "SPECS", "START", "catalogue", "load"]
-START = start.EFFECTS
-"""What is free at the start of every trial, and never named."""
 ONSETS = (*fins.ONSETS, *hull.ONSETS, *propulsion.ONSETS)
 """What can only begin in mid-trial: a jam is no small deviation from a fin that follows, and a growth has a time to
 begin at. Neither is a tolerance of a healthy vehicle, and so no part of every fit."""

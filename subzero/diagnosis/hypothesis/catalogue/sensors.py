@@ -1,9 +1,14 @@
-"""What can be wrong with sensors and their clock: an effect per channel and kind, made from one table."""
+"""What each record has of its own.
+
+What can be wrong with its sensors and their clock: an effect per channel and kind, made from one table. And how the
+vehicle may lie at the start, never a cause, always free within its tolerance.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from functools import partial
+from math import radians
 from typing import NamedTuple
 
 from subzero.channels import BY_NAME
@@ -94,3 +99,34 @@ CLOCK = Effect(
     parameters=(Parameter(name="late", unit="s", tolerance=0.01, scale=0.5, low=-3.0, high=3.0),),
     apply=_clock,
 )
+
+
+def _turned(key: str) -> Callable[[Setting, float], Setting]:
+    def apply(setting: Setting, angle: float) -> Setting:
+        return setting.with_start(**{key: getattr(setting.trial.start, key) + radians(angle)})
+
+    return apply
+
+
+def _moved(key: str) -> Callable[[Setting, float], Setting]:
+    def apply(setting: Setting, amount: float) -> Setting:
+        return setting.with_start(**{key: getattr(setting.trial.start, key) + amount})
+
+    return apply
+
+
+def _nuisance(key: str, unit: str, tolerance: float) -> Effect:
+    make = _turned if unit == "degree" else _moved
+    parameter = Parameter(name=key, unit=unit, tolerance=tolerance, scale=tolerance)
+    return Effect(id=f"start:{key}", sentence=f"another {key.replace('_', ' ')} at the start", slot="start",
+                  parameters=(parameter,), apply=make(key))  # fmt: skip
+
+
+START = (
+    _nuisance("heading", "degree", 0.3),
+    _nuisance("pitch", "degree", 0.2),
+    _nuisance("roll", "degree", 0.3),
+    _nuisance("depth", "m", 0.01),
+    _nuisance("surge_speed", "m/s", 0.005),
+)
+"""What is free at the start of every trial, each with its own, and never named."""

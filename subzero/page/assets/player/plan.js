@@ -8,9 +8,14 @@ export class PlanView {
   constructor(canvas, replay) {
     this.canvas = canvas;
     this.paper = canvas.getContext("2d");
+    this.hidden = new Set();
+    this.show(replay);
+  }
+
+  /** Take other runs. */
+  show(replay) {
     this.replay = replay;
     this.shown = {};
-    this.hidden = new Set();
   }
 
   draw(t) {

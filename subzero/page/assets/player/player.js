@@ -96,6 +96,19 @@ class Player {
     ["bar-low", "bar-middle", "bar-high"].forEach((id, i) => (element(id).textContent = plain((highestTension * i) / 2, 2)));
   }
 
+  /** Show other runs of the same names and the same vehicle, at this moment and from where the camera stands. */
+  show(stored) {
+    this.replay = readReplay(stored);
+    this.lead = this.replay.actors[0];
+    this.camera.extent = this.replay.extent;
+    this.view.show(this.replay);
+    this.plots.show(this.replay);
+    element("time").max = this.replay.end;
+    this.time = Math.min(this.time, this.replay.end);
+    this.prepareBar();
+    this.changed();
+  }
+
   look(mode) {
     if (mode === "whole") this.camera.wholeScene();
     else {
@@ -295,6 +308,7 @@ const player = new Player(JSON.parse(element("replay-data").textContent));
 window.subzero = {
   at: (t) => player.at(t),
   seek: (t) => player.seek(t),
+  show: (stored) => player.show(stored),
   shown: () => player.shown(),
   look: (mode) => player.look(mode),
   setFineness: (fineness) => player.setFineness(fineness),

@@ -1,11 +1,11 @@
 // Channels over time, drawn by uPlot: a click moves the replay, a drag zooms in, a double click shows all again.
 
-const COLOURS = { tethered: "#0072b2", untethered: "#d55e00", 0: "#0072b2", 1: "#d55e00", 2: "#009e73", 3: "#aa4499" };
-const DARK_COLOURS = { tethered: "#56b4e9", untethered: "#ff8c42", 0: "#56b4e9", 1: "#ff8c42", 2: "#3fc79a", 3: "#d98ccf" };
+const COLOURS = { tethered: "#0072b2", untethered: "#d55e00", nominal: "#7b868c", 0: "#0072b2", 1: "#d55e00", 2: "#009e73", 3: "#aa4499" };
+const DARK_COLOURS = { tethered: "#56b4e9", untethered: "#ff8c42", nominal: "#9aa7ad", 0: "#56b4e9", 1: "#ff8c42", 2: "#3fc79a", 3: "#d98ccf" };
 const FIRST_SHOWN = [
   "surge_speed", "heading", "depth", "cable_tension", "cable_length", "rudder_angle", "propeller_speed", "pitch", "roll_angle",
 ];
-const HEIGHT = 132;
+const HEIGHT = document.body.classList.contains("bare") ? Math.min(Math.max(innerHeight / 4 - 40, 80), 160) : 132;  // inside another page four fill its frame
 
 /** Whether the reader's screen is set to dark. */
 export const isDark = () => matchMedia("(prefers-color-scheme: dark)").matches;
@@ -60,7 +60,7 @@ export class Plots {
     plot.over.addEventListener("click", (event) => {
       if (!plot.wasDragged) this.seek(plot.posToVal(event.clientX - plot.over.getBoundingClientRect().left, "x"));
     });
-    this.plots.push({ plot, now, lines, values, width: plot.over.clientWidth });
+    this.plots.push({ name, plot, now, lines, values, width: plot.over.clientWidth });
     this.showTime(this.time ?? 0);
   }
 
@@ -72,6 +72,15 @@ export class Plots {
     }));
     if (measured?.has(name)) lines.push({ label: "measured", source: measured, name, stroke: isDark() ? "#ddd" : "#333", dots: true });
     return lines;
+  }
+
+  /** Take other runs of the same names; the same channels stay drawn, over the whole time. */
+  show(replay) {
+    this.replay = replay;
+    for (const one of this.plots) {
+      one.lines = this.linesOf(one.name);
+      one.plot.setData(joined(one.lines));
+    }
   }
 
   readout(caption, { label, stroke }) {

@@ -9,11 +9,11 @@ const FIELD_OF_VIEW = 0.75;                   // vertical [rad]
 const SMALLEST_VEHICLE = 0.055;               // a vehicle is never drawn shorter than this share of the distance to the target
 const PROPELLER_SLOWED = 12;                  // a screen shows 25 turns a second as anything but that
 const GHOST = [1.0, 0.76, 0.50, 0.36], GHOST_TRACK = [1.0, 0.66, 0.36, 0.95], TRACK = [0.75, 0.93, 1.0, 0.85], DOTS = [1, 1, 1, 0.9];
-const MEASURED_GHOST = [0.93, 0.98, 1.0, 0.45], MEASURED_TRACK = [1, 1, 1, 0.95];   // what was measured is white, all else that is no more than a ghost orange
+const WHITE_GHOST = [0.93, 0.98, 1.0, 0.45], WHITE_TRACK = [1, 1, 1, 0.95];   // what others are held against is white, all else that is no more than a ghost orange
 const SPECKS = 500;
 const BACKGROUND_TILES = [24, 24];
 
-const isMeasured = (actor) => actor.name === "measured";
+const isReference = (actor) => actor.name === "measured" || actor.name === "nominal";
 
 /** WebGL2 on a canvas, or null where there is none. */
 export function webglOn(canvas) {
@@ -53,7 +53,6 @@ export class Scene {
   /** @param replay of `readReplay`. */
   constructor(gl, replay) {
     this.gl = gl;
-    this.replay = replay;
     const shaders = { background, solid, line, ground, surface, specks };
     this.programs = Object.fromEntries(Object.entries(shaders).map(([name, one]) => [name, programOf(gl, one)]));
     const { rudderAt, planesAt, propellerAt, ...parts } = vehicleMeshes(replay.vehicle);
@@ -64,12 +63,19 @@ export class Scene {
     this.nothing = gl.createVertexArray();
     this.lines = this.lineBuffer();
     this.specks = this.speckCloud();
+    this.pixelsPerPoint = 1;
+    this.hidden = new Set();
+    this.show(replay);
+  }
+
+  /** Take other runs of the same vehicle. */
+  show(replay) {
+    this.replay = replay;
     this.tracks = new Map(replay.actors.map((actor) => [actor, trackOf(actor)]));
     this.measured = measuredTrack(replay.measured);
     this.groundDepth = replay.sea_bed ?? depthOfGrid(replay.extent);
-    this.pixelsPerPoint = 1;
+    this.cablePoints = new Map();
     this.shown = {};
-    this.hidden = new Set();
   }
 
   mesh(corners) {
@@ -206,10 +212,10 @@ export class Scene {
     const gl = this.gl;
     for (const actor of this.visible(true)) {
       gl.colorMask(false, false, false, false);
-      this.drawVehicle(actor, t, isMeasured(actor) ? MEASURED_GHOST : GHOST);
+      this.drawVehicle(actor, t, isReference(actor) ? WHITE_GHOST : GHOST);
       gl.colorMask(true, true, true, true);
       gl.depthFunc(gl.LEQUAL);
-      this.drawVehicle(actor, t, isMeasured(actor) ? MEASURED_GHOST : GHOST);
+      this.drawVehicle(actor, t, isReference(actor) ? WHITE_GHOST : GHOST);
       gl.depthFunc(gl.LESS);
     }
   }
@@ -261,7 +267,7 @@ export class Scene {
     if (this.measured && !this.hidden.has("measured")) this.drawLine(this.measured, { ...common, colour: DOTS, width: 1.2 * pixels, dash: 0.002 * this.distance + 0.01, opacity: 0.9 });
     for (const actor of this.visible(true)) {
       const dash = 0.012 * this.distance;
-      this.drawLine(this.trackUntil(actor, t), { ...common, colour: isMeasured(actor) ? MEASURED_TRACK : GHOST_TRACK, width: 1.3 * pixels, dash, opacity: 0.9 });
+      this.drawLine(this.trackUntil(actor, t), { ...common, colour: isReference(actor) ? WHITE_TRACK : GHOST_TRACK, width: 1.3 * pixels, dash, opacity: 0.9 });
       this.drawCable(actor, t, { ...common, width: 2.2 * pixels, dash: 0, opacity: 0.4 });
     }
     for (const actor of this.visible(false)) {
@@ -274,7 +280,6 @@ export class Scene {
 
   drawCable(actor, t, look) {
     if (!actor.cable) return;
-    this.cablePoints ??= new Map();
     if (!this.cablePoints.has(actor)) this.cablePoints.set(actor, new Float32Array(4 * actor.cable.points));
     const points = this.cablePoints.get(actor);
     if (actor.cable.fill(t, points)) this.drawLine(points, { ...look, colour: [0, 0, 0, -1] });
