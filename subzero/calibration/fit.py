@@ -6,24 +6,28 @@ M is right if the whitened residual r is white. What a noise model of one slow p
 estimated by sums over blocks of each channel (Liang and Zeger 1986); variances are inflated by what that is more.
 
 A vehicle whose numbers are off by 40 % leaves records far off, where the linear problem says little. So the fit begins
-with simulations that are led along what was measured (`state_correction`), and goes on with free ones, the usual noise,
-the estimated one, and the error of the economical steps made good.
+with the beginnings of the records and with more noise than there is, lowered as it comes closer, from several starts; it
+goes on with the usual noise, the estimated one, and the error of the economical steps made good. Sensors, fins and
+start are free from the first step on: what they are off by is many times the noise, and numbers that must make up for
+it without them end in a wrong minimum.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.stats.qmc import Sobol
 
-from subzero.calibration.state_correction import led
+from subzero.calibration.numbers import STEP_SHARE
 from subzero.diagnosis.inference import (
     Fit,
     Problem,
     Progress,
     bounds,
     broyden_update,
+    economical,
     objective,
     posterior,
     quadratic_step,
@@ -32,11 +36,14 @@ from subzero.diagnosis.inference import (
     with_noise_behind,
 )
 
-LAGS_S = (0.3, 1.5, np.inf)
-"""Within so long simulations are led back to what was measured, one fit behind the other. [s]"""
-NOT_LED = (np.inf, np.inf, np.inf)
-"""The same of another start, where the first one leads into a corner: only the noise is raised, less and less."""
-AT_BOUND = 1e-9
+HORIZONS = ((0.3, 0.6, 1.0), (0.1, 0.2, 0.35, 0.6, 1.0))
+"""Shares of the records that are fitted, one behind the other; of the first start, and of the second. [-]"""
+MORE_STARTS, START_SHARE = 4, 0.3
+"""Starts with other numbers, up to this share of each, where those did not end in the same minimum. [-]"""
+SAME_MINIMUM = 10.0
+"""Fits of two starts whose objectives differ by less ended in the same minimum; others differ by hundreds. [nat]"""
+MAX_LOWERINGS, FAILED_SHARE = 5, 0.9
+"""Noise is lowered so often; no more where the misfit stays above this share of what it was. [-]"""
 FIRST_MISFIT = 2.0
 """A fit begins with so much noise that it leaves the vehicle so many levels off. [-]"""
 FIRST_STEPS = 10
@@ -65,12 +72,14 @@ class Fitted:
         fit: the most probable deviations.
         M: their covariance (k, k), inflated.
         settled: no step would gain more.
+        repeated: another start ended in the same minimum.
     """
 
     problem: Problem
     fit: Fit
     M: np.ndarray
     settled: bool
+    repeated: bool = True
 
 
 def fitted(problem: Problem, free: int, D: np.ndarray, progress: Progress) -> Fitted:
@@ -82,16 +91,11 @@ def fitted(problem: Problem, free: int, D: np.ndarray, progress: Progress) -> Fi
         D: prior variances of all entries (k,).
         progress: told the fraction that is done, and what is being done.
     """
-    progress(0.05, "first fit, with more noise than there is")
-    z = _first(problem, free, D, LAGS_S)
-    progress(0.25, "fit with usual noise")
+    z, repeated = _first(problem, free, D, progress)
+    progress(0.5, "fit with usual noise")
     fit, settled = _settled(problem, z, D)
-    if not settled or _in_corner(problem, fit, free):
-        progress(0.35, "fit from another start")
-        other = _settled(problem, _first(problem, free, D, NOT_LED), D)
-        fit, settled = min((fit, settled), other, key=lambda one: one[0].objective)
     for round in range(MAX_NOISE_ROUNDS):
-        progress(0.5 + 0.15 * round, "noise behind the fit")
+        progress(0.6 + 0.1 * round, "noise behind the fit")
         again = with_noise_behind(problem, fit.z, D)
         if again is None:
             break
@@ -102,35 +106,66 @@ def fitted(problem: Problem, free: int, D: np.ndarray, progress: Progress) -> Fi
     if corrected is not None:
         problem = corrected
         fit, settled = _settled(problem, fit.z, D)
-    return Fitted(problem=problem, fit=fit, M=covariance(problem, fit), settled=settled)
+    return Fitted(
+        problem=problem, fit=fit, M=covariance(problem, fit), settled=settled, repeated=repeated
+    )
 
 
-def _in_corner(problem: Problem, fit: Fit, free: int) -> bool:
-    """Say whether a number stands at its bound: that may be a wrong minimum, where it makes up for another."""
+def _first(problem: Problem, free: int, D: np.ndarray, progress: Progress) -> tuple[np.ndarray, bool]:
+    """Return where the fit with usual noise begins (k,), and whether two starts ended there."""
+    ends: list[Fit] = []
+    for i, (z, shares) in enumerate(_starts(problem, free, D.size)):
+        progress(0.5 * i / (len(HORIZONS) + MORE_STARTS), f"first fit, from start {i + 1}")
+        ends.append(_fit_from(problem, z, D, shares))
+        best = min(ends, key=lambda one: one.objective)
+        repeated = sum(one.objective < best.objective + SAME_MINIMUM for one in ends) > 1
+        if repeated:
+            break
+    return best.z, repeated
+
+
+def _starts(problem: Problem, free: int, size: int) -> Iterator[tuple[np.ndarray, tuple[float, ...]]]:
+    """Give starts (k,), and the shares of the records to begin with: the vehicle as it was, then others around it."""
+    for shares in HORIZONS:
+        yield np.zeros(size), shares
+    nominal = np.array([entry.parameter.tolerance for entry in problem.entries[:free]]) / STEP_SHARE
     low, high = bounds(problem)
-    return bool(np.any(np.minimum(fit.z - low, high - fit.z)[:free] < AT_BOUND))
+    for row in Sobol(free, rng=0).random(MORE_STARTS):
+        z = np.zeros(size)
+        z[:free] = START_SHARE * (2.0 * row - 1.0) * nominal
+        yield np.clip(z, low, high), HORIZONS[0]
 
 
-def _first(problem: Problem, free: int, D: np.ndarray, lags: Sequence[float]) -> np.ndarray:
-    """Return where the fit begins (k,): numbers and starts alone, of records whose simulation is led less and less.
+def _fit_from(problem: Problem, z: np.ndarray, D: np.ndarray, shares: Sequence[float]) -> Fit:
+    """Return the fit with usual noise from a start, by way of the beginnings of the records and raised noise."""
+    for share in shares:
+        short = beginnings(problem, share)
+        for _ in range(MAX_LOWERINGS):
+            z, r = runnable(short, z, None)
+            misfit = float(np.sqrt(np.mean(r**2)))
+            if not np.isfinite(misfit):
+                break
+            factor = max(misfit / FIRST_MISFIT, 1.0)
+            fit, _ = _settled(with_more_noise(short, factor), z, D, is_first=True)
+            z = fit.z
+            if factor == 1.0 or factor * np.sqrt(np.mean(fit.r**2)) > FAILED_SHARE * misfit:
+                break
+    return _settled(problem, z, D, is_first=True)[0]
 
-    Noise is raised so that what is left is a few levels of it. Where that led farther off than the vehicle as it was,
-    as with a record that contradicts its trial, the fit begins there.
-    """
-    core = [k for k, entry in enumerate(problem.entries) if k < free or entry.record >= 0]
-    few = replace(problem, entries=tuple(problem.entries[k] for k in core))
-    z = np.zeros(len(core))
-    for lag in lags:
-        part = led(few, lag) if np.isfinite(lag) else few
-        z, r = runnable(part, z, None)
-        misfit = float(np.sqrt(np.mean(r**2)))
-        if not np.isfinite(misfit):
-            continue
-        z = _settled(with_more_noise(part, max(misfit / FIRST_MISFIT, 1.0)), z, D[core], is_first=True)[0].z
-    there, here = (objective(few.residual(one), one, D[core]) for one in (z, np.zeros(len(core))))
-    whole = np.zeros(D.size)
-    whole[core] = z if there < here else 0.0
-    return whole
+
+def beginnings(problem: Problem, share: float) -> Problem:
+    """Return the problem of the first part of every record, a share of its length."""
+    if share >= 1.0:
+        return problem
+    records = []
+    for one in problem.records:
+        end = share * float(one.time[-1])
+        noise = {}
+        for name, old in one.noise.items():
+            used = old.used & (one.time <= end)
+            noise[name] = replace(old, used=used, time=one.time[used])
+        records.append(replace(one, noise=noise, setting=economical(one.setting, end)))
+    return replace(problem, records=tuple(records))
 
 
 def _settled(problem: Problem, z: np.ndarray, D: np.ndarray, *, is_first: bool = False) -> tuple[Fit, bool]:
