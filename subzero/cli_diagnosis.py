@@ -63,6 +63,23 @@ class Search:
 FULL_SEARCH = Search()
 
 
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class Estimation:
+    """What is estimated.
+
+    Attributes:
+        free: numbers to estimate, such as rudder.lift_slope; by default the twelve that records usually determine.
+        quick: the numbers only, without profiles and without what to fly next.
+    """
+
+    free: Annotated[list[str] | None, Parameter(negative=(), consume_multiple=True)] = None
+    quick: Flag = False
+
+
+ALL_USUAL = Estimation()
+
+
 def diagnose(
     files: Annotated[list[Path], Parameter(negative=())],
     /,
@@ -113,10 +130,9 @@ def calibrate(
     *,
     scenario: str | None = None,
     vehicle: str | None = None,
-    free: Annotated[list[str] | None, Parameter(negative=(), consume_multiple=True)] = None,
     out: Path = Path("my_vehicle.toml"),
     commands: Literal["record", "scenario"] | None = None,
-    quick: Flag = False,
+    estimation: Estimation = ALL_USUAL,
     voice: Voice = PLAIN,
 ) -> int:
     """Estimate numbers of a vehicle from measured records, all at once, and write the vehicle they make.
@@ -125,10 +141,9 @@ def calibrate(
         records: CSV files of one vehicle, or folders of them; several manoeuvres say more than one.
         scenario: what was flown: a name (see "subzero list") or a path; a record's sidecar may name another.
         vehicle: name or file of the vehicle to begin with, instead of the scenario's.
-        free: numbers to estimate, such as rudder.lift_slope; by default the twelve that records usually determine.
         out: file of the calibrated vehicle; figures and a JSON file go beside it.
         commands: whose commands hold if the record and the scenario differ.
-        quick: the numbers only, without profiles and without what to fly next.
+        estimation: what is estimated.
         voice: how the command speaks.
     """
     from subzero.calibration.numbers import full_name
@@ -136,7 +151,7 @@ def calibrate(
     from subzero.write_calibration import files_of, tell, write_all
 
     names = files_of(out)
-    wanted = [full_name(name) for name in free or ()]
+    wanted = [full_name(name) for name in estimation.free or ()]
     if scenario is not None:
         scenarios.load(scenario)  # a mistake in it answers at once
     with staged(out.parent, names) as stage:
@@ -144,7 +159,7 @@ def calibrate(
         from subzero.calibration.api import calibrate as run
 
         with progress_bar("Calibrating", lambda: COSTS) as progress:
-            found = run(logged, free=wanted, vehicle=vehicle, progress=progress, quick=quick)
+            found = run(logged, free=wanted, vehicle=vehicle, progress=progress, quick=estimation.quick)
         write_all(found, stage, out.stem)
     tell(found, stage, out, voice=voice)
     return NO_CALIBRATION if found.refused else FINE

@@ -12,9 +12,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.special import ndtri
 
-from subzero.calibration.fit import Fitted
+from subzero.calibration.fit import SIGMAS_95, Fitted, held_at
 from subzero.calibration.numbers import Number
 from subzero.calibration.results import Advice, Direction, Estimate, Held, Profile
 from subzero.diagnosis import assessment as judged
@@ -26,14 +25,10 @@ from subzero.diagnosis.inference import (
     Progress,
     bounded_step,
     bounds,
-    broyden_update,
     is_noise,
-    objective,
     runnable,
 )
 
-SIGMAS_95 = float(ndtri(0.975))
-"""Half an interval of 95 % in standard deviations."""
 UNDETERMINED_ABOVE = 0.5
 """What is left of the standard deviation beforehand, from which on the records do not determine it. [-]"""
 SMALL_PART = 0.2
@@ -95,8 +90,6 @@ def _change(number: Number, change: float) -> str:
 
 PROFILE_SIGMAS = (-3.0, -1.5, 1.5, 3.0)
 """Where a profile is made, in standard deviations from the estimate."""
-MAX_PROFILE_STEPS, PROFILE_GAIN = 5, 0.1
-"""Steps of the fit of all others, and the gain that is worth one more. [nat]"""
 RISE_95 = SIGMAS_95**2
 """Rise of −2 log posterior at the ends of an interval of 95 %."""
 
@@ -108,7 +101,7 @@ def profiles(numbers: Sequence[Number], work: Fitted, progress: Progress) -> dic
         progress(k / len(numbers), f"profile of {number.name}")
         sd = float(np.sqrt(work.M[k, k]))
         offsets = [s * sd for s in PROFILE_SIGMAS if number.low <= work.fit.z[k] + s * sd <= number.high]
-        points = [(offset, _held_at(work, k, offset)) for offset in offsets]
+        points = [(offset, max(held_at(work.problem, work.fit, k, offset)[1], 0.0)) for offset in offsets]
         whole = sorted([*points, (0.0, 0.0)])
         values, rise = (
             np.array([number.nominal + work.fit.z[k] + x for x, _ in whole]),
@@ -117,23 +110,6 @@ def profiles(numbers: Sequence[Number], work: Fitted, progress: Progress) -> dic
         low, high = _ends(values, rise)
         found[number.name] = Profile(values=values, rise=rise, low=low, high=high)
     return found
-
-
-def _held_at(work: Fitted, k: int, offset: float) -> float:
-    """Return the rise of −2 log posterior with entry k held at an offset from the best, others fitted again."""
-    problem, J, D = work.problem, work.fit.J, work.fit.D
-    low, high = bounds(problem)
-    low[k] = high[k] = work.fit.z[k] + offset
-    z, r, best = work.fit.z, work.fit.r, math.inf
-    for _ in range(MAX_PROFILE_STEPS):
-        step = bounded_step(J, r, z, D, low, high)
-        after = problem.residual(z + step)
-        now = objective(after, z + step, D)
-        if not now < best - PROFILE_GAIN:
-            break
-        J = broyden_update(J, step, after - r, D)
-        z, r, best = z + step, after, now
-    return max(2.0 * (best - work.fit.objective), 0.0)
 
 
 def _ends(values: np.ndarray, rise: np.ndarray) -> tuple[float, float]:
@@ -238,6 +214,8 @@ def refused(numbers: Sequence[Number], work: Fitted) -> tuple[str, ...]:
         is_determined = np.sqrt(work.M[k, k]) < UNDETERMINED_ABOVE * one.prior_sd
         if is_determined and min(z - one.low, one.high - z) < AT_BOUND:
             found.append(f"{one.name} stands at its bound: it makes up for something else.")
+    if not work.repeated:
+        found.append("Every start ended in another minimum: which of them is the vehicle is not known.")
     if not work.settled:
         found.append("The fit found no minimum: another step would still gain.")
     return tuple(found)

@@ -6,7 +6,7 @@ M is right if the whitened residual r is white. What a noise model of one slow p
 estimated by sums over blocks of each channel (Liang and Zeger 1986); variances are inflated by what that is more.
 
 A vehicle whose numbers are off by 40 % leaves records far off, where the linear problem says little. So the fit begins
-with the beginnings of the records and with more noise than there is, lowered as it comes closer, from several starts; it
+with the beginnings of the records and more noise than there is, lowered as it comes closer, from several starts; it
 goes on with the usual noise, the estimated one, and the error of the economical steps made good. Sensors, fins and
 start are free from the first step on: what they are off by is many times the noise, and numbers that must make up for
 it without them end in a wrong minimum.
@@ -18,6 +18,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import ndtri
 from scipy.stats.qmc import Sobol
 
 from subzero.calibration.numbers import STEP_SHARE
@@ -25,6 +26,7 @@ from subzero.diagnosis.inference import (
     Fit,
     Problem,
     Progress,
+    bounded_step,
     bounds,
     broyden_update,
     economical,
@@ -42,6 +44,14 @@ MORE_STARTS, START_SHARE = 4, 0.3
 """Starts with other numbers, up to this share of each, where those did not end in the same minimum. [-]"""
 SAME_MINIMUM = 10.0
 """Fits of two starts whose objectives differ by less ended in the same minimum; others differ by hundreds. [nat]"""
+MAX_CHECKS = 3
+"""How often a fit goes on from what is better at the end of an interval."""
+SIGMAS_95 = float(ndtri(0.975))
+"""Half an interval of 95 % in standard deviations."""
+LEAST_RISE = 0.25
+"""−2 log posterior that rises by less than this at the end of an interval says only that it is far wider. [-]"""
+MAX_PROFILE_STEPS, PROFILE_GAIN = 5, 0.1
+"""Steps of the fit of all others with one number held, and the gain that is worth one more. [nat]"""
 MAX_LOWERINGS, FAILED_SHARE = 5, 0.9
 """Noise is lowered so often; no more where the misfit stays above this share of what it was. [-]"""
 FIRST_MISFIT = 2.0
@@ -91,9 +101,9 @@ def fitted(problem: Problem, free: int, D: np.ndarray, progress: Progress) -> Fi
         D: prior variances of all entries (k,).
         progress: told the fraction that is done, and what is being done.
     """
-    z, repeated = _first(problem, free, D, progress)
+    first, spread, repeated = _first(problem, free, D, progress)
     progress(0.5, "fit with usual noise")
-    fit, settled = _settled(problem, z, D)
+    fit, settled = _settled(problem, first, D)
     for round in range(MAX_NOISE_ROUNDS):
         progress(0.6 + 0.1 * round, "noise behind the fit")
         again = with_noise_behind(problem, fit.z, D)
@@ -101,27 +111,79 @@ def fitted(problem: Problem, free: int, D: np.ndarray, progress: Progress) -> Fi
             break
         problem = again
         fit, settled = _settled(problem, fit.z, D)
-    progress(0.85, "errors of the time steps")
+    progress(0.8, "errors of the time steps")
     corrected = with_finer_steps(problem, fit.z)
     if corrected is not None:
         problem = corrected
         fit, settled = _settled(problem, fit.z, D)
-    return Fitted(
-        problem=problem, fit=fit, M=covariance(problem, fit), settled=settled, repeated=repeated
-    )
+    for round in range(MAX_CHECKS):
+        progress(0.85 + 0.05 * round, "ends of the intervals")
+        M = covariance(problem, fit)
+        wider, better = _checked(problem, fit, M, free)
+        if better is None:
+            break
+        fit, settled = _settled(problem, better, D)
+    else:
+        settled = False
+    wider = np.maximum(wider, spread)
+    M = wider[:, None] * M * wider
+    return Fitted(problem=problem, fit=fit, M=M, settled=settled, repeated=repeated)
 
 
-def _first(problem: Problem, free: int, D: np.ndarray, progress: Progress) -> tuple[np.ndarray, bool]:
-    """Return where the fit with usual noise begins (k,), and whether two starts ended there."""
+def _first(
+    problem: Problem, free: int, D: np.ndarray, progress: Progress
+) -> tuple[np.ndarray, np.ndarray, bool]:
+    """Return where the fit with usual noise begins (k,), by how much what starts ended at is wider than Laplace's
+    interval says (k,), and whether two ended in the same minimum.
+    """
     ends: list[Fit] = []
     for i, (z, shares) in enumerate(_starts(problem, free, D.size)):
         progress(0.5 * i / (len(HORIZONS) + MORE_STARTS), f"first fit, from start {i + 1}")
         ends.append(_fit_from(problem, z, D, shares))
         best = min(ends, key=lambda one: one.objective)
-        repeated = sum(one.objective < best.objective + SAME_MINIMUM for one in ends) > 1
-        if repeated:
+        same = [one for one in ends if one.objective < best.objective + SAME_MINIMUM]
+        if len(same) > 1:
             break
-    return best.z, repeated
+    sd = np.sqrt(np.diag(posterior(best.quadratic, D).M))
+    apart = [
+        np.abs(one.z - best.z) / sd / np.sqrt(1.0 + 2.0 * (one.objective - best.objective)) for one in same
+    ]
+    return best.z, np.maximum(np.max(apart, axis=0), 1.0), len(same) > 1
+
+
+def _checked(problem: Problem, fit: Fit, M: np.ndarray, free: int) -> tuple[np.ndarray, np.ndarray | None]:
+    """Return by which factors intervals must be wider (k,) for −2 log posterior to rise at their ends as it should; and
+    deviations that are better than the fit (k,), where some are found on the way.
+    """
+    wider = np.ones(fit.z.size)
+    low, high = bounds(problem)
+    for k in range(free):
+        for offset in SIGMAS_95 * np.sqrt(M[k, k]) * np.array([-1.0, 1.0]):
+            if low[k] < fit.z[k] + offset < high[k]:
+                z, rise = held_at(problem, fit, k, offset)
+                if rise < -2.0 * SETTLED_GAIN:
+                    return wider, z
+                wider[k] = max(wider[k], SIGMAS_95 / np.sqrt(max(rise, LEAST_RISE)))
+    return wider, None
+
+
+def held_at(problem: Problem, fit: Fit, k: int, offset: float) -> tuple[np.ndarray, float]:
+    """Return the deviations with entry k held at an offset from the best and all others fitted again (k,), and the rise
+    of −2 log posterior there.
+    """
+    J, D = fit.J, fit.D
+    low, high = bounds(problem)
+    low[k] = high[k] = fit.z[k] + offset
+    z, r, best, at = fit.z, fit.r, np.inf, fit.z
+    for _ in range(MAX_PROFILE_STEPS):
+        step = bounded_step(J, r, z, D, low, high)
+        after = problem.residual(z + step)
+        now = objective(after, z + step, D)
+        if not now < best - PROFILE_GAIN:
+            break
+        J = broyden_update(J, step, after - r, D)
+        z, r, best, at = z + step, after, now, z + step
+    return at, float(2.0 * (best - fit.objective))
 
 
 def _starts(problem: Problem, free: int, size: int) -> Iterator[tuple[np.ndarray, tuple[float, ...]]]:

@@ -164,7 +164,7 @@ def test_calibrated_again_a_vehicle_stays_as_it_is(found, written, records):
 
 
 def test_the_json_file_has_it_all_and_no_nan(found):
-    from subzero.calibration.report import text
+    from subzero.write_calibration import text
 
     read = json.loads(text(found))
     assert set(read["numbers"]) == {f"vehicle.{name}" for name in (*FREE, UNSEEN)}

@@ -27,7 +27,8 @@ def fitted(size=1.0, slow=1.0, resolution=0.0, known=None, **more):
     fit = SimpleNamespace(r=r, z=np.array([more.get("at", 0.0), -7.0]))
     problem = SimpleNamespace(records=[record])
     M = np.eye(2) * more.get("sd", 0.1) ** 2
-    return SimpleNamespace(problem=problem, fit=fit, M=M, settled=more.get("settled", True))
+    return SimpleNamespace(problem=problem, fit=fit, M=M, settled=more.get("settled", True),
+                           repeated=more.get("repeated", True))  # fmt: skip
 
 
 @pytest.mark.parametrize(("work", "words"), [
@@ -42,6 +43,7 @@ def fitted(size=1.0, slow=1.0, resolution=0.0, known=None, **more):
     (fitted(at=2.0), "rudder.lift_slope stands at its bound"),
     (fitted(at=2.0, sd=0.9), ""),
     (fitted(settled=False), "found no minimum"),
+    (fitted(repeated=False), "Every start ended in another minimum"),
 ])  # fmt: skip
 def test_what_is_left_is_held_to_the_noise_of_the_sensor(work, words):
     said = " ".join(refused([NUMBER], work))
