@@ -156,6 +156,7 @@ def test_the_file_says_where_it_comes_from(found, written, records):
         )
 
 
+@pytest.mark.slow
 def test_calibrated_again_a_vehicle_stays_as_it_is(found, written, records):
     again = subzero.calibrate(records, free=FREE, vehicle=written, quick=True)
     for name in FREE:
