@@ -106,7 +106,7 @@ def run_converged(
     """
     times = trial.times()
     coarse_times = _every_other(times)
-    coarser = _resolved(trial, 2.0)
+    coarser = resolved(trial, 2.0)
     whole = Grid(times, 1, trial.stride)
     if coarser is None or coarse_times.size < 3:
         return take(trial, whole, progress), None
@@ -117,7 +117,7 @@ def run_converged(
     change = _after_start(coarse, run)
     accuracy = _accuracy(trial, take, run, change, None, 0)
     for halvings in range(1, LAST_HALVING + 1):
-        finer = _resolved(trial, 0.5**halvings)
+        finer = resolved(trial, 0.5**halvings)
         too_far = halvings == LAST_HALVING and accuracy.force_error > LEAST_GAIN * trial.rtol
         if accuracy.converged or too_far or finer is None or _work(run) * 4**halvings > MOST_WORK:
             break
@@ -142,7 +142,7 @@ def _taken(take: Take, trial: scenarios.Trial, grid: Grid, progress: Progress | 
         return None
 
 
-def _resolved(trial: scenarios.Trial, factor: float) -> scenarios.Trial | None:
+def resolved(trial: scenarios.Trial, factor: float) -> scenarios.Trial | None:
     """Return a trial with segments, and smaller steps of the hull, times a factor; None beyond the limits."""
     try:
         return dataclasses.replace(
@@ -196,7 +196,7 @@ def _start(trial: scenarios.Trial, take: Take, run: Run, halvings: int) -> Chang
     """Return what finer steps and segments change in the first samples; nothing where no finer run gets so far."""
     times = run.all_times[: START_ROWS + 1]
     for finer in START_REFINEMENTS if times.size > 1 else ():
-        other = _resolved(trial, 0.5**halvings / finer)
+        other = resolved(trial, 0.5**halvings / finer)
         fine = None if other is None else _taken(take, other, _only_traced(times, finer * 2**halvings), None)
         if fine is not None and fine.completed:
             return _change(run, fine, 1, _largest(run))

@@ -15,6 +15,8 @@ rudder, 13 % for 0.6°, 37 % for 5°.
 
 from __future__ import annotations
 
+import dataclasses
+import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -25,8 +27,10 @@ from scenarios import Trial
 from scenarios.steps import whole_steps
 from subzero.autopilot.coupled_plant import CABLE_OUTPUTS, HULL_SIZE, NoRoomError, Tethered, blank_trial
 from subzero.channels import BY_NAME
+from subzero.convergence import resolved
 from subzero.errors import UserError
 from subzero.model import Model, load
+from subzero.simulation import simulate
 from subzero.steady_motion.hull_state_space import INPUT_NAMES, STATE_NAMES, UNITS
 from subzero.steady_motion.trim_point import Trim
 
@@ -48,12 +52,15 @@ class Along:
     Attributes:
         time: of the run, one cable step apart (n + 1,). [s]
         commands: that were given (n, 4), as `INPUTS`. [rev/s, rad]
-        states: of hull and cable (n + 1, m): `STATES` first, then what only the simulation knows.
+        parts: so many steps of the simulation make a cable step: more than one where the accuracy of the run needs it.
+        states: of hull and cable, one such part apart (n parts + 1, m): `STATES` first, then what only the simulation
+            knows.
         step: the simulation.
     """
 
     time: np.ndarray
     commands: np.ndarray
+    parts: int
     states: np.ndarray
     step: Tethered
 
@@ -80,9 +87,10 @@ class Along:
             x[: len(STATE_NAMES)] = self._checked(start, "start", (len(STATE_NAMES),))
             x[len(STATE_NAMES) + 1 : HULL_SIZE] = x[13 : len(STATE_NAMES)]
         rows = [self._seen(0, x)]
-        for k in range(len(change)):
-            x = self._moved_on(k, x, change[k])
-            rows.append(self._seen(k + 1, x))
+        for k, du in enumerate(np.repeat(change, self.parts, axis=0)):
+            x = self._moved_on(k, x, du)
+            if (k + 1) % self.parts == 0:
+                rows.append(self._seen(k + 1, x))
         values = np.array(rows).T
         names = (*STATE_NAMES, *CABLE_OUTPUTS)
         units = UNITS | {name: BY_NAME[name].unit for name in CABLE_OUTPUTS}
@@ -93,23 +101,21 @@ class Along:
         return xr.Dataset(variables, coords={"time": ("time", self.time, {"units": "s"})})
 
     def _moved_on(self, k: int, dx: np.ndarray, du: np.ndarray) -> np.ndarray:
-        """Return A_k δx + B_k δu."""
+        """Return A_k δx + B_k δu of part k."""
+        t, u = self._at(k)
         largest = max(float(np.max(np.abs(dx))), float(np.max(np.abs(du))))
         if largest == 0.0:
             return dx
         size = SIZE
         while size >= SMALLEST:
             h = size / largest
-            ends = [
-                self.step.update(self.time[k], self.states[k] + s * h * dx, self.commands[k] + s * h * du, {})
-                for s in (1.0, -1.0)
-            ]
+            ends = [self.step.update(t, self.states[k] + s * h * dx, u + s * h * du, {}) for s in (1.0, -1.0)]
             if self.step.events(ends[0]) == self.step.events(ends[1]):
                 column: np.ndarray = (ends[0] - ends[1]) / (2.0 * h)
                 return column
             size *= 0.1
         raise UserError(
-            f"linearise_along: at t = {self.time[k]:g} s the drum begins or stops to turn, or the cable is split, just"
+            f"linearise_along: at t = {t:g} s the drum begins or stops to turn, or the cable is split, just"
             " then: the run has no derivative there. Allowed: a run that starts, or is commanded, a little otherwise."
         )
 
@@ -118,10 +124,19 @@ class Along:
         largest = float(np.max(np.abs(dx)))
         if largest == 0.0:
             return np.zeros(len(STATE_NAMES) + len(CABLE_OUTPUTS))
-        h, x, u = SIZE / largest, self.states[k], self.commands[min(k, len(self.commands) - 1)]
-        ends = [self.step.output(self.time[k], x + s * h * dx, u, {}) for s in (1.0, -1.0)]
+        h, x, (t, u) = SIZE / largest, self.states[k], self._at(k)
+        ends = [self.step.output(t, x + s * h * dx, u, {}) for s in (1.0, -1.0)]
         column: np.ndarray = (ends[0] - ends[1]) / (2.0 * h)
         return column
+
+    def _at(self, k: int) -> tuple[float, np.ndarray]:
+        """Return the time at which part k begins, and the commands that hold then."""
+        row, part = divmod(k, self.parts)
+        if row == len(self.commands):
+            return float(self.time[row]), self.commands[-1]
+        return float(
+            self.time[row] + part * (self.time[row + 1] - self.time[row]) / self.parts
+        ), self.commands[row]
 
     def _checked(self, values: np.ndarray, what: str, shape: tuple[int, ...]) -> np.ndarray:
         """Return deviations as an array of a shape, or refuse them."""
@@ -143,11 +158,13 @@ def linearise_along(
 ) -> Along:
     """Return the linear model along a run of the coupled simulation, the cable growing as it does there.
 
+    Steps and segments are those of `subzero.simulate`: finer than the trial's where its `rtol` asks for it.
+
     Args:
         scenario: what is run: its start, commands, water and steps.
         model: another model than the scenario's.
         start: a steady motion to begin with instead, its cable straight behind, its commands held to the end; heading,
-            depth and steps stay the scenario's.
+            depth and steps stay the scenario's, as they are.
         duration: how long; the scenario's by default. [s]
 
     Raises:
@@ -164,8 +181,10 @@ def linearise_along(
         raise UserError(f"linearise_along: the duration is {end!r}. Allowed: at least one cable step.")
     time = whole_steps(trial.cable_step, round(end / trial.cable_step) + 1)
     commands = _commands(trial, time[:-1]) if start is None else np.tile(start.command, (time.size - 1, 1))
-    x = None
-    if start is not None:
+    x, parts = None, 1
+    if start is None:
+        trial, parts = _as_it_is_run(trial, model, end)
+    else:
         x = start.state.copy()
         x[2], x[5] = trial.start.depth, trial.start.heading
         steps = {
@@ -176,7 +195,8 @@ def linearise_along(
     while True:
         step = Tethered(trial, model, room, x=x, exact=True)
         try:
-            return Along(time=time, commands=commands, states=_run(step, time, commands), step=step)
+            states = _run(step, time, commands, parts)
+            return Along(time=time, commands=commands, parts=parts, states=states, step=step)
         except NoRoomError:
             room *= 2.0
 
@@ -188,9 +208,18 @@ def _commands(trial: Trial, time: np.ndarray) -> np.ndarray:
     return trial.commands.at(time)
 
 
-def _run(step: Tethered, time: np.ndarray, commands: np.ndarray) -> np.ndarray:
-    """Return the states of a run (n + 1, m)."""
+def _as_it_is_run(trial: Trial, model: Model, end: float) -> tuple[Trial, int]:
+    """Return a trial with steps and segments as fine as its run takes them, and into how many parts a step is cut."""
+    run = simulate(dataclasses.replace(trial, duration=end), model=model)
+    halvings = int((json.loads(run.attrs.get("accuracy", "null")) or {}).get("halvings") or 0)
+    fine = resolved(trial, 0.5**halvings) or trial
+    return dataclasses.replace(fine, cable_step=trial.cable_step / 2**halvings), 2**halvings
+
+
+def _run(step: Tethered, time: np.ndarray, commands: np.ndarray, parts: int) -> np.ndarray:
+    """Return the states of a run, so many parts to each step (n parts + 1, m)."""
     states = [step.initial]
-    for t, u in zip(time[:-1], commands, strict=True):
-        states.append(step.update(float(t), states[-1], u, {}))
+    for begin, end, u in zip(time[:-1], time[1:], commands, strict=True):
+        for part in range(parts):
+            states.append(step.update(float(begin + part * (end - begin) / parts), states[-1], u, {}))
     return np.array(states)

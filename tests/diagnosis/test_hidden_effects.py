@@ -76,8 +76,8 @@ def words(result):
     return f"{truth}, D {result['D']}: {result['verdict']}, {', '.join(first)}"
 
 
-SINGLES = [drawn("single", 12)]
-LONG = slow("single", 5, 9, 18)
+SINGLES = [drawn("single", 18)]
+LONG = slow("single", 5, 9, 12)
 MORE = slow("single", 8, 11, 13, 16, 19, 25)
 
 
@@ -104,7 +104,7 @@ def test_a_healthy_record_gets_no_name(told, case):
     assert not names(result), words(result)
 
 
-@pytest.mark.parametrize("case", [drawn("pair", 6)])
+@pytest.mark.parametrize("case", slow("pair", 6))
 def test_two_hidden_effects_are_named(told, case):
     result = told[case].result()
     assert min(result["D"].values()) >= CLEAR
@@ -136,7 +136,7 @@ def test_what_is_outside_the_catalogue_is_flagged(told, case):
     assert result["verdict"] == "outside_catalogue", words(result)
 
 
-@pytest.mark.parametrize("case", [drawn("twin", 0)])
+@pytest.mark.parametrize("case", slow("twin", 0))
 def test_twins_are_told_as_a_set(told, case):
     """No name, and the truth among those that are left."""
     result = told[case].result()
@@ -145,6 +145,7 @@ def test_twins_are_told_as_a_set(told, case):
     assert any(set(one.split(" + ")) & set(result["truth"]) for one in result["probabilities"]), words(result)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", [drawn("healthy", 3, how="wide")])
 def test_tolerances_declared_half_as_wide_make_no_false_name(told, case):
     result = told[case].result()

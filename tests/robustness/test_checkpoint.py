@@ -77,7 +77,7 @@ def test_a_run_that_is_broken_off_at_any_file_ends_the_same(case, tmp_path, kill
     checkpoint = Checkpoint(folder=tmp_path / "kept", minutes=0.0)
     rng, kills, run = np.random.default_rng(3), 0, None
     while run is None:
-        killed_at(int(rng.integers(1, 9)) if kills else 2, behind=bool(kills % 2))
+        killed_at(int(rng.integers(2, 20)) if kills else 2, behind=bool(kills % 2))
         try:
             run = subzero.simulate(trial, **options, checkpoint=checkpoint)
         except Killed:
@@ -222,7 +222,7 @@ def same_files(path, folder):
 
 
 def test_a_command_that_is_killed_goes_on(tmp_path):
-    same_files(killed_and_resumed(tmp_path, 1, 0.2, duration=300), tmp_path)
+    same_files(killed_and_resumed(tmp_path, 1, 0.2, duration=120), tmp_path)
 
 
 @pytest.mark.slow
