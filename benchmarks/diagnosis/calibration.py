@@ -202,6 +202,7 @@ def _held_to(case: Case, found: Calibration, numbers: Mapping[str, float]) -> di
         "error": {when: error_in_true_noise(case, found, when) for when in ("before", "after", "fitted")},
         "converged": found.converged,
         "verdict": found.verdict,
+        "refused": list(found.refused),
         "strange": len(found.strange),
     }  # fmt: skip
 

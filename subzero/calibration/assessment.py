@@ -21,6 +21,7 @@ from subzero.diagnosis.assessment import LIBRARY, is_safe, prepared_trial, rows_
 from subzero.diagnosis.hypothesis.catalogue import START
 from subzero.diagnosis.hypothesis.catalogue.sensors import SPECS
 from subzero.diagnosis.inference import (
+    Noise,
     Problem,
     Progress,
     bounded_step,
@@ -204,7 +205,7 @@ def refused(numbers: Sequence[Number], work: Fitted) -> tuple[str, ...]:
             words = f"{name.replace('_', ' ')} in {record.name}"
             if not is_noise(r):
                 found.append(f"The best fit misses the {words} by more than its noise.")
-            elif (p := whiteness(r)) < STRANGE_P:
+            elif (p := whiteness(r)) < STRANGE_P and not _is_coarse(noise):
                 found.append(f"What is left of the {words} is no noise (Ljung and Box: p = {p:.1g}).")
             elif noise.slow > MOST_WANDER * level:
                 found.append(
@@ -221,6 +222,15 @@ def refused(numbers: Sequence[Number], work: Fitted) -> tuple[str, ...]:
     return tuple(found)
 
 
+def _is_coarse(noise: Noise) -> bool:
+    """Say whether a channel is rounded so coarsely that what is left is never white: where it hardly moves, the error
+    of the rounding is the same for many samples.
+    """
+    return bool(noise.resolution > COARSE * math.sqrt(12.0) * noise.white)
+
+
+COARSE = 0.5
+"""Rounding errors of more than this share of the white noise are told apart from it. [-]"""
 STRANGE_P = 1e-4
 """A channel whose whitened residual is white with less than this probability is no noise. [-]"""
 STRANGE_NOISE = 3.0
