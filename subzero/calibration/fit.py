@@ -119,7 +119,7 @@ def fitted(problem: Problem, free: int, D: np.ndarray, progress: Progress) -> Fi
     for round in range(MAX_CHECKS):
         progress(0.85 + 0.05 * round, "ends of the intervals")
         M = covariance(problem, fit)
-        wider, better = _checked(problem, fit, M, free)
+        wider, better = ends_checked(problem, fit, M, free)
         if better is None:
             break
         fit, settled = _settled(problem, better, D)
@@ -151,7 +151,9 @@ def _first(
     return best.z, np.maximum(np.max(apart, axis=0), 1.0), len(same) > 1
 
 
-def _checked(problem: Problem, fit: Fit, M: np.ndarray, free: int) -> tuple[np.ndarray, np.ndarray | None]:
+def ends_checked(
+    problem: Problem, fit: Fit, M: np.ndarray, free: int
+) -> tuple[np.ndarray, np.ndarray | None]:
     """Return by which factors intervals must be wider (k,) for −2 log posterior to rise at their ends as it should; and
     deviations that are better than the fit (k,), where some are found on the way.
     """
