@@ -306,7 +306,7 @@ def line_of(one: Mapping[str, Any]) -> str:
 
 def table(results: Sequence[Mapping[str, Any]]) -> str:
     """Return a row for every family and vehicle: coverage, errors before and after, verdicts, names."""
-    head = "                 cases refused  in 95 %   of   share (95 %)         before   after  above 1.2  strange"
+    head = "                 cases refused  in 95 %   of   share (95 %)         before  fourth  above 1.2  strange"
     rows = [_row(name, results) for name in (*NOISES, *VEHICLES, *CABLES, "all")]
     return "\n".join([head, *rows, *_diagnosed_rows(results)])
 

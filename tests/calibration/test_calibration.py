@@ -7,7 +7,6 @@ intervals say themselves; that a profile rises by 3.84 at their ends is the law 
 
 import hashlib
 import json
-import math
 import tomllib
 from dataclasses import replace
 
@@ -286,7 +285,7 @@ def test_the_command_speaks_json(command, found):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("index", [0, 1, 2, 5])
+@pytest.mark.parametrize("index", [0, 2, 3])
 def test_twelve_numbers_off_by_up_to_40_percent_come_back(index):
     from benchmarks.diagnosis.calibration import Case, result_of
 
@@ -296,5 +295,5 @@ def test_twelve_numbers_off_by_up_to_40_percent_come_back(index):
     assert sum(held) >= 10, one
     assert max(map(abs, z)) < 4.0
     assert one["error"]["before"] > 2.0
-    assert one["error"]["after"] < 1.2
-    assert math.isfinite(one["error"]["fitted"])
+    assert one["later_error"] < 1.2
+    assert one["verdict"] == "calibrated"
