@@ -43,6 +43,7 @@ ROWS = (
     "vehicle",
     "scenarios",
     "subzero.autopilot",
+    "subzero.calibration",
     "subzero.diagnosis",
     "subzero.page",
     "subzero.records",

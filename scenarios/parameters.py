@@ -24,7 +24,17 @@ import numpy as np
 
 from scenarios.errors import Problem, ScenarioError, nearest_or_all
 from scenarios.files import Source
-from scenarios.parts import Leaf, changeable, leaves, read_part, value_complaint
+from scenarios.parts import (
+    PATTERNS,
+    Leaf,
+    Part,
+    changeable,
+    leaves,
+    read_changes,
+    read_part,
+    read_tolerances,
+    value_complaint,
+)
 from scenarios.quantities import (
     BED,
     COMMANDS,
@@ -134,26 +144,72 @@ def declared_ranges(trial: Trial) -> dict[str, tuple[float, float]]:
     Raises:
         ScenarioError: the trial was not read from a file, or its files are not there any more.
     """
-    table = tomllib.loads(trial.text) if trial.text else {}
-    source = Source(
-        name=trial.source, folder=Path(trial.source).parent, text=trial.text, table=table, lines={}
-    )
     ranges: dict[str, tuple[float, float]] = {}
-    for kind in ("vehicle", "cable"):
-        named = table.get(kind)
-        if not isinstance(named, str):
-            why = f"it does not say which {kind} it has, so no ranges are known"
-            raise ScenarioError([Problem(file=trial.name, key=kind, why=why, remedy="Give the ranges.")])
-        part, problems = read_part(source, kind, named)
-        if part.source is None:
-            raise ScenarioError(problems)
+    for kind in PATTERNS:
         above = "vehicle." if kind == "vehicle" else ""
-        ranges |= {
-            f"{above}{key}": (float(leaf["range"][0]), float(leaf["range"][1]))
-            for key, leaf in leaves(part.source.table)
-            if "range" in leaf
-        }
+        ranges |= {f"{above}{key}": one for key, one in ranges_in(part_file(trial, kind)).items()}
     return ranges
+
+
+def ranges_in(part: Source) -> dict[str, tuple[float, float]]:
+    """Return what the file of a vehicle or a cable declares as plausible: dotted key → least, greatest value."""
+    return {
+        key: (float(leaf["range"][0]), float(leaf["range"][1]))
+        for key, leaf in leaves(part.table)
+        if "range" in leaf
+    }
+
+
+def part_file(trial: Trial, kind: str) -> Source:
+    """Return the file of the vehicle, or of the cable, that a trial names.
+
+    Raises:
+        ScenarioError: the trial was not read from a file, or its file is not there any more.
+    """
+    source = _source_of(trial)
+    named = source.table.get(kind)
+    if not isinstance(named, str):
+        why = f"it does not say which {kind} it has, so no ranges are known"
+        raise ScenarioError([Problem(file=trial.name, key=kind, why=why, remedy="Give the ranges.")])
+    return _part(source, kind, named)[1]
+
+
+def with_vehicle(trial: Trial, named: str | Path) -> tuple[Trial, Source]:
+    """Return a trial with another vehicle, and the file of that; single values that the trial changes stay changed.
+
+    Args:
+        trial: what is changed; it stays as it is.
+        named: a vehicle that we ship, or the path of a file, from the working directory.
+
+    Raises:
+        ScenarioError: there is no such vehicle, or it cannot be used.
+    """
+    here = replace(_source_of(trial), folder=Path())
+    part, file = _part(here, "vehicle", str(named))
+    values = {f"vehicle.{key}": one for key, one in part.values.items()}
+    changes, _ = read_changes(here)
+    changed = with_parameters(trial, values | {key: one for key, one in changes.items() if key in values})
+    tolerances = {key: one for key, one in trial.tolerances.items() if not key.startswith("vehicle.")}
+    tolerances |= {f"vehicle.{key}": one for key, one in part.tolerances.items()} | read_tolerances(here)[0]
+    return replace(changed, tolerances=tolerances), file
+
+
+def changes_of(trial: Trial) -> dict[str, float]:
+    """Return the single values that the file of a trial changes itself: dotted name → value."""
+    return read_changes(_source_of(trial))[0]
+
+
+def _part(source: Source, kind: str, named: str) -> tuple[Part, Source]:
+    part, problems = read_part(source, kind, named)
+    if part.source is None or problems:
+        raise ScenarioError(problems)
+    return part, part.source
+
+
+def _source_of(trial: Trial) -> Source:
+    """Return the file of a trial again, from what it keeps of it."""
+    table = tomllib.loads(trial.text) if trial.text else {}
+    return Source(name=trial.source, folder=Path(trial.source).parent, text=trial.text, table=table, lines={})
 
 
 # What there is, and what is wrong with a name or a value.

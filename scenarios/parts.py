@@ -2,8 +2,9 @@
 
 A number is an inline table ``{ value = 6.6, unit = "kg", range = [6.4, 7.5], source = "..." }``. The first
 file we ship of each kind is its *pattern*: a user's file must have the same sections, keys and units; only what is
-`OPTIONAL` may be missing. ``range`` says what is plausible and is for readers; ``limits`` in the pattern says what is
-possible, and is enforced.
+`OPTIONAL` may be missing. ``range`` says what is plausible: readers, sweeps and calibrations
+go by it. ``tolerance``, which may be left out, says how far a healthy vehicle may be from the value (one standard
+deviation): diagnoses go by it. ``limits`` in the pattern says what is possible, and is enforced.
 
 The section [changes] of a trial gives single values that differ from these files:
 
@@ -11,14 +12,14 @@ The section [changes] of a trial gives single values that differ from these file
     "cable.normal_drag_coefficient" = 1.2
     "drum.inertia" = 1e-4
 
-The quotes may be left out.
+The quotes may be left out. The section [tolerances] gives tolerances of such values in the same way.
 """
 
 from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from typing import Any
@@ -30,7 +31,7 @@ from subzero.errors import short as shown
 PATTERNS = {"vehicle": ("vehicles", "subzero2"), "cable": ("cables", "table1")}
 """Kind of part → the folder of its files, and the file that is the pattern."""
 
-LEAF_KEYS = ("value", "unit", "range", "limits", "source")
+LEAF_KEYS = ("value", "unit", "range", "tolerance", "limits", "source")
 
 SERVOS = ("rudder_servo", "stern_plane_port_servo", "stern_plane_starboard_servo")
 OPTIONAL = {
@@ -56,11 +57,13 @@ class Part:
     Attributes:
         source: its file; None if that could not be read.
         values: dotted key → value, as far as they are good.
+        tolerances: dotted key → how far a healthy vehicle may be off, of those numbers that say it.
         complete: whether all of them are good.
     """
 
     source: Source | None = None
     values: Mapping[str, float] = field(default_factory=dict)
+    tolerances: Mapping[str, float] = field(default_factory=dict)
     complete: bool = False
 
 
@@ -95,7 +98,13 @@ def read_part(source: Source, kind: str, named: str) -> tuple[Part, list[Problem
         values, problems = _checked(part, pattern(kind))
     except ScenarioError as error:
         return Part(), list(error.problems)
-    return Part(source=part, values=values, complete=not problems), problems
+    said = (
+        {}
+        if problems
+        else {key: leaf["tolerance"] for key, leaf in leaves(part.table) if "tolerance" in leaf}
+    )
+    tolerances = {key: float(tolerance) for key, tolerance in said.items()}
+    return Part(source=part, values=values, tolerances=tolerances, complete=not problems), problems
 
 
 def _checked(source: Source, model: Source) -> tuple[dict[str, float], list[Problem]]:
@@ -143,7 +152,17 @@ def _complaint(leaf: Leaf, model: Leaf, key: str) -> tuple[str, str] | None:
     if leaf.get("unit") != unit:
         given = shown(leaf["unit"]) if "unit" in leaf else "not given"
         return f"its unit is {given}", f'Allowed: unit = "{unit}".'
+    if "tolerance" in leaf and (complaint := tolerance_complaint(leaf["tolerance"], unit)):
+        return f"its tolerance is {shown(leaf['tolerance'])}: {complaint[0]}", complaint[1]
     return value_complaint(leaf["value"], model, key)
+
+
+def tolerance_complaint(value: object, unit: str) -> tuple[str, str] | None:
+    """Return why a value cannot be the tolerance of a number, and what to do; None if it can."""
+    allowed = f"Allowed: above 0{'' if unit == '1' else f' {unit}'}."
+    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= sys.float_info.max:
+        return "this is not a finite number", allowed
+    return None if value > 0.0 else ("this is not above 0", allowed)
 
 
 def value_complaint(value: object, model: Leaf, key: str) -> tuple[str, str] | None:
@@ -191,20 +210,35 @@ def changeable() -> dict[str, Leaf]:
 
 def read_changes(source: Source) -> tuple[dict[str, float], list[Problem]]:
     """Return the changes that a trial file asks for: dotted key → value, and the problems."""
-    raw = source.table.get("changes", {})
+    return _numbers_by_key(source, "changes", value_complaint)
+
+
+def read_tolerances(source: Source) -> tuple[dict[str, float], list[Problem]]:
+    """Return the tolerances that a trial file sets itself: dotted key → tolerance, and the problems."""
+    return _numbers_by_key(
+        source, "tolerances", lambda value, leaf, key: tolerance_complaint(value, leaf["unit"])
+    )
+
+
+def _numbers_by_key(
+    source: Source, section: str, complaint_of: Callable[[object, Leaf, str], tuple[str, str] | None]
+) -> tuple[dict[str, float], list[Problem]]:
+    """Return the numbers of a section whose keys are those of vehicle and cable, and the problems."""
+    raw = source.table.get(section, {})
     given = dict(_flat(raw)) if isinstance(raw, Mapping) else {}
     allowed = changeable() if given else {}
-    changes, problems = {}, []
+    found: dict[str, float] = {}
+    problems = []
     for key, value in given.items():
-        place = f"changes.{key}"
+        place = f"{section}.{key}"
         if key not in allowed:
             why = "no vehicle and no cable has such a value"
             problems.append(source.problem(place, why, _nearest(key, allowed)))
-        elif complaint := value_complaint(value, allowed[key], key):
+        elif complaint := complaint_of(value, allowed[key], key):
             problems.append(source.problem(place, *complaint, found=value))
         else:
-            changes[key] = float(value)
-    return changes, problems
+            found[key] = float(value)
+    return found, problems
 
 
 def _flat(table: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:

@@ -17,7 +17,7 @@ from typing import Any, TypeVar
 from scenarios.errors import Problem, ScenarioError
 from scenarios.files import Source, find
 from scenarios.instructions import Motion
-from scenarios.parts import Part, nested, read_changes, read_part
+from scenarios.parts import Part, nested, read_changes, read_part, read_tolerances
 from scenarios.quantities import PROFILE, RUN, SCHEMES, SECTIONS, START, WINCH, by_field
 from scenarios.samples import LEFT_OPEN, check_times, commands, inline, motion, read_instructions
 from scenarios.schema import LISTS, check_page, check_section
@@ -91,7 +91,7 @@ def load(
     run, start = (reading.section(name) for name in ("run", "start"))
     reading.problems.extend(check_steps(reading.source, run, start))
     around = reading.keep(read_surroundings(reading.source))
-    vehicle, cable = _parts(reading, check_vehicle)
+    vehicle, cable, tolerances = _parts(reading, check_vehicle)
     reading.problems.extend(check_scheme(reading.source, run, cable.get("cable", {})))
     given = {
         kind: path for kind, path in zip(LISTS, (commands_csv, motion_csv), strict=True) if path is not None
@@ -121,6 +121,7 @@ def load(
         vehicle=vehicle,
         cable=cable["cable"],
         drum=cable["drum"],
+        tolerances=tolerances,
         **around,
         commands=commands(samples["commands"]) if "commands" in samples else None,
         motion=prescribed,
@@ -141,8 +142,10 @@ def _part(reading: Reading, kind: str) -> Part:
     return reading.keep(read_part(reading.source, kind, named))
 
 
-def _parts(reading: Reading, check: VehicleCheck | None) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Return the numbers of the vehicle, and those of cable and drum, with the changes of the trial."""
+def _parts(
+    reading: Reading, check: VehicleCheck | None
+) -> tuple[dict[str, Any], dict[str, Any], dict[str, float]]:
+    """Return the numbers of the vehicle, those of cable and drum, with the changes of the trial, and tolerances."""
     part, cable = (_part(reading, kind) for kind in ("vehicle", "cable"))
     changes = reading.keep(read_changes(reading.source))
     of_vehicle = {
@@ -152,7 +155,12 @@ def _parts(reading: Reading, check: VehicleCheck | None) -> tuple[dict[str, Any]
     vehicle = nested({**part.values, **of_vehicle})
     if check and part.complete:
         reading.problems.extend(_complaint(reading, part, of_vehicle, said) for said in check(vehicle))
-    return vehicle, nested({**cable.values, **of_cable})
+    declared = {f"vehicle.{key}": one for key, one in part.tolerances.items()} | dict(cable.tolerances)
+    return (
+        vehicle,
+        nested({**cable.values, **of_cable}),
+        declared | reading.keep(read_tolerances(reading.source)),
+    )
 
 
 def _complaint(reading: Reading, part: Part, changed: Mapping[str, float], said: Any) -> Problem:

@@ -42,6 +42,7 @@ class Page(BaseModel):
     commands: dict[str, Any] = {}
     motion: dict[str, Any] = {}
     changes: dict[str, Any] = {}
+    tolerances: dict[str, Any] = {}
 
 
 class FileReference(BaseModel):

@@ -12,7 +12,7 @@ turns the heading to starboard (it increases); positive stern-planes (both) pitc
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from importlib import import_module
 from typing import Any
 
@@ -225,8 +225,8 @@ def _tuples(array: np.ndarray | None) -> Any:
 
 def _keep(value: Any, **fields: Any) -> None:
     """Set fields of a frozen value that is being made."""
-    for name, field in fields.items():
-        object.__setattr__(value, name, field)
+    for name, one in fields.items():
+        object.__setattr__(value, name, one)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -253,6 +253,8 @@ class Trial:
         vehicle: section → key → SI value; sections may hold sections.
         cable: key → SI value, the fields of ``cable.CableProperties``.
         drum: key → SI value, the fields of ``cable.DrumProperties``.
+        tolerances: dotted name of a number of vehicle, cable or drum → how far a healthy vehicle may be from it, of
+            those whose file or trial says so; one standard deviation, in the number's unit.
         current: velocity of the water, north, east, down, the same everywhere. [m/s]
         profile: what is added to it by depth.
         sea_bed: depth of a flat sea bed, which a run that goes below it warns of; 0 is not known. [m]
@@ -280,6 +282,7 @@ class Trial:
     vehicle: Mapping[str, Any]
     cable: Mapping[str, float]
     drum: Mapping[str, float]
+    tolerances: Mapping[str, float] = field(default_factory=dict)
     current: tuple[float, float, float] = (0.0, 0.0, 0.0)
     profile: Profile | None = None
     sea_bed: float = 0.0
@@ -303,7 +306,7 @@ class Trial:
         there = {name for name, kind in parts.items() if check.kind(name, (kind,), optional=True)}
         if {"commands", "motion"} <= there:
             check.say("motion", "commands are given too", "Keep one of commands and motion.")
-        for name in ("vehicle", "cable", "drum"):
+        for name in ("vehicle", "cable", "drum", "tolerances"):
             check.mapping(name)
         check.refuse()
         if self.motion is not None and self.motion.is_smooth and self.motion.time[-1] < self.duration - 1e-9:

@@ -12,8 +12,8 @@ Names come from their modules when they are first used, so that ``import subzero
 `warnings_of` says what may be wrong with a run, `check` how much it changes with half the steps,
 `read_record` a measured record, `draw` makes the figures, `export` writes a run for other programs,
 `Simulator` steps a run for a controller of your own,
-`diagnose` says what a simulation gets wrong in measured records, `read_trials` reads those as `Logged`, `challenge`
-hides an effect in a record to try that out,
+`diagnose` says what a simulation gets wrong in measured records, `calibrate` estimates numbers of a vehicle from them,
+`read_trials` reads those as `Logged`, `challenge` hides an effect in a record to try that out,
 `sweep` runs a trial with many values of its parameters (`plan_sweep` says which without running them),
 `autopilot` leads to linear models and controllers, `CHANNELS` is the table of everything that a run gives.
 """
@@ -34,6 +34,7 @@ _HOME = {
     "RunStoppedError": ("subzero.simulator", "RunStoppedError"),
     "Simulator": ("subzero.simulator", "Simulator"),
     "UserError": ("subzero.errors", "UserError"),
+    "calibrate": ("subzero.calibration.api", "calibrate"),
     "challenge": ("subzero.synthetic.challenge", "challenge"),
     "check": ("subzero.comparison", "check"),
     "compare": ("subzero.comparison", "compare"),

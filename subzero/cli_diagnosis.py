@@ -1,4 +1,4 @@
-"""The commands ``subzero diagnose`` and ``subzero challenge``, and ``--with``: everything heavy is imported inside."""
+"""The commands ``diagnose``, ``calibrate`` and ``challenge``, and ``--with``: everything heavy is imported inside."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from subzero.diagnosis.hypothesis.logged import Logged
     from subzero.diagnosis.results import Verdict
 
-FINE = 0
+FINE, NO_CALIBRATION = 0, 3
 LAST_WORDS_S = 60.0
 """An interrupted diagnosis has so long to tell and write what it has. [s]"""
 
@@ -61,6 +61,23 @@ class Search:
 
 
 FULL_SEARCH = Search()
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class Estimation:
+    """What is estimated.
+
+    Attributes:
+        free: numbers to estimate, such as rudder.lift_slope; by default the twelve that records usually determine.
+        quick: the numbers only, without profiles and without what to fly next.
+    """
+
+    free: Annotated[list[str] | None, Parameter(negative=(), consume_multiple=True)] = None
+    quick: Flag = False
+
+
+ALL_USUAL = Estimation()
 
 
 def diagnose(
@@ -107,6 +124,47 @@ def diagnose(
     return FINE if verdict.complete else INTERRUPTED
 
 
+def calibrate(
+    records: Annotated[list[Path], Parameter(negative=())],
+    /,
+    *,
+    scenario: str | None = None,
+    vehicle: str | None = None,
+    out: Path = Path("my_vehicle.toml"),
+    commands: Literal["record", "scenario"] | None = None,
+    estimation: Estimation = ALL_USUAL,
+    voice: Voice = PLAIN,
+) -> int:
+    """Estimate numbers of a vehicle from measured records, all at once, and write the vehicle they make.
+
+    Args:
+        records: CSV files of one vehicle, or folders of them; several manoeuvres say more than one.
+        scenario: what was flown: a name (see "subzero list") or a path; a record's sidecar may name another.
+        vehicle: name or file of the vehicle to begin with, instead of the scenario's.
+        out: file of the calibrated vehicle; figures and a JSON file go beside it.
+        commands: whose commands hold if the record and the scenario differ.
+        estimation: what is estimated.
+        voice: how the command speaks.
+    """
+    from subzero.calibration.numbers import full_name
+    from subzero.stage import staged
+    from subzero.write_calibration import files_of, tell, write_all
+
+    names = files_of(out)
+    wanted = [full_name(name) for name in estimation.free or ()]
+    if scenario is not None:
+        scenarios.load(scenario)  # a mistake in it answers at once
+    with staged(out.parent, names) as stage:
+        logged = _read(records, scenario, commands)
+        from subzero.calibration.api import calibrate as run
+
+        with progress_bar("Calibrating", lambda: COSTS) as progress:
+            found = run(logged, free=wanted, vehicle=vehicle, progress=progress, quick=estimation.quick)
+        write_all(found, stage, out.stem)
+    tell(found, stage, out, voice=voice)
+    return NO_CALIBRATION if found.refused else FINE
+
+
 def challenge(
     scenario: str = "fig6",
     *,
@@ -147,6 +205,7 @@ def challenge(
 def add_to(app: cyclopts.App) -> None:
     """Add the commands to the command line."""
     register(app, diagnose)
+    register(app, calibrate)
     register(app, challenge)
 
 

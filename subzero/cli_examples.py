@@ -31,6 +31,10 @@ EXAMPLES = {
         "subzero diagnose fig6 record.csv --out found",
         "subzero diagnose hidden --scenario fig6 --screen",
     ),
+    "calibrate": (
+        "subzero calibrate zigzag.csv dive.csv --scenario fig6 --out my_vehicle.toml",
+        "subzero calibrate flown --free rudder.lift_slope rudder_servo.lag --quick",
+    ),
     "challenge": ("subzero challenge fig6 --seed 38 --out hidden", "subzero challenge --reveal hidden"),
     "sweep": ("subzero sweep cable_and_current.toml",),
     "doctor": ("subzero doctor",),

@@ -26,6 +26,7 @@ from importlib import import_module
 from typing import Any
 
 _HOME = {
+    "CALIBRATED": ("results", "CALIBRATED"),
     "CAUSE_NAMED": ("results", "CAUSE_NAMED"),
     "Cause": ("results", "Cause"),
     "ChannelGain": ("results", "ChannelGain"),
@@ -40,6 +41,7 @@ _HOME = {
     "Logged": ("hypothesis.logged", "Logged"),
     "Misfit": ("results", "Misfit"),
     "NOISE": ("hypothesis.catalogue", "NOISE"),
+    "NOTHING_NEAR": ("results", "NOTHING_NEAR"),
     "NOTHING_WRONG": ("results", "NOTHING_WRONG"),
     "NextTrial": ("results", "NextTrial"),
     "ONSETS": ("hypothesis.catalogue", "ONSETS"),

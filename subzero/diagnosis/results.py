@@ -12,14 +12,16 @@ from subzero.channels import BY_NAME
 from subzero.external_force import MissingForce
 from subzero.overview import Overview
 
-NOTHING_WRONG, CAUSE_NAMED, UNDECIDED, OUTSIDE, DATA_ERROR = (
+NOTHING_WRONG, CALIBRATED, CAUSE_NAMED, UNDECIDED, OUTSIDE, NOTHING_NEAR, DATA_ERROR = (
     "nothing_wrong",
+    "calibrated",
     "cause_named",
     "undecided",
     "outside_catalogue",
+    "nothing_near",
     "data_error",
 )
-"""The five verdicts."""
+"""The seven verdicts."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -289,7 +291,7 @@ class Verdict:
     """The outcome of `subzero.diagnose`.
 
     Attributes:
-        verdict: one of the five.
+        verdict: one of the seven.
         sentence: the verdict in words.
         causes: what is named.
         rivals: what else the records allow, most probable first; all of it where the records do not decide.

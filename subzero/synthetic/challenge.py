@@ -16,6 +16,7 @@ from subzero.channels import HEADING, TIME, TURN, column_name
 from subzero.diagnosis.hypothesis.catalogue import START, catalogue
 from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.effect import Effect
+from subzero.diagnosis.hypothesis.hypotheses import with_tolerances
 from subzero.errors import UserError, printable
 from subzero.model import Model, load
 from subzero.records.consistency import REPORTED_COMMANDS
@@ -87,7 +88,8 @@ def challenge(
             f"The scenario {trial.name} prescribes the motion: whatever is wrong, the vehicle moves alike. "
             "Take a trial with commands, such as fig6."
         )
-    nominal, effects = Setting(trial=trial, model=Model.of(trial)), catalogue(BASIC)
+    nominal = Setting(trial=trial, model=Model.of(trial))
+    effects = {key: with_tolerances(effect, nominal) for key, effect in catalogue(BASIC).items()}
     both = (*effects.values(), *START)
     times = sample_times(trial.duration, SAMPLE_S)
     for attempt in range(10):

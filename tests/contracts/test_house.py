@@ -13,6 +13,7 @@ FLOORS = {
     "vehicle": 6,
     "scenarios": 6,
     "subzero.autopilot": 8,
+    "subzero.calibration": 4,
     "subzero.diagnosis": 12,
     "subzero.page": 3,
     "subzero.records": 2,

@@ -10,7 +10,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from subzero.diagnosis import CAUSE_NAMED, NOTHING_WRONG, OUTSIDE, UNDECIDED, catalogue
+from subzero.diagnosis import (
+    CALIBRATED,
+    CAUSE_NAMED,
+    NOTHING_NEAR,
+    NOTHING_WRONG,
+    OUTSIDE,
+    UNDECIDED,
+    catalogue,
+)
 from subzero.diagnosis.inference import (
     UNTRIED_LOG_POSTERIOR,
     Beliefs,
@@ -20,6 +28,7 @@ from subzero.diagnosis.inference import (
     decide,
     occam_folded,
     practical_causes,
+    qualified,
 )
 
 
@@ -77,6 +86,31 @@ def test_only_causes_beyond_four_tolerances_are_large():
     ids = ("rudder_lag", "rudder_offset")
     assert practical_causes(entries, ids, tolerance * [-5.0, 3.0], 1.0) == ("rudder_offset",)
     assert practical_causes(entries, ids, tolerance * [-5.0, 3.0], 2.0) == (), "tolerances twice as wide"
+
+
+@pytest.mark.parametrize(
+    ("tolerances", "kappa", "excess", "said", "verdict"),
+    [
+        (3.9, 2.0, 1.0, NOTHING_WRONG, NOTHING_WRONG),
+        (-4.1, 1.0, 1.0, NOTHING_WRONG, CALIBRATED),
+        (0.5, 4.0, 1.0, NOTHING_WRONG, CALIBRATED),
+        (0.5, 1.0, 1.5, NOTHING_WRONG, NOTHING_NEAR),
+        (0.5, 1.0, 1.5, UNDECIDED, NOTHING_NEAR),
+        (9.0, 4.0, 1.0, UNDECIDED, UNDECIDED),
+        (9.0, 4.0, 1.5, CAUSE_NAMED, CAUSE_NAMED),
+        (9.0, 4.0, 1.5, OUTSIDE, OUTSIDE),
+    ],
+)
+def test_nothing_is_wrong_only_where_the_vehicle_stayed_what_it_was_and_noise_is_left(
+    tolerances, kappa, excess, said, verdict
+):
+    effect = catalogue(("heading",))["rudder_offset"]
+    tolerance = effect.parameters[0].tolerance
+    entries = [SimpleNamespace(record=-1, parameter=effect.parameters[0]),
+               SimpleNamespace(record=0, parameter=effect.parameters[0])]  # fmt: skip
+    r = np.full(2000, np.sqrt(excess))
+    fit = SimpleNamespace(z=tolerance * np.array([tolerances, 50.0]), r=r)
+    assert qualified(said, entries, SimpleNamespace(fit=fit, kappa=kappa)) == verdict
 
 
 @pytest.mark.parametrize(

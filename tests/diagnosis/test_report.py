@@ -12,8 +12,10 @@ import pytest
 from rich.console import Console
 
 from subzero.diagnosis import (
+    CALIBRATED,
     CAUSE_NAMED,
     DATA_ERROR,
+    NOTHING_NEAR,
     NOTHING_WRONG,
     OUTSIDE,
     UNDECIDED,
@@ -285,6 +287,18 @@ def test_the_terminal_names_the_file_that_is_simulated_with_and_shows_every_erro
     said = capsys.readouterr().out
     assert "subzero simulate fig6 --with 'some where/extended.toml'" in said
     assert " ".join(said.split()).count("nominal extended best rival noise floor") == 1
+
+
+@pytest.mark.parametrize(("verdict", "wrong", "sure"), [(CALIBRATED, "wants calibration", "could not have shown"),
+                                                        (NOTHING_NEAR, "more than noise", "do not fit")])  # fmt: skip
+def test_numbers_that_are_far_off_lead_to_a_calibration(verdict, wrong, sure):
+    found = Verdict(verdict=verdict, sentence="", detectable=NAMED.detectable, misfit=NAMED.misfit)
+    said = answers(found)
+    assert wrong in said["What is wrong"]
+    assert sure in said["How sure is that"]
+    assert "Nothing has to be done" not in said["What to do next"]
+    (command,) = [one.command for one in report.summary(found, "zigzag") if one.command]
+    assert command.startswith("subzero calibrate RECORDS --scenario zigzag")
 
 
 def test_an_interrupted_verdict_says_so():

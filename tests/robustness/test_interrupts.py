@@ -187,13 +187,16 @@ OF_A_DIAGNOSIS = {
 """What docs/diagnosis.md says that a diagnosis leaves behind."""
 
 
+VERDICTS = ("nothing_wrong", "calibrated", "cause_named", "undecided", "outside_catalogue", "nothing_near")
+
+
 def check_unfinished(folder, left):
     """A diagnosis that was interrupted once writes what it has: its report and its numbers, and what it has no gain of
     has no figure of it.
     """
     assert {"out/report.html", "out/report.md", "out/diagnosis.json"} <= set(left) <= OF_A_DIAGNOSIS, left
     said = json.loads((folder / "out" / "diagnosis.json").read_text(encoding="utf-8"))
-    assert said["verdict"] in ("nothing_wrong", "cause_named", "undecided", "outside_catalogue")
+    assert said["verdict"] in VERDICTS
 
 
 def interrupt_commands(seed, count, names, made, folder, cold=False):

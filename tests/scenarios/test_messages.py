@@ -298,7 +298,7 @@ def test_an_own_cable_is_held_against_the_shipped_one(complaints):
         "own.toml, line 5, cable.diameter: found -0.0025, but this is outside its limits. "
         "Allowed: 1e-06 to 1 m; plausible is 0.0024 to 0.0026.",
         "own.toml, line 6, cable.tangential_drag_coefficient: found 'low', but 'origin' says nothing here. "
-        "Allowed: value, unit, range, limits, source.",
+        "Allowed: value, unit, range, tolerance, limits, source.",
         "own.toml, line 7, cable.normal_drag_coefficient: found 1.0, but its unit is not given. "
         'Allowed: unit = "1".',
     ]

@@ -30,11 +30,13 @@ from subzero.diagnosis.assessment.identifiability import (
 from subzero.diagnosis.assessment.next_trial import (
     DECISIVE_DISCRIMINATION,
     Belief,
+    is_safe,
     next_trial,
     outlook,
     outlooks,
+    prepared_trial,
 )
-from subzero.diagnosis.assessment.residuals import curves, misfits
+from subzero.diagnosis.assessment.residuals import curves, misfits, whiteness
 from subzero.diagnosis.assessment.trial_library import (
     LIBRARY,
     PLANE_AMPLITUDE,
@@ -45,8 +47,10 @@ from subzero.diagnosis.assessment.trial_library import (
     rich,
     rudder_doublets,
 )
+from subzero.diagnosis.assessment.trial_library import rows_of as trial_rows
 
 __all__ = ["BLOCKS", "DECISIVE_DISCRIMINATION", "LIBRARY", "PLANE_AMPLITUDE", "RUDDER_AMPLITUDE", "Belief", "Fitted",
-           "cruise", "curves", "detectability", "fastest", "flown", "gain", "held_out", "information", "marginal",
-           "misfits", "next_trial", "outlook", "outlooks", "parts_of", "raw", "rich", "rows_of", "rudder_doublets",
-           "separation", "share", "with_whole_effects"]  # fmt: skip
+           "cruise", "curves", "detectability", "fastest", "flown", "gain", "held_out", "information", "is_safe",
+           "marginal", "misfits", "next_trial", "outlook", "outlooks", "parts_of", "prepared_trial", "raw", "rich",
+           "rows_of", "rudder_doublets", "separation", "share", "trial_rows", "whiteness",
+           "with_whole_effects"]  # fmt: skip

@@ -42,6 +42,7 @@ from subzero.diagnosis.results import NextTrial
 if TYPE_CHECKING:
     from subzero.diagnosis.hypothesis.configuration import Setting
     from subzero.diagnosis.inference.map_fit import Fit
+    from subzero.diagnosis.inference.simulator import Track
 
 
 class Survivor(Protocol):
@@ -281,16 +282,18 @@ def _looked_at(
 def _shown(coming: Problem, held: Sequence[Belief]) -> np.ndarray | None:
     """Return h(z) (hypotheses, m) of a trial; None if a hypothesis leads it out of safe depths."""
     tracks = coming.tracks([(0, one.z) for one in held])
-    depths = np.stack([track[1][:, 2] for track in tracks])
-    start = coming.records[0].setting.trial.start.depth
-    if (
-        not np.isfinite(depths).all()
-        or depths.min() < min(MIN_DEPTH_M, start)
-        or depths.max() > start + MAX_DEEPER_M
-    ):
+    if not is_safe(coming, tracks):
         return None
     return np.stack([coming.whitened(0, coming.setting(0, one.z), track)
                      for one, track in zip(held, tracks, strict=True)])  # fmt: skip
+
+
+def is_safe(coming: Problem, tracks: Sequence[Track]) -> bool:
+    """Say whether a trial to come stays within safe depths, whatever of some tracks it takes."""
+    depths = np.stack([track[1][:, 2] for track in tracks])
+    start = coming.records[0].setting.trial.start.depth
+    return bool(np.isfinite(depths).all() and depths.min() >= min(MIN_DEPTH_M, start)
+                and depths.max() <= start + MAX_DEEPER_M)  # fmt: skip
 
 
 def _apart(shown: np.ndarray) -> float:

@@ -7,11 +7,13 @@ of causes, whose entries get the prior variance s² instead of (κτ)².
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import combinations
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.effect import Effect, Parameter
 
 
@@ -52,6 +54,61 @@ def grouped(entries: tuple[Entry, ...]) -> list[tuple[Effect, list[int], int]]:
     for k, entry in enumerate(entries):
         found.setdefault((entry.effect.id, entry.record), (entry.effect, [], entry.record))[1].append(k)
     return list(found.values())
+
+
+def number_of(name: str, setting: Setting) -> float:
+    """Return a number of a setting's vehicle, cable or drum, by its dotted name such as "vehicle.rudder.lift_slope"."""
+    found: Any = setting.model
+    for key in name.split("."):
+        found = getattr(found, key)
+    return float(found)
+
+
+def with_tolerances(effect: Effect, setting: Setting) -> Effect:
+    """Return an effect with the tolerances that the files of a setting's vehicle, cable or trial declare.
+
+    A parameter that moves a number by dv/dz may move it by the tolerance that is declared, τ / |dv/dz|; of several such
+    numbers the one that is least allowed counts. Where nothing is declared the tolerance of the catalogue holds.
+    """
+    declared = setting.trial.tolerances
+    if not declared:
+        return effect
+    parameters = []
+    for at, one in enumerate(effect.parameters):
+        slopes = {name: _slope(effect, at, setting, name) for name in declared}
+        allowed = [declared[name] / slope for name, slope in slopes.items() if slope > 0.0]
+        parameters.append(replace(one, tolerance=min(allowed)) if allowed else one)
+    return replace(effect, parameters=tuple(parameters))
+
+
+def _slope(effect: Effect, at: int, setting: Setting, name: str) -> float:
+    """Return by how much a parameter of an effect moves a number, over its deviation."""
+    z = small_deviation(effect.parameters[at])
+    moved = _moved(effect, at, setting)
+    return abs(number_of(name, moved) - number_of(name, setting)) / abs(z)
+
+
+def small_deviation(parameter: Parameter) -> float:
+    """Return a deviation as large as the tolerance, on the side that is possible."""
+    return parameter.tolerance if parameter.tolerance <= parameter.high else -parameter.tolerance
+
+
+def _moved(effect: Effect, at: int, setting: Setting) -> Setting:
+    """Return a setting with one parameter of an effect moved by its tolerance."""
+    return effect.apply(
+        setting, *(small_deviation(one) if i == at else 0.0 for i, one in enumerate(effect.parameters))
+    )
+
+
+def moves_nothing(effect: Effect, setting: Setting) -> bool:
+    """Say whether an effect is none in a setting: a share of a number that is zero there."""
+    moved = [_moved(effect, at, setting) for at in range(len(effect.parameters))]
+    return all(_same(one, setting) for one in moved)
+
+
+def _same(one: Setting, other: Setting) -> bool:
+    parts = ("model", "sensing", "clock_offset", "later", "tethered")
+    return one.trial is other.trial and all(getattr(one, part) == getattr(other, part) for part in parts)
 
 
 Ids = tuple[str, ...]

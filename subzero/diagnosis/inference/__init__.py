@@ -34,7 +34,15 @@ it for what stands outside the diagnosis).
 # ruff: noqa: I001 - in the order in which they stand on one another, not in that of the alphabet
 
 from subzero.diagnosis.hypothesis.data_error import KINDS as KINDS_OF_DATA_ERRORS, DataError
-from subzero.diagnosis.hypothesis.hypotheses import PRIOR, columns_of, entries_of, log_prior, variances
+from subzero.diagnosis.hypothesis.hypotheses import (
+    PRIOR,
+    columns_of,
+    entries_of,
+    log_prior,
+    moves_nothing,
+    variances,
+    with_tolerances,
+)
 from subzero.diagnosis.inference.noise import Behind, Noise, Usual, estimate, resolution_of, spikes
 from subzero.diagnosis.hypothesis.measurement import TRUTHS
 from subzero.diagnosis.inference.simulator import (
@@ -45,8 +53,8 @@ from subzero.diagnosis.inference.simulator import (
     simulate_track,
     with_stops,
 )
-from subzero.diagnosis.inference.problem import Observed, Problem
-from subzero.diagnosis.inference.posing import pose
+from subzero.diagnosis.inference.problem import Observed, Problem, Progress
+from subzero.diagnosis.inference.posing import pose, with_finer_steps, with_noise_behind
 from subzero.diagnosis.inference.linear_gaussian import (
     KAPPAS,
     ForceInformation,
@@ -64,11 +72,15 @@ from subzero.diagnosis.inference.linear_gaussian import (
 from subzero.diagnosis.inference.map_fit import (
     Fit,
     at_bad_minimum,
+    bounded_step,
+    bounds,
     broyden_update,
     is_poor_fit,
+    objective,
     quadratic_step,
     refit,
     restarted_where_smooth,
+    runnable,
 )
 from subzero.diagnosis.inference.laplace import Candidate, candidate_of, laplace
 from subzero.diagnosis.inference.change_point_scan import (
@@ -103,8 +115,10 @@ from subzero.diagnosis.inference.model_average import (
     Beliefs,
     ChangePointSummary,
     decide,
+    is_noise,
     occam_folded,
     practical_causes,
+    qualified,
 )
 from subzero.diagnosis.inference.out_of_catalogue import Findings, special_cases_folded
 
@@ -131,6 +145,7 @@ __all__ = [
     "Noise",
     "Observed",
     "Problem",
+    "Progress",
     "Quadratic",
     "RunCache",
     "Scale",
@@ -139,6 +154,8 @@ __all__ = [
     "Usual",
     "all_columns",
     "at_bad_minimum",
+    "bounded_step",
+    "bounds",
     "broyden_update",
     "candidate_of",
     "change_point_columns",
@@ -154,6 +171,7 @@ __all__ = [
     "freed",
     "grown",
     "history",
+    "is_noise",
     "is_poor_fit",
     "knots_of",
     "laplace",
@@ -164,18 +182,22 @@ __all__ = [
     "log_gains",
     "log_prior",
     "mixed",
+    "moves_nothing",
+    "objective",
     "occam_folded",
     "one_terms",
     "pose",
     "posterior",
     "practical_causes",
     "quadratic_step",
+    "qualified",
     "refit",
     "relinearised_force",
     "repeated_values",
     "resolution_of",
     "respond",
     "restarted_where_smooth",
+    "runnable",
     "scan",
     "seen",
     "simulate_on",
@@ -185,6 +207,9 @@ __all__ = [
     "spikes",
     "times_of",
     "variances",
+    "with_finer_steps",
+    "with_noise_behind",
     "with_stops",
+    "with_tolerances",
     "without_force",
 ]

@@ -219,7 +219,7 @@ def refit(
         most_fresh: how many times sensitivities may be made again.
         made_at: where J was made (k,).
     """
-    z, r = _runnable(problem, np.clip(z, *bounds(problem)), r)
+    z, r = runnable(problem, np.clip(z, *bounds(problem)), r)
     now, fresh, converged, left = objective(r, z, D), 0, False, 0.0
     for _ in range(settings.MAX_STEPS):
         one = damped_step(problem, z, r, now, J, D)
@@ -248,7 +248,7 @@ def refit(
     )
 
 
-def _runnable(problem: Problem, z: np.ndarray, r: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
+def runnable(problem: Problem, z: np.ndarray, r: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
     """Return z, or what is nearer to the nominal model if that cannot be run, and the residual there."""
     r = problem.residual(z) if r is None else r
     for share in (0.5, 0.2, 0.0):

@@ -1,6 +1,9 @@
 """Probabilities of all hypotheses from their evidence, and the decision rule for the verdict.
 
-nothing_wrong      p(none) ≥ 0.5, or the named size is within the practical one (then the model wants calibration)
+nothing_wrong      p(none) ≥ 0.5, or the named size is within the practical one
+calibrated         the same, but numbers had to move by more than 4 tolerances, or tolerances 4 times as wide explain
+                   the records best: the model wants calibration
+nothing_near       nothing is named, and what the best fit leaves is no noise
 cause_named        one hypothesis, or one cause that begins in mid-trial, with p ≥ 0.8, D ≥ 9 to its closest rival,
                    its size beyond 4 tolerances
 outside_catalogue  a latent force or a drift that no cause explains has p ≥ 0.8
@@ -21,7 +24,14 @@ import numpy as np
 
 from subzero.diagnosis.hypothesis.hypotheses import Entry, Ids, columns_of
 from subzero.diagnosis.inference.linear_gaussian import KAPPAS, log_sum
-from subzero.diagnosis.results import CAUSE_NAMED, NOTHING_WRONG, OUTSIDE, UNDECIDED
+from subzero.diagnosis.results import (
+    CALIBRATED,
+    CAUSE_NAMED,
+    NOTHING_NEAR,
+    NOTHING_WRONG,
+    OUTSIDE,
+    UNDECIDED,
+)
 
 if TYPE_CHECKING:
     from subzero.diagnosis.inference.laplace import Candidate
@@ -110,6 +120,35 @@ def decide(
     if best and practical and apart >= MIN_DISCRIMINATION and probabilities[best] >= NAMED_PROBABILITY:
         return CAUSE_NAMED
     return UNDECIDED
+
+
+EXCESS_SIGMAS = 6.0
+"""A square of the whitened residual that is so many standard deviations above that of noise is no noise. [-]"""
+
+
+def has_moved(entries: Sequence[Entry], z: np.ndarray, kappa: float) -> bool:
+    """Say whether a fit z (k,) is no longer the vehicle that was declared: a number that all records share is more than
+    PRACTICAL_TOLERANCES off, or the widest scale κ of the tolerances is the most probable.
+    """
+    shared = [k for k, entry in enumerate(entries) if entry.record < 0]
+    sizes = [abs(float(z[k])) / entries[k].parameter.tolerance for k in shared]
+    return kappa == max(KAPPAS) or max(sizes, default=0.0) > PRACTICAL_TOLERANCES
+
+
+def is_noise(r: np.ndarray) -> bool:
+    """Say whether a whitened residual (m,) is no larger than noise."""
+    return bool(r @ r <= r.size + EXCESS_SIGMAS * np.sqrt(2.0 * r.size))
+
+
+def qualified(verdict: str, entries: Sequence[Entry], best: Candidate) -> str:
+    """Return a verdict that names nothing as the best fit allows it: a vehicle that had to move far is not one with
+    nothing wrong, and where the best fit leaves more than noise nothing came near.
+    """
+    if verdict in (NOTHING_WRONG, UNDECIDED) and not is_noise(best.fit.r):
+        return NOTHING_NEAR
+    if verdict == NOTHING_WRONG and has_moved(entries, best.fit.z, best.kappa):
+        return CALIBRATED
+    return verdict
 
 
 UNTRIED_LOG_POSTERIOR = 2.0

@@ -17,7 +17,7 @@ import numpy as np
 from subzero.channels import HEADING, turned
 from subzero.diagnosis.hypothesis.catalogue import ONSETS, START, catalogue
 from subzero.diagnosis.hypothesis.catalogue.sensors import SPECS
-from subzero.diagnosis.hypothesis.hypotheses import entries_of
+from subzero.diagnosis.hypothesis.hypotheses import entries_of, moves_nothing, with_tolerances
 from subzero.diagnosis.inference.noise import (
     Behind,
     Noise,
@@ -59,8 +59,8 @@ def pose(records: Sequence[Logged], more: Iterable[Effect] = ()) -> Problem:
     nominal = observed[0].setting
     effects = [
         replace(effect, parameters=tuple(one.within(nominal) for one in effect.parameters))
-        for effect in catalogue(channels, more).values()
-        if _possible(effect, observed)
+        for effect in (with_tolerances(one, nominal) for one in catalogue(channels, more).values())
+        if _possible(effect, observed) and not moves_nothing(effect, nominal)
     ]
     onsets = tuple(effect for effect in ONSETS if _possible(effect, observed))
     return Problem(records=observed, entries=entries_of(effects, START, len(observed)), onsets=onsets)

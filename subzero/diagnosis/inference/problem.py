@@ -121,12 +121,16 @@ class Problem:
         count = len(self.records)
         return [np.concatenate(shown[at : at + count]) for at in range(0, len(shown), count)]
 
-    def jacobian(self, z: np.ndarray, columns: Sequence[int] | None = None) -> np.ndarray:
-        """Return J (m, k) at z by one-sided differences; only some of its columns, if asked, others 0."""
+    def jacobian(
+        self, z: np.ndarray, columns: Sequence[int] | None = None, *, side: float = 1.0
+    ) -> np.ndarray:
+        """Return J (m, k) at z by one-sided differences, upwards (1) or downwards (-1) where bounds let them; only some
+        of its columns, if asked, others 0.
+        """
         wanted = range(len(self.entries)) if columns is None else columns
         base = self.tracks([(i, z) for i in range(len(self.records))])
         shown = [self.whitened(i, self.setting(i, z), track) for i, track in enumerate(base)]
-        jobs = [(k, i, self.moved(z, k)) for k in wanted for i in range(len(self.records))
+        jobs = [(k, i, self.moved(z, k, side)) for k in wanted for i in range(len(self.records))
                 if self.entries[k].record in (-1, i)]  # fmt: skip
         stops = [self._stops(i, z, wanted) for i in range(len(self.records))]
         early = [(k, i, moved) for k, i, moved in jobs if not self._late(k)]
@@ -147,13 +151,22 @@ class Problem:
     def _late(self, k: int) -> bool:
         return self.entries[k].effect.slot in POST_RUN_SLOTS
 
-    def moved(self, z: np.ndarray, k: int) -> np.ndarray:
-        """Return z with entry k moved by a step, away from the nearer bound."""
+    def central_jacobian(self, z: np.ndarray) -> np.ndarray:
+        """Return J (m, k) at z by central differences, whose error is of the second order; one-sided at bounds.
+
+        Where runs part quickly, as those of an unstable vehicle, and columns nearly cancel, one-sided ones show
+        information where there is none.
+        """
+        return 0.5 * (self.jacobian(z) + self.jacobian(z, side=-1.0))
+
+    def moved(self, z: np.ndarray, k: int, side: float = 1.0) -> np.ndarray:
+        """Return z with entry k moved by a step to a side, or to the other one if a bound is nearer than that."""
         parameter, moved = self.entries[k].parameter, z.copy()
         at_rest = parameter.low == 0.0 and z[k] < parameter.tolerance
         step = parameter.step or (1.0 if at_rest else JACOBIAN_STEP) * parameter.tolerance
         step = max(step, JACOBIAN_STEP_SHARE * abs(z[k]))
-        moved[k] += step if z[k] + step <= parameter.high else -step
+        step *= side
+        moved[k] += step if parameter.low <= z[k] + step <= parameter.high else -step
         return moved
 
     def tracks(

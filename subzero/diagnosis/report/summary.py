@@ -16,7 +16,15 @@ from subzero.channels import BY_NAME
 from subzero.diagnosis.hypothesis.extended_model import plain_id
 from subzero.diagnosis.report import words
 from subzero.diagnosis.report.tables import CLEAR_FROM, CONFUSED_BELOW, SEEN_SIGNAL
-from subzero.diagnosis.results import CAUSE_NAMED, NOTHING_WRONG, OUTSIDE, UNDECIDED, Verdict
+from subzero.diagnosis.results import (
+    CALIBRATED,
+    CAUSE_NAMED,
+    NOTHING_NEAR,
+    NOTHING_WRONG,
+    OUTSIDE,
+    UNDECIDED,
+    Verdict,
+)
 
 SURE = {
     0.999: "As sure as records can make one",
@@ -64,14 +72,20 @@ def summary(
         scenario: the trial's name, for lines of the shell.
         extended: path of the extended model, likewise.
     """
-    command = f"subzero simulate {scenario} --with {extended}" if _is_new(verdict) else ""
     return (
         Answer("What is wrong", tuple(_wrong(verdict))),
         Answer("How sure is that", tuple(_sure(verdict))),
         Answer("What it costs", tuple(_costs(verdict))),
-        Answer("What to do next", tuple(_next(verdict)), command),
+        Answer("What to do next", tuple(_next(verdict)), _command(verdict, scenario, extended)),
         Answer("What would settle it", tuple(_settles(verdict))),
     )
+
+
+def _command(verdict: Verdict, scenario: str, extended: str) -> str:
+    """Return the line of the shell that does what is to be done next, "" if there is none."""
+    if verdict.on_model in (CALIBRATED, NOTHING_NEAR):
+        return f"subzero calibrate RECORDS --scenario {scenario} --out my_vehicle.toml"
+    return f"subzero simulate {scenario} --with {extended}" if _is_new(verdict) else ""
 
 
 def _is_new(verdict: Verdict) -> bool:
@@ -106,7 +120,9 @@ def _sure(verdict: Verdict) -> Iterator[str]:
         sure = f"{_in_words(probability)} (probability {words.probability(probability)})."
         nothing = f"That nothing {'else ' if verdict.then else ''}is wrong: {sure[:1].lower()}{sure[1:]}"
         yield nothing if verdict.on_model == NOTHING_WRONG else sure
-    if verdict.on_model == NOTHING_WRONG:
+    if verdict.on_model == NOTHING_NEAR:
+        yield "No probability says anything here: all are of explanations that do not fit."
+    elif verdict.on_model in (NOTHING_WRONG, CALIBRATED):
         yield from _not_seen(verdict)
     elif verdict.on_model != UNDECIDED:
         yield from _runner_up(verdict)
@@ -267,6 +283,13 @@ def _next(verdict: Verdict) -> Iterator[str]:
             if verdict.next_trial
             else ("Look at what the explanations have in common, or log another channel.")
         )
+    elif verdict.on_model == CALIBRATED:
+        yield "Calibrate the vehicle with these records and others, and diagnose them again with the calibrated one:"
+    elif verdict.on_model == NOTHING_NEAR:
+        yield (
+            "Hold the record against its trial: units, signs, commands, the clock, the vehicle, the cable. If they are "
+            "right, numbers of the vehicle may be far off; estimate them:"
+        )
     elif not verdict.then:
         yield "Nothing has to be done."
     if _is_new(verdict):
@@ -291,6 +314,8 @@ def _settles(verdict: Verdict) -> Iterator[str]:
         yield "A trial with other commands: the extended model has to explain it without another fit."
     elif verdict.on_model == NOTHING_WRONG:
         yield "A manoeuvre or a sensor that shows what these records could not have shown, in the last table."
+    elif verdict.on_model == CALIBRATED:
+        yield "`subzero calibrate` tells which numbers it is, how far, and which trial would determine the rest."
     else:
         yield (
             "A longer look: the verdict is of the first one."

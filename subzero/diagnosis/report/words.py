@@ -11,8 +11,10 @@ import numpy as np
 from subzero.channels import BY_NAME
 from subzero.diagnosis.hypothesis.extended_model import all_effects, plain_id
 from subzero.diagnosis.results import (
+    CALIBRATED,
     CAUSE_NAMED,
     DATA_ERROR,
+    NOTHING_NEAR,
     NOTHING_WRONG,
     OUTSIDE,
     UNDECIDED,
@@ -27,6 +29,8 @@ from subzero.external_force import FEATURES
 
 HEADLINES = {
     NOTHING_WRONG: "Nothing is wrong beyond tolerance",
+    CALIBRATED: "No cause, but the model wants calibration",
+    NOTHING_NEAR: "Nothing comes near these records",
     CAUSE_NAMED: "The cause is named",
     UNDECIDED: "Undecided: several causes explain the records as well",
     OUTSIDE: "Something real, and outside the catalogue",
@@ -223,6 +227,10 @@ def on_model(verdict: Verdict) -> str:
         return f"{_capital(said)}, and no cause of the catalogue explains it."
     if verdict.on_model == NOTHING_WRONG:
         return f"Nothing is wrong beyond the tolerances of the model.{_within(verdict)}"
+    if verdict.on_model == CALIBRATED:
+        return "No part is at fault, but numbers of the model are off beyond their tolerances: it wants calibration."
+    if verdict.on_model == NOTHING_NEAR:
+        return "Nothing explains these records: what the best explanation leaves of them is more than noise."
     return verdict.sentence
 
 

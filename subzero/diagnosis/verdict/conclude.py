@@ -19,10 +19,13 @@ from subzero.diagnosis.inference.model_average import (
     ChangePointSummary,
     credible_set,
     decide,
+    qualified,
     tolerance_scale,
 )
 from subzero.diagnosis.results import (
+    CALIBRATED,
     CAUSE_NAMED,
+    NOTHING_NEAR,
     NOTHING_WRONG,
     OUTSIDE,
     UNDECIDED,
@@ -154,7 +157,8 @@ def decided(findings: Findings, ranked: Ranked) -> str:
     forces = sum(p for key, p in ranked.outside.items() if "@" not in key)
     is_practical = bool(practical_of(findings, ranked.best))
     apart = ranked.close_to_best.discrimination
-    return decide(ranked.inside, forces, is_practical, apart, ranked.change_point)
+    verdict = decide(ranked.inside, forces, is_practical, apart, ranked.change_point)
+    return qualified(verdict, findings.problem.entries, ranked.best)
 
 
 def remaining_models(ranked: Ranked) -> RemainingModels:
@@ -256,6 +260,13 @@ def _sentence(
     if verdict == NOTHING_WRONG:
         size = f" The fit moves {name(best.ids)}, within what calibration may." if best.ids else ""
         return f"Nothing is wrong beyond the tolerances of the model.{size}"
+    if verdict == CALIBRATED:
+        return (
+            "No cause is named, but numbers of the model had to move beyond their tolerances: it wants calibration. "
+            "`subzero calibrate` estimates them."
+        )
+    if verdict == NOTHING_NEAR:
+        return "Nothing comes near: what the best explanation leaves of these records is no noise."
     if verdict == CAUSE_NAMED:
         since = f"From {named[0].start_time:g} s on, " if named[0].start_time is not None else ""
         words = since + ", and ".join(cause.sentence for cause in named)

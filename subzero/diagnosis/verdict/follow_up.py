@@ -33,7 +33,9 @@ from subzero.diagnosis.inference.change_point_scan import BaseRun, change_point_
 from subzero.diagnosis.inference.model_average import MIN_DISCRIMINATION
 from subzero.diagnosis.inference.out_of_catalogue import Findings, shares
 from subzero.diagnosis.results import (
+    CALIBRATED,
     CAUSE_NAMED,
+    NOTHING_NEAR,
     NOTHING_WRONG,
     OUTSIDE,
     UNDECIDED,
@@ -58,7 +60,7 @@ if TYPE_CHECKING:
     from subzero.diagnosis.inference.map_fit import Fit
     from subzero.diagnosis.inference.model_search import Search
 
-RIVALS_DRAWN = {CAUSE_NAMED: 1, OUTSIDE: 1, UNDECIDED: 3, NOTHING_WRONG: 0}
+RIVALS_DRAWN = {CAUSE_NAMED: 1, OUTSIDE: 1, UNDECIDED: 3, NOTHING_NEAR: 1, CALIBRATED: 0, NOTHING_WRONG: 0}
 """Verdict → so many rivals are drawn: of what is undecided, the best and two more."""
 MAX_SURVIVORS = 4
 """At most so many hypotheses are to be told apart by the next trial."""

@@ -1,0 +1,328 @@
+"""The most probable numbers, the noise behind them, and the covariance of both together.
+
+    M = P⁻¹,  P = D⁻¹ + Jᵀ J;        honest:  M' = P⁻¹ (D⁻¹ + Jᵀ Ω J) P⁻¹,   Ω = cov(r)
+
+M is right if the whitened residual r is white. What a noise model of one slow part leaves of other colours is in Ω,
+estimated by sums over blocks of each channel (Liang and Zeger 1986); variances are inflated by what that is more.
+
+A vehicle whose numbers are off by 40 % leaves records far off, where the linear problem says little. So the fit begins
+with the beginnings of the records and more noise than there is, lowered as it comes closer, from several starts; it
+goes on with the usual noise, the estimated one, and the error of the economical steps made good. Sensors, fins and
+start are free from the first step on: what they are off by is many times the noise, and numbers that must make up for
+it without them end in a wrong minimum.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.special import ndtri
+from scipy.stats.qmc import Sobol
+
+from subzero.calibration.numbers import STEP_SHARE
+from subzero.diagnosis.inference import (
+    Fit,
+    Problem,
+    Progress,
+    bounded_step,
+    bounds,
+    broyden_update,
+    economical,
+    objective,
+    posterior,
+    quadratic_step,
+    runnable,
+    with_finer_steps,
+    with_noise_behind,
+)
+
+HORIZONS = ((0.3, 0.6, 1.0), (0.1, 0.2, 0.35, 0.6, 1.0))
+"""Shares of the records that are fitted, one behind the other; of the first start, and of the second. [-]"""
+MORE_STARTS, START_SHARE = 4, 0.3
+"""Starts with other numbers, up to this share of each, where those did not end in the same minimum. [-]"""
+SAME_MINIMUM = 10.0
+"""Fits of two starts whose objectives differ by less ended in the same minimum; others differ by hundreds. [nat]"""
+MAX_CHECKS = 3
+"""How often a fit goes on from what is better at the end of an interval."""
+SIGMAS_95 = float(ndtri(0.975))
+"""Half an interval of 95 % in standard deviations."""
+LEAST_RISE = 0.25
+"""−2 log posterior that rises by less than this at the end of an interval says only that it is far wider. [-]"""
+MAX_PROFILE_STEPS, PROFILE_GAIN = 5, 0.1
+"""Steps of the fit of all others with one number held, and the gain that is worth one more. [nat]"""
+MAX_LOWERINGS, FAILED_SHARE = 5, 0.9
+"""Noise is lowered so often; no more where the misfit stays above this share of what it was. [-]"""
+FIRST_MISFIT = 2.0
+"""A fit begins with so much noise that it leaves the vehicle so many levels off. [-]"""
+FIRST_STEPS = 10
+"""Steps of a fit that only leads to the next, at most."""
+MAX_STEPS = 25
+"""Steps of a fit, at most."""
+SETTLED_GAIN = 0.3
+"""A fit that the linear problem promises less than this has settled. [nat]"""
+LEAST_SHARE, FRESH_SHARE = 0.05, 0.5
+"""A step that gains less than the first share of what was promised is not taken; behind one that gains less than the
+second, sensitivities are made again. [-]"""
+FIRST_DAMPING, LEAST_DAMPING = 1.0, 0.1
+"""Damping of a step that failed, in inverse prior variances, and that which is none any more. [-]"""
+OWN_WITHIN = 0.3
+"""Sensitivities will do for a first fit if they were made so close to it, in tolerances."""
+MAX_NOISE_ROUNDS = 2
+"""How often the noise is estimated."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Fitted:
+    """The fit of a calibration.
+
+    Attributes:
+        problem: with the noise that was estimated behind the fit.
+        fit: the most probable deviations.
+        M: their covariance (k, k), inflated.
+        settled: no step would gain more.
+        repeated: another start ended in the same minimum.
+    """
+
+    problem: Problem
+    fit: Fit
+    M: np.ndarray
+    settled: bool
+    repeated: bool = True
+
+
+def fitted(problem: Problem, free: int, D: np.ndarray, progress: Progress) -> Fitted:
+    """Return the most probable deviations, with the noise behind them.
+
+    Args:
+        problem: records, and what is free.
+        free: so many entries, the first ones, are the numbers that are calibrated.
+        D: prior variances of all entries (k,).
+        progress: told the fraction that is done, and what is being done.
+    """
+    first, spread, repeated = _first(problem, free, D, progress)
+    progress(0.5, "fit with usual noise")
+    fit, settled = _settled(problem, first, D)
+    for round in range(MAX_NOISE_ROUNDS):
+        progress(0.6 + 0.1 * round, "noise behind the fit")
+        again = with_noise_behind(problem, fit.z, D)
+        if again is None:
+            break
+        problem = again
+        fit, settled = _settled(problem, fit.z, D)
+    progress(0.8, "errors of the time steps")
+    corrected = with_finer_steps(problem, fit.z)
+    if corrected is not None:
+        problem = corrected
+        fit, settled = _settled(problem, fit.z, D)
+    for round in range(MAX_CHECKS):
+        progress(0.85 + 0.05 * round, "ends of the intervals")
+        M = covariance(problem, fit)
+        wider, better = ends_checked(problem, fit, M, free)
+        if better is None:
+            break
+        fit, settled = _settled(problem, better, D)
+    else:
+        settled = False
+    wider = np.maximum(wider, spread)
+    M = wider[:, None] * M * wider
+    return Fitted(problem=problem, fit=fit, M=M, settled=settled, repeated=repeated)
+
+
+def _first(
+    problem: Problem, free: int, D: np.ndarray, progress: Progress
+) -> tuple[np.ndarray, np.ndarray, bool]:
+    """Return where the fit with usual noise begins (k,), by how much what starts ended at is wider than Laplace's
+    interval says (k,), and whether two ended in the same minimum.
+    """
+    ends: list[Fit] = []
+    for i, (z, shares) in enumerate(_starts(problem, free, D.size)):
+        progress(0.5 * i / (len(HORIZONS) + MORE_STARTS), f"first fit, from start {i + 1}")
+        ends.append(_fit_from(problem, z, D, shares))
+        best = min(ends, key=lambda one: one.objective)
+        same = [one for one in ends if one.objective < best.objective + SAME_MINIMUM]
+        if len(same) > 1:
+            break
+    sd = np.sqrt(np.diag(posterior(best.quadratic, D).M))
+    apart = [
+        np.abs(one.z - best.z) / sd / np.sqrt(1.0 + 2.0 * (one.objective - best.objective)) for one in same
+    ]
+    return best.z, np.maximum(np.max(apart, axis=0), 1.0), len(same) > 1
+
+
+def ends_checked(
+    problem: Problem, fit: Fit, M: np.ndarray, free: int
+) -> tuple[np.ndarray, np.ndarray | None]:
+    """Return by which factors intervals must be wider (k,) for −2 log posterior to rise at their ends as it should; and
+    deviations that are better than the fit (k,), where some are found on the way.
+    """
+    wider = np.ones(fit.z.size)
+    low, high = bounds(problem)
+    for k in range(free):
+        for offset in SIGMAS_95 * np.sqrt(M[k, k]) * np.array([-1.0, 1.0]):
+            if low[k] < fit.z[k] + offset < high[k]:
+                z, rise = held_at(problem, fit, k, offset)
+                if rise < -2.0 * SETTLED_GAIN:
+                    return wider, z
+                wider[k] = max(wider[k], SIGMAS_95 / np.sqrt(max(rise, LEAST_RISE)))
+    return wider, None
+
+
+def held_at(problem: Problem, fit: Fit, k: int, offset: float) -> tuple[np.ndarray, float]:
+    """Return the deviations with entry k held at an offset from the best and all others fitted again (k,), and the rise
+    of −2 log posterior there.
+    """
+    J, D = fit.J, fit.D
+    low, high = bounds(problem)
+    low[k] = high[k] = fit.z[k] + offset
+    z, r, best, at = fit.z, fit.r, np.inf, fit.z
+    for _ in range(MAX_PROFILE_STEPS):
+        step = bounded_step(J, r, z, D, low, high)
+        after = problem.residual(z + step)
+        now = objective(after, z + step, D)
+        if not now < best - PROFILE_GAIN:
+            break
+        J = broyden_update(J, step, after - r, D)
+        z, r, best, at = z + step, after, now, z + step
+    return at, float(2.0 * (best - fit.objective))
+
+
+def _starts(problem: Problem, free: int, size: int) -> Iterator[tuple[np.ndarray, tuple[float, ...]]]:
+    """Give starts (k,), and the shares of the records to begin with: the vehicle as it was, then others around it."""
+    for shares in HORIZONS:
+        yield np.zeros(size), shares
+    nominal = np.array([entry.parameter.tolerance for entry in problem.entries[:free]]) / STEP_SHARE
+    low, high = bounds(problem)
+    for row in Sobol(free, rng=0).random(MORE_STARTS):
+        z = np.zeros(size)
+        z[:free] = START_SHARE * (2.0 * row - 1.0) * nominal
+        yield np.clip(z, low, high), HORIZONS[0]
+
+
+def _fit_from(problem: Problem, z: np.ndarray, D: np.ndarray, shares: Sequence[float]) -> Fit:
+    """Return the fit with usual noise from a start, by way of the beginnings of the records and raised noise."""
+    for share in shares:
+        short = beginnings(problem, share)
+        for _ in range(MAX_LOWERINGS):
+            z, r = runnable(short, z, None)
+            misfit = float(np.sqrt(np.mean(r**2)))
+            if not np.isfinite(misfit):
+                break
+            factor = max(misfit / FIRST_MISFIT, 1.0)
+            fit, _ = _settled(with_more_noise(short, factor), z, D, is_first=True)
+            z = fit.z
+            if factor == 1.0 or factor * np.sqrt(np.mean(fit.r**2)) > FAILED_SHARE * misfit:
+                break
+    return _settled(problem, z, D, is_first=True)[0]
+
+
+def beginnings(problem: Problem, share: float) -> Problem:
+    """Return the problem of the first part of every record, a share of its length."""
+    if share >= 1.0:
+        return problem
+    records = []
+    for one in problem.records:
+        end = share * float(one.time[-1])
+        noise = {}
+        for name, old in one.noise.items():
+            used = old.used & (one.time <= end)
+            noise[name] = replace(old, used=used, time=one.time[used])
+        records.append(replace(one, noise=noise, setting=economical(one.setting, end)))
+    return replace(problem, records=tuple(records))
+
+
+def _settled(problem: Problem, z: np.ndarray, D: np.ndarray, *, is_first: bool = False) -> tuple[Fit, bool]:
+    """Return a fit with sensitivities of its own, and whether a further step would gain nothing.
+
+    A first one, which only leads to the next, takes fewer steps, and makes do with one-sided sensitivities close by.
+
+    Levenberg's and Marquardt's method within bounds (Nielsen 1999): where numbers trade against each other the best fit
+    lies at the end of a curved valley, and a whole step of Gauss and Newton, or a part of it, leaves it.
+    """
+    low, high = bounds(problem)
+    slopes, within = (problem.jacobian, OWN_WITHIN) if is_first else (problem.central_jacobian, 0.0)
+    z, r = runnable(problem, z, None)
+    J, made_at = slopes(z), z
+    now, damping, harder, left = objective(r, z, D), 0.0, 2.0, 0.0
+    for _ in range(FIRST_STEPS if is_first else MAX_STEPS):
+        P, g = J.T @ J + np.diag((1.0 + damping) / D), J.T @ r - z / D
+        step = quadratic_step(P, g, low - z, high - z)
+        left = now - objective(r - J @ step, z + step, D)
+        fresh = made_at is z
+        if left < SETTLED_GAIN and damping < 1.0:
+            if fresh or _apart(problem, z, made_at) < within:
+                break
+            J, made_at = slopes(z), z
+            continue
+        r_there = problem.residual(z + step)
+        then = objective(r_there, z + step, D)
+        share = (now - then) / left if left > 0.0 else 0.0
+        if share > LEAST_SHARE:
+            J = broyden_update(J, step, r_there - r, D)
+            z, r, now = z + step, r_there, then
+            damping *= max(1.0 / 3.0, 1.0 - (2.0 * share - 1.0) ** 3)
+            damping, harder = (damping if damping > LEAST_DAMPING else 0.0), 2.0
+        elif fresh:
+            damping, harder = max(damping, FIRST_DAMPING) * harder, 2.0 * harder
+        if share < FRESH_SHARE and not fresh:
+            J, made_at = slopes(z), z
+    fit = Fit(z=z, r=r, J=J, D=D, objective=now, converged=left < SETTLED_GAIN, predicted_gain=left, fresh=0,
+              made_at=made_at)  # fmt: skip
+    return fit, fit.converged
+
+
+def _apart(problem: Problem, z: np.ndarray, other: np.ndarray) -> float:
+    """Return how far two points are apart, in tolerances."""
+    tolerance = np.array([entry.parameter.tolerance for entry in problem.entries])
+    return float(np.max(np.abs(z - other) / tolerance))
+
+
+def with_more_noise(problem: Problem, factor: float) -> Problem:
+    """Return the problem with noise that is a factor larger in every channel."""
+    records = tuple(
+        replace(
+            one,
+            noise={
+                name: replace(
+                    old, white=factor * old.white, slow=factor * old.slow, resolution=factor * old.resolution
+                )
+                for name, old in one.noise.items()
+            },
+        )
+        for one in problem.records
+    )
+    return replace(problem, records=records)
+
+
+BLOCK_CORRELATIONS = 5.0
+"""A block of the residual lasts so many correlation times of the channel's slow part …"""
+LEAST_BLOCK_S = 2.0
+"""… and no less than this. [s]"""
+
+
+def covariance(problem: Problem, fit: Fit) -> np.ndarray:
+    """Return the covariance of the deviations (k, k), inflated where the residual is not white."""
+    M = posterior(fit.quadratic, fit.D).M
+    scores = block_scores(problem, fit)
+    robust = M @ (np.diag(1.0 / fit.D) + scores.T @ scores) @ M
+    factor = np.sqrt(np.maximum(np.diag(robust) / np.diag(M), 1.0))
+    inflated: np.ndarray = factor[:, None] * M * factor
+    return inflated
+
+
+def block_scores(problem: Problem, fit: Fit) -> np.ndarray:
+    """Return Σ over a block of J r, for every block of every channel of every record (blocks, k)."""
+    found, at = [], 0
+    for record in problem.records:
+        for noise in record.noise.values():
+            own = slice(at, at + noise.count)
+            at += noise.count
+            if noise.count:
+                length = max(
+                    LEAST_BLOCK_S, BLOCK_CORRELATIONS * noise.correlation_time if noise.slow else 0.0
+                )
+                block = ((noise.time - noise.time[0]) // length).astype(int)
+                score = fit.J[own] * fit.r[own][:, None]
+                found.append(np.stack([score[block == one].sum(axis=0) for one in np.unique(block)]))
+    return np.concatenate(found)

@@ -1,0 +1,125 @@
+"""The calibrated vehicle (or cable) as a file that every command takes: the file it was, with the numbers estimated.
+
+Of each number `value`, `range` (the interval of 95 %), `tolerance` and `source` are new; all else stays as it was
+written, and a section [provenance] says which records made it, when, and with which version. A tolerance is what a
+diagnosis allows a healthy vehicle to be off: the uncertainty of the estimate on top of what was allowed before,
+
+    τ = √(τ₀² + sd²)
+
+so that a number that records hardly determine is no cause, and one that they determine to 0.3 % may still change by as
+much as any from one day to the next.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from scenarios.files import HEADER, KEY
+from scenarios.parts import leaves
+from subzero.calibration.results import Estimate, Source
+from subzero.errors import UserError
+
+DIGITS = 6
+"""Significant ones of a number in the file."""
+PROVENANCE = "provenance"
+"""The section that says where a file comes from."""
+
+
+def text_of(before: str, estimates: Mapping[str, Estimate], provenance: Mapping[str, Any]) -> str:
+    """Return the text of a calibrated file.
+
+    Args:
+        before: the text of the file that it was.
+        estimates: dotted key of the file → what was estimated.
+        provenance: key → text, or list of texts.
+
+    Raises:
+        UserError: a number stands in no line of its own in the file.
+    """
+    lines, section, left, inside = [], "", dict(estimates), False
+    for line in before.rstrip().split("\n"):
+        if header := HEADER.match(line):
+            section = header[1]
+        inside = section == PROVENANCE
+        key = f"{section}.{found[1]}" if (found := KEY.match(line)) else ""
+        if key in left:
+            line = _number_line(line, left.pop(key))
+        if not inside:
+            lines.append(line)
+    text = "\n".join([*lines, "", *_provenance_lines(provenance)]) + "\n"
+    _check(text, estimates)
+    return text
+
+
+def _number_line(line: str, one: Estimate) -> str:
+    """Return the line of a number with what was estimated in it."""
+    leaf = next(iter(tomllib.loads(line).values()))
+    key = line.partition("=")[0].rstrip()
+    said = leaf if isinstance(leaf, Mapping) else {"unit": one.unit}
+    kept = {
+        name: value for name, value in said.items() if name not in ("value", "range", "tolerance", "source")
+    }
+    was = f"calibrated from records, see [{PROVENANCE}]; was {one.before:g}"
+    was += "" if one.is_determined else "; they hardly determine it"
+    new = {"value": _rounded(one.value), **kept, "range": [_rounded(one.low), _rounded(one.high)],
+           "tolerance": _rounded(one.tolerance), "source": f"{was} ({said.get('source', 'no source')})"}  # fmt: skip
+    return f"{key} = {{ {', '.join(f'{name} = {_toml(value)}' for name, value in new.items())} }}"
+
+
+def _provenance_lines(provenance: Mapping[str, Any]) -> Iterator[str]:
+    yield f"[{PROVENANCE}]"
+    for key, value in provenance.items():
+        yield f"{key} = {_toml(value)}"
+
+
+def _toml(value: Any) -> str:
+    """Return a text, a number, or a list of them as TOML."""
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False)
+    if isinstance(value, Sequence):
+        return f"[{', '.join(map(_toml, value))}]"
+    return repr(value)
+
+
+def _rounded(value: float) -> float:
+    return float(f"{value:.{DIGITS}g}")
+
+
+def _check(text: str, estimates: Mapping[str, Estimate]) -> None:
+    """Refuse a text that does not hold what it should: the file was not written one number a line."""
+    held = dict(leaves(tomllib.loads(text)))
+    wrong = [key for key, one in estimates.items() if held.get(key, {}).get("value") != _rounded(one.value)]
+    if wrong:
+        raise UserError(f"The file of the vehicle has no line of its own for {', '.join(wrong)}, so the calibrated one "
+                        'cannot be written. Write each as key = { value = ..., unit = "..." } on a line.')  # fmt: skip
+
+
+def provenance(records: Sequence[Source], base: str, when: str, version: str, held: str) -> dict[str, Any]:
+    """Return what a calibrated file says of where it comes from.
+
+    Args:
+        records: that it was made of.
+        base: name of the file that it was.
+        when: date and time, ISO 8601.
+        version: of this package.
+        held: the error in records that were not fitted, in words.
+    """
+    return {
+        "made_by": f"subzero calibrate, version {version}",
+        "when": when,
+        "from_file": base,
+        "records": [
+            f"{one.file} (trial {one.trial}, {one.duration:g} s, sha256 {one.sha256})" for one in records
+        ],
+        "held_out": held,
+    }
+
+
+def section_of(name: str) -> tuple[str, str]:
+    """Return which file a dotted name stands in, "vehicle" or "cable", and its key there."""
+    part, _, key = name.partition(".")
+    return ("vehicle", key) if part == "vehicle" else ("cable", re.sub(r"^\.", "", name))

@@ -1,0 +1,104 @@
+"""Sensitivities of a calibration are those of a curve, and the ends of its intervals are looked at.
+
+Verifies: `Problem.central_jacobian`, `subzero.calibration.fit.ends_checked`. Configuration: problems of one record that
+needs no run, whose residual is a curve: a square; one that stays flat far out; a line that is 0 elsewhere.
+"""
+
+import numpy as np
+import pytest
+
+from subzero.calibration.fit import ends_checked
+from subzero.diagnosis import Effect, Parameter
+from subzero.diagnosis.inference import Fit, Problem, entries_of
+
+LOW, HIGH = -1.0, 2.0
+
+
+class Curve(Problem):
+    """A curve of every entry, of one record that needs no run."""
+
+    @staticmethod
+    def curve(z):
+        return z**2
+
+    def setting(self, record, z, *, late=True):
+        return z
+
+    def tracks(self, jobs, stops=None):
+        return [None] * len(jobs)
+
+    def whitened(self, record, setting, track, *, measured=False):
+        return self.curve(setting)
+
+
+class Flat(Curve):
+    """It begins with slope 10 and stays below 1."""
+
+    @staticmethod
+    def curve(z):
+        return np.sign(z) * np.sqrt(-np.expm1(-((10.0 * z) ** 2)))
+
+
+class Aside(Curve):
+    """It is 0 at 0.2."""
+
+    @staticmethod
+    def curve(z):
+        return 20.0 * z - 4.0
+
+
+class Straight(Curve):
+    """It is what Laplace says."""
+
+    @staticmethod
+    def curve(z):
+        return 10.0 * z
+
+
+def problem(count, kind=Curve):
+    def nothing(setting, size):
+        return setting
+
+    parameter = Parameter(name="size", unit="1", tolerance=0.1, scale=1.0, low=LOW, high=HIGH)
+    effects = [Effect(id=f"e{k}", sentence="it is another", slot="hull", apply=nothing, parameters=(parameter,))
+               for k in range(count)]  # fmt: skip
+    return kind(records=(None,), entries=entries_of(effects, (), 1))
+
+
+def test_central_differences_are_exact_on_a_parabola_and_one_sided_ones_are_not():
+    z = np.array([0.3, -0.5, 1.0])
+    assert problem(3).central_jacobian(z) == pytest.approx(np.diag(2.0 * z), abs=1e-9)
+    assert np.max(np.abs(problem(3).jacobian(z) - np.diag(2.0 * z))) > 0.01
+
+
+def test_at_a_bound_no_run_is_made_beyond_it():
+    z = np.array([LOW, HIGH])
+    J = problem(2).central_jacobian(z)
+    assert J[0, 0] == pytest.approx(2.0 * LOW, abs=0.05)
+    assert J[0, 0] > 2.0 * LOW, "from within"
+    assert J[1, 1] < 2.0 * HIGH, "from within"
+
+
+def checked(kind):
+    one, D = problem(1, kind), np.array([100.0])
+    r = one.residual(np.zeros(1))
+    fit = Fit(z=np.zeros(1), r=r, J=np.array([[10.0]]), D=D, objective=0.5 * float(r @ r), converged=True,
+              predicted_gain=0.0, fresh=0, made_at=np.zeros(1))  # fmt: skip
+    return ends_checked(one, fit, np.array([[0.01]]), 1)
+
+
+def test_an_interval_at_whose_ends_the_posterior_has_not_fallen_is_widened():
+    wider, better = checked(Flat)
+    assert better is None
+    assert wider == pytest.approx([1.96 / np.sqrt(1.0 - np.exp(-(1.96**2)))], rel=1e-3)
+
+
+def test_an_interval_of_a_normal_posterior_stays_as_it_is():
+    wider, better = checked(Straight)
+    assert better is None
+    assert wider == pytest.approx([1.0], rel=1e-3)
+
+
+def test_what_is_better_at_the_end_of_an_interval_is_told():
+    _, better = checked(Aside)
+    assert better == pytest.approx([0.196], rel=1e-3)
