@@ -77,7 +77,7 @@ def test_a_run_that_is_broken_off_at_any_file_ends_the_same(case, tmp_path, kill
     checkpoint = Checkpoint(folder=tmp_path / "kept", minutes=0.0)
     rng, kills, run = np.random.default_rng(3), 0, None
     while run is None:
-        killed_at(int(rng.integers(2, 20)) if kills else 2, behind=bool(kills % 2))
+        killed_at(int(rng.integers(2, 20)) if kills > 1 else 2, behind=bool(kills % 2))
         try:
             run = subzero.simulate(trial, **options, checkpoint=checkpoint)
         except Killed:
