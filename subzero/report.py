@@ -41,7 +41,17 @@ DIAGNOSTIC_ROWS = {
 """What tells how far to trust the cable: words, and how to write the number."""
 
 
-INDEX_UNITS = {"_deg_s": "degree/s", "_m_s": "m/s", "_per_s": "1/s", "_deg": "degree", "_s": "s", "_m": "m"}
+INDEX_UNITS = {
+    "_deg_s": "degree/s",
+    "_m_s": "m/s",
+    "_per_s": "1/s",
+    "_N_m": "N m",
+    "_deg": "degree",
+    "_s": "s",
+    "_m": "m",
+    "_N": "N",
+    "_J": "J",
+}
 """How the name of an index ends → its unit; without such an end it is a share, or as large as the channel."""
 
 

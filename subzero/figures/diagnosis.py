@@ -80,9 +80,9 @@ FORMULA_LENGTH = 110
 def _what(unknown: Unknown) -> str:
     """Return what is drawn in words: what it does, and which sign that has."""
     if unknown.is_drift:
-        return f"Drift of the {unknown.axis.replace('_', ' ')}'s sensor, that no cause explains"
+        return f"Drift of the {unknown.axis.replace('_', ' ')}'s sensor, that no cause explains; band: 95 %"
     does = something(unknown.axis, unknown.force)
-    return f"{does[0].upper()}{does[1:]}: {AXES[unknown.axis].lower()}"
+    return f"{does[0].upper()}{does[1:]}: {AXES[unknown.axis].lower()}; band: 95 %"
 
 
 MOST = 10
