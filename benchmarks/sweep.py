@@ -272,9 +272,15 @@ def kills(count, members, seed=0):
     return same
 
 
+MOSTLY = 0.98
+"""How probable it is, each tenth of a second, to go on waiting for the workers of a command before it is struck."""
+
+
 def _strike(run, rng, count, done):
     """Kill workers of a command, or it, at random moments, until it has ended or there were kills enough."""
     while sum(done.values()) < count:
+        while rng.random() < MOSTLY and run.poll() is None and not _children(run.pid):
+            time.sleep(0.1)  # else a busy machine is struck before there is a worker, time after time
         time.sleep(rng.uniform(0.1, 2.5))
         if run.poll() is not None:
             return
