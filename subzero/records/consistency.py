@@ -163,7 +163,9 @@ def time_problems(record: Record, trial: scenarios.Trial, *, longer: bool) -> li
         return problems
     step = float(np.median(np.diff(time))) if time.size > 1 else 0.0
     if time.size < MIN_SAMPLES:
-        problems.append(f"it has {time.size} samples; a diagnosis needs at least {MIN_SAMPLES}")
+        problems.append(
+            f"it has {time.size} sample{'s' * (time.size != 1)}; a diagnosis needs at least {MIN_SAMPLES}"
+        )
     if step > MAX_STEP_S:
         problems.append(
             f"it is sampled every {step:g} s, slower than the vehicle moves: a diagnosis needs a sample every "

@@ -74,9 +74,11 @@ def _correlations(one: Observed, noise: Noise, difference: np.ndarray) -> dict[s
     step, found = float(np.median(np.diff(one.time))), {}
     for name, column in zip(COMMANDS, held.T, strict=True):
         x = column - np.mean(column)
-        if np.any(x != 0.0):
-            scale = np.linalg.norm(x) * np.linalg.norm(residual)
-            values = [float(residual[k:] @ x[: x.size - k]) / scale for k in range(LJUNG_BOX_LAGS)]
+        scale = np.linalg.norm(x) * np.linalg.norm(residual)
+        if scale > 0.0:
+            values = [
+                float(residual[k:] @ x[: x.size - k]) / scale for k in range(min(LJUNG_BOX_LAGS, x.size))
+            ]
             at = int(np.argmax(np.abs(values)))
             found[name] = (at * step, float(values[at]))
     return found
