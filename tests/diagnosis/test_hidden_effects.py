@@ -2,7 +2,7 @@
 
 Verifies: the whole diagnosis. Configuration: fig6, six channels at 10 Hz, coloured noise, outliers, gaps, and
 every parameter drawn from its tolerance. Cases are drawn from a seed (benchmarks/diagnosis); chosen are
-those that the trial can tell at all, D ≥ 25, whatever comes out. Slow: more of each kind, those that take longest (a
+those that the trial can tell at all, D ≥ 25, whatever comes out. Slow: single causes, more of each kind, those that take longest (a
 minute), and every id of the catalogue with both signs. What begins in mid-trial is in `test_verdicts`, too.
 """
 
@@ -76,7 +76,7 @@ def words(result):
     return f"{truth}, D {result['D']}: {result['verdict']}, {', '.join(first)}"
 
 
-SINGLES = [drawn("single", 18)]
+SINGLES = slow("single", 18)
 LONG = slow("single", 5, 9, 12)
 MORE = slow("single", 8, 11, 13, 16, 19, 25)
 
