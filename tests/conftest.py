@@ -9,4 +9,6 @@ import sys
 def pytest_sessionstart(session):
     """Compile what a run uses before workers begin, where there are several (`-n`)."""
     if getattr(session.config.option, "numprocesses", None) and not hasattr(session.config, "workerinput"):
-        subprocess.run([sys.executable, "-P", "-m", "subzero", "warm", "--quiet"], capture_output=True, check=False)
+        subprocess.run(
+            [sys.executable, "-P", "-m", "subzero", "warm", "--quiet"], capture_output=True, check=False
+        )
