@@ -3,8 +3,8 @@
 Verifies: the whole diagnosis. Configuration: fig6, six channels at 10 Hz, coloured noise, outliers, gaps, and
 every parameter drawn from its tolerance. Cases are drawn from a seed (benchmarks/diagnosis); chosen are
 those that the trial can tell at all, D ≥ 25, whatever comes out. Slow: single
-causes, more of each kind, those that take longest (a minute), and every id of the catalogue with both signs. What begins
-in mid-trial is in `test_verdicts`, too.
+causes, more of each kind, those that take longest (a minute), and every id of the catalogue with both signs. What
+begins in mid-trial is in `test_verdicts`, too.
 """
 
 import dataclasses
