@@ -141,6 +141,7 @@ def test_longer_cable_is_slower_and_pulls_more():
     assert np.all(np.diff(runs["largest_cable_force_N"]) > 0.0)
 
 
+@pytest.mark.slow
 def test_a_cable_as_stiff_as_a_rod_cannot_be_bent_by_what_pulls_it_and_the_other_member_can():
     spread = {"cable.bending_stiffness": [0.0, 10.0]}
     changes = SHORT | {"run.duration_s": 3.0}
