@@ -257,7 +257,7 @@ def test_a_cable_that_would_be_a_flat_line_is_stretched_and_says_how_much(make_r
     assert "stretched" not in steep.get_title(loc="left")
 
 
-@pytest.mark.parametrize("kind", ["svg", "pdf"])
+@pytest.mark.parametrize("kind", ["svg", pytest.param("pdf", marks=pytest.mark.slow)])
 def test_figures_are_drawings_if_asked_for_and_two_are_alike_to_the_last_byte(kind, rails, tmp_path):
     from subzero.cli import FINE, main
 

@@ -112,6 +112,7 @@ def test_more_verdicts_are_true_or_not_sure(case, judged):
     check(case, judged(case))
 
 
+@pytest.mark.slow
 def test_a_record_diagnosed_twice_has_the_same_verdict(judged):
     case = QUICK[1]
     one = judged(case).verdict

@@ -3,7 +3,7 @@
 Verifies: `subzero.checkpoint`. Configuration: stop_and_drift, whose accuracy takes several runs; a model that changes
 in mid-run; a winch on a moving drum; no cable; a command that is killed. Tolerance: identity of every value and every
 attribute. Each run is broken off at each of many operations on the disk, and the command by SIGKILL at random times
-(3 by default, 20 in the slow form).
+(slow: once, and 20 times).
 """
 
 from __future__ import annotations
@@ -221,6 +221,7 @@ def same_files(path, folder):
         xr.testing.assert_identical(run.load(), plain.load())
 
 
+@pytest.mark.slow
 def test_a_command_that_is_killed_goes_on(tmp_path):
     same_files(killed_and_resumed(tmp_path, 1, 0.2, duration=120), tmp_path)
 

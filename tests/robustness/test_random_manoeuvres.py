@@ -19,7 +19,7 @@ import cable
 DURATION, KNOTS, FINE = 15.0, 7, 1501
 CLOSED = 1e-9
 """How far the ends may be from where they should be: the length equations hold to a strain of 1e-12. [m]"""
-FAST, ALL = 50, 600
+FAST, ALL = 12, 600
 
 
 def between(low, high):
