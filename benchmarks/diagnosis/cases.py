@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cache
 
 import numpy as np
 
@@ -84,11 +85,12 @@ class Made:
     dropped: int = field(default=0)
 
 
-def cases(seed: int = SEED, scale: float = 1.0) -> list[Case]:
+@cache
+def cases(seed: int = SEED, scale: float = 1.0) -> tuple[Case, ...]:
     """Return the cases of a benchmark, all kinds in turn; fewer or more of them by a factor."""
     counts = {kind: max(round(scale * count), 1) for kind, count in SHARES.items()}
     order = sorted(((i + 0.5) / n, kind, i) for kind, n in counts.items() for i in range(n))
-    return [_case(seed, index, kind, number) for index, (_, kind, number) in enumerate(order)]
+    return tuple(_case(seed, index, kind, number) for index, (_, kind, number) in enumerate(order))
 
 
 def _case(seed: int, index: int, kind: str, number: int) -> Case:

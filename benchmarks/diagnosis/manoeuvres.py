@@ -60,6 +60,7 @@ def ids() -> tuple[str, ...]:
     return tuple(catalogue(CHANNELS))
 
 
+@cache
 def sudden() -> tuple[str, ...]:
     """Return all causes that may begin in mid-trial."""
     return tuple(one for one, effect in catalogue(CHANNELS).items() if effect.sudden)

@@ -4,6 +4,7 @@ Configuration: fig6 for 12 s with the cable, economical steps, no noise; deviati
 """
 
 import dataclasses
+from functools import cache
 
 import numpy as np
 import pytest
@@ -18,13 +19,18 @@ from .conftest import CHANNELS, nominal
 TIME = np.linspace(0.1, 12.0, 120)
 CATALOGUE = catalogue(CHANNELS)
 SETTING = nominal(12.0)
-PLAIN = respond(SETTING, TIME, CHANNELS)
+
+
+@cache
+def plain():
+    """Return what the nominal trial records, by channel (n,)."""
+    return respond(SETTING, TIME, CHANNELS)
 
 
 def changed(name, *size):
     """Return channel → what a cause changes (n,)."""
     shown = respond(CATALOGUE[name].apply(SETTING, *size), TIME, CHANNELS)
-    return {channel: shown[channel] - PLAIN[channel] for channel in CHANNELS}
+    return {channel: shown[channel] - plain()[channel] for channel in CHANNELS}
 
 
 @pytest.mark.parametrize(
@@ -51,7 +57,7 @@ def test_a_buoyant_hull_rises_until_the_munk_moment_turns_its_nose_down():
 
 def test_a_late_clock_shows_what_was_before():
     late = respond(CATALOGUE["clock_offset"].apply(SETTING, 0.5), TIME, CHANNELS)
-    assert_allclose(late["surge_speed"][10:], PLAIN["surge_speed"][5:-5], atol=1e-12)
+    assert_allclose(late["surge_speed"][10:], plain()["surge_speed"][5:-5], atol=1e-12)
 
 
 def test_a_current_goes_where_its_parameters_say():
@@ -61,7 +67,7 @@ def test_a_current_goes_where_its_parameters_say():
 
 def test_a_sensor_shows_too_much_by_its_bias_and_its_share():
     assert_allclose(changed("sensor_bias:pitch", 1.5)["pitch"], 1.5, atol=1e-12)
-    assert_allclose(changed("sensor_scale:pitch", 0.1)["pitch"], 0.1 * PLAIN["pitch"], atol=1e-12)
+    assert_allclose(changed("sensor_scale:pitch", 0.1)["pitch"], 0.1 * plain()["pitch"], atol=1e-12)
 
 
 def problem(values):
@@ -85,7 +91,7 @@ def test_a_residual_vanishes_at_the_truth(name):
 
 def test_secants_mean_by_a_column_what_sensitivities_mean():
     """R falls by J z: for a limit that is not felt when it is wide, along the whole effect."""
-    made = problem(PLAIN)
+    made = problem(plain())
     k = next(k for k, entry in enumerate(made.entries) if entry.effect.id == "rudder_rate_limit")
     scale, zero = made.entries[k].parameter.scale, np.zeros(len(made.entries))
     there = zero.copy()
@@ -98,7 +104,7 @@ def test_secants_mean_by_a_column_what_sensitivities_mean():
 def test_a_correction_is_added_to_what_is_simulated():
     """A record that shows half a metre more than the simulation fits one that half a metre is added to."""
     more = {"depth": np.full(TIME.size, 0.5)}
-    made = problem({**PLAIN, "depth": PLAIN["depth"] + more["depth"]})
+    made = problem({**plain(), "depth": plain()["depth"] + more["depth"]})
     (record,) = made.records
     corrected = dataclasses.replace(made, records=(record.corrected(more),))
     assert_allclose(corrected.residual(np.zeros(len(made.entries))), 0.0, atol=1e-9)
