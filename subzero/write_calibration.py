@@ -63,10 +63,12 @@ def tell(found: Calibration, stage: Stage, out: Path, *, voice: Voice = PLAIN) -
 
 
 def _tell(found: Calibration, stage: Stage, out: Path, console: Console) -> None:
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0))
+    table = Table(box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=(0, 1, 0, 0))
     for name in ("number", "before", "calibrated", "95 %", "change"):
         words = name in ("number", "change")
-        table.add_column(name, justify="left" if words else "right", overflow="fold", no_wrap=not words)
+        table.add_column(
+            name, justify="left" if words else "right", overflow="fold", no_wrap=name != "change"
+        )
     for row in rows(found):
         table.add_row(*row)
     console.print(table, highlight=False)

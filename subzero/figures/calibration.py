@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator, StrMethodFormatter
 
 from subzero.calibration.results import Calibration, Estimate, Profile
 from subzero.figures import style
@@ -18,9 +18,12 @@ if TYPE_CHECKING:
 
 ROW = 0.2
 """Height of a row of a list of numbers. [inch]"""
+LEGEND = 0.75
+"""Room for the legend below the profiles. [inch]"""
 RISE_95 = 3.84
 """Rise of −2 log posterior at the ends of an interval of 95 %."""
 COLUMNS = 4
+"""Panels of profiles in a row, at most."""
 
 
 def draw_calibration(found: Calibration, title: Title) -> dict[str, Figure]:
@@ -89,7 +92,7 @@ def errors(found: Calibration, title: Title) -> Figure:
             heights = [getattr(rows[name], key) if name in rows else math.nan for name in names]
             axes.bar(np.arange(len(names)) + 0.27 * (at - 1), heights, 0.27, color=colour, label=words)
         axes.axhline(1.0, color=style.INK, linewidth=0.9, linestyle=style.DASHES[1])
-        axes.set_yscale("log")
+        _log_scale(axes)
         tops = [getattr(one, key) for one in rows.values() for key in bars]
         axes.set_ylim(0.3, 2.0 * max([1.0, *(x for x in tops if math.isfinite(x))]))
         axes.set_xticks(range(len(names)), [name.replace("_", " ") for name in names], fontsize=style.SMALL)
@@ -99,17 +102,28 @@ def errors(found: Calibration, title: Title) -> Figure:
     return figure
 
 
+def _log_scale(axes: Axes) -> None:
+    """Give an axis of errors a logarithmic scale with plain numbers."""
+    axes.set_yscale("log")
+    axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axes.yaxis.set_minor_locator(NullLocator())
+    axes.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+
+
 def profiles(found: Calibration, title: Title) -> Figure:
     """Draw how much worse the fit gets with each number held elsewhere, beside what its interval says."""
-    rows = math.ceil(len(found.profiles) / COLUMNS)
-    figure, panels = sheet(rows, COLUMNS, title)
+    columns = min(len(found.profiles), COLUMNS)
+    figure, panels = sheet(math.ceil(len(found.profiles) / columns), columns, title)
     for axes, (name, one) in zip(panels, found.profiles.items(), strict=False):
         _profile(axes, one, found[name])
         section, _, key = name.removeprefix("vehicle.").replace("_", " ").rpartition(".")
         axes.set_title(f"{section}:\n{key}", loc="left", fontsize=style.TINY, pad=3)
     for axes in panels[len(found.profiles) :]:
         axes.remove()
-    figure.subplots_adjust(hspace=0.55, wspace=0.34)
+    figure.supylabel("rise of −2 log posterior", fontsize=style.NORMAL, x=0.02)
+    handles, words = panels[0].get_legend_handles_labels()
+    figure.legend(handles, words, fontsize=style.TINY, loc="lower center", ncols=3, frameon=False)
+    figure.subplots_adjust(hspace=0.55, wspace=0.34, bottom=LEGEND / figure.get_figheight())
     return figure
 
 
@@ -117,10 +131,10 @@ def _profile(axes: Axes, one: Profile, estimate: Estimate) -> None:
     """Draw a profile, the parabola of the interval, and the level at its ends."""
     grid = np.linspace(one.values[0], one.values[-1], 80)
     axes.plot(grid, ((grid - estimate.value) / estimate.sd) ** 2, color=style.GREY, linewidth=1.0,
-              linestyle=style.DASHES[1])  # fmt: skip
+              linestyle=style.DASHES[1], label="what the interval supposes")  # fmt: skip
     axes.plot(one.values, one.rise, "o", color=style.BLUE, markersize=3.0)
-    axes.plot(grid, _between(one, grid), color=style.BLUE, linewidth=1.2)
-    axes.axhline(RISE_95, color=style.ORANGE, linewidth=0.8)
+    axes.plot(grid, _between(one, grid), color=style.BLUE, linewidth=1.2, label="all else fitted again")
+    axes.axhline(RISE_95, color=style.ORANGE, linewidth=0.8, label=f"ends of 95 %: {RISE_95}")
     axes.set_ylim(0.0, 14.0)
     axes.xaxis.set_major_locator(MaxNLocator(3))
     unit = "" if estimate.unit == "1" else f"[{estimate.unit}]"
