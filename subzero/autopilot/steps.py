@@ -29,18 +29,21 @@ STEP_AT, DURATION = 15.0, 60.0
 
 @dataclass(frozen=True, kw_only=True)
 class Step:
-    """A line of the table: what is stepped, its channel, by how much (in the unit of the channel), inner per unit."""
+    """A line of the table: what is stepped, its channel, by how much (in the unit of the channel), inner per unit, and
+    how the name of an index in that unit ends.
+    """
 
     field: str
     channel: str
     size: float
     scale: float
+    ending: str
 
 
 STEPS = {
-    "heading_step": Step(field="heading", channel="heading", size=10.0, scale=radians(1.0)),
-    "depth_step": Step(field="depth", channel="depth", size=1.0, scale=1.0),
-    "speed_step": Step(field="speed", channel="surge_speed", size=0.2, scale=1.0),
+    "heading_step": Step(field="heading", channel="heading", size=10.0, scale=radians(1.0), ending="_deg"),
+    "depth_step": Step(field="depth", channel="depth", size=1.0, scale=1.0, ending="_m"),
+    "speed_step": Step(field="speed", channel="surge_speed", size=0.2, scale=1.0, ending="_m_s"),
 }
 """Step by name: degrees, m, m/s."""
 
@@ -84,7 +87,7 @@ def step(
     tethered: bool = True,
     progress: Progress | None = None,
 ) -> tuple[xr.Dataset, dict[str, float]]:
-    """Return the run of a step and its indices: rise, overshoot, settling, steady error (in the channel's unit).
+    """Return the run of a step and its indices: rise, overshoot, settling, steady error (units in their names).
 
     Args:
         name: one of `STEPS`.
@@ -116,4 +119,6 @@ def step(
     )  # fmt: skip
     values = run[line.channel].values
     wanted = getattr(goal, line.field) / line.scale
-    return run, step_response(run["time"].values, values, wanted, STEP_AT)
+    indices = step_response(run["time"].values, values, wanted, STEP_AT)
+    indices[f"steady_error{line.ending}"] = indices.pop("steady_error")
+    return run, indices
