@@ -61,10 +61,12 @@ def index_words(name: str) -> str:
     return name.removesuffix(end).replace("_", " ") + (f" [{INDEX_UNITS[end]}]" if end else "")
 
 
-def show(summary: Summary, console: Console) -> None:
-    """Print a summary, as `subzero.comparison.summary_of` gives it."""
+def show(summary: Summary, console: Console, *, whole: bool = False) -> None:
+    """Print a summary, as `subzero.comparison.summary_of` gives it; the whole of it with what tells how far to trust
+    the cable, of which a warning speaks where it matters.
+    """
     console.print(f"[bold]{escape(summary['scenario'])}[/bold]: {escape(summary['title'])}", highlight=False)
-    console.print(_runs_table(summary), highlight=False)
+    console.print(_runs_table(summary, whole), highlight=False)
     runs = {label: summary[label] for label in RUNS if label in summary}
     for label, run in runs.items():
         if run["refinement"] is not None:
@@ -85,25 +87,25 @@ def show_warnings(runs: dict[str, Summary], console: Console) -> None:
             console.print(row, highlight=False)
 
 
-def number_groups(summary: Summary) -> list[list[Row]]:
+def number_groups(summary: Summary, *, whole: bool = True) -> list[list[Row]]:
     """Return what one reads first, runs side by side: rows in groups, each a row's words and a cell for each run."""
     runs = [summary[label] for label in RUNS if label in summary]
     first = _rows(bool(summary["prescribed"])).items()
     groups: list[list[Row]] = [[(words, *map(cell, runs)) for words, cell in first]]
     if all(run["energy"] is not None for run in runs):
         groups.append(_energy_rows([run["energy"] for run in runs]))
-    if any(run["diagnostics"] is not None for run in runs):
+    if whole and any(run["diagnostics"] is not None for run in runs):
         groups.append(_diagnostic_rows([run["diagnostics"] or {} for run in runs]))
     return groups
 
 
-def _runs_table(summary: Summary) -> Table:
+def _runs_table(summary: Summary, whole: bool) -> Table:
     """Return the table of what one reads first, runs side by side."""
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     table.add_column("")
     for label in (label for label in RUNS if label in summary):
         table.add_column(label, justify="right")
-    for group in number_groups(summary):
+    for group in number_groups(summary, whole=whole):
         table.add_section()
         for row in group:
             table.add_row(*map(escape, row))

@@ -23,7 +23,8 @@ class Voice:
     Attributes:
         as_json: print the result as one JSON object, and nothing else, on standard output.
         quiet: print no table and no progress; errors and the exit code stay.
-        verbose: say on standard error which versions run, where machine code is kept, and how long it took.
+        verbose: print how far to trust the cable too; say on standard error which versions run, where machine code is
+            kept, and how long it took.
     """
 
     as_json: Annotated[bool, Parameter(name="--json", negative=())] = False

@@ -102,7 +102,7 @@ def tell(summary: dict[str, Any], stage: Stage, *, strict: bool = False, voice: 
 
     with voice.tells(summary | stage.files()):
         console = Console()
-        show(summary, console)
+        show(summary, console, whole=voice.verbose)
         console.print(stage.words(), highlight=False, markup=False)
     stopped = [label for label in RUNS if summary.get(label, {}).get("outcome") == "stopped"]
     for label in stopped:

@@ -61,7 +61,7 @@ def test_a_summary_says_how_far_to_trust_the_cable(run, make_run):
 def test_the_table_shows_the_runs_side_by_side(run):
     out = io.StringIO()
     show(summary_of({"tethered": run, "untethered": run.assign(surge_speed=0.5 * run["surge_speed"])}, None),
-         Console(file=out, width=100))  # fmt: skip
+         Console(file=out, width=100), whole=True)  # fmt: skip
     rows = [" ".join(line.split()) for line in out.getvalue().splitlines()]
     assert "tethered untethered" in rows
     for row in (
@@ -80,6 +80,14 @@ def test_the_table_shows_the_runs_side_by_side(run):
         "Newton iterations 4 4",
     ):
         assert row in rows, rows
+
+
+def test_what_only_a_numerical_analyst_reads_is_printed_if_asked_for(run):
+    out = io.StringIO()
+    show(summary_of({"tethered": run}, None), Console(file=out, width=100))
+    assert "peak speed" in out.getvalue()
+    assert "unexplained share" in out.getvalue()
+    assert "Courant" not in out.getvalue()
 
 
 def test_what_does_not_exist_is_null_in_json_and_empty_in_csv(run, tmp_path):
