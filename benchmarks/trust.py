@@ -18,6 +18,12 @@ cable never reaches `NO_PULL`, there is nothing to judge by.
     unchecked  silent, and not even `subzero.check`, with half the steps, changes the tow force by more than 1 %
     right      within 1 %, force and energies
     false      right, with a numerical warning
+    unsettled  it would be false, but a second reference, twice as fine as the first, moves by more than 1 %
+
+A reference may call a warning false only if it stands itself: where a drum is ill-posed, the run and its reference may
+agree, and segments half as long give another force, as the warning says. So each trial that is right and warns gets a
+second reference. One that is unsettled is neither right nor wrong; where the second one stops or takes too long, the
+warning stays false.
 
 A numerical warning (`NUMERICAL`) says that force or energies may be off, and is false where neither is. Energies are
 measured as the force is: the largest residual, as a share of the largest energy of the run. The other warnings (a
@@ -25,7 +31,8 @@ vehicle in the air, a cable that would break, a servo at its limit) say what hap
 so that the run of a right one may have them. Between 1 and 3 % a run is neither right nor wrong, whatever it says.
 
 A reference of a drum that does not hold its cable may take half an hour. With `--patience` trials that take longer
-than so many seconds of CPU are given up, and counted with what they had warned of by then.
+than so many seconds of CPU are given up, and counted with what they had warned of by then; a second reference has as
+much again.
 """
 
 from __future__ import annotations
@@ -48,6 +55,7 @@ import scenarios
 import subzero
 from scenarios import CONTROLS
 from subzero.comparison import MOST, refine
+from subzero.validity import DOUBTS
 
 WRONG, RIGHT = 0.03, 0.01
 """Error of the force from which a run is wrong, and up to which it is right. [-]"""
@@ -61,7 +69,7 @@ RTOL = 0.02
 TOO_LONG = "no reference: too long"
 WATER = 1000.0
 """Density of the water. [kg/m³]"""
-NUMERICAL = ("energy_residual", "resolution", "tow_force", "ill_posed_drum", "slack", "closure", "push")
+NUMERICAL = DOUBTS
 """Checks that say that numbers are wrong; all others say what happened."""
 PULL = ("cable_force_forward", "cable_force_starboard", "cable_force_down")
 ENERGIES = ("propeller_work", "hull_loss", "cable_loss", "kinetic_change", "drum", "added_mass_term")
@@ -78,6 +86,7 @@ class Verdict:
             ended before it did.
         force_error, smooth_error: of the tow force; and without jolts of a single sample. [-]
         largest_force: of the fine run. [N]
+        reference_change: of the force, from the fine run to the second reference; nan without one. [-]
         check: by which share half the steps change the tow force. [-]
         stated: error of the force that the run itself states. [-]
         halvings: how often the run halved its steps and segments.
@@ -92,6 +101,7 @@ class Verdict:
     force_error: float = np.nan
     smooth_error: float = np.nan
     largest_force: float = 0.0
+    reference_change: float = np.nan
     check: float = np.nan
     stated: float = np.nan
     halvings: int = 0
@@ -125,9 +135,19 @@ class Verdict:
         return self.silent and self.check <= MOST
 
     @property
+    def near(self) -> bool:
+        """Whether force and energies are within what is right of the reference, whatever that is worth."""
+        return self.judged and self.force_error < RIGHT and self.residual < RIGHT
+
+    @property
+    def unsettled(self) -> bool:
+        """Whether the warning cannot be called false, as the reference moves itself."""
+        return self.near and self.numerical and self.reference_change > RIGHT
+
+    @property
     def right(self) -> bool:
         """Whether force and energies are right."""
-        return self.judged and self.force_error < RIGHT and self.residual < RIGHT
+        return self.near and not self.unsettled
 
     @property
     def false(self) -> bool:
@@ -327,17 +347,41 @@ def judge(seed: int, patience: float = np.inf, rtol: float = RTOL) -> Verdict:
         middle, warnings, given_up = perf_counter(), warned(run), TOO_LONG
         if run.attrs["outcome"] != "completed":
             return Verdict(seed=seed, tags=tags, outcome="stopped", warnings=warnings)
-        found = compared(run, trial, tell)
+        found, fine = compared(run, trial, tell)
     except TooLongError:
         return Verdict(seed=seed, tags=tags, outcome=given_up, warnings=warnings)
     except subzero.UserError as error:  # a cable that does not reach its drum in this current
         return Verdict(seed=seed, tags=tags, outcome=f"refused: {str(error)[:60]}")
     seconds = (middle - begin, perf_counter() - middle)
-    return Verdict(seed=seed, tags=tags, warnings=warnings, seconds=seconds, **found)
+    verdict = Verdict(seed=seed, tags=tags, warnings=warnings, seconds=seconds, **found)
+    if not verdict.false:
+        return verdict
+    change = change_of_reference(fine, trial, 2.0**verdict.halvings, impatient(patience))
+    return dataclasses.replace(verdict, reference_change=change)
 
 
-def compared(run: xr.Dataset, trial: scenarios.Trial, tell: Callable[[float], None]) -> dict[str, object]:
-    """Return what finer runs say of a run that reached its end: fields of a `Verdict`."""
+def change_of_reference(
+    fine: xr.Dataset, trial: scenarios.Trial, taken: float, tell: Callable[[float], None]
+) -> float:
+    """Return how much the force of a reference moves with half its steps and segments; nan where that does not end.
+
+    Args:
+        fine: the reference.
+        trial: of the run.
+        taken: how much finer than its trial the run was taken. [-]
+        tell: ends what takes too long.
+    """
+    try:
+        finer = subzero.simulate(refined(trial, 2.0 * REFINEMENT * taken), progress=tell)
+    except TooLongError:
+        return np.nan
+    return force_errors(fine, finer)[0] if finer.attrs["outcome"] == "completed" else np.nan
+
+
+def compared(
+    run: xr.Dataset, trial: scenarios.Trial, tell: Callable[[float], None]
+) -> tuple[dict[str, object], xr.Dataset]:
+    """Return what finer runs say of a run that reached its end, fields of a `Verdict`, and the reference."""
     accuracy = json.loads(run.attrs["accuracy"])
     halvings, stated = accuracy.get("halvings", 0), accuracy.get("force_error", np.nan)
     check = refine(run, trial, progress=tell).tow_force
@@ -348,12 +392,12 @@ def compared(run: xr.Dataset, trial: scenarios.Trial, tell: Callable[[float], No
         "halvings": halvings,
     }
     if fine.attrs["outcome"] != "completed":
-        return {**found, "outcome": "no reference"}
+        return {**found, "outcome": "no reference"}, fine
     error, smooth, largest = force_errors(run, fine)
     if largest < NO_PULL:
-        return {**found, "outcome": "no pull"}
+        return {**found, "outcome": "no pull"}, fine
     errors = {"force_error": error, "smooth_error": smooth, "check": check}
-    return {**found, **errors, "outcome": "completed", "largest_force": largest}
+    return {**found, **errors, "outcome": "completed", "largest_force": largest}, fine
 
 
 def report(verdicts: list[Verdict]) -> str:
@@ -368,8 +412,13 @@ def report(verdicts: list[Verdict]) -> str:
         some = [one for one in judged if tag in one.tags]
         right, *others = (sum(map(_is(name), some)) for name in ("right", "wrong", "silent", "false"))
         lines.append(f"{tag:32s} {len(some):6d} {right:6d} {others[0]:6d} {others[1]:7d} {others[2]:6d}")
-    for words, test in (("silent and wrong", _is("silent")), ("false warnings", _is("false"))):
-        lines += ["", f"{words}:", *(_line(one) for one in judged if test(one))]
+    lists = {
+        "silent and wrong": "silent",
+        "false warnings": "false",
+        "warnings of which the reference moves": "unsettled",
+    }
+    for words, name in lists.items():
+        lines += ["", f"{words}:", *(_line(one) for one in judged if getattr(one, name))]
     lines += ["", "without an end or a reference:"]
     lines += [f"  {one.seed:6d}  {one.outcome}: {'; '.join(one.tags)}" for one in verdicts if not one.judged]
     return "\n".join(lines)
@@ -381,8 +430,9 @@ def _is(name: str) -> Callable[[Verdict], bool]:
 
 def _counts(verdicts: list[Verdict], judged: list[Verdict]) -> str:
     """Return the sums."""
-    names = ("wrong", "silent", "unchecked", "right", "false")
-    wrong, silent, unchecked, right, false = (sum(map(_is(name), judged)) for name in names)
+    names = ("wrong", "silent", "unchecked", "right", "false", "unsettled")
+    wrong, silent, unchecked, right, false, unsettled = (sum(map(_is(name), judged)) for name in names)
+    unproved = sum(one.false and np.isnan(one.reference_change) for one in judged)
     others = len(verdicts) - len(judged)
     long = [one for one in verdicts if one.outcome == TOO_LONG]
     unwarned = sum(not one.numerical for one in long)
@@ -391,7 +441,9 @@ def _counts(verdicts: list[Verdict], judged: list[Verdict]) -> str:
         f"of these {len(long)} took too long, {unwarned} of them without a numerical warning\n"
         f"wrong (force off by > 3 % or residual > 5 %): {wrong}; of them silent: {silent} "
         f"({interval(silent, len(judged))} of all), and silent under --check: {unchecked}\n"
-        f"right within 1 %: {right}; of them with a numerical warning: {false} ({interval(false, right)})"
+        f"right within 1 %: {right}; of them with a numerical warning: {false} ({interval(false, right)}), "
+        f"{unproved} of these without a second reference\n"
+        f"within 1 %, with a numerical warning, and the reference moves by more than 1 %: {unsettled}"
     )
 
 
