@@ -373,7 +373,7 @@ def change_of_reference(
     """
     try:
         finer = subzero.simulate(refined(trial, 2.0 * REFINEMENT * taken), progress=tell)
-    except TooLongError:
+    except (TooLongError, subzero.UserError):  # steps below the least that a trial may have
         return np.nan
     return force_errors(fine, finer)[0] if finer.attrs["outcome"] == "completed" else np.nan
 

@@ -30,7 +30,6 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import count
 from math import inf, isfinite
 from typing import TYPE_CHECKING
 
@@ -44,9 +43,9 @@ from subzero.errors import UserError
 if TYPE_CHECKING:
     from subzero.engine.recording import Run
 
-MOST_HALVINGS = 2
-"""Steps and segments a quarter as long cost sixteen times as much. More halves are taken where they are cheap; and one
-where the error is within `LEAST_GAIN` of `rtol`."""
+MOST_HALVINGS, CHEAP_HALVINGS = 2, 4
+"""Steps and segments a quarter as long cost sixteen times as much. Up to `CHEAP_HALVINGS` are taken where they are
+cheap; and a third one where the error is within `LEAST_GAIN` of `rtol`."""
 MOST_WORK, CHEAP_WORK, PROOF_WORK = 1e7, 3e5, 2e6
 """Nodes times exchanges that a repeated run may take, half a minute or so; that are cheap, a second or so; and that the
 proof of a run that is doubted may take, several. [-]"""
@@ -132,7 +131,7 @@ def run_converged(
         return run, None
     change = _after_start(coarse, run)
     accuracy = _accuracy(trial, take, run, change, None, 0)
-    for halvings in count(1):
+    for halvings in range(1, CHEAP_HALVINGS + 1):
         finer = resolved(trial, 0.5**halvings)
         if accuracy.converged or finer is None or _finer_work(run, halvings) > _allowed(accuracy):
             break
