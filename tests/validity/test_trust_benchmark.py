@@ -5,7 +5,8 @@ import pytest
 
 import subzero
 from benchmarks import trust
-from benchmarks.trust import Verdict, draw, force_errors, interval, judge, refined, residual_of, tags_of
+from benchmarks.trust import Verdict, force_errors, interval, judge, refined, residual_of
+from benchmarks.trust_trials import draw, tags_of
 
 
 def test_a_trial_is_drawn_from_its_seed_alone():

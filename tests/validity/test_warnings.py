@@ -13,7 +13,7 @@ import pytest
 
 import scenarios
 import subzero
-from benchmarks.trust import draw
+from benchmarks.trust_trials import draw
 from subzero.comparison import halved
 from subzero.validity import CHECKS
 from subzero.validity.limits import bend_radii
