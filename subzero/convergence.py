@@ -293,7 +293,7 @@ def _work(run: Run) -> float:
 
 def _finer_work(run: Run, halvings: int) -> float:
     """Return nodes times exchanges of a run with so many halvings, from the one before, with half as many nodes. [-]"""
-    return _work(run) * 2.0 * 2**halvings
+    return _work(run) * 2.0 ** (1 + halvings)
 
 
 def _share(progress: Progress | None, start: float, size: float) -> Progress | None:

@@ -13,10 +13,9 @@ To add a check, add a row to `CHECKS`, and a test that it warns and one that it 
 
 from __future__ import annotations
 
-import dataclasses
 import json
 from collections.abc import Callable
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from subzero.validity.limits import above_surface, actuators, below_sea_bed, bend_radius, strength
 from subzero.validity.numerics import (
@@ -35,7 +34,6 @@ from subzero.validity.numerics import (
 if TYPE_CHECKING:
     import scenarios
     from subzero.channels import AnyRun
-    from subzero.dataset import PlainRun
     from subzero.model import Model
 
     Check = Callable[[AnyRun, scenarios.Trial, Model], list[str]]
@@ -53,7 +51,18 @@ def check_run(run: AnyRun, trial: scenarios.Trial, model: Model) -> list[RunWarn
     return [RunWarning(name, words) for name, check in CHECKS.items() for words in check(run, trial, model)]
 
 
-def refinement_that_settles(run: PlainRun, trial: scenarios.Trial, model: Model) -> int:
+class _Supposed:
+    """A run with something else in its attributes."""
+
+    def __init__(self, run: AnyRun, **attrs: str) -> None:
+        self._run, self.attrs = run, run.attrs | attrs
+
+    def __getitem__(self, name: str, /) -> Any:
+        """Return a variable of the run."""
+        return self._run[name]
+
+
+def refinement_that_settles(run: AnyRun, trial: scenarios.Trial, model: Model) -> int:
     """Return how much finer a run would have to confirm the tow force so that no number is doubted any more.
 
     0 if none is, if no coarser run has confirmed the force, or if another doubt would be left all the same.
@@ -63,7 +72,7 @@ def refinement_that_settles(run: PlainRun, trial: scenarios.Trial, model: Model)
         return 0
     for finer in sorted({SLACK_PROOF, DRUM_PROOF}):
         proved = json.loads(run.attrs["accuracy"]) | {"proof_finer": finer}
-        supposed = dataclasses.replace(run, attrs=run.attrs | {"accuracy": json.dumps(proved)})
+        supposed = _Supposed(run, accuracy=json.dumps(proved))
         if not any(CHECKS[check](supposed, trial, model) for check in DOUBTS):
             return finer
     return 0
