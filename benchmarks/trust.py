@@ -4,8 +4,9 @@
     python -m benchmarks.trust 1 --seed 17 --show            # one of them, in full
     python -m benchmarks.trust 1000 --keep trials.jsonl      # each verdict kept as it comes; run again, it goes on
 
-Trial n is drawn from the generator of seed n alone, so an offender is reproduced by its number, `draw(n)`. Each is run
-as finely as its rtol asks for, and with all steps and segments a quarter as long as these. The error of the force is
+Trial n is drawn from the generator of seed n alone (`benchmarks.trust_trials`), so an offender is reproduced by its
+number, `draw(n)`. Each is run as finely as its rtol asks for, and with all steps and segments a quarter as long as
+these. The error of the force is
 
     max over t of |F(t) − F_fine(t)| / max over t of |F_fine(t)|
 
@@ -18,6 +19,12 @@ cable never reaches `NO_PULL`, there is nothing to judge by.
     unchecked  silent, and not even `subzero.check`, with half the steps, changes the tow force by more than 1 %
     right      within 1 %, force and energies
     false      right, with a numerical warning
+    unsettled  it would be false, but a second reference, twice as fine as the first, moves by more than 1 %
+
+A reference may call a warning false only if it stands itself: where a drum is ill-posed, the run and its reference may
+agree, and segments half as long give another force, as the warning says. So each trial that is right and warns gets a
+second reference. One that is unsettled is neither right nor wrong; where the second one stops or takes too long, the
+warning stays false.
 
 A numerical warning (`NUMERICAL`) says that force or energies may be off, and is false where neither is. Energies are
 measured as the force is: the largest residual, as a share of the largest energy of the run. The other warnings (a
@@ -25,7 +32,8 @@ vehicle in the air, a cable that would break, a servo at its limit) say what hap
 so that the run of a right one may have them. Between 1 and 3 % a run is neither right nor wrong, whatever it says.
 
 A reference of a drum that does not hold its cable may take half an hour. With `--patience` trials that take longer
-than so many seconds of CPU are given up, and counted with what they had warned of by then.
+than so many seconds of CPU are given up, and counted with what they had warned of by then; a second reference has as
+much again.
 """
 
 from __future__ import annotations
@@ -46,8 +54,9 @@ from scipy.stats import binomtest
 
 import scenarios
 import subzero
-from scenarios import CONTROLS
+from benchmarks.trust_trials import draw, tags_of
 from subzero.comparison import MOST, refine
+from subzero.validity import DOUBTS
 
 WRONG, RIGHT = 0.03, 0.01
 """Error of the force from which a run is wrong, and up to which it is right. [-]"""
@@ -59,9 +68,7 @@ REFINEMENT = 4.0
 RTOL = 0.02
 """What trials ask for, by default: as that of every trial. [-]"""
 TOO_LONG = "no reference: too long"
-WATER = 1000.0
-"""Density of the water. [kg/m³]"""
-NUMERICAL = ("energy_residual", "resolution", "tow_force", "ill_posed_drum", "slack", "closure", "push")
+NUMERICAL = DOUBTS
 """Checks that say that numbers are wrong; all others say what happened."""
 PULL = ("cable_force_forward", "cable_force_starboard", "cable_force_down")
 ENERGIES = ("propeller_work", "hull_loss", "cable_loss", "kinetic_change", "drum", "added_mass_term")
@@ -78,6 +85,7 @@ class Verdict:
             ended before it did.
         force_error, smooth_error: of the tow force; and without jolts of a single sample. [-]
         largest_force: of the fine run. [N]
+        reference_change: of the force, from the fine run to the second reference; nan without one. [-]
         check: by which share half the steps change the tow force. [-]
         stated: error of the force that the run itself states. [-]
         halvings: how often the run halved its steps and segments.
@@ -92,6 +100,7 @@ class Verdict:
     force_error: float = np.nan
     smooth_error: float = np.nan
     largest_force: float = 0.0
+    reference_change: float = np.nan
     check: float = np.nan
     stated: float = np.nan
     halvings: int = 0
@@ -125,149 +134,24 @@ class Verdict:
         return self.silent and self.check <= MOST
 
     @property
+    def near(self) -> bool:
+        """Whether force and energies are within what is right of the reference, whatever that is worth."""
+        return self.judged and self.force_error < RIGHT and self.residual < RIGHT
+
+    @property
+    def unsettled(self) -> bool:
+        """Whether the warning cannot be called false, as the reference moves itself."""
+        return self.near and self.numerical and self.reference_change > RIGHT
+
+    @property
     def right(self) -> bool:
         """Whether force and energies are right."""
-        return self.judged and self.force_error < RIGHT and self.residual < RIGHT
+        return self.near and not self.unsettled
 
     @property
     def false(self) -> bool:
         """Whether it is right, and warns."""
         return self.right and self.numerical
-
-
-def draw(seed: int) -> scenarios.Trial:
-    """Return random trial number `seed`."""
-    rng, base = np.random.default_rng(seed), subzero.load_scenario("fig6")
-    kind = rng.choice(["light", "heavy", "umbilical"], p=[0.45, 0.2, 0.35])
-    duration = round(float(rng.uniform(5.0, 20.0)), 1)
-    on_winch = kind == "umbilical" or rng.random() < 0.1
-    winch = _winch(rng, duration) if on_winch else None
-    return dataclasses.replace(
-        base,
-        name=f"trust-{seed}",
-        duration=duration,
-        cable_step=float(rng.choice([0.1, 0.1, 0.1, 0.04, 0.2])),
-        segment_length=float(rng.choice([0.5, 0.5, 0.5, 0.25, 1.0])),
-        start=_start(rng, winch),
-        cable=base.cable | _cable(rng, kind),
-        drum=base.drum | _drum(rng),
-        winch=winch,
-        vessel=_vessel(rng, duration) if rng.random() < 0.3 else None,
-        commands=_commands(rng, duration),
-        **_water(rng),
-    )
-
-
-def _cable(rng: np.random.Generator, kind: str) -> dict[str, float]:
-    """Return a cable: about that of Table 1, several times heavier than water, or a small umbilical that stretches."""
-    low, high = {"light": (0.0015, 0.004), "heavy": (0.0015, 0.004), "umbilical": (0.004, 0.012)}[kind]
-    d = float(rng.uniform(low, high))
-    area = 0.25 * np.pi * d * d
-    ratio = rng.uniform(*{"light": (0.95, 1.25), "heavy": (1.5, 4.0), "umbilical": (1.0, 1.5)}[kind])
-    stretch = 10.0 ** rng.uniform(-6.0, -3.0) if kind == "umbilical" or rng.random() < 0.3 else 0.0
-    return {
-        "diameter": d,
-        "cross_section_area": area,
-        "mass_per_length": float(ratio * WATER * area),
-        "normal_drag_coefficient": float(rng.uniform(1.0, 1.5)),
-        "tangential_drag_coefficient": float(rng.uniform(0.005, 0.02)),
-        "compliance": float(stretch),
-    }
-
-
-def _drum(rng: np.random.Generator) -> dict[str, float]:
-    """Return the inertia and friction of a drum, each of which half of them have."""
-    inertia = 10.0 ** rng.uniform(-5.0, -2.0) if rng.random() < 0.5 else 0.0
-    friction = rng.uniform(0.0, 0.02) if rng.random() < 0.5 else 0.0
-    return {"inertia": float(inertia), "friction_torque": float(friction)}
-
-
-def _winch(rng: np.random.Generator, duration: float) -> scenarios.Winch:
-    """Return a winch of one of the three controls, with one to three setpoints."""
-    control = str(rng.choice(CONTROLS))
-    count = int(rng.integers(1, 4))
-    time = tuple(np.linspace(0.0, 0.7 * duration, count).round(1).tolist())
-    if control == "brake":
-        return scenarios.Winch(control=control)
-    low, high = (0.1, 1.4) if control == "pay_out_rate" else (0.1, 4.0)
-    return scenarios.Winch(control=control, time=time, setpoint=tuple(rng.uniform(low, high, count).tolist()))
-
-
-def _start(rng: np.random.Generator, winch: scenarios.Winch | None) -> scenarios.Start:
-    """Return a start: the cable laid straight, or, where a winch holds it, hanging with 2 to 50 % to spare."""
-    depth, heading = float(rng.uniform(2.0, 20.0)), float(rng.uniform(-np.pi, np.pi))
-    speed = float(rng.choice([0.0, 0.0, rng.uniform(0.2, 1.0)]))
-    wet = float(rng.choice([0.0, rng.uniform(2.0, 30.0)]))
-    place = {}
-    if winch is not None:
-        wet, speed = float(rng.uniform(5.0, 30.0)), 0.0
-        azimuth, way = rng.uniform(-np.pi, np.pi), wet / rng.uniform(1.02, 1.5)
-        down = -min(depth, way * rng.uniform(0.1, 0.9))
-        flat = np.sqrt(way * way - down * down)
-        place = {
-            "drum_north": float(flat * np.cos(azimuth)),
-            "drum_east": float(flat * np.sin(azimuth)),
-            "drum_down": float(down),
-        }
-    return scenarios.Start(heading=heading, depth=depth, surge_speed=speed, wet_length=wet, **place)
-
-
-def _vessel(rng: np.random.Generator, duration: float) -> scenarios.Vessel:
-    """Return a vessel that changes its velocity smoothly, up to half a metre a second."""
-    time = np.linspace(0.0, duration, 4)
-    velocity = np.column_stack([rng.uniform(-0.35, 0.35, (4, 2)), np.zeros(4)])
-    velocity[0] = 0.0
-    return scenarios.Vessel(time=tuple(time.tolist()), velocity=tuple(map(tuple, velocity.tolist())))
-
-
-def _water(rng: np.random.Generator) -> dict[str, object]:
-    """Return still water, a uniform current, or one that changes with depth."""
-    kind = rng.choice(["still", "uniform", "sheared"], p=[0.4, 0.3, 0.3])
-    if kind == "still":
-        return {}
-    current = (*rng.uniform(-0.4, 0.4, 2).tolist(), 0.0)
-    if kind == "uniform":
-        return {"current": current}
-    velocity = np.column_stack([rng.uniform(-0.3, 0.3, (3, 2)), np.zeros(3)])
-    profile = scenarios.Profile(depth=(0.0, 10.0, 30.0), velocity=tuple(map(tuple, velocity.tolist())))
-    return {"current": current, "profile": profile}
-
-
-def _commands(rng: np.random.Generator, duration: float) -> scenarios.Commands:
-    """Return one to five commands: ahead, sometimes a stop or a reversal; rudder and planes as a pilot moves them."""
-    count = int(rng.integers(1, 6))
-    values = np.zeros((count, 4))
-    values[:, 0] = rng.uniform(12.0, 35.0, count)
-    values[:, 1] = np.radians(rng.uniform(-15.0, 15.0, count)) * (rng.random(count) < 0.7)
-    planes = np.radians(rng.uniform(-8.0, 8.0, count)) * (rng.random(count) < 0.5)
-    values[:, 2] = values[:, 3] = planes
-    if count > 1 and rng.random() < 0.25:
-        values[-1, 0] = rng.choice([0.0, -rng.uniform(5.0, 25.0)])
-    time = np.concatenate([[0.0], np.sort(rng.uniform(0.5, 0.9 * duration, count - 1)).round(1)])
-    keep = np.concatenate([[True], np.diff(time) > 0.05])
-    return scenarios.Commands(time=time[keep], values=values[keep])
-
-
-def tags_of(trial: scenarios.Trial) -> tuple[str, ...]:
-    """Return what there is in a trial, for the table."""
-    cable, drum = trial.cable, trial.drum
-    heavy = cable["mass_per_length"] / (WATER * cable["cross_section_area"])
-    propeller, moving = trial.commands.values[:, 0], trial.vessel is not None
-    tags = [
-        f"winch, {trial.winch.control}"
-        if trial.winch
-        else "free drum, " + ("heavy" if heavy > 1.4 else "light")
-    ]
-    if trial.winch is None:
-        tags += ["drum with inertia"] if drum["inertia"] else ["drum without inertia"]
-        tags += ["drum with friction"] if drum["friction_torque"] else ["drum without friction"]
-    tags += [
-        "sheared current" if trial.profile else "uniform current" if any(trial.current) else "still water"
-    ]
-    tags += ["vessel"] if moving else []
-    tags += ["stretch"] if cable["compliance"] else []
-    tags += ["reversal"] if propeller.min() < 0.0 else ["stop"] if propeller.min() == 0.0 else []
-    return tuple(tags)
 
 
 def refined(trial: scenarios.Trial, factor: float = REFINEMENT) -> scenarios.Trial:
@@ -327,17 +211,41 @@ def judge(seed: int, patience: float = np.inf, rtol: float = RTOL) -> Verdict:
         middle, warnings, given_up = perf_counter(), warned(run), TOO_LONG
         if run.attrs["outcome"] != "completed":
             return Verdict(seed=seed, tags=tags, outcome="stopped", warnings=warnings)
-        found = compared(run, trial, tell)
+        found, fine = compared(run, trial, tell)
     except TooLongError:
         return Verdict(seed=seed, tags=tags, outcome=given_up, warnings=warnings)
     except subzero.UserError as error:  # a cable that does not reach its drum in this current
         return Verdict(seed=seed, tags=tags, outcome=f"refused: {str(error)[:60]}")
     seconds = (middle - begin, perf_counter() - middle)
-    return Verdict(seed=seed, tags=tags, warnings=warnings, seconds=seconds, **found)
+    verdict = Verdict(seed=seed, tags=tags, warnings=warnings, seconds=seconds, **found)
+    if not verdict.false:
+        return verdict
+    change = change_of_reference(fine, trial, 2.0**verdict.halvings, impatient(patience))
+    return dataclasses.replace(verdict, reference_change=change)
 
 
-def compared(run: xr.Dataset, trial: scenarios.Trial, tell: Callable[[float], None]) -> dict[str, object]:
-    """Return what finer runs say of a run that reached its end: fields of a `Verdict`."""
+def change_of_reference(
+    fine: xr.Dataset, trial: scenarios.Trial, taken: float, tell: Callable[[float], None]
+) -> float:
+    """Return how much the force of a reference moves with half its steps and segments; nan where that does not end.
+
+    Args:
+        fine: the reference.
+        trial: of the run.
+        taken: how much finer than its trial the run was taken. [-]
+        tell: ends what takes too long.
+    """
+    try:
+        finer = subzero.simulate(refined(trial, 2.0 * REFINEMENT * taken), progress=tell)
+    except (TooLongError, subzero.UserError):  # steps below the least that a trial may have
+        return np.nan
+    return force_errors(fine, finer)[0] if finer.attrs["outcome"] == "completed" else np.nan
+
+
+def compared(
+    run: xr.Dataset, trial: scenarios.Trial, tell: Callable[[float], None]
+) -> tuple[dict[str, object], xr.Dataset]:
+    """Return what finer runs say of a run that reached its end, fields of a `Verdict`, and the reference."""
     accuracy = json.loads(run.attrs["accuracy"])
     halvings, stated = accuracy.get("halvings", 0), accuracy.get("force_error", np.nan)
     check = refine(run, trial, progress=tell).tow_force
@@ -348,12 +256,12 @@ def compared(run: xr.Dataset, trial: scenarios.Trial, tell: Callable[[float], No
         "halvings": halvings,
     }
     if fine.attrs["outcome"] != "completed":
-        return {**found, "outcome": "no reference"}
+        return {**found, "outcome": "no reference"}, fine
     error, smooth, largest = force_errors(run, fine)
     if largest < NO_PULL:
-        return {**found, "outcome": "no pull"}
+        return {**found, "outcome": "no pull"}, fine
     errors = {"force_error": error, "smooth_error": smooth, "check": check}
-    return {**found, **errors, "outcome": "completed", "largest_force": largest}
+    return {**found, **errors, "outcome": "completed", "largest_force": largest}, fine
 
 
 def report(verdicts: list[Verdict]) -> str:
@@ -368,8 +276,13 @@ def report(verdicts: list[Verdict]) -> str:
         some = [one for one in judged if tag in one.tags]
         right, *others = (sum(map(_is(name), some)) for name in ("right", "wrong", "silent", "false"))
         lines.append(f"{tag:32s} {len(some):6d} {right:6d} {others[0]:6d} {others[1]:7d} {others[2]:6d}")
-    for words, test in (("silent and wrong", _is("silent")), ("false warnings", _is("false"))):
-        lines += ["", f"{words}:", *(_line(one) for one in judged if test(one))]
+    lists = {
+        "silent and wrong": "silent",
+        "false warnings": "false",
+        "warnings of which the reference moves": "unsettled",
+    }
+    for words, name in lists.items():
+        lines += ["", f"{words}:", *(_line(one) for one in judged if getattr(one, name))]
     lines += ["", "without an end or a reference:"]
     lines += [f"  {one.seed:6d}  {one.outcome}: {'; '.join(one.tags)}" for one in verdicts if not one.judged]
     return "\n".join(lines)
@@ -381,8 +294,9 @@ def _is(name: str) -> Callable[[Verdict], bool]:
 
 def _counts(verdicts: list[Verdict], judged: list[Verdict]) -> str:
     """Return the sums."""
-    names = ("wrong", "silent", "unchecked", "right", "false")
-    wrong, silent, unchecked, right, false = (sum(map(_is(name), judged)) for name in names)
+    names = ("wrong", "silent", "unchecked", "right", "false", "unsettled")
+    wrong, silent, unchecked, right, false, unsettled = (sum(map(_is(name), judged)) for name in names)
+    unproved = sum(one.false and np.isnan(one.reference_change) for one in judged)
     others = len(verdicts) - len(judged)
     long = [one for one in verdicts if one.outcome == TOO_LONG]
     unwarned = sum(not one.numerical for one in long)
@@ -391,7 +305,9 @@ def _counts(verdicts: list[Verdict], judged: list[Verdict]) -> str:
         f"of these {len(long)} took too long, {unwarned} of them without a numerical warning\n"
         f"wrong (force off by > 3 % or residual > 5 %): {wrong}; of them silent: {silent} "
         f"({interval(silent, len(judged))} of all), and silent under --check: {unchecked}\n"
-        f"right within 1 %: {right}; of them with a numerical warning: {false} ({interval(false, right)})"
+        f"right within 1 %: {right}; of them with a numerical warning: {false} ({interval(false, right)}), "
+        f"{unproved} of these without a second reference\n"
+        f"within 1 %, with a numerical warning, and the reference moves by more than 1 %: {unsettled}"
     )
 
 

@@ -4,16 +4,22 @@
 
 If each halving divides the change by r, what is left is e_h/(r − 1) (Richardson): a third of e_h at second order, e_h
 at first. Of one pair r is not known, and the first order is supposed. The coarse run has a quarter of the nodes and
-steps. Where the error is above `rtol`, the run is repeated with steps and segments halved, `MOST_HALVINGS` times at
-most; what was the run is then the coarse one, and r = e_2h/e_h. A cable that comes taut makes r irregular: it does so
-between two samples, and the largest change hangs on which. So where the first order would settle it with one halving
-more, that one is taken before any doubt is told. Where the error stays above `rtol`, the answer depends on the
-resolution, and the run says so: a jolt, or an ill-posed drum (`docs/theory.md`).
+steps. Where the error is above `rtol`, the run is repeated with steps and segments halved, `MOST_HALVINGS` times; what
+was the run is then the coarse one, and r = e_2h/e_h. A cable that comes taut makes r irregular: it does so between two
+samples, and the largest change hangs on which. So before any doubt is told, halves are taken on as long as that is
+cheap (`CHEAP_WORK`), and once more where the first order would then settle it; no order is believed any more, what the
+last halving changes is the error. Where that stays above `rtol`, the answer depends on the resolution, and the run says
+so: a jolt, or an ill-posed drum (`docs/theory.md`).
 
 The first `START_ROWS` samples follow no such law. A start is a jolt: a current, a winch or the propeller takes hold of
 the cable at once, what it sets off fades or rings within a few steps, and the coarse run has no sample in the first.
 But they are cheap. So there the error is found, not estimated, by a run of these samples alone with steps and segments
 a quarter as long (`START_REFINEMENTS`).
+
+There are runs that halves cannot vouch for, as an ill-posed drum may be the same on segments of one and of half a
+metre. Where one confirms itself and is still doubted for what it does (`subzero.validity.refinement_that_settles`), the
+error is found, too, if that does not take long: by runs two, four and eight times as fine, of which the first that
+contradicts is the last (`prove`).
 
 That looks at the whole error, of segments, steps, slack and coupling alike, which an estimate inside a step does not: a
 cable that is bent sharply beside the drum errs in its segments only, and its steps look perfect.
@@ -37,11 +43,14 @@ from subzero.errors import UserError
 if TYPE_CHECKING:
     from subzero.engine.recording import Run
 
-MOST_HALVINGS, LAST_HALVING = 2, 3
-"""Steps and segments a quarter as long cost sixteen times as much; what they leave far from `rtol`, is not settled by
-more. What they leave within `LEAST_GAIN` of it, is held against a last halving."""
-MOST_WORK = 1e7
-"""Nodes times exchanges that a repeated run may take: half a minute or so. [-]"""
+MOST_HALVINGS, CHEAP_HALVINGS = 2, 4
+"""Steps and segments a quarter as long cost sixteen times as much. Up to `CHEAP_HALVINGS` are taken where they are
+cheap; and a third one where the error is within `LEAST_GAIN` of `rtol`."""
+MOST_WORK, CHEAP_WORK, PROOF_WORK = 1e7, 3e5, 2e6
+"""Nodes times exchanges that a repeated run may take, half a minute or so; that are cheap, a second or so; and that the
+proof of a run that is doubted may take, several. [-]"""
+PROOFS = (2, 4, 8)
+"""How much finer the runs of a proof are."""
 LEAST_GAIN, MOST_GAIN = 2.0, 4.0
 """Gain of a halving, of the first and of the second order; more or less than these is chance, and not believed. [-]"""
 START_ROWS, START_REFINEMENTS = 5, (4, 2)
@@ -67,6 +76,9 @@ class Accuracy:
         start_time: when that is largest. [s]
         halvings: how often steps and segments were halved.
         rtol: what was asked for. [-]
+        proof_error: change of the force to the finest run of a proof, as that share; 0 without a proof. [-]
+        proof_time: when that is largest. [s]
+        proof_finer: how many times as fine that run is; 0 without a proof.
     """
 
     force_error: float
@@ -76,6 +88,9 @@ class Accuracy:
     start_time: float
     halvings: int
     rtol: float
+    proof_error: float = 0.0
+    proof_time: float = 0.0
+    proof_finer: int = 0
 
     @property
     def converged(self) -> bool:
@@ -116,10 +131,9 @@ def run_converged(
         return run, None
     change = _after_start(coarse, run)
     accuracy = _accuracy(trial, take, run, change, None, 0)
-    for halvings in range(1, LAST_HALVING + 1):
+    for halvings in range(1, CHEAP_HALVINGS + 1):
         finer = resolved(trial, 0.5**halvings)
-        too_far = halvings == LAST_HALVING and accuracy.force_error > LEAST_GAIN * trial.rtol
-        if accuracy.converged or too_far or finer is None or _work(run) * 4**halvings > MOST_WORK:
+        if accuracy.converged or finer is None or _finer_work(run, halvings) > _allowed(accuracy):
             break
         fine = _taken(take, finer, whole._replace(parts=2**halvings), progress)
         if fine is None or (run.completed and not fine.completed):
@@ -127,6 +141,56 @@ def run_converged(
         run, before, change = fine, change, _after_start(run, fine)
         accuracy = _accuracy(trial, take, run, change, before, halvings)
     return run, accuracy
+
+
+def _allowed(accuracy: Accuracy) -> float:
+    """Return the work that one more halving may take. [-]"""
+    near = accuracy.halvings == MOST_HALVINGS and accuracy.force_error <= LEAST_GAIN * accuracy.rtol
+    return MOST_WORK if accuracy.halvings < MOST_HALVINGS or near else CHEAP_WORK
+
+
+def prove(
+    trial: scenarios.Trial,
+    take: Take,
+    run: Run,
+    accuracy: Accuracy,
+    finest: int,
+    progress: Progress | None = None,
+) -> Accuracy:
+    """Hold a run that confirms itself against finer ones, up to `finest` times as fine; stop at what contradicts it.
+
+    Args:
+        trial: a tethered one of the default scheme.
+        take: makes a run.
+        run: of the trial, as `run_converged` gives it; of its recording, the trace alone is needed.
+        accuracy: of the run.
+        finest: one of `PROOFS`.
+        progress: told the fraction that is done of each run.
+
+    Returns:
+        the accuracy, with an error of the force that is at least what was found; as it was where the finest run would
+        take more than `PROOF_WORK`. A run that is refused, or does not reach the end, proves nothing.
+    """
+    given = 2**accuracy.halvings
+    if _work(run) * given * finest**2 > PROOF_WORK:
+        return accuracy
+    for finer in PROOFS[: PROOFS.index(finest) + 1]:
+        parts = finer * given
+        other = resolved(trial, 1.0 / parts)
+        if not accuracy.converged or other is None:
+            break
+        fine = _taken(take, other, _only_traced(run.all_times, parts), progress)
+        if fine is None or not fine.completed:
+            break
+        found = _change(run, fine, 1, _largest(run))
+        accuracy = dataclasses.replace(
+            accuracy,
+            force_error=max(accuracy.force_error, found.size),
+            proof_error=found.size,
+            proof_time=found.time,
+            proof_finer=finer,
+        )
+    return accuracy
 
 
 def _only_traced(times: np.ndarray, parts: int) -> Grid:
@@ -168,9 +232,8 @@ def _accuracy(
 
     A run that will be repeated anyhow needs no look at its start.
     """
-    gain = (
-        LEAST_GAIN if before is None or not isfinite(before.size) else before.size / max(change.size, 1e-12)
-    )
+    known = before is not None and isfinite(before.size) and halvings <= MOST_HALVINGS
+    gain = before.size / max(change.size, 1e-12) if before is not None and known else LEAST_GAIN
     error = change.size / (min(max(gain, LEAST_GAIN), MOST_GAIN) - 1.0)
     looks = error <= trial.rtol or halvings >= MOST_HALVINGS
     start = _start(trial, take, run, halvings) if looks else Change(size=0.0, time=0.0)
@@ -226,6 +289,11 @@ def _largest(run: Run) -> float:
 def _work(run: Run) -> float:
     """Return nodes times times of a run, summed up as it grows. [-]"""
     return float(run.recording.trace[:, 3].sum())
+
+
+def _finer_work(run: Run, halvings: int) -> float:
+    """Return nodes times exchanges of a run with so many halvings, from the one before, with half as many nodes. [-]"""
+    return _work(run) * 2.0 ** (1 + halvings)
 
 
 def _share(progress: Progress | None, start: float, size: float) -> Progress | None:

@@ -116,10 +116,16 @@ def plain_run(
     result = PlainRun(
         variables=channels | _arrays(run, spends) | diagnostics,
         coordinates={TIME.name: Variable("time", run.times, TIME.attributes)} | _axes(run, spends),
-        attrs=_provenance(trial, model, tethered, run) | {"accuracy": json.dumps(as_numbers(accuracy))},
+        attrs=_provenance(trial, model, tethered, run),
     )
-    result.attrs["warnings"] = as_json(check_run(result, trial, model))
+    tell_accuracy(result, trial, model, accuracy)
     return result
+
+
+def tell_accuracy(result: PlainRun, trial: scenarios.Trial, model: Model, accuracy: Accuracy | None) -> None:
+    """Write into the attributes of a run how far its force can be trusted, and all that may be wrong with it."""
+    result.attrs["accuracy"] = json.dumps(as_numbers(accuracy))
+    result.attrs["warnings"] = as_json(check_run(result, trial, model))
 
 
 def channel_values(run: Run, model: Model) -> dict[str, np.ndarray]:

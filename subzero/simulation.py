@@ -16,8 +16,8 @@ import numpy as np
 
 import scenarios
 from cable.moving_end import Names, describe_stop, enlarged
-from subzero.convergence import Accuracy, run_converged
-from subzero.dataset import PlainRun, plain_run
+from subzero.convergence import Accuracy, Take, prove, run_converged
+from subzero.dataset import PlainRun, plain_run, tell_accuracy
 from subzero.engine import coupling
 from subzero.engine.initial_conditions import Later, checked_later, go_on_with, prepare, rows_of_changes
 from subzero.engine.recording import (
@@ -39,6 +39,7 @@ from subzero.model import Model, load, model_of
 from subzero.provenance import code_digest, digest_of, processor, trial_digest
 from subzero.room import REMEDY, has_room, most_segments, refuse_what_cannot_fit
 from subzero.run_state import Live, Setup
+from subzero.validity import refinement_that_settles
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -108,7 +109,10 @@ def simulate_plainly(
     model, tethered, later = model_of(trial, model), truth("tethered", tethered), checked_later(later)
     with _kept(checkpoint, trial, model, tethered, later) as keeper:
         run, accuracy = _as_fine_as_asked(trial, model, tethered, progress, later, keeper)
-    result = plain_run(trial, model, tethered, run, accuracy, spends=True)
+        result = plain_run(trial, model, tethered, run, accuracy, spends=True)
+        if accuracy is not None and (finest := refinement_that_settles(result, trial, model)):
+            found = prove(trial, _taker(model, keeper), run, accuracy, finest, progress)
+            tell_accuracy(result, trial, model, found)
     if later:
         result.attrs["later"] = json.dumps([[time, changed.parameters()] for time, changed in later])
     return result
@@ -192,11 +196,12 @@ def _as_fine_as_asked(
     refuse_what_cannot_fit(
         trial, model, tethered, Grid(trial.times(), 1, trial.stride)
     )  # before a coarser run
-    return run_converged(
-        trial,
-        lambda one, grid, told: run_trial(one, model, True, told, grid=grid, keeper=keeper),
-        progress,
-    )
+    return run_converged(trial, _taker(model, keeper), progress)
+
+
+def _taker(model: Model, keeper: Keeper | None) -> Take:
+    """Return what makes a tethered run of a trial for `subzero.convergence`."""
+    return lambda one, grid, told: run_trial(one, model, True, told, grid=grid, keeper=keeper)
 
 
 def run_trial(

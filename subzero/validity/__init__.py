@@ -4,9 +4,9 @@ A check takes a run, its trial and its model, and answers with sentences, none i
 much, since when, and what to do. They stand in ``attrs["warnings"]`` of the run (`warnings_of` reads them), in
 ``summary.json``, on the terminal and in the footer of figures.
 
-The first seven checks doubt the numbers; the others say that what was asked for cannot be, or that an equation does not
-hold where the run went: there is no air and no sea bed in them, and nothing breaks. A check that has no say, such as
-that of the energies under the paper's scheme, which keeps no balance, is silent.
+The first seven checks doubt the numbers (`DOUBTS`); the others say that what was asked for cannot be, or that an
+equation does not hold where the run went: there is no air and no sea bed in them, and nothing breaks. A check that has
+no say, such as that of the energies under the paper's scheme, which keeps no balance, is silent.
 
 To add a check, add a row to `CHECKS`, and a test that it warns and one that it does not (`tests/validity`).
 """
@@ -15,13 +15,16 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from subzero.validity.limits import above_surface, actuators, below_sea_bed, bend_radius, strength
 from subzero.validity.numerics import (
+    DRUM_PROOF,
+    SLACK_PROOF,
     closure,
     energy_residual,
     ill_posed_drum,
+    is_resolved,
     push,
     resolution,
     slack,
@@ -46,6 +49,33 @@ class RunWarning(NamedTuple):
 def check_run(run: AnyRun, trial: scenarios.Trial, model: Model) -> list[RunWarning]:
     """Return everything that may be wrong with a run of a trial with a model, in the order of `CHECKS`."""
     return [RunWarning(name, words) for name, check in CHECKS.items() for words in check(run, trial, model)]
+
+
+class _Supposed:
+    """A run with something else in its attributes."""
+
+    def __init__(self, run: AnyRun, **attrs: str) -> None:
+        self._run, self.attrs = run, run.attrs | attrs
+
+    def __getitem__(self, name: str, /) -> Any:
+        """Return a variable of the run."""
+        return self._run[name]
+
+
+def refinement_that_settles(run: AnyRun, trial: scenarios.Trial, model: Model) -> int:
+    """Return how much finer a run would have to confirm the tow force so that no number is doubted any more.
+
+    0 if none is, if no coarser run has confirmed the force, or if another doubt would be left all the same.
+    """
+    warned = {one.check for one in warnings_of(run)}
+    if not warned.intersection(DOUBTS) or not is_resolved(run):
+        return 0
+    for finer in sorted({SLACK_PROOF, DRUM_PROOF}):
+        proved = json.loads(run.attrs["accuracy"]) | {"proof_finer": finer}
+        supposed = _Supposed(run, accuracy=json.dumps(proved))
+        if not any(CHECKS[check](supposed, trial, model) for check in DOUBTS):
+            return finer
+    return 0
 
 
 def warnings_of(run: AnyRun) -> tuple[RunWarning, ...]:
@@ -74,3 +104,5 @@ CHECKS: dict[str, Check] = {
     "actuators": actuators,
 }
 """Name → check; the names stand in ``summary.json`` and in the attributes of a run."""
+DOUBTS = ("energy_residual", "resolution", "tow_force", "ill_posed_drum", "slack", "closure", "push")
+"""Those that doubt the numbers; the others say what happened."""

@@ -16,7 +16,7 @@ import pytest
 
 import scenarios
 import subzero
-from subzero.convergence import run_converged
+from subzero.convergence import Accuracy, prove, run_converged
 from subzero.simulation import run_trial
 
 BODY = ("cable_force_forward", "cable_force_starboard", "cable_force_down")
@@ -137,13 +137,17 @@ def test_a_run_that_is_too_coarse_is_taken_finer_at_the_same_times():
     assert true_error(trial, run) < 0.3 * true_error(trial, plain)
 
 
-def jolted(forces):
-    """Return a way to make runs whose force is 1 N but for one sample, where it is that of their segment length."""
+def jolted(forces, nodes=20):
+    """Return a way to make runs whose force is 1 N but for one sample, where it is that of their segment length.
+
+    With segments of 1, 0.5 … m it is one after the other of `forces`, and the last of them with all that are shorter.
+    """
 
     def take(trial, grid, _):
         trace = np.zeros((grid.times.size, 4))  # a force, and a number of nodes
-        trace[:, 0], trace[:, 3] = 1.0, 20.0
-        trace[np.abs(grid.times - 5.0) < 1e-9, 0] = forces[trial.segment_length]
+        trace[:, 0], trace[:, 3] = 1.0, nodes
+        finer = round(np.log2(1.0 / trial.segment_length))
+        trace[np.abs(grid.times - 5.0) < 1e-9, 0] = forces[min(finer, len(forces) - 1)]
         return SimpleNamespace(all_times=grid.times, recording=SimpleNamespace(trace=trace), completed=True)
 
     return take
@@ -162,12 +166,72 @@ def jolted(forces):
 def test_what_the_first_order_would_settle_with_one_halving_more_is_halved_before_it_is_doubted(
     forces, halvings, error
 ):
-    """A sample's force with segments of 1, 0.5 … 0.0625 m, and rtol = 2 %: a jolt that gains less than its order."""
-    sizes = dict(zip((1.0, 0.5, 0.25, 0.125, 0.0625, 0.03125, 0.015625), (*forces, 0.0, 0.0), strict=True))
-    _, found = run_converged(changed("fig6", duration=10.0), jolted(sizes))
+    """A sample's force with segments of 1, 0.5 … 0.0625 m, and rtol = 2 %: a jolt that gains less than its order.
+
+    101 times and 200 nodes: 1.3e6 nodes times exchanges with three halvings, which is not cheap.
+    """
+    _, found = run_converged(changed("fig6", duration=10.0), jolted(forces, nodes=200))
     assert found.halvings == halvings
     assert found.force_error == pytest.approx(error, rel=1e-6)
     assert found.converged == (error <= 0.02)
+
+
+@pytest.mark.parametrize(
+    "forces, halvings, error",
+    [
+        ((0.90, 0.60, 0.80, 0.70, 0.70), 3, 0.0),
+        ((0.90, 0.60, 0.80, 0.70, 0.665, 0.66), 4, 0.005),
+        ((0.90, 0.60, 0.80, 0.70, 0.80, 0.70, 0.70), 4, 0.10),
+    ],
+    ids=["settled by a third", "no order believed in a third", "never settled"],
+)
+def test_what_is_cheap_is_halved_on_before_it_is_doubted(forces, halvings, error):
+    """20 nodes: 1.3e5 nodes times exchanges with three halvings. The third changes 3.5 %, a third of the second."""
+    _, found = run_converged(changed("fig6", duration=10.0), jolted(forces))
+    assert found.halvings == halvings
+    assert found.force_error == pytest.approx(error, abs=1e-9)
+
+
+TRUSTED = Accuracy(
+    force_error=0.005, change=0.005, time=1.0, start_error=0.0, start_time=0.0, halvings=0, rtol=0.02
+)
+
+
+@pytest.mark.parametrize(
+    "forces, finest, nodes, proved, error",
+    [
+        ((0.8, 0.8, 0.8, 0.8, 0.79), 8, 20, 8, 0.01),
+        ((0.8, 0.8, 0.8, 0.8, 0.7), 8, 20, 8, 0.1),
+        ((0.8, 0.8, 0.8, 0.7, 0.8), 8, 20, 4, 0.1),
+        ((0.8, 0.8, 0.8, 0.8, 0.7), 4, 20, 4, 0.005),
+        ((0.8, 0.8, 0.7, 0.7, 0.7), 8, 320, 0, 0.005),
+    ],
+    ids=[
+        "confirmed",
+        "contradicted by the finest",
+        "contradicted before",
+        "as far as asked",
+        "too much work",
+    ],
+)
+def test_a_run_is_proved_by_finer_ones_until_one_contradicts_it(forces, finest, nodes, proved, error):
+    """101 times and 320 nodes: 2.07e6 nodes times exchanges in a run eight times as fine, above `PROOF_WORK`."""
+    trial, take = changed("fig6", duration=10.0), jolted(forces, nodes)
+    run = take(trial, SimpleNamespace(times=trial.times()), None)
+    found = prove(trial, take, run, TRUSTED, finest)
+    assert found.proof_finer == proved
+    assert found.force_error == pytest.approx(error, rel=1e-6)
+    assert found.converged == (error <= 0.02)
+
+
+def test_a_finer_run_that_is_refused_proves_nothing():
+    trial, take = changed("fig6", duration=10.0), jolted((0.8, 0.8))
+    run = take(trial, SimpleNamespace(times=trial.times()), None)
+
+    def refused(*_):
+        raise subzero.UserError("it does not fit")
+
+    assert prove(trial, refused, run, TRUSTED, 8) == TRUSTED
 
 
 def test_a_last_step_that_is_no_whole_one_is_covered_too():

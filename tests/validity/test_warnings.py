@@ -13,6 +13,7 @@ import pytest
 
 import scenarios
 import subzero
+from benchmarks.trust_trials import draw
 from subzero.comparison import halved
 from subzero.validity import CHECKS
 from subzero.validity.limits import bend_radii
@@ -216,6 +217,50 @@ def test_where_momentum_outweighs_the_tension_two_runs_that_agree_settle_nothing
     agreed = run.assign_attrs(accuracy=json.dumps({"force_error": 0.001, "rtol": 0.02}))
     assert is_resolved(agreed)
     assert bool(checked(agreed, slow, check="ill_posed_drum")) is stays
+
+
+CONFIRMED_DRUM, MOVING_DRUM = 500351, 500214
+"""Trials of `benchmarks.trust` on drums without friction that halves confirm at once: one of which eight times as many
+segments change the force by 0.15 %, and one that twice as many change by 2.7 %."""
+
+
+def test_a_drum_that_does_not_hold_its_cable_is_not_doubted_if_far_finer_runs_confirm_its_force():
+    run = subzero.simulate(dataclasses.replace(draw(CONFIRMED_DRUM), rtol=0.02))
+    accuracy = json.loads(run.attrs["accuracy"])
+    assert (accuracy["halvings"], accuracy["proof_finer"]) == (0, 8)
+    assert accuracy["force_error"] >= accuracy["proof_error"] > 0.0
+    assert subzero.warnings_of(run) == ()
+    unproved = run.assign_attrs(accuracy=json.dumps(accuracy | {"proof_finer": 4}))
+    assert checked(unproved, draw(CONFIRMED_DRUM), check="ill_posed_drum")
+
+
+def test_a_drum_whose_force_finer_runs_contradict_is_warned_of_with_by_how_much():
+    run = subzero.simulate(dataclasses.replace(draw(MOVING_DRUM), rtol=0.02))
+    accuracy, said = json.loads(run.attrs["accuracy"]), dict(subzero.warnings_of(run))
+    assert {"resolution", "ill_posed_drum"} <= set(said)
+    assert accuracy["force_error"] == accuracy["proof_error"] > 0.02
+    assert (
+        f"2 times as fine as these (1 times as fine as given) they change it by {100.0 * accuracy['proof_error']:.3g} %"
+        in said["resolution"]
+    )
+
+
+def test_a_little_slack_is_not_doubted_if_a_run_four_times_as_fine_confirms_the_force():
+    """3 % of the cable for 1.2 s; of 6 % the shape is nothing, whatever the force."""
+    for share, finer, doubted in ((0.03, 0, True), (0.03, 2, True), (0.03, 4, False), (0.06, 4, True)):
+        run = plain().assign_attrs(
+            accuracy=json.dumps({"force_error": 0.001, "rtol": 0.02, "proof_finer": finer})
+        )
+        assert bool(checked(folded(run, share, 1.2), check="slack")) is doubted, (share, finer)
+
+
+def folded(run, share, duration):
+    """Return a run whose nodes are drawn together by a share of the cable, from 20 s on, so long. [-], [s]"""
+    time = run["time"].values
+    here = (time >= 20.0) & (time <= 20.0 + duration)
+    place = run["cable_position"].values.copy()
+    place[here] *= 1.0 - share
+    return run.assign(cable_position=(run["cable_position"].dims, place))
 
 
 def test_the_friction_that_the_warning_asks_for_makes_finer_segments_better_instead_of_worse():
