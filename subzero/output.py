@@ -128,12 +128,13 @@ def _append(run: xr.Dataset, path: Path, stored: dict[str, dict[str, Any]]) -> N
         )
         for name, how in stored.items():
             values = run.variables[name]
-            for dim in (dim for dim in values.dims if dim not in file.dimensions):
+            dims = tuple(str(dim) for dim in values.dims)
+            for dim in (dim for dim in dims if dim not in file.dimensions):
                 file.createDimension(dim, values.sizes[dim])
             kind = np.dtype(how.get("dtype", values.dtype))
             options = {key: value for key, value in how.items() if key != "dtype"}
             fill = np.array(np.nan, kind) if kind.kind == "f" else None
-            made = file.createVariable(name, kind, values.dims, fill_value=fill, **options)
+            made = file.createVariable(name, kind, dims, fill_value=fill, **options)
             made.set_var_chunk_cache(CHUNK_CACHE)
             made.setncatts(_located(run, name) | values.attrs)
             for first in range(0, values.shape[0], BLOCK):
