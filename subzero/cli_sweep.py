@@ -14,10 +14,11 @@ import cyclopts
 from cyclopts import Parameter
 
 from subzero.cli_examples import register
-from subzero.errors import UserError, printable
+from subzero.errors import UserError, printable, whole
 from subzero.voice import NOT_STRICT, StrictVoice
 
 if TYPE_CHECKING:
+    from subzero.stage import Stage
     from subzero.sweeps.api import Standing
 
 FINE, STOPPED = 0, 3
@@ -47,35 +48,57 @@ def sweep(
         retry: run members again that failed.
         voice: how the command speaks.
     """
+    if workers is not None and scheduler is not None:
+        raise UserError("--workers are processes here, and --scheduler has its own. Leave out one of them.")
+    with _executor(workers, scheduler) as executor:
+        summary, stage = _swept(spec, out, executor, retry)
+    from subzero.sweeps.tell import tell_sweep
+
+    tell_sweep(summary, stage, voice)
+    return STOPPED if summary["failed"] or (voice.strict and summary["warnings"]) else FINE
+
+
+def _swept(spec: Path, out: Path | None, executor: Any, retry: bool) -> tuple[dict[str, Any], Stage]:
+    """Run what a file asks for, write all of it, and return the summary and where the files are."""
     from subzero.sweeps.plan import read_plan
 
     plan = read_plan(spec)
     from subzero.stage import staged
     from subzero.sweeps.api import finished
 
-    if workers is not None and scheduler is not None:
-        raise UserError("--workers are processes here, and --scheduler has its own. Leave out one of them.")
     folder = out or Path(spec.stem or "sweep")
     threading.Thread(target=_import_what_tells, daemon=True).start()
     with (
         _Bar(plan.description, len(plan.points.values), folder) as bar,
-        _client(scheduler) as client,
-        finished(plan, folder, workers=client or workers, progress=bar, retry=retry) as store,
+        finished(plan, folder, workers=executor, progress=bar, retry=retry) as store,
     ):
-        from subzero.sweeps.tell import FILES, tell_sweep, write_sweep
+        from subzero.sweeps.tell import FILES, write_sweep
 
         with staged(folder, FILES) as stage:
             summary = write_sweep(plan, store, stage)
-    tell_sweep(summary, stage, voice)
-    return STOPPED if summary["failed"] or (voice.strict and summary["warnings"]) else FINE
+    return summary, stage
 
 
 def _import_what_tells() -> None:
     """Import what tells of a sweep while its workers run: it takes a second, which nobody then waits for."""
     with suppress(Exception):  # whoever needs it finds out
-        import scipy.stats  # noqa: F401
-
         import subzero.sweeps.tell  # noqa: F401
+
+
+@contextmanager
+def _executor(workers: int | None, scheduler: str | None) -> Iterator[Any]:
+    """Give a Dask client, or processes here, which begin before the plan is read: they have as much to import."""
+    if scheduler is not None:
+        with _client(scheduler) as client:
+            yield client
+        return
+    from subzero.sweeps.workers import WorkerPool, cores
+
+    pool = WorkerPool(cores() if workers is None else whole("workers", workers, least=1))
+    try:
+        yield pool
+    finally:
+        pool.shutdown(cancel_futures=True)
 
 
 def add_to(app: cyclopts.App) -> None:
@@ -139,11 +162,8 @@ def _span(seconds: float) -> str:
 
 
 @contextmanager
-def _client(scheduler: str | None) -> Iterator[Any]:
-    """Give a client of a Dask scheduler, None without one."""
-    if scheduler is None:
-        yield None
-        return
+def _client(scheduler: str) -> Iterator[Any]:
+    """Give a client of a Dask scheduler."""
     try:
         import distributed
     except ImportError:

@@ -11,6 +11,8 @@ from contextvars import ContextVar
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from subzero import stage as stages
 from subzero.channels import CHANNELS, TIME
 from subzero.stage import Stage
@@ -88,10 +90,26 @@ def storage(run: xr.Dataset, *, float64: bool = False) -> dict[str, dict[str, An
     return stored
 
 
+BLOCK = 8 * CHUNKS["time"]
+"""So many times of an array are converted and written together: whole chunks, and no second copy of all of it. [-]"""
+
+CHUNK_CACHE = 2**20
+"""No chunk is written twice: the library need not keep 16 MiB of them for each array. [bytes]"""
+
+
 def write_netcdf(run: xr.Dataset, path: Path, float64: bool = False) -> None:
-    """Write a run as netCDF; its library says a full disk as it says everything else."""
+    """Write a run as netCDF, its large arrays block by block; its library says a full disk as it says everything else.
+
+    xarray converts all that it writes before it writes any of it, which takes as much memory as the run itself.
+    """
+    stored = storage(run, float64=float64)
+    large = [name for name, values in run.variables.items() if values.ndim > 1 and name in stored]
+    rest = run.drop_vars(large)
     try:
-        run.to_netcdf(path, engine="netcdf4", encoding=storage(run, float64=float64))
+        rest.to_netcdf(
+            path, engine="netcdf4", encoding={name: stored[name] for name in stored if name in rest.variables}
+        )
+        _append(run, path, {str(name): stored[str(name)] for name in large})
     except RuntimeError as error:
         if "HDF error" not in str(error):
             raise
@@ -100,14 +118,57 @@ def write_netcdf(run: xr.Dataset, path: Path, float64: bool = False) -> None:
         ) from error
 
 
+def _append(run: xr.Dataset, path: Path, stored: dict[str, dict[str, Any]]) -> None:
+    """Write arrays over time into a file that has the rest of their run, as xarray would have."""
+    import netCDF4
+
+    with netCDF4.Dataset(path, "a") as file:
+        _forget_homeless(
+            file, {one for name in stored for one in _located(run, name).get("coordinates", "").split()}
+        )
+        for name, how in stored.items():
+            values = run.variables[name]
+            dims = tuple(str(dim) for dim in values.dims)
+            for dim in (dim for dim in dims if dim not in file.dimensions):
+                file.createDimension(dim, values.sizes[dim])
+            kind = np.dtype(how.get("dtype", values.dtype))
+            options = {key: value for key, value in how.items() if key != "dtype"}
+            fill = np.array(np.nan, kind) if kind.kind == "f" else None
+            made = file.createVariable(name, kind, dims, fill_value=fill, **options)
+            made.set_var_chunk_cache(CHUNK_CACHE)
+            made.setncatts(_located(run, name) | values.attrs)
+            for first in range(0, values.shape[0], BLOCK):
+                made[first : first + BLOCK] = values.values[first : first + BLOCK].astype(kind)
+
+
+def _forget_homeless(file: Any, found: set[str]) -> None:
+    """Take coordinates that variables will name out of the attribute of those that none names."""
+    if "coordinates" in file.ncattrs():
+        left = [name for name in file.coordinates.split() if name not in found]
+        file.delncattr("coordinates")
+        file.setncatts({"coordinates": " ".join(left)} if left else {})
+
+
+def _located(run: xr.Dataset, name: str) -> dict[str, str]:
+    """Return the attribute that names the coordinates of a variable that are no axes of it, by the CF conventions."""
+    beside = sorted(
+        str(one)
+        for one, values in run.coords.items()
+        if one not in run.dims and set(values.dims) <= set(run[name].dims)
+    )
+    return {"coordinates": " ".join(beside)} if beside and name not in run.coords else {}
+
+
 def write_csv(run: xr.Dataset, path: Path) -> None:
     """Write the channels of a run as CSV: one row a sample, units in the column names, nothing where NaN."""
     channels = [TIME, *(channel for channel in CHANNELS if channel.name in run)]
-    columns = [run[channel.name].values.tolist() for channel in channels]
+    columns = [run[channel.name].values for channel in channels]
     with open(path, "w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow([channel.column for channel in channels])
-        writer.writerows([_cell(value) for value in row] for row in zip(*columns, strict=True))
+        for first in range(0, columns[0].size, BLOCK):
+            block = [column[first : first + BLOCK].tolist() for column in columns]
+            writer.writerows([_cell(value) for value in row] for row in zip(*block, strict=True))
 
 
 def write_summary(summary: dict[str, Any], stage: Stage) -> None:

@@ -136,6 +136,7 @@ class Live(NamedTuple):
         state: of the vehicle, as in `vehicle.STATE`.
         path: the vehicle's states on the way of an exchange (steps + 1, STATE_SIZE).
         stages: Runge-Kutta slopes (rows 0 … 3) and the state they are taken at (5, STATE_SIZE).
+        powers: `vehicle.power` at the first stage of each step of an exchange that is booked (steps, 4). [W]
         line: the cable.
         load: work space of the cable.
     """
@@ -144,5 +145,6 @@ class Live(NamedTuple):
     state: np.ndarray
     path: np.ndarray
     stages: np.ndarray
+    powers: np.ndarray
     line: Line
     load: Load

@@ -122,17 +122,43 @@ def derivative(
     R, nu_r, terms = scratch(3, 3), scratch(1, 6)[0], scratch(TERM_COUNT, 6)
     evaluate(state, command, current_n, wrench_b, numbers, R, nu_r, terms)
     motion(state, R, out)
+    _accelerations(terms, numbers, out)
+    actuators(state, command, nu_r[0], numbers, out)
+
+
+@compiled
+def derivative_and_power(
+    state: np.ndarray,
+    command: np.ndarray,
+    current_n: np.ndarray,
+    wrench_b: np.ndarray,
+    numbers: VehicleNumbers,
+    out: np.ndarray,
+    powers: np.ndarray,
+) -> None:
+    """Fill out as `derivative` does and powers as `power` does, to the same last bit, from one look at the forces."""
+    R, nu_r, terms = scratch(3, 3), scratch(1, 6)[0], scratch(TERM_COUNT, 6)
+    evaluate(state, command, current_n, wrench_b, numbers, R, nu_r, terms)
+    motion(state, R, out)
+    _accelerations(terms, numbers, out)
+    actuators(state, command, nu_r[0], numbers, out)
+    _powers(terms, nu_r, powers)
+
+
+@compiled
+def _accelerations(terms: np.ndarray, numbers: VehicleNumbers, out: np.ndarray) -> None:
+    """Fill out[7:13] with ν' = M⁻¹ Σ terms."""
+    wrench = scratch(1, 6)[0]
     for j in range(6):
         total = 0.0
         for i in range(TERM_COUNT):
             total += terms[i, j]
-        terms[0, j] = total
+        wrench[j] = total
     for i in range(6):
         rate = 0.0
         for j in range(6):
-            rate += numbers.inverse_mass[i, j] * terms[0, j]
+            rate += numbers.inverse_mass[i, j] * wrench[j]
         out[7 + i] = rate
-    actuators(state, command, nu_r[0], numbers, out)
 
 
 @compiled
@@ -185,8 +211,14 @@ def power(
         numbers: as for `derivative`.
         out: the powers; losses are negative, whatever the motion.
     """
-    R, nu_r, terms = scratch(3, 3), scratch(1, 6)[0], scratch(TERM_COUNT, 6)
-    evaluate(state, command, current_n, wrench_b, numbers, R, nu_r, terms)
+    nu_r, terms = scratch(1, 6)[0], scratch(TERM_COUNT, 6)
+    evaluate(state, command, current_n, wrench_b, numbers, scratch(3, 3), nu_r, terms)
+    _powers(terms, nu_r, out)
+
+
+@compiled
+def _powers(terms: np.ndarray, nu_r: np.ndarray, out: np.ndarray) -> None:
+    """Fill out (len(POWERS),) with the powers of all terms (terms, 6) at a velocity through the water."""
     for i in range(len(POWERS)):
         out[i] = 0.0
     for i in range(TERM_COUNT):

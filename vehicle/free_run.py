@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from subzero.jit import allocating, compiled
-from vehicle.dynamics import POWERS, derivative, finish_step, power
+from vehicle.dynamics import POWERS, derivative_and_power, finish_step
 from vehicle.state import STATE_SIZE
 from vehicle.vehicle import Vehicle, VehicleNumbers
 
@@ -42,8 +42,7 @@ def rates(
 ) -> None:
     """Fill out (SIZE,) with the rates of the state and of the works."""
     state = y[:STATE_SIZE]
-    derivative(state, command, current_n, wrench_b, numbers, out[:STATE_SIZE])
-    power(state, command, current_n, wrench_b, numbers, out[STATE_SIZE:])
+    derivative_and_power(state, command, current_n, wrench_b, numbers, out[:STATE_SIZE], out[STATE_SIZE:])
 
 
 @compiled

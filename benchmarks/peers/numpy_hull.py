@@ -37,7 +37,7 @@ def body_terms(nu, c):
     a, out = c.body_lift, np.zeros(6)
     out[[1, 5]] = a[0] * abs(u) * v + a[1] * u * r, a[2] * u * v + a[3] * abs(u) * r
     out[[2, 4]] = a[4] * abs(u) * w + a[5] * u * q, a[6] * u * w + a[7] * abs(u) * q
-    x, size = c.strips.T
+    x, size = c.strips
     across = np.array([v + x * r, w - x * q])
     drag = size * np.linalg.norm(across, axis=0) * across
     out[[1, 2, 4, 5]] += -drag[0].sum(), -drag[1].sum(), x @ drag[1], -(x @ drag[0])

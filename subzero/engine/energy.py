@@ -70,16 +70,22 @@ def _book_hull(setup: Setup, live: Live, start: float, span: float, steps: int) 
     """Add the hull's share of an exchange."""
     ledger = live.now.ledger
     h, old, new, total, before = span / steps, ledger.hull_old, ledger.hull_new, ledger.total, -1
+    # Without a missing force, the first stages of the steps have left the powers: the cable's is not asked for.
+    left = not (setup.fixed.prescribed or setup.fixed.lacking)
     for n in range(steps):
         held = row_at(setup.orders.time, start + n * h)
         command = setup.orders.values[held]
         if held == before:  # a step begins as the one before ended, unless another command holds
-            for i in range(old.size):
-                old[i] = new[i]
+            _copy_power(new, new[P_EXTERNAL], old)
+        elif left:
+            _copy_power(live.powers[n], 0.0, old)
         else:
             _hull_power(setup, live, n, start + n * h, n / steps, command, old)
         row, before = n + 1, held
-        _hull_power(setup, live, row, start + row * h, row / steps, command, new)
+        if left and row < steps and row_at(setup.orders.time, start + row * h) == held:
+            _copy_power(live.powers[row], 0.0, new)
+        else:
+            _hull_power(setup, live, row, start + row * h, row / steps, command, new)
         if setup.fixed.prescribed:
             total[PROPELLER] -= 0.5 * h * (old[P_EXTERNAL] + new[P_EXTERNAL])
             continue
@@ -93,6 +99,14 @@ def _book_hull(setup: Setup, live: Live, start: float, span: float, steps: int) 
     kinetic = kinetic_energy(live.path[steps], live.now.hull.current, setup.fixed.vehicle)
     total[KINETIC] += kinetic - ledger.kinetic
     ledger.kinetic = kinetic
+
+
+@inlined
+def _copy_power(powers: np.ndarray, external: float, out: np.ndarray) -> None:
+    """Fill out (4,) with powers, but for "external" with another one. [W]."""
+    for i in range(P_EXTERNAL):
+        out[i] = powers[i]
+    out[P_EXTERNAL] = external
 
 
 @inlined

@@ -45,7 +45,7 @@ from subzero.external_force import MissingForce
 from subzero.jit import allocating, compiled
 from subzero.model import Model
 from subzero.run_state import LINEAR_ROWS, Fixed, HullWork, Ledger, Live, Now, Orders, Setup
-from vehicle import STATE_SIZE, initial_state, kinetic_energy, rotation
+from vehicle import POWERS, STATE_SIZE, initial_state, kinetic_energy, rotation
 from vehicle.state import LINKAGE, POSITION, SERVO, VELOCITY
 
 FORCE_TOLERANCE = 1e-9
@@ -90,6 +90,7 @@ def prepare(
         state=first_state(trial, model, tethered) if state is None else state,
         path=np.zeros((steps + 1, size)),
         stages=np.zeros((5, size)),
+        powers=np.zeros((steps, len(POWERS))),
         line=new_line(int((wet + RUN_IN) / trial.segment_length) + FIRST_ROOM),
         load=new_load(),
     )

@@ -15,7 +15,7 @@ import numpy as np
 from subzero.engine.external_wrench import add_missing, feel_current, row_at, tow_wrench
 from subzero.jit import allocating, compiled, inlined, inner, scratch
 from subzero.run_state import HEADING, LINEAR_ROWS, PITCH, PLACE, SLOPE, SPEED, TIME, Live, Setup
-from vehicle import STATE_SIZE, derivative, finish_step, quaternion_from_euler, rotation
+from vehicle import STATE_SIZE, derivative, derivative_and_power, finish_step, quaternion_from_euler, rotation
 
 GAUSS_OFFSET = 0.5 * np.sqrt(0.6)
 """Three-point Gauss quadrature: nodes at the middle and this fraction of a step before and behind it."""
@@ -52,7 +52,12 @@ def advance_hull(setup: Setup, live: Live, start: float, span: float, steps: int
             feel_current(setup, stage, start + n * h + part, work)
             if setup.fixed.lacking:
                 add_missing(setup, live, stage, command, start + n * h + part, work)
-            derivative(stage, command, work.current, work.wrench, setup.fixed.vehicle, k[s])
+            if s == 0 and setup.fixed.booked:
+                derivative_and_power(
+                    stage, command, work.current, work.wrench, setup.fixed.vehicle, k[0], live.powers[n]
+                )
+            else:
+                derivative(stage, command, work.current, work.wrench, setup.fixed.vehicle, k[s])
         for i in range(STATE_SIZE):
             new[i] = state[i] + h / 6.0 * (k[0, i] + 2.0 * k[1, i] + 2.0 * k[2, i] + k[3, i])
         finish_step(

@@ -21,7 +21,7 @@ from subzero.sweeps.plan import Plan, Planned, plan_sweep
 from subzero.sweeps.result import RESULT, Gathered, open_result, write_result
 from subzero.sweeps.schedule import Schedule
 from subzero.sweeps.store import Store, opened
-from subzero.sweeps.workers import WorkerPool
+from subzero.sweeps.workers import WorkerPool, cores
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -195,7 +195,7 @@ def deliver(plan: Plan, store: Store, folder: Path) -> Gathered:
 def _executor(workers: Any, members: int) -> Iterator[tuple[Executor, int]]:
     """Give what runs members, and how many it runs at a time."""
     if isinstance(workers, Executor):
-        yield workers, cores()
+        yield workers, workers.count if isinstance(workers, WorkerPool) else cores()
     elif _is_client(workers):
         yield workers.get_executor(), _cluster_size(workers)
     else:
@@ -243,8 +243,3 @@ def _cluster_size(client: Any) -> int:
         ) from None
     cores: dict[str, int] = client.ncores()
     return max(1, sum(cores.values()))
-
-
-def cores() -> int:
-    """Return how many cores this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -40,6 +40,11 @@ MOST_FALSE_STARTS = 3
 """A process that ends before it is ready, by itself so many times in a row, will never be. [-]"""
 
 
+def cores() -> int:
+    """Return how many cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
 class WorkerDiedError(RuntimeError):
     """The process that had a task died of it, or was killed."""
 
@@ -49,10 +54,14 @@ class WorkerPool(Executor):
 
     Args:
         workers: how many.
+
+    Attributes:
+        count: how many.
     """
 
     def __init__(self, workers: int) -> None:
         self._tasks: queue.SimpleQueue[tuple[Future[Any], bytes] | None] = queue.SimpleQueue()
+        self.count = workers
         self._hands = [_Hand(self._tasks) for _ in range(workers)]
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:

@@ -66,3 +66,23 @@ def test_the_propeller_never_gives_more_than_its_shaft(subzero2):
             useful = thrust(n, u, numbers) / (1 - P.thrust_deduction) * (1 - P.wake_fraction) * u
             shaft = 2 * np.pi * n * torque(n, u, numbers)
             assert useful <= shaft + 1e-12
+
+
+def test_rates_and_powers_taken_together_are_those_taken_apart(subzero2):
+    """One look at the forces gives what two give, to the last bit: the arithmetic is the same, so no tolerance."""
+    numbers, command, current = (
+        subzero2.numbers(),
+        np.array([20.0, 0.1, -0.05, 0.02]),
+        np.array([0.1, -0.2, 0.05]),
+    )
+    state = vehicle.initial_state(
+        roll=0.3, pitch=-0.2, heading=1.0, velocity=(0.8, 0.1, -0.1, 0.2, 0.1, -0.1)
+    )
+    wrench = np.array([-1.0, 0.5, 0.2, 0.01, 0.1, -0.1])
+    rates, powers = np.empty(vehicle.STATE_SIZE), np.empty(len(vehicle.POWERS))
+    together = np.empty(vehicle.STATE_SIZE), np.empty(len(vehicle.POWERS))
+    vehicle.derivative(state, command, current, wrench, numbers, rates)
+    vehicle.power(state, command, current, wrench, numbers, powers)
+    vehicle.derivative_and_power(state, command, current, wrench, numbers, *together)
+    assert np.array_equal(together[0], rates)
+    assert np.array_equal(together[1], powers)
