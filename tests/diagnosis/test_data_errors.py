@@ -136,6 +136,16 @@ def test_two_errors_at_once_are_named_at_the_public_face_and_nothing_is_converte
 
 
 @pytest.mark.slow
+def test_an_error_that_physics_has_no_chance_against_is_corrected_before_anything_is_searched():
+    """Each search begins with the sensitivities of the nominal model: there is one, of the record without the error."""
+    turned, words = DataError(kind="command_sign", channels=("rudder",)), list[str]()
+    verdict = subzero.diagnose(turned.planted(measured("zigzag", 20251)), budget="screen",
+                               progress=lambda share, doing: words.append(doing))  # fmt: skip
+    assert named(verdict) == {"command_sign:rudder"}
+    assert words.count("sensitivities of the nominal model") == 1
+
+
+@pytest.mark.slow
 def test_what_the_user_vouches_for_is_not_called_an_error():
     wrong = EACH[2].planted(measured("fig6", 20252))
     trusted = dataclasses.replace(wrong, trusted=frozenset(CHANNELS))
