@@ -17,7 +17,7 @@ import scenarios
 import subzero
 from subzero import Logged
 from subzero.diagnosis import Setting, catalogue, report
-from subzero.diagnosis.inference import KINDS_OF_DATA_ERRORS, DataError, repeated_values
+from subzero.diagnosis.inference import KINDS_OF_DATA_ERRORS, DataError, is_rounded, repeated_values
 from subzero.records.record import Record
 from subzero.synthetic.planted import draw_tolerances, make_record
 
@@ -177,3 +177,15 @@ def test_a_channel_that_is_frozen_from_the_first_sample_of_a_turn_on_is_no_value
     record = Record(source="made", time=time, values={"heading": heading})
     (found,) = repeated_values(dataclasses.replace(clean, record=record))
     assert (found.kind, found.since, len(found.at)) == ("frozen", 12.0, 28)
+
+
+def test_a_rounded_log_that_jumps_by_no_whole_step_is_rounded_all_the_same():
+    """A speed log with steps of 0.05 m/s repeats values while the speed is steady; its sensor jumps by 0.24 m/s."""
+    time, clean = np.arange(0.0, 60.0, 0.1), smooth()
+    noisy = 1.5 * (1.0 - np.exp(-time / 5.0)) + 0.004 * np.random.default_rng(3).standard_normal(time.size)
+    jumping = np.round(noisy / 0.05) * 0.05 + np.where(time < 30.0, 0.0, 0.24)
+    record = Record(source="made", time=time, values={"surge_speed": jumping})
+    logged = dataclasses.replace(clean, record=record)
+    found = repeated_values(logged)
+    assert found
+    assert all(is_rounded(one, logged) for one in found)
