@@ -189,3 +189,14 @@ def test_a_rounded_log_that_jumps_by_no_whole_step_is_rounded_all_the_same():
     found = repeated_values(logged)
     assert found
     assert all(is_rounded(one, logged) for one in found)
+
+
+def test_a_rounded_depth_that_stands_still_between_outliers_stands_for_itself():
+    """At 0.1 m an outlier of 0.2 m is no more than two steps off: what lies between two of them is measured."""
+    time, clean = np.arange(0.0, 20.0, 0.1), smooth()
+    steps = np.round(10.0 + 2.0 * np.maximum(time - 4.5, 0.0))
+    steps[[0, 20, np.flatnonzero(steps == 10.0)[-1]]] = 8.0, 12.0, 12.0
+    depth = np.round(0.1 * steps, 6)
+    record = Record(source="made", time=time, values={"depth": depth})
+    found = repeated_values(dataclasses.replace(clean, record=record))
+    assert not [one for one in found if one.how]

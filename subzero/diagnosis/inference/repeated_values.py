@@ -44,7 +44,9 @@ def repeated_values(logged: Logged, trusted: frozenset[str] = frozenset()) -> li
     found = []
     for name, values in logged.record.values.items():
         if name not in trusted:
-            found += _of(name, logged.record.time, values, usual_of(name, values, logged.noise).level)
+            usual = usual_of(name, values, logged.noise)
+            level = float(np.hypot(usual.level, usual.resolution / np.sqrt(12.0)))
+            found += _of(name, logged.record.time, values, level)
     return found
 
 
