@@ -17,7 +17,7 @@ import scenarios
 import subzero
 from subzero import Logged
 from subzero.diagnosis import Setting, catalogue, report
-from subzero.diagnosis.inference import KINDS_OF_DATA_ERRORS, DataError, repeated_values
+from subzero.diagnosis.inference import KINDS_OF_DATA_ERRORS, DataError, is_rounded, repeated_values
 from subzero.records.record import Record
 from subzero.synthetic.planted import draw_tolerances, make_record
 
@@ -136,6 +136,16 @@ def test_two_errors_at_once_are_named_at_the_public_face_and_nothing_is_converte
 
 
 @pytest.mark.slow
+def test_an_error_that_physics_has_no_chance_against_is_corrected_before_anything_is_searched():
+    """Each search begins with the sensitivities of the nominal model: there is one, of the record without the error."""
+    turned, words = DataError(kind="command_sign", channels=("rudder",)), list[str]()
+    verdict = subzero.diagnose(turned.planted(measured("zigzag", 20251)), budget="screen",
+                               progress=lambda share, doing: words.append(doing))  # fmt: skip
+    assert named(verdict) == {"command_sign:rudder"}
+    assert words.count("sensitivities of the nominal model") == 1
+
+
+@pytest.mark.slow
 def test_what_the_user_vouches_for_is_not_called_an_error():
     wrong = EACH[2].planted(measured("fig6", 20252))
     trusted = dataclasses.replace(wrong, trusted=frozenset(CHANNELS))
@@ -167,3 +177,26 @@ def test_a_channel_that_is_frozen_from_the_first_sample_of_a_turn_on_is_no_value
     record = Record(source="made", time=time, values={"heading": heading})
     (found,) = repeated_values(dataclasses.replace(clean, record=record))
     assert (found.kind, found.since, len(found.at)) == ("frozen", 12.0, 28)
+
+
+def test_a_rounded_log_that_jumps_by_no_whole_step_is_rounded_all_the_same():
+    """A speed log with steps of 0.05 m/s repeats values while the speed is steady; its sensor jumps by 0.24 m/s."""
+    time, clean = np.arange(0.0, 60.0, 0.1), smooth()
+    noisy = 1.5 * (1.0 - np.exp(-time / 5.0)) + 0.004 * np.random.default_rng(3).standard_normal(time.size)
+    jumping = np.round(noisy / 0.05) * 0.05 + np.where(time < 30.0, 0.0, 0.24)
+    record = Record(source="made", time=time, values={"surge_speed": jumping})
+    logged = dataclasses.replace(clean, record=record)
+    found = repeated_values(logged)
+    assert found
+    assert all(is_rounded(one, logged) for one in found)
+
+
+def test_a_rounded_depth_that_stands_still_between_outliers_stands_for_itself():
+    """At 0.1 m an outlier of 0.2 m is no more than two steps off: what lies between two of them is measured."""
+    time, clean = np.arange(0.0, 20.0, 0.1), smooth()
+    steps = np.round(10.0 + 2.0 * np.maximum(time - 4.5, 0.0))
+    steps[[0, 20, np.flatnonzero(steps == 10.0)[-1]]] = 8.0, 12.0, 12.0
+    depth = np.round(0.1 * steps, 6)
+    record = Record(source="made", time=time, values={"depth": depth})
+    found = repeated_values(dataclasses.replace(clean, record=record))
+    assert not [one for one in found if one.how]

@@ -151,6 +151,12 @@ def log_prior(ids: Ids, count: int) -> float:
 def variances(entries: Sequence[Entry], ids: Ids, kappa: float) -> np.ndarray:
     """Return the prior variances of z (k,): (κτ)², or s² for the causes that are named."""
     D = np.array([(kappa * entry.parameter.tolerance) ** 2 for entry in entries])
-    for k in columns_of(entries, ids):
-        D[k] = max(entries[k].parameter.scale, 2.0 * kappa * entries[k].parameter.tolerance) ** 2
+    at = columns_of(entries, ids)
+    D[at] = variances_named(entries, at, kappa)
     return D
+
+
+def variances_named(entries: Sequence[Entry], at: Sequence[int], kappa: float) -> np.ndarray:
+    """Return the prior variances that entries have if their causes are named (at,): s²."""
+    own = [entries[k].parameter for k in at]
+    return np.array([max(one.scale, 2.0 * kappa * one.tolerance) ** 2 for one in own])

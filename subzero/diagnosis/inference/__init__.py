@@ -122,7 +122,7 @@ from subzero.diagnosis.inference.model_average import (
 )
 from subzero.diagnosis.inference.out_of_catalogue import Findings, special_cases_folded
 
-from subzero.diagnosis.inference.repeated_values import repeated_values
+from subzero.diagnosis.inference.repeated_values import is_rounded, repeated_values
 
 __all__ = [
     "AXIS_WORDS",
@@ -173,6 +173,7 @@ __all__ = [
     "history",
     "is_noise",
     "is_poor_fit",
+    "is_rounded",
     "knots_of",
     "laplace",
     "latent_force_candidates",

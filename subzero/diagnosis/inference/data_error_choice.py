@@ -6,15 +6,18 @@ its own, with causes, what begins in mid-trial, forces and drifts. T the correct
 
     log p(y, errors) = log Σ_M p(T y | M) p(M) + Σ log|dT/dy| + Σ log p(error) + log p(noise)
 
-A search that is hopelessly behind ends with its first look. What no vehicle does (another sign, unit or reference of
-one channel, exchanged columns, repeated values) needs no such search where the linear problem leaves physics no chance
-with all its parameters free at once, and causes that hold throughout explain what is left (`is_clear`).
+A search that is hopelessly behind ends with its first look. What the linear problem leaves no choice of is corrected
+before anything is searched, and the records with it are not searched at all if causes that hold throughout explain what
+is left (`is_clear`): what no vehicle does (another sign, unit or reference of one channel, exchanged columns, repeated
+values) where physics has no chance with all its parameters free at once; a clock, a latency or a command where it is
+hopelessly behind. A step in a sensor is always held against physics: a load that shifts looks like one.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
@@ -52,6 +55,8 @@ ALIKE_LEAD = 3.0
 CLEAR_LEAD, CLEAR_GENEROUS_LEAD = 15.0, 10.0
 """With a greater lead over physics, in the linear problem, an error needs no search of the record as it is: over
 nothing and every cause, and over all causes at once."""
+NEVER_CLEAR = ("step",)
+"""Kinds that what breaks in mid-trial may look like to the noise."""
 LOUD = 2.5
 """Noise of more usual levels hides a misfit. [-]"""
 SIGNATURE_LEAD = 20.0
@@ -62,13 +67,16 @@ ALIKE = 10
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SuspectedError:
-    """An error of a record, its leads, and those that the record cannot tell from it."""
+    """An error of a record, its leads, and those that the record cannot tell from it; `left` is the noise of the
+    channel that is explained worst without it, in usual levels, with all of physics to help.
+    """
 
     record: int
     error: DataError
     lead: float
     generous: float
     alike: tuple[DataError, ...] = ()
+    left: float = np.inf
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -87,6 +95,23 @@ class Suspicion:
         """Return what no vehicle does, or none of it, and so many of the others, the first, in their order."""
         counted = [one for one in self.errors if is_soft(one)][:soft]
         return tuple(one for one in self.errors if one in counted or (firm and not is_soft(one)))
+
+    @property
+    def soft(self) -> int:
+        """How many there are that a vehicle may look like."""
+        return sum(map(is_soft, self.errors))
+
+    def fewer(self, errors: Sequence[SuspectedError]) -> list[tuple[SuspectedError, ...]]:
+        """Return the sets with less of those that a vehicle may look like, the largest first, and that with none."""
+        sets = [self.subset(soft=k) for k in reversed(range(sum(map(is_soft, errors))))]
+        return [one for one in dict.fromkeys([*sets, ()]) if one != errors]
+
+    @property
+    def clear_soft(self) -> int:
+        """How many of those that a vehicle may look like, from the first on, leave physics no chance, and explain."""
+        soft = [one for one in self.errors if is_soft(one)]
+        clear = next((k for k, one in enumerate(soft) if not leads_clearly(one)), len(soft))
+        return clear if explain(self.subset(soft=clear)) else 0
 
     def log_linear(self, errors: Sequence[SuspectedError]) -> float:
         """Return about the log evidence in the linear problem with some of the errors."""
@@ -124,8 +149,8 @@ def _of_record(problem: Problem, record: int, logged: Logged) -> tuple[Yardstick
         ranked = suspects(yardstick, logged.trusted)
         if not ranked or not _is_suspected(ranked[0]):
             break
-        found.append(_suspected(record, ranked))
         yardstick = _after(yardstick, ranked[0].error)
+        found.append(_suspected(record, ranked, max(yardstick.as_is.scales.values())))
     return begun, found
 
 
@@ -133,12 +158,11 @@ def _is_suspected(one: Suspect) -> bool:
     return one.lead > (LEAST_SOFT_LEAD if one.error.kind in SOFT else LEAST_LEAD)
 
 
-def _suspected(record: int, ranked: Sequence[Suspect]) -> SuspectedError:
+def _suspected(record: int, ranked: Sequence[Suspect], left: float) -> SuspectedError:
     first = ranked[0]
     alike = tuple(one.error for one in ranked[1:] if one.lead > first.lead - ALIKE_LEAD)
-    return SuspectedError(
-        record=record, error=first.error, lead=first.lead, generous=first.generous, alike=alike
-    )
+    return SuspectedError(record=record, error=first.error, lead=first.lead, generous=first.generous, alike=alike,
+                          left=left)  # fmt: skip
 
 
 def _after(yardstick: Yardstick, error: DataError) -> Yardstick:
@@ -149,13 +173,28 @@ def _after(yardstick: Yardstick, error: DataError) -> Yardstick:
     return replace(changed, corrected=(*yardstick.corrected, error), repeated=yardstick.repeated)
 
 
-def is_clear(firm: Sequence[SuspectedError], work: Findings) -> bool:
-    """Say whether what no vehicle does need not be held against a search of the records as they are: what is left then
-    is explained without anything that begins in mid-trial, and without a force.
+def explain(errors: Sequence[SuspectedError]) -> bool:
+    """Say whether errors are all that the linear problem needs: what broke in mid-trial makes an error of a clock
+    likely, too, but that leaves more than noise.
     """
-    leads = all(one.lead > CLEAR_LEAD and one.generous > CLEAR_GENEROUS_LEAD for one in firm)
+    last = {one.record: one for one in errors}
+    return all(one.left < LOUD for one in last.values())
+
+
+def leads_clearly(one: SuspectedError) -> bool:
+    """Say whether an error leaves physics no chance in the linear problem."""
+    if is_soft(one):
+        return one.error.kind not in NEVER_CLEAR and min(one.lead, one.generous) > FAR_BEHIND
+    return one.lead > CLEAR_LEAD and one.generous > CLEAR_GENEROUS_LEAD
+
+
+def is_clear(errors: Sequence[SuspectedError], work: Findings) -> bool:
+    """Say whether errors need not be held against a search of the records with them: what is left then is explained
+    without anything that begins in mid-trial, and without a force.
+    """
     outside = max((one.log_posterior for one in work.out_of_catalogue), default=-np.inf)
-    return leads and work.search.best().log_posterior > outside and is_explained(work)
+    explained = work.search.best().log_posterior > outside and is_explained(work)
+    return explained and all(map(leads_clearly, errors))
 
 
 def is_soft(one: SuspectedError) -> bool:
@@ -224,30 +263,34 @@ class Look(Protocol):
 def compared(suspicion: Suspicion, records: Sequence[Logged], look: Look) -> list[tuple[Explained, float]]:
     """Return what errors the data may have, with what explains the records besides and its log evidence.
 
-    The records without what no vehicle does get a first look, and a whole one if that does not explain them and
-    something else is suspected. This gets a first look, too, unless it is far behind in the linear problem: by 30 nats
-    of what explains them, by 100 of what does not. The most probable is finished, then what is not hopelessly behind.
+    The records without what no vehicle does, and without what physics has no chance against, get a first look; a whole
+    one if neither that nor, in the linear problem, what else is suspected explains them. This gets a first look, too,
+    unless it is far behind in the linear problem: by 30 nats of what explains them, by 100 of what does not. The most
+    probable is finished, then what is not hopelessly behind. While that is not clear, records with more errors get the
+    same.
 
     Args:
         suspicion: what a scan says.
         records: as they are.
         look: searches records.
     """
-    firm, tried = suspicion.subset(), list[Explained]()
+    least, tried = suspicion.clear_soft, list[Explained]()
+    first = suspicion.subset(soft=least)
     try:
-        tried.append(_explained(firm, records, look.begin(without(records, firm))))
-        more = [suspicion.subset(soft=k + 1) for k in range(sum(map(is_soft, suspicion.errors)))]
-        if is_finished := bool(more) and not is_explained(tried[0].work):
-            look.finish(
-                tried[0].work
-            )  # what begins in mid-trial may explain it, and looks like a step or a clock
+        tried.append(_explained(first, records, look.begin(without(records, first))))
+        more = [suspicion.subset(soft=k + 1) for k in range(least, suspicion.soft)]
+        is_open = bool(more) and not is_explained(tried[0].work)
+        if is_finished := is_open and not explain(suspicion.errors):
+            # what begins in mid-trial may explain it, and looks like a step or a clock
+            look.finish(tried[0].work)
         behind = settings.DECISIVE_NATS if is_explained(tried[0].work) else FAR_BEHIND
         bar = tried[0].log_evidence(0.0) - behind
         more = [one for one in more if suspicion.log_linear(one) > bar]
         _race(tried, more, records, look, new=[] if is_finished else tried[:])
-        if firm and not is_clear(firm, _first(tried).work) and _is_complete(tried):
-            tried.append(_explained((), records, look.begin(records)))
-            _race(tried, [], records, look, new=tried[-1:])
+        for held, fewer in pairwise([first, *suspicion.fewer(first)]):
+            if is_clear(held, _first(tried).work):
+                break
+            _race(tried, [fewer], records, look, new=[])
     except KeyboardInterrupt:  # before anything was found of one of them
         if not tried:
             raise

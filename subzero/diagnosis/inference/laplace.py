@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.stats import norm
+from scipy.special import log_ndtr
 
 from subzero.diagnosis.hypothesis.hypotheses import Entry, Ids, log_prior, nameable, variances
 from subzero.diagnosis.inference import settings
@@ -102,6 +102,8 @@ def possible(
     """Return what is added to a log evidence because values below a bound at 0 are not possible; `held` if it was
     taken at the best values within bounds.
     """
-    low = np.array([entries[k].parameter.low for k in at])
-    x = (mean / sd)[low == 0.0]
-    return float(np.sum(norm.logcdf(x) + np.log(2.0) + (0.5 * np.minimum(x, 0.0) ** 2 if held else 0.0)))
+    bounded = np.array([entries[k].parameter.low == 0.0 for k in at])
+    if not bounded.any():
+        return 0.0
+    x = (mean / sd)[bounded]
+    return float(np.sum(log_ndtr(x) + np.log(2.0) + (0.5 * np.minimum(x, 0.0) ** 2 if held else 0.0)))

@@ -21,6 +21,7 @@ from subzero.diagnosis.hypothesis.hypotheses import (
     nameable,
     pairs_of,
     variances,
+    variances_named,
 )
 from subzero.diagnosis.inference import settings
 from subzero.diagnosis.inference.laplace import Candidate, possible
@@ -96,7 +97,7 @@ def screening_of(
         return _from_afar(problem, *nominal)
     names = nameable(problem.entries)
     found = Screening(count=len(names))
-    base = {kappa: posterior(wide.quadratic, variances(problem.entries, (), kappa)) for kappa in KAPPAS}
+    base = _bases(problem, wide.quadratic, ())
     for ids in [(), *((one,) for one in names), *pairs_of(problem.entries, names)]:
         found.log_posterior[ids] = linear_evidence(problem, base, (), ids) + log_prior(ids, len(names))
     _sweep(problem, wide.z, wide.J, _without_slope(problem, wide.J), found, wide.r)
@@ -117,14 +118,28 @@ def _from_afar(problem: Problem, r: np.ndarray, J: np.ndarray) -> Screening:
     return found
 
 
-def linear_evidence(problem: Problem, base: Mapping[float, Posterior], held: Ids, more: Ids) -> float:
+class Base(NamedTuple):
+    """What the data say with some causes free under a κ, and the prior variances of that (k,)."""
+
+    known: Posterior
+    D: np.ndarray
+
+
+def _bases(problem: Problem, q: Quadratic, ids: Ids) -> dict[float, Base]:
+    """Return κ → what the data say with some causes free."""
+    under = {kappa: variances(problem.entries, ids, kappa) for kappa in KAPPAS}
+    return {kappa: Base(posterior(q, D), D) for kappa, D in under.items()}
+
+
+def linear_evidence(problem: Problem, base: Mapping[float, Base], held: Ids, more: Ids) -> float:
     """Return the log evidence, mixed over κ, when further causes are freed beside those that are free in `base`."""
     at, found = columns_of(problem.entries, tuple(one for one in more if one not in held)), []
     for kappa, prior in KAPPAS.items():
-        value = base[kappa].log_evidence
+        known, D = base[kappa]
+        value = known.log_evidence
         if at:
-            D, own = (variances(problem.entries, ids, kappa) for ids in (held, more))
-            value, mean, covariance = freed(base[kappa], D, at, own[at])
+            own = variances_named(problem.entries, at, kappa)
+            value, mean, covariance = freed(known, D, at, own)
             value += possible(problem.entries, at, mean, np.sqrt(np.diag(covariance)))
         found.append(np.log(prior) + value)
     return log_sum(found)
@@ -189,9 +204,7 @@ def mixed_evidence(problem: Problem, q: Quadratic, ids: Ids = ()) -> float:
 def with_one_added(problem: Problem, one: Candidate) -> dict[Ids, float]:
     """Return hypothesis → log posterior of all with one cause more than a candidate, in the linear problem there."""
     names, found = nameable(problem.entries), {}
-    base = {
-        kappa: posterior(one.fit.quadratic, variances(problem.entries, one.ids, kappa)) for kappa in KAPPAS
-    }
+    base = _bases(problem, one.fit.quadratic, one.ids)
     here = linear_evidence(problem, base, one.ids, one.ids) + log_prior(one.ids, len(names))
     for more in names:
         ids = tuple(sorted({*one.ids, more}))
