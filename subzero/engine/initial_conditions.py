@@ -36,6 +36,7 @@ from cable.moving_end import (
     start_in_water,
 )
 from cable.task import START_LENGTH
+from subzero.engine.coupling import compile_cable_beside
 from subzero.engine.environment import drum_of, water_of, way_of_drum
 from subzero.engine.external_wrench import feel_current, tow_point, way_of_tow_point
 from subzero.engine.prescribed_motion import knots
@@ -93,6 +94,8 @@ def prepare(
         line=new_line(int((wet + RUN_IN) / trial.segment_length) + FIRST_ROOM),
         load=new_load(),
     )
+    if tethered:
+        compile_cable_beside(setup, live)
     live.now.length = wet if tethered else 0.0
     layout = live.line.ends.layout
     layout.segment_length, layout.grading = trial.segment_length, trial.grading
