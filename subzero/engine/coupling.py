@@ -16,15 +16,14 @@ with z² + 4z + 1 = 0, root −3.73. With the slope of the exchange before, the 
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 
 from cable.drum_motion import lead_drum
-from cable.moving_end import NOW, accept, energy_flow, impedance, take_jolt, try_step
+from cable.moving_end import NOW, accept, energy_flow, impedance, try_step
 from subzero.engine.energy import book, take_jolt_of_motion
 from subzero.engine.external_wrench import tow_point
 from subzero.engine.vehicle_step import advance_hull, follow_track
-from subzero.jit import Call, compile_beside, compiled, inlined, inner, scratch
+from subzero.jit import compiled, inlined, inner, scratch
 from subzero.run_state import Live, Now, Setup
 from vehicle import STATE_SIZE
 
@@ -37,23 +36,6 @@ FASTEST = 50.0
 
 FINE, CABLE_FAILED, DISAGREED, ABSURD = range(4)
 """How an exchange ended."""
-
-
-def compile_cable_beside(setup: Setup, live: Live) -> None:
-    """Have what an exchange asks of the cable compiled by a second process, while this one compiles the rest."""
-    compile_beside(lambda: _asked_of_cable(setup, live))
-
-
-def _asked_of_cable(setup: Setup, live: Live) -> list[Call]:
-    """Return the functions of the cable that an exchange calls, in its order, and numba's types of their arguments."""
-    kind, now = numba.typeof, numba.typeof(live.now)
-    line, work, c, drum = (kind(each) for each in (live.line, live.load, setup.fixed.cable, setup.fixed.drum))
-    step, vector = numba.float64, numba.float64[::1]
-    return [
-        (take_jolt, (line, vector, c, drum, work, vector)),
-        (try_step, (line, step, now.typeof("tow"), kind(setup.water), c, drum, work, numba.boolean)),
-        (accept, (line, step, c, work)),
-    ]
 
 
 @inner
