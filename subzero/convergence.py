@@ -222,7 +222,7 @@ def resolved(trial: scenarios.Trial, factor: float) -> scenarios.Trial | None:
 
 def _every_other(times: np.ndarray) -> np.ndarray:
     """Return every other time, and the last one."""
-    return times[::2] if times.size % 2 else np.append(times[::2], times[-1])
+    return times[::2].copy() if times.size % 2 else np.append(times[::2], times[-1])
 
 
 def _accuracy(

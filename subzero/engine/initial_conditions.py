@@ -17,6 +17,7 @@ from collections.abc import Sequence
 from math import degrees
 from typing import Any
 
+import numba
 import numpy as np
 
 import scenarios
@@ -28,12 +29,15 @@ from cable.moving_end import (
     NOW,
     STORED,
     Line,
+    accept,
     energy_flow,
     lay_held,
     lay_straight,
     new_line,
     new_load,
     start_in_water,
+    take_jolt,
+    try_step,
 )
 from cable.task import START_LENGTH
 from subzero.engine.environment import drum_of, water_of, way_of_drum
@@ -42,7 +46,7 @@ from subzero.engine.prescribed_motion import knots
 from subzero.engine.vehicle_step import pose
 from subzero.errors import BadValueError, UserError, printable, real, short
 from subzero.external_force import MissingForce
-from subzero.jit import allocating, compiled
+from subzero.jit import Call, allocating, compile_beside, compiled
 from subzero.model import Model
 from subzero.run_state import LINEAR_ROWS, Fixed, HullWork, Ledger, Live, Now, Orders, Setup
 from vehicle import POWERS, STATE_SIZE, initial_state, kinetic_energy, rotation
@@ -94,6 +98,8 @@ def prepare(
         line=new_line(int((wet + RUN_IN) / trial.segment_length) + FIRST_ROOM),
         load=new_load(),
     )
+    if tethered:
+        compile_beside(lambda: _asked_of_cable(setup, live))
     live.now.length = wet if tethered else 0.0
     layout = live.line.ends.layout
     layout.segment_length, layout.grading = trial.segment_length, trial.grading
@@ -105,6 +111,18 @@ def prepare(
     elif setup.fixed.drum.control != FREE:
         _hang(live.line, float(live.now.guess[2] * setup.fixed.cable.weight))
     return setup, live
+
+
+def _asked_of_cable(setup: Setup, live: Live) -> list[Call]:
+    """Return the functions of the cable that an exchange calls, in its order, and numba's types of their arguments."""
+    kind, now = numba.typeof, numba.typeof(live.now)
+    line, work, c, drum = (kind(each) for each in (live.line, live.load, setup.fixed.cable, setup.fixed.drum))
+    step, vector = numba.float64, numba.float64[::1]
+    return [
+        (take_jolt, (line, vector, c, drum, work, vector)),
+        (try_step, (line, step, now.typeof("tow"), kind(setup.water), c, drum, work, numba.boolean)),
+        (accept, (line, step, c, work)),
+    ]
 
 
 def _new_now() -> Now:

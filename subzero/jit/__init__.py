@@ -7,13 +7,25 @@ name                                            what for                        
 compiled, allocating, inner, inlined, by_field  how a function is compiled                            decorators
 Record                                          numbers as one record in memory, a single pointer     record
 scratch                                         a small array on the stack of a compiled function     stack
+compile_beside, Call                            a second process compiles along                        beside
 -                                               machine code kept for the next run, never stale       machine_code
 -                                               which files a piece of machine code is made of        sources
 -                                               signals wait while code is compiled                   unbroken
 """
 
+from subzero.jit.beside import Call, compile_beside
 from subzero.jit.decorators import allocating, by_field, compiled, inlined, inner
 from subzero.jit.record import Record
 from subzero.jit.stack import scratch
 
-__all__ = ["Record", "allocating", "by_field", "compiled", "inlined", "inner", "scratch"]
+__all__ = [
+    "Call",
+    "Record",
+    "allocating",
+    "by_field",
+    "compile_beside",
+    "compiled",
+    "inlined",
+    "inner",
+    "scratch",
+]

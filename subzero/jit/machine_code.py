@@ -33,10 +33,12 @@ import numba
 import numpy as np
 from numba.core.caching import _Cache
 from numba.core.compiler import CompileResult
+from numba.core.registry import cpu_target
 from numba.core.serialize import dumps
 from numba.core.sigutils import normalize_signature
 
 from subzero.errors import printable
+from subzero.jit.beside import is_delivered
 from subzero.jit.sources import PACKAGES, Tree
 from subzero.jit.unbroken import heed
 
@@ -105,8 +107,19 @@ class Home:
                 where, why = printable(str(self._base or "a home folder")), error.strerror or error
                 tell("not kept", f"Compiled code cannot be kept in {where}: {why}. {ANOTHER} {ANEW}")
 
-    def _write(self, name: str, data: bytes) -> None:
-        """Let a file appear with this in it."""
+    def made(self) -> Path | None:
+        """Return the folder, which is made if it is not there; None where nothing can be kept."""
+        try:
+            return self._made()
+        except OSError:  # `keep` says so
+            return None
+
+    def _made(self) -> Path:
+        """Return the folder, which is made if it is not there.
+
+        Raises:
+            OSError: nothing can be kept.
+        """
         if self._base is None or self.path is None:
             raise FileNotFoundError(0, "this user has none")
         if not self.path.is_dir():
@@ -116,11 +129,16 @@ class Home:
                 sweep(self._base, self.path.name)
         if not self._is_trusted():
             raise PermissionError(0, "others may write there")
-        handle, half = tempfile.mkstemp(suffix=HALF, dir=self.path)
+        return self.path
+
+    def _write(self, name: str, data: bytes) -> None:
+        """Let a file appear with this in it."""
+        folder = self._made()
+        handle, half = tempfile.mkstemp(suffix=HALF, dir=folder)
         try:
             with open(handle, "wb") as file:
                 file.write(data)
-            os.replace(half, self.path / name)
+            os.replace(half, folder / name)
         except BaseException:
             with suppress(OSError):
                 os.unlink(half)
@@ -274,11 +292,21 @@ class MachineCode(_Cache):  # type: ignore[misc]  # numba has no types
         """Return the folder, for numba's statistics."""
         return str(self._home.path)
 
+    def file_for(self, sig: Any) -> Path | None:
+        """Return the file of the code for a signature, in a folder that is there; None where nothing is kept."""
+        folder = self._home.made()
+        if folder is None:
+            return None
+        return folder / self._name(sig, cpu_target.target_context.codegen())
+
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Return what was kept for a signature; None if it has to be compiled."""
         heed()
         target_context.refresh()
-        code = self._home.read(self._name(sig, target_context.codegen()))
+        name = self._name(sig, target_context.codegen())
+        code = self._home.read(name)
+        if code is None and self._home.path is not None and is_delivered(self._home.path / name, heed):
+            code = self._home.read(name)
         if code is not None:
             found = CompileResult._rebuild(target_context, *pickle.loads(code))
             if found.signature.args == tuple(normalize_signature(sig)[0]):

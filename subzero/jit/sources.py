@@ -18,8 +18,8 @@ from pathlib import Path
 PACKAGES = ("cable", "scenarios", "subzero", "vehicle")
 """What is followed. All stand in one folder."""
 
-COMPILER = re.compile(rb"subzero\.jit(?!\.(?:machine_code|sources)\b)")
-"""Whoever compiles a function imports this; the two files that it leaves out only keep machine code."""
+COMPILER = re.compile(rb"subzero\.jit(?!\.(?:beside|machine_code|sources)\b)")
+"""Whoever compiles a function imports this; the files that it leaves out only keep machine code."""
 
 _COMMENT = re.compile(rb"#[^\n]*")
 _IMPORT = re.compile(

@@ -1,0 +1,155 @@
+"""Compile some functions in a second process while this one compiles others, as the compiler uses one core only.
+
+Whoever is about to compile much names the functions that it will need last, and for what arguments. A second process
+compiles them, and keeps their code where this one looks for it (`subzero.jit.machine_code`); should this one be there
+before, it waits. No result depends on it: what the second process does not deliver, for whatever reason, is compiled
+here. It ends with this process, however that ends: it listens to a pipe that breaks then.
+
+There is none where it would not help: the code is kept already, nothing can be kept, only one core may be used,
+another process has one at work on the same folder, or this process itself is one of many.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import pickle
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from importlib import import_module
+from multiprocessing import parent_process
+from pathlib import Path
+from typing import Any
+
+import numba
+
+Call = tuple[Callable[..., Any], tuple[Any, ...]]
+"""A compiled function, and numba's types of the arguments that it will be called with."""
+
+LOCK = "beside.half"
+"""File in a folder of machine code that is locked while a second process is at work; swept with the folder."""
+LOOK_S = 0.02
+"""So often this process looks whether the second one has delivered. [s]"""
+PATIENCE_S = 60.0
+"""So long this process waits for a file; a second process that takes longer has been stopped, or has no core. [s]"""
+BEGIN = "import sys; sys.path[:] = sys.argv[1:]; from subzero.jit.beside import serve; serve()"
+
+_asked = [False]
+"""Whether a second process has been asked for: there is never another."""
+_second: list[subprocess.Popen[bytes]] = []
+"""The second process of this one, if there has been one."""
+_promised: set[Path] = set()
+"""Files that it will make."""
+
+
+def compile_beside(needed: Callable[[], Sequence[Call]]) -> None:
+    """Have functions compiled by a second process, if that helps; returns at once, and does nothing a second time.
+
+    Args:
+        needed: returns what to compile, in this order; all of one package.
+    """
+    if numba.config.DISABLE_JIT or _asked[0]:
+        return
+    _asked[0] = True
+    if not _may_have_one():
+        return
+    calls = needed()
+    files = [function._cache.file_for(types) for function, types in calls]  # type: ignore[attr-defined]
+    if None in files or any(file.exists() for file in files):
+        return
+    lock = _locked(files[0].parent)
+    if lock is not None:
+        try:
+            _start(calls, files, lock)
+        except OSError:  # no more processes, or it is gone already: this one compiles all
+            return
+        finally:
+            os.close(lock)
+
+
+def _may_have_one() -> bool:
+    """Say whether a second process would have a core, and this one is not itself one of several."""
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    is_alone = parent_process() is None and threading.current_thread() is threading.main_thread()
+    return cores > 1 and is_alone and bool(sys.executable)
+
+
+def _locked(folder: Path) -> int | None:
+    """Return the open lock of a folder; None if another process has it, or nothing can be written there."""
+    try:
+        lock = os.open(folder / LOCK, os.O_CREAT | os.O_RDWR | os.O_NOFOLLOW | os.O_CLOEXEC, 0o600)
+    except OSError:
+        return None
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        os.close(lock)
+        return None
+    return lock
+
+
+def _start(calls: Sequence[Call], files: Sequence[Path], lock: int) -> None:
+    """Start the second process, which holds the lock as long as it lives."""
+    work = [(each.__module__, each.__name__, types) for each, types in calls]
+    told = pickle.dumps((str(files[0].parent), work))
+    second = subprocess.Popen(
+        [sys.executable, "-c", BEGIN, *sys.path],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        pass_fds=(lock,),
+        start_new_session=True,  # Ctrl-C is for this process, which takes it along
+    )
+    _second.append(second)
+    _promised.update(files)
+    threading.Thread(target=_see_it_end, args=(second,), daemon=True).start()
+    assert second.stdin is not None
+    second.stdin.write(told)
+    second.stdin.flush()  # and stays open: where it breaks, the second process ends
+
+
+def _see_it_end(second: subprocess.Popen[bytes]) -> None:
+    """Wait for the second process, so that no dead one is left behind, and close the pipe to it."""
+    second.wait()
+    assert second.stdin is not None
+    with suppress(OSError):
+        second.stdin.close()
+
+
+def is_delivered(file: Path, meanwhile: Callable[[], None]) -> bool:
+    """Say whether a file is there that the second process makes; wait for it as long as that one works.
+
+    Args:
+        file: any file of machine code.
+        meanwhile: called again and again while this waits.
+    """
+    if file not in _promised:
+        return False
+    until = time.monotonic() + PATIENCE_S
+    while not file.exists() and _second and _second[0].returncode is None and time.monotonic() < until:
+        time.sleep(LOOK_S)
+        meanwhile()
+    _promised.discard(file)
+    return file.exists()
+
+
+def serve() -> None:
+    """Compile what stands in standard input, and end as soon as that breaks: the second process's whole life."""
+    folder, work = pickle.load(sys.stdin.buffer)
+    threading.Thread(target=_end_with_the_first, daemon=True).start()
+    for module, name, types in work:
+        function = getattr(import_module(module), name)
+        if function._cache.cache_path != folder:  # other sources or settings than the first process has
+            return
+        function.compile(types)
+
+
+def _end_with_the_first() -> None:
+    """Wait until nobody is there any more who could write to standard input."""
+    with suppress(OSError):
+        os.read(0, 1)  # not through `sys.stdin`: its lock, held by a thread, aborts a process that ends
+    os._exit(1)

@@ -1,0 +1,143 @@
+"""A second process compiles along: same numbers whether it delivers, dies or is not there, and it outlives nobody."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import subprocess
+import sys
+import time
+
+import numba
+import psutil
+import pytest
+
+from subzero.jit import beside, compile_beside, machine_code
+from subzero.jit.machine_code import home_of
+from subzero.jit.sources import Tree
+
+MODULE = "compiled_beside"
+SOURCE = """
+import os, time
+from pathlib import Path
+from subzero.jit import compiled
+
+HERE = Path(__file__).parent
+(HERE / "imported_by").write_text(str(os.getpid()))
+if (HERE / "slow").exists():
+    time.sleep(100.0)
+
+@compiled
+def scaled(x):
+    return 3.0 * x + 0.5
+"""
+COMMAND = f"""
+import time, numba, {MODULE}
+from subzero.jit import beside, compile_beside
+({MODULE}.HERE / "slow").touch()
+beside.os.sched_getaffinity = lambda pid: {{0, 1}}
+compile_beside(lambda: [({MODULE}.scaled, (numba.float64,))])
+print(beside._second[0].pid, flush=True)
+time.sleep(100.0)
+"""
+
+
+@pytest.fixture
+def scaled(base, tmp_path, monkeypatch):
+    """A function that a second process can import, in a process with two cores that has not asked for one."""
+    (tmp_path / f"{MODULE}.py").write_text(SOURCE)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.setattr(machine_code, "_tree", Tree())
+    monkeypatch.setattr(beside, "_asked", [False])
+    monkeypatch.setattr(beside, "_second", [])
+    monkeypatch.setattr(beside, "_promised", set())
+    monkeypatch.setattr(beside.os, "sched_getaffinity", lambda pid: {0, 1}, raising=False)
+    monkeypatch.setattr(beside, "parent_process", lambda: None)  # tests themselves may run side by side
+    home_of.cache_clear()
+    yield importlib.import_module(MODULE).scaled
+    sys.modules.pop(MODULE)
+    home_of.cache_clear()
+
+
+def ask(function):
+    compile_beside(lambda: [(function, (numba.float64,))])
+
+
+def test_what_a_second_process_has_compiled_is_loaded(scaled, capfd):
+    ask(scaled)
+    (second,) = beside._second
+    assert scaled(2.0) == 6.5
+    assert scaled.stats.cache_hits[(numba.float64,)] == 1
+    assert second.wait(timeout=60) == 0
+    assert capfd.readouterr().out == ""
+
+
+def test_a_second_process_that_dies_is_done_without(scaled):
+    ask(scaled)
+    (second,) = beside._second
+    second.kill()
+    assert scaled(2.0) == 6.5
+    assert not scaled.stats.cache_hits
+
+
+def test_a_second_process_ends_with_a_first_that_is_killed(scaled, base, tmp_path):
+    first = subprocess.Popen([sys.executable, "-c", COMMAND], stdout=subprocess.PIPE, text=True,
+                             env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)})  # fmt: skip
+    second = psutil.Process(int(first.stdout.readline()))
+    while (tmp_path / "imported_by").read_text() != str(second.pid):
+        time.sleep(0.02)
+    first.kill()
+    first.communicate()
+    until = time.monotonic() + 30.0
+    while second.is_running() and second.status() != psutil.STATUS_ZOMBIE:
+        assert time.monotonic() < until
+        time.sleep(0.02)
+
+
+@pytest.fixture
+def started(monkeypatch):
+    """What second processes have been started for, without starting any."""
+    started = []
+    monkeypatch.setattr(beside, "_start", lambda calls, files, lock: started.append(calls))
+    return started
+
+
+def test_there_is_one_at_most(scaled, started):
+    ask(scaled)
+    ask(scaled)
+    assert len(started) == 1
+
+
+def test_there_is_none_where_the_code_is_kept(scaled, started):
+    scaled(2.0)
+    ask(scaled)
+    assert not started
+
+
+def test_there_is_none_on_one_core(scaled, started, monkeypatch):
+    monkeypatch.setattr(beside.os, "sched_getaffinity", lambda pid: {0}, raising=False)
+    ask(scaled)
+    assert not started
+
+
+def test_there_is_none_in_one_of_many_processes(scaled, started, monkeypatch):
+    monkeypatch.setattr(beside, "parent_process", lambda: True)
+    ask(scaled)
+    assert not started
+
+
+def test_there_is_none_where_nothing_can_be_kept(scaled, started, base):
+    base.parent.mkdir()
+    base.touch()
+    ask(scaled)
+    assert not started
+
+
+def test_there_is_none_where_another_process_has_one(scaled, started):
+    lock = beside._locked(scaled._cache.file_for((numba.float64,)).parent)
+    ask(scaled)
+    assert not started
+    os.close(lock)
+    beside._asked[0] = False
+    ask(scaled)
+    assert len(started) == 1
