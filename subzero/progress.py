@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     import scenarios
 
-COMPILING = "Compiling what is not compiled yet (all of it takes about 50 s, once)…"
+COMPILING = "Compiling what is not compiled yet (all of it takes about half a minute, once)…"
 
 PATIENCE_S = 1.0
 """What takes less needs no bar. [s]"""
