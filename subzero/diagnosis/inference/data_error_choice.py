@@ -9,8 +9,9 @@ its own, with causes, what begins in mid-trial, forces and drifts. T the correct
 A search that is hopelessly behind ends with its first look. What the linear problem leaves no choice of is corrected
 before anything is searched, and the records with it are not searched at all if causes that hold throughout explain what
 is left (`is_clear`): what no vehicle does (another sign, unit or reference of one channel, exchanged columns, repeated
-values) where physics has no chance with all its parameters free at once; a clock, a latency or a command where it is
-hopelessly behind. A step in a sensor is always held against physics: a load that shifts looks like one.
+values) where physics has no chance with all its parameters free at once; a command where it is hopelessly behind. A
+clock and a latency are corrected first, too, where it is, but are always held against a search of the records with
+them, as a step is: what breaks in mid-trial looks like them.
 """
 
 from __future__ import annotations
@@ -55,8 +56,9 @@ ALIKE_LEAD = 3.0
 CLEAR_LEAD, CLEAR_GENEROUS_LEAD = 15.0, 10.0
 """With a greater lead over physics, in the linear problem, an error needs no search of the record as it is: over
 nothing and every cause, and over all causes at once."""
-NEVER_CLEAR = ("step",)
-"""Kinds that what breaks in mid-trial may look like to the noise."""
+LIKE_AN_ONSET = ("step", "late_clock", "clock_rate", "latency")
+"""Kinds that what breaks in mid-trial looks like, to the noise: a rudder that is off its centre from 13 s on like a
+late clock, with a lead of more than 100 nats over all that holds throughout."""
 LOUD = 2.5
 """Noise of more usual levels hides a misfit. [-]"""
 SIGNATURE_LEAD = 20.0
@@ -184,7 +186,7 @@ def explain(errors: Sequence[SuspectedError]) -> bool:
 def leads_clearly(one: SuspectedError) -> bool:
     """Say whether an error leaves physics no chance in the linear problem."""
     if is_soft(one):
-        return one.error.kind not in NEVER_CLEAR and min(one.lead, one.generous) > FAR_BEHIND
+        return one.error.kind != "step" and min(one.lead, one.generous) > FAR_BEHIND
     return one.lead > CLEAR_LEAD and one.generous > CLEAR_GENEROUS_LEAD
 
 
@@ -194,7 +196,7 @@ def is_clear(errors: Sequence[SuspectedError], work: Findings) -> bool:
     """
     outside = max((one.log_posterior for one in work.out_of_catalogue), default=-np.inf)
     explained = work.search.best().log_posterior > outside and is_explained(work)
-    return explained and all(map(leads_clearly, errors))
+    return explained and all(leads_clearly(one) and one.error.kind not in LIKE_AN_ONSET for one in errors)
 
 
 def is_soft(one: SuspectedError) -> bool:
