@@ -83,6 +83,7 @@ def test_a_rudder_to_the_other_side_has_the_other_sign(plant):
     assert one.change_point.mean[0] == pytest.approx(-3.0, abs=0.3)
 
 
+@pytest.mark.slow
 def test_a_force_that_comes_and_goes_is_no_sudden_cause(plant):
     """Nothing is fitted that cannot be as probable as the force."""
     time = np.linspace(0.0, 30.0, 301)

@@ -65,7 +65,7 @@ def told(number, folder, capsys, *options):
     return found["verdict"]
 
 
-@pytest.mark.parametrize("number", [100, 102, 103, 104, 106, 131, 154])
+@pytest.mark.parametrize("number", [100, 102, 103, pytest.param(104, marks=pytest.mark.slow), 106, 131, 154])
 def test_an_odd_record_gets_a_verdict_or_a_message(number, tmp_path, capsys):
     told(number, tmp_path, capsys, "--screen")
 
