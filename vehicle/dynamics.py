@@ -101,6 +101,25 @@ def actuators(
 
 
 @compiled
+def _fill_rates(
+    state: np.ndarray,
+    command: np.ndarray,
+    current_n: np.ndarray,
+    wrench_b: np.ndarray,
+    numbers: VehicleNumbers,
+    R: np.ndarray,
+    nu_r: np.ndarray,
+    terms: np.ndarray,
+    out: np.ndarray,
+) -> None:
+    """Fill out with the rate of the state, and what `evaluate` fills."""
+    evaluate(state, command, current_n, wrench_b, numbers, R, nu_r, terms)
+    motion(state, R, out)
+    _accelerations(terms, numbers, out)
+    actuators(state, command, nu_r[0], numbers, out)
+
+
+@compiled
 def derivative(
     state: np.ndarray,
     command: np.ndarray,
@@ -120,10 +139,7 @@ def derivative(
         out: the rates.
     """
     R, nu_r, terms = scratch(3, 3), scratch(1, 6)[0], scratch(TERM_COUNT, 6)
-    evaluate(state, command, current_n, wrench_b, numbers, R, nu_r, terms)
-    motion(state, R, out)
-    _accelerations(terms, numbers, out)
-    actuators(state, command, nu_r[0], numbers, out)
+    _fill_rates(state, command, current_n, wrench_b, numbers, R, nu_r, terms, out)
 
 
 @compiled
@@ -138,10 +154,7 @@ def derivative_and_power(
 ) -> None:
     """Fill out as `derivative` does and powers as `power` does, to the same last bit, from one look at the forces."""
     R, nu_r, terms = scratch(3, 3), scratch(1, 6)[0], scratch(TERM_COUNT, 6)
-    evaluate(state, command, current_n, wrench_b, numbers, R, nu_r, terms)
-    motion(state, R, out)
-    _accelerations(terms, numbers, out)
-    actuators(state, command, nu_r[0], numbers, out)
+    _fill_rates(state, command, current_n, wrench_b, numbers, R, nu_r, terms, out)
     _powers(terms, nu_r, powers)
 
 

@@ -108,13 +108,14 @@ def step(
         raise UserError(f"A step of {short(size)} is none. Allowed: a finite number, not 0.")
     speed = checked("", "speed", speed, unit="m/s")
     trial = scenario if isinstance(scenario, scenarios.Trial) else load(scenario)
+    flown_by = pilot.made(trial)
     before = Wanted(speed, trial.start.heading, trial.start.depth)
     goal = before._replace(**{line.field: getattr(before, line.field) + size * line.scale})
     for fast in sorted({before.speed, goal.speed}):
         trim(Model.of(trial), speed=fast)  # refuses a speed that the bare hull does not reach
     begin = replace(trial, start=replace(trial.start, surge_speed=speed), duration=DURATION)
     run = fly(
-        begin, pilot.made(trial), lambda t: goal if t >= STEP_AT - 1e-9 else before,
+        begin, flown_by, lambda t: goal if t >= STEP_AT - 1e-9 else before,
         tethered=tethered, sensors=pilot.sensors, progress=progress,
     )  # fmt: skip
     values = run[line.channel].values
