@@ -123,7 +123,14 @@ class Kept:
 
     def of(self, trial: scenarios.Trial) -> scenarios.Trial:
         """Return a trial with the results that are asked for."""
-        return trial if self.every is None else replace(trial, every=self.every)
+        if self.every is None:
+            return trial
+        try:
+            return replace(trial, every=self.every)
+        except scenarios.ScenarioError as error:  # the user wrote an option, not a field of a trial
+            raise scenarios.ScenarioError(
+                replace(one, file="--every", key="") for one in error.problems
+            ) from error
 
     def folder(self, trial: scenarios.Trial) -> Path:
         """Return where the files go."""

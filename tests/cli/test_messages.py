@@ -29,6 +29,8 @@ MESSAGES = {
     "  no.csv: there is no such file. Check the path.",
     "simulate fig6 --motion no.csv": "The scenario cannot be used (1 problem):\n"
     "  no.csv: there is no such file. Check the path.",
+    "simulate fig6 --every 0.15": "The scenario cannot be used (1 problem):\n"
+    "  --every: found 0.15, but it must be a whole number of steps cable_step = 0.1. Nearest: 0.1 or 0.2.",
     "simulate fig6 --out file": "The output folder file cannot be written: file is a file, not a folder. "
     "Give another one with --out DIR.",
     "simulate fig6 --out file/deep/er": "The output folder file/deep/er cannot be written: file is a file, "
