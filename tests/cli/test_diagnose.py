@@ -7,6 +7,7 @@ import re
 import resource
 import sys
 import types
+from contextlib import contextmanager
 from dataclasses import replace
 
 import numpy as np
@@ -201,12 +202,15 @@ def test_nothing_to_reveal_is_a_mistake(engine, capsys):
     assert "There is no sealed answer" in capsys.readouterr().err
 
 
-@pytest.fixture
-def full_disk():
-    """Give what lets no file grow beyond so many bytes, as on a full disk, until the test ends."""
+@contextmanager
+def full_disk(most):
+    """Let no file grow beyond so many bytes, as on a full disk; nor one that the tests themselves are told into."""
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    yield lambda most: resource.setrlimit(resource.RLIMIT_FSIZE, (most, hard))
-    resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (most, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 
 NOT_KEPT = "(Compil.*\\n|[ 0-9.]+(functions\\.)?\\n)*"
@@ -214,23 +218,19 @@ NOT_KEPT = "(Compil.*\\n|[ 0-9.]+(functions\\.)?\\n)*"
 
 
 @pytest.mark.parametrize("most", [10, 1_000, 20_000])
-def test_a_full_disk_stops_a_diagnosis_with_one_message_and_no_files(
-    most, engine, full_disk, tmp_path, capsys
-):
-    full_disk(most)
-    assert main(["diagnose", "record.csv", "--scenario", "fig6", "--out", "found"]) == MISTAKE
+def test_a_full_disk_stops_a_diagnosis_with_one_message_and_no_files(most, engine, tmp_path, capsys):
+    with full_disk(most):
+        assert main(["diagnose", "record.csv", "--scenario", "fig6", "--out", "found"]) == MISTAKE
     said = capsys.readouterr().err
     assert re.fullmatch(f"{NOT_KEPT}The output folder found cannot be written: .*\\n", said), said
     assert not (tmp_path / "found").exists()
 
 
 @pytest.mark.parametrize("most", [10, 1_000])
-def test_a_full_disk_stops_a_challenge_with_one_message_and_no_files(
-    most, full_disk, tmp_path, monkeypatch, capsys
-):
+def test_a_full_disk_stops_a_challenge_with_one_message_and_no_files(most, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    full_disk(most)
-    assert main(["challenge", "--seed", "7", "--out", "hidden"]) == MISTAKE
+    with full_disk(most):
+        assert main(["challenge", "--seed", "7", "--out", "hidden"]) == MISTAKE
     said = capsys.readouterr().err
     assert re.fullmatch(f"{NOT_KEPT}The output folder hidden cannot be written: .*\\n", said), said
     assert list(tmp_path.iterdir()) == []
