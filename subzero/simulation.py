@@ -28,8 +28,6 @@ from subzero.engine.recording import (
     Run,
     Standing,
     new_recording,
-    note,
-    record_row,
     row_of,
     run_so_far,
 )
@@ -268,16 +266,14 @@ SPARE_NODES = 64
 
 
 def _begun(trial: scenarios.Trial, model: Model, tethered: bool, grid: Grid) -> Standing:
-    """Return a run at its start."""
+    """Return a run at its start, of which no row is written yet."""
     longest = float(np.diff(grid.times).max()) / grid.parts
     setup, live = prepare(trial, model, tethered, longest_exchange=longest)
     setup.fixed.booked = grid.booked
     rows = row_of(grid.times.size - 1, grid.stride) + 1
     each = min(4 * live.line.length.size, 2 * most_segments(trial, model) + SPARE_NODES)
     recording = new_recording(rows, rows * each if tethered else 0, grid.times.size)
-    used = record_row(setup, live, recording, 0, 0.0, 0)
-    note(recording, 0, 0)
-    return Standing(setup, live, recording, 1, used, coupling.FINE)
+    return Standing(setup, live, recording, 0, 0, coupling.FINE)
 
 
 def _further(now: Standing, grid: Grid, last: int) -> Standing:

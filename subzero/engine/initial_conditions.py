@@ -43,6 +43,7 @@ from cable.task import START_LENGTH
 from subzero.engine.environment import drum_of, water_of, way_of_drum
 from subzero.engine.external_wrench import feel_current, tow_point, way_of_tow_point
 from subzero.engine.prescribed_motion import knots
+from subzero.engine.recording import new_recording, record_row
 from subzero.engine.vehicle_step import pose
 from subzero.errors import BadValueError, UserError, printable, real, short
 from subzero.external_force import MissingForce
@@ -99,7 +100,7 @@ def prepare(
         load=new_load(),
     )
     if tethered:
-        compile_beside(lambda: _asked_of_cable(setup, live))
+        compile_beside(lambda: _needed_last(setup, live))
     live.now.length = wet if tethered else 0.0
     layout = live.line.ends.layout
     layout.segment_length, layout.grading = trial.segment_length, trial.grading
@@ -113,15 +114,17 @@ def prepare(
     return setup, live
 
 
-def _asked_of_cable(setup: Setup, live: Live) -> list[Call]:
-    """Return the functions of the cable that an exchange calls, in its order, and numba's types of their arguments."""
+def _needed_last(setup: Setup, live: Live) -> list[Call]:
+    """Return what a run calls behind all else, in its order: half of what it compiles."""
     kind, now = numba.typeof, numba.typeof(live.now)
     line, work, c, drum = (kind(each) for each in (live.line, live.load, setup.fixed.cable, setup.fixed.drum))
-    step, vector = numba.float64, numba.float64[::1]
+    step, vector, row = numba.float64, numba.float64[::1], numba.int64
+    run = tuple(kind(each) for each in (setup, live, new_recording(1, 1, 1)))
     return [
         (take_jolt, (line, vector, c, drum, work, vector)),
         (try_step, (line, step, now.typeof("tow"), kind(setup.water), c, drum, work, numba.boolean)),
         (accept, (line, step, c, work)),
+        (record_row, (*run, row, step, row)),
     ]
 
 

@@ -46,7 +46,7 @@ def run_rows(
         live: what changes; at times[first − 1] when called.
         recording: filled.
         times: of the run (n,). [s]
-        first: time to begin with.
+        first: time to begin with; 0 writes the row of the start, too.
         last: time to end before.
         used: nodes of the recording in use, in rows that are kept.
         parts: exchanges from a time to the next.
@@ -57,21 +57,34 @@ def run_rows(
         `line.ends.solved` tells how the cable's last step was solved.
     """
     for at in range(first, last):
-        # Arrays cannot grow in here: stop before they are full, and let Python enlarge them and call again.
-        nodes = live.line.ends.count + 1 + SPARE * parts
-        if nodes > live.line.length.size or used + live.line.length.size > recording.tension.size:
-            return at, used, NO_ROOM
-        span = (times[at] - times[at - 1]) / parts
-        for part in range(parts):
-            ending = exchange(setup, live, times[at - 1] + part * span, span)
-            if ending != FINE:
-                return at, used, ending
+        ending = _reach(setup, live, recording, times, at, used, parts) if at > 0 else FINE
+        if ending != FINE:
+            return at, used, ending
         row = row_of(at, stride)
         after = record_row(setup, live, recording, row, times[at], used)
         note(recording, row, at)
         if at % stride == 0:  # the row stays; else the next one is written over it
             used = after
     return last, used, FINE
+
+
+@compiled
+def _reach(
+    setup: Setup, live: Live, recording: Recording, times: np.ndarray, at: int, used: int, parts: int
+) -> int:
+    """Go from times[at − 1] to times[at]; return how that ended.
+
+    Arrays cannot grow in here: stop before they are full, and let Python enlarge them and call again.
+    """
+    nodes = live.line.ends.count + 1 + SPARE * parts
+    if nodes > live.line.length.size or used + live.line.length.size > recording.tension.size:
+        return NO_ROOM
+    span = (times[at] - times[at - 1]) / parts
+    for part in range(parts):
+        ending = exchange(setup, live, times[at - 1] + part * span, span)
+        if ending != FINE:
+            return ending
+    return FINE
 
 
 FIELDS = ("setup", "live", "recording", "times")

@@ -50,7 +50,7 @@ def compile_beside(needed: Callable[[], Sequence[Call]]) -> None:
     """Have functions compiled by a second process, if that helps; returns at once, and does nothing a second time.
 
     Args:
-        needed: returns what to compile, in this order; all of one package.
+        needed: returns what to compile, in this order.
     """
     if numba.config.DISABLE_JIT or _asked[0]:
         return
@@ -94,8 +94,12 @@ def _locked(folder: Path) -> int | None:
 
 def _start(calls: Sequence[Call], files: Sequence[Path], lock: int) -> None:
     """Start the second process, which holds the lock as long as it lives."""
-    work = [(each.__module__, each.__name__, types) for each, types in calls]
-    told = pickle.dumps((str(files[0].parent), work))
+    told = pickle.dumps(
+        [
+            (each.__module__, each.__name__, str(file.parent), types)
+            for (each, types), file in zip(calls, files, strict=True)
+        ]
+    )
     second = subprocess.Popen(
         [sys.executable, "-c", BEGIN, *sys.path],
         stdin=subprocess.PIPE,
@@ -139,9 +143,9 @@ def is_delivered(file: Path, meanwhile: Callable[[], None]) -> bool:
 
 def serve() -> None:
     """Compile what stands in standard input, and end as soon as that breaks: the second process's whole life."""
-    folder, work = pickle.load(sys.stdin.buffer)
+    work = pickle.load(sys.stdin.buffer)
     threading.Thread(target=_end_with_the_first, daemon=True).start()
-    for module, name, types in work:
+    for module, name, folder, types in work:
         function = getattr(import_module(module), name)
         if function._cache.cache_path != folder:  # other sources or settings than the first process has
             return

@@ -141,3 +141,27 @@ def test_there_is_none_where_another_process_has_one(scaled, started):
     beside._asked[0] = False
     ask(scaled)
     assert len(started) == 1
+
+
+ASK = """
+import subzero
+from subzero.jit import beside
+
+beside.os.sched_getaffinity = lambda pid: {0, 1}
+start, asked = beside._start, []
+beside._start = lambda calls, files, lock: (asked.extend(files), start(calls, files, lock))
+subzero.simulate(subzero.load_scenario("fig6").with_changes({"duration_s": 1.0}))
+print(*(file.name.partition("-")[0] for file in asked))
+"""
+
+
+@pytest.mark.slow
+def test_a_run_calls_what_it_has_had_compiled_for_those_arguments(tmp_path):
+    """Asked for other types, the second process would compile what nobody calls: two files of a function, not one."""
+    cache = tmp_path / "cache"
+    env = os.environ | {"SUBZERO_CACHE_DIR": str(cache), "PYTHONPATH": os.pathsep.join(sys.path)}
+    done = subprocess.run([sys.executable, "-c", ASK], env=env, capture_output=True, text=True, check=True)
+    names = done.stdout.split()
+    assert len(names) == 4
+    for name in names:
+        assert len(list(cache.rglob(f"{name}-*.code"))) == 1, name
