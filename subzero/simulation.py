@@ -237,6 +237,8 @@ def run_trial(
     now = kept.go_on(now) if kept is not None else now
     pace = Pace()
     while now.behind < grid.times.size and now.ending in (coupling.FINE, NO_ROOM):
+        if now.live.now.iterations > grid.iterations:
+            break
         start = now.behind - 1
         if start in changes:
             now = now._replace(
@@ -259,7 +261,9 @@ def run_trial(
     if kept is not None:
         kept.keep(now, grid.times, grid.stride, at_once=True)
     message = in_words(now.ending, float(grid.times[now.behind - 1]), now.setup, now.live)
-    completed = now.ending == coupling.FINE
+    given_up = now.ending == coupling.FINE and now.behind < grid.times.size
+    message = GIVEN_UP if given_up else message
+    completed = now.ending == coupling.FINE and not given_up
     return run_so_far(grid, now.recording, now.behind, now.used, message, completed=completed)
 
 
@@ -308,7 +312,7 @@ NAMES = Names(
     yielding='control = "constant_tension"',
 )
 """What the settings of a cable are called in a trial file."""
-WENT_WELL = "The run reached its end."
+WENT_WELL, GIVEN_UP = "The run reached its end.", "The run took more iterations than it may."
 
 
 def in_words(ending: int, time: float, setup: Setup, live: Live) -> str:
