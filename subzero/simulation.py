@@ -261,7 +261,7 @@ def run_trial(
     if kept is not None:
         kept.keep(now, grid.times, grid.stride, at_once=True)
     message = in_words(now.ending, float(grid.times[now.behind - 1]), now.setup, now.live)
-    given_up = now.ending == coupling.FINE and now.behind < grid.times.size
+    given_up = now.live.now.iterations > grid.iterations
     message = GIVEN_UP if given_up else message
     completed = now.ending == coupling.FINE and not given_up
     return run_so_far(grid, now.recording, now.behind, now.used, message, completed=completed)
