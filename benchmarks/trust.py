@@ -32,8 +32,8 @@ vehicle in the air, a cable that would break, a servo at its limit) say what hap
 so that the run of a right one may have them. Between 1 and 3 % a run is neither right nor wrong, whatever it says.
 
 A reference of a drum that does not hold its cable may take half an hour. With `--patience` trials that take longer
-than so many seconds of CPU are given up, and counted with what they had warned of by then; a second reference has as
-much again.
+than so many seconds of CPU are given up, and counted with what they had warned of by then; so is one whose reference
+goes on at a rate (`LEAST_LOOK`, `SPARE`) at which it will. A second reference has `--second-patience`.
 """
 
 from __future__ import annotations
@@ -67,6 +67,9 @@ NO_PULL = 1e-3
 REFINEMENT = 4.0
 RTOL = 0.02
 """What trials ask for, by default: as that of every trial. [-]"""
+LEAST_LOOK, SPARE = 1.0, 1.5
+"""A reference is given up where it would take so many times what is left, by the rate at which it went on for so long:
+that grows with the cable, so that it rather takes longer. [s], [-]"""
 TOO_LONG = "no reference: too long"
 NUMERICAL = DOUBTS
 """Checks that say that numbers are wrong; all others say what happened."""
@@ -202,16 +205,35 @@ def impatient(seconds: float) -> Callable[[float], None]:
     return tell
 
 
-def judge(seed: int, patience: float = np.inf, rtol: float = RTOL) -> Verdict:
-    """Run a trial and its refinements, for at most so many seconds of CPU, and compare."""
+def foreseeing(tell: Callable[[float], None], end: float) -> Callable[[float], None]:
+    """Return a progress that also ends what would not be done by a time of the CPU, at the rate since now. [s]."""
+    begin = process_time()
+
+    def look(fraction: float) -> None:
+        tell(fraction)
+        taken = process_time() - begin
+        if taken > LEAST_LOOK and taken > SPARE * fraction * (end - begin):
+            raise TooLongError
+
+    return look
+
+
+def judge(
+    seed: int, patience: float = np.inf, rtol: float = RTOL, second_patience: float | None = None
+) -> Verdict:
+    """Run a trial and its refinements, for at most so many seconds of CPU, and compare.
+
+    A second reference has as much again, if not told otherwise.
+    """
     trial, tell = dataclasses.replace(draw(seed), rtol=rtol), impatient(patience)
+    end = process_time() + patience
     tags, begin, warnings, given_up = tags_of(trial), perf_counter(), (), "no run: too long"
     try:
         run = subzero.simulate(trial, progress=tell)
         middle, warnings, given_up = perf_counter(), warned(run), TOO_LONG
         if run.attrs["outcome"] != "completed":
             return Verdict(seed=seed, tags=tags, outcome="stopped", warnings=warnings)
-        found, fine = compared(run, trial, tell)
+        found, fine = compared(run, trial, tell, end)
     except TooLongError:
         return Verdict(seed=seed, tags=tags, outcome=given_up, warnings=warnings)
     except subzero.UserError as error:  # a cable that does not reach its drum in this current
@@ -220,7 +242,8 @@ def judge(seed: int, patience: float = np.inf, rtol: float = RTOL) -> Verdict:
     verdict = Verdict(seed=seed, tags=tags, warnings=warnings, seconds=seconds, **found)
     if not verdict.false:
         return verdict
-    change = change_of_reference(fine, trial, 2.0**verdict.halvings, impatient(patience))
+    again = patience if second_patience is None else second_patience
+    change = change_of_reference(fine, trial, 2.0**verdict.halvings, impatient(again))
     return dataclasses.replace(verdict, reference_change=change)
 
 
@@ -243,13 +266,21 @@ def change_of_reference(
 
 
 def compared(
-    run: xr.Dataset, trial: scenarios.Trial, tell: Callable[[float], None]
+    run: xr.Dataset, trial: scenarios.Trial, tell: Callable[[float], None], end: float
 ) -> tuple[dict[str, object], xr.Dataset]:
-    """Return what finer runs say of a run that reached its end, fields of a `Verdict`, and the reference."""
+    """Return what finer runs say of a run that reached its end, fields of a `Verdict`, and the reference.
+
+    Args:
+        run: of the trial.
+        trial: what was run.
+        tell: ends what takes too long.
+        end: when it will, by the time of the CPU. [s]
+    """
     accuracy = json.loads(run.attrs["accuracy"])
     halvings, stated = accuracy.get("halvings", 0), accuracy.get("force_error", np.nan)
     check = refine(run, trial, progress=tell).tow_force
-    fine = subzero.simulate(refined(trial, REFINEMENT * 2.0**halvings), progress=tell)
+    finest = refined(trial, REFINEMENT * 2.0**halvings)
+    fine = subzero.simulate(finest, progress=foreseeing(tell, end))
     found = {
         "residual": residual_of(run),
         "stated": np.inf if stated is None else stated,
@@ -374,12 +405,15 @@ def main() -> None:
     parser.add_argument("--keep", type=Path, help="file for all verdicts, one a line, as they come")
     parser.add_argument("--kept", action="store_true", help="only print the tables of what the file keeps")
     parser.add_argument("--patience", type=float, default=np.inf, help="CPU seconds that a trial may take")
+    parser.add_argument(
+        "--second-patience", type=float, help="of a second reference; as much as of the trial if not given"
+    )
     parser.add_argument("--rtol", type=float, default=RTOL, help="of the trials; 0 takes steps as they are")
     asked = parser.parse_args()
     if asked.kept:
         verdicts = kept(asked.keep)
     else:
-        how = partial(judge, patience=asked.patience, rtol=asked.rtol)
+        how = partial(judge, patience=asked.patience, rtol=asked.rtol, second_patience=asked.second_patience)
         verdicts = judged_all(range(asked.seed, asked.seed + asked.count), asked.jobs, asked.keep, how)
     if asked.show:
         print(*(_line(one) for one in verdicts), sep="\n")
