@@ -31,9 +31,10 @@ measured as the force is: the largest residual, as a share of the largest energy
 vehicle in the air, a cable that would break, a servo at its limit) say what happened and claim nothing about numbers,
 so that the run of a right one may have them. Between 1 and 3 % a run is neither right nor wrong, whatever it says.
 
-A reference of a drum that does not hold its cable may take half an hour. With `--patience` trials that take longer
-than so many seconds of CPU are given up, and counted with what they had warned of by then; so is one whose reference
-goes on at a rate (`LEAST_LOOK`, `SPARE`) at which it will. A second reference has `--second-patience`.
+A reference of a drum that does not hold its cable may take half an hour. With `--patience` a trial is given up whose
+references take longer than so many seconds of CPU, or whose reference goes on at a rate (`LEAST_LOOK`, `SPARE`) at
+which it will, or whose run takes three times as long; it is counted with what it had warned of by then. So what a run
+spends on its own doubts hardly chooses which trials are judged. A second reference has `--second-patience`.
 """
 
 from __future__ import annotations
@@ -67,7 +68,7 @@ NO_PULL = 1e-3
 REFINEMENT = 4.0
 RTOL = 0.02
 """What trials ask for, by default: as that of every trial. [-]"""
-LEAST_LOOK, SPARE = 1.0, 1.5
+LEAST_LOOK, SPARE = 0.5, 1.2
 """A reference is given up where it would take so many times what is left, by the rate at which it went on for so long:
 that grows with the cable, so that it rather takes longer. [s], [-]"""
 TOO_LONG = "no reference: too long"
@@ -221,19 +222,18 @@ def foreseeing(tell: Callable[[float], None], end: float) -> Callable[[float], N
 def judge(
     seed: int, patience: float = np.inf, rtol: float = RTOL, second_patience: float | None = None
 ) -> Verdict:
-    """Run a trial and its refinements, for at most so many seconds of CPU, and compare.
+    """Run a trial and its refinements, these for at most so many seconds of CPU, the run for thrice that, and compare.
 
     A second reference has as much again, if not told otherwise.
     """
-    trial, tell = dataclasses.replace(draw(seed), rtol=rtol), impatient(patience)
-    end = process_time() + patience
+    trial = dataclasses.replace(draw(seed), rtol=rtol)
     tags, begin, warnings, given_up = tags_of(trial), perf_counter(), (), "no run: too long"
     try:
-        run = subzero.simulate(trial, progress=tell)
+        run = subzero.simulate(trial, progress=impatient(3.0 * patience))
         middle, warnings, given_up = perf_counter(), warned(run), TOO_LONG
         if run.attrs["outcome"] != "completed":
             return Verdict(seed=seed, tags=tags, outcome="stopped", warnings=warnings)
-        found, fine = compared(run, trial, tell, end)
+        found, fine = compared(run, trial, patience)
     except TooLongError:
         return Verdict(seed=seed, tags=tags, outcome=given_up, warnings=warnings)
     except subzero.UserError as error:  # a cable that does not reach its drum in this current
@@ -266,16 +266,16 @@ def change_of_reference(
 
 
 def compared(
-    run: xr.Dataset, trial: scenarios.Trial, tell: Callable[[float], None], end: float
+    run: xr.Dataset, trial: scenarios.Trial, patience: float
 ) -> tuple[dict[str, object], xr.Dataset]:
     """Return what finer runs say of a run that reached its end, fields of a `Verdict`, and the reference.
 
     Args:
         run: of the trial.
         trial: what was run.
-        tell: ends what takes too long.
-        end: when it will, by the time of the CPU. [s]
+        patience: seconds of CPU for them.
     """
+    tell, end = impatient(patience), process_time() + patience
     accuracy = json.loads(run.attrs["accuracy"])
     halvings, stated = accuracy.get("halvings", 0), accuracy.get("force_error", np.nan)
     check = refine(run, trial, progress=tell).tow_force
@@ -404,7 +404,9 @@ def main() -> None:
     parser.add_argument("--show", action="store_true", help="one line for every trial")
     parser.add_argument("--keep", type=Path, help="file for all verdicts, one a line, as they come")
     parser.add_argument("--kept", action="store_true", help="only print the tables of what the file keeps")
-    parser.add_argument("--patience", type=float, default=np.inf, help="CPU seconds that a trial may take")
+    parser.add_argument(
+        "--patience", type=float, default=np.inf, help="CPU seconds of the references of a trial"
+    )
     parser.add_argument(
         "--second-patience", type=float, help="of a second reference; as much as of the trial if not given"
     )
