@@ -32,9 +32,9 @@ vehicle in the air, a cable that would break, a servo at its limit) say what hap
 so that the run of a right one may have them. Between 1 and 3 % a run is neither right nor wrong, whatever it says.
 
 A reference of a drum that does not hold its cable may take half an hour. With `--patience` a trial is given up whose
-references take longer than so many seconds of CPU, or whose reference goes on at a rate (`LEAST_LOOK`, `SPARE`) at
-which it will, or whose run takes three times as long; it is counted with what it had warned of by then. So what a run
-spends on its own doubts hardly chooses which trials are judged. A second reference has `--second-patience`.
+reference takes longer than so many seconds of CPU, or goes on at a rate (`LEAST_LOOK`, `SPARE`) at which it will, or
+whose run takes three times as long; it is counted with what it had warned of by then. So what a run spends on its own
+doubts hardly chooses which trials are judged. A second reference has `--second-patience`.
 """
 
 from __future__ import annotations
@@ -68,9 +68,9 @@ NO_PULL = 1e-3
 REFINEMENT = 4.0
 RTOL = 0.02
 """What trials ask for, by default: as that of every trial. [-]"""
-LEAST_LOOK, SPARE = 0.5, 1.2
-"""A reference is given up where it would take so many times what is left, by the rate at which it went on for so long:
-that grows with the cable, so that it rather takes longer. [s], [-]"""
+LEAST_LOOK, SPARE = 2.0, 2.0
+"""A reference is given up where it would take so many times its patience, by the rate at which it went on for so long.
+A start takes more iterations than what comes later, a long cable more than a short one. [s], [-]"""
 TOO_LONG = "no reference: too long"
 NUMERICAL = DOUBTS
 """Checks that say that numbers are wrong; all others say what happened."""
@@ -90,7 +90,7 @@ class Verdict:
         force_error, smooth_error: of the tow force; and without jolts of a single sample. [-]
         largest_force: of the fine run. [N]
         reference_change: of the force, from the fine run to the second reference; nan without one. [-]
-        check: by which share half the steps change the tow force. [-]
+        check: by which share half the steps change the tow force; nan where the run is not silent. [-]
         stated: error of the force that the run itself states. [-]
         halvings: how often the run halved its steps and segments.
         residual: largest residual of the energies, as a share of the largest term of the run. [-]
@@ -222,7 +222,7 @@ def foreseeing(tell: Callable[[float], None], end: float) -> Callable[[float], N
 def judge(
     seed: int, patience: float = np.inf, rtol: float = RTOL, second_patience: float | None = None
 ) -> Verdict:
-    """Run a trial and its refinements, these for at most so many seconds of CPU, the run for thrice that, and compare.
+    """Run a trial and its reference, this for at most so many seconds of CPU, the run for thrice that, and compare.
 
     A second reference has as much again, if not told otherwise.
     """
@@ -240,6 +240,8 @@ def judge(
         return Verdict(seed=seed, tags=tags, outcome=f"refused: {str(error)[:60]}")
     seconds = (middle - begin, perf_counter() - middle)
     verdict = Verdict(seed=seed, tags=tags, warnings=warnings, seconds=seconds, **found)
+    if verdict.silent:
+        return dataclasses.replace(verdict, check=refine(run, trial).tow_force)
     if not verdict.false:
         return verdict
     again = patience if second_patience is None else second_patience
@@ -268,17 +270,16 @@ def change_of_reference(
 def compared(
     run: xr.Dataset, trial: scenarios.Trial, patience: float
 ) -> tuple[dict[str, object], xr.Dataset]:
-    """Return what finer runs say of a run that reached its end, fields of a `Verdict`, and the reference.
+    """Return what a finer run says of a run that reached its end, fields of a `Verdict`, and the reference.
 
     Args:
         run: of the trial.
         trial: what was run.
-        patience: seconds of CPU for them.
+        patience: seconds of CPU for the reference.
     """
     tell, end = impatient(patience), process_time() + patience
     accuracy = json.loads(run.attrs["accuracy"])
     halvings, stated = accuracy.get("halvings", 0), accuracy.get("force_error", np.nan)
-    check = refine(run, trial, progress=tell).tow_force
     finest = refined(trial, REFINEMENT * 2.0**halvings)
     fine = subzero.simulate(finest, progress=foreseeing(tell, end))
     found = {
@@ -291,7 +292,7 @@ def compared(
     error, smooth, largest = force_errors(run, fine)
     if largest < NO_PULL:
         return {**found, "outcome": "no pull"}, fine
-    errors = {"force_error": error, "smooth_error": smooth, "check": check}
+    errors = {"force_error": error, "smooth_error": smooth}
     return {**found, **errors, "outcome": "completed", "largest_force": largest}, fine
 
 
@@ -355,7 +356,7 @@ def _line(one: Verdict) -> str:
     checks = ", ".join(dict.fromkeys(one.warnings)) or "no warning"
     return (
         f"  {one.seed:6d}  force {100 * one.force_error:7.2f} % (without jolts {100 * one.smooth_error:7.2f} %), "
-        f"half the steps {100 * one.check:6.2f} %, residual {100 * one.residual:6.2f} %, {one.largest_force:7.3f} N; "
+        f"residual {100 * one.residual:6.2f} %, {one.largest_force:7.3f} N; "
         f"{checks}; {'; '.join(one.tags)}"
     )
 

@@ -235,20 +235,21 @@ def test_a_run_is_proved_by_finer_ones_until_one_contradicts_it(given, forces, f
     assert found.converged == (error <= 0.02)
 
 
-def test_a_finer_run_that_takes_more_than_was_foreseen_proves_nothing():
-    """Four times as many iterations twice as fine, 64 times four times as fine: that is given up, the doubt stays."""
+@pytest.mark.parametrize("growth, tried", [(4, [2, 4]), (16, [2])], ids=["not foreseen", "foreseen"])
+def test_a_finer_run_that_takes_more_than_it_may_proves_nothing(growth, tried):
+    """So many times as many iterations twice as fine, that cubed four times as fine: it is given up, or not begun."""
     trial, plain, taken = changed("fig6", duration=10.0), jolted((0.8,), 300), []
 
     def take(one, grid, _):
         run = plain(one, grid, _)
         taken.append(round(0.5 / one.segment_length))
-        run.recording.iterations *= 4 ** (taken[-1] - 1)
+        run.recording.iterations *= growth ** (taken[-1] - 1)
         run.completed = run.recording.iterations[-1] <= grid.iterations
         return run
 
     run = plain(trial, SimpleNamespace(times=trial.times()), None)
     found = prove(trial, take, run, DOUBTED, 4)
-    assert (taken, found.proof_finer, found.force_error) == ([2, 4], 2, 0.04)
+    assert (taken, found.proof_finer, found.force_error) == (tried, 2, 0.04)
 
 
 def test_a_run_is_given_up_after_so_many_iterations_and_is_not_complete():
@@ -260,6 +261,44 @@ def test_a_run_is_given_up_after_so_many_iterations_and_is_not_complete():
     less = run_trial(trial, model, True, grid=Grid(times, iterations=most // 2))
     assert not less.completed
     assert less.message == "The run took more iterations than it may."
+
+
+LATE = changed("current", duration=2.0, segment_length=1.0)
+"""Segments twice as long as its file says: the last of four halvings changes the force by 0.64 %, and what is left is
+0.11 %, by runs two and four times as fine as that."""
+
+
+def test_a_run_that_is_right_since_its_last_halving_is_not_doubted_but_proved():
+    run = subzero.simulate(dataclasses.replace(LATE, rtol=0.005))
+    told = accuracy(run)
+    assert (told["halvings"], told["proof_finer"]) == (4, 4)
+    assert told["change"] > 0.005 > told["force_error"] > 0.0
+    assert subzero.warnings_of(run) == ()
+    fine = force(subzero.simulate(finer(LATE, 64)))[::64]
+    errors = np.linalg.norm(force(run) - fine, axis=1)[1:] / np.linalg.norm(fine, axis=1).max()
+    assert told["proof_error"] == pytest.approx(
+        errors.max(), rel=0.01
+    )  # of the largest, rows between included
+    assert told["force_error"] >= told["proof_error"]
+
+
+def test_a_doubt_that_the_first_finer_run_shares_stays_and_says_by_how_much():
+    run = subzero.simulate(dataclasses.replace(LATE, rtol=0.0005))
+    told, said = accuracy(run), dict(subzero.warnings_of(run))
+    assert told["proof_finer"] == 2
+    assert told["force_error"] == told["proof_error"] > 0.0005
+    share = f"{100.0 * told['proof_error']:.3g} %"
+    assert (
+        f"2 times as fine as these (16 times as fine as given) they change it by {share}"
+        in said["resolution"]
+    )
+    assert "with twice as long ones it is the same" not in said["resolution"]
+
+
+def test_a_start_that_finer_runs_contradict_is_not_held_against_them_again():
+    told = accuracy(subzero.simulate(dataclasses.replace(START_FROM_REST, rtol=1e-4)))
+    assert told["start_error"] > 1e-4
+    assert told["proof_finer"] == 0
 
 
 def test_a_finer_run_that_is_refused_proves_nothing():
