@@ -15,7 +15,7 @@ import scenarios
 import subzero
 from benchmarks.trust_trials import draw
 from subzero.comparison import halved
-from subzero.validity import CHECKS
+from subzero.validity import CHECKS, refinement_that_settles
 from subzero.validity.limits import bend_radii
 from subzero.validity.numerics import drum_is_ill_posed, is_resolved, roughness
 
@@ -261,6 +261,15 @@ def test_slack_is_not_doubted_if_a_run_four_times_as_fine_confirms_the_force():
     assert said[0].endswith(
         "up to 4 times as fine, steps and segments change it by 0.3 % of its largest value."
     )
+
+
+def test_what_finer_runs_could_settle_is_not_asked_of_a_run_that_stopped():
+    doubt = {"force_error": 0.05, "rtol": 0.02, "proof_finer": 0, "start_error": 0.0}
+    said = json.dumps([{"check": "resolution", "message": "It depends on steps."}])
+    run = plain().assign_attrs(accuracy=json.dumps(doubt), warnings=said)
+    assert refinement_that_settles(run, FIG6, subzero.Model.of(FIG6)) == 4
+    stopped = run.assign_attrs(outcome="stopped")
+    assert refinement_that_settles(stopped, FIG6, subzero.Model.of(FIG6)) == 0
 
 
 def folded(run, share, duration):
