@@ -186,37 +186,21 @@ def residual_of(run: xr.Dataset) -> float:
     return float(np.abs(run["energy_residual"].values).max()) / max(largest, 1e-12)
 
 
-def warned(run: xr.Dataset) -> tuple[str, ...]:
-    """Return the checks that warn."""
-    return tuple(one["check"] for one in json.loads(run.attrs.get("warnings", "[]")))
-
-
 class TooLongError(Exception):
     """The patience is at an end."""
 
 
-def impatient(seconds: float) -> Callable[[float], None]:
-    """Return a progress that ends what runs after so many seconds of CPU from now on."""
-    end = process_time() + seconds
+def impatient(seconds: float, *, foresees: bool = False) -> Callable[[float], None]:
+    """Return a progress that ends what takes longer than so many seconds of CPU from now on, or will (`SPARE`)."""
+    begin = process_time()
 
-    def tell(_: float) -> None:
-        if process_time() > end:
+    def tell(fraction: float) -> None:
+        taken = process_time() - begin
+        late = foresees and taken > max(LEAST_LOOK, SPARE * fraction * seconds)
+        if late or taken > seconds:
             raise TooLongError
 
     return tell
-
-
-def foreseeing(tell: Callable[[float], None], end: float) -> Callable[[float], None]:
-    """Return a progress that also ends what would not be done by a time of the CPU, at the rate since now. [s]."""
-    begin = process_time()
-
-    def look(fraction: float) -> None:
-        tell(fraction)
-        taken = process_time() - begin
-        if taken > LEAST_LOOK and taken > SPARE * fraction * (end - begin):
-            raise TooLongError
-
-    return look
 
 
 def judge(
@@ -230,7 +214,8 @@ def judge(
     tags, begin, warnings, given_up = tags_of(trial), perf_counter(), (), "no run: too long"
     try:
         run = subzero.simulate(trial, progress=impatient(3.0 * patience))
-        middle, warnings, given_up = perf_counter(), warned(run), TOO_LONG
+        middle, given_up = perf_counter(), TOO_LONG
+        warnings = tuple(one.check for one in subzero.warnings_of(run))
         if run.attrs["outcome"] != "completed":
             return Verdict(seed=seed, tags=tags, outcome="stopped", warnings=warnings)
         found, fine = compared(run, trial, patience)
@@ -270,30 +255,23 @@ def change_of_reference(
 def compared(
     run: xr.Dataset, trial: scenarios.Trial, patience: float
 ) -> tuple[dict[str, object], xr.Dataset]:
-    """Return what a finer run says of a run that reached its end, fields of a `Verdict`, and the reference.
+    """Return what a finer run says of one that reached its end, fields of a `Verdict`, and that reference.
 
-    Args:
-        run: of the trial.
-        trial: what was run.
-        patience: seconds of CPU for the reference.
+    It has so many seconds of CPU.
     """
-    tell, end = impatient(patience), process_time() + patience
     accuracy = json.loads(run.attrs["accuracy"])
     halvings, stated = accuracy.get("halvings", 0), accuracy.get("force_error", np.nan)
     finest = refined(trial, REFINEMENT * 2.0**halvings)
-    fine = subzero.simulate(finest, progress=foreseeing(tell, end))
-    found = {
-        "residual": residual_of(run),
-        "stated": np.inf if stated is None else stated,
-        "halvings": halvings,
-    }
+    fine = subzero.simulate(finest, progress=impatient(patience, foresees=True))
+    stated = np.inf if stated is None else stated
+    found = {"residual": residual_of(run), "stated": stated, "halvings": halvings}
     if fine.attrs["outcome"] != "completed":
         return {**found, "outcome": "no reference"}, fine
     error, smooth, largest = force_errors(run, fine)
     if largest < NO_PULL:
         return {**found, "outcome": "no pull"}, fine
-    errors = {"force_error": error, "smooth_error": smooth}
-    return {**found, **errors, "outcome": "completed", "largest_force": largest}, fine
+    found |= {"force_error": error, "smooth_error": smooth, "largest_force": largest}
+    return {**found, "outcome": "completed"}, fine
 
 
 def report(verdicts: list[Verdict]) -> str:

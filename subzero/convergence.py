@@ -181,8 +181,9 @@ def prove(
             break
         found = _change(run, fine, 1, _largest(run))
         latest, reached, worst = fine, finer, max(worst, found.size)
-        told = {"proof_error": found.size, "proof_time": found.time, "proof_finer": finer}
-        accuracy = dataclasses.replace(accuracy, **told)
+        accuracy = dataclasses.replace(
+            accuracy, proof_error=found.size, proof_time=found.time, proof_finer=finer
+        )
         if finer == finest or worst > accuracy.rtol:
             return dataclasses.replace(accuracy, force_error=worst)
     return accuracy
