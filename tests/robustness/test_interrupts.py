@@ -461,5 +461,7 @@ run()
 
 def test_a_command_that_is_ended_behind_its_last_words_has_said_them_once():
     """On a busy machine a command had said them, when its patience ended: they were said again."""
-    done = subprocess.run([sys.executable, "-c", LATE], capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [sys.executable, "-c", LATE], capture_output=True, text=True, check=False, preexec_fn=heed_again
+    )
     assert (done.returncode, done.stderr) == (INTERRUPTED, "Interrupted; nothing was written.\n")
