@@ -31,9 +31,10 @@ measured as the force is: the largest residual, as a share of the largest energy
 vehicle in the air, a cable that would break, a servo at its limit) say what happened and claim nothing about numbers,
 so that the run of a right one may have them. Between 1 and 3 % a run is neither right nor wrong, whatever it says.
 
-A reference of a drum that does not hold its cable may take half an hour. With `--patience` trials that take longer
-than so many seconds of CPU are given up, and counted with what they had warned of by then; a second reference has as
-much again.
+A reference of a drum that does not hold its cable may take half an hour. With `--patience` a trial is given up whose
+reference takes longer than so many seconds of CPU, or goes on at a rate (`LEAST_LOOK`, `SPARE`) at which it will, or
+whose run takes three times as long; it is counted with what it had warned of by then. So what a run spends on its own
+doubts hardly chooses which trials are judged. A second reference has `--second-patience`.
 """
 
 from __future__ import annotations
@@ -67,6 +68,9 @@ NO_PULL = 1e-3
 REFINEMENT = 4.0
 RTOL = 0.02
 """What trials ask for, by default: as that of every trial. [-]"""
+LEAST_LOOK, SPARE = 2.0, 2.0
+"""A reference is given up where it would take so many times its patience, by the rate at which it went on for so long.
+A start takes more iterations than what comes later, a long cable more than a short one. [s], [-]"""
 TOO_LONG = "no reference: too long"
 NUMERICAL = DOUBTS
 """Checks that say that numbers are wrong; all others say what happened."""
@@ -86,7 +90,7 @@ class Verdict:
         force_error, smooth_error: of the tow force; and without jolts of a single sample. [-]
         largest_force: of the fine run. [N]
         reference_change: of the force, from the fine run to the second reference; nan without one. [-]
-        check: by which share half the steps change the tow force. [-]
+        check: by which share half the steps change the tow force; nan where the run is not silent. [-]
         stated: error of the force that the run itself states. [-]
         halvings: how often the run halved its steps and segments.
         residual: largest residual of the energies, as a share of the largest term of the run. [-]
@@ -182,45 +186,51 @@ def residual_of(run: xr.Dataset) -> float:
     return float(np.abs(run["energy_residual"].values).max()) / max(largest, 1e-12)
 
 
-def warned(run: xr.Dataset) -> tuple[str, ...]:
-    """Return the checks that warn."""
-    return tuple(one["check"] for one in json.loads(run.attrs.get("warnings", "[]")))
-
-
 class TooLongError(Exception):
     """The patience is at an end."""
 
 
-def impatient(seconds: float) -> Callable[[float], None]:
-    """Return a progress that ends what runs after so many seconds of CPU from now on."""
-    end = process_time() + seconds
+def impatient(seconds: float, *, foresees: bool = False) -> Callable[[float], None]:
+    """Return a progress that ends what takes longer than so many seconds of CPU from now on, or will (`SPARE`)."""
+    begin = process_time()
 
-    def tell(_: float) -> None:
-        if process_time() > end:
+    def tell(fraction: float) -> None:
+        taken = process_time() - begin
+        late = foresees and taken > max(LEAST_LOOK, SPARE * fraction * seconds)
+        if late or taken > seconds:
             raise TooLongError
 
     return tell
 
 
-def judge(seed: int, patience: float = np.inf, rtol: float = RTOL) -> Verdict:
-    """Run a trial and its refinements, for at most so many seconds of CPU, and compare."""
-    trial, tell = dataclasses.replace(draw(seed), rtol=rtol), impatient(patience)
+def judge(
+    seed: int, patience: float = np.inf, rtol: float = RTOL, second_patience: float | None = None
+) -> Verdict:
+    """Run a trial and its reference, this for at most so many seconds of CPU, the run for thrice that, and compare.
+
+    A second reference has as much again, if not told otherwise.
+    """
+    trial = dataclasses.replace(draw(seed), rtol=rtol)
     tags, begin, warnings, given_up = tags_of(trial), perf_counter(), (), "no run: too long"
     try:
-        run = subzero.simulate(trial, progress=tell)
-        middle, warnings, given_up = perf_counter(), warned(run), TOO_LONG
+        run = subzero.simulate(trial, progress=impatient(3.0 * patience))
+        middle, given_up = perf_counter(), TOO_LONG
+        warnings = tuple(one.check for one in subzero.warnings_of(run))
         if run.attrs["outcome"] != "completed":
             return Verdict(seed=seed, tags=tags, outcome="stopped", warnings=warnings)
-        found, fine = compared(run, trial, tell)
+        found, fine = compared(run, trial, patience)
     except TooLongError:
         return Verdict(seed=seed, tags=tags, outcome=given_up, warnings=warnings)
     except subzero.UserError as error:  # a cable that does not reach its drum in this current
         return Verdict(seed=seed, tags=tags, outcome=f"refused: {str(error)[:60]}")
     seconds = (middle - begin, perf_counter() - middle)
     verdict = Verdict(seed=seed, tags=tags, warnings=warnings, seconds=seconds, **found)
+    if verdict.silent:
+        return dataclasses.replace(verdict, check=refine(run, trial).tow_force)
     if not verdict.false:
         return verdict
-    change = change_of_reference(fine, trial, 2.0**verdict.halvings, impatient(patience))
+    again = patience if second_patience is None else second_patience
+    change = change_of_reference(fine, trial, 2.0**verdict.halvings, impatient(again))
     return dataclasses.replace(verdict, reference_change=change)
 
 
@@ -243,25 +253,25 @@ def change_of_reference(
 
 
 def compared(
-    run: xr.Dataset, trial: scenarios.Trial, tell: Callable[[float], None]
+    run: xr.Dataset, trial: scenarios.Trial, patience: float
 ) -> tuple[dict[str, object], xr.Dataset]:
-    """Return what finer runs say of a run that reached its end, fields of a `Verdict`, and the reference."""
+    """Return what a finer run says of one that reached its end, fields of a `Verdict`, and that reference.
+
+    It has so many seconds of CPU.
+    """
     accuracy = json.loads(run.attrs["accuracy"])
     halvings, stated = accuracy.get("halvings", 0), accuracy.get("force_error", np.nan)
-    check = refine(run, trial, progress=tell).tow_force
-    fine = subzero.simulate(refined(trial, REFINEMENT * 2.0**halvings), progress=tell)
-    found = {
-        "residual": residual_of(run),
-        "stated": np.inf if stated is None else stated,
-        "halvings": halvings,
-    }
+    finest = refined(trial, REFINEMENT * 2.0**halvings)
+    fine = subzero.simulate(finest, progress=impatient(patience, foresees=True))
+    stated = np.inf if stated is None else stated
+    found = {"residual": residual_of(run), "stated": stated, "halvings": halvings}
     if fine.attrs["outcome"] != "completed":
         return {**found, "outcome": "no reference"}, fine
     error, smooth, largest = force_errors(run, fine)
     if largest < NO_PULL:
         return {**found, "outcome": "no pull"}, fine
-    errors = {"force_error": error, "smooth_error": smooth, "check": check}
-    return {**found, **errors, "outcome": "completed", "largest_force": largest}, fine
+    found |= {"force_error": error, "smooth_error": smooth, "largest_force": largest}
+    return {**found, "outcome": "completed"}, fine
 
 
 def report(verdicts: list[Verdict]) -> str:
@@ -324,7 +334,7 @@ def _line(one: Verdict) -> str:
     checks = ", ".join(dict.fromkeys(one.warnings)) or "no warning"
     return (
         f"  {one.seed:6d}  force {100 * one.force_error:7.2f} % (without jolts {100 * one.smooth_error:7.2f} %), "
-        f"half the steps {100 * one.check:6.2f} %, residual {100 * one.residual:6.2f} %, {one.largest_force:7.3f} N; "
+        f"residual {100 * one.residual:6.2f} %, {one.largest_force:7.3f} N; "
         f"{checks}; {'; '.join(one.tags)}"
     )
 
@@ -373,13 +383,18 @@ def main() -> None:
     parser.add_argument("--show", action="store_true", help="one line for every trial")
     parser.add_argument("--keep", type=Path, help="file for all verdicts, one a line, as they come")
     parser.add_argument("--kept", action="store_true", help="only print the tables of what the file keeps")
-    parser.add_argument("--patience", type=float, default=np.inf, help="CPU seconds that a trial may take")
+    parser.add_argument(
+        "--patience", type=float, default=np.inf, help="CPU seconds of the references of a trial"
+    )
+    parser.add_argument(
+        "--second-patience", type=float, help="of a second reference; as much as of the trial if not given"
+    )
     parser.add_argument("--rtol", type=float, default=RTOL, help="of the trials; 0 takes steps as they are")
     asked = parser.parse_args()
     if asked.kept:
         verdicts = kept(asked.keep)
     else:
-        how = partial(judge, patience=asked.patience, rtol=asked.rtol)
+        how = partial(judge, patience=asked.patience, rtol=asked.rtol, second_patience=asked.second_patience)
         verdicts = judged_all(range(asked.seed, asked.seed + asked.count), asked.jobs, asked.keep, how)
     if asked.show:
         print(*(_line(one) for one in verdicts), sep="\n")

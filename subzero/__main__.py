@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import sys
-
 from subzero import interrupts
 
 
@@ -17,7 +15,7 @@ def run() -> None:
         interrupts.ignore()  # all is done: what comes now cannot change it
     except KeyboardInterrupt:  # before the command line was ready, or while it said so
         interrupts.ignore()
-        print(interrupts.words(), file=sys.stderr)
+        interrupts.say()
         code = interrupts.INTERRUPTED
     interrupts.leave(code)
 

@@ -27,7 +27,7 @@ import scenarios
 from subzero import cli_autopilot, cli_diagnosis, cli_install, cli_sweep, cli_trials
 from subzero.cli_examples import EXAMPLES, register
 from subzero.errors import UserError, printable
-from subzero.interrupts import INTERRUPTED, begin, came, words
+from subzero.interrupts import INTERRUPTED, begin, came, say
 from subzero.voice import NOT_STRICT, PLAIN, StrictVoice, Voice, speak
 
 if TYPE_CHECKING:
@@ -370,12 +370,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except UserError as error:
         return _refuse(str(error))
     except KeyboardInterrupt:
-        print(words(), file=sys.stderr)
+        say()
         return INTERRUPTED
     except Exception:  # matplotlib's drawing in C++ made a ValueError of an interrupt in a call back
         if not came():
             raise
-        print(words(), file=sys.stderr)
+        say()
         return INTERRUPTED
 
 

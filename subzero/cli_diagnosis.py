@@ -14,7 +14,7 @@ from cyclopts import Parameter
 import scenarios
 from subzero.cli_examples import register
 from subzero.errors import UserError, printable
-from subzero.interrupts import INTERRUPTED, patience
+from subzero.interrupts import INTERRUPTED, patience, say
 from subzero.progress import progress_bar
 from subzero.voice import PLAIN, Voice
 
@@ -120,7 +120,7 @@ def diagnose(
             )
     write_diagnosis.tell(verdict, stage, scenario=logged[0].setting.trial.name, voice=voice)
     if not verdict.complete:
-        print("Interrupted; what it has is written.", file=sys.stderr)
+        say("Interrupted; what it has is written.")
     return FINE if verdict.complete else INTERRUPTED
 
 

@@ -16,10 +16,11 @@ the cable at once, what it sets off fades or rings within a few steps, and the c
 But they are cheap. So there the error is found, not estimated, by a run of these samples alone with steps and segments
 a quarter as long (`START_REFINEMENTS`).
 
-There are runs that halves cannot vouch for, as an ill-posed drum may be the same on segments of one and of half a
-metre. Where one confirms itself and is still doubted for what it does (`subzero.validity.refinement_that_settles`), the
-error is found, too, if that does not take long: by runs two, four and eight times as fine, of which the first that
-contradicts is the last (`prove`).
+A doubt is proved where that does not take long. A run may be right since its last halving, which only another would
+show; and one that confirms itself may be doubted for what it does, as an ill-posed drum may be the same on segments of
+one and of half a metre. So every run that would end with a doubt that finer ones can settle
+(`subzero.validity.refinement_that_settles`) is held against runs two, four and, where it must be, eight times as fine,
+of which the first that contradicts is the last (`prove`). What they change is its error, whatever was estimated before.
 
 That looks at the whole error, of segments, steps, slack and coupling alike, which an estimate inside a step does not: a
 cable that is bent sharply beside the drum errs in its segments only, and its steps look perfect.
@@ -46,11 +47,11 @@ if TYPE_CHECKING:
 MOST_HALVINGS, CHEAP_HALVINGS = 2, 4
 """Steps and segments a quarter as long cost sixteen times as much. Up to `CHEAP_HALVINGS` are taken where they are
 cheap; and a third one where the error is within `LEAST_GAIN` of `rtol`."""
-MOST_WORK, CHEAP_WORK, PROOF_WORK = 1e7, 3e5, 2e6
-"""Nodes times exchanges that a repeated run may take, half a minute or so; that are cheap, a second or so; and that the
-proof of a run that is doubted may take, several. [-]"""
-PROOFS = (2, 4, 8)
-"""How much finer the runs of a proof are."""
+MOST_WORK, CHEAP_WORK = 1e7, 3e5
+"""Nodes times exchanges that a repeated run may take, half a minute or so; and that are cheap, a second or so. [-]"""
+PROOFS, PROOF_WORK = (2, 4, 8), 1.5e7
+"""How much finer the runs of a proof are; and nodes times iterations that the finest may take, at half a microsecond
+each. [-]"""
 LEAST_GAIN, MOST_GAIN = 2.0, 4.0
 """Gain of a halving, of the first and of the second order; more or less than these is chance, and not believed. [-]"""
 START_ROWS, START_REFINEMENTS = 5, (4, 2)
@@ -157,40 +158,57 @@ def prove(
     finest: int,
     progress: Progress | None = None,
 ) -> Accuracy:
-    """Hold a run that confirms itself against finer ones, up to `finest` times as fine; stop at what contradicts it.
+    """Hold a run that is doubted against finer ones, up to `finest` times as fine; stop at what contradicts it.
 
     Args:
         trial: a tethered one of the default scheme.
         take: makes a run.
-        run: of the trial, as `run_converged` gives it; of its recording, the trace alone is needed.
+        run: of the trial, as `run_converged` gives it; of its recording, trace and iterations are needed.
         accuracy: of the run.
         finest: one of `PROOFS`.
         progress: told the fraction that is done of each run.
 
     Returns:
-        the accuracy, with an error of the force that is at least what was found; as it was where the finest run would
-        take more than `PROOF_WORK`. A run that is refused, or does not reach the end, proves nothing.
+        the accuracy with the error that was found, where all of them agree or one contradicts. The error stays as it
+        was where the finest would take more than `PROOF_WORK`, as far as the one before tells, and where one of them is
+        refused or does not reach the end: that proves nothing.
     """
-    given = 2**accuracy.halvings
-    if _work(run) * given * finest**2 > PROOF_WORK:
-        return accuracy
+    latest, reached, worst = run, 1, 0.0
     for finer in PROOFS[: PROOFS.index(finest) + 1]:
-        parts = finer * given
-        other = resolved(trial, 1.0 / parts)
-        if not accuracy.converged or other is None:
-            break
-        fine = _taken(take, other, _only_traced(run.all_times, parts), progress)
-        if fine is None or not fine.completed:
+        too_long = _iterated(latest) * (finest / reached) ** 2 > PROOF_WORK
+        fine = None if too_long else _finer(trial, take, run, 2**accuracy.halvings, finer, progress)
+        if fine is None:
             break
         found = _change(run, fine, 1, _largest(run))
+        latest, reached, worst = fine, finer, max(worst, found.size)
         accuracy = dataclasses.replace(
-            accuracy,
-            force_error=max(accuracy.force_error, found.size),
-            proof_error=found.size,
-            proof_time=found.time,
-            proof_finer=finer,
+            accuracy, proof_error=found.size, proof_time=found.time, proof_finer=finer
         )
+        if finer == finest or worst > accuracy.rtol:
+            return dataclasses.replace(accuracy, force_error=worst)
     return accuracy
+
+
+def _finer(
+    trial: scenarios.Trial, take: Take, run: Run, given: int, finer: int, progress: Progress | None
+) -> Run | None:
+    """Return a run of a proof; None where it is refused, takes more than `PROOF_WORK`, or does not reach the end.
+
+    Args:
+        trial: of the run.
+        take: makes a run.
+        run: what is proved.
+        given: how many times as fine as its trial that is.
+        finer: how many times as fine as that.
+        progress: told the fraction that is done.
+    """
+    other = resolved(trial, 1.0 / (finer * given))
+    if other is None:
+        return None
+    most = PROOF_WORK / (finer * _mean_nodes(run))
+    grid = _only_traced(run.all_times, finer * given)._replace(iterations=most)
+    fine = _taken(take, other, grid, progress)
+    return fine if fine is not None and fine.completed else None
 
 
 def _only_traced(times: np.ndarray, parts: int) -> Grid:
@@ -289,6 +307,16 @@ def _largest(run: Run) -> float:
 def _work(run: Run) -> float:
     """Return nodes times times of a run, summed up as it grows. [-]"""
     return float(run.recording.trace[:, 3].sum())
+
+
+def _mean_nodes(run: Run) -> float:
+    """Return how many nodes a run has, on average. [-]"""
+    return float(run.recording.trace[:, 3].mean())
+
+
+def _iterated(run: Run) -> float:
+    """Return nodes times iterations of Newton's method of a run: what it took, half a microsecond each. [-]"""
+    return float(run.recording.iterations[-1]) * _mean_nodes(run)
 
 
 def _finer_work(run: Run, halvings: int) -> float:

@@ -24,12 +24,14 @@ PATIENCE_S = 1.2
 """A command has so long to end by itself. [s]"""
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
-AGAIN_S = 0.02
-"""An interrupt that was lost comes again after this. [s]"""
+AGAIN_S, SAYING_S = 0.02, 0.2
+"""An interrupt that was lost comes again after this; last words that are being said may take so long. [s]"""
 
 _patience = [PATIENCE_S]
 _raised = [False]
 """Whether a signal has interrupted this process."""
+_saying, _said = threading.Lock(), [False]
+"""Held by what says the last words of a command; and whether they are said."""
 _left: list[Callable[[], str]] = []
 _lost = [0]
 """How many signals were lost and have been sent again, and not been heard by the thread yet."""
@@ -78,7 +80,7 @@ def leave(code: int) -> Never:
 def begin() -> None:
     """Forget what a former command of this process has left, and that it was interrupted."""
     _left.clear()
-    _raised[0] = False
+    _raised[0] = _said[0] = False
 
 
 def came() -> bool:
@@ -98,6 +100,14 @@ def words() -> str:
     stage = sys.modules.get("subzero.stage")
     left = stage.interruption() if stage and hasattr(stage, "interruption") else "nothing was written"
     return f"Interrupted; {left}."
+
+
+def say(last: str = "") -> None:
+    """Say the last words of an interrupted command, `words()` if none are given; once, whoever ends it."""
+    with _saying:
+        if not _said[0]:
+            print(last or words(), file=sys.stderr, flush=True)
+            _said[0] = True
 
 
 def _interrupt(number: int, frame: FrameType | None) -> Never:
@@ -142,5 +152,7 @@ def _end_late(woken: socket.socket, waker: socket.socket) -> None:
     stage = sys.modules.get("subzero.stage")
     if stage and hasattr(stage, "sweep_own"):
         stage.sweep_own()
-    os.write(2, f"\n{words()}\n".encode(errors="replace"))
+    _saying.acquire(timeout=SAYING_S)
+    if not _said[0]:
+        os.write(2, f"\n{words()}\n".encode(errors="replace"))
     os._exit(INTERRUPTED)

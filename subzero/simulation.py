@@ -234,7 +234,7 @@ def run_trial(
     now = _begun(trial, model, tethered, grid)
     now = kept.go_on(now) if kept is not None else now
     pace = Pace()
-    while now.behind < grid.times.size and now.ending in (coupling.FINE, NO_ROOM):
+    while now.behind < grid.times.size and _goes_on(now, grid):
         start = now.behind - 1
         if start in changes:
             now = now._replace(
@@ -257,8 +257,19 @@ def run_trial(
     if kept is not None:
         kept.keep(now, grid.times, grid.stride, at_once=True)
     message = in_words(now.ending, float(grid.times[now.behind - 1]), now.setup, now.live)
-    completed = now.ending == coupling.FINE
+    message = GIVEN_UP if _took_too_long(now, grid) else message
+    completed = now.ending == coupling.FINE and _goes_on(now, grid)
     return run_so_far(grid, now.recording, now.behind, now.used, message, completed=completed)
+
+
+def _goes_on(now: Standing, grid: Grid) -> bool:
+    """Say whether a run can and may go on."""
+    return now.ending in (coupling.FINE, NO_ROOM) and not _took_too_long(now, grid)
+
+
+def _took_too_long(now: Standing, grid: Grid) -> bool:
+    """Say whether a run took more iterations than it may, however many rows were filled at a time."""
+    return bool(now.live.now.iterations > grid.iterations)
 
 
 SPARE_NODES = 64
@@ -304,7 +315,7 @@ NAMES = Names(
     yielding='control = "constant_tension"',
 )
 """What the settings of a cable are called in a trial file."""
-WENT_WELL = "The run reached its end."
+WENT_WELL, GIVEN_UP = "The run reached its end.", "The run took more iterations than it may."
 
 
 def in_words(ending: int, time: float, setup: Setup, live: Live) -> str:

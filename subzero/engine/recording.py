@@ -7,6 +7,7 @@ are kept are the same to the last bit as without, and the last one is where the 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from math import inf
 from time import perf_counter
 from typing import NamedTuple
 
@@ -87,14 +88,21 @@ class Run:
 
 
 class Grid(NamedTuple):
-    """The times of a run (n,) [s], in how many exchanges it goes from one to the next, that every `stride` of them one
-    is kept as a row, and whether energies are summed up.
+    """The times of a run and what is kept.
+
+    Attributes:
+        times: (n,). [s]
+        parts: in how many exchanges it goes from one to the next.
+        stride: every so many of them one is kept as a row.
+        booked: energies are summed up.
+        iterations: of Newton's method on the cable, after which it is given up.
     """
 
     times: np.ndarray
     parts: int = 1
     stride: int = 1
     booked: bool = True
+    iterations: float = inf
 
 
 class Standing(NamedTuple):

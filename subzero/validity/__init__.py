@@ -20,14 +20,15 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from subzero.validity.limits import above_surface, actuators, below_sea_bed, bend_radius, strength
 from subzero.validity.numerics import (
     DRUM_PROOF,
-    SLACK_PROOF,
+    PROOF,
     closure,
     energy_residual,
     ill_posed_drum,
-    is_resolved,
     push,
     resolution,
     slack,
+    slack_shape,
+    starts_otherwise,
     tow_force,
 )
 
@@ -65,13 +66,14 @@ class _Supposed:
 def refinement_that_settles(run: AnyRun, trial: scenarios.Trial, model: Model) -> int:
     """Return how much finer a run would have to confirm the tow force so that no number is doubted any more.
 
-    0 if none is, if no coarser run has confirmed the force, or if another doubt would be left all the same.
+    0 if none is, if another doubt would be left all the same, if finer runs of the start contradict it already, or if
+    the run stopped.
     """
-    warned = {one.check for one in warnings_of(run)}
-    if not warned.intersection(DOUBTS) or not is_resolved(run):
+    doubted = {one.check for one in warnings_of(run)}.intersection(DOUBTS)
+    if not doubted or run.attrs["outcome"] != "completed" or starts_otherwise(run):
         return 0
-    for finer in sorted({SLACK_PROOF, DRUM_PROOF}):
-        proved = json.loads(run.attrs["accuracy"]) | {"proof_finer": finer}
+    for finer in sorted({PROOF, DRUM_PROOF}):
+        proved = json.loads(run.attrs["accuracy"]) | {"force_error": 0.0, "proof_finer": finer}
         supposed = _Supposed(run, accuracy=json.dumps(proved))
         if not any(CHECKS[check](supposed, trial, model) for check in DOUBTS):
             return finer
@@ -97,6 +99,7 @@ CHECKS: dict[str, Check] = {
     "slack": slack,
     "closure": closure,
     "push": push,
+    "slack_shape": slack_shape,
     "above_surface": above_surface,
     "below_sea_bed": below_sea_bed,
     "strength": strength,

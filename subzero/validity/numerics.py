@@ -30,17 +30,16 @@ OVERRUN, SAGGING, ILL_POSED_TIME = 1.2, 0.2, 2.0
 this share of its drag hangs off the drum at an angle; both count when they last longer than this. Of 171 trials of
 `benchmarks.trust` on drums without friction that were wrong, 112 had it, and none of the 5 that were right.
 [-], [-], [s]"""
-DRUM_PROOF = 8
-"""A run so many times as fine, and those of half and a quarter of that, have to confirm the force on a drum that does
-not hold its cable: a wave in it may be hidden from four times as many segments. [-]"""
+PROOF, DRUM_PROOF = 4, 8
+"""A run so many times as fine, and all that are coarser, have to confirm a force that is doubted; the second on a drum
+that does not hold its cable: a wave in it may be hidden from four times as many segments. [-]"""
 SLOWEST = 0.02
 """Pay-out rates below this are none. [m/s]"""
 
 LIMP = 1e-6
 """A cable with less tension than this at both ends of a segment does not pull there. [N]"""
-SLACK_SHARE, SLACK_TIME, SLACK_PROOF = 0.05, 1.0, 4
-"""Slack is warned of from this share of the length on, and when it lasts longer than this, unless a run so many times
-as fine has confirmed the force. [-], [s], [-]"""
+SLACK_SHARE, SLACK_TIME = 0.05, 1.0
+"""Slack is warned of from this share of the length on, and when it lasts longer than this. [-], [s]"""
 FOLDED = 1e-3
 """A cable whose segments are shorter than their cable by more than this share is folded somewhere. [-]"""
 
@@ -81,14 +80,15 @@ def resolution(run: AnyRun, trial: scenarios.Trial, _: Model) -> list[str]:
         return []
     finer = f"({2 ** accuracy['halvings']} times as fine as given)"
     asked = f"run.rtol allows {percent(trial.rtol)}"
+    start, change = _share(accuracy["start_error"]), _share(accuracy["change"])
     if accuracy["proof_error"] > trial.rtol:
+        same = "" if change > trial.rtol else ", though with twice as long ones it is the same"
         return [
             f"The tow force depends on steps and segments: {accuracy['proof_finer']} times as fine as these {finer} "
-            f"they change it by {_told(accuracy['proof_error'])} (at {accuracy['proof_time']:g} s; {asked}), though "
-            "with twice as long ones it is the same. Give the drum friction_torque or a [winch], or the cable "
-            "bending_stiffness."
+            f"they change it by {_told(accuracy['proof_error'])} (at {accuracy['proof_time']:g} s; {asked}){same}. "
+            "Give the drum friction_torque or a [winch], or the cable bending_stiffness."
         ]
-    if (start := _share(accuracy["start_error"])) > max(trial.rtol, _share(accuracy["change"])):
+    if start > max(trial.rtol, change):
         return [
             f"The tow force of the start depends on steps and segments: four times as fine as these {finer} they "
             f"change it by {_told(start)} (at {accuracy['start_time']:g} s; {asked}). The cable is jerked at the "
@@ -97,7 +97,7 @@ def resolution(run: AnyRun, trial: scenarios.Trial, _: Model) -> list[str]:
         ]
     return [
         f"The tow force depends on steps and segments: from twice as long ones to these {finer} it changes by "
-        f"{_told(_share(accuracy['change']))} (at {accuracy['time']:g} s; {asked}). Either they are "
+        f"{_told(change)} (at {accuracy['time']:g} s; {asked}). Either they are "
         "still too long, or the problem is ill-posed: a heavy cable, or one in a cross current, on a drum that does "
         "not hold it, or a cable that snaps taut. Give the drum friction_torque or a [winch], or the cable "
         "bending_stiffness."
@@ -119,6 +119,12 @@ def is_resolved(run: AnyRun) -> bool:
     accuracy = json.loads(run.attrs.get("accuracy", "{}"))
     error = accuracy.get("force_error")
     return error is not None and error <= accuracy["rtol"]
+
+
+def starts_otherwise(run: AnyRun) -> bool:
+    """Say whether finer runs of the start alone give another tow force there."""
+    accuracy = json.loads(run.attrs.get("accuracy", "{}"))
+    return bool(accuracy) and _share(accuracy["start_error"]) > accuracy["rtol"]
 
 
 def is_proved(run: AnyRun, finer: int) -> bool:
@@ -224,22 +230,48 @@ def drum_is_ill_posed(
 
 
 def slack(run: AnyRun, trial: scenarios.Trial, _: Model) -> list[str]:
-    """Part of the cable is folded: its ends, its drag and its inertia mean something, its shape does not."""
-    if not run.attrs["tethered"]:
+    """Part of the cable is folded: the tow force jumps when it comes taut, and no finer run has confirmed it."""
+    if not run.attrs["tethered"] or is_proved(run, PROOF):
         return []
-    time, share = run["time"].values, slack_share(run)
+    share, longest = _slack(run, trial)
+    if share.max() <= SLACK_SHARE and longest <= SLACK_TIME:
+        return []
+    return [
+        f"{_how_slack(run, share, longest)}: there its shape means nothing, and the "
+        "tow force jumps when it comes taut. Pay out less, or give the drum friction, or the cable bending_stiffness."
+    ]
+
+
+def slack_shape(run: AnyRun, trial: scenarios.Trial, _: Model) -> list[str]:
+    """More of the cable is folded than means nothing, where finer runs have confirmed the tow force."""
+    if not run.attrs["tethered"] or not is_proved(run, PROOF):
+        return []
+    share, longest = _slack(run, trial)
+    if share.max() <= SLACK_SHARE:
+        return []
+    accuracy = json.loads(run.attrs["accuracy"])
+    return [
+        f"{_how_slack(run, share, longest)}: there its shape means nothing. The tow force is not doubted: up to "
+        f"{accuracy['proof_finer']} times as fine, steps and segments change it by {_told(accuracy['force_error'])}."
+    ]
+
+
+def _slack(run: AnyRun, trial: scenarios.Trial) -> tuple[np.ndarray, float]:
+    """Return which share of the cable is slack (samples,) [-], and how long some is at a stretch, at most [s]."""
+    share = slack_share(run)
     share = np.where(
         run["cable_length"].values < trial.segment_length, 0.0, share
     )  # hardly any cable, no shape
-    longest = longest_span(time, share > 0.0)[0]
-    if share.max() <= SLACK_SHARE and (longest <= SLACK_TIME or is_proved(run, SLACK_PROOF)):
-        return []
-    worst = int(share.argmax())
-    return [
+    return share, longest_span(run["time"].values, share > 0.0)[0]
+
+
+def _how_slack(run: AnyRun, share: np.ndarray, longest: float) -> str:
+    """Say how much of the cable is slack, when, and how long."""
+    time, worst = run["time"].values, int(share.argmax())
+    return (
         f"Up to {percent(share[worst])} of the cable in the water is slack (at {time[worst]:g} s; first at "
-        f"{first_time(time, share > 0.0):g} s, {longest:.3g} s at a stretch): there its shape means nothing, and the "
-        "tow force jumps when it comes taut. Pay out less, or give the drum friction, or the cable bending_stiffness."
-    ]
+        f"{first_time(time, share > 0.0):g} s, {longest:.3g} s at a stretch)"
+    )
 
 
 def slack_share(run: AnyRun) -> np.ndarray:

@@ -17,6 +17,7 @@ import pytest
 import scenarios
 import subzero
 from subzero.convergence import Accuracy, prove, run_converged
+from subzero.engine.recording import Grid
 from subzero.simulation import run_trial
 
 BODY = ("cable_force_forward", "cable_force_starboard", "cable_force_down")
@@ -147,8 +148,11 @@ def jolted(forces, nodes=20):
         trace = np.zeros((grid.times.size, 4))  # a force, and a number of nodes
         trace[:, 0], trace[:, 3] = 1.0, nodes
         finer = round(np.log2(1.0 / trial.segment_length))
+        iterations = np.array([5 * grid.times.size * getattr(grid, "parts", 1)])
         trace[np.abs(grid.times - 5.0) < 1e-9, 0] = forces[min(finer, len(forces) - 1)]
-        return SimpleNamespace(all_times=grid.times, recording=SimpleNamespace(trace=trace), completed=True)
+        recording = SimpleNamespace(trace=trace, iterations=iterations)
+        within = iterations[-1] <= getattr(grid, "iterations", np.inf)
+        return SimpleNamespace(all_times=grid.times, recording=recording, completed=within)
 
     return take
 
@@ -195,33 +199,106 @@ def test_what_is_cheap_is_halved_on_before_it_is_doubted(forces, halvings, error
 TRUSTED = Accuracy(
     force_error=0.005, change=0.005, time=1.0, start_error=0.0, start_time=0.0, halvings=0, rtol=0.02
 )
+DOUBTED = dataclasses.replace(TRUSTED, force_error=0.04, change=0.04)
 
 
 @pytest.mark.parametrize(
-    "forces, finest, nodes, proved, error",
+    "given, forces, finest, nodes, proved, error",
     [
-        ((0.8, 0.8, 0.8, 0.8, 0.79), 8, 20, 8, 0.01),
-        ((0.8, 0.8, 0.8, 0.8, 0.7), 8, 20, 8, 0.1),
-        ((0.8, 0.8, 0.8, 0.7, 0.8), 8, 20, 4, 0.1),
-        ((0.8, 0.8, 0.8, 0.8, 0.7), 4, 20, 4, 0.005),
-        ((0.8, 0.8, 0.7, 0.7, 0.7), 8, 320, 0, 0.005),
+        (TRUSTED, (0.8, 0.8, 0.8, 0.8, 0.79), 8, 20, 8, 0.01),
+        (TRUSTED, (0.8, 0.8, 0.8, 0.8, 0.7), 8, 20, 8, 0.1),
+        (TRUSTED, (0.8, 0.8, 0.8, 0.7, 0.8), 8, 20, 4, 0.1),
+        (TRUSTED, (0.8, 0.8, 0.81, 0.8, 0.7), 4, 20, 4, 0.01),
+        (DOUBTED, (0.8, 0.8, 0.79, 0.8, 0.8), 4, 20, 4, 0.01),
+        (DOUBTED, (0.8, 0.8, 0.775, 0.8, 0.8), 4, 20, 2, 0.025),
+        (DOUBTED, (0.8, 0.8, 0.8, 0.775, 0.8), 4, 20, 4, 0.025),
+        (DOUBTED, (0.8, 0.8, 0.8, 0.8, 0.8), 8, 470, 0, 0.04),
     ],
     ids=[
         "confirmed",
         "contradicted by the finest",
         "contradicted before",
         "as far as asked",
+        "right since its last halving",
+        "contradicted at once",
+        "contradicted after an agreement",
         "too much work",
     ],
 )
-def test_a_run_is_proved_by_finer_ones_until_one_contradicts_it(forces, finest, nodes, proved, error):
-    """101 times and 320 nodes: 2.07e6 nodes times exchanges in a run eight times as fine, above `PROOF_WORK`."""
+def test_a_run_is_proved_by_finer_ones_until_one_contradicts_it(given, forces, finest, nodes, proved, error):
+    """101 times, five iterations and 470 nodes: 1.52e7 in a run eight times as fine, above `PROOF_WORK`."""
     trial, take = changed("fig6", duration=10.0), jolted(forces, nodes)
     run = take(trial, SimpleNamespace(times=trial.times()), None)
-    found = prove(trial, take, run, TRUSTED, finest)
+    found = prove(trial, take, run, given, finest)
     assert found.proof_finer == proved
     assert found.force_error == pytest.approx(error, rel=1e-6)
     assert found.converged == (error <= 0.02)
+
+
+@pytest.mark.parametrize("growth, tried", [(4, [2, 4]), (16, [2])], ids=["not foreseen", "foreseen"])
+def test_a_finer_run_that_takes_more_than_it_may_proves_nothing(growth, tried):
+    """So many times as many iterations twice as fine, that cubed four times as fine: it is given up, or not begun."""
+    trial, plain, taken = changed("fig6", duration=10.0), jolted((0.8,), 300), []
+
+    def take(one, grid, _):
+        run = plain(one, grid, _)
+        taken.append(round(0.5 / one.segment_length))
+        run.recording.iterations *= growth ** (taken[-1] - 1)
+        run.completed = run.recording.iterations[-1] <= grid.iterations
+        return run
+
+    run = plain(trial, SimpleNamespace(times=trial.times()), None)
+    found = prove(trial, take, run, DOUBTED, 4)
+    assert (taken, found.proof_finer, found.force_error) == (tried, 2, 0.04)
+
+
+def test_a_run_is_given_up_after_so_many_iterations_and_is_not_complete():
+    trial = changed("fig6", duration=10.0)
+    model, times = subzero.Model.of(trial), trial.times()
+    whole = run_trial(trial, model, True, grid=Grid(times))
+    most = int(whole.recording.iterations[-1])
+    assert run_trial(trial, model, True, grid=Grid(times, iterations=most)).completed
+    less = run_trial(trial, model, True, grid=Grid(times, iterations=most // 2))
+    assert not less.completed
+    assert less.message == "The run took more iterations than it may."
+
+
+LATE = changed("current", duration=2.0, segment_length=1.0)
+"""Segments twice as long as its file says: the last of four halvings changes the force by 0.64 %, and what is left is
+0.11 %, by runs two and four times as fine as that."""
+
+
+def test_a_run_that_is_right_since_its_last_halving_is_not_doubted_but_proved():
+    run = subzero.simulate(dataclasses.replace(LATE, rtol=0.005))
+    told = accuracy(run)
+    assert (told["halvings"], told["proof_finer"]) == (4, 4)
+    assert told["change"] > 0.005 > told["force_error"] > 0.0
+    assert subzero.warnings_of(run) == ()
+    fine = force(subzero.simulate(finer(LATE, 64)))[::64]
+    errors = np.linalg.norm(force(run) - fine, axis=1)[1:] / np.linalg.norm(fine, axis=1).max()
+    assert told["proof_error"] == pytest.approx(
+        errors.max(), rel=0.01
+    )  # of the largest, rows between included
+    assert told["force_error"] >= told["proof_error"]
+
+
+def test_a_doubt_that_the_first_finer_run_shares_stays_and_says_by_how_much():
+    run = subzero.simulate(dataclasses.replace(LATE, rtol=0.0005))
+    told, said = accuracy(run), dict(subzero.warnings_of(run))
+    assert told["proof_finer"] == 2
+    assert told["force_error"] == told["proof_error"] > 0.0005
+    share = f"{100.0 * told['proof_error']:.3g} %"
+    assert (
+        f"2 times as fine as these (16 times as fine as given) they change it by {share}"
+        in said["resolution"]
+    )
+    assert "with twice as long ones it is the same" not in said["resolution"]
+
+
+def test_a_start_that_finer_runs_contradict_is_not_held_against_them_again():
+    told = accuracy(subzero.simulate(dataclasses.replace(START_FROM_REST, rtol=1e-4)))
+    assert told["start_error"] > 1e-4
+    assert told["proof_finer"] == 0
 
 
 def test_a_finer_run_that_is_refused_proves_nothing():
@@ -231,7 +308,7 @@ def test_a_finer_run_that_is_refused_proves_nothing():
     def refused(*_):
         raise subzero.UserError("it does not fit")
 
-    assert prove(trial, refused, run, TRUSTED, 8) == TRUSTED
+    assert prove(trial, refused, run, DOUBTED, 8) == DOUBTED
 
 
 def test_a_last_step_that_is_no_whole_one_is_covered_too():

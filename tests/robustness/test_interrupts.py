@@ -439,3 +439,29 @@ def test_a_command_that_has_to_be_ended_leaves_no_hidden_files(tmp_path):
     _, err = command.communicate(timeout=60.0)
     assert (command.returncode, err) == (INTERRUPTED, "\nInterrupted; nothing was written.\n")
     assert list(tmp_path.iterdir()) == []
+
+
+LATE = """
+import os, signal, time
+from subzero import cli, interrupts
+from subzero.__main__ import run
+
+class Hanging:
+    def parse_args(self, *_, **__):
+        os.kill(os.getpid(), signal.SIGINT)
+        time.sleep(60.0)
+
+def late(code):
+    time.sleep(60.0)
+
+cli.app, interrupts.leave = Hanging(), late
+run()
+"""
+
+
+def test_a_command_that_is_ended_behind_its_last_words_has_said_them_once():
+    """On a busy machine a command had said them, when its patience ended: they were said again."""
+    done = subprocess.run(
+        [sys.executable, "-c", LATE], capture_output=True, text=True, check=False, preexec_fn=heed_again
+    )
+    assert (done.returncode, done.stderr) == (INTERRUPTED, "Interrupted; nothing was written.\n")

@@ -1,5 +1,7 @@
 """The judge of `benchmarks.trust`: same trials from same seeds, errors as it says, verdicts that follow from them."""
 
+import contextlib
+
 import numpy as np
 import pytest
 
@@ -130,10 +132,30 @@ def test_verdicts_are_kept_as_they_come_and_a_trial_that_is_kept_is_not_run_agai
 
 def test_a_trial_that_takes_longer_than_the_patience_is_given_up_with_what_it_had_warned_of(monkeypatch):
     run = subzero.simulate(subzero.load_scenario("fig6"))
-    monkeypatch.setattr(subzero, "simulate", lambda trial, progress: run)
+
+    def simulated(trial, progress):
+        if trial.rtol == 0.0:  # the reference
+            progress(0.5)
+        return run
+
+    monkeypatch.setattr(subzero, "simulate", simulated)
     assert judge(7, patience=0.0).outcome == trust.TOO_LONG
     monkeypatch.undo()
     assert judge(7, patience=0.0).outcome == "no run: too long"
+
+
+@pytest.mark.parametrize(
+    "after, fraction, ends",
+    [(1.0, 0.01, False), (3.0, 0.14, True), (3.0, 0.16, False), (10.1, 0.99, True)],
+    ids=["a slow start", "it would take 21 s", "it would take 19 s", "the patience is over"],
+)
+def test_a_reference_that_would_take_twice_its_patience_is_given_up_early(after, fraction, ends, monkeypatch):
+    clock = [5.0]
+    monkeypatch.setattr(trust, "process_time", lambda: clock[0])
+    tell = trust.impatient(10.0, foresees=True)
+    clock[0] += after
+    with pytest.raises(trust.TooLongError) if ends else contextlib.nullcontext():
+        tell(fraction)
 
 
 @pytest.mark.slow

@@ -15,7 +15,7 @@ import scenarios
 import subzero
 from benchmarks.trust_trials import draw
 from subzero.comparison import halved
-from subzero.validity import CHECKS
+from subzero.validity import CHECKS, refinement_that_settles
 from subzero.validity.limits import bend_radii
 from subzero.validity.numerics import drum_is_ill_posed, is_resolved, roughness
 
@@ -245,13 +245,31 @@ def test_a_drum_whose_force_finer_runs_contradict_is_warned_of_with_by_how_much(
     )
 
 
-def test_a_little_slack_is_not_doubted_if_a_run_four_times_as_fine_confirms_the_force():
-    """3 % of the cable for 1.2 s; of 6 % the shape is nothing, whatever the force."""
-    for share, finer, doubted in ((0.03, 0, True), (0.03, 2, True), (0.03, 4, False), (0.06, 4, True)):
-        run = plain().assign_attrs(
-            accuracy=json.dumps({"force_error": 0.001, "rtol": 0.02, "proof_finer": finer})
-        )
-        assert bool(checked(folded(run, share, 1.2), check="slack")) is doubted, (share, finer)
+def test_slack_is_not_doubted_if_a_run_four_times_as_fine_confirms_the_force():
+    """3 % of the cable for 1.2 s; of 6 % the shape is nothing, whatever the force, and that is said without doubt."""
+    for share, finer, doubted, told in (
+        (0.03, 2, True, False), (0.03, 4, False, False), (0.06, 2, True, False), (0.06, 4, False, True),
+    ):  # fmt: skip
+        numbers = {"force_error": 0.003, "rtol": 0.02, "proof_finer": finer}
+        run = folded(plain().assign_attrs(accuracy=json.dumps(numbers)), share, 1.2)
+        assert bool(checked(run, check="slack")) is doubted, (share, finer)
+        said = checked(run, check="slack_shape")
+        assert bool(said) is told, (share, finer)
+    assert said[0].startswith(
+        "Up to 6 % of the cable in the water is slack (at 20.5 s; first at 20 s, 1.1 s at a stretch)"
+    )
+    assert said[0].endswith(
+        "up to 4 times as fine, steps and segments change it by 0.3 % of its largest value."
+    )
+
+
+def test_what_finer_runs_could_settle_is_not_asked_of_a_run_that_stopped():
+    doubt = {"force_error": 0.05, "rtol": 0.02, "proof_finer": 0, "start_error": 0.0}
+    said = json.dumps([{"check": "resolution", "message": "It depends on steps."}])
+    run = plain().assign_attrs(accuracy=json.dumps(doubt), warnings=said)
+    assert refinement_that_settles(run, FIG6, subzero.Model.of(FIG6)) == 4
+    stopped = run.assign_attrs(outcome="stopped")
+    assert refinement_that_settles(stopped, FIG6, subzero.Model.of(FIG6)) == 0
 
 
 def folded(run, share, duration):

@@ -54,9 +54,14 @@ def test_compiling_is_announced_when_something_is_compiled_and_only_then(run, ke
 COMMAND = "import sys; from subzero.cli import main; sys.exit(main(sys.argv[1:]))"
 
 
+def heed_again():
+    """Let a command heed SIGINT though this process was started with it ignored, as jobs in the background are."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 def command(*words, here, **environment):
     return subprocess.Popen([sys.executable, "-c", COMMAND, *words], cwd=here, env=os.environ | environment,
-                            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)  # fmt: skip
+                            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=heed_again)  # fmt: skip
 
 
 def files_of(base):
