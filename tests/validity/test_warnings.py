@@ -279,7 +279,7 @@ def test_what_finer_runs_could_settle_is_not_asked_of_a_run_that_stopped():
 def test_a_cable_faster_than_its_waves_that_is_barely_resolved_is_held_against_finer_runs(
     number, finer, doubted
 ):
-    """Trials of `benchmarks.trust` on drums without friction: off by 2.5 % without a word, right within 1.2 %, off by 4.3 %."""
+    """Drums without friction: off by 2.5 % without a word, right within 1.2 %, off by 4.3 %."""
     trial = dataclasses.replace(draw(number), rtol=0.02)
     run = subzero.simulate(trial)
     accuracy = json.loads(run.attrs["accuracy"])
