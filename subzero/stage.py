@@ -30,6 +30,7 @@ from pathlib import Path
 from typing import Any
 
 from subzero.errors import UserError, printable
+from subzero.interrupts import came
 from subzero.user_file import INCOMPLETE, MOST_OF_AN_ANSWER, read_bytes
 
 HIDDEN = ".subzero-"
@@ -138,6 +139,8 @@ def told(folder: Path, inside: Path | None = None) -> Iterator[None]:
     except (OSError, ValueError) as error:
         if inside is not None and not _is_of_disk(error, inside):
             raise
+        if isinstance(error, ValueError) and came():
+            raise  # what matplotlib's drawing in C++ made of an interrupt, no word of the disk
         reason = getattr(error, "strerror", None) or str(error)
         raise UserError(
             f"The output folder {printable(str(folder))} cannot be written: {reason}. "

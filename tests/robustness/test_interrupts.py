@@ -287,8 +287,10 @@ def test_an_interrupt_that_machine_code_would_swallow_is_heard():
 
 MADE_AN_ERROR = """
 import os, signal, sys
+from contextlib import nullcontext
+from pathlib import Path
 from types import SimpleNamespace
-from subzero import cli
+from subzero import cli, stage
 
 def parsed(*arguments, **options):
     try:
@@ -297,7 +299,8 @@ def parsed(*arguments, **options):
             pass
     except KeyboardInterrupt:
         pass
-    raise ValueError("Invalid bounding box")
+    with stage.told(Path("out")) if sys.argv[2] == "drawing" else nullcontext():
+        raise ValueError("Invalid bounding box")
 
 cli.app = SimpleNamespace(parse_args=parsed)
 from subzero.__main__ import run
@@ -305,12 +308,17 @@ run()
 """
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, 0])
-def test_an_error_that_machine_code_makes_of_an_interrupt_is_an_interrupt(number):
-    """Matplotlib told a ValueError, with a traceback; without a signal (0) an error stays one."""
+@pytest.mark.parametrize(
+    "number, where",
+    [(signal.SIGINT, "else"), (signal.SIGTERM, "else"), (signal.SIGINT, "drawing"), (0, "else")],
+)
+def test_an_error_that_machine_code_makes_of_an_interrupt_is_an_interrupt(number, where):
+    """Matplotlib told a ValueError, with a traceback; while a figure was drawn it was taken for a word of the disk, and
+    the exit code was 2. Without a signal (0) an error stays one.
+    """
     done = subprocess.run(
-        [sys.executable, "-c", MADE_AN_ERROR, str(int(number))], capture_output=True, text=True, check=False,
-        preexec_fn=heed_again,
+        [sys.executable, "-c", MADE_AN_ERROR, str(int(number)), where], capture_output=True, text=True,
+        check=False, preexec_fn=heed_again,
     )  # fmt: skip
     if number:
         assert (done.returncode, done.stderr) == (INTERRUPTED, "Interrupted; nothing was written.\n")

@@ -150,7 +150,7 @@ from subzero.jit import beside
 beside.os.sched_getaffinity = lambda pid: {0, 1}
 start, asked = beside._start, []
 beside._start = lambda calls, files, lock: (asked.extend(files), start(calls, files, lock))
-subzero.simulate(subzero.load_scenario("fig6").with_changes({"duration_s": 1.0}))
+subzero.simulate(subzero.load_scenario("fig6").with_changes({"run.duration_s": 1.0}))
 print(*(file.name.partition("-")[0] for file in asked))
 """
 

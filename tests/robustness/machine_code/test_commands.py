@@ -60,8 +60,10 @@ def heed_again():
 
 
 def command(*words, here, **environment):
-    return subprocess.Popen([sys.executable, "-c", COMMAND, *words], cwd=here, env=os.environ | environment,
-                            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=heed_again)  # fmt: skip
+    return subprocess.Popen(
+        [sys.executable, "-c", COMMAND, *words], cwd=here, env=os.environ | environment,
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=heed_again,
+    )  # fmt: skip
 
 
 def files_of(base):
