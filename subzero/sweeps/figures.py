@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import textwrap
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -176,8 +175,10 @@ def _tornado(points: Points, effects: list[Effect], title: Title) -> Figure:
     method, first, second = words_of(points.design)
     figure, panels = sheet(len(scalars), 1, title)
     bars = min(MOST_BARS, len(points.names))
-    figure.set_size_inches(width(), figure.get_figheight() + len(scalars) * 0.12 * max(bars - 5, 0))
-    figure.subplots_adjust(left=BAR_LEFT if width() >= ONE_COLUMN else 2.0 * BAR_LEFT, right=0.97, hspace=0.5)
+    usual, more = figure.get_figheight(), len(scalars) * 0.12 * max(bars - 5, 0)
+    figure.set_size_inches(width(), usual + more)
+    figure.subplots_adjust(left=BAR_LEFT if width() >= ONE_COLUMN else 2.0 * BAR_LEFT, right=0.97)
+    figure.subplots_adjust(hspace=0.5 * usual / (usual + more))
     for axes, scalar in zip(panels, scalars, strict=True):
         own = [one for one in effects if one.scalar == scalar][:MOST_BARS]
         places = np.arange(len(own))
@@ -206,7 +207,10 @@ def _scalar(name: str) -> str:
 
 
 def _short(name: str, most: int = NAME_LENGTH) -> str:
-    return textwrap.shorten(name, most, placeholder="…") if len(name) <= most else f"…{name[-most + 1 :]}"
+    """Return a name without its first parts, where it has too many letters: `propeller.diameter`, of the vehicle."""
+    while len(name) > most and "." in name:
+        name = name.partition(".")[2]
+    return name if len(name) <= most else f"…{name[-most + 1 :]}"
 
 
 def _hide(panels: list[Axes], used: int) -> None:

@@ -42,7 +42,7 @@ class Effect:
 
 
 METHODS = {
-    "morris": ("elementary effects", "mu*", "sigma"),
+    "morris": ("elementary effects", "mean size, μ*", "spread, σ"),
     "saltelli": ("Sobol indices", "total", "first order"),
 }
 CORRELATION = ("Spearman's rank correlation", "correlation", "")
