@@ -140,6 +140,8 @@ class Tethered:
         live.state[:] = to_vehicle(x[: len(STATE_NAMES)])
         live.state[CHARGE], live.state[LINKAGE : LINKAGE + 3] = x[16], x[17:HULL_SIZE]
         self._memory.write(x[HULL_SIZE:])
+        # What only makes a first guess better is of another state.
+        live.now.missed[:], live.line.ends.solver.factored = 0.0, False
         self._setup.orders.values[0] = u
         times = np.array([t, t + self.sample_time])
         _, _, ending = run_rows(self._setup, live, self._recording, times, 1, 2, 0, 1, 1)
