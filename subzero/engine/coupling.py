@@ -80,7 +80,7 @@ def _agree(setup: Setup, live: Live, start: float, span: float) -> int:
     lead_drum(setup.led, start + span, setup.fixed.drum)
     size = np.inf
     if live.now.last_step == 0.0:
-        _mobility(setup.fixed.r_c, setup.fixed.vehicle.inverse_mass, live.now.mobility)
+        forget(setup, live)
     for evaluation in range(MOST_EXCHANGES):
         for i in range(3):
             live.now.tow_before[i] = live.now.tow[i]
@@ -112,6 +112,15 @@ def _agree(setup: Setup, live: Live, start: float, span: float) -> int:
             return FINE
         size = _improve(span, live.now, live.line.ends.tow.force, size)
     return DISAGREED
+
+
+@compiled
+def forget(setup: Setup, live: Live) -> None:
+    """Forget what only makes guesses better: where a state is set anew, it is of another one."""
+    for i in range(3):
+        live.now.missed[i] = 0.0
+    _mobility(setup.fixed.r_c, setup.fixed.vehicle.inverse_mass, live.now.mobility)
+    live.line.ends.solver.factored = False
 
 
 @inlined
