@@ -52,6 +52,8 @@ ROUNDING = 1e-15
 """Positions x are known to this fraction; inertia m1 ℓ a₀ b₀ x and strain x/ℓ of a segment cannot be known better."""
 NEARLY = 1e-5
 """Below this merit a step is taken whole: Newton's method ends there by itself; rounding could hide its progress."""
+FAR = 1e-2
+"""From a merit above this, no step of Newton's method gets to the end: the next matrix is made with the residual."""
 SMALLEST_SEGMENT = 1e-9
 """The growing segment never gets shorter than this while iterating. [m]"""
 
@@ -209,10 +211,11 @@ def solve_step(
         if not line.ends.solver.factored:
             break
         last_length, before, fraction = save_guess(line), merit, 1.0
+        made = before > FAR or not alone
         for _ in range(MAX_HALVINGS):
             go_from_guess(line, last_length, fraction)
-            _residual(line, w, c, drum, work, alone)
-            made, merit = not alone, _merit(line)
+            _residual(line, w, c, drum, work, not made)
+            merit = _merit(line)
             if isfinite(merit) and merit <= max(before * (1.0 - 0.1 * fraction), NEARLY):
                 break
             fraction *= 0.5
