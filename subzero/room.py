@@ -6,6 +6,7 @@ only runs are refused that cannot fit; one that nevertheless outgrows the memory
 
 from __future__ import annotations
 
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -85,6 +86,7 @@ def refuse_what_cannot_fit(trial: scenarios.Trial, model: Model, tethered: bool,
     )
 
 
+@cache
 def bytes_a_row() -> float:
     """Return what a recording keeps of the vehicle at one time."""
     return float(sum(values.nbytes for values in new_recording(1, 0)))

@@ -82,11 +82,14 @@ class Now(Record):
 
     Attributes:
         force, force_before: pull of the cable on the vehicle, at the last two accepted times, earth axes (3,). [N]
+        missed: by how much the pull came out other than straight on from the two before it, in the last exchange (3,).
+            [N]
         guess: pull at the end of the exchange that is being tried (3,). [N]
         change: what the last guess was changed by (3,). [N]
         tow: tow point there, relative to the drum (3,). [m]
         Z: answer of the pull to the tow point's place (3, 3). [N/m]
-        mobility: acceleration of the tow point per pull (3, 3). [1/kg]
+        tow_before: the same for the guess before (3,). [m]
+        mobility: acceleration of the tow point per pull, body axes, as the last exchanges showed it (3, 3). [1/kg]
         last_step: length of the last accepted exchange, 0 at the start. [s]
         iterations: of Newton's method on the cable, since the start.
         length: of the cable in the water, at the last accepted time, 0 without a cable. [m]
@@ -96,9 +99,11 @@ class Now(Record):
 
     force: np.ndarray
     force_before: np.ndarray
+    missed: np.ndarray
     guess: np.ndarray
     change: np.ndarray
     tow: np.ndarray
+    tow_before: np.ndarray
     Z: np.ndarray
     mobility: np.ndarray
     last_step: float

@@ -9,6 +9,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -97,22 +98,12 @@ class Vehicle:
             raise VehicleError(tuple(problems))
 
     def numbers(self) -> VehicleNumbers:
-        """Return what the compiled equations take.
+        """Return what the compiled equations take: made once for a vehicle, and given away as copies.
 
         Raises:
             VehicleError: numbers so large or so small that what follows from them is not finite.
         """
-        try:
-            with np.errstate(all="ignore"):
-                numbers = self._numbers()
-            plain = all(np.isfinite(part).all() for part in _arrays(numbers))
-        except (ArithmeticError, ValueError, np.linalg.LinAlgError):
-            plain = False
-        if not plain:
-            why = "some are so large or so small that masses, areas or forces are not finite"
-            problem = Problem(key="vehicle", found="its numbers", why=why, allowed="those of a real vehicle")
-            raise VehicleError((problem,))
-        return numbers
+        return _numbers_of(self).copy()
 
     def _numbers(self) -> VehicleNumbers:
         density = self.water.density
@@ -146,6 +137,22 @@ class Vehicle:
         mapping = {s: dict(values) for s, values in to_mapping(self).items()}
         mapping.setdefault(section, {})[name] = value
         return from_mapping(mapping)
+
+
+@lru_cache(maxsize=4)
+def _numbers_of(vehicle: Vehicle) -> VehicleNumbers:
+    """Return the numbers of one of the last few vehicles: a run asks for those of its own three times and more."""
+    try:
+        with np.errstate(all="ignore"):
+            numbers = vehicle._numbers()
+        plain = all(np.isfinite(part).all() for part in _arrays(numbers))
+    except (ArithmeticError, ValueError, np.linalg.LinAlgError):
+        plain = False
+    if not plain:
+        why = "some are so large or so small that masses, areas or forces are not finite"
+        problem = Problem(key="vehicle", found="its numbers", why=why, allowed="those of a real vehicle")
+        raise VehicleError((problem,))
+    return numbers
 
 
 def _arrays(numbers: VehicleNumbers) -> list[Any]:

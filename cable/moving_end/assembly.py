@@ -114,18 +114,19 @@ def _fill(line: Line, w: Weights, c: CableNumbers, drum: DrumNumbers, work: Load
             history = w.a1 * line.momentum[NOW, j, i] + w.a2 * line.momentum[BEFORE, j, i]
             line.load[j, i] = length * work.q[i] + history
         if slopes:
-            differentiate_load(length, line.slip[j], w.a0, c, work)
+            differentiate_load(line.slip[j], w.a0, c, work)
         if j == held:
             add_influx(line, c, work)
         _add_balance(line, j, T, work)
-        by_strain = _length_equation(line, j, T, length, c, work.chord, slopes)
+        by_strain = _length_equation(line, j, T, c, work.square, slopes)
         if slopes:
             if j < held:
                 _differentiate_segment(length, w, T, c, work)
+                _scatter_balance(line, j, T, work)
             else:
                 differentiate_influx(line, length, w, T, c, work)
-            _scatter_balance(line, j, T, length, work)
-            _scatter_length(line, j, length, by_strain, work.chord)
+                _scatter_influx(line, T, length, work)
+            _scatter_length(line, j, length, by_strain, work)
     add_bending(line, c)
     if N > 1:
         _sharpen_tow_force(line)
@@ -143,7 +144,7 @@ def _clear(line: Line, slopes: bool) -> None:
     for j in range(1, line.ends.count + 1):
         for i in range(4):
             line.rows[RESIDUAL, j, i] = 0.0
-            for k in range(4 if slopes else 0):
+            for k in range(4 if slopes and j == line.ends.count else 0):
                 line.blocks[LOWER, j, i, k] = 0.0
                 line.blocks[DIAGONAL, j, i, k] = 0.0
                 line.blocks[UPPER, j, i, k] = 0.0
@@ -179,45 +180,55 @@ def _add_balance(line: Line, j: int, T: float, work: Load) -> None:
 
 
 @inlined
-def _scatter_balance(line: Line, j: int, T: float, length: float, work: Load) -> None:
-    """Add the derivatives of what `_add_balance` adds."""
-    held, t, d = held_node(line), work.tangent, work.chord
-    stiffness, g = T / work.chord_length, turning_rate(d, length)
-    fading = fading_rate(d, length, work.chord_length) if j == held else 0.0
-    by_near, by_far = work.by_near, work.by_far
-    D, L, U = line.blocks[DIAGONAL], line.blocks[LOWER], line.blocks[UPPER]
+def _scatter_balance(line: Line, j: int, T: float, work: Load) -> None:
+    """Write the derivatives of what `_add_balance` adds; segment j is the first that writes to D_j, L_j and U_{j−1}."""
+    t, by_near, by_far = work.tangent, work.by_near, work.by_far
+    stiffness, g = T / work.chord_length, turning_rate(work.square)
+    D, L, U, before = (
+        line.blocks[DIAGONAL, j],
+        line.blocks[LOWER, j],
+        line.blocks[UPPER],
+        line.blocks[DIAGONAL],
+    )
     for i in range(3):
-        if j < held:
-            D[j, 1 + i, 0] += t[i]
+        D[1 + i, 0] = t[i] + 0.5 * by_far[i, 0]
         if j > 1:
-            U[j - 1, 1 + i, 0] -= t[i]
+            U[j - 1, 1 + i, 0] = 0.5 * by_far[i, 0] - t[i]
         else:
-            line.ends.tow.by_block[i, 0] = t[i]
-        for k in range(4):
-            far = 0.5 * by_far[i, k]
-            # ∂f/∂x = T ∂t/∂x: a taut chord can only turn, T (I − t tᵀ)/|d|; of a folded one t gets longer, too (g < 1).
-            pull = (
-                stiffness * ((1.0 if i == k - 1 else 0.0) - g * t[i] * t[k - 1])
-                if j < held and k > 0
-                else 0.0
-            )
-            if (
-                j == held and k == 1
-            ):  # its far node is fixed, and its second unknown the length ℓ, not a place
-                pull = -fading * T * t[i]
-            if j < held:
-                D[j, 1 + i, k] += far + pull
-            if j > 1:
-                U[j - 1, 1 + i, k] += far - pull
-            else:
-                line.ends.tow.by_block[i, k] = (t[i] if k == 0 else 0.0) + pull - far
+            line.ends.tow.by_block[i, 0] = t[i] - 0.5 * by_far[i, 0]
         for k in range(3):
-            near = 0.5 * by_near[i, k]
+            # ∂f/∂x = T ∂t/∂x: a taut chord can only turn, T (I − t tᵀ)/|d|; of a folded one t gets longer, too (g < 1).
             pull = stiffness * ((1.0 if i == k else 0.0) - g * t[i] * t[k])
-            if j < held:
-                L[j, 1 + i, 1 + k] += near - pull
+            near, far = 0.5 * by_near[i, k], 0.5 * by_far[i, 1 + k]
+            D[1 + i, 1 + k], L[1 + i, 1 + k] = far + pull, near - pull
             if j > 1:
-                D[j - 1, 1 + i, 1 + k] += near + pull
+                U[j - 1, 1 + i, 1 + k] = far - pull
+                before[j - 1, 1 + i, 1 + k] += near + pull
+            else:
+                line.ends.tow.by_block[i, 1 + k] = pull - far
+                line.ends.tow.by_tow[i, k] = -pull - near
+
+
+@inlined
+def _scatter_influx(line: Line, T: float, length: float, work: Load) -> None:
+    """Do the same for the last segment at a drum: its far node is fixed, and its second unknown is the length ℓ."""
+    N, t, by_near, by_far = line.ends.count, work.tangent, work.by_near, work.by_far
+    stiffness, g = T / work.chord_length, turning_rate(work.square)
+    fading = fading_rate(work.square, length, work.chord_length)
+    U, before = line.blocks[UPPER], line.blocks[DIAGONAL]
+    for i in range(3):
+        for k in range(4):
+            pull = t[i] if k == 0 else -fading * T * t[i] if k == 1 else 0.0
+            far = 0.5 * by_far[i, k]
+            if N > 1:
+                U[N - 1, 1 + i, k] = far - pull
+            else:
+                line.ends.tow.by_block[i, k] = pull - far
+        for k in range(3):
+            pull = stiffness * ((1.0 if i == k else 0.0) - g * t[i] * t[k])
+            near = 0.5 * by_near[i, k]
+            if N > 1:
+                before[N - 1, 1 + i, 1 + k] += near + pull
             else:
                 line.ends.tow.by_tow[i, k] = -pull - near
 
@@ -235,11 +246,8 @@ def _sharpen_tow_force(line: Line) -> None:
 
 
 @inlined
-def _length_equation(
-    line: Line, j: int, T: float, length: float, c: CableNumbers, d: np.ndarray, slopes: bool
-) -> float:
-    """Write the length equation of segment j, the first row of its block; return ∂φ/∂σ."""
-    square = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) / (length * length)
+def _length_equation(line: Line, j: int, T: float, c: CableNumbers, square: float, slopes: bool) -> float:
+    """Write the length equation of segment j, whose |d|²/ℓ² is `square`; return ∂φ/∂σ."""
     stretch = 1.0 + c.compliance * T
     phi, by_T, by_strain = slack_law(T, 0.5 * (stretch * stretch - square), line.ends.solver.smoothing)
     line.rows[RESIDUAL, j, 0] = phi
@@ -249,17 +257,16 @@ def _length_equation(
 
 
 @inlined
-def _scatter_length(line: Line, j: int, length: float, by_strain: float, d: np.ndarray) -> None:
+def _scatter_length(line: Line, j: int, length: float, by_strain: float, work: Load) -> None:
     """Write the derivatives of the length equation by the ends of segment j, and by its length."""
     scale, held = 1.0 / (length * length), held_node(line)
     for i in range(3):
-        slope = by_strain * d[i] * scale
+        slope = by_strain * work.chord[i] * scale
         line.blocks[LOWER, j, 0, 1 + i] = slope
         if j < held:
             line.blocks[DIAGONAL, j, 0, 1 + i] = -slope
     if j == held:
-        square = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) * scale
-        line.blocks[DIAGONAL, j, 0, 1] = by_strain * square / length
+        line.blocks[DIAGONAL, j, 0, 1] = by_strain * work.square / length
 
 
 CORNER = 1e-9
@@ -334,7 +341,7 @@ def differentiate_influx(
     """Fill ∂Q/∂x_{N−1} and ∂Q/∂(T, ℓ) of the last segment."""
     N, U, t, d = line.ends.count, line.ends.payout[NEW], work.tangent, work.chord
     by_near, by_far, J, r = work.by_near, work.by_far, work.water, work.chord_length
-    g, fading = turning_rate(d, length), fading_rate(d, length, r)
+    g, fading = turning_rate(work.square), fading_rate(work.square, length, r)
     Jt = J[0] * t[0] + J[1] * t[1] + J[2] * t[2]
     dU = 0.0 if line.ends.drum_mode == STANDING else w.b0
     stretch = 0.5 * c.compliance / (1.0 + c.compliance * T)
@@ -391,7 +398,7 @@ def _differentiate_drum(line: Line, by_length: float, pulled: bool, Qt: float, w
         return
     D[1, 0] = 1.0
     size, length = work.chord_length, line.ends.last_length[NEW]
-    g, fading = turning_rate(work.chord, length), fading_rate(work.chord, length, size)
+    g, fading = turning_rate(work.square), fading_rate(work.square, length, size)
     for i in range(3):
         D[1, 0] += 0.5 * t[i] * by_far[i, 0]
         D[1, 1] += 0.5 * t[i] * (by_far[i, 1] - fading * line.load[N, i])

@@ -20,7 +20,7 @@ from math import sqrt
 
 import numpy as np
 
-from cable.moving_end.block_solver import factor, factor_wide, solve, solve_wide
+from cable.moving_end.block_solver import factor_wide, solve, solve_wide
 from cable.moving_end.state import DIAGONAL, LOWER, LOWER2, NEW, NOW, RESIDUAL, UPPER, UPPER2, Line, held_node
 from cable.properties import CableNumbers, StiffCableNumbers
 from subzero.jit import allocating, by_field, compiled, inner
@@ -155,37 +155,23 @@ def _no_energy(line: Line, c: CableNumbers) -> float:
 
 
 @inner
-def _factor(line: Line, c: CableNumbers) -> bool:
-    """Factor the matrix in place; False where it is singular."""
-    if (
-        factor(line.blocks[LOWER], line.blocks[DIAGONAL], line.blocks[UPPER], line.pivots, line.ends.count)
-        > 0
-    ):
+def _solve(line: Line, c: CableNumbers) -> bool:
+    """Overwrite the residual with the Newton step, and the matrix with its factors; False where it is singular."""
+    L, D, U = line.blocks[LOWER], line.blocks[DIAGONAL], line.blocks[UPPER]
+    if solve(L, D, U, line.pivots, line.ends.count, line.rows[RESIDUAL]) > 0:
         return False
     keep_tow_answer(line)
     return True
 
 
 @inner
-def _stiff_factor(line: Line, c: StiffCableNumbers) -> bool:
+def _stiff_solve(line: Line, c: StiffCableNumbers) -> bool:
     """Do the same for five diagonals of blocks."""
     if factor_wide(line.blocks, line.pivots, line.ends.count) > 0:
         return False
+    solve_wide(line.blocks, line.pivots, line.ends.count, line.rows[RESIDUAL])
     keep_tow_answer(line)
     return True
-
-
-@inner
-def _solve(line: Line, c: CableNumbers) -> None:
-    """Overwrite the residual with the Newton step of the factors."""
-    L, D, U = line.blocks[LOWER], line.blocks[DIAGONAL], line.blocks[UPPER]
-    solve(L, D, U, line.pivots, line.ends.count, line.rows[RESIDUAL])
-
-
-@inner
-def _stiff_solve(line: Line, c: StiffCableNumbers) -> None:
-    """Do the same for five diagonals of blocks."""
-    solve_wide(line.blocks, line.pivots, line.ends.count, line.rows[RESIDUAL])
 
 
 @inner
@@ -205,11 +191,10 @@ def keep_tow_answer(line: Line) -> None:
     """Keep W_1 of the elimination (`block_solver`), before the next assembly overwrites it."""
     for k in range(3):
         for m in range(4):
-            line.ends.tow.answer[k, m] = line.blocks[LOWER, 1, 1 + k, m]
+            line.ends.tow.answer[k, m] = line.blocks[LOWER, 1, m, 1 + k]
 
 
 add_bending = by_field("bending_stiffness", _add_bending, _no_bending)
-factor_step = by_field("bending_stiffness", _stiff_factor, _factor)
-solve_factored = by_field("bending_stiffness", _stiff_solve, _solve)
+solve_for_step = by_field("bending_stiffness", _stiff_solve, _solve)
 has_residual = by_field("bending_stiffness", _no_residual, _has_residual)
 bending_energy = by_field("bending_stiffness", _energy, _no_energy)

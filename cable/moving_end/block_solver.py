@@ -18,7 +18,7 @@ Elimination from the drum to the tow point leaves z_j = b_j − W_j z_{j−1} �
 
     U' = U_j − V_j W_{j+2},   D' = D_j − V_j X_{j+2} − U' W_{j+1},   W_j = D'⁻¹ (L_j − U' X_{j+1}),   X_j = D'⁻¹ K_j
 
-W replaces L and X replaces K, both transposed as above, so W_1 still tells how the first block answers to the tow
+W replaces L and X replaces K, so W_1 still tells how the first block answers to the tow
 point.
 """
 
@@ -73,41 +73,53 @@ def solve_block(D: np.ndarray, pivots: np.ndarray, b: np.ndarray) -> None:
         b[k] *= D[k, k]
 
 
+@inlined
+def solve_columns(D: np.ndarray, pivots: np.ndarray, B: np.ndarray) -> None:
+    """Do that with all four columns of B (4, 4), row by row."""
+    for k in range(SIZE):
+        p = pivots[k]
+        if p != k:
+            for m in range(SIZE):
+                B[k, m], B[p, m] = B[p, m], B[k, m]
+        for i in range(k + 1, SIZE):
+            for m in range(SIZE):
+                B[i, m] -= D[i, k] * B[k, m]
+    for k in range(SIZE - 1, -1, -1):
+        for c in range(k + 1, SIZE):
+            for m in range(SIZE):
+                B[k, m] -= D[k, c] * B[c, m]
+        for m in range(SIZE):
+            B[k, m] *= D[k, k]
+
+
 @compiled
-def factor(L: np.ndarray, D: np.ndarray, U: np.ndarray, pivots: np.ndarray, last: int) -> int:
-    """Factor blocks 1 … last in place; L_j becomes W_j = D_j⁻¹ L_j, transposed so that columns are contiguous.
+def solve(L: np.ndarray, D: np.ndarray, U: np.ndarray, pivots: np.ndarray, last: int, r: np.ndarray) -> int:
+    """Overwrite r (blocks, 4) with the solution of blocks 1 … last, and L_j with W_j = D_j⁻¹ L_j, D_j factored.
+
+    The right-hand side goes through the elimination as the column of L_j that is zero, and stays there.
 
     Returns:
         0 when done, else the index of the singular block.
     """
     for j in range(last, 0, -1):
-        if j < last:
-            # D_j − U_j W_{j+1}, without what is zero: a length knows the ends of its own segment only (row 0 of U), and
-            # nobody knows the tension of the segment before (column 0 of L, and so of W).
-            for row in range(1, SIZE):
-                for column in range(1, SIZE):
-                    total = 0.0
-                    for k in range(SIZE):
-                        total += U[j, row, k] * L[j + 1, column, k]
-                    D[j, row, column] -= total
+        for row in range(SIZE):
+            L[j, row, 0] = r[j, row]
+        # D_j − U_j W_{j+1}, without what is zero: a length knows the ends of its own segment only (row 0 of U).
+        for row in range(1 if j < last else SIZE, SIZE):
+            for k in range(SIZE):
+                L[j, row, 0] -= U[j, row, k] * L[j + 1, k, 0]
+            for column in range(1, SIZE):
+                total = 0.0
+                for k in range(SIZE):
+                    total += U[j, row, k] * L[j + 1, k, column]
+                D[j, row, column] -= total
         if not factor_block(D[j], pivots[j]):
             return j
-        transpose(L[j])
-        for column in range(1, SIZE):
-            solve_block(D[j], pivots[j], L[j, column])
-    return 0
-
-
-@compiled
-def solve(L: np.ndarray, D: np.ndarray, U: np.ndarray, pivots: np.ndarray, last: int, r: np.ndarray) -> None:
-    """Overwrite r (blocks, 4) with the solution, given what `factor` left."""
-    for j in range(last, 0, -1):
-        if j < last:
-            for row in range(1, SIZE):
-                for k in range(SIZE):
-                    r[j, row] -= U[j, row, k] * r[j + 1, k]
-        solve_block(D[j], pivots[j], r[j])
+        solve_columns(D[j], pivots[j], L[j])
+        for row in range(SIZE):
+            r[j, row] = L[j, row, 0]
     spread(L, last, r)
+    return 0
 
 
 @inlined
@@ -116,15 +128,7 @@ def spread(L: np.ndarray, last: int, r: np.ndarray) -> None:
     for j in range(2, last + 1):
         for column in range(1, SIZE):
             for row in range(SIZE):
-                r[j, row] -= L[j, column, row] * r[j - 1, column]
-
-
-@inlined
-def transpose(A: np.ndarray) -> None:
-    """Transpose a 4×4 block in place."""
-    for i in range(SIZE):
-        for k in range(i + 1, SIZE):
-            A[i, k], A[k, i] = A[k, i], A[i, k]
+                r[j, row] -= L[j, row, column] * r[j - 1, column]
 
 
 @inner
@@ -140,22 +144,19 @@ def factor_wide(blocks: np.ndarray, pivots: np.ndarray, last: int) -> int:
             _take_off(U[j], K[j + 1], L[j])
         if not factor_block(D[j], pivots[j]):
             return j
-        transpose(L[j])
-        transpose(K[j])
-        for column in range(SIZE):
-            solve_block(D[j], pivots[j], L[j, column])
-            solve_block(D[j], pivots[j], K[j, column])
+        solve_columns(D[j], pivots[j], L[j])
+        solve_columns(D[j], pivots[j], K[j])
     return 0
 
 
 @compiled
-def _take_off(A: np.ndarray, transposed: np.ndarray, out: np.ndarray) -> None:
-    """Take A·B off `out`, given Bᵀ."""
+def _take_off(A: np.ndarray, B: np.ndarray, out: np.ndarray) -> None:
+    """Take A·B off `out`."""
     for row in range(SIZE):
         for column in range(SIZE):
             total = 0.0
             for k in range(SIZE):
-                total += A[row, k] * transposed[column, k]
+                total += A[row, k] * B[k, column]
             out[row, column] -= total
 
 
@@ -174,6 +175,6 @@ def solve_wide(blocks: np.ndarray, pivots: np.ndarray, last: int, r: np.ndarray)
     for j in range(2, last + 1):
         for column in range(SIZE):
             for row in range(SIZE):
-                r[j, row] -= L[j, column, row] * r[j - 1, column]
+                r[j, row] -= L[j, row, column] * r[j - 1, column]
                 if j > 2:
-                    r[j, row] -= K[j, column, row] * r[j - 2, column]
+                    r[j, row] -= K[j, row, column] * r[j - 2, column]

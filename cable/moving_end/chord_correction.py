@@ -34,9 +34,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cable.moving_end.slack_law import chord_length
+from cable.moving_end.slack_law import chord_length, squared_share
 from cable.moving_end.state import NEW, NOW, Line
-from subzero.jit import inlined, inner
+from subzero.jit import inlined, inner, scratch
 
 if TYPE_CHECKING:
     from cable.moving_end.segment_load import Load
@@ -52,10 +52,14 @@ def correct_for_arc(line: Line, led: bool, work: Load) -> None:
     """Fill line.slip and line.normal_gain from the prediction on level NEW and the velocities of level NOW; `led` by a
     winch, a cable need not slide.
     """
-    for j in range(1, line.ends.count + 1):
-        square = _turning_angle(line, j, work)
-        theta, t, U = work.across, work.tangent, work.velocity
-        _tangent(line, j, t)
+    N, tangents = line.ends.count, scratch(3, 3)
+    _tangent(line, 1, tangents[1])
+    _tangent(line, 1, tangents[0])
+    for j in range(1, N + 1):
+        before, t, after = tangents[(j - 1) % 3], tangents[j % 3], tangents[(j + 1) % 3]
+        _tangent(line, min(j + 1, N), after)
+        square = _turning_angle(line, j, before, after, work.across)
+        theta, U = work.across, work.velocity
         slide, side, along, speed = 0.0, 0.0, 0.0, 0.0
         for i in range(3):
             near, far = line.velocity[NOW, j - 1, i], line.velocity[NOW, j, i]
@@ -80,19 +84,19 @@ def _missing_gain(sliding: float, oblique: float) -> float:
 
 
 @inlined
-def _turning_angle(line: Line, j: int, work: Load) -> float:
-    """Fill work.across (3,) with θ = ℓκ of segment j, as a vector towards the inside; return θ² (cut off)."""
-    N, before, theta = line.ends.count, work.chord, work.across
+def _turning_angle(line: Line, j: int, before: np.ndarray, after: np.ndarray, theta: np.ndarray) -> float:
+    """Fill theta (3,) with θ = ℓκ of segment j, as a vector towards the inside; return θ² (cut off).
+
+    `before` and `after` (3,) are the tangents of its neighbours; where there is none, its own.
+    """
     length, span = _length(line, j), 0.0
     if j > 1:
         span += 0.5 * (_length(line, j - 1) + length)
-    if j < N:
+    if j < line.ends.count:
         span += 0.5 * (length + _length(line, j + 1))
-    _tangent(line, max(j - 1, 1), before)
-    _tangent(line, min(j + 1, N), theta)
     share, square = (length / span if span > 0.0 else 0.0), 0.0
     for i in range(3):
-        theta[i] = share * (theta[i] - before[i])
+        theta[i] = share * (after[i] - before[i])
         square += theta[i] * theta[i]
     if square > MOST_BENT * MOST_BENT:
         for i in range(3):
@@ -111,6 +115,7 @@ def _tangent(line: Line, j: int, out: np.ndarray) -> None:
     """Fill the predicted tangent of segment j (3,)."""
     for i in range(3):
         out[i] = line.position[NEW, j, i] - line.position[NEW, j - 1, i]
-    r = chord_length(out, _length(line, j))
+    length = _length(line, j)
+    r = chord_length(squared_share(out, length), length)
     for i in range(3):
         out[i] /= r

@@ -19,9 +19,9 @@ from __future__ import annotations
 import numpy as np
 
 from cable.drum import LENGTH, STANDING, TENSION, DrumNumbers
-from cable.moving_end.block_solver import factor, solve
+from cable.moving_end.block_solver import solve
 from cable.moving_end.segment_load import Load, segment_momentum
-from cable.moving_end.slack_law import chord_length
+from cable.moving_end.slack_law import chord_length, squared_share
 from cable.moving_end.state import BEFORE, DIAGONAL, LOWER, NOW, RESIDUAL, UPPER, Line
 from cable.properties import CableNumbers
 from subzero.jit import allocating, inner
@@ -56,9 +56,8 @@ def take_jolt(
     _assemble(line, tangents, change, c, drum, masses)
     blocks, jump = line.blocks, line.rows[RESIDUAL]
     line.ends.solver.factored = False
-    if factor(blocks[LOWER], blocks[DIAGONAL], blocks[UPPER], line.pivots, line.ends.count) > 0:
+    if solve(blocks[LOWER], blocks[DIAGONAL], blocks[UPPER], line.pivots, line.ends.count, jump) > 0:
         return False
-    solve(blocks[LOWER], blocks[DIAGONAL], blocks[UPPER], line.pivots, line.ends.count, jump)
     for j in range(1, line.ends.count + 1):
         if jump[j, 0] < -max(line.tension[NOW, j], 0.0) * SLACK_FOR:
             return False
@@ -83,7 +82,8 @@ def _fill_tangents(line: Line, tangents: np.ndarray) -> None:
     for j in range(1, line.ends.count + 1):
         for i in range(3):
             tangents[j, i] = line.position[NOW, j, i] - line.position[NOW, j - 1, i]
-        r = chord_length(tangents[j], _length(line, j))
+        length = _length(line, j)
+        r = chord_length(squared_share(tangents[j], length), length)
         for i in range(3):
             tangents[j, i] /= r
 

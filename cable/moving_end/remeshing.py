@@ -78,7 +78,7 @@ def split_last(line: Line, segment_length: float, c: CableNumbers, work: Load) -
             line.node_tension[N + 1] = end
             _share_tension(line, N, fraction, near - end)
     line.length[N] = segment_length
-    line.ends.count = N + 1
+    line.ends.count, line.ends.solver.factored = N + 1, False
     line.ends.settled += segment_length
     # Momenta are remembered for whole segments (d(ℓp)/dt in `assembly`), so both parts need theirs at both levels.
     for level in (NOW, BEFORE):
@@ -131,7 +131,7 @@ def merge_last(line: Line, c: CableNumbers, work: Load) -> None:
     line.tension[NOW, N - 1] = 0.5 * (line.tension[NOW, N - 1] + line.tension[NOW, N])
     line.tension[BEFORE, N - 1] = 0.5 * (line.tension[BEFORE, N - 1] + line.tension[BEFORE, N])
     line.node_tension[N - 1] = line.node_tension[N]
-    line.ends.count = N - 1
+    line.ends.count, line.ends.solver.factored = N - 1, False
     line.ends.settled -= line.length[N - 1]
     for level in (NOW, BEFORE):
         segment_momentum(line, level, N - 1, last[level], c, work)
@@ -192,7 +192,7 @@ def _join(line: Line, j: int, whole: float, cut_off: float) -> None:
         line.slip[n], line.normal_gain[n] = line.slip[n + 1], line.normal_gain[n + 1]
     line.length[j] = whole * (1.0 - cut_off)
     line.ends.settled -= whole * cut_off
-    line.ends.count = N - 1
+    line.ends.count, line.ends.solver.factored = N - 1, False
 
 
 @compiled

@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from cable.moving_end.slack_law import chord_length, turning_rate
+from cable.moving_end.slack_law import chord_length, squared_share, turning_rate
 from cable.moving_end.state import NOW, Line
 from cable.properties import CableNumbers
 from subzero.jit import Record, inlined, inner
@@ -32,10 +32,10 @@ class Load(Record):
     Attributes:
         velocity, water, chord: V of the segment's middle, J there, and d (3,).
         tangent, momentum, drag, q, across: t, p, D, q and U_⊥ (3,).
-        along, side, chord_length: U_t, |U_⊥| and r.
+        along, side, chord_length, square: U_t, |U_⊥|, r and |d|²/ℓ², see `slack_law`.
         kt, kn: drag constants with stretch and correction.
         q_V, q_d: ∂q/∂V and ∂q/∂d (3, 3).
-        q_tt, G: (∂q/∂t) t (3,) and G (3, 3), see `differentiate_load`.
+        q_tt: (∂q/∂t) t (3,), see `differentiate_load`.
         by_near, by_far: derivatives of the segment's total load Q by the position of its near node (3, 3) and by the
             unknowns of its own block (3, 4), see `assembly`.
     """
@@ -51,12 +51,12 @@ class Load(Record):
     along: float
     side: float
     chord_length: float
+    square: float
     kt: float
     kn: float
     q_V: np.ndarray
     q_d: np.ndarray
     q_tt: np.ndarray
-    G: np.ndarray
     by_near: np.ndarray
     by_far: np.ndarray
 
@@ -64,18 +64,20 @@ class Load(Record):
 def new_load() -> Load:
     """Return empty work space for one segment."""
     parts: dict[str, Any] = {name: np.zeros(3) for name in Load.names}
-    parts |= {name: np.zeros((3, 3)) for name in ("q_V", "q_d", "G", "by_near")}
-    parts |= dict.fromkeys(("along", "side", "chord_length", "kt", "kn"), 0.0)
+    parts |= {name: np.zeros((3, 3)) for name in ("q_V", "q_d", "by_near")}
+    parts |= dict.fromkeys(("along", "side", "chord_length", "square", "kt", "kn"), 0.0)
     return Load(**parts | {"by_far": np.zeros((3, 4))})
 
 
 @inlined
 def evaluate_momentum(c: CableNumbers, work: Load) -> None:
-    """Fill p = m V + ρA P (V − J), the momentum per length, from velocity, water and tangent. [kg/s]."""
-    V, J, t = work.velocity, work.water, work.tangent
+    """Fill U_t, U_⊥ and p = m V + ρA U_⊥, the momentum per length, from velocity, water and tangent. [kg/s]."""
+    V, J, t, across = work.velocity, work.water, work.tangent, work.across
     along = (V[0] - J[0]) * t[0] + (V[1] - J[1]) * t[1] + (V[2] - J[2]) * t[2]
     for i in range(3):
-        work.momentum[i] = c.mass * V[i] + c.added_mass * (V[i] - J[i] - along * t[i])
+        across[i] = V[i] - J[i] - along * t[i]
+        work.momentum[i] = c.mass * V[i] + c.added_mass * across[i]
+    work.along = along
 
 
 @inlined
@@ -93,15 +95,13 @@ def evaluate_load(
         c: the cable.
         work: filled.
     """
-    V, J, t, across = work.velocity, work.water, work.tangent, work.across
-    r = chord_length(work.chord, length)
-    work.chord_length, shorter = r, 1.0 / r
+    t, across, square = work.tangent, work.across, squared_share(work.chord, length)
+    r = chord_length(square, length)
+    work.square, work.chord_length, shorter = square, r, 1.0 / r
     for i in range(3):
         t[i] = work.chord[i] * shorter
     evaluate_momentum(c, work)
-    Ut = (V[0] - J[0]) * t[0] + (V[1] - J[1]) * t[1] + (V[2] - J[2]) * t[2]
-    for i in range(3):
-        across[i] = V[i] - J[i] - Ut * t[i]
+    Ut = work.along
     normal = sqrt(across[0] * across[0] + across[1] * across[1] + across[2] * across[2])
     stretch = sqrt(1.0 + c.compliance * T)
     kt, kn = stretch * c.tangential_drag, gain * stretch * c.normal_drag
@@ -109,43 +109,37 @@ def evaluate_load(
         work.drag[i] = kt * abs(Ut + slip) * (Ut + slip) * t[i] + kn * normal * across[i]
         work.q[i] = a0 * work.momentum[i] + work.drag[i]
     work.q[2] -= c.weight
-    work.along, work.side, work.kt, work.kn = Ut, normal, kt, kn
+    work.side, work.kt, work.kn = normal, kt, kn
 
 
 @inner
-def differentiate_load(length: float, slip: float, a0: float, c: CableNumbers, work: Load) -> None:
+def differentiate_load(slip: float, a0: float, c: CableNumbers, work: Load) -> None:
     """Fill ∂q/∂V and ∂q/∂d of what `evaluate_load` has filled.
 
-    With C = ∂(U_t t)/∂t = t Uᵀ + U_t I = −∂U_⊥/∂t, G = |U_⊥| I + U_⊥ U_⊥ᵀ/|U_⊥| and ∂t/∂d = (I − g t tᵀ)/r:
+    With W = U_t + slip, the drag across k_n (|U_⊥| I + U_⊥ U_⊥ᵀ/|U_⊥|) by U_⊥, ∂U_⊥/∂V = P = I − t tᵀ,
+    ∂U_⊥/∂t = −(t Uᵀ + U_t I) and ∂t/∂d = (I − g t tᵀ)/r:
 
-        ∂q/∂V = a₀(m I + ρA P) + 2 k_t |W| t tᵀ + k_n G P
-        ∂q/∂t = −a₀ρA C + k_t |W| (W I + 2 t Uᵀ) − k_n G C,     W = U_t + slip
+        α     = (2 k_t|W| − a₀ρA) t − k_n (|U_⊥| t + U_⊥ (U_⊥·t)/|U_⊥|)
+        ∂q/∂V = (a₀ (m + ρA) + k_n|U_⊥|) I + α tᵀ + k_n U_⊥ U_⊥ᵀ/|U_⊥|
+        ∂q/∂t = (k_t|W| W − (a₀ρA + k_n|U_⊥|) U_t) I + α Uᵀ − U_t k_n U_⊥ U_⊥ᵀ/|U_⊥|
     """
-    V, J, t, across, G = work.velocity, work.water, work.tangent, work.across, work.G
-    Ut, normal, r, kt, kn = work.along, work.side, work.chord_length, work.kt, work.kn
-    g = turning_rate(work.chord, length)
-    inverse = 1.0 / normal if normal > 1e-12 else 0.0
-    along, shorter = abs(Ut + slip), 1.0 / r
+    V, J, t, across = work.velocity, work.water, work.tangent, work.across
+    Ut, normal, shorter = work.along, work.side, 1.0 / work.chord_length
+    g, pulled = turning_rate(work.square), work.kt * abs(Ut + slip)
+    turned = work.kn / normal if normal > 1e-12 else 0.0
+    inert, side = a0 * c.added_mass, work.kn * normal
+    At = turned * (across[0] * t[0] + across[1] * t[1] + across[2] * t[2])
+    by_V, by_t = a0 * c.mass + inert + side, pulled * (Ut + slip) - (inert + side) * Ut
     for i in range(3):
+        alpha, bent = (2.0 * pulled - inert - side) * t[i] - At * across[i], turned * across[i]
         for k in range(3):
-            G[i, k] = across[i] * across[k] * inverse
-        G[i, i] += normal
-    for i in range(3):
-        Gt = G[i, 0] * t[0] + G[i, 1] * t[1] + G[i, 2] * t[2]
-        work.q_tt[i] = 0.0
-        for k in range(3):
-            P = (1.0 if i == k else 0.0) - t[i] * t[k]
-            outer = t[i] * (V[k] - J[k])
-            C = outer + (Ut if i == k else 0.0)
-            GC = Gt * (V[k] - J[k]) + Ut * G[i, k]
-            work.q_V[i, k] = a0 * c.added_mass * P + 2.0 * kt * along * t[i] * t[k]
-            work.q_V[i, k] += kn * (G[i, k] - Gt * t[k])
-            pull = 2.0 * outer + (Ut + slip if i == k else 0.0)
-            work.q_d[i, k] = kt * along * pull - kn * GC - a0 * c.added_mass * C
-            work.q_tt[i] += work.q_d[i, k] * t[k]
+            work.q_V[i, k] = alpha * t[k] + bent * across[k]
+            work.q_d[i, k] = alpha * (V[k] - J[k]) - Ut * bent * across[k]
+        work.q_V[i, i] += by_V
+        work.q_d[i, i] += by_t
+        work.q_tt[i] = work.q_d[i, 0] * t[0] + work.q_d[i, 1] * t[1] + work.q_d[i, 2] * t[2]
         for k in range(3):
             work.q_d[i, k] = (work.q_d[i, k] - g * work.q_tt[i] * t[k]) * shorter
-        work.q_V[i, i] += a0 * c.mass
 
 
 @inlined
@@ -161,7 +155,8 @@ def take_segment(x: np.ndarray, V: np.ndarray, J: np.ndarray, j: int, work: Load
 def segment_momentum(line: Line, level: int, j: int, length: float, c: CableNumbers, work: Load) -> None:
     """Fill ∫p ds of segment j at a level; the tangent is the one of level NOW, where the segment has a length."""
     take_segment(line.position[NOW], line.velocity[level], line.water[level], j, work)
-    r = chord_length(work.chord, line.ends.last_length[NOW] if j == line.ends.count else line.length[j])
+    whole = line.ends.last_length[NOW] if j == line.ends.count else line.length[j]
+    r = chord_length(squared_share(work.chord, whole), whole)
     for i in range(3):
         work.tangent[i] = work.chord[i] / r
     evaluate_momentum(c, work)

@@ -49,25 +49,32 @@ def slack_law(T: float, shortening: float, smoothing: float) -> tuple[float, flo
 
 
 @inlined
-def chord_length(d: np.ndarray, length: float) -> float:
+def squared_share(d: np.ndarray, length: float) -> float:
+    """Return |d|²/ℓ², 1 for a chord as long as its segment. [-]."""
+    return (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) / (length * length)
+
+
+@inlined
+def chord_length(square: float, length: float) -> float:
     """Return r with r² = |d|² + F² max(1 − |d|²/ℓ², 0)² ℓ², the length that the tangent t = d/r is made with. [m].
 
     For a taut or stretched segment r = |d|, and t is a unit vector. A slack one (|d| < ℓ) is a folded cable: its t gets
     shorter than one, smoothly to 0 when both ends meet, and P = I − t tᵀ then tends to equal drag in all directions.
+
+    Args:
+        square: |d|²/ℓ². [-]
+        length: ℓ, unstretched. [m]
     """
-    square = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) / (length * length)
     return length * sqrt(square + (FOLDING * max(1.0 - square, 0.0)) ** 2)
 
 
 @inlined
-def turning_rate(d: np.ndarray, length: float) -> float:
-    """Return g in ∂t/∂d = (I − g t tᵀ)/r; 1 for a taut segment. [-]."""
-    square = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) / (length * length)
+def turning_rate(square: float) -> float:
+    """Return g in ∂t/∂d = (I − g t tᵀ)/r, of |d|²/ℓ²; 1 for a taut segment. [-]."""
     return 1.0 - 2.0 * FOLDING * FOLDING * max(1.0 - square, 0.0)
 
 
 @inlined
-def fading_rate(d: np.ndarray, length: float, r: float) -> float:
-    """Return f in ∂t/∂ℓ = −f t; 0 for a taut segment. [1/m]."""
-    square = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) / (length * length)
+def fading_rate(square: float, length: float, r: float) -> float:
+    """Return f in ∂t/∂ℓ = −f t, of |d|²/ℓ²; 0 for a taut segment. [1/m]."""
     return FOLDING * FOLDING * length * max(1.0 - square * square, 0.0) / (r * r)

@@ -18,7 +18,7 @@ from cable.current import Water
 from cable.drum import FREE, STANDING, DrumNumbers, next_mode
 from cable.moving_end.assembly import assemble, assemble_residual
 from cable.moving_end.bdf2 import Weights, backward_weights
-from cable.moving_end.bending import factor_step, has_residual, solve_factored
+from cable.moving_end.bending import has_residual, solve_for_step
 from cable.moving_end.block_solver import SIZE, spread
 from cable.moving_end.chord_correction import correct_for_arc
 from cable.moving_end.segment_load import Load
@@ -36,7 +36,7 @@ from cable.moving_end.state import (
     held_node,
 )
 from cable.properties import CableNumbers
-from subzero.jit import compiled, inlined, inner
+from subzero.jit import compiled, inlined, inner, scratch
 
 TAUT = 1e-2
 """A step begins with at least this tension everywhere: Newton then looks for a taut cable first. [N]"""
@@ -52,6 +52,8 @@ ROUNDING = 1e-15
 """Positions x are known to this fraction; inertia m1 ℓ a₀ b₀ x and strain x/ℓ of a segment cannot be known better."""
 NEARLY = 1e-5
 """Below this merit a step is taken whole: Newton's method ends there by itself; rounding could hide its progress."""
+FAR = 1e-2
+"""From a merit above this, no step of Newton's method gets to the end: the next matrix is made with the residual."""
 SMALLEST_SEGMENT = 1e-9
 """The growing segment never gets shorter than this while iterating. [m]"""
 
@@ -162,7 +164,9 @@ def _predict(
             change = ratio * (line.velocity[NOW, j, i] - line.velocity[BEFORE, j, i])
             moved = line.position[NOW, j, i] + step * (line.velocity[NOW, j, i] + 0.5 * change)
             line.position[NEW, j, i] = moved if j < held else drum.place[i]
+    gap = scratch(1, 3)[0]
     for i in range(3):
+        gap[i] = tow[i] - line.position[NEW, 0, i]
         line.position[NEW, 0, i] = tow[i]
         line.ends.drum_velocity[i] = drum.velocity[i]
     rate, last = line.ends.payout, line.ends.last_length
@@ -173,6 +177,8 @@ def _predict(
         line.tension[NEW, N] = max(pull + (line.tension[NOW, N] - pull) * last[NEW] / last[NOW], KNOWN)
     feel_water(line, water, line.ends.time + step)
     correct_for_arc(line, drum.control != FREE, work)
+    if line.ends.solver.factored:
+        _give_way(line, gap)
 
 
 @inner
@@ -201,15 +207,15 @@ def solve_step(
             return _solved(line, iteration, size)
         if not made:
             assemble(line, w, c, drum, work)
-        line.ends.solver.factored = factor_step(line, c)
+        line.ends.solver.factored = solve_for_step(line, c)
         if not line.ends.solver.factored:
             break
-        solve_factored(line, c)
         last_length, before, fraction = save_guess(line), merit, 1.0
+        made = before > FAR or not alone
         for _ in range(MAX_HALVINGS):
             go_from_guess(line, last_length, fraction)
-            _residual(line, w, c, drum, work, alone)
-            made, merit = not alone, _merit(line)
+            _residual(line, w, c, drum, work, not made)
+            merit = _merit(line)
             if isfinite(merit) and merit <= max(before * (1.0 - 0.1 * fraction), NEARLY):
                 break
             fraction *= 0.5
@@ -305,6 +311,7 @@ def _failed(line: Line, rounding: float) -> bool:
     solved = line.ends.solved
     solved.converged, solved.iterations, solved.residual = False, MAX_ITERATIONS, worst
     solved.worst_node, solved.worst_equation = node, equation
+    line.ends.solver.factored = False  # of a matrix that led astray
     return False
 
 
@@ -338,23 +345,30 @@ def impedance(line: Line, Z: np.ndarray) -> None:
                 Z[i, k] -= line.ends.tow.by_block[i, m] * line.ends.tow.answer[k, m]
 
 
+@compiled
+def _give_way(line: Line, gap: np.ndarray) -> None:
+    """Move all of level NEW as the last matrix has it answer to a tow point that is moved by `gap` (3,). [m]."""
+    step, L = line.rows[RESIDUAL], line.blocks[LOWER]
+    for j in range(1, line.ends.count + 1):
+        for m in range(SIZE):
+            step[j, m] = 0.0
+    for m in range(SIZE):
+        for i in range(3):
+            step[1, m] += L[1, m, 1 + i] * gap[i]
+    spread(L, line.ends.count, step)
+    go_from_guess(line, save_guess(line), 1.0)
+
+
 @inner
 def follow_tow(line: Line, tow: np.ndarray) -> bool:
     """Move the tow point of the answer on level NEW, and all that moves with it by the factors of the last matrix.
 
     False, and nothing has moved, if there are none.
     """
-    step, at, L = line.rows[RESIDUAL], line.position[NEW, 0], line.blocks[LOWER]
     if not line.ends.solver.factored:
         return False
-    for j in range(1, line.ends.count + 1):
-        for m in range(SIZE):
-            step[j, m] = 0.0
-    for m in range(SIZE):
-        for i in range(3):
-            step[1, m] += L[1, 1 + i, m] * (tow[i] - at[i])
-    spread(L, line.ends.count, step)
-    go_from_guess(line, save_guess(line), 1.0)
+    gap, at = scratch(1, 3)[0], line.position[NEW, 0]
     for i in range(3):
-        at[i] = tow[i]
+        gap[i], at[i] = tow[i] - at[i], tow[i]
+    _give_way(line, gap)
     return True

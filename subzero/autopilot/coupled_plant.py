@@ -21,7 +21,7 @@ import numpy as np
 
 from cable.moving_end import enlarged
 from scenarios import Start, Trial
-from subzero.engine.coupling import FINE
+from subzero.engine.coupling import FINE, forget
 from subzero.engine.initial_conditions import RUN_IN, prepare
 from subzero.engine.recording import new_recording
 from subzero.engine.time_loop import NO_ROOM, SPARE, run_rows
@@ -140,6 +140,7 @@ class Tethered:
         live.state[:] = to_vehicle(x[: len(STATE_NAMES)])
         live.state[CHARGE], live.state[LINKAGE : LINKAGE + 3] = x[16], x[17:HULL_SIZE]
         self._memory.write(x[HULL_SIZE:])
+        forget(self._setup, live)
         self._setup.orders.values[0] = u
         times = np.array([t, t + self.sample_time])
         _, _, ending = run_rows(self._setup, live, self._recording, times, 1, 2, 0, 1, 1)

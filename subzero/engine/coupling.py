@@ -6,8 +6,8 @@ the cable is solved for the place to which that takes the tow point; F_{n+1} is 
     G(F) = F_cable(x_tow(F)) − F = 0
 
 Newton's method solves it, with the cable's own ∂F/∂x (`cable.moving_end.time_step.impedance`) and the hull's ∂x/∂F
-= (h²/2) A, A the inverse mass at the tow point; two to three evaluations do. An exchange that does not converge is
-tried again in halves.
+= (h²/2) A, A the inverse mass at the tow point, corrected by how the hull gave way in the exchanges before: mostly, two
+evaluations do. An exchange that does not converge is tried again in halves.
 
 The exchange is of second order, and stable for a cable of any weight. A loose one (the force of the step before) is not
 for a cable heavier than the vehicle; nor is a force that goes linearly from F_n to F_{n+1}: a heavy cable then answers
@@ -73,15 +73,21 @@ def hull_steps(setup: Setup, span: float) -> int:
 @inlined
 def _agree(setup: Setup, live: Live, start: float, span: float) -> int:
     """Find the force at the end of an exchange with which hull and cable agree; nothing is made real yet."""
-    # First guess: the force goes on with the slope of the exchange before, F_n + h F', F' = (F_n − F_{n−1})/h_n.
+    # First guess: the force goes on with the slope of the exchange before, and bends as it did there.
     ratio = span / live.now.last_step if live.now.last_step > 0.0 else 0.0
     for i in range(3):
-        live.now.guess[i] = live.now.force[i] + ratio * (live.now.force[i] - live.now.force_before[i])
+        live.now.guess[i] = _straight_on(live.now, ratio, i) + ratio * ratio * live.now.missed[i]
     lead_drum(setup.led, start + span, setup.fixed.drum)
     size = np.inf
+    if live.now.last_step == 0.0:
+        forget(setup, live)
     for evaluation in range(MOST_EXCHANGES):
+        for i in range(3):
+            live.now.tow_before[i] = live.now.tow[i]
         if not _move(setup, live, start, span):
             return ABSURD
+        if evaluation == 1:
+            _learn(live.now, span)
         if not setup.fixed.tethered:
             return FINE
         converged = try_step(
@@ -99,13 +105,28 @@ def _agree(setup: Setup, live: Live, start: float, span: float) -> int:
             return CABLE_FAILED
         # Before the test of agreement: how stiff the cable is says how well two forces can agree at all.
         impedance(live.line, live.now.Z)
-        if setup.fixed.prescribed or _forces_agree(live.now, live.line.ends.tow.force, setup.fixed.agreement):
+        # A first guess is never believed, however good: what errors it takes over differs from exchange to exchange.
+        if setup.fixed.prescribed or (
+            evaluation > 0 and _forces_agree(live.now, live.line.ends.tow.force, setup.fixed.agreement)
+        ):
             return FINE
-        _mobility(
-            setup.fixed.r_c, live.now.hull.rotation, setup.fixed.vehicle.inverse_mass, live.now.mobility
-        )
         size = _improve(span, live.now, live.line.ends.tow.force, size)
     return DISAGREED
+
+
+@compiled
+def forget(setup: Setup, live: Live) -> None:
+    """Forget what only makes guesses better: where a state is set anew, it is of another one."""
+    for i in range(3):
+        live.now.missed[i] = 0.0
+    _mobility(setup.fixed.r_c, setup.fixed.vehicle.inverse_mass, live.now.mobility)
+    live.line.ends.solver.factored = False
+
+
+@inlined
+def _straight_on(now: Now, ratio: float, i: int) -> float:
+    """Return a component of F_n + h F', F' = (F_n − F_{n−1})/h_n, for h = `ratio` h_n. [N]."""
+    return now.force[i] + ratio * (now.force[i] - now.force_before[i])
 
 
 @inlined
@@ -152,7 +173,8 @@ def _improve(span: float, now: Now, F: np.ndarray, last_size: float) -> float:
     """
     # G(F + δ) ≈ G + (Z ∂x/∂F − I) δ = 0. The pull of the whole exchange is moved by δ, for its slope is known: so the
     # tow point moves by ½h²A δ, and the cable answers with Z times that.
-    M, b, Z, A = scratch(3, 3), scratch(1, 3)[0], now.Z, now.mobility
+    M, b, A, Z, R = scratch(3, 3), scratch(1, 3)[0], scratch(3, 3), now.Z, now.hull.rotation
+    _turn(R, now.mobility, A)
     for i in range(3):
         b[i] = F[i] - now.guess[i]
         for k in range(3):
@@ -170,25 +192,56 @@ def _improve(span: float, now: Now, F: np.ndarray, last_size: float) -> float:
 
 
 @compiled
-def _mobility(r: np.ndarray, R: np.ndarray, inverse: np.ndarray, out: np.ndarray) -> None:
-    """Fill out (3, 3) with A = R [I, −r×] M⁻¹ [I, −r×]ᵀ Rᵀ, acceleration of the tow point per force. [1/kg]."""
-    lever, turned = scratch(3, 6), scratch(3, 6)
+def _turn(R: np.ndarray, body: np.ndarray, out: np.ndarray) -> None:
+    """Fill out (3, 3) with R B Rᵀ: in earth axes what `body` (3, 3) is in those of the vehicle."""
+    half = scratch(3, 3)
+    for i in range(3):
+        for k in range(3):
+            half[i, k] = R[i, 0] * body[0, k] + R[i, 1] * body[1, k] + R[i, 2] * body[2, k]
+    for i in range(3):
+        for k in range(3):
+            out[i, k] = half[i, 0] * R[k, 0] + half[i, 1] * R[k, 1] + half[i, 2] * R[k, 2]
+
+
+@compiled
+def _mobility(r: np.ndarray, inverse: np.ndarray, out: np.ndarray) -> None:
+    """Fill out (3, 3) with A = [I, −r×] M⁻¹ [I, −r×]ᵀ, acceleration of the tow point per force, body axes. [1/kg]."""
+    lever = scratch(3, 6)
     for i in range(3):
         for k in range(6):
-            lever[i, k], turned[i, k] = (1.0 if i == k else 0.0), 0.0
+            lever[i, k] = 1.0 if i == k else 0.0
     lever[0, 4], lever[0, 5] = r[2], -r[1]
     lever[1, 3], lever[1, 5] = -r[2], r[0]
     lever[2, 3], lever[2, 4] = r[1], -r[0]
-    for i in range(3):
-        for k in range(6):
-            for m in range(3):
-                turned[i, k] += R[i, m] * lever[m, k]
     for i in range(3):
         for k in range(3):
             out[i, k] = 0.0
             for m in range(6):
                 for n in range(6):
-                    out[i, k] += turned[i, m] * inverse[m, n] * turned[k, n]
+                    out[i, k] += lever[i, m] * inverse[m, n] * lever[k, n]
+
+
+@compiled
+def _learn(now: Now, span: float) -> None:
+    """Make A such that it gives the last move of the tow point for the last change of the guess (Broyden's update).
+
+    M⁻¹ leaves out what the water does within an exchange, up to a tenth. A move that may be rounding teaches nothing.
+    """
+    R, A, d, x = now.hull.rotation, now.mobility, scratch(1, 3)[0], scratch(1, 3)[0]
+    size, way, reach = 0.0, 0.0, 0.0
+    for i in range(3):
+        d[i], x[i] = 0.0, 0.0
+        for k in range(3):
+            d[i] += R[k, i] * now.change[k]
+            x[i] += R[k, i] * (now.tow[k] - now.tow_before[k])
+        size += d[i] * d[i]
+        way, reach = max(way, abs(x[i])), max(reach, abs(now.tow[i]))
+    if not way > 1e2 * ROUNDING * reach:
+        return
+    for i in range(3):
+        missed = 2.0 / (span * span) * x[i] - (A[i, 0] * d[0] + A[i, 1] * d[1] + A[i, 2] * d[2])
+        for k in range(3):
+            A[i, k] += missed * d[k] / size
 
 
 @compiled
@@ -212,14 +265,16 @@ def _solve_three(M: np.ndarray, b: np.ndarray) -> None:
 def _accept(setup: Setup, live: Live, start: float, span: float) -> None:
     """Make the exchange real: state, forces, cable, energies."""
     steps = hull_steps(setup, span)
+    ratio = span / live.now.last_step if live.now.last_step > 0.0 else 0.0
     for i in range(3):
-        live.now.force_before[i] = live.now.force[i]
-        live.now.force[i] = live.line.ends.tow.force[i] if setup.fixed.tethered else 0.0
+        force = live.line.ends.tow.force[i] if setup.fixed.tethered else 0.0
+        live.now.missed[i] = force - _straight_on(live.now, ratio, i)
+        live.now.force_before[i], live.now.force[i] = live.now.force[i], force
     for i in range(STATE_SIZE):
         live.state[i] = live.path[steps, i]
     if live.now.last_step == 0.0:
         for i in range(3):  # the force at the start is a guess: it gives no slope
-            live.now.force_before[i] = live.now.force[i]
+            live.now.force_before[i], live.now.missed[i] = live.now.force[i], 0.0
     # The cable is accepted first: the energies booked below are those of its new time level.
     live.now.last_step = span
     if setup.fixed.tethered:

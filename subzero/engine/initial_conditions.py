@@ -139,7 +139,10 @@ def _new_now() -> Now:
         cable_new=np.zeros(FLOWS),
         kinetic=0.0,
     )
-    vectors = {name: np.zeros(3) for name in ("force", "force_before", "guess", "change", "tow")}
+    vectors = {
+        name: np.zeros(3)
+        for name in ("force", "force_before", "missed", "guess", "change", "tow", "tow_before")
+    }
     matrices = {name: np.zeros((3, 3)) for name in ("Z", "mobility")}
     return Now(**vectors, **matrices, last_step=0.0, iterations=0, length=0.0, hull=work, ledger=ledger)
 

@@ -31,6 +31,9 @@ if TYPE_CHECKING:
         def tobytes(self) -> bytes:
             """Return the memory as bytes."""
 
+        def copy(self) -> Self:
+            """Return the same numbers in memory of their own."""
+
         def __getitem__(self, name: str) -> Any: ...
         def __setitem__(self, name: str, value: Any) -> None: ...
 else:
