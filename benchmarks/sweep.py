@@ -250,56 +250,44 @@ def kills(count, members, seed=0):
     spec.write_text(SHORT_SPEC.format(members=members))
     whole = _sweep_command(spec, home / "whole").wait()
     assert whole == 0
-    done, begun = [], 0
+    done, before = {"parent": 0, "worker": 0}, 0
     while True:
         run = _sweep_command(spec, home / "killed")
-        _strike(run, home / "killed", rng, members, count, done)
-        finished = [one[1] for one in done[begun:]]
-        assert finished == sorted(finished), finished
+        _strike(run, rng, count, done)
         if (code := run.wait()) > 0:
             raise RuntimeError(f"the sweep refuses to go on: exit code {code}. Were its sources changed?")
         if code == 0:
-            if len(done) >= count:
+            if sum(done.values()) >= count:
                 break
             shutil.rmtree(home / "killed")  # it got through: begin anew, for the kills that are left
-            begun = len(done)
+            before = 0
+            continue
+        now = _kept(home / "killed") if (home / "killed/members.sqlite").exists() else 0
+        assert now >= before, (before, now)
+        before = now
     same = (home / "whole/sweep.nc").read_bytes() == (home / "killed/sweep.nc").read_bytes()
-    _tell_kills(done, members)
+    print(f"{done['parent']} kills of the parent, {done['worker']} of a worker, {members} members:")
     print(f"kept {_kept(home / 'killed')}, the same result to the last byte: {same}")
     shutil.rmtree(home)
     return same
 
 
-def _tell_kills(done, members):
-    """Print who was killed when; `done` has (victim, members that were finished, workers that ran) of each kill."""
-    parents, running = sum(one[0] == "parent" for one in done), sum(one[2] > 0 for one in done)
-    print(f"{parents} kills of the parent, {len(done) - parents} of a worker, {members} members;")
-    print(f"workers ran at {running} of them. Finished at each: {', '.join(str(one[1]) for one in done)}")
+MOSTLY = 0.98
+"""How probable it is, each tenth of a second, to go on waiting for the workers of a command before it is struck."""
 
 
-AT_ONCE = 0.1
-"""Share of the strikes that come in the first seconds of a command, whether it has workers by then or not."""
-
-
-def _strike(run, folder, rng, members, count, done):
-    """Kill workers of a command, or it, at random moments, until it has ended or there were kills enough.
-
-    All others come when some more members are finished, so many that the kills that are left spread over those left.
-    """
-    while len(done) < count:
-        kept = _kept(folder)
-        if rng.random() < AT_ONCE:
-            time.sleep(rng.uniform(0.1, 4.0))
-        else:
-            wanted = kept + 1 + rng.random() * 2.0 * (members - kept) / (count - len(done) + 1)
-            while run.poll() is None and _kept(folder) < wanted:
-                time.sleep(0.02)
+def _strike(run, rng, count, done):
+    """Kill workers of a command, or it, at random moments, until it has ended or there were kills enough."""
+    while sum(done.values()) < count:
+        while rng.random() < MOSTLY and run.poll() is None and not _children(run.pid):
+            time.sleep(0.1)  # else a busy machine is struck before there is a worker, time after time
+        time.sleep(rng.uniform(0.1, 2.5))
         if run.poll() is not None:
             return
         workers = _children(run.pid)
         victim = "worker" if rng.random() < 0.5 and workers else "parent"
         _kill(rng.choice(workers) if victim == "worker" else run.pid)
-        done.append((victim, _kept(folder), len(workers)))
+        done[victim] += 1
         if victim == "parent":
             return
 
@@ -326,11 +314,8 @@ def _kill(pid):
 
 
 def _kept(folder):
-    """Return how many members a sweep has finished."""
     import sqlite3
 
-    if not (folder / "members.sqlite").exists():
-        return 0
     with closing(sqlite3.connect(folder / "members.sqlite")) as file:
         try:
             return file.execute("SELECT count(*) FROM members").fetchone()[0]
