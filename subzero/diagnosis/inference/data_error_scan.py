@@ -22,7 +22,7 @@ from typing import NamedTuple
 import numpy as np
 
 from subzero.channels import BY_NAME, HEADING, turned
-from subzero.diagnosis.hypothesis.configuration import Setting
+from subzero.diagnosis.hypothesis.configuration import Setting, sensed, truth
 from subzero.diagnosis.hypothesis.data_error import (
     ANY,
     COMMAND_GROUPS,
@@ -35,7 +35,6 @@ from subzero.diagnosis.hypothesis.data_error import (
 )
 from subzero.diagnosis.hypothesis.hypotheses import PRIOR, columns_of, nameable, variances
 from subzero.diagnosis.hypothesis.logged import Logged
-from subzero.diagnosis.hypothesis.measurement import sensed, truth
 from subzero.diagnosis.inference.linear_gaussian import KAPPAS, Posterior, freed, log_sum
 from subzero.diagnosis.inference.noise import resolution_of, spikes, usual_noise
 from subzero.diagnosis.inference.posing import usual_of
