@@ -143,7 +143,7 @@ def test_an_error_that_physics_has_no_chance_against_is_corrected_before_anythin
     words = list[str]()
     verdict = subzero.diagnose(error.planted(measured("zigzag", 20251)), budget="screen",
                                progress=lambda share, doing: words.append(doing))  # fmt: skip
-    assert named(verdict) == {error.id}
+    assert error.id in named(verdict)
     assert words.count("sensitivities of the nominal model") == 1
 
 
