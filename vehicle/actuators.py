@@ -28,7 +28,7 @@ at the end of each step. For a servo that turns one way during a step this is th
 from __future__ import annotations
 
 import math
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -69,7 +69,7 @@ class Servo(Section):
 
     def numbers(self) -> ServoNumbers:
         """Return what the compiled servo needs."""
-        return ServoNumbers(*astuple(self))
+        return ServoNumbers(*self.values())
 
 
 @compiled

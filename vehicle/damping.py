@@ -9,7 +9,7 @@ known by such tables (REMUS 100, LAUV) put their numbers here instead of, or bes
 
 from __future__ import annotations
 
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -30,7 +30,7 @@ class LinearDamping(Section):
 
     def numbers(self) -> np.ndarray:
         """Return the six derivatives in the order of ν."""
-        return np.array(astuple(self))
+        return np.array(self.values())
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,7 +49,7 @@ class QuadraticDamping(Section):
 
     def numbers(self) -> np.ndarray:
         """Return Y_vv, Y_rr, N_vv, N_rr, Z_ww, Z_qq, M_ww, M_qq, K_pp."""
-        return np.array(astuple(self))
+        return np.array(self.values())
 
 
 @compiled

@@ -13,7 +13,7 @@ values: k = R = s = l = 0, c infinite, lag 0 (see `actuators`).
 from __future__ import annotations
 
 import math
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass
 
 from subzero.jit import Record, compiled
 from vehicle.parameters import Section, parameter
@@ -60,7 +60,7 @@ class Battery(Section):
 
 def motor_numbers(motor: Motor, battery: Battery) -> MotorNumbers:
     """Return what the compiled motor needs."""
-    return MotorNumbers(*astuple(motor), *astuple(battery))
+    return MotorNumbers(*motor.values(), *battery.values())
 
 
 @compiled

@@ -216,6 +216,8 @@ def _first_look(findings: Findings, seen: Seen) -> None:
         return
     with _timed(findings, "fits"):
         search.first_fits()
+        if search.is_poor():
+            search.refine_first()
     if search.is_poor() and not findings.out_of_catalogue:
         _look_outside(findings, 0.6, "forces, and causes that begin in mid-trial")
 

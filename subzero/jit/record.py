@@ -77,12 +77,12 @@ class Record(Memory):
         if len(values) > len(cls.names) or given.keys() != set(cls.names):
             raise TypeError(f"{cls.__name__} takes {', '.join(cls.names)}; it got {', '.join(given)}.")
         parts = [_read(given[name]) for name in cls.names]
-        made_of = (cls, *(kind for _, kind in parts))
+        made_of = (cls, *[kind for _, kind in parts])
         if made_of not in _layouts:
             fields = [(name, _layout(given[name])) for name in cls.names]
             _layouts[made_of] = np.dtype((cls, fields))
         memory = np.zeros(1, dtype=_layouts[made_of])
-        memory[0] = tuple(value for value, _ in parts)
+        memory[0] = tuple([value for value, _ in parts])
         made: Self = memory[0]
         return made
 
@@ -126,6 +126,8 @@ _layouts: dict[Any, np.dtype[Any]] = {}
 
 def _read(value: Any) -> tuple[Any, Any]:
     """Return the value of a field as numpy takes it (rows as lists), and what it is made of."""
+    if type(value) is float:  # most are
+        return value, float
     if isinstance(value, Record):
         return value, value.dtype
     if isinstance(value, tuple):

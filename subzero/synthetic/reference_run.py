@@ -1,7 +1,7 @@
 """The truth of a setting by the other cable formulation, lumped masses and springs, and what sensors show of it.
 
 Another cable (`cable.lumped`), another way to couple it (`reference_coupling`), finer steps, and sensors written
-independently of `hypothesis.measurement`. Only the hull is the same; without the cable it is the hull alone in finer
+independently of `hypothesis.configuration`. Only the hull is the same; without the cable it is the hull alone in finer
 steps.
 
     y' = (x − y)/lag,   shown = (1 + scale) y + bias,   at t − clock offset

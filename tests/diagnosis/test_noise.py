@@ -102,6 +102,17 @@ def test_the_resolution_is_read_off_the_values(step):
     assert resolution_of(170.0 + smooth, LEVEL) == 0.0, "what is not rounded has none"
 
 
+@pytest.mark.parametrize("jump", [0.24, 0.013, 0.0098])
+def test_the_resolution_is_that_before_and_behind_a_jump(jump):
+    """A sensor that jumps by no whole step is rounded all the same, and so is a record without that jump."""
+    random = np.random.default_rng(8)
+    rounded = (
+        np.round((2.0 * np.sin(np.arange(300) / 40.0) + 0.02 * random.standard_normal(300)) / 0.05) * 0.05
+    )
+    rounded[170:] += jump
+    assert_allclose(resolution_of(rounded, 0.015), 0.05, rtol=1e-6)
+
+
 def test_a_record_of_seven_digits_is_hardly_rounded():
     values = np.array([float(f"{x:.7g}") for x in 27.0 + np.random.default_rng(7).standard_normal(300)])
     assert resolution_of(values, LEVEL) < 1e-4

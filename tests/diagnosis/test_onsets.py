@@ -85,13 +85,39 @@ def test_growth_is_beside_what_else_begins_in_mid_trial(setting):
         assert at_eight.vehicle.rudder_servo.offset == 0.0
 
 
-def test_what_grows_is_a_sum_of_steps_in_the_scan():
-    """Against runs that grow: the trapezoidal rule errs by a tenth at most well before the end; it needs no run."""
-    flown = subzero.load_scenario("zigzag")
+def nominal_problem(scenario: str):
+    """Return the problem of a record without noise, of the nominal model."""
+    flown = subzero.load_scenario(scenario)
     nominal = Setting(trial=flown, model=Model.of(flown))
     times = np.arange(0.0, flown.duration + 1e-9, 0.2)
     record = subzero.Record(source="nominal", time=times, values=respond(nominal, times, CHANNELS))
-    problem = pose([subzero.Logged(record=record, setting=nominal, name="zigzag")])
+    return pose([subzero.Logged(record=record, setting=nominal, name=scenario)])
+
+
+def test_what_an_onset_changes_is_known_along_a_run_that_the_noise_hides():
+    """Along a hull drag of half a tolerance more, no run is made but that one; along 30 tolerances, all are. Both are
+    the same to a twentieth: so far sensitivities by differences err anyway.
+    """
+    problem = nominal_problem("fig6")
+    drag = next(k for k, entry in enumerate(problem.entries) if entry.effect.id == "hull_drag")
+    offset, tolerance = all_effects()["rudder_offset"], problem.entries[drag].parameter.tolerance
+    z = np.zeros(len(problem.entries))
+    (plain,) = change_point_columns(BaseRun(problem, z), [(offset, 12.0)])
+    asked, near, far = problem.kept.asked, z.copy(), z.copy()
+    near[drag], far[drag] = 0.5 * tolerance, 30.0 * tolerance
+    (known,) = change_point_columns(BaseRun(problem, near), [(offset, 12.0)])
+    assert np.array_equal(known, plain)
+    assert problem.kept.asked == asked + 1
+    (made,) = change_point_columns(BaseRun(problem, far), [(offset, 12.0)])
+    assert not np.allclose(made, plain, rtol=0.05)
+    fresh = nominal_problem("fig6")
+    (own,) = change_point_columns(BaseRun(fresh, near), [(offset, 12.0)])
+    assert np.linalg.norm(own - plain) < 0.05 * np.linalg.norm(own)
+
+
+def test_what_grows_is_a_sum_of_steps_in_the_scan():
+    """Against runs that grow: the trapezoidal rule errs by a tenth at most well before the end; it needs no run."""
+    flown, problem = subzero.load_scenario("zigzag"), nominal_problem("zigzag")
     along, spacing = BaseRun(problem, np.zeros(len(problem.entries))), spacing_of(problem, 0)
     thrust, fading = all_effects()["propeller_thrust_gain"], all_effects()["fading_thrust"]
     steps = [(thrust, time) for time in times_of(problem, 0)]

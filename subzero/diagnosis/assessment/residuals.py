@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from subzero.diagnosis.inference.simulator import respond
 from subzero.diagnosis.results import Curves, Misfit
@@ -60,7 +60,7 @@ def whiteness(white: np.ndarray, lags: int = LJUNG_BOX_LAGS) -> float:
     if n <= lags + 1 or total == 0.0:
         return float("nan")
     rho = np.array([x[k:] @ x[:-k] for k in range(1, lags + 1)]) / total
-    return float(chi2.sf(n * (n + 2) * np.sum(rho**2 / (n - np.arange(1, lags + 1))), lags))
+    return float(chdtrc(lags, n * (n + 2) * np.sum(rho**2 / (n - np.arange(1, lags + 1)))))
 
 
 def _correlations(one: Observed, noise: Noise, difference: np.ndarray) -> dict[str, tuple[float, float]]:

@@ -4,7 +4,7 @@ what is computed                                          file
 --------------------------------------------------------  -----------------
 parameter vector z, its prior, prior of hypotheses        ../hypothesis/hypotheses
 noise of a channel, whitening, its estimate               noise
-h(z): what the sensors would have measured                ../hypothesis/measurement
+h(z): what the sensors would have measured                ../hypothesis/configuration
 one simulation, from its start or from a stop             simulator
 r(z) and J of all records                                 problem
 records → problem                                         posing
@@ -24,6 +24,7 @@ a formula for a latent force                              force_formula
 change points, forces and drifts beside the hypotheses    out_of_catalogue
 values that a record repeats in place of measurements     repeated_values
 errors in the data, proposed by linear evidence           data_error_scan
+... and how close a few causes come to them there         data_error_rivals
 ... and held against all else                             data_error_choice
 all that only steers the search                           settings
 
@@ -44,7 +45,7 @@ from subzero.diagnosis.hypothesis.hypotheses import (
     with_tolerances,
 )
 from subzero.diagnosis.inference.noise import Behind, Noise, Usual, estimate, resolution_of, spikes
-from subzero.diagnosis.hypothesis.measurement import TRUTHS
+from subzero.diagnosis.hypothesis.configuration import TRUTHS
 from subzero.diagnosis.inference.simulator import (
     RunCache,
     economical,

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 import vehicle
-from subzero.diagnosis.hypothesis.measurement import LENGTH, RUDDER, WATER
+from subzero.diagnosis.hypothesis.configuration import LENGTH, RUDDER, WATER
 from subzero.diagnosis.inference.linear_gaussian import Terms, log_sum
 from subzero.diagnosis.inference.simulator import simulate_track
 from subzero.external_force import AXES, FACTORS, FEATURES, feature_value, fill_factors

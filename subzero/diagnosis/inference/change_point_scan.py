@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import islice
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -24,7 +25,7 @@ from subzero.diagnosis.inference.simulator import Stop, Track, simulate_on, simu
 
 if TYPE_CHECKING:
     from subzero.diagnosis.hypothesis.configuration import Setting
-    from subzero.diagnosis.inference.problem import Problem
+    from subzero.diagnosis.inference.problem import Observed, Problem
 
 COARSE_ONSETS, FINE_PER_COARSE, MIN_ONSET_SPACING_S = 15, 4, 1.0
 """A record has so many steps of times to begin at, each so many finer ones, but none is shorter than the last. [s]"""
@@ -63,6 +64,10 @@ class ChangePoint:
     def id(self) -> str:
         """Such as "rudder_offset@12"."""
         return self.with_onset.id
+
+
+Begun = tuple[Effect, float]
+"""An effect, and when it begins. [s]"""
 
 
 class BaseRun(NamedTuple):
@@ -112,11 +117,7 @@ def scan(
         record: in which they begin.
         best: how many are tried on the finer grid.
     """
-    able = [effect for effect in effects if effect.sudden]
-    spacing, coarse = spacing_of(point.along.problem, record), times_of(point.along.problem, record)
-    steps = [(one, time) for one in able if not one.grows for time in coarse]
-    columns = dict(zip(steps, change_point_columns(point.along, steps, record), strict=True))
-    columns |= grown([one for one in able if one.grows], columns, spacing)
+    columns, spacing = onset_columns(point.along, effects, record), spacing_of(point.along.problem, record)
     found = _strongest(_tried(point, D, columns, record))
     worth = [one for one in found[:best] if one.log_gain > settings.SCAN_GAIN_NATS]
     finer = [(one.effect, time) for one in worth for time in _around(one.time, spacing)]
@@ -126,8 +127,13 @@ def scan(
     return _strongest(found + _tried(point, D, columns, record))
 
 
-Begun = tuple[Effect, float]
-"""An effect, and when it begins. [s]"""
+def onset_columns(along: BaseRun, effects: Sequence[Effect], record: int) -> dict[Begun, np.ndarray]:
+    """Return whitened sensitivities (m, parameters) to every sudden effect from every time of a grid on."""
+    able = [effect for effect in effects if effect.sudden]
+    coarse = times_of(along.problem, record)
+    steps = [(one, time) for one in able if not one.grows for time in coarse]
+    columns = dict(zip(steps, change_point_columns(along, steps, record), strict=True))
+    return columns | grown([one for one in able if one.grows], columns, spacing_of(along.problem, record))
 
 
 def grown(
@@ -189,12 +195,12 @@ def _tried(
     found = []
     for (effect, time), first, last in zip(columns, sizes[:-1], sizes[1:], strict=True):
         own = slice(first, last)
-        log, mean = _gain(ForceInformation(data.M[own, own], data.q[own]), effect)
+        log, mean = gain_of(ForceInformation(data.M[own, own], data.q[own]), effect)
         found.append(ChangePoint(effect=effect, time=time, record=record, log_gain=log, mean=mean))
     return found
 
 
-def _gain(data: ForceInformation, effect: Effect) -> tuple[float, np.ndarray]:
+def gain_of(data: ForceInformation, effect: Effect) -> tuple[float, np.ndarray]:
     """Return the log evidence of an effect over that of none, and the mean of its deviations."""
     variance = np.array([parameter.scale**2 for parameter in effect.parameters])
     inner = np.eye(variance.size) + variance[:, None] * data.M
@@ -205,27 +211,96 @@ def _gain(data: ForceInformation, effect: Effect) -> tuple[float, np.ndarray]:
     return log + possible(entries, range(variance.size), mean, np.sqrt(np.diag(M))), mean
 
 
-def change_point_columns(
-    along: BaseRun, pairs: Sequence[tuple[Effect, float]], record: int = 0
-) -> list[np.ndarray]:
-    """Return whitened sensitivities (m, parameters) to each (effect, time) in one record; secants of a small step."""
+SAME_RUN_LEVELS = 1.0
+"""Along runs that differ by less than this many levels of the noise (root mean square of each channel), an onset
+changes the same: at so small a distance sensitivities differ by less than their steps make them err. [-]"""
+MOST_RUNS_KEPT = 4
+"""Along so many runs, the last ones, what onsets change is kept."""
+
+
+class OnsetResponses(NamedTuple):
+    """What onsets change along a run.
+
+    Attributes:
+        setting: the nominal one of the record.
+        time: of its samples (n,). [s]
+        shown: what the run shows, channel → (n,).
+        changes: (effect, onset) → channel → what a unit of each parameter changes (n, parameters).
+    """
+
+    setting: Setting
+    time: np.ndarray
+    shown: Mapping[str, np.ndarray]
+    changes: dict[tuple[str, float], dict[str, np.ndarray]]
+
+    def serves(self, other: OnsetResponses, seen: Observed) -> bool:
+        """Say whether another run of the same record is as good as this one."""
+        if (
+            self.setting is not other.setting
+            or self.time is not other.time
+            or self.shown.keys() != other.shown.keys()
+        ):
+            return False
+        apart = [float(np.mean((self.shown[name] - other.shown[name]) ** 2)) / noise.sd**2
+                 for name, noise in seen.noise.items()]  # fmt: skip
+        return max(apart) < SAME_RUN_LEVELS**2
+
+
+def change_point_columns(along: BaseRun, pairs: Sequence[Begun], record: int = 0) -> list[np.ndarray]:
+    """Return whitened sensitivities (m, parameters) to each (effect, time) in one record; secants of a small step,
+    along the run or one that differs by less than the noise.
+    """
+    problem, seen = along.problem, along.problem.records[record]
+    known = _responses_along(along, record)
+    known.changes.update(_changes(along, [(one, time) for one, time in pairs if (one.id, time) not in known.changes],
+                                  record))  # fmt: skip
+    first, size = _rows(problem, record)
+    found: list[np.ndarray] = []
+    for effect, time in pairs:
+        C, change = np.zeros((size, len(effect.parameters))), known.changes[effect.id, time]
+        own = np.concatenate([noise.whiten(change[name]) for name, noise in seen.noise.items()])
+        C[first : first + own.shape[0]] = np.nan_to_num(own)
+        found.append(C)
+    return found
+
+
+def _responses_along(along: BaseRun, record: int) -> OnsetResponses:
+    """Return what is known along a run that serves, or nothing along this one; the last runs are kept."""
+    (problem, z), kept = along, along.problem.kept.onsets
+    seen, (track,) = problem.records[record], problem.tracks([(record, z)])
+    here = OnsetResponses(
+        seen.setting, seen.time, problem.shown(record, _plain(problem, record, z), track), {}
+    )
+    for known in kept:
+        if here.serves(known, seen):
+            return known
+    kept[:] = [*kept[1 - MOST_RUNS_KEPT :], here]
+    return here
+
+
+def _changes(
+    along: BaseRun, pairs: Sequence[Begun], record: int
+) -> dict[tuple[str, float], dict[str, np.ndarray]]:
+    """Return what onsets change along a run: (effect, onset) → channel → (n, parameters)."""
     problem, z = along
     base, steps = _plain(problem, record, z), [np.diag(_steps(effect)) for effect, _ in pairs]
     jobs = [(with_onset(effect, time).apply(base, *row.tolist()), time)
             for (effect, time), rows in zip(pairs, steps, strict=True) for row in rows]  # fmt: skip
+    if not jobs:
+        return {}
     problem.kept.count(1 + len(jobs))
     plain, stops = with_stops(base, {time for _, time in jobs})
-    tracks = [plain, *problem.pool.map(partial(_run, stops), jobs)]
-    shown = problem.setting(record, z)
-    seen_of = [problem.whitened(record, shown, track) for track in tracks]
-    first, size = _rows(problem, record)
-    changes, at = np.array(seen_of[1:]) - seen_of[0], 0
-    found: list[np.ndarray] = []
-    for rows in steps:
-        C = np.zeros((size, rows.shape[0]))
-        own = changes[at : at + rows.shape[0]] / np.diag(rows)[:, None]
-        C[first : first + own.shape[1]] = np.nan_to_num(own.T)
-        found, at = [*found, C], at + rows.shape[0]
+    tracks = problem.pool.map(partial(_run, stops), jobs)
+    setting = problem.setting(record, z)
+    shown, found = problem.shown(record, setting, plain), {}
+    for (effect, time), rows in zip(pairs, steps, strict=True):
+        moved = [problem.shown(record, setting, track) for track in islice(tracks, len(rows))]
+        found[effect.id, time] = {
+            name: np.column_stack(
+                [(one[name] - own) / step for one, step in zip(moved, np.diag(rows), strict=True)]
+            )
+            for name, own in shown.items()
+        }
     return found
 
 

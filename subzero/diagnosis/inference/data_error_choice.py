@@ -9,9 +9,9 @@ its own, with causes, what begins in mid-trial, forces and drifts. T the correct
 A search that is hopelessly behind ends with its first look. What the linear problem leaves no choice of is corrected
 before anything is searched, and the records with it are not searched at all if causes that hold throughout explain what
 is left (`is_clear`): what no vehicle does (another sign, unit or reference of one channel, exchanged columns, repeated
-values) where physics has no chance with all its parameters free at once; a command where it is hopelessly behind. A
-clock and a latency are corrected first, too, where it is, but are always held against a search of the records with
-them, as a step is: what breaks in mid-trial looks like them.
+values) where physics has no chance with all its parameters free at once; a command, a clock or a latency where a few
+causes, throughout or from mid-trial on, are hopelessly behind (`data_error_rivals`). A step in a sensor is always held
+against a search of the records with it.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ import numpy as np
 from subzero.diagnosis.hypothesis.data_error import DataError, corrected
 from subzero.diagnosis.hypothesis.logged import Logged
 from subzero.diagnosis.inference import settings
+from subzero.diagnosis.inference.data_error_rivals import most_of_physics
 from subzero.diagnosis.inference.data_error_scan import (
     FAR_BEHIND,
     OUTLIER_LOG_DENSITY,
@@ -38,7 +39,7 @@ from subzero.diagnosis.inference.data_error_scan import (
 from subzero.diagnosis.inference.linear_gaussian import log_sum
 from subzero.diagnosis.inference.map_fit import is_poor_fit
 from subzero.diagnosis.inference.noise import log_prior_of
-from subzero.diagnosis.inference.posing import pose, usual_of
+from subzero.diagnosis.inference.posing import pose, posed_again, usual_of
 from subzero.diagnosis.inference.problem import Observed, Problem
 from subzero.diagnosis.inference.repeated_values import is_rounded, repeated_values
 
@@ -56,9 +57,6 @@ ALIKE_LEAD = 3.0
 CLEAR_LEAD, CLEAR_GENEROUS_LEAD = 15.0, 10.0
 """With a greater lead over physics, in the linear problem, an error needs no search of the record as it is: over
 nothing and every cause, and over all causes at once."""
-LIKE_AN_ONSET = ("step", "late_clock", "clock_rate", "latency")
-"""Kinds that what breaks in mid-trial looks like, to the noise: a rudder that is off its centre from 13 s on like a
-late clock, with a lead of more than 100 nats over all that holds throughout."""
 LOUD = 2.5
 """Noise of more usual levels hides a misfit. [-]"""
 SIGNATURE_LEAD = 20.0
@@ -70,7 +68,8 @@ ALIKE = 10
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SuspectedError:
     """An error of a record, its leads, and those that the record cannot tell from it; `left` is the noise of the
-    channel that is explained worst without it, in usual levels, with all of physics to help.
+    channel that is explained worst without it, in usual levels, with all of physics to help; `over_few` the lead over
+    a few causes, throughout or from mid-trial on.
     """
 
     record: int
@@ -79,6 +78,7 @@ class SuspectedError:
     generous: float
     alike: tuple[DataError, ...] = ()
     left: float = np.inf
+    over_few: float = -np.inf
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -122,7 +122,7 @@ class Suspicion:
 
 def suspected(problem: Problem, records: Sequence[Logged]) -> Suspicion:
     """Return what errors the data of some records may have."""
-    each = [_of_record(problem, i, logged) for i, logged in enumerate(records)]
+    each = [_of_record(problem, records, i) for i in range(len(records))]
     errors = tuple(one for _, found in each for one in found)
     return Suspicion(errors=errors, log_as_is=sum(one.log_sparse for one, _ in each) if errors else 0.0)
 
@@ -135,9 +135,12 @@ def without(records: Sequence[Logged], found: Sequence[SuspectedError]) -> list[
     ]
 
 
-def _of_record(problem: Problem, record: int, logged: Logged) -> tuple[Yardstick, list[SuspectedError]]:
+def _of_record(
+    problem: Problem, records: Sequence[Logged], record: int
+) -> tuple[Yardstick, list[SuspectedError]]:
     """Return what a record is judged by, without values that it repeats, and the errors that it may have."""
-    yardstick, found = yardstick_of(problem, record, logged), list[SuspectedError]()
+    logged, found = records[record], list[SuspectedError]()
+    yardstick = yardstick_of(problem, record, logged)
     repeated = repeated_values(logged, logged.trusted)
     for error in repeated:
         if not is_rounded(error, logged):
@@ -151,20 +154,32 @@ def _of_record(problem: Problem, record: int, logged: Logged) -> tuple[Yardstick
         ranked = suspects(yardstick, logged.trusted)
         if not ranked or not _is_suspected(ranked[0]):
             break
-        yardstick = _after(yardstick, ranked[0].error)
-        found.append(_suspected(record, ranked, max(yardstick.as_is.scales.values())))
+        one, before = _suspected(record, ranked), yardstick
+        yardstick = _after(yardstick, one.error)
+        found.append(replace(one, left=max(yardstick.as_is.scales.values()),
+                             over_few=_over_few(problem, records, before, one)))  # fmt: skip
     return begun, found
+
+
+def _over_few(problem: Problem, records: Sequence[Logged], before: Yardstick, one: SuspectedError) -> float:
+    """Return the lead of an error over a few causes of the record before it is corrected; only where it matters."""
+    if not is_soft(one) or one.error.kind == "step" or one.lead < FAR_BEHIND:
+        return -np.inf
+    each = [before.logged if i == one.record else other for i, other in enumerate(records)]
+    over_none = one.lead + before.log_sparse - before.log_none
+    return over_none - most_of_physics(posed_again(problem, each), one.record)
 
 
 def _is_suspected(one: Suspect) -> bool:
     return one.lead > (LEAST_SOFT_LEAD if one.error.kind in SOFT else LEAST_LEAD)
 
 
-def _suspected(record: int, ranked: Sequence[Suspect], left: float) -> SuspectedError:
+def _suspected(record: int, ranked: Sequence[Suspect]) -> SuspectedError:
     first = ranked[0]
     alike = tuple(one.error for one in ranked[1:] if one.lead > first.lead - ALIKE_LEAD)
-    return SuspectedError(record=record, error=first.error, lead=first.lead, generous=first.generous, alike=alike,
-                          left=left)  # fmt: skip
+    return SuspectedError(
+        record=record, error=first.error, lead=first.lead, generous=first.generous, alike=alike
+    )
 
 
 def _after(yardstick: Yardstick, error: DataError) -> Yardstick:
@@ -186,7 +201,7 @@ def explain(errors: Sequence[SuspectedError]) -> bool:
 def leads_clearly(one: SuspectedError) -> bool:
     """Say whether an error leaves physics no chance in the linear problem."""
     if is_soft(one):
-        return one.error.kind != "step" and min(one.lead, one.generous) > FAR_BEHIND
+        return one.over_few > FAR_BEHIND
     return one.lead > CLEAR_LEAD and one.generous > CLEAR_GENEROUS_LEAD
 
 
@@ -196,7 +211,7 @@ def is_clear(errors: Sequence[SuspectedError], work: Findings) -> bool:
     """
     outside = max((one.log_posterior for one in work.out_of_catalogue), default=-np.inf)
     explained = work.search.best().log_posterior > outside and is_explained(work)
-    return explained and all(leads_clearly(one) and one.error.kind not in LIKE_AN_ONSET for one in errors)
+    return explained and all(map(leads_clearly, errors))
 
 
 def is_soft(one: SuspectedError) -> bool:

@@ -22,7 +22,7 @@ from typing import NamedTuple
 import numpy as np
 
 from subzero.channels import BY_NAME, HEADING, turned
-from subzero.diagnosis.hypothesis.configuration import Setting
+from subzero.diagnosis.hypothesis.configuration import Setting, sensed, truth
 from subzero.diagnosis.hypothesis.data_error import (
     ANY,
     COMMAND_GROUPS,
@@ -35,9 +35,8 @@ from subzero.diagnosis.hypothesis.data_error import (
 )
 from subzero.diagnosis.hypothesis.hypotheses import PRIOR, columns_of, nameable, variances
 from subzero.diagnosis.hypothesis.logged import Logged
-from subzero.diagnosis.hypothesis.measurement import sensed, truth
 from subzero.diagnosis.inference.linear_gaussian import KAPPAS, Posterior, freed, log_sum
-from subzero.diagnosis.inference.noise import resolution_of, spikes, usual_noise
+from subzero.diagnosis.inference.noise import Noise, resolution_of, spikes, usual_noise
 from subzero.diagnosis.inference.posing import usual_of
 from subzero.diagnosis.inference.problem import Problem
 from subzero.diagnosis.inference.simulator import Track, simulate_track
@@ -47,10 +46,9 @@ KAPPA_NARROW = 2.0
 """How much wider than declared tolerances are where a cause stands by itself: the linear problem is no better."""
 FEWEST = 6
 """A channel with fewer samples says nothing."""
-EXPLAINED_SCALE = 1.05
-"""Noise of no more than so many usual levels leaves no error of a time, or a step, to be found. [-]"""
 LEAST_SCALE, MOST_SCALE, ROUNDS = 0.3, 1e4, 5
-"""Scales of the noise of a channel, and how often they are found anew behind the parameters."""
+"""Scales of the noise of a channel, and how often they are found anew behind the parameters. Of a rounded one it is
+never so small that a sample has more density than 1/q, which is a probability of 1."""
 OUTLIER_LOG_DENSITY = float(np.log(0.01 / 50.0))
 """Of a sample that is left out: one of a hundred, anywhere within fifty levels of the noise."""
 LATEST_SHARE, CLOCK_STEP_S, LATEST_CHANNEL_S = 0.5, 0.5, 6.0
@@ -62,8 +60,8 @@ CHANNEL_STEP_S = 1.0
 STEP_MARGIN = 0.1
 """No step is looked for so close to the ends of a record, as a share of it: there it is a bias, or nothing."""
 STEP_TIMES, STEP_LEVELS, LEAST_STEP_LEVELS = 40, 30.0, 4.0
-"""A step in a sensor is looked for at so many times; its usual and its least size in levels of the noise: less is a
-drift."""
+"""A step in a sensor is looked for at so many times; its usual and its least size in levels of the noise, the latter
+with its rounding: less is a drift, or nothing."""
 CAUSES_TRIED = 3
 """So many causes, the most promising, have the scales of the noise found behind them."""
 FREE_NUMBER_LOG_PRIOR = -5.0
@@ -72,7 +70,7 @@ FREE_NUMBER_LOG_PRIOR = -5.0
 
 class Term(NamedTuple):
     """What a channel says of the parameters: JᵀJ, Jᵀr, |r|², whitened; how many samples, and ½ log det of their noise
-    with what outliers cost.
+    with what outliers cost; and the least scale of its noise.
     """
 
     A: np.ndarray
@@ -80,6 +78,7 @@ class Term(NamedTuple):
     rr: float
     samples: int
     fixed: float
+    least: float
 
 
 class Reckoned(NamedTuple):
@@ -166,7 +165,7 @@ class Yardstick:
         white = noise.whiten(np.column_stack([values - expected, self.at(self.slopes[name], time)]))
         r, J = white[:, 0], white[:, 1:]
         out = (measured - noise.count) * (OUTLIER_LOG_DENSITY - np.log(usual.level))
-        return Term(J.T @ J, J.T @ r, float(r @ r), noise.count, out - noise.log_scale)
+        return Term(J.T @ J, J.T @ r, float(r @ r), noise.count, out - noise.log_scale, least_scale(noise))
 
     @cached_property
     def own(self) -> dict[str, Term]:
@@ -179,14 +178,14 @@ class Yardstick:
         return reckon(self.own, self.D)
 
     @cached_property
-    def is_explained(self) -> bool:
-        """Wide tolerances leave no more than the noise of usual sensors."""
-        return max(reckon(self.own, self.narrow).scales.values()) < EXPLAINED_SCALE
-
-    @cached_property
     def log_sparse(self) -> float:
         """The evidence of nothing, and of every cause by itself, of the record as it is."""
         return self.sparse(self.own)
+
+    @property
+    def log_none(self) -> float:
+        """The evidence of nothing, of the record as it is."""
+        return reckon(self.own, self.narrow).log + float(np.log(PRIOR["none"]))
 
     def sparse(self, terms: Mapping[str, Term]) -> float:
         """Return the log evidence of nothing, and of every cause by itself, mixed; within wide tolerances."""
@@ -207,7 +206,7 @@ class Yardstick:
 def reckon(terms: Mapping[str, Term], D: np.ndarray) -> Reckoned:
     """Return the generous evidence of what channels say."""
     root = np.sqrt(D)
-    scales = {name: _scale(one.rr, one.samples) for name, one in terms.items()}
+    scales = {name: _scale(one, one.rr) for name, one in terms.items()}
     for turn in range(ROUNDS + 1):
         A = sum(one.A / scales[name] ** 2 for name, one in terms.items())
         b = sum(one.b / scales[name] ** 2 for name, one in terms.items())
@@ -216,7 +215,7 @@ def reckon(terms: Mapping[str, Term], D: np.ndarray) -> Reckoned:
         M = half.T @ half
         z = M @ b
         if turn < ROUNDS:
-            scales = {name: _scale(_left(one, z, M), one.samples) for name, one in terms.items()}
+            scales = {name: _scale(one, _left(one, z, M)) for name, one in terms.items()}
     rr = sum(one.rr / scales[name] ** 2 for name, one in terms.items())
     log = -0.5 * (rr - float(b @ z)) - float(np.sum(np.log(np.diag(factor))))
     log += sum(one.fixed - one.samples * np.log(scales[name]) for name, one in terms.items())
@@ -228,8 +227,15 @@ def _left(one: Term, z: np.ndarray, M: np.ndarray) -> float:
     return one.rr - 2.0 * float(one.b @ z) + float(z @ one.A @ z) + float(np.sum(one.A * M))
 
 
-def _scale(square: float, count: int) -> float:
-    return float(np.clip(np.sqrt(max(square, 0.0) / max(count, 1)), LEAST_SCALE, MOST_SCALE))
+def least_scale(noise: Noise) -> float:
+    """Return the least scale of a channel's noise."""
+    level = float(np.exp(noise.log_scale / max(noise.count, 1)))
+    return max(LEAST_SCALE, noise.resolution / np.sqrt(2.0 * np.pi) / level)
+
+
+def _scale(one: Term, square: float) -> float:
+    """Return the scale of a channel's noise of which a square is left."""
+    return float(np.clip(np.sqrt(max(square, 0.0) / max(one.samples, 1)), one.least, MOST_SCALE))
 
 
 def yardstick_of(problem: Problem, record: int, logged: Logged) -> Yardstick:
@@ -245,21 +251,27 @@ def yardstick_of(problem: Problem, record: int, logged: Logged) -> Yardstick:
     (base,) = problem.tracks([(record, zero)])
     nominal = shown_on_grid(one.setting, base, names)
     ks = [k for k, entry in enumerate(problem.entries) if entry.record in (-1, record)]
-    moved = {k: _moved(problem, k) for k in ks}
+    moved = {k: to_usual_sizes(problem, k) for k in ks}
     tracks = problem.tracks([(record, moved[k]) for k in ks])
     slopes = {name: np.zeros((nominal[name].size, zero.size)) for name in names}
     for k, track in zip(ks, tracks, strict=True):
         there = shown_on_grid(problem.setting(record, moved[k]), track, names)
         for name in names:
             slopes[name][:, k] = np.nan_to_num((there[name] - nominal[name]) / moved[k][k])
-    D = np.array([max(e.parameter.scale, max(KAPPAS) * e.parameter.tolerance) ** 2 for e in problem.entries])
     grid, causes = base[0], [columns_of(problem.entries, (name,)) for name in nameable(problem.entries)]
-    return Yardstick(logged=logged, step=float(grid[1] - grid[0]), nominal=nominal, slopes=slopes, D=D,
-                     narrow=variances(problem.entries, (), KAPPA_NARROW), causes=causes,
-                     setting=one.setting)  # fmt: skip
+    return Yardstick(logged=logged, step=float(grid[1] - grid[0]), nominal=nominal, slopes=slopes,
+                     D=generous_variances(problem), narrow=variances(problem.entries, (), KAPPA_NARROW),
+                     causes=causes, setting=one.setting)  # fmt: skip
 
 
-def _moved(problem: Problem, k: int) -> np.ndarray:
+def generous_variances(problem: Problem) -> np.ndarray:
+    """Return prior variances of every cause at once (k,)."""
+    return np.array(
+        [max(e.parameter.scale, max(KAPPAS) * e.parameter.tolerance) ** 2 for e in problem.entries]
+    )
+
+
+def to_usual_sizes(problem: Problem, k: int) -> np.ndarray:
     """Return deviations with an entry moved for a sensitivity: what does nothing while it is small to a usual size."""
     zero, parameter = np.zeros(len(problem.entries)), problem.entries[k].parameter
     if parameter.low < 0.0 or problem.entries[k].effect.slot == "sensors":
@@ -354,8 +366,7 @@ def possible(yardstick: Yardstick, trusted: frozenset[str]) -> list[Group]:
         Group(pairs),
         Group([one for one in yardstick.repeated if one.channels[0] in open_]),
     ]
-    if not yardstick.is_explained:
-        found += [Group([one for name in open_ for one in _step(yardstick, name)]), *_clocks(time, open_)]
+    found += [Group([one for name in open_ for one in _step(yardstick, name)]), *_clocks(time, open_)]
     if yardstick.logged.setting.trial.commands is not None:
         found += _commands(yardstick.logged)
     return [group for group in found if group.each]
@@ -421,9 +432,7 @@ def _different(logged: Logged, errors: Iterable[DataError]) -> list[DataError]:
 
 
 def _step(yardstick: Yardstick, name: str) -> list[DataError]:
-    """Return the step in a sensor that explains most of what the generous fit leaves of its channel; none if it is
-    small.
-    """
+    """Return the step in a sensor that explains most of what the generous fit leaves of its channel."""
     record, here = yardstick.logged.record, yardstick.as_is
     values, time = record.values[name], record.time
     expected = yardstick.at(yardstick.nominal[name], time)
@@ -442,8 +451,6 @@ def _step(yardstick: Yardstick, name: str) -> list[DataError]:
     q, prior = C.T @ r, (STEP_LEVELS * usual.level) ** -2
     best = int(np.argmax(q**2 / (np.maximum(M, 0.0) + prior)))
     size = float(q[best] / (max(M[best], 0.0) + prior))
-    if abs(size) < LEAST_STEP_LEVELS * usual.level:
-        return []
     return [DataError(kind="step", channels=(name,), amount=size, since=_first(time, begins[best]))]
 
 
@@ -462,7 +469,7 @@ def _judged(yardstick: Yardstick, error: DataError, group: Group, *, closer: boo
     logged = error.corrected(yardstick.logged)
     touched = list(yardstick.own) if error.is_of_clock or error.is_of_commands else list(error.channels)
     terms = {**yardstick.own, **yardstick.terms(logged, touched)}
-    if min(terms[name].samples for name in touched) < FEWEST:
+    if min(terms[name].samples for name in touched) < FEWEST or _is_small_step(yardstick, error):
         return Suspect(error, -np.inf, -np.inf)
     odds = log_prior(error, len(group.each))
     for name in touched:
@@ -471,6 +478,17 @@ def _judged(yardstick: Yardstick, error: DataError, group: Group, *, closer: boo
     generous = odds + reckon(terms, yardstick.D).log - yardstick.as_is.log
     lead = odds + yardstick.sparse(terms) - yardstick.log_sparse if closer else generous
     return Suspect(error, float(lead), float(generous))
+
+
+def _is_small_step(yardstick: Yardstick, error: DataError) -> bool:
+    """Say whether a step in a sensor is too small to be one: where a rounded channel stands still, what rounding takes
+    off is the same for long, and a step of some of its resolution explains it.
+    """
+    if error.kind != "step":
+        return False
+    (name,) = error.channels
+    usual = usual_of(name, yardstick.logged.record.values[name], yardstick.logged.noise)
+    return abs(error.amount) < LEAST_STEP_LEVELS * np.hypot(usual.level, usual.resolution / np.sqrt(12.0))
 
 
 def _closer(yardstick: Yardstick, one: Suspect, group: Group) -> Suspect:

@@ -287,4 +287,15 @@ def restarted_where_smooth(problem: Problem, fit: Fit, ids: Ids, D: np.ndarray |
     low, high = bounds(problem)
     low[at] = high[at] = [settings.RESTART_TOLERANCES * problem.entries[k].parameter.tolerance for k in at]
     z = fit.z + bounded_step(fit.J, fit.r, fit.z, D, low, high)
-    return refit(problem, z, problem.jacobian(z), D, most_fresh=1, made_at=z)
+    return refit(problem, z, _across_kinks(problem, fit, z, at), D, most_fresh=1)
+
+
+def _across_kinks(problem: Problem, fit: Fit, z: np.ndarray, at: list[int]) -> np.ndarray:
+    """Return the sensitivities (m, k) of a fit with new ones at z to what has kinks, if it has not moved far from where
+    the others were made; else all of them at z.
+    """
+    if fit.moved(problem) > settings.JACOBIAN_HOLDS_TOLERANCES:
+        return problem.jacobian(z)
+    J = fit.J.copy()
+    J[:, at] = problem.jacobian(z, at)[:, at]
+    return J

@@ -133,14 +133,27 @@ class Fits:
     def _again(self, one: Candidate) -> None:
         """Fit a candidate with sensitivities of its own, under its most probable κ; again if that turns out another."""
         self.refined.add(one.ids)
-        J, D = self.problem.jacobian(one.fit.z), variances(self.problem.entries, one.ids, one.kappa)
-        fit = refit(self.problem, one.fit.z, J, D, r=one.fit.r, most_fresh=1, made_at=one.fit.z)
+        (J, made_at), D = self._slopes_at(one.fit), variances(self.problem.entries, one.ids, one.kappa)
+        fit = refit(self.problem, one.fit.z, J, D, r=one.fit.r, most_fresh=1, made_at=made_at)
         now = self._keep(one.ids, fit)
         if now.kappa != one.kappa:
             D = variances(self.problem.entries, one.ids, now.kappa)
             self._keep(
                 one.ids, refit(self.problem, fit.z, fit.J, D, r=fit.r, most_fresh=0, made_at=fit.made_at)
             )
+
+    def _slopes_at(self, fit: Fit) -> tuple[np.ndarray, np.ndarray]:
+        """Return sensitivities (m, k) that hold at a fit, and where they were made (k,): those of the candidate that
+        has any made closest by; new ones if there is none, or the fit has them already.
+        """
+        near = settings.JACOBIAN_HOLDS_TOLERANCES
+        if fit.moved(self.problem) > near:
+            made = [(one.fit.J, one.fit.made_at) for one in self.candidates.values()
+                    if one.fit.made_at is not None]  # fmt: skip
+            apart = [replace(fit, made_at=made_at).moved(self.problem) for _, made_at in made]
+            if apart and min(apart) < near:
+                return made[int(np.argmin(apart))]
+        return self.problem.jacobian(fit.z), fit.z
 
     def _keep(self, ids: Ids, fit: Fit) -> Candidate:
         """Keep a fit and return its candidate."""
@@ -213,8 +226,11 @@ class SharpFits(Fits):
         """Estimate the noise behind the best fit, and make white by it what the noise before has made white; say
         whether it is another.
         """
-        D = variances(self.problem.entries, best.ids, best.kappa)
-        found = with_noise_behind(self.economical, best.fit.z, D, again=True)
+        D, fit = variances(self.problem.entries, best.ids, best.kappa), best.fit
+        near = fit.moved(self.problem) < settings.JACOBIAN_HOLDS_TOLERANCES
+        found = with_noise_behind(
+            self.economical, fit.z, D, fit.J if near else self.economical.jacobian(fit.z)
+        )
         if found is None:
             return False
         again = partial(whitened_again, self.economical, found)

@@ -175,6 +175,9 @@ FEWEST = 8
 """Fewer different values than this say nothing of the step that they are rounded to."""
 WHOLE, MOSTLY = 0.02, 0.98
 """Steps between values that are whole within the first share are multiples; of rounded values so many are. [-]"""
+SAME, STEPS_TRIED = 1e-6, 3
+"""Changes of less than this share of a usual level are what arithmetic leaves of none [-]; a jump by no whole step
+makes one or two steps smaller than that of the sensor: so many are tried."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -265,19 +268,31 @@ def resolution_of(values: np.ndarray, level: float) -> float:
     """Return the step that all values are multiples of, NaN left out; 0 where there is none.
 
     A sensor that rounds to 0.1 m shows 5.1, 5.2 and 5.4, and the steps between its different values are whole multiples
-    of the smallest. One that shows the same value all along rounds to a step that nobody knows, which is then taken to
-    be as coarse as the noise of a usual sensor, `level`.
+    of the smallest. So are its changes from sample to sample, also where it jumps by no whole step and goes on: of two
+    such steps the coarser is that of the sensor. One that shows the same value all along rounds to a step that nobody
+    knows, which is then taken to be as coarse as the noise of a usual sensor, `level`.
     """
     known = values[np.isfinite(values)]
     distinct = np.unique(known)
     if distinct.size == 1 and known.size >= FEWEST:
         return float(np.sqrt(12.0) * level)
+    changes = np.abs(np.diff(known))
+    changes = changes[changes > SAME * level]
+    by_change = _whole_step(changes) if changes.size >= FEWEST else 0.0
     if distinct.size < 2 or (distinct.size < FEWEST and 2 * distinct.size > known.size):
-        return 0.0
-    steps = np.diff(distinct)
-    multiples = steps / np.min(steps)
-    whole = np.abs(multiples - np.round(multiples)) < WHOLE
-    return float(np.min(steps)) if np.mean(whole) > MOSTLY else 0.0
+        return by_change
+    return max(by_change, _whole_step(np.diff(distinct)))
+
+
+def _whole_step(steps: np.ndarray) -> float:
+    """Return the one of a few least steps (n,) that nearly all, or all but one, are multiples of; 0 if none is."""
+    least = np.unique(np.round(steps / np.min(steps), 6))[:STEPS_TRIED] * np.min(steps)
+    for step in least.tolist():
+        multiples = steps / step
+        broken = np.count_nonzero(np.abs(multiples - np.round(multiples)) >= WHOLE)
+        if broken <= max(1.0, (1.0 - MOSTLY) * steps.size):
+            return float(step)
+    return 0.0
 
 
 def _slow_usual(usual: Usual) -> float:

@@ -139,7 +139,7 @@ def _used(values: np.ndarray, difference: np.ndarray, usual: Usual) -> np.ndarra
 
 
 def with_noise_behind(
-    problem: Problem, z: np.ndarray, D: np.ndarray, *, again: bool = False
+    problem: Problem, z: np.ndarray, D: np.ndarray, white: np.ndarray | None = None
 ) -> Problem | None:
     """Return the problem with the noise that is left behind deviations z; None if that is as good as known.
 
@@ -147,13 +147,13 @@ def with_noise_behind(
         problem: records and parameters.
         z: the best fit so far (k,).
         D: prior variances of the parameters in it (k,).
-        again: outliers are known already, behind another fit that is close.
+        white: sensitivities of the problem close to z (m, k); if they are known, outliers are, too.
     """
     records = tuple(
-        one if again else _without_outliers(problem, i, z) for i, one in enumerate(problem.records)
+        _without_outliers(problem, i, z) if white is None else one for i, one in enumerate(problem.records)
     )
     plain = replace(problem, records=tuple(replace(one, noise=_unit(one)) for one in records))
-    r, J = plain.residual(z), plain.jacobian(z)
+    r, J = plain.residual(z), plain.jacobian(z) if white is None else whitened_again(problem, plain, white)
     rest, at, found = r + J @ z, 0, []
     for one in records:
         noise = {}

@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from subzero.diagnosis.hypothesis.configuration import sensed, truth
 from subzero.diagnosis.hypothesis.hypotheses import Entry, grouped
-from subzero.diagnosis.hypothesis.measurement import sensed, truth
 from subzero.diagnosis.inference.simulator import (
     RunCache,
     Stop,
@@ -92,12 +92,24 @@ class Problem:
 
     def setting(self, record: int, z: np.ndarray, *, late: bool = True) -> Setting:
         """Return the setting of a record with deviations z (k,); without those of the sensors if not `late`."""
-        setting, numbers = self.records[record].setting, z.tolist()
+        setting = self.records[record].setting
+        early = self.kept.setting(setting, self.entries, np.where(self._is_early, z, 0.0),
+                                  lambda: self._changed(setting, record, z, late=False))  # fmt: skip
+        return self._changed(early, record, z, late=True) if late else early
+
+    def _changed(self, setting: Setting, record: int, z: np.ndarray, *, late: bool) -> Setting:
+        """Return a setting with those deviations that change a run, or with those of the sensors (`late`)."""
+        numbers = z.tolist()
         for effect, own, where in self._groups:
             values = [numbers[k] for k in own]
-            if where in (-1, record) and any(values) and (late or effect.slot not in POST_RUN_SLOTS):
+            if where in (-1, record) and any(values) and late == (effect.slot in POST_RUN_SLOTS):
                 setting = effect.apply(setting, *values)
         return setting
+
+    @cached_property
+    def _is_early(self) -> np.ndarray:
+        """Which entries change a run (k,)."""
+        return np.array([not self._late(k) for k in range(len(self.entries))])
 
     @property
     def sudden_effects(self) -> list[Effect]:
@@ -176,8 +188,7 @@ class Problem:
         it has one.
         """
         self.kept.count(len(jobs))
-        early = np.array([not self._late(k) for k in range(len(self.entries))])
-        asked = [(i, np.where(early, z, 0.0)) for i, z in jobs]
+        asked = [(i, np.where(self._is_early, z, 0.0)) for i, z in jobs]
         names, found = [(i, z.tobytes()) for i, z in asked], dict[tuple[int, bytes], Track]()
         for name, (i, z) in zip(names, asked, strict=True):
             if track := self.kept.get(self.records[i].setting, self.entries, z):
@@ -206,15 +217,20 @@ class Problem:
 
     def whitened(self, record: int, setting: Setting, track: Track, *, measured: bool = False) -> np.ndarray:
         """Return W h of a record, or W (y − h)."""
-        seen, grid, parts = self.records[record], track[0], []
-        earlier = seen.time - setting.clock_offset
-        for channel, noise in seen.noise.items():
-            shown = sensed(setting.sensing.get(channel), grid, truth(setting, track[1], channel))
-            values = np.interp(earlier, grid, shown)
+        seen, parts = self.records[record], []
+        for channel, values in self.shown(record, setting, track).items():
             if measured:
                 values = seen.values[channel] - values - seen.correction.get(channel, 0.0)
-            parts.append(noise.whiten(values))
+            parts.append(seen.noise[channel].whiten(values))
         return np.concatenate(parts)
+
+    def shown(self, record: int, setting: Setting, track: Track) -> dict[str, np.ndarray]:
+        """Return what the sensors of a record would show: channel → (n,), in its display unit."""
+        seen, (grid, states) = self.records[record], track
+        earlier = seen.time - setting.clock_offset
+        return {channel: np.interp(earlier, grid, sensed(setting.sensing.get(channel), grid,
+                                                         truth(setting, states, channel)))
+                for channel in seen.noise}  # fmt: skip
 
 
 Progress = Callable[[float, str], None]

@@ -16,7 +16,7 @@ import numpy as np
 
 from subzero.diagnosis.hypothesis.data_error import DataError
 from subzero.diagnosis.hypothesis.logged import Logged
-from subzero.diagnosis.inference.noise import MOSTLY, WHOLE, resolution_of
+from subzero.diagnosis.inference.noise import resolution_of
 from subzero.diagnosis.inference.posing import usual_of
 
 CLEAR_LOG_ODDS = 6.0
@@ -26,10 +26,6 @@ FAR_LEVELS, FEWEST_FAR, NEIGHBOURS = 8.0, 4, 5
 what is measured around it: outliers that are rounded may be equal, but not in a row."""
 SHORT, FEWEST_FROZEN = 3, 6
 """Runs as short as this say how often values repeat by chance; a channel is frozen if it repeats so many to the end."""
-
-
-FEWEST_CHANGES = 8
-"""Fewer changes than this say nothing of the step that a channel is rounded to."""
 
 
 class Repeats(NamedTuple):
@@ -55,21 +51,7 @@ def is_rounded(error: DataError, logged: Logged) -> bool:
     (channel,) = error.channels
     left = error.corrected(logged).record.values[channel]
     level = usual_of(channel, left, logged.noise).level
-    return not error.how and (resolution_of(left, level) > 0.0 or _changes_in_steps(left, level))
-
-
-def _changes_in_steps(values: np.ndarray, level: float) -> bool:
-    """Say whether a channel changes by multiples of one step, the most usual change: a rounded one does so before a
-    jump of the sensor and behind it, though the jump itself is no whole step.
-    """
-    changes = np.round(
-        np.abs(np.diff(values[np.isfinite(values)])) / level, 6
-    )  # without what subtraction leaves
-    sizes, counts = np.unique(changes[changes > 0.0], return_counts=True)
-    if counts.sum() < FEWEST_CHANGES:
-        return False
-    steps = changes / sizes[np.argmax(counts)]
-    return bool(np.mean(np.abs(steps - np.round(steps)) < WHOLE) > MOSTLY)
+    return not error.how and resolution_of(left, level) > 0.0
 
 
 def _of(name: str, time: np.ndarray, values: np.ndarray, level: float) -> list[DataError]:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections import OrderedDict
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import replace
 from threading import Lock
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -21,7 +21,7 @@ import numpy as np
 import vehicle
 from cable.moving_end import enlarged
 from scenarios.steps import fitting_step
-from subzero.diagnosis.hypothesis.measurement import (
+from subzero.diagnosis.hypothesis.configuration import (
     COLUMNS,
     LENGTH,
     RUDDER,
@@ -155,10 +155,11 @@ def simulate_on(setting: Setting, stop: Stop) -> Track:
     track[: stop.track.shape[0]] = stop.track
     live = _copied(stop.live)
     setup = go_on_with(
-        _model_at(setting, time), stop.setup, live, setting.trial, setting.tethered, float(time)
+        _model_from(setting, time), stop.setup, live, setting.trial, setting.tethered, float(time)
     )
     _ease(setup)
-    _run(setting, Stop(stop.exchanges, setup, live, track), grid, steps, ())
+    later = tuple((begin, model) for begin, model in setting.later if begin > time + SAME_TIME_S)
+    _run(replace(setting, later=later), Stop(stop.exchanges, setup, live, track), grid, steps, ())
     return np.linspace(0.0, grid[-1], track.shape[0]), track
 
 
@@ -196,9 +197,13 @@ def _exchanges(setting: Setting) -> tuple[np.ndarray, int]:
     return np.linspace(0.0, end, count + 1), most_hull_steps(trial.cable_step, trial.hull_step)
 
 
-def _model_at(setting: Setting, time: float) -> Model:
-    """Return the model that holds just before a time."""
-    return [setting.model, *(model for begin, model in setting.later if begin < time - 1e-9)][-1]
+SAME_TIME_S = 1e-6
+"""Times that are closer are the same. [s]"""
+
+
+def _model_from(setting: Setting, time: float) -> Model:
+    """Return the model that holds from a time on."""
+    return [setting.model, *(model for begin, model in setting.later if begin <= time + SAME_TIME_S)][-1]
 
 
 def _ease(setup: Setup) -> None:
@@ -266,8 +271,8 @@ def respond(setting: Setting, times: np.ndarray, channels: Iterable[str]) -> dic
     }
 
 
-CACHE_BYTES = 64_000_000
-"""Runs are kept until they take more memory than this; the oldest go first. [byte]"""
+CACHE_BYTES, SETTINGS_KEPT = 64_000_000, 500
+"""Runs are kept until they take more memory than this [byte], settings until they are so many; the oldest go first."""
 
 
 class RunCache:
@@ -275,12 +280,14 @@ class RunCache:
 
     Attributes:
         asked: how many runs were asked for.
+        onsets: what causes that begin in mid-trial change along some runs, of `change_point_scan`.
     """
 
     def __init__(self) -> None:
         """Begin with none."""
-        self.asked = 0
+        self.asked, self.onsets = 0, list[Any]()
         self._tracks: OrderedDict[tuple[int, int, bytes], tuple[Track, Any]] = OrderedDict()
+        self._settings: OrderedDict[tuple[int, int, bytes], tuple[Setting, Any]] = OrderedDict()
         self._size = 0
         self._lock = Lock()
 
@@ -288,13 +295,26 @@ class RunCache:
         """Return what counts from none, and has the same tracks."""
         new = RunCache()
         with self._lock:
-            new._tracks, new._size = self._tracks.copy(), self._size
+            new._tracks, new._size, new.onsets = self._tracks.copy(), self._size, self.onsets[:]
         return new
 
     def count(self, runs: int) -> None:
         """Count runs that are asked for; the search hangs on their number, so none may be lost between threads."""
         with self._lock:
             self.asked += runs
+
+    def setting(self, nominal: Setting, entries: Any, z: np.ndarray, make: Callable[[], Setting]) -> Setting:
+        """Return what was made of a nominal setting, entries, the very objects that they are, and deviations."""
+        key = (id(nominal), id(entries), z.tobytes())
+        with self._lock:
+            found = self._settings.get(key)
+        if found is None:
+            found = make(), (nominal, entries)
+            with self._lock:
+                self._settings[key] = found
+                if len(self._settings) > SETTINGS_KEPT:
+                    self._settings.popitem(last=False)
+        return found[0]
 
     def get(self, setting: Any, entries: Any, z: np.ndarray) -> Track | None:
         """Return the track that was made of these; None if there is none, or no more."""
