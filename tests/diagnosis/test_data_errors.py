@@ -202,3 +202,14 @@ def test_a_rounded_depth_that_stands_still_between_outliers_stands_for_itself():
     record = Record(source="made", time=time, values={"depth": depth})
     found = repeated_values(dataclasses.replace(clean, record=record))
     assert not [one for one in found if one.how]
+
+
+@pytest.mark.parametrize("outlier", [0.3, -0.7])
+def test_a_rounded_depth_that_stands_still_before_an_outlier_stands_for_itself(outlier):
+    """A record that begins with a constant depth has one neighbour, and that may be an outlier: the next one tells."""
+    time, clean = np.arange(0.0, 20.0, 0.1), smooth()
+    depth = np.round(1.0 + 0.2 * np.maximum(time - 2.0, 0.0), 1)
+    depth[np.flatnonzero(depth > 1.0)[0]] += outlier
+    record = Record(source="made", time=time, values={"depth": depth})
+    found = repeated_values(dataclasses.replace(clean, record=record))
+    assert not [one for one in found if one.how]

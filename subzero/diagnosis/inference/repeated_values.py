@@ -21,9 +21,10 @@ from subzero.diagnosis.inference.posing import usual_of
 
 CLEAR_LOG_ODDS = 6.0
 """Runs whose log probability by chance is less than minus this are no chance."""
-FAR_LEVELS, FEWEST_FAR, NEIGHBOURS = 8.0, 4, 5
+FAR_LEVELS, FEWEST_FAR, NEIGHBOURS, NEAREST = 8.0, 4, 5, 2
 """A value is no measurement if it comes at least so often, once in three samples in a row, so many noise levels from
-what is measured around it: outliers that are rounded may be equal, but not in a row."""
+what is measured around it, that is from each of the nearest on both sides, of which one may be an outlier. Outliers that
+are rounded may be equal, but not in a row."""
 SHORT, FEWEST_FROZEN = 3, 6
 """Runs as short as this say how often values repeat by chance; a channel is frozen if it repeats so many to the end."""
 
@@ -105,7 +106,7 @@ def _is_far(value: float, at: int, values: np.ndarray, others: np.ndarray, level
     i = int(np.searchsorted(others, at))
     around = values[others[max(i - NEIGHBOURS, 0) : i + NEIGHBOURS]]
     spread = float(np.median(np.abs(np.diff(around)))) if around.size > 1 else 0.0
-    beside = values[others[max(i - 1, 0) : i + 1]]
+    beside = values[others[max(i - NEAREST, 0) : i + NEAREST]]
     return bool(np.min(np.abs(value - beside)) > FAR_LEVELS * max(level, spread))
 
 
