@@ -115,7 +115,7 @@ def prepare(
 
 
 def _needed_last(setup: Setup, live: Live) -> list[Call]:
-    """Return what a run calls behind all else, in its order: half of what it compiles."""
+    """Return what a run calls last, in its order, and for which arguments: half of what it compiles."""
     kind, now = numba.typeof, numba.typeof(live.now)
     line, work, c, drum = (kind(each) for each in (live.line, live.load, setup.fixed.cable, setup.fixed.drum))
     step, vector, row = numba.float64, numba.float64[::1], numba.int64

@@ -14,6 +14,10 @@ from scipy.spatial.transform import Rotation
 
 import cable
 import scenarios
+import subzero
+from subzero.engine.coupling import forget
+from subzero.engine.initial_conditions import prepare
+from subzero.model import Model
 
 COUPLED = ("fig6", "wide_turn", "spiral", "dive")
 
@@ -233,3 +237,17 @@ def test_a_prescribed_turn_on_a_slope_has_the_rates_of_its_angles(simulate, tria
     path = CubicHermiteSpline(run["time"].values, tow_point(run), tow_velocity(run))
     middle = np.diff(tow_point(run), axis=0) / 0.1
     assert_allclose(path.derivative()(run["time"].values[:-2] + 0.05), middle[:-1], rtol=0, atol=2e-4)
+
+
+def test_a_force_at_the_tow_point_accelerates_it_as_the_first_guess_of_an_exchange_has_it():
+    """A force f at r_c, from rest and without water that moves: (ν̇, ω̇) = M⁻¹ (f, r_c × f), and the tow point gets
+    ν̇ + ω̇ × r_c. It is but a guess, so no result depends on it; the tow point is anywhere, as 0s hide signs.
+    """
+    place = {"vehicle.tow_point.x": -0.45, "vehicle.tow_point.y": 0.06, "vehicle.tow_point.z": -0.05}
+    trial = subzero.load_scenario("fig6").with_changes(place)
+    setup, live = prepare(trial, Model.of(trial), tethered=True)
+    forget(setup, live)
+    r_c, inverse = np.array(list(place.values())), setup.fixed.vehicle.inverse_mass
+    for force, gained in zip(np.eye(3), live.now.mobility.T, strict=True):
+        rates = inverse @ np.concatenate([force, np.cross(r_c, force)])
+        assert_allclose(gained, rates[:3] + np.cross(rates[3:], r_c), rtol=1e-12, atol=1e-15)
