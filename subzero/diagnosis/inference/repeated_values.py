@@ -23,8 +23,8 @@ CLEAR_LOG_ODDS = 6.0
 """Runs whose log probability by chance is less than minus this are no chance."""
 FAR_LEVELS, FEWEST_FAR, NEIGHBOURS, NEAREST = 8.0, 4, 5, 2
 """A value is no measurement if it comes at least so often, once in three samples in a row, so many noise levels from
-what is measured around it, that is from each of the nearest on both sides, of which one may be an outlier. Outliers that
-are rounded may be equal, but not in a row."""
+what is measured around it: from each of the nearest on both sides, of which one may be an outlier. Outliers that are
+rounded may be equal, but not in a row."""
 SHORT, FEWEST_FROZEN = 3, 6
 """Runs as short as this say how often values repeat by chance; a channel is frozen if it repeats so many to the end."""
 
