@@ -24,14 +24,14 @@ def tell():
     for second in beside._second:
         second.wait()  # its processor time counts once it has ended
     spent = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
-    with open(sys.argv.pop(), "w") as file:
+    with open(told, "w") as file:
         json.dump([one.ru_utime + one.ru_stime for one in spent], file)
 
-file = sys.argv[-1]
+told = sys.argv[-1]
 atexit.register(tell)
-words = sys.argv[1:-1]
-from subzero.cli import main
-sys.exit(main(words))
+del sys.argv[-1]
+from subzero.__main__ import run
+run()
 """
 
 

@@ -40,6 +40,8 @@ from cable.moving_end import (
     try_step,
 )
 from cable.task import START_LENGTH
+from subzero.engine.coupling import improve
+from subzero.engine.energy import book
 from subzero.engine.environment import drum_of, water_of, way_of_drum
 from subzero.engine.external_wrench import feel_current, tow_point, way_of_tow_point
 from subzero.engine.prescribed_motion import knots
@@ -100,7 +102,7 @@ def prepare(
         load=new_load(),
     )
     if tethered:
-        compile_beside(lambda: _needed_last(setup, live))
+        compile_beside(lambda: _needed_last(setup, live), lambda: _needed_then(setup, live))
     live.now.length = wet if tethered else 0.0
     layout = live.line.ends.layout
     layout.segment_length, layout.grading = trial.segment_length, trial.grading
@@ -125,6 +127,16 @@ def _needed_last(setup: Setup, live: Live) -> list[Call]:
         (try_step, (line, step, now.typeof("tow"), kind(setup.water), c, drum, work, numba.boolean)),
         (accept, (line, step, c, work)),
         (record_row, (*run, row, step, row)),
+    ]
+
+
+def _needed_then(setup: Setup, live: Live) -> list[Call]:
+    """Return what a run calls once the cable is solved, and for which arguments: the longest of it."""
+    kind, number = numba.typeof, numba.float64
+    force = kind(live.line.ends.tow).typeof("force")
+    return [
+        (book, (kind(setup), kind(live), number, number, numba.int64)),
+        (improve, (number, kind(live.now), force, number)),
     ]
 
 

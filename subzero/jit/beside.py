@@ -2,8 +2,9 @@
 
 Whoever is about to compile much names the functions that it will need last, and for what arguments. A second process
 compiles them, and keeps their code where this one looks for it (`subzero.jit.machine_code`); should this one be there
-before, it waits. No result depends on it: what the second process does not deliver, for whatever reason, is compiled
-here. It ends with this process, however that ends: it listens to a pipe that breaks then.
+before, it compiles meanwhile what it will need afterwards, and then waits. No result depends on it: what the second
+process does not deliver, for whatever reason, is compiled here. It ends with this process, however that ends: it
+listens to a pipe that breaks then. Through another one it tells of each function that it has compiled.
 
 There is none where it would not help: the code is kept already, nothing can be kept, only one core may be used,
 another process has one at work on the same folder, or this process itself is one of many.
@@ -36,6 +37,8 @@ LOOK_S = 0.02
 """So often this process looks whether the second one has delivered. [s]"""
 PATIENCE_S = 60.0
 """So long this process waits for a file; a second process that takes longer has been stopped, or has no core. [s]"""
+MADE = b"."
+"""What a second process writes for each function that it has compiled."""
 BEGIN = "import sys; sys.path[:] = sys.argv[1:]; from subzero.jit.beside import serve; serve()"
 
 _asked = [False]
@@ -44,20 +47,28 @@ _second: list[subprocess.Popen[bytes]] = []
 """The second process of this one, if there has been one."""
 _promised: set[Path] = set()
 """Files that it will make."""
+_meanwhile: list[Call] = []
+"""What this process compiles where it would wait for such a file."""
+_told = [0]
+"""How many functions it has told of."""
+_serving = [False]
+"""Whether this is a second process."""
 
 
-def compile_beside(needed: Callable[[], Sequence[Call]]) -> None:
+def compile_beside(last: Callable[[], Sequence[Call]], meanwhile: Callable[[], Sequence[Call]]) -> None:
     """Have functions compiled by a second process, if that helps; returns at once, and does nothing a second time.
 
     Args:
-        needed: returns what to compile, in this order.
+        last: returns what that process is to compile, in this order.
+        meanwhile: returns what this one compiles wherever it would wait for that, in this order. These functions call
+            none of the others, and nothing that calls them is called before them.
     """
     if numba.config.DISABLE_JIT or _asked[0]:
         return
     _asked[0] = True
     if not _may_have_one():
         return
-    calls = needed()
+    calls = last()
     files = [function._cache.file_for(types) for function, types in calls]  # type: ignore[attr-defined]
     if None in files or any(file.exists() for file in files):
         return
@@ -65,6 +76,7 @@ def compile_beside(needed: Callable[[], Sequence[Call]]) -> None:
     if lock is not None:
         try:
             _start(calls, files, lock)
+            _meanwhile.extend(meanwhile())
         except OSError:  # no more processes, or it is gone already: this one compiles all
             return
         finally:
@@ -103,7 +115,7 @@ def _start(calls: Sequence[Call], files: Sequence[Path], lock: int) -> None:
     second = subprocess.Popen(
         [sys.executable, "-c", BEGIN, *sys.path],
         stdin=subprocess.PIPE,
-        stdout=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
         pass_fds=(lock,),
         start_new_session=True,  # Ctrl-C is for this process, which takes it along
@@ -117,33 +129,54 @@ def _start(calls: Sequence[Call], files: Sequence[Path], lock: int) -> None:
 
 
 def _see_it_end(second: subprocess.Popen[bytes]) -> None:
-    """Wait for the second process, so that no dead one is left behind, and close the pipe to it."""
-    second.wait()
+    """Hear what the second process tells, and wait for it, so that no dead one is left behind; close both pipes."""
     assert second.stdin is not None
-    with suppress(OSError):
-        second.stdin.close()
+    assert second.stdout is not None
+    while second.stdout.read(len(MADE)):
+        _told[0] += 1
+    second.wait()
+    for pipe in (second.stdin, second.stdout):
+        with suppress(OSError):
+            pipe.close()
 
 
-def is_delivered(file: Path, meanwhile: Callable[[], None]) -> bool:
+def is_delivered(file: Path, heed: Callable[[], None]) -> bool:
     """Say whether a file is there that the second process makes; wait for it as long as that one works.
 
     Args:
         file: any file of machine code.
-        meanwhile: called again and again while this waits.
+        heed: called again and again while this waits.
     """
     if file not in _promised:
         return False
     until = time.monotonic() + PATIENCE_S
     while not file.exists() and _second and _second[0].returncode is None and time.monotonic() < until:
-        time.sleep(LOOK_S)
-        meanwhile()
+        if _meanwhile:
+            function, types = _meanwhile.pop(0)
+            function.compile(types)  # type: ignore[attr-defined]
+        else:
+            time.sleep(LOOK_S)
+        heed()
     _promised.discard(file)
     return file.exists()
+
+
+def made_by_second() -> int:
+    """Return how many functions the second process has compiled so far."""
+    return _told[0]
+
+
+def tell_first() -> None:
+    """Tell the first process, if this is a second one, that a function has been compiled."""
+    if _serving[0]:
+        with suppress(OSError):  # it has gone, and this one goes as well
+            os.write(sys.__stdout__.fileno(), MADE)  # type: ignore[union-attr]
 
 
 def serve() -> None:
     """Compile what stands in standard input, and end as soon as that breaks: the second process's whole life."""
     work = pickle.load(sys.stdin.buffer)
+    _serving[0] = True
     threading.Thread(target=_end_with_the_first, daemon=True).start()
     for module, name, folder, types in work:
         function = getattr(import_module(module), name)

@@ -38,7 +38,7 @@ from numba.core.serialize import dumps
 from numba.core.sigutils import normalize_signature
 
 from subzero.errors import printable
-from subzero.jit.beside import is_delivered
+from subzero.jit.beside import is_delivered, made_by_second, tell_first
 from subzero.jit.sources import PACKAGES, Tree
 from subzero.jit.unbroken import heed
 
@@ -317,6 +317,7 @@ class MachineCode(_Cache):  # type: ignore[misc]  # numba has no types
     def save_overload(self, sig: Any, data: Any) -> None:
         """Count what was compiled for a signature, and keep it; not what holds addresses of this process."""
         _made[0] += 1
+        tell_first()
         if self._function.__closure__ is None and not data.lifted and not data.library.has_dynamic_globals:
             self._home.keep(self._name(sig, data.codegen), dumps(data._reduce()))
 
@@ -346,8 +347,8 @@ _made = [0]
 
 
 def made() -> int:
-    """Return how many functions this process has compiled so far."""
-    return _made[0]
+    """Return how many functions this process and its second one have compiled so far."""
+    return _made[0] + made_by_second()
 
 
 _told: set[str] = set()

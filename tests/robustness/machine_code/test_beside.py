@@ -6,6 +6,7 @@ import importlib
 import os
 import subprocess
 import sys
+import threading
 import time
 
 import numba
@@ -30,13 +31,17 @@ if (HERE / "slow").exists():
 @compiled
 def scaled(x):
     return 3.0 * x + 0.5
+
+@compiled
+def shifted(x):
+    return x - 2.0
 """
 COMMAND = f"""
 import time, numba, {MODULE}
 from subzero.jit import beside, compile_beside
 ({MODULE}.HERE / "slow").touch()
 beside.os.sched_getaffinity = lambda pid: {{0, 1}}
-compile_beside(lambda: [({MODULE}.scaled, (numba.float64,))])
+compile_beside(lambda: [({MODULE}.scaled, (numba.float64,))], list)
 print(beside._second[0].pid, flush=True)
 time.sleep(100.0)
 """
@@ -51,6 +56,7 @@ def scaled(base, tmp_path, monkeypatch):
     monkeypatch.setattr(beside, "_asked", [False])
     monkeypatch.setattr(beside, "_second", [])
     monkeypatch.setattr(beside, "_promised", set())
+    monkeypatch.setattr(beside, "_meanwhile", [])
     monkeypatch.setattr(beside.os, "sched_getaffinity", lambda pid: {0, 1}, raising=False)
     monkeypatch.setattr(beside, "parent_process", lambda: None)  # tests themselves may run side by side
     home_of.cache_clear()
@@ -59,8 +65,10 @@ def scaled(base, tmp_path, monkeypatch):
     home_of.cache_clear()
 
 
-def ask(function):
-    compile_beside(lambda: [(function, (numba.float64,))])
+def ask(function, *meanwhile):
+    compile_beside(
+        lambda: [(function, (numba.float64,))], lambda: [(each, (numba.float64,)) for each in meanwhile]
+    )
 
 
 def test_what_a_second_process_has_compiled_is_loaded(scaled, capfd):
@@ -70,6 +78,34 @@ def test_what_a_second_process_has_compiled_is_loaded(scaled, capfd):
     assert scaled.stats.cache_hits[(numba.float64,)] == 1
     assert second.wait(timeout=60) == 0
     assert capfd.readouterr().out == ""
+
+
+def test_what_a_second_process_compiles_is_counted(scaled):
+    before = machine_code.made()
+    ask(scaled)
+    assert scaled(2.0) == 6.5
+    beside._second[0].wait(timeout=60)
+    until = time.monotonic() + 30.0
+    while machine_code.made() == before and time.monotonic() < until:
+        time.sleep(0.01)
+    assert machine_code.made() == before + 1
+
+
+def test_a_wait_for_the_second_process_is_spent_on_what_is_needed_then(scaled, tmp_path):
+    (tmp_path / "slow").touch()  # it never delivers: what it makes is compiled here, too
+    shifted = sys.modules[MODULE].shifted
+    ask(scaled, shifted)
+    (second,) = beside._second
+    waiting = threading.Thread(target=scaled, args=(2.0,))
+    waiting.start()
+    until = time.monotonic() + 30.0
+    while not shifted.signatures and time.monotonic() < until:
+        time.sleep(0.01)
+    assert shifted.signatures
+    assert waiting.is_alive()
+    second.kill()
+    waiting.join()
+    assert not scaled.stats.cache_hits
 
 
 def test_a_second_process_that_dies_is_done_without(scaled):
