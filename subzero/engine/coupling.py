@@ -110,7 +110,7 @@ def _agree(setup: Setup, live: Live, start: float, span: float) -> int:
             evaluation > 0 and _forces_agree(live.now, live.line.ends.tow.force, setup.fixed.agreement)
         ):
             return FINE
-        size = improve(span, live.now, live.line.ends.tow.force, size)
+        size = _improve(span, live.now, live.line.ends.tow.force, size)
     return DISAGREED
 
 
@@ -165,7 +165,7 @@ def _forces_agree(now: Now, F: np.ndarray, agreement: float) -> bool:
 
 
 @compiled
-def improve(span: float, now: Now, F: np.ndarray, last_size: float) -> float:
+def _improve(span: float, now: Now, F: np.ndarray, last_size: float) -> float:
     """Take one Newton step on the force, (I − (h²/2) Z A) δ = F_cable − guess, or go back half of the last one.
 
     A cable between slack and taut is a stiff and bent spring: a step after which the next one would be longer than

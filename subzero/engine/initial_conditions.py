@@ -40,7 +40,6 @@ from cable.moving_end import (
     try_step,
 )
 from cable.task import START_LENGTH
-from subzero.engine.coupling import improve
 from subzero.engine.energy import book
 from subzero.engine.environment import drum_of, water_of, way_of_drum
 from subzero.engine.external_wrench import feel_current, tow_point, way_of_tow_point
@@ -131,13 +130,9 @@ def _needed_last(setup: Setup, live: Live) -> list[Call]:
 
 
 def _needed_then(setup: Setup, live: Live) -> list[Call]:
-    """Return what a run calls once the cable is solved, and for which arguments: the longest of it."""
+    """Return what a run calls once the cable is solved and accepted, and for which arguments: the longest of it."""
     kind, number = numba.typeof, numba.float64
-    force = kind(live.line.ends.tow).typeof("force")
-    return [
-        (book, (kind(setup), kind(live), number, number, numba.int64)),
-        (improve, (number, kind(live.now), force, number)),
-    ]
+    return [(book, (kind(setup), kind(live), number, number, numba.int64))]
 
 
 def _new_now() -> Now:
