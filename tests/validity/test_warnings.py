@@ -274,20 +274,32 @@ def test_what_finer_runs_could_settle_is_not_asked_of_a_run_that_stopped():
 
 @pytest.mark.parametrize(
     "number, finer, doubted",
-    [(500158, 2, True), (700037, 4, False), pytest.param(700056, 4, True, marks=pytest.mark.slow)],
+    [
+        (500158, 2, True),
+        (700037, 4, False),
+        (900120, 4, False),
+        pytest.param(700056, 4, True, marks=pytest.mark.slow),
+        pytest.param(900055, 4, True, marks=pytest.mark.slow),
+    ],
 )
-def test_a_cable_faster_than_its_waves_that_is_barely_resolved_is_held_against_finer_runs(
-    number, finer, doubted
-):
-    """Drums without friction: off by 2.5 % without a word, right within 1.2 %, off by 4.3 %."""
+def test_a_cable_faster_than_its_waves_with_a_load_across_is_held_against_finer_runs(number, finer, doubted):
+    """Drums without friction: off by 2.5 % without a word, right within 1.2 and 0.5 %, off by 4.3 and by 9 %."""
     trial = dataclasses.replace(draw(number), rtol=0.02)
     run = subzero.simulate(trial)
     accuracy = json.loads(run.attrs["accuracy"])
-    assert 0.01 < accuracy["change"] < 0.02
+    assert accuracy["change"] < 0.02  # the coarser run confirms it
     assert accuracy["proof_finer"] == finer
     assert ("resolution" in dict(subzero.warnings_of(run))) is doubted
-    well = run.assign_attrs(accuracy=json.dumps(accuracy | {"force_error": 0.009}), warnings="[]")
-    assert refinement_that_settles(well, trial, subzero.Model.of(trial)) == 0
+
+
+def test_a_load_across_is_looked_at_only_where_no_wave_comes_back_to_the_drum():
+    """Fig. 6 with a current of 5 cm/s across the drum, and with the tension there above m1 U² (15 mN at 1 m/s)."""
+    run, model = plain(), subzero.Model.of(FIG6)
+    assert refinement_that_settles(run, FIG6, model) == 0
+    crossed = dataclasses.replace(model, current=(0.0, 0.05, 0.0))
+    assert refinement_that_settles(run, FIG6, crossed) == 4
+    held = run.assign(drum_tension=run["drum_tension"] + 0.05)
+    assert refinement_that_settles(held, FIG6, crossed) == 0
 
 
 def folded(run, share, duration):
