@@ -49,7 +49,7 @@ MOST_HALVINGS, CHEAP_HALVINGS = 2, 4
 cheap; and a third one where the error is within `LEAST_GAIN` of `rtol`."""
 MOST_WORK, CHEAP_WORK = 1e7, 3e5
 """Nodes times exchanges that a repeated run may take, half a minute or so; and that are cheap, a second or so. [-]"""
-PROOFS, PROOF_WORK = (2, 4, 8), 1.5e7
+PROOFS, PROOF_WORK = (2, 4, 8), 3e7
 """How much finer the runs of a proof are; and nodes times iterations that the finest may take, at half a microsecond
 each. [-]"""
 LEAST_GAIN, MOST_GAIN = 2.0, 4.0
