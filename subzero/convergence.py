@@ -4,12 +4,13 @@
 
 If each halving divides the change by r, what is left is e_h/(r − 1) (Richardson): a third of e_h at second order, e_h
 at first. Of one pair r is not known, and the first order is supposed. The coarse run has a quarter of the nodes and
-steps. Where the error is above `rtol`, the run is repeated with steps and segments halved, `MOST_HALVINGS` times; what
-was the run is then the coarse one, and r = e_2h/e_h. A cable that comes taut makes r irregular: it does so between two
-samples, and the largest change hangs on which. So before any doubt is told, halves are taken on as long as that is
-cheap (`CHEAP_WORK`), and once more where the first order would then settle it; no order is believed any more, what the
-last halving changes is the error. Where that stays above `rtol`, the answer depends on the resolution, and the run says
-so: a jolt, or an ill-posed drum (`docs/theory.md`).
+steps. Where the error is above `rtol`, the run is repeated with steps and segments halved, `MOST_HALVINGS` times;
+what was the run is then the coarse one, and r = e_2h/e_h. A cable that comes taut makes r irregular: it does so
+between two samples, and the largest change hangs on which. So does a command that changes between two. So while
+another halving is cheap (`CHEAP_WORK`), no order is believed: halves are taken on until one changes no more than
+`rtol`. Before any doubt is told, they are taken on as long as that is cheap, and once more where the first order
+would then settle it; from the third on, what the last halving changes is the error. Where that stays above `rtol`,
+the answer depends on the resolution, and the run says so: a jolt, or an ill-posed drum (`docs/theory.md`).
 
 The first `START_ROWS` samples follow no such law. A start is a jolt: a current, a winch or the propeller takes hold of
 the cable at once, what it sets off fades or rings within a few steps, and the coarse run has no sample in the first.
@@ -134,7 +135,8 @@ def run_converged(
     accuracy = _accuracy(trial, take, run, change, None, 0)
     for halvings in range(1, CHEAP_HALVINGS + 1):
         finer = resolved(trial, 0.5**halvings)
-        if accuracy.converged or finer is None or _finer_work(run, halvings) > _allowed(accuracy):
+        work = np.inf if finer is None else _finer_work(run, halvings)
+        if finer is None or work > _allowed(accuracy) or _settled(accuracy, work <= CHEAP_WORK):
             break
         fine = _taken(take, finer, whole._replace(parts=2**halvings), progress)
         if fine is None or (run.completed and not fine.completed):
@@ -142,6 +144,11 @@ def run_converged(
         run, before, change = fine, change, _after_start(run, fine)
         accuracy = _accuracy(trial, take, run, change, before, halvings)
     return run, accuracy
+
+
+def _settled(accuracy: Accuracy, is_cheap: bool) -> bool:
+    """Say whether no other halving is needed; a cheap one is, where only the order says that the error is small."""
+    return accuracy.converged and not (is_cheap and accuracy.change > accuracy.rtol)
 
 
 def _allowed(accuracy: Accuracy) -> float:

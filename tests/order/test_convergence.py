@@ -186,8 +186,16 @@ def test_what_the_first_order_would_settle_with_one_halving_more_is_halved_befor
         ((0.90, 0.60, 0.80, 0.70, 0.70), 3, 0.0),
         ((0.90, 0.60, 0.80, 0.70, 0.665, 0.66), 4, 0.005),
         ((0.90, 0.60, 0.80, 0.70, 0.80, 0.70, 0.70), 4, 0.10),
+        ((0.90, 0.80, 0.77, 0.73, 0.73), 3, 0.0),
+        ((0.90, 0.80, 0.77, 0.76, 0.76), 2, 0.005),
     ],
-    ids=["settled by a third", "no order believed in a third", "never settled"],
+    ids=[
+        "settled by a third",
+        "no order believed in a third",
+        "never settled",
+        "not by an order",
+        "nor where it holds",
+    ],
 )
 def test_what_is_cheap_is_halved_on_before_it_is_doubted(forces, halvings, error):
     """20 nodes: 1.3e5 nodes times exchanges with three halvings. The third changes 3.5 %, a third of the second."""
