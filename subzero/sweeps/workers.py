@@ -46,21 +46,26 @@ class WorkerPool(Executor):
 
     Args:
         workers: how many.
+        nursery: where they come from; one of their own when not given.
 
     Attributes:
         count: how many.
     """
 
-    def __init__(self, workers: int) -> None:
+    def __init__(self, workers: int, nursery: Nursery | None = None) -> None:
         self._tasks: Tasks = queue.SimpleQueue()
-        self.count = workers
-        self._nursery = Nursery() if FORKS else None
+        self.count, self._is_guest = workers, nursery is not None
+        self._nursery = nursery or (Nursery() if FORKS else None)
         self._hands = [_Hand(self._tasks, self._nursery) for _ in range(workers)]
 
     def prepare(self, rehearsal: Callable[[], object]) -> None:
         """Have something done once, where processes come from, before their first task: what it loads, all have."""
         if self._nursery is not None:
             self._nursery.prepare(rehearsal)
+
+    def sibling(self) -> WorkerPool | None:
+        """Return another pool whose processes have what was prepared until their first task; None without forks."""
+        return None if self._nursery is None else WorkerPool(self.count, self._nursery)
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
         """Ask for ``fn(*args, **kwargs)`` in one of the processes."""
@@ -81,13 +86,17 @@ class WorkerPool(Executor):
         for hand in self._hands:
             if cancel_futures:
                 hand.kill()
-        if self._nursery is not None and cancel_futures:
-            self._nursery.close()
+        if cancel_futures:
+            self._leave()
         if wait:
             for hand in self._hands:
                 hand.join()
-            if self._nursery is not None:
-                self._nursery.close()
+            self._leave()
+
+    def _leave(self) -> None:
+        """End what its processes come from, if that is its own."""
+        if self._nursery is not None and not self._is_guest:
+            self._nursery.close()
 
 
 class _Hand:
