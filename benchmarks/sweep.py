@@ -17,15 +17,13 @@ from __future__ import annotations
 
 import argparse
 import os
-import random
 import shutil
-import signal
 import statistics
 import subprocess
 import sys
 import tempfile
 import time
-from contextlib import ExitStack, closing, contextmanager, suppress
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -78,7 +76,7 @@ def bare_loops(members, at_a_time):
 
 
 def one_thread():
-    from subzero.sweeps.workers import ONE_THREAD
+    from subzero.sweeps.processes import ONE_THREAD
 
     return os.environ | ONE_THREAD
 
@@ -224,103 +222,6 @@ def memory():
         print(
             f"{members:>6} members: {own:6.0f} MB, a worker {workers:6.0f} MB   ({time.perf_counter() - begun:.0f} s)"
         )
-
-
-SHORT_SPEC = """
-trial = "fig6"
-design = "monte_carlo"
-samples = {members}
-seed = 4
-[parameters]
-"start.wet_length_m" = {{ from = 0.0, to = 38.0 }}
-"water.current_east_m_s" = {{ from = 0.0, to = 0.09 }}
-[changes]
-"run.duration_s" = 0.5
-"run.rtol" = 0.0
-[outcomes]
-every_s = 0.1
-"""
-
-
-def kills(count, members, seed=0):
-    """Kill a sweep at random places, its parent or a worker by turns, go on each time; compare with one left alone."""
-    rng = random.Random(seed)
-    home = Path(tempfile.mkdtemp())
-    spec = home / "short.toml"
-    spec.write_text(SHORT_SPEC.format(members=members))
-    whole = _sweep_command(spec, home / "whole").wait()
-    assert whole == 0
-    done, before = {"parent": 0, "worker": 0}, 0
-    while True:
-        run = _sweep_command(spec, home / "killed")
-        _strike(run, rng, count, done)
-        if (code := run.wait()) > 0:
-            raise RuntimeError(f"the sweep refuses to go on: exit code {code}. Were its sources changed?")
-        if code == 0:
-            if sum(done.values()) >= count:
-                break
-            shutil.rmtree(home / "killed")  # it got through: begin anew, for the kills that are left
-            before = 0
-            continue
-        now = _kept(home / "killed") if (home / "killed/members.sqlite").exists() else 0
-        assert now >= before, (before, now)
-        before = now
-    same = (home / "whole/sweep.nc").read_bytes() == (home / "killed/sweep.nc").read_bytes()
-    print(f"{done['parent']} kills of the parent, {done['worker']} of a worker, {members} members:")
-    print(f"kept {_kept(home / 'killed')}, the same result to the last byte: {same}")
-    shutil.rmtree(home)
-    return same
-
-
-MOSTLY = 0.98
-"""How probable it is, each tenth of a second, to go on waiting for the workers of a command before it is struck."""
-
-
-def _strike(run, rng, count, done):
-    """Kill workers of a command, or it, at random moments, until it has ended or there were kills enough."""
-    while sum(done.values()) < count:
-        while rng.random() < MOSTLY and run.poll() is None and not _children(run.pid):
-            time.sleep(0.1)  # else a busy machine is struck before there is a worker, time after time
-        time.sleep(rng.uniform(0.1, 2.5))
-        if run.poll() is not None:
-            return
-        workers = _children(run.pid)
-        victim = "worker" if rng.random() < 0.5 and workers else "parent"
-        _kill(rng.choice(workers) if victim == "worker" else run.pid)
-        done[victim] += 1
-        if victim == "parent":
-            return
-
-
-def _sweep_command(spec, out):
-    return subprocess.Popen(
-        [sys.executable, "-m", "subzero", "sweep", str(spec), "--out", str(out), "--workers", "2"],
-        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-    )  # fmt: skip
-
-
-def _children(pid):
-    import psutil
-
-    try:
-        return [child.pid for child in psutil.Process(pid).children()]
-    except psutil.NoSuchProcess:
-        return []
-
-
-def _kill(pid):
-    with suppress(ProcessLookupError):
-        os.kill(pid, signal.SIGKILL)
-
-
-def _kept(folder):
-    import sqlite3
-
-    with closing(sqlite3.connect(folder / "members.sqlite")) as file:
-        try:
-            return file.execute("SELECT count(*) FROM members").fetchone()[0]
-        except sqlite3.OperationalError:  # killed before there was a table
-            return 0
 
 
 def stores(members=20000, batch=20):
@@ -541,6 +442,8 @@ def main():
         for _ in range(asked.repeats):
             command_of_200()
     elif asked.kills:
+        from benchmarks.sweep_kills import kills
+
         return 0 if kills(asked.kills, 5000) else 1
     else:
         command_of_200()

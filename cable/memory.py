@@ -6,6 +6,8 @@ from subzero.errors import UserError
 
 SHARE = 0.8
 """A run may ask for this share of the memory that is free. [-]"""
+SMALL = 2.0**24
+"""So little is had without a look at what is free, which takes longer than a second of a short run. [bytes]"""
 GIB = 1024.0**3
 
 
@@ -24,7 +26,7 @@ def free_memory() -> float:
 
 def fits(size: float) -> bool:
     """Say whether so many bytes can be had."""
-    return size <= SHARE * free_memory()
+    return size <= SMALL or size <= SHARE * free_memory()
 
 
 def refuse_unless_it_fits(size: float, what: str, remedy: str) -> None:

@@ -108,6 +108,8 @@ class Checks:
         if not isinstance(table, Mapping):
             self.say(name, "this is no mapping", "Allowed: key → number.", table)
             return
+        if _all_finite(table):
+            return
         for key, inside in table.items():
             for place, number in _leaves(f"{name}[{key!r}]", inside):
                 if real(number) is None:
@@ -167,6 +169,14 @@ class Checks:
             )
             return None
         return np.ascontiguousarray(array)
+
+
+def _all_finite(table: Mapping[str, Any]) -> bool:
+    """Say whether all of a table, and of the tables in it, is a finite number."""
+    return all(
+        _all_finite(inside) if isinstance(inside, dict) else real(inside) is not None
+        for inside in table.values()
+    )
 
 
 def _leaves(place: str, inside: object) -> Iterator[tuple[str, object]]:

@@ -111,7 +111,7 @@ class Kept:
 
     Attributes:
         out: folder for the files; by default one named after the scenario, here.
-        every: seconds between results that are kept, a whole number of cable steps; without it all are.
+        every: seconds between results that are kept, a whole number of cable steps; without it as the trial says.
         float64: write all numbers in double precision; shapes and forces by name have 7 digits without it.
         checkpoint: minutes after which it is kept again how far the run is; the same command goes on from there.
     """

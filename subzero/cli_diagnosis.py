@@ -282,7 +282,8 @@ def simulated(setting: Setting) -> xr.Dataset:
     """Return what the vehicle does in a setting, with the steps that the diagnosis took."""
     from subzero.simulation import simulate
 
-    trial = dataclasses.replace(setting.trial, rtol=0.0)
+    every = setting.trial.every or setting.trial.cable_step  # all of them, however long the record is
+    trial = dataclasses.replace(setting.trial, rtol=0.0, every=every)
     return simulate(trial, tethered=setting.tethered, model=setting.model, later=setting.later)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from time import monotonic
@@ -66,21 +66,69 @@ def _swept(spec: Path, out: Path | None, executor: Any, retry: bool) -> tuple[di
     from subzero.stage import staged
     from subzero.sweeps.api import finished
 
-    folder = out or Path(spec.stem or "sweep")
-    threading.Thread(target=_import_what_tells, daemon=True).start()
+    folder, artists = out or Path(spec.stem or "sweep"), _Artists(executor)
     with (
         _Bar(plan.description, len(plan.points.values), folder) as bar,
-        finished(plan, folder, workers=executor, progress=bar, retry=retry) as store,
+        finished(plan, folder, workers=executor, progress=artists.beside(bar), retry=retry) as store,
     ):
         from subzero.sweeps.tell import FILES, write_sweep
 
-        with staged(folder, FILES) as stage:
-            summary = write_sweep(plan, store, stage)
+        with staged(folder, FILES) as stage, artists.pool() as pool:
+            summary = write_sweep(plan, store, stage, pool)
     return summary, stage
 
 
+class _Artists:
+    """What draws and tells, imported while workers run: it takes half a second, which nobody then waits for."""
+
+    def __init__(self, executor: Any) -> None:
+        self._executor, self._ready = executor, False
+
+    def beside(self, progress: Callable[[Standing], None]) -> Callable[[Standing], None]:
+        """Return a progress that has it imported once workers are at work."""
+
+        def told(standing: Standing) -> None:
+            if standing.rate > 0.0:
+                self._prepare()
+            progress(standing)
+
+        return told
+
+    def _prepare(self) -> None:
+        from subzero.sweeps.processes import FORKS
+        from subzero.sweeps.workers import WorkerPool
+
+        if not self._ready:
+            self._ready, others_draw = True, isinstance(self._executor, WorkerPool) and FORKS
+            if others_draw:
+                self._executor.prepare(_load_what_draws)
+            mine = _import_what_tells if others_draw else _load_what_draws
+            threading.Thread(target=mine, daemon=True).start()
+
+    @contextmanager
+    def pool(self) -> Iterator[Any]:
+        """Give processes that draw; None where this one does."""
+        from subzero.sweeps.workers import WorkerPool
+
+        self._prepare()
+        pool = self._executor.sibling() if isinstance(self._executor, WorkerPool) else None
+        try:
+            yield pool
+        finally:
+            if pool is not None:
+                pool.shutdown(cancel_futures=True)
+
+
+def _load_what_draws() -> None:
+    """Import what draws, and have it draw something small."""
+    with suppress(Exception):  # whoever needs it finds out
+        from subzero.sweeps.tell import load
+
+        load()
+
+
 def _import_what_tells() -> None:
-    """Import what tells of a sweep while its workers run: it takes a second, which nobody then waits for."""
+    """Import what tells of a sweep."""
     with suppress(Exception):  # whoever needs it finds out
         import subzero.sweeps.tell  # noqa: F401
 

@@ -24,9 +24,10 @@ import scenarios
 from subzero.channels import BY_NAME, CHANNELS, UNITS
 from subzero.engine.initial_conditions import Later
 from subzero.errors import UserError
-from subzero.model import Model, load
+from subzero.model import Model, load, model_of
 from subzero.overview import Overview
 from subzero.records.record import Fit, Record, beside, fits, read_record
+from subzero.room import THINNED, told_of_results, with_fewer_results
 from subzero.simulation import simulate
 from subzero.summary import FORCE, MOMENT, summarise, summary_of
 from subzero.validity import RunWarning, as_json, warnings_of
@@ -132,16 +133,26 @@ def compare(
             "Leave out every_s (--every)."
         )
     sidecar = _checked(record, trial)
+    asked, trial = trial, _kept_alike(trial, model, record)
     given = {"model": model, "later": later, "checkpoint": checkpoint}
     other: dict[str, Any] = {name: value for name, value in given.items() if value}
     tethered = simulate(trial, tethered=True, **other, progress=_part(progress, 0.0, 0.5))
     untethered = simulate(trial, tethered=False, **other, progress=_part(progress, 0.5, 1.0))
+    if trial is not asked and record is None:
+        for run in (tethered, untethered):
+            run.attrs[THINNED] = told_of_results(trial)
     record = beside(record, tethered) if record is not None else None
     if record is not None:
         from subzero.diagnosis.read_trials import check_beside
 
         check_beside(record, {"tethered": tethered, "untethered": untethered}, sidecar)
     return Comparison(tethered=tethered, untethered=untethered, trial=trial, measured=record)
+
+
+def _kept_alike(trial: scenarios.Trial, model: Model | None, record: Record | None) -> scenarios.Trial:
+    """Return a trial that keeps as many results of both runs, of a long one, too: all of them beside a record."""
+    kept = with_fewer_results(trial, model_of(trial, model), True)
+    return kept if record is None or kept is trial else dataclasses.replace(trial, every=trial.cable_step)
 
 
 def _checked(record: Record | None, trial: scenarios.Trial) -> Any:
@@ -274,6 +285,8 @@ def refine(
     """Set a run of a trial beside a finer one; arguments as `check`."""
     other: dict[str, Any] = {"model": model, "later": later} if model or later else {}
     halvings = json.loads(run.attrs.get("accuracy", "{}")).get("halvings", 0)
+    if THINNED in run.attrs:
+        trial = with_fewer_results(trial, model_of(trial, model), bool(run.attrs["tethered"]))
     finer = simulate(
         halved(trial, halvings + 1), tethered=bool(run.attrs["tethered"]), **other, progress=progress
     )

@@ -33,6 +33,8 @@ class BadValueError(UserError, ValueError):
 
 def real(value: object) -> float | None:
     """Return a value as a float if it is a finite real number (not a truth value, not a text); else None."""
+    if type(value) is float:  # most are: to ask what else it could be takes longer
+        return value if isfinite(value) else None
     if isinstance(value, bool) or not isinstance(value, Real):
         return None
     try:

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -204,11 +204,17 @@ def lacking_letters_as_boxes() -> Iterator[None]:
 
 def write_figures(figures: Mapping[str, Figure], stage: Stage, kind: str = "png") -> None:
     """Write each figure as ``name.png``, or as a drawing, ``name.svg`` or ``name.pdf``."""
+    with stages.told(stage.folder):
+        for name, figure in figures.items():
+            save(figure, stage.path / f"{name}.{kind}", kind)
+
+
+def save(figure: Figure, to: Path | IO[bytes], kind: str) -> None:
+    """Write a figure to a file, or to what is open."""
     import matplotlib as mpl
 
-    with stages.told(stage.folder), mpl.rc_context(DRAWING), lacking_letters_as_boxes():
-        for name, figure in figures.items():
-            figure.savefig(stage.path / f"{name}.{kind}", **OF_KIND[kind])
+    with mpl.rc_context(DRAWING), lacking_letters_as_boxes():
+        figure.savefig(to, format=kind, **OF_KIND[kind])
 
 
 def _cell(value: float) -> str:

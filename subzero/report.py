@@ -68,6 +68,8 @@ def show(summary: Summary, console: Console, *, whole: bool = False) -> None:
     console.print(f"[bold]{escape(summary['scenario'])}[/bold]: {escape(summary['title'])}", highlight=False)
     console.print(_runs_table(summary, whole), highlight=False)
     runs = {label: summary[label] for label in RUNS if label in summary}
+    for words in dict.fromkeys(run["thinned"] for run in runs.values() if run["thinned"]):
+        console.print(words, highlight=False, markup=False, soft_wrap=True)
     for label, run in runs.items():
         if run["refinement"] is not None:
             console.print(_refinement_table(label, run["refinement"]), highlight=False)

@@ -6,6 +6,7 @@ only runs are refused that cannot fit; one that nevertheless outgrows the memory
 
 from __future__ import annotations
 
+import dataclasses
 from functools import cache
 from typing import NamedTuple
 
@@ -30,6 +31,14 @@ REMEDY = (
     "Keep fewer results (every_s in the trial, or --every), or try a longer cable_step_s or segment_length_m, a "
     "grading, or a shorter duration_s."
 )
+
+
+MOST_KEPT = 1.5e8
+"""A trial that does not say how many results it wants keeps all as long as these take so much; else fewer. [bytes]"""
+THINNED = "thinned"
+"""Attribute of a run that keeps fewer results than it has steps, unasked: why, and how to keep all."""
+ROUND = (1, 2, 5)
+"""Every so many results one is kept then, or ten times as many, and so on. [-]"""
 
 
 class Work(NamedTuple):
@@ -68,6 +77,40 @@ def segments_of(trial: scenarios.Trial, length: float) -> int:
     growth = np.log1p(trial.far_grading * min(half, graded) / trial.segment_length)
     far = JOINED * 2.0 * (growth / np.log1p(trial.far_grading) + max(half - graded, 0.0) / LONGEST)
     return min(even, segments_needed(near, trial.segment_length, trial.grading) + int(far))
+
+
+def with_fewer_results(trial: scenarios.Trial, model: Model, tethered: bool) -> scenarios.Trial:
+    """Return a trial that keeps as many results as take `MOST_KEPT`, if it leaves open how many it wants (`every` 0).
+
+    One whose results take less, and one that says how many it wants, stays as it is.
+    """
+    if trial.every > 0.0:
+        return trial
+    size = bytes_of_results(trial, model, tethered, row_of(trial.times().size - 1, 1) + 1.0)
+    if size <= MOST_KEPT:
+        return trial
+    power = 10 ** int(np.log10(size / MOST_KEPT))
+    stride = next(power * one for one in (*ROUND, 10) if power * one * MOST_KEPT >= size)
+    return dataclasses.replace(trial, every=stride * trial.cable_step)
+
+
+def told_of_results(trial: scenarios.Trial) -> str:
+    """Return what a run tells whose results are fewer than there are steps, unasked."""
+    step = f"{trial.cable_step:g}"
+    return (
+        f"Results are kept every {trial.every:g} s of this long run: all would take more than {MOST_KEPT / 1e6:g} MB. "
+        f"every_s = {step} in the trial, or --every {step}, keeps all."
+    )
+
+
+def bytes_of_results(trial: scenarios.Trial, model: Model, tethered: bool, rows: float) -> float:
+    """Return what so many results of a run take, about."""
+    if not tethered:
+        return rows * bytes_a_row()
+    longest = max(
+        segments_of(trial, length) for length in (trial.start.wet_length, _last_length(trial, model))
+    )
+    return rows * (bytes_a_row() + BYTES_A_NODE * (1 + longest))
 
 
 def refuse_what_cannot_fit(trial: scenarios.Trial, model: Model, tethered: bool, grid: Grid) -> None:

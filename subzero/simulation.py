@@ -35,7 +35,15 @@ from subzero.engine.time_loop import NO_ROOM, run_rows
 from subzero.errors import UserError, truth, whole
 from subzero.model import Model, load, model_of
 from subzero.provenance import code_digest, digest_of, processor, trial_digest
-from subzero.room import REMEDY, has_room, most_segments, refuse_what_cannot_fit
+from subzero.room import (
+    REMEDY,
+    THINNED,
+    has_room,
+    most_segments,
+    refuse_what_cannot_fit,
+    told_of_results,
+    with_fewer_results,
+)
 from subzero.run_state import Live, Setup
 from subzero.validity import refinement_that_settles
 
@@ -66,7 +74,9 @@ def simulate(
         model: another model than the one that the scenario describes.
         later: times of results [s] and the model that holds from each of them on, such as one with a bent rudder.
         every: time between results that are kept, a whole number of cable steps; what the trial says if not given [s].
-            They are the same as without, to the last bit, and the last result is always kept.
+            They are the same as without, to the last bit, and the last result is always kept. Where the trial says
+            nothing either, all are, but of a long run only as many as take `subzero.room.MOST_KEPT`;
+            ``attrs["thinned"]`` then says so.
         checkpoint: keeps where the run stands, now and then; the same call then goes on from there, and gives the same
             result, to the last bit.
         progress: told the fraction that is done.
@@ -80,15 +90,16 @@ def simulate(
         scenarios.ScenarioError: the scenario cannot be used.
         UserError: a time of `later` is none of the run; a checkpoint of another simulation.
     """
-    return simulate_plainly(
-        scenario,
-        tethered=tethered,
-        model=model,
-        later=later,
-        every=every,
-        checkpoint=checkpoint,
-        progress=progress,
-    ).labelled()
+    trial = scenario if isinstance(scenario, scenarios.Trial) else load(scenario)
+    trial = trial if every is None else dataclasses.replace(trial, every=every)
+    model = model_of(trial, model)
+    kept = with_fewer_results(trial, model, truth("tethered", tethered))
+    run = simulate_plainly(
+        kept, tethered=tethered, model=model, later=later, checkpoint=checkpoint, progress=progress
+    )
+    if kept.every != trial.every:
+        run.attrs[THINNED] = told_of_results(kept)
+    return run.labelled()
 
 
 def simulate_plainly(
@@ -97,13 +108,14 @@ def simulate_plainly(
     tethered: bool = True,
     model: Model | None = None,
     later: Later = (),
-    every: float | None = None,
     checkpoint: Checkpoint | None = None,
     progress: Progress | None = None,
 ) -> PlainRun:
-    """Simulate a trial as `simulate` does, and return its result in plain arrays, by the same names."""
+    """Simulate a trial as `simulate` does, and return its result in plain arrays, by the same names.
+
+    Its results are all that the trial asks for, however many.
+    """
     trial = scenario if isinstance(scenario, scenarios.Trial) else load(scenario)
-    trial = trial if every is None else dataclasses.replace(trial, every=every)
     model, tethered, later = model_of(trial, model), truth("tethered", tethered), checked_later(later)
     with _kept(checkpoint, trial, model, tethered, later) as keeper:
         run, accuracy = _as_fine_as_asked(trial, model, tethered, progress, later, keeper)

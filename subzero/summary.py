@@ -52,6 +52,7 @@ def summarise(run: AnyRun) -> dict[str, Any]:
         "time_of_largest_cable_moment_s": number(time[twist]),
         "energy": energy_balance(run),
         "diagnostics": diagnostics(run),
+        "thinned": run.attrs.get("thinned"),
         "refinement": json.loads(run.attrs["refinement"]) if "refinement" in run.attrs else None,
     }
 

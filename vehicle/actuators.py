@@ -32,7 +32,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from subzero.jit import Record, compiled
+from subzero.jit import Record, compiled, gated_inlined, inlined
 from vehicle.parameters import Section, parameter
 from vehicle.state import LINKAGE, QUICKEST, SERVO
 
@@ -72,13 +72,13 @@ class Servo(Section):
         return ServoNumbers(*self.values())
 
 
-@compiled
+@inlined
 def _feedback(servo: ServoNumbers) -> float:
     """Return k, the share of the error that is taken at the fin, as far as the fin follows at all."""
     return (1.0 - servo.lost_command) * servo.position_feedback
 
 
-@compiled
+@gated_inlined
 def servo_target(command: float, servo: ServoNumbers) -> float:
     """Return the angle that a commanded angle leads to in the end, but for the play [rad]."""
     moved = max(0.0, command - servo.dead_band) + min(0.0, command + servo.dead_band)
@@ -87,7 +87,7 @@ def servo_target(command: float, servo: ServoNumbers) -> float:
     return (1.0 - k) * own + k * max(-most, min(most, command))
 
 
-@compiled
+@inlined
 def servo_rate(angle: float, linkage: float, command: float, servo: ServoNumbers) -> float:
     """Return how fast a servo at `angle`, with its linkage at `linkage`, turns under a commanded angle [rad/s]."""
     k = _feedback(servo)
@@ -96,7 +96,7 @@ def servo_rate(angle: float, linkage: float, command: float, servo: ServoNumbers
     return max(-servo.rate_limit, min(servo.rate_limit, rate))
 
 
-@compiled
+@inlined
 def fin_angle(angle: float, linkage: float, command: float, servo: ServoNumbers) -> float:
     """Return the angle of a fin in the water, from the angles of servo, linkage and command [rad].
 
@@ -109,7 +109,7 @@ def fin_angle(angle: float, linkage: float, command: float, servo: ServoNumbers)
     return _dragged(linkage, angle, servo.half_backlash)
 
 
-@compiled
+@inlined
 def _dragged(linkage: float, servo: float, half_backlash: float) -> float:
     """Return the angle of a linkage whose servo has turned within, or beyond, its play [rad]."""
     return max(servo - half_backlash, min(servo + half_backlash, linkage))

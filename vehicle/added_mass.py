@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from subzero.jit import compiled
+from subzero.jit import inlined
 from vehicle.parameters import Section, parameter
 
 
@@ -44,7 +44,7 @@ class AddedMass(Section):
         return matrix
 
 
-@compiled
+@inlined
 def munk_correction(nu_r: np.ndarray, added_mass: np.ndarray, excess: float, out: np.ndarray) -> None:
     """Fill out (6,) with (munk_factor − 1) times the Munk moment [N, N m]; `excess` is munk_factor − 1."""
     u, v, w = nu_r[0], nu_r[1], nu_r[2]

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from subzero.jit import compiled
+from subzero.jit import inlined
 from vehicle.parameters import Section, parameter
 
 
@@ -27,7 +27,7 @@ class AxialDrag(Section):
         return density * math.pi / 8.0 * diameter**2 * self.drag_coefficient
 
 
-@compiled
+@inlined
 def axial_drag(nu_r: np.ndarray, quadratic: float, out: np.ndarray) -> None:
     """Fill out (6,) with the axial drag [N]; `quadratic` is −X_uu [kg/m], nu_r relative to the water."""
     out[0] = -quadratic * nu_r[0] * abs(nu_r[0])

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from subzero.jit import compiled
+from subzero.jit import inlined
 from vehicle.parameters import Section, parameter
 
 
@@ -39,7 +39,7 @@ class BodyLift(Section):
         return np.array(lateral + vertical)
 
 
-@compiled
+@inlined
 def body_lift(nu_r: np.ndarray, lift: np.ndarray, out: np.ndarray) -> None:
     """Fill out (6,) with the lift and its moment [N, N m]; nu_r through the water, `lift` from numbers()."""
     u, v, w, q, r = nu_r[0], nu_r[1], nu_r[2], nu_r[4], nu_r[5]

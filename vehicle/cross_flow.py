@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from subzero.jit import compiled, scratch
+from subzero.jit import gated_inlined, scratch
 from vehicle.parameters import Section, parameter
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ class CrossFlowDrag(Section):
         return np.stack([centroid, density * self.drag_coefficient * area])
 
 
-@compiled
+@gated_inlined
 def cross_flow_drag(nu_r: np.ndarray, strips: np.ndarray, out: np.ndarray) -> None:
     """Fill out (6,) with the cross-flow drag of all strips [N, N m]; nu_r relative to the water."""
     v, w, q, r = nu_r[1], nu_r[2], nu_r[4], nu_r[5]

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from subzero.jit import compiled
+from subzero.jit import inlined
 from vehicle.parameters import Section, parameter
 
 
@@ -52,14 +52,14 @@ class QuadraticDamping(Section):
         return np.array(self.values())
 
 
-@compiled
+@inlined
 def linear_damping(nu_r: np.ndarray, linear: np.ndarray, out: np.ndarray) -> None:
     """Fill out (6,) with the linear damping [N, N m]; nu_r relative to the water."""
     for i in range(6):
         out[i] = linear[i] * nu_r[i]
 
 
-@compiled
+@inlined
 def quadratic_damping(nu_r: np.ndarray, quadratic: np.ndarray, out: np.ndarray) -> None:
     """Fill out (6,) with the quadratic damping by component [N, N m]; nu_r relative to the water."""
     vv, ww = nu_r[1] * abs(nu_r[1]), nu_r[2] * abs(nu_r[2])

@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from subzero.jit import compiled, scratch
+from subzero.jit import compiled, gated_inlined, inlined, scratch
 from vehicle.actuators import fin_angle, servo_rate, settle
 from vehicle.kinematics import motion, normalise, rotation
 from vehicle.motor import battery_current, shaft_goal, shaft_rate, shaft_speed, voltage
@@ -39,7 +39,7 @@ POWERS = ("propeller", "loss", "restoring", "external")
 NO_COMMAND, NO_CURRENT, NO_WRENCH = (0.0,) * 4, (0.0,) * 3, (0.0,) * 6
 
 
-@compiled
+@gated_inlined
 def relative_velocity(state: np.ndarray, R: np.ndarray, current_n: np.ndarray, nu_r: np.ndarray) -> None:
     """Fill nu_r (6,) with the velocity through the water in body axes [m/s, rad/s]; R is R_nb."""
     for i in range(3):
@@ -56,7 +56,7 @@ def surge_through_water(state: np.ndarray, current_n: np.ndarray) -> float:
     return state[7] - (R[0, 0] * current_n[0] + R[1, 0] * current_n[1] + R[2, 0] * current_n[2])
 
 
-@compiled
+@gated_inlined
 def deflections(
     state: np.ndarray, command: np.ndarray, numbers: VehicleNumbers
 ) -> tuple[float, float, float]:
@@ -86,7 +86,7 @@ def evaluate(
     fill_terms(state[7:13], nu_r, R, n, deflections(state, command, numbers), wrench_b, numbers, out)
 
 
-@compiled
+@inlined
 def actuators(
     state: np.ndarray, command: np.ndarray, u: float, numbers: VehicleNumbers, out: np.ndarray
 ) -> None:
@@ -158,7 +158,7 @@ def derivative_and_power(
     _powers(terms, nu_r, powers)
 
 
-@compiled
+@inlined
 def _accelerations(terms: np.ndarray, numbers: VehicleNumbers, out: np.ndarray) -> None:
     """Fill out[7:13] with ν' = M⁻¹ Σ terms."""
     wrench = scratch(1, 6)[0]
@@ -229,7 +229,7 @@ def power(
     _powers(terms, nu_r, out)
 
 
-@compiled
+@inlined
 def _powers(terms: np.ndarray, nu_r: np.ndarray, out: np.ndarray) -> None:
     """Fill out (len(POWERS),) with the powers of all terms (terms, 6) at a velocity through the water."""
     for i in range(len(POWERS)):

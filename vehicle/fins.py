@@ -23,7 +23,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from subzero.jit import Record, compiled
+from subzero.jit import Record, gated_inlined, inlined
 from vehicle.parameters import Section, parameter
 
 STILL = 1e-16
@@ -73,7 +73,7 @@ class Fins(Section):
         )
 
 
-@compiled
+@gated_inlined
 def section_force(ux: float, un: float, angle: float, fin: FinNumbers) -> tuple[float, float]:
     """Return the force along the body x axis and along the fin's normal axis [N].
 
@@ -86,7 +86,7 @@ def section_force(ux: float, un: float, angle: float, fin: FinNumbers) -> tuple[
     return _turned_force(ux, un, math.cos(angle), math.sin(angle), fin)
 
 
-@compiled
+@inlined
 def _turned_force(ux: float, un: float, c: float, s: float, fin: FinNumbers) -> tuple[float, float]:
     """Return what `section_force` does, from cosine and sine of the angle."""
     Vc = ux * c + un * s
@@ -110,7 +110,7 @@ def _turned_force(ux: float, un: float, c: float, s: float, fin: FinNumbers) -> 
     return Fc * c - Fm * s, Fc * s + Fm * c
 
 
-@compiled
+@gated_inlined
 def rudder(nu_r: np.ndarray, angle: float, fin: FinNumbers, out: np.ndarray) -> None:
     """Fill out (6,) with the wrench of the linked upper and lower rudder [N, N m].
 
@@ -133,7 +133,7 @@ def rudder(nu_r: np.ndarray, angle: float, fin: FinNumbers, out: np.ndarray) -> 
     out[5] = x * (Y_lower + Y_upper)
 
 
-@compiled
+@gated_inlined
 def stern_plane(nu_r: np.ndarray, angle: float, side: float, fin: FinNumbers, out: np.ndarray) -> None:
     """Fill out (6,) with the wrench of one stern-plane [N, N m].
 

@@ -15,11 +15,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from subzero.jit import allocating, compiled
+from subzero.jit import allocating, compiled, gated_inlined, inlined
 from vehicle.state import SHAFT, STATE_SIZE
 
 
-@compiled
+@gated_inlined
 def rotation(quaternion: np.ndarray, R: np.ndarray) -> None:
     """Fill R_nb (3, 3), which takes body components to earth components."""
     w, x, y, z = quaternion[0], quaternion[1], quaternion[2], quaternion[3]
@@ -60,7 +60,7 @@ def quaternion_from_euler(roll: float, pitch: float, heading: float) -> np.ndarr
     return quaternion
 
 
-@compiled
+@inlined
 def motion(state: np.ndarray, R: np.ndarray, out: np.ndarray) -> None:
     """Fill out[0:7] with the rates of position [m/s] and quaternion [1/s]; R is R_nb of the state."""
     u, v, w = state[7], state[8], state[9]

@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from subzero.jit import Record, compiled
+from subzero.jit import Record, gated_inlined, inlined
 from vehicle.parameters import Section, parameter
 from vehicle.propeller import PropellerNumbers, torque
 from vehicle.state import QUICKEST
@@ -63,21 +63,21 @@ def motor_numbers(motor: Motor, battery: Battery) -> MotorNumbers:
     return MotorNumbers(*motor.values(), *battery.values())
 
 
-@compiled
+@gated_inlined
 def battery_current(n: float, u: float, motor: MotorNumbers, propeller: PropellerNumbers) -> float:
     """Return the current drawn [A] at shaft speed n [rev/s] and surge speed u through the water [m/s]."""
     shaft_power = max(0.0, 2.0 * math.pi * n * torque(n, u, propeller))
     return shaft_power / (motor.efficiency * motor.full_voltage) + motor.hotel_current
 
 
-@compiled
+@gated_inlined
 def voltage(charge: float, current: float, motor: MotorNumbers) -> float:
     """Return the battery voltage [V] after a charge drawn [C], under a current [A]; never below zero."""
     sag = motor.voltage_drop_per_charge * charge + motor.internal_resistance * current
     return max(0.0, motor.full_voltage - sag)
 
 
-@compiled
+@inlined
 def shaft_target(command: float, volts: float, motor: MotorNumbers) -> float:
     """Return the shaft speed that a command leads to at a battery voltage [rev/s]."""
     wanted = command * (1.0 - motor.voltage_sensitivity * (1.0 - volts / motor.full_voltage))
@@ -87,7 +87,7 @@ def shaft_target(command: float, volts: float, motor: MotorNumbers) -> float:
     return max(-ceiling, min(ceiling, wanted))
 
 
-@compiled
+@inlined
 def shaft_goal(
     n: float, charge: float, command: float, u: float, motor: MotorNumbers, propeller: PropellerNumbers
 ) -> float:
@@ -98,7 +98,7 @@ def shaft_goal(
     )
 
 
-@compiled
+@gated_inlined
 def shaft_speed(
     n: float, charge: float, command: float, u: float, motor: MotorNumbers, propeller: PropellerNumbers
 ) -> float:
@@ -108,7 +108,7 @@ def shaft_speed(
     return n
 
 
-@compiled
+@inlined
 def shaft_rate(n: float, target: float, motor: MotorNumbers) -> float:
     """Return n' [rev/s2]."""
     return (target - n) / max(motor.lag, QUICKEST)

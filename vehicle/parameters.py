@@ -61,6 +61,10 @@ class Section:
         """
         return tuple([getattr(self, name) for name in type(self).__dataclass_fields__])  # type: ignore[attr-defined]
 
+    def by_name(self) -> dict[str, float]:
+        """Return the numbers by the names of their fields; `dataclasses.asdict` copies each."""
+        return {name: getattr(self, name) for name in type(self).__dataclass_fields__}  # type: ignore[attr-defined]
+
 
 def parameter(
     meaning: str,
@@ -93,6 +97,8 @@ def allowed_values(field: dataclasses.Field[Any]) -> str:
 def check_value(key: str, value: object, field: dataclasses.Field[Any]) -> Problem | None:
     """Return what is wrong with one value, or None."""
     low, high, strict = (field.metadata[name] for name in ("low", "high", "strict"))
+    if type(value) is float and low < value < high:
+        return None
     if isinstance(value, float) and value == math.inf and field.metadata["unlimited"]:
         return None
     number = real(value)

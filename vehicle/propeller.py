@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from subzero.jit import Record, compiled
+from subzero.jit import Record, gated_inlined
 from vehicle.parameters import Section, parameter
 
 
@@ -69,19 +69,19 @@ class Propeller(Section):
         )
 
 
-@compiled
+@gated_inlined
 def thrust(n: float, u: float, numbers: PropellerNumbers) -> float:
     """Return the thrust on the hull, (1 − t) T [N], at n [rev/s] and surge speed u [m/s]."""
     return numbers.thrust_nn * n * abs(n) - numbers.thrust_nu * abs(n) * u - numbers.thrust_uu * u * abs(u)
 
 
-@compiled
+@gated_inlined
 def torque(n: float, u: float, numbers: PropellerNumbers) -> float:
     """Return the torque of the shaft on the propeller, Q [N m], at n [rev/s] and surge speed u [m/s]."""
     return numbers.torque_nn * n * abs(n) - numbers.torque_nu * abs(n) * u - numbers.torque_uu * u * abs(u)
 
 
-@compiled
+@gated_inlined
 def propeller(nu_r: np.ndarray, n: float, numbers: PropellerNumbers, out: np.ndarray) -> None:
     """Fill out (6,) with thrust and reaction torque on the hull [N, N m]; nu_r relative to the water."""
     for i in range(6):

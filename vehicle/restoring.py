@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from subzero.jit import Record, compiled
+from subzero.jit import Record, compiled, inlined
 from vehicle.parameters import Section, parameter
 
 if TYPE_CHECKING:
@@ -47,7 +47,7 @@ class Buoyancy(Section):
         return RestoringNumbers(-self.net_buoyancy, float(arm[0]), float(arm[1]), float(arm[2]))
 
 
-@compiled
+@inlined
 def restoring(R: np.ndarray, numbers: RestoringNumbers, out: np.ndarray) -> None:
     """Fill out (6,) with weight plus buoyancy [N, N m]; R is R_nb."""
     kx, ky, kz = R[2, 0], R[2, 1], R[2, 2]

@@ -22,7 +22,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from subzero.jit import compiled
+from subzero.jit import gated_inlined
 from vehicle.parameters import Section, parameter
 
 
@@ -61,7 +61,7 @@ class RigidBody(Section):
         return matrix
 
 
-@compiled
+@gated_inlined
 def coriolis(mass_matrix: np.ndarray, nu: np.ndarray, out: np.ndarray) -> None:
     """Fill out (6,) with the force −C(ν)ν on the body [N, N m], of a symmetric mass matrix (6, 6)."""
     P0 = P1 = P2 = L0 = L1 = L2 = 0.0

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from subzero.jit import compiled
+from subzero.jit import inlined
 from vehicle.added_mass import munk_correction
 from vehicle.axial_drag import axial_drag
 from vehicle.body_lift import body_lift
@@ -67,7 +67,7 @@ POWER_OF_TERM = tuple(term.power for term in TERMS)
 TERM_COUNT = len(TERMS)
 
 
-@compiled
+@inlined
 def turning_current(nu: np.ndarray, nu_r: np.ndarray, mass_matrix: np.ndarray, out: np.ndarray) -> None:
     """Fill out (6,) with −M (ω × v_c, 0) [N, N m]; v_c = ν − ν_r in body axes."""
     # All other terms belong to M ν̇_r, and the state is ν: a current that is steady on earth turns in body axes,
@@ -79,7 +79,7 @@ def turning_current(nu: np.ndarray, nu_r: np.ndarray, mass_matrix: np.ndarray, o
         out[i] = -(mass_matrix[i, 0] * x + mass_matrix[i, 1] * y + mass_matrix[i, 2] * z)
 
 
-@compiled
+@inlined
 def fill_terms(
     nu: np.ndarray,
     nu_r: np.ndarray,

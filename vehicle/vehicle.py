@@ -6,7 +6,6 @@ A `Vehicle` is frozen and has no defaults: its numbers come from a file (`scenar
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
@@ -191,7 +190,7 @@ SECTIONS: dict[str, type] = {
 
 def to_mapping(vehicle: Vehicle) -> dict[str, dict[str, float]]:
     """Return the plain numbers of a vehicle, section by section, as `from_mapping` takes them."""
-    return {section: dataclasses.asdict(getattr(vehicle, section)) for section in SECTIONS}
+    return {section: getattr(vehicle, section).by_name() for section in SECTIONS}
 
 
 def from_mapping(mapping: Mapping[str, object]) -> Vehicle:

@@ -158,7 +158,7 @@ def _no_energy(line: Line, c: CableNumbers) -> float:
 def _solve(line: Line, c: CableNumbers) -> bool:
     """Overwrite the residual with the Newton step, and the matrix with its factors; False where it is singular."""
     L, D, U = line.blocks[LOWER], line.blocks[DIAGONAL], line.blocks[UPPER]
-    if solve(L, D, U, line.pivots, line.ends.count, line.rows[RESIDUAL]) > 0:
+    if solve(L, D, U, line.ends.count, line.rows[RESIDUAL]) > 0:
         return False
     keep_tow_answer(line)
     return True

@@ -56,7 +56,7 @@ def take_jolt(
     _assemble(line, tangents, change, c, drum, masses)
     blocks, jump = line.blocks, line.rows[RESIDUAL]
     line.ends.solver.factored = False
-    if solve(blocks[LOWER], blocks[DIAGONAL], blocks[UPPER], line.pivots, line.ends.count, jump) > 0:
+    if solve(blocks[LOWER], blocks[DIAGONAL], blocks[UPPER], line.ends.count, jump) > 0:
         return False
     for j in range(1, line.ends.count + 1):
         if jump[j, 0] < -max(line.tension[NOW, j], 0.0) * SLACK_FOR:

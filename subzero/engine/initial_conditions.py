@@ -62,7 +62,7 @@ RUN_IN = 2.0
 an error of first order. A winch may pay out slack, which short segments would fold. [m]"""
 NO_WEIGHT = 1e-4
 """A cable that weighs less in water is neutral. [N/m]"""
-FIRST_ROOM = 16
+FIRST_ROOM = 48
 """Segments that a new cable has room for, beyond those that are in the water."""
 
 

@@ -21,6 +21,8 @@ from vehicle import BREAKDOWN, STATE_SIZE, battery_voltage, breakdown, deflectio
 
 BREATH_S = 0.1
 """Compiled code computes for about so long before Python moves the progress bar and heeds an interrupt. [s]"""
+MOST_QUICKER = 16.0
+"""So many times as many rows are filled at a time as the last time, at most: later ones may take longer. [-]"""
 
 
 class Recording(NamedTuple):
@@ -141,7 +143,7 @@ class Pace:
     def __exit__(self, *_: object) -> None:
         """See how long it took."""
         share = BREATH_S / max(perf_counter() - self._begin, 1e-6)
-        self.rows = max(1, int(self.rows * min(share, 4.0)))
+        self.rows = max(1, int(self.rows * min(share, MOST_QUICKER)))
 
 
 def new_recording(rows: int, nodes: int, times: int = 0) -> Recording:

@@ -4,7 +4,8 @@
 
 name                                            what for                                              file
 ----------------------------------------------  ----------------------------------------------------  ------------
-compiled, allocating, inner, inlined, by_field  how a function is compiled                            decorators
+compiled, allocating, inner, inlined,
+gated_inlined, by_field                         how a function is compiled                            decorators
 Record                                          numbers as one record in memory, a single pointer     record
 scratch                                         a small array on the stack of a compiled function     stack
 compile_beside, Call                            a second process compiles along                        beside
@@ -14,7 +15,7 @@ compile_beside, Call                            a second process compiles along 
 """
 
 from subzero.jit.beside import Call, compile_beside
-from subzero.jit.decorators import allocating, by_field, compiled, inlined, inner
+from subzero.jit.decorators import allocating, by_field, compiled, gated_inlined, inlined, inner
 from subzero.jit.record import Record
 from subzero.jit.stack import scratch
 
@@ -25,6 +26,7 @@ __all__ = [
     "by_field",
     "compile_beside",
     "compiled",
+    "gated_inlined",
     "inlined",
     "inner",
     "scratch",

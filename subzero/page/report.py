@@ -85,6 +85,18 @@ class Answer:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Drawn:
+    """A figure that is drawn already: the address of an image that is inside a page, and its width. [inch]"""
+
+    address: str
+    width: float
+
+    def get_figwidth(self) -> float:
+        """Return its width, as a figure does. [inch]"""
+        return self.width
+
+
+@dataclass(frozen=True, kw_only=True)
 class Section:
     """A part of a page: paragraphs, then tables, then figures.
 
@@ -99,7 +111,7 @@ class Section:
     title: str
     text: Sequence[str] = ()
     tables: Sequence[Table] = ()
-    figures: Mapping[str, Figure] = field(default_factory=dict)
+    figures: Mapping[str, Figure | Drawn] = field(default_factory=dict)
     is_folded: bool = False
 
 
@@ -197,11 +209,17 @@ def _in_script(data: Mapping[str, Any] | None) -> str:
     return text.replace("<", "\\u003c").replace("&", "\\u0026")
 
 
-def _image(figure: Figure) -> str:
+def _image(figure: Figure | Drawn) -> str:
     """Return a figure as the address of an image that is inside the page."""
+    return figure.address if isinstance(figure, Drawn) else drawn(figure).address
+
+
+def drawn(figure: Figure) -> Drawn:
+    """Return a figure as a page has it."""
     import matplotlib as mpl
 
     held = io.BytesIO()
     with mpl.rc_context(SVG_STYLE), lacking_letters_as_boxes():
         figure.savefig(held, format="svg", metadata={"Date": None})
-    return f"data:image/svg+xml;base64,{base64.b64encode(held.getvalue()).decode('ascii')}"
+    text = base64.b64encode(held.getvalue()).decode("ascii")
+    return Drawn(address=f"data:image/svg+xml;base64,{text}", width=float(figure.get_figwidth()))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -47,7 +48,12 @@ BAR_LEFT = 0.3
 
 
 def draw_sweep(
-    points: Points, job: Job, found: Gathered, effects: list[Effect], title: Title
+    points: Points,
+    job: Job,
+    found: Gathered,
+    effects: list[Effect],
+    title: Title,
+    names: Sequence[str],
 ) -> dict[str, Figure]:
     """Return the figures of a sweep by the name of their file.
 
@@ -57,15 +63,16 @@ def draw_sweep(
         found: what came of it.
         effects: what matters.
         title: above each.
+        names: of those that are drawn, such as "bands", as far as there is something to show.
     """
-    alive = _alive(found)
-    figures = {}
-    if job.outcomes.channels and np.isfinite(found.channels).any():
+    alive, figures = _alive(found), {}
+    if "bands" in names and job.outcomes.channels and np.isfinite(found.channels).any():
         figures["bands"] = _bands(job, found, title)
-    if alive:
+    if "histograms" in names and alive:
         figures["histograms"] = _histograms(found, alive, title)
+    if "against" in names and alive:
         figures["against"] = _against(points, found, effects, title)
-    if effects:
+    if "tornado" in names and effects:
         figures["tornado"] = _tornado(points, effects, title)
     return figures
 

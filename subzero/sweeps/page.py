@@ -9,15 +9,13 @@ import sys
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
-from subzero.page.report import Answer, Line, Report, Section, Table, render
+from subzero.page.report import Answer, Drawn, Line, Report, Section, Table, render
 from subzero.sweeps.outcomes import in_words
 from subzero.sweeps.result import TABLE
 from subzero.sweeps.sensitivity import words_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
-
-    from matplotlib.figure import Figure
 
     from subzero.sweeps.plan import Plan
 
@@ -35,7 +33,7 @@ NOTHING = "–"
 LIBRARIES = ("numpy", "numba", "scipy", "xarray")
 
 
-def page_of_sweep(plan: Plan, summary: Summary, figures: Mapping[str, Figure], command: str) -> str:
+def page_of_sweep(plan: Plan, summary: Summary, figures: Mapping[str, Drawn], command: str) -> str:
     """Return ``report.html`` of a finished sweep.
 
     Args:
@@ -174,7 +172,7 @@ def _matters(summary: Summary) -> list[str]:
     ] or [f"No parameter moves these numbers ({method})."]
 
 
-def _sections(summary: Summary, figures: Mapping[str, Figure]) -> list[Section]:
+def _sections(summary: Summary, figures: Mapping[str, Drawn]) -> list[Section]:
     effects = bool(summary["sensitivity"]["effects"])
     tornado = {name: one for name, one in figures.items() if name == "tornado"}
     others = {name: one for name, one in figures.items() if name != "tornado"}

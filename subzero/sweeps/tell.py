@@ -1,10 +1,15 @@
-"""What the command leaves behind: dataset, table, summary, figures, page; and tells: numbers and what matters."""
+"""What the command leaves behind: dataset, table, summary, figures, page; and tells: numbers and what matters.
+
+Each figure takes a quarter of a second, most of it in Python. So where processes can be forked, they draw the figures
+together, and what draws is imported once, while members still run.
+"""
 
 from __future__ import annotations
 
+import io
 import math
-from collections.abc import Iterator
-from dataclasses import asdict
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 from rich import box
@@ -12,22 +17,28 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from subzero import output
 from subzero.errors import printable
-from subzero.figures.style import Title
-from subzero.sweeps.figures import draw_sweep
+from subzero.page.report import Drawn, drawn
+from subzero.sweeps.design import Points
+from subzero.sweeps.member import Job
 from subzero.sweeps.outcomes import unit_of
 from subzero.sweeps.page import numbers, page_of_sweep, warning_lines, what_matters
 from subzero.sweeps.plan import Plan
 from subzero.sweeps.result import RESULT, TABLE, Gathered, percentiles, write_result
 from subzero.sweeps.sensitivity import Effect, effects_of, words_of
 from subzero.sweeps.store import FILE, Store
+from subzero.sweeps.workers import WorkerDiedError
 from subzero.voice import PLAIN, Voice
 
 if TYPE_CHECKING:
     from subzero.page.report import Table as Rows
     from subzero.stage import Stage
+    from subzero.sweeps.workers import WorkerPool
 
 FIGURES = ("bands", "histograms", "against", "tornado")
+"""All that there may be, in the order in which a page has them."""
+LONGEST_FIRST = ("against", "histograms", "bands", "tornado")
 FILES = (RESULT, TABLE, "summary.json", "report.html", *(f"{name}.png" for name in FIGURES))
 """What a sweep writes beside its store."""
 SHOWN_REASONS = 5
@@ -36,9 +47,8 @@ KEPT_REASONS = 100
 """So many stand in the summary; the table has all."""
 
 
-def write_sweep(plan: Plan, store: Store, stage: Stage) -> dict[str, Any]:
-    """Write everything that belongs to a finished sweep, and return its summary."""
-    from subzero import output
+def write_sweep(plan: Plan, store: Store, stage: Stage, pool: WorkerPool | None = None) -> dict[str, Any]:
+    """Write everything that belongs to a finished sweep, and return its summary; a pool draws, if there is one."""
     from subzero.stage import told
 
     with told(stage.folder):
@@ -46,11 +56,82 @@ def write_sweep(plan: Plan, store: Store, stage: Stage) -> dict[str, Any]:
     effects = effects_of(plan.points, found)
     summary = summary_of(plan, store, found, effects)
     output.write_summary(summary, stage)
-    words = Title(words=plan.description, scenario=plan.job.trial.name, warnings=_in_short(summary))
-    figures = draw_sweep(plan.points, plan.job, found, effects, words)
-    output.write_figures(figures, stage)
+    below = _in_short(summary)
+    shown = Shown(
+        points=plan.points,
+        job=plan.job,
+        found=found,
+        effects=effects,
+        words=plan.description,
+        warnings=below,
+    )
+    made = pictures(shown, pool)
+    with told(stage.folder):
+        for name, one in made.items():
+            (stage.path / f"{name}.png").write_bytes(one.png)
+    figures = {name: one.drawn for name, one in made.items()}
     output.write_page(page_of_sweep(plan, summary, figures, output.COMMAND.get()), stage)
     return summary
+
+
+@dataclass(frozen=True, kw_only=True)
+class Shown:
+    """What figures show: points, what was run, what came of it, what matters; and what stands above and below."""
+
+    points: Points
+    job: Job
+    found: Gathered
+    effects: list[Effect]
+    words: str
+    warnings: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Picture:
+    """A figure as the bytes of a PNG, and as it stands in a page."""
+
+    png: bytes
+    drawn: Drawn
+
+
+def pictures(shown: Shown, pool: WorkerPool | None = None) -> dict[str, Picture]:
+    """Return the pictures that there are, by name, in the order of `FIGURES`; drawn by a pool, if there is one."""
+    if pool is None:
+        made = drawn_here(shown, FIGURES)
+    else:
+        made, asked = {}, {name: pool.submit(drawn_here, shown, [name]) for name in LONGEST_FIRST}
+        for name, one in asked.items():
+            try:
+                made |= one.result()
+            except WorkerDiedError:  # somebody killed it: no member is lost by that, and no figure
+                made |= drawn_here(shown, [name])
+    return {name: made[name] for name in FIGURES if name in made}
+
+
+def drawn_here(shown: Shown, names: Sequence[str]) -> dict[str, Picture]:
+    """Draw those of some figures that there are, in this process."""
+    from subzero.figures.style import Title
+    from subzero.sweeps.figures import draw_sweep
+
+    title = Title(words=shown.words, scenario=shown.job.trial.name, warnings=shown.warnings)
+    figures = draw_sweep(shown.points, shown.job, shown.found, shown.effects, title, names)
+    made = {}
+    for name, figure in figures.items():
+        held = io.BytesIO()
+        output.save(figure, held, "png")
+        made[name] = Picture(png=held.getvalue(), drawn=drawn(figure))
+    return made
+
+
+def load() -> None:
+    """Import what draws, and have it draw a letter and a formula, in both ways: the first ones take longer."""
+    import subzero.sweeps.figures  # noqa: F401
+    from subzero.figures.style import Title, label, sheet
+
+    figure, panels = sheet(1, 1, Title(words="a", scenario="b"))
+    label(panels[0], "t", "$x$ [m]")
+    output.save(figure, io.BytesIO(), "png")
+    drawn(figure)
 
 
 def summary_of(plan: Plan, store: Store, found: Gathered, effects: list[Effect]) -> dict[str, Any]:

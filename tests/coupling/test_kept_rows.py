@@ -13,6 +13,7 @@ import xarray as xr
 import scenarios
 import subzero
 from subzero.cli import FINE, MISTAKE, main
+from subzero.room import MOST_KEPT, bytes_of_results, with_fewer_results
 
 
 def held_against(plain, kept):
@@ -90,3 +91,47 @@ def test_the_file_and_the_command_say_it(tmp_path, monkeypatch, capsys):
     capsys.readouterr()
     assert main(["simulate", "mine.toml", "--every", "0.55"]) == MISTAKE
     assert "0.5 or 0.6" in capsys.readouterr().err
+
+
+@pytest.fixture
+def little_kept(monkeypatch):
+    """Of fig6, 0.4 MB are kept unasked, and all of it takes 1 MB about."""
+    monkeypatch.setattr("subzero.room.MOST_KEPT", 4e5)
+
+
+def test_a_long_run_keeps_fewer_results_unasked_says_so_and_keeps_all_when_told_to(little_kept):
+    kept, plain = subzero.simulate("fig6"), subzero.simulate("fig6", every=0.1)
+    assert kept["time"].values[1] in (0.2, 0.5, 1.0)
+    held_against(plain, kept)
+    assert kept.attrs["thinned"].startswith(
+        f"Results are kept every {kept['time'].values[1]:g} s of this long run"
+    )
+    assert "every_s = 0.1 in the trial, or --every 0.1, keeps all" in kept.attrs["thinned"]
+    assert plain.sizes["time"] == 301
+    assert "thinned" not in plain.attrs
+
+
+def test_both_runs_of_a_comparison_keep_as_many_and_a_record_is_set_beside_all(
+    little_kept, tmp_path, monkeypatch, capsys
+):
+    both = subzero.compare("fig6")
+    assert both.tethered["time"].equals(both.untethered["time"])
+    assert both.tethered.attrs["thinned"] == both.untethered.attrs["thinned"]
+    rows = [f"{t},{u}" for t, u in both.tethered["surge_speed"].to_series().items()]
+    (tmp_path / "record.csv").write_text("\n".join(["time_s,surge_speed_m_s", *rows]), encoding="utf-8")
+    assert subzero.compare("fig6", measured=tmp_path / "record.csv").tethered.sizes["time"] == 301
+    monkeypatch.chdir(tmp_path)
+    assert main(["simulate", "fig6"]) == FINE
+    assert capsys.readouterr().out.count("Results are kept every") == 1
+
+
+def test_thirty_minutes_with_two_kilometres_of_cable_keep_what_fits_and_five_minutes_of_fig6_all():
+    fig6 = subzero.load_scenario("fig6")
+    start = dataclasses.replace(fig6.start, wet_length=1800.0)
+    long = dataclasses.replace(fig6, duration=1800.0, start=start)
+    for trial, wanted in ((long, False), (dataclasses.replace(fig6, duration=300.0), True)):
+        model = subzero.Model.of(trial)
+        kept = with_fewer_results(trial, model, True)
+        assert (kept is trial) == wanted
+        rows = trial.times().size // kept.stride
+        assert bytes_of_results(kept, model, True, rows) <= MOST_KEPT

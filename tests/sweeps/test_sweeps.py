@@ -27,6 +27,7 @@ from subzero.sweeps.design import points_of
 from subzero.sweeps.member import OtherVersionError, run_members
 from subzero.sweeps.page import page_of_sweep
 from subzero.sweeps.plan import plan_sweep
+from subzero.sweeps.processes import FORKS
 from subzero.sweeps.result import MOST_DRAWN, Gathered, _drawn, write_result
 from subzero.sweeps.schedule import MOST_DEATHS, Schedule
 from subzero.sweeps.sensitivity import effects_of
@@ -371,6 +372,25 @@ def test_a_worker_labels_nothing_and_so_starts_a_second_sooner():
     assert not loaded & {"xarray", "pandas", "dask", "matplotlib", "netCDF4", "scipy.stats"}
 
 
+@pytest.mark.skipif(not FORKS, reason="elsewhere each process is a Python of its own")
+def test_processes_have_what_was_rehearsed_and_outlive_what_they_come_from():
+    pool = WorkerPool(1)
+    try:
+        pool.prepare(lambda: os.environ.update(REHEARSED="yes"))
+        assert pool.submit(os.getenv, "REHEARSED").result() == "yes"
+        home = pool.submit(os.getppid).result()
+        os.kill(home, signal.SIGKILL)
+        assert pool.submit(abs, -1).result() == 1
+        with pytest.raises(WorkerDiedError, match="signal 9"):
+            pool.submit(_end_yourself).result()
+        assert pool.submit(os.getppid).result() not in (home, os.getpid())
+        pool.submit(_end_yourself)
+        pool.prepare(_end_yourself)  # a rehearsal that dies costs no task
+        assert pool.submit(abs, -2).result() == 2
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
 def _end_yourself():
     os.kill(os.getpid(), signal.SIGKILL)
 
@@ -506,7 +526,7 @@ def test_two_dask_workers_give_the_same_bytes_as_processes_here(tmp_path):
 
 @pytest.mark.slow
 def test_a_sweep_that_is_killed_time_after_time_loses_nothing():
-    from benchmarks.sweep import kills
+    from benchmarks.sweep_kills import kills
 
     assert kills(8, 600, seed=5)
 
