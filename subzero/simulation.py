@@ -284,6 +284,8 @@ def _took_too_long(now: Standing, grid: Grid) -> bool:
     return bool(now.live.now.iterations > grid.iterations)
 
 
+ROOM = 48
+"""A run begins with room for so many segments beyond those in the water: half a millisecond to enlarge it. [-]"""
 SPARE_NODES = 64
 """A recording has room for twice the nodes that are expected, and so many more in each row. [-]"""
 
@@ -291,7 +293,7 @@ SPARE_NODES = 64
 def _begun(trial: scenarios.Trial, model: Model, tethered: bool, grid: Grid) -> Standing:
     """Return a run at its start, of which no row is written yet."""
     longest = float(np.diff(grid.times).max()) / grid.parts
-    setup, live = prepare(trial, model, tethered, longest_exchange=longest)
+    setup, live = prepare(trial, model, tethered, longest_exchange=longest, room=ROOM)
     setup.fixed.booked = grid.booked
     rows = row_of(grid.times.size - 1, grid.stride) + 1
     each = min(4 * live.line.length.size, 2 * most_segments(trial, model) + SPARE_NODES)

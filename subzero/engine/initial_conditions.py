@@ -62,7 +62,7 @@ RUN_IN = 2.0
 an error of first order. A winch may pay out slack, which short segments would fold. [m]"""
 NO_WEIGHT = 1e-4
 """A cable that weighs less in water is neutral. [N/m]"""
-FIRST_ROOM = 48
+FIRST_ROOM = 16
 """Segments that a new cable has room for, beyond those that are in the water."""
 
 
@@ -73,6 +73,7 @@ def prepare(
     state: np.ndarray | None = None,
     longest_exchange: float | None = None,
     run_in: float = RUN_IN,
+    room: int = FIRST_ROOM,
 ) -> tuple[Setup, Live]:
     """Return what stays and what changes in a run, at its start: the cable laid straight behind the vehicle.
 
@@ -83,6 +84,7 @@ def prepare(
         state: another first state than that of the trial.
         longest_exchange: there is room for the hull's steps in so long an exchange; that of the trial by default. [s]
         run_in: length up to which a cable that begins shorter, on a free drum, has short segments; 0 for even ones. [m]
+        room: for so many segments beyond those in the water.
 
     Raises:
         UserError: a start that cannot be.
@@ -97,7 +99,7 @@ def prepare(
         path=np.zeros((steps + 1, size)),
         stages=np.zeros((5, size)),
         powers=np.zeros((steps, len(POWERS))),
-        line=new_line(int((wet + RUN_IN) / trial.segment_length) + FIRST_ROOM),
+        line=new_line(int((wet + RUN_IN) / trial.segment_length) + room),
         load=new_load(),
     )
     if tethered:
