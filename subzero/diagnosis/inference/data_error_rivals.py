@@ -109,7 +109,7 @@ def _linear(problem: Problem, record: int) -> Linear:
     ends = np.cumsum([0, *(noise.count for noise in seen_.noise.values())]).tolist()
     own = {name: slice(a, b) for name, a, b in zip(seen_.noise, ends[:-1], ends[1:], strict=True)}
     nothing = np.zeros(0)
-    bare = {name: Term(nothing, nothing, 0.0, noise.count, -noise.log_scale, least_scale(noise))
+    bare = {name: Term(nothing, nothing, 0.0, noise.count, -noise.log_scale, least_scale(noise), noise.count)
             for name, noise in seen_.noise.items()}  # fmt: skip
     r = problem.whitened(record, seen_.setting, base, measured=True)
     return Linear(r=r, J=J, D=variances(problem.entries, (), KAPPA_NARROW), own=own, bare=bare)

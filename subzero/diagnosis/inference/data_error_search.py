@@ -1,0 +1,235 @@
+"""Which errors in the data are suspected: a search forward and back, in the linear problem, before anything is fitted.
+
+Forward: the best suspect of `data_error_scan` is corrected, and the scan goes on with the corrected record, until it
+finds none. Back: each error is judged again with all others corrected, and its numbers are found anew; what is not
+needed any more is dropped, the weakest first. So the first of two errors, which may have looked like something else
+while the second was there, is judged as the second is: by what it adds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from subzero.diagnosis.hypothesis.data_error import DataError, corrected
+from subzero.diagnosis.hypothesis.logged import Logged
+from subzero.diagnosis.inference.data_error_rivals import most_of_physics
+from subzero.diagnosis.inference.data_error_scan import (
+    FAR_BEHIND,
+    Suspect,
+    Yardstick,
+    judged_again,
+    suspects,
+    yardstick_of,
+)
+from subzero.diagnosis.inference.posing import pose, posed_again
+from subzero.diagnosis.inference.problem import Problem
+from subzero.diagnosis.inference.repeated_values import is_rounded, repeated_values
+
+MOST_ERRORS = 3
+"""Of a record, beside values that are repeated."""
+LEAST_LEAD, LEAST_SOFT_LEAD = 5.0, 15.0
+"""An error is suspected if a record is so much more probable with it, as a logarithm; the second of what is `SOFT`."""
+SOFT = ("step", "late_clock", "clock_rate", "latency", "command_sign", "command_swap")
+"""Kinds with a number to be fitted, or that change the motion: something that broke in mid-trial may look like them."""
+ALIKE_LEAD = 3.0
+"""Errors whose leads differ by less are told together."""
+CLEAR_LEAD, CLEAR_GENEROUS_LEAD = 15.0, 10.0
+"""With a greater lead over physics, in the linear problem, an error needs no search of the record as it is: over
+nothing and every cause, and over all causes at once."""
+LOUD = 2.5
+"""Noise of more usual levels hides a misfit. [-]"""
+SIGNATURE_LEAD = 20.0
+"""Lead of what is read off a record."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SuspectedError:
+    """An error of a record, its leads with all others corrected, and those that the record cannot tell from it; `left`
+    is the noise of the channel that is explained worst without all of them, in usual levels, with all of physics to
+    help; `over_few` the lead over a few causes, throughout or from mid-trial on.
+    """
+
+    record: int
+    error: DataError
+    lead: float
+    generous: float
+    alike: tuple[DataError, ...] = ()
+    left: float = np.inf
+    over_few: float = -np.inf
+
+
+def is_soft(one: SuspectedError) -> bool:
+    """Say whether something that a vehicle does may look like an error."""
+    return one.error.kind in SOFT
+
+
+def leads_clearly(one: SuspectedError) -> bool:
+    """Say whether an error leaves physics no chance in the linear problem: one that a vehicle may look like must also
+    explain, with the others, all that is there.
+    """
+    if is_soft(one):
+        return one.over_few > FAR_BEHIND and one.left < LOUD
+    return one.lead > CLEAR_LEAD and one.generous > CLEAR_GENEROUS_LEAD
+
+
+def explain(errors: Sequence[SuspectedError]) -> bool:
+    """Say whether errors are all that the linear problem needs: what broke in mid-trial makes an error of a clock
+    likely, too, but that leaves more than noise.
+    """
+    return all(one.left < LOUD for one in errors)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Suspicion:
+    """What a scan of records says of errors in their data.
+
+    Attributes:
+        errors: that are suspected, in the order in which they are to be corrected.
+    """
+
+    errors: tuple[SuspectedError, ...]
+
+    def first(self, count: int) -> tuple[SuspectedError, ...]:
+        """Return so many of them, in their order: first what is clear, then what no vehicle does, the best first."""
+        ranked = sorted(self.errors, key=lambda one: (not leads_clearly(one), is_soft(one), -one.lead))
+        return tuple(one for one in self.errors if any(one is each for each in ranked[:count]))
+
+    @property
+    def firm(self) -> int:
+        """How many of them leave physics no chance, or are what no vehicle does."""
+        return sum(leads_clearly(one) or not is_soft(one) for one in self.errors)
+
+    def fewer(self, count: int) -> list[tuple[SuspectedError, ...]]:
+        """Return the sets with less than so many of them: with one after the other of those that are not clear taken
+        away, and with none.
+        """
+        clear = sum(map(leads_clearly, self.errors))
+        return [*(self.first(k) for k in reversed(range(max(clear, 1), count))), ()] if count else []
+
+
+def suspected(problem: Problem, records: Sequence[Logged]) -> Suspicion:
+    """Return what errors the data of some records may have."""
+    each = [_of_record(problem, records, i) for i in range(len(records))]
+    return Suspicion(errors=tuple(one for found in each for one in found))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Bench:
+    """A record as it is, and what it is judged by, for each of the commands that it may have been flown with.
+
+    Attributes:
+        begun: its yardstick as it is.
+        under: commands → a yardstick under them.
+    """
+
+    begun: Yardstick
+    under: dict[bytes, Yardstick] = field(default_factory=dict)
+
+    def without(self, errors: Sequence[DataError]) -> Yardstick:
+        """Return what the record is judged by without some errors; with other commands it has sensitivities of its
+        own.
+        """
+        written = self.begun.written
+        logged = corrected(written, tuple(errors))
+        commands = logged.setting.trial.commands
+        base = self.begun
+        if commands is not written.setting.trial.commands and commands is not None:
+            key = commands.values.tobytes()
+            if key not in self.under:
+                self.under[key] = yardstick_of(pose([logged]), 0, logged)
+            base = self.under[key]
+        return replace(
+            base, logged=logged, written=written, repeated=self.begun.repeated, corrected=tuple(errors)
+        )
+
+
+class _Judged(NamedTuple):
+    """An error with its leads, and what the record cannot tell from it."""
+
+    suspect: Suspect
+    alike: tuple[DataError, ...]
+
+
+def _of_record(problem: Problem, records: Sequence[Logged], record: int) -> list[SuspectedError]:
+    """Return the errors that a record may have."""
+    logged = records[record]
+    repeated = repeated_values(logged, logged.trusted)
+    read_off = [one for one in repeated if not is_rounded(one, logged)]
+    unclear = tuple(one for one in repeated if is_rounded(one, logged))
+    bench = _Bench(begun=replace(yardstick_of(problem, record, logged), repeated=unclear))
+    found = _back(bench, read_off, _forward(bench, read_off, logged.trusted))
+    errors = [*read_off, *(one.suspect.error for one in found)]
+    left = max(bench.without(errors).as_is.scales.values(), default=np.inf) if found else 0.0
+    sure = [SuspectedError(record=record, error=one, lead=SIGNATURE_LEAD, generous=SIGNATURE_LEAD, left=left)
+            for one in read_off]  # fmt: skip
+    more = [SuspectedError(record=record, error=one.suspect.error, lead=one.suspect.lead, alike=one.alike,
+                           generous=one.suspect.generous, left=left) for one in found]  # fmt: skip
+    return [*sure, *(replace(one, over_few=_over_few(problem, records, bench, one, errors)) for one in more)]
+
+
+def _forward(bench: _Bench, read_off: Sequence[DataError], trusted: frozenset[str]) -> list[_Judged]:
+    """Return the errors that come out best one after the other, each with those before it corrected."""
+    found = list[_Judged]()
+    for _ in range(MOST_ERRORS):
+        ranked = suspects(bench.without([*read_off, *(one.suspect.error for one in found)]), trusted)
+        if not ranked or not _is_suspected(ranked[0]):
+            break
+        alike = tuple(one.error for one in ranked[1:] if one.lead > ranked[0].lead - ALIKE_LEAD)
+        found.append(_Judged(ranked[0], alike))
+    return found
+
+
+def _back(bench: _Bench, read_off: Sequence[DataError], found: list[_Judged]) -> list[_Judged]:
+    """Return the errors that are still needed with all others corrected, judged so."""
+    last = len(found) - 1  # is judged so already
+    while len(found) > 1:
+        found = [one if i == last else _again(bench, read_off, found, i) for i, one in enumerate(found)]
+        weakest = min(found, key=lambda one: one.suspect.lead - _least(one.suspect))
+        if _is_suspected(weakest.suspect):
+            break
+        found, last = [one for one in found if one is not weakest], -1
+    return found
+
+
+def _again(bench: _Bench, read_off: Sequence[DataError], found: Sequence[_Judged], i: int) -> _Judged:
+    """Return one of some errors, judged with all others corrected."""
+    others = [one.suspect.error for k, one in enumerate(found) if k != i]
+    return found[i]._replace(
+        suspect=judged_again(bench.without([*read_off, *others]), found[i].suspect.error)
+    )
+
+
+def _over_few(
+    problem: Problem,
+    records: Sequence[Logged],
+    bench: _Bench,
+    one: SuspectedError,
+    errors: Sequence[DataError],
+) -> float:
+    """Return the lead of an error over a few causes of the record with all others corrected; only where it matters."""
+    if not is_soft(one) or one.error.kind == "step" or one.lead < FAR_BEHIND or one.left >= LOUD:
+        return -np.inf
+    before = bench.without([other for other in errors if other is not one.error])
+    each = [before.logged if i == one.record else other for i, other in enumerate(records)]
+    over_none = one.lead + before.log_sparse - before.log_none
+    return over_none - most_of_physics(posed_again(problem, each), one.record)
+
+
+def _is_suspected(one: Suspect) -> bool:
+    return one.lead > _least(one)
+
+
+def _least(one: Suspect) -> float:
+    return LEAST_SOFT_LEAD if one.error.kind in SOFT else LEAST_LEAD
+
+
+def without(records: Sequence[Logged], found: Sequence[SuspectedError]) -> list[Logged]:
+    """Return records without the errors that were found in them."""
+    return [
+        corrected(logged, tuple(one.error for one in found if one.record == i))
+        for i, logged in enumerate(records)
+    ]
