@@ -100,8 +100,8 @@ def fit_change_points(
 def _worth(
     candidates: Sequence[RankedChangePoint], done: dict[str, FittedChangePoint], least: float
 ) -> list[RankedChangePoint]:
-    """Return what is worth a fit: each cause where it comes out best, if it may come close to the best, known or hoped
-    for, and is promised more than what is known of it.
+    """Return what is worth a fit: each cause where it comes out best, if it gains anything there, may come close to
+    the best, known or hoped for, and is promised more than what is known of it.
     """
     ranked = sorted(candidates, key=lambda one: -one.log_posterior)
     first = {one.change_point.effect.id: one for one in reversed(ranked)}
@@ -109,6 +109,7 @@ def _worth(
     bar = max([least, *known.values(), *(one.log_posterior for one in ranked[:1])]) - settings.HOPELESS_NATS
     found = [one for name, one in first.items()
              if one.at_most(settings.NON_LINEAR_SHARE_OF_FIRST if one is ranked[0] else settings.NON_LINEAR_SHARE) > bar
+             and one.change_point.log_gain + one.change_point.between > settings.CLOSE_NATS
              and one.log_posterior > known.get(name, -np.inf) + settings.CLOSE_NATS]  # fmt: skip
     return sorted(found, key=lambda one: -one.log_posterior)[: settings.MAX_TRIED]
 

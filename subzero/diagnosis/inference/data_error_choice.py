@@ -119,25 +119,26 @@ class Look(Protocol):
 def compared(suspicion: Suspicion, records: Sequence[Logged], look: Look) -> list[tuple[Explained, float]]:
     """Return what errors the data may have, with what explains the records besides and its log evidence.
 
-    Where all suspected errors together explain the records in the linear problem, the records without all of them are
-    searched first, then with the weakest of them, and so on, until those that are left leave physics no chance. Where
-    they do not, something may have begun in mid-trial, which looks like a step or a clock: the records without what no
-    vehicle does get a whole search; if that does not explain them, then those without more; then those with fewer. What
-    is hopelessly behind is not finished.
+    The records without what no vehicle does, and without what physics has no chance against, get a first look. If no
+    causes explain what is left, within declared tolerances, so do those without more: at once where all errors together
+    explain the records in the linear problem; else after a whole search, as something may have begun in mid-trial,
+    which looks like a step or a clock. The most probable is finished, then what is not hopelessly behind. While that is
+    not clear, records with more errors get the same.
 
     Args:
         suspicion: what a scan says.
         records: as they are.
         look: searches records.
     """
-    whole, tried = len(suspicion.errors), list[Explained]()
-    least = whole if explain(suspicion.errors) else suspicion.firm
+    whole, least, tried = len(suspicion.errors), suspicion.firm, list[Explained]()
     first = suspicion.first(least)
     try:
         tried.append(_explained(first, records, look.begin(without(records, first))))
-        if is_finished := least < whole and not is_explained(tried[0].work):
+        is_open = least < whole and (tried[0].work.search.is_poor() or not is_explained(tried[0].work))
+        if is_finished := is_open and not explain(suspicion.errors):
             look.finish(tried[0].work)
-        more = [] if is_explained(tried[0].work) else [suspicion.first(k + 1) for k in range(least, whole)]
+            is_open = not is_explained(tried[0].work)
+        more = [suspicion.first(k + 1) for k in range(least, whole)] if is_open else []
         _race(tried, more, records, look, new=[] if is_finished else tried[:])
         for held, errors in pairwise([first, *suspicion.fewer(least)]):
             if is_clear(held, _first(tried).work):

@@ -47,8 +47,9 @@ KAPPA_NARROW = 2.0
 """How much wider than declared tolerances are where a cause stands by itself: the linear problem is no better."""
 FEWEST = 6
 """A channel with fewer samples says nothing."""
-LEAST_SCALE, MOST_SCALE, ROUNDS = 0.3, 1e4, 5
-"""Scales of the noise of a channel, and how often they are found anew behind the parameters. Of a rounded one it is
+LEAST_SCALE, MOST_SCALE, ROUNDS, SETTLED = 0.3, 1e4, 5, 0.01
+"""Scales of the noise of a channel, and how often they are found anew behind the parameters, if they still change by
+more than that share: a hundredth costs less than 0.1 nats, as the best scales are stationary. Of a rounded one it is
 never so small that a sample has more density than 1/q, which is a probability of 1."""
 OUTLIER_LOG_DENSITY = float(np.log(0.01 / 50.0))
 """Of a sample that is left out: one of a hundred, anywhere within fifty levels of the noise."""
@@ -225,8 +226,10 @@ def reckon(terms: Mapping[str, Term], D: np.ndarray) -> Reckoned:
         half = np.linalg.solve(factor, np.diag(root))
         M = half.T @ half
         z = M @ b
-        if turn < ROUNDS:
-            scales = {name: _scale(one, _left(one, z, M)) for name, one in terms.items()}
+        before, scales = scales, {name: _scale(one, _left(one, z, M)) for name, one in terms.items()}
+        if turn == ROUNDS or all(abs(scales[name] - old) < SETTLED * old for name, old in before.items()):
+            scales = before
+            break
     rr = sum(one.rr / scales[name] ** 2 for name, one in terms.items())
     log = -0.5 * (rr - float(b @ z)) - float(np.sum(np.log(np.diag(factor))))
     log += sum(one.fixed - one.samples * np.log(scales[name]) for name, one in terms.items())
