@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import numpy as np
 
@@ -33,17 +33,15 @@ from subzero.diagnosis.inference.data_error_search import (
     Suspicion,
     explain,
     is_soft,
-    leads_clearly,
     without,
 )
 from subzero.diagnosis.inference.linear_gaussian import log_sum
 from subzero.diagnosis.inference.map_fit import is_poor_fit
 from subzero.diagnosis.inference.noise import log_prior_of
+from subzero.diagnosis.inference.out_of_catalogue import Findings
+from subzero.diagnosis.inference.out_of_catalogue import is_explained as is_found
 from subzero.diagnosis.inference.posing import usual_of
 from subzero.diagnosis.inference.problem import Observed
-
-if TYPE_CHECKING:
-    from subzero.diagnosis.inference.out_of_catalogue import Findings
 
 ALIKE = 10
 """So many errors of a kind share its probability, about."""
@@ -55,7 +53,7 @@ def is_clear(errors: Sequence[SuspectedError], work: Findings) -> bool:
     """
     outside = max((one.log_posterior for one in work.out_of_catalogue), default=-np.inf)
     explained = work.search.best().log_posterior > outside and is_explained(work)
-    return explained and all(map(leads_clearly, errors))
+    return explained and all(one.is_clear for one in errors)
 
 
 def may_be_named(errors: Sequence[SuspectedError], work: Findings) -> bool:
@@ -134,7 +132,7 @@ def compared(suspicion: Suspicion, records: Sequence[Logged], look: Look) -> lis
     first = suspicion.first(least)
     try:
         tried.append(_explained(first, records, look.begin(without(records, first))))
-        is_open = least < whole and (tried[0].work.search.is_poor() or not is_explained(tried[0].work))
+        is_open = least < whole and not _is_settled(tried[0].work)
         if is_finished := is_open and not explain(suspicion.errors):
             look.finish(tried[0].work)
             is_open = not is_explained(tried[0].work)
@@ -150,6 +148,15 @@ def compared(suspicion: Suspicion, records: Sequence[Logged], look: Look) -> lis
         tried[-1].work.complete = False
     per_lost = min(one.mean for one in tried)
     return [(one, one.log_evidence(per_lost)) for one in tried]
+
+
+def _is_settled(work: Findings) -> bool:
+    """Say whether a first look leaves nothing to be explained: by causes within declared tolerances, or by one that
+    begins in mid-trial, and is far before them.
+    """
+    if is_found(work.search, work.out_of_catalogue):
+        return True
+    return is_explained(work) and not work.search.is_poor()
 
 
 def _race(

@@ -50,7 +50,7 @@ SIGNATURE_LEAD = 20.0
 class SuspectedError:
     """An error of a record, its leads with all others corrected, and those that the record cannot tell from it; `left`
     is the noise of the channel that is explained worst without all of them, in usual levels, with all of physics to
-    help; `over_few` the lead over a few causes, throughout or from mid-trial on.
+    help; `is_clear` says that it leaves physics no chance in the linear problem.
     """
 
     record: int
@@ -59,21 +59,12 @@ class SuspectedError:
     generous: float
     alike: tuple[DataError, ...] = ()
     left: float = np.inf
-    over_few: float = -np.inf
+    is_clear: bool = False
 
 
 def is_soft(one: SuspectedError) -> bool:
     """Say whether something that a vehicle does may look like an error."""
     return one.error.kind in SOFT
-
-
-def leads_clearly(one: SuspectedError) -> bool:
-    """Say whether an error leaves physics no chance in the linear problem: one that a vehicle may look like must also
-    explain, with the others, all that is there.
-    """
-    if is_soft(one):
-        return one.over_few > FAR_BEHIND and one.left < LOUD
-    return one.lead > CLEAR_LEAD and one.generous > CLEAR_GENEROUS_LEAD
 
 
 def explain(errors: Sequence[SuspectedError]) -> bool:
@@ -95,19 +86,19 @@ class Suspicion:
 
     def first(self, count: int) -> tuple[SuspectedError, ...]:
         """Return so many of them, in their order: first what is clear, then what no vehicle does, the best first."""
-        ranked = sorted(self.errors, key=lambda one: (not leads_clearly(one), is_soft(one), -one.lead))
+        ranked = sorted(self.errors, key=lambda one: (not one.is_clear, is_soft(one), -one.lead))
         return tuple(one for one in self.errors if any(one is each for each in ranked[:count]))
 
     @property
     def firm(self) -> int:
         """How many of them leave physics no chance, or are what no vehicle does."""
-        return sum(leads_clearly(one) or not is_soft(one) for one in self.errors)
+        return sum(one.is_clear or not is_soft(one) for one in self.errors)
 
     def fewer(self, count: int) -> list[tuple[SuspectedError, ...]]:
         """Return the sets with less than so many of them: with one after the other of those that are not clear taken
         away, and with none.
         """
-        clear = sum(map(leads_clearly, self.errors))
+        clear = sum(one.is_clear for one in self.errors)
         return [*(self.first(k) for k in reversed(range(max(clear, 1), count))), ()] if count else []
 
 
@@ -164,11 +155,13 @@ def _of_record(problem: Problem, records: Sequence[Logged], record: int) -> list
     found = _back(bench, read_off, _forward(bench, read_off, logged.trusted))
     errors = [*read_off, *(one.suspect.error for one in found)]
     left = max(bench.without(errors).as_is.scales.values(), default=np.inf) if found else 0.0
-    sure = [SuspectedError(record=record, error=one, lead=SIGNATURE_LEAD, generous=SIGNATURE_LEAD, left=left)
-            for one in read_off]  # fmt: skip
-    more = [SuspectedError(record=record, error=one.suspect.error, lead=one.suspect.lead, alike=one.alike,
-                           generous=one.suspect.generous, left=left) for one in found]  # fmt: skip
-    return [*sure, *(replace(one, over_few=_over_few(problem, records, bench, one, errors)) for one in more)]
+    made = [*(_Judged(Suspect(one, SIGNATURE_LEAD, SIGNATURE_LEAD), ()) for one in read_off), *found]
+    clear = _clear(problem, records, record, bench, made)
+    return [
+        SuspectedError(record=record, error=one.error, lead=one.lead, generous=one.generous, alike=alike,
+                       left=left, is_clear=any(one.error is other for other in clear))
+        for one, alike in made
+    ]  # fmt: skip
 
 
 def _forward(bench: _Bench, read_off: Sequence[DataError], trusted: frozenset[str]) -> list[_Judged]:
@@ -203,20 +196,27 @@ def _again(bench: _Bench, read_off: Sequence[DataError], found: Sequence[_Judged
     )
 
 
-def _over_few(
-    problem: Problem,
-    records: Sequence[Logged],
-    bench: _Bench,
-    one: SuspectedError,
-    errors: Sequence[DataError],
-) -> float:
-    """Return the lead of an error over a few causes of the record with all others corrected; only where it matters."""
-    if not is_soft(one) or one.error.kind == "step" or one.lead < FAR_BEHIND or one.left >= LOUD:
-        return -np.inf
-    before = bench.without([other for other in errors if other is not one.error])
-    each = [before.logged if i == one.record else other for i, other in enumerate(records)]
-    over_none = one.lead + before.log_sparse - before.log_none
-    return over_none - most_of_physics(posed_again(problem, each), one.record)
+def _clear(
+    problem: Problem, records: Sequence[Logged], record: int, bench: _Bench, made: Sequence[_Judged]
+) -> list[DataError]:
+    """Return the errors that leave physics no chance in the linear problem. One that a vehicle may look like must also
+    explain all that is there, and without the help of any that is not clear: what broke in mid-trial makes an error of
+    a clock likely, too, but that leaves more than noise, or needs another one.
+    """
+    firm = [one for one, _ in made if one.error.kind not in SOFT]
+    clear = [one.error for one in firm if one.lead > CLEAR_LEAD and one.generous > CLEAR_GENEROUS_LEAD]
+    held = [one.error for one in firm]
+    for one in sorted((one for one, _ in made if one.error.kind in SOFT), key=lambda each: -each.lead):
+        after = bench.without([*held, one.error])
+        if one.error.kind == "step" or one.lead < FAR_BEHIND or max(after.as_is.scales.values()) >= LOUD:
+            break
+        before = bench.without(held)
+        each = [before.logged if i == record else other for i, other in enumerate(records)]
+        over_none = judged_again(before, one.error).lead + before.log_sparse - before.log_none
+        if over_none - most_of_physics(posed_again(problem, each), record) < FAR_BEHIND:
+            break
+        held, clear = [*held, one.error], [*clear, one.error]
+    return clear
 
 
 def _is_suspected(one: Suspect) -> bool:
