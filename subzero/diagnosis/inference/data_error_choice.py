@@ -10,7 +10,7 @@ A search that is hopelessly behind ends with its first look. What the linear pro
 before anything is searched, and the records with it are not searched at all if causes that hold throughout explain what
 is left (`is_clear`): what no vehicle does (another sign, unit or reference of one channel, exchanged columns, repeated
 values) where physics has no chance with all its parameters free at once; a command, a clock or a latency where a few
-causes, throughout or from mid-trial on, are hopelessly behind (`data_error_rivals`). A step in a sensor is always held
+causes, throughout or from mid-trial on, are hopelessly behind (`data_error_search`). A step in a sensor is always held
 against a search of the records with it.
 """
 

@@ -61,7 +61,7 @@ def _of(name: str, time: np.ndarray, values: np.ndarray, level: float) -> list[D
     found = []
     for value, at in _far_values(values, level).items():
         found.append(
-            DataError(kind="dropout", channels=(name,), how=f"{value:.9g}", at=tuple(time[at].tolist()))
+            DataError(kind="dropout", channels=(name,), how=f"{value + 0.0:.9g}", at=tuple(time[at].tolist()))
         )
         values = np.where(at, np.nan, values)
     known = np.flatnonzero(np.isfinite(values))
