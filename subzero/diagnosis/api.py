@@ -23,7 +23,8 @@ from subzero.diagnosis.assessment.residuals import misfits
 from subzero.diagnosis.hypothesis.catalogue import load
 from subzero.diagnosis.hypothesis.effect import Effect
 from subzero.diagnosis.hypothesis.logged import Logged
-from subzero.diagnosis.inference.data_error_choice import compared, suspected
+from subzero.diagnosis.inference.data_error_choice import compared
+from subzero.diagnosis.inference.data_error_search import suspected
 from subzero.diagnosis.inference.model_search import Search
 from subzero.diagnosis.inference.out_of_catalogue import Findings, explanations_outside, is_explained
 from subzero.diagnosis.inference.posing import pose, posed_again

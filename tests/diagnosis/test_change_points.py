@@ -120,6 +120,17 @@ def test_the_scan_finds_what_began_and_when(dragging):
     assert found[0].log_gain > 20.0
 
 
+def test_of_a_healthy_record_no_change_point_is_worth_a_fit(plant):
+    """It gains nothing, so whatever else is known, a fit could not make it probable."""
+    healthy = plant(lambda setting: setting)
+    fit = healthy.fit()
+    effects = [EFFECTS[name] for name in ("hull_drag", "rudder_offset", "net_buoyancy")]
+    with ThreadPoolExecutor(2) as side:
+        assert not fit_change_points(
+            healthy.problem, [point_of(healthy.problem, fit)], effects, 0, -1e9, side
+        )
+
+
 def test_times_stay_clear_of_the_ends(dragging):
     times = times_of(dragging.problem, 0)
     assert times[0] == 2.0

@@ -15,8 +15,10 @@ from numpy.testing import assert_allclose
 
 import scenarios
 import subzero
+from benchmarks.diagnosis import data_errors
 from subzero import Logged
 from subzero.diagnosis import Setting, catalogue, report
+from subzero.diagnosis.hypothesis.data_error import corrected
 from subzero.diagnosis.inference import KINDS_OF_DATA_ERRORS, DataError, is_rounded, repeated_values
 from subzero.records.record import Record
 from subzero.synthetic.planted import draw_tolerances, make_record
@@ -81,6 +83,14 @@ def test_a_correction_undoes_its_error(error):
         assert_allclose(after.record.values[name][known], true, atol=0.03)
 
 
+def test_what_a_record_repeats_is_taken_off_at_the_times_that_were_written():
+    clean = smooth()
+    late, frozen = EACH[11], EACH[7]
+    for order in ((late, frozen), (frozen, late)):
+        values = corrected(clean, order).record.values["roll_angle"]
+        assert np.isfinite(values).sum() == 160  # 20 s of which the first 4 are before the trial
+
+
 @pytest.mark.parametrize("error", EACH, ids=lambda one: f"{one.id} {one.amount:g}")
 def test_a_density_is_counted_in_the_units_of_the_record(error):
     """log|dT/dy| is how far two values that are close come apart by the correction."""
@@ -133,6 +143,14 @@ def test_two_errors_at_once_are_named_at_the_public_face_and_nothing_is_converte
     assert told["verdict"] == "data_error"
     assert told["data_errors"][0]["remedy"]
     assert "heading_deg has the other sign" in report.words.sentence(verdict)
+
+
+@pytest.mark.slow
+def test_a_channel_that_froze_beside_one_that_is_late_is_not_said_to_be_exchanged_as_well():
+    """A rounded heading, frozen from 10.4 s on, has few measurements: exchanged with another, it hands its gaps on."""
+    record = data_errors.made(*data_errors.drawn(4411, 7)[6])
+    assert {one.id for one in record.errors} == {"frozen:heading", "latency:roll_angle"}
+    assert data_errors.is_right(record, subzero.diagnose(record.logged, budget="verdict"))
 
 
 @pytest.mark.slow
@@ -213,3 +231,18 @@ def test_a_rounded_depth_that_stands_still_before_an_outlier_stands_for_itself(o
     record = Record(source="made", time=time, values={"depth": depth})
     found = repeated_values(dataclasses.replace(clean, record=record))
     assert not [one for one in found if one.how]
+
+
+def test_a_log_that_shows_zeros_in_between_is_found_though_the_vehicle_began_at_rest():
+    """Its first zeros are measured; and what it measures between two stretches of zeros is no drop-out."""
+    time, clean = np.arange(0.0, 40.0, 0.1), smooth()
+    speed = np.round(
+        1.0 - np.exp(-time / 2.0) + 0.006 * np.random.default_rng(4).standard_normal(time.size), 2
+    )
+    lost = (
+        ((time > 20.0) & (time < 22.0)) | ((time > 22.35) & (time < 24.0)) | ((time > 30.0) & (time < 31.0))
+    )
+    record = Record(source="made", time=time, values={"surge_speed": np.where(lost, 0.0, speed)})
+    (found,) = [one for one in repeated_values(dataclasses.replace(clean, record=record)) if one.how]
+    assert (found.kind, found.how) == ("dropout", "0")
+    assert_allclose(found.at, time[lost])

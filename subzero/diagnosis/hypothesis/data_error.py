@@ -13,7 +13,7 @@ Each is a transformation of the record, or of the commands that are said to have
 `DataError.corrected` undoes the error in a record, and `DataError.planted` makes it. Probabilities of records are
 compared as they were written, so that y = a x costs log|a| a sample (`DataError.log_jacobian`).
 
-An offset of the clock within `LEAST_LATE_S`, a first-order lag, a bias or a scale of a sensor are causes of the
+An offset of the clock within its `LEAST`, a first-order lag, a bias or a scale of a sensor are causes of the
 catalogue and no errors in the data: they have any size, errors in the data are discrete, or large.
 """
 
@@ -33,7 +33,7 @@ from subzero.errors import UserError
 from subzero.records.consistency import MISTAKEN, REPORTED_COMMANDS
 from subzero.records.record import Record
 
-LEAST_LATE_S, LEAST_LATENCY_S, LEAST_RATE = 1.5, 1.0, 0.01
+LEAST = {"late_clock": 1.5, "latency": 1.0, "clock_rate": 0.01}
 """Smaller delays are the catalogue's: three of its scales of a clock [s], five of a lag [s]; a clock that is wrong by
 less than that share is a good one."""
 
@@ -412,12 +412,14 @@ KINDS: Mapping[str, Kind] = {
 }  # fmt: skip
 """Kind → what it is; shares sum to one."""
 
+REPEATED = ("frozen", "dropout")
+"""Kinds that are read off a record as it was written."""
 ANY = 0.1
 """How probable it is beforehand that a record has an error in its data."""
 
 
 def corrected(logged: Logged, errors: tuple[DataError, ...]) -> Logged:
-    """Return a record without some errors, undone in turn."""
-    for error in errors:
+    """Return a record without some errors, undone in turn; first what stands at the times that were written."""
+    for error in sorted(errors, key=lambda one: one.kind not in REPEATED):
         logged = error.corrected(logged)
     return logged

@@ -24,7 +24,7 @@ a formula for a latent force                              force_formula
 change points, forces and drifts beside the hypotheses    out_of_catalogue
 values that a record repeats in place of measurements     repeated_values
 errors in the data, proposed by linear evidence           data_error_scan
-... and how close a few causes come to them there         data_error_rivals
+... suspected together, and how close a few causes come   data_error_search
 ... and held against all else                             data_error_choice
 all that only steers the search                           settings
 

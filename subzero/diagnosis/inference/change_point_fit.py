@@ -92,16 +92,19 @@ def fit_change_points(
             done[name] = max(one, done.get(name, one), key=lambda each: each.log_posterior)
         best = max(done.values(), key=lambda one: one.log_posterior)
         candidates = [one for one in candidates if not any(one is each for each in worth)]
-        if not is_poor_fit(best.fit):
-            candidates = ranked_in(problem, linearised_at(problem, best), able, record)
+        if is_poor_fit(best.fit):
+            continue
+        if best.log_posterior < least - settings.HOPELESS_NATS:  # no place to look from
+            break
+        candidates = ranked_in(problem, linearised_at(problem, best), able, record)
     return list(done.values())
 
 
 def _worth(
     candidates: Sequence[RankedChangePoint], done: dict[str, FittedChangePoint], least: float
 ) -> list[RankedChangePoint]:
-    """Return what is worth a fit: each cause where it comes out best, if it may come close to the best, known or hoped
-    for, and is promised more than what is known of it.
+    """Return what is worth a fit: each cause where it comes out best, if it gains anything there, may come close to
+    the best, known or hoped for, and is promised more than what is known of it.
     """
     ranked = sorted(candidates, key=lambda one: -one.log_posterior)
     first = {one.change_point.effect.id: one for one in reversed(ranked)}
@@ -109,6 +112,7 @@ def _worth(
     bar = max([least, *known.values(), *(one.log_posterior for one in ranked[:1])]) - settings.HOPELESS_NATS
     found = [one for name, one in first.items()
              if one.at_most(settings.NON_LINEAR_SHARE_OF_FIRST if one is ranked[0] else settings.NON_LINEAR_SHARE) > bar
+             and one.change_point.log_gain + one.change_point.between > settings.CLOSE_NATS
              and one.log_posterior > known.get(name, -np.inf) + settings.CLOSE_NATS]  # fmt: skip
     return sorted(found, key=lambda one: -one.log_posterior)[: settings.MAX_TRIED]
 

@@ -27,11 +27,12 @@ from subzero.diagnosis.hypothesis.data_error import (
     ANY,
     COMMAND_GROUPS,
     KINDS,
-    LEAST_LATE_S,
-    LEAST_LATENCY_S,
+    LEAST,
     REFERENCES,
+    REPEATED,
     SWAPS,
     DataError,
+    corrected,
 )
 from subzero.diagnosis.hypothesis.hypotheses import PRIOR, columns_of, nameable, variances
 from subzero.diagnosis.hypothesis.logged import Logged
@@ -46,8 +47,9 @@ KAPPA_NARROW = 2.0
 """How much wider than declared tolerances are where a cause stands by itself: the linear problem is no better."""
 FEWEST = 6
 """A channel with fewer samples says nothing."""
-LEAST_SCALE, MOST_SCALE, ROUNDS = 0.3, 1e4, 5
-"""Scales of the noise of a channel, and how often they are found anew behind the parameters. Of a rounded one it is
+LEAST_SCALE, MOST_SCALE, ROUNDS, SETTLED = 0.3, 1e4, 5, 0.01
+"""Scales of the noise of a channel, and how often they are found anew behind the parameters, if they still change by
+more than that share: a hundredth costs less than 0.1 nats, as the best scales are stationary. Of a rounded one it is
 never so small that a sample has more density than 1/q, which is a probability of 1."""
 OUTLIER_LOG_DENSITY = float(np.log(0.01 / 50.0))
 """Of a sample that is left out: one of a hundred, anywhere within fifty levels of the noise."""
@@ -70,7 +72,7 @@ FREE_NUMBER_LOG_PRIOR = -5.0
 
 class Term(NamedTuple):
     """What a channel says of the parameters: JᵀJ, Jᵀr, |r|², whitened; how many samples, and ½ log det of their noise
-    with what outliers cost; and the least scale of its noise.
+    with what outliers cost; the least scale of its noise; and how many were measured, with outliers.
     """
 
     A: np.ndarray
@@ -79,6 +81,7 @@ class Term(NamedTuple):
     samples: int
     fixed: float
     least: float
+    measured: int
 
 
 class Reckoned(NamedTuple):
@@ -105,7 +108,8 @@ class Yardstick:
     """What the nominal model, and all that may be wrong with it, say of a record at any time.
 
     Attributes:
-        logged: the record as it is said to be.
+        logged: the record as it is said to be, but for what is corrected in it.
+        written: the record as it is.
         step: between times of the prediction, from 0 on. [s]
         nominal: channel → prediction (g,). [display unit]
         slopes: channel → sensitivities to all parameters (g, k).
@@ -119,6 +123,7 @@ class Yardstick:
     """
 
     logged: Logged
+    written: Logged
     step: float
     nominal: Mapping[str, np.ndarray]
     slopes: Mapping[str, np.ndarray]
@@ -129,6 +134,12 @@ class Yardstick:
     repeated: tuple[DataError, ...] = ()
     corrected: tuple[DataError, ...] = ()
     kept: dict[str, Mapping[str, np.ndarray]] = field(default_factory=dict)
+
+    def without(self, error: DataError) -> Logged:
+        """Return the record without a further error: a value that it repeats stands at the times that were written."""
+        if error.kind in REPEATED and self.corrected:
+            return corrected(self.written, (*self.corrected, error))
+        return error.corrected(self.logged)
 
     def terms(self, logged: Logged, channels: Iterable[str]) -> dict[str, Term]:
         """Return what channels of a record, or of a corrected one, say of the parameters."""
@@ -165,7 +176,8 @@ class Yardstick:
         white = noise.whiten(np.column_stack([values - expected, self.at(self.slopes[name], time)]))
         r, J = white[:, 0], white[:, 1:]
         out = (measured - noise.count) * (OUTLIER_LOG_DENSITY - np.log(usual.level))
-        return Term(J.T @ J, J.T @ r, float(r @ r), noise.count, out - noise.log_scale, least_scale(noise))
+        fixed, least = out - noise.log_scale, least_scale(noise)
+        return Term(J.T @ J, J.T @ r, float(r @ r), noise.count, fixed, least, measured)
 
     @cached_property
     def own(self) -> dict[str, Term]:
@@ -214,8 +226,10 @@ def reckon(terms: Mapping[str, Term], D: np.ndarray) -> Reckoned:
         half = np.linalg.solve(factor, np.diag(root))
         M = half.T @ half
         z = M @ b
-        if turn < ROUNDS:
-            scales = {name: _scale(one, _left(one, z, M)) for name, one in terms.items()}
+        before, scales = scales, {name: _scale(one, _left(one, z, M)) for name, one in terms.items()}
+        if turn == ROUNDS or all(abs(scales[name] - old) < SETTLED * old for name, old in before.items()):
+            scales = before
+            break
     rr = sum(one.rr / scales[name] ** 2 for name, one in terms.items())
     log = -0.5 * (rr - float(b @ z)) - float(np.sum(np.log(np.diag(factor))))
     log += sum(one.fixed - one.samples * np.log(scales[name]) for name, one in terms.items())
@@ -259,7 +273,7 @@ def yardstick_of(problem: Problem, record: int, logged: Logged) -> Yardstick:
         for name in names:
             slopes[name][:, k] = np.nan_to_num((there[name] - nominal[name]) / moved[k][k])
     grid, causes = base[0], [columns_of(problem.entries, (name,)) for name in nameable(problem.entries)]
-    return Yardstick(logged=logged, step=float(grid[1] - grid[0]), nominal=nominal, slopes=slopes,
+    return Yardstick(logged=logged, written=logged, step=float(grid[1] - grid[0]), nominal=nominal, slopes=slopes,
                      D=generous_variances(problem), narrow=variances(problem.entries, (), KAPPA_NARROW),
                      causes=causes, setting=one.setting)  # fmt: skip
 
@@ -312,6 +326,18 @@ def suspects(yardstick: Yardstick, trusted: frozenset[str] = frozenset()) -> lis
         if one.lead > found.get(one.error.id, one).lead or one.error.id not in found:
             found[one.error.id] = one
     return sorted((one for one in found.values() if one.lead > 0.0), key=lambda one: -one.lead)
+
+
+def judged_again(yardstick: Yardstick, error: DataError) -> Suspect:
+    """Return how an error is judged in another record, or with others corrected; its number is found anew."""
+    group = next(
+        (one for one in possible(yardstick, frozenset()) if any(other.id == error.id for other in one.each)),
+        Group([error]),
+    )
+    one = _judged(yardstick, error, group, closer=True)
+    if group.step:
+        return best_number(partial(_judged, yardstick, group=group, closer=True), one, 0.5 * group.step)
+    return one
 
 
 def _is_known(error: DataError, known: Sequence[DataError]) -> bool:
@@ -399,8 +425,9 @@ def _jitter(values: np.ndarray) -> float:
 
 def _clocks(time: np.ndarray, names: Sequence[str]) -> list[Group]:
     span = float(time[-1] - time[0])
-    late = np.arange(LEAST_LATE_S, max(LATEST_SHARE * span, 2.0 * LEAST_LATE_S), CLOCK_STEP_S)
-    own = np.arange(LEAST_LATENCY_S, min(LATEST_CHANNEL_S, LATEST_SHARE * span) + 1e-9, CHANNEL_STEP_S)
+    least = LEAST["late_clock"]
+    late = np.arange(least, max(LATEST_SHARE * span, 2.0 * least), CLOCK_STEP_S)
+    own = np.arange(LEAST["latency"], min(LATEST_CHANNEL_S, LATEST_SHARE * span) + 1e-9, CHANNEL_STEP_S)
     found = [_numbered("late_clock", late, CLOCK_STEP_S), _numbered("clock_rate", RATES, RATE_STEP)]
     return found + [_numbered("latency", own, CHANNEL_STEP_S, name) for name in names if len(names) > 1]
 
@@ -466,26 +493,25 @@ def log_prior(error: DataError, alike: int) -> float:
 
 def _judged(yardstick: Yardstick, error: DataError, group: Group, *, closer: bool = False) -> Suspect:
     """Return by how much a record is more probable with an error in its data than without."""
-    logged = error.corrected(yardstick.logged)
-    touched = list(yardstick.own) if error.is_of_clock or error.is_of_commands else list(error.channels)
+    logged = yardstick.without(error)
+    is_of_all = error.is_of_clock or error.is_of_commands or (error.kind in REPEATED and yardstick.corrected)
+    touched = list(yardstick.own) if is_of_all else list(error.channels)
     terms = {**yardstick.own, **yardstick.terms(logged, touched)}
-    if min(terms[name].samples for name in touched) < FEWEST or _is_small_step(yardstick, error):
+    if min(terms[name].samples for name in touched) < FEWEST or _is_small(yardstick, error):
         return Suspect(error, -np.inf, -np.inf)
-    odds = log_prior(error, len(group.each))
-    for name in touched:
-        lost = yardstick.own[name].samples - terms[name].samples
-        odds += error.log_jacobian * terms[name].samples + lost * _mean_log_density(yardstick, name)
+    odds = log_prior(error, len(group.each)) + _lost(yardstick, terms, touched)
+    odds += error.log_jacobian * sum(terms[name].samples for name in touched)
     generous = odds + reckon(terms, yardstick.D).log - yardstick.as_is.log
     lead = odds + yardstick.sparse(terms) - yardstick.log_sparse if closer else generous
     return Suspect(error, float(lead), float(generous))
 
 
-def _is_small_step(yardstick: Yardstick, error: DataError) -> bool:
-    """Say whether a step in a sensor is too small to be one: where a rounded channel stands still, what rounding takes
-    off is the same for long, and a step of some of its resolution explains it.
+def _is_small(yardstick: Yardstick, error: DataError) -> bool:
+    """Say whether the number of an error is too small to be one. Where a rounded channel stands still, what rounding
+    takes off is the same for long, and a step in the sensor of some of its resolution explains it.
     """
     if error.kind != "step":
-        return False
+        return abs(error.amount) < LEAST.get(error.kind, 0.0)
     (name,) = error.channels
     usual = usual_of(name, yardstick.logged.record.values[name], yardstick.logged.noise)
     return abs(error.amount) < LEAST_STEP_LEVELS * np.hypot(usual.level, usual.resolution / np.sqrt(12.0))
@@ -495,10 +521,20 @@ def _closer(yardstick: Yardstick, one: Suspect, group: Group) -> Suspect:
     return _judged(yardstick, one.error, group, closer=True)
 
 
+def _lost(yardstick: Yardstick, terms: Mapping[str, Term], touched: Sequence[str]) -> float:
+    """Return what samples that are no measurements any more added to the evidence of the record as it is, on average;
+    of channels that are exchanged, gaps only change places.
+    """
+    lost = {name: yardstick.own[name].measured - terms[name].measured for name in touched}
+    if not any(lost.values()) or sum(lost.values()) == 0:
+        return 0.0
+    return sum(count * _mean_log_density(yardstick, name) for name, count in lost.items())
+
+
 def _mean_log_density(yardstick: Yardstick, name: str) -> float:
-    """Return what a sample of a channel adds to the evidence of the record as it is."""
+    """Return what a measured sample of a channel adds to the evidence of the record as it is."""
     own, scale = yardstick.own[name], yardstick.as_is.scales[name]
-    return own.fixed / max(own.samples, 1) - float(np.log(scale)) - 0.5
+    return (own.fixed - own.samples * (float(np.log(scale)) + 0.5)) / max(own.measured, 1)
 
 
 FINEST = 0.02

@@ -25,6 +25,8 @@ FAR_LEVELS, FEWEST_FAR, NEIGHBOURS, NEAREST = 8.0, 4, 5, 2
 """A value is no measurement if it comes at least so often, once in three samples in a row, so many noise levels from
 what is measured around it: from each of the nearest on both sides, of which one may be an outlier. Outliers that are
 rounded may be equal, but not in a row."""
+MOSTLY_FAR = 0.5
+"""... and in so large a share of its places: a vehicle at rest has a speed of 0, too. [-]"""
 SHORT, FEWEST_FROZEN = 3, 6
 """Runs as short as this say how often values repeat by chance; a channel is frozen if it repeats so many to the end."""
 
@@ -59,7 +61,7 @@ def _of(name: str, time: np.ndarray, values: np.ndarray, level: float) -> list[D
     found = []
     for value, at in _far_values(values, level).items():
         found.append(
-            DataError(kind="dropout", channels=(name,), how=f"{value:.9g}", at=tuple(time[at].tolist()))
+            DataError(kind="dropout", channels=(name,), how=f"{value + 0.0:.9g}", at=tuple(time[at].tolist()))
         )
         values = np.where(at, np.nan, values)
     known = np.flatnonzero(np.isfinite(values))
@@ -83,21 +85,21 @@ def _of(name: str, time: np.ndarray, values: np.ndarray, level: float) -> list[D
 
 
 def _far_values(values: np.ndarray, level: float) -> Mapping[float, np.ndarray]:
-    """Return value → where it stands (n,), of those that are no measurements."""
-    known = np.isfinite(values)
-    distinct, counts = np.unique(values[known], return_counts=True)
-    found = {}
-    for value in distinct[counts >= FEWEST_FAR].tolist():
-        at, others = values == value, np.flatnonzero(known & (values != value))
+    """Return value → where it stands for nothing (n,), of those that are no measurements there: elsewhere, as where a
+    vehicle is at rest, it may be measured. The farthest first: what lies between two of its stretches is far from it.
+    """
+    distinct, counts = np.unique(values[np.isfinite(values)], return_counts=True)
+    often, found = distinct[counts >= FEWEST_FAR], {}
+    for value in sorted(often.tolist(), key=lambda one: -abs(one - np.nanmedian(values))):
+        at, others = values == value, np.flatnonzero(np.isfinite(values) & (values != value))
         if others.size < FEWEST_FAR:
             continue
-        back = at & (np.arange(at.size) < others[-1])  # what lasts to the end is frozen
-        if (
-            np.count_nonzero(back) >= FEWEST_FAR
-            and np.any(back[2:] & back[1:-1] & back[:-2])
-            and all(_is_far(value, i, values, others, level) for i in np.flatnonzero(back).tolist())
-        ):
-            found[value] = at
+        places = np.flatnonzero(at[: others[-1]])  # what only lasts to the end is frozen
+        far = at.copy()
+        far[places] = [_is_far(value, i, values, others, level) for i in places.tolist()]
+        enough = np.count_nonzero(far[: others[-1]]) >= max(FEWEST_FAR, MOSTLY_FAR * places.size)
+        if enough and np.any(far[2:] & far[1:-1] & far[:-2]):
+            found[value], values = far, np.where(far, np.nan, values)
     return found
 
 

@@ -13,12 +13,8 @@ import numpy as np
 
 from subzero.diagnosis.hypothesis.data_error import DataError
 from subzero.diagnosis.hypothesis.logged import Logged
-from subzero.diagnosis.inference.data_error_choice import (
-    Explained,
-    SuspectedError,
-    is_soft,
-    may_be_named,
-)
+from subzero.diagnosis.inference.data_error_choice import Explained, may_be_named
+from subzero.diagnosis.inference.data_error_search import SuspectedError, is_soft
 from subzero.diagnosis.inference.linear_gaussian import log_sum
 from subzero.diagnosis.inference.model_average import NAMED_PROBABILITY
 from subzero.diagnosis.inference.out_of_catalogue import Findings

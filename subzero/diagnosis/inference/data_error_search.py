@@ -1,0 +1,376 @@
+"""Which errors in the data are suspected: a search forward and back, in the linear problem, before anything is fitted.
+
+Forward: the best suspect of `data_error_scan` is corrected, and the scan goes on with the corrected record, until it
+finds none. Back: each error is judged again with all others corrected, and its numbers are found anew; what is not
+needed any more is dropped, the weakest first. So the first of two errors, which may have looked like something else
+while the second was there, is judged as the second is: by what it adds.
+
+How far physics comes towards a record without them is looked at before any search, too:
+
+    G = max over sets of at most MAX_CAUSES terms of  log p(y | terms) p(terms) − log p(y | nothing) p(nothing)
+
+A term is a cause, throughout or from some time of a grid on, which is what a late clock looks like. The set grows by
+the term that gains most; the scales of the noise are found anew behind each set, as in `data_error_scan`, which has
+nothing and single causes only. An error of the data that is far ahead of that needs no search of the record as it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from subzero.diagnosis.hypothesis.data_error import DataError, corrected
+from subzero.diagnosis.hypothesis.hypotheses import MAX_CAUSES, PRIOR, columns_of, nameable, variances
+from subzero.diagnosis.hypothesis.logged import Logged
+from subzero.diagnosis.inference.change_point_scan import BaseRun, Begun, gain_of, onset_columns
+from subzero.diagnosis.inference.data_error_scan import (
+    FAR_BEHIND,
+    KAPPA_NARROW,
+    Reckoned,
+    Suspect,
+    Term,
+    Yardstick,
+    generous_variances,
+    judged_again,
+    least_scale,
+    reckon,
+    suspects,
+    to_usual_sizes,
+    yardstick_of,
+)
+from subzero.diagnosis.inference.linear_gaussian import ForceInformation, Posterior, freed, seen
+from subzero.diagnosis.inference.posing import pose, posed_again
+from subzero.diagnosis.inference.problem import Problem
+from subzero.diagnosis.inference.repeated_values import is_rounded, repeated_values
+
+MOST_ERRORS = 3
+"""Of a record, beside values that are repeated."""
+LEAST_LEAD, LEAST_SOFT_LEAD = 5.0, 15.0
+"""An error is suspected if a record is so much more probable with it, as a logarithm; the second of what is `SOFT`."""
+SOFT = ("step", "late_clock", "clock_rate", "latency", "command_sign", "command_swap")
+"""Kinds with a number to be fitted, or that change the motion: something that broke in mid-trial may look like them."""
+ALIKE_LEAD = 3.0
+"""Errors whose leads differ by less are told together."""
+CLEAR_LEAD, CLEAR_GENEROUS_LEAD = 15.0, 10.0
+"""With a greater lead over physics, in the linear problem, an error needs no search of the record as it is: over
+nothing and every cause, and over all causes at once."""
+LOUD = 2.5
+"""Noise of more usual levels hides a misfit. [-]"""
+SIGNATURE_LEAD = 20.0
+"""Lead of what is read off a record."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SuspectedError:
+    """An error of a record, its leads with all others corrected, and those that the record cannot tell from it; `left`
+    is the noise of the channel that is explained worst without all of them, in usual levels, with all of physics to
+    help; `is_clear` says that it leaves physics no chance in the linear problem.
+    """
+
+    record: int
+    error: DataError
+    lead: float
+    generous: float
+    alike: tuple[DataError, ...] = ()
+    left: float = np.inf
+    is_clear: bool = False
+
+
+def is_soft(one: SuspectedError) -> bool:
+    """Say whether something that a vehicle does may look like an error."""
+    return one.error.kind in SOFT
+
+
+def explain(errors: Sequence[SuspectedError]) -> bool:
+    """Say whether errors are all that the linear problem needs: what broke in mid-trial makes an error of a clock
+    likely, too, but that leaves more than noise.
+    """
+    return all(one.left < LOUD for one in errors)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Suspicion:
+    """What a scan of records says of errors in their data.
+
+    Attributes:
+        errors: that are suspected, in the order in which they are to be corrected.
+    """
+
+    errors: tuple[SuspectedError, ...]
+
+    def first(self, count: int) -> tuple[SuspectedError, ...]:
+        """Return so many of them, in their order: first what is clear, then what no vehicle does, the best first."""
+        ranked = sorted(self.errors, key=lambda one: (not one.is_clear, is_soft(one), -one.lead))
+        return tuple(one for one in self.errors if any(one is each for each in ranked[:count]))
+
+    @property
+    def firm(self) -> int:
+        """How many of them leave physics no chance, or are what no vehicle does."""
+        return sum(one.is_clear or not is_soft(one) for one in self.errors)
+
+    def fewer(self, count: int) -> list[tuple[SuspectedError, ...]]:
+        """Return the sets with less than so many of them: with one after the other of those that are not clear taken
+        away, and with none.
+        """
+        clear = sum(one.is_clear for one in self.errors)
+        return [*(self.first(k) for k in reversed(range(max(clear, 1), count))), ()] if count else []
+
+
+def suspected(problem: Problem, records: Sequence[Logged]) -> Suspicion:
+    """Return what errors the data of some records may have."""
+    each = [_of_record(problem, records, i) for i in range(len(records))]
+    return Suspicion(errors=tuple(one for found in each for one in found))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Bench:
+    """A record as it is, and what it is judged by, for each of the commands that it may have been flown with.
+
+    Attributes:
+        begun: its yardstick as it is.
+        under: commands → a yardstick under them.
+    """
+
+    begun: Yardstick
+    under: dict[bytes, Yardstick] = field(default_factory=dict)
+
+    def without(self, errors: Sequence[DataError]) -> Yardstick:
+        """Return what the record is judged by without some errors; with other commands it has sensitivities of its
+        own.
+        """
+        written = self.begun.written
+        logged = corrected(written, tuple(errors))
+        commands = logged.setting.trial.commands
+        base = self.begun
+        if commands is not written.setting.trial.commands and commands is not None:
+            key = commands.values.tobytes()
+            if key not in self.under:
+                self.under[key] = yardstick_of(pose([logged]), 0, logged)
+            base = self.under[key]
+        return replace(
+            base, logged=logged, written=written, repeated=self.begun.repeated, corrected=tuple(errors)
+        )
+
+
+class _Judged(NamedTuple):
+    """An error with its leads, and what the record cannot tell from it."""
+
+    suspect: Suspect
+    alike: tuple[DataError, ...]
+
+
+def _of_record(problem: Problem, records: Sequence[Logged], record: int) -> list[SuspectedError]:
+    """Return the errors that a record may have."""
+    logged = records[record]
+    repeated = repeated_values(logged, logged.trusted)
+    read_off = [one for one in repeated if not is_rounded(one, logged)]
+    unclear = tuple(one for one in repeated if is_rounded(one, logged))
+    bench = _Bench(begun=replace(yardstick_of(problem, record, logged), repeated=unclear))
+    found = _back(bench, read_off, _forward(bench, read_off, logged.trusted))
+    errors = [*read_off, *(one.suspect.error for one in found)]
+    left = max(bench.without(errors).as_is.scales.values(), default=np.inf) if found else 0.0
+    made = [*(_Judged(Suspect(one, SIGNATURE_LEAD, SIGNATURE_LEAD), ()) for one in read_off), *found]
+    clear = _clear(problem, records, record, bench, made)
+    return [
+        SuspectedError(record=record, error=one.error, lead=one.lead, generous=one.generous, alike=alike,
+                       left=left, is_clear=any(one.error is other for other in clear))
+        for one, alike in made
+    ]  # fmt: skip
+
+
+def _forward(bench: _Bench, read_off: Sequence[DataError], trusted: frozenset[str]) -> list[_Judged]:
+    """Return the errors that come out best one after the other, each with those before it corrected."""
+    found = list[_Judged]()
+    for _ in range(MOST_ERRORS):
+        ranked = suspects(bench.without([*read_off, *(one.suspect.error for one in found)]), trusted)
+        if not ranked or not _is_suspected(ranked[0]):
+            break
+        alike = tuple(one.error for one in ranked[1:] if one.lead > ranked[0].lead - ALIKE_LEAD)
+        found.append(_Judged(ranked[0], alike))
+    return found
+
+
+def _back(bench: _Bench, read_off: Sequence[DataError], found: list[_Judged]) -> list[_Judged]:
+    """Return the errors that are still needed with all others corrected, judged so."""
+    last = len(found) - 1  # is judged so already
+    while len(found) > 1:
+        found = [one if i == last else _again(bench, read_off, found, i) for i, one in enumerate(found)]
+        weakest = min(found, key=lambda one: one.suspect.lead - _least(one.suspect))
+        if _is_suspected(weakest.suspect):
+            break
+        found, last = [one for one in found if one is not weakest], -1
+    return found
+
+
+def _again(bench: _Bench, read_off: Sequence[DataError], found: Sequence[_Judged], i: int) -> _Judged:
+    """Return one of some errors, judged with all others corrected."""
+    others = [one.suspect.error for k, one in enumerate(found) if k != i]
+    return found[i]._replace(
+        suspect=judged_again(bench.without([*read_off, *others]), found[i].suspect.error)
+    )
+
+
+def _clear(
+    problem: Problem, records: Sequence[Logged], record: int, bench: _Bench, made: Sequence[_Judged]
+) -> list[DataError]:
+    """Return the errors that leave physics no chance in the linear problem. One that a vehicle may look like must also
+    explain all that is there, and without the help of any that is not clear: what broke in mid-trial makes an error of
+    a clock likely, too, but that leaves more than noise, or needs another one.
+    """
+    firm = [one for one, _ in made if one.error.kind not in SOFT]
+    clear = [one.error for one in firm if one.lead > CLEAR_LEAD and one.generous > CLEAR_GENEROUS_LEAD]
+    held = [one.error for one in firm]
+    for one in sorted((one for one, _ in made if one.error.kind in SOFT), key=lambda each: -each.lead):
+        after = bench.without([*held, one.error])
+        if one.error.kind == "step" or one.lead < FAR_BEHIND or max(after.as_is.scales.values()) >= LOUD:
+            break
+        before = bench.without(held)
+        each = [before.logged if i == record else other for i, other in enumerate(records)]
+        over_none = judged_again(before, one.error).lead + before.log_sparse - before.log_none
+        if over_none - most_of_physics(posed_again(problem, each), record) < FAR_BEHIND:
+            break
+        held, clear = [*held, one.error], [*clear, one.error]
+    return clear
+
+
+def _is_suspected(one: Suspect) -> bool:
+    return one.lead > _least(one)
+
+
+def _least(one: Suspect) -> float:
+    return LEAST_SOFT_LEAD if one.error.kind in SOFT else LEAST_LEAD
+
+
+def without(records: Sequence[Logged], found: Sequence[SuspectedError]) -> list[Logged]:
+    """Return records without the errors that were found in them."""
+    return [
+        corrected(logged, tuple(one.error for one in found if one.record == i))
+        for i, logged in enumerate(records)
+    ]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Linear:
+    """The linear problem of a record at the nominal model, whitened with the noise of usual sensors.
+
+    Attributes:
+        r: residual (m,).
+        J: sensitivities to what is free (m, k).
+        D: prior variances (k,).
+        own: channel → its rows.
+        bare: channel → what it says of nothing, but for its sums.
+    """
+
+    r: np.ndarray
+    J: np.ndarray
+    D: np.ndarray
+    own: Mapping[str, slice]
+    bare: Mapping[str, Term]
+
+    def reckoned(self) -> Reckoned:
+        """Return its evidence, with the scales of the noise that are best."""
+        return reckon({name: self._term(name, rows) for name, rows in self.own.items()}, self.D)
+
+    def _term(self, name: str, rows: slice) -> Term:
+        r, J = self.r[rows], self.J[rows]
+        return self.bare[name]._replace(A=J.T @ J, b=J.T @ r, rr=float(r @ r))
+
+    def scaled(self, scales: Mapping[str, float], values: np.ndarray) -> np.ndarray:
+        """Return values (m, …) in noise of these scales."""
+        found = values.copy()
+        for name, rows in self.own.items():
+            found[rows] /= scales[name]
+        return found
+
+
+class Further(NamedTuple):
+    """A further term: its log prior, and about the log evidence with it; the linear problem then."""
+
+    log_prior: float
+    log_evidence: float
+    beside: Linear
+
+
+def most_of_physics(problem: Problem, record: int) -> float:
+    """Return by how much a few causes, throughout or from mid-trial on, are more probable than none. [nat]
+
+    Args:
+        problem: of all records as they are, as posed.
+        record: its number.
+    """
+    here = _linear(problem, record)
+    begun = _begun(problem, record, here)
+    now, log_prior = here.reckoned(), float(np.log(PRIOR["none"]))
+    best = none = now.log + log_prior
+    for _ in range(MAX_CAUSES):
+        further = [*_causes(problem, here, now), *_onsets(problem, here, now, begun)]
+        one = max(further, key=lambda each: each.log_evidence + each.log_prior)
+        here, log_prior = one.beside, log_prior + one.log_prior
+        now = here.reckoned()
+        if now.log + log_prior <= best:
+            break
+        best = now.log + log_prior
+    return best - none
+
+
+def _linear(problem: Problem, record: int) -> Linear:
+    """Return the linear problem of a record, with wide tolerances; what does nothing while it is small is moved to a
+    usual size.
+    """
+    zero, seen_ = np.zeros(len(problem.entries)), problem.records[record]
+    places = [k for k, entry in enumerate(problem.entries) if entry.record in (-1, record)]
+    moved = [to_usual_sizes(problem, k) for k in places]
+    base, *tracks = problem.tracks([(record, z) for z in (zero, *moved)])
+    plain = problem.whitened(record, seen_.setting, base)
+    J = np.zeros((plain.size, zero.size))
+    for k, z, track in zip(places, moved, tracks, strict=True):
+        J[:, k] = np.nan_to_num((problem.whitened(record, problem.setting(record, z), track) - plain) / z[k])
+    ends = np.cumsum([0, *(noise.count for noise in seen_.noise.values())]).tolist()
+    own = {name: slice(a, b) for name, a, b in zip(seen_.noise, ends[:-1], ends[1:], strict=True)}
+    nothing = np.zeros(0)
+    bare = {name: Term(nothing, nothing, 0.0, noise.count, -noise.log_scale, least_scale(noise), noise.count)
+            for name, noise in seen_.noise.items()}  # fmt: skip
+    r = problem.whitened(record, seen_.setting, base, measured=True)
+    return Linear(r=r, J=J, D=variances(problem.entries, (), KAPPA_NARROW), own=own, bare=bare)
+
+
+def _begun(problem: Problem, record: int, here: Linear) -> dict[Begun, np.ndarray]:
+    """Return what causes that begin at times of a grid change in the rows of a record (m, parameters)."""
+    along = BaseRun(problem, np.zeros(len(problem.entries)))
+    before = sum(noise.count for one in problem.records[:record] for noise in one.noise.values())
+    columns = onset_columns(along, problem.sudden_effects, record)
+    return {pair: C[before : before + here.r.size] for pair, C in columns.items()}
+
+
+def _causes(problem: Problem, here: Linear, now: Reckoned) -> Iterator[Further]:
+    """Give every cause that holds throughout."""
+    names, wide = nameable(problem.entries), generous_variances(problem)
+    base = Posterior(z=now.z, M=now.M, log_evidence=now.log, log_det=0.0)
+    price = float(np.log(PRIOR["single"] / len(names)))
+    for name in names:
+        at = columns_of(problem.entries, (name,))
+        D = here.D.copy()
+        D[at] = wide[at]
+        if not np.array_equal(D, here.D):
+            yield Further(price, freed(base, here.D, at, D[at])[0], replace(here, D=D))
+
+
+def _onsets(
+    problem: Problem, here: Linear, now: Reckoned, begun: Mapping[Begun, np.ndarray]
+) -> Iterator[Further]:
+    """Give every cause from every time on."""
+    if not begun:
+        return
+    J, r = here.scaled(now.scales, here.J), here.scaled(now.scales, here.r)
+    C = here.scaled(now.scales, np.hstack(list(begun.values())))
+    data = seen(J.T @ J, J.T @ r, here.D, J, C, r)
+    ends = np.cumsum([0, *(columns.shape[1] for columns in begun.values())]).tolist()
+    price = float(np.log(PRIOR["sudden"] / len(begun)))
+    for (effect, time), a, b in zip(begun, ends[:-1], ends[1:], strict=True):
+        gain = gain_of(ForceInformation(data.M[a:b, a:b], data.q[a:b]), effect)[0]
+        more = np.array([parameter.scale**2 for parameter in effect.parameters])
+        beside = replace(here, J=np.hstack([here.J, begun[effect, time]]), D=np.append(here.D, more))
+        yield Further(price, now.log + gain, beside)
