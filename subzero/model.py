@@ -18,8 +18,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
+import numpy as np
+
 import scenarios
 from cable import CableProperties, DrumProperties
+from cable.current import Current
 from subzero.errors import BadValueError, real, short, suggestion
 from subzero.external_force import MissingForce
 from vehicle import Vehicle, VehicleError, from_mapping, to_mapping
@@ -95,6 +98,14 @@ class Model:
             **{name: _plain(getattr(self, name)) for name in ("profile", "winch", "vessel")},
             **({"missing": _plain(self.missing)} if self.missing else {}),
         }
+
+
+def water_of(model: Model) -> Current:
+    """Return how the water moves: the uniform current, and what is added to it by depth."""
+    if model.profile is None:
+        return Current.uniform(model.current)
+    added = np.array(model.profile.velocity, dtype=float)
+    return Current.profile(down=model.profile.depth, velocity=added + np.array(model.current))
 
 
 def model_of(trial: scenarios.Trial, model: object = None) -> Model:

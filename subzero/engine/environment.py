@@ -1,4 +1,4 @@
-"""From plain values to what compiled code takes: how the water moves, how the drum moves, and what its winch does."""
+"""From plain values to what compiled code takes: how the drum moves, and what its winch does."""
 
 from __future__ import annotations
 
@@ -7,19 +7,10 @@ from collections.abc import Callable
 import numpy as np
 
 import scenarios
-from cable.current import Current
 from cable.drum import DrumProperties
 from cable.drum_motion import PLACE, SETPOINT, VELOCITY, resting
 from cable.winch import Brake, ConstantTension, PayOutRate, Winch
 from subzero.model import Model
-
-
-def water_of(model: Model) -> Current:
-    """Return how the water moves: the uniform current, and what is added to it by depth."""
-    if model.profile is None:
-        return Current.uniform(model.current)
-    added = np.array(model.profile.velocity, dtype=float)
-    return Current.profile(down=model.profile.depth, velocity=added + np.array(model.current))
 
 
 def drum_of(model: Model) -> DrumProperties | Winch:

@@ -41,7 +41,7 @@ from cable.moving_end import (
 )
 from cable.task import START_LENGTH
 from subzero.engine.energy import book
-from subzero.engine.environment import drum_of, water_of, way_of_drum
+from subzero.engine.environment import drum_of, way_of_drum
 from subzero.engine.external_wrench import feel_current, tow_point, way_of_tow_point
 from subzero.engine.prescribed_motion import knots
 from subzero.engine.recording import new_recording, record_row
@@ -49,7 +49,7 @@ from subzero.engine.vehicle_step import pose
 from subzero.errors import BadValueError, UserError, printable, real, short
 from subzero.external_force import MissingForce
 from subzero.jit import Call, allocating, compile_beside, compiled
-from subzero.model import Model
+from subzero.model import Model, water_of
 from subzero.run_state import LINEAR_ROWS, Fixed, HullWork, Ledger, Live, Now, Orders, Setup
 from vehicle import POWERS, STATE_SIZE, initial_state, kinetic_energy, rotation
 from vehicle.state import LINKAGE, POSITION, SERVO, VELOCITY

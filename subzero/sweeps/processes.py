@@ -3,7 +3,7 @@
 A task is what `cloudpickle` makes of a function and its arguments; the answer says whether it went well, and what came
 of it. A process ends when its pipe does, so with its parent, however that ends.
 
-On Linux they are forks of one fresh Python, the `Nursery`, which has imported and loaded all that a member needs, once
+On Linux they are forks of one fresh Python, the `ForkServer`, which has imported and loaded all that a member needs, once
 for all of them, and shares the memory of it. It has one thread that works, so nothing is torn by the fork; the process
 that plans the sweep has many, and is never forked. Elsewhere, where libraries of the system do not bear a fork, each is
 a fresh Python of its own.
@@ -36,11 +36,11 @@ ONE_THREAD = dict.fromkeys(
 )
 """Each process has one core; more threads would only be in one another's way."""
 LONGEST_WORD = 100
-"""Of a request to the nursery. [bytes]"""
+"""Of a request to the fork server. [bytes]"""
 LIVES, LOOK_S = 1000, 0.002
-"""No exit code: the worker lives. So often the nursery is asked. [-], [s]"""
+"""No exit code: the worker lives. So often the fork server is asked. [-], [s]"""
 PATIENCE_S = 1.0
-"""So long a process may take to end by itself, or the nursery to answer, before it is killed. [s]"""
+"""So long a process may take to end by itself, or the fork server to answer, before it is killed. [s]"""
 
 
 class Life(Protocol):
@@ -132,7 +132,7 @@ def fresh() -> Worker:
     return worker
 
 
-class NurseryError(Exception):
+class ForkServerError(Exception):
     """It has died, `by_itself` or of a signal, or can fork no more."""
 
     def __init__(self, words: str, *, by_itself: bool = True) -> None:
@@ -140,7 +140,7 @@ class NurseryError(Exception):
         self.by_itself = by_itself
 
 
-class Nursery:
+class ForkServer:
     """A fresh Python that has ready what workers need, and forks them."""
 
     def __init__(self) -> None:
@@ -149,8 +149,8 @@ class Nursery:
         self._start()
 
     def _start(self) -> None:
-        self._office, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        self._popen = _python("nurse", theirs, subprocess.DEVNULL)
+        self._socket, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        self._popen = _python("serve_forks", theirs, subprocess.DEVNULL)
         theirs.close()
 
     def prepare(self, rehearsal: Callable[[], object]) -> None:
@@ -158,18 +158,18 @@ class Nursery:
         with tempfile.TemporaryFile() as file, self._lock, suppress(OSError):
             file.write(cloudpickle.dumps(rehearsal))
             file.flush()
-            socket.send_fds(self._office, [b"rehearse"], [file.fileno()])
+            socket.send_fds(self._socket, [b"rehearse"], [file.fileno()])
 
     def worker(self) -> Worker:
         """Return a new worker.
 
         Raises:
-            NurseryError: there is none: the nursery has died; the next one comes of a new one.
+            ForkServerError: there is none: the fork server has died; the next one comes of a new one.
         """
         (task, to), (back, answers) = os.pipe(), os.pipe()
         try:
             pid = self._forked([task, answers])
-        except NurseryError:
+        except ForkServerError:
             os.close(to)
             os.close(back)
             raise
@@ -182,31 +182,31 @@ class Nursery:
         """Return the number of a new worker with these two pipes."""
         pid = int(self._asked(b"fork", handles))
         if pid == 0:
-            raise NurseryError("the system starts no more processes")
+            raise ForkServerError("the system starts no more processes")
         return pid
 
     def ended(self, pid: int) -> int | None:
-        """Return the exit code of a worker, None if it lives; as if killed if the nursery has died."""
+        """Return the exit code of a worker, None if it lives; as if killed if the fork server has died."""
         try:
             code = int(self._asked(b"wait %d" % pid))
-        except NurseryError:
+        except ForkServerError:
             return -signal.SIGKILL
         return None if code == LIVES else code
 
     def _asked(self, word: bytes, handles: list[int] | None = None) -> bytes:
-        """Return the answer to a request; start another nursery where this one has died."""
+        """Return the answer to a request; start another fork server where this one has died."""
         with self._lock:
             if self._ended:
-                raise NurseryError("it was ended")
+                raise ForkServerError("it was ended")
             with suppress(OSError):
-                socket.send_fds(self._office, [word], handles or [])
-                if answer := self._office.recv(LONGEST_WORD):
+                socket.send_fds(self._socket, [word], handles or [])
+                if answer := self._socket.recv(LONGEST_WORD):
                     return answer
-            self._office.close()
+            self._socket.close()
             code = self._popen.wait()
             if not self._ended:
                 self._start()
-            raise NurseryError(in_words(code), by_itself=code >= 0)
+            raise ForkServerError(in_words(code), by_itself=code >= 0)
 
     def close(self) -> None:
         """End it; one that is still at something is killed."""
@@ -215,7 +215,7 @@ class Nursery:
         try:
             if not idle:
                 self._popen.kill()
-            self._office.close()
+            self._socket.close()
             with suppress(subprocess.TimeoutExpired):
                 self._popen.wait(PATIENCE_S)
             self._popen.kill()
@@ -226,14 +226,14 @@ class Nursery:
 
 
 class _Child:
-    """A fork of the nursery, which alone is told how it ended."""
+    """A fork of the fork server, which alone is told how it ended."""
 
-    def __init__(self, pid: int, nursery: Nursery) -> None:
-        self._pid, self._nursery, self._lock = pid, nursery, threading.Lock()
+    def __init__(self, pid: int, forks: ForkServer) -> None:
+        self._pid, self._forks, self._lock = pid, forks, threading.Lock()
         self._code: int | None = None
 
     def kill(self) -> None:
-        """End it at once; nobody else has its number until the nursery was asked how it ended."""
+        """End it at once; nobody else has its number until the fork server was asked how it ended."""
         with self._lock, suppress(ProcessLookupError):
             if self._code is None:
                 os.kill(self._pid, signal.SIGKILL)
@@ -243,7 +243,7 @@ class _Child:
         until = monotonic() + (inf if timeout is None else timeout)
         while True:
             with self._lock:
-                self._code = self._nursery.ended(self._pid) if self._code is None else self._code
+                self._code = self._forks.ended(self._pid) if self._code is None else self._code
                 if self._code is not None:
                     return self._code
             if monotonic() > until:
@@ -251,18 +251,18 @@ class _Child:
             sleep(LOOK_S)
 
 
-def nurse() -> NoReturn:
-    """Be a nursery: at the other end of the socket that is standard input, until that ends."""
+def serve_forks() -> NoReturn:
+    """Be a fork server: at the other end of the socket that is standard input, until that ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent, which then closes the socket
-    office = socket.socket(fileno=os.dup(0))
+    connection = socket.socket(fileno=os.dup(0))
     os.dup2(2, 1)  # what tasks print goes to standard error
     _load()
     while True:
-        word, handles, _, _ = socket.recv_fds(office, LONGEST_WORD, 2)
+        word, handles, _, _ = socket.recv_fds(connection, LONGEST_WORD, 2)
         if not word:
             os._exit(0)
         with suppress(BrokenPipeError):  # the parent is gone, which the next word says
-            _heed(word, handles, office)
+            _heed(word, handles, connection)
         for handle in handles:
             os.close(handle)
 
@@ -276,25 +276,25 @@ def _load() -> None:
     cpu_target.target_context.refresh()
 
 
-def _heed(word: bytes, handles: list[int], office: socket.socket) -> None:
-    """Do what the nursery is asked for."""
+def _heed(word: bytes, handles: list[int], connection: socket.socket) -> None:
+    """Do what the fork server is asked for."""
     if word == b"rehearse":
         _rehearse(handles[0])
     elif word == b"fork":
         gc.freeze()  # what is there stays; and pages that nobody touches are shared
-        office.send(b"%d" % _forked(handles, office))
+        connection.send(b"%d" % _forked(handles, connection))
     else:
-        office.send(b"%d" % _code_of(int(word.split()[1])))
+        connection.send(b"%d" % _code_of(int(word.split()[1])))
 
 
-def _forked(handles: list[int], office: socket.socket) -> int:
+def _forked(handles: list[int], connection: socket.socket) -> int:
     """Return the number of a new worker with these two pipes, 0 if the system has no room for it."""
     try:
         pid = os.fork()
     except OSError:
         return 0
     if pid == 0:
-        office.close()
+        connection.close()
         _serve(Connection(handles[0], writable=False), Connection(handles[1], readable=False))
         os._exit(0)
     return pid

@@ -23,7 +23,7 @@ from typing import Any
 import cloudpickle
 
 from subzero.errors import UserError
-from subzero.sweeps.processes import FORKS, Nursery, NurseryError, Worker, fresh
+from subzero.sweeps.processes import FORKS, ForkServer, ForkServerError, Worker, fresh
 
 MOST_FALSE_STARTS = 3
 """A process that ends before it is ready, by itself so many times in a row, will never be. [-]"""
@@ -46,26 +46,26 @@ class WorkerPool(Executor):
 
     Args:
         workers: how many.
-        nursery: where they come from; one of their own when not given.
+        forks: where they come from; one of their own when not given.
 
     Attributes:
         count: how many.
     """
 
-    def __init__(self, workers: int, nursery: Nursery | None = None) -> None:
+    def __init__(self, workers: int, forks: ForkServer | None = None) -> None:
         self._tasks: Tasks = queue.SimpleQueue()
-        self.count, self._is_guest = workers, nursery is not None
-        self._nursery = nursery or (Nursery() if FORKS else None)
-        self._hands = [_Hand(self._tasks, self._nursery) for _ in range(workers)]
+        self.count, self._is_guest = workers, forks is not None
+        self._forks = forks or (ForkServer() if FORKS else None)
+        self._hands = [_Hand(self._tasks, self._forks) for _ in range(workers)]
 
     def prepare(self, rehearsal: Callable[[], object]) -> None:
         """Have something done once, where processes come from, before their first task: what it loads, all have."""
-        if self._nursery is not None:
-            self._nursery.prepare(rehearsal)
+        if self._forks is not None:
+            self._forks.preload(work)
 
     def sibling(self) -> WorkerPool | None:
         """Return another pool whose processes have what was prepared until their first task; None without forks."""
-        return None if self._nursery is None else WorkerPool(self.count, self._nursery)
+        return None if self._forks is None else WorkerPool(self.count, self._forks)
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
         """Ask for ``fn(*args, **kwargs)`` in one of the processes."""
@@ -95,15 +95,15 @@ class WorkerPool(Executor):
 
     def _leave(self) -> None:
         """End what its processes come from, if that is its own."""
-        if self._nursery is not None and not self._is_guest:
-            self._nursery.close()
+        if self._forks is not None and not self._is_guest:
+            self._forks.close()
 
 
 class _Hand:
     """A thread that looks after one process at a time, and hands it tasks."""
 
-    def __init__(self, tasks: Tasks, nursery: Nursery | None) -> None:
-        self._tasks, self._nursery, self._ended = tasks, nursery, False
+    def __init__(self, tasks: Tasks, forks: ForkServer | None) -> None:
+        self._tasks, self._forks, self._ended = tasks, forks, False
         self._process: Worker | None = None
         self._thread = threading.Thread(target=self._serve, daemon=True)
         self._false_starts, self._trouble = 0, ""
@@ -120,7 +120,7 @@ class _Hand:
             process.kill()
 
     def _serve(self) -> None:
-        if self._nursery is None:  # it has as much to import as the parent that plans; a fork has it all
+        if self._forks is None:  # it has as much to import as the parent that plans; a fork has it all
             self._start()
         while (task := self._tasks.get()) is not None:
             future, asked = task
@@ -154,8 +154,8 @@ class _Hand:
     def _start(self) -> bool:
         """Start a process; return whether it is ready."""
         try:
-            process = self._process = fresh() if self._nursery is None else self._nursery.worker()
-        except NurseryError as error:
+            process = self._process = fresh() if self._forks is None else self._forks.worker()
+        except ForkServerError as error:
             self._trouble = f"{error}."
             self._false_starts += error.by_itself
             return False

@@ -22,11 +22,11 @@ from cable.task import START_LENGTH
 from scenarios.steps import fitting_step
 from subzero.channels import BY_NAME
 from subzero.diagnosis.hypothesis.configuration import Sensing, Setting
-from subzero.engine.environment import drum_of, water_of
+from subzero.engine.environment import drum_of
 from subzero.engine.initial_conditions import go_on_with, prepare, rows_of_changes
 from subzero.engine.recording import Run, new_recording, record_row
 from subzero.errors import UserError
-from subzero.model import Model
+from subzero.model import Model, water_of
 from subzero.run_state import Live, Setup
 from subzero.simulation import run_trial
 from subzero.synthetic.reference_coupling import FINE, Led, follow_rope

@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from subzero.diagnosis.hypothesis.configuration import Setting
-from subzero.engine.environment import water_of
 from subzero.external_force import AXES, FACTORS, MissingForce, Term, feature_value, fill_factors, history_at
+from subzero.model import water_of
 from subzero.synthetic.reference_run import Truth
 
 

@@ -7,14 +7,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from subzero.engine.environment import water_of
+from subzero.model import Model, water_of
 from subzero.validity.limits import blocks_of, first_time, longest_span, percent
 
 if TYPE_CHECKING:
     import scenarios
     from cable import CableProperties, DrumProperties
     from subzero.channels import AnyRun
-    from subzero.model import Model
 
 RESIDUAL = 0.01
 """A residual above this share of the largest energy of the run is too much. [-]"""
