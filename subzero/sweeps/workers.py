@@ -61,7 +61,7 @@ class WorkerPool(Executor):
     def prepare(self, rehearsal: Callable[[], object]) -> None:
         """Have something done once, where processes come from, before their first task: what it loads, all have."""
         if self._forks is not None:
-            self._forks.preload(work)
+            self._forks.prepare(rehearsal)
 
     def sibling(self) -> WorkerPool | None:
         """Return another pool whose processes have what was prepared until their first task; None without forks."""
