@@ -33,7 +33,7 @@ EACH = (
     DataError(kind="reference", channels=("heading",), how="is 90 degrees too large"),
     DataError(kind="reference", channels=("heading",), how="counts counter-clockwise from east"),
     DataError(kind="step", channels=("pitch",), amount=3.0, since=12.0),
-    DataError(kind="frozen", channels=("roll_angle",), since=20.0, at=tuple(TIME[TIME >= 20.0])),
+    DataError(kind="frozen", channels=("roll_angle",), since=20.0, at=tuple(np.arange(20.0, 60.0, 0.1))),
     DataError(kind="dropout", channels=("roll_angle",), how="-999", at=tuple(TIME[50:60])),
     DataError(kind="dropout", channels=("depth",), at=tuple(TIME[80:95])),
     DataError(kind="swapped", channels=("pitch", "roll_angle")),
