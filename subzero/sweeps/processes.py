@@ -4,9 +4,9 @@ A task is what `cloudpickle` makes of a function and its arguments; the answer s
 of it. A process ends when its pipe does, so with its parent, however that ends.
 
 On Linux they are forks of one fresh Python, the `ForkServer`, which has imported and loaded all that a member needs,
-once for all of them, and shares the memory of it. It has one thread that works, so nothing is torn by the fork; the process
-that plans the sweep has many, and is never forked. Elsewhere, where libraries of the system do not bear a fork, each is
-a fresh Python of its own.
+once for all of them, and shares the memory of it. It has one thread that works, so nothing is torn by the fork; the
+process that plans the sweep has many, and is never forked. Elsewhere, where libraries of the system do not bear a
+fork, each is a fresh Python of its own.
 """
 
 from __future__ import annotations
