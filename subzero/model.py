@@ -99,13 +99,12 @@ class Model:
             **({"missing": _plain(self.missing)} if self.missing else {}),
         }
 
-
-def water_of(model: Model) -> Current:
-    """Return how the water moves: the uniform current, and what is added to it by depth."""
-    if model.profile is None:
-        return Current.uniform(model.current)
-    added = np.array(model.profile.velocity, dtype=float)
-    return Current.profile(down=model.profile.depth, velocity=added + np.array(model.current))
+    def water(self) -> Current:
+        """Return how the water moves: the uniform current, and what is added to it by depth."""
+        if self.profile is None:
+            return Current.uniform(self.current)
+        added = np.array(self.profile.velocity, dtype=float)
+        return Current.profile(down=self.profile.depth, velocity=added + np.array(self.current))
 
 
 def model_of(trial: scenarios.Trial, model: object = None) -> Model:

@@ -49,7 +49,7 @@ from subzero.engine.vehicle_step import pose
 from subzero.errors import BadValueError, UserError, printable, real, short
 from subzero.external_force import MissingForce
 from subzero.jit import Call, allocating, compile_beside, compiled
-from subzero.model import Model, water_of
+from subzero.model import Model
 from subzero.run_state import LINEAR_ROWS, Fixed, HullWork, Ledger, Live, Now, Orders, Setup
 from vehicle import POWERS, STATE_SIZE, initial_state, kinetic_energy, rotation
 from vehicle.state import LINKAGE, POSITION, SERVO, VELOCITY
@@ -173,7 +173,7 @@ def setup_of(trial: scenarios.Trial, model: Model, tethered: bool) -> Setup:
         fixed=_fixed(trial, model, tethered, bool(added.size or terms.size)),
         orders=_orders(trial),
         track=_track(trial),
-        water=water_of(model).numbers(),
+        water=model.water().numbers(),
         led=way_of_drum(trial, model, _wet_length(trial)),
         added=added,
         terms=terms,
@@ -265,7 +265,7 @@ def hang_between(setup: Setup, live: Live, trial: scenarios.Trial, model: Model)
     """
     fixed, now, wet = setup.fixed, live.now, trial.start.wet_length
     places = np.array([now.tow, now.tow + np.array(trial.start.drum)])
-    held = hold(places, wet, water_of(model), cable=model.cable, segment_length=trial.segment_length)
+    held = hold(places, wet, model.water(), cable=model.cable, segment_length=trial.segment_length)
     fixed.drum_place[:] = setup.water.points[:3] = places[1]
     led = setup.led
     rate = (

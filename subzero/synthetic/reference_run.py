@@ -26,7 +26,7 @@ from subzero.engine.environment import drum_of
 from subzero.engine.initial_conditions import go_on_with, prepare, rows_of_changes
 from subzero.engine.recording import Run, new_recording, record_row
 from subzero.errors import UserError
-from subzero.model import Model, water_of
+from subzero.model import Model
 from subzero.run_state import Live, Setup
 from subzero.simulation import run_trial
 from subzero.synthetic.reference_coupling import FINE, Led, follow_rope
@@ -76,7 +76,7 @@ def _water(setting: Setting, truth: Truth) -> np.ndarray:
     r, times = truth.run.recording, truth.run.times
     changes = [0.0, *(time - 1e-6 for time, _ in setting.later)]
     models = [setting.model, *(model for _, model in setting.later)]
-    waters = [water_of(model) for model in models]
+    waters = [model.water() for model in models]
     rows = np.searchsorted(changes, times, side="right") - 1
     north_east_down = [
         waters[max(row, 0)].at(place, time)
@@ -215,7 +215,7 @@ def _rope(setting: Setting, setup: Setup, live: Live, times: np.ndarray) -> Rope
     setpoint, rate = winch_rows(drum_of(model), ends, wet)
     still = np.zeros((2, 3))
     course = Course(ends, np.c_[tow, still, setpoint], np.c_[velocity, still, rate])
-    fastest = water_of(model).fastest
+    fastest = model.water().fastest
     rope = rope_off_drum(
         course, setting.trial.segment_length, model.cable, drum_of(model), fastest, wet, ahead
     )

@@ -15,7 +15,6 @@ import numpy as np
 
 from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.external_force import AXES, FACTORS, MissingForce, Term, feature_value, fill_factors, history_at
-from subzero.model import water_of
 from subzero.synthetic.reference_run import Truth
 
 
@@ -66,7 +65,7 @@ def factors_of(setting: Setting, truth: Truth) -> np.ndarray:
     """Return the factors of features (n, len(FACTORS)) along a truth, see `subzero.external_force`."""
     r, water, out = (
         truth.run.recording,
-        water_of(setting.model),
+        setting.model.water(),
         np.zeros((truth.run.times.size, len(FACTORS))),
     )
     for row, time in enumerate(truth.run.times):

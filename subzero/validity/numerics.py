@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from subzero.model import Model, water_of
 from subzero.validity.limits import blocks_of, first_time, longest_span, percent
 
 if TYPE_CHECKING:
     import scenarios
     from cable import CableProperties, DrumProperties
     from subzero.channels import AnyRun
+    from subzero.model import Model
 
 RESIDUAL = 0.01
 """A residual above this share of the largest energy of the run is too much. [-]"""
@@ -225,7 +225,7 @@ def _load_across(run: AnyRun, model: Model) -> np.ndarray:
     rows, last = np.arange(time.size), np.maximum(nodes - 1, 1)
     drum, side = P[rows, last], P[rows, last - 1] - P[rows, last]
     along = side / np.maximum(np.linalg.norm(side, axis=1, keepdims=True), np.finfo(float).tiny)
-    water = water_of(model)
+    water = model.water()
     flow = np.array([water.at(place, when) for place, when in zip(drum, time, strict=True)])
     flow = flow - np.gradient(drum, time, axis=0)
     flow -= np.sum(flow * along, axis=1, keepdims=True) * along
