@@ -73,7 +73,7 @@ def refinement_that_settles(run: AnyRun, trial: scenarios.Trial, model: Model) -
     if run.attrs["outcome"] != "completed" or starts_otherwise(run):
         return 0
     if not {one.check for one in warnings_of(run)}.intersection(DOUBTS):
-        return PROOF if is_left_open(run, model) else 0
+        return PROOF if is_left_open(run, trial, model) else 0
     for finer in sorted({PROOF, DRUM_PROOF}):
         proved = json.loads(run.attrs["accuracy"]) | {"force_error": 0.0, "proof_finer": finer}
         supposed = _Supposed(run, accuracy=json.dumps(proved))

@@ -38,6 +38,8 @@ SLOWEST = 0.02
 LEAN = 0.03
 """A load across the cable of this share of its drag turns it by as many radians within the last m1 U²/(½ρπdC_t U²)
 metres before the drum; more counts where no wave comes back to the drum. [-]"""
+BARELY = 0.5
+"""A coarser run that differs by more than this share of `rtol` only just confirms a force. [-]"""
 
 LIMP = 1e-6
 """A cable with less tension than this at both ends of a segment does not pull there. [N]"""
@@ -198,21 +200,27 @@ def ill_posed_drum(run: AnyRun, _: scenarios.Trial, model: Model) -> list[str]:
     ]
 
 
-def is_left_open(run: AnyRun, model: Model) -> bool:
+def is_left_open(run: AnyRun, trial: scenarios.Trial, model: Model) -> bool:
     """Say whether nothing determines how the cable leaves its free drum, so that a coarser run confirms too little.
 
         T(S) < m1 U²,    |q⊥| > 0.03 ½ρπdC_t U²        q⊥: what water and weight do across the cable
 
     No wave comes back to the drum, and nothing says in which direction the cable leaves it. Without a load across, its
-    drag does, within the first segments. With one it is bent there, the more, the shorter the segments are. Mostly they
-    are long enough to hide it, so that is no reason to warn, but one to look again.
+    drag does, within the first m1/(½ρπdC_t) metres. With one it is bent there, the more, the shorter the segments are.
+    Longer segments hide it, so that is no reason to warn; but one to look again if they are shorter than that, or if
+    the coarser run only just confirms the force.
     """
-    if model.winch is not None or not run.attrs.get("accuracy"):
+    accuracy = json.loads(run.attrs.get("accuracy", "{}"))
+    if model.winch is not None or not accuracy:
+        return False
+    cable, segment = model.cable, trial.segment_length / 2.0 ** accuracy["halvings"]
+    is_hidden = segment * cable.tangential_drag > cable.virtual_mass_per_length
+    if is_hidden and _share(accuracy["force_error"]) <= BARELY * accuracy["rtol"]:
         return False
     time = run["time"].values
     payout = np.gradient(run["cable_length"].values, time)
-    faster = run["drum_tension"].values < model.cable.virtual_mass_per_length * payout**2
-    leans = _load_across(run, model) > LEAN * model.cable.tangential_drag * payout**2
+    faster = run["drum_tension"].values < cable.virtual_mass_per_length * payout**2
+    leans = _load_across(run, model) > LEAN * cable.tangential_drag * payout**2
     return longest_span(time, faster & leans & (payout > SLOWEST))[0] > ILL_POSED_TIME
 
 
