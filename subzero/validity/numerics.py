@@ -220,11 +220,11 @@ def is_left_open(run: AnyRun, trial: scenarios.Trial, model: Model) -> bool:
     time = run["time"].values
     payout = np.gradient(run["cable_length"].values, time)
     faster = run["drum_tension"].values < cable.virtual_mass_per_length * payout**2
-    leans = _load_across(run, model) > LEAN * cable.tangential_drag * payout**2
+    leans = load_across(run, model) > LEAN * cable.tangential_drag * payout**2
     return longest_span(time, faster & leans & (payout > SLOWEST))[0] > ILL_POSED_TIME
 
 
-def _load_across(run: AnyRun, model: Model) -> np.ndarray:
+def load_across(run: AnyRun, model: Model) -> np.ndarray:
     """Return the load across the cable where it leaves the drum, of water and weight (samples,). [N/m]
 
     The current is that at the drum; along the cable it only adds to the pay-out rate.

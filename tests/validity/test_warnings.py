@@ -17,7 +17,7 @@ from benchmarks.trust_trials import draw
 from subzero.comparison import halved
 from subzero.validity import CHECKS, refinement_that_settles
 from subzero.validity.limits import bend_radii
-from subzero.validity.numerics import drum_is_ill_posed, is_resolved, roughness
+from subzero.validity.numerics import drum_is_ill_posed, is_resolved, load_across, roughness
 
 FIG6 = dataclasses.replace(subzero.load_scenario("fig6"), rtol=0.0)
 """With steps and segments as they are: no coarser run confirms it, and none is taken finer."""
@@ -305,6 +305,26 @@ def test_a_load_across_is_looked_at_only_where_short_segments_show_what_no_wave_
     assert refinement_that_settles(run, fine, model) == 0
     held = run.assign(drum_tension=run["drum_tension"] + 0.05)
     assert refinement_that_settles(held, fine, crossed) == 0
+
+
+def test_what_acts_across_a_cable_at_its_drum_is_weight_and_the_part_of_the_current_that_crosses_it():
+    """Along the last segment a current does nothing, across it ½ρdC_n J², and weight what stands across the segment."""
+    run, trial = plain(), FIG6
+    last = int(run["node_count"].values[-1]) - 1
+    place = run["cable_position"].values[-1]
+    along = place[last - 1] - place[last]
+    along /= np.linalg.norm(along)
+    across = np.cross(along, (0.0, 0.0, 1.0)) / np.linalg.norm(np.cross(along, (0.0, 0.0, 1.0)))
+    model = subzero.Model.of(trial)
+    light = dataclasses.replace(model.cable, mass_per_length=1000.0 * model.cable.cross_section_area)
+    heavy = dataclasses.replace(light, mass_per_length=0.02)
+    for cable, current, load in (
+        (light, 0.3 * along, 0.0),
+        (light, 0.3 * across, light.normal_drag * 0.09),
+        (heavy, np.zeros(3), heavy.weight_in_water * np.sqrt(1.0 - along[2] ** 2)),
+    ):
+        there = dataclasses.replace(model, cable=cable, current=tuple(current.tolist()))
+        assert load_across(run, there)[-1] == pytest.approx(load, rel=1e-9, abs=1e-12)
 
 
 def folded(run, share, duration):
