@@ -68,7 +68,7 @@ segment_length_m | m | 0.001  | 100   | 0.5  | length of a cable segment
 grading          | 1 | 0      | 0.5   | 0    | how much longer segments get per metre of cable from the vehicle
 far_length_m     | m | 0      | 100000 | 40  | farther from both ends of the cable, segments are joined to longer ones
 far_grading      | 1 | 0      | 0.5   | 0.2  | by how much longer per metre of cable beyond; 0: none are joined
-every_s          | s | 0      | 86400 | 0    | time between kept results, whole cable steps; 0: all, but of long runs
+every_s          | s | 0      | 86400 | 0    | time between kept results, whole cable steps; 0: all, fewer of long runs
 rtol             | 1 | 0      | 0.5   | 0.02 | error of the tow force that is allowed, as a share of its largest; 0: any
 """)
 

@@ -93,8 +93,8 @@ def solve_columns(D: np.ndarray, pivots: np.ndarray, B: np.ndarray) -> None:
 
 
 Row = tuple[float, float, float, float, float, float, float, float]
-"""A row of D_j, and behind it that of r_j, and of L_j without the column that is zero. Numbers by themselves, not of an
-array, stay where the processor reckons with them: so it takes half as long."""
+"""A row of D_j, and behind it that of r_j, and of L_j without the column that is zero. Scalars stay in registers, which
+elements of an array do not: so it takes half as long."""
 Four = tuple[float, float, float, float]
 Block = tuple[Four, Four, Four, Four]
 """The rows of z_j and, behind it, of W_j without the column that is zero."""
