@@ -21,7 +21,8 @@ A doubt is proved where that does not take long. A run may be right since its la
 show; and one that confirms itself may be doubted for what it does, as an ill-posed drum may be the same on segments of
 one and of half a metre. So every run that would end with a doubt that finer ones can settle
 (`subzero.validity.refinement_that_settles`) is held against runs two, four and, where it must be, eight times as fine,
-of which the first that contradicts is the last (`prove`). What they change is its error, whatever was estimated before.
+of which the first that contradicts is the last (`prove`). So is one whose error is estimated at more than three
+quarters of `rtol`: an estimate is not as good as that. What they change is its error, whatever was estimated before.
 
 That looks at the whole error, of segments, steps, slack and coupling alike, which an estimate inside a step does not: a
 cable that is bent sharply beside the drum errs in its segments only, and its steps look perfect.

@@ -25,6 +25,7 @@ from subzero.validity.numerics import (
     energy_residual,
     ill_posed_drum,
     is_left_open,
+    only_just_fits,
     push,
     resolution,
     slack,
@@ -68,12 +69,13 @@ def refinement_that_settles(run: AnyRun, trial: scenarios.Trial, model: Model) -
     """Return how much finer a run would have to confirm the tow force so that no number is doubted any more.
 
     0 if none is, if another doubt would be left all the same, if finer runs of the start contradict it already, or if
-    the run stopped. A cable of which nothing says how it leaves its drum is no doubt yet, but looked at all the same.
+    the run stopped. A cable of which nothing says how it leaves its drum, and an error that is close to what is
+    allowed, are no doubts yet, but looked at all the same.
     """
     if run.attrs["outcome"] != "completed" or starts_otherwise(run):
         return 0
     if not {one.check for one in warnings_of(run)}.intersection(DOUBTS):
-        return PROOF if is_left_open(run, trial, model) else 0
+        return PROOF if only_just_fits(run) or is_left_open(run, trial, model) else 0
     for finer in sorted({PROOF, DRUM_PROOF}):
         proved = json.loads(run.attrs["accuracy"]) | {"force_error": 0.0, "proof_finer": finer}
         supposed = _Supposed(run, accuracy=json.dumps(proved))
