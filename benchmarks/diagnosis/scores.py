@@ -141,16 +141,19 @@ def number(words: str, values: Sequence[float], target: str, form: str, *, least
 def calibration(results: Sequence[Result]) -> tuple[list[tuple[float, float, int]], float]:
     """Return (stated, right, cases) by bins of the first hypothesis' probability, and the expected error."""
     stated = np.array([first(one)[1] for one in results])
-    return _calibration(stated, np.array([is_right_as_told(one) for one in results], dtype=float))
+    return calibration_error(stated, np.array([is_right_as_told(one) for one in results], dtype=float))
 
 
 def by_chance(results: Sequence[Result], draws: int = 1000) -> np.ndarray:
     """Return the calibration errors (draws,) of an engine that is right as often as it states, on such cases."""
     stated, rng = np.array([first(one)[1] for one in results]), np.random.default_rng(0)
-    return np.array([_calibration(stated, 1.0 * (rng.random(stated.size) < stated))[1] for _ in range(draws)])
+    return np.array(
+        [calibration_error(stated, 1.0 * (rng.random(stated.size) < stated))[1] for _ in range(draws)]
+    )
 
 
-def _calibration(stated: np.ndarray, right: np.ndarray) -> tuple[list[tuple[float, float, int]], float]:
+def calibration_error(stated: np.ndarray, right: np.ndarray) -> tuple[list[tuple[float, float, int]], float]:
+    """Return (stated, right, cases) by bins of stated probabilities (n,), and the mean difference of the two."""
     found = []
     for low, high in pairwise(EDGES):
         own = (stated >= low) & (stated < high)

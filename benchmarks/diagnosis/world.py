@@ -16,7 +16,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
-from time import perf_counter
+from time import perf_counter, process_time
 from typing import Any, NamedTuple
 
 import cyclopts
@@ -213,8 +213,9 @@ def result_of(one: Drawn) -> dict[str, Any]:
         logged, planted = record_of(one)
         problem = with_true_noise(pose([logged]), FAMILIES[one.family])
         D = discriminations(problem, sensitivities(problem), planted) if planted else {}
-        start = perf_counter()
+        start, cpu = perf_counter(), process_time()
         verdict = diagnose_trials([logged], seed=one.index, budget="verdict")
+        took = {"seconds": perf_counter() - start, "cpu": process_time() - cpu}
         first, p = next(iter(verdict.probabilities.items()))
         said = {
             "D": {name: value for name, (value, _) in D.items()},
@@ -224,7 +225,7 @@ def result_of(one: Drawn) -> dict[str, Any]:
         said |= {"p": p, "listed": dict(list(verdict.probabilities.items())[:6])}
         noise = {name: [m.noise_sd, m.noise_slow, m.noise_time, m.resolution]
                  for rows in verdict.misfit.values() for name, m in rows.items()}  # fmt: skip
-        return {**found, **said, "noise": noise, "seconds": perf_counter() - start}
+        return found | said | {"noise": noise, **took}
     except Exception as error:
         return {**found, "error": repr(error)}
 
