@@ -23,7 +23,9 @@ features and shapes of a formula                          basis
 a formula for a latent force                              force_formula
 change points, forces and drifts beside the hypotheses    out_of_catalogue
 values that a record repeats in place of measurements     repeated_values
-errors in the data, proposed by linear evidence           data_error_scan
+what physics may do with a record, its linear evidence    data_error_yardstick
+errors that data may have                                 data_error_candidates
+... of which linear evidence proposes some                data_error_scan
 ... suspected together, and how close a few causes come   data_error_search
 ... and held against all else                             data_error_choice
 all that only steers the search                           settings

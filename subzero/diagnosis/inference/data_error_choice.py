@@ -26,7 +26,7 @@ import numpy as np
 from subzero.diagnosis.hypothesis.data_error import DataError
 from subzero.diagnosis.hypothesis.logged import Logged
 from subzero.diagnosis.inference import settings
-from subzero.diagnosis.inference.data_error_scan import OUTLIER_LOG_DENSITY, log_prior
+from subzero.diagnosis.inference.data_error_scan import log_prior
 from subzero.diagnosis.inference.data_error_search import (
     LOUD,
     SuspectedError,
@@ -35,6 +35,7 @@ from subzero.diagnosis.inference.data_error_search import (
     is_soft,
     without,
 )
+from subzero.diagnosis.inference.data_error_yardstick import OUTLIER_LOG_DENSITY
 from subzero.diagnosis.inference.linear_gaussian import log_sum
 from subzero.diagnosis.inference.map_fit import is_poor_fit
 from subzero.diagnosis.inference.noise import log_prior_of

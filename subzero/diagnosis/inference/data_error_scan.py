@@ -1,96 +1,39 @@
 """Which errors in the data would explain a record better: each correction judged against all that physics could do.
 
-The yardstick is generous to physics. All parameters are free at once, each as far as a cause may go, in the linear
-problem at the nominal model; and every channel has a scale of its noise that is free, so that what a linear model
-cannot follow makes a channel count for less, and not the others bend:
-
-    G = max over s of  log N(W y; W h, s² I + J D Jᵀ) − Σ n_c log s_c,      D = (max(size of a cause, 4 τ))²
-
-An error in the data is suspected if the corrected record has a G that is ahead of the record's own as it is, counted
-in the units in which it was written, and with what is known beforehand. Nothing is simulated for it, but once for each
-error of the commands. Whether it is one is for real fits to say (`data_error_choice`).
+An error in the data is suspected if the corrected record has an evidence that is ahead of the record's own as it is
+(`data_error_yardstick`), counted in the units in which it was written, and with what is known beforehand. Nothing is
+simulated for it, but once for each error of the commands. Whether it is one is for real fits to say
+(`data_error_choice`).
 """
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
-from subzero.channels import BY_NAME, HEADING, turned
-from subzero.diagnosis.hypothesis.configuration import Setting, sensed, truth
-from subzero.diagnosis.hypothesis.data_error import (
-    ANY,
-    COMMAND_GROUPS,
-    KINDS,
-    LEAST,
-    REFERENCES,
-    REPEATED,
-    SWAPS,
-    DataError,
-    corrected,
-)
-from subzero.diagnosis.hypothesis.hypotheses import PRIOR, columns_of, nameable, variances
-from subzero.diagnosis.hypothesis.logged import Logged
-from subzero.diagnosis.inference.linear_gaussian import KAPPAS, Posterior, freed, log_sum
-from subzero.diagnosis.inference.noise import Noise, resolution_of, spikes, usual_noise
+from subzero.diagnosis.hypothesis.data_error import ANY, KINDS, LEAST, REPEATED, DataError
+from subzero.diagnosis.inference.data_error_candidates import FEWEST, STEP_TIMES, Group, possible
+from subzero.diagnosis.inference.data_error_yardstick import Term, Yardstick, reckon
 from subzero.diagnosis.inference.posing import usual_of
-from subzero.diagnosis.inference.problem import Problem
-from subzero.diagnosis.inference.simulator import Track, simulate_track
-from subzero.records.consistency import MISTAKEN
 
-KAPPA_NARROW = 2.0
-"""How much wider than declared tolerances are where a cause stands by itself: the linear problem is no better."""
-FEWEST = 6
-"""A channel with fewer samples says nothing."""
-LEAST_SCALE, MOST_SCALE, ROUNDS, SETTLED = 0.3, 1e4, 5, 0.01
-"""Scales of the noise of a channel, and how often they are found anew behind the parameters, if they still change by
-more than that share: a hundredth costs less than 0.1 nats, as the best scales are stationary. Of a rounded one it is
-never so small that a sample has more density than 1/q, which is a probability of 1."""
-OUTLIER_LOG_DENSITY = float(np.log(0.01 / 50.0))
-"""Of a sample that is left out: one of a hundred, anywhere within fifty levels of the noise."""
-LATEST_SHARE, CLOCK_STEP_S, LATEST_CHANNEL_S = 0.5, 0.5, 6.0
-"""Clocks are late by up to this share of the record, tried every so often; one channel by no more than that. [s]"""
-RATES, RATE_STEP = (0.02, 0.04, 0.06, 0.08, 0.1, 0.12, 0.14, 0.16, 0.18, 0.2), 0.02
-"""By how much a clock may run too fast, or too slow. [-]"""
-CHANNEL_STEP_S = 1.0
-"""Delays of one channel are tried every so often: its lag and the clock are free about each. [s]"""
-STEP_MARGIN = 0.1
-"""No step is looked for so close to the ends of a record, as a share of it: there it is a bias, or nothing."""
-STEP_TIMES, STEP_LEVELS, LEAST_STEP_LEVELS = 40, 30.0, 4.0
-"""A step in a sensor is looked for at so many times; its usual and its least size in levels of the noise, the latter
-with its rounding: less is a drift, or nothing."""
-CAUSES_TRIED = 3
-"""So many causes, the most promising, have the scales of the noise found behind them."""
 FREE_NUMBER_LOG_PRIOR = -5.0
 """What it costs that a number (a delay, a rate, a size, a time) is fitted to the record."""
-
-
-class Term(NamedTuple):
-    """What a channel says of the parameters: JᵀJ, Jᵀr, |r|², whitened; how many samples, and ½ log det of their noise
-    with what outliers cost; the least scale of its noise; and how many were measured, with outliers.
-    """
-
-    A: np.ndarray
-    b: np.ndarray
-    rr: float
-    samples: int
-    fixed: float
-    least: float
-    measured: int
-
-
-class Reckoned(NamedTuple):
-    """The generous evidence, the parameters (k,) and their covariance, and the scale of the noise of each channel."""
-
-    log: float
-    z: np.ndarray
-    M: np.ndarray
-    scales: dict[str, float]
+LEAST_STEP_LEVELS = 4.0
+"""Least size of a step in a sensor, in levels of the noise with its rounding: less is a drift, or nothing."""
+PEAKS = 4
+"""Of numbers that are tried on a grid so many are looked at closer."""
+UNREFINED = -8.0
+"""The number of an error that is less probable than that is left as it is."""
+FAR_BEHIND = 100.0
+"""What is so far behind the best suspect is not looked at closer."""
+HOPELESS = -30.0
+"""Nor is what is so much less probable than no error, with all of physics to help."""
+FINEST = 0.02
+"""A number is found to this share of the step between those that were tried."""
 
 
 class Suspect(NamedTuple):
@@ -101,206 +44,6 @@ class Suspect(NamedTuple):
     error: DataError
     lead: float
     generous: float
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Yardstick:
-    """What the nominal model, and all that may be wrong with it, say of a record at any time.
-
-    Attributes:
-        logged: the record as it is said to be, but for what is corrected in it.
-        written: the record as it is.
-        step: between times of the prediction, from 0 on. [s]
-        nominal: channel → prediction (g,). [display unit]
-        slopes: channel → sensitivities to all parameters (g, k).
-        D: prior variances that are generous to physics: every cause at once (k,).
-        narrow: prior variances of wide tolerances (k,).
-        causes: places of the parameters of each cause.
-        setting: of its simulations.
-        repeated: values that it repeats, which may be a channel that is rounded and stands still.
-        corrected: errors that are corrected in it already.
-        kept: predictions under other commands.
-    """
-
-    logged: Logged
-    written: Logged
-    step: float
-    nominal: Mapping[str, np.ndarray]
-    slopes: Mapping[str, np.ndarray]
-    D: np.ndarray
-    narrow: np.ndarray
-    causes: Sequence[Sequence[int]]
-    setting: Setting
-    repeated: tuple[DataError, ...] = ()
-    corrected: tuple[DataError, ...] = ()
-    kept: dict[str, Mapping[str, np.ndarray]] = field(default_factory=dict)
-
-    def without(self, error: DataError) -> Logged:
-        """Return the record without a further error: a value that it repeats stands at the times that were written."""
-        if error.kind in REPEATED and self.corrected:
-            return corrected(self.written, (*self.corrected, error))
-        return error.corrected(self.logged)
-
-    def terms(self, logged: Logged, channels: Iterable[str]) -> dict[str, Term]:
-        """Return what channels of a record, or of a corrected one, say of the parameters."""
-        nominal = self.nominal_of(logged)
-        return {name: self._term(logged, name, nominal[name]) for name in channels}
-
-    def nominal_of(self, logged: Logged) -> Mapping[str, np.ndarray]:
-        """Return the prediction under a record's commands, simulated once if they are others."""
-        commands, own = logged.setting.trial.commands, self.logged.setting.trial.commands
-        if commands is own or commands is None or own is None:
-            return self.nominal
-        key = commands.values.tobytes().hex()
-        if key not in self.kept:
-            setting = replace(self.setting, trial=replace(self.setting.trial, commands=commands))
-            self.kept[key] = shown_on_grid(setting, simulate_track(setting), self.nominal)
-        return self.kept[key]
-
-    def at(self, rows: np.ndarray, time: np.ndarray) -> np.ndarray:
-        """Return what stands on the grid (g, …) at times (n,): linear between, held at the ends."""
-        x = np.clip(time / self.step, 0.0, rows.shape[0] - 1.000001)
-        low = x.astype(int)
-        share = (x - low).reshape(-1, *(1,) * (rows.ndim - 1))
-        return (1.0 - share) * rows[low] + share * rows[low + 1]
-
-    def _term(self, logged: Logged, name: str, nominal: np.ndarray) -> Term:
-        time, values = logged.record.time, logged.record.values[name]
-        expected, usual = self.at(nominal, time), usual_of(name, values, logged.noise)
-        if name == HEADING:
-            values = turned(values, expected)
-        used = np.isfinite(values) & np.isfinite(expected)
-        measured = int(np.count_nonzero(used))
-        used[used] = ~spikes((values - expected)[used], max(usual.level, usual.resolution))
-        noise = usual_noise(time, used, usual)
-        white = noise.whiten(np.column_stack([values - expected, self.at(self.slopes[name], time)]))
-        r, J = white[:, 0], white[:, 1:]
-        out = (measured - noise.count) * (OUTLIER_LOG_DENSITY - np.log(usual.level))
-        fixed, least = out - noise.log_scale, least_scale(noise)
-        return Term(J.T @ J, J.T @ r, float(r @ r), noise.count, fixed, least, measured)
-
-    @cached_property
-    def own(self) -> dict[str, Term]:
-        """What the record as it is says."""
-        return self.terms(self.logged, self.logged.record.values)
-
-    @cached_property
-    def as_is(self) -> Reckoned:
-        """The generous evidence of the record as it is."""
-        return reckon(self.own, self.D)
-
-    @cached_property
-    def log_sparse(self) -> float:
-        """The evidence of nothing, and of every cause by itself, of the record as it is."""
-        return self.sparse(self.own)
-
-    @property
-    def log_none(self) -> float:
-        """The evidence of nothing, of the record as it is."""
-        return reckon(self.own, self.narrow).log + float(np.log(PRIOR["none"]))
-
-    def sparse(self, terms: Mapping[str, Term]) -> float:
-        """Return the log evidence of nothing, and of every cause by itself, mixed; within wide tolerances."""
-        none = reckon(terms, self.narrow)
-        base = Posterior(z=none.z, M=none.M, log_evidence=none.log, log_det=0.0)
-        gains = [freed(base, self.narrow, at, self.D[list(at)])[0] for at in self.causes]
-        best = sorted(range(len(gains)), key=lambda i: -gains[i])[:CAUSES_TRIED]
-        each = [reckon(terms, self._freed(self.causes[i])).log for i in best]
-        prior = np.log(PRIOR["single"] / max(len(self.causes), 1))
-        return log_sum([none.log + np.log(PRIOR["none"]), *(log + prior for log in each)])
-
-    def _freed(self, at: Sequence[int]) -> np.ndarray:
-        D = self.narrow.copy()
-        D[list(at)] = self.D[list(at)]
-        return D
-
-
-def reckon(terms: Mapping[str, Term], D: np.ndarray) -> Reckoned:
-    """Return the generous evidence of what channels say."""
-    root = np.sqrt(D)
-    scales = {name: _scale(one, one.rr) for name, one in terms.items()}
-    for turn in range(ROUNDS + 1):
-        A = sum(one.A / scales[name] ** 2 for name, one in terms.items())
-        b = sum(one.b / scales[name] ** 2 for name, one in terms.items())
-        factor = np.linalg.cholesky(np.eye(D.size) + root[:, None] * A * root)
-        half = np.linalg.solve(factor, np.diag(root))
-        M = half.T @ half
-        z = M @ b
-        before, scales = scales, {name: _scale(one, _left(one, z, M)) for name, one in terms.items()}
-        if turn == ROUNDS or all(abs(scales[name] - old) < SETTLED * old for name, old in before.items()):
-            scales = before
-            break
-    rr = sum(one.rr / scales[name] ** 2 for name, one in terms.items())
-    log = -0.5 * (rr - float(b @ z)) - float(np.sum(np.log(np.diag(factor))))
-    log += sum(one.fixed - one.samples * np.log(scales[name]) for name, one in terms.items())
-    return Reckoned(float(log), z, M, scales)
-
-
-def _left(one: Term, z: np.ndarray, M: np.ndarray) -> float:
-    """Return the expected square that parameters leave of a channel."""
-    return one.rr - 2.0 * float(one.b @ z) + float(z @ one.A @ z) + float(np.sum(one.A * M))
-
-
-def least_scale(noise: Noise) -> float:
-    """Return the least scale of a channel's noise."""
-    level = float(np.exp(noise.log_scale / max(noise.count, 1)))
-    return max(LEAST_SCALE, noise.resolution / np.sqrt(2.0 * np.pi) / level)
-
-
-def _scale(one: Term, square: float) -> float:
-    """Return the scale of a channel's noise of which a square is left."""
-    return float(np.clip(np.sqrt(max(square, 0.0) / max(one.samples, 1)), one.least, MOST_SCALE))
-
-
-def yardstick_of(problem: Problem, record: int, logged: Logged) -> Yardstick:
-    """Return what a record is judged by; its simulations are those of the sensitivities at the nominal model.
-
-    Args:
-        problem: all records and parameters.
-        record: its number.
-        logged: the record.
-    """
-    zero, one = np.zeros(len(problem.entries)), problem.records[record]
-    names = [name for name in logged.record.values if name in one.noise]
-    (base,) = problem.tracks([(record, zero)])
-    nominal = shown_on_grid(one.setting, base, names)
-    ks = [k for k, entry in enumerate(problem.entries) if entry.record in (-1, record)]
-    moved = {k: to_usual_sizes(problem, k) for k in ks}
-    tracks = problem.tracks([(record, moved[k]) for k in ks])
-    slopes = {name: np.zeros((nominal[name].size, zero.size)) for name in names}
-    for k, track in zip(ks, tracks, strict=True):
-        there = shown_on_grid(problem.setting(record, moved[k]), track, names)
-        for name in names:
-            slopes[name][:, k] = np.nan_to_num((there[name] - nominal[name]) / moved[k][k])
-    grid, causes = base[0], [columns_of(problem.entries, (name,)) for name in nameable(problem.entries)]
-    return Yardstick(logged=logged, written=logged, step=float(grid[1] - grid[0]), nominal=nominal, slopes=slopes,
-                     D=generous_variances(problem), narrow=variances(problem.entries, (), KAPPA_NARROW),
-                     causes=causes, setting=one.setting)  # fmt: skip
-
-
-def generous_variances(problem: Problem) -> np.ndarray:
-    """Return prior variances of every cause at once (k,)."""
-    return np.array(
-        [max(e.parameter.scale, max(KAPPAS) * e.parameter.tolerance) ** 2 for e in problem.entries]
-    )
-
-
-def to_usual_sizes(problem: Problem, k: int) -> np.ndarray:
-    """Return deviations with an entry moved for a sensitivity: what does nothing while it is small to a usual size."""
-    zero, parameter = np.zeros(len(problem.entries)), problem.entries[k].parameter
-    if parameter.low < 0.0 or problem.entries[k].effect.slot == "sensors":
-        return problem.moved(zero, k)
-    zero[k] = min(parameter.scale, parameter.high)
-    return zero
-
-
-def shown_on_grid(setting: Setting, track: Track, names: Iterable[str]) -> dict[str, np.ndarray]:
-    """Return what the sensors show at the times of a track: channel → (g,), in its display unit."""
-    grid, states = track
-    shown = {name: sensed(setting.sensing.get(name), grid, truth(setting, states, name)) for name in names}
-    if setting.clock_offset:
-        shown = {name: np.interp(grid - setting.clock_offset, grid, one) for name, one in shown.items()}
-    return shown
 
 
 def suspects(yardstick: Yardstick, trusted: frozenset[str] = frozenset()) -> list[Suspect]:
@@ -353,138 +96,6 @@ def _peaks(each: Sequence[Suspect]) -> list[Suspect]:
     return sorted(tops, key=lambda one: -one.generous)[:PEAKS]
 
 
-PEAKS = 4
-"""Of numbers that are tried on a grid so many are looked at closer."""
-UNREFINED = -8.0
-"""The number of an error that is less probable than that is left as it is."""
-FAR_BEHIND = 100.0
-"""What is so far behind the best suspect is not looked at closer."""
-HOPELESS = -30.0
-"""Nor is what is so much less probable than no error, with all of physics to help."""
-
-
-class Group(NamedTuple):
-    """Errors of a kind that share its probability; `step` of a number that is tried on a grid, 0 if there is none."""
-
-    each: list[DataError]
-    step: float = 0.0
-
-
-def possible(yardstick: Yardstick, trusted: frozenset[str]) -> list[Group]:
-    """Return all errors that a record may have, but for repeated values."""
-    values, time = yardstick.logged.record.values, yardstick.logged.record.time
-    names = [name for name in values if name in yardstick.nominal]
-    open_ = [name for name in names if name not in trusted]
-    units = [DataError(kind="unit", channels=(name,), how=how)
-             for name in open_ for how in MISTAKEN.get(BY_NAME[name].unit, {})]  # fmt: skip
-    units = [one for one in units if _is_quiet(yardstick, one)]
-    pairs = [DataError(kind="swapped", channels=pair) for pair in itertools.combinations(open_, 2)]
-    found = [
-        Group([DataError(kind="sign", channels=(name,)) for name in open_]),
-        Group(units),
-        Group(
-            [
-                DataError(kind="reference", channels=(HEADING,), how=how)
-                for how in REFERENCES
-                if HEADING in open_
-            ]
-        ),
-        Group(pairs),
-        Group([one for one in yardstick.repeated if one.channels[0] in open_]),
-    ]
-    found += [Group([one for name in open_ for one in _step(yardstick, name)]), *_clocks(time, open_)]
-    if yardstick.logged.setting.trial.commands is not None:
-        found += _commands(yardstick.logged)
-    return [group for group in found if group.each]
-
-
-LOUDEST = 6.0
-"""Noise of a sensor is never so many usual levels: what is louder in another unit is not in that unit. [-]"""
-
-
-def _is_quiet(yardstick: Yardstick, error: DataError) -> bool:
-    """Say whether a channel's noise from sample to sample is that of a sensor, once it is in the right unit.
-
-    Where the prediction fails, any unit that makes a record smaller than it would be as likely; but not its noise.
-    """
-    (name,) = error.channels
-    record = error.corrected(yardstick.logged).record
-    known = record.values[name][np.isfinite(record.values[name])]
-    level = usual_of(name, known, yardstick.logged.noise).level
-    if known.size < FEWEST or np.ptp(known) == 0.0:
-        return False
-    expected = yardstick.at(yardstick.nominal[name], record.time)
-    jitter = _jitter(known) + resolution_of(known, level) / np.sqrt(12.0)
-    return jitter < LOUDEST * level + 2.0 * _jitter(expected)
-
-
-def _jitter(values: np.ndarray) -> float:
-    """Return the standard deviation of white noise whose second differences are as large (median)."""
-    return 1.4826 * float(np.median(np.abs(np.diff(values, 2)))) / np.sqrt(6.0) if values.size > 2 else 0.0
-
-
-def _clocks(time: np.ndarray, names: Sequence[str]) -> list[Group]:
-    span = float(time[-1] - time[0])
-    least = LEAST["late_clock"]
-    late = np.arange(least, max(LATEST_SHARE * span, 2.0 * least), CLOCK_STEP_S)
-    own = np.arange(LEAST["latency"], min(LATEST_CHANNEL_S, LATEST_SHARE * span) + 1e-9, CHANNEL_STEP_S)
-    found = [_numbered("late_clock", late, CLOCK_STEP_S), _numbered("clock_rate", RATES, RATE_STEP)]
-    return found + [_numbered("latency", own, CHANNEL_STEP_S, name) for name in names if len(names) > 1]
-
-
-def _numbered(kind: str, sizes: Iterable[float], step: float, *channels: str) -> Group:
-    """Return errors of a kind of these sizes, either way."""
-    both = [side * float(x) for x in sizes for side in (1.0, -1.0)]
-    return Group([DataError(kind=kind, channels=channels, amount=x) for x in both], step)
-
-
-def _commands(logged: Logged) -> list[Group]:
-    """Return the errors of commands that change any."""
-    turned_ = [DataError(kind="command_sign", channels=(group,)) for group in COMMAND_GROUPS]
-    exchanged = [DataError(kind="command_swap", channels=pair) for pair in SWAPS]
-    return [Group(_different(logged, some)) for some in (turned_, exchanged)]
-
-
-def _different(logged: Logged, errors: Iterable[DataError]) -> list[DataError]:
-    """Return those errors that change commands, each change once."""
-    found: dict[bytes, DataError] = {}
-    own = logged.setting.trial.commands
-    assert own is not None
-    for one in errors:
-        changed = one.corrected(logged).setting.trial.commands
-        assert changed is not None
-        if not np.array_equal(changed.values, own.values):
-            found.setdefault((changed.values + 0.0).tobytes(), one)
-    return list(found.values())
-
-
-def _step(yardstick: Yardstick, name: str) -> list[DataError]:
-    """Return the step in a sensor that explains most of what the generous fit leaves of its channel."""
-    record, here = yardstick.logged.record, yardstick.as_is
-    values, time = record.values[name], record.time
-    expected = yardstick.at(yardstick.nominal[name], time)
-    values = turned(values, expected) if name == HEADING else values
-    usual = usual_of(name, values, yardstick.logged.noise)
-    used = np.isfinite(values)
-    noise = usual_noise(time, used, usual)
-    begins = time[0] + (time[-1] - time[0]) * np.linspace(STEP_MARGIN, 1.0 - STEP_MARGIN, STEP_TIMES)
-    steps = (time[:, None] >= begins).astype(float)
-    rows = np.column_stack([values - expected - yardstick.at(yardstick.slopes[name], time) @ here.z, steps,
-                            yardstick.at(yardstick.slopes[name], time)])  # fmt: skip
-    white = noise.whiten(rows) / here.scales[name]
-    r, C, J = white[:, 0], white[:, 1 : 1 + begins.size], white[:, 1 + begins.size :]
-    cross = J.T @ C
-    M = np.sum(C * C, axis=0) - np.sum(cross * (here.M @ cross), axis=0)
-    q, prior = C.T @ r, (STEP_LEVELS * usual.level) ** -2
-    best = int(np.argmax(q**2 / (np.maximum(M, 0.0) + prior)))
-    size = float(q[best] / (max(M[best], 0.0) + prior))
-    return [DataError(kind="step", channels=(name,), amount=size, since=_first(time, begins[best]))]
-
-
-def _first(time: np.ndarray, at: float) -> float:
-    return float(time[np.searchsorted(time, at)])
-
-
 def log_prior(error: DataError, alike: int) -> float:
     """Return the log odds beforehand of an error, one of so many of its kind, against none."""
     among = error.numbers * FREE_NUMBER_LOG_PRIOR if error.numbers else -np.log(max(alike, 1))
@@ -535,10 +146,6 @@ def _mean_log_density(yardstick: Yardstick, name: str) -> float:
     """Return what a measured sample of a channel adds to the evidence of the record as it is."""
     own, scale = yardstick.own[name], yardstick.as_is.scales[name]
     return (own.fixed - own.samples * (float(np.log(scale)) + 0.5)) / max(own.measured, 1)
-
-
-FINEST = 0.02
-"""A number is found to this share of the step between those that were tried."""
 
 
 def _refined(yardstick: Yardstick, one: Suspect, group: Group) -> Suspect:

@@ -10,8 +10,9 @@ How far physics comes towards a record without them is looked at before any sear
     G = max over sets of at most MAX_CAUSES terms of  log p(y | terms) p(terms) − log p(y | nothing) p(nothing)
 
 A term is a cause, throughout or from some time of a grid on, which is what a late clock looks like. The set grows by
-the term that gains most; the scales of the noise are found anew behind each set, as in `data_error_scan`, which has
-nothing and single causes only. An error of the data that is far ahead of that needs no search of the record as it is.
+the term that gains most; the scales of the noise are found anew behind each set, as in `data_error_yardstick`, which
+has nothing and single causes only. An error of the data that is far ahead of that needs no search of the record as it
+is.
 """
 
 from __future__ import annotations
@@ -26,18 +27,15 @@ from subzero.diagnosis.hypothesis.data_error import DataError, corrected
 from subzero.diagnosis.hypothesis.hypotheses import MAX_CAUSES, PRIOR, columns_of, nameable, variances
 from subzero.diagnosis.hypothesis.logged import Logged
 from subzero.diagnosis.inference.change_point_scan import BaseRun, Begun, gain_of, onset_columns
-from subzero.diagnosis.inference.data_error_scan import (
-    FAR_BEHIND,
+from subzero.diagnosis.inference.data_error_scan import FAR_BEHIND, Suspect, judged_again, suspects
+from subzero.diagnosis.inference.data_error_yardstick import (
     KAPPA_NARROW,
     Reckoned,
-    Suspect,
     Term,
     Yardstick,
     generous_variances,
-    judged_again,
     least_scale,
     reckon,
-    suspects,
     to_usual_sizes,
     yardstick_of,
 )
