@@ -17,8 +17,9 @@ import numpy as np
 
 from subzero.diagnosis.hypothesis.data_error import ANY, KINDS, LEAST, REPEATED, DataError
 from subzero.diagnosis.inference.data_error_candidates import FEWEST, STEP_TIMES, Group, possible
-from subzero.diagnosis.inference.data_error_yardstick import Term, Yardstick, reckon
+from subzero.diagnosis.inference.data_error_yardstick import Reckoned, Term, Yardstick, log_density, reckon
 from subzero.diagnosis.inference.posing import usual_of
+from subzero.diagnosis.inference.rounded_values import log_odds_of_frozen, steps_of
 
 FREE_NUMBER_LOG_PRIOR = -5.0
 """What it costs that a number (a delay, a rate, a size, a time) is fitted to the record."""
@@ -110,10 +111,15 @@ def _judged(yardstick: Yardstick, error: DataError, group: Group, *, closer: boo
     terms = {**yardstick.own, **yardstick.terms(logged, touched)}
     if min(terms[name].samples for name in touched) < FEWEST or _is_small(yardstick, error):
         return Suspect(error, -np.inf, -np.inf)
-    odds = log_prior(error, len(group.each)) + _lost(yardstick, terms, touched)
+    odds = log_prior(error, len(group.each))
     odds += error.log_jacobian * sum(terms[name].samples for name in touched)
-    generous = odds + reckon(terms, yardstick.D).log - yardstick.as_is.log
-    lead = odds + yardstick.sparse(terms) - yardstick.log_sparse if closer else generous
+    lost = partial(_lost, yardstick, terms, touched)
+    if may_stand_still(yardstick, error):
+        lost = partial(_stuck, yardstick, error, terms)
+    generous = odds + lost(yardstick.as_is) + reckon(terms, yardstick.D).log - yardstick.as_is.log
+    if not closer:
+        return Suspect(error, float(generous), float(generous))
+    lead = odds + lost(yardstick.likeliest) + yardstick.sparse(terms) - yardstick.log_sparse
     return Suspect(error, float(lead), float(generous))
 
 
@@ -132,7 +138,31 @@ def _closer(yardstick: Yardstick, one: Suspect, group: Group) -> Suspect:
     return _judged(yardstick, one.error, group, closer=True)
 
 
-def _lost(yardstick: Yardstick, terms: Mapping[str, Term], touched: Sequence[str]) -> float:
+def may_stand_still(yardstick: Yardstick, error: DataError) -> bool:
+    """Say whether a channel that seems to be frozen may only stand still, as it is rounded."""
+    return error.kind == "frozen" and error in yardstick.repeated
+
+
+def _stuck(yardstick: Yardstick, error: DataError, terms: Mapping[str, Term], as_is: Reckoned) -> float:
+    """Return what the values that a rounded channel repeats to the end added to the evidence of the record as it is,
+    and the log odds that it is frozen, not standing still: there each value is an interval (`rounded_values`).
+    """
+    (name,) = error.channels
+    record, kept = yardstick.logged.record, yardstick.without(error).record.values[name]
+    known = np.isfinite(record.values[name])
+    run = ~np.isfinite(kept[known])
+    if not run.any():
+        return -np.inf
+    usual = usual_of(name, record.values[name], yardstick.logged.noise)
+    steps = steps_of(record.time[known], yardstick.deviations(name, as_is.z)[known], usual)
+    own, scale = yardstick.own[name], as_is.scales[name]
+    added = log_density(own, as_is.z, scale) - log_density(terms[name], as_is.z, scale)
+    return added + log_odds_of_frozen(steps, run)
+
+
+def _lost(
+    yardstick: Yardstick, terms: Mapping[str, Term], touched: Sequence[str], as_is: Reckoned | None = None
+) -> float:
     """Return what samples that are no measurements any more added to the evidence of the record as it is, on average;
     of channels that are exchanged, gaps only change places.
     """

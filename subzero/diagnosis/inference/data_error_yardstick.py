@@ -160,15 +160,31 @@ class Yardstick:
         """The evidence of nothing, of the record as it is."""
         return reckon(self.own, self.narrow).log + float(np.log(PRIOR["none"]))
 
+    def deviations(self, name: str, z: np.ndarray) -> np.ndarray:
+        """Return measured − predicted of a channel (n,), with parameters in the linear problem. [display unit]"""
+        time, values = self.logged.record.time, self.logged.record.values[name]
+        expected = self.at(self.nominal_of(self.logged)[name], time)
+        values = turned(values, expected) if name == HEADING else values
+        return values - expected - self.at(self.slopes[name], time) @ z
+
     def sparse(self, terms: Mapping[str, Term]) -> float:
         """Return the log evidence of nothing, and of every cause by itself, mixed; within wide tolerances."""
+        return log_sum([log for log, _ in self._each(terms)])
+
+    @cached_property
+    def likeliest(self) -> Reckoned:
+        """The most probable of nothing and single causes, of the record as it is."""
+        return max(self._each(self.own), key=lambda pair: pair[0])[1]
+
+    def _each(self, terms: Mapping[str, Term]) -> list[tuple[float, Reckoned]]:
+        """Return nothing and the best causes with their log posteriors."""
         none = reckon(terms, self.narrow)
         base = Posterior(z=none.z, M=none.M, log_evidence=none.log, log_det=0.0)
         gains = [freed(base, self.narrow, at, self.D[list(at)])[0] for at in self.causes]
         best = sorted(range(len(gains)), key=lambda i: -gains[i])[:CAUSES_TRIED]
-        each = [reckon(terms, self._freed(self.causes[i])).log for i in best]
-        prior = np.log(PRIOR["single"] / max(len(self.causes), 1))
-        return log_sum([none.log + np.log(PRIOR["none"]), *(log + prior for log in each)])
+        each = [reckon(terms, self._freed(self.causes[i])) for i in best]
+        prior = float(np.log(PRIOR["single"] / max(len(self.causes), 1)))
+        return [(none.log + float(np.log(PRIOR["none"])), none), *((one.log + prior, one) for one in each)]
 
     def _freed(self, at: Sequence[int]) -> np.ndarray:
         D = self.narrow.copy()
@@ -199,7 +215,16 @@ def reckon(terms: Mapping[str, Term], D: np.ndarray) -> Reckoned:
 
 def _left(one: Term, z: np.ndarray, M: np.ndarray) -> float:
     """Return the expected square that parameters leave of a channel."""
-    return one.rr - 2.0 * float(one.b @ z) + float(z @ one.A @ z) + float(np.sum(one.A * M))
+    return _square(one, z) + float(np.sum(one.A * M))
+
+
+def _square(one: Term, z: np.ndarray) -> float:
+    return one.rr - 2.0 * float(one.b @ z) + float(z @ one.A @ z)
+
+
+def log_density(one: Term, z: np.ndarray, scale: float) -> float:
+    """Return the log density of a channel with parameters (k,) and a scale of its noise."""
+    return -0.5 * _square(one, z) / scale**2 + one.fixed - one.samples * float(np.log(scale))
 
 
 def least_scale(noise: Noise) -> float:
