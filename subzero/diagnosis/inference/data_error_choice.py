@@ -17,13 +17,13 @@ against a search of the records with it.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from subzero.diagnosis.hypothesis.data_error import DataError
+from subzero.diagnosis.hypothesis.data_error import DataError, corrected
 from subzero.diagnosis.hypothesis.logged import Logged
 from subzero.diagnosis.inference import settings
 from subzero.diagnosis.inference.data_error_scan import log_prior
@@ -71,6 +71,43 @@ def is_explained(work: Findings) -> bool:
     )
 
 
+class Standing(NamedTuple):
+    """A channel of a record that repeats its value to the end (n,), and may be frozen: the log odds of that."""
+
+    record: int
+    channel: str
+    run: np.ndarray
+    odds: float
+
+    def log_density(self, work: Findings) -> float:
+        """Return what its values add to the log density of the records by how densely their noise lies."""
+        noise = work.problem.records[self.record].noise[self.channel]
+        rest = noise.used & ~self.run
+        before = replace(noise, used=rest, time=noise.time[~self.run[noise.used]])
+        return before.log_scale - noise.log_scale
+
+
+def _standing(
+    whole: Suspicion, errors: Sequence[SuspectedError], records: Sequence[Logged]
+) -> tuple[Standing, ...]:
+    """Return the rounded channels that are held to stand still where only some suspected errors are corrected."""
+    return tuple(
+        Standing(one.record, one.error.channels[0], _lost_by(one, errors, records), one.odds)
+        for one in whole.errors
+        if one.odds is not None and not any(one is each for each in errors)
+    )
+
+
+def _lost_by(one: SuspectedError, errors: Sequence[SuspectedError], records: Sequence[Logged]) -> np.ndarray:
+    """Return which samples of its channel (n,) one more error takes from a record."""
+    others = tuple(each.error for each in errors if each.record == one.record and each is not one)
+    before, after = (
+        np.isfinite(corrected(records[one.record], found).record.values[one.error.channels[0]])
+        for found in (others, (*others, one.error))
+    )
+    return before & ~after
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Explained:
     """Records that are taken to have errors in their data, and what explains them besides.
@@ -79,17 +116,22 @@ class Explained:
         errors: in the data.
         work: what was found in the records without them.
         log_prior: of the errors, and what their corrections stretch.
-        lost: samples that are no measurements then.
+        lost: samples that are no measurements then, but for those of rounded channels that are frozen.
+        standing: rounded channels that are held to stand still.
     """
 
     errors: tuple[SuspectedError, ...]
     work: Findings
     log_prior: float
     lost: int
+    standing: tuple[Standing, ...] = ()
 
     def log_evidence(self, per_lost: float) -> float:
-        """Return the log evidence of the records as they were written; of samples that are lost, each so much."""
-        return log_evidence(self.work) + self.log_prior + self.lost * per_lost
+        """Return the log evidence of the records as they were written; of samples that are lost, each so much. That a
+        frozen channel repeats its value is certain; one that stands still has its odds in place of a density.
+        """
+        standing = sum(one.log_density(self.work) + one.odds for one in self.standing)
+        return log_evidence(self.work) + self.log_prior + self.lost * per_lost - standing
 
     @property
     def mean(self) -> float:
@@ -132,17 +174,17 @@ def compared(suspicion: Suspicion, records: Sequence[Logged], look: Look) -> lis
     whole, least, tried = len(suspicion.errors), suspicion.firm, list[Explained]()
     first = suspicion.first(least)
     try:
-        tried.append(_explained(first, records, look.begin(without(records, first))))
+        tried.append(_explained(first, suspicion, records, look.begin(without(records, first))))
         is_open = least < whole and not _is_settled(tried[0].work)
         if is_finished := is_open and not explain(suspicion.errors):
             look.finish(tried[0].work)
             is_open = not is_explained(tried[0].work)
         more = [suspicion.first(k + 1) for k in range(least, whole)] if is_open else []
-        _race(tried, more, records, look, new=[] if is_finished else tried[:])
+        _race(tried, more, suspicion, records, look, new=[] if is_finished else tried[:])
         for held, errors in pairwise([first, *suspicion.fewer(least)]):
             if is_clear(held, _first(tried).work):
                 break
-            _race(tried, [errors], records, look, new=[])
+            _race(tried, [errors], suspicion, records, look, new=[])
     except KeyboardInterrupt:  # before anything was found of one of them
         if not tried:
             raise
@@ -163,6 +205,7 @@ def _is_settled(work: Findings) -> bool:
 def _race(
     tried: list[Explained],
     more: Sequence[tuple[SuspectedError, ...]],
+    whole: Suspicion,
     records: Sequence[Logged],
     look: Look,
     *,
@@ -171,7 +214,7 @@ def _race(
     """Give further sets of errors a first look, and finish what may be the most probable, also of what is new."""
     for errors in more:
         if _is_complete(tried):
-            new.append(_explained(errors, records, look.begin(without(records, errors))))
+            new.append(_explained(errors, whole, records, look.begin(without(records, errors))))
             tried.append(new[-1])
     while new and _is_complete(tried):
         now = _first(new)
@@ -190,12 +233,16 @@ def _first(tried: Sequence[Explained]) -> Explained:
     return max(tried, key=lambda one: one.log_evidence(per_lost))
 
 
-def _explained(errors: tuple[SuspectedError, ...], records: Sequence[Logged], work: Findings) -> Explained:
+def _explained(
+    errors: tuple[SuspectedError, ...], whole: Suspicion, records: Sequence[Logged], work: Findings
+) -> Explained:
     prior = sum(log_prior(one.error, ALIKE) + one.error.log_jacobian * _measured(records[one.record], one.error)
                 for one in errors)  # fmt: skip
     measured = sum(int(np.isfinite(logged.record.values[name]).sum()) for logged, one in
                    zip(records, work.problem.records, strict=True) for name in one.noise)  # fmt: skip
-    return Explained(errors=errors, work=work, log_prior=float(prior), lost=measured - _samples(work))
+    frozen = sum(int(_lost_by(one, errors, records).sum()) for one in errors if one.odds is not None)
+    return Explained(errors=errors, work=work, log_prior=float(prior), lost=measured - frozen - _samples(work),
+                     standing=_standing(whole, errors, records))  # fmt: skip
 
 
 def _measured(logged: Logged, error: DataError) -> int:

@@ -17,7 +17,7 @@ import numpy as np
 
 from subzero.diagnosis.hypothesis.data_error import ANY, KINDS, LEAST, REPEATED, DataError
 from subzero.diagnosis.inference.data_error_candidates import FEWEST, STEP_TIMES, Group, possible
-from subzero.diagnosis.inference.data_error_yardstick import Reckoned, Term, Yardstick, log_density, reckon
+from subzero.diagnosis.inference.data_error_yardstick import Reckoned, Term, Yardstick, reckon, square_of
 from subzero.diagnosis.inference.posing import usual_of
 from subzero.diagnosis.inference.rounded_values import log_odds_of_frozen, steps_of
 
@@ -113,13 +113,12 @@ def _judged(yardstick: Yardstick, error: DataError, group: Group, *, closer: boo
         return Suspect(error, -np.inf, -np.inf)
     odds = log_prior(error, len(group.each))
     odds += error.log_jacobian * sum(terms[name].samples for name in touched)
-    lost = partial(_lost, yardstick, terms, touched)
-    if may_stand_still(yardstick, error):
-        lost = partial(_stuck, yardstick, error, terms)
-    generous = odds + lost(yardstick.as_is) + reckon(terms, yardstick.D).log - yardstick.as_is.log
+    generous = odds + _lost(yardstick, error, terms, yardstick.as_is)
+    generous += reckon(terms, yardstick.D).log - yardstick.as_is.log
     if not closer:
         return Suspect(error, float(generous), float(generous))
-    lead = odds + lost(yardstick.likeliest) + yardstick.sparse(terms) - yardstick.log_sparse
+    lead = odds + _lost(yardstick, error, terms, yardstick.likeliest)
+    lead += yardstick.sparse(terms) - yardstick.log_sparse
     return Suspect(error, float(lead), float(generous))
 
 
@@ -143,30 +142,50 @@ def may_stand_still(yardstick: Yardstick, error: DataError) -> bool:
     return error.kind == "frozen" and error in yardstick.repeated
 
 
-def _stuck(yardstick: Yardstick, error: DataError, terms: Mapping[str, Term], as_is: Reckoned) -> float:
-    """Return what the values that a rounded channel repeats to the end added to the evidence of the record as it is,
-    and the log odds that it is frozen, not standing still: there each value is an interval (`rounded_values`).
+class _Stuck(NamedTuple):
+    """A rounded channel that repeats its value to the end: log odds that it is frozen, not standing still, where each
+    value is an interval (`rounded_values`); and what the run adds to the log evidence of the record as it is, by how
+    far it is from the prediction and by how densely its noise lies.
     """
+
+    odds: float
+    misfit: float
+    density: float
+
+
+def _stuck(yardstick: Yardstick, error: DataError, as_is: Reckoned) -> _Stuck:
+    """Return what speaks for a frozen channel, behind one explanation of the record as it is."""
     (name,) = error.channels
-    record, kept = yardstick.logged.record, yardstick.without(error).record.values[name]
+    logged = yardstick.without(error)
+    record, kept = yardstick.logged.record, logged.record.values[name]
     known = np.isfinite(record.values[name])
     run = ~np.isfinite(kept[known])
     if not run.any():
-        return -np.inf
+        return _Stuck(-np.inf, 0.0, 0.0)
     usual = usual_of(name, record.values[name], yardstick.logged.noise)
     steps = steps_of(record.time[known], yardstick.deviations(name, as_is.z)[known], usual)
-    own, scale = yardstick.own[name], as_is.scales[name]
-    added = log_density(own, as_is.z, scale) - log_density(terms[name], as_is.z, scale)
-    return added + log_odds_of_frozen(steps, run)
+    own, rest, scale = yardstick.own[name], yardstick.terms(logged, [name])[name], as_is.scales[name]
+    misfit = -0.5 * (square_of(own, as_is.z) - square_of(rest, as_is.z)) / scale**2
+    density = own.fixed - rest.fixed - (own.samples - rest.samples) * float(np.log(scale))
+    return _Stuck(log_odds_of_frozen(steps, run), misfit, density)
 
 
-def _lost(
-    yardstick: Yardstick, terms: Mapping[str, Term], touched: Sequence[str], as_is: Reckoned | None = None
-) -> float:
-    """Return what samples that are no measurements any more added to the evidence of the record as it is, on average;
-    of channels that are exchanged, gaps only change places.
+def odds_of_frozen(yardstick: Yardstick, error: DataError) -> float:
+    """Return the log odds that a rounded channel is frozen, not standing still, but for how far it is then from what is
+    predicted: by how often it flickers, behind that of two explanations which is better for a standing one.
     """
-    lost = {name: yardstick.own[name].measured - terms[name].measured for name in touched}
+    each = [_stuck(yardstick, error, one) for one in (yardstick.as_is, yardstick.likeliest)]
+    return min(one.odds + one.misfit for one in each)
+
+
+def _lost(yardstick: Yardstick, error: DataError, terms: Mapping[str, Term], as_is: Reckoned) -> float:
+    """Return what samples that are no measurements any more added to the evidence of the record as it is, on average;
+    of channels that are exchanged, gaps only change places; of one that may only stand still, what these samples added,
+    and the odds that it does not.
+    """
+    if may_stand_still(yardstick, error):
+        return sum(_stuck(yardstick, error, as_is))
+    lost = {name: yardstick.own[name].measured - terms[name].measured for name in yardstick.own}
     if not any(lost.values()) or sum(lost.values()) == 0:
         return 0.0
     return sum(count * _mean_log_density(yardstick, name) for name, count in lost.items())

@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -27,7 +28,14 @@ from subzero.diagnosis.hypothesis.data_error import DataError, corrected
 from subzero.diagnosis.hypothesis.hypotheses import MAX_CAUSES, PRIOR, columns_of, nameable, variances
 from subzero.diagnosis.hypothesis.logged import Logged
 from subzero.diagnosis.inference.change_point_scan import BaseRun, Begun, gain_of, onset_columns
-from subzero.diagnosis.inference.data_error_scan import FAR_BEHIND, Suspect, judged_again, suspects
+from subzero.diagnosis.inference.data_error_scan import (
+    FAR_BEHIND,
+    Suspect,
+    judged_again,
+    may_stand_still,
+    odds_of_frozen,
+    suspects,
+)
 from subzero.diagnosis.inference.data_error_yardstick import (
     KAPPA_NARROW,
     Reckoned,
@@ -65,7 +73,8 @@ SIGNATURE_LEAD = 20.0
 class SuspectedError:
     """An error of a record, its leads with all others corrected, and those that the record cannot tell from it; `left`
     is the noise of the channel that is explained worst without all of them, in usual levels, with all of physics to
-    help; `is_clear` says that it leaves physics no chance in the linear problem.
+    help; `is_clear` says that it leaves physics no chance in the linear problem; `odds` are those of a rounded channel
+    that is frozen and does not stand still, by how often it flickers, None for anything else.
     """
 
     record: int
@@ -75,6 +84,7 @@ class SuspectedError:
     alike: tuple[DataError, ...] = ()
     left: float = np.inf
     is_clear: bool = False
+    odds: float | None = None
 
 
 def is_soft(one: SuspectedError) -> bool:
@@ -174,9 +184,17 @@ def _of_record(problem: Problem, records: Sequence[Logged], record: int) -> list
     clear = _clear(problem, records, record, bench, made)
     return [
         SuspectedError(record=record, error=one.error, lead=one.lead, generous=one.generous, alike=alike,
-                       left=left, is_clear=any(one.error is other for other in clear))
+                       left=left, is_clear=any(one.error is other for other in clear),
+                       odds=_odds(bench, one.error, errors))
         for one, alike in made
     ]  # fmt: skip
+
+
+def _odds(bench: _Bench, error: DataError, errors: Sequence[DataError]) -> float | None:
+    """Return the log odds that a rounded channel is frozen, with all other errors corrected; None of what is none."""
+    if error not in bench.begun.repeated or error.kind != "frozen":
+        return None
+    return odds_of_frozen(bench.without([one for one in errors if one is not error]), error)
 
 
 def _forward(bench: _Bench, read_off: Sequence[DataError], trusted: frozenset[str]) -> list[_Judged]:
@@ -216,22 +234,38 @@ def _clear(
 ) -> list[DataError]:
     """Return the errors that leave physics no chance in the linear problem. One that a vehicle may look like must also
     explain all that is there, and without the help of any that is not clear: what broke in mid-trial makes an error of
-    a clock likely, too, but that leaves more than noise, or needs another one.
+    a clock likely, too, but that leaves more than noise, or needs another one. So may a rounded channel stand still
+    since something broke.
     """
+    ahead = partial(_lead_over_few, problem, records, record, bench)
     firm = [one for one, _ in made if one.error.kind not in SOFT]
-    clear = [one.error for one in firm if one.lead > CLEAR_LEAD and one.generous > CLEAR_GENEROUS_LEAD]
     held = [one.error for one in firm]
+    clear = [one.error for one in firm if one.lead > CLEAR_LEAD and one.generous > CLEAR_GENEROUS_LEAD]
+    clear = [one for one in clear if not may_stand_still(bench.begun, one)
+             or ahead(one, [other.error for other, _ in made if other.error is not one]) > CLEAR_LEAD]  # fmt: skip
     for one in sorted((one for one, _ in made if one.error.kind in SOFT), key=lambda each: -each.lead):
         after = bench.without([*held, one.error])
         if one.error.kind == "step" or one.lead < FAR_BEHIND or max(after.as_is.scales.values()) >= LOUD:
             break
-        before = bench.without(held)
-        each = [before.logged if i == record else other for i, other in enumerate(records)]
-        over_none = judged_again(before, one.error).lead + before.log_sparse - before.log_none
-        if over_none - most_of_physics(posed_again(problem, each), record) < FAR_BEHIND:
+        if ahead(one.error, held) < FAR_BEHIND:
             break
         held, clear = [*held, one.error], [*clear, one.error]
     return clear
+
+
+def _lead_over_few(
+    problem: Problem,
+    records: Sequence[Logged],
+    record: int,
+    bench: _Bench,
+    error: DataError,
+    others: Sequence[DataError],
+) -> float:
+    """Return by how much a record is more probable with an error than with a few causes, where others are corrected."""
+    before = bench.without(others)
+    each = [before.logged if i == record else one for i, one in enumerate(records)]
+    over_none = judged_again(before, error).lead + before.log_sparse - before.log_none
+    return over_none - most_of_physics(posed_again(problem, each), record)
 
 
 def _is_suspected(one: Suspect) -> bool:

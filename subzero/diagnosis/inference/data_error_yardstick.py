@@ -215,16 +215,12 @@ def reckon(terms: Mapping[str, Term], D: np.ndarray) -> Reckoned:
 
 def _left(one: Term, z: np.ndarray, M: np.ndarray) -> float:
     """Return the expected square that parameters leave of a channel."""
-    return _square(one, z) + float(np.sum(one.A * M))
+    return square_of(one, z) + float(np.sum(one.A * M))
 
 
-def _square(one: Term, z: np.ndarray) -> float:
+def square_of(one: Term, z: np.ndarray) -> float:
+    """Return the square of what is left of a channel with parameters (k,), whitened."""
     return one.rr - 2.0 * float(one.b @ z) + float(z @ one.A @ z)
-
-
-def log_density(one: Term, z: np.ndarray, scale: float) -> float:
-    """Return the log density of a channel with parameters (k,) and a scale of its noise."""
-    return -0.5 * _square(one, z) / scale**2 + one.fixed - one.samples * float(np.log(scale))
 
 
 def least_scale(noise: Noise) -> float:
