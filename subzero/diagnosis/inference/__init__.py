@@ -26,7 +26,9 @@ values that a record repeats in place of measurements     repeated_values
 what physics may do with a record, its linear evidence    data_error_yardstick
 errors that data may have                                 data_error_candidates
 ... of which linear evidence proposes some                data_error_scan
-... suspected together, and how close a few causes come   data_error_search
+how close a few causes come, without a search             few_causes
+the odds that a rounded channel froze                     rounded_values
+errors that are suspected together                        data_error_search
 ... and held against all else                             data_error_choice
 all that only steers the search                           settings
 
@@ -126,6 +128,7 @@ from subzero.diagnosis.inference.model_average import (
 from subzero.diagnosis.inference.out_of_catalogue import Findings, special_cases_folded
 
 from subzero.diagnosis.inference.repeated_values import is_rounded, repeated_values
+from subzero.diagnosis.inference.rounded_values import log_odds_of_frozen, steps_of
 
 __all__ = [
     "AXIS_WORDS",
@@ -184,6 +187,7 @@ __all__ = [
     "log_evidence_process",
     "log_evidence_term",
     "log_gains",
+    "log_odds_of_frozen",
     "log_prior",
     "mixed",
     "moves_nothing",
@@ -209,6 +213,7 @@ __all__ = [
     "spacing_of",
     "special_cases_folded",
     "spikes",
+    "steps_of",
     "times_of",
     "variances",
     "with_finer_steps",

@@ -6,6 +6,9 @@ and drifts. T the corrections, y the record as written:
 
     log p(y, errors) = log Σ_M p(T y | M) p(M) + Σ log|dT/dy| + Σ log p(error) + log p(noise)
 
+A sample that is lost counts as any other. But where a rounded channel may be frozen or stand still, what it repeats is
+certain in the one case, and in the other an interval each, no density (`rounded_values`).
+
 A search that is hopelessly behind ends with its first look. What the linear problem leaves no choice of is corrected
 before anything is searched, and the records with it are not searched at all if causes that hold throughout explain what
 is left (`is_clear`): what no vehicle does (another sign, unit or reference of one channel, exchanged columns, repeated

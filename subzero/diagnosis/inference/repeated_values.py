@@ -4,7 +4,8 @@ A sensor's noise changes its value from sample to sample. So a run of L equal va
 repeat the one before has the probability p^(L−1), at each place. A run up to the end of the record is a frozen channel;
 others are drop-outs; and so is a value that comes again and again far from its neighbours, such as 0 or −999.
 
-A channel that is rounded and stands still repeats itself, too: there it is for the prediction to say (`is_rounded`).
+A channel that is rounded and stands still repeats itself, too (`is_rounded`): there it is for the prediction to say,
+and for how often the channel flickers (`rounded_values`).
 """
 
 from __future__ import annotations
