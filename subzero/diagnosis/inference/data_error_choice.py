@@ -29,6 +29,7 @@ import numpy as np
 from subzero.diagnosis.hypothesis.data_error import DataError, corrected
 from subzero.diagnosis.hypothesis.logged import Logged
 from subzero.diagnosis.inference import settings
+from subzero.diagnosis.inference.change_point_fit import FittedChangePoint
 from subzero.diagnosis.inference.data_error_scan import log_prior
 from subzero.diagnosis.inference.data_error_search import (
     LOUD,
@@ -39,13 +40,15 @@ from subzero.diagnosis.inference.data_error_search import (
     without,
 )
 from subzero.diagnosis.inference.data_error_yardstick import OUTLIER_LOG_DENSITY
+from subzero.diagnosis.inference.latent_force import FORCE
 from subzero.diagnosis.inference.linear_gaussian import log_sum
 from subzero.diagnosis.inference.map_fit import is_poor_fit
 from subzero.diagnosis.inference.noise import log_prior_of
 from subzero.diagnosis.inference.out_of_catalogue import Findings
 from subzero.diagnosis.inference.out_of_catalogue import is_explained as is_found
 from subzero.diagnosis.inference.posing import usual_of
-from subzero.diagnosis.inference.problem import Observed
+from subzero.diagnosis.inference.problem import Observed, Problem
+from subzero.diagnosis.inference.rounded_values import log_odds_of_frozen, steps_of
 
 ALIKE = 10
 """So many errors of a kind share its probability, about."""
@@ -75,19 +78,51 @@ def is_explained(work: Findings) -> bool:
 
 
 class Standing(NamedTuple):
-    """A channel of a record that repeats its value to the end (n,), and may be frozen: the log odds of that."""
+    """A rounded channel of a record that repeats its value to the end (n,), and may be frozen."""
 
     record: int
     channel: str
     run: np.ndarray
-    odds: float
 
-    def log_density(self, work: Findings) -> float:
-        """Return what its values add to the log density of the records by how densely their noise lies."""
-        noise = work.problem.records[self.record].noise[self.channel]
-        rest = noise.used & ~self.run
-        before = replace(noise, used=rest, time=noise.time[~self.run[noise.used]])
-        return before.log_scale - noise.log_scale
+    def log_excess(self, work: Findings) -> float:
+        """Return by how much the evidence is too great with its values as densities: what they add to it behind the
+        best fit, and the log odds that it is frozen, not standing still, where each value is an interval.
+        """
+        problem, r = _best_residual(work)
+        one, white = problem.records[self.record], _own(problem, r, self.record, self.channel)
+        noise, usual = one.noise[self.channel], usual_of(self.channel, one.values[self.channel], one.known)
+        run = self.run[noise.used]
+        if not run.any():
+            return 0.0
+        before = replace(noise, used=noise.used & ~self.run, time=noise.time[~run])
+        added = before.log_scale - noise.log_scale - 0.5 * float(np.sum(white[run] ** 2))
+        return added + log_odds_of_frozen(steps_of(noise.time, noise.colour(white), usual), run)
+
+
+def _best_residual(work: Findings) -> tuple[Problem, np.ndarray]:
+    """Return the residual (m,) of the most probable explanation that has a run of its own, and its problem: of a drift
+    there is none.
+    """
+    best = work.search.best()
+    least, found = best.log_posterior, (work.problem, best.fit.r)
+    for one in work.out_of_catalogue:
+        if one.log_posterior > least and isinstance(one.what, FittedChangePoint):
+            least, found = one.log_posterior, (one.what.problem, one.what.fit.r)
+        elif one.log_posterior > least and one.point and one.id.startswith(FORCE):
+            along = one.point.along
+            least, found = one.log_posterior, (along.problem, along.problem.residual(along.z))
+    return found
+
+
+def _own(problem: Problem, r: np.ndarray, record: int, channel: str) -> np.ndarray:
+    """Return the part of a residual (m,) that is of one channel of one record."""
+    at = 0
+    for i, one in enumerate(problem.records):
+        for name, noise in one.noise.items():
+            if (i, name) == (record, channel):
+                return r[at : at + noise.count]
+            at += noise.count
+    raise KeyError(channel)
 
 
 def _standing(
@@ -95,9 +130,9 @@ def _standing(
 ) -> tuple[Standing, ...]:
     """Return the rounded channels that are held to stand still where only some suspected errors are corrected."""
     return tuple(
-        Standing(one.record, one.error.channels[0], _lost_by(one, errors, records), one.odds)
+        Standing(one.record, one.error.channels[0], _lost_by(one, errors, records))
         for one in whole.errors
-        if one.odds is not None and not any(one is each for each in errors)
+        if one.may_stand_still and not any(one is each for each in errors)
     )
 
 
@@ -133,7 +168,7 @@ class Explained:
         """Return the log evidence of the records as they were written; of samples that are lost, each so much. That a
         frozen channel repeats its value is certain; one that stands still has its odds in place of a density.
         """
-        standing = sum(one.log_density(self.work) + one.odds for one in self.standing)
+        standing = sum(one.log_excess(self.work) for one in self.standing)
         return log_evidence(self.work) + self.log_prior + self.lost * per_lost - standing
 
     @property
@@ -243,7 +278,7 @@ def _explained(
                 for one in errors)  # fmt: skip
     measured = sum(int(np.isfinite(logged.record.values[name]).sum()) for logged, one in
                    zip(records, work.problem.records, strict=True) for name in one.noise)  # fmt: skip
-    frozen = sum(int(_lost_by(one, errors, records).sum()) for one in errors if one.odds is not None)
+    frozen = sum(int(_lost_by(one, errors, records).sum()) for one in errors if one.may_stand_still)
     return Explained(errors=errors, work=work, log_prior=float(prior), lost=measured - frozen - _samples(work),
                      standing=_standing(whole, errors, records))  # fmt: skip
 

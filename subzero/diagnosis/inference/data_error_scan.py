@@ -142,40 +142,23 @@ def may_stand_still(yardstick: Yardstick, error: DataError) -> bool:
     return error.kind == "frozen" and error in yardstick.repeated
 
 
-class _Stuck(NamedTuple):
-    """A rounded channel that repeats its value to the end: log odds that it is frozen, not standing still, where each
-    value is an interval (`rounded_values`); and what the run adds to the log evidence of the record as it is, by how
-    far it is from the prediction and by how densely its noise lies.
+def _stuck(yardstick: Yardstick, error: DataError, as_is: Reckoned) -> float:
+    """Return what the values that a rounded channel repeats to the end add to the log evidence of the record as it is,
+    and the log odds that it is frozen, not standing still: where each value is an interval (`rounded_values`).
     """
-
-    odds: float
-    misfit: float
-    density: float
-
-
-def _stuck(yardstick: Yardstick, error: DataError, as_is: Reckoned) -> _Stuck:
-    """Return what speaks for a frozen channel, behind one explanation of the record as it is."""
     (name,) = error.channels
     logged = yardstick.without(error)
     record, kept = yardstick.logged.record, logged.record.values[name]
     known = np.isfinite(record.values[name])
     run = ~np.isfinite(kept[known])
     if not run.any():
-        return _Stuck(-np.inf, 0.0, 0.0)
+        return -np.inf
     usual = usual_of(name, record.values[name], yardstick.logged.noise)
     steps = steps_of(record.time[known], yardstick.deviations(name, as_is.z)[known], usual)
     own, rest, scale = yardstick.own[name], yardstick.terms(logged, [name])[name], as_is.scales[name]
     misfit = -0.5 * (square_of(own, as_is.z) - square_of(rest, as_is.z)) / scale**2
     density = own.fixed - rest.fixed - (own.samples - rest.samples) * float(np.log(scale))
-    return _Stuck(log_odds_of_frozen(steps, run), misfit, density)
-
-
-def odds_of_frozen(yardstick: Yardstick, error: DataError) -> float:
-    """Return the log odds that a rounded channel is frozen, not standing still, but for how far it is then from what is
-    predicted: by how often it flickers, behind that of two explanations which is better for a standing one.
-    """
-    each = [_stuck(yardstick, error, one) for one in (yardstick.as_is, yardstick.likeliest)]
-    return min(one.odds + one.misfit for one in each)
+    return misfit + density + log_odds_of_frozen(steps, run)
 
 
 def _lost(yardstick: Yardstick, error: DataError, terms: Mapping[str, Term], as_is: Reckoned) -> float:
@@ -184,7 +167,7 @@ def _lost(yardstick: Yardstick, error: DataError, terms: Mapping[str, Term], as_
     and the odds that it does not.
     """
     if may_stand_still(yardstick, error):
-        return sum(_stuck(yardstick, error, as_is))
+        return _stuck(yardstick, error, as_is)
     lost = {name: yardstick.own[name].measured - terms[name].measured for name in yardstick.own}
     if not any(lost.values()) or sum(lost.values()) == 0:
         return 0.0

@@ -24,7 +24,6 @@ from subzero.diagnosis.inference.data_error_scan import (
     Suspect,
     judged_again,
     may_stand_still,
-    odds_of_frozen,
     suspects,
 )
 from subzero.diagnosis.inference.data_error_yardstick import Yardstick, yardstick_of
@@ -54,8 +53,8 @@ SIGNATURE_LEAD = 20.0
 class SuspectedError:
     """An error of a record, its leads with all others corrected, and those that the record cannot tell from it; `left`
     is the noise of the channel that is explained worst without all of them, in usual levels, with all of physics to
-    help; `is_clear` says that it leaves physics no chance in the linear problem; `odds` are those of a rounded channel
-    that is frozen and does not stand still, by how often it flickers, None for anything else.
+    help; `is_clear` says that it leaves physics no chance in the linear problem; `may_stand_still` that a channel
+    that seems to be frozen is rounded.
     """
 
     record: int
@@ -65,7 +64,7 @@ class SuspectedError:
     alike: tuple[DataError, ...] = ()
     left: float = np.inf
     is_clear: bool = False
-    odds: float | None = None
+    may_stand_still: bool = False
 
 
 def is_soft(one: SuspectedError) -> bool:
@@ -166,16 +165,9 @@ def _of_record(problem: Problem, records: Sequence[Logged], record: int) -> list
     return [
         SuspectedError(record=record, error=one.error, lead=one.lead, generous=one.generous, alike=alike,
                        left=left, is_clear=any(one.error is other for other in clear),
-                       odds=_odds(bench, one.error, errors))
+                       may_stand_still=may_stand_still(bench.begun, one.error))
         for one, alike in made
     ]  # fmt: skip
-
-
-def _odds(bench: _Bench, error: DataError, errors: Sequence[DataError]) -> float | None:
-    """Return the log odds that a rounded channel is frozen, with all other errors corrected; None of what is none."""
-    if error not in bench.begun.repeated or error.kind != "frozen":
-        return None
-    return odds_of_frozen(bench.without([one for one in errors if one is not error]), error)
 
 
 def _forward(bench: _Bench, read_off: Sequence[DataError], trusted: frozenset[str]) -> list[_Judged]:
