@@ -24,11 +24,8 @@ a formula for a latent force                              force_formula
 change points, forces and drifts beside the hypotheses    out_of_catalogue
 values that a record repeats in place of measurements     repeated_values
 what physics may do with a record, its linear evidence    data_error_yardstick
-errors that data may have                                 data_error_candidates
-... of which linear evidence proposes some                data_error_scan
-how close a few causes come, without a search             few_causes
-the odds that a rounded channel froze                     rounded_values
-errors that are suspected together                        data_error_search
+errors in the data, proposed by linear evidence           data_error_scan
+... suspected together, and how close a few causes come   data_error_search
 ... and held against all else                             data_error_choice
 all that only steers the search                           settings
 
@@ -127,8 +124,12 @@ from subzero.diagnosis.inference.model_average import (
 )
 from subzero.diagnosis.inference.out_of_catalogue import Findings, special_cases_folded
 
-from subzero.diagnosis.inference.repeated_values import is_rounded, repeated_values
-from subzero.diagnosis.inference.rounded_values import log_odds_of_frozen, steps_of
+from subzero.diagnosis.inference.repeated_values import (
+    is_rounded,
+    log_odds_of_frozen,
+    repeated_values,
+    steps_of,
+)
 
 __all__ = [
     "AXIS_WORDS",

@@ -7,7 +7,7 @@ and drifts. T the corrections, y the record as written:
     log p(y, errors) = log Σ_M p(T y | M) p(M) + Σ log|dT/dy| + Σ log p(error) + log p(noise)
 
 A sample that is lost counts as any other. But where a rounded channel may be frozen or stand still, what it repeats is
-certain in the one case, and in the other an interval each, no density (`rounded_values`).
+certain in the one case, and in the other an interval each, no density (`repeated_values`).
 
 A search that is hopelessly behind ends with its first look. What the linear problem leaves no choice of is corrected
 before anything is searched, and the records with it are not searched at all if causes that hold throughout explain what
@@ -48,7 +48,7 @@ from subzero.diagnosis.inference.out_of_catalogue import Findings
 from subzero.diagnosis.inference.out_of_catalogue import is_explained as is_found
 from subzero.diagnosis.inference.posing import usual_of
 from subzero.diagnosis.inference.problem import Observed, Problem
-from subzero.diagnosis.inference.rounded_values import log_odds_of_frozen, steps_of
+from subzero.diagnosis.inference.repeated_values import log_odds_of_frozen, steps_of
 
 ALIKE = 10
 """So many errors of a kind share its probability, about."""

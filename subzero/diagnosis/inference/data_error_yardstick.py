@@ -167,6 +167,17 @@ class Yardstick:
         values = turned(values, expected) if name == HEADING else values
         return values - expected - self.at(self.slopes[name], time) @ z
 
+    def generous(self, terms: Mapping[str, Term]) -> float:
+        """Return the log evidence with all of physics at once."""
+        return reckon(terms, self.D).log
+
+    def added(self, name: str, rest: Term, as_is: Reckoned) -> float:
+        """Return what samples of a channel that are not in its rest add to the log density of the record as it is."""
+        own, scale = self.own[name], as_is.scales[name]
+        square = _square(own, as_is.z) - _square(rest, as_is.z)
+        lost = own.samples - rest.samples
+        return own.fixed - rest.fixed - lost * float(np.log(scale)) - 0.5 * square / scale**2
+
     def sparse(self, terms: Mapping[str, Term]) -> float:
         """Return the log evidence of nothing, and of every cause by itself, mixed; within wide tolerances."""
         return log_sum([log for log, _ in self._each(terms)])
@@ -215,10 +226,10 @@ def reckon(terms: Mapping[str, Term], D: np.ndarray) -> Reckoned:
 
 def _left(one: Term, z: np.ndarray, M: np.ndarray) -> float:
     """Return the expected square that parameters leave of a channel."""
-    return square_of(one, z) + float(np.sum(one.A * M))
+    return _square(one, z) + float(np.sum(one.A * M))
 
 
-def square_of(one: Term, z: np.ndarray) -> float:
+def _square(one: Term, z: np.ndarray) -> float:
     """Return the square of what is left of a channel with parameters (k,), whitened."""
     return one.rr - 2.0 * float(one.b @ z) + float(z @ one.A @ z)
 
