@@ -43,10 +43,9 @@ from subzero.diagnosis.inference.data_error_yardstick import OUTLIER_LOG_DENSITY
 from subzero.diagnosis.inference.latent_force import FORCE
 from subzero.diagnosis.inference.linear_gaussian import log_sum
 from subzero.diagnosis.inference.map_fit import is_poor_fit
-from subzero.diagnosis.inference.noise import log_prior_of
+from subzero.diagnosis.inference.noise import log_prior_of, usual_of
 from subzero.diagnosis.inference.out_of_catalogue import Findings
 from subzero.diagnosis.inference.out_of_catalogue import is_explained as is_found
-from subzero.diagnosis.inference.posing import usual_of
 from subzero.diagnosis.inference.problem import Observed, Problem
 from subzero.diagnosis.inference.repeated_values import log_odds_of_frozen, steps_of
 

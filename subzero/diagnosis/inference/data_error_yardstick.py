@@ -24,8 +24,7 @@ from subzero.diagnosis.hypothesis.data_error import REPEATED, DataError, correct
 from subzero.diagnosis.hypothesis.hypotheses import PRIOR, columns_of, nameable, variances
 from subzero.diagnosis.hypothesis.logged import Logged
 from subzero.diagnosis.inference.linear_gaussian import KAPPAS, Posterior, freed, log_sum
-from subzero.diagnosis.inference.noise import Noise, spikes, usual_noise
-from subzero.diagnosis.inference.posing import usual_of
+from subzero.diagnosis.inference.noise import Noise, spikes, usual_noise, usual_of
 from subzero.diagnosis.inference.problem import Problem
 from subzero.diagnosis.inference.simulator import Track, simulate_track
 
