@@ -16,10 +16,16 @@ from numpy.testing import assert_allclose
 import scenarios
 import subzero
 from benchmarks.diagnosis import data_errors
+from benchmarks.diagnosis.world import ROUNDED
 from subzero import Logged
 from subzero.diagnosis import Setting, catalogue, report
 from subzero.diagnosis.hypothesis.data_error import corrected
-from subzero.diagnosis.inference import KINDS_OF_DATA_ERRORS, DataError, is_rounded, repeated_values
+from subzero.diagnosis.inference import (
+    KINDS_OF_DATA_ERRORS,
+    DataError,
+    is_rounded,
+    repeated_values,
+)
 from subzero.records.record import Record
 from subzero.synthetic.planted import draw_tolerances, make_record
 
@@ -143,6 +149,33 @@ def test_two_errors_at_once_are_named_at_the_public_face_and_nothing_is_converte
     assert told["verdict"] == "data_error"
     assert told["data_errors"][0]["remedy"]
     assert "heading_deg has the other sign" in report.words.sentence(verdict)
+
+
+def rounded(logged: Logged) -> Logged:
+    """Return a record as coarse sensors show it: compass 1 degree, log 0.05 m/s, depth 0.1 m."""
+    values = {
+        name: np.round(column / ROUNDED[name]) * ROUNDED[name]
+        for name, column in logged.record.values.items()
+    }
+    return dataclasses.replace(logged, record=dataclasses.replace(logged.record, values=values))
+
+
+def frozen(logged: Logged, channel: str, since: float) -> Logged:
+    """Return a record whose channel repeats what it shows from some time on."""
+    at = tuple(logged.record.time[logged.record.time >= since].tolist())
+    return DataError(kind="frozen", channels=(channel,), since=since, at=at).planted(logged)
+
+
+def test_a_rounded_channel_that_froze_is_named_at_the_public_face():
+    """The heading of a zigzag in steps of 1 degree, beside the two channels that say that it goes on."""
+    whole = measured("zigzag", 20262).record
+    few = {name: whole.values[name] for name in ("surge_speed", "heading", "yaw_rate")}
+    short = whole.time < 20.0
+    record = Record(
+        source="made", time=whole.time[short], values={name: one[short] for name, one in few.items()}
+    )
+    wrong = frozen(rounded(dataclasses.replace(measured("zigzag", 20262), record=record)), "heading", 12.0)
+    assert named(subzero.diagnose(wrong, budget="screen")) == {"frozen:heading"}
 
 
 @pytest.mark.slow

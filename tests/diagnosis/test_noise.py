@@ -9,7 +9,16 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from subzero.diagnosis.inference import Behind, Noise, Usual, estimate, resolution_of, spikes
+from subzero.diagnosis.inference import (
+    Behind,
+    Noise,
+    Usual,
+    estimate,
+    log_odds_of_frozen,
+    resolution_of,
+    spikes,
+    steps_of,
+)
 
 LEVEL = 0.3
 RECORDS = 24
@@ -139,3 +148,40 @@ def test_two_spikes_at_the_end_of_a_record_are_no_majority():
         assert np.flatnonzero(spikes(spoilt, 0.02)).tolist() == sorted({first % 200, second % 200})
     slope = values + 0.01 * np.arange(200)
     assert not spikes(slope, 0.02).any(), "a slope of half a noise level a sample is none at the ends either"
+
+
+@pytest.mark.parametrize("white, slow", [(0.5, 0.0), (1.0, 0.0), (0.5, 0.7), (0.2, 1.5)])
+def test_a_rounded_channel_that_stands_still_is_not_said_to_be_frozen(white, slow):
+    """Where nothing froze, odds above e^5, which are the least to suspect it, come at most once in 150 records."""
+    usual, rng = Usual(level=0.2, resolution=0.5, is_known=False), np.random.default_rng(20263)
+    for _ in range(8):
+        shown, _ = standing(usual, white, slow, rng)
+        repeats = np.arange(200) > np.flatnonzero(np.diff(shown, prepend=np.nan) != 0.0)[-1]
+        if repeats.any():
+            assert log_odds_of_frozen(steps_of(0.1 * np.arange(200), shown, usual), repeats) < 5.0
+
+
+def test_a_rounded_channel_that_flickers_no_more_is_frozen_and_slow_noise_says_less_of_it():
+    """The last 100 of 200 samples are equal, a quarter of a noise level from the edge of their step: white noise would
+    have left it some 40 times, and a slow part that lasts for 2 s may have stayed away from it.
+    """
+    usual, at, odds = Usual(level=0.2, resolution=0.5, is_known=False), np.arange(200), []
+    for white, slow in ((1.0, 0.0), (0.5, 0.7)):
+        shown, true = standing(usual, white, slow, np.random.default_rng(20264), place=0.2)
+        shown[100:] = shown[100]
+        odds.append(log_odds_of_frozen(steps_of(0.1 * at, shown - true, usual), at > 100))
+    assert odds[0] > 10.0
+    assert odds[0] > odds[1] + 5.0
+
+
+def standing(
+    usual: Usual, white: float, slow: float, rng: np.random.Generator, place: float | None = None
+) -> tuple[np.ndarray, float]:
+    """Return what a rounded sensor shows of what stands still (200,), with noise in usual levels, and where it does."""
+    true = usual.resolution * (rng.uniform(-0.5, 0.5) if place is None else place)
+    kept = np.exp(-0.1 / 2.0)  # a slow part of 2 s
+    wander = np.cumsum(
+        kept ** -np.arange(200) * rng.standard_normal(200) * np.r_[1.0, np.full(199, np.sqrt(1 - kept**2))]
+    )
+    noisy = true + usual.level * (white * rng.standard_normal(200) + slow * wander * kept ** np.arange(200))
+    return np.round(noisy / usual.resolution) * usual.resolution, true

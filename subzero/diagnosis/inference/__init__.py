@@ -23,6 +23,7 @@ features and shapes of a formula                          basis
 a formula for a latent force                              force_formula
 change points, forces and drifts beside the hypotheses    out_of_catalogue
 values that a record repeats in place of measurements     repeated_values
+what physics may do with a record, its linear evidence    data_error_yardstick
 errors in the data, proposed by linear evidence           data_error_scan
 ... suspected together, and how close a few causes come   data_error_search
 ... and held against all else                             data_error_choice
@@ -123,7 +124,12 @@ from subzero.diagnosis.inference.model_average import (
 )
 from subzero.diagnosis.inference.out_of_catalogue import Findings, special_cases_folded
 
-from subzero.diagnosis.inference.repeated_values import is_rounded, repeated_values
+from subzero.diagnosis.inference.repeated_values import (
+    is_rounded,
+    log_odds_of_frozen,
+    repeated_values,
+    steps_of,
+)
 
 __all__ = [
     "AXIS_WORDS",
@@ -182,6 +188,7 @@ __all__ = [
     "log_evidence_process",
     "log_evidence_term",
     "log_gains",
+    "log_odds_of_frozen",
     "log_prior",
     "mixed",
     "moves_nothing",
@@ -207,6 +214,7 @@ __all__ = [
     "spacing_of",
     "special_cases_folded",
     "spikes",
+    "steps_of",
     "times_of",
     "variances",
     "with_finer_steps",

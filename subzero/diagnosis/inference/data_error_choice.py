@@ -6,6 +6,9 @@ and drifts. T the corrections, y the record as written:
 
     log p(y, errors) = log Σ_M p(T y | M) p(M) + Σ log|dT/dy| + Σ log p(error) + log p(noise)
 
+A sample that is lost counts as any other. But where a rounded channel may be frozen or stand still, what it repeats is
+certain in the one case, and in the other an interval each, no density (`repeated_values`).
+
 A search that is hopelessly behind ends with its first look. What the linear problem leaves no choice of is corrected
 before anything is searched, and the records with it are not searched at all if causes that hold throughout explain what
 is left (`is_clear`): what no vehicle does (another sign, unit or reference of one channel, exchanged columns, repeated
@@ -17,16 +20,17 @@ against a search of the records with it.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from subzero.diagnosis.hypothesis.data_error import DataError
+from subzero.diagnosis.hypothesis.data_error import DataError, corrected
 from subzero.diagnosis.hypothesis.logged import Logged
 from subzero.diagnosis.inference import settings
-from subzero.diagnosis.inference.data_error_scan import OUTLIER_LOG_DENSITY, log_prior
+from subzero.diagnosis.inference.change_point_fit import FittedChangePoint
+from subzero.diagnosis.inference.data_error_scan import log_prior
 from subzero.diagnosis.inference.data_error_search import (
     LOUD,
     SuspectedError,
@@ -35,13 +39,15 @@ from subzero.diagnosis.inference.data_error_search import (
     is_soft,
     without,
 )
+from subzero.diagnosis.inference.data_error_yardstick import OUTLIER_LOG_DENSITY
+from subzero.diagnosis.inference.latent_force import FORCE
 from subzero.diagnosis.inference.linear_gaussian import log_sum
 from subzero.diagnosis.inference.map_fit import is_poor_fit
-from subzero.diagnosis.inference.noise import log_prior_of
+from subzero.diagnosis.inference.noise import log_prior_of, usual_of
 from subzero.diagnosis.inference.out_of_catalogue import Findings
 from subzero.diagnosis.inference.out_of_catalogue import is_explained as is_found
-from subzero.diagnosis.inference.posing import usual_of
-from subzero.diagnosis.inference.problem import Observed
+from subzero.diagnosis.inference.problem import Observed, Problem
+from subzero.diagnosis.inference.repeated_values import log_odds_of_frozen, steps_of
 
 ALIKE = 10
 """So many errors of a kind share its probability, about."""
@@ -70,6 +76,75 @@ def is_explained(work: Findings) -> bool:
     )
 
 
+class Standing(NamedTuple):
+    """A rounded channel of a record that repeats its value to the end (n,), and may be frozen."""
+
+    record: int
+    channel: str
+    run: np.ndarray
+
+    def log_excess(self, work: Findings) -> float:
+        """Return by how much the evidence is too great with its values as densities: what they add to it behind the
+        best fit, and the log odds that it is frozen, not standing still, where each value is an interval.
+        """
+        problem, r = _best_residual(work)
+        one, white = problem.records[self.record], _own(problem, r, self.record, self.channel)
+        noise, usual = one.noise[self.channel], usual_of(self.channel, one.values[self.channel], one.known)
+        run = self.run[noise.used]
+        if not run.any():
+            return 0.0
+        before = replace(noise, used=noise.used & ~self.run, time=noise.time[~run])
+        added = before.log_scale - noise.log_scale - 0.5 * float(np.sum(white[run] ** 2))
+        return added + log_odds_of_frozen(steps_of(noise.time, noise.colour(white), usual), run)
+
+
+def _best_residual(work: Findings) -> tuple[Problem, np.ndarray]:
+    """Return the residual (m,) of the most probable explanation that has a run of its own, and its problem: of a drift
+    there is none.
+    """
+    best = work.search.best()
+    least, found = best.log_posterior, (work.problem, best.fit.r)
+    for one in work.out_of_catalogue:
+        if one.log_posterior > least and isinstance(one.what, FittedChangePoint):
+            least, found = one.log_posterior, (one.what.problem, one.what.fit.r)
+        elif one.log_posterior > least and one.point and one.id.startswith(FORCE):
+            along = one.point.along
+            least, found = one.log_posterior, (along.problem, along.problem.residual(along.z))
+    return found
+
+
+def _own(problem: Problem, r: np.ndarray, record: int, channel: str) -> np.ndarray:
+    """Return the part of a residual (m,) that is of one channel of one record."""
+    at = 0
+    for i, one in enumerate(problem.records):
+        for name, noise in one.noise.items():
+            if (i, name) == (record, channel):
+                return r[at : at + noise.count]
+            at += noise.count
+    raise KeyError(channel)
+
+
+def _standing(
+    whole: Suspicion, errors: Sequence[SuspectedError], records: Sequence[Logged]
+) -> tuple[Standing, ...]:
+    """Return the rounded channels that are held to stand still where only some suspected errors are corrected."""
+    return tuple(
+        Standing(one.record, one.error.channels[0], _lost_by(one, errors, records))
+        for one in whole.errors
+        if one.may_stand_still and not any(one is each for each in errors)
+    )
+
+
+def _lost_by(one: SuspectedError, errors: Sequence[SuspectedError], records: Sequence[Logged]) -> np.ndarray:
+    """Return which samples of its channel (n,) one more error takes from a record."""
+    others = tuple(each.error for each in errors if each.record == one.record and each is not one)
+    before, after = (
+        np.isfinite(corrected(records[one.record], found).record.values[one.error.channels[0]])
+        for found in (others, (*others, one.error))
+    )
+    return before & ~after
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Explained:
     """Records that are taken to have errors in their data, and what explains them besides.
@@ -78,17 +153,22 @@ class Explained:
         errors: in the data.
         work: what was found in the records without them.
         log_prior: of the errors, and what their corrections stretch.
-        lost: samples that are no measurements then.
+        lost: samples that are no measurements then, but for those of rounded channels that are frozen.
+        standing: rounded channels that are held to stand still.
     """
 
     errors: tuple[SuspectedError, ...]
     work: Findings
     log_prior: float
     lost: int
+    standing: tuple[Standing, ...] = ()
 
     def log_evidence(self, per_lost: float) -> float:
-        """Return the log evidence of the records as they were written; of samples that are lost, each so much."""
-        return log_evidence(self.work) + self.log_prior + self.lost * per_lost
+        """Return the log evidence of the records as they were written; of samples that are lost, each so much. That a
+        frozen channel repeats its value is certain; one that stands still has its odds in place of a density.
+        """
+        standing = sum(one.log_excess(self.work) for one in self.standing)
+        return log_evidence(self.work) + self.log_prior + self.lost * per_lost - standing
 
     @property
     def mean(self) -> float:
@@ -131,17 +211,17 @@ def compared(suspicion: Suspicion, records: Sequence[Logged], look: Look) -> lis
     whole, least, tried = len(suspicion.errors), suspicion.firm, list[Explained]()
     first = suspicion.first(least)
     try:
-        tried.append(_explained(first, records, look.begin(without(records, first))))
+        tried.append(_explained(first, suspicion, records, look.begin(without(records, first))))
         is_open = least < whole and not _is_settled(tried[0].work)
         if is_finished := is_open and not explain(suspicion.errors):
             look.finish(tried[0].work)
             is_open = not is_explained(tried[0].work)
         more = [suspicion.first(k + 1) for k in range(least, whole)] if is_open else []
-        _race(tried, more, records, look, new=[] if is_finished else tried[:])
+        _race(tried, more, suspicion, records, look, new=[] if is_finished else tried[:])
         for held, errors in pairwise([first, *suspicion.fewer(least)]):
             if is_clear(held, _first(tried).work):
                 break
-            _race(tried, [errors], records, look, new=[])
+            _race(tried, [errors], suspicion, records, look, new=[])
     except KeyboardInterrupt:  # before anything was found of one of them
         if not tried:
             raise
@@ -162,6 +242,7 @@ def _is_settled(work: Findings) -> bool:
 def _race(
     tried: list[Explained],
     more: Sequence[tuple[SuspectedError, ...]],
+    whole: Suspicion,
     records: Sequence[Logged],
     look: Look,
     *,
@@ -170,7 +251,7 @@ def _race(
     """Give further sets of errors a first look, and finish what may be the most probable, also of what is new."""
     for errors in more:
         if _is_complete(tried):
-            new.append(_explained(errors, records, look.begin(without(records, errors))))
+            new.append(_explained(errors, whole, records, look.begin(without(records, errors))))
             tried.append(new[-1])
     while new and _is_complete(tried):
         now = _first(new)
@@ -189,12 +270,16 @@ def _first(tried: Sequence[Explained]) -> Explained:
     return max(tried, key=lambda one: one.log_evidence(per_lost))
 
 
-def _explained(errors: tuple[SuspectedError, ...], records: Sequence[Logged], work: Findings) -> Explained:
+def _explained(
+    errors: tuple[SuspectedError, ...], whole: Suspicion, records: Sequence[Logged], work: Findings
+) -> Explained:
     prior = sum(log_prior(one.error, ALIKE) + one.error.log_jacobian * _measured(records[one.record], one.error)
                 for one in errors)  # fmt: skip
     measured = sum(int(np.isfinite(logged.record.values[name]).sum()) for logged, one in
                    zip(records, work.problem.records, strict=True) for name in one.noise)  # fmt: skip
-    return Explained(errors=errors, work=work, log_prior=float(prior), lost=measured - _samples(work))
+    frozen = sum(int(_lost_by(one, errors, records).sum()) for one in errors if one.may_stand_still)
+    return Explained(errors=errors, work=work, log_prior=float(prior), lost=measured - frozen - _samples(work),
+                     standing=_standing(whole, errors, records))  # fmt: skip
 
 
 def _measured(logged: Logged, error: DataError) -> int:

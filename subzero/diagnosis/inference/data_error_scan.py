@@ -1,28 +1,22 @@
 """Which errors in the data would explain a record better: each correction judged against all that physics could do.
 
-The yardstick is generous to physics. All parameters are free at once, each as far as a cause may go, in the linear
-problem at the nominal model; and every channel has a scale of its noise that is free, so that what a linear model
-cannot follow makes a channel count for less, and not the others bend:
-
-    G = max over s of  log N(W y; W h, s² I + J D Jᵀ) − Σ n_c log s_c,      D = (max(size of a cause, 4 τ))²
-
-An error in the data is suspected if the corrected record has a G that is ahead of the record's own as it is, counted
-in the units in which it was written, and with what is known beforehand. Nothing is simulated for it, but once for each
-error of the commands. Whether it is one is for real fits to say (`data_error_choice`).
+An error in the data is suspected if the corrected record has an evidence that is ahead of the record's own as it is
+(`data_error_yardstick`), counted in the units in which it was written, and with what is known beforehand. Nothing is
+simulated for it, but once for each error of the commands. Whether it is one is for real fits to say
+(`data_error_choice`).
 """
 
 from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
-from typing import NamedTuple
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from subzero.channels import BY_NAME, HEADING, turned
-from subzero.diagnosis.hypothesis.configuration import Setting, sensed, truth
 from subzero.diagnosis.hypothesis.data_error import (
     ANY,
     COMMAND_GROUPS,
@@ -32,27 +26,18 @@ from subzero.diagnosis.hypothesis.data_error import (
     REPEATED,
     SWAPS,
     DataError,
-    corrected,
 )
-from subzero.diagnosis.hypothesis.hypotheses import PRIOR, columns_of, nameable, variances
 from subzero.diagnosis.hypothesis.logged import Logged
-from subzero.diagnosis.inference.linear_gaussian import KAPPAS, Posterior, freed, log_sum
-from subzero.diagnosis.inference.noise import Noise, resolution_of, spikes, usual_noise
-from subzero.diagnosis.inference.posing import usual_of
-from subzero.diagnosis.inference.problem import Problem
-from subzero.diagnosis.inference.simulator import Track, simulate_track
+from subzero.diagnosis.inference.noise import resolution_of, usual_noise, usual_of
+from subzero.diagnosis.inference.repeated_values import log_odds_of_frozen, steps_of
 from subzero.records.consistency import MISTAKEN
 
-KAPPA_NARROW = 2.0
-"""How much wider than declared tolerances are where a cause stands by itself: the linear problem is no better."""
+if TYPE_CHECKING:
+    from subzero.diagnosis.inference.data_error_yardstick import Reckoned, Term, Yardstick
+
+
 FEWEST = 6
 """A channel with fewer samples says nothing."""
-LEAST_SCALE, MOST_SCALE, ROUNDS, SETTLED = 0.3, 1e4, 5, 0.01
-"""Scales of the noise of a channel, and how often they are found anew behind the parameters, if they still change by
-more than that share: a hundredth costs less than 0.1 nats, as the best scales are stationary. Of a rounded one it is
-never so small that a sample has more density than 1/q, which is a probability of 1."""
-OUTLIER_LOG_DENSITY = float(np.log(0.01 / 50.0))
-"""Of a sample that is left out: one of a hundred, anywhere within fifty levels of the noise."""
 LATEST_SHARE, CLOCK_STEP_S, LATEST_CHANNEL_S = 0.5, 0.5, 6.0
 """Clocks are late by up to this share of the record, tried every so often; one channel by no more than that. [s]"""
 RATES, RATE_STEP = (0.02, 0.04, 0.06, 0.08, 0.1, 0.12, 0.14, 0.16, 0.18, 0.2), 0.02
@@ -61,36 +46,24 @@ CHANNEL_STEP_S = 1.0
 """Delays of one channel are tried every so often: its lag and the clock are free about each. [s]"""
 STEP_MARGIN = 0.1
 """No step is looked for so close to the ends of a record, as a share of it: there it is a bias, or nothing."""
-STEP_TIMES, STEP_LEVELS, LEAST_STEP_LEVELS = 40, 30.0, 4.0
-"""A step in a sensor is looked for at so many times; its usual and its least size in levels of the noise, the latter
-with its rounding: less is a drift, or nothing."""
-CAUSES_TRIED = 3
-"""So many causes, the most promising, have the scales of the noise found behind them."""
+STEP_TIMES, STEP_LEVELS = 40, 30.0
+"""A step in a sensor is looked for at so many times; its usual size in levels of the noise."""
+LOUDEST = 6.0
+"""Noise of a sensor is never so many usual levels: what is louder in another unit is not in that unit. [-]"""
 FREE_NUMBER_LOG_PRIOR = -5.0
 """What it costs that a number (a delay, a rate, a size, a time) is fitted to the record."""
-
-
-class Term(NamedTuple):
-    """What a channel says of the parameters: JᵀJ, Jᵀr, |r|², whitened; how many samples, and ½ log det of their noise
-    with what outliers cost; the least scale of its noise; and how many were measured, with outliers.
-    """
-
-    A: np.ndarray
-    b: np.ndarray
-    rr: float
-    samples: int
-    fixed: float
-    least: float
-    measured: int
-
-
-class Reckoned(NamedTuple):
-    """The generous evidence, the parameters (k,) and their covariance, and the scale of the noise of each channel."""
-
-    log: float
-    z: np.ndarray
-    M: np.ndarray
-    scales: dict[str, float]
+LEAST_STEP_LEVELS = 4.0
+"""Least size of a step in a sensor, in levels of the noise with its rounding: less is a drift, or nothing."""
+PEAKS = 4
+"""Of numbers that are tried on a grid so many are looked at closer."""
+UNREFINED = -8.0
+"""The number of an error that is less probable than that is left as it is."""
+FAR_BEHIND = 100.0
+"""What is so far behind the best suspect is not looked at closer."""
+HOPELESS = -30.0
+"""Nor is what is so much less probable than no error, with all of physics to help."""
+FINEST = 0.02
+"""A number is found to this share of the step between those that were tried."""
 
 
 class Suspect(NamedTuple):
@@ -101,206 +74,6 @@ class Suspect(NamedTuple):
     error: DataError
     lead: float
     generous: float
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Yardstick:
-    """What the nominal model, and all that may be wrong with it, say of a record at any time.
-
-    Attributes:
-        logged: the record as it is said to be, but for what is corrected in it.
-        written: the record as it is.
-        step: between times of the prediction, from 0 on. [s]
-        nominal: channel → prediction (g,). [display unit]
-        slopes: channel → sensitivities to all parameters (g, k).
-        D: prior variances that are generous to physics: every cause at once (k,).
-        narrow: prior variances of wide tolerances (k,).
-        causes: places of the parameters of each cause.
-        setting: of its simulations.
-        repeated: values that it repeats, which may be a channel that is rounded and stands still.
-        corrected: errors that are corrected in it already.
-        kept: predictions under other commands.
-    """
-
-    logged: Logged
-    written: Logged
-    step: float
-    nominal: Mapping[str, np.ndarray]
-    slopes: Mapping[str, np.ndarray]
-    D: np.ndarray
-    narrow: np.ndarray
-    causes: Sequence[Sequence[int]]
-    setting: Setting
-    repeated: tuple[DataError, ...] = ()
-    corrected: tuple[DataError, ...] = ()
-    kept: dict[str, Mapping[str, np.ndarray]] = field(default_factory=dict)
-
-    def without(self, error: DataError) -> Logged:
-        """Return the record without a further error: a value that it repeats stands at the times that were written."""
-        if error.kind in REPEATED and self.corrected:
-            return corrected(self.written, (*self.corrected, error))
-        return error.corrected(self.logged)
-
-    def terms(self, logged: Logged, channels: Iterable[str]) -> dict[str, Term]:
-        """Return what channels of a record, or of a corrected one, say of the parameters."""
-        nominal = self.nominal_of(logged)
-        return {name: self._term(logged, name, nominal[name]) for name in channels}
-
-    def nominal_of(self, logged: Logged) -> Mapping[str, np.ndarray]:
-        """Return the prediction under a record's commands, simulated once if they are others."""
-        commands, own = logged.setting.trial.commands, self.logged.setting.trial.commands
-        if commands is own or commands is None or own is None:
-            return self.nominal
-        key = commands.values.tobytes().hex()
-        if key not in self.kept:
-            setting = replace(self.setting, trial=replace(self.setting.trial, commands=commands))
-            self.kept[key] = shown_on_grid(setting, simulate_track(setting), self.nominal)
-        return self.kept[key]
-
-    def at(self, rows: np.ndarray, time: np.ndarray) -> np.ndarray:
-        """Return what stands on the grid (g, …) at times (n,): linear between, held at the ends."""
-        x = np.clip(time / self.step, 0.0, rows.shape[0] - 1.000001)
-        low = x.astype(int)
-        share = (x - low).reshape(-1, *(1,) * (rows.ndim - 1))
-        return (1.0 - share) * rows[low] + share * rows[low + 1]
-
-    def _term(self, logged: Logged, name: str, nominal: np.ndarray) -> Term:
-        time, values = logged.record.time, logged.record.values[name]
-        expected, usual = self.at(nominal, time), usual_of(name, values, logged.noise)
-        if name == HEADING:
-            values = turned(values, expected)
-        used = np.isfinite(values) & np.isfinite(expected)
-        measured = int(np.count_nonzero(used))
-        used[used] = ~spikes((values - expected)[used], max(usual.level, usual.resolution))
-        noise = usual_noise(time, used, usual)
-        white = noise.whiten(np.column_stack([values - expected, self.at(self.slopes[name], time)]))
-        r, J = white[:, 0], white[:, 1:]
-        out = (measured - noise.count) * (OUTLIER_LOG_DENSITY - np.log(usual.level))
-        fixed, least = out - noise.log_scale, least_scale(noise)
-        return Term(J.T @ J, J.T @ r, float(r @ r), noise.count, fixed, least, measured)
-
-    @cached_property
-    def own(self) -> dict[str, Term]:
-        """What the record as it is says."""
-        return self.terms(self.logged, self.logged.record.values)
-
-    @cached_property
-    def as_is(self) -> Reckoned:
-        """The generous evidence of the record as it is."""
-        return reckon(self.own, self.D)
-
-    @cached_property
-    def log_sparse(self) -> float:
-        """The evidence of nothing, and of every cause by itself, of the record as it is."""
-        return self.sparse(self.own)
-
-    @property
-    def log_none(self) -> float:
-        """The evidence of nothing, of the record as it is."""
-        return reckon(self.own, self.narrow).log + float(np.log(PRIOR["none"]))
-
-    def sparse(self, terms: Mapping[str, Term]) -> float:
-        """Return the log evidence of nothing, and of every cause by itself, mixed; within wide tolerances."""
-        none = reckon(terms, self.narrow)
-        base = Posterior(z=none.z, M=none.M, log_evidence=none.log, log_det=0.0)
-        gains = [freed(base, self.narrow, at, self.D[list(at)])[0] for at in self.causes]
-        best = sorted(range(len(gains)), key=lambda i: -gains[i])[:CAUSES_TRIED]
-        each = [reckon(terms, self._freed(self.causes[i])).log for i in best]
-        prior = np.log(PRIOR["single"] / max(len(self.causes), 1))
-        return log_sum([none.log + np.log(PRIOR["none"]), *(log + prior for log in each)])
-
-    def _freed(self, at: Sequence[int]) -> np.ndarray:
-        D = self.narrow.copy()
-        D[list(at)] = self.D[list(at)]
-        return D
-
-
-def reckon(terms: Mapping[str, Term], D: np.ndarray) -> Reckoned:
-    """Return the generous evidence of what channels say."""
-    root = np.sqrt(D)
-    scales = {name: _scale(one, one.rr) for name, one in terms.items()}
-    for turn in range(ROUNDS + 1):
-        A = sum(one.A / scales[name] ** 2 for name, one in terms.items())
-        b = sum(one.b / scales[name] ** 2 for name, one in terms.items())
-        factor = np.linalg.cholesky(np.eye(D.size) + root[:, None] * A * root)
-        half = np.linalg.solve(factor, np.diag(root))
-        M = half.T @ half
-        z = M @ b
-        before, scales = scales, {name: _scale(one, _left(one, z, M)) for name, one in terms.items()}
-        if turn == ROUNDS or all(abs(scales[name] - old) < SETTLED * old for name, old in before.items()):
-            scales = before
-            break
-    rr = sum(one.rr / scales[name] ** 2 for name, one in terms.items())
-    log = -0.5 * (rr - float(b @ z)) - float(np.sum(np.log(np.diag(factor))))
-    log += sum(one.fixed - one.samples * np.log(scales[name]) for name, one in terms.items())
-    return Reckoned(float(log), z, M, scales)
-
-
-def _left(one: Term, z: np.ndarray, M: np.ndarray) -> float:
-    """Return the expected square that parameters leave of a channel."""
-    return one.rr - 2.0 * float(one.b @ z) + float(z @ one.A @ z) + float(np.sum(one.A * M))
-
-
-def least_scale(noise: Noise) -> float:
-    """Return the least scale of a channel's noise."""
-    level = float(np.exp(noise.log_scale / max(noise.count, 1)))
-    return max(LEAST_SCALE, noise.resolution / np.sqrt(2.0 * np.pi) / level)
-
-
-def _scale(one: Term, square: float) -> float:
-    """Return the scale of a channel's noise of which a square is left."""
-    return float(np.clip(np.sqrt(max(square, 0.0) / max(one.samples, 1)), one.least, MOST_SCALE))
-
-
-def yardstick_of(problem: Problem, record: int, logged: Logged) -> Yardstick:
-    """Return what a record is judged by; its simulations are those of the sensitivities at the nominal model.
-
-    Args:
-        problem: all records and parameters.
-        record: its number.
-        logged: the record.
-    """
-    zero, one = np.zeros(len(problem.entries)), problem.records[record]
-    names = [name for name in logged.record.values if name in one.noise]
-    (base,) = problem.tracks([(record, zero)])
-    nominal = shown_on_grid(one.setting, base, names)
-    ks = [k for k, entry in enumerate(problem.entries) if entry.record in (-1, record)]
-    moved = {k: to_usual_sizes(problem, k) for k in ks}
-    tracks = problem.tracks([(record, moved[k]) for k in ks])
-    slopes = {name: np.zeros((nominal[name].size, zero.size)) for name in names}
-    for k, track in zip(ks, tracks, strict=True):
-        there = shown_on_grid(problem.setting(record, moved[k]), track, names)
-        for name in names:
-            slopes[name][:, k] = np.nan_to_num((there[name] - nominal[name]) / moved[k][k])
-    grid, causes = base[0], [columns_of(problem.entries, (name,)) for name in nameable(problem.entries)]
-    return Yardstick(logged=logged, written=logged, step=float(grid[1] - grid[0]), nominal=nominal, slopes=slopes,
-                     D=generous_variances(problem), narrow=variances(problem.entries, (), KAPPA_NARROW),
-                     causes=causes, setting=one.setting)  # fmt: skip
-
-
-def generous_variances(problem: Problem) -> np.ndarray:
-    """Return prior variances of every cause at once (k,)."""
-    return np.array(
-        [max(e.parameter.scale, max(KAPPAS) * e.parameter.tolerance) ** 2 for e in problem.entries]
-    )
-
-
-def to_usual_sizes(problem: Problem, k: int) -> np.ndarray:
-    """Return deviations with an entry moved for a sensitivity: what does nothing while it is small to a usual size."""
-    zero, parameter = np.zeros(len(problem.entries)), problem.entries[k].parameter
-    if parameter.low < 0.0 or problem.entries[k].effect.slot == "sensors":
-        return problem.moved(zero, k)
-    zero[k] = min(parameter.scale, parameter.high)
-    return zero
-
-
-def shown_on_grid(setting: Setting, track: Track, names: Iterable[str]) -> dict[str, np.ndarray]:
-    """Return what the sensors show at the times of a track: channel → (g,), in its display unit."""
-    grid, states = track
-    shown = {name: sensed(setting.sensing.get(name), grid, truth(setting, states, name)) for name in names}
-    if setting.clock_offset:
-        shown = {name: np.interp(grid - setting.clock_offset, grid, one) for name, one in shown.items()}
-    return shown
 
 
 def suspects(yardstick: Yardstick, trusted: frozenset[str] = frozenset()) -> list[Suspect]:
@@ -353,14 +126,121 @@ def _peaks(each: Sequence[Suspect]) -> list[Suspect]:
     return sorted(tops, key=lambda one: -one.generous)[:PEAKS]
 
 
-PEAKS = 4
-"""Of numbers that are tried on a grid so many are looked at closer."""
-UNREFINED = -8.0
-"""The number of an error that is less probable than that is left as it is."""
-FAR_BEHIND = 100.0
-"""What is so far behind the best suspect is not looked at closer."""
-HOPELESS = -30.0
-"""Nor is what is so much less probable than no error, with all of physics to help."""
+def log_prior(error: DataError, alike: int) -> float:
+    """Return the log odds beforehand of an error, one of so many of its kind, against none."""
+    among = error.numbers * FREE_NUMBER_LOG_PRIOR if error.numbers else -np.log(max(alike, 1))
+    return float(np.log(ANY * KINDS[error.kind].share / (1.0 - ANY)) + among)
+
+
+def _judged(yardstick: Yardstick, error: DataError, group: Group, *, closer: bool = False) -> Suspect:
+    """Return by how much a record is more probable with an error in its data than without."""
+    logged = yardstick.without(error)
+    is_of_all = error.is_of_clock or error.is_of_commands or (error.kind in REPEATED and yardstick.corrected)
+    touched = list(yardstick.own) if is_of_all else list(error.channels)
+    terms = {**yardstick.own, **yardstick.terms(logged, touched)}
+    if min(terms[name].samples for name in touched) < FEWEST or _is_small(yardstick, error):
+        return Suspect(error, -np.inf, -np.inf)
+    odds = log_prior(error, len(group.each))
+    odds += error.log_jacobian * sum(terms[name].samples for name in touched)
+    generous = odds + _lost(yardstick, error, terms, yardstick.as_is)
+    generous += yardstick.generous(terms) - yardstick.as_is.log
+    if not closer:
+        return Suspect(error, float(generous), float(generous))
+    lead = odds + _lost(yardstick, error, terms, yardstick.likeliest)
+    lead += yardstick.sparse(terms) - yardstick.log_sparse
+    return Suspect(error, float(lead), float(generous))
+
+
+def _is_small(yardstick: Yardstick, error: DataError) -> bool:
+    """Say whether the number of an error is too small to be one. Where a rounded channel stands still, what rounding
+    takes off is the same for long, and a step in the sensor of some of its resolution explains it.
+    """
+    if error.kind != "step":
+        return abs(error.amount) < LEAST.get(error.kind, 0.0)
+    (name,) = error.channels
+    usual = usual_of(name, yardstick.logged.record.values[name], yardstick.logged.noise)
+    return abs(error.amount) < LEAST_STEP_LEVELS * np.hypot(usual.level, usual.resolution / np.sqrt(12.0))
+
+
+def _closer(yardstick: Yardstick, one: Suspect, group: Group) -> Suspect:
+    return _judged(yardstick, one.error, group, closer=True)
+
+
+def may_stand_still(yardstick: Yardstick, error: DataError) -> bool:
+    """Say whether a channel that seems to be frozen may only stand still, as it is rounded."""
+    return error.kind == "frozen" and error in yardstick.repeated
+
+
+def _stuck(yardstick: Yardstick, error: DataError, as_is: Reckoned) -> float:
+    """Return what the values that a rounded channel repeats to the end add to the log evidence of the record as it is,
+    and the log odds that it is frozen, not standing still: where each value is an interval (`repeated_values`).
+    """
+    (name,) = error.channels
+    logged = yardstick.without(error)
+    record, kept = yardstick.logged.record, logged.record.values[name]
+    known = np.isfinite(record.values[name])
+    run = ~np.isfinite(kept[known])
+    if not run.any():
+        return -np.inf
+    usual = usual_of(name, record.values[name], yardstick.logged.noise)
+    steps = steps_of(record.time[known], yardstick.deviations(name, as_is.z)[known], usual)
+    rest = yardstick.terms(logged, [name])[name]
+    return yardstick.added(name, rest, as_is) + log_odds_of_frozen(steps, run)
+
+
+def _lost(yardstick: Yardstick, error: DataError, terms: Mapping[str, Term], as_is: Reckoned) -> float:
+    """Return what samples that are no measurements any more added to the evidence of the record as it is, on average;
+    of channels that are exchanged, gaps only change places; of one that may only stand still, what these samples added,
+    and the odds that it does not.
+    """
+    if may_stand_still(yardstick, error):
+        return _stuck(yardstick, error, as_is)
+    lost = {name: yardstick.own[name].measured - terms[name].measured for name in yardstick.own}
+    if not any(lost.values()) or sum(lost.values()) == 0:
+        return 0.0
+    return sum(count * _mean_log_density(yardstick, name) for name, count in lost.items())
+
+
+def _mean_log_density(yardstick: Yardstick, name: str) -> float:
+    """Return what a measured sample of a channel adds to the evidence of the record as it is."""
+    own, scale = yardstick.own[name], yardstick.as_is.scales[name]
+    return (own.fixed - own.samples * (float(np.log(scale)) + 0.5)) / max(own.measured, 1)
+
+
+def _refined(yardstick: Yardstick, one: Suspect, group: Group) -> Suspect:
+    """Return an error with the numbers that are best close to those that were tried."""
+    judge = partial(_judged, yardstick, group=group, closer=True)
+    if group.step:
+        return best_number(judge, one, group.step)
+    time = yardstick.logged.record.time
+    at, span = int(np.searchsorted(time, one.error.since)), max(time.size // STEP_TIMES, 1)
+    around = time[max(at - span, 1) : at + span + 1 : max(span // 4, 1)]
+    for _ in range(2):
+        one = best_number(judge, one, 0.6 * abs(one.error.amount))
+        one = max(
+            [one, *(judge(replace(one.error, since=float(t))) for t in around)], key=lambda each: each.lead
+        )
+        around = time[max(int(np.searchsorted(time, one.error.since)) - 3, 1) :][:7]
+    return one
+
+
+def best_number(judge: Callable[[DataError], Suspect], one: Suspect, step: float) -> Suspect:
+    """Return an error with the number between amount ± step that is judged best (golden section)."""
+    ratio = 0.5 * (np.sqrt(5.0) - 1.0)
+    low, high, best = one.error.amount - step, one.error.amount + step, one
+    inner = [
+        judge(replace(one.error, amount=float(x)))
+        for x in (high - ratio * step * 2.0, low + ratio * step * 2.0)
+    ]
+    while high - low > FINEST * step:
+        best = max([best, *inner], key=lambda each: each.lead)
+        if inner[0].lead > inner[1].lead:
+            high = inner[1].error.amount
+            inner = [judge(replace(one.error, amount=float(high - ratio * (high - low)))), inner[0]]
+        else:
+            low = inner[0].error.amount
+            inner = [inner[1], judge(replace(one.error, amount=float(low + ratio * (high - low))))]
+    return max([best, *inner], key=lambda each: each.lead)
 
 
 class Group(NamedTuple):
@@ -396,10 +276,6 @@ def possible(yardstick: Yardstick, trusted: frozenset[str]) -> list[Group]:
     if yardstick.logged.setting.trial.commands is not None:
         found += _commands(yardstick.logged)
     return [group for group in found if group.each]
-
-
-LOUDEST = 6.0
-"""Noise of a sensor is never so many usual levels: what is louder in another unit is not in that unit. [-]"""
 
 
 def _is_quiet(yardstick: Yardstick, error: DataError) -> bool:
@@ -483,95 +359,3 @@ def _step(yardstick: Yardstick, name: str) -> list[DataError]:
 
 def _first(time: np.ndarray, at: float) -> float:
     return float(time[np.searchsorted(time, at)])
-
-
-def log_prior(error: DataError, alike: int) -> float:
-    """Return the log odds beforehand of an error, one of so many of its kind, against none."""
-    among = error.numbers * FREE_NUMBER_LOG_PRIOR if error.numbers else -np.log(max(alike, 1))
-    return float(np.log(ANY * KINDS[error.kind].share / (1.0 - ANY)) + among)
-
-
-def _judged(yardstick: Yardstick, error: DataError, group: Group, *, closer: bool = False) -> Suspect:
-    """Return by how much a record is more probable with an error in its data than without."""
-    logged = yardstick.without(error)
-    is_of_all = error.is_of_clock or error.is_of_commands or (error.kind in REPEATED and yardstick.corrected)
-    touched = list(yardstick.own) if is_of_all else list(error.channels)
-    terms = {**yardstick.own, **yardstick.terms(logged, touched)}
-    if min(terms[name].samples for name in touched) < FEWEST or _is_small(yardstick, error):
-        return Suspect(error, -np.inf, -np.inf)
-    odds = log_prior(error, len(group.each)) + _lost(yardstick, terms, touched)
-    odds += error.log_jacobian * sum(terms[name].samples for name in touched)
-    generous = odds + reckon(terms, yardstick.D).log - yardstick.as_is.log
-    lead = odds + yardstick.sparse(terms) - yardstick.log_sparse if closer else generous
-    return Suspect(error, float(lead), float(generous))
-
-
-def _is_small(yardstick: Yardstick, error: DataError) -> bool:
-    """Say whether the number of an error is too small to be one. Where a rounded channel stands still, what rounding
-    takes off is the same for long, and a step in the sensor of some of its resolution explains it.
-    """
-    if error.kind != "step":
-        return abs(error.amount) < LEAST.get(error.kind, 0.0)
-    (name,) = error.channels
-    usual = usual_of(name, yardstick.logged.record.values[name], yardstick.logged.noise)
-    return abs(error.amount) < LEAST_STEP_LEVELS * np.hypot(usual.level, usual.resolution / np.sqrt(12.0))
-
-
-def _closer(yardstick: Yardstick, one: Suspect, group: Group) -> Suspect:
-    return _judged(yardstick, one.error, group, closer=True)
-
-
-def _lost(yardstick: Yardstick, terms: Mapping[str, Term], touched: Sequence[str]) -> float:
-    """Return what samples that are no measurements any more added to the evidence of the record as it is, on average;
-    of channels that are exchanged, gaps only change places.
-    """
-    lost = {name: yardstick.own[name].measured - terms[name].measured for name in touched}
-    if not any(lost.values()) or sum(lost.values()) == 0:
-        return 0.0
-    return sum(count * _mean_log_density(yardstick, name) for name, count in lost.items())
-
-
-def _mean_log_density(yardstick: Yardstick, name: str) -> float:
-    """Return what a measured sample of a channel adds to the evidence of the record as it is."""
-    own, scale = yardstick.own[name], yardstick.as_is.scales[name]
-    return (own.fixed - own.samples * (float(np.log(scale)) + 0.5)) / max(own.measured, 1)
-
-
-FINEST = 0.02
-"""A number is found to this share of the step between those that were tried."""
-
-
-def _refined(yardstick: Yardstick, one: Suspect, group: Group) -> Suspect:
-    """Return an error with the numbers that are best close to those that were tried."""
-    judge = partial(_judged, yardstick, group=group, closer=True)
-    if group.step:
-        return best_number(judge, one, group.step)
-    time = yardstick.logged.record.time
-    at, span = int(np.searchsorted(time, one.error.since)), max(time.size // STEP_TIMES, 1)
-    around = time[max(at - span, 1) : at + span + 1 : max(span // 4, 1)]
-    for _ in range(2):
-        one = best_number(judge, one, 0.6 * abs(one.error.amount))
-        one = max(
-            [one, *(judge(replace(one.error, since=float(t))) for t in around)], key=lambda each: each.lead
-        )
-        around = time[max(int(np.searchsorted(time, one.error.since)) - 3, 1) :][:7]
-    return one
-
-
-def best_number(judge: Callable[[DataError], Suspect], one: Suspect, step: float) -> Suspect:
-    """Return an error with the number between amount ± step that is judged best (golden section)."""
-    ratio = 0.5 * (np.sqrt(5.0) - 1.0)
-    low, high, best = one.error.amount - step, one.error.amount + step, one
-    inner = [
-        judge(replace(one.error, amount=float(x)))
-        for x in (high - ratio * step * 2.0, low + ratio * step * 2.0)
-    ]
-    while high - low > FINEST * step:
-        best = max([best, *inner], key=lambda each: each.lead)
-        if inner[0].lead > inner[1].lead:
-            high = inner[1].error.amount
-            inner = [judge(replace(one.error, amount=float(high - ratio * (high - low)))), inner[0]]
-        else:
-            low = inner[0].error.amount
-            inner = [inner[1], judge(replace(one.error, amount=float(low + ratio * (high - low))))]
-    return max([best, *inner], key=lambda each: each.lead)

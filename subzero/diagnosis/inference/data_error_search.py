@@ -10,14 +10,16 @@ How far physics comes towards a record without them is looked at before any sear
     G = max over sets of at most MAX_CAUSES terms of  log p(y | terms) p(terms) − log p(y | nothing) p(nothing)
 
 A term is a cause, throughout or from some time of a grid on, which is what a late clock looks like. The set grows by
-the term that gains most; the scales of the noise are found anew behind each set, as in `data_error_scan`, which has
-nothing and single causes only. An error of the data that is far ahead of that needs no search of the record as it is.
+the term that gains most; the scales of the noise are found anew behind each set, as in `data_error_yardstick`, which
+has nothing and single causes only. An error of the data that is far ahead of that needs no search of the record as it
+is.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -28,16 +30,19 @@ from subzero.diagnosis.hypothesis.logged import Logged
 from subzero.diagnosis.inference.change_point_scan import BaseRun, Begun, gain_of, onset_columns
 from subzero.diagnosis.inference.data_error_scan import (
     FAR_BEHIND,
+    Suspect,
+    judged_again,
+    may_stand_still,
+    suspects,
+)
+from subzero.diagnosis.inference.data_error_yardstick import (
     KAPPA_NARROW,
     Reckoned,
-    Suspect,
     Term,
     Yardstick,
     generous_variances,
-    judged_again,
     least_scale,
     reckon,
-    suspects,
     to_usual_sizes,
     yardstick_of,
 )
@@ -67,7 +72,8 @@ SIGNATURE_LEAD = 20.0
 class SuspectedError:
     """An error of a record, its leads with all others corrected, and those that the record cannot tell from it; `left`
     is the noise of the channel that is explained worst without all of them, in usual levels, with all of physics to
-    help; `is_clear` says that it leaves physics no chance in the linear problem.
+    help; `is_clear` says that it leaves physics no chance in the linear problem; `may_stand_still` that a channel
+    that seems to be frozen is rounded.
     """
 
     record: int
@@ -77,6 +83,7 @@ class SuspectedError:
     alike: tuple[DataError, ...] = ()
     left: float = np.inf
     is_clear: bool = False
+    may_stand_still: bool = False
 
 
 def is_soft(one: SuspectedError) -> bool:
@@ -176,7 +183,8 @@ def _of_record(problem: Problem, records: Sequence[Logged], record: int) -> list
     clear = _clear(problem, records, record, bench, made)
     return [
         SuspectedError(record=record, error=one.error, lead=one.lead, generous=one.generous, alike=alike,
-                       left=left, is_clear=any(one.error is other for other in clear))
+                       left=left, is_clear=any(one.error is other for other in clear),
+                       may_stand_still=may_stand_still(bench.begun, one.error))
         for one, alike in made
     ]  # fmt: skip
 
@@ -218,22 +226,38 @@ def _clear(
 ) -> list[DataError]:
     """Return the errors that leave physics no chance in the linear problem. One that a vehicle may look like must also
     explain all that is there, and without the help of any that is not clear: what broke in mid-trial makes an error of
-    a clock likely, too, but that leaves more than noise, or needs another one.
+    a clock likely, too, but that leaves more than noise, or needs another one. So may a rounded channel stand still
+    since something broke.
     """
+    ahead = partial(_lead_over_few, problem, records, record, bench)
     firm = [one for one, _ in made if one.error.kind not in SOFT]
-    clear = [one.error for one in firm if one.lead > CLEAR_LEAD and one.generous > CLEAR_GENEROUS_LEAD]
     held = [one.error for one in firm]
+    clear = [one.error for one in firm if one.lead > CLEAR_LEAD and one.generous > CLEAR_GENEROUS_LEAD]
+    clear = [one for one in clear if not may_stand_still(bench.begun, one)
+             or ahead(one, [other.error for other, _ in made if other.error is not one]) > CLEAR_LEAD]  # fmt: skip
     for one in sorted((one for one, _ in made if one.error.kind in SOFT), key=lambda each: -each.lead):
         after = bench.without([*held, one.error])
         if one.error.kind == "step" or one.lead < FAR_BEHIND or max(after.as_is.scales.values()) >= LOUD:
             break
-        before = bench.without(held)
-        each = [before.logged if i == record else other for i, other in enumerate(records)]
-        over_none = judged_again(before, one.error).lead + before.log_sparse - before.log_none
-        if over_none - most_of_physics(posed_again(problem, each), record) < FAR_BEHIND:
+        if ahead(one.error, held) < FAR_BEHIND:
             break
         held, clear = [*held, one.error], [*clear, one.error]
     return clear
+
+
+def _lead_over_few(
+    problem: Problem,
+    records: Sequence[Logged],
+    record: int,
+    bench: _Bench,
+    error: DataError,
+    others: Sequence[DataError],
+) -> float:
+    """Return by how much a record is more probable with an error than with a few causes, where others are corrected."""
+    before = bench.without(others)
+    each = [before.logged if i == record else one for i, one in enumerate(records)]
+    over_none = judged_again(before, error).lead + before.log_sparse - before.log_none
+    return over_none - most_of_physics(posed_again(problem, each), record)
 
 
 def _is_suspected(one: Suspect) -> bool:

@@ -16,12 +16,14 @@ is the usual level of the sensor, or the known one. q is read off the values: se
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
+from subzero.diagnosis.hypothesis.catalogue.sensors import SPECS
 from subzero.jit import compiled
 
 
@@ -201,6 +203,14 @@ class Usual(NamedTuple):
     level: float
     resolution: float
     is_known: bool
+
+
+def usual_of(channel: str, values: np.ndarray, known: Mapping[str, float]) -> Usual:
+    """Return what a channel's sensor is like, before anything is fitted: its level as known or usual, its resolution as
+    its values (n,) show it.
+    """
+    level = known.get(channel, SPECS[channel].noise)
+    return Usual(level, resolution_of(values, level), channel in known)
 
 
 def usual_noise(time: np.ndarray, used: np.ndarray, usual: Usual) -> Noise:

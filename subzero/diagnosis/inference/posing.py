@@ -8,7 +8,7 @@ What was measured stays as it was: a correction is added to the simulation. Only
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -23,9 +23,9 @@ from subzero.diagnosis.inference.noise import (
     Noise,
     Usual,
     estimate,
-    resolution_of,
     spikes,
     usual_noise,
+    usual_of,
 )
 from subzero.diagnosis.inference.problem import Observed, Problem
 from subzero.diagnosis.inference.simulator import economical, finer, respond
@@ -116,14 +116,6 @@ def _observed(one: Logged) -> Observed:
     noise = {name: _usual(time, column, column - simulated[name], usual_of(name, column, one.noise))
              for name, column in values.items()}  # fmt: skip
     return Observed(name=one.name, time=time, values=values, noise=noise, setting=setting, known=one.noise)
-
-
-def usual_of(channel: str, values: np.ndarray, known: Mapping[str, float]) -> Usual:
-    """Return what a channel's sensor is like, before anything is fitted: its level as known or usual, its resolution as
-    its values (n,) show it.
-    """
-    level = known.get(channel, SPECS[channel].noise)
-    return Usual(level, resolution_of(values, level), channel in known)
 
 
 def _usual(time: np.ndarray, values: np.ndarray, difference: np.ndarray, usual: Usual) -> Noise:

@@ -1,0 +1,295 @@
+"""What the nominal model, and all that may be wrong with it, say of a record, or of one without an error.
+
+The yardstick is generous to physics. All parameters are free at once, each as far as a cause may go, in the linear
+problem at the nominal model; and every channel has a scale of its noise that is free, so that what a linear model
+cannot follow makes a channel count for less, and not the others bend:
+
+    G = max over s of  log N(W y; W h, s² I + J D Jᵀ) − Σ n_c log s_c,      D = (max(size of a cause, 4 τ))²
+
+Beside it stands the evidence of nothing and of single causes within wide tolerances. Only other commands are simulated.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from subzero.channels import HEADING, turned
+from subzero.diagnosis.hypothesis.configuration import Setting, sensed, truth
+from subzero.diagnosis.hypothesis.data_error import REPEATED, DataError, corrected
+from subzero.diagnosis.hypothesis.hypotheses import PRIOR, columns_of, nameable, variances
+from subzero.diagnosis.hypothesis.logged import Logged
+from subzero.diagnosis.inference.linear_gaussian import KAPPAS, Posterior, freed, log_sum
+from subzero.diagnosis.inference.noise import Noise, spikes, usual_noise, usual_of
+from subzero.diagnosis.inference.problem import Problem
+from subzero.diagnosis.inference.simulator import Track, simulate_track
+
+KAPPA_NARROW = 2.0
+"""How much wider than declared tolerances are where a cause stands by itself: the linear problem is no better."""
+LEAST_SCALE, MOST_SCALE, ROUNDS, SETTLED = 0.3, 1e4, 5, 0.01
+"""Scales of the noise of a channel, and how often they are found anew behind the parameters, if they still change by
+more than that share: a hundredth costs less than 0.1 nats, as the best scales are stationary. Of a rounded one it is
+never so small that a sample has more density than 1/q, which is a probability of 1."""
+OUTLIER_LOG_DENSITY = float(np.log(0.01 / 50.0))
+"""Of a sample that is left out: one of a hundred, anywhere within fifty levels of the noise."""
+CAUSES_TRIED = 3
+"""So many causes, the most promising, have the scales of the noise found behind them."""
+
+
+class Term(NamedTuple):
+    """What a channel says of the parameters: JᵀJ, Jᵀr, |r|², whitened; how many samples, and ½ log det of their noise
+    with what outliers cost; the least scale of its noise; and how many were measured, with outliers.
+    """
+
+    A: np.ndarray
+    b: np.ndarray
+    rr: float
+    samples: int
+    fixed: float
+    least: float
+    measured: int
+
+
+class Reckoned(NamedTuple):
+    """The generous evidence, the parameters (k,) and their covariance, and the scale of the noise of each channel."""
+
+    log: float
+    z: np.ndarray
+    M: np.ndarray
+    scales: dict[str, float]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Yardstick:
+    """What the nominal model, and all that may be wrong with it, say of a record at any time.
+
+    Attributes:
+        logged: the record as it is said to be, but for what is corrected in it.
+        written: the record as it is.
+        step: between times of the prediction, from 0 on. [s]
+        nominal: channel → prediction (g,). [display unit]
+        slopes: channel → sensitivities to all parameters (g, k).
+        D: prior variances that are generous to physics: every cause at once (k,).
+        narrow: prior variances of wide tolerances (k,).
+        causes: places of the parameters of each cause.
+        setting: of its simulations.
+        repeated: values that it repeats, which may be a channel that is rounded and stands still.
+        corrected: errors that are corrected in it already.
+        kept: predictions under other commands.
+    """
+
+    logged: Logged
+    written: Logged
+    step: float
+    nominal: Mapping[str, np.ndarray]
+    slopes: Mapping[str, np.ndarray]
+    D: np.ndarray
+    narrow: np.ndarray
+    causes: Sequence[Sequence[int]]
+    setting: Setting
+    repeated: tuple[DataError, ...] = ()
+    corrected: tuple[DataError, ...] = ()
+    kept: dict[str, Mapping[str, np.ndarray]] = field(default_factory=dict)
+
+    def without(self, error: DataError) -> Logged:
+        """Return the record without a further error: a value that it repeats stands at the times that were written."""
+        if error.kind in REPEATED and self.corrected:
+            return corrected(self.written, (*self.corrected, error))
+        return error.corrected(self.logged)
+
+    def terms(self, logged: Logged, channels: Iterable[str]) -> dict[str, Term]:
+        """Return what channels of a record, or of a corrected one, say of the parameters."""
+        nominal = self.nominal_of(logged)
+        return {name: self._term(logged, name, nominal[name]) for name in channels}
+
+    def nominal_of(self, logged: Logged) -> Mapping[str, np.ndarray]:
+        """Return the prediction under a record's commands, simulated once if they are others."""
+        commands, own = logged.setting.trial.commands, self.logged.setting.trial.commands
+        if commands is own or commands is None or own is None:
+            return self.nominal
+        key = commands.values.tobytes().hex()
+        if key not in self.kept:
+            setting = replace(self.setting, trial=replace(self.setting.trial, commands=commands))
+            self.kept[key] = shown_on_grid(setting, simulate_track(setting), self.nominal)
+        return self.kept[key]
+
+    def at(self, rows: np.ndarray, time: np.ndarray) -> np.ndarray:
+        """Return what stands on the grid (g, …) at times (n,): linear between, held at the ends."""
+        x = np.clip(time / self.step, 0.0, rows.shape[0] - 1.000001)
+        low = x.astype(int)
+        share = (x - low).reshape(-1, *(1,) * (rows.ndim - 1))
+        return (1.0 - share) * rows[low] + share * rows[low + 1]
+
+    def _term(self, logged: Logged, name: str, nominal: np.ndarray) -> Term:
+        time, values = logged.record.time, logged.record.values[name]
+        expected, usual = self.at(nominal, time), usual_of(name, values, logged.noise)
+        if name == HEADING:
+            values = turned(values, expected)
+        used = np.isfinite(values) & np.isfinite(expected)
+        measured = int(np.count_nonzero(used))
+        used[used] = ~spikes((values - expected)[used], max(usual.level, usual.resolution))
+        noise = usual_noise(time, used, usual)
+        white = noise.whiten(np.column_stack([values - expected, self.at(self.slopes[name], time)]))
+        r, J = white[:, 0], white[:, 1:]
+        out = (measured - noise.count) * (OUTLIER_LOG_DENSITY - np.log(usual.level))
+        fixed, least = out - noise.log_scale, least_scale(noise)
+        return Term(J.T @ J, J.T @ r, float(r @ r), noise.count, fixed, least, measured)
+
+    @cached_property
+    def own(self) -> dict[str, Term]:
+        """What the record as it is says."""
+        return self.terms(self.logged, self.logged.record.values)
+
+    @cached_property
+    def as_is(self) -> Reckoned:
+        """The generous evidence of the record as it is."""
+        return reckon(self.own, self.D)
+
+    @cached_property
+    def log_sparse(self) -> float:
+        """The evidence of nothing, and of every cause by itself, of the record as it is."""
+        return self.sparse(self.own)
+
+    @property
+    def log_none(self) -> float:
+        """The evidence of nothing, of the record as it is."""
+        return reckon(self.own, self.narrow).log + float(np.log(PRIOR["none"]))
+
+    def deviations(self, name: str, z: np.ndarray) -> np.ndarray:
+        """Return measured − predicted of a channel (n,), with parameters in the linear problem. [display unit]"""
+        time, values = self.logged.record.time, self.logged.record.values[name]
+        expected = self.at(self.nominal_of(self.logged)[name], time)
+        values = turned(values, expected) if name == HEADING else values
+        return values - expected - self.at(self.slopes[name], time) @ z
+
+    def generous(self, terms: Mapping[str, Term]) -> float:
+        """Return the log evidence with all of physics at once."""
+        return reckon(terms, self.D).log
+
+    def added(self, name: str, rest: Term, as_is: Reckoned) -> float:
+        """Return what samples of a channel that are not in its rest add to the log density of the record as it is."""
+        own, scale = self.own[name], as_is.scales[name]
+        square = _square(own, as_is.z) - _square(rest, as_is.z)
+        lost = own.samples - rest.samples
+        return own.fixed - rest.fixed - lost * float(np.log(scale)) - 0.5 * square / scale**2
+
+    def sparse(self, terms: Mapping[str, Term]) -> float:
+        """Return the log evidence of nothing, and of every cause by itself, mixed; within wide tolerances."""
+        return log_sum([log for log, _ in self._each(terms)])
+
+    @cached_property
+    def likeliest(self) -> Reckoned:
+        """The most probable of nothing and single causes, of the record as it is."""
+        return max(self._each(self.own), key=lambda pair: pair[0])[1]
+
+    def _each(self, terms: Mapping[str, Term]) -> list[tuple[float, Reckoned]]:
+        """Return nothing and the best causes with their log posteriors."""
+        none = reckon(terms, self.narrow)
+        base = Posterior(z=none.z, M=none.M, log_evidence=none.log, log_det=0.0)
+        gains = [freed(base, self.narrow, at, self.D[list(at)])[0] for at in self.causes]
+        best = sorted(range(len(gains)), key=lambda i: -gains[i])[:CAUSES_TRIED]
+        each = [reckon(terms, self._freed(self.causes[i])) for i in best]
+        prior = float(np.log(PRIOR["single"] / max(len(self.causes), 1)))
+        return [(none.log + float(np.log(PRIOR["none"])), none), *((one.log + prior, one) for one in each)]
+
+    def _freed(self, at: Sequence[int]) -> np.ndarray:
+        D = self.narrow.copy()
+        D[list(at)] = self.D[list(at)]
+        return D
+
+
+def reckon(terms: Mapping[str, Term], D: np.ndarray) -> Reckoned:
+    """Return the generous evidence of what channels say."""
+    root = np.sqrt(D)
+    scales = {name: _scale(one, one.rr) for name, one in terms.items()}
+    for turn in range(ROUNDS + 1):
+        A = sum(one.A / scales[name] ** 2 for name, one in terms.items())
+        b = sum(one.b / scales[name] ** 2 for name, one in terms.items())
+        factor = np.linalg.cholesky(np.eye(D.size) + root[:, None] * A * root)
+        half = np.linalg.solve(factor, np.diag(root))
+        M = half.T @ half
+        z = M @ b
+        before, scales = scales, {name: _scale(one, _left(one, z, M)) for name, one in terms.items()}
+        if turn == ROUNDS or all(abs(scales[name] - old) < SETTLED * old for name, old in before.items()):
+            scales = before
+            break
+    rr = sum(one.rr / scales[name] ** 2 for name, one in terms.items())
+    log = -0.5 * (rr - float(b @ z)) - float(np.sum(np.log(np.diag(factor))))
+    log += sum(one.fixed - one.samples * np.log(scales[name]) for name, one in terms.items())
+    return Reckoned(float(log), z, M, scales)
+
+
+def _left(one: Term, z: np.ndarray, M: np.ndarray) -> float:
+    """Return the expected square that parameters leave of a channel."""
+    return _square(one, z) + float(np.sum(one.A * M))
+
+
+def _square(one: Term, z: np.ndarray) -> float:
+    """Return the square of what is left of a channel with parameters (k,), whitened."""
+    return one.rr - 2.0 * float(one.b @ z) + float(z @ one.A @ z)
+
+
+def least_scale(noise: Noise) -> float:
+    """Return the least scale of a channel's noise."""
+    level = float(np.exp(noise.log_scale / max(noise.count, 1)))
+    return max(LEAST_SCALE, noise.resolution / np.sqrt(2.0 * np.pi) / level)
+
+
+def _scale(one: Term, square: float) -> float:
+    """Return the scale of a channel's noise of which a square is left."""
+    return float(np.clip(np.sqrt(max(square, 0.0) / max(one.samples, 1)), one.least, MOST_SCALE))
+
+
+def yardstick_of(problem: Problem, record: int, logged: Logged) -> Yardstick:
+    """Return what a record is judged by; its simulations are those of the sensitivities at the nominal model.
+
+    Args:
+        problem: all records and parameters.
+        record: its number.
+        logged: the record.
+    """
+    zero, one = np.zeros(len(problem.entries)), problem.records[record]
+    names = [name for name in logged.record.values if name in one.noise]
+    (base,) = problem.tracks([(record, zero)])
+    nominal = shown_on_grid(one.setting, base, names)
+    ks = [k for k, entry in enumerate(problem.entries) if entry.record in (-1, record)]
+    moved = {k: to_usual_sizes(problem, k) for k in ks}
+    tracks = problem.tracks([(record, moved[k]) for k in ks])
+    slopes = {name: np.zeros((nominal[name].size, zero.size)) for name in names}
+    for k, track in zip(ks, tracks, strict=True):
+        there = shown_on_grid(problem.setting(record, moved[k]), track, names)
+        for name in names:
+            slopes[name][:, k] = np.nan_to_num((there[name] - nominal[name]) / moved[k][k])
+    grid, causes = base[0], [columns_of(problem.entries, (name,)) for name in nameable(problem.entries)]
+    return Yardstick(logged=logged, written=logged, step=float(grid[1] - grid[0]), nominal=nominal, slopes=slopes,
+                     D=generous_variances(problem), narrow=variances(problem.entries, (), KAPPA_NARROW),
+                     causes=causes, setting=one.setting)  # fmt: skip
+
+
+def generous_variances(problem: Problem) -> np.ndarray:
+    """Return prior variances of every cause at once (k,)."""
+    return np.array(
+        [max(e.parameter.scale, max(KAPPAS) * e.parameter.tolerance) ** 2 for e in problem.entries]
+    )
+
+
+def to_usual_sizes(problem: Problem, k: int) -> np.ndarray:
+    """Return deviations with an entry moved for a sensitivity: what does nothing while it is small to a usual size."""
+    zero, parameter = np.zeros(len(problem.entries)), problem.entries[k].parameter
+    if parameter.low < 0.0 or problem.entries[k].effect.slot == "sensors":
+        return problem.moved(zero, k)
+    zero[k] = min(parameter.scale, parameter.high)
+    return zero
+
+
+def shown_on_grid(setting: Setting, track: Track, names: Iterable[str]) -> dict[str, np.ndarray]:
+    """Return what the sensors show at the times of a track: channel → (g,), in its display unit."""
+    grid, states = track
+    shown = {name: sensed(setting.sensing.get(name), grid, truth(setting, states, name)) for name in names}
+    if setting.clock_offset:
+        shown = {name: np.interp(grid - setting.clock_offset, grid, one) for name, one in shown.items()}
+    return shown
