@@ -9,7 +9,7 @@ NEW as often as needed and becomes real only by `accept`.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -217,7 +217,7 @@ def _new_ends() -> Ends:
     )
 
 
-def _per_node(n: int) -> dict[str, np.ndarray]:
+def _per_node(n: int) -> dict[str, Any]:
     """Return what an empty line has of each of n nodes, by name."""
     vectors = {name: np.zeros((3, n, 3)) for name in ("position", "velocity", "momentum", "water")}
     return vectors | {

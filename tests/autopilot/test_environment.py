@@ -55,14 +55,15 @@ def test_the_same_seed_draws_the_same_heading(env):
     assert drawn[0] == drawn[1] != drawn[2]
 
 
-def test_many_at_once_are_those_of_one_after_another_to_the_last_bit(monkeypatch):
+@pytest.mark.parametrize("workers", [1, 2])
+def test_many_at_once_are_those_of_one_after_another_to_the_last_bit(monkeypatch, workers):
     """Episodes of five steps, so that environments begin again on the way."""
     monkeypatch.setattr(subzero.gym_environment, "STEPS", 5)
     name = subzero.gym_environment.ENVIRONMENT
     actions = np.random.default_rng(0).uniform(-1.0, 1.0, (13, 3, 1)).astype(np.float32)
     told = {}
-    for mode in ("sync", None):
-        made = gymnasium.make_vec(name, num_envs=3, vectorization_mode=mode, propeller_rps=30.0)
+    for mode, how in (("sync", {}), (None, {"workers": workers})):
+        made = gymnasium.make_vec(name, num_envs=3, vectorization_mode=mode, propeller_rps=30.0, **how)
         told[mode] = [(*made.reset(seed=7),), *(made.step(one) for one in actions)]
         made.close()
     assert isinstance(made.unwrapped, subzero.gym_environment.TetheredHeadings)
