@@ -153,7 +153,7 @@ def learning(repeats):
         sync = many(sample_time, count, "sync")
         for name, rate in (
             ("`sync`, Gymnasium's own", sync),
-            ("the default", many(sample_time, count, None)),
+            ("`workers=1`", many(sample_time, count, None, workers=1)),
             (f"`workers={threads}`", many(sample_time, count, None, workers=threads)),
         ):
             yield f"{sample_time:g}", name, f"{rate:,.0f}", f"{rate / sync:.2f}"

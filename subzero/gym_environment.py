@@ -14,6 +14,7 @@ at each reset. ``gymnasium.make_vec("subzero/TetheredHeading-v0", num_envs=8)`` 
 
 from __future__ import annotations
 
+import os
 from concurrent.futures import ThreadPoolExecutor
 from itertools import chain, repeat
 from math import cos, pi, radians, sin
@@ -40,6 +41,10 @@ LARGEST_TURN = radians(30.0)
 """New headings lie within this of the one at the start. [rad]"""
 RUDDER_PRICE = 0.1
 """How much a rudder command at its limit costs, in rad² of heading error."""
+
+MANY_EXCHANGES = 10
+"""A step of so many exchanges of vehicle and cable, a second of fig6, takes 0.3 ms and more: from there on threads pay.
+One of a single exchange takes 0.05 ms, and to hand Python's lock over takes half of that. [-]"""
 
 LIMITS = {
     "sine of the heading error": (-1.0, 1.0),
@@ -117,6 +122,11 @@ class TetheredHeading(gymnasium.Env[np.ndarray, np.ndarray]):
         return -(error**2 + RUDDER_PRICE * share**2) * self._sim.sample_time
 
     @property
+    def exchanges(self) -> int:
+        """How many exchanges of vehicle and cable a step takes."""
+        return round(self._sim.sample_time / self._sim.trial.cable_step)
+
+    @property
     def is_over(self) -> bool:
         """Whether the episode has had all its steps."""
         return self._taken >= STEPS
@@ -150,19 +160,19 @@ class TetheredHeadings(gymnasium.vector.SyncVectorEnv):
     They give what ``gymnasium.vector.SyncVectorEnv`` gives, to the last bit, but put together at once and not one by
     one: one that has ended begins again in the step behind.
 
-    Threads pay where the simulation of a step takes longer than they take to hand over Python's lock: from some 0.3 ms
-    on, a sample time of a second with little cable (``python -m benchmarks.throughput --learning``).
-
     Args:
         num_envs: how many.
-        workers: threads.
+        workers: threads; if not given, one for each processor where a step takes `MANY_EXCHANGES`, else one
+            (``python -m benchmarks.throughput --learning``).
         **how: of each, see `TetheredHeading`.
     """
 
-    def __init__(self, num_envs: int = 1, *, workers: int = 1, **how: Any) -> None:
+    def __init__(self, num_envs: int = 1, *, workers: int | None = None, **how: Any) -> None:
         super().__init__([lambda: TetheredHeading(**how)] * num_envs)
-        threads = min(whole("TetheredHeadings: workers", workers, least=1), num_envs)
         self._ours: list[Any] = list(self.envs)
+        if workers is None:
+            workers = (os.cpu_count() or 1) if self._ours[0].exchanges >= MANY_EXCHANGES else 1
+        threads = min(whole("TetheredHeadings: workers", workers, least=1), num_envs)
         self._parts = [part.tolist() for part in np.array_split(np.arange(num_envs), threads)]
         self._pool = ThreadPoolExecutor(threads)
         self._map = map if threads == 1 else self._pool.map

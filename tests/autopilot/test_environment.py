@@ -7,6 +7,7 @@ it. Tolerance: none; 2 degrees for the heading.
 
 import subprocess
 import sys
+import threading
 
 import gymnasium
 import numpy as np
@@ -75,6 +76,26 @@ def test_many_at_once_are_those_of_one_after_another_to_the_last_bit(monkeypatch
         assert mine[-1].keys() == plain[-1].keys()
         for key, ours in mine[-1].items():
             np.testing.assert_array_equal(ours, plain[-1][key])
+
+
+@pytest.mark.parametrize("how, threads", [({}, 1), ({"sample_time": 1.0}, 2), ({"workers": 2}, 2)])
+def test_threads_are_for_long_steps_and_for_who_asks(monkeypatch, how, threads):
+    """On a machine of two processors: a step of ten exchanges is long, one of a single exchange is not."""
+    one, used, meet = subzero.gym_environment.TetheredHeading, set(), threading.Barrier(threads)
+    hold = one.hold
+
+    def seen_to_hold(self, share):
+        used.add(threading.get_ident())
+        meet.wait(timeout=60.0)  # until as many are here as there are threads
+        return hold(self, share)
+
+    monkeypatch.setattr(subzero.gym_environment.os, "cpu_count", lambda: 2)
+    monkeypatch.setattr(one, "hold", seen_to_hold)
+    made = gymnasium.make_vec(subzero.gym_environment.ENVIRONMENT, num_envs=2, **how)
+    made.reset(seed=1)
+    made.step(np.zeros((2, 1), dtype=np.float32))
+    made.close()
+    assert len(used) == threads
 
 
 def test_it_can_be_made_without_its_cable():
