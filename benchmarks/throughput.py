@@ -2,6 +2,7 @@
 
     python -m benchmarks.throughput                  # all tables: some minutes
     python -m benchmarks.throughput --repeats 3
+    python -m benchmarks.throughput --learning       # only the last one, of the Gymnasium environment
 
 A step is an exchange of vehicle and cable, 0.1 s with five steps of the hull in it, results of all steps kept; a run is
 thirty seconds of fig6, with cable in the water at the start. Many runs at once are `subzero.simulate_many`: threads of
@@ -32,7 +33,8 @@ RUNS = 8
 LONG_S, SLOW_S, FINEST_S = 600.0, 2.0, 0.005
 HULL_STEPS_S = (0.02, 0.05, 0.1)
 BATCH = 16
-ENVIRONMENTS, ENVIRONMENT_STEPS = 16, 100
+ENVIRONMENTS, ENVIRONMENT_STEPS = 16, {0.1: 100, 1.0: 10, 5.0: 2}
+"""How many; sample time of a step [s] → steps of each."""
 
 
 def median(run, repeats, clock=time.process_time):
@@ -131,25 +133,30 @@ def learning(repeats):
 
     import subzero.gym_environment as ours
 
-    def many(mode, count):
-        made = gymnasium.make_vec(ours.ENVIRONMENT, num_envs=count, vectorization_mode=mode)
+    def many(sample_time, count, mode, **how):
+        made = gymnasium.make_vec(
+            ours.ENVIRONMENT, num_envs=ENVIRONMENTS, vectorization_mode=mode, sample_time=sample_time, **how
+        )
         made.reset(seed=1)
-        actions = np.zeros((count, 1), dtype=np.float32)
+        actions = np.zeros((ENVIRONMENTS, 1), dtype=np.float32)
 
         def go():
-            for _ in range(ENVIRONMENT_STEPS):
+            for _ in range(count):
                 made.step(actions)
 
-        rate = count * ENVIRONMENT_STEPS / median(go, repeats, time.perf_counter)
+        rate = ENVIRONMENTS * count / median(go, repeats, time.perf_counter)
         made.close()
         return rate
 
-    sync = many("sync", ENVIRONMENTS)
-    for name, rate in (
-        ("`sync`, one after another", sync),
-        ("in threads, the default", many(None, ENVIRONMENTS)),
-    ):
-        yield name, f"{rate:,.0f}", f"{rate / sync:.2f}"
+    threads = os.cpu_count()
+    for sample_time, count in ENVIRONMENT_STEPS.items():
+        sync = many(sample_time, count, "sync")
+        for name, rate in (
+            ("`sync`, Gymnasium's own", sync),
+            ("`workers=1`", many(sample_time, count, None, workers=1)),
+            (f"`workers={threads}`", many(sample_time, count, None, workers=threads)),
+        ):
+            yield f"{sample_time:g}", name, f"{rate:,.0f}", f"{rate / sync:.2f}"
 
 
 def main():
@@ -157,8 +164,18 @@ def main():
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--repeats", type=int, default=5)
-    repeats, cores = parser.parse_args().repeats, os.cpu_count()
-    print(f"{cores} cores, load {os.getloadavg()[0]:.1f} before this began, medians of {repeats}")
+    parser.add_argument("--learning", action="store_true")
+    asked, cores = parser.parse_args(), os.cpu_count()
+    print(f"{cores} cores, load {os.getloadavg()[0]:.1f} before this began, medians of {asked.repeats}")
+    if not asked.learning:
+        of_runs(asked.repeats, cores)
+    head = ("sample time [s]", "`gymnasium.make_vec`", "steps a second", "ratio")
+    table(f"{ENVIRONMENTS} environments that learn", head, learning(asked.repeats))
+    print(f"\nload {os.getloadavg()[0]:.1f} when it ended")
+
+
+def of_runs(repeats, cores):
+    """Print the tables of runs."""
     head = (
         "segments",
         "steps a second, one core",
@@ -176,9 +193,6 @@ def main():
         "end states apart",
     )
     table("Beside NumPy", head, plain(repeats))
-    head = ("`gymnasium.make_vec`", "steps a second", "ratio")
-    table(f"{ENVIRONMENTS} environments that learn", head, learning(repeats))
-    print(f"\nload {os.getloadavg()[0]:.1f} when it ended")
 
 
 if __name__ == "__main__":

@@ -26,13 +26,16 @@ columns over time; `reader` all together; `errors` what a problem is.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from scenarios.errors import Problem, ScenarioError
-from scenarios.instructions import Commands, Motion
 from scenarios.quantities import CONTROLS, SCHEMES
-from scenarios.trial import Profile, Start, Trial, Vessel, Winch
+
+if TYPE_CHECKING:
+    from scenarios.instructions import Commands, Motion
+    from scenarios.trial import Profile, Start, Trial, Vessel, Winch
 
 __all__ = [
     "CONTROLS",
@@ -51,6 +54,20 @@ __all__ = [
     "names",
     "path",
 ]
+
+_HOME = dict.fromkeys(("Commands", "Motion"), "scenarios.instructions") | dict.fromkeys(
+    ("Profile", "Start", "Trial", "Vessel", "Winch"), "scenarios.trial"
+)
+"""Name → its module, which needs numpy: fetched when it is first used, so that a command line need not wait for it."""
+
+
+def __getattr__(name: str) -> Any:
+    """Fetch a name from its module, once."""
+    if name not in _HOME:
+        raise AttributeError(f"module 'scenarios' has no attribute '{name}'; it has {', '.join(__all__)}")
+    value = globals()[name] = getattr(import_module(_HOME[name]), name)
+    return value
+
 
 VehicleCheck = Callable[[Mapping[str, Any]], Iterable[Any]]
 

@@ -21,8 +21,6 @@ from subzero.errors import short as shown
 
 OUTSIDE = "this is outside its limits"
 NO_NUMBER = "this is not a finite number"
-ROUNDING = 1e-12
-"""What was degrees in a file may be beyond its limit by rounding. [-]"""
 
 
 class Checks:
@@ -47,7 +45,7 @@ class Checks:
         number = real(given)
         if number is None:
             self.say(name, NO_NUMBER, quantity.allowed, given)
-        elif not _inside(np.float64(number), quantity):
+        elif not _inside(number, quantity):
             self._outside(name, number, quantity)
         else:
             self._keep(name, number)
@@ -62,9 +60,11 @@ class Checks:
         array = self._array(name, (len(quantities),))
         if array is None:
             return
-        for i, quantity in enumerate(quantities):
-            self._column(f"{name}[{i}]", array[i : i + 1], quantity)
-        self._keep(name, tuple(array.tolist()))
+        numbers = tuple(array.tolist())
+        for i, (number, quantity) in enumerate(zip(numbers, quantities, strict=True)):
+            if not _inside(number, quantity):
+                self._outside(f"{name}[{i}]", number, quantity)
+        self._keep(name, numbers)
 
     def rows(
         self, name: str, quantities: tuple[Quantity, ...], count: int | None = None
@@ -140,8 +140,7 @@ class Checks:
         """Note the first number of a column that is outside its limits."""
         wrong = np.flatnonzero(~_inside(values, quantity))
         if wrong.size:
-            place = name if name.endswith("]") else f"{name}[{wrong[0]}]"
-            self._outside(place, float(values[wrong[0]]), quantity)
+            self._outside(f"{name}[{wrong[0]}]", float(values[wrong[0]]), quantity)
 
     def _array(self, name: str, shape: tuple[int | None, ...]) -> np.ndarray | None:
         """Return a field as an array of finite numbers of a shape (None: any count above zero); note what is wrong."""
@@ -173,10 +172,10 @@ class Checks:
 
 def _all_finite(table: Mapping[str, Any]) -> bool:
     """Say whether all of a table, and of the tables in it, is a finite number."""
-    return all(
-        _all_finite(inside) if isinstance(inside, dict) else real(inside) is not None
-        for inside in table.values()
-    )
+    for inside in table.values():
+        if not (_all_finite(inside) if isinstance(inside, dict) else real(inside) is not None):
+            return False
+    return True
 
 
 def _leaves(place: str, inside: object) -> Iterator[tuple[str, object]]:
@@ -190,5 +189,5 @@ def _leaves(place: str, inside: object) -> Iterator[tuple[str, object]]:
 
 def _inside(values: Any, quantity: Quantity) -> Any:
     """Return which values, in inner units, are within the limits."""
-    low, high = quantity.low * quantity.scale, quantity.high * quantity.scale
-    return (values >= low - ROUNDING * abs(low)) & (values <= high + ROUNDING * abs(high))
+    low, high = quantity.inner_limits
+    return (values >= low) & (values <= high)

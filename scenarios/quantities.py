@@ -9,7 +9,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
+ROUNDING = 1e-12
+"""What was degrees in a file may be beyond its limit by rounding. [-]"""
 INNER = {"degree": math.pi / 180.0, "degree/s": math.pi / 180.0}
 """Inner units per unit of a file: radians inside; all other units are kept."""
 
@@ -40,6 +43,12 @@ class Quantity:
     def scale(self) -> float:
         """Inner units per unit of the file."""
         return INNER.get(self.unit, 1.0)
+
+    @cached_property
+    def inner_limits(self) -> tuple[float, float]:
+        """Least and greatest value in inner units, with what rounding may add to what was degrees in a file."""
+        low, high = self.low * self.scale, self.high * self.scale
+        return low - ROUNDING * abs(low), high + ROUNDING * abs(high)
 
     @property
     def allowed(self) -> str:

@@ -48,8 +48,8 @@ def only_default(asked: list[str]) -> str:
     return f'Set scheme = "{SCHEMES[0]}", or leave out {" and ".join(asked)}.'
 
 
-RUN_FIELDS = tuple(by_field(RUN))
-"""Fields of a trial that hold the numbers of [run]."""
+RUN_FIELDS, START_FIELDS = by_field(RUN), by_field(START)
+"""Fields of a trial that hold the numbers of [run], and those of a start, with their quantities."""
 
 FOUND_BY_TRIM = (
     "pitch", "sway_speed", "heave_speed", "roll_rate", "pitch_rate", "yaw_rate", "propeller_speed",
@@ -110,7 +110,7 @@ class Start:
     def __post_init__(self) -> None:
         """Refuse what is no start."""
         check = Checks(self)
-        check.numbers(by_field(START))
+        check.numbers(START_FIELDS)
         if check.kind("at_trim", (bool,)) and self.at_trim:
             for name in FOUND_BY_TRIM:
                 if getattr(self, name):
@@ -296,7 +296,7 @@ class Trial:
         check = Checks(self)
         for name in ("name", "description", "text", "source"):
             check.kind(name, (str,))
-        check.numbers(by_field(RUN))
+        check.numbers(RUN_FIELDS)
         if not isinstance(self.scheme, str) or self.scheme not in SCHEMES:
             check.say("scheme", "this is not a scheme", f"Allowed: {', '.join(SCHEMES)}.", self.scheme)
         check.vector("current", WATER)

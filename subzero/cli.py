@@ -28,7 +28,7 @@ from subzero import cli_autopilot, cli_diagnosis, cli_install, cli_sweep, cli_tr
 from subzero.cli_examples import EXAMPLES, register
 from subzero.errors import UserError, printable
 from subzero.interrupts import INTERRUPTED, begin, came, say
-from subzero.voice import NOT_STRICT, PLAIN, StrictVoice, Voice, speak
+from subzero.voice import COMMAND, NOT_STRICT, PLAIN, StrictVoice, Voice, speak
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -407,8 +407,6 @@ def _effort() -> str:
 
 def _note_command(words: Sequence[str]) -> None:
     """Keep the line that is carried out, for the pages that tell how to do it again; where it writes to is no part."""
-    from subzero.output import COMMAND
-
     kept = [word for before, word in zip(["", *words], words, strict=False)
             if "--out" not in (before, word) and not word.startswith("--out=")]  # fmt: skip
     COMMAND.set(printable(shlex.join(["subzero", *kept])))

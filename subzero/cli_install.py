@@ -7,7 +7,6 @@ import platform
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from importlib.metadata import PackageNotFoundError, requires, version
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
@@ -133,6 +132,8 @@ def add_to(app: cyclopts.App) -> None:
 
 
 def _version(name: str) -> str:
+    from importlib.metadata import PackageNotFoundError, version
+
     try:
         return version(name)
     except PackageNotFoundError:
@@ -142,6 +143,7 @@ def _version(name: str) -> str:
 def _extras() -> Iterator[tuple[str, list[str]]]:
     """Return each extra of ours that is not installed whole, and what it lacks."""
     import re
+    from importlib.metadata import requires
 
     wanted: dict[str, list[str]] = {}
     for line in requires("subzero") or ():

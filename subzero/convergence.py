@@ -135,11 +135,12 @@ def run_converged(
     change = _after_start(coarse, run)
     accuracy = _accuracy(trial, take, run, change, None, 0)
     for halvings in range(1, CHEAP_HALVINGS + 1):
-        finer = resolved(trial, 0.5**halvings)
-        work = np.inf if finer is None else _finer_work(run, halvings)
-        if finer is None or work > _allowed(accuracy) or _settled(accuracy, work <= CHEAP_WORK):
+        work = _finer_work(run, halvings)
+        if work > _allowed(accuracy) or _settled(accuracy, work <= CHEAP_WORK):
             break
-        fine = _taken(take, finer, whole._replace(parts=2**halvings), progress)
+        finer = resolved(trial, 0.5**halvings)
+        grid = whole._replace(parts=2**halvings)
+        fine = None if finer is None else _taken(take, finer, grid, progress)
         if fine is None or (run.completed and not fine.completed):
             break
         run, before, change = fine, change, _after_start(run, fine)

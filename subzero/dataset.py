@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import version
+from math import prod
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -261,9 +262,17 @@ def _by_node(r: Recording, packed: np.ndarray, spends: bool) -> np.ndarray:
     for first in reversed(range(0, r.nodes.size, BLOCK)):
         last = min(first + BLOCK, r.nodes.size)
         some = np.full((last - first, nodes, *packed.shape[1:]), np.nan)
-        some[np.arange(nodes) < r.nodes[first:last, None]] = packed[ends[first] : ends[last]]
+        is_there = np.arange(nodes) < r.nodes[first:last, None]
+        _as_items(some, 2)[is_there] = _as_items(packed[ends[first] : ends[last]], 1)
         rows[first:last] = some
     return rows
+
+
+def _as_items(array: np.ndarray, axes: int) -> np.ndarray:
+    """Return an array as one of so many axes: the numbers of a node are one item, and moved at once, not one by one."""
+    numbers = prod(array.shape[axes:])
+    item = np.dtype((np.void, numbers * array.itemsize))
+    return array.reshape(*array.shape[:axes], numbers).view(item)[..., 0]
 
 
 def _diagnostics(run: Run, values: dict[str, np.ndarray], model: Model) -> dict[str, Variable]:

@@ -9,7 +9,7 @@ since 1.0.)
 
 It needs the extra ``subzero[gym]``. The vehicle starts from rest as in a scenario, with a constant propeller command;
 the action is the rudder, and the reward punishes the heading error and the work of the rudder. A new heading is drawn
-at each reset. ``gymnasium.make_vec("subzero/TetheredHeading-v0", num_envs=8)`` gives many, in threads of one process.
+at each reset. ``gymnasium.make_vec("subzero/TetheredHeading-v0", num_envs=8)`` gives many in one process.
 """
 
 from __future__ import annotations
@@ -42,6 +42,10 @@ LARGEST_TURN = radians(30.0)
 RUDDER_PRICE = 0.1
 """How much a rudder command at its limit costs, in rad² of heading error."""
 
+MANY_EXCHANGES = 10
+"""A step of so many exchanges of vehicle and cable, a second of fig6, takes 0.3 ms and more: from there on threads pay.
+One of a single exchange takes 0.05 ms, and to hand Python's lock over takes half of that. [-]"""
+
 LIMITS = {
     "sine of the heading error": (-1.0, 1.0),
     "cosine of the heading error": (-1.0, 1.0),
@@ -51,6 +55,8 @@ LIMITS = {
     "cable length [m]": (0.0, 1000.0),
 }
 """What is observed, in this order, with the limits of the observation space."""
+TRUTH = ("wanted_heading", *Observation._fields)
+"""What an info holds: the heading that is wanted [rad], and all that is true."""
 
 
 class TetheredHeading(gymnasium.Env[np.ndarray, np.ndarray]):
@@ -82,7 +88,7 @@ class TetheredHeading(gymnasium.Env[np.ndarray, np.ndarray]):
         low, high = np.array(list(LIMITS.values()), dtype=np.float32).T
         self.observation_space = gymnasium.spaces.Box(low, high, dtype=np.float32)
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (1,), dtype=np.float32)
-        self._wanted, self._taken = 0.0, 0
+        self._wanted, self._taken, self.seen = 0.0, 0, self._sim.observation
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -90,91 +96,125 @@ class TetheredHeading(gymnasium.Env[np.ndarray, np.ndarray]):
         """Begin again; a heading to turn to is drawn, or is options["turn"] [rad], from the one at the start."""
         super().reset(seed=seed)
         drawn = self.np_random.uniform(-LARGEST_TURN, LARGEST_TURN)
-        seen = self._sim.reset()
-        self._wanted = seen.heading + float((options or {}).get("turn", drawn))
+        self.seen = self._sim.reset()
+        self._wanted = self.seen.heading + float((options or {}).get("turn", drawn))
         self._taken = 0
-        return self._observed(seen), self._info(seen)
+        return self._observed(), self._info()
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
         """Hold the rudder for one sample time."""
         share = float(np.clip(np.asarray(action, dtype=float).reshape(-1)[0], -1.0, 1.0))
+        stopped = self.hold(share)
+        return self._observed(), self.reward(share), stopped, self.is_over, self._info()
+
+    def hold(self, share: float) -> bool:
+        """Hold the rudder at a share of its limit for one sample time; return whether the simulation stopped."""
         try:
-            seen, stopped = self._sim.step((self._propeller, self._most * share, 0.0, 0.0)), False
+            self.seen, stopped = self._sim.step((self._propeller, self._most * share, 0.0, 0.0)), False
         except RunStoppedError:
-            seen, stopped = self._sim.observation, True
+            self.seen, stopped = self._sim.observation, True
         self._taken += 1
-        error = self._wanted - seen.heading
-        reward = -(error**2 + RUDDER_PRICE * share**2) * self._sim.sample_time
-        return self._observed(seen), reward, stopped, self._taken >= STEPS, self._info(seen)
+        return stopped
 
-    def _observed(self, seen: Observation) -> np.ndarray:
+    def reward(self, share: float) -> float:
+        """Return the reward of the last sample time, in which the rudder was held at that share of its limit."""
+        error = self._wanted - self.seen.heading
+        return -(error**2 + RUDDER_PRICE * share**2) * self._sim.sample_time
+
+    @property
+    def exchanges(self) -> int:
+        """How many exchanges of vehicle and cable a step takes."""
+        return round(self._sim.sample_time / self._sim.trial.cable_step)
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the episode has had all its steps."""
+        return self._taken >= STEPS
+
+    @property
+    def felt(self) -> tuple[float, ...]:
+        """What the agent sees, before it is cut to the limits of its space: the values of `LIMITS`."""
+        error, seen = self._wanted - self.seen.heading, self.seen
+        return (
+            sin(error), cos(error), seen.yaw_rate, seen.surge_speed, seen.rudder_angle, seen.cable_length
+        )  # fmt: skip
+
+    @property
+    def truth(self) -> tuple[float, ...]:
+        """The values of `TRUTH`."""
+        return (self._wanted, *self.seen)
+
+    def _observed(self) -> np.ndarray:
         """Return what the agent sees, within the limits of its space."""
-        error = self._wanted - seen.heading
-        values = (
-            sin(error),
-            cos(error),
-            seen.yaw_rate,
-            seen.surge_speed,
-            seen.rudder_angle,
-            seen.cable_length,
-        )
         space: Any = self.observation_space
-        return np.clip(np.array(values, dtype=np.float32), space.low, space.high)
+        return np.clip(np.array(self.felt, dtype=np.float32), space.low, space.high)
 
-    def _info(self, seen: Observation) -> dict[str, Any]:
+    def _info(self) -> dict[str, Any]:
         """Return the whole truth, by name, and the heading that is wanted [rad]."""
-        return {"wanted_heading": self._wanted, **seen._asdict()}
+        return dict(zip(TRUTH, self.truth, strict=True))
 
 
 class TetheredHeadings(gymnasium.vector.SyncVectorEnv):
-    """Many environments, stepped at once in threads: the compiled simulation lets go of Python's lock.
+    """Many environments, one after another or in threads: the compiled simulation lets go of Python's lock.
 
-    They give what ``gymnasium.vector.SyncVectorEnv`` gives, to the last bit: one that has ended begins again in the
-    step behind.
+    They give what ``gymnasium.vector.SyncVectorEnv`` gives, to the last bit, but put together at once and not one by
+    one: one that has ended begins again in the step behind.
 
     Args:
         num_envs: how many.
-        workers: threads; one for each processor, if not given.
+        workers: threads; if not given, one for each processor where a step takes `MANY_EXCHANGES`, else one
+            (``python -m benchmarks.throughput --learning``).
         **how: of each, see `TetheredHeading`.
     """
 
     def __init__(self, num_envs: int = 1, *, workers: int | None = None, **how: Any) -> None:
         super().__init__([lambda: TetheredHeading(**how)] * num_envs)
-        threads = (
-            (os.cpu_count() or 1) if workers is None else whole("TetheredHeadings: workers", workers, least=1)
-        )
-        self._shares = np.array_split(np.arange(num_envs), min(threads, num_envs))
-        self._pool = ThreadPoolExecutor(len(self._shares))
+        self._ours: list[Any] = list(self.envs)
+        if workers is None:
+            workers = (os.cpu_count() or 1) if self._ours[0].exchanges >= MANY_EXCHANGES else 1
+        threads = min(whole("TetheredHeadings: workers", workers, least=1), num_envs)
+        self._parts = [part.tolist() for part in np.array_split(np.arange(num_envs), threads)]
+        self._pool = ThreadPoolExecutor(threads)
+        self._map = map if threads == 1 else self._pool.map
 
     def step(
         self, actions: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         """Hold each rudder for one sample time, (num_envs, 1); return the same in arrays as each environment does."""
-        seen = list(chain.from_iterable(self._pool.map(self._step_some, self._shares, repeat(actions))))
-        observed, rewards, ended, cut, told = zip(*seen, strict=True)
-        self._autoreset_envs = np.logical_or(ended, cut)
-        infos: dict[str, Any] = {}
-        for i, info in enumerate(told):
-            infos = self._add_info(infos, info, i)
-        return np.stack(observed), np.array(rewards, dtype=float), np.array(ended), np.array(cut), infos
+        rudders = np.clip(np.asarray(actions, dtype=float).reshape(self.num_envs), -1.0, 1.0).tolist()
+        parts = self._map(self._held, self._parts, repeat(rudders))
+        rewards, ended = map(np.array, zip(*chain.from_iterable(parts), strict=True))
+        cut = np.array([one.is_over for one in self._ours])
+        self._autoreset_envs = ended | cut
+        return self._observed(), rewards, ended, cut, self._infos()
 
-    def _step_some(self, which: np.ndarray, actions: np.ndarray) -> list[tuple[Any, ...]]:
-        """Step some environments, one after another; one whose episode is over begins again."""
-        return [
-            _begun(self.envs[i].reset()) if self._autoreset_envs[i] else self.envs[i].step(actions[i])
-            for i in which
-        ]
+    def _held(self, which: list[int], rudders: list[float]) -> list[tuple[float, bool]]:
+        """Step some environments; return the reward of each, and whether its simulation stopped."""
+        return [self._held_one(self._ours[i], rudders[i], self._autoreset_envs[i]) for i in which]
+
+    @staticmethod
+    def _held_one(one: TetheredHeading, rudder: float, is_over: bool) -> tuple[float, bool]:
+        """Step one environment, or let it begin again where its episode is over."""
+        if is_over:
+            one.reset()
+            return 0.0, False
+        stopped = one.hold(rudder)
+        return one.reward(rudder), stopped
+
+    def _observed(self) -> np.ndarray:
+        """Return what the agents see, within the limits of their space (num_envs, 6)."""
+        space: Any = self.observation_space
+        return np.clip(np.array([one.felt for one in self._ours], dtype=np.float32), space.low, space.high)
+
+    def _infos(self) -> dict[str, Any]:
+        """Return the truth of all by name, (num_envs,) each; and by the name with _ before it, that each has it."""
+        values = dict(zip(TRUTH, np.array([one.truth for one in self._ours]).T.copy(), strict=True))
+        return values | {f"_{name}": np.ones(self.num_envs, dtype=bool) for name in TRUTH}
 
     def close_extras(self, **kwargs: Any) -> None:
         """Let the threads end."""
         super().close_extras(**kwargs)
         self._pool.shutdown()
-
-
-def _begun(first: tuple[np.ndarray, dict[str, Any]]) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
-    """Return what a step tells of an environment that has just begun again."""
-    observed, info = first
-    return observed, 0.0, False, False, info
 
 
 def register() -> None:

@@ -15,6 +15,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -92,8 +93,8 @@ class Model:
         """Return every number by name, ready for JSON."""
         return {
             "vehicle": to_mapping(self.vehicle),
-            "cable": dataclasses.asdict(self.cable),
-            "drum": dataclasses.asdict(self.drum),
+            "cable": _numbers_of(self.cable),
+            "drum": _numbers_of(self.drum),
             "current": list(self.current),
             **{name: _plain(getattr(self, name)) for name in ("profile", "winch", "vessel")},
             **({"missing": _plain(self.missing)} if self.missing else {}),
@@ -101,6 +102,10 @@ class Model:
 
     def water(self) -> Current:
         """Return how the water moves: the uniform current, and what is added to it by depth."""
+        return self._water
+
+    @cached_property
+    def _water(self) -> Current:
         if self.profile is None:
             return Current.uniform(self.current)
         added = np.array(self.profile.velocity, dtype=float)
@@ -141,6 +146,11 @@ def _made(kind: type[Part], numbers: Mapping[str, Any]) -> Part:
             hint = suggestion(name, known) or f" It has {', '.join(known)}."
             raise BadValueError(f"{kind.__name__} has no {short(name)}.{hint}")
     return kind(**numbers)
+
+
+def _numbers_of(part: CableProperties | DrumProperties) -> dict[str, float]:
+    """Return the numbers of a cable or a drum by name; `dataclasses.asdict` copies each."""
+    return {field.name: getattr(part, field.name) for field in dataclasses.fields(part)}
 
 
 def _plain(value: Any) -> dict[str, Any] | None:

@@ -7,7 +7,6 @@ import json
 import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from contextvars import ContextVar
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
@@ -20,9 +19,6 @@ from subzero.stage import Stage
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
-
-COMMAND: ContextVar[str] = ContextVar("COMMAND", default="")
-"""The line of the shell that is being carried out; a page says it, so that its reader can do it again."""
 
 RUN_FILES = (*("tethered.nc", "tethered.csv", "untethered.nc", "untethered.csv", "summary.json", "report.html"),
              *(f"{name}.{kind}" for kind in ("png", "svg", "pdf")

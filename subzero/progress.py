@@ -13,12 +13,11 @@ from time import monotonic
 from types import TracebackType
 from typing import TYPE_CHECKING
 
-from rich.console import Console
-
 from subzero.errors import printable
 from subzero.voice import voice_of_command
 
 if TYPE_CHECKING:
+    from rich.console import Console
     from rich.progress import Progress
 
     import scenarios
@@ -40,6 +39,8 @@ def progress_bar(words: str, costs: Callable[[], str] = str) -> ProgressBar:
 
     Arguments as of `ProgressBar`.
     """
+    from rich.console import Console
+
     from subzero.jit.machine_code import before_compiling
 
     console = Console(stderr=True, highlight=False, quiet=voice_of_command().quiet)

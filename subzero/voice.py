@@ -14,6 +14,9 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
+COMMAND: ContextVar[str] = ContextVar("COMMAND", default="")
+"""The line of the shell that is being carried out; a page says it, so that its reader can do it again."""
+
 
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)

@@ -43,7 +43,7 @@ from subzero.output import lacking_letters_as_boxes
 from subzero.page.replay import HULL, Actor, as_run, encode
 from subzero.page.report import Answer, Line, Report, Section, render
 from subzero.page.report import Table as Rows
-from subzero.voice import PLAIN, Voice
+from subzero.voice import COMMAND, PLAIN, Voice
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -181,8 +181,6 @@ def write_all(
         effects: causes of the user's own.
         effects_file: where they are from.
     """
-    from subzero import output
-
     stage.failed = not verdict.complete
     if effects_file is not None:
         shutil.copyfile(effects_file, stage.path / effects_file.name)
@@ -195,7 +193,7 @@ def write_all(
     _write(stage, "diagnosis.json", json_file.text(verdict, told, logged[0].setting.trial.name))
     figures = _draw(verdict, logged, stage)
     _write(stage, "report.md", markdown(verdict, about(logged), tuple(figures), logged[0].setting.trial.name))
-    command = output.COMMAND.get()
+    command = COMMAND.get()
     page = page_of_diagnosis(
         verdict, logged, figures, command=command, run=run, extended_toml=extended, effects=effects
     )

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from rich.console import Console
 
 from subzero import output
-from subzero.voice import PLAIN, Voice
+from subzero.voice import COMMAND, PLAIN, Voice
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -62,9 +62,7 @@ def write_all(
     with page_width(WIDTH if width is None else width):
         figures = draw(runs, record)
         output.write_figures(figures, stage, kind)
-    output.write_page(
-        page_of_runs(runs, summary, figures, command=output.COMMAND.get(), record=record), stage
-    )
+    output.write_page(page_of_runs(runs, summary, figures, command=COMMAND.get(), record=record), stage)
     return summary
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -97,12 +97,21 @@ class Vehicle:
             raise VehicleError(tuple(problems))
 
     def numbers(self) -> VehicleNumbers:
-        """Return what the compiled equations take: made once for a vehicle, and given away as copies.
+        """Return what the compiled equations take, a copy that may be changed.
 
         Raises:
             VehicleError: numbers so large or so small that what follows from them is not finite.
         """
-        return _numbers_of(self).copy()
+        return self.own_numbers.copy()
+
+    @cached_property
+    def own_numbers(self) -> VehicleNumbers:
+        """What the compiled equations take, made once: for what copies it itself, as a record does of another.
+
+        Raises:
+            VehicleError: as of `numbers`.
+        """
+        return _numbers_of(self)
 
     def _numbers(self) -> VehicleNumbers:
         density = self.water.density
@@ -140,7 +149,7 @@ class Vehicle:
 
 @lru_cache(maxsize=4)
 def _numbers_of(vehicle: Vehicle) -> VehicleNumbers:
-    """Return the numbers of one of the last few vehicles: a run asks for those of its own three times and more."""
+    """Return the numbers of one of the last few vehicles: each run of a sweep has one that is made anew, and alike."""
     try:
         with np.errstate(all="ignore"):
             numbers = vehicle._numbers()

@@ -23,7 +23,7 @@ import numpy as np
 from cable.moving_end.slack_law import chord_length, squared_share, turning_rate
 from cable.moving_end.state import NOW, Line
 from cable.properties import CableNumbers
-from subzero.jit import Record, inlined, inner
+from subzero.jit import Record, inlined, inner, made_once
 
 
 class Load(Record):
@@ -61,6 +61,7 @@ class Load(Record):
     by_far: np.ndarray
 
 
+@made_once
 def new_load() -> Load:
     """Return empty work space for one segment."""
     parts: dict[str, Any] = {name: np.zeros(3) for name in Load.names}

@@ -9,7 +9,7 @@ NEW as often as needed and becomes real only by `accept`.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from cable.current import Water, water_velocity
 from cable.drum import TURNING
 from cable.moving_end.slack_law import SMOOTHING
 from cable.schemes import TOLERANCE
-from subzero.jit import Record, inlined, inner
+from subzero.jit import Record, inlined, inner, made_once
 
 NEW, NOW, BEFORE = 0, 1, 2
 
@@ -185,7 +185,12 @@ LOWER, DIAGONAL, UPPER, LOWER2, UPPER2 = range(5)
 
 def new_line(capacity: int) -> Line:
     """Return an empty line with room for `capacity` segments."""
-    n = capacity + 1
+    return Line(ends=_new_ends(), **_per_node(capacity + 1))
+
+
+@made_once
+def _new_ends() -> Ends:
+    """Return what an empty line has once."""
     tow = Tow(
         force=np.zeros(3),
         past=np.zeros((2, 3)),
@@ -194,7 +199,7 @@ def new_line(capacity: int) -> Line:
         by_block=np.zeros((3, 4)),
         answer=np.zeros((3, 4)),
     )
-    ends = Ends(
+    return Ends(
         count=0,
         settled=0.0,
         last_length=np.zeros(3),
@@ -210,29 +215,32 @@ def new_line(capacity: int) -> Line:
         solver=Solver(),
         solved=Solved(),
     )
-    per_node = {name: np.zeros((3, n, 3)) for name in ("position", "velocity", "momentum", "water")}
-    return Line(
-        ends=ends,
-        **per_node,
-        tension=np.zeros((3, n)),
-        length=np.zeros(n),
-        node_tension=np.zeros(n),
-        forcing=np.zeros((n, 3)),
-        slip=np.zeros(n),
-        normal_gain=np.ones(n),
-        load=np.zeros((n, 3)),
-        blocks=np.zeros((5, n, 4, 4)),
-        pivots=np.zeros((n, 4), np.int64),
-        rows=np.zeros((3, n, 4)),
-    )
+
+
+def _per_node(n: int) -> dict[str, Any]:
+    """Return what an empty line has of each of n nodes, by name."""
+    vectors = {name: np.zeros((3, n, 3)) for name in ("position", "velocity", "momentum", "water")}
+    return vectors | {
+        "tension": np.zeros((3, n)),
+        "length": np.zeros(n),
+        "node_tension": np.zeros(n),
+        "forcing": np.zeros((n, 3)),
+        "slip": np.zeros(n),
+        "normal_gain": np.ones(n),
+        "load": np.zeros((n, 3)),
+        "blocks": np.zeros((5, n, 4, 4)),
+        "pivots": np.zeros((n, 4), np.int64),
+        "rows": np.zeros((3, n, 4)),
+    }
 
 
 def enlarged(line: Line, capacity: int) -> Line:
     """Return the same line with room for `capacity` segments."""
-    larger = new_line(capacity)
-    for old, new in zip(line[1:], larger[1:], strict=True):
+    larger = _per_node(capacity + 1)
+    for name, new in larger.items():
+        old = getattr(line, name)
         new[tuple(slice(0, size) for size in old.shape)] = old
-    return larger._replace(ends=line.ends)
+    return line._replace(**larger)
 
 
 @inlined

@@ -28,7 +28,7 @@ from subzero.figures.style import (
     warnings_in_short,
 )
 from subzero.report import NOTHING, index_words, show_warnings
-from subzero.voice import PLAIN, Voice
+from subzero.voice import COMMAND, PLAIN, Voice
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -65,7 +65,7 @@ def write(measured: Measured, title: str, answer: str, command: str, stage: Stag
     output.write_summary(summary, stage)
     figures = {"manoeuvre": picture(runs, title, answer, command)}
     output.write_figures(figures, stage)
-    output.write_page(page_of_runs(runs, summary, figures, command=output.COMMAND.get()), stage)
+    output.write_page(page_of_runs(runs, summary, figures, command=COMMAND.get()), stage)
     return summary
 
 

@@ -48,7 +48,7 @@ from subzero.engine.recording import new_recording, record_row
 from subzero.engine.vehicle_step import pose
 from subzero.errors import BadValueError, UserError, printable, real, short
 from subzero.external_force import MissingForce
-from subzero.jit import Call, allocating, compile_beside, compiled
+from subzero.jit import Call, allocating, compile_beside, compiled, made_once
 from subzero.model import Model
 from subzero.run_state import LINEAR_ROWS, Fixed, HullWork, Ledger, Live, Now, Orders, Setup
 from vehicle import POWERS, STATE_SIZE, initial_state, kinetic_energy, rotation
@@ -62,6 +62,7 @@ RUN_IN = 2.0
 an error of first order. A winch may pay out slack, which short segments would fold. [m]"""
 NO_WEIGHT = 1e-4
 """A cable that weighs less in water is neutral. [N/m]"""
+NOTHING = MissingForce()
 FIRST_ROOM = 16
 """Segments that a new cable has room for, beyond those that are in the water."""
 
@@ -137,6 +138,7 @@ def _needed_then(setup: Setup, live: Live) -> list[Call]:
     return [(book, (kind(setup), kind(live), number, number, numba.int64))]
 
 
+@made_once
 def _new_now() -> Now:
     """Return the beginning of a run, with a cable that does not pull."""
     work = HullWork(np.zeros((3, 3)), np.zeros(3), np.zeros(6), np.zeros(3))
@@ -168,7 +170,7 @@ def _can_run_in(fixed: Fixed) -> bool:
 
 def setup_of(trial: scenarios.Trial, model: Model, tethered: bool) -> Setup:
     """Return what stays in a run; where its drum is, is still to be filled in."""
-    added, terms = (model.missing or MissingForce()).numbers()
+    added, terms = (model.missing or NOTHING).numbers()
     return Setup(
         fixed=_fixed(trial, model, tethered, bool(added.size or terms.size)),
         orders=_orders(trial),
@@ -225,7 +227,7 @@ def _hang(line: Line, weight: float) -> None:
 def _fixed(trial: scenarios.Trial, model: Model, tethered: bool, lacking: bool) -> Fixed:
     """Return the numbers of a run; the drum's place is still to be filled in."""
     return Fixed(
-        vehicle=model.vehicle.numbers(),
+        vehicle=model.vehicle.own_numbers,
         cable=model.cable.numbers(),
         drum=drum_of(model).numbers(),
         r_c=model.vehicle.tow_point.position(),

@@ -6,7 +6,7 @@ name                                            what for                        
 ----------------------------------------------  ----------------------------------------------------  ------------
 compiled, allocating, inner, inlined,
 gated_inlined, by_field                         how a function is compiled                            decorators
-Record                                          numbers as one record in memory, a single pointer     record
+Record, made_once                               numbers as one record in memory, a single pointer     record
 scratch                                         a small array on the stack of a compiled function     stack
 compile_beside, Call                            a second process compiles along                        beside
 -                                               machine code kept for the next run, never stale       machine_code
@@ -16,7 +16,7 @@ compile_beside, Call                            a second process compiles along 
 
 from subzero.jit.beside import Call, compile_beside
 from subzero.jit.decorators import allocating, by_field, compiled, gated_inlined, inlined, inner
-from subzero.jit.record import Record
+from subzero.jit.record import Record, made_once
 from subzero.jit.stack import scratch
 
 __all__ = [
@@ -29,5 +29,6 @@ __all__ = [
     "gated_inlined",
     "inlined",
     "inner",
+    "made_once",
     "scratch",
 ]

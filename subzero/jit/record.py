@@ -14,9 +14,10 @@ A compiled function takes a named tuple field by field, and a record as one poin
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import cache, wraps
 from inspect import get_annotations
-from typing import TYPE_CHECKING, Any, ClassVar, Self, dataclass_transform
+from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar, dataclass_transform
 
 import numpy as np
 
@@ -30,9 +31,6 @@ if TYPE_CHECKING:
 
         def tobytes(self) -> bytes:
             """Return the memory as bytes."""
-
-        def copy(self) -> Self:
-            """Return the same numbers in memory of their own."""
 
         def __getitem__(self, name: str) -> Any: ...
         def __setitem__(self, name: str, value: Any) -> None: ...
@@ -86,6 +84,13 @@ class Record(Memory):
         made: Self = memory[0]
         return made
 
+    def copy(self) -> Self:
+        """Return the same numbers in memory of their own: in a tenth of the time that it takes to make a record."""
+        memory = np.empty(1, dtype=self.dtype)
+        memory[0] = self
+        same: Self = memory[0]
+        return same
+
     def memory_of(self, name: str) -> np.ndarray:
         """Return the memory of a field as an array, that of a single number with one element."""
         view: np.ndarray = self.base[name]
@@ -118,6 +123,20 @@ class Record(Memory):
     def _unknown(self, name: str) -> str:
         """Return what is wrong with the name of a field."""
         return f"This record has no field {name!r}; it has {', '.join(self.names)}."
+
+
+Made = TypeVar("Made", bound=Record)
+
+
+def made_once(make: Callable[[], Made]) -> Callable[[], Made]:
+    """Return a function that gives copies of one record: of an empty work space, which is always the same."""
+    first = cache(make)
+
+    @wraps(make)
+    def copied() -> Made:
+        return first().copy()
+
+    return copied
 
 
 _layouts: dict[Any, np.dtype[Any]] = {}

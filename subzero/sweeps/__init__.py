@@ -12,7 +12,24 @@ a store (`store`) keeps what comes back. In the end one dataset is written (`res
 `figures`). `api` does it all; the command is ``subzero sweep``.
 """
 
-from subzero.sweeps.design import Design
-from subzero.sweeps.outcomes import Kept
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from subzero.sweeps.design import Design
+    from subzero.sweeps.outcomes import Kept
 
 __all__ = ["Design", "Kept"]
+
+_HOME = {"Design": "subzero.sweeps.design", "Kept": "subzero.sweeps.outcomes"}
+"""Name → its module: fetched when it is first used, so that workers begin before numpy is there."""
+
+
+def __getattr__(name: str) -> Any:
+    """Fetch a name from its module, once."""
+    if name not in _HOME:
+        raise AttributeError(
+            f"module 'subzero.sweeps' has no attribute '{name}'; it has {', '.join(__all__)}"
+        )
+    value = globals()[name] = getattr(import_module(_HOME[name]), name)
+    return value

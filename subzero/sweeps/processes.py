@@ -20,8 +20,8 @@ import subprocess
 import sys
 import tempfile
 import threading
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from math import inf
 from multiprocessing.connection import Connection
 from time import monotonic, sleep
@@ -269,11 +269,23 @@ def serve_forks() -> NoReturn:
 
 def _load() -> None:
     """Import what every member needs, and what numba looks up before it loads compiled code: the parent still plans."""
-    from numba.core.registry import cpu_target
+    with _all_stays():
+        from numba.core.registry import cpu_target
 
-    import subzero.simulation  # noqa: F401
+        import subzero.simulation  # noqa: F401
 
-    cpu_target.target_context.refresh()
+        cpu_target.target_context.refresh()
+
+
+@contextmanager
+def _all_stays() -> Iterator[None]:
+    """Let Python look for no garbage among what is made inside, now and later: that is a seventh of an import."""
+    gc.disable()
+    try:
+        yield
+    finally:
+        gc.freeze()
+        gc.enable()
 
 
 def _heed(word: bytes, handles: list[int], connection: socket.socket) -> None:
@@ -308,7 +320,7 @@ def _code_of(pid: int) -> int:
 
 def _rehearse(handle: int) -> None:
     """Do what a file asks for, whatever comes of it: the tasks will tell."""
-    with suppress(Exception), open(handle, "rb", closefd=False) as file:
+    with suppress(Exception), open(handle, "rb", closefd=False) as file, _all_stays():
         file.seek(0)
         pickle.load(file)()
 

@@ -29,7 +29,7 @@ from subzero.sweeps.result import RESULT, TABLE, Gathered, percentiles, write_re
 from subzero.sweeps.sensitivity import Effect, effects_of, words_of
 from subzero.sweeps.store import FILE, Store
 from subzero.sweeps.workers import WorkerDiedError
-from subzero.voice import PLAIN, Voice
+from subzero.voice import COMMAND, PLAIN, Voice
 
 if TYPE_CHECKING:
     from subzero.page.report import Table as Rows
@@ -70,7 +70,7 @@ def write_sweep(plan: Plan, store: Store, stage: Stage, pool: WorkerPool | None 
         for name, one in made.items():
             (stage.path / f"{name}.png").write_bytes(one.png)
     figures = {name: one.drawn for name, one in made.items()}
-    output.write_page(page_of_sweep(plan, summary, figures, output.COMMAND.get()), stage)
+    output.write_page(page_of_sweep(plan, summary, figures, COMMAND.get()), stage)
     return summary
 
 

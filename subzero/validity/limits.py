@@ -19,10 +19,10 @@ if TYPE_CHECKING:
 
 def longest_span(time: np.ndarray, holds: np.ndarray) -> tuple[float, float]:
     """Return how long something holds at a stretch, at most, and when that stretch begins. [s]."""
+    if not holds.any():
+        return 0.0, 0.0
     edges = np.flatnonzero(np.diff(np.concatenate([[False], holds, [False]]).astype(int)))
     begin, end = edges[::2], edges[1::2] - 1
-    if not begin.size:
-        return 0.0, 0.0
     spans = time[end] - time[begin]
     return float(spans.max()), float(time[begin[spans.argmax()]])
 

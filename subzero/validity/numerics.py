@@ -345,9 +345,9 @@ def slack_share(run: AnyRun) -> np.ndarray:
 def _slack_share(S: np.ndarray, P: np.ndarray, T: np.ndarray) -> np.ndarray:
     """Return the share of some samples, from length (samples,), places (samples, nodes, 3) and tensions."""
     chord, S = _chords(P), np.maximum(S, 1e-9)
-    folded = 1.0 - np.nansum(chord, axis=1) / S
+    folded = 1.0 - chord.sum(axis=1) / S
     limp = (T[:, 1:] < LIMP) & (T[:, :-1] < LIMP)
-    share = np.nansum(np.where(limp, chord, 0.0), axis=1) / S + folded
+    share = np.where(limp, chord, 0.0).sum(axis=1) / S + folded
     return np.where(folded > FOLDED, np.clip(share, 0.0, 1.0), 0.0)
 
 
@@ -389,9 +389,10 @@ def _finer(trial: scenarios.Trial) -> str:
 
 
 def _chords(P: np.ndarray) -> np.ndarray:
-    """Return the distances between neighbouring nodes, NaN behind the last (samples, nodes − 1). [m]."""
-    side = np.diff(P, axis=1)
-    lengths: np.ndarray = np.sqrt(np.einsum("tni,tni->tn", side, side))
+    """Return the distances between neighbouring nodes, 0 behind the last (samples, nodes − 1). [m]."""
+    x, y, z = np.moveaxis(np.diff(P, axis=1), 2, 0)
+    lengths: np.ndarray = np.sqrt(x * x + y * y + z * z)
+    lengths[np.isnan(lengths)] = 0.0
     return lengths
 
 

@@ -7,6 +7,7 @@ it. Tolerance: none; 2 degrees for the heading.
 
 import subprocess
 import sys
+import threading
 
 import gymnasium
 import numpy as np
@@ -55,14 +56,15 @@ def test_the_same_seed_draws_the_same_heading(env):
     assert drawn[0] == drawn[1] != drawn[2]
 
 
-def test_many_at_once_are_those_of_one_after_another_to_the_last_bit(monkeypatch):
+@pytest.mark.parametrize("workers", [1, 2])
+def test_many_at_once_are_those_of_one_after_another_to_the_last_bit(monkeypatch, workers):
     """Episodes of five steps, so that environments begin again on the way."""
     monkeypatch.setattr(subzero.gym_environment, "STEPS", 5)
     name = subzero.gym_environment.ENVIRONMENT
     actions = np.random.default_rng(0).uniform(-1.0, 1.0, (13, 3, 1)).astype(np.float32)
     told = {}
-    for mode in ("sync", None):
-        made = gymnasium.make_vec(name, num_envs=3, vectorization_mode=mode, propeller_rps=30.0)
+    for mode, how in (("sync", {}), (None, {"workers": workers})):
+        made = gymnasium.make_vec(name, num_envs=3, vectorization_mode=mode, propeller_rps=30.0, **how)
         told[mode] = [(*made.reset(seed=7),), *(made.step(one) for one in actions)]
         made.close()
     assert isinstance(made.unwrapped, subzero.gym_environment.TetheredHeadings)
@@ -74,6 +76,26 @@ def test_many_at_once_are_those_of_one_after_another_to_the_last_bit(monkeypatch
         assert mine[-1].keys() == plain[-1].keys()
         for key, ours in mine[-1].items():
             np.testing.assert_array_equal(ours, plain[-1][key])
+
+
+@pytest.mark.parametrize("how, threads", [({}, 1), ({"sample_time": 1.0}, 2), ({"workers": 2}, 2)])
+def test_threads_are_for_long_steps_and_for_who_asks(monkeypatch, how, threads):
+    """On a machine of two processors: a step of ten exchanges is long, one of a single exchange is not."""
+    one, used, meet = subzero.gym_environment.TetheredHeading, set(), threading.Barrier(threads)
+    hold = one.hold
+
+    def seen_to_hold(self, share):
+        used.add(threading.get_ident())
+        meet.wait(timeout=60.0)  # until as many are here as there are threads
+        return hold(self, share)
+
+    monkeypatch.setattr(subzero.gym_environment.os, "cpu_count", lambda: 2)
+    monkeypatch.setattr(one, "hold", seen_to_hold)
+    made = gymnasium.make_vec(subzero.gym_environment.ENVIRONMENT, num_envs=2, **how)
+    made.reset(seed=1)
+    made.step(np.zeros((2, 1), dtype=np.float32))
+    made.close()
+    assert len(used) == threads
 
 
 def test_it_can_be_made_without_its_cable():

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from subzero.jit import Record, compiled
+from subzero.jit import Record, compiled, made_once
 
 
 class Inner(Record):
@@ -94,6 +94,30 @@ def test_a_record_copies_what_it_is_made_of():
     matrix[:] = inner.gain = 7.0
     assert again.inner.matrix.tolist() == [[1.0, 0.0], [0.0, 1.0]]
     assert again.inner.gain == 1.0
+
+
+def test_a_copy_is_the_same_record_in_memory_of_its_own_to_the_last_field():
+    record = make()
+    copy = record.copy()
+    assert isinstance(copy, Outer)
+    assert copy.tobytes() == record.tobytes()
+    copy.memory_of("count")[0] = 2
+    assert change(copy) == 2.5
+    assert (record.count, copy.count) == (3, 5)
+    assert record.inner.matrix[0, 1] == 1.0
+
+
+def test_what_is_made_once_is_given_away_as_copies():
+    calls = []
+
+    @made_once
+    def empty() -> Inner:
+        calls.append(1)
+        return Inner(1.0, np.zeros((2, 2)))
+
+    empty().matrix[:] = 7.0
+    assert empty().matrix.tolist() == [[0.0, 0.0], [0.0, 0.0]]
+    assert len(calls) == 1
 
 
 def test_the_fields_of_a_subclass_stand_first_in_its_memory():
