@@ -6,17 +6,17 @@ and drifts. T the corrections, y the record as written:
 
     log p(y, errors) = log Σ_M p(T y | M) p(M) + Σ log|dT/dy| + Σ log p(error) + log p(noise)
 
-A search that is hopelessly behind ends with its first look. What the linear problem leaves no choice of is corrected
-before anything is searched, and the records with it are not searched at all if causes that hold throughout explain what
-is left (`is_clear`): what no vehicle does (another sign, unit or reference of one channel, exchanged columns, repeated
-values) where physics has no chance with all its parameters free at once; a command, a clock or a latency where a few
-causes, throughout or from mid-trial on, are hopelessly behind (`data_error_search`). A step in a sensor is always held
-against a search of the records with it.
+A search that is hopelessly behind ends within its first look, or with it. What the linear problem leaves no choice of
+is corrected before anything is searched, and the records with it are not searched at all if causes that hold throughout
+explain what is left (`is_clear`): what no vehicle does (another sign, unit or reference of one channel, exchanged
+columns, repeated values) where physics has no chance with all its parameters free at once; a command, a clock or a
+latency where a few causes, throughout or from mid-trial on, are hopelessly behind (`data_error_search`). A step in a
+sensor is always held against a search of the records with it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Protocol
@@ -99,16 +99,25 @@ class Explained:
         """Say whether no more causes, nor better fits, bring it close to another that leaves only noise."""
         if other is self or not is_explained(other.work):
             return False
-        fits, per_lost = self.work.search.candidates.values(), min(self.mean, other.mean)
-        gain = max(one.optimistic_log_posterior for one in fits) - max(one.log_posterior for one in fits)
-        return self.log_evidence(per_lost) + gain < other.log_evidence(per_lost) - settings.DECISIVE_NATS
+        per_lost, behind = min(self.mean, other.mean), settings.DECISIVE_NATS
+        return self.log_evidence(per_lost) + self._to_be_gained() < other.log_evidence(per_lost) - behind
+
+    def _to_be_gained(self) -> float:
+        """Return what better fits promise; while only the wide one was made, what any may promise."""
+        if not self.work.search.screen.log_posterior:
+            return settings.MAX_PREDICTED_GAIN_NATS
+        fits = self.work.search.candidates.values()
+        return max(one.optimistic_log_posterior for one in fits) - max(one.log_posterior for one in fits)
 
 
 class Look(Protocol):
-    """A search for causes, what begins in mid-trial, forces and drifts, in two parts; it may be interrupted."""
+    """A search for causes, what begins in mid-trial, forces and drifts, in three parts; it may be interrupted."""
 
-    def begin(self, records: Sequence[Logged]) -> Findings:
-        """Return what a first look at records finds."""
+    def start(self, records: Sequence[Logged]) -> Findings:
+        """Return how close wide tolerances come to records."""
+
+    def begin(self, work: Findings, is_hopeless: Callable[[], bool]) -> None:
+        """Have a first look; no farther than to where it is asked whether it is hopeless, and is."""
 
     def finish(self, work: Findings) -> None:
         """Find the rest."""
@@ -123,31 +132,74 @@ def compared(suspicion: Suspicion, records: Sequence[Logged], look: Look) -> lis
     which looks like a step or a clock. The most probable is finished, then what is not hopelessly behind. While that is
     not clear, records with more errors get the same.
 
+    Where even wide tolerances do not come close, a first look takes long: those without more errors have theirs before.
+
     Args:
         suspicion: what a scan says.
         records: as they are.
         look: searches records.
     """
-    whole, least, tried = len(suspicion.errors), suspicion.firm, list[Explained]()
-    first = suspicion.first(least)
+    tried = list[Explained]()
     try:
-        tried.append(_explained(first, records, look.begin(without(records, first))))
-        is_open = least < whole and not _is_settled(tried[0].work)
-        if is_finished := is_open and not explain(suspicion.errors):
-            look.finish(tried[0].work)
-            is_open = not is_explained(tried[0].work)
-        more = [suspicion.first(k + 1) for k in range(least, whole)] if is_open else []
-        _race(tried, more, records, look, new=[] if is_finished else tried[:])
-        for held, errors in pairwise([first, *suspicion.fewer(least)]):
-            if is_clear(held, _first(tried).work):
-                break
-            _race(tried, [errors], records, look, new=[])
+        _compare(suspicion, records, look, tried)
     except KeyboardInterrupt:  # before anything was found of one of them
         if not tried:
             raise
         tried[-1].work.complete = False
     per_lost = min(one.mean for one in tried)
     return [(one, one.log_evidence(per_lost)) for one in tried]
+
+
+def _compare(suspicion: Suspicion, records: Sequence[Logged], look: Look, tried: list[Explained]) -> None:
+    """Add what was tried to a list, as `compared` does."""
+    least, whole = suspicion.firm, len(suspicion.errors)
+    first, more = suspicion.first(least), [suspicion.first(k + 1) for k in range(least, whole)]
+    work = look.start(without(records, first))
+    is_last = bool(more) and work.search.is_far and explain(suspicion.errors)
+    _looks(tried, more if is_last else [], records, look)
+    if not _is_complete(tried):
+        return
+    now = _look_at(tried, first, records, look, work)
+    new = tried[:]
+    if not more or _is_settled(now.work):
+        tried[:], new, more = [now], [now], []
+    elif not explain(suspicion.errors):
+        look.finish(now.work)
+        new, more = [], [] if is_explained(now.work) else more
+    new += _looks(tried, [] if is_last else more, records, look)
+    _race(tried, new, look)
+    for held, errors in pairwise([first, *suspicion.fewer(least)]):
+        if is_clear(held, _first(tried).work):
+            break
+        _race(tried, _looks(tried, [errors], records, look), look)
+
+
+def _look_at(
+    tried: list[Explained],
+    errors: tuple[SuspectedError, ...],
+    records: Sequence[Logged],
+    look: Look,
+    work: Findings,
+) -> Explained:
+    """Have a first look at records without errors, that was started, beside what was tried; return what is found."""
+    look.begin(work, lambda: _is_hopeless(errors, records, work, tried))
+    tried.append(_explained(errors, records, work))
+    return tried[-1]
+
+
+def _is_hopeless(
+    errors: tuple[SuspectedError, ...], records: Sequence[Logged], work: Findings, tried: Sequence[Explained]
+) -> bool:
+    """Say whether records without errors are hopelessly behind something that was tried, even with the causes of that:
+    what is far from a run is not found around it.
+    """
+    better = [one for one in tried if _explained(errors, records, work).is_behind(one)]
+    for one in better:
+        if one.work.problem.entries is not work.problem.entries:
+            return False
+        work.search.fit_like(one.work.search.best())
+    now = _explained(errors, records, work)
+    return any(now.is_behind(one) for one in better)
 
 
 def _is_settled(work: Findings) -> bool:
@@ -159,22 +211,23 @@ def _is_settled(work: Findings) -> bool:
     return is_explained(work) and not work.search.is_poor()
 
 
-def _race(
-    tried: list[Explained],
-    more: Sequence[tuple[SuspectedError, ...]],
-    records: Sequence[Logged],
-    look: Look,
-    *,
-    new: list[Explained],
-) -> None:
-    """Give further sets of errors a first look, and finish what may be the most probable, also of what is new."""
-    for errors in more:
-        if _is_complete(tried):
-            new.append(_explained(errors, records, look.begin(without(records, errors))))
-            tried.append(new[-1])
-    while new and _is_complete(tried):
-        now = _first(new)
-        new.remove(now)
+def _looks(
+    tried: list[Explained], more: Sequence[tuple[SuspectedError, ...]], records: Sequence[Logged], look: Look
+) -> list[Explained]:
+    """Give further sets of errors a first look, beside what was tried; return what is found, unless interrupted."""
+    return [
+        _look_at(tried, errors, records, look, look.start(without(records, errors)))
+        for errors in more
+        if _is_complete(tried)
+    ]
+
+
+def _race(tried: Sequence[Explained], new: Sequence[Explained], look: Look) -> None:
+    """Finish what may be the most probable, of what is new among what was tried."""
+    waiting = [one for one in new if not one.work.given_up]
+    while waiting and _is_complete(tried):
+        now = _first(waiting)
+        waiting.remove(now)
         if not any(now.is_behind(one) for one in tried):
             look.finish(now.work)
 
