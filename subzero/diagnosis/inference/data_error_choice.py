@@ -142,6 +142,7 @@ def compared(suspicion: Suspicion, records: Sequence[Logged], look: Look) -> lis
     tried = list[Explained]()
     try:
         _compare(suspicion, records, look, tried)
+        _with_fewer(suspicion, records, look, tried)
     except KeyboardInterrupt:  # before anything was found of one of them
         if not tried:
             raise
@@ -151,7 +152,7 @@ def compared(suspicion: Suspicion, records: Sequence[Logged], look: Look) -> lis
 
 
 def _compare(suspicion: Suspicion, records: Sequence[Logged], look: Look, tried: list[Explained]) -> None:
-    """Add what was tried to a list, as `compared` does."""
+    """Hold what no vehicle does, and what physics has no chance against, against records with more errors."""
     least, whole = suspicion.firm, len(suspicion.errors)
     first, more = suspicion.first(least), [suspicion.first(k + 1) for k in range(least, whole)]
     work = look.start(without(records, first))
@@ -168,7 +169,12 @@ def _compare(suspicion: Suspicion, records: Sequence[Logged], look: Look, tried:
         new, more = [], [] if is_explained(now.work) else more
     new += _looks(tried, [] if is_last else more, records, look)
     _race(tried, new, look)
-    for held, errors in pairwise([first, *suspicion.fewer(least)]):
+
+
+def _with_fewer(suspicion: Suspicion, records: Sequence[Logged], look: Look, tried: list[Explained]) -> None:
+    """Hold errors that are not clear against records with fewer of them corrected."""
+    least = suspicion.firm
+    for held, errors in pairwise([suspicion.first(least), *suspicion.fewer(least)]):
         if is_clear(held, _first(tried).work):
             break
         _race(tried, _looks(tried, [errors], records, look), look)
