@@ -172,7 +172,7 @@ class _Looking:
         return work
 
     def begin(self, work: Findings, is_hopeless: Callable[[], bool] = lambda: False) -> None:
-        """Have a first look; no farther than to where it is asked whether it is hopeless, and is."""
+        """Have a first look; if it is hopeless, no farther than outside, as what is there may explain records, too."""
         _keeping_what_there_is(work, lambda: _first_look(work, is_hopeless))
 
     def finish(self, work: Findings) -> None:
@@ -231,10 +231,10 @@ def _first_look(findings: Findings, is_hopeless: Callable[[], bool]) -> None:
         return
     with _timed(findings, "fits"):
         search.first_fits()
-        findings.given_up = is_hopeless()
+        findings.given_up = is_hopeless() and bool(findings.out_of_catalogue)
         if search.is_poor() and not findings.given_up:
             search.refine_first()
-    if search.is_poor() and not findings.out_of_catalogue and not findings.given_up:
+    if search.is_poor() and not findings.out_of_catalogue:
         _look_outside(findings, 0.6, "forces, and causes that begin in mid-trial")
 
 

@@ -117,7 +117,7 @@ class Look(Protocol):
         """Return how close wide tolerances come to records."""
 
     def begin(self, work: Findings, is_hopeless: Callable[[], bool]) -> None:
-        """Have a first look; no farther than to where it is asked whether it is hopeless, and is."""
+        """Have a first look; if it is hopeless, no farther than outside, as what is there may explain records, too."""
 
     def finish(self, work: Findings) -> None:
         """Find the rest."""
