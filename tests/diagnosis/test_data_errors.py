@@ -289,10 +289,10 @@ PLAIN = smooth()
 def test_a_record_that_is_far_is_given_up_where_it_is_hopelessly_behind_what_was_put_right(
     helped, is_given_up
 ):
-    """Its first look, which takes long from afar, comes last, and tries what explains the record that was put right."""
+    """Its first look, which takes long from afar, waits for the other, and tries what explains that."""
     step = SuspectedError(record=0, error=EACH[6], lead=100.0, generous=90.0, left=0.6)
     look = Look(plain=-1000.0, helped=helped, put_right=0.0)
     tried = compared(Suspicion(errors=(step,)), [PLAIN], look)
-    assert look.begun == ["put right", "as it is"]
+    assert look.begun == ["as it is", "put right"]
     assert set(look.finished) == ({"put right"} if is_given_up else {"put right", "as it is"})
     assert [one.work.given_up for one, _ in tried] == [False, is_given_up]

@@ -132,7 +132,8 @@ def compared(suspicion: Suspicion, records: Sequence[Logged], look: Look) -> lis
     which looks like a step or a clock. The most probable is finished, then what is not hopelessly behind. While that is
     not clear, records with more errors get the same.
 
-    Where even wide tolerances do not come close, a first look takes long: those without more errors have theirs before.
+    Where even wide tolerances do not come close, a first look takes long: if nothing outside explains the records,
+    those without more errors have theirs before it goes on.
 
     Args:
         suspicion: what a scan says.
@@ -156,18 +157,15 @@ def _compare(suspicion: Suspicion, records: Sequence[Logged], look: Look, tried:
     least, whole = suspicion.firm, len(suspicion.errors)
     first, more = suspicion.first(least), [suspicion.first(k + 1) for k in range(least, whole)]
     work = look.start(without(records, first))
-    is_last = bool(more) and work.search.is_far and explain(suspicion.errors)
-    _looks(tried, more if is_last else [], records, look)
-    if not _is_complete(tried):
-        return
-    now = _look_at(tried, first, records, look, work)
+    late = more if work.search.is_far and explain(suspicion.errors) else []
+    now = _look_at(tried, first, records, look, work, late)
     new = tried[:]
     if not more or _is_settled(now.work):
         tried[:], new, more = [now], [now], []
     elif not explain(suspicion.errors):
         look.finish(now.work)
         new, more = [], [] if is_explained(now.work) else more
-    new += _looks(tried, [] if is_last else more, records, look)
+    new += _looks(tried, more if len(tried) == 1 else [], records, look)
     _race(tried, new, look)
 
 
@@ -186,9 +184,19 @@ def _look_at(
     records: Sequence[Logged],
     look: Look,
     work: Findings,
+    before: Sequence[tuple[SuspectedError, ...]] = (),
 ) -> Explained:
-    """Have a first look at records without errors, that was started, beside what was tried; return what is found."""
-    look.begin(work, lambda: _is_hopeless(errors, records, work, tried))
+    """Have a first look at records without errors, that was started, beside what was tried; where that is asked whether
+    it is hopeless, and nothing that begins in mid-trial explains them, look at those without others before. Return what
+    is found.
+    """
+
+    def is_hopeless() -> bool:
+        if not tried and not is_found(work.search, work.out_of_catalogue):
+            _looks(tried, before, records, look)
+        return _is_hopeless(errors, records, work, tried)
+
+    look.begin(work, is_hopeless)
     tried.append(_explained(errors, records, work))
     return tried[-1]
 
