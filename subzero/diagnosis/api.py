@@ -134,7 +134,8 @@ def diagnose_trials(
             most=len(suspicion.errors) + 1,
         )  # fmt: skip
         if not suspicion.errors:
-            work = looking.begin(records)
+            work = looking.start(records)
+            looking.begin(work)
             looking.finish(work)
             return _concluded(work)
         return _on_records(records, compared(suspicion, records, looking), _concluded)
@@ -169,8 +170,8 @@ class _Looking:
         self.shown = max(self.shown, share)
         self.progress(self.shown, words)
 
-    def begin(self, records: Sequence[Logged]) -> Findings:
-        """Return what a first look at records finds."""
+    def start(self, records: Sequence[Logged]) -> Findings:
+        """Return how close wide tolerances come to records."""
         low, self.done = self.done / self.most, self.done + 1
         search = Search(
             problem=posed_again(self.problem, records, self.effects),
@@ -179,8 +180,12 @@ class _Looking:
         work = Findings(search=search, seed=self.seed, budget=self.budget)
         work.seconds["errors in the data"] = self.scanned
         seen = self.seen if self.done == 1 else lambda table: None
-        _keeping_what_there_is(work, lambda: _first_look(work, seen))
+        _keeping_what_there_is(work, lambda: _fit_wide(work, seen))
         return work
+
+    def begin(self, work: Findings, is_hopeless: Callable[[], bool] = lambda: False) -> None:
+        """Have a first look; if it is hopeless, no farther than outside, as what is there may explain records, too."""
+        _keeping_what_there_is(work, lambda: _first_look(work, is_hopeless))
 
     def finish(self, work: Findings) -> None:
         """Find the rest."""
@@ -211,8 +216,8 @@ def _concluded(findings: Findings) -> Verdict:
     return conclude(findings, known, follow_up(findings, known))
 
 
-def _first_look(findings: Findings, seen: Seen) -> None:
-    """Screen all hypotheses, fit the best, and look outside where none of them explains the records."""
+def _fit_wide(findings: Findings, seen: Seen) -> None:
+    """Fit within wide tolerances, measure the misfit, and tell what the records can show."""
     search = findings.search
     with _timed(findings, "screen"):
         search.begin()
@@ -221,15 +226,25 @@ def _first_look(findings: Findings, seen: Seen) -> None:
             findings.problem, with_whole_effects(findings.problem, search.nominal[1])
         )
         seen(findings.detectable)
+
+
+def _first_look(findings: Findings, is_hopeless: Callable[[], bool]) -> None:
+    """Screen all hypotheses, fit the best, and look outside where none of them explains the records."""
+    search = findings.search
+    with _timed(findings, "screen"):
         if search.is_far and findings.budget != "screen":
             _from_afar(findings)
+            findings.given_up = is_hopeless()
+            if findings.given_up:
+                return
         search.look()
     if findings.budget == "screen":
         search.fit(())
         return
     with _timed(findings, "fits"):
         search.first_fits()
-        if search.is_poor():
+        findings.given_up = is_hopeless() and bool(findings.out_of_catalogue)
+        if search.is_poor() and not findings.given_up:
             search.refine_first()
     if search.is_poor() and not findings.out_of_catalogue:
         _look_outside(findings, 0.6, "forces, and causes that begin in mid-trial")

@@ -8,6 +8,7 @@ Tolerance: a delay within 0.3 s.
 
 import dataclasses
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -26,6 +27,8 @@ from subzero.diagnosis.inference import (
     is_rounded,
     repeated_values,
 )
+from subzero.diagnosis.inference.data_error_choice import compared
+from subzero.diagnosis.inference.data_error_search import SuspectedError, Suspicion
 from subzero.records.record import Record
 from subzero.synthetic.planted import draw_tolerances, make_record
 
@@ -279,3 +282,50 @@ def test_a_log_that_shows_zeros_in_between_is_found_though_the_vehicle_began_at_
     (found,) = [one for one in repeated_values(dataclasses.replace(clean, record=record)) if one.how]
     assert (found.kind, found.how) == ("dropout", "0")
     assert_allclose(found.at, time[lost])
+
+
+class Look:
+    """A search with a log evidence that is told; `helped` is what the causes of another search bring it to."""
+
+    def __init__(self, plain: float, helped: float, put_right: float) -> None:
+        self.plain, self.helped, self.put_right = plain, helped, put_right
+        self.entries, self.begun, self.finished = (), list[str](), list[str]()
+
+    def start(self, records):
+        is_plain = records[0] is PLAIN
+        found = self.plain if is_plain else self.put_right
+        fit = SimpleNamespace(log_posterior=found, optimistic_log_posterior=found,
+                              fit=SimpleNamespace(r=np.ones(100)))  # fmt: skip
+        problem = SimpleNamespace(entries=self.entries, records=[SimpleNamespace(noise={}, values={})])
+        search = SimpleNamespace(is_far=is_plain, is_poor=lambda: is_plain, best=lambda: fit, candidates={(): fit},
+                                 screen=SimpleNamespace(log_posterior={}))  # fmt: skip
+        search.beliefs = SimpleNamespace(log_total=lambda: fit.log_posterior)
+        search.fit_like = lambda other: vars(fit).update(log_posterior=max(found, self.helped))
+        name = "as it is" if is_plain else "put right"
+        return SimpleNamespace(problem=problem, search=search, out_of_catalogue=[], complete=True, given_up=False,
+                               name=name)  # fmt: skip
+
+    def begin(self, work, is_hopeless):
+        self.begun.append(work.name)
+        work.given_up = is_hopeless()
+
+    def finish(self, work):
+        self.finished.append(work.name)
+
+
+PLAIN = smooth()
+
+
+@pytest.mark.parametrize(
+    ("helped", "is_given_up"), [(-1000.0, True), (-10.0, False)], ids=["no", "with its causes"]
+)
+def test_a_record_that_is_far_is_given_up_where_it_is_hopelessly_behind_what_was_put_right(
+    helped, is_given_up
+):
+    """Its first look, which takes long from afar, waits for the other, and tries what explains that."""
+    step = SuspectedError(record=0, error=EACH[6], lead=100.0, generous=90.0, left=0.6)
+    look = Look(plain=-1000.0, helped=helped, put_right=0.0)
+    tried = compared(Suspicion(errors=(step,)), [PLAIN], look)
+    assert look.begun == ["as it is", "put right"]
+    assert set(look.finished) == ({"put right"} if is_given_up else {"put right", "as it is"})
+    assert [one.work.given_up for one, _ in tried] == [False, is_given_up]

@@ -9,18 +9,18 @@ and drifts. T the corrections, y the record as written:
 A sample that is lost counts as any other. But where a rounded channel may be frozen or stand still, what it repeats is
 certain in the one case, and in the other an interval each, no density (`repeated_values`).
 
-A search that is hopelessly behind ends with its first look. What the linear problem leaves no choice of is corrected
-before anything is searched, and the records with it are not searched at all if causes that hold throughout explain what
-is left (`is_clear`): what no vehicle does (another sign, unit or reference of one channel, exchanged columns, repeated
-values) where physics has no chance with all its parameters free at once; a command, a clock or a latency where a few
-causes, throughout or from mid-trial on, are hopelessly behind (`data_error_search`). A step in a sensor is always held
-against a search of the records with it.
+A search that is hopelessly behind ends within its first look, or with it. What the linear problem leaves no choice of
+is corrected before anything is searched, and the records with it are not searched at all if causes that hold throughout
+explain what is left (`is_clear`): what no vehicle does (another sign, unit or reference of one channel, exchanged
+columns, repeated values) where physics has no chance with all its parameters free at once; a command, a clock or a
+latency where a few causes, throughout or from mid-trial on, are hopelessly behind (`data_error_search`). A step in a
+sensor is always held against a search of the records with it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import NamedTuple, Protocol
 
@@ -179,16 +179,25 @@ class Explained:
         """Say whether no more causes, nor better fits, bring it close to another that leaves only noise."""
         if other is self or not is_explained(other.work):
             return False
-        fits, per_lost = self.work.search.candidates.values(), min(self.mean, other.mean)
-        gain = max(one.optimistic_log_posterior for one in fits) - max(one.log_posterior for one in fits)
-        return self.log_evidence(per_lost) + gain < other.log_evidence(per_lost) - settings.DECISIVE_NATS
+        per_lost, behind = min(self.mean, other.mean), settings.DECISIVE_NATS
+        return self.log_evidence(per_lost) + self._to_be_gained() < other.log_evidence(per_lost) - behind
+
+    def _to_be_gained(self) -> float:
+        """Return what better fits promise; while only the wide one was made, what any may promise."""
+        if not self.work.search.screen.log_posterior:
+            return settings.MAX_PREDICTED_GAIN_NATS
+        fits = self.work.search.candidates.values()
+        return max(one.optimistic_log_posterior for one in fits) - max(one.log_posterior for one in fits)
 
 
 class Look(Protocol):
-    """A search for causes, what begins in mid-trial, forces and drifts, in two parts; it may be interrupted."""
+    """A search for causes, what begins in mid-trial, forces and drifts, in three parts; it may be interrupted."""
 
-    def begin(self, records: Sequence[Logged]) -> Findings:
-        """Return what a first look at records finds."""
+    def start(self, records: Sequence[Logged]) -> Findings:
+        """Return how close wide tolerances come to records."""
+
+    def begin(self, work: Findings, is_hopeless: Callable[[], bool]) -> None:
+        """Have a first look; if it is hopeless, no farther than outside, as what is there may explain records, too."""
 
     def finish(self, work: Findings) -> None:
         """Find the rest."""
@@ -203,31 +212,119 @@ def compared(suspicion: Suspicion, records: Sequence[Logged], look: Look) -> lis
     which looks like a step or a clock. The most probable is finished, then what is not hopelessly behind. While that is
     not clear, records with more errors get the same.
 
+    Where even wide tolerances do not come close, a first look takes long: if nothing outside explains the records,
+    those without more errors have theirs before it goes on.
+
     Args:
         suspicion: what a scan says.
         records: as they are.
         look: searches records.
     """
-    whole, least, tried = len(suspicion.errors), suspicion.firm, list[Explained]()
-    first = suspicion.first(least)
+    comparison = _Comparison(suspicion, records, look)
+    tried = comparison.tried
     try:
-        tried.append(_explained(first, suspicion, records, look.begin(without(records, first))))
-        is_open = least < whole and not _is_settled(tried[0].work)
-        if is_finished := is_open and not explain(suspicion.errors):
-            look.finish(tried[0].work)
-            is_open = not is_explained(tried[0].work)
-        more = [suspicion.first(k + 1) for k in range(least, whole)] if is_open else []
-        _race(tried, more, suspicion, records, look, new=[] if is_finished else tried[:])
-        for held, errors in pairwise([first, *suspicion.fewer(least)]):
-            if is_clear(held, _first(tried).work):
-                break
-            _race(tried, [errors], suspicion, records, look, new=[])
+        comparison.with_more()
+        comparison.with_fewer()
     except KeyboardInterrupt:  # before anything was found of one of them
         if not tried:
             raise
         tried[-1].work.complete = False
     per_lost = min(one.mean for one in tried)
     return [(one, one.log_evidence(per_lost)) for one in tried]
+
+
+@dataclass(frozen=True, eq=False)
+class _Comparison:
+    """Sets of suspected errors, held against one another: those whose first look was taken are in `tried`."""
+
+    suspicion: Suspicion
+    records: Sequence[Logged]
+    look: Look
+    tried: list[Explained] = field(default_factory=list)
+
+    def with_more(self) -> None:
+        """Hold what no vehicle does, and what physics has no chance against, against records with more errors."""
+        least, errors = self.suspicion.firm, self.suspicion.errors
+        first, more = (
+            self.suspicion.first(least),
+            [self.suspicion.first(k + 1) for k in range(least, len(errors))],
+        )
+        work = self.look.start(without(self.records, first))
+        now = self._look_at(first, work, more if work.search.is_far and explain(errors) else [])
+        new = self.tried[:]
+        if not more or _is_settled(now.work):
+            self.tried[:], new, more = [now], [now], []
+        elif not explain(errors):
+            self.look.finish(now.work)
+            new, more = [], [] if is_explained(now.work) else more
+        self._race(new + self._looks(more if len(self.tried) == 1 else []))
+
+    def with_fewer(self) -> None:
+        """Hold errors that are not clear against records with fewer of them corrected."""
+        least = self.suspicion.firm
+        for held, errors in pairwise([self.suspicion.first(least), *self.suspicion.fewer(least)]):
+            if is_clear(held, _first(self.tried).work):
+                break
+            self._race(self._looks([errors]))
+
+    def _looks(self, more: Sequence[tuple[SuspectedError, ...]]) -> list[Explained]:
+        """Give further sets of errors a first look, and return what is found, unless interrupted."""
+        return [
+            self._look_at(errors, self.look.start(without(self.records, errors)))
+            for errors in more
+            if _is_complete(self.tried)
+        ]
+
+    def _look_at(
+        self,
+        errors: tuple[SuspectedError, ...],
+        work: Findings,
+        before: Sequence[tuple[SuspectedError, ...]] = (),
+    ) -> Explained:
+        """Have a first look at records without errors, that was started; where that is asked whether it is hopeless,
+        and nothing that begins in mid-trial explains them, look at those without others before. Return what is found.
+        """
+
+        def is_hopeless() -> bool:
+            if not self.tried and not is_found(work.search, work.out_of_catalogue):
+                self._looks(before)
+            return self._is_hopeless(errors, work)
+
+        self.look.begin(work, is_hopeless)
+        self.tried.append(self._explained(errors, work))
+        return self.tried[-1]
+
+    def _is_hopeless(self, errors: tuple[SuspectedError, ...], work: Findings) -> bool:
+        """Say whether records without errors are hopelessly behind something that was tried, even with the causes of
+        that: what is far from a run is not found around it.
+        """
+        better = [one for one in self.tried if self._explained(errors, work).is_behind(one)]
+        for one in better:
+            if one.work.problem.entries is not work.problem.entries:
+                return False
+            work.search.fit_like(one.work.search.best())
+        now = self._explained(errors, work)
+        return any(now.is_behind(one) for one in better)
+
+    def _race(self, new: Sequence[Explained]) -> None:
+        """Finish what may be the most probable, of what is new among what was tried."""
+        waiting = [one for one in new if not one.work.given_up]
+        while waiting and _is_complete(self.tried):
+            now = _first(waiting)
+            waiting.remove(now)
+            if not any(now.is_behind(one) for one in self.tried):
+                self.look.finish(now.work)
+
+    def _explained(self, errors: tuple[SuspectedError, ...], work: Findings) -> Explained:
+        """Return records that are taken to have errors, with what was found in the records without them."""
+        prior = sum(log_prior(one.error, ALIKE)
+                    + one.error.log_jacobian * _measured(self.records[one.record], one.error)
+                    for one in errors)  # fmt: skip
+        measured = sum(int(np.isfinite(logged.record.values[name]).sum()) for logged, one in
+                       zip(self.records, work.problem.records, strict=True) for name in one.noise)  # fmt: skip
+        frozen = sum(int(_lost_by(one, errors, self.records).sum()) for one in errors if one.may_stand_still)
+        return Explained(errors=errors, work=work, log_prior=float(prior), lost=measured - frozen - _samples(work),
+                         standing=_standing(self.suspicion, errors, self.records))  # fmt: skip
 
 
 def _is_settled(work: Findings) -> bool:
@@ -239,27 +336,6 @@ def _is_settled(work: Findings) -> bool:
     return is_explained(work) and not work.search.is_poor()
 
 
-def _race(
-    tried: list[Explained],
-    more: Sequence[tuple[SuspectedError, ...]],
-    whole: Suspicion,
-    records: Sequence[Logged],
-    look: Look,
-    *,
-    new: list[Explained],
-) -> None:
-    """Give further sets of errors a first look, and finish what may be the most probable, also of what is new."""
-    for errors in more:
-        if _is_complete(tried):
-            new.append(_explained(errors, whole, records, look.begin(without(records, errors))))
-            tried.append(new[-1])
-    while new and _is_complete(tried):
-        now = _first(new)
-        new.remove(now)
-        if not any(now.is_behind(one) for one in tried):
-            look.finish(now.work)
-
-
 def _is_complete(tried: Sequence[Explained]) -> bool:
     """Say whether nothing was interrupted."""
     return all(one.work.complete for one in tried)
@@ -268,18 +344,6 @@ def _is_complete(tried: Sequence[Explained]) -> bool:
 def _first(tried: Sequence[Explained]) -> Explained:
     per_lost = min(one.mean for one in tried)
     return max(tried, key=lambda one: one.log_evidence(per_lost))
-
-
-def _explained(
-    errors: tuple[SuspectedError, ...], whole: Suspicion, records: Sequence[Logged], work: Findings
-) -> Explained:
-    prior = sum(log_prior(one.error, ALIKE) + one.error.log_jacobian * _measured(records[one.record], one.error)
-                for one in errors)  # fmt: skip
-    measured = sum(int(np.isfinite(logged.record.values[name]).sum()) for logged, one in
-                   zip(records, work.problem.records, strict=True) for name in one.noise)  # fmt: skip
-    frozen = sum(int(_lost_by(one, errors, records).sum()) for one in errors if one.may_stand_still)
-    return Explained(errors=errors, work=work, log_prior=float(prior), lost=measured - frozen - _samples(work),
-                     standing=_standing(whole, errors, records))  # fmt: skip
 
 
 def _measured(logged: Logged, error: DataError) -> int:

@@ -191,6 +191,12 @@ class Search(GrowingFits):
         """Make everything around a linear problem that is closer to the records than that of the wide fit."""
         self.wide, self.is_far = fit, False
 
+    def fit_like(self, other: Candidate) -> None:
+        """Fit a hypothesis from where it explains the same runs, recorded otherwise, with the sensitivities there."""
+        z, D = other.fit.z, variances(self.problem.entries, other.ids, other.kappa)
+        fit = refit(self.problem, z, self.problem.jacobian(z), D, most_fresh=1, made_at=z)
+        self._take(candidate_of(self.problem, other.ids, fit))
+
     def look(self) -> None:
         """Fill the screen: linear evidence of nothing, every cause, and every pair."""
         self.screen = screening_of(self.problem, self.wide, self.nominal, far=self.is_far)

@@ -280,6 +280,7 @@ class Findings:
         refuted: rivals of the best that simulations refute, however alike the linear problem has them.
         seconds: how long each part took.
         complete: nothing was left out.
+        given_up: nothing that is left to be found brings it close to what explains the records otherwise.
         seed: of everything random.
         budget: one of BUDGETS.
     """
@@ -291,6 +292,7 @@ class Findings:
     refuted: frozenset[str] = frozenset()
     seconds: dict[str, float] = field(default_factory=dict)
     complete: bool = True
+    given_up: bool = False
     seed: int = 0
     budget: str = "full"
 

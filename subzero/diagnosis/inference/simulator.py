@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from collections import OrderedDict
 from collections.abc import Callable, Collection, Iterable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from threading import Lock
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -271,8 +271,20 @@ def respond(setting: Setting, times: np.ndarray, channels: Iterable[str]) -> dic
     }
 
 
-CACHE_BYTES, SETTINGS_KEPT = 64_000_000, 500
-"""Runs are kept until they take more memory than this [byte], settings until they are so many; the oldest go first."""
+CACHE_BYTES, SETTINGS_KEPT = 250_000_000, 500
+"""Runs are kept until they take more memory than this [byte], settings until they are so many; the oldest go first. A
+search asks for some 1500 runs, of 180 kB each where the record lasts a minute; with a quarter of this, one run of six
+was made again."""
+
+
+@dataclass(kw_only=True, eq=False)
+class _Store:
+    """Runs and settings that were made, of `size` bytes, behind a lock."""
+
+    tracks: OrderedDict[tuple[int, int, bytes], tuple[Track, Any]] = field(default_factory=OrderedDict)
+    settings: OrderedDict[tuple[int, int, bytes], tuple[Setting, Any]] = field(default_factory=OrderedDict)
+    size: int = 0
+    lock: Lock = field(default_factory=Lock)
 
 
 class RunCache:
@@ -285,50 +297,45 @@ class RunCache:
 
     def __init__(self) -> None:
         """Begin with none."""
-        self.asked, self.onsets = 0, list[Any]()
-        self._tracks: OrderedDict[tuple[int, int, bytes], tuple[Track, Any]] = OrderedDict()
-        self._settings: OrderedDict[tuple[int, int, bytes], tuple[Setting, Any]] = OrderedDict()
-        self._size = 0
-        self._lock = Lock()
+        self.asked, self.onsets, self._store = 0, list[Any](), _Store()
 
     def again(self) -> RunCache:
-        """Return what counts from none, and has the same tracks."""
+        """Return what counts from none, and shares the tracks."""
         new = RunCache()
-        with self._lock:
-            new._tracks, new._size, new.onsets = self._tracks.copy(), self._size, self.onsets[:]
+        new.onsets, new._store = self.onsets[:], self._store
         return new
 
     def count(self, runs: int) -> None:
         """Count runs that are asked for; the search hangs on their number, so none may be lost between threads."""
-        with self._lock:
+        with self._store.lock:
             self.asked += runs
 
     def setting(self, nominal: Setting, entries: Any, z: np.ndarray, make: Callable[[], Setting]) -> Setting:
         """Return what was made of a nominal setting, entries, the very objects that they are, and deviations."""
-        key = (id(nominal), id(entries), z.tobytes())
-        with self._lock:
-            found = self._settings.get(key)
+        key, store = (id(nominal), id(entries), z.tobytes()), self._store
+        with store.lock:
+            found = store.settings.get(key)
         if found is None:
             found = make(), (nominal, entries)
-            with self._lock:
-                self._settings[key] = found
-                if len(self._settings) > SETTINGS_KEPT:
-                    self._settings.popitem(last=False)
+            with store.lock:
+                store.settings[key] = found
+                if len(store.settings) > SETTINGS_KEPT:
+                    store.settings.popitem(last=False)
         return found[0]
 
     def get(self, setting: Any, entries: Any, z: np.ndarray) -> Track | None:
         """Return the track that was made of these; None if there is none, or no more."""
-        with self._lock:
-            found = self._tracks.get((id(setting), id(entries), z.tobytes()))
+        with self._store.lock:
+            found = self._store.tracks.get((id(setting), id(entries), z.tobytes()))
         return found[0] if found else None
 
     def keep(self, setting: Any, entries: Any, z: np.ndarray, track: Track) -> None:
         """Keep a track, and with it what made it, so that no other value can take its identity."""
-        key = (id(setting), id(entries), z.tobytes())
-        with self._lock:
-            if key not in self._tracks:
-                self._tracks[key] = (track, (setting, entries))
-                self._size += track[1].nbytes
-            while self._size > CACHE_BYTES:
-                (_, old), _ = self._tracks.popitem(last=False)[1]
-                self._size -= old.nbytes
+        key, store = (id(setting), id(entries), z.tobytes()), self._store
+        with store.lock:
+            if key not in store.tracks:
+                store.tracks[key] = (track, (setting, entries))
+                store.size += track[1].nbytes
+            while store.size > CACHE_BYTES:
+                (_, old), _ = store.tracks.popitem(last=False)[1]
+                store.size -= old.nbytes
