@@ -15,7 +15,6 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -102,10 +101,6 @@ class Model:
 
     def water(self) -> Current:
         """Return how the water moves: the uniform current, and what is added to it by depth."""
-        return self._water
-
-    @cached_property
-    def _water(self) -> Current:
         if self.profile is None:
             return Current.uniform(self.current)
         added = np.array(self.profile.velocity, dtype=float)

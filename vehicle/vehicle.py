@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -104,14 +104,14 @@ class Vehicle:
         """
         return self.own_numbers.copy()
 
-    @cached_property
+    @property
     def own_numbers(self) -> VehicleNumbers:
         """What the compiled equations take, made once: for what copies it itself, as a record does of another.
 
         Raises:
             VehicleError: as of `numbers`.
         """
-        return _numbers_of(self)
+        return _numbers_of(self)  # not kept as an attribute: a copy with other values would take it along
 
     def _numbers(self) -> VehicleNumbers:
         density = self.water.density
