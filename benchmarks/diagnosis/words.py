@@ -11,8 +11,8 @@ This page rests on **{cases} of {whole} cases**.{unfinished} {fig6} on
 speed through the water, heading, yaw rate, pitch, roll, depth. Cases that ended in an error: {broken}.
 
 They were diagnosed before noise was inferred with the fit: all of them have the noise that the engine supposed then
-(AR(1), ρ 0.5, 10 Hz). What the present engine says of other noise: `python -m benchmarks.diagnosis.world` (table in
-[diagnosis.md](diagnosis.md)).
+(AR(1), ρ 0.5, 10 Hz). What the present engine says of records of the world stands in
+[diagnosis_world.md](diagnosis_world.md).
 
 The cases are those of seed {seed}, which no choice was made with: engine, kinds of cases and rules were settled with
 seeds 1 to {settled} before the first of them was drawn. {versions} What was said of each is kept in
