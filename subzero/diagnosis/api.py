@@ -34,7 +34,12 @@ from subzero.diagnosis.inference.data_error_search import SuspectedError, is_sof
 from subzero.diagnosis.inference.linear_gaussian import log_sum
 from subzero.diagnosis.inference.model_average import NAMED_PROBABILITY
 from subzero.diagnosis.inference.model_search import Search
-from subzero.diagnosis.inference.out_of_catalogue import Findings, explanations_outside, is_explained
+from subzero.diagnosis.inference.out_of_catalogue import (
+    Findings,
+    explanations_outside,
+    is_explained,
+    with_own_noise,
+)
 from subzero.diagnosis.inference.posing import pose, posed_again
 from subzero.diagnosis.inference.problem import Problem, Progress
 from subzero.diagnosis.inference.simulator import respond
@@ -261,6 +266,7 @@ def _look_closer(findings: Findings) -> None:
         _look_outside(findings, 0.8, "forces that no cause explains")
     with _timed(findings, "outside"):
         findings.refuted = refuted_rivals(search)
+        findings.out_of_catalogue = with_own_noise(search, findings.out_of_catalogue)
         _measure_misfit(findings)
 
 

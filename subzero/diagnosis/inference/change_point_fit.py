@@ -29,7 +29,7 @@ from subzero.diagnosis.inference.change_point_scan import (
     ranked_in,
     with_change_point,
 )
-from subzero.diagnosis.inference.laplace import Candidate, laplace
+from subzero.diagnosis.inference.laplace import Candidate, Linear, laplace
 from subzero.diagnosis.inference.linear_gaussian import KAPPAS, Quadratic, log_sum, posterior
 from subzero.diagnosis.inference.map_fit import Fit, bounds, continued, is_poor_fit, refit, with_own_jacobian
 
@@ -58,6 +58,11 @@ class FittedChangePoint:
     def id(self) -> str:
         """Such as "rudder_offset@12"."""
         return self.change_point.id
+
+    def linear(self, problem: Problem) -> tuple[Linear, np.ndarray]:
+        """Return the linear problem around its fit, and the prior variances of all its parameters (k,)."""
+        fit = self.fit
+        return Linear(fit.r + fit.J @ fit.z, fit.J), _prior(problem, self.problem, self.change_point.kappa)
 
 
 def fit_change_points(

@@ -18,9 +18,9 @@ import numpy as np
 
 from subzero.channels import BY_NAME
 from subzero.diagnosis.hypothesis.catalogue.sensors import SPECS
-from subzero.diagnosis.hypothesis.hypotheses import log_prior, nameable, variances
+from subzero.diagnosis.hypothesis.hypotheses import Ids, log_prior, nameable, variances
 from subzero.diagnosis.inference.change_point_scan import BaseRun, LinearisationPoint
-from subzero.diagnosis.inference.laplace import possible
+from subzero.diagnosis.inference.laplace import Linear, possible
 from subzero.diagnosis.inference.latent_force import (
     DRIFT,
     FINE_SPACING_S,
@@ -71,11 +71,26 @@ class LatentForceCandidate:
         id: "unknown_force:X", "sensor_drift:heading".
         log_gain: log evidence over that of none; amplitudes, correlation times, formulas of one term and κ mixed.
         kappa: the most probable κ.
+        fit: around which the linear problem is.
+        columns: sensitivities to the history at its knots (m, n).
+        knots: of the history.
     """
 
     id: str
     log_gain: float
     kappa: float
+    fit: Fit
+    columns: np.ndarray
+    knots: Knots
+
+    def linear(self, problem: Problem, causes: Ids) -> tuple[Linear, np.ndarray]:
+        """Return its linear problem beside causes, with the modes of the most probable history, and the prior variances
+        of all that (k,).
+        """
+        D, size = variances(problem.entries, causes, self.kappa), max(_amplitudes(problem, self.id))
+        L = _best_modes(_seen(self.fit, D, self.columns), self.knots, size)
+        J = np.hstack([self.fit.J, self.columns @ L])
+        return Linear(self.fit.r + self.fit.J @ self.fit.z, J), np.concatenate([D, np.ones(L.shape[1])])
 
 
 def latent_force_candidates(
@@ -104,7 +119,9 @@ def latent_force_candidates(
             for kappa, one in scales.items()
         }
         gain, kappa = mixed(scales, gains)
-        found.append(LatentForceCandidate(id=name, log_gain=gain, kappa=kappa))
+        found.append(
+            LatentForceCandidate(id=name, log_gain=gain, kappa=kappa, fit=fit, columns=C, knots=knots)
+        )
     return sorted(found, key=lambda one: -one.log_gain)
 
 

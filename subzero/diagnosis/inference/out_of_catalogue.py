@@ -8,7 +8,7 @@ so far: an interrupted diagnosis concludes from it.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -26,6 +26,7 @@ from subzero.diagnosis.inference.input_estimation import (
     linear_candidates,
     relinearised_force,
 )
+from subzero.diagnosis.inference.laplace import candidate_with_own_noise, gain_of_own_noise
 from subzero.diagnosis.inference.latent_force import (
     FINE_SPACING_S,
     FORCE,
@@ -266,6 +267,33 @@ def shares(
         found[one.id] = found.get(one.id, 0.0) + float(np.exp(one.log_posterior - total))
     kept = float(np.exp(scale - total))
     return {ids: kept * p for ids, p in inside.items()}, found
+
+
+def with_own_noise(search: Search, outside: Sequence[OutOfCatalogue]) -> list[OutOfCatalogue]:
+    """Give every explanation that may be the most probable the evidence that it has with the noise behind it:
+    hypotheses in the search, and what lies outside, which is returned, most probable first.
+
+    "Nothing is wrong" leaves most to noise, and gains most: nothing that is farther behind than that gains is asked.
+    """
+    fits, first = search.candidates, max(search.best().log_posterior, _most(outside))
+    own = partial(candidate_with_own_noise, search.problem)
+    none = own(fits[()])
+    gained = max(none.log_posterior - fits[()].log_posterior, 0.0)
+    least = max(first, none.log_posterior) - gained - settings.HOPELESS_NATS
+    ranked = sorted(fits.values(), key=lambda one: -one.log_posterior)[: settings.MAX_REFINED]
+    near = [one for one in ranked if one.ids and one.log_posterior > least]
+    fits.update({one.ids: one for one in [none, *search.side.map(own, near)]})
+    few = [one for one in outside[: settings.MAX_REFINED] if one.log_posterior > least]
+    return _sorted([_with_own_noise(search.problem, one) for one in few], list(outside[len(few) :]))
+
+
+def _with_own_noise(problem: Problem, one: OutOfCatalogue) -> OutOfCatalogue:
+    """Return what lies outside with the evidence that it has with the noise behind it."""
+    if isinstance(one.what, FittedChangePoint):
+        linear, D = one.what.linear(problem)
+    else:
+        linear, D = one.what.linear(problem, one.causes)
+    return replace(one, log_posterior=one.log_posterior + gain_of_own_noise(problem, linear, D))
 
 
 @dataclass(kw_only=True, eq=False)
