@@ -24,7 +24,8 @@ from subzero.diagnosis.hypothesis.data_error import REPEATED, DataError, correct
 from subzero.diagnosis.hypothesis.hypotheses import PRIOR, columns_of, nameable, variances
 from subzero.diagnosis.hypothesis.logged import Logged
 from subzero.diagnosis.inference.linear_gaussian import KAPPAS, Posterior, freed, log_sum
-from subzero.diagnosis.inference.noise import Noise, spikes, usual_noise, usual_of
+from subzero.diagnosis.inference.noise import Noise, usual_noise, usual_of
+from subzero.diagnosis.inference.posing import spikes
 from subzero.diagnosis.inference.problem import Problem
 from subzero.diagnosis.inference.simulator import Track, simulate_track
 

@@ -20,7 +20,7 @@ from subzero.channels import BY_NAME
 from subzero.diagnosis.hypothesis.catalogue.sensors import SPECS
 from subzero.diagnosis.hypothesis.hypotheses import Ids, log_prior, nameable, variances
 from subzero.diagnosis.inference.change_point_scan import BaseRun, LinearisationPoint
-from subzero.diagnosis.inference.laplace import Linear, possible
+from subzero.diagnosis.inference.laplace import possible
 from subzero.diagnosis.inference.latent_force import (
     DRIFT,
     FINE_SPACING_S,
@@ -38,6 +38,7 @@ from subzero.diagnosis.inference.linear_gaussian import (
     AMPLITUDE_SHARES,
     KAPPAS,
     ForceInformation,
+    Linear,
     Posterior,
     ProcessShape,
     Quadratic,

@@ -56,6 +56,21 @@ class Quadratic:
         return cls(A=J.T @ J, b=J.T @ whole, rr=float(whole @ whole))
 
 
+class Linear(NamedTuple):
+    """A linear problem around a fit: what is left if no parameter did anything, r + J z (m,), and J (m, k), both made
+    white by the noise of a problem.
+    """
+
+    whole: np.ndarray
+    J: np.ndarray
+
+    @property
+    def quadratic(self) -> Quadratic:
+        """The same, as far as parameters are concerned."""
+        whole, J = self
+        return Quadratic(A=J.T @ J, b=J.T @ whole, rr=float(whole @ whole))
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Posterior:
     """Under prior variances D: mean and covariance of z, the log evidence, and log det(D P)."""

@@ -152,8 +152,59 @@ def coloured(
             expected = kept[i] * (expected + gain[i] * new)
 
 
-SPIKE = 5.0
-"""A sample this many noise levels off the median of its neighbours is an outlier. [-]"""
+@compiled
+def log_marginal(
+    steps: np.ndarray, unrelated: float, slow: float, lasts: float, both: np.ndarray, room: np.ndarray
+) -> float:
+    """Return log N(r; 0, F Fᵀ + Σ), but for a constant: −½ (xᵀx − |L⁻¹ Gᵀx|²) − log det L − ½ log det Σ, with x and G
+    what Σ makes white of r and F, and L Lᵀ = I + Gᵀ G.
+
+    Args:
+        steps: times to the next sample (m,). [s]
+        unrelated: σ_w² + q²/12.
+        slow: σ_s².
+        lasts: τ_s. [s]
+        both: F and, in the last column, r (m, n + 1).
+        room: to work in (n + 3, n + 1).
+    """
+    many = both.shape[1]
+    expected, white, inner = room[many], room[many + 1], room[:many]
+    expected[:] = 0.0
+    inner[:] = 0.0
+    left, log_scale = slow, 0.0
+    for i in range(both.shape[0]):
+        seen, kept = left + unrelated, np.exp(-steps[i] / lasts)
+        gain = left / seen
+        log_scale += 0.5 * np.log(seen)
+        left = kept * kept * left * (1.0 - gain) + slow * (1.0 - kept * kept)
+        for j in range(many):
+            new = both[i, j] - expected[j]
+            white[j] = new / np.sqrt(seen)
+            expected[j] = kept * (expected[j] + gain * new)
+            for k in range(j + 1):
+                inner[j, k] += white[j] * white[k]
+    return -log_scale + _log_of_square(inner)
+
+
+@compiled
+def _log_of_square(inner: np.ndarray) -> float:
+    """Return −½ (xᵀx − |L⁻¹ Gᵀx|²) − log det L, given Gᵀ G, below it xᵀ G, and xᵀx (n + 1, n + 1), where L is left."""
+    last, log_det = inner.shape[0] - 1, 0.0
+    for j in range(last + 1):
+        for k in range(j + 1):
+            value = inner[j, k] + (1.0 if j == k and j < last else 0.0)
+            for i in range(k):
+                value -= inner[j, i] * inner[k, i]
+            if k < j:
+                inner[j, k] = value / inner[k, k]
+            elif j < last:
+                inner[j, j] = np.sqrt(value)
+                log_det += np.log(inner[j, j])
+            else:
+                inner[j, j] = value
+    return -0.5 * inner[last, last] - log_det
+
+
 SLOW_SHARE = 0.7
 """Usual standard deviation of a sensor's slow part, in its usual noise levels. [-]"""
 WHITE_SPREAD, SLOW_SPREAD, TIME_SPREAD = 1.5, 1.0, 1.5
@@ -245,33 +296,18 @@ def estimate(time: np.ndarray, behind: Behind, usual: Usual) -> Noise:
         return usual_noise(time, np.ones(time.size, dtype=bool), usual)
     r, F = behind.residual, _felt_directions(behind.J * np.sqrt(behind.D), usual.level)
     low, high = _bounds(time, r, usual)
+    steps, both = np.diff(time, append=time[-1:]), np.column_stack([F, r])
+    room = np.empty((both.shape[1] + 2, both.shape[1]))
 
     def cost(log: np.ndarray) -> float:
-        return -_log_marginal(_noise_of(log, time, usual), r, F) - _log_prior(log, usual)
+        white, slow, lasts = np.exp(log).tolist()
+        unrelated = white**2 + usual.resolution**2 / 12.0
+        return -log_marginal(steps, unrelated, slow**2, lasts, both, room) - _log_prior(log, usual)
 
     starts = sorted((np.clip(one, low, high) for one in _starts(time, r, F, usual)), key=cost)[:2]
     found = [minimize(cost, one, method="Nelder-Mead", bounds=list(zip(low, high, strict=True)),
                       options={"xatol": 0.02, "fatol": 0.02, "maxfev": 200}) for one in starts]  # fmt: skip
     return _noise_of(min(found, key=lambda one: one.fun).x, time, usual)
-
-
-def spikes(values: np.ndarray, spec: float) -> np.ndarray:
-    """Say which samples stand alone, far from the median of seven around them; at the ends, of the first or last five.
-
-    A record mirrored at its ends would show an outlier there twice, and two of them as a majority.
-
-    Args:
-        values: measured − simulated (m,), in the channel's unit.
-        spec: the least level of noise that is believed of the sensor.
-    """
-    if values.size < 7:
-        return np.zeros(values.size, dtype=bool)
-    inside = np.median(np.lib.stride_tricks.sliding_window_view(values, 7), axis=1)
-    first, last = np.median(values[:5]), np.median(values[-5:])
-    around = np.concatenate([np.full(3, first), inside, np.full(3, last)])
-    off = np.abs(values - around)
-    level = max(1.4826 * float(np.median(off)) * 1.2, 0.5 * spec)
-    return off > SPIKE * level
 
 
 def resolution_of(values: np.ndarray, level: float) -> float:
@@ -322,16 +358,6 @@ def _felt_directions(scaled: np.ndarray, level: float) -> np.ndarray:
     U, s, _ = np.linalg.svd(scaled, full_matrices=False)
     felt = s > FELT * level * np.sqrt(scaled.shape[0])
     return U[:, felt] * s[felt]
-
-
-def _log_marginal(noise: Noise, r: np.ndarray, F: np.ndarray) -> float:
-    """Return log N(r; 0, F Fᵀ + Σ), but for a constant."""
-    both = noise.whiten(np.column_stack([r, F]))
-    x, G = both[:, 0], both[:, 1:]
-    half = np.linalg.cholesky(np.eye(F.shape[1]) + G.T @ G)
-    seen = np.linalg.solve(half, G.T @ x)
-    log_det = float(np.sum(np.log(np.diag(half)))) + noise.log_scale
-    return -0.5 * float(x @ x - seen @ seen) - log_det
 
 
 def log_prior_of(noise: Noise, usual: Usual) -> float:

@@ -26,7 +26,6 @@ from subzero.diagnosis.inference.input_estimation import (
     linear_candidates,
     relinearised_force,
 )
-from subzero.diagnosis.inference.laplace import candidate_with_own_noise, gain_of_own_noise
 from subzero.diagnosis.inference.latent_force import (
     FINE_SPACING_S,
     FORCE,
@@ -38,6 +37,7 @@ from subzero.diagnosis.inference.latent_force import (
 from subzero.diagnosis.inference.linear_gaussian import KAPPAS, Terms, log_sum
 from subzero.diagnosis.inference.map_fit import is_poor_fit
 from subzero.diagnosis.inference.model_average import FURTHER_CAUSE_ODDS
+from subzero.diagnosis.inference.model_fits import candidate_with_own_noise, gain_of_own_noise
 from subzero.external_force import AXES
 
 if TYPE_CHECKING:

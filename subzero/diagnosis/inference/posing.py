@@ -23,7 +23,6 @@ from subzero.diagnosis.inference.noise import (
     Noise,
     Usual,
     estimate,
-    spikes,
     usual_noise,
     usual_of,
 )
@@ -38,6 +37,8 @@ if TYPE_CHECKING:
 
 VISIBLE_STEP_ERROR = 1.0
 """Squared size, in noise, of an error of the steps that is worth correcting."""
+SPIKE = 5.0
+"""A sample this many noise levels off the median of its neighbours is an outlier. [-]"""
 NOISE_LEVEL_CHANGE = 0.1
 """Change of a noise level, as a logarithm, that is worth beginning again; of its slow part,
 SLOW_NOISE_FACTOR times as much."""
@@ -130,6 +131,25 @@ def _used(values: np.ndarray, difference: np.ndarray, usual: Usual) -> np.ndarra
     return used
 
 
+def spikes(values: np.ndarray, spec: float) -> np.ndarray:
+    """Say which samples stand alone, far from the median of seven around them; at the ends, of the first or last five.
+
+    A record mirrored at its ends would show an outlier there twice, and two of them as a majority.
+
+    Args:
+        values: measured − simulated (m,), in the channel's unit.
+        spec: the least level of noise that is believed of the sensor.
+    """
+    if values.size < 7:
+        return np.zeros(values.size, dtype=bool)
+    inside = np.median(np.lib.stride_tricks.sliding_window_view(values, 7), axis=1)
+    first, last = np.median(values[:5]), np.median(values[-5:])
+    around = np.concatenate([np.full(3, first), inside, np.full(3, last)])
+    off = np.abs(values - around)
+    level = max(1.4826 * float(np.median(off)) * 1.2, 0.5 * spec)
+    return off > SPIKE * level
+
+
 def with_noise_behind(
     problem: Problem, z: np.ndarray, D: np.ndarray, white: np.ndarray | None = None
 ) -> Problem | None:
@@ -176,10 +196,14 @@ def _without_outliers(problem: Problem, record: int, z: np.ndarray) -> Observed:
     shown = respond(problem.setting(record, z), one.time, one.noise)
     noise = {}
     for name, old in one.noise.items():
-        usual = Usual(one.known.get(name, SPECS[name].noise), old.resolution, name in one.known)
-        used = _used(one.values[name], one.values[name] - shown[name], usual)
+        used = _used(one.values[name], one.values[name] - shown[name], sensor_of(one, name))
         noise[name] = replace(old, used=used, time=one.time[used])
     return replace(one, noise=noise)
+
+
+def sensor_of(one: Observed, name: str) -> Usual:
+    """Return what the sensor of a channel is like, by what is known of it and by the record as it was posed."""
+    return Usual(one.known.get(name, SPECS[name].noise), one.noise[name].resolution, name in one.known)
 
 
 def _unit(one: Observed) -> dict[str, Noise]:
@@ -189,8 +213,8 @@ def _unit(one: Observed) -> dict[str, Noise]:
 
 def _behind(one: Observed, name: str, behind: Behind) -> Noise:
     """Return the noise of a channel behind a fit."""
-    old, level = one.noise[name], one.known.get(name, SPECS[name].noise)
-    return replace(estimate(old.time, behind, Usual(level, old.resolution, name in one.known)), used=old.used)
+    old = one.noise[name]
+    return replace(estimate(old.time, behind, sensor_of(one, name)), used=old.used)
 
 
 def _alike(old: Noise, new: Noise) -> bool:
