@@ -12,7 +12,7 @@ evidence and posterior of the linear problem              linear_gaussian
 MAP fit with real simulations                             map_fit
 evidence around a fit                                     laplace
 linear evidence of all hypotheses                         screening
-the pool of fitted hypotheses                             model_fits
+the pool of fitted hypotheses, each with its noise        model_fits
 add, drop, swap and merge causes                          model_search
 probabilities, decision rule                              model_average
 onsets, ranked by linear evidence                         change_point_scan
@@ -60,6 +60,7 @@ from subzero.diagnosis.inference.posing import pose, spikes, with_finer_steps, w
 from subzero.diagnosis.inference.linear_gaussian import (
     KAPPAS,
     ForceInformation,
+    Linear,
     Quadratic,
     Scale,
     Terms,
@@ -122,6 +123,7 @@ from subzero.diagnosis.inference.model_average import (
     practical_causes,
     qualified,
 )
+from subzero.diagnosis.inference.model_fits import gain_of_own_noise, with_own_noise
 from subzero.diagnosis.inference.out_of_catalogue import Findings, special_cases_folded
 
 from subzero.diagnosis.inference.repeated_values import (
@@ -148,6 +150,7 @@ __all__ = [
     "Findings",
     "Fit",
     "ForceInformation",
+    "Linear",
     "LinearisationPoint",
     "Noise",
     "Observed",
@@ -176,6 +179,7 @@ __all__ = [
     "fit_change_points",
     "force_columns",
     "freed",
+    "gain_of_own_noise",
     "grown",
     "history",
     "is_noise",
@@ -219,6 +223,7 @@ __all__ = [
     "variances",
     "with_finer_steps",
     "with_noise_behind",
+    "with_own_noise",
     "with_stops",
     "with_tolerances",
     "without_force",
