@@ -4,9 +4,9 @@ nothing_wrong      p(none) ≥ 0.5, or the named size is within the practical on
 calibrated         the same, but numbers had to move by more than 4 tolerances, or tolerances 4 times as wide explain
                    the records best: the model wants calibration
 nothing_near       nothing is named, and what the best fit leaves is no noise
-cause_named        one hypothesis, or one cause that begins in mid-trial, with p ≥ 0.8, D ≥ 9 to its closest rival,
+cause_named        one hypothesis, or one cause that begins in mid-trial, with p ≥ 0.9, D ≥ 9 to its closest rival,
                    its size beyond 4 tolerances
-outside_catalogue  a latent force or a drift that no cause explains has p ≥ 0.8
+outside_catalogue  a latent force or a drift that no cause explains has p ≥ 0.9
 undecided          everything else: the smallest set with p ≥ 0.95
 
 Hypotheses with a fit have Laplace's evidence; all others that of the screening, never ahead of the best fit. A further
@@ -39,12 +39,8 @@ if TYPE_CHECKING:
     from subzero.diagnosis.inference.screening import Screening
 
 Key = TypeVar("Key")
-NAMED_PROBABILITY, HEALTHY_PROBABILITY, OUT_OF_CATALOGUE_PROBABILITY, CREDIBLE_SET_PROBABILITY = (
-    0.8,
-    0.5,
-    0.8,
-    0.95,
-)
+NAMED_PROBABILITY, HEALTHY_PROBABILITY, CREDIBLE_SET_PROBABILITY = 0.9, 0.5, 0.95
+"""A cause, a force, a drift or an error in the data is told from the first on: one name in ten may be wrong there. [-]"""
 MIN_DISCRIMINATION = 9.0
 """With less than this squared distance to a rival no cause is named, whatever the record happens to say."""
 PRACTICAL_TOLERANCES = 4.0
@@ -109,7 +105,7 @@ def decide(
     """
     late = late or ChangePointSummary()
     best = max(probabilities, key=lambda ids: probabilities[ids])
-    if outside >= OUT_OF_CATALOGUE_PROBABILITY:
+    if outside >= NAMED_PROBABILITY:
         return OUTSIDE
     if late.is_named:
         return CAUSE_NAMED
