@@ -49,8 +49,8 @@ def screen(far=False, **log_posteriors):
 
 
 def test_a_further_cause_is_told_only_if_it_is_needed():
-    assert occam_folded({("a",): 0.21, ("a", "b"): 0.79}) == {("a",): 1.0}
-    needed = occam_folded({("a",): 0.19, ("a", "b"): 0.81})
+    assert occam_folded({("a",): 0.11, ("a", "b"): 0.89}) == {("a",): 1.0}
+    needed = occam_folded({("a",): 0.09, ("a", "b"): 0.91})
     assert list(needed) == [("a", "b"), ("a",)]
     assert sum(needed.values()) == pytest.approx(1.0)
 
@@ -116,14 +116,14 @@ def test_nothing_is_wrong_only_where_the_vehicle_stayed_what_it_was_and_noise_is
 @pytest.mark.parametrize(
     ("late", "verdict"),
     [
-        (ChangePointSummary(0.85, True, 20.0), CAUSE_NAMED),
-        (ChangePointSummary(0.75, True, 20.0), UNDECIDED),
-        (ChangePointSummary(0.85, False, 20.0), UNDECIDED),
-        (ChangePointSummary(0.85, True, 5.0), UNDECIDED),
+        (ChangePointSummary(0.95, True, 20.0), CAUSE_NAMED),
+        (ChangePointSummary(0.85, True, 20.0), UNDECIDED),
+        (ChangePointSummary(0.95, False, 20.0), UNDECIDED),
+        (ChangePointSummary(0.95, True, 5.0), UNDECIDED),
         (ChangePointSummary(0.3, True, 20.0), NOTHING_WRONG),
     ],
 )
 def test_it_is_named_only_if_it_is_probable_large_and_apart(late, verdict):
     inside = {(): 0.7 if late.probability < 0.5 else 0.1, ("a",): 0.05}
     assert decide(inside, 0.0, True, 20.0, late) == verdict
-    assert decide(inside, 0.85, True, 20.0, late) == OUTSIDE
+    assert decide(inside, 0.95, True, 20.0, late) == OUTSIDE
