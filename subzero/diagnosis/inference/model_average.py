@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 
 Key = TypeVar("Key")
 NAMED_PROBABILITY, HEALTHY_PROBABILITY, CREDIBLE_SET_PROBABILITY = 0.9, 0.5, 0.95
-"""A cause, a force, a drift or an error in the data is told from the first on: one name in ten may be wrong there. [-]"""
+"""A cause, a force, a drift or an error in the data is told from the first on: one in ten may be wrong there. [-]"""
 MIN_DISCRIMINATION = 9.0
 """With less than this squared distance to a rival no cause is named, whatever the record happens to say."""
 PRACTICAL_TOLERANCES = 4.0
