@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+import subzero
 from benchmarks.diagnosis import world
 from subzero.diagnosis import SPECS
-from subzero.diagnosis.api import diagnose_trials
 from subzero.diagnosis.inference import (
     Behind,
     Linear,
@@ -183,7 +183,7 @@ def test_a_healthy_record_with_white_and_slow_noise_at_once_gets_no_name(index):
     """With one noise for all, that behind the best fit, both were named with 0.99."""
     logged, planted = world.record_of(world.drawn(7301, index + 1)[index])
     assert not planted
-    assert diagnose_trials([logged], budget="verdict").verdict != "cause_named"
+    assert subzero.diagnose(logged, budget="verdict").verdict != "cause_named"
 
 
 def test_a_wander_of_twenty_levels_is_no_noise():
