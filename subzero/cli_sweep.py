@@ -6,6 +6,7 @@ import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from functools import partial
 from pathlib import Path
 from time import monotonic
 from typing import TYPE_CHECKING, Annotated, Any, Self
@@ -60,6 +61,10 @@ def sweep(
 
 def _swept(spec: Path, out: Path | None, executor: Any, retry: bool) -> tuple[dict[str, Any], Stage]:
     """Run what a file asks for, write all of it, and return the summary and where the files are."""
+    from subzero.sweeps.workers import WorkerPool, rehearse_file
+
+    if isinstance(executor, WorkerPool):
+        executor.prepare(partial(rehearse_file, spec))
     from subzero.sweeps.plan import read_plan
 
     plan = read_plan(spec)

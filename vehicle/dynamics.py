@@ -113,10 +113,14 @@ def _fill_rates(
     out: np.ndarray,
 ) -> None:
     """Fill out with the rate of the state, and what `evaluate` fills."""
-    evaluate(state, command, current_n, wrench_b, numbers, R, nu_r, terms)
-    motion(state, R, out)
-    _accelerations(terms, numbers, out)
+    rotation(state[3:7], R)
+    relative_velocity(state, R, current_n, nu_r)
+    # The motor first: its quotients wait for one another, and a processor sums up forces meanwhile.
     actuators(state, command, nu_r[0], numbers, out)
+    motion(state, R, out)
+    n = shaft_speed(state[SHAFT], state[CHARGE], command[0], nu_r[0], numbers.motor, numbers.propeller)
+    fill_terms(state[7:13], nu_r, R, n, deflections(state, command, numbers), wrench_b, numbers, terms)
+    _accelerations(terms, numbers, out)
 
 
 @compiled

@@ -42,6 +42,7 @@ from cable.moving_end.segment_load import (
     Load,
     differentiate_load,
     evaluate_load,
+    measured_chord,
     take_segment,
 )
 from cable.moving_end.slack_law import fading_rate, slack_law, turning_rate
@@ -101,11 +102,15 @@ def _fill(line: Line, w: Weights, c: CableNumbers, drum: DrumNumbers, work: Load
     node_velocities(line, w)
     N, held = line.ends.count, held_node(line)
     _clear(line, slopes)
+    ahead = measured_chord(line.position[NEW], 1, _length(line, 1))
     for j in range(1, N + 1):
-        length = line.ends.last_length[NEW] if j == N else line.length[j]
-        T = line.tension[NEW, j]
+        length, T = _length(line, j), line.tension[NEW, j]
+        work.square, work.chord_length, work.shorter = ahead
+        by_strain = _length_equation(line, j, T, c, work.square, slopes)
         take_segment(line.position[NEW], line.velocity[NEW], line.water[NEW], j, work)
-        evaluate_load(length, T, line.slip[j], line.normal_gain[j], w.a0, c, work)
+        beyond = min(j + 1, N)
+        ahead = measured_chord(line.position[NEW], beyond, _length(line, beyond))
+        evaluate_load(T, line.slip[j], line.normal_gain[j], w.a0, c, work)
         for i in range(3):
             work.q[i] -= line.forcing[j, i]
             # d(ℓp)/dt of the whole segment, and not ℓ dp/dt: only so does the one that grows keep its momentum. q has
@@ -118,15 +123,14 @@ def _fill(line: Line, w: Weights, c: CableNumbers, drum: DrumNumbers, work: Load
         if j == held:
             add_influx(line, c, work)
         _add_balance(line, j, T, work)
-        by_strain = _length_equation(line, j, T, c, work.square, slopes)
         if slopes:
             if j < held:
-                _differentiate_segment(length, w, T, c, work)
-                _scatter_balance(line, j, T, work)
+                _scatter_balance(line, j, length, T, w.b0, c, work)
             else:
                 differentiate_influx(line, length, w, T, c, work)
                 _scatter_influx(line, T, length, work)
             _scatter_length(line, j, length, by_strain, work)
+    _keep_tow_force(line, slopes)
     add_bending(line, c)
     if N > 1:
         _sharpen_tow_force(line)
@@ -139,74 +143,59 @@ def _fill(line: Line, w: Weights, c: CableNumbers, drum: DrumNumbers, work: Load
 
 
 @inlined
+def _length(line: Line, j: int) -> float:
+    """Return the unstretched length of segment j at level NEW. [m]."""
+    return line.ends.last_length[NEW] if j == line.ends.count else line.length[j]
+
+
+@inlined
 def _clear(line: Line, slopes: bool) -> None:
-    """Set the residual to zero, and the matrix."""
-    for j in range(1, line.ends.count + 1):
+    """Set the residual to zero, and those blocks that are summed up."""
+    for j in range(line.ends.count + 1):
         for i in range(4):
             line.rows[RESIDUAL, j, i] = 0.0
-            for k in range(4 if slopes and j == line.ends.count else 0):
+            for k in range(4 if slopes and j in (0, line.ends.count) else 0):
                 line.blocks[LOWER, j, i, k] = 0.0
                 line.blocks[DIAGONAL, j, i, k] = 0.0
                 line.blocks[UPPER, j, i, k] = 0.0
 
 
 @inlined
-def _differentiate_segment(length: float, w: Weights, T: float, c: CableNumbers, work: Load) -> None:
-    """Fill ∂Q/∂x of the near node (3, 3), and ∂Q/∂(T, x) of the far node (3, 4)."""
-    by_near, by_far = work.by_near, work.by_far
-    stretch = 0.5 * c.compliance / (1.0 + c.compliance * T)
-    for i in range(3):
-        by_far[i, 0] = length * stretch * work.drag[i]
-        for k in range(3):
-            mean = 0.5 * w.b0 * work.q_V[i, k]
-            by_near[i, k] = length * (mean - work.q_d[i, k])
-            by_far[i, 1 + k] = length * (mean + work.q_d[i, k])
-
-
-@inlined
 def _add_balance(line: Line, j: int, T: float, work: Load) -> None:
     """Add segment j to the balances of its two nodes: f + ½Q to the far one, −f + ½Q to the near one."""
     held, t, r = held_node(line), work.tangent, line.rows[RESIDUAL]
-    # t points to the drum: T t pulls the near node on, and the far node back. Segment 1 has no near node to balance:
-    # what it does there is the force on the vehicle (12). Nor has the last one a far node, where a drum is.
+    # t points to the drum: T t pulls the near node on, and the far node back. The last segment has no far node to
+    # balance where a drum is. Row 0 is what the vehicle has to balance, see `_keep_tow_force`.
     for i in range(3):
         f, half = T * t[i], 0.5 * line.load[j, i]
         if j < held:
             r[j, 1 + i] += f + half
-        if j > 1:
-            r[j - 1, 1 + i] += half - f
-        else:
-            line.ends.tow.force[i] = f - half
+        r[j - 1, 1 + i] += half - f
 
 
 @inlined
-def _scatter_balance(line: Line, j: int, T: float, work: Load) -> None:
-    """Write the derivatives of what `_add_balance` adds; segment j is the first that writes to D_j, L_j and U_{j−1}."""
-    t, by_near, by_far = work.tangent, work.by_near, work.by_far
-    stiffness, g = T / work.chord_length, turning_rate(work.square)
-    D, L, U, before = (
-        line.blocks[DIAGONAL, j],
-        line.blocks[LOWER, j],
-        line.blocks[UPPER],
-        line.blocks[DIAGONAL],
-    )
+def _scatter_balance(
+    line: Line, j: int, length: float, T: float, b0: float, c: CableNumbers, work: Load
+) -> None:
+    """Write the derivatives of what `_add_balance` adds; segment j is the first that writes to D_j, L_j and U_{j−1}.
+
+    ½Q changes with the tension by `stretched`, with the place of the near node by `near` and of the far one by `far`.
+    """
+    t, q_V, q_d, g = work.tangent, work.q_V, work.q_d, turning_rate(work.square)
+    stiffness, stretch = T / work.chord_length, 0.5 * c.compliance / (1.0 + c.compliance * T)
+    D, L, U = line.blocks[DIAGONAL, j], line.blocks[LOWER, j], line.blocks[UPPER, j - 1]
+    before = line.blocks[DIAGONAL, j - 1]
     for i in range(3):
-        D[1 + i, 0] = t[i] + 0.5 * by_far[i, 0]
-        if j > 1:
-            U[j - 1, 1 + i, 0] = 0.5 * by_far[i, 0] - t[i]
-        else:
-            line.ends.tow.by_block[i, 0] = t[i] - 0.5 * by_far[i, 0]
+        stretched = 0.5 * (length * stretch * work.drag[i])
+        D[1 + i, 0], U[1 + i, 0] = t[i] + stretched, stretched - t[i]
         for k in range(3):
             # ∂f/∂x = T ∂t/∂x: a taut chord can only turn, T (I − t tᵀ)/|d|; of a folded one t gets longer, too (g < 1).
             pull = stiffness * ((1.0 if i == k else 0.0) - g * t[i] * t[k])
-            near, far = 0.5 * by_near[i, k], 0.5 * by_far[i, 1 + k]
+            mean = 0.5 * b0 * q_V[i, k]
+            near, far = 0.5 * (length * (mean - q_d[i, k])), 0.5 * (length * (mean + q_d[i, k]))
             D[1 + i, 1 + k], L[1 + i, 1 + k] = far + pull, near - pull
-            if j > 1:
-                U[j - 1, 1 + i, 1 + k] = far - pull
-                before[j - 1, 1 + i, 1 + k] += near + pull
-            else:
-                line.ends.tow.by_block[i, 1 + k] = pull - far
-                line.ends.tow.by_tow[i, k] = -pull - near
+            U[1 + i, 1 + k] = far - pull
+            before[1 + i, 1 + k] += near + pull
 
 
 @inlined
@@ -215,22 +204,27 @@ def _scatter_influx(line: Line, T: float, length: float, work: Load) -> None:
     N, t, by_near, by_far = line.ends.count, work.tangent, work.by_near, work.by_far
     stiffness, g = T / work.chord_length, turning_rate(work.square)
     fading = fading_rate(work.square, length, work.chord_length)
-    U, before = line.blocks[UPPER], line.blocks[DIAGONAL]
+    U, before = line.blocks[UPPER, N - 1], line.blocks[DIAGONAL, N - 1]
     for i in range(3):
         for k in range(4):
             pull = t[i] if k == 0 else -fading * T * t[i] if k == 1 else 0.0
-            far = 0.5 * by_far[i, k]
-            if N > 1:
-                U[N - 1, 1 + i, k] = far - pull
-            else:
-                line.ends.tow.by_block[i, k] = pull - far
+            U[1 + i, k] = 0.5 * by_far[i, k] - pull
         for k in range(3):
             pull = stiffness * ((1.0 if i == k else 0.0) - g * t[i] * t[k])
-            near = 0.5 * by_near[i, k]
-            if N > 1:
-                before[N - 1, 1 + i, 1 + k] += near + pull
-            else:
-                line.ends.tow.by_tow[i, k] = -pull - near
+            before[1 + i, 1 + k] += 0.5 * by_near[i, k] + pull
+
+
+@inlined
+def _keep_tow_force(line: Line, slopes: bool) -> None:
+    """Take the force on the vehicle (12), and if `slopes` its derivatives, from row 0: it keeps the tow point there."""
+    tow = line.ends.tow
+    for i in range(3):
+        tow.force[i] = -line.rows[RESIDUAL, 0, 1 + i]
+        if slopes:
+            for k in range(4):
+                tow.by_block[i, k] = -line.blocks[UPPER, 0, 1 + i, k]
+            for k in range(3):
+                tow.by_tow[i, k] = -line.blocks[DIAGONAL, 0, 1 + i, 1 + k]
 
 
 @inlined

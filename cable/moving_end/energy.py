@@ -21,7 +21,7 @@ from __future__ import annotations
 import numpy as np
 
 from cable.moving_end.bending import bending_energy
-from cable.moving_end.segment_load import Load, evaluate_load, take_segment
+from cable.moving_end.segment_load import Load, evaluate_load, measured_chord, take_segment
 from cable.moving_end.state import BEFORE, NOW, Line
 from cable.properties import CableNumbers
 from subzero.jit import compiled, inlined, inner
@@ -40,7 +40,8 @@ def energy_flow(line: Line, c: CableNumbers, work: Load, out: np.ndarray) -> Non
         length = line.ends.last_length[NOW] if j == N else line.length[j]
         T = line.tension[NOW, j]
         take_segment(line.position[NOW], line.velocity[NOW], line.water[NOW], j, work)
-        evaluate_load(length, T, line.slip[j], line.normal_gain[j], 0.0, c, work)
+        work.square, work.chord_length, work.shorter = measured_chord(line.position[NOW], j, length)
+        evaluate_load(T, line.slip[j], line.normal_gain[j], 0.0, c, work)
         square, turn = 0.0, 0.0
         for i in range(3):
             speed = V[i] - J[i]

@@ -28,7 +28,7 @@ from cable.drum import DrumNumbers
 from cable.moving_end.bdf2 import Weights
 from cable.moving_end.chord_correction import correct_for_arc
 from cable.moving_end.remeshing import fill_node_tensions
-from cable.moving_end.segment_load import Load, evaluate_load, segment_momentum, take_segment
+from cable.moving_end.segment_load import Load, evaluate_load, measured_chord, segment_momentum, take_segment
 from cable.moving_end.slack_law import SMOOTHING, SOFTEST
 from cable.moving_end.state import (
     BEFORE,
@@ -96,7 +96,10 @@ def hang(line: Line, water: Water, c: CableNumbers, work: Load) -> float:
         feel_water(line, water, line.ends.time)
         for j in range(1, N + 1):
             take_segment(line.position[NEW], line.velocity[NEW], line.water[NEW], j, work)
-            evaluate_load(_length(line, j), line.tension[NEW, j], 0.0, 1.0, 0.0, c, work)
+            work.square, work.chord_length, work.shorter = measured_chord(
+                line.position[NEW], j, _length(line, j)
+            )
+            evaluate_load(line.tension[NEW, j], 0.0, 1.0, 0.0, c, work)
             for i in range(3):
                 line.load[j, i] += 0.5 * (_length(line, j) * work.q[i] - line.load[j, i])
     _keep(line, c, work)

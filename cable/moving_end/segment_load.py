@@ -32,12 +32,13 @@ class Load(Record):
     Attributes:
         velocity, water, chord: V of the segment's middle, J there, and d (3,).
         tangent, momentum, drag, q, across: t, p, D, q and U_⊥ (3,).
-        along, side, chord_length, square: U_t, |U_⊥|, r and |d|²/ℓ², see `slack_law`.
+        along, side: U_t and |U_⊥|.
+        square, chord_length, shorter: |d|²/ℓ², r and 1/r, see `measured_chord`.
         kt, kn: drag constants with stretch and correction.
         q_V, q_d: ∂q/∂V and ∂q/∂d (3, 3).
         q_tt: (∂q/∂t) t (3,), see `differentiate_load`.
-        by_near, by_far: derivatives of the segment's total load Q by the position of its near node (3, 3) and by the
-            unknowns of its own block (3, 4), see `assembly`.
+        by_near, by_far: derivatives of the last segment's total load Q by the position of its near node (3, 3) and by
+            the unknowns of its own block (3, 4), see `assembly`.
     """
 
     velocity: np.ndarray
@@ -50,8 +51,9 @@ class Load(Record):
     across: np.ndarray
     along: float
     side: float
-    chord_length: float
     square: float
+    chord_length: float
+    shorter: float
     kt: float
     kn: float
     q_V: np.ndarray
@@ -66,7 +68,7 @@ def new_load() -> Load:
     """Return empty work space for one segment."""
     parts: dict[str, Any] = {name: np.zeros(3) for name in Load.names}
     parts |= {name: np.zeros((3, 3)) for name in ("q_V", "q_d", "by_near")}
-    parts |= dict.fromkeys(("along", "side", "chord_length", "square", "kt", "kn"), 0.0)
+    parts |= dict.fromkeys(("along", "side", "square", "chord_length", "shorter", "kt", "kn"), 0.0)
     return Load(**parts | {"by_far": np.zeros((3, 4))})
 
 
@@ -82,13 +84,23 @@ def evaluate_momentum(c: CableNumbers, work: Load) -> None:
 
 
 @inlined
-def evaluate_load(
-    length: float, T: float, slip: float, gain: float, a0: float, c: CableNumbers, work: Load
-) -> None:
-    """Fill tangent, momentum, drag and q = a₀p + D − w_c k from velocity, water and chord. [N/m].
+def measured_chord(x: np.ndarray, j: int, length: float) -> tuple[float, float, float]:
+    """Return |d|²/ℓ² [-], r [m] and 1/r [1/m] of segment j, given the nodes at one level (nodes, 3), see `slack_law`.
+
+    Whoever goes along a cable measures the next chord before it works on this one: a processor does the root and the
+    quotients, which wait for one another, beside that.
+    """
+    a, b, d = x[j, 0] - x[j - 1, 0], x[j, 1] - x[j - 1, 1], x[j, 2] - x[j - 1, 2]
+    square = (a * a + b * b + d * d) / (length * length)
+    r = chord_length(square, length)
+    return square, r, 1.0 / r
+
+
+@inlined
+def evaluate_load(T: float, slip: float, gain: float, a0: float, c: CableNumbers, work: Load) -> None:
+    """Fill tangent, momentum, drag and q = a₀p + D − w_c k from velocity, water and chord, which was measured. [N/m].
 
     Args:
-        length: unstretched length of the segment. [m]
         T: tension (only √(1+eT) is taken from it). [N]
         slip: added to the speed along the chord, see `chord_correction`. [m/s]
         gain: on the normal drag, see `chord_correction`. [-]
@@ -96,11 +108,9 @@ def evaluate_load(
         c: the cable.
         work: filled.
     """
-    t, across, square = work.tangent, work.across, squared_share(work.chord, length)
-    r = chord_length(square, length)
-    work.square, work.chord_length, shorter = square, r, 1.0 / r
+    t, across = work.tangent, work.across
     for i in range(3):
-        t[i] = work.chord[i] * shorter
+        t[i] = work.chord[i] * work.shorter
     evaluate_momentum(c, work)
     Ut = work.along
     normal = sqrt(across[0] * across[0] + across[1] * across[1] + across[2] * across[2])
@@ -124,8 +134,7 @@ def differentiate_load(slip: float, a0: float, c: CableNumbers, work: Load) -> N
         ∂q/∂V = (a₀ (m + ρA) + k_n|U_⊥|) I + α tᵀ + k_n U_⊥ U_⊥ᵀ/|U_⊥|
         ∂q/∂t = (k_t|W| W − (a₀ρA + k_n|U_⊥|) U_t) I + α Uᵀ − U_t k_n U_⊥ U_⊥ᵀ/|U_⊥|
     """
-    V, J, t, across = work.velocity, work.water, work.tangent, work.across
-    Ut, normal, shorter = work.along, work.side, 1.0 / work.chord_length
+    t, across, Ut, normal = work.tangent, work.across, work.along, work.side
     g, pulled = turning_rate(work.square), work.kt * abs(Ut + slip)
     turned = work.kn / normal if normal > 1e-12 else 0.0
     inert, side = a0 * c.added_mass, work.kn * normal
@@ -135,12 +144,23 @@ def differentiate_load(slip: float, a0: float, c: CableNumbers, work: Load) -> N
         alpha, bent = (2.0 * pulled - inert - side) * t[i] - At * across[i], turned * across[i]
         for k in range(3):
             work.q_V[i, k] = alpha * t[k] + bent * across[k]
-            work.q_d[i, k] = alpha * (V[k] - J[k]) - Ut * bent * across[k]
         work.q_V[i, i] += by_V
-        work.q_d[i, i] += by_t
-        work.q_tt[i] = work.q_d[i, 0] * t[0] + work.q_d[i, 1] * t[1] + work.q_d[i, 2] * t[2]
-        for k in range(3):
-            work.q_d[i, k] = (work.q_d[i, k] - g * work.q_tt[i] * t[k]) * shorter
+        _differentiate_by_chord(i, alpha, Ut * bent, by_t, g, work)
+
+
+@inlined
+def _differentiate_by_chord(i: int, alpha: float, bent: float, by_t: float, g: float, work: Load) -> None:
+    """Fill row i of ∂q/∂d and of (∂q/∂t) t, of α, U_t k_n U_⊥/|U_⊥| and what stands before I in ∂q/∂t."""
+    V, J, t, across = work.velocity, work.water, work.tangent, work.across
+    x, y, z = t[0], t[1], t[2]
+    a = alpha * (V[0] - J[0]) - bent * across[0] + (by_t if i == 0 else 0.0)
+    b = alpha * (V[1] - J[1]) - bent * across[1] + (by_t if i == 1 else 0.0)
+    d = alpha * (V[2] - J[2]) - bent * across[2] + (by_t if i == 2 else 0.0)
+    along = a * x + b * y + d * z
+    work.q_tt[i] = along
+    work.q_d[i, 0] = (a - g * along * x) * work.shorter
+    work.q_d[i, 1] = (b - g * along * y) * work.shorter
+    work.q_d[i, 2] = (d - g * along * z) * work.shorter
 
 
 @inlined

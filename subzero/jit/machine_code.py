@@ -34,6 +34,7 @@ import numpy as np
 from numba.core.caching import _Cache
 from numba.core.compiler import CompileResult
 from numba.core.registry import cpu_target
+from numba.core.runtime import rtsys
 from numba.core.serialize import dumps
 from numba.core.sigutils import normalize_signature
 
@@ -302,7 +303,9 @@ class MachineCode(_Cache):  # type: ignore[misc]  # numba has no types
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Return what was kept for a signature; None if it has to be compiled."""
         heed()
-        target_context.refresh()
+        # What kept code calls. What a compiler looks up besides, and takes a quarter of a second to import, it looks
+        # up itself.
+        rtsys.initialize(target_context)
         name = self._name(sig, target_context.codegen())
         code = self._home.read(name)
         if code is None and self._home.path is not None and is_delivered(self._home.path / name, heed):

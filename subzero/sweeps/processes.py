@@ -268,13 +268,9 @@ def serve_forks() -> NoReturn:
 
 
 def _load() -> None:
-    """Import what every member needs, and what numba looks up before it loads compiled code: the parent still plans."""
+    """Import what every member needs: the parent still plans."""
     with _all_stays():
-        from numba.core.registry import cpu_target
-
         import subzero.simulation  # noqa: F401
-
-        cpu_target.target_context.refresh()
 
 
 @contextmanager

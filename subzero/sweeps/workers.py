@@ -18,6 +18,7 @@ import threading
 from collections.abc import Callable
 from concurrent.futures import Executor, Future
 from contextlib import suppress
+from pathlib import Path
 from typing import Any
 
 import cloudpickle
@@ -27,6 +28,13 @@ from subzero.sweeps.processes import FORKS, ForkServer, ForkServerError, Worker,
 
 MOST_FALSE_STARTS = 3
 """A process that ends before it is ready, by itself so many times in a row, will never be. [-]"""
+
+
+def rehearse_file(spec: Path) -> None:
+    """Read the sweep that a file asks for and rehearse a member of it, while its parent reads the same file."""
+    from subzero.sweeps.plan import read_plan
+
+    read_plan(spec).job.rehearse()
 
 
 def cores() -> int:

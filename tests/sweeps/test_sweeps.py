@@ -12,6 +12,7 @@ import re
 import signal
 import sqlite3
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from functools import partial
 
 import numpy as np
 import pytest
@@ -31,7 +32,7 @@ from subzero.sweeps.processes import FORKS
 from subzero.sweeps.result import MOST_DRAWN, Gathered, _drawn, write_result
 from subzero.sweeps.schedule import MOST_DEATHS, Schedule
 from subzero.sweeps.sensitivity import effects_of
-from subzero.sweeps.workers import WorkerDiedError, WorkerPool
+from subzero.sweeps.workers import WorkerDiedError, WorkerPool, rehearse_file
 
 SHORT = {"run.duration_s": 2.0, "run.rtol": 0.0}
 LENGTHS = [0.0, 5.0, 10.0]
@@ -387,6 +388,21 @@ def test_processes_have_what_was_rehearsed_and_outlive_what_they_come_from():
         pool.submit(_end_yourself)
         pool.prepare(_end_yourself)  # a rehearsal that dies costs no task
         assert pool.submit(abs, -2).result() == 2
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+@pytest.mark.skipif(not FORKS, reason="elsewhere each process is a Python of its own")
+def test_workers_of_a_command_have_run_a_member_of_its_file_before_their_first(tmp_path):
+    spec, pool = tmp_path / "lengths.toml", WorkerPool(1)
+    spec.write_text('trial = "fig6"\n[parameters]\n"start.wet_length_m" = [0.0, 5.0]\n')
+    loaded = "len(__import__('subzero.engine.time_loop').engine.time_loop.run_rows.overloads)"
+    try:
+        pool.prepare(
+            partial(rehearse_file, tmp_path / "missing.toml")
+        )  # what is wrong with a file, its parent says
+        pool.prepare(partial(rehearse_file, spec))
+        assert pool.submit(eval, loaded).result() == 1
     finally:
         pool.shutdown(cancel_futures=True)
 
