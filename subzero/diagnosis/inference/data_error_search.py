@@ -1,9 +1,9 @@
 """Which errors in the data are suspected: a search forward and back, in the linear problem, before anything is fitted.
 
 Forward: the best suspect of `data_error_scan` is corrected, and the scan goes on with the corrected record, until it
-finds none. Back: each error is judged again with all others corrected, and its numbers are found anew; what is not
-needed any more is dropped, the weakest first. So the first of two errors, which may have looked like something else
-while the second was there, is judged as the second is: by what it adds.
+finds none. Back: each error is judged again in its place, with all others corrected, and its numbers are found anew;
+what is not needed any more is dropped, the weakest first. So the first of two errors, which may have looked like
+something else while the second was there, is judged as the second is: by what it adds.
 
 How far physics comes towards a record without them is looked at before any search, too:
 
@@ -18,7 +18,7 @@ is.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import NamedTuple
 
@@ -47,7 +47,7 @@ from subzero.diagnosis.inference.data_error_yardstick import (
     yardstick_of,
 )
 from subzero.diagnosis.inference.linear_gaussian import ForceInformation, Posterior, freed, seen
-from subzero.diagnosis.inference.posing import pose, posed_again
+from subzero.diagnosis.inference.posing import posed_again
 from subzero.diagnosis.inference.problem import Problem
 from subzero.diagnosis.inference.repeated_values import is_rounded, repeated_values
 
@@ -134,32 +134,21 @@ def suspected(problem: Problem, records: Sequence[Logged]) -> Suspicion:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Bench:
-    """A record as it is, and what it is judged by, for each of the commands that it may have been flown with.
+    """A record as it is, and what it is judged by.
 
     Attributes:
         begun: its yardstick as it is.
-        under: commands → a yardstick under them.
     """
 
     begun: Yardstick
-    under: dict[bytes, Yardstick] = field(default_factory=dict)
 
-    def without(self, errors: Sequence[DataError]) -> Yardstick:
-        """Return what the record is judged by without some errors; with other commands it has sensitivities of its
-        own.
+    def without(self, errors: Sequence[DataError], place: int | None = None) -> Yardstick:
+        """Return what the record is judged by without some errors, and by a further one in a place among them; with
+        other commands it has sensitivities of its own.
         """
-        written = self.begun.written
-        logged = corrected(written, tuple(errors))
-        commands = logged.setting.trial.commands
-        base = self.begun
-        if commands is not written.setting.trial.commands and commands is not None:
-            key = commands.values.tobytes()
-            if key not in self.under:
-                self.under[key] = yardstick_of(pose([logged]), 0, logged)
-            base = self.under[key]
-        return replace(
-            base, logged=logged, written=written, repeated=self.begun.repeated, corrected=tuple(errors)
-        )
+        base, logged = self.begun, corrected(self.begun.written, tuple(errors))
+        return replace(base.under(logged), written=base.written, repeated=base.repeated, corrected=tuple(errors),
+                       place=place)  # fmt: skip
 
 
 class _Judged(NamedTuple):
@@ -216,9 +205,8 @@ def _back(bench: _Bench, read_off: Sequence[DataError], found: list[_Judged]) ->
 def _again(bench: _Bench, read_off: Sequence[DataError], found: Sequence[_Judged], i: int) -> _Judged:
     """Return one of some errors, judged with all others corrected."""
     others = [one.suspect.error for k, one in enumerate(found) if k != i]
-    return found[i]._replace(
-        suspect=judged_again(bench.without([*read_off, *others]), found[i].suspect.error)
-    )
+    after = bench.without([*read_off, *others], len(read_off) + i)
+    return found[i]._replace(suspect=judged_again(after, found[i].suspect.error))
 
 
 def _clear(

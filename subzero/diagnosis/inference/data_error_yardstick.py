@@ -6,7 +6,8 @@ cannot follow makes a channel count for less, and not the others bend:
 
     G = max over s of  log N(W y; W h, s² I + J D Jᵀ) − Σ n_c log s_c,      D = (max(size of a cause, 4 τ))²
 
-Beside it stands the evidence of nothing and of single causes within wide tolerances. Only other commands are simulated.
+Beside it stands the evidence of nothing and of single causes within wide tolerances. Only other commands are simulated:
+at first the nominal model alone, and with all sensitivities where they may be the right ones.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from subzero.diagnosis.hypothesis.hypotheses import PRIOR, columns_of, nameable,
 from subzero.diagnosis.hypothesis.logged import Logged
 from subzero.diagnosis.inference.linear_gaussian import KAPPAS, Posterior, freed, log_sum
 from subzero.diagnosis.inference.noise import Noise, spikes, usual_noise, usual_of
+from subzero.diagnosis.inference.posing import pose
 from subzero.diagnosis.inference.problem import Problem
 from subzero.diagnosis.inference.simulator import Track, simulate_track
 
@@ -79,7 +81,9 @@ class Yardstick:
         setting: of its simulations.
         repeated: values that it repeats, which may be a channel that is rounded and stands still.
         corrected: errors that are corrected in it already.
+        place: among those, where a further error is undone; behind them all if not given.
         kept: predictions under other commands.
+        others: commands → what is judged by under them, with sensitivities of its own.
     """
 
     logged: Logged
@@ -93,13 +97,39 @@ class Yardstick:
     setting: Setting
     repeated: tuple[DataError, ...] = ()
     corrected: tuple[DataError, ...] = ()
+    place: int | None = None
     kept: dict[str, Mapping[str, np.ndarray]] = field(default_factory=dict)
+    others: dict[bytes, Yardstick] = field(default_factory=dict)
 
     def without(self, error: DataError) -> Logged:
         """Return the record without a further error: a value that it repeats stands at the times that were written."""
-        if error.kind in REPEATED and self.corrected:
-            return corrected(self.written, (*self.corrected, error))
-        return error.corrected(self.logged)
+        if self.is_last(error):
+            return error.corrected(self.logged)
+        return corrected(self.written, (*self.corrected[: self.place], error, *self._later))
+
+    def is_last(self, error: DataError) -> bool:
+        """Say whether a further error is undone behind all that are corrected."""
+        return not self._later and not (error.kind in REPEATED and self.corrected)
+
+    @property
+    def _later(self) -> tuple[DataError, ...]:
+        """Return what is corrected behind a further error."""
+        return () if self.place is None else self.corrected[self.place :]
+
+    @property
+    def time(self) -> np.ndarray:
+        """Return the times at which a further error stands (n,). [s]"""
+        return corrected(self.written, self.corrected[: self.place]).record.time
+
+    def under(self, logged: Logged) -> Yardstick:
+        """Return what a record is judged by under its own commands, if they are others than this one's."""
+        commands = logged.setting.trial.commands
+        if commands is self.logged.setting.trial.commands or commands is None:
+            return replace(self, logged=logged)
+        key = commands.values.tobytes()
+        if key not in self.others:
+            self.others[key] = yardstick_of(pose([logged]), 0, logged)
+        return replace(self.others[key], logged=logged, others=self.others)
 
     def terms(self, logged: Logged, channels: Iterable[str]) -> dict[str, Term]:
         """Return what channels of a record, or of a corrected one, say of the parameters."""

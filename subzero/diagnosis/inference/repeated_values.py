@@ -2,7 +2,8 @@
 
 A sensor's noise changes its value from sample to sample. So a run of L equal values among samples of which a share p
 repeat the one before has the probability p^(L−1), at each place. A run up to the end of the record is a frozen channel;
-others are drop-outs; and so is a value that comes again and again far from its neighbours, such as 0 or −999.
+others are drop-outs; and so is a value that comes again and again far from its neighbours, such as 0 or −999, or that
+comes back in several runs though nothing is rounded.
 
 A channel that is rounded and stands still repeats itself, too (`is_rounded`): there it is for the prediction to say,
 and for how often the channel flickers.
@@ -83,7 +84,7 @@ def is_rounded(error: DataError, logged: Logged) -> bool:
 
 def _of(name: str, time: np.ndarray, values: np.ndarray, level: float) -> list[DataError]:
     found = []
-    for value, at in _far_values(values, level).items():
+    for value, at in (_far_values(values, level) | _values_again(values, level)).items():
         found.append(
             DataError(kind="dropout", channels=(name,), how=f"{value + 0.0:.9g}", at=tuple(time[at].tolist()))
         )
@@ -125,6 +126,22 @@ def _far_values(values: np.ndarray, level: float) -> Mapping[float, np.ndarray]:
         if enough and np.any(far[2:] & far[1:-1] & far[:-2]):
             found[value], values = far, np.where(far, np.nan, values)
     return found
+
+
+def _values_again(values: np.ndarray, level: float) -> Mapping[float, np.ndarray]:
+    """Return value → where it stands for nothing (n,), of a channel that is not rounded: several runs of one value,
+    which no chance makes, are no measurement, however close to it the channel is.
+    """
+    known = np.flatnonzero(np.isfinite(values))
+    if known.size <= FEWEST_FROZEN:
+        return {}
+    runs = _runs(values[known])
+    unlikely = _unlikely(runs, known.size)
+    kept = np.repeat(~unlikely, runs.length)
+    if not unlikely.any() or resolution_of(values[known][kept], level) > 0.0:
+        return {}
+    again, times = np.unique(values[known][runs.first[unlikely]], return_counts=True)
+    return {value: values == value for value in again[times > 1].tolist()}
 
 
 def _is_far(value: float, at: int, values: np.ndarray, others: np.ndarray, level: float) -> bool:
