@@ -101,14 +101,22 @@ def suspects(yardstick: Yardstick, trusted: frozenset[str] = frozenset()) -> lis
     return sorted((one for one in found.values() if one.lead > 0.0), key=lambda one: -one.lead)
 
 
+def judged_as_it_is(yardstick: Yardstick, error: DataError) -> Suspect:
+    """Return how an error is judged in another record, or with others corrected."""
+    return _judged(yardstick, error, _group_of(yardstick, error), closer=True)
+
+
 def judged_again(yardstick: Yardstick, error: DataError) -> Suspect:
-    """Return how an error is judged in another record, or with others corrected; its number is found anew."""
-    group = next(
-        (one for one in possible(yardstick, frozenset()) if any(other.id == error.id for other in one.each)),
-        Group([error]),
-    )
-    one = _judged(yardstick, error, group, closer=True)
+    """Return the same with its numbers found anew."""
+    one, group = judged_as_it_is(yardstick, error), _group_of(yardstick, error)
     return _refined(yardstick, one, group) if group.step or error.kind == "step" else one
+
+
+def _group_of(yardstick: Yardstick, error: DataError) -> Group:
+    """Return the errors that share the probability of one, those that only the record itself tells by themselves."""
+    groups = possible(yardstick, frozenset())
+    found = (group for group in groups if any(one.id == error.id for one in group.each))
+    return next(found, Group([error]))
 
 
 def _is_known(error: DataError, known: Sequence[DataError]) -> bool:

@@ -38,6 +38,8 @@ more than that share: a hundredth costs less than 0.1 nats, as the best scales a
 never so small that a sample has more density than 1/q, which is a probability of 1."""
 OUTLIER_LOG_DENSITY = float(np.log(0.01 / 50.0))
 """Of a sample that is left out: one of a hundred, anywhere within fifty levels of the noise."""
+BESIDE_JUMP = 10
+"""So many samples before and after say how large a jump is."""
 CAUSES_TRIED = 3
 """So many causes, the most promising, have the scales of the noise found behind them."""
 
@@ -106,6 +108,14 @@ class Yardstick:
         if self.is_last(error):
             return error.corrected(self.logged)
         return corrected(self.written, (*self.corrected[: self.place], error, *self._later))
+
+    def after(self, errors: Sequence[DataError], place: int | None = None) -> Yardstick:
+        """Return what the record as it is written is judged by without some errors, and by a further one in a place
+        among them; with other commands it has sensitivities of its own.
+        """
+        base = self.under(corrected(self.written, tuple(errors)))
+        return replace(base, written=self.written, repeated=self.repeated, corrected=tuple(errors),
+                       place=place)  # fmt: skip
 
     def is_last(self, error: DataError) -> bool:
         """Say whether a further error is undone behind all that are corrected."""
@@ -195,6 +205,18 @@ class Yardstick:
         expected = self.at(self.nominal_of(self.logged)[name], time)
         values = turned(values, expected) if name == HEADING else values
         return values - expected - self.at(self.slopes[name], time) @ z
+
+    def by_whole_steps(self, error: DataError) -> DataError:
+        """Return a step in a rounded sensor, known but for whole steps, about as large as what the prediction leaves
+        jumps by.
+        """
+        (name,) = error.channels
+        deviations, time = self.deviations(name, self.as_is.z), self.logged.record.time
+        known = np.isfinite(deviations)
+        at, left = int(np.searchsorted(time[known], error.since)), deviations[known]
+        jump = np.median(left[at : at + BESIDE_JUMP]) - np.median(left[max(at - BESIDE_JUMP, 0) : at])
+        step = usual_of(name, self.logged.record.values[name], self.logged.noise).resolution
+        return replace(error, amount=error.amount + step * float(np.round((jump - error.amount) / step)))
 
     def generous(self, terms: Mapping[str, Term]) -> float:
         """Return the log evidence with all of physics at once."""
@@ -323,3 +345,37 @@ def shown_on_grid(setting: Setting, track: Track, names: Iterable[str]) -> dict[
     if setting.clock_offset:
         shown = {name: np.interp(grid - setting.clock_offset, grid, one) for name, one in shown.items()}
     return shown
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Linear:
+    """The linear problem of a record at the nominal model, whitened with the noise of usual sensors.
+
+    Attributes:
+        r: residual (m,).
+        J: sensitivities to what is free (m, k).
+        D: prior variances (k,).
+        own: channel → its rows.
+        bare: channel → what it says of nothing, but for its sums.
+    """
+
+    r: np.ndarray
+    J: np.ndarray
+    D: np.ndarray
+    own: Mapping[str, slice]
+    bare: Mapping[str, Term]
+
+    def reckoned(self) -> Reckoned:
+        """Return its evidence, with the scales of the noise that are best."""
+        return reckon({name: self._term(name, rows) for name, rows in self.own.items()}, self.D)
+
+    def _term(self, name: str, rows: slice) -> Term:
+        r, J = self.r[rows], self.J[rows]
+        return self.bare[name]._replace(A=J.T @ J, b=J.T @ r, rr=float(r @ r))
+
+    def scaled(self, scales: Mapping[str, float], values: np.ndarray) -> np.ndarray:
+        """Return values (m, …) in noise of these scales."""
+        found = values.copy()
+        for name, rows in self.own.items():
+            found[rows] /= scales[name]
+        return found
