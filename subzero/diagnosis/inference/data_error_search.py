@@ -17,8 +17,9 @@ is.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -296,7 +297,7 @@ class Further(NamedTuple):
 
     log_prior: float
     log_evidence: float
-    beside: Linear
+    beside: Callable[[], Linear]
 
 
 def most_of_physics(problem: Problem, record: int) -> float:
@@ -313,7 +314,7 @@ def most_of_physics(problem: Problem, record: int) -> float:
     for _ in range(MAX_CAUSES):
         further = [*_causes(problem, here, now), *_onsets(problem, here, now, begun)]
         one = max(further, key=lambda each: each.log_evidence + each.log_prior)
-        here, log_prior = one.beside, log_prior + one.log_prior
+        here, log_prior = one.beside(), log_prior + one.log_prior
         now = here.reckoned()
         if now.log + log_prior <= best:
             break
@@ -360,7 +361,7 @@ def _causes(problem: Problem, here: Linear, now: Reckoned) -> Iterator[Further]:
         D = here.D.copy()
         D[at] = wide[at]
         if not np.array_equal(D, here.D):
-            yield Further(price, freed(base, here.D, at, D[at])[0], replace(here, D=D))
+            yield Further(price, freed(base, here.D, at, D[at])[0], partial(replace, here, D=D))
 
 
 def _onsets(
@@ -377,5 +378,9 @@ def _onsets(
     for (effect, time), a, b in zip(begun, ends[:-1], ends[1:], strict=True):
         gain = gain_of(ForceInformation(data.M[a:b, a:b], data.q[a:b]), effect)[0]
         more = np.array([parameter.scale**2 for parameter in effect.parameters])
-        beside = replace(here, J=np.hstack([here.J, begun[effect, time]]), D=np.append(here.D, more))
-        yield Further(price, now.log + gain, beside)
+        yield Further(price, now.log + gain, partial(_with_columns, here, begun[effect, time], more))
+
+
+def _with_columns(here: Linear, C: np.ndarray, D: np.ndarray) -> Linear:
+    """Return a linear problem with further columns (m, p), and their prior variances (p,)."""
+    return replace(here, J=np.hstack([here.J, C]), D=np.append(here.D, D))
