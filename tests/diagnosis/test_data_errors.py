@@ -202,18 +202,6 @@ def test_an_error_that_physics_has_no_chance_against_is_corrected_before_anythin
 
 
 @pytest.mark.slow
-def test_a_command_with_the_other_sign_is_no_fin_that_jams_in_the_first_second():
-    """A port stern-plane that is said to have moved the other way in a random trial with rounded channels: a jam from
-    1 s on does much the same, and was told with certainty; nothing else explains what is left without the error.
-    """
-    record = data_errors.made(*data_errors.drawn(7401, 49)[48])
-    assert {one.id for one in record.errors} == {"command_sign:stern_plane_port"}
-    verdict = subzero.diagnose(record.logged, budget="verdict")
-    assert data_errors.is_right(record, verdict)
-    assert verdict.data_errors[0].probability > 0.95
-
-
-@pytest.mark.slow
 def test_what_the_user_vouches_for_is_not_called_an_error():
     wrong = EACH[2].planted(measured("fig6", 20252))
     trusted = dataclasses.replace(wrong, trusted=frozenset(CHANNELS))

@@ -106,6 +106,12 @@ def judged_as_it_is(yardstick: Yardstick, error: DataError) -> Suspect:
     return _judged(yardstick, error, _group_of(yardstick, error), closer=True)
 
 
+def likeliest(yardstick: Yardstick, errors: Sequence[DataError]) -> DataError:
+    """Return the most probable of errors that are read off a record, and may be as small as they are."""
+    group = Group(list(errors), is_read_off=True)
+    return max(errors, key=lambda one: _judged(yardstick, one, group, closer=True).lead)
+
+
 def judged_again(yardstick: Yardstick, error: DataError) -> Suspect:
     """Return the same with its numbers found anew."""
     one, group = judged_as_it_is(yardstick, error), _group_of(yardstick, error)
@@ -145,7 +151,8 @@ def _judged(yardstick: Yardstick, error: DataError, group: Group, *, closer: boo
     touched = list(yardstick.own) if is_of_all else list(error.channels)
     there = yardstick.under(logged) if closer and error.is_of_commands else yardstick
     terms = {**yardstick.own, **there.terms(logged, touched)}
-    if min(terms[name].samples for name in touched) < FEWEST or _is_small(yardstick, error):
+    is_small = not group.is_read_off and _is_small(yardstick, error)
+    if min(terms[name].samples for name in touched) < FEWEST or is_small:
         return Suspect(error, -np.inf, -np.inf)
     odds = log_prior(error, len(group.each))
     odds += error.log_jacobian * sum(terms[name].samples for name in error.channels if name in terms)
@@ -272,10 +279,13 @@ def _mean_number(seen: Sequence[Suspect]) -> float:
 
 
 class Group(NamedTuple):
-    """Errors of a kind that share its probability; `step` of a number that is tried on a grid, 0 if there is none."""
+    """Errors of a kind that share its probability; `step` of a number that is tried on a grid, 0 if there is none;
+    whether that there is one of them is read off the record.
+    """
 
     each: list[DataError]
     step: float = 0.0
+    is_read_off: bool = False
 
 
 def possible(yardstick: Yardstick, trusted: frozenset[str]) -> list[Group]:

@@ -33,6 +33,7 @@ from subzero.diagnosis.inference.data_error_scan import (
     Suspect,
     judged_again,
     judged_as_it_is,
+    likeliest,
     may_stand_still,
     suspects,
 )
@@ -148,7 +149,8 @@ def _of_record(problem: Problem, records: Sequence[Logged], record: int) -> list
     unclear = tuple(one for one in repeated if is_rounded(one, logged))
     begun = replace(yardstick_of(problem, record, logged), repeated=unclear)
     read_off = [one for one in repeated if not is_rounded(one, logged)]
-    read_off += [begun.by_whole_steps(one) for one in steps_off_grid(logged, logged.trusted)]
+    jumps = steps_off_grid(logged, logged.trusted)
+    read_off += [likeliest(begun, begun.by_whole_steps(one)) for one in jumps]
     found = _back(begun, read_off, _forward(begun, read_off, logged.trusted))
     made = [*(_Judged(Suspect(one, SIGNATURE_LEAD, SIGNATURE_LEAD), ()) for one in read_off), *found]
     against = _Against(problem=problem, records=records, record=record, begun=begun, read_off=len(read_off),

@@ -206,9 +206,9 @@ class Yardstick:
         values = turned(values, expected) if name == HEADING else values
         return values - expected - self.at(self.slopes[name], time) @ z
 
-    def by_whole_steps(self, error: DataError) -> DataError:
-        """Return a step in a rounded sensor, known but for whole steps, about as large as what the prediction leaves
-        jumps by.
+    def by_whole_steps(self, error: DataError) -> list[DataError]:
+        """Return a step in a rounded sensor, known but for whole steps, with amounts about as large as what the
+        prediction leaves jumps by.
         """
         (name,) = error.channels
         deviations, time = self.deviations(name, self.as_is.z), self.logged.record.time
@@ -216,7 +216,8 @@ class Yardstick:
         at, left = int(np.searchsorted(time[known], error.since)), deviations[known]
         jump = np.median(left[at : at + BESIDE_JUMP]) - np.median(left[max(at - BESIDE_JUMP, 0) : at])
         step = usual_of(name, self.logged.record.values[name], self.logged.noise).resolution
-        return replace(error, amount=error.amount + step * float(np.round((jump - error.amount) / step)))
+        near = float(np.round((jump - error.amount) / step))
+        return [replace(error, amount=error.amount + step * (near + k)) for k in (-1.0, 0.0, 1.0)]
 
     def generous(self, terms: Mapping[str, Term]) -> float:
         """Return the log evidence with all of physics at once."""
