@@ -159,15 +159,16 @@ def _far_values(values: np.ndarray, level: float) -> Mapping[float, np.ndarray]:
 
 def _values_again(values: np.ndarray, level: float) -> Mapping[float, np.ndarray]:
     """Return value → where it stands for nothing (n,), of a channel that is not rounded: several runs of one value,
-    which no chance makes, are no measurement, however close to it the channel is.
+    which no chance makes, are no measurement, however close to it the channel is. Of the others most are different.
     """
     known = np.flatnonzero(np.isfinite(values))
     if known.size <= FEWEST_FROZEN:
         return {}
     runs = _runs(values[known])
     unlikely = _unlikely(runs, known.size)
-    kept = np.repeat(~unlikely, runs.length)
-    if not unlikely.any() or resolution_of(values[known][kept], level) > 0.0:
+    kept = values[known][np.repeat(~unlikely, runs.length)]
+    is_fine = 2 * np.unique(kept).size > kept.size and resolution_of(values[known], level) == 0.0
+    if not unlikely.any() or not is_fine:
         return {}
     again, times = np.unique(values[known][runs.first[unlikely]], return_counts=True)
     return {value: values == value for value in again[times > 1].tolist()}
