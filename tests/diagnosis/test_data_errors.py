@@ -269,6 +269,16 @@ def test_a_rounded_depth_that_stands_still_before_an_outlier_stands_for_itself(o
     assert not [one for one in found if one.how]
 
 
+def test_zeros_of_a_rounded_yaw_rate_that_flickers_now_and_then_are_measured():
+    """In steps of 0.5 deg/s it is 0 nearly all along, and hardly anything else says that it is rounded."""
+    time, clean = np.arange(0.0, 40.0, 0.1), smooth()
+    rate = np.zeros(time.size)
+    rate[[40, 41, 200]] = 0.5
+    record = Record(source="made", time=time, values={"yaw_rate": rate})
+    found = repeated_values(dataclasses.replace(clean, record=record))
+    assert not [one for one in found if one.how]
+
+
 def test_a_log_that_shows_zeros_in_between_is_found_though_the_vehicle_began_at_rest():
     """Its first zeros are measured; and what it measures between two stretches of zeros is no drop-out."""
     time, clean = np.arange(0.0, 40.0, 0.1), smooth()

@@ -69,11 +69,23 @@ def may_be_named(errors: Sequence[SuspectedError], work: Findings) -> bool:
 
 def is_explained(work: Findings) -> bool:
     """Say whether one explanation leaves nothing but the noise of usual sensors."""
-    usual = all(noise.sd < LOUD * usual_of(name, one.values[name], one.known).level + noise.resolution
-                for one in work.problem.records for name, noise in one.noise.items())  # fmt: skip
-    return usual and (
+    return _is_quiet(work) and (
         not is_poor_fit(work.search.best().fit) or any(one.point for one in work.out_of_catalogue)
     )
+
+
+def _is_quiet(work: Findings) -> bool:
+    """Say whether the most probable explanation leaves no channel more than the noise of a usual sensor: the noise that
+    was estimated behind wide tolerances may be that of a misfit, which something explains by now.
+    """
+    problem, r = _best_residual(work)
+    for i, one in enumerate(problem.records):
+        for name, noise in one.noise.items():
+            left = min(float(np.sqrt(np.mean(_own(problem, r, i, name) ** 2))), 1.0)
+            most = LOUD * usual_of(name, one.values[name], one.known).level + noise.resolution
+            if noise.sd * left >= most:
+                return False
+    return True
 
 
 class Standing(NamedTuple):
@@ -209,8 +221,9 @@ def compared(suspicion: Suspicion, records: Sequence[Logged], look: Look) -> lis
     The records without what no vehicle does, and without what physics has no chance against, get a first look. If no
     causes explain what is left, within declared tolerances, so do those without more: at once where all errors together
     explain the records in the linear problem; else after a whole search, as something may have begun in mid-trial,
-    which looks like a step or a clock. The most probable is finished, then what is not hopelessly behind. While that is
-    not clear, records with more errors get the same.
+    which looks like a step or a clock. What begins in mid-trial, or a force, settles nothing where errors explain all,
+    either: a fin that jams in the first second does what a command with the other sign does. The most probable is
+    finished, then what is not hopelessly behind. While that is not clear, records with more errors get the same.
 
     Where even wide tolerances do not come close, a first look takes long: if nothing outside explains the records,
     those without more errors have theirs before it goes on.
@@ -253,7 +266,8 @@ class _Comparison:
         now = self._look_at(first, work, more if work.search.is_far and explain(errors) else [])
         new = self.tried[:]
         if not more or _is_settled(now.work):
-            self.tried[:], new, more = [now], [now], []
+            self.tried[:], new = [now], [now]
+            more = more[-1:] if explain(errors) and _is_outside(now.work) else []
         elif not explain(errors):
             self.look.finish(now.work)
             new, more = [], [] if is_explained(now.work) else more
@@ -334,6 +348,12 @@ def _is_settled(work: Findings) -> bool:
     if is_found(work.search, work.out_of_catalogue):
         return True
     return is_explained(work) and not work.search.is_poor()
+
+
+def _is_outside(work: Findings) -> bool:
+    """Say whether something that begins in mid-trial, or a force, is more probable than any causes."""
+    best = work.search.best().log_posterior
+    return any(one.log_posterior > best for one in work.out_of_catalogue)
 
 
 def _is_complete(tried: Sequence[Explained]) -> bool:

@@ -23,7 +23,6 @@ from subzero.diagnosis.hypothesis.data_error import (
     KINDS,
     LEAST,
     REFERENCES,
-    REPEATED,
     SWAPS,
     DataError,
 )
@@ -64,6 +63,8 @@ HOPELESS = -30.0
 """Nor is what is so much less probable than no error, with all of physics to help."""
 FINEST = 0.02
 """A number is found to this share of the step between those that were tried."""
+AS_GOOD = 0.5
+"""The mean of a number is told in place of the best where that is no more than so much more probable."""
 
 
 class Suspect(NamedTuple):
@@ -88,9 +89,8 @@ def suspects(yardstick: Yardstick, trusted: frozenset[str] = frozenset()) -> lis
         group = group._replace(each=[one for one in group.each if not _is_known(one, yardstick.corrected)])
         each = [_judged(yardstick, one, group) for one in group.each]
         rough += [(one, group) for one in (_peaks(each) if group.step else each)]
-    best = max((one.generous for one, _ in rough), default=-np.inf)
-    close = [(_closer(yardstick, one, group), group) for one, group in rough
-             if one.generous > max(HOPELESS, best - FAR_BEHIND)]  # fmt: skip
+    close = [(_judged(yardstick, one.error, group, closer=True), group) for one, group in rough
+             if one.generous > HOPELESS or _may_be_commanded(yardstick, one.error)]  # fmt: skip
     lead = max((one.lead for one, _ in close), default=-np.inf)
     found: dict[str, Suspect] = {}
     for one, group in close:
@@ -101,16 +101,28 @@ def suspects(yardstick: Yardstick, trusted: frozenset[str] = frozenset()) -> lis
     return sorted((one for one in found.values() if one.lead > 0.0), key=lambda one: -one.lead)
 
 
+def judged_as_it_is(yardstick: Yardstick, error: DataError) -> Suspect:
+    """Return how an error is judged in another record, or with others corrected."""
+    return _judged(yardstick, error, _group_of(yardstick, error), closer=True)
+
+
+def likeliest(yardstick: Yardstick, errors: Sequence[DataError]) -> DataError:
+    """Return the most probable of errors that are read off a record, and may be as small as they are."""
+    group = Group(list(errors), is_read_off=True)
+    return max(errors, key=lambda one: _judged(yardstick, one, group, closer=True).lead)
+
+
 def judged_again(yardstick: Yardstick, error: DataError) -> Suspect:
-    """Return how an error is judged in another record, or with others corrected; its number is found anew."""
-    group = next(
-        (one for one in possible(yardstick, frozenset()) if any(other.id == error.id for other in one.each)),
-        Group([error]),
-    )
-    one = _judged(yardstick, error, group, closer=True)
-    if group.step:
-        return best_number(partial(_judged, yardstick, group=group, closer=True), one, 0.5 * group.step)
-    return one
+    """Return the same with its numbers found anew."""
+    one, group = judged_as_it_is(yardstick, error), _group_of(yardstick, error)
+    return _refined(yardstick, one, group) if group.step or error.kind == "step" else one
+
+
+def _group_of(yardstick: Yardstick, error: DataError) -> Group:
+    """Return the errors that share the probability of one, those that only the record itself tells by themselves."""
+    groups = possible(yardstick, frozenset())
+    found = (group for group in groups if any(one.id == error.id for one in group.each))
+    return next(found, Group([error]))
 
 
 def _is_known(error: DataError, known: Sequence[DataError]) -> bool:
@@ -135,19 +147,21 @@ def log_prior(error: DataError, alike: int) -> float:
 def _judged(yardstick: Yardstick, error: DataError, group: Group, *, closer: bool = False) -> Suspect:
     """Return by how much a record is more probable with an error in its data than without."""
     logged = yardstick.without(error)
-    is_of_all = error.is_of_clock or error.is_of_commands or (error.kind in REPEATED and yardstick.corrected)
+    is_of_all = error.is_of_clock or error.is_of_commands or not yardstick.is_last(error)
     touched = list(yardstick.own) if is_of_all else list(error.channels)
-    terms = {**yardstick.own, **yardstick.terms(logged, touched)}
-    if min(terms[name].samples for name in touched) < FEWEST or _is_small(yardstick, error):
+    there = yardstick.under(logged) if closer and error.is_of_commands else yardstick
+    terms = {**yardstick.own, **there.terms(logged, touched)}
+    is_small = not group.is_read_off and _is_small(yardstick, error)
+    if min(terms[name].samples for name in touched) < FEWEST or is_small:
         return Suspect(error, -np.inf, -np.inf)
     odds = log_prior(error, len(group.each))
-    odds += error.log_jacobian * sum(terms[name].samples for name in touched)
+    odds += error.log_jacobian * sum(terms[name].samples for name in error.channels if name in terms)
     generous = odds + _lost(yardstick, error, terms, yardstick.as_is)
-    generous += yardstick.generous(terms) - yardstick.as_is.log
+    generous += there.generous(terms) - yardstick.as_is.log
     if not closer:
         return Suspect(error, float(generous), float(generous))
     lead = odds + _lost(yardstick, error, terms, yardstick.likeliest)
-    lead += yardstick.sparse(terms) - yardstick.log_sparse
+    lead += there.sparse(terms) - yardstick.log_sparse
     return Suspect(error, float(lead), float(generous))
 
 
@@ -162,8 +176,14 @@ def _is_small(yardstick: Yardstick, error: DataError) -> bool:
     return abs(error.amount) < LEAST_STEP_LEVELS * np.hypot(usual.level, usual.resolution / np.sqrt(12.0))
 
 
-def _closer(yardstick: Yardstick, one: Suspect, group: Group) -> Suspect:
-    return _judged(yardstick, one.error, group, closer=True)
+def _may_be_commanded(yardstick: Yardstick, error: DataError) -> bool:
+    """Say whether the nominal model under other commands comes closer to a record: with the sensitivities under those
+    that are said to have been given, all of physics at once says little of others.
+    """
+    if not error.is_of_commands:
+        return False
+    terms = yardstick.terms(yardstick.without(error), yardstick.own)
+    return yardstick.sparse(terms) - yardstick.log_sparse > HOPELESS
 
 
 def may_stand_still(yardstick: Yardstick, error: DataError) -> bool:
@@ -212,7 +232,7 @@ def _refined(yardstick: Yardstick, one: Suspect, group: Group) -> Suspect:
     judge = partial(_judged, yardstick, group=group, closer=True)
     if group.step:
         return best_number(judge, one, group.step)
-    time = yardstick.logged.record.time
+    time = yardstick.time
     at, span = int(np.searchsorted(time, one.error.since)), max(time.size // STEP_TIMES, 1)
     around = time[max(at - span, 1) : at + span + 1 : max(span // 4, 1)]
     for _ in range(2):
@@ -225,29 +245,47 @@ def _refined(yardstick: Yardstick, one: Suspect, group: Group) -> Suspect:
 
 
 def best_number(judge: Callable[[DataError], Suspect], one: Suspect, step: float) -> Suspect:
-    """Return an error with the number between amount ± step that is judged best (golden section)."""
+    """Return an error with the number between amount ± step that is judged best (golden section); where others are
+    about as good, with their mean.
+    """
     ratio = 0.5 * (np.sqrt(5.0) - 1.0)
-    low, high, best = one.error.amount - step, one.error.amount + step, one
-    inner = [
-        judge(replace(one.error, amount=float(x)))
-        for x in (high - ratio * step * 2.0, low + ratio * step * 2.0)
-    ]
+
+    def at(amount: float) -> Suspect:
+        return judge(replace(one.error, amount=float(amount)))
+
+    low, high = one.error.amount - step, one.error.amount + step
+    inner = [at(high - ratio * step * 2.0), at(low + ratio * step * 2.0)]
+    seen = [one, *inner]
     while high - low > FINEST * step:
-        best = max([best, *inner], key=lambda each: each.lead)
         if inner[0].lead > inner[1].lead:
             high = inner[1].error.amount
-            inner = [judge(replace(one.error, amount=float(high - ratio * (high - low)))), inner[0]]
+            inner = [at(high - ratio * (high - low)), inner[0]]
+            seen.append(inner[0])
         else:
             low = inner[0].error.amount
-            inner = [inner[1], judge(replace(one.error, amount=float(low + ratio * (high - low))))]
-    return max([best, *inner], key=lambda each: each.lead)
+            inner = [inner[1], at(low + ratio * (high - low))]
+            seen.append(inner[1])
+    seen += [at(one.error.amount + share * step) for share in (-1.0, -0.5, 0.5, 1.0)]
+    best, mean = max(seen, key=lambda each: each.lead), at(_mean_number(seen))
+    return mean if mean.lead > best.lead - AS_GOOD else best
+
+
+def _mean_number(seen: Sequence[Suspect]) -> float:
+    """Return the mean of a number, by what is judged of some of its values (trapezoidal rule)."""
+    row = sorted({one.error.amount: one.lead for one in seen}.items())
+    x, lead = np.array(row).T
+    density = np.exp(lead - lead.max())
+    return float(np.trapezoid(density * x, x) / np.trapezoid(density, x))
 
 
 class Group(NamedTuple):
-    """Errors of a kind that share its probability; `step` of a number that is tried on a grid, 0 if there is none."""
+    """Errors of a kind that share its probability; `step` of a number that is tried on a grid, 0 if there is none;
+    whether that there is one of them is read off the record.
+    """
 
     each: list[DataError]
     step: float = 0.0
+    is_read_off: bool = False
 
 
 def possible(yardstick: Yardstick, trusted: frozenset[str]) -> list[Group]:

@@ -1,9 +1,9 @@
 """Which errors in the data are suspected: a search forward and back, in the linear problem, before anything is fitted.
 
 Forward: the best suspect of `data_error_scan` is corrected, and the scan goes on with the corrected record, until it
-finds none. Back: each error is judged again with all others corrected, and its numbers are found anew; what is not
-needed any more is dropped, the weakest first. So the first of two errors, which may have looked like something else
-while the second was there, is judged as the second is: by what it adds.
+finds none. Back: each error is judged again in its place, with all others corrected, and its numbers are found anew;
+what is not needed any more is dropped, the weakest first. So the first of two errors, which may have looked like
+something else while the second was there, is judged as the second is: by what it adds.
 
 How far physics comes towards a record without them is looked at before any search, too:
 
@@ -17,7 +17,7 @@ is.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import NamedTuple
@@ -32,24 +32,26 @@ from subzero.diagnosis.inference.data_error_scan import (
     FAR_BEHIND,
     Suspect,
     judged_again,
+    judged_as_it_is,
+    likeliest,
     may_stand_still,
     suspects,
 )
 from subzero.diagnosis.inference.data_error_yardstick import (
     KAPPA_NARROW,
+    Linear,
     Reckoned,
     Term,
     Yardstick,
     generous_variances,
     least_scale,
-    reckon,
     to_usual_sizes,
     yardstick_of,
 )
 from subzero.diagnosis.inference.linear_gaussian import ForceInformation, Posterior, freed, seen
-from subzero.diagnosis.inference.posing import pose, posed_again
+from subzero.diagnosis.inference.posing import posed_again
 from subzero.diagnosis.inference.problem import Problem
-from subzero.diagnosis.inference.repeated_values import is_rounded, repeated_values
+from subzero.diagnosis.inference.repeated_values import is_rounded, repeated_values, steps_off_grid
 
 MOST_ERRORS = 3
 """Of a record, beside values that are repeated."""
@@ -73,7 +75,7 @@ class SuspectedError:
     """An error of a record, its leads with all others corrected, and those that the record cannot tell from it; `left`
     is the noise of the channel that is explained worst without all of them, in usual levels, with all of physics to
     help; `is_clear` says that it leaves physics no chance in the linear problem; `may_stand_still` that a channel
-    that seems to be frozen is rounded.
+    that seems to be frozen is rounded; `is_read_off` that it is read off the record's values.
     """
 
     record: int
@@ -84,11 +86,12 @@ class SuspectedError:
     left: float = np.inf
     is_clear: bool = False
     may_stand_still: bool = False
+    is_read_off: bool = False
 
 
 def is_soft(one: SuspectedError) -> bool:
-    """Say whether something that a vehicle does may look like an error."""
-    return one.error.kind in SOFT
+    """Say whether something that a vehicle does may look like an error: not like one that the values tell."""
+    return one.error.kind in SOFT and not one.is_read_off
 
 
 def explain(errors: Sequence[SuspectedError]) -> bool:
@@ -132,36 +135,6 @@ def suspected(problem: Problem, records: Sequence[Logged]) -> Suspicion:
     return Suspicion(errors=tuple(one for found in each for one in found))
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Bench:
-    """A record as it is, and what it is judged by, for each of the commands that it may have been flown with.
-
-    Attributes:
-        begun: its yardstick as it is.
-        under: commands → a yardstick under them.
-    """
-
-    begun: Yardstick
-    under: dict[bytes, Yardstick] = field(default_factory=dict)
-
-    def without(self, errors: Sequence[DataError]) -> Yardstick:
-        """Return what the record is judged by without some errors; with other commands it has sensitivities of its
-        own.
-        """
-        written = self.begun.written
-        logged = corrected(written, tuple(errors))
-        commands = logged.setting.trial.commands
-        base = self.begun
-        if commands is not written.setting.trial.commands and commands is not None:
-            key = commands.values.tobytes()
-            if key not in self.under:
-                self.under[key] = yardstick_of(pose([logged]), 0, logged)
-            base = self.under[key]
-        return replace(
-            base, logged=logged, written=written, repeated=self.begun.repeated, corrected=tuple(errors)
-        )
-
-
 class _Judged(NamedTuple):
     """An error with its leads, and what the record cannot tell from it."""
 
@@ -173,27 +146,32 @@ def _of_record(problem: Problem, records: Sequence[Logged], record: int) -> list
     """Return the errors that a record may have."""
     logged = records[record]
     repeated = repeated_values(logged, logged.trusted)
-    read_off = [one for one in repeated if not is_rounded(one, logged)]
     unclear = tuple(one for one in repeated if is_rounded(one, logged))
-    bench = _Bench(begun=replace(yardstick_of(problem, record, logged), repeated=unclear))
-    found = _back(bench, read_off, _forward(bench, read_off, logged.trusted))
-    errors = [*read_off, *(one.suspect.error for one in found)]
-    left = max(bench.without(errors).as_is.scales.values(), default=np.inf) if found else 0.0
+    begun = replace(yardstick_of(problem, record, logged), repeated=unclear)
+    read_off = [one for one in repeated if not is_rounded(one, logged)]
+    jumps = steps_off_grid(logged, logged.trusted)
+    read_off += [likeliest(begun, begun.by_whole_steps(one)) for one in jumps]
+    found = _back(begun, read_off, _forward(begun, read_off, logged.trusted))
     made = [*(_Judged(Suspect(one, SIGNATURE_LEAD, SIGNATURE_LEAD), ()) for one in read_off), *found]
-    clear = _clear(problem, records, record, bench, made)
+    against = _Against(problem=problem, records=records, record=record, begun=begun, read_off=len(read_off),
+                       errors=tuple(one.suspect.error for one in made))  # fmt: skip
+    if against.few_causes_explain_more():
+        made = [one for one in made if not any(one.suspect.error is soft for soft in against.soft)]
+        against = replace(against, errors=tuple(one.suspect.error for one in made), kept={})
+    left, clear = against.left if found else 0.0, _clear(against, [one.suspect for one in made])
     return [
         SuspectedError(record=record, error=one.error, lead=one.lead, generous=one.generous, alike=alike,
                        left=left, is_clear=any(one.error is other for other in clear),
-                       may_stand_still=may_stand_still(bench.begun, one.error))
-        for one, alike in made
+                       may_stand_still=may_stand_still(begun, one.error), is_read_off=i < len(read_off))
+        for i, (one, alike) in enumerate(made)
     ]  # fmt: skip
 
 
-def _forward(bench: _Bench, read_off: Sequence[DataError], trusted: frozenset[str]) -> list[_Judged]:
+def _forward(begun: Yardstick, read_off: Sequence[DataError], trusted: frozenset[str]) -> list[_Judged]:
     """Return the errors that come out best one after the other, each with those before it corrected."""
     found = list[_Judged]()
     for _ in range(MOST_ERRORS):
-        ranked = suspects(bench.without([*read_off, *(one.suspect.error for one in found)]), trusted)
+        ranked = suspects(begun.after([*read_off, *(one.suspect.error for one in found)]), trusted)
         if not ranked or not _is_suspected(ranked[0]):
             break
         alike = tuple(one.error for one in ranked[1:] if one.lead > ranked[0].lead - ALIKE_LEAD)
@@ -201,11 +179,11 @@ def _forward(bench: _Bench, read_off: Sequence[DataError], trusted: frozenset[st
     return found
 
 
-def _back(bench: _Bench, read_off: Sequence[DataError], found: list[_Judged]) -> list[_Judged]:
+def _back(begun: Yardstick, read_off: Sequence[DataError], found: list[_Judged]) -> list[_Judged]:
     """Return the errors that are still needed with all others corrected, judged so."""
     last = len(found) - 1  # is judged so already
     while len(found) > 1:
-        found = [one if i == last else _again(bench, read_off, found, i) for i, one in enumerate(found)]
+        found = [one if i == last else _again(begun, read_off, found, i) for i, one in enumerate(found)]
         weakest = min(found, key=lambda one: one.suspect.lead - _least(one.suspect))
         if _is_suspected(weakest.suspect):
             break
@@ -213,51 +191,91 @@ def _back(bench: _Bench, read_off: Sequence[DataError], found: list[_Judged]) ->
     return found
 
 
-def _again(bench: _Bench, read_off: Sequence[DataError], found: Sequence[_Judged], i: int) -> _Judged:
+def _again(begun: Yardstick, read_off: Sequence[DataError], found: Sequence[_Judged], i: int) -> _Judged:
     """Return one of some errors, judged with all others corrected."""
     others = [one.suspect.error for k, one in enumerate(found) if k != i]
-    return found[i]._replace(
-        suspect=judged_again(bench.without([*read_off, *others]), found[i].suspect.error)
-    )
+    after = begun.after([*read_off, *others], len(read_off) + i)
+    return found[i]._replace(suspect=judged_again(after, found[i].suspect.error))
 
 
-def _clear(
-    problem: Problem, records: Sequence[Logged], record: int, bench: _Bench, made: Sequence[_Judged]
-) -> list[DataError]:
-    """Return the errors that leave physics no chance in the linear problem. One that a vehicle may look like must also
-    explain all that is there, and without the help of any that is not clear: what broke in mid-trial makes an error of
-    a clock likely, too, but that leaves more than noise, or needs another one. So may a rounded channel stand still
-    since something broke.
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Against:
+    """The suspected errors of a record, in the order in which they are undone, and a few causes that they are held
+    against.
+
+    Attributes:
+        problem: of all records, as posed.
+        records: as they are.
+        record: its number.
+        begun: its yardstick as it is.
+        errors: all of them.
+        read_off: so many of them, the first, are read off the record's values.
+        kept: errors that were corrected → what a few causes do beside them.
     """
-    ahead = partial(_lead_over_few, problem, records, record, bench)
-    firm = [one for one, _ in made if one.error.kind not in SOFT]
-    held = [one.error for one in firm]
+
+    problem: Problem
+    records: Sequence[Logged]
+    record: int
+    begun: Yardstick
+    errors: tuple[DataError, ...]
+    read_off: int
+    kept: dict[tuple[int, ...], float] = field(default_factory=dict)
+
+    @property
+    def left(self) -> float:
+        """The noise of the channel that is explained worst without all of them, in usual levels."""
+        return max(self.begun.after(self.errors).as_is.scales.values(), default=np.inf)
+
+    @property
+    def soft(self) -> list[DataError]:
+        """Those that something a vehicle does may look like."""
+        return [one for one in self.errors[self.read_off :] if one.kind in SOFT]
+
+    def few_causes_explain_more(self) -> bool:
+        """Say whether soft errors, with a few causes beside them, are far behind a few causes in their place."""
+        some = self.soft
+        return bool(some) and self.lead(some) + self._few_beside(self.errors) < -FAR_BEHIND
+
+    def lead(self, some: Sequence[DataError]) -> float:
+        """Return by how much some errors are more probable than a few causes, with all others corrected."""
+        held = [one for one in self.errors if not any(one is other for other in some)]
+        lead = -self._few_beside(held)
+        for one in some:
+            place = sum(self._at(other) < self._at(one) for other in held)
+            lead += judged_as_it_is(self.begun.after(held, place), one).lead
+            held.insert(place, one)
+        return lead
+
+    def _at(self, one: DataError) -> int:
+        return next(i for i, other in enumerate(self.errors) if other is one)
+
+    def _few_beside(self, held: Sequence[DataError]) -> float:
+        """Return by how much a few causes are more probable than at most one, where errors are corrected."""
+        key = tuple(self._at(one) for one in held)
+        if key not in self.kept:
+            after = self.begun.after(held)
+            each = [after.logged if i == self.record else one for i, one in enumerate(self.records)]
+            most = most_of_physics(posed_again(self.problem, each), self.record)
+            self.kept[key] = most + after.log_none - after.log_sparse
+        return self.kept[key]
+
+
+def _clear(against: _Against, made: Sequence[Suspect]) -> list[DataError]:
+    """Return the errors that leave physics no chance in the linear problem. Those that a vehicle may look like must
+    also explain all that is there, and be far before a few causes together and each: what broke in mid-trial makes an
+    error of a clock likely, too. So may a rounded channel stand still since something broke. A step is never clear, as
+    a force or a drift may be as sudden.
+    """
+    soft = against.soft
+    firm = [one for one in made if not any(one.error is each for each in soft)]
     clear = [one.error for one in firm if one.lead > CLEAR_LEAD and one.generous > CLEAR_GENEROUS_LEAD]
-    clear = [one for one in clear if not may_stand_still(bench.begun, one)
-             or ahead(one, [other.error for other, _ in made if other.error is not one]) > CLEAR_LEAD]  # fmt: skip
-    for one in sorted((one for one, _ in made if one.error.kind in SOFT), key=lambda each: -each.lead):
-        after = bench.without([*held, one.error])
-        if one.error.kind == "step" or one.lead < FAR_BEHIND or max(after.as_is.scales.values()) >= LOUD:
-            break
-        if ahead(one.error, held) < FAR_BEHIND:
-            break
-        held, clear = [*held, one.error], [*clear, one.error]
-    return clear
-
-
-def _lead_over_few(
-    problem: Problem,
-    records: Sequence[Logged],
-    record: int,
-    bench: _Bench,
-    error: DataError,
-    others: Sequence[DataError],
-) -> float:
-    """Return by how much a record is more probable with an error than with a few causes, where others are corrected."""
-    before = bench.without(others)
-    each = [before.logged if i == record else one for i, one in enumerate(records)]
-    over_none = judged_again(before, error).lead + before.log_sparse - before.log_none
-    return over_none - most_of_physics(posed_again(problem, each), record)
+    clear = [one for one in clear if not may_stand_still(against.begun, one)
+             or against.lead([one]) > CLEAR_LEAD]  # fmt: skip
+    likely = [one.error for one in made if one.lead > FAR_BEHIND and any(one.error is each for each in soft)]
+    likely = [one for one in likely if one.kind != "step"]
+    if not likely or against.left >= LOUD or against.lead(soft) < FAR_BEHIND:
+        return clear
+    return clear + [one for one in likely if len(soft) == 1 or against.lead([one]) > FAR_BEHIND]
 
 
 def _is_suspected(one: Suspect) -> bool:
@@ -276,46 +294,12 @@ def without(records: Sequence[Logged], found: Sequence[SuspectedError]) -> list[
     ]
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Linear:
-    """The linear problem of a record at the nominal model, whitened with the noise of usual sensors.
-
-    Attributes:
-        r: residual (m,).
-        J: sensitivities to what is free (m, k).
-        D: prior variances (k,).
-        own: channel → its rows.
-        bare: channel → what it says of nothing, but for its sums.
-    """
-
-    r: np.ndarray
-    J: np.ndarray
-    D: np.ndarray
-    own: Mapping[str, slice]
-    bare: Mapping[str, Term]
-
-    def reckoned(self) -> Reckoned:
-        """Return its evidence, with the scales of the noise that are best."""
-        return reckon({name: self._term(name, rows) for name, rows in self.own.items()}, self.D)
-
-    def _term(self, name: str, rows: slice) -> Term:
-        r, J = self.r[rows], self.J[rows]
-        return self.bare[name]._replace(A=J.T @ J, b=J.T @ r, rr=float(r @ r))
-
-    def scaled(self, scales: Mapping[str, float], values: np.ndarray) -> np.ndarray:
-        """Return values (m, …) in noise of these scales."""
-        found = values.copy()
-        for name, rows in self.own.items():
-            found[rows] /= scales[name]
-        return found
-
-
 class Further(NamedTuple):
     """A further term: its log prior, and about the log evidence with it; the linear problem then."""
 
     log_prior: float
     log_evidence: float
-    beside: Linear
+    beside: Callable[[], Linear]
 
 
 def most_of_physics(problem: Problem, record: int) -> float:
@@ -332,7 +316,7 @@ def most_of_physics(problem: Problem, record: int) -> float:
     for _ in range(MAX_CAUSES):
         further = [*_causes(problem, here, now), *_onsets(problem, here, now, begun)]
         one = max(further, key=lambda each: each.log_evidence + each.log_prior)
-        here, log_prior = one.beside, log_prior + one.log_prior
+        here, log_prior = one.beside(), log_prior + one.log_prior
         now = here.reckoned()
         if now.log + log_prior <= best:
             break
@@ -379,7 +363,7 @@ def _causes(problem: Problem, here: Linear, now: Reckoned) -> Iterator[Further]:
         D = here.D.copy()
         D[at] = wide[at]
         if not np.array_equal(D, here.D):
-            yield Further(price, freed(base, here.D, at, D[at])[0], replace(here, D=D))
+            yield Further(price, freed(base, here.D, at, D[at])[0], partial(replace, here, D=D))
 
 
 def _onsets(
@@ -396,5 +380,9 @@ def _onsets(
     for (effect, time), a, b in zip(begun, ends[:-1], ends[1:], strict=True):
         gain = gain_of(ForceInformation(data.M[a:b, a:b], data.q[a:b]), effect)[0]
         more = np.array([parameter.scale**2 for parameter in effect.parameters])
-        beside = replace(here, J=np.hstack([here.J, begun[effect, time]]), D=np.append(here.D, more))
-        yield Further(price, now.log + gain, beside)
+        yield Further(price, now.log + gain, partial(_with_columns, here, begun[effect, time], more))
+
+
+def _with_columns(here: Linear, C: np.ndarray, D: np.ndarray) -> Linear:
+    """Return a linear problem with further columns (m, p), and their prior variances (p,)."""
+    return replace(here, J=np.hstack([here.J, C]), D=np.append(here.D, D))

@@ -6,7 +6,8 @@ cannot follow makes a channel count for less, and not the others bend:
 
     G = max over s of  log N(W y; W h, s² I + J D Jᵀ) − Σ n_c log s_c,      D = (max(size of a cause, 4 τ))²
 
-Beside it stands the evidence of nothing and of single causes within wide tolerances. Only other commands are simulated.
+Beside it stands the evidence of nothing and of single causes within wide tolerances. Only other commands are simulated:
+at first the nominal model alone, and with all sensitivities where they may be the right ones.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from subzero.diagnosis.hypothesis.hypotheses import PRIOR, columns_of, nameable,
 from subzero.diagnosis.hypothesis.logged import Logged
 from subzero.diagnosis.inference.linear_gaussian import KAPPAS, Posterior, freed, log_sum
 from subzero.diagnosis.inference.noise import Noise, usual_noise, usual_of
-from subzero.diagnosis.inference.posing import spikes
+from subzero.diagnosis.inference.posing import pose, spikes
 from subzero.diagnosis.inference.problem import Problem
 from subzero.diagnosis.inference.simulator import Track, simulate_track
 
@@ -37,6 +38,8 @@ more than that share: a hundredth costs less than 0.1 nats, as the best scales a
 never so small that a sample has more density than 1/q, which is a probability of 1."""
 OUTLIER_LOG_DENSITY = float(np.log(0.01 / 50.0))
 """Of a sample that is left out: one of a hundred, anywhere within fifty levels of the noise."""
+BESIDE_JUMP = 10
+"""So many samples before and after say how large a jump is."""
 CAUSES_TRIED = 3
 """So many causes, the most promising, have the scales of the noise found behind them."""
 
@@ -80,7 +83,9 @@ class Yardstick:
         setting: of its simulations.
         repeated: values that it repeats, which may be a channel that is rounded and stands still.
         corrected: errors that are corrected in it already.
+        place: among those, where a further error is undone; behind them all if not given.
         kept: predictions under other commands.
+        others: commands → what is judged by under them, with sensitivities of its own.
     """
 
     logged: Logged
@@ -94,13 +99,47 @@ class Yardstick:
     setting: Setting
     repeated: tuple[DataError, ...] = ()
     corrected: tuple[DataError, ...] = ()
+    place: int | None = None
     kept: dict[str, Mapping[str, np.ndarray]] = field(default_factory=dict)
+    others: dict[bytes, Yardstick] = field(default_factory=dict)
 
     def without(self, error: DataError) -> Logged:
         """Return the record without a further error: a value that it repeats stands at the times that were written."""
-        if error.kind in REPEATED and self.corrected:
-            return corrected(self.written, (*self.corrected, error))
-        return error.corrected(self.logged)
+        if self.is_last(error):
+            return error.corrected(self.logged)
+        return corrected(self.written, (*self.corrected[: self.place], error, *self._later))
+
+    def after(self, errors: Sequence[DataError], place: int | None = None) -> Yardstick:
+        """Return what the record as it is written is judged by without some errors, and by a further one in a place
+        among them; with other commands it has sensitivities of its own.
+        """
+        base = self.under(corrected(self.written, tuple(errors)))
+        return replace(base, written=self.written, repeated=self.repeated, corrected=tuple(errors),
+                       place=place)  # fmt: skip
+
+    def is_last(self, error: DataError) -> bool:
+        """Say whether a further error is undone behind all that are corrected."""
+        return not self._later and not (error.kind in REPEATED and self.corrected)
+
+    @property
+    def _later(self) -> tuple[DataError, ...]:
+        """Return what is corrected behind a further error."""
+        return () if self.place is None else self.corrected[self.place :]
+
+    @property
+    def time(self) -> np.ndarray:
+        """Return the times at which a further error stands (n,). [s]"""
+        return corrected(self.written, self.corrected[: self.place]).record.time
+
+    def under(self, logged: Logged) -> Yardstick:
+        """Return what a record is judged by under its own commands, if they are others than this one's."""
+        commands = logged.setting.trial.commands
+        if commands is self.logged.setting.trial.commands or commands is None:
+            return replace(self, logged=logged)
+        key = commands.values.tobytes()
+        if key not in self.others:
+            self.others[key] = yardstick_of(pose([logged]), 0, logged)
+        return replace(self.others[key], logged=logged, others=self.others)
 
     def terms(self, logged: Logged, channels: Iterable[str]) -> dict[str, Term]:
         """Return what channels of a record, or of a corrected one, say of the parameters."""
@@ -166,6 +205,19 @@ class Yardstick:
         expected = self.at(self.nominal_of(self.logged)[name], time)
         values = turned(values, expected) if name == HEADING else values
         return values - expected - self.at(self.slopes[name], time) @ z
+
+    def by_whole_steps(self, error: DataError) -> list[DataError]:
+        """Return a step in a rounded sensor, known but for whole steps, with amounts about as large as what the
+        prediction leaves jumps by.
+        """
+        (name,) = error.channels
+        deviations, time = self.deviations(name, self.as_is.z), self.logged.record.time
+        known = np.isfinite(deviations)
+        at, left = int(np.searchsorted(time[known], error.since)), deviations[known]
+        jump = np.median(left[at : at + BESIDE_JUMP]) - np.median(left[max(at - BESIDE_JUMP, 0) : at])
+        step = usual_of(name, self.logged.record.values[name], self.logged.noise).resolution
+        near = float(np.round((jump - error.amount) / step))
+        return [replace(error, amount=error.amount + step * (near + k)) for k in (-1.0, 0.0, 1.0)]
 
     def generous(self, terms: Mapping[str, Term]) -> float:
         """Return the log evidence with all of physics at once."""
@@ -294,3 +346,37 @@ def shown_on_grid(setting: Setting, track: Track, names: Iterable[str]) -> dict[
     if setting.clock_offset:
         shown = {name: np.interp(grid - setting.clock_offset, grid, one) for name, one in shown.items()}
     return shown
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Linear:
+    """The linear problem of a record at the nominal model, whitened with the noise of usual sensors.
+
+    Attributes:
+        r: residual (m,).
+        J: sensitivities to what is free (m, k).
+        D: prior variances (k,).
+        own: channel → its rows.
+        bare: channel → what it says of nothing, but for its sums.
+    """
+
+    r: np.ndarray
+    J: np.ndarray
+    D: np.ndarray
+    own: Mapping[str, slice]
+    bare: Mapping[str, Term]
+
+    def reckoned(self) -> Reckoned:
+        """Return its evidence, with the scales of the noise that are best."""
+        return reckon({name: self._term(name, rows) for name, rows in self.own.items()}, self.D)
+
+    def _term(self, name: str, rows: slice) -> Term:
+        r, J = self.r[rows], self.J[rows]
+        return self.bare[name]._replace(A=J.T @ J, b=J.T @ r, rr=float(r @ r))
+
+    def scaled(self, scales: Mapping[str, float], values: np.ndarray) -> np.ndarray:
+        """Return values (m, …) in noise of these scales."""
+        found = values.copy()
+        for name, rows in self.own.items():
+            found[rows] /= scales[name]
+        return found

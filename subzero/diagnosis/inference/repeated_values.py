@@ -2,7 +2,11 @@
 
 A sensor's noise changes its value from sample to sample. So a run of L equal values among samples of which a share p
 repeat the one before has the probability p^(L−1), at each place. A run up to the end of the record is a frozen channel;
-others are drop-outs; and so is a value that comes again and again far from its neighbours, such as 0 or −999.
+others are drop-outs; and so is a value that comes again and again far from its neighbours, such as 0 or −999, or that
+comes back in several runs though nothing is rounded.
+
+A rounded channel whose values from a sample on lie beside the multiples of before jumps: no motion does that
+(`steps_off_grid`).
 
 A channel that is rounded and stands still repeats itself, too (`is_rounded`): there it is for the prediction to say,
 and for how often the channel flickers.
@@ -53,6 +57,8 @@ OUTLIERS, OUTLIER_LEVELS = 0.01, 50.0
 """So many samples are anywhere within so many usual levels: with less than that probability nothing is ruled out."""
 IMPROBABLE = 1e-300
 """What is less probable is as improbable as that."""
+OFF_GRID = 0.02
+"""A value is off the multiples of a channel's steps by more than that share of a step. [-]"""
 
 
 class Repeats(NamedTuple):
@@ -73,6 +79,30 @@ def repeated_values(logged: Logged, trusted: frozenset[str] = frozenset()) -> li
     return found
 
 
+def steps_off_grid(logged: Logged, trusted: frozenset[str] = frozenset()) -> list[DataError]:
+    """Return steps of rounded channels that no motion makes: from a sample on all values lie as far beside the
+    multiples that were shown before. How many whole steps there are in the amount is for the prediction to say.
+    """
+    found = []
+    for name, values in logged.record.values.items():
+        step = usual_of(name, values, logged.noise).resolution
+        known = np.flatnonzero(np.isfinite(values))
+        if name in trusted or step == 0.0 or known.size < 2 * FEWEST_FROZEN:
+            continue
+        beside = _beside_multiples((values[known] - values[known[0]]) / step)
+        first = int(np.argmax(np.abs(beside) > OFF_GRID))
+        same = np.abs(_beside_multiples(beside[first:] - beside[first])) < OFF_GRID
+        if FEWEST_FROZEN <= first <= known.size - FEWEST_FROZEN and same.all():
+            found.append(DataError(kind="step", channels=(name,), amount=float(step * np.median(beside[first:])),
+                                   since=float(logged.record.time[known[first]])))  # fmt: skip
+    return found
+
+
+def _beside_multiples(values: np.ndarray) -> np.ndarray:
+    """Return by how much values are more than the nearest whole number (n,)."""
+    return values - np.round(values)
+
+
 def is_rounded(error: DataError, logged: Logged) -> bool:
     """Say whether a channel may repeat values because it is rounded and stands still."""
     (channel,) = error.channels
@@ -83,7 +113,7 @@ def is_rounded(error: DataError, logged: Logged) -> bool:
 
 def _of(name: str, time: np.ndarray, values: np.ndarray, level: float) -> list[DataError]:
     found = []
-    for value, at in _far_values(values, level).items():
+    for value, at in {**_far_values(values, level), **_values_again(values, level)}.items():
         found.append(
             DataError(kind="dropout", channels=(name,), how=f"{value + 0.0:.9g}", at=tuple(time[at].tolist()))
         )
@@ -125,6 +155,23 @@ def _far_values(values: np.ndarray, level: float) -> Mapping[float, np.ndarray]:
         if enough and np.any(far[2:] & far[1:-1] & far[:-2]):
             found[value], values = far, np.where(far, np.nan, values)
     return found
+
+
+def _values_again(values: np.ndarray, level: float) -> Mapping[float, np.ndarray]:
+    """Return value → where it stands for nothing (n,), of a channel that is not rounded: several runs of one value,
+    which no chance makes, are no measurement, however close to it the channel is. Of the others most are different.
+    """
+    known = np.flatnonzero(np.isfinite(values))
+    if known.size <= FEWEST_FROZEN:
+        return {}
+    runs = _runs(values[known])
+    unlikely = _unlikely(runs, known.size)
+    kept = values[known][np.repeat(~unlikely, runs.length)]
+    is_fine = 2 * np.unique(kept).size > kept.size and resolution_of(values[known], level) == 0.0
+    if not unlikely.any() or not is_fine:
+        return {}
+    again, times = np.unique(values[known][runs.first[unlikely]], return_counts=True)
+    return {value: values == value for value in again[times > 1].tolist()}
 
 
 def _is_far(value: float, at: int, values: np.ndarray, others: np.ndarray, level: float) -> bool:
