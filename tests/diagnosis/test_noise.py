@@ -226,6 +226,16 @@ def test_the_resolution_is_that_before_and_behind_a_jump(jump):
     assert_allclose(resolution_of(rounded, 0.015), 0.05, rtol=1e-6)
 
 
+def test_the_resolution_is_that_of_a_value_that_is_hardly_ever_left_though_a_few_samples_are_wrong():
+    """Such as a heading near 0 in whole radians, of which outliers are turned into ±180 degrees."""
+    random = np.random.default_rng(7)
+    values = np.zeros(400)
+    values[random.permutation(400)[:22]] = [*[57.3] * 11, *[-57.3] * 7, -41.07, -41.07, 16.2, 16.2]
+    assert resolution_of(values, 0.4) == pytest.approx(57.3)
+    values[values != 0.0] = random.standard_normal(22)
+    assert resolution_of(values, 0.4) == 0.0, "of a sensor that freezes nothing is known"
+
+
 def test_a_record_of_seven_digits_is_hardly_rounded():
     values = np.array([float(f"{x:.7g}") for x in 27.0 + np.random.default_rng(7).standard_normal(300)])
     assert resolution_of(values, LEVEL) < 1e-4

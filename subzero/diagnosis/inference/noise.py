@@ -226,8 +226,9 @@ RATIOS, TIMES, LEVELS = (0.1, 0.5, 1.0, 3.0), 6, (0.4, 1.0, 2.5)
 """Where the search for the best begins: σ_s/σ_w, how many τ_s, and level in the level of what is left. [-]"""
 FEWEST = 8
 """Fewer different values than this say nothing of the step that they are rounded to."""
-WHOLE, MOSTLY = 0.02, 0.98
-"""Steps between values that are whole within the first share are multiples; of rounded values so many are. [-]"""
+WHOLE, MOSTLY, FEW_WRONG = 0.02, 0.98, 0.25
+"""Steps between values that are whole within the first share are multiples; of rounded values so many are, and of those
+away from the most common one all but the last share. [-]"""
 SAME, STEPS_TRIED = 1e-6, 3
 """Changes of less than this share of a usual level are what arithmetic leaves of none [-]; a jump by no whole step
 makes one or two steps smaller than that of the sensor: so many are tried."""
@@ -315,11 +316,12 @@ def resolution_of(values: np.ndarray, level: float) -> float:
 
     A sensor that rounds to 0.1 m shows 5.1, 5.2 and 5.4, and the steps between its different values are whole multiples
     of the smallest. So are its changes from sample to sample, also where it jumps by no whole step and goes on: of two
-    such steps the coarser is that of the sensor. One that shows the same value all along rounds to a step that nobody
-    knows, which is then taken to be as coarse as the noise of a usual sensor, `level`.
+    such steps the coarser is that of the sensor. One that hardly ever leaves a value is whole steps off it, but for a
+    few samples that are wrong. One that shows the same value all along rounds to a step that nobody knows, which is
+    then taken to be as coarse as the noise of a usual sensor, `level`.
     """
     known = values[np.isfinite(values)]
-    distinct = np.unique(known)
+    distinct, times = np.unique(known, return_counts=True)
     if distinct.size == 1 and known.size >= FEWEST:
         return float(np.sqrt(12.0) * level)
     changes = np.abs(np.diff(known))
@@ -327,16 +329,22 @@ def resolution_of(values: np.ndarray, level: float) -> float:
     by_change = _whole_step(changes) if changes.size >= FEWEST else 0.0
     if distinct.size < 2 or (distinct.size < FEWEST and 2 * distinct.size > known.size):
         return by_change
-    return max(by_change, _whole_step(np.diff(distinct)))
+    away = np.abs(known - distinct[np.argmax(times)])
+    away = away[away > SAME * level]
+    few = min((1.0 - MOSTLY) * known.size, FEW_WRONG * away.size)
+    return max(by_change, _whole_step(np.diff(distinct)), _whole_step(away, few))
 
 
-def _whole_step(steps: np.ndarray) -> float:
-    """Return the one of a few least steps (n,) that nearly all, or all but one, are multiples of; 0 if none is."""
+def _whole_step(steps: np.ndarray, most: float | None = None) -> float:
+    """Return the one of a few least steps (n,) that nearly all, or all but one, or but `most`, are multiples of; 0 if
+    none is.
+    """
+    most = max(1.0, (1.0 - MOSTLY) * steps.size) if most is None else most
     least = np.unique(np.round(steps / np.min(steps), 6))[:STEPS_TRIED] * np.min(steps)
     for step in least.tolist():
         multiples = steps / step
         broken = np.count_nonzero(np.abs(multiples - np.round(multiples)) >= WHOLE)
-        if broken <= max(1.0, (1.0 - MOSTLY) * steps.size):
+        if broken <= most:
             return float(step)
     return 0.0
 
