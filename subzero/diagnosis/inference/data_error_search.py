@@ -61,9 +61,9 @@ SOFT = ("step", "late_clock", "clock_rate", "latency", "command_sign", "command_
 """Kinds with a number to be fitted, or that change the motion: something that broke in mid-trial may look like them."""
 ALIKE_LEAD = 3.0
 """Errors whose leads differ by less are told together."""
-CLEAR_LEAD, CLEAR_GENEROUS_LEAD = 15.0, 10.0
+CLEAR_LEAD, CLEAR_GENEROUS_LEAD = 50.0, 10.0
 """With a greater lead over physics, in the linear problem, an error needs no search of the record as it is: over
-nothing and every cause, and over all causes at once."""
+nothing and every cause, where the linear problem may err by tens of nats, and over all causes at once."""
 LOUD = 2.5
 """Noise of more usual levels hides a misfit. [-]"""
 SIGNATURE_LEAD = 20.0
