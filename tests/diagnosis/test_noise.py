@@ -234,6 +234,8 @@ def test_the_resolution_is_that_of_a_value_that_is_hardly_ever_left_though_a_few
     assert resolution_of(values, 0.4) == pytest.approx(57.3)
     values[values != 0.0] = random.standard_normal(22)
     assert resolution_of(values, 0.4) == 0.0, "of a sensor that freezes nothing is known"
+    values[values == 0.0] = -999.0
+    assert resolution_of(values, 0.4) == 0.0, "what stands for nothing is no step away from what is measured"
 
 
 def test_a_record_of_seven_digits_is_hardly_rounded():

@@ -82,7 +82,8 @@ def _is_quiet(work: Findings) -> bool:
     for i, one in enumerate(problem.records):
         for name, noise in one.noise.items():
             left = min(float(np.sqrt(np.mean(_own(problem, r, i, name) ** 2))), 1.0)
-            most = LOUD * usual_of(name, one.values[name], one.known).level + noise.resolution
+            level = usual_of(name, one.values[name], one.known).level
+            most = LOUD * float(np.hypot(level, noise.resolution / np.sqrt(12.0)))
             if noise.sd * left >= most:
                 return False
     return True

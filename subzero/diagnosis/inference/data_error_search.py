@@ -66,7 +66,7 @@ CLEAR_LEAD, CLEAR_GENEROUS_LEAD = 50.0, 10.0
 nothing and every cause, where the linear problem may err by tens of nats, and over all causes at once."""
 LOUD = 2.5
 """Noise of more usual levels hides a misfit. [-]"""
-SIGNATURE_LEAD = 20.0
+SIGNATURE_LEAD = 60.0
 """Lead of what is read off a record."""
 
 

@@ -229,6 +229,8 @@ FEWEST = 8
 WHOLE, MOSTLY, FEW_WRONG = 0.02, 0.98, 0.25
 """Steps between values that are whole within the first share are multiples; of rounded values so many are, and of those
 away from the most common one all but the last share. [-]"""
+EXACT = 0.05
+"""... and within this share of a usual level: what is far from the others is one step from each of them, about. [-]"""
 SAME, STEPS_TRIED = 1e-6, 3
 """Changes of less than this share of a usual level are what arithmetic leaves of none [-]; a jump by no whole step
 makes one or two steps smaller than that of the sensor: so many are tried."""
@@ -325,26 +327,25 @@ def resolution_of(values: np.ndarray, level: float) -> float:
     if distinct.size == 1 and known.size >= FEWEST:
         return float(np.sqrt(12.0) * level)
     changes = np.abs(np.diff(known))
-    changes = changes[changes > SAME * level]
-    by_change = _whole_step(changes) if changes.size >= FEWEST else 0.0
+    changes, exact = changes[changes > SAME * level], EXACT * level
+    by_change = _whole_step(changes, exact) if changes.size >= FEWEST else 0.0
     if distinct.size < 2 or (distinct.size < FEWEST and 2 * distinct.size > known.size):
         return by_change
     away = np.abs(known - distinct[np.argmax(times)])
     away = away[away > SAME * level]
     few = min((1.0 - MOSTLY) * known.size, FEW_WRONG * away.size)
-    return max(by_change, _whole_step(np.diff(distinct)), _whole_step(away, few))
+    return max(by_change, _whole_step(np.diff(distinct), exact), _whole_step(away, exact, few))
 
 
-def _whole_step(steps: np.ndarray, most: float | None = None) -> float:
-    """Return the one of a few least steps (n,) that nearly all, or all but one, or but `most`, are multiples of; 0 if
-    none is.
+def _whole_step(steps: np.ndarray, exact: float, most: float | None = None) -> float:
+    """Return the one of a few least steps (n,) that nearly all, or all but one, or but `most`, are multiples of, to
+    within a share of it and `exact`; 0 if none is.
     """
     most = max(1.0, (1.0 - MOSTLY) * steps.size) if most is None else most
     least = np.unique(np.round(steps / np.min(steps), 6))[:STEPS_TRIED] * np.min(steps)
     for step in least.tolist():
-        multiples = steps / step
-        broken = np.count_nonzero(np.abs(multiples - np.round(multiples)) >= WHOLE)
-        if broken <= most:
+        beside = np.abs(steps - step * np.round(steps / step))
+        if np.count_nonzero(beside >= min(WHOLE * step, exact)) <= most:
             return float(step)
     return 0.0
 

@@ -145,7 +145,7 @@ def _far_values(values: np.ndarray, level: float) -> Mapping[float, np.ndarray]:
     distinct, counts = np.unique(values[np.isfinite(values)], return_counts=True)
     often, found = distinct[counts >= FEWEST_FAR], {}
     for value in sorted(often.tolist(), key=lambda one: -abs(one - np.nanmedian(values))):
-        at, others = values == value, np.flatnonzero(np.isfinite(values) & (values != value))
+        at, others = values == value, _others(values, value)
         if others.size < FEWEST_FAR:
             continue
         places = np.flatnonzero(at[: others[-1]])  # what only lasts to the end is frozen
@@ -155,6 +155,16 @@ def _far_values(values: np.ndarray, level: float) -> Mapping[float, np.ndarray]:
         if enough and np.any(far[2:] & far[1:-1] & far[:-2]):
             found[value], values = far, np.where(far, np.nan, values)
     return found
+
+
+def _others(values: np.ndarray, value: float) -> np.ndarray:
+    """Return where a channel shows something else than a value (k,): but for a single sample between two of the value,
+    which is an outlier where a channel hardly ever leaves a value, if there are others.
+    """
+    known = np.flatnonzero(np.isfinite(values))
+    other = values[known] != value
+    alone = other & ~np.r_[other[1:], True] & ~np.r_[True, other[:-1]]
+    return known[other & ~alone] if np.count_nonzero(other & ~alone) >= FEWEST_FAR else known[other]
 
 
 def _values_again(values: np.ndarray, level: float) -> Mapping[float, np.ndarray]:
