@@ -236,13 +236,13 @@ def is_right(one: Mapping[str, Any]) -> bool:
 
 
 def is_confidently_wrong(one: Mapping[str, Any]) -> bool:
-    """Say whether something wrong has a probability of SURE."""
-    return one["p"] >= SURE and not is_right(one)
+    """Say whether something wrong has a probability of SURE, or an error is told of data that have none."""
+    return one["verdict"] == "data_error" or (one["p"] >= SURE and not is_right(one))
 
 
 def is_false_alarm(one: Mapping[str, Any]) -> bool:
-    """Say whether a healthy record got a name, or was called outside the catalogue."""
-    return not one["cause"] and one["verdict"] in ("cause_named", "outside_catalogue")
+    """Say whether a healthy record got a name, was called outside the catalogue, or accused of an error in its data."""
+    return not one["cause"] and one["verdict"] in ("cause_named", "outside_catalogue", "data_error")
 
 
 def table(results: Sequence[Mapping[str, Any]], families: Sequence[str] = tuple(FAMILIES)) -> str:
