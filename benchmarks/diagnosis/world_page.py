@@ -114,7 +114,7 @@ def of_world(results: Rows) -> list[Score]:
     right = np.array([float(world.is_right(one)) for one in results])
     error = scores.calibration_error(stated, right)[1] if results else 0.0
     return [
-        share("healthy: named, called outside, or accused of an error", healthy, world.is_false_alarm, "≤ 1 %", most=0.01),
+        share("healthy: named, outside, or accused of an error", healthy, world.is_false_alarm, "≤ 1 %", most=0.01),
         share("one cause, D ≥ 25: right first", clear, world.is_right, "≥ 95 %", least=0.95),
         share("wrong with p ≥ 0.95", results, world.is_confidently_wrong, "≤ 1 %", most=0.01),
         Score("probabilities: mean error of calibration", f"{error:.3f}", "≤ 0.03", "–", len(results), error <= 0.03),
