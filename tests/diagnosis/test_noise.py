@@ -24,6 +24,7 @@ from subzero.diagnosis.inference import (
     Usual,
     estimate,
     gain_of_own_noise,
+    log_marginal,
     log_odds_of_frozen,
     resolution_of,
     spikes,
@@ -109,6 +110,20 @@ def log_prior(noise, level):
 def log_normal(values, covariance):
     """Return log N(values; 0, covariance), but for a constant."""
     return -0.5 * values @ np.linalg.solve(covariance, values) - 0.5 * np.linalg.slogdet(covariance)[1]
+
+
+def test_the_compiled_likelihood_is_that_of_the_dense_covariance_at_uneven_times():
+    random = np.random.default_rng(3)
+    time, F, r = (
+        np.sort(random.uniform(0.0, 30.0, 200)),
+        random.standard_normal((200, 5)),
+        random.standard_normal(200),
+    )
+    noise = Noise(white=0.7, slow=0.5, correlation_time=2.0, used=np.ones(200, bool), time=time)
+    found = log_marginal(
+        np.diff(time, append=time[-1]), 0.7**2, 0.5**2, 2.0, np.column_stack([F, r]), np.empty((8, 6))
+    )
+    assert_allclose(found, log_normal(r, F @ F.T + dense(noise)), rtol=1e-9)
 
 
 def test_no_noise_close_by_is_more_probable_than_what_is_found():

@@ -16,7 +16,7 @@ from benchmarks.diagnosis import data_errors, world
 from benchmarks.diagnosis.world import ROUNDED
 from subzero import Logged
 from subzero.diagnosis import Setting, catalogue
-from subzero.diagnosis.inference import DataError
+from subzero.diagnosis.inference import DataError, repeated_values
 from subzero.records.record import Record
 from subzero.synthetic.planted import draw_tolerances, make_record
 
@@ -55,6 +55,17 @@ def test_a_rounded_depth_that_jumps_by_less_than_its_step_is_named():
     (found,) = verdict.data_errors
     assert (verdict.verdict, found.id) == ("data_error", "step:depth")
     assert (found.amount, found.since) == (pytest.approx(0.06, abs=0.0015), pytest.approx(8.0, abs=0.11))
+
+
+def test_a_rounded_heading_that_is_hardly_ever_left_is_no_drop_out_between_its_outliers():
+    clean = measured("dive", 20265)
+    heading = np.where(
+        np.arange(clean.record.time.size) < 16, np.arange(clean.record.time.size) // 2 % 2 - 1.0, 0.0
+    )
+    heading[[20, 26, 40, 60, 80, 100, 125, 131]] = 9.0
+    record = dataclasses.replace(clean.record, values={**clean.record.values, "heading": heading})
+    found = repeated_values(dataclasses.replace(clean, record=record))
+    assert not [one for one in found if one.channels == ("heading",) and one.how]
 
 
 @pytest.mark.slow

@@ -45,7 +45,7 @@ from subzero.diagnosis.hypothesis.hypotheses import (
     variances,
     with_tolerances,
 )
-from subzero.diagnosis.inference.noise import Behind, Noise, Usual, estimate, resolution_of
+from subzero.diagnosis.inference.noise import Behind, Noise, Usual, estimate, log_marginal, resolution_of
 from subzero.diagnosis.hypothesis.configuration import TRUTHS
 from subzero.diagnosis.inference.simulator import (
     RunCache,
@@ -192,6 +192,7 @@ __all__ = [
     "log_evidence_process",
     "log_evidence_term",
     "log_gains",
+    "log_marginal",
     "log_odds_of_frozen",
     "log_prior",
     "mixed",
