@@ -38,7 +38,7 @@ from subzero.diagnosis.inference.out_of_catalogue import (
     Findings,
     explanations_outside,
     is_explained,
-    with_own_noise,
+    each_with_own_noise,
 )
 from subzero.diagnosis.inference.posing import pose, posed_again
 from subzero.diagnosis.inference.problem import Problem, Progress
@@ -266,7 +266,7 @@ def _look_closer(findings: Findings) -> None:
         _look_outside(findings, 0.8, "forces that no cause explains")
     with _timed(findings, "outside"):
         findings.refuted = refuted_rivals(search)
-        findings.out_of_catalogue = with_own_noise(search, findings.out_of_catalogue)
+        findings.out_of_catalogue = each_with_own_noise(search, findings.out_of_catalogue)
         _measure_misfit(findings)
 
 

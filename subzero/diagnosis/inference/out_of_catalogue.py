@@ -269,7 +269,7 @@ def shares(
     return {ids: kept * p for ids, p in inside.items()}, found
 
 
-def with_own_noise(search: Search, outside: Sequence[OutOfCatalogue]) -> list[OutOfCatalogue]:
+def each_with_own_noise(search: Search, outside: Sequence[OutOfCatalogue]) -> list[OutOfCatalogue]:
     """Give every explanation that may be the most probable the evidence that it has with the noise behind it:
     hypotheses in the search, and what lies outside, which is returned, most probable first.
 
