@@ -36,9 +36,9 @@ from subzero.diagnosis.inference.model_average import NAMED_PROBABILITY
 from subzero.diagnosis.inference.model_search import Search
 from subzero.diagnosis.inference.out_of_catalogue import (
     Findings,
+    each_with_own_noise,
     explanations_outside,
     is_explained,
-    each_with_own_noise,
 )
 from subzero.diagnosis.inference.posing import pose, posed_again
 from subzero.diagnosis.inference.problem import Problem, Progress
