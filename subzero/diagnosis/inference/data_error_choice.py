@@ -6,8 +6,8 @@ and drifts. T the corrections, y the record as written:
 
     log p(y, errors) = log Σ_M p(T y | M) p(M) + Σ log|dT/dy| + Σ log p(error) + log p(noise)
 
-A sample that is lost counts as any other. But where a rounded channel may be frozen or stand still, what it repeats is
-certain in the one case, and in the other an interval each, no density (`repeated_values`).
+A sample that is lost counts as any other of its channel. But where a rounded channel may be frozen or stand still, what
+it repeats is certain in the one case, and in the other an interval each, no density (`repeated_values`).
 
 A search that is hopelessly behind ends within its first look, or with it. What the linear problem leaves no choice of
 is corrected before anything is searched, and the records with it are not searched at all if causes that hold throughout
@@ -19,8 +19,10 @@ sensor is always held against a search of the records with it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import pairwise
 from typing import NamedTuple, Protocol
 
@@ -166,33 +168,42 @@ class Explained:
         errors: in the data.
         work: what was found in the records without them.
         log_prior: of the errors, and what their corrections stretch.
-        lost: samples that are no measurements then, but for those of rounded channels that are frozen.
+        lost: channel → samples that are no measurements then, but for those of rounded channels that are frozen.
         standing: rounded channels that are held to stand still.
     """
 
     errors: tuple[SuspectedError, ...]
     work: Findings
     log_prior: float
-    lost: int
+    lost: Mapping[str, int]
     standing: tuple[Standing, ...] = ()
 
-    def log_evidence(self, per_lost: float) -> float:
-        """Return the log evidence of the records as they were written; of samples that are lost, each so much. That a
-        frozen channel repeats its value is certain; one that stands still has its odds in place of a density.
+    def log_evidence(self, per_lost: Mapping[str, float]) -> float:
+        """Return the log evidence of the records as they were written; of samples that are lost, each so much as its
+        channel is given. That a frozen channel repeats its value is certain; one that stands still has its odds in
+        place of a density.
         """
         standing = sum(one.log_excess(self.work) for one in self.standing)
-        return log_evidence(self.work) + self.log_prior + self.lost * per_lost - standing
+        lost = sum(count * per_lost.get(name, 0.0) for name, count in self.lost.items())
+        return log_evidence(self.work) + self.log_prior + lost - standing
 
-    @property
-    def mean(self) -> float:
-        """The mean log density of a sample."""
-        return log_evidence(self.work) / max(_samples(self.work), 1)
+    @cached_property
+    def means(self) -> dict[str, float]:
+        """Channel → the mean log density of a sample: units differ, and so do densities in them."""
+        problem, r = _best_residual(self.work)
+        samples = _samples(self.work)
+        total = dict.fromkeys(samples, 0.0)
+        for i, one in enumerate(problem.records):
+            for name in one.noise:
+                square = float(np.sum(_own(problem, r, i, name) ** 2))
+                total[name] += _fixed(one, name) - 0.5 * square
+        return {name: total[name] / count for name, count in samples.items() if count}
 
     def is_behind(self, other: Explained) -> bool:
         """Say whether no more causes, nor better fits, bring it close to another that leaves only noise."""
         if other is self or not is_explained(other.work):
             return False
-        per_lost, behind = min(self.mean, other.mean), settings.DECISIVE_NATS
+        per_lost, behind = _least_means([self, other]), settings.DECISIVE_NATS
         return self.log_evidence(per_lost) + self._to_be_gained() < other.log_evidence(per_lost) - behind
 
     def _to_be_gained(self) -> float:
@@ -201,6 +212,12 @@ class Explained:
             return settings.MAX_PREDICTED_GAIN_NATS
         fits = self.work.search.candidates.values()
         return max(one.optimistic_log_posterior for one in fits) - max(one.log_posterior for one in fits)
+
+
+def _least_means(several: Sequence[Explained]) -> dict[str, float]:
+    """Return channel → the least of the mean log densities of a sample."""
+    means = [one.means for one in several]
+    return {name: min(one[name] for one in means if name in one) for name in set().union(*means)}
 
 
 class Look(Protocol):
@@ -243,7 +260,7 @@ def compared(suspicion: Suspicion, records: Sequence[Logged], look: Look) -> lis
         if not tried:
             raise
         tried[-1].work.complete = False
-    per_lost = min(one.mean for one in tried)
+    per_lost = _least_means(tried)
     return [(one, one.log_evidence(per_lost)) for one in tried]
 
 
@@ -335,11 +352,21 @@ class _Comparison:
         prior = sum(log_prior(one.error, ALIKE)
                     + one.error.log_jacobian * _measured(self.records[one.record], one.error)
                     for one in errors)  # fmt: skip
-        measured = sum(int(np.isfinite(logged.record.values[name]).sum()) for logged, one in
-                       zip(self.records, work.problem.records, strict=True) for name in one.noise)  # fmt: skip
-        frozen = sum(int(_lost_by(one, errors, self.records).sum()) for one in errors if one.may_stand_still)
-        return Explained(errors=errors, work=work, log_prior=float(prior), lost=measured - frozen - _samples(work),
+        return Explained(errors=errors, work=work, log_prior=float(prior), lost=self._lost(errors, work),
                          standing=_standing(self.suspicion, errors, self.records))  # fmt: skip
+
+    def _lost(self, errors: Sequence[SuspectedError], work: Findings) -> Counter[str]:
+        """Return how many samples of each channel are no measurements without errors: more than 0 or fewer, where
+        channels are exchanged.
+        """
+        lost = Counter[str]()
+        for logged, seen in zip(self.records, work.problem.records, strict=True):
+            lost.update({name: int(np.isfinite(logged.record.values[name]).sum()) for name in seen.noise})
+        lost.subtract(_samples(work))
+        for one in errors:
+            if one.may_stand_still:
+                lost[one.error.channels[0]] -= int(_lost_by(one, errors, self.records).sum())
+        return lost
 
 
 def _is_settled(work: Findings) -> bool:
@@ -363,7 +390,7 @@ def _is_complete(tried: Sequence[Explained]) -> bool:
 
 
 def _first(tried: Sequence[Explained]) -> Explained:
-    per_lost = min(one.mean for one in tried)
+    per_lost = _least_means(tried)
     return max(tried, key=lambda one: one.log_evidence(per_lost))
 
 
@@ -376,20 +403,20 @@ def log_evidence(work: Findings) -> float:
     """Return the log evidence of records, all explanations together, as a density of what was measured."""
     inside = work.search.beliefs.log_total()
     found = log_sum([inside, *(one.log_posterior for one in work.out_of_catalogue)])
-    return found + sum(_fixed(one) for one in work.problem.records)
+    return found + sum(_fixed(one, name) for one in work.problem.records for name in one.noise)
 
 
-def _samples(work: Findings) -> int:
-    return sum(int(np.isfinite(one.values[name]).sum()) for one in work.problem.records for name in one.noise)
+def _samples(work: Findings) -> Counter[str]:
+    """Return how many samples of each channel were measured."""
+    samples = Counter[str]()
+    for one in work.problem.records:
+        samples.update({name: int(np.isfinite(one.values[name]).sum()) for name in one.noise})
+    return samples
 
 
-def _fixed(one: Observed) -> float:
-    """Return what the noise of a record adds to its log density: −½ log det Σ, what outliers cost, and its prior."""
-    found = 0.0
-    for name, noise in one.noise.items():
-        usual = usual_of(name, one.values[name], one.known)
-        out = int(np.isfinite(one.values[name]).sum()) - noise.count
-        found += (
-            out * (OUTLIER_LOG_DENSITY - np.log(usual.level)) - noise.log_scale + log_prior_of(noise, usual)
-        )
-    return found
+def _fixed(one: Observed, name: str) -> float:
+    """Return what the noise of a channel adds to its log density: −½ log det Σ, what outliers cost, and its prior."""
+    noise, usual = one.noise[name], usual_of(name, one.values[name], one.known)
+    out = int(np.isfinite(one.values[name]).sum()) - noise.count
+    log_outliers = out * (OUTLIER_LOG_DENSITY - np.log(usual.level))
+    return float(log_outliers - noise.log_scale + log_prior_of(noise, usual))

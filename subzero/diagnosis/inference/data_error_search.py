@@ -49,6 +49,7 @@ from subzero.diagnosis.inference.data_error_yardstick import (
     yardstick_of,
 )
 from subzero.diagnosis.inference.linear_gaussian import ForceInformation, Posterior, freed, seen
+from subzero.diagnosis.inference.map_fit import bounds
 from subzero.diagnosis.inference.posing import posed_again
 from subzero.diagnosis.inference.problem import Problem
 from subzero.diagnosis.inference.repeated_values import is_rounded, repeated_values, steps_off_grid
@@ -152,6 +153,7 @@ def _of_record(problem: Problem, records: Sequence[Logged], record: int) -> list
     jumps = steps_off_grid(logged, logged.trusted)
     read_off += [likeliest(begun, begun.by_whole_steps(one)) for one in jumps]
     found = _back(begun, read_off, _forward(begun, read_off, logged.trusted))
+    found = _closer(problem, record, begun, read_off, found)
     made = [*(_Judged(Suspect(one, SIGNATURE_LEAD, SIGNATURE_LEAD), ()) for one in read_off), *found]
     against = _Against(problem=problem, records=records, record=record, begun=begun, read_off=len(read_off),
                        errors=tuple(one.suspect.error for one in made))  # fmt: skip
@@ -189,6 +191,23 @@ def _back(begun: Yardstick, read_off: Sequence[DataError], found: list[_Judged])
             break
         found, last = [one for one in found if one is not weakest], -1
     return found
+
+
+def _closer(
+    problem: Problem, record: int, begun: Yardstick, read_off: Sequence[DataError], found: list[_Judged]
+) -> list[_Judged]:
+    """Return the errors that are still suspected where the problem is linear close to what explains the record without
+    them: far from the nominal model it errs by as much as a delay does. Of those of commands it is simulated anyway.
+    """
+    errors = [*read_off, *(one.suspect.error for one in found)]
+    if not any(one.kind in SOFT for one in errors) or any(one.is_of_commands for one in errors):
+        return found
+    z = np.clip(begun.after(errors).likeliest.z, *bounds(problem))
+    if not np.isfinite(problem.residual(z)).all():
+        return found
+    there = replace(yardstick_of(problem, record, begun.logged, z), repeated=begun.repeated)
+    found = [_again(there, read_off, found, i) for i in range(len(found))]
+    return [one for one in found if _is_suspected(one.suspect)]
 
 
 def _again(begun: Yardstick, read_off: Sequence[DataError], found: Sequence[_Judged], i: int) -> _Judged:
@@ -330,7 +349,7 @@ def _linear(problem: Problem, record: int) -> Linear:
     """
     zero, seen_ = np.zeros(len(problem.entries)), problem.records[record]
     places = [k for k, entry in enumerate(problem.entries) if entry.record in (-1, record)]
-    moved = [to_usual_sizes(problem, k) for k in places]
+    moved = [to_usual_sizes(problem, k, zero) for k in places]
     base, *tracks = problem.tracks([(record, z) for z in (zero, *moved)])
     plain = problem.whitened(record, seen_.setting, base)
     J = np.zeros((plain.size, zero.size))

@@ -75,12 +75,13 @@ class Yardstick:
         logged: the record as it is said to be, but for what is corrected in it.
         written: the record as it is.
         step: between times of the prediction, from 0 on. [s]
-        nominal: channel → prediction (g,). [display unit]
+        nominal: channel → prediction of the nominal model (g,), by what is linear close to z. [display unit]
         slopes: channel → sensitivities to all parameters (g, k).
         D: prior variances that are generous to physics: every cause at once (k,).
         narrow: prior variances of wide tolerances (k,).
         causes: places of the parameters of each cause.
-        setting: of its simulations.
+        z: where it is linear (k,).
+        setting: of its simulations there.
         repeated: values that it repeats, which may be a channel that is rounded and stands still.
         corrected: errors that are corrected in it already.
         place: among those, where a further error is undone; behind them all if not given.
@@ -96,6 +97,7 @@ class Yardstick:
     D: np.ndarray
     narrow: np.ndarray
     causes: Sequence[Sequence[int]]
+    z: np.ndarray
     setting: Setting
     repeated: tuple[DataError, ...] = ()
     corrected: tuple[DataError, ...] = ()
@@ -154,7 +156,8 @@ class Yardstick:
         key = commands.values.tobytes().hex()
         if key not in self.kept:
             setting = replace(self.setting, trial=replace(self.setting.trial, commands=commands))
-            self.kept[key] = shown_on_grid(setting, simulate_track(setting), self.nominal)
+            shown = shown_on_grid(setting, simulate_track(setting), self.nominal)
+            self.kept[key] = {name: shown[name] - self.slopes[name] @ self.z for name in shown}
         return self.kept[key]
 
     def at(self, rows: np.ndarray, time: np.ndarray) -> np.ndarray:
@@ -297,30 +300,33 @@ def _scale(one: Term, square: float) -> float:
     return float(np.clip(np.sqrt(max(square, 0.0) / max(one.samples, 1)), one.least, MOST_SCALE))
 
 
-def yardstick_of(problem: Problem, record: int, logged: Logged) -> Yardstick:
-    """Return what a record is judged by; its simulations are those of the sensitivities at the nominal model.
+def yardstick_of(problem: Problem, record: int, logged: Logged, z: np.ndarray | None = None) -> Yardstick:
+    """Return what a record is judged by; its simulations are those of the sensitivities at the nominal model, or at
+    another.
 
     Args:
         problem: all records and parameters.
         record: its number.
         logged: the record.
+        z: deviations of the model that is linear close by (k,); of the nominal one if not given.
     """
-    zero, one = np.zeros(len(problem.entries)), problem.records[record]
+    z, one = np.zeros(len(problem.entries)) if z is None else z, problem.records[record]
     names = [name for name in logged.record.values if name in one.noise]
-    (base,) = problem.tracks([(record, zero)])
-    nominal = shown_on_grid(one.setting, base, names)
+    (base,), setting = problem.tracks([(record, z)]), problem.setting(record, z)
+    shown = shown_on_grid(setting, base, names)
     ks = [k for k, entry in enumerate(problem.entries) if entry.record in (-1, record)]
-    moved = {k: to_usual_sizes(problem, k) for k in ks}
+    moved = {k: to_usual_sizes(problem, k, z) for k in ks}
     tracks = problem.tracks([(record, moved[k]) for k in ks])
-    slopes = {name: np.zeros((nominal[name].size, zero.size)) for name in names}
+    slopes = {name: np.zeros((shown[name].size, z.size)) for name in names}
     for k, track in zip(ks, tracks, strict=True):
         there = shown_on_grid(problem.setting(record, moved[k]), track, names)
         for name in names:
-            slopes[name][:, k] = np.nan_to_num((there[name] - nominal[name]) / moved[k][k])
+            slopes[name][:, k] = np.nan_to_num((there[name] - shown[name]) / (moved[k][k] - z[k]))
+    nominal = {name: shown[name] - slopes[name] @ z for name in names}
     grid, causes = base[0], [columns_of(problem.entries, (name,)) for name in nameable(problem.entries)]
     return Yardstick(logged=logged, written=logged, step=float(grid[1] - grid[0]), nominal=nominal, slopes=slopes,
                      D=generous_variances(problem), narrow=variances(problem.entries, (), KAPPA_NARROW),
-                     causes=causes, setting=one.setting)  # fmt: skip
+                     causes=causes, z=z, setting=setting)  # fmt: skip
 
 
 def generous_variances(problem: Problem) -> np.ndarray:
@@ -330,13 +336,15 @@ def generous_variances(problem: Problem) -> np.ndarray:
     )
 
 
-def to_usual_sizes(problem: Problem, k: int) -> np.ndarray:
-    """Return deviations with an entry moved for a sensitivity: what does nothing while it is small to a usual size."""
-    zero, parameter = np.zeros(len(problem.entries)), problem.entries[k].parameter
-    if parameter.low < 0.0 or problem.entries[k].effect.slot == "sensors":
-        return problem.moved(zero, k)
-    zero[k] = min(parameter.scale, parameter.high)
-    return zero
+def to_usual_sizes(problem: Problem, k: int, z: np.ndarray) -> np.ndarray:
+    """Return deviations z (k,) with an entry moved for a sensitivity: what does nothing while it is small to a usual
+    size.
+    """
+    parameter, moved = problem.entries[k].parameter, z.copy()
+    if parameter.low < 0.0 or z[k] > 0.0 or problem.entries[k].effect.slot == "sensors":
+        return problem.moved(z, k)
+    moved[k] = min(parameter.scale, parameter.high)
+    return moved
 
 
 def shown_on_grid(setting: Setting, track: Track, names: Iterable[str]) -> dict[str, np.ndarray]:
