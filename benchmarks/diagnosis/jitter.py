@@ -1,8 +1,9 @@
 """Does a verdict survive a rounding? ``python -m benchmarks.diagnosis.jitter``.
 
 Records of `benchmarks.diagnosis.world` are diagnosed again as copies that say the same: with seven significant digits,
-as a file has them, and with a hundredth of a noise level added to every sample. A verdict of a copy repeats if it has
-the verdict and the first name of the original. What is more probable than it repeats is sure of the way of the search.
+as a file has them, and with a hundredth of a noise level added to every sample before the sensor rounds it. A verdict of
+a copy repeats if it has the verdict and the first name of the original. What is more probable than it repeats is sure
+of the way of the search.
 """
 
 from __future__ import annotations
@@ -17,40 +18,31 @@ import cyclopts
 import numpy as np
 
 from subzero.diagnosis.api import diagnose_trials
-from subzero.diagnosis.hypothesis.catalogue.sensors import NOISE
 from subzero.diagnosis.hypothesis.logged import Logged
 
 from .results import results_of
 from .world import Drawn, drawn, record_of
 
 DIGITS = 7
-SHARE = 0.01
-"""Of a noise level that is added to every sample. [-]"""
 SURE = 0.95
 app = cyclopts.App(name="python -m benchmarks.diagnosis.jitter", help_format="plaintext", version_flags=[])
 Said = tuple[str, str, float]
 """Verdict, first name, and its probability."""
 
 
-def copies(logged: Logged, count: int, rng: np.random.Generator) -> list[Logged]:
-    """Return a copy with DIGITS digits, and so many with a little noise."""
-    values = logged.record.values
-    rounded = {name: np.array([float(f"{x:.{DIGITS}g}") for x in column]) for name, column in values.items()}
-    shaken = [
-        {
-            name: column + SHARE * NOISE[name] * rng.standard_normal(column.size)
-            for name, column in values.items()
-        }
-        for _ in range(count)
-    ]
-    return [replace(logged, record=replace(logged.record, values=one)) for one in (rounded, *shaken)]
+def with_digits(logged: Logged) -> Logged:
+    """Return a copy with DIGITS digits."""
+    values = {name: np.array([float(f"{x:.{DIGITS}g}") for x in column])
+              for name, column in logged.record.values.items()}  # fmt: skip
+    return replace(logged, record=replace(logged.record, values=values))
 
 
 def result_of(one: Drawn, count: int) -> dict[str, Any]:
-    """Return what is said of a record and of its copies."""
+    """Return what is said of a record and of its copies: with DIGITS digits, and so many that were shaken."""
     logged, _ = record_of(one)
-    rng = np.random.default_rng([one.seed, one.index, 9])
-    said = [_said(each, one.index) for each in (logged, *copies(logged, count, rng))]
+    rngs = [np.random.default_rng([one.seed, one.index, 9, copy]) for copy in range(count)]
+    shaken = [record_of(one, rng)[0] for rng in rngs]
+    said = [_said(each, one.index) for each in (logged, with_digits(logged), *shaken)]
     return {"index": one.index, "flown": one.flown, "family": one.family, "cause": one.cause, "said": said}
 
 

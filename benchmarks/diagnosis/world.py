@@ -41,6 +41,8 @@ from .truth import FAR, GAPS, OUTLIERS, NoRunError, agreed
 
 FLOWN = ("fig6", "rich", "zigzag", "dive", "turning_circle", "stop_and_drift", "spiral", "current", "random")
 """Manoeuvres; "random" draws its commands."""
+SHAKEN_BY = 0.01
+"""Of a usual level of noise, that a record is shaken by. [-]"""
 ROUNDED = {
     "heading": 1.0,
     "surge_speed": 0.05,
@@ -114,8 +116,13 @@ def drawn(seed: int, count: int) -> list[Drawn]:
     ]
 
 
-def record_of(one: Drawn) -> tuple[Logged, Values]:
-    """Return a record with its nominal trial, and what is hidden in it; drawn again where there is no one truth."""
+def record_of(one: Drawn, shaken: np.random.Generator | None = None) -> tuple[Logged, Values]:
+    """Return a record with its nominal trial, and what is hidden in it; drawn again where there is no one truth.
+
+    Args:
+        one: what is drawn.
+        shaken: draws the little that every sample is off by, before it is rounded; nothing if not given.
+    """
     for attempt in range(20):
         rng = one.rng(attempt)
         setting, family = flown(one, rng), FAMILIES[one.family]
@@ -127,7 +134,7 @@ def record_of(one: Drawn) -> tuple[Logged, Values]:
             shown = agreed(longer, times, CHANNELS)
         except (NoRunError, subzero.UserError):
             continue
-        values = {name: seen_by(family, name, column, times, rng) for name, column in shown.items()}
+        values = {name: seen_by(family, name, column, times, rng, shaken) for name, column in shown.items()}
         record = Record(source="world", time=times, values=values)
         return Logged(record=record, setting=setting, name=one.flown), planted
     message = f"Record {one.index} ({one.cause} on {one.flown}) has no truth."
@@ -161,10 +168,17 @@ def _random_commands(rng: np.random.Generator) -> Setting:
 
 
 def seen_by(
-    family: Family, name: str, column: np.ndarray, times: np.ndarray, rng: np.random.Generator
+    family: Family,
+    name: str,
+    column: np.ndarray,
+    times: np.ndarray,
+    rng: np.random.Generator,
+    shaken: np.random.Generator | None = None,
 ) -> np.ndarray:
     """Return what a sensor with noise of a family shows of a channel (n,), with outliers, NaN in gaps."""
-    return shown(family, name, column + NOISE[name] * noise_of(family, times, rng), rng)
+    noise = noise_of(family, times, rng)
+    more = SHAKEN_BY * shaken.standard_normal(times.size) if shaken else 0.0
+    return shown(family, name, column + NOISE[name] * (noise + more), rng)
 
 
 def noise_of(family: Family, times: np.ndarray, rng: np.random.Generator) -> np.ndarray:
