@@ -1,9 +1,9 @@
 """Does a verdict survive a rounding? ``python -m benchmarks.diagnosis.jitter``.
 
 Records of `benchmarks.diagnosis.world` are diagnosed again as copies that say the same: with seven significant digits,
-as a file has them, and with a hundredth of a noise level added to every sample before the sensor rounds it. A verdict of
-a copy repeats if it has the verdict and the first name of the original. What is more probable than it repeats is sure
-of the way of the search.
+as a file has them, and with a hundredth of a noise level added to every sample before the sensor rounds it. A verdict
+of a copy repeats if it has the verdict and the first name of the original. What is more probable than it repeats is
+sure of the way of the search.
 """
 
 from __future__ import annotations
