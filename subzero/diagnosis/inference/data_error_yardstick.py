@@ -18,6 +18,7 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg.lapack import dpotrf, dpotri
 
 from subzero.channels import HEADING, turned
 from subzero.diagnosis.hypothesis.configuration import Setting, sensed, truth
@@ -260,28 +261,24 @@ class Yardstick:
 
 def reckon(terms: Mapping[str, Term], D: np.ndarray) -> Reckoned:
     """Return the generous evidence of what channels say."""
-    root = np.sqrt(D)
-    scales = {name: _scale(one, one.rr) for name, one in terms.items()}
+    A, b, rr, samples, fixed, least, _ = (np.array(column) for column in zip(*terms.values(), strict=True))
+    root, rows, samples = np.sqrt(D), A.reshape(len(A), -1), np.maximum(samples, 1)
+    scales = _scales(rr, samples, least)
     for turn in range(ROUNDS + 1):
-        A = sum(one.A / scales[name] ** 2 for name, one in terms.items())
-        b = sum(one.b / scales[name] ** 2 for name, one in terms.items())
-        factor = np.linalg.cholesky(np.eye(D.size) + root[:, None] * A * root)
-        half = np.linalg.solve(factor, np.diag(root))
-        M = half.T @ half
-        z = M @ b
-        before, scales = scales, {name: _scale(one, _left(one, z, M)) for name, one in terms.items()}
-        if turn == ROUNDS or all(abs(scales[name] - old) < SETTLED * old for name, old in before.items()):
-            scales = before
+        weights = scales**-2.0
+        here = weights @ b
+        P = np.eye(D.size) + root[:, None] * (weights @ rows).reshape(D.size, -1) * root
+        factor, _ = dpotrf(P, lower=1)
+        inverse, _ = dpotri(factor, lower=1)
+        M = root[:, None] * (np.tril(inverse) + np.tril(inverse, -1).T) * root
+        z = M @ here
+        square = rr - 2.0 * (b @ z) + (rows @ np.outer(z, z).ravel())
+        before, scales = scales, _scales(square + rows @ M.ravel(), samples, least)
+        if turn == ROUNDS or np.all(np.abs(scales - before) < SETTLED * before):
             break
-    rr = sum(one.rr / scales[name] ** 2 for name, one in terms.items())
-    log = -0.5 * (rr - float(b @ z)) - float(np.sum(np.log(np.diag(factor))))
-    log += sum(one.fixed - one.samples * np.log(scales[name]) for name, one in terms.items())
-    return Reckoned(float(log), z, M, scales)
-
-
-def _left(one: Term, z: np.ndarray, M: np.ndarray) -> float:
-    """Return the expected square that parameters leave of a channel."""
-    return _square(one, z) + float(np.sum(one.A * M))
+    log = -0.5 * float(weights @ rr - here @ z) - float(np.sum(np.log(np.diag(factor))))
+    log += float(np.sum(fixed - samples * np.log(before)))
+    return Reckoned(log, z, M, dict(zip(terms, before.tolist(), strict=True)))
 
 
 def _square(one: Term, z: np.ndarray) -> float:
@@ -289,15 +286,15 @@ def _square(one: Term, z: np.ndarray) -> float:
     return one.rr - 2.0 * float(one.b @ z) + float(z @ one.A @ z)
 
 
+def _scales(square: np.ndarray, samples: np.ndarray, least: np.ndarray) -> np.ndarray:
+    """Return the scales of the noise of channels of which squares are left (c,)."""
+    return np.clip(np.sqrt(np.maximum(square, 0.0) / samples), least, MOST_SCALE)
+
+
 def least_scale(noise: Noise) -> float:
     """Return the least scale of a channel's noise."""
     level = float(np.exp(noise.log_scale / max(noise.count, 1)))
     return max(LEAST_SCALE, noise.resolution / np.sqrt(2.0 * np.pi) / level)
-
-
-def _scale(one: Term, square: float) -> float:
-    """Return the scale of a channel's noise of which a square is left."""
-    return float(np.clip(np.sqrt(max(square, 0.0) / max(one.samples, 1)), one.least, MOST_SCALE))
 
 
 def yardstick_of(problem: Problem, record: int, logged: Logged, z: np.ndarray | None = None) -> Yardstick:
