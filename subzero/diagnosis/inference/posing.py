@@ -13,6 +13,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.ndimage import median_filter
 
 from subzero.channels import HEADING, turned
 from subzero.diagnosis.hypothesis.catalogue import ONSETS, START, catalogue
@@ -142,7 +143,7 @@ def spikes(values: np.ndarray, spec: float) -> np.ndarray:
     """
     if values.size < 7:
         return np.zeros(values.size, dtype=bool)
-    inside = np.median(np.lib.stride_tricks.sliding_window_view(values, 7), axis=1)
+    inside = median_filter(values, 7)[3:-3]
     first, last = np.median(values[:5]), np.median(values[-5:])
     around = np.concatenate([np.full(3, first), inside, np.full(3, last)])
     off = np.abs(values - around)
