@@ -24,10 +24,11 @@ from subzero.diagnosis.hypothesis.data_error import corrected
 from subzero.diagnosis.inference import (
     KINDS_OF_DATA_ERRORS,
     DataError,
+    Noise,
     is_rounded,
     repeated_values,
 )
-from subzero.diagnosis.inference.data_error_choice import compared
+from subzero.diagnosis.inference.data_error_choice import Explained, compared
 from subzero.diagnosis.inference.data_error_search import SuspectedError, Suspicion
 from subzero.records.record import Record
 from subzero.synthetic.planted import draw_tolerances, make_record
@@ -339,3 +340,37 @@ def test_a_record_that_is_far_is_given_up_where_it_is_hopelessly_behind_what_was
     assert look.begun == ["as it is", "put right"]
     assert set(look.finished) == ({"put right"} if is_given_up else {"put right", "as it is"})
     assert [one.work.given_up for one, _ in tried] == [False, is_given_up]
+
+
+@pytest.mark.parametrize(("channel", "level"), [("heading", 2.0), ("depth", 0.005)])
+def test_a_lost_sample_counts_as_one_of_its_own_channel(channel, level):
+    """Of white noise σ it has, but for a constant, the log density −log σ − ½: more in metres than in degrees."""
+    time, levels, count = np.arange(0.0, 40.0, 0.1), {"heading": 2.0, "depth": 0.005}, 400
+    rng = np.random.default_rng(5)
+    values = {name: one * rng.standard_normal(count) for name, one in levels.items()}
+    noise = {name: Noise(white=one, slow=0.01 * one, correlation_time=2.0, resolution=0.0,
+                         used=np.ones(count, dtype=bool), time=time) for name, one in levels.items()}  # fmt: skip
+    record = SimpleNamespace(noise=noise, values=values, known={})
+    residual = np.concatenate([noise[name].whiten(column) for name, column in values.items()])
+    best = SimpleNamespace(log_posterior=0.0, fit=SimpleNamespace(r=residual))
+    search = SimpleNamespace(best=lambda: best, beliefs=SimpleNamespace(log_total=lambda: 0.0))
+    work = SimpleNamespace(problem=SimpleNamespace(records=[record]), search=search, out_of_catalogue=[])
+    lost = Explained(errors=(), work=work, log_prior=0.0, lost={channel: 40})
+    gained = lost.log_evidence(lost.means) - lost.log_evidence({})
+    assert gained == pytest.approx(
+        40 * (-np.log(level) - 0.5), abs=40 * 0.15
+    )  # 400 samples: ½ ± 0.04; and a prior
+
+
+@pytest.mark.slow
+def test_a_cable_that_is_long_at_the_start_is_no_late_heading():
+    """A delay loses samples of its channel; degrees have less density than metres, and are not to count as much."""
+    record = data_errors.made(*data_errors.drawn(8501, 22)[21])
+    assert not named(subzero.diagnose(record.logged, budget="verdict"))
+
+
+@pytest.mark.slow
+def test_a_depth_that_is_late_is_no_drift_and_its_delay_is_found():
+    """Its delay is found where the problem is linear close to the run: at the nominal model it comes out 0.6 s off."""
+    record = data_errors.made(*data_errors.drawn(8401, 3)[2])
+    assert data_errors.is_right(record, subzero.diagnose(record.logged, budget="verdict"))
