@@ -236,12 +236,13 @@ class Look(Protocol):
 def compared(suspicion: Suspicion, records: Sequence[Logged], look: Look) -> list[tuple[Explained, float]]:
     """Return what errors the data may have, with what explains the records besides and its log evidence.
 
-    The records without what no vehicle does, and without what physics has no chance against, get a first look. If no
-    causes explain what is left, within declared tolerances, so do those without more: at once where all errors together
-    explain the records in the linear problem; else after a whole search, as something may have begun in mid-trial,
-    which looks like a step or a clock. What begins in mid-trial, or a force, settles nothing where errors explain all,
-    either: a fin that jams in the first second does what a command with the other sign does. The most probable is
-    finished, then what is not hopelessly behind. While that is not clear, records with more errors get the same.
+    The records without what no vehicle does, and without what physics has no chance against, get a first look. If that
+    explains what is left, by causes within declared tolerances or by what begins in mid-trial, only all errors together
+    are held against it, where they explain the records in the linear problem: a fin that jams in the first second does
+    what a command with the other sign does, and a lag what a delay does. If not, so are those without more, one after
+    the other: at once where all errors together explain the records; else after a whole search, as something may have
+    begun in mid-trial, which looks like a step or a clock. The most probable is finished, then what is not hopelessly
+    behind. While that is not clear, records with more errors get the same.
 
     Where even wide tolerances do not come close, a first look takes long: if nothing outside explains the records,
     those without more errors have theirs before it goes on.
@@ -285,7 +286,7 @@ class _Comparison:
         new = self.tried[:]
         if not more or _is_settled(now.work):
             self.tried[:], new = [now], [now]
-            more = more[-1:] if explain(errors) and _is_outside(now.work) else []
+            more = more[-1:] if explain(errors) else []
         elif not explain(errors):
             self.look.finish(now.work)
             new, more = [], [] if is_explained(now.work) else more
@@ -376,12 +377,6 @@ def _is_settled(work: Findings) -> bool:
     if is_found(work.search, work.out_of_catalogue):
         return True
     return is_explained(work) and not work.search.is_poor()
-
-
-def _is_outside(work: Findings) -> bool:
-    """Say whether something that begins in mid-trial, or a force, is more probable than any causes."""
-    best = work.search.best().log_posterior
-    return any(one.log_posterior > best for one in work.out_of_catalogue)
 
 
 def _is_complete(tried: Sequence[Explained]) -> bool:
