@@ -45,9 +45,10 @@ from subzero.diagnosis.inference.data_error_yardstick import OUTLIER_LOG_DENSITY
 from subzero.diagnosis.inference.latent_force import FORCE
 from subzero.diagnosis.inference.linear_gaussian import log_sum
 from subzero.diagnosis.inference.map_fit import is_poor_fit
-from subzero.diagnosis.inference.noise import log_prior_of, usual_of
+from subzero.diagnosis.inference.model_fits import log_density_of_noise
 from subzero.diagnosis.inference.out_of_catalogue import Findings
 from subzero.diagnosis.inference.out_of_catalogue import is_explained as is_found
+from subzero.diagnosis.inference.posing import sensor_of
 from subzero.diagnosis.inference.problem import Observed, Problem
 from subzero.diagnosis.inference.repeated_values import log_odds_of_frozen, steps_of
 
@@ -84,7 +85,7 @@ def _is_quiet(work: Findings) -> bool:
     for i, one in enumerate(problem.records):
         for name, noise in one.noise.items():
             left = min(float(np.sqrt(np.mean(_own(problem, r, i, name) ** 2))), 1.0)
-            level = usual_of(name, one.values[name], one.known).level
+            level = sensor_of(one, name).level
             most = LOUD * float(np.hypot(level, noise.resolution / np.sqrt(12.0)))
             if noise.sd * left >= most:
                 return False
@@ -104,7 +105,7 @@ class Standing(NamedTuple):
         """
         problem, r = _best_residual(work)
         one, white = problem.records[self.record], _own(problem, r, self.record, self.channel)
-        noise, usual = one.noise[self.channel], usual_of(self.channel, one.values[self.channel], one.known)
+        noise, usual = one.noise[self.channel], sensor_of(one, self.channel)
         run = self.run[noise.used]
         if not run.any():
             return 0.0
@@ -411,7 +412,6 @@ def _samples(work: Findings) -> Counter[str]:
 
 def _fixed(one: Observed, name: str) -> float:
     """Return what the noise of a channel adds to its log density: −½ log det Σ, what outliers cost, and its prior."""
-    noise, usual = one.noise[name], usual_of(name, one.values[name], one.known)
-    out = int(np.isfinite(one.values[name]).sum()) - noise.count
-    log_outliers = out * (OUTLIER_LOG_DENSITY - np.log(usual.level))
-    return float(log_outliers - noise.log_scale + log_prior_of(noise, usual))
+    out = int(np.isfinite(one.values[name]).sum()) - one.noise[name].count
+    log_outliers = out * (OUTLIER_LOG_DENSITY - np.log(sensor_of(one, name).level))
+    return float(log_outliers) + log_density_of_noise(one, name)

@@ -280,17 +280,15 @@ def _rewhitened(fit: Fit, again: Callable[[np.ndarray], np.ndarray]) -> Fit:
     return replace(fit, r=again(fit.r), J=again(fit.J))
 
 
-def log_density_of_noise(one: Observed) -> float:
-    """Return what the noise of a record adds to the log density of its samples: −½ log det Σ + log p(θ)."""
-    return sum(
-        log_prior_of(noise, sensor_of(one, name)) - noise.log_scale for name, noise in one.noise.items()
-    )
+def log_density_of_noise(one: Observed, name: str) -> float:
+    """Return what the noise of a channel adds to the log density of its samples: −½ log det Σ + log p(θ)."""
+    return log_prior_of(one.noise[name], sensor_of(one, name)) - one.noise[name].log_scale
 
 
 def _gained(before: Problem, after: Problem) -> float:
     """Return what another noise adds to the log density of all samples, but for their residual."""
-    pairs = zip(before.records, after.records, strict=True)
-    return sum(log_density_of_noise(new) - log_density_of_noise(old) for old, new in pairs)
+    return sum(log_density_of_noise(new, name) - log_density_of_noise(old, name)
+               for old, new in zip(before.records, after.records, strict=True) for name in old.noise)  # fmt: skip
 
 
 def candidate_with_own_noise(problem: Problem, one: Candidate) -> Candidate:
