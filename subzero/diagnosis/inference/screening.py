@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from scipy.special import log_ndtr
 
 from subzero.diagnosis.hypothesis.hypotheses import (
     Entry,
@@ -24,7 +25,7 @@ from subzero.diagnosis.hypothesis.hypotheses import (
     variances_named,
 )
 from subzero.diagnosis.inference import settings
-from subzero.diagnosis.inference.laplace import Candidate, possible
+from subzero.diagnosis.inference.laplace import Candidate
 from subzero.diagnosis.inference.linear_gaussian import (
     KAPPAS,
     Posterior,
@@ -98,8 +99,9 @@ def screening_of(
     names = nameable(problem.entries)
     found = Screening(count=len(names))
     base = _bases(problem, wide.quadratic, ())
-    for ids in [(), *((one,) for one in names), *pairs_of(problem.entries, names)]:
-        found.log_posterior[ids] = linear_evidence(problem, base, (), ids) + log_prior(ids, len(names))
+    several: list[Ids] = [(), *((one,) for one in names), *pairs_of(problem.entries, names)]
+    for ids, log in linear_evidences(problem, base, (), several).items():
+        found.log_posterior[ids] = log + log_prior(ids, len(names))
     _sweep(problem, wide.z, wide.J, _without_slope(problem, wide.J), found, wide.r)
     return found
 
@@ -131,18 +133,29 @@ def _bases(problem: Problem, q: Quadratic, ids: Ids) -> dict[float, Base]:
     return {kappa: Base(posterior(q, D), D) for kappa, D in under.items()}
 
 
-def linear_evidence(problem: Problem, base: Mapping[float, Base], held: Ids, more: Ids) -> float:
-    """Return the log evidence, mixed over κ, when further causes are freed beside those that are free in `base`."""
-    at, found = columns_of(problem.entries, tuple(one for one in more if one not in held)), []
-    for kappa, prior in KAPPAS.items():
-        known, D = base[kappa]
-        value = known.log_evidence
-        if at:
-            own = variances_named(problem.entries, at, kappa)
-            value, mean, covariance = freed(known, D, at, own)
-            value += possible(problem.entries, at, mean, np.sqrt(np.diag(covariance)))
-        found.append(np.log(prior) + value)
-    return log_sum(found)
+def linear_evidences(
+    problem: Problem, base: Mapping[float, Base], held: Ids, several: Sequence[Ids]
+) -> dict[Ids, float]:
+    """Return hypothesis → log evidence, mixed over κ, when its causes are freed beside those that are free in `base`."""
+    entries, by_size = problem.entries, dict[int, list[tuple[Ids, list[int]]]]()
+    own = {one: columns_of(entries, (one,)) for one in {one for ids in several for one in ids}}
+    for ids in several:
+        at = [k for one in ids if one not in held for k in own[one]]
+        by_size.setdefault(len(at), []).append((ids, at))
+    found = dict[Ids, float]()
+    for alike in by_size.values():
+        places = np.array([at for _, at in alike], dtype=int)
+        logs = [np.log(prior) + _freed_evidence(problem, base[kappa], kappa, places) for kappa, prior in KAPPAS.items()]
+        found |= zip([ids for ids, _ in alike], np.logaddexp.reduce(logs).tolist(), strict=True)
+    return {ids: found[ids] for ids in several}
+
+
+def _freed_evidence(problem: Problem, base: Base, kappa: float, places: np.ndarray) -> np.ndarray:
+    """Return the log evidence (n,) of n hypotheses that free the entries at places (n, p) under a κ."""
+    every, bounded = range(len(problem.entries)), _lowest(problem) == 0.0
+    value, mean, covariance = freed(base.known, base.D, places, variances_named(problem.entries, every, kappa)[places])
+    x = mean / np.sqrt(np.diagonal(covariance, axis1=-2, axis2=-1))
+    return value + np.sum(np.where(bounded[places], log_ndtr(x) + np.log(2.0), 0.0), axis=-1)
 
 
 def _without_slope(problem: Problem, J: np.ndarray) -> list[int]:
@@ -203,15 +216,11 @@ def mixed_evidence(problem: Problem, q: Quadratic, ids: Ids = ()) -> float:
 
 def with_one_added(problem: Problem, one: Candidate) -> dict[Ids, float]:
     """Return hypothesis → log posterior of all with one cause more than a candidate, in the linear problem there."""
-    names, found = nameable(problem.entries), {}
-    base = _bases(problem, one.fit.quadratic, one.ids)
-    here = linear_evidence(problem, base, one.ids, one.ids) + log_prior(one.ids, len(names))
-    for more in names:
-        ids = tuple(sorted({*one.ids, more}))
-        if len(ids) > len(one.ids):
-            there = linear_evidence(problem, base, one.ids, ids) + log_prior(ids, len(names))
-            found[ids] = one.log_posterior + there - here
-    return found
+    names, base = nameable(problem.entries), _bases(problem, one.fit.quadratic, one.ids)
+    several = [tuple(sorted({*one.ids, more})) for more in names if more not in one.ids]
+    logs = linear_evidences(problem, base, one.ids, [one.ids, *several])
+    there = {ids: log + log_prior(ids, len(names)) for ids, log in logs.items()}
+    return {ids: one.log_posterior + there[ids] - there[one.ids] for ids in several}
 
 
 def with_one_swapped(problem: Problem, one: Candidate, rest: Ids) -> dict[Ids, float]:
@@ -270,6 +279,8 @@ def _lowest(problem: Problem) -> np.ndarray:
 
 KAPPA_WIDE = 4.0
 """κ of the fit that the linear evidence is made at."""
+FRESH_WIDE = 2
+"""How often that fit makes its sensitivities again; less often, the more often the noise behind it was estimated."""
 Nominal = tuple[np.ndarray, np.ndarray]
 """Residual (m,) and sensitivities (m, k) of the nominal model."""
 
@@ -279,21 +290,26 @@ def fit_wide(problem: Problem, progress: Progress) -> tuple[Problem, Fit, Nomina
     progress(0.05, "sensitivities of the nominal model")
     zero = np.zeros(len(problem.entries))
     J = problem.jacobian(zero)
-    fit = _from(problem, zero, J, progress)
-    for _ in range(settings.MAX_ADDED):
+    progress(0.15, "fit within wide tolerances")
+    fit = _off_kinks(problem, _from(problem, zero, J, FRESH_WIDE))
+    for more in range(1, settings.MAX_ADDED + 1):
         D = variances(problem.entries, (), KAPPA_WIDE)
         again = with_noise_behind(problem, fit.z, D) if np.isfinite(fit.r).all() else None
         if again is None:
             break
         problem, J = again, again.jacobian(zero)
-        fit = _from(problem, fit.z, problem.jacobian(fit.z), progress)
+        fit = _from(problem, fit.z, problem.jacobian(fit.z), max(FRESH_WIDE - more, 0))
     return problem, fit, (problem.residual(zero), J)
 
 
-def _from(problem: Problem, z: np.ndarray, J: np.ndarray, progress: Progress) -> Fit:
-    """Return the fit from z, with the sensitivities there; or if it went astray, a better one from off its kinks."""
-    progress(0.15, "fit within wide tolerances")
-    fit = refit(problem, z, J, variances(problem.entries, (), KAPPA_WIDE), most_fresh=2, made_at=z)
+def _from(problem: Problem, z: np.ndarray, J: np.ndarray, most_fresh: int) -> Fit:
+    """Return the fit from z, with the sensitivities there."""
+    D = variances(problem.entries, (), KAPPA_WIDE)
+    return refit(problem, z, J, D, most_fresh=most_fresh, made_at=z)
+
+
+def _off_kinks(problem: Problem, fit: Fit) -> Fit:
+    """Return a fit, or if it went astray, a better one from off its kinks."""
     if not at_bad_minimum(problem, fit, ()):
         return fit
     again = restarted_where_smooth(problem, fit, ())
