@@ -27,7 +27,13 @@ import numpy as np
 from subzero.diagnosis.hypothesis.data_error import DataError, corrected
 from subzero.diagnosis.hypothesis.hypotheses import MAX_CAUSES, PRIOR, columns_of, nameable, variances
 from subzero.diagnosis.hypothesis.logged import Logged
-from subzero.diagnosis.inference.change_point_scan import BaseRun, Begun, gain_of, in_rough_steps, onset_columns
+from subzero.diagnosis.inference.change_point_scan import (
+    BaseRun,
+    Begun,
+    gain_of,
+    in_rough_steps,
+    onset_columns,
+)
 from subzero.diagnosis.inference.data_error_scan import (
     FAR_BEHIND,
     Suspect,

@@ -105,7 +105,10 @@ class Problem:
         z (k,) differ more in such steps than noise lets one see.
         """
         whole = np.zeros(0)
-        made = [self.kept.setting(one.setting, rougher, whole, partial(rougher, one.setting)) for one in self.records]
+        made = [
+            self.kept.setting(one.setting, rougher, whole, partial(rougher, one.setting))
+            for one in self.records
+        ]
         records = (replace(one, setting=setting) for one, setting in zip(self.records, made, strict=True))
         rough = replace(self, records=tuple(records))
         apart = rough.residual(z) - self.residual(z)

@@ -136,7 +136,7 @@ def _bases(problem: Problem, q: Quadratic, ids: Ids) -> dict[float, Base]:
 def linear_evidences(
     problem: Problem, base: Mapping[float, Base], held: Ids, several: Sequence[Ids]
 ) -> dict[Ids, float]:
-    """Return hypothesis → log evidence, mixed over κ, when its causes are freed beside those that are free in `base`."""
+    """Return hypothesis → log evidence, mixed over κ, with its causes freed beside those that are free in `base`."""
     entries, by_size = problem.entries, dict[int, list[tuple[Ids, list[int]]]]()
     own = {one: columns_of(entries, (one,)) for one in {one for ids in several for one in ids}}
     for ids in several:
@@ -145,7 +145,10 @@ def linear_evidences(
     found = dict[Ids, float]()
     for alike in by_size.values():
         places = np.array([at for _, at in alike], dtype=int)
-        logs = [np.log(prior) + _freed_evidence(problem, base[kappa], kappa, places) for kappa, prior in KAPPAS.items()]
+        logs = [
+            np.log(prior) + _freed_evidence(problem, base[kappa], kappa, places)
+            for kappa, prior in KAPPAS.items()
+        ]
         found |= zip([ids for ids, _ in alike], np.logaddexp.reduce(logs).tolist(), strict=True)
     return {ids: found[ids] for ids in several}
 
@@ -153,7 +156,9 @@ def linear_evidences(
 def _freed_evidence(problem: Problem, base: Base, kappa: float, places: np.ndarray) -> np.ndarray:
     """Return the log evidence (n,) of n hypotheses that free the entries at places (n, p) under a κ."""
     every, bounded = range(len(problem.entries)), _lowest(problem) == 0.0
-    value, mean, covariance = freed(base.known, base.D, places, variances_named(problem.entries, every, kappa)[places])
+    value, mean, covariance = freed(
+        base.known, base.D, places, variances_named(problem.entries, every, kappa)[places]
+    )
     x = mean / np.sqrt(np.diagonal(covariance, axis1=-2, axis2=-1))
     return value + np.sum(np.where(bounded[places], log_ndtr(x) + np.log(2.0), 0.0), axis=-1)
 
