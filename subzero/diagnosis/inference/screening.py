@@ -284,8 +284,6 @@ def _lowest(problem: Problem) -> np.ndarray:
 
 KAPPA_WIDE = 4.0
 """κ of the fit that the linear evidence is made at."""
-FRESH_WIDE = 2
-"""How often that fit makes its sensitivities again; less often, the more often the noise behind it was estimated."""
 Nominal = tuple[np.ndarray, np.ndarray]
 """Residual (m,) and sensitivities (m, k) of the nominal model."""
 
@@ -295,26 +293,21 @@ def fit_wide(problem: Problem, progress: Progress) -> tuple[Problem, Fit, Nomina
     progress(0.05, "sensitivities of the nominal model")
     zero = np.zeros(len(problem.entries))
     J = problem.jacobian(zero)
-    progress(0.15, "fit within wide tolerances")
-    fit = _off_kinks(problem, _from(problem, zero, J, FRESH_WIDE))
-    for more in range(1, settings.MAX_ADDED + 1):
+    fit = _from(problem, zero, J, progress)
+    for _ in range(settings.MAX_ADDED):
         D = variances(problem.entries, (), KAPPA_WIDE)
         again = with_noise_behind(problem, fit.z, D) if np.isfinite(fit.r).all() else None
         if again is None:
             break
         problem, J = again, again.jacobian(zero)
-        fit = _from(problem, fit.z, problem.jacobian(fit.z), max(FRESH_WIDE - more, 0))
+        fit = _from(problem, fit.z, problem.jacobian(fit.z), progress)
     return problem, fit, (problem.residual(zero), J)
 
 
-def _from(problem: Problem, z: np.ndarray, J: np.ndarray, most_fresh: int) -> Fit:
-    """Return the fit from z, with the sensitivities there."""
-    D = variances(problem.entries, (), KAPPA_WIDE)
-    return refit(problem, z, J, D, most_fresh=most_fresh, made_at=z)
-
-
-def _off_kinks(problem: Problem, fit: Fit) -> Fit:
-    """Return a fit, or if it went astray, a better one from off its kinks."""
+def _from(problem: Problem, z: np.ndarray, J: np.ndarray, progress: Progress) -> Fit:
+    """Return the fit from z, with the sensitivities there; or if it went astray, a better one from off its kinks."""
+    progress(0.15, "fit within wide tolerances")
+    fit = refit(problem, z, J, variances(problem.entries, (), KAPPA_WIDE), most_fresh=2, made_at=z)
     if not at_bad_minimum(problem, fit, ()):
         return fit
     again = restarted_where_smooth(problem, fit, ())
