@@ -369,7 +369,7 @@ def _causes(problem: Problem, here: Linear, now: Reckoned) -> Iterator[Further]:
         D = here.D.copy()
         D[at] = wide[at]
         if not np.array_equal(D, here.D):
-            yield Further(price, freed(base, here.D, at, D[at])[0], partial(replace, here, D=D))
+            yield Further(price, float(freed(base, here.D, at, D[at])[0]), partial(replace, here, D=D))
 
 
 def _onsets(
