@@ -30,6 +30,7 @@ from subzero.diagnosis.hypothesis.data_error import DataError
 from subzero.diagnosis.hypothesis.effect import Effect
 from subzero.diagnosis.hypothesis.logged import Logged
 from subzero.diagnosis.inference.data_error_choice import Explained, compared, may_be_named
+from subzero.diagnosis.inference.data_error_choice import is_explained as is_quietly_explained
 from subzero.diagnosis.inference.data_error_search import SuspectedError, is_soft, suspected
 from subzero.diagnosis.inference.linear_gaussian import log_sum
 from subzero.diagnosis.inference.model_average import NAMED_PROBABILITY
@@ -235,20 +236,23 @@ def _fit_wide(findings: Findings, seen: Seen) -> None:
 
 def _first_look(findings: Findings, is_hopeless: Callable[[], bool]) -> None:
     """Screen all hypotheses, fit the best, and look outside where none of them explains the records."""
-    search = findings.search
+    search, explained = findings.search, False
     with _timed(findings, "screen"):
         if search.is_far and findings.budget != "screen":
-            _from_afar(findings)
-            findings.given_up = is_hopeless()
+            explained = _one_explains(findings)
+            if not explained:
+                _from_afar(findings)
+                findings.given_up = is_hopeless()
             if findings.given_up:
                 return
-        search.look()
+        if not search.is_far or not search.screen.far:
+            search.look()
     if findings.budget == "screen":
         search.fit(())
         return
     with _timed(findings, "fits"):
         search.first_fits()
-        findings.given_up = is_hopeless() and bool(findings.out_of_catalogue)
+        findings.given_up = not explained and is_hopeless() and bool(findings.out_of_catalogue)
         if search.is_poor() and not findings.given_up:
             search.refine_first()
     if search.is_poor() and not findings.out_of_catalogue:
@@ -282,13 +286,26 @@ def _measure_misfit(findings: Findings) -> None:
         findings.misfit[one.name] = misfits(one, respond(one.setting, one.time, one.noise))
 
 
+def _one_explains(findings: Findings) -> bool:
+    """Fit the causes by themselves that come out best in real runs of some sizes, and say whether one of them explains
+    the records, within declared tolerances: then nothing else has to take the run along them.
+    """
+    findings.search.progress(0.2, "causes of any size")
+    findings.search.only_nothing()
+    findings.search.look()
+    findings.search.fit_from_afar()
+    return is_quietly_explained(findings) and not findings.search.is_poor()
+
+
 def _from_afar(findings: Findings) -> None:
     """Let a force, or a cause that begins in mid-trial, take the run along the records, and look from there."""
-    findings.search.progress(0.2, "forces, and causes that begin in mid-trial")
-    findings.search.only_nothing()
-    findings.out_of_catalogue = explanations_outside(findings.search)
+    search = findings.search
+    search.progress(0.25, "forces, and causes that begin in mid-trial")
+    aside = search.set_aside()
+    findings.out_of_catalogue = explanations_outside(search)
     if findings.out_of_catalogue[0].point:
-        findings.search.go_near(findings.out_of_catalogue[0].point.fit)
+        search.go_near(findings.out_of_catalogue[0].point.fit)
+    search.take_back(aside)
 
 
 def _on_records(

@@ -87,6 +87,16 @@ def test_freeing_entries_is_another_prior(at):
     assert_allclose(covariance, direct.M[np.ix_(at, at)], atol=1e-8)
 
 
+def test_entries_are_freed_alike_by_themselves_and_many_at_once():
+    """Screening frees all pairs in one go; the solves are the same, so only rounding may differ."""
+    J, D, z, r = linear_problem(7)
+    base, pairs = posterior(Quadratic.at(z, r, J), D), np.array([[0, 4], [2, 3], [1, 0]])
+    together = freed(base, D, pairs, 25.0 * D[pairs])
+    for i, pair in enumerate(pairs):
+        for many, own in zip(together, freed(base, D, pair, 25.0 * D[pair]), strict=True):
+            assert_allclose(many[i], own, atol=1e-12)
+
+
 @pytest.mark.parametrize("seed", range(20))
 def test_a_bounded_step_is_the_best_within_bounds(seed):
     random = np.random.default_rng(seed)

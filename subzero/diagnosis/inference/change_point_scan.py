@@ -117,14 +117,20 @@ def scan(
         record: in which they begin.
         best: how many are tried on the finer grid.
     """
-    columns, spacing = onset_columns(point.along, effects, record), spacing_of(point.along.problem, record)
+    along, spacing = in_rough_steps(point.along), spacing_of(point.along.problem, record)
+    columns = onset_columns(along, effects, record)
     found = _strongest(_tried(point, D, columns, record))
     worth = [one for one in found[:best] if one.log_gain > settings.SCAN_GAIN_NATS]
     finer = [(one.effect, time) for one in worth for time in _around(one.time, spacing)]
     if not finer:
         return found
-    columns = dict(zip(finer, change_point_columns(point.along, finer, record), strict=True))
+    columns = dict(zip(finer, change_point_columns(along, finer, record), strict=True))
     return _strongest(found + _tried(point, D, columns, record))
+
+
+def in_rough_steps(along: BaseRun) -> BaseRun:
+    """Return a run in rougher steps, which serves to look for onsets."""
+    return along._replace(problem=along.problem.roughly(along.z))
 
 
 def onset_columns(along: BaseRun, effects: Sequence[Effect], record: int) -> dict[Begun, np.ndarray]:
@@ -214,7 +220,7 @@ def gain_of(data: ForceInformation, effect: Effect) -> tuple[float, np.ndarray]:
 SAME_RUN_LEVELS = 1.0
 """Along runs that differ by less than this many levels of the noise (root mean square of each channel), an onset
 changes the same: at so small a distance sensitivities differ by less than their steps make them err. [-]"""
-MOST_RUNS_KEPT = 4
+MOST_RUNS_KEPT = 6
 """Along so many runs, the last ones, what onsets change is kept."""
 
 

@@ -27,7 +27,13 @@ import numpy as np
 from subzero.diagnosis.hypothesis.data_error import DataError, corrected
 from subzero.diagnosis.hypothesis.hypotheses import MAX_CAUSES, PRIOR, columns_of, nameable, variances
 from subzero.diagnosis.hypothesis.logged import Logged
-from subzero.diagnosis.inference.change_point_scan import BaseRun, Begun, gain_of, onset_columns
+from subzero.diagnosis.inference.change_point_scan import (
+    BaseRun,
+    Begun,
+    gain_of,
+    in_rough_steps,
+    onset_columns,
+)
 from subzero.diagnosis.inference.data_error_scan import (
     FAR_BEHIND,
     Suspect,
@@ -366,7 +372,7 @@ def _linear(problem: Problem, record: int) -> Linear:
 
 def _begun(problem: Problem, record: int, here: Linear) -> dict[Begun, np.ndarray]:
     """Return what causes that begin at times of a grid change in the rows of a record (m, parameters)."""
-    along = BaseRun(problem, np.zeros(len(problem.entries)))
+    along = in_rough_steps(BaseRun(problem, np.zeros(len(problem.entries))))
     before = sum(noise.count for one in problem.records[:record] for noise in one.noise.values())
     columns = onset_columns(along, problem.sudden_effects, record)
     return {pair: C[before : before + here.r.size] for pair, C in columns.items()}
@@ -382,7 +388,7 @@ def _causes(problem: Problem, here: Linear, now: Reckoned) -> Iterator[Further]:
         D = here.D.copy()
         D[at] = wide[at]
         if not np.array_equal(D, here.D):
-            yield Further(price, freed(base, here.D, at, D[at])[0], partial(replace, here, D=D))
+            yield Further(price, float(freed(base, here.D, at, D[at])[0]), partial(replace, here, D=D))
 
 
 def _onsets(

@@ -309,7 +309,7 @@ def relinearised_force(
     """
     D, which = variances(problem.entries, (), kappa), name.partition(":")[2]
     if name.startswith(FORCE):
-        found = estimate_force(problem, start, which, D, spacing=knots.spacing, most_fresh=1)
+        found = estimate_force(problem, start, which, D, spacing=knots.spacing, most_fresh=0)
         done = found.fit
     else:
         found = estimate_drift(problem, start, which, MAX_DRIFT_LEVELS * SPECS[which].noise, D)

@@ -102,8 +102,10 @@ def with_force(problem: Problem, axis: str, knots: Knots, L: np.ndarray, size: f
 def force_columns(
     problem: Problem, z: np.ndarray, axes: Iterable[str], knots: Knots
 ) -> dict[str, np.ndarray]:
-    """Return axis → whitened sensitivities (m, n) of what is simulated to a force of 1 N (1 N m) at each knot."""
-    axes, more, eye = list(axes), problem, np.eye(knots.time.size)
+    """Return axis → whitened sensitivities (m, n) of what is simulated to a force of 1 N (1 N m) at each knot, in rough
+    steps.
+    """
+    axes, more, eye = list(axes), problem.roughly(z), np.eye(knots.time.size)
     for axis in axes:
         more = with_force(more, axis, knots, eye, 0.5 * usual_force(problem.records[0].setting, axis))
     there = np.concatenate([z, np.zeros(len(axes) * knots.time.size)])

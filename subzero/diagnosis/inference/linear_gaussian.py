@@ -94,25 +94,25 @@ def posterior(q: Quadratic, D: np.ndarray) -> Posterior:
 
 
 def freed(
-    base: Posterior, D: np.ndarray, places: Sequence[int], variance: np.ndarray
-) -> tuple[float, np.ndarray, np.ndarray]:
-    """Return log evidence, means and covariance of some entries when their prior variance is another.
+    base: Posterior, D: np.ndarray, places: Sequence[int] | np.ndarray, variance: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return log evidence (…), means (…, p) and covariance (…, p, p) of p entries when their prior variance is another.
 
     Args:
         base: under D.
         D: prior variances (k,).
-        places: of the entries.
-        variance: theirs, instead (places,).
+        places: of the entries (…, p): of several hypotheses at once, if asked.
+        variance: theirs, instead (…, p).
     """
-    at = list(places)
-    change = 1.0 / variance - 1.0 / D[at]
-    M, z = base.M[np.ix_(at, at)], base.z[at]
-    inner = np.eye(len(at)) + change[:, None] * M
-    solved = np.linalg.solve(inner, change[:, None] * np.eye(len(at)))
-    gain = -0.5 * float(z @ solved @ z)
-    log_det = float(np.linalg.slogdet(inner)[1]) + float(np.sum(np.log(variance / D[at])))
-    covariance = np.linalg.solve(np.eye(len(at)) + M * change, M)
-    mean = z - covariance @ (change * z)
+    at = np.asarray(places)
+    change, eye = 1.0 / variance - 1.0 / D[at], np.eye(at.shape[-1])
+    M, z = base.M[at[..., :, None], at[..., None, :]], base.z[at]
+    inner = eye + change[..., :, None] * M
+    solved = np.linalg.solve(inner, change[..., :, None] * eye)
+    gain = -0.5 * np.einsum("...i,...ij,...j", z, solved, z)
+    log_det = np.linalg.slogdet(inner)[1] + np.sum(np.log(variance / D[at]), axis=-1)
+    covariance = np.linalg.solve(eye + M * change[..., None, :], M)
+    mean = z - (covariance @ (change * z)[..., None])[..., 0]
     return base.log_evidence + gain - 0.5 * log_det, mean, covariance
 
 

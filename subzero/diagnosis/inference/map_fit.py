@@ -189,12 +189,14 @@ def with_own_jacobian(problem: Problem, fit: Fit) -> Fit:
 
 
 def continued(problem: Problem, fit: Fit) -> Fit:
-    """Return a fit that has gone on, with sensitivities of its own, while much is predicted."""
+    """Return a fit that has gone on, with sensitivities of its own, while much is predicted, and some of it gained."""
     for _ in range(settings.MAX_TRIED):
         if fit.predicted_gain < settings.DECISIVE_NATS:
             break
-        J = problem.jacobian(fit.z)
+        before, J = fit, problem.jacobian(fit.z)
         fit = refit(problem, fit.z, J, fit.D, r=fit.r, most_fresh=2, made_at=fit.z)
+        if fit.objective > before.objective - settings.CLOSE_NATS:
+            break
     return fit
 
 

@@ -203,7 +203,9 @@ class Search(GrowingFits):
 
     def first_fits(self) -> None:
         """Fit nothing, and the best causes and pairs of the screen, with real runs and the sensitivities at hand."""
-        first = self._first()
+        if self.screen.far:
+            self.fit_from_afar()
+        first = [] if self.screen.far else self._first()
         for ids, fit in zip(first, self._in_parallel(self._alone, first), strict=True):
             self._say(0.3, "fitting", ids, " by itself")
             self._keep(ids, fit)
@@ -212,6 +214,29 @@ class Search(GrowingFits):
             self.screen.best(2, settings.MAX_PAIRS, settings.SCREENED_NATS),
         )
         self.fit_all(list(chain([()], *best)), words="fitting")
+
+    def fit_from_afar(self) -> None:
+        """Fit the best causes of the screen by themselves, the best first; if one explains the records, within declared
+        tolerances, none that real runs of some sizes have far behind it.
+        """
+        for ids in self._first():
+            best = self.best().log_posterior
+            if not self.is_poor() and self.screen.log_posterior[ids] < best - settings.DECISIVE_NATS:
+                return
+            if ids not in self.candidates:
+                self._say(0.3, "fitting", ids, " by itself")
+                self._keep(ids, self._alone(ids))
+
+    def set_aside(self) -> dict[Ids, Candidate]:
+        """Go on as if nothing was fitted but the wide fit, and return the candidates, for `take_back`."""
+        aside, self.candidates = self.candidates, {}
+        self.only_nothing()
+        return aside
+
+    def take_back(self, candidates: Mapping[Ids, Candidate]) -> None:
+        """Keep candidates that are better than what is known of them."""
+        for one in candidates.values():
+            self._take(one)
 
     def refine_first(self) -> None:
         """Fit what came out best again, with sensitivities of its own."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from os import cpu_count
 from typing import TYPE_CHECKING
 
@@ -22,6 +22,7 @@ from subzero.diagnosis.inference.simulator import (
     RunCache,
     Stop,
     Track,
+    rougher,
     simulate_on,
     simulate_track,
     with_stops,
@@ -38,6 +39,8 @@ JACOBIAN_STEP = 0.2
 """Step of a sensitivity, in tolerances; a whole one from a state of rest (a play, a friction), where slopes jump."""
 JACOBIAN_STEP_SHARE = 0.03
 """... and at least this share of what is there: far from the nominal model runs are rougher."""
+ROUGH_LEVELS = 0.5
+"""Runs in rougher steps that are this many levels of the noise off (root mean square) serve for no sensitivity. [-]"""
 POST_RUN_SLOTS = ("sensors", "clock")
 """Slots that act on a finished run."""
 Job = tuple[int, np.ndarray, Stop | None]
@@ -96,6 +99,20 @@ class Problem:
         early = self.kept.setting(setting, self.entries, np.where(self._is_early, z, 0.0),
                                   lambda: self._changed(setting, record, z, late=False))  # fmt: skip
         return self._changed(early, record, z, late=True) if late else early
+
+    def roughly(self, z: np.ndarray) -> Problem:
+        """Return the same in rougher steps, for sensitivities that a linear look takes; itself if runs with deviations
+        z (k,) differ more in such steps than noise lets one see.
+        """
+        whole = np.zeros(0)
+        made = [
+            self.kept.setting(one.setting, rougher, whole, partial(rougher, one.setting))
+            for one in self.records
+        ]
+        records = (replace(one, setting=setting) for one, setting in zip(self.records, made, strict=True))
+        rough = replace(self, records=tuple(records))
+        apart = rough.residual(z) - self.residual(z)
+        return rough if float(np.mean(apart**2)) < ROUGH_LEVELS**2 else self
 
     def _changed(self, setting: Setting, record: int, z: np.ndarray, *, late: bool) -> Setting:
         """Return a setting with those deviations that change a run, or with those of the sensors (`late`)."""

@@ -2,7 +2,7 @@
 
 A cause that does nothing while it is small has no slope, and a one-sided slope at a non-smooth point says nothing of
 the other side: real simulations try some sizes of such causes. If even κ = 4 does not come close to the records, all
-causes are tried so.
+causes are tried so, and the best fitted by themselves, before a force or an onset takes the run along the records.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from scipy.special import log_ndtr
 
 from subzero.diagnosis.hypothesis.hypotheses import (
     Entry,
@@ -24,7 +25,7 @@ from subzero.diagnosis.hypothesis.hypotheses import (
     variances_named,
 )
 from subzero.diagnosis.inference import settings
-from subzero.diagnosis.inference.laplace import Candidate, possible
+from subzero.diagnosis.inference.laplace import Candidate
 from subzero.diagnosis.inference.linear_gaussian import (
     KAPPAS,
     Posterior,
@@ -98,8 +99,9 @@ def screening_of(
     names = nameable(problem.entries)
     found = Screening(count=len(names))
     base = _bases(problem, wide.quadratic, ())
-    for ids in [(), *((one,) for one in names), *pairs_of(problem.entries, names)]:
-        found.log_posterior[ids] = linear_evidence(problem, base, (), ids) + log_prior(ids, len(names))
+    several: list[Ids] = [(), *((one,) for one in names), *pairs_of(problem.entries, names)]
+    for ids, log in linear_evidences(problem, base, (), several).items():
+        found.log_posterior[ids] = log + log_prior(ids, len(names))
     _sweep(problem, wide.z, wide.J, _without_slope(problem, wide.J), found, wide.r)
     return found
 
@@ -131,18 +133,34 @@ def _bases(problem: Problem, q: Quadratic, ids: Ids) -> dict[float, Base]:
     return {kappa: Base(posterior(q, D), D) for kappa, D in under.items()}
 
 
-def linear_evidence(problem: Problem, base: Mapping[float, Base], held: Ids, more: Ids) -> float:
-    """Return the log evidence, mixed over κ, when further causes are freed beside those that are free in `base`."""
-    at, found = columns_of(problem.entries, tuple(one for one in more if one not in held)), []
-    for kappa, prior in KAPPAS.items():
-        known, D = base[kappa]
-        value = known.log_evidence
-        if at:
-            own = variances_named(problem.entries, at, kappa)
-            value, mean, covariance = freed(known, D, at, own)
-            value += possible(problem.entries, at, mean, np.sqrt(np.diag(covariance)))
-        found.append(np.log(prior) + value)
-    return log_sum(found)
+def linear_evidences(
+    problem: Problem, base: Mapping[float, Base], held: Ids, several: Sequence[Ids]
+) -> dict[Ids, float]:
+    """Return hypothesis → log evidence, mixed over κ, with its causes freed beside those that are free in `base`."""
+    entries, by_size = problem.entries, dict[int, list[tuple[Ids, list[int]]]]()
+    own = {one: columns_of(entries, (one,)) for one in {one for ids in several for one in ids}}
+    for ids in several:
+        at = [k for one in ids if one not in held for k in own[one]]
+        by_size.setdefault(len(at), []).append((ids, at))
+    found = dict[Ids, float]()
+    for alike in by_size.values():
+        places = np.array([at for _, at in alike], dtype=int)
+        logs = [
+            np.log(prior) + _freed_evidence(problem, base[kappa], kappa, places)
+            for kappa, prior in KAPPAS.items()
+        ]
+        found |= zip([ids for ids, _ in alike], np.logaddexp.reduce(logs).tolist(), strict=True)
+    return {ids: found[ids] for ids in several}
+
+
+def _freed_evidence(problem: Problem, base: Base, kappa: float, places: np.ndarray) -> np.ndarray:
+    """Return the log evidence (n,) of n hypotheses that free the entries at places (n, p) under a κ."""
+    every, bounded = range(len(problem.entries)), _lowest(problem) == 0.0
+    value, mean, covariance = freed(
+        base.known, base.D, places, variances_named(problem.entries, every, kappa)[places]
+    )
+    x = mean / np.sqrt(np.diagonal(covariance, axis1=-2, axis2=-1))
+    return value + np.sum(np.where(bounded[places], log_ndtr(x) + np.log(2.0), 0.0), axis=-1)
 
 
 def _without_slope(problem: Problem, J: np.ndarray) -> list[int]:
@@ -203,15 +221,11 @@ def mixed_evidence(problem: Problem, q: Quadratic, ids: Ids = ()) -> float:
 
 def with_one_added(problem: Problem, one: Candidate) -> dict[Ids, float]:
     """Return hypothesis → log posterior of all with one cause more than a candidate, in the linear problem there."""
-    names, found = nameable(problem.entries), {}
-    base = _bases(problem, one.fit.quadratic, one.ids)
-    here = linear_evidence(problem, base, one.ids, one.ids) + log_prior(one.ids, len(names))
-    for more in names:
-        ids = tuple(sorted({*one.ids, more}))
-        if len(ids) > len(one.ids):
-            there = linear_evidence(problem, base, one.ids, ids) + log_prior(ids, len(names))
-            found[ids] = one.log_posterior + there - here
-    return found
+    names, base = nameable(problem.entries), _bases(problem, one.fit.quadratic, one.ids)
+    several = [tuple(sorted({*one.ids, more})) for more in names if more not in one.ids]
+    logs = linear_evidences(problem, base, one.ids, [one.ids, *several])
+    there = {ids: log + log_prior(ids, len(names)) for ids, log in logs.items()}
+    return {ids: one.log_posterior + there[ids] - there[one.ids] for ids in several}
 
 
 def with_one_swapped(problem: Problem, one: Candidate, rest: Ids) -> dict[Ids, float]:
