@@ -25,7 +25,7 @@ from subzero.diagnosis.inference import (
     KINDS_OF_DATA_ERRORS,
     DataError,
     Noise,
-    is_rounded,
+    may_be_measured,
     repeated_values,
 )
 from subzero.diagnosis.inference.data_error_choice import Explained, compared
@@ -245,7 +245,7 @@ def test_a_rounded_log_that_jumps_by_no_whole_step_is_rounded_all_the_same():
     logged = dataclasses.replace(clean, record=record)
     found = repeated_values(logged)
     assert found
-    assert all(is_rounded(one, logged) for one in found)
+    assert all(may_be_measured(one, logged) for one in found)
 
 
 def test_a_rounded_depth_that_stands_still_between_outliers_stands_for_itself():

@@ -127,7 +127,7 @@ from subzero.diagnosis.inference.model_fits import gain_of_own_noise, with_own_n
 from subzero.diagnosis.inference.out_of_catalogue import Findings, special_cases_folded
 
 from subzero.diagnosis.inference.repeated_values import (
-    is_rounded,
+    may_be_measured,
     log_odds_of_frozen,
     repeated_values,
     steps_of,
@@ -184,7 +184,6 @@ __all__ = [
     "history",
     "is_noise",
     "is_poor_fit",
-    "is_rounded",
     "knots_of",
     "laplace",
     "latent_force_candidates",
@@ -195,6 +194,7 @@ __all__ = [
     "log_marginal",
     "log_odds_of_frozen",
     "log_prior",
+    "may_be_measured",
     "mixed",
     "moves_nothing",
     "objective",

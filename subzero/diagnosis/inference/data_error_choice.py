@@ -347,7 +347,16 @@ class _Comparison:
             now = _first(waiting)
             waiting.remove(now)
             if not any(now.is_behind(one) for one in self.tried):
+                self._fit_like_others(now.work)
                 self.look.finish(now.work)
+
+    def _fit_like_others(self, work: Findings) -> None:
+        """Fit what explains the records without other errors from where it does: a fit may end in a hollow of its own,
+        and what it lacks there is no evidence of an error.
+        """
+        for one in self.tried:
+            if one.work is not work and one.work.problem.entries is work.problem.entries:
+                work.search.fit_like(one.work.search.best())
 
     def _explained(self, errors: tuple[SuspectedError, ...], work: Findings) -> Explained:
         """Return records that are taken to have errors, with what was found in the records without them."""

@@ -58,7 +58,7 @@ from subzero.diagnosis.inference.linear_gaussian import ForceInformation, Poster
 from subzero.diagnosis.inference.map_fit import bounds
 from subzero.diagnosis.inference.posing import posed_again
 from subzero.diagnosis.inference.problem import Problem
-from subzero.diagnosis.inference.repeated_values import is_rounded, repeated_values, steps_off_grid
+from subzero.diagnosis.inference.repeated_values import may_be_measured, repeated_values, steps_off_grid
 
 MOST_ERRORS = 3
 """Of a record, beside values that are repeated."""
@@ -153,9 +153,9 @@ def _of_record(problem: Problem, records: Sequence[Logged], record: int) -> list
     """Return the errors that a record may have."""
     logged = records[record]
     repeated = repeated_values(logged, logged.trusted)
-    unclear = tuple(one for one in repeated if is_rounded(one, logged))
+    unclear = tuple(one for one in repeated if may_be_measured(one, logged))
     begun = replace(yardstick_of(problem, record, logged), repeated=unclear)
-    read_off = [one for one in repeated if not is_rounded(one, logged)]
+    read_off = [one for one in repeated if not may_be_measured(one, logged)]
     jumps = steps_off_grid(logged, logged.trusted)
     read_off += [likeliest(begun, begun.by_whole_steps(one)) for one in jumps]
     found = _back(begun, read_off, _forward(begun, read_off, logged.trusted))

@@ -8,8 +8,8 @@ comes back in several runs though nothing is rounded.
 A rounded channel whose values from a sample on lie beside the multiples of before jumps: no motion does that
 (`steps_off_grid`).
 
-A channel that is rounded and stands still repeats itself, too (`is_rounded`): there it is for the prediction to say,
-and for how often the channel flickers.
+A channel that is rounded and stands still repeats itself, too, and a value that stands far from its neighbours may more
+often be measured (`may_be_measured`): there it is for the prediction to say, and for how often the channel flickers.
 
 A sensor that rounds to steps of q shows the step in which what it measures lies:
 
@@ -45,7 +45,7 @@ FAR_LEVELS, FEWEST_FAR, NEIGHBOURS, NEAREST = 8.0, 4, 5, 2
 what is measured around it: from each of the nearest on both sides, of which one may be an outlier. Outliers that are
 rounded may be equal, but not in a row."""
 MOSTLY_FAR = 0.5
-"""... and in so large a share of its places: a vehicle at rest has a speed of 0, too. [-]"""
+"""... and if so large a share of its places does, no prediction is asked: a speed is 0 at rest, too. [-]"""
 SHORT, FEWEST_FROZEN = 3, 6
 """Runs as short as this say how often values repeat by chance; a channel is frozen if it repeats so many to the end."""
 WHITE_LEVELS = (0.1, 0.18, 0.31, 0.55, 0.97, 1.7, 3.0)
@@ -103,12 +103,17 @@ def _beside_multiples(values: np.ndarray) -> np.ndarray:
     return values - np.round(values)
 
 
-def is_rounded(error: DataError, logged: Logged) -> bool:
-    """Say whether a channel may repeat values because it is rounded and stands still."""
+def may_be_measured(error: DataError, logged: Logged) -> bool:
+    """Say whether a channel may repeat values because it is rounded and stands still; or has measured a value at more
+    places than those at which it stands far from its neighbours.
+    """
     (channel,) = error.channels
     left = error.corrected(logged).record.values[channel]
+    if error.how:
+        places = np.count_nonzero(left == float(error.how)) + len(error.at)
+        return len(error.at) < MOSTLY_FAR * places
     level = usual_of(channel, left, logged.noise).level
-    return not error.how and resolution_of(left, level) > 0.0
+    return resolution_of(left, level) > 0.0
 
 
 def _of(name: str, time: np.ndarray, values: np.ndarray, level: float) -> list[DataError]:
@@ -151,7 +156,7 @@ def _far_values(values: np.ndarray, level: float) -> Mapping[float, np.ndarray]:
         places = np.flatnonzero(at[: others[-1]])  # what only lasts to the end is frozen
         far = at.copy()
         far[places] = [_is_far(value, i, values, others, level) for i in places.tolist()]
-        enough = np.count_nonzero(far[: others[-1]]) >= max(FEWEST_FAR, MOSTLY_FAR * places.size)
+        enough = np.count_nonzero(far[: others[-1]]) >= FEWEST_FAR
         if enough and np.any(far[2:] & far[1:-1] & far[:-2]):
             found[value], values = far, np.where(far, np.nan, values)
     return found
