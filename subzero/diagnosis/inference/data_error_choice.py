@@ -45,13 +45,15 @@ from subzero.diagnosis.inference.data_error_yardstick import OUTLIER_LOG_DENSITY
 from subzero.diagnosis.inference.latent_force import FORCE
 from subzero.diagnosis.inference.linear_gaussian import log_sum
 from subzero.diagnosis.inference.map_fit import is_poor_fit
-from subzero.diagnosis.inference.model_fits import log_density_of_noise
-from subzero.diagnosis.inference.out_of_catalogue import Findings
+from subzero.diagnosis.inference.model_fits import log_density_of_noise, log_evidence_of
+from subzero.diagnosis.inference.out_of_catalogue import Findings, linear_of_first
 from subzero.diagnosis.inference.out_of_catalogue import is_explained as is_found
 from subzero.diagnosis.inference.posing import sensor_of
 from subzero.diagnosis.inference.problem import Observed, Problem
 from subzero.diagnosis.inference.repeated_values import log_odds_of_frozen, steps_of
 
+SHIFTS = ("late_clock", "clock_rate", "latency")
+"""Kinds that put samples outside the trial."""
 ALIKE = 10
 """So many errors of a kind share its probability, about."""
 
@@ -262,8 +264,51 @@ def compared(suspicion: Suspicion, records: Sequence[Logged], look: Look) -> lis
         if not tried:
             raise
         tried[-1].work.complete = False
-    per_lost = _least_means(tried)
-    return [(one, one.log_evidence(per_lost)) for one in tried]
+    per_lost, least = _least_means(tried), min(tried, key=lambda one: len(one.errors))
+    return [(one, one.log_evidence(per_lost) + _beyond(one, least, records, per_lost)) for one in tried]
+
+
+def _beyond(
+    one: Explained, least: Explained, records: Sequence[Logged], per_lost: Mapping[str, float]
+) -> float:
+    """Return by how much samples that a clock or a delay puts outside the trial are more probable than those of their
+    channel on average: by how much they are, to who knows the others, beside the explanation of the records with the
+    least errors,
+
+        log p(y outside | y inside) = log p(y) − log p(y inside)
+
+    The ends of a record are like no others: something begins there, and noise that wanders is at its farthest.
+    """
+    places = [_places(logged, one.errors, i) for i, logged in enumerate(records)]
+    kept = [{name: np.isin(here, places[i][name]) for name, here in _places(logged, least.errors, i).items()}
+            for i, logged in enumerate(records)]  # fmt: skip
+    seen = least.work.problem.records
+    if one is least or all(
+        some[name].all() for some, record in zip(kept, seen, strict=True) for name in record.noise
+    ):
+        return 0.0
+    every = [{name: np.ones(some.size, dtype=bool) for name, some in each.items()} for each in kept]
+    problem = least.work.search.problem
+    linear, D = linear_of_first(least.work.search, least.work.out_of_catalogue)
+    log_all, log_inside = (log_evidence_of(problem, linear, D, some) for some in (every, kept))
+    found = float(log_all - log_inside)
+    for some, record in zip(kept, seen, strict=True):
+        for name, noise in record.noise.items():
+            gone = ~some[name] & np.isfinite(record.values[name])
+            found += np.count_nonzero(gone & ~noise.used) * _log_outlier(record, name)
+            found -= np.count_nonzero(gone) * per_lost.get(name, 0.0)
+    return found
+
+
+def _places(logged: Logged, errors: Sequence[SuspectedError], record: int) -> dict[str, np.ndarray]:
+    """Return channel → which of the samples that were written stands where when clocks are put right (n,); -1 where
+    none does.
+    """
+    count = np.arange(logged.record.time.size, dtype=float)
+    written = replace(logged.record, values=dict.fromkeys(logged.record.values, count))
+    shifts = tuple(one.error for one in errors if one.record == record and one.error.kind in SHIFTS)
+    shown = corrected(replace(logged, record=written), shifts).record.values
+    return {name: np.where(np.isfinite(column), column, -1.0) for name, column in shown.items()}
 
 
 @dataclass(frozen=True, eq=False)
@@ -422,5 +467,9 @@ def _samples(work: Findings) -> Counter[str]:
 def _fixed(one: Observed, name: str) -> float:
     """Return what the noise of a channel adds to its log density: −½ log det Σ, what outliers cost, and its prior."""
     out = int(np.isfinite(one.values[name]).sum()) - one.noise[name].count
-    log_outliers = out * (OUTLIER_LOG_DENSITY - np.log(sensor_of(one, name).level))
-    return float(log_outliers) + log_density_of_noise(one, name)
+    return out * _log_outlier(one, name) + log_density_of_noise(one, name)
+
+
+def _log_outlier(one: Observed, name: str) -> float:
+    """Return the log density of an outlier of a channel."""
+    return float(OUTLIER_LOG_DENSITY - np.log(sensor_of(one, name).level))

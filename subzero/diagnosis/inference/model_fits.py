@@ -15,7 +15,7 @@ a channel after the other: what the others say of the parameters, N(m, M), is th
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
@@ -325,19 +325,29 @@ def with_own_noise(problem: Problem, linear: Linear, D: np.ndarray) -> Problem:
         linear: around the fit of the explanation.
         D: prior variances of its parameters (k,).
     """
-    channels = _channels(problem, linear)
-    now = _log_evidence(channels, D)
-    for _ in range(settings.MAX_TRIED):
-        for i, one in enumerate(channels):
-            channels[i] = one.with_noise_given(_sum(channels[:i] + channels[i + 1 :], D.size), D)
-        then = _log_evidence(channels, D)
-        if then < now + settings.NEGLIGIBLE_GAIN_NATS:
-            break
-        now = then
-    new = iter(channels)
+    new = iter(_with_noise_behind(_channels(problem, linear), D))
     records = [replace(one, noise={name: replace(next(new).noise, used=old.used) for name, old in one.noise.items()})
                for one in problem.records]  # fmt: skip
     return replace(problem, records=tuple(records))
+
+
+def log_evidence_of(
+    problem: Problem, linear: Linear, D: np.ndarray, kept: Sequence[Mapping[str, np.ndarray]]
+) -> float:
+    """Return the log evidence of an explanation if only some samples were measured, with the noise that is the most
+    probable then.
+
+    Args:
+        problem: with the noise that the linear problem was made white by.
+        linear: around the fit of the explanation.
+        D: prior variances of its parameters (k,).
+        kept: channel → which of its samples are kept (n,), of every record.
+    """
+    channels, masks = _channels(problem, linear), []
+    for one, some in zip(problem.records, kept, strict=True):
+        masks += [some[name][noise.used] for name, noise in one.noise.items()]
+    some_of_each = [one.only(mask) for one, mask in zip(channels, masks, strict=True)]
+    return _log_evidence(_with_noise_behind(some_of_each, D), D)
 
 
 @dataclass(frozen=True, eq=False)
@@ -361,6 +371,13 @@ class _Channel:
         """The linear problem of the channel alone, made white by its noise."""
         return Linear(self.noise.whiten(self.whole), self.noise.whiten(self.J)).quadratic
 
+    def only(self, kept: np.ndarray) -> _Channel:
+        """Return the channel with some of its samples (m,)."""
+        noise = replace(
+            self.noise, used=np.ones(np.count_nonzero(kept), dtype=bool), time=self.noise.time[kept]
+        )
+        return replace(self, noise=noise, whole=self.whole[kept], J=self.J[kept])
+
     def with_noise_given(self, others: Quadratic, D: np.ndarray) -> _Channel:
         """Return the channel with its most probable noise, given what others say of parameters of variances D (k,)."""
         half = np.linalg.cholesky(np.diag(1.0 / D) + others.A)
@@ -369,6 +386,19 @@ class _Channel:
         behind = Behind(residual=self.whole - self.J @ mean, J=slopes, D=np.ones(D.size))
         found = estimate(self.noise.time, behind, self.usual)
         return replace(self, noise=found)
+
+
+def _with_noise_behind(channels: list[_Channel], D: np.ndarray) -> list[_Channel]:
+    """Return channels with their most probable noise, beside parameters of prior variances D (k,)."""
+    now = _log_evidence(channels, D)
+    for _ in range(settings.MAX_TRIED):
+        for i, one in enumerate(channels):
+            channels[i] = one.with_noise_given(_sum(channels[:i] + channels[i + 1 :], D.size), D)
+        then = _log_evidence(channels, D)
+        if then < now + settings.NEGLIGIBLE_GAIN_NATS:
+            break
+        now = then
+    return channels
 
 
 def _channels(problem: Problem, linear: Linear) -> list[_Channel]:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from subzero.diagnosis.hypothesis.hypotheses import PRIOR, Ids
+from subzero.diagnosis.hypothesis.hypotheses import PRIOR, Ids, variances
 from subzero.diagnosis.inference import settings
 from subzero.diagnosis.inference.basis import one_terms
 from subzero.diagnosis.inference.change_point_fit import FittedChangePoint, fit_change_points, linearised_at
@@ -34,7 +34,7 @@ from subzero.diagnosis.inference.latent_force import (
     force_columns,
     knots_of,
 )
-from subzero.diagnosis.inference.linear_gaussian import KAPPAS, Terms, log_sum
+from subzero.diagnosis.inference.linear_gaussian import KAPPAS, Linear, Terms, log_sum
 from subzero.diagnosis.inference.map_fit import is_poor_fit
 from subzero.diagnosis.inference.model_average import FURTHER_CAUSE_ODDS
 from subzero.diagnosis.inference.model_fits import candidate_with_own_noise, gain_of_own_noise
@@ -289,11 +289,25 @@ def each_with_own_noise(search: Search, outside: Sequence[OutOfCatalogue]) -> li
 
 def _with_own_noise(problem: Problem, one: OutOfCatalogue) -> OutOfCatalogue:
     """Return what lies outside with the evidence that it has with the noise behind it."""
-    if isinstance(one.what, FittedChangePoint):
-        linear, D = one.what.linear(problem)
-    else:
-        linear, D = one.what.linear(problem, one.causes)
+    linear, D = _linear_of(problem, one)
     return replace(one, log_posterior=one.log_posterior + gain_of_own_noise(problem, linear, D))
+
+
+def _linear_of(problem: Problem, one: OutOfCatalogue) -> tuple[Linear, np.ndarray]:
+    """Return the linear problem around what lies outside, and the prior variances of all its parameters (k,)."""
+    if isinstance(one.what, FittedChangePoint):
+        return one.what.linear(problem)
+    return one.what.linear(problem, one.causes)
+
+
+def linear_of_first(search: Search, outside: Sequence[OutOfCatalogue]) -> tuple[Linear, np.ndarray]:
+    """Return the linear problem around the most probable explanation, and prior variances of its parameters (k,)."""
+    best = search.best()
+    first = max(outside, key=lambda one: one.log_posterior, default=None)
+    if first is not None and first.log_posterior > best.log_posterior:
+        return _linear_of(search.problem, first)
+    linear = Linear(best.fit.r + best.fit.J @ best.fit.z, best.fit.J)
+    return linear, variances(search.problem.entries, best.ids, best.kappa)
 
 
 @dataclass(kw_only=True, eq=False)

@@ -111,7 +111,7 @@ def may_be_measured(error: DataError, logged: Logged) -> bool:
     left = error.corrected(logged).record.values[channel]
     if error.how:
         places = np.count_nonzero(left == float(error.how)) + len(error.at)
-        return len(error.at) < MOSTLY_FAR * places
+        return bool(len(error.at) < MOSTLY_FAR * places)
     level = usual_of(channel, left, logged.noise).level
     return resolution_of(left, level) > 0.0
 
