@@ -16,7 +16,7 @@ from numpy.testing import assert_allclose
 
 import scenarios
 import subzero
-from benchmarks.diagnosis import data_errors
+from benchmarks.diagnosis import data_errors, world
 from benchmarks.diagnosis.world import ROUNDED
 from subzero import Logged
 from subzero.diagnosis import Setting, catalogue, report
@@ -295,6 +295,18 @@ def test_a_log_that_shows_zeros_in_between_is_found_though_the_vehicle_began_at_
     assert_allclose(found.at, time[lost])
 
 
+def test_zeros_far_from_a_rounded_pitch_that_is_often_0_are_for_the_prediction_to_say():
+    """It passes 0 for 10 s, and later shows 0 for a second between -5.5 and -6: these zeros are no measurements."""
+    time, clean = np.arange(0.0, 30.0, 0.1), smooth()
+    pitch = np.round(2.0 * (-0.3 * np.maximum(time - 10.0, 0.0) + 0.1 * np.sin(40.0 * time))) / 2.0 + 0.0
+    lost = (time > 28.45) & (time < 29.55)
+    record = Record(source="made", time=time, values={"pitch": np.where(lost, 0.0, pitch)})
+    logged = dataclasses.replace(clean, record=record)
+    (found,) = [one for one in repeated_values(logged) if one.how]
+    assert_allclose(found.at, time[lost])
+    assert may_be_measured(found, logged)
+
+
 class Look:
     """A search with a log evidence that is told; `helped` is what the causes of another search bring it to."""
 
@@ -374,3 +386,20 @@ def test_a_depth_that_is_late_is_no_drift_and_its_delay_is_found():
     """Its delay is found where the problem is linear close to the run: at the nominal model it comes out 0.6 s off."""
     record = data_errors.made(*data_errors.drawn(8401, 3)[2])
     assert data_errors.is_right(record, subzero.diagnose(record.logged, budget="verdict"))
+
+
+@pytest.mark.slow
+def test_zeros_of_a_rounded_pitch_that_passes_0_are_named():
+    """Of 88 zeros 40 stand for nothing; where less than half did, nothing was suspected."""
+    record = data_errors.made(*data_errors.drawn(9401, 9)[8])
+    assert "dropout:pitch=0" in named(subzero.diagnose(record.logged, budget="verdict"))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("index", [21, 49])
+def test_a_cause_under_slow_noise_is_no_error_of_a_clock(index):
+    """Fitted from one another, and the ends of the record as probable as they are beside the rest of it."""
+    logged, planted = world.record_of(world.drawn(9301, index + 1)[index])
+    verdict = subzero.diagnose(logged, budget="verdict")
+    assert {cause.id for cause in verdict.causes} == set(planted)
+    assert not named(verdict)

@@ -24,6 +24,7 @@ from subzero.diagnosis.inference import (
     Usual,
     estimate,
     gain_of_own_noise,
+    log_evidence_of,
     log_marginal,
     log_odds_of_frozen,
     resolution_of,
@@ -190,6 +191,23 @@ def test_the_gain_of_own_noise_is_that_of_dense_covariances():
     gain = log_posterior(found) - log_posterior(problem)
     assert gain > 1.0
     assert_allclose(gain_of_own_noise(problem, linear, D), gain, rtol=1e-6)
+
+
+def test_the_evidence_of_some_samples_is_that_of_a_record_without_the_others():
+    problem, linear, D, values, J = two_channels(7)
+    (record,) = problem.records
+    kept = {"depth": record.time > 4.0, "heading": record.time < 20.0}
+    noise = {name: dataclasses.replace(one, used=kept[name], time=record.time[kept[name]])
+             for name, one in record.noise.items()}  # fmt: skip
+    fewer = dataclasses.replace(problem, records=(dataclasses.replace(record, noise=noise),))
+    white = [(one.whiten(values[name]), one.whiten(J[name])) for name, one in noise.items()]
+    whole, slopes = (np.concatenate([pair[i] for pair in white]) for i in range(2))
+    every = {name: np.ones(record.time.size, dtype=bool) for name in noise}
+    found = log_evidence_of(problem, linear, D, [kept])
+    assert found < log_evidence_of(problem, linear, D, [every]) - 100.0, (
+        "log densities in metres are positive"
+    )
+    assert_allclose(found, log_evidence_of(fewer, Linear(whole, slopes[:, None]), D, [every]), rtol=1e-9)
 
 
 @pytest.mark.slow

@@ -123,7 +123,7 @@ from subzero.diagnosis.inference.model_average import (
     practical_causes,
     qualified,
 )
-from subzero.diagnosis.inference.model_fits import gain_of_own_noise, with_own_noise
+from subzero.diagnosis.inference.model_fits import gain_of_own_noise, log_evidence_of, with_own_noise
 from subzero.diagnosis.inference.out_of_catalogue import Findings, special_cases_folded
 
 from subzero.diagnosis.inference.repeated_values import (
@@ -188,6 +188,7 @@ __all__ = [
     "laplace",
     "latent_force_candidates",
     "linearised_at",
+    "log_evidence_of",
     "log_evidence_process",
     "log_evidence_term",
     "log_gains",
