@@ -8,7 +8,6 @@ Tolerance: a delay within 0.3 s.
 
 import dataclasses
 import json
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -20,16 +19,13 @@ from benchmarks.diagnosis import data_errors, world
 from benchmarks.diagnosis.world import ROUNDED
 from subzero import Logged
 from subzero.diagnosis import Setting, catalogue, report
-from subzero.diagnosis.hypothesis.data_error import corrected
 from subzero.diagnosis.inference import (
     KINDS_OF_DATA_ERRORS,
     DataError,
-    Noise,
+    data_errors_undone,
     may_be_measured,
     repeated_values,
 )
-from subzero.diagnosis.inference.data_error_choice import Explained, compared
-from subzero.diagnosis.inference.data_error_search import SuspectedError, Suspicion
 from subzero.records.record import Record
 from subzero.synthetic.planted import draw_tolerances, make_record
 
@@ -97,7 +93,7 @@ def test_what_a_record_repeats_is_taken_off_at_the_times_that_were_written():
     clean = smooth()
     late, frozen = EACH[11], EACH[7]
     for order in ((late, frozen), (frozen, late)):
-        values = corrected(clean, order).record.values["roll_angle"]
+        values = data_errors_undone(clean, order).record.values["roll_angle"]
         assert np.isfinite(values).sum() == 160  # 20 s of which the first 4 are before the trial
 
 
@@ -305,73 +301,6 @@ def test_zeros_far_from_a_rounded_pitch_that_is_often_0_are_for_the_prediction_t
     (found,) = [one for one in repeated_values(logged) if one.how]
     assert_allclose(found.at, time[lost])
     assert may_be_measured(found, logged)
-
-
-class Look:
-    """A search with a log evidence that is told; `helped` is what the causes of another search bring it to."""
-
-    def __init__(self, plain: float, helped: float, put_right: float) -> None:
-        self.plain, self.helped, self.put_right = plain, helped, put_right
-        self.entries, self.begun, self.finished = (), list[str](), list[str]()
-
-    def start(self, records):
-        is_plain = records[0] is PLAIN
-        found = self.plain if is_plain else self.put_right
-        fit = SimpleNamespace(log_posterior=found, optimistic_log_posterior=found,
-                              fit=SimpleNamespace(r=np.ones(100)))  # fmt: skip
-        problem = SimpleNamespace(entries=self.entries, records=[SimpleNamespace(noise={}, values={})])
-        search = SimpleNamespace(is_far=is_plain, is_poor=lambda: is_plain, best=lambda: fit, candidates={(): fit},
-                                 screen=SimpleNamespace(log_posterior={}))  # fmt: skip
-        search.beliefs = SimpleNamespace(log_total=lambda: fit.log_posterior)
-        search.fit_like = lambda other: vars(fit).update(log_posterior=max(found, self.helped))
-        name = "as it is" if is_plain else "put right"
-        return SimpleNamespace(problem=problem, search=search, out_of_catalogue=[], complete=True, given_up=False,
-                               name=name)  # fmt: skip
-
-    def begin(self, work, is_hopeless):
-        self.begun.append(work.name)
-        work.given_up = is_hopeless()
-
-    def finish(self, work):
-        self.finished.append(work.name)
-
-
-PLAIN = smooth()
-
-
-@pytest.mark.parametrize(
-    ("helped", "is_given_up"), [(-1000.0, True), (-10.0, False)], ids=["no", "with its causes"]
-)
-def test_a_record_that_is_far_is_given_up_where_it_is_hopelessly_behind_what_was_put_right(
-    helped, is_given_up
-):
-    """Its first look, which takes long from afar, waits for the other, and tries what explains that."""
-    step = SuspectedError(record=0, error=EACH[6], lead=100.0, generous=90.0, left=0.6)
-    look = Look(plain=-1000.0, helped=helped, put_right=0.0)
-    tried = compared(Suspicion(errors=(step,)), [PLAIN], look)
-    assert look.begun == ["as it is", "put right"]
-    assert set(look.finished) == ({"put right"} if is_given_up else {"put right", "as it is"})
-    assert [one.work.given_up for one, _ in tried] == [False, is_given_up]
-
-
-@pytest.mark.parametrize(("channel", "level"), [("heading", 2.0), ("depth", 0.005)])
-def test_a_lost_sample_counts_as_one_of_its_own_channel(channel, level):
-    """Of white noise σ it has, but for a constant, the log density −log σ − ½: more in metres than in degrees."""
-    time, levels, count = np.arange(0.0, 40.0, 0.1), {"heading": 2.0, "depth": 0.005}, 400
-    rng = np.random.default_rng(5)
-    values = {name: one * rng.standard_normal(count) for name, one in levels.items()}
-    noise = {name: Noise(white=one, slow=0.01 * one, correlation_time=2.0, resolution=0.0,
-                         used=np.ones(count, dtype=bool), time=time) for name, one in levels.items()}  # fmt: skip
-    record = SimpleNamespace(noise=noise, values=values, known={})
-    residual = np.concatenate([noise[name].whiten(column) for name, column in values.items()])
-    best = SimpleNamespace(log_posterior=0.0, fit=SimpleNamespace(r=residual))
-    search = SimpleNamespace(best=lambda: best, beliefs=SimpleNamespace(log_total=lambda: 0.0))
-    work = SimpleNamespace(problem=SimpleNamespace(records=[record]), search=search, out_of_catalogue=[])
-    lost = Explained(errors=(), work=work, log_prior=0.0, lost={channel: 40})
-    gained = lost.log_evidence(lost.means) - lost.log_evidence({})
-    assert gained == pytest.approx(
-        40 * (-np.log(level) - 0.5), abs=40 * 0.15
-    )  # 400 samples: ½ ± 0.04; and a prior
 
 
 @pytest.mark.slow

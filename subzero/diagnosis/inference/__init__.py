@@ -35,7 +35,11 @@ it for what stands outside the diagnosis).
 
 # ruff: noqa: I001 - in the order in which they stand on one another, not in that of the alphabet
 
-from subzero.diagnosis.hypothesis.data_error import KINDS as KINDS_OF_DATA_ERRORS, DataError
+from subzero.diagnosis.hypothesis.data_error import (
+    KINDS as KINDS_OF_DATA_ERRORS,
+    DataError,
+    corrected as data_errors_undone,
+)
 from subzero.diagnosis.hypothesis.hypotheses import (
     PRIOR,
     columns_of,
@@ -170,6 +174,7 @@ __all__ = [
     "candidate_of",
     "change_point_columns",
     "columns_of",
+    "data_errors_undone",
     "decide",
     "economical",
     "entries_of",

@@ -1,0 +1,94 @@
+"""Sets of errors in the data are explanations like others: which are searched, and what a lost sample counts.
+
+Configuration: searches that are told what they find. Tolerance: of a mean density of 400 samples.
+"""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import subzero
+from subzero import Logged
+from subzero.diagnosis import Setting
+from subzero.diagnosis.inference import DataError, Noise
+from subzero.diagnosis.inference.data_error_choice import Explained, compared
+from subzero.diagnosis.inference.data_error_search import SuspectedError, Suspicion
+from subzero.records.record import Record
+
+TIME = np.arange(0.0, 30.01, 0.1)
+STEP = DataError(kind="step", channels=("pitch",), amount=3.0, since=12.0)
+
+
+def smooth() -> Logged:
+    """Return a record of a smooth pitch on fig6."""
+    trial = subzero.load_scenario("fig6")
+    record = Record(source="made", time=TIME, values={"pitch": np.sin(0.3 * TIME)})
+    return Logged(record=record, setting=Setting(trial=trial, model=subzero.Model.of(trial)), name="fig6")
+
+
+class Look:
+    """A search with a log evidence that is told; `helped` is what the causes of another search bring it to."""
+
+    def __init__(self, plain: float, helped: float, put_right: float) -> None:
+        self.plain, self.helped, self.put_right = plain, helped, put_right
+        self.entries, self.begun, self.finished = (), list[str](), list[str]()
+
+    def start(self, records):
+        is_plain = records[0] is PLAIN
+        found = self.plain if is_plain else self.put_right
+        fit = SimpleNamespace(log_posterior=found, optimistic_log_posterior=found,
+                              fit=SimpleNamespace(r=np.ones(100)))  # fmt: skip
+        problem = SimpleNamespace(entries=self.entries, records=[SimpleNamespace(noise={}, values={})])
+        search = SimpleNamespace(is_far=is_plain, is_poor=lambda: is_plain, best=lambda: fit, candidates={(): fit},
+                                 screen=SimpleNamespace(log_posterior={}))  # fmt: skip
+        search.beliefs = SimpleNamespace(log_total=lambda: fit.log_posterior)
+        search.fit_like = lambda other: vars(fit).update(log_posterior=max(found, self.helped))
+        name = "as it is" if is_plain else "put right"
+        return SimpleNamespace(problem=problem, search=search, out_of_catalogue=[], complete=True, given_up=False,
+                               name=name)  # fmt: skip
+
+    def begin(self, work, is_hopeless):
+        self.begun.append(work.name)
+        work.given_up = is_hopeless()
+
+    def finish(self, work):
+        self.finished.append(work.name)
+
+
+PLAIN = smooth()
+
+
+@pytest.mark.parametrize(
+    ("helped", "is_given_up"), [(-1000.0, True), (-10.0, False)], ids=["no", "with its causes"]
+)
+def test_a_record_that_is_far_is_given_up_where_it_is_hopelessly_behind_what_was_put_right(
+    helped, is_given_up
+):
+    """Its first look, which takes long from afar, waits for the other, and tries what explains that."""
+    step = SuspectedError(record=0, error=STEP, lead=100.0, generous=90.0, left=0.6)
+    look = Look(plain=-1000.0, helped=helped, put_right=0.0)
+    tried = compared(Suspicion(errors=(step,)), [PLAIN], look)
+    assert look.begun == ["as it is", "put right"]
+    assert set(look.finished) == ({"put right"} if is_given_up else {"put right", "as it is"})
+    assert [one.work.given_up for one, _ in tried] == [False, is_given_up]
+
+
+@pytest.mark.parametrize(("channel", "level"), [("heading", 2.0), ("depth", 0.005)])
+def test_a_lost_sample_counts_as_one_of_its_own_channel(channel, level):
+    """Of white noise σ it has, but for a constant, the log density −log σ − ½: more in metres than in degrees."""
+    time, levels, count = np.arange(0.0, 40.0, 0.1), {"heading": 2.0, "depth": 0.005}, 400
+    rng = np.random.default_rng(5)
+    values = {name: one * rng.standard_normal(count) for name, one in levels.items()}
+    noise = {name: Noise(white=one, slow=0.01 * one, correlation_time=2.0, resolution=0.0,
+                         used=np.ones(count, dtype=bool), time=time) for name, one in levels.items()}  # fmt: skip
+    record = SimpleNamespace(noise=noise, values=values, known={})
+    residual = np.concatenate([noise[name].whiten(column) for name, column in values.items()])
+    best = SimpleNamespace(log_posterior=0.0, fit=SimpleNamespace(r=residual))
+    search = SimpleNamespace(best=lambda: best, beliefs=SimpleNamespace(log_total=lambda: 0.0))
+    work = SimpleNamespace(problem=SimpleNamespace(records=[record]), search=search, out_of_catalogue=[])
+    lost = Explained(errors=(), work=work, log_prior=0.0, lost={channel: 40})
+    gained = lost.log_evidence(lost.means) - lost.log_evidence({})
+    assert gained == pytest.approx(
+        40 * (-np.log(level) - 0.5), abs=40 * 0.15
+    )  # 400 samples: ½ ± 0.04; and a prior
