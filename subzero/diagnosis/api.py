@@ -29,8 +29,12 @@ from subzero.diagnosis.hypothesis.catalogue import load
 from subzero.diagnosis.hypothesis.data_error import DataError
 from subzero.diagnosis.hypothesis.effect import Effect
 from subzero.diagnosis.hypothesis.logged import Logged
-from subzero.diagnosis.inference.data_error_choice import Explained, compared, may_be_named
-from subzero.diagnosis.inference.data_error_choice import is_explained as is_quietly_explained
+from subzero.diagnosis.inference.data_error_choice import (
+    Explained,
+    compared,
+    leaves_only_noise,
+    may_be_named,
+)
 from subzero.diagnosis.inference.data_error_search import SuspectedError, is_soft, suspected
 from subzero.diagnosis.inference.linear_gaussian import log_sum
 from subzero.diagnosis.inference.model_average import NAMED_PROBABILITY
@@ -294,7 +298,7 @@ def _one_explains(findings: Findings) -> bool:
     findings.search.only_nothing()
     findings.search.look()
     findings.search.fit_from_afar()
-    return is_quietly_explained(findings) and not findings.search.is_poor()
+    return leaves_only_noise(findings) and not findings.search.is_poor()
 
 
 def _from_afar(findings: Findings) -> None:

@@ -3,6 +3,7 @@
 Configuration: searches that are told what they find. Tolerance: of a mean density of 400 samples.
 """
 
+import dataclasses
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,8 +12,9 @@ import pytest
 import subzero
 from subzero import Logged
 from subzero.diagnosis import Setting
-from subzero.diagnosis.inference import DataError, Noise
+from subzero.diagnosis.inference import DataError, Linear, Noise, Observed, Problem
 from subzero.diagnosis.inference.data_error_choice import Explained, compared
+from subzero.diagnosis.inference.data_error_scan import log_prior
 from subzero.diagnosis.inference.data_error_search import SuspectedError, Suspicion
 from subzero.records.record import Record
 
@@ -92,3 +94,65 @@ def test_a_lost_sample_counts_as_one_of_its_own_channel(channel, level):
     assert gained == pytest.approx(
         40 * (-np.log(level) - 0.5), abs=40 * 0.15
     )  # 400 samples: ½ ± 0.04; and a prior
+
+
+LEVELS = {"heading": 2.0, "depth": 0.005}
+LATE = DataError(kind="latency", channels=("heading",), amount=3.0)
+
+
+class Quiet:
+    """A search that finds nothing but white noise, in records that show nothing else."""
+
+    def start(self, records):
+        noise = {name: white_noise(records[0], name) for name in LEVELS}
+        seen = Observed(name="one", time=records[0].record.time, values=records[0].record.values, noise=noise,
+                        setting=None)  # fmt: skip
+        residual = np.concatenate([one.whiten(seen.values[name]) for name, one in noise.items()])
+        problem = Problem(records=(seen,), entries=())
+        linear = Linear(residual, np.zeros((residual.size, 1)))
+        found = SimpleNamespace(log_posterior=-0.5 * float(residual @ residual), id="sensor_drift:depth", point=None,
+                                causes=(), what=SimpleNamespace(linear=lambda *_: (linear, np.ones(1))))  # fmt: skip
+        fit = SimpleNamespace(
+            log_posterior=-np.inf, optimistic_log_posterior=-np.inf, fit=SimpleNamespace(r=residual)
+        )
+        search = SimpleNamespace(problem=problem, is_far=False, is_poor=lambda: True, best=lambda: fit,
+                                 candidates={(): fit}, screen=SimpleNamespace(log_posterior={(): 0.0}),
+                                 fit_like=lambda other: None,
+                                 beliefs=SimpleNamespace(log_total=lambda: -np.inf))  # fmt: skip
+        return SimpleNamespace(
+            problem=problem, search=search, out_of_catalogue=[found], complete=True, given_up=False
+        )
+
+    def begin(self, work, is_hopeless):
+        work.given_up = is_hopeless()
+
+    def finish(self, work):
+        pass
+
+
+def white_noise(logged, name):
+    """Return the noise of a channel, without what stands far off."""
+    values, level = logged.record.values[name], LEVELS[name]
+    used = np.isfinite(values) & (np.abs(values) < 20.0 * level)
+    return Noise(
+        white=level, slow=0.05 * level, correlation_time=2.0, used=used, time=logged.record.time[used]
+    )
+
+
+def lead_of_a_delay(outlier):
+    """Return by how much a delay of the heading is more probable than none, where nothing but noise is shown."""
+    rng = np.random.default_rng(8)
+    values = {name: level * rng.standard_normal(TIME.size) for name, level in LEVELS.items()}
+    values["heading"][10] = outlier  # at 1 s: outside the trial, if the heading is 3 s late
+    logged = dataclasses.replace(PLAIN, record=Record(source="made", time=TIME, values=values))
+    late = SuspectedError(record=0, error=LATE, lead=100.0, generous=90.0, left=0.6)
+    found = {len(one.errors): log for one, log in compared(Suspicion(errors=(late,)), [logged], Quiet())}
+    return found[1] - found[0]
+
+
+@pytest.mark.parametrize("outlier", [0.0, 60.0, np.nan], ids=["none", "outlier", "gap"])
+def test_a_delay_of_nothing_but_noise_is_as_probable_as_beforehand(outlier):
+    """What it puts outside the trial speaks neither for nor against it, whether measured, lost, or an outlier. The
+    noise is found anew without these samples: a nat.
+    """
+    assert lead_of_a_delay(outlier) == pytest.approx(log_prior(LATE, 10), abs=1.0)

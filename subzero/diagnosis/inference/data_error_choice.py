@@ -46,8 +46,7 @@ from subzero.diagnosis.inference.latent_force import FORCE
 from subzero.diagnosis.inference.linear_gaussian import log_sum
 from subzero.diagnosis.inference.map_fit import is_poor_fit
 from subzero.diagnosis.inference.model_fits import log_density_of_noise, log_evidence_of
-from subzero.diagnosis.inference.out_of_catalogue import Findings, linear_of_first
-from subzero.diagnosis.inference.out_of_catalogue import is_explained as is_found
+from subzero.diagnosis.inference.out_of_catalogue import Findings, is_explained, linear_of_first
 from subzero.diagnosis.inference.posing import sensor_of
 from subzero.diagnosis.inference.problem import Observed, Problem
 from subzero.diagnosis.inference.repeated_values import log_odds_of_frozen, steps_of
@@ -63,16 +62,16 @@ def is_clear(errors: Sequence[SuspectedError], work: Findings) -> bool:
     without anything that begins in mid-trial, and without a force.
     """
     outside = max((one.log_posterior for one in work.out_of_catalogue), default=-np.inf)
-    explained = work.search.best().log_posterior > outside and is_explained(work)
+    explained = work.search.best().log_posterior > outside and leaves_only_noise(work)
     return explained and all(one.is_clear for one in errors)
 
 
 def may_be_named(errors: Sequence[SuspectedError], work: Findings) -> bool:
     """Say whether errors may be the verdict: those that something else may look like only if they explain all."""
-    return is_explained(work) or not any(is_soft(one) for one in errors)
+    return leaves_only_noise(work) or not any(is_soft(one) for one in errors)
 
 
-def is_explained(work: Findings) -> bool:
+def leaves_only_noise(work: Findings) -> bool:
     """Say whether one explanation leaves nothing but the noise of usual sensors."""
     return _is_quiet(work) and (
         not is_poor_fit(work.search.best().fit) or any(one.point for one in work.out_of_catalogue)
@@ -204,7 +203,7 @@ class Explained:
 
     def is_behind(self, other: Explained) -> bool:
         """Say whether no more causes, nor better fits, bring it close to another that leaves only noise."""
-        if other is self or not is_explained(other.work):
+        if other is self or not leaves_only_noise(other.work):
             return False
         per_lost, behind = _least_means([self, other]), settings.DECISIVE_NATS
         return self.log_evidence(per_lost) + self._to_be_gained() < other.log_evidence(per_lost) - behind
@@ -265,38 +264,47 @@ def compared(suspicion: Suspicion, records: Sequence[Logged], look: Look) -> lis
             raise
         tried[-1].work.complete = False
     per_lost, least = _least_means(tried), min(tried, key=lambda one: len(one.errors))
-    return [(one, one.log_evidence(per_lost) + _beyond(one, least, records, per_lost)) for one in tried]
+    return [
+        (one, one.log_evidence(per_lost) + _of_samples_outside(one, least, records, per_lost))
+        for one in tried
+    ]
 
 
-def _beyond(
+def _of_samples_outside(
     one: Explained, least: Explained, records: Sequence[Logged], per_lost: Mapping[str, float]
 ) -> float:
     """Return by how much samples that a clock or a delay puts outside the trial are more probable than those of their
-    channel on average: by how much they are, to who knows the others, beside the explanation of the records with the
-    least errors,
+    channel on average: they have their density given all others, beside the explanation of the records with the least
+    errors,
 
         log p(y outside | y inside) = log p(y) − log p(y inside)
 
     The ends of a record are like no others: something begins there, and noise that wanders is at its farthest.
     """
-    places = [_places(logged, one.errors, i) for i, logged in enumerate(records)]
-    kept = [{name: np.isin(here, places[i][name]) for name, here in _places(logged, least.errors, i).items()}
-            for i, logged in enumerate(records)]  # fmt: skip
-    seen = least.work.problem.records
-    if one is least or all(
-        some[name].all() for some, record in zip(kept, seen, strict=True) for name in record.noise
-    ):
+    kept, seen = _inside(one, least, records), least.work.problem.records
+    gone = [{name: ~some[name] & np.isfinite(record.values[name]) for name in record.noise}
+            for some, record in zip(kept, seen, strict=True)]  # fmt: skip
+    if not any(lost.any() for each in gone for lost in each.values()):
         return 0.0
     every = [{name: np.ones(some.size, dtype=bool) for name, some in each.items()} for each in kept]
-    problem = least.work.search.problem
     linear, D = linear_of_first(least.work.search, least.work.out_of_catalogue)
-    log_all, log_inside = (log_evidence_of(problem, linear, D, some) for some in (every, kept))
+    log_all, log_inside = (
+        log_evidence_of(least.work.search.problem, linear, D, some) for some in (every, kept)
+    )
     found = float(log_all - log_inside)
-    for some, record in zip(kept, seen, strict=True):
-        for name, noise in record.noise.items():
-            gone = ~some[name] & np.isfinite(record.values[name])
-            found += np.count_nonzero(gone & ~noise.used) * _log_outlier(record, name)
-            found -= np.count_nonzero(gone) * per_lost.get(name, 0.0)
+    for each, record in zip(gone, seen, strict=True):
+        for name, lost in each.items():
+            found += np.count_nonzero(lost & ~record.noise[name].used) * _log_outlier(record, name)
+            found -= np.count_nonzero(lost) * per_lost.get(name, 0.0)
+    return found
+
+
+def _inside(one: Explained, least: Explained, records: Sequence[Logged]) -> list[dict[str, np.ndarray]]:
+    """Return channel → which samples of the records with the least errors are inside the trial with others (n,)."""
+    found = []
+    for i, logged in enumerate(records):
+        places, here = _places(logged, one.errors, i), _places(logged, least.errors, i)
+        found.append({name: np.isin(column, places[name]) for name, column in here.items()})
     return found
 
 
@@ -335,7 +343,7 @@ class _Comparison:
             more = more[-1:] if explain(errors) else []
         elif not explain(errors):
             self.look.finish(now.work)
-            new, more = [], [] if is_explained(now.work) else more
+            new, more = [], [] if leaves_only_noise(now.work) else more
         self._race(new + self._looks(more if len(self.tried) == 1 else []))
 
     def with_fewer(self) -> None:
@@ -365,7 +373,7 @@ class _Comparison:
         """
 
         def is_hopeless() -> bool:
-            if not self.tried and not is_found(work.search, work.out_of_catalogue):
+            if not self.tried and not is_explained(work.search, work.out_of_catalogue):
                 self._looks(before)
             return self._is_hopeless(errors, work)
 
@@ -396,8 +404,8 @@ class _Comparison:
                 self.look.finish(now.work)
 
     def _fit_like_others(self, work: Findings) -> None:
-        """Fit what explains the records without other errors from where it does: a fit may end in a hollow of its own,
-        and what it lacks there is no evidence of an error.
+        """Fit what explains the records without other errors from where it does: a fit may end in a local minimum, and
+        what it lacks there is no evidence of an error.
         """
         for one in self.tried:
             if one.work is not work and one.work.problem.entries is work.problem.entries:
@@ -429,9 +437,9 @@ def _is_settled(work: Findings) -> bool:
     """Say whether a first look leaves nothing to be explained: by causes within declared tolerances, or by one that
     begins in mid-trial, and is far before them.
     """
-    if is_found(work.search, work.out_of_catalogue):
+    if is_explained(work.search, work.out_of_catalogue):
         return True
-    return is_explained(work) and not work.search.is_poor()
+    return leaves_only_noise(work) and not work.search.is_poor()
 
 
 def _is_complete(tried: Sequence[Explained]) -> bool:

@@ -126,7 +126,7 @@ class Fits:
 
     def cross(self) -> None:
         """Fit the close rivals of the best candidate from where that is, and it from where they are, and keep what is
-        better: where a drum stops or a cable falls slack runs have kinks, and a fit may end in a hollow of its own.
+        better: where a drum stops or a cable falls slack runs have kinks, and a fit may end in a local minimum.
         """
         for _ in range(settings.MAX_ADDED):
             best = self.best()

@@ -45,7 +45,8 @@ FAR_LEVELS, FEWEST_FAR, NEIGHBOURS, NEAREST = 8.0, 4, 5, 2
 what is measured around it: from each of the nearest on both sides, of which one may be an outlier. Outliers that are
 rounded may be equal, but not in a row."""
 MOSTLY_FAR = 0.5
-"""... and if so large a share of its places does, no prediction is asked: a speed is 0 at rest, too. [-]"""
+"""Where so large a share of a value's places stands far off, it is no measurement there; where less does, the
+prediction has to say, as a vehicle at rest has a speed of 0, too. [-]"""
 SHORT, FEWEST_FROZEN = 3, 6
 """Runs as short as this say how often values repeat by chance; a channel is frozen if it repeats so many to the end."""
 WHITE_LEVELS = (0.1, 0.18, 0.31, 0.55, 0.97, 1.7, 3.0)
