@@ -73,6 +73,19 @@ def test_the_moment_is_the_lever_times_the_force(name, simulate):
     assert_allclose(moment[:, 2], -0.5 * force[:, 1], rtol=1e-12, atol=1e-15)
 
 
+def test_a_tow_point_beside_the_axis_has_a_lever_in_every_direction(simulate, trial_of):
+    """(13) and V + Ω × r_c with no 0 in r_c, in a tight turn: with the cable tied on the axis, four of six products
+    vanish, and a wrong index in them shows nothing.
+    """
+    place = {"vehicle.tow_point.x": -0.45, "vehicle.tow_point.y": 0.06, "vehicle.tow_point.z": -0.05}
+    run, r_c = simulate(trial_of("wide_turn").with_changes(place)), list(place.values())
+    force = columns(run, ("cable_force_forward", "cable_force_starboard", "cable_force_down"))
+    moment = columns(run, ("cable_moment_roll", "cable_moment_pitch", "cable_moment_yaw"))
+    assert (np.abs(force).max(axis=0) > 1e-3).all(), "pulled along all three axes"
+    assert_allclose(moment, np.cross(r_c, force), rtol=0, atol=1e-15)
+    assert_allclose(run["cable_position"].values[:, 0], tow_point(run, r_c), rtol=0, atol=3e-6)
+
+
 @pytest.mark.parametrize("name", COUPLED)
 def test_the_cable_feels_the_tow_points_path_and_nothing_else(name, simulate):
     """`cable.pull_out` along the recorded path answers with the recorded force."""
