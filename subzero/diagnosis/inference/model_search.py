@@ -32,6 +32,7 @@ from subzero.diagnosis.inference.screening import (
     fit_wide,
     is_close,
     screening_of,
+    swept_from_nominal,
     with_one_added,
     with_one_swapped,
     with_sizes_tried,
@@ -215,6 +216,15 @@ class Search(GrowingFits):
         )
         self.fit_all(list(chain([()], *best)), words="fitting")
 
+    def fit_from_nominal(self) -> None:
+        """Fit causes by themselves that real runs of some sizes, from the nominal model, have before all that is known:
+        of what bends runs the linear problem at a wide fit says little.
+        """
+        swept = swept_from_nominal(self.problem, *self.nominal)
+        for ids in _best_of(self._unknown(swept.log_posterior), self.best().log_posterior):
+            self._say(0.4, "fitting", ids, " by itself")
+            self._take(candidate_of(self.problem, ids, self._alone(ids, swept.starts[ids])))
+
     def fit_from_afar(self) -> None:
         """Fit the best causes of the screen by themselves, the best first; if one explains the records, within declared
         tolerances, none that real runs of some sizes have far behind it.
@@ -308,10 +318,12 @@ class Search(GrowingFits):
             if moved[ids] > settings.BENT_TOLERANCES
         ]
 
-    def _alone(self, ids: Ids) -> Fit:
-        """Return the fit of a cause from where the wide fit has it, all else nominal, with the sensitivities there."""
+    def _alone(self, ids: Ids, start: np.ndarray | None = None) -> Fit:
+        """Return the fit of a cause from deviations (k,), those of the wide fit if None, all else nominal, with the
+        sensitivities there.
+        """
         z, at = np.zeros(len(self.problem.entries)), columns_of(self.problem.entries, ids)
-        z[at] = self.screen.starts.get(ids, self.wide.z)[at]
+        z[at] = (self.screen.starts.get(ids, self.wide.z) if start is None else start)[at]
         D = variances(self.problem.entries, ids, 1.0)
         return continued(
             self.problem, refit(self.problem, z, self.problem.jacobian(z), D, most_fresh=2, made_at=z)

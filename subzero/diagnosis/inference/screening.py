@@ -113,11 +113,26 @@ def _from_afar(problem: Problem, r: np.ndarray, J: np.ndarray) -> Screening:
     names, zero = nameable(problem.entries), np.zeros(J.shape[1])
     found = Screening(count=len(names), far=True)
     found.log_posterior[()] = mixed_evidence(problem, Quadratic.at(zero, r, J)) + log_prior((), len(names))
-    _sweep(problem, zero, J, [k for k, entry in enumerate(problem.entries) if entry.record < 0], found, r)
+    _sweep(problem, zero, J, _of_the_model(problem), found, r)
     for pair in pairs_of(problem.entries, names):
         better = max(found.log_posterior[(one,)] for one in pair)
         found.log_posterior[pair] = better + log_prior(pair, len(names)) - log_prior(pair[:1], len(names))
     return found
+
+
+def swept_from_nominal(problem: Problem, r: np.ndarray, J: np.ndarray) -> Screening:
+    """Return what single causes explain at the best of some sizes, all else within tolerances about the nominal model
+    with residual r (m,) and sensitivities J (m, k): a wide fit may take one large cause for many small ones.
+    """
+    found = Screening(count=len(nameable(problem.entries)))
+    zero = np.zeros(J.shape[1])
+    _sweep(problem, zero, J, _of_the_model(problem), found, r, settings.MERGED_SCALES)
+    return found
+
+
+def _of_the_model(problem: Problem) -> list[int]:
+    """Return the entries of causes, not of start values."""
+    return [k for k, entry in enumerate(problem.entries) if entry.record < 0]
 
 
 class Base(NamedTuple):
@@ -175,13 +190,19 @@ def is_flat(entry: Entry, column: np.ndarray) -> bool:
 
 
 def _sweep(
-    problem: Problem, z: np.ndarray, J: np.ndarray, columns_of: list[int], found: Screening, here: np.ndarray
+    problem: Problem,
+    z: np.ndarray,
+    J: np.ndarray,
+    at: list[int],
+    found: Screening,
+    here: np.ndarray,
+    scales: Sequence[float] = settings.SWEEP_SCALES,
 ) -> None:
     """Try sizes of entries about z, side by side, with the residual `here` there; keep the best of every cause."""
     jobs = [
         (k, size)
-        for k in columns_of
-        for size in sizes_tried(problem.entries[k].parameter, settings.SWEEP_SCALES)
+        for k in at
+        for size in sizes_tried(problem.entries[k].parameter, scales)
     ]
     moved = [np.concatenate([z[:k], [size], z[k + 1 :]]) for k, size in jobs]
     best, flat = dict[Ids, float](), _without_slope(problem, J)
