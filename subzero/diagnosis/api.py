@@ -257,9 +257,9 @@ def _first_look(findings: Findings, is_hopeless: Callable[[], bool]) -> None:
     with _timed(findings, "fits"):
         search.first_fits()
         findings.given_up = not explained and is_hopeless() and bool(findings.out_of_catalogue)
+        if not findings.given_up:
+            search.fit_from_nominal()
         if search.is_poor() and not findings.given_up:
-            if not search.screen.far:
-                search.fit_from_nominal()
             search.refine_first()
     if search.is_poor() and not findings.out_of_catalogue:
         _look_outside(findings, 0.6, "forces, and causes that begin in mid-trial")

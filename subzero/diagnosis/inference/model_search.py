@@ -218,8 +218,11 @@ class Search(GrowingFits):
 
     def fit_from_nominal(self) -> None:
         """Fit causes by themselves that real runs of some sizes, from the nominal model, have before all that is known:
-        of what bends runs the linear problem at a wide fit says little.
+        of what bends runs the linear problem at a wide fit says little. Nothing to be done where they were so fitted
+        from afar, or where nothing seems wrong.
         """
+        if self.screen.far or not (self.best().ids or self.is_poor()):
+            return
         swept = swept_from_nominal(self.problem, *self.nominal)
         for ids in _best_of(self._unknown(swept.log_posterior), self.best().log_posterior):
             self._say(0.4, "fitting", ids, " by itself")

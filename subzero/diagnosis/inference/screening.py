@@ -102,7 +102,7 @@ def screening_of(
     several: list[Ids] = [(), *((one,) for one in names), *pairs_of(problem.entries, names)]
     for ids, log in linear_evidences(problem, base, (), several).items():
         found.log_posterior[ids] = log + log_prior(ids, len(names))
-    _sweep(problem, wide.z, wide.J, _without_slope(problem, wide.J), found, wide.r)
+    _sweep(problem, wide.z, wide.J, _without_slope(problem, wide.J), found, wide.r, settings.SWEEP_SCALES)
     return found
 
 
@@ -113,7 +113,7 @@ def _from_afar(problem: Problem, r: np.ndarray, J: np.ndarray) -> Screening:
     names, zero = nameable(problem.entries), np.zeros(J.shape[1])
     found = Screening(count=len(names), far=True)
     found.log_posterior[()] = mixed_evidence(problem, Quadratic.at(zero, r, J)) + log_prior((), len(names))
-    _sweep(problem, zero, J, _of_the_model(problem), found, r)
+    _sweep(problem, zero, J, _of_the_model(problem), found, r, settings.SWEEP_SCALES)
     for pair in pairs_of(problem.entries, names):
         better = max(found.log_posterior[(one,)] for one in pair)
         found.log_posterior[pair] = better + log_prior(pair, len(names)) - log_prior(pair[:1], len(names))
@@ -193,45 +193,78 @@ def _sweep(
     problem: Problem,
     z: np.ndarray,
     J: np.ndarray,
-    at: list[int],
+    at: Sequence[int],
     found: Screening,
     here: np.ndarray,
-    scales: Sequence[float] = settings.SWEEP_SCALES,
+    scales: Sequence[float],
 ) -> None:
     """Try sizes of entries about z, side by side, with the residual `here` there; keep the best of every cause."""
-    jobs = [
-        (k, size)
-        for k in at
-        for size in sizes_tried(problem.entries[k].parameter, scales)
-    ]
+    names, flat, at_z = nameable(problem.entries), _without_slope(problem, J), Quadratic.at(z, here, J)
+    best: dict[Ids, float] = {(problem.entries[k].effect.id,): -np.inf for k in at}  # that cannot be run
+    for one in sizes_run(problem, z, here, at, scales):
+        ids: Ids = (problem.entries[one.k].effect.id,)
+        value = _evidence_there(problem, one.quadratic(at_z, J), (), ids) + log_prior(ids, len(names))
+        if value > best[ids]:
+            best[ids], found.starts[ids] = value, one.z
+            if one.k in flat:
+                found.columns[one.k] = (here - one.r) / (one.z[one.k] - z[one.k])
+    found.log_posterior.update(best)
+
+
+def _evidence_there(problem: Problem, q: Quadratic, held: Ids, ids: Ids) -> float:
+    """Return the log evidence of a hypothesis, which has the causes `held` and may have one more, mixed over κ."""
+    return linear_evidences(problem, _bases(problem, q, held), held, [ids])[ids]
+
+
+class SizeRun(NamedTuple):
+    """A run with entry k of another size: deviations (k,), residual (m,), and the sensitivity to that entry (m,)."""
+
+    k: int
+    z: np.ndarray
+    r: np.ndarray
+    column: np.ndarray
+
+    def quadratic(self, near: Quadratic, J: np.ndarray) -> Quadratic:
+        """Return the linear problem there, with all other sensitivities J (m, k), of which `near` has the products."""
+        whole = self.r + J @ self.z + (self.column - J[:, self.k]) * self.z[self.k]
+        A, b, cross = near.A.copy(), J.T @ whole, J.T @ self.column
+        cross[self.k], b[self.k] = self.column @ self.column, self.column @ whole
+        A[self.k], A[:, self.k] = cross, cross
+        return Quadratic(A=A, b=b, rr=float(whole @ whole))
+
+
+def sizes_run(
+    problem: Problem, z: np.ndarray, here: np.ndarray, at: Sequence[int], scales: Sequence[float]
+) -> list[SizeRun]:
+    """Run sizes of entries about z, side by side, with the residual `here` there.
+
+    A sensitivity is the difference quotient between neighbouring sizes: what bends runs has another one at each.
+    """
+    sizes = {k: sizes_tried(problem.entries[k].parameter, scales) for k in at}
+    jobs = [(k, size) for k in at for size in sizes[k]]
     moved = [np.concatenate([z[:k], [size], z[k + 1 :]]) for k, size in jobs]
-    best, flat = dict[Ids, float](), _without_slope(problem, J)
-    for (k, size), there, r in zip(jobs, moved, problem.residuals(moved), strict=True):
-        ids: Ids = (problem.entries[k].effect.id,)
-        value = _at_size(problem, k, size, there, r, J)
-        if value > best.get(ids, -np.inf) or ids not in best:
-            best[ids], found.starts[ids] = value, there
-            if k in flat and np.isfinite(r).all():
-                found.columns[k] = (here - r) / (size - z[k])
-    found.log_posterior.update(
-        {ids: best[ids] + log_prior(ids, len(nameable(problem.entries))) for ids in best}
-    )
+    of: dict[int, dict[float, np.ndarray]] = {k: {float(z[k]): here} for k in at}
+    for (k, size), r in zip(jobs, problem.residuals(moved), strict=True):
+        of[k][size] = r
+    found = [SizeRun(k, there, of[k][size], _slope(of[k], size))
+             for (k, size), there in zip(jobs, moved, strict=True)]  # fmt: skip
+    return [one for one in found if np.isfinite(one.r).all() and np.isfinite(one.column).all()]
+
+
+def _slope(runs: Mapping[float, np.ndarray], size: float) -> np.ndarray:
+    """Return the sensitivity (m,) at a size of runs, size → residual (m,), between those next to it; NaN if there is
+    none.
+    """
+    row = sorted(one for one in runs if one == size or np.isfinite(runs[one]).all())
+    i = row.index(size)
+    below, above = row[max(i - 1, 0)], row[min(i + 1, len(row) - 1)]
+    return (runs[below] - runs[above]) / (above - below if above > below else np.nan)
 
 
 def sizes_tried(parameter: Parameter, scales: Sequence[float]) -> list[float]:
     """Return the deviations that are tried, at some effect scales either way."""
     both = [side * size * parameter.scale for size in scales for side in (1.0, -1.0)]
     return [size for size in both if parameter.low <= size <= parameter.high]
-
-
-def _at_size(problem: Problem, k: int, size: float, z: np.ndarray, r: np.ndarray, J: np.ndarray) -> float:
-    """Return the log evidence of entry k at a size, others within their tolerances about z, with the residual there."""
-    if not np.isfinite(r).all():
-        return -np.inf
-    others = z.copy()
-    others[k] = 0.0
-    far = 0.5 * (size / problem.entries[k].parameter.scale) ** 2
-    return mixed_evidence(problem, Quadratic.at(others, r, J)) - far - 1.0
 
 
 def mixed_evidence(problem: Problem, q: Quadratic, ids: Ids = ()) -> float:
@@ -285,17 +318,14 @@ def with_sizes_tried(
     """
     entries, names, J = problem.entries, nameable(problem.entries), one.fit.J
     z = np.maximum(posterior(one.fit.quadratic, variances(entries, rest, one.kappa)).z, _lowest(problem))
-    jobs = [(k, size) for k in at for size in sizes_tried(entries[k].parameter, scales)]
-    moved = [np.concatenate([z[:k], [size], z[k + 1 :]]) for k, size in jobs]
-    found = dict[Ids, TriedSize]()
-    here, *runs = problem.residuals([z, *moved])
-    for (k, size), there, r in zip(jobs, moved, runs, strict=True):
-        ids = tuple(sorted({*rest, entries[k].effect.id}))
-        slopes = np.column_stack([J[:, :k], (here - r) / (size - z[k]), J[:, k + 1 :]])
-        if np.isfinite(slopes).all():
-            log = mixed_evidence(problem, Quadratic.at(there, r, slopes), ids) + log_prior(ids, len(names))
-            if ids not in found or log > found[ids].log_posterior:
-                found[ids] = TriedSize(log, there, slopes)
+    here = problem.residual(z)
+    found, at_z = dict[Ids, TriedSize](), Quadratic.at(z, here, J)
+    for run in sizes_run(problem, z, here, at, scales):
+        ids = tuple(sorted({*rest, entries[run.k].effect.id}))
+        log = _evidence_there(problem, run.quadratic(at_z, J), rest, ids) + log_prior(ids, len(names))
+        if ids not in found or log > found[ids].log_posterior:
+            slopes = np.column_stack([J[:, : run.k], run.column, J[:, run.k + 1 :]])
+            found[ids] = TriedSize(log, run.z, slopes)
     return found
 
 
