@@ -17,7 +17,7 @@ from scipy.ndimage import median_filter
 
 from subzero.channels import HEADING, turned
 from subzero.diagnosis.hypothesis.catalogue import ONSETS, START, catalogue
-from subzero.diagnosis.hypothesis.catalogue.sensors import SPECS
+from subzero.diagnosis.hypothesis.catalogue.sensors import CLOCK, SPECS
 from subzero.diagnosis.hypothesis.hypotheses import entries_of, moves_nothing, with_tolerances
 from subzero.diagnosis.inference.noise import (
     Behind,
@@ -38,6 +38,9 @@ if TYPE_CHECKING:
 
 VISIBLE_STEP_ERROR = 1.0
 """Squared size, in noise, of an error of the steps that is worth correcting."""
+EARLIEST_CLOCK_S = -CLOCK.parameters[0].low
+"""A clock may be so early: runs go on beyond the last sample, which happened later than it says, under the last
+command."""
 SPIKE = 5.0
 """A sample this many noise levels off the median of its neighbours is an outlier. [-]"""
 NOISE_LEVEL_CHANGE = 0.1
@@ -103,7 +106,7 @@ def _possible(effect: Effect, observed: Sequence[Observed]) -> bool:
 def _observed(one: Logged) -> Observed:
     """Return a record with its noise."""
     time = one.record.time
-    setting = economical(one.setting, float(time[-1]))
+    setting = economical(one.setting, min(float(time[-1]), one.setting.trial.duration) + EARLIEST_CLOCK_S)
     values = {name: column for name, column in one.record.values.items()
               if name in SPECS and np.isfinite(column).any()}  # fmt: skip
     if not values:

@@ -229,12 +229,14 @@ def _copied(value: Any) -> Any:
 
 
 def economical(setting: Setting, duration: float) -> Setting:
-    """Return a setting in the steps of a diagnosis, no longer than needed; commands stay at their times."""
+    """Return a setting in the steps of a diagnosis, as long as asked; commands stay at their times, the last one holds
+    to the end.
+    """
     trial = setting.trial
     on_grid = trial.commands is None or multiples(trial.commands.time, HULL_STEP_S)
     hull_step = max(trial.hull_step, HULL_STEP_S) if on_grid else trial.hull_step
     cable_step = max(trial.cable_step, CABLE_STEP_S)
-    steps = int(np.ceil(min(duration, trial.duration) / cable_step - 1e-9))
+    steps = int(np.ceil(duration / cable_step - 1e-9))
     made = replace(trial, hull_step=fitting_step(cable_step, hull_step), cable_step=cable_step,
                    duration=steps * cable_step, segment_length=max(trial.segment_length, SEGMENT_M),
                    every=0.0)  # fmt: skip
