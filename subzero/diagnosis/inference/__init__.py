@@ -26,6 +26,7 @@ values that a record repeats in place of measurements     repeated_values
 what physics may do with a record, its linear evidence    data_error_yardstick
 errors in the data, proposed by linear evidence           data_error_scan
 ... suspected together, and how close a few causes come   data_error_search
+... how probable a set of them is                         data_error_evidence
 ... and held against all else                             data_error_choice
 all that only steers the search                           settings
 
