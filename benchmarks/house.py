@@ -389,7 +389,7 @@ def goals(found: dict[str, Figures]) -> list[Goal]:
         Goal(
             name="% of diagnosis tests below its faces",
             found=100.0 * diagnosis.tests_below_faces / max(diagnosis.tests, 1),
-            most=25,
+            most=10,
         ),
     ]
 

@@ -117,6 +117,7 @@ from subzero.diagnosis.inference.input_estimation import (
     latent_force_candidates,
     relinearised_force,
 )
+from subzero.diagnosis.inference.force_formula import describe
 from subzero.diagnosis.inference.screening import Screening
 from subzero.diagnosis.inference.model_average import (
     UNTRIED_LOG_POSTERIOR,
@@ -177,6 +178,7 @@ __all__ = [
     "columns_of",
     "data_errors_undone",
     "decide",
+    "describe",
     "economical",
     "entries_of",
     "estimate",
