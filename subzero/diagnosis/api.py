@@ -23,8 +23,8 @@ from time import perf_counter
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from subzero.diagnosis.assessment.goodness_of_fit import misfits
 from subzero.diagnosis.assessment.identifiability import detectability, with_whole_effects
-from subzero.diagnosis.assessment.residuals import misfits
 from subzero.diagnosis.hypothesis.catalogue import load
 from subzero.diagnosis.hypothesis.data_error import DataError
 from subzero.diagnosis.hypothesis.effect import Effect

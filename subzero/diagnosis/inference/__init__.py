@@ -9,8 +9,7 @@ one simulation, from its start or from a stop             simulator
 r(z) and J of all records                                 problem
 records → problem                                         posing
 evidence and posterior of the linear problem              linear_gaussian
-MAP fit with real simulations                             map_fit
-evidence around a fit                                     laplace
+MAP fit with real simulations, evidence around it         map_fit
 linear evidence of all hypotheses                         screening
 the pool of fitted hypotheses, each with its noise        model_fits
 add, drop, swap and merge causes                          model_search
@@ -78,19 +77,21 @@ from subzero.diagnosis.inference.linear_gaussian import (
     seen,
 )
 from subzero.diagnosis.inference.map_fit import (
+    Candidate,
     Fit,
     at_bad_minimum,
     bounded_step,
     bounds,
     broyden_update,
+    candidate_of,
     is_poor_fit,
+    laplace,
     objective,
     quadratic_step,
     refit,
     restarted_where_smooth,
     runnable,
 )
-from subzero.diagnosis.inference.laplace import Candidate, candidate_of, laplace
 from subzero.diagnosis.inference.change_point_scan import (
     BaseRun,
     LinearisationPoint,

@@ -34,7 +34,7 @@ from subzero.diagnosis.results import (
 )
 
 if TYPE_CHECKING:
-    from subzero.diagnosis.inference.laplace import Candidate
+    from subzero.diagnosis.inference.map_fit import Candidate
     from subzero.diagnosis.inference.problem import Problem
     from subzero.diagnosis.inference.screening import Screening
 

@@ -14,11 +14,12 @@ import numpy as np
 
 from subzero.diagnosis.hypothesis.hypotheses import MAX_CAUSES, Ids, columns_of, nameable, variances
 from subzero.diagnosis.inference import settings
-from subzero.diagnosis.inference.laplace import Candidate, candidate_of
 from subzero.diagnosis.inference.linear_gaussian import KAPPAS
 from subzero.diagnosis.inference.map_fit import (
+    Candidate,
     Fit,
     at_bad_minimum,
+    candidate_of,
     continued,
     is_poor_fit,
     non_smooth,

@@ -41,7 +41,7 @@ from subzero.diagnosis.inference.model_fits import candidate_with_own_noise, gai
 from subzero.external_force import AXES
 
 if TYPE_CHECKING:
-    from subzero.diagnosis.inference.laplace import Candidate
+    from subzero.diagnosis.inference.map_fit import Candidate
     from subzero.diagnosis.inference.model_search import Search
     from subzero.diagnosis.inference.problem import Problem
     from subzero.diagnosis.results import Detectability, Misfit

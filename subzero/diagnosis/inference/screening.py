@@ -25,7 +25,6 @@ from subzero.diagnosis.hypothesis.hypotheses import (
     variances_named,
 )
 from subzero.diagnosis.inference import settings
-from subzero.diagnosis.inference.laplace import Candidate
 from subzero.diagnosis.inference.linear_gaussian import (
     KAPPAS,
     Posterior,
@@ -34,7 +33,7 @@ from subzero.diagnosis.inference.linear_gaussian import (
     log_sum,
     posterior,
 )
-from subzero.diagnosis.inference.map_fit import Fit, at_bad_minimum, refit, restarted_where_smooth
+from subzero.diagnosis.inference.map_fit import Candidate, Fit, at_bad_minimum, refit, restarted_where_smooth
 from subzero.diagnosis.inference.posing import with_noise_behind
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from subzero.diagnosis.assessment.cross_validation import Fitted, gain
+from subzero.diagnosis.assessment.goodness_of_fit import Fitted, curves, gain
 from subzero.diagnosis.assessment.identifiability import (
     against,
     information,
@@ -24,7 +24,6 @@ from subzero.diagnosis.assessment.identifiability import (
     with_whole_effects,
 )
 from subzero.diagnosis.assessment.next_trial import Survivor, next_trial
-from subzero.diagnosis.assessment.residuals import curves
 from subzero.diagnosis.hypothesis.effect import MINUTE_S, with_onset
 from subzero.diagnosis.hypothesis.hypotheses import Ids, columns_of, nameable
 from subzero.diagnosis.inference import settings
@@ -56,8 +55,7 @@ from subzero.diagnosis.verdict.estimates import cause_of, name, practical_of
 from subzero.diagnosis.verdict.extension import Extension, of_causes, of_nothing, of_sudden, of_unknown
 
 if TYPE_CHECKING:
-    from subzero.diagnosis.inference.laplace import Candidate
-    from subzero.diagnosis.inference.map_fit import Fit
+    from subzero.diagnosis.inference.map_fit import Candidate, Fit
     from subzero.diagnosis.inference.model_search import Search
 
 RIVALS_DRAWN = {CAUSE_NAMED: 1, OUTSIDE: 1, UNDECIDED: 3, NOTHING_NEAR: 1, CALIBRATED: 0, NOTHING_WRONG: 0}
