@@ -58,6 +58,15 @@ def grouped(entries: tuple[Entry, ...]) -> list[tuple[Effect, list[int], int]]:
     return list(found.values())
 
 
+FLAT_SIGNAL = 1.0
+"""A parameter that does no more than this at one effect scale, in noise levels, has no slope there."""
+
+
+def is_flat(entry: Entry, column: np.ndarray) -> bool:
+    """Say whether whitened sensitivities to an entry (m,) are none."""
+    return bool(np.linalg.norm(column) * entry.parameter.scale <= FLAT_SIGNAL)
+
+
 def number_of(name: str, setting: Setting) -> float:
     """Return a number of a setting's vehicle, cable or drum, by its dotted name such as "vehicle.rudder.lift_slope"."""
     found: Any = setting.model

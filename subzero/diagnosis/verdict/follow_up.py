@@ -29,7 +29,7 @@ from subzero.diagnosis.hypothesis.hypotheses import Ids, columns_of, nameable
 from subzero.diagnosis.inference import settings
 from subzero.diagnosis.inference.change_point_fit import FittedChangePoint
 from subzero.diagnosis.inference.change_point_scan import BaseRun, change_point_columns
-from subzero.diagnosis.inference.model_average import MIN_DISCRIMINATION
+from subzero.diagnosis.inference.model_average import MIN_DISCRIMINATION, REFUTED_NATS
 from subzero.diagnosis.inference.out_of_catalogue import Findings, shares
 from subzero.diagnosis.results import (
     CALIBRATED,
@@ -273,7 +273,7 @@ def refuted_rivals(search: Search) -> frozenset[str]:
         if rival == "none" or D >= MIN_DISCRIMINATION:
             break
         search.fit((rival,), best.fit)
-        if search.candidates[(rival,)].optimistic_log_posterior > best.log_posterior - settings.REFUTED_NATS:
+        if search.candidates[(rival,)].optimistic_log_posterior > best.log_posterior - REFUTED_NATS:
             break
         found.add(rival)
     return frozenset(found)
