@@ -242,12 +242,12 @@ def extended_run(
             )
         return trial, {}
     from subzero.diagnosis.hypothesis.configuration import Setting
-    from subzero.diagnosis.hypothesis.extended_model import apply, unseen
+    from subzero.diagnosis.hypothesis.hypotheses import apply_extended, unseen
     from subzero.diagnosis.report.toml_file import read_extended
     from subzero.model import Model
 
     found = read_extended(path, _own(own))
-    setting = apply(found.extended, Setting(trial=trial, model=Model.of(trial)), found.effects)
+    setting = apply_extended(found.extended, Setting(trial=trial, model=Model.of(trial)), found.effects)
     hidden = unseen(found.extended, found.effects)
     if hidden:
         print(

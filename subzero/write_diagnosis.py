@@ -23,7 +23,9 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from subzero.diagnosis.hypothesis.extended_model import all_effects, apply, plain_id
+from subzero.diagnosis.hypothesis.catalogue import all_effects
+from subzero.diagnosis.hypothesis.effect import plain_id
+from subzero.diagnosis.hypothesis.hypotheses import apply_extended
 from subzero.diagnosis.report import json_file, tables, words
 from subzero.diagnosis.report.sections import Section as Told
 from subzero.diagnosis.report.sections import belongs, markdown, sections
@@ -320,7 +322,7 @@ def replayed(
     nominal = run(logged.setting)
     if nominal.sizes["time"] < 2 or not all(part in _vehicle(nominal) for part in HULL):
         return (), ""
-    best = run(apply(extended, logged.setting, known)) if extended is not None else None
+    best = run(apply_extended(extended, logged.setting, known)) if extended is not None else None
     found = [Actor(name=name, run=best)] if best is not None and best.sizes["time"] > 1 else []
     found.append(Actor(name="simulated", run=nominal, ghost=bool(found)))
     said = f"{logged.name}. " + (f"Solid: the {name}. " if len(found) > 1 else "")

@@ -2,7 +2,7 @@
 
     python -m benchmarks.diagnosis.settings                            # every setting, a few quick cases
     python -m benchmarks.diagnosis.settings --names CLOSE_NATS,MAX_STEPS --count 3
-    python -m benchmarks.diagnosis.settings --together LINEAR_NATS=12,FAR_NATS=30   # these at once
+    python -m benchmarks.diagnosis.settings --together LINEAR_NATS=8,FAR_NATS=30   # these at once
 
 A case is a challenge (`subzero.challenge`): a manoeuvre, a seed and what is hidden. Compared with the settings as they
 are: the verdict, what comes first, its probability (to 0.05), and how many simulations it took. A setting that changes

@@ -23,18 +23,14 @@ from time import perf_counter
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from subzero.diagnosis.assessment.goodness_of_fit import misfits
 from subzero.diagnosis.assessment.identifiability import detectability, with_whole_effects
-from subzero.diagnosis.assessment.residuals import misfits
 from subzero.diagnosis.hypothesis.catalogue import load
 from subzero.diagnosis.hypothesis.data_error import DataError
 from subzero.diagnosis.hypothesis.effect import Effect
 from subzero.diagnosis.hypothesis.logged import Logged
-from subzero.diagnosis.inference.data_error_choice import (
-    Explained,
-    compared,
-    leaves_only_noise,
-    may_be_named,
-)
+from subzero.diagnosis.inference.data_error_choice import compared, may_be_named
+from subzero.diagnosis.inference.data_error_evidence import Explained, leaves_only_noise
 from subzero.diagnosis.inference.data_error_search import SuspectedError, is_soft, suspected
 from subzero.diagnosis.inference.linear_gaussian import log_sum
 from subzero.diagnosis.inference.model_average import NAMED_PROBABILITY

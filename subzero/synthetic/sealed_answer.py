@@ -12,7 +12,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from subzero.diagnosis.hypothesis.extended_model import plain_id
+from subzero.diagnosis.hypothesis.effect import plain_id
 from subzero.diagnosis.report import words
 from subzero.errors import UserError, printable
 from subzero.external_force import FEATURES

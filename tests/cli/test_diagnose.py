@@ -242,7 +242,7 @@ def test_no_id_and_no_word_of_a_table_is_broken_however_narrow_the_terminal(widt
 
     from rich.console import Console
 
-    from subzero.diagnosis.report.tables import Table
+    from subzero.diagnosis import report
     from subzero.write_diagnosis import _rich
 
     ids = ["sensor_scale:propeller_speed@12.5", "cable_tangential_drag"]
@@ -252,7 +252,9 @@ def test_no_id_and_no_word_of_a_table_is_broken_however_narrow_the_terminal(widt
         "time constant 0.311 s; share 0.2",
         "not told apart",
     )
-    table = Table(("cause", "signal", "smallest that is seen", "", "id"), [(*cells, one) for one in ids])
+    table = report.tables.Table(
+        ("cause", "signal", "smallest that is seen", "", "id"), [(*cells, one) for one in ids]
+    )
     text = io.StringIO()
     Console(file=text, width=width).print(_rich(table, width))
     words = text.getvalue().split()

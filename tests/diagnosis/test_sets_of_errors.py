@@ -13,7 +13,8 @@ import subzero
 from subzero import Logged
 from subzero.diagnosis import Setting
 from subzero.diagnosis.inference import DataError, Linear, Noise, Observed, Problem
-from subzero.diagnosis.inference.data_error_choice import Explained, compared
+from subzero.diagnosis.inference.data_error_choice import compared
+from subzero.diagnosis.inference.data_error_evidence import Explained
 from subzero.diagnosis.inference.data_error_scan import log_prior
 from subzero.diagnosis.inference.data_error_search import SuspectedError, Suspicion
 from subzero.records.record import Record

@@ -7,15 +7,13 @@ import pytest
 
 from subzero.diagnosis import catalogue, with_onset
 from subzero.diagnosis.inference import (
+    RunCache,
     history,
     simulate_on,
     simulate_track,
-    simulator,
     with_stops,
     without_force,
 )
-from subzero.diagnosis.inference import problem as problem_module
-from subzero.external_force import MissingForce, Term
 
 from .conftest import CHANNELS, nominal
 
@@ -63,42 +61,37 @@ def test_a_time_behind_the_end_has_no_stop():
     assert with_stops(SETTING, [5.0, 60.0])[1].keys() == {5.0}
 
 
-@pytest.fixture
-def counted(monkeypatch):
-    """Return a list that grows with every run that is really made."""
-    runs = []
+class Counting(RunCache):
+    """Keeps runs, and counts those that are made to be kept."""
 
-    def count(setting):
-        runs.append(setting)
-        return simulate_track(setting)
+    made = 0
 
-    monkeypatch.setattr(problem_module, "simulate_track", count)
-    return runs
+    def keep(self, setting, entries, z, track):
+        self.made += 1
+        super().keep(setting, entries, z, track)
 
 
-def test_no_run_is_made_twice_and_sensors_need_none(plant, counted):
-    problem = dataclasses.replace(plant(duration=6.0).problem, kept=simulator.RunCache())
-    counted.clear()
+def test_no_run_is_made_twice_and_sensors_need_none(plant):
+    problem = dataclasses.replace(plant(duration=6.0).problem, kept=Counting())
     z = np.zeros(len(problem.entries))
     bias = next(k for k, entry in enumerate(problem.entries) if entry.effect.id == "sensor_bias:heading")
     drag = next(k for k, entry in enumerate(problem.entries) if entry.effect.id == "hull_drag")
     moved, other = z.copy(), z.copy()
     moved[bias], other[drag] = 2.0, 0.1
     plain, shifted, again = problem.residuals([z, moved, z])
-    assert len(counted) == 1
+    assert problem.kept.made == 1
     assert not np.array_equal(plain, shifted), "the sensor shows another value"
     assert np.array_equal(plain, again)
     problem.residual(other)
-    assert len(counted) == 2, "another drag is another run"
+    assert problem.kept.made == 2, "another drag is another run"
 
 
-def test_runs_for_a_record_put_right_serve_for_it_as_it_was(plant, counted):
-    problem = dataclasses.replace(plant(duration=6.0).problem, kept=simulator.RunCache())
+def test_runs_for_a_record_put_right_serve_for_it_as_it_was(plant):
+    problem = dataclasses.replace(plant(duration=6.0).problem, kept=Counting())
     right = dataclasses.replace(problem, kept=problem.kept.again())
-    counted.clear()
     z = np.zeros(len(problem.entries))
     assert np.array_equal(right.residual(z), problem.residual(z))
-    assert len(counted) == 1
+    assert problem.kept.made == 0, "it was made for the record put right"
     assert (right.kept.asked, problem.kept.asked) == (1, 1), "each search counts what it asks for"
 
 
@@ -112,32 +105,14 @@ def test_runs_of_another_setting_are_others(plant):
     assert not np.array_equal(here, there)
 
 
-def test_old_runs_are_forgotten_when_there_is_no_room(plant, counted, monkeypatch):
-    problem = dataclasses.replace(plant(duration=6.0).problem, kept=simulator.RunCache())
-    counted.clear()
+def test_old_runs_are_forgotten_when_there_is_no_room(plant):
+    problem = dataclasses.replace(plant(duration=6.0).problem, kept=Counting())
     z = np.zeros(len(problem.entries))
-    monkeypatch.setattr(simulator, "CACHE_BYTES", simulate_track(SETTING)[1].nbytes)
-    other = z.copy()
-    other[0] = 0.01
-    for deviations in (z, other, z):
-        problem.residual(deviations)
-    assert len(counted) == 3
-
-
-def test_a_run_without_its_energies_is_the_same_run(monkeypatch):
-    """Bit for bit, with forces that depend on the wet length: nothing in the loop reads what the ledger fills."""
-    force = MissingForce(terms=(Term("X", "wet_length*u2", -0.02), Term("N", "time*u2", 0.01)))
-    trial = dataclasses.replace(SETTING.trial, duration=4.0)
-    setting = dataclasses.replace(SETTING, trial=trial).with_model(missing=force)
-    without, eased = simulate_track(setting)[1], simulator._ease
-
-    def ease(setup):
-        eased(setup)
-        assert not setup.fixed.booked
-        setup.fixed.booked = True
-
-    monkeypatch.setattr(simulator, "_ease", ease)
-    assert np.array_equal(simulate_track(setting)[1], without)
+    problem.residual(z)
+    terabyte = np.broadcast_to(0.0, (125_000_000_000,))  # says so, and takes none
+    RunCache.keep(problem.kept, None, None, z, (z, terabyte))
+    problem.residual(z)
+    assert problem.kept.made == 2
 
 
 def test_a_setting_refuses_what_a_model_does_not_have():

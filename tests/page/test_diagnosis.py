@@ -16,10 +16,7 @@ import numpy as np
 import pytest
 
 import subzero
-from subzero.diagnosis.hypothesis.configuration import Setting
-from subzero.diagnosis.hypothesis.extended_model import all_effects, apply
-from subzero.diagnosis.hypothesis.logged import Logged
-from subzero.diagnosis.results import (
+from subzero.diagnosis import (
     CAUSE_NAMED,
     DATA_ERROR,
     OUTSIDE,
@@ -28,10 +25,14 @@ from subzero.diagnosis.results import (
     Estimate,
     Extended,
     FoundError,
+    Logged,
     Misfit,
     Rival,
+    Setting,
     Unknown,
     Verdict,
+    all_effects,
+    apply_extended,
 )
 from subzero.figures.diagnosis import draw_diagnosis
 from subzero.figures.style import Title
@@ -50,7 +51,7 @@ def truth() -> Any:
     """Return the run that was measured."""
     trial = dataclasses.replace(subzero.load_scenario("fig6"), duration=6.0, rtol=0.0)
     setting = Setting(trial=trial, model=Model.of(trial))
-    true = apply(Extended(deviations=OFF), setting, all_effects())
+    true = apply_extended(Extended(deviations=OFF), setting, all_effects())
     return setting, subzero.simulate(true.trial, model=true.model)
 
 

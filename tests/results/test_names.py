@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 
 import subzero
 from subzero.channels import CHANNELS, RENAMED_CHANNELS
-from subzero.diagnosis.report.toml_file import read_extended
+from subzero.diagnosis import read_extended
 
 
 def run():

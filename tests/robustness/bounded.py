@@ -84,7 +84,7 @@ def held() -> None:
 
 def other_code() -> None:
     """The other formulation of a coupled run, which hides effects and checks diagnoses."""
-    from subzero.diagnosis.hypothesis.configuration import Setting
+    from subzero.diagnosis import Setting
     from subzero.synthetic.reference_run import truth_of
 
     fig6 = subzero.load_scenario("fig6")

@@ -3,22 +3,24 @@
 what is computed                                          file
 --------------------------------------------------------  ----------------
 signal of a cause, and D to its closest rival             identifiability
-residuals of the nominal model, channel by channel        residuals
-gain on data that were not fitted                         cross_validation
+residuals of the nominal model; gain on held-out data     goodness_of_fit
 the trial that best tells hypotheses apart                next_trial, trial_library
 
 What others may use stands in `__all__` (for what stands outside the diagnosis, a contract holds it).
 """
 
-from subzero.diagnosis.assessment.cross_validation import (
+from subzero.diagnosis.assessment.goodness_of_fit import (
     BLOCKS,
     Fitted,
+    curves,
     gain,
     held_out,
+    misfits,
     parts_of,
     raw,
     rows_of,
     share,
+    whiteness,
 )
 from subzero.diagnosis.assessment.identifiability import (
     detectability,
@@ -36,7 +38,6 @@ from subzero.diagnosis.assessment.next_trial import (
     outlooks,
     prepared_trial,
 )
-from subzero.diagnosis.assessment.residuals import curves, misfits, whiteness
 from subzero.diagnosis.assessment.trial_library import (
     LIBRARY,
     PLANE_AMPLITUDE,

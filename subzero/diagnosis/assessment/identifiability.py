@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from subzero.diagnosis.hypothesis.hypotheses import Entry, columns_of, nameable
-from subzero.diagnosis.inference import settings
+from subzero.diagnosis.hypothesis.hypotheses import Entry, columns_of, is_flat, nameable
 from subzero.diagnosis.results import Detectability
 
 if TYPE_CHECKING:
@@ -46,7 +45,7 @@ def _is_flat(entry: Entry, value: float, column: np.ndarray) -> bool:
     """Say whether a parameter at its bound seems to do nothing."""
     parameter = entry.parameter
     at_rest = entry.record < 0 and parameter.low == 0.0 and value < parameter.tolerance
-    return bool(at_rest and np.linalg.norm(column) * parameter.scale < settings.FLAT_SIGNAL)
+    return at_rest and is_flat(entry, column)
 
 
 def marginal(problem: Problem, J: np.ndarray, kappa: float = 1.0) -> np.ndarray:

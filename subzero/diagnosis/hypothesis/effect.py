@@ -130,6 +130,11 @@ def with_onset(effect: Effect, time: float) -> Effect:
     )
 
 
+def plain_id(name: str) -> str:
+    """Return the id of an effect without the time at which it begins: ``hull_drag@12`` → hull_drag."""
+    return name.partition("@")[0]
+
+
 def with_free_onset(effect: Effect, time: float, end: float) -> Effect:
     """Return the effect as it begins at about a time [s] of a trial until `end`: when exactly is its last parameter, as
     likely at any time.

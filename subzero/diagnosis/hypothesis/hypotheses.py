@@ -1,12 +1,13 @@
 """The parameter vector z, the hypotheses about it, and their prior probabilities in one visible table.
 
 z holds the parameters of all effects, which all records share, and then the start of each record. A hypothesis is a set
-of causes, whose entries get the prior variance s² instead of (κτ)².
+of causes, whose entries get the prior variance s² instead of (κτ)². With its numbers, by name, it is an extended model,
+and `apply_extended` makes a setting of that.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations
 from typing import Any, NamedTuple
@@ -14,7 +15,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from subzero.diagnosis.hypothesis.configuration import Setting
-from subzero.diagnosis.hypothesis.effect import Effect, Parameter
+from subzero.diagnosis.hypothesis.effect import Effect, Parameter, plain_id, with_onset
+from subzero.diagnosis.results import Extended
 
 
 class Entry(NamedTuple):
@@ -54,6 +56,15 @@ def grouped(entries: tuple[Entry, ...]) -> list[tuple[Effect, list[int], int]]:
     for k, entry in enumerate(entries):
         found.setdefault((entry.effect.id, entry.record), (entry.effect, [], entry.record))[1].append(k)
     return list(found.values())
+
+
+FLAT_SIGNAL = 1.0
+"""A parameter that does no more than this at one effect scale, in noise levels, has no slope there."""
+
+
+def is_flat(entry: Entry, column: np.ndarray) -> bool:
+    """Say whether whitened sensitivities to an entry (m,) are none."""
+    return bool(np.linalg.norm(column) * entry.parameter.scale <= FLAT_SIGNAL)
 
 
 def number_of(name: str, setting: Setting) -> float:
@@ -160,3 +171,54 @@ def variances_named(entries: Sequence[Entry], at: Sequence[int], kappa: float) -
     """Return the prior variances that entries have if their causes are named (at,): s²."""
     own = [entries[k].parameter for k in at]
     return np.array([max(one.scale, 2.0 * kappa * one.tolerance) ** 2 for one in own])
+
+
+def apply_extended(extended: Extended, setting: Setting, effects: Mapping[str, Effect]) -> Setting:
+    """Return a setting with an extended model; causes that begin in mid-trial hold from the next exchange on.
+
+    Args:
+        extended: the deviations.
+        setting: the nominal one.
+        effects: by id, all that are named.
+    """
+    grows = {name: 0.0 for name in extended.deviations if effects[plain_id(name)].grows}
+    starts = grows | starts_of(extended)
+    throughout = [(name, numbers) for name, numbers in extended.deviations.items() if name not in starts]
+    for name, numbers in (*extended.calibration.items(), *throughout):
+        setting = _with(setting, effects[name], numbers)
+    if extended.missing is not None:
+        setting = setting.with_model(missing=extended.missing + setting.model.missing)
+    for start, name in sorted((start, name) for name, start in starts.items()):
+        setting = _with_later(setting, effects[plain_id(name)], extended.deviations[name], start)
+    return setting
+
+
+def starts_of(extended: Extended) -> dict[str, float]:
+    """Return when causes that began in mid-trial began, whether their id says it or `start_times`. [s]"""
+    said = {name: float(name.partition("@")[2]) for name in extended.deviations if "@" in name}
+    return said | {name: start for name, start in extended.start_times.items() if name in extended.deviations}
+
+
+def _with_later(setting: Setting, effect: Effect, numbers: Mapping[str, float], start: float) -> Setting:
+    """Return a setting in which an effect begins in mid-trial, after all changes that are there. [s]"""
+    step = setting.trial.cable_step
+    if effect.grows:
+        return with_onset(effect, start).apply(setting, *_values(effect, numbers))
+    start = min(max(round(start / step), 1) * step, setting.trial.duration)
+    last = setting.later[-1][1] if setting.later else setting.model
+    changed = _with(replace(setting, model=last), effect, numbers).model
+    return replace(setting, later=(*setting.later, (start, changed)))
+
+
+def unseen(extended: Extended, effects: Mapping[str, Effect]) -> list[str]:
+    """Return the named causes of sensors and their clock, which change what is shown and not what is."""
+    return [name for name in extended.deviations if effects[plain_id(name)].slot in ("sensors", "clock")]
+
+
+def _with(setting: Setting, effect: Effect, numbers: Mapping[str, float]) -> Setting:
+    """Return a setting with an effect; parameters that are not named stay as they are."""
+    return effect.apply(setting, *_values(effect, numbers))
+
+
+def _values(effect: Effect, numbers: Mapping[str, float]) -> list[float]:
+    return [numbers.get(parameter.name, 0.0) for parameter in effect.parameters]

@@ -9,8 +9,7 @@ one simulation, from its start or from a stop             simulator
 r(z) and J of all records                                 problem
 records → problem                                         posing
 evidence and posterior of the linear problem              linear_gaussian
-MAP fit with real simulations                             map_fit
-evidence around a fit                                     laplace
+MAP fit with real simulations, evidence around it         map_fit
 linear evidence of all hypotheses                         screening
 the pool of fitted hypotheses, each with its noise        model_fits
 add, drop, swap and merge causes                          model_search
@@ -26,6 +25,7 @@ values that a record repeats in place of measurements     repeated_values
 what physics may do with a record, its linear evidence    data_error_yardstick
 errors in the data, proposed by linear evidence           data_error_scan
 ... suspected together, and how close a few causes come   data_error_search
+... how probable a set of them is                         data_error_evidence
 ... and held against all else                             data_error_choice
 all that only steers the search                           settings
 
@@ -77,19 +77,21 @@ from subzero.diagnosis.inference.linear_gaussian import (
     seen,
 )
 from subzero.diagnosis.inference.map_fit import (
+    Candidate,
     Fit,
     at_bad_minimum,
     bounded_step,
     bounds,
     broyden_update,
+    candidate_of,
     is_poor_fit,
+    laplace,
     objective,
     quadratic_step,
     refit,
     restarted_where_smooth,
     runnable,
 )
-from subzero.diagnosis.inference.laplace import Candidate, candidate_of, laplace
 from subzero.diagnosis.inference.change_point_scan import (
     BaseRun,
     LinearisationPoint,
@@ -116,6 +118,7 @@ from subzero.diagnosis.inference.input_estimation import (
     latent_force_candidates,
     relinearised_force,
 )
+from subzero.diagnosis.inference.force_formula import describe
 from subzero.diagnosis.inference.screening import Screening
 from subzero.diagnosis.inference.model_average import (
     UNTRIED_LOG_POSTERIOR,
@@ -176,6 +179,7 @@ __all__ = [
     "columns_of",
     "data_errors_undone",
     "decide",
+    "describe",
     "economical",
     "entries_of",
     "estimate",

@@ -29,9 +29,17 @@ from subzero.diagnosis.inference.change_point_scan import (
     ranked_in,
     with_change_point,
 )
-from subzero.diagnosis.inference.laplace import Candidate, laplace
 from subzero.diagnosis.inference.linear_gaussian import KAPPAS, Linear, Quadratic, log_sum, posterior
-from subzero.diagnosis.inference.map_fit import Fit, bounds, continued, is_poor_fit, refit, with_own_jacobian
+from subzero.diagnosis.inference.map_fit import (
+    Candidate,
+    Fit,
+    bounds,
+    continued,
+    is_poor_fit,
+    laplace,
+    refit,
+    with_own_jacobian,
+)
 
 if TYPE_CHECKING:
     from subzero.diagnosis.hypothesis.effect import Effect

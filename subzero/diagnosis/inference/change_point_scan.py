@@ -18,9 +18,8 @@ import numpy as np
 from subzero.diagnosis.hypothesis.effect import MINUTE_S, Effect, with_free_onset, with_onset
 from subzero.diagnosis.hypothesis.hypotheses import Entry, columns_of, log_prior, nameable, variances
 from subzero.diagnosis.inference import settings
-from subzero.diagnosis.inference.laplace import Candidate, possible
 from subzero.diagnosis.inference.linear_gaussian import KAPPAS, ForceInformation, Quadratic, posterior, seen
-from subzero.diagnosis.inference.map_fit import Fit, bounds
+from subzero.diagnosis.inference.map_fit import Candidate, Fit, bounds, possible
 from subzero.diagnosis.inference.simulator import Stop, Track, simulate_on, simulate_track, with_stops
 
 if TYPE_CHECKING:

@@ -27,9 +27,8 @@ from subzero.diagnosis.inference.basis import (
     shifted,
     size_of,
 )
-from subzero.diagnosis.inference.latent_force import history, usual_force
+from subzero.diagnosis.inference.latent_force import usual_force
 from subzero.diagnosis.inference.linear_gaussian import AMPLITUDE_SHARES, ForceInformation, log_sum
-from subzero.external_force import MissingForce, Term
 
 if TYPE_CHECKING:
     from subzero.diagnosis.inference.input_estimation import EstimatedForce
@@ -72,20 +71,6 @@ class Formula:
     def force(self) -> np.ndarray:
         """Return the force at the samples (n,). [N, N m]"""
         return np.sum([s.columns @ c for s, c in zip(self.shapes, self.coefficients, strict=True)], axis=0)
-
-
-def as_missing(formula: Formula) -> MissingForce:
-    """Return a formula as a part of a model: plain features as terms, all others as a history of this very trial."""
-    terms, rest = [], np.zeros(formula.shapes[0].columns.shape[0])
-    for shape, c in zip(formula.shapes, formula.coefficients, strict=True):
-        if shape.is_plain:
-            terms.append(Term(formula.axis, shape.feature, float(c[0])))
-        else:
-            rest = rest + shape.columns @ c
-    told = (
-        history(formula.axis, SHAPE_STEP_S * np.arange(rest.size), rest) if np.any(rest) else MissingForce()
-    )
-    return told + MissingForce(terms=tuple(terms))
 
 
 FURTHER_TERM_PRIOR = 0.05

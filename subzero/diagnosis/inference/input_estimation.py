@@ -20,7 +20,6 @@ from subzero.channels import BY_NAME
 from subzero.diagnosis.hypothesis.catalogue.sensors import SPECS
 from subzero.diagnosis.hypothesis.hypotheses import Ids, log_prior, nameable, variances
 from subzero.diagnosis.inference.change_point_scan import BaseRun, LinearisationPoint
-from subzero.diagnosis.inference.laplace import possible
 from subzero.diagnosis.inference.latent_force import (
     DRIFT,
     FINE_SPACING_S,
@@ -55,7 +54,7 @@ from subzero.diagnosis.inference.linear_gaussian import (
     posterior,
     seen,
 )
-from subzero.diagnosis.inference.map_fit import Fit, is_poor_fit, refit, with_own_jacobian
+from subzero.diagnosis.inference.map_fit import Fit, is_poor_fit, possible, refit, with_own_jacobian
 from subzero.diagnosis.results import Unknown
 
 if TYPE_CHECKING:

@@ -34,7 +34,7 @@ from subzero.diagnosis.results import (
 )
 
 if TYPE_CHECKING:
-    from subzero.diagnosis.inference.laplace import Candidate
+    from subzero.diagnosis.inference.map_fit import Candidate
     from subzero.diagnosis.inference.problem import Problem
     from subzero.diagnosis.inference.screening import Screening
 
@@ -43,6 +43,8 @@ NAMED_PROBABILITY, HEALTHY_PROBABILITY, CREDIBLE_SET_PROBABILITY = 0.9, 0.5, 0.9
 """A cause, a force, a drift or an error in the data is told from the first on: one in ten may be wrong there. [-]"""
 MIN_DISCRIMINATION = 9.0
 """With less than this squared distance to a rival no cause is named, whatever the record happens to say."""
+REFUTED_NATS = 16.0
+"""A rival whose fit is this far behind the best is refuted: where D is 9, luck would have to be worth 3 σ."""
 PRACTICAL_TOLERANCES = 4.0
 """A deviation within this many tolerances is a matter of calibration, whatever its evidence."""
 

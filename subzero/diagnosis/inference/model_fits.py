@@ -1,8 +1,8 @@
 """The pool of fitted hypotheses: each keeps its best fit, and all follow when noise or discretisation are known better.
 
 Simulations have non-smooth points, and a fit may end in a local minimum. So what is close to the best is fitted again
-with a Jacobian of its own, and rivals from where the others are. `SharpFits` estimates the noise again behind the best
-fit, and takes from the records what economical steps get wrong there, where that is seen.
+with a Jacobian of its own, and rivals from where the others are. `Fits.sharpen` estimates the noise again behind the
+best fit, and takes from the records what economical steps get wrong there, where that is seen.
 
 One noise for all favours what it was found behind: what is slow in a record is noise to one explanation, and motion to
 another. So each has, in the end, the noise θ that is the most probable beside it (`with_own_noise`), in the linear
@@ -24,14 +24,13 @@ from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
-from subzero.diagnosis.hypothesis.hypotheses import Ids, columns_of, variances
+from subzero.diagnosis.hypothesis.hypotheses import Ids, columns_of, is_flat, variances
 from subzero.diagnosis.inference import settings
-from subzero.diagnosis.inference.laplace import Candidate, candidate_of
 from subzero.diagnosis.inference.linear_gaussian import KAPPAS, Linear, Quadratic, posterior
-from subzero.diagnosis.inference.map_fit import Fit, refit
+from subzero.diagnosis.inference.map_fit import Candidate, Fit, candidate_of, refit
 from subzero.diagnosis.inference.noise import Behind, Noise, Usual, estimate, log_prior_of
 from subzero.diagnosis.inference.posing import sensor_of, whitened_again, with_finer_steps, with_noise_behind
-from subzero.diagnosis.inference.screening import Screening, is_flat, screening_of
+from subzero.diagnosis.inference.screening import Screening, screening_of
 
 if TYPE_CHECKING:
     from subzero.diagnosis.inference.problem import Observed, Problem, Progress
@@ -42,7 +41,7 @@ Made = TypeVar("Made")
 
 @dataclass(kw_only=True, eq=False)
 class Fits:
-    """The fits of hypotheses, which get better and more.
+    """The fits of hypotheses, which get better and more, and whose problem gets sharper where the best of them is.
 
     Attributes:
         problem: records and parameters.
@@ -52,6 +51,10 @@ class Fits:
         candidates: hypothesis → its real fit.
         refined: hypotheses that were fitted with sensitivities of their own.
         side: threads for fits side by side, whose runs may use those of the problem.
+        behind: hypothesis → how far its fit was behind the best when it was given up, in log posterior.
+        economical: the problem before what economical steps get wrong was taken from its records.
+        sharp_at: the hypothesis at whose fit that was done.
+        nominal: residual (m,) and sensitivities (m, k) of the nominal model.
     """
 
     problem: Problem
@@ -61,6 +64,10 @@ class Fits:
     candidates: dict[Ids, Candidate] = field(default_factory=dict)
     refined: set[Ids] = field(default_factory=set)
     side: ThreadPoolExecutor = field(default_factory=lambda: ThreadPoolExecutor(cpu_count() or 1))
+    behind: dict[Ids, float] = field(default_factory=dict)
+    economical: Problem = field(init=False)
+    sharp_at: Ids | None = None
+    nominal: tuple[np.ndarray, np.ndarray] = field(init=False)
 
     def best(self) -> Candidate:
         """Return the most probable candidate."""
@@ -107,7 +114,7 @@ class Fits:
         """Fit candidates again with sensitivities of their own, the best first, until the next is hopeless."""
         hopeless = settings.HOPELESS_NATS if hopeless is None else hopeless
         runs = settings.MAX_RUNS_PER_RECORD * len(self.problem.records)
-        for _ in range(settings.MAX_REFINED if most is None else most):
+        for _ in range(settings.MAX_RANKED if most is None else most):
             self.refined |= {
                 one.ids
                 for one in self.candidates.values()
@@ -130,7 +137,7 @@ class Fits:
         """
         for _ in range(settings.MAX_ADDED):
             best = self.best()
-            close = [ids for ids in self._ranked()[1:settings.MAX_REFINED]
+            close = [ids for ids in self._ranked()[1:settings.MAX_RANKED]
                      if self.candidates[ids].log_posterior > best.log_posterior - settings.HOPELESS_NATS]  # fmt: skip
             self.fit_all(close, best.fit)
             starts = [self.candidates[ids].fit for ids in close]
@@ -198,23 +205,6 @@ class Fits:
 
     def _say(self, share: float, words: str, ids: Ids, more: str = "") -> None:
         self.progress(share, f"{words} {' + '.join(ids) or 'nothing wrong'}{more}")
-
-
-@dataclass(kw_only=True, eq=False)
-class SharpFits(Fits):
-    """Fits whose problem gets sharper where the best of them is.
-
-    Attributes:
-        behind: hypothesis → how far its fit was behind the best when it was given up, in log posterior.
-        economical: the problem before what economical steps get wrong was taken from its records.
-        sharp_at: the hypothesis at whose fit that was done.
-        nominal: residual (m,) and sensitivities (m, k) of the nominal model.
-    """
-
-    behind: dict[Ids, float] = field(default_factory=dict)
-    economical: Problem = field(init=False)
-    sharp_at: Ids | None = None
-    nominal: tuple[np.ndarray, np.ndarray] = field(init=False)
 
     def sharpen(self) -> None:
         """Estimate the noise behind the best fit, take from the records what economical steps get wrong there, and fit

@@ -14,11 +14,12 @@ import numpy as np
 
 from subzero.diagnosis.hypothesis.hypotheses import MAX_CAUSES, Ids, columns_of, nameable, variances
 from subzero.diagnosis.inference import settings
-from subzero.diagnosis.inference.laplace import Candidate, candidate_of
 from subzero.diagnosis.inference.linear_gaussian import KAPPAS
 from subzero.diagnosis.inference.map_fit import (
+    Candidate,
     Fit,
     at_bad_minimum,
+    candidate_of,
     continued,
     is_poor_fit,
     non_smooth,
@@ -26,7 +27,7 @@ from subzero.diagnosis.inference.map_fit import (
     restarted_where_smooth,
 )
 from subzero.diagnosis.inference.model_average import Beliefs
-from subzero.diagnosis.inference.model_fits import SharpFits
+from subzero.diagnosis.inference.model_fits import Fits
 from subzero.diagnosis.inference.screening import (
     TriedSize,
     fit_wide,
@@ -40,23 +41,25 @@ from subzero.diagnosis.inference.screening import (
 
 
 @dataclass(kw_only=True, eq=False)
-class GrowingFits(SharpFits):
-    """Fits that more are made around.
+class Search(Fits):
+    """A search that goes on, with more fits around the best: what was found so far is always in `candidates`.
 
     Attributes:
+        is_far: nothing came close to the records so far, not even within wide tolerances.
         one_more: hypothesis → log posterior, estimated at the fit of one with a cause less.
         restarted: hypotheses that were fitted from off their kinks.
     """
 
+    is_far: bool = False
     one_more: dict[Ids, float] = field(default_factory=dict)
     restarted: set[Ids] = field(default_factory=set)
 
     def grow(self) -> None:
         """Look beside the best candidate for one more cause, in the place of each for another, and below it for one
-        less, until the best stays.
+        less, until the best stays: once for each cause that it may have, and once more.
         """
         looked: set[Ids] = set()
-        for _ in range(settings.MAX_GROWING_ROUNDS):
+        for _ in range(MAX_CAUSES + 1):
             best = self.restart(self.best())
             if best.ids in looked:
                 return
@@ -125,7 +128,7 @@ class GrowingFits(SharpFits):
         )
         for rest in combinations(best.ids, len(best.ids) - 2) if len(best.ids) > 1 else ():
             found |= with_sizes_tried(self.problem, best, rest, others, settings.MERGED_SCALES)
-        worth = self._worth_fitting(found, best, -settings.MERGED_NATS)
+        worth = self._worth_fitting(found, best, -settings.LINEAR_NATS)
         for ids in worth:
             z, D = found[ids].z, variances(entries, ids, best.kappa)
             fit = refit(self.problem, z, self.problem.jacobian(z), D, most_fresh=2, made_at=z)
@@ -162,23 +165,6 @@ class GrowingFits(SharpFits):
             ids: log for ids, log in found.items() if known.get(ids, -np.inf) < log - settings.HOPELESS_NATS
         }
 
-
-def _best_of(found: Mapping[Ids, float], least: float) -> list[Ids]:
-    """Return the best hypotheses, at most MAX_ADDED, of those whose log posterior is above the least."""
-    ranked = sorted(found, key=lambda ids: -found[ids])[: settings.MAX_ADDED]
-    return [ids for ids in ranked if found[ids] > least]
-
-
-@dataclass(kw_only=True, eq=False)
-class Search(GrowingFits):
-    """A search that goes on: what was found so far is always in `candidates`.
-
-    Attributes:
-        is_far: nothing came close to the records so far, not even within wide tolerances.
-    """
-
-    is_far: bool = False
-
     def begin(self) -> None:
         """Make the sensitivities at the nominal model, and the fit with wide tolerances."""
         self.problem, self.wide, self.nominal = fit_wide(self.problem, self.progress)
@@ -211,8 +197,8 @@ class Search(GrowingFits):
             self._say(0.3, "fitting", ids, " by itself")
             self._keep(ids, fit)
         best = (
-            self.screen.best(1, settings.MAX_SINGLES, settings.SCREENED_NATS),
-            self.screen.best(2, settings.MAX_PAIRS, settings.SCREENED_NATS),
+            self.screen.best(1, settings.MAX_RANKED, settings.LINEAR_NATS),
+            self.screen.best(2, settings.MAX_PAIRS, settings.LINEAR_NATS),
         )
         self.fit_all(list(chain([()], *best)), words="fitting")
 
@@ -345,3 +331,9 @@ class Search(GrowingFits):
 def _akin(ids: Ids, others: Ids) -> bool:
     """Say whether hypotheses are the same but for at most one cause more in one of them."""
     return len(set(ids) ^ set(others)) <= 1
+
+
+def _best_of(found: Mapping[Ids, float], least: float) -> list[Ids]:
+    """Return the best hypotheses, at most MAX_ADDED, of those whose log posterior is above the least."""
+    ranked = sorted(found, key=lambda ids: -found[ids])[: settings.MAX_ADDED]
+    return [ids for ids in ranked if found[ids] > least]

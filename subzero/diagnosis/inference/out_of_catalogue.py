@@ -41,7 +41,7 @@ from subzero.diagnosis.inference.model_fits import candidate_with_own_noise, gai
 from subzero.external_force import AXES
 
 if TYPE_CHECKING:
-    from subzero.diagnosis.inference.laplace import Candidate
+    from subzero.diagnosis.inference.map_fit import Candidate
     from subzero.diagnosis.inference.model_search import Search
     from subzero.diagnosis.inference.problem import Problem
     from subzero.diagnosis.results import Detectability, Misfit
@@ -280,10 +280,10 @@ def each_with_own_noise(search: Search, outside: Sequence[OutOfCatalogue]) -> li
     none = own(fits[()])
     gained = max(none.log_posterior - fits[()].log_posterior, 0.0)
     least = max(first, none.log_posterior) - gained - settings.HOPELESS_NATS
-    ranked = sorted(fits.values(), key=lambda one: -one.log_posterior)[: settings.MAX_REFINED]
+    ranked = sorted(fits.values(), key=lambda one: -one.log_posterior)[: settings.MAX_RANKED]
     near = [one for one in ranked if one.ids and one.log_posterior > least]
     fits.update({one.ids: one for one in [none, *search.side.map(own, near)]})
-    few = [one for one in outside[: settings.MAX_REFINED] if one.log_posterior > least]
+    few = [one for one in outside[: settings.MAX_RANKED] if one.log_posterior > least]
     return _sorted([_with_own_noise(search.problem, one) for one in few], list(outside[len(few) :]))
 
 

@@ -15,9 +15,9 @@ import numpy as np
 from scipy.special import log_ndtr
 
 from subzero.diagnosis.hypothesis.hypotheses import (
-    Entry,
     Ids,
     columns_of,
+    is_flat,
     log_prior,
     nameable,
     pairs_of,
@@ -25,7 +25,6 @@ from subzero.diagnosis.hypothesis.hypotheses import (
     variances_named,
 )
 from subzero.diagnosis.inference import settings
-from subzero.diagnosis.inference.laplace import Candidate
 from subzero.diagnosis.inference.linear_gaussian import (
     KAPPAS,
     Posterior,
@@ -34,7 +33,7 @@ from subzero.diagnosis.inference.linear_gaussian import (
     log_sum,
     posterior,
 )
-from subzero.diagnosis.inference.map_fit import Fit, at_bad_minimum, refit, restarted_where_smooth
+from subzero.diagnosis.inference.map_fit import Candidate, Fit, at_bad_minimum, refit, restarted_where_smooth
 from subzero.diagnosis.inference.posing import with_noise_behind
 
 if TYPE_CHECKING:
@@ -182,11 +181,6 @@ def _without_slope(problem: Problem, J: np.ndarray) -> list[int]:
     """Return the entries that do nothing when they are small."""
     return [k for k, entry in enumerate(problem.entries)
             if entry.record < 0 and entry.parameter.low == 0.0 and is_flat(entry, J[:, k])]  # fmt: skip
-
-
-def is_flat(entry: Entry, column: np.ndarray) -> bool:
-    """Say whether sensitivities to an entry (m,) are none."""
-    return bool(np.linalg.norm(column) * entry.parameter.scale <= settings.FLAT_SIGNAL)
 
 
 def _sweep(

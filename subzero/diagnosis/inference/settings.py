@@ -2,9 +2,10 @@
 
 None of these numbers belongs to the statistical model: with an endless budget, and simulations without non-smooth
 points, the verdict would not depend on them. They buy time. What belongs to the model stands with its concept: prior
-probabilities and the most causes (`hypotheses`), what a poor fit is (`map_fit`), priors of noise (`noise`) and of
-latent forces (`linear_gaussian`), rules for a verdict (`model_average`). So do the steps of differences and grids
-(`problem`, `change_point_scan`, `latent_force`). `benchmarks/diagnosis/settings.py` halves and doubles each.
+probabilities, the most causes and what has no slope (`hypotheses`), what a poor fit is (`map_fit`), priors of noise
+(`noise`) and of latent forces (`linear_gaussian`), rules for a verdict (`model_average`). So do the steps of
+differences and grids (`problem`, `change_point_scan`, `latent_force`). `benchmarks/diagnosis/settings.py` halves and
+doubles each.
 
 Log posteriors are in nats: 2 nats are odds of 7 to 1, 6 of 400 to 1. Distances of parameters are in tolerances τ.
 """
@@ -24,14 +25,9 @@ FURTHER_CAUSE_NATS = 4.0
 HOPELESS_NATS = 6.0
 """What is this far behind the best is given up; what the linear model has this far before its own fit was fitted into
 a local minimum, and is fitted again."""
-LINEAR_NATS = 10.0
-"""Linear evidence far from a fit may err by this much: forces and hypotheses within it are looked at again."""
-SCREENED_NATS = 12.0
-"""Screened hypotheses this close to the best of as many causes are fitted."""
-MERGED_NATS = 15.0
-"""One cause in the place of two is fitted even if it looks this much worse: far away, linear evidence says little."""
-REFUTED_NATS = 16.0
-"""A rival whose fit is this far behind the best is refuted: where D is 9, luck would have to be worth 3 σ."""
+LINEAR_NATS = 12.0
+"""Linear evidence far from a fit may err by this much: within it, screened hypotheses and one cause in the place of two
+are fitted, and forces, drifts and large hypotheses are looked at around fits of their own."""
 DECISIVE_NATS = 30.0
 """No sum of causes gains more over an explanation that leaves only noise; a fit that predicts this much more is
 continued."""
@@ -57,8 +53,6 @@ BENT_TOLERANCES = 10.0
 # Sizes and shares. [-]
 POOR_MEAN_SQUARE = 1.08
 """A wide fit with a larger mean square of the whitened residual is not close to the records."""
-FLAT_SIGNAL = 1.0
-"""A cause that does less than this at one effect scale, in noise levels, has no slope there."""
 STALE_GAIN_SHARE = 0.5
 """A step that gains less than this share of its predicted gain asks for a new Jacobian."""
 NON_LINEAR_SHARE, NON_LINEAR_SHARE_OF_FIRST = 0.05, 0.75
@@ -79,13 +73,10 @@ how often one is repeated with what it showed: rivals from one another's optimum
 MAX_TRIED = 3
 """Most fits of one kind in one look (swapped causes, restarts, change points, forces, rivals to refute), and most
 looks: at change points, at what has not settled, and where a fit might go on."""
-MAX_GROWING_ROUNDS = 4
-"""How often it adds, drops, swaps and merges causes of the best."""
 MAX_PAIRS = 4
 """Most screened pairs that are fitted; from afar, most causes by themselves."""
-MAX_REFINED = 6
-"""Most fits that one refinement gives a Jacobian of their own."""
-MAX_SINGLES = 7
-"""Most screened causes that are fitted."""
+MAX_RANKED = 7
+"""So far down a ranking of hypotheses it goes: screened causes are fitted; fits are given a Jacobian of their own, are
+begun from one another's optimum, and have the noise behind them estimated."""
 MAX_RUNS_PER_RECORD = 800
 """After so many simulations of each record only what predicts to be the best is refined."""

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from subzero.channels import BY_NAME
-from subzero.diagnosis.hypothesis.extended_model import plain_id
+from subzero.diagnosis.hypothesis.effect import plain_id
 from subzero.diagnosis.report import words
 from subzero.diagnosis.report.tables import CLEAR_FROM, CONFUSED_BELOW, SEEN_SIGNAL
 from subzero.diagnosis.results import (

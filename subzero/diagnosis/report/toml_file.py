@@ -1,7 +1,27 @@
-"""An extended model as a TOML file (`hypothesis.extended_model` shows one): written, and read with all its faults told.
+"""An extended model as a TOML file that anyone can run, written, and read with all its faults told.
 
-It may name the Python file that its effects came from. That file is never run from here, for reading data must not run
-code: whoever trusts it says so on the command line (``--effects FILE``).
+    scenario = "fig6"
+
+    [effects.rudder_lag]            # the rudder servo lags
+    time_constant_s = 0.21          # deviation; as a whole 0.31 s, the model has 0.1 s
+    starts_at_s = 12.0              # only if it began in mid-trial
+
+    [calibration.hull_drag]         # within tolerance, found by the refit
+    share = 0.012
+
+    [[missing_force]]               # what no effect explains: a history
+    axis = "X"
+    time_s = [0.0, 2.0, 4.0]
+    force_N = [0.0, -0.3, -0.2]     # K, M, N: moment_N_m
+
+    [[missing_term]]                # … or a formula
+    axis = "X"
+    feature = "u|u|"
+    coefficient = -1.2              # N s2/m2
+
+Numbers are deviations from the nominal model, with their unit in the key: ``subzero simulate fig6 --with FILE``. It may
+name the Python file that its effects came from. That file is never run from here, for reading data must not run code:
+whoever trusts it says so on the command line (``--effects FILE``).
 """
 
 from __future__ import annotations
@@ -10,6 +30,7 @@ import json
 import re
 import shlex
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -18,24 +39,45 @@ import numpy as np
 from scenarios import ScenarioError
 from scenarios.files import Source, read_toml
 from subzero.channels import RENAMED_CHANNELS
+from subzero.diagnosis.hypothesis.catalogue import all_effects
 from subzero.diagnosis.hypothesis.configuration import Setting
-from subzero.diagnosis.hypothesis.effect import Effect, Parameter
-from subzero.diagnosis.hypothesis.extended_model import (
-    STARTS,
-    ExtendedFile,
-    all_effects,
-    force_key,
-    key_of,
-    plain_id,
-    starts_of,
-)
+from subzero.diagnosis.hypothesis.effect import Effect, Parameter, plain_id
+from subzero.diagnosis.hypothesis.hypotheses import starts_of
 from subzero.diagnosis.results import Extended
 from subzero.errors import UserError, listed, printable, suggestion
 from subzero.errors import short as shown
 from subzero.external_force import AXES, FEATURES, MissingForce, Term
 
+STARTS = "starts_at_s"
+"""Key of when a cause began in mid-trial."""
 DIGITS = 8
 """Significant ones in the file."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExtendedFile:
+    """What an extended.toml says.
+
+    Attributes:
+        extended: the deviations.
+        effects: every effect that it names, by id.
+        scenario: the one it was found with.
+    """
+
+    extended: Extended
+    effects: Mapping[str, Effect]
+    scenario: str = ""
+
+
+def key_of(parameter: Parameter) -> str:
+    """Return the key of a parameter, with its unit: ``time_constant_s``, ``force_N_per_min``; a share has none."""
+    unit = parameter.unit.removeprefix("1").replace("degree", "deg").replace("/min", " per_min")
+    return "_".join([parameter.name, *unit.replace("/", " ").split()])
+
+
+def force_key(axis: str) -> str:
+    """Return the key of a history on an axis, with its unit."""
+    return "force_N" if axis in "XYZ" else "moment_N_m"
 
 
 def text_of(

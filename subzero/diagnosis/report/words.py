@@ -9,7 +9,8 @@ from functools import cache
 import numpy as np
 
 from subzero.channels import BY_NAME
-from subzero.diagnosis.hypothesis.extended_model import all_effects, plain_id
+from subzero.diagnosis.hypothesis.catalogue import all_effects
+from subzero.diagnosis.hypothesis.effect import plain_id
 from subzero.diagnosis.results import (
     CALIBRATED,
     CAUSE_NAMED,

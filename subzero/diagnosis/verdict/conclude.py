@@ -52,8 +52,8 @@ from subzero.diagnosis.verdict.estimates import (
 
 if TYPE_CHECKING:
     from subzero.diagnosis.hypothesis.hypotheses import Ids
+    from subzero.diagnosis.inference import Candidate
     from subzero.diagnosis.inference.change_point_fit import FittedChangePoint
-    from subzero.diagnosis.inference.laplace import Candidate
     from subzero.diagnosis.inference.out_of_catalogue import Findings
     from subzero.diagnosis.verdict.extension import Extension
 

@@ -27,8 +27,7 @@ from subzero.diagnosis.results import Cause, Extended, Unknown
 
 if TYPE_CHECKING:
     from subzero.diagnosis.inference.change_point_fit import FittedChangePoint
-    from subzero.diagnosis.inference.laplace import Candidate
-    from subzero.diagnosis.inference.map_fit import Fit
+    from subzero.diagnosis.inference.map_fit import Candidate, Fit
     from subzero.diagnosis.inference.out_of_catalogue import Findings, OutOfCatalogue
     from subzero.diagnosis.inference.problem import Problem
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from subzero.diagnosis.assessment.cross_validation import Fitted, gain
+from subzero.diagnosis.assessment.goodness_of_fit import Fitted, curves, gain
 from subzero.diagnosis.assessment.identifiability import (
     against,
     information,
@@ -24,13 +24,12 @@ from subzero.diagnosis.assessment.identifiability import (
     with_whole_effects,
 )
 from subzero.diagnosis.assessment.next_trial import Survivor, next_trial
-from subzero.diagnosis.assessment.residuals import curves
 from subzero.diagnosis.hypothesis.effect import MINUTE_S, with_onset
 from subzero.diagnosis.hypothesis.hypotheses import Ids, columns_of, nameable
 from subzero.diagnosis.inference import settings
 from subzero.diagnosis.inference.change_point_fit import FittedChangePoint
 from subzero.diagnosis.inference.change_point_scan import BaseRun, change_point_columns
-from subzero.diagnosis.inference.model_average import MIN_DISCRIMINATION
+from subzero.diagnosis.inference.model_average import MIN_DISCRIMINATION, REFUTED_NATS
 from subzero.diagnosis.inference.out_of_catalogue import Findings, shares
 from subzero.diagnosis.results import (
     CALIBRATED,
@@ -56,8 +55,7 @@ from subzero.diagnosis.verdict.estimates import cause_of, name, practical_of
 from subzero.diagnosis.verdict.extension import Extension, of_causes, of_nothing, of_sudden, of_unknown
 
 if TYPE_CHECKING:
-    from subzero.diagnosis.inference.laplace import Candidate
-    from subzero.diagnosis.inference.map_fit import Fit
+    from subzero.diagnosis.inference.map_fit import Candidate, Fit
     from subzero.diagnosis.inference.model_search import Search
 
 RIVALS_DRAWN = {CAUSE_NAMED: 1, OUTSIDE: 1, UNDECIDED: 3, NOTHING_NEAR: 1, CALIBRATED: 0, NOTHING_WRONG: 0}
@@ -275,7 +273,7 @@ def refuted_rivals(search: Search) -> frozenset[str]:
         if rival == "none" or D >= MIN_DISCRIMINATION:
             break
         search.fit((rival,), best.fit)
-        if search.candidates[(rival,)].optimistic_log_posterior > best.log_posterior - settings.REFUTED_NATS:
+        if search.candidates[(rival,)].optimistic_log_posterior > best.log_posterior - REFUTED_NATS:
             break
         found.add(rival)
     return frozenset(found)

@@ -17,7 +17,7 @@ from subzero.diagnosis.hypothesis.effect import Effect
 from subzero.errors import UserError
 from subzero.user_file import MOST_OF_A_PROGRAM, read_bytes
 
-__all__ = ["NOISE", "ONSETS", "SPECS", "START", "catalogue", "load"]
+__all__ = ["NOISE", "ONSETS", "SPECS", "START", "all_effects", "catalogue", "load"]
 ONSETS = (*fins.ONSETS, *hull.ONSETS, *propulsion.ONSETS)
 """What can only begin in mid-trial: a jam is no small deviation from a fin that follows, and a growth has a time to
 begin at. Neither is a tolerance of a healthy vehicle, and so no part of every fit."""
@@ -31,6 +31,11 @@ def catalogue(channels: Iterable[str], more: Iterable[Effect] = ()) -> dict[str,
     if twice:
         raise UserError(f"Effects need ids of their own; there are two of {', '.join(twice)}.")
     return {effect.id: effect for effect in found}
+
+
+def all_effects(more: Iterable[Effect] = ()) -> dict[str, Effect]:
+    """Return every effect there is, by id: of the start, of all sensors, and what only begins in mid-trial, too."""
+    return {**catalogue(sensors.SPECS, more), **{effect.id: effect for effect in (*START, *ONSETS)}}
 
 
 def load(path: str | Path) -> tuple[Effect, ...]:
