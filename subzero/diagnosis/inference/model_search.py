@@ -1,7 +1,8 @@
 """The search over hypotheses: from linear evidence of all to MAP fits of a few, adding, dropping and swapping causes.
 
-fit with κ = 4 → screening of nothing, all causes, all pairs → fits of the best → best-first refinement
-→ add, drop, swap, or merge two causes of the best, until it stays → settle the best and its rivals
+fit with κ = 4 → screening of nothing, all causes, all pairs → fits of the best, and of causes that come before them
+where sizes are run from the nominal model → best-first refinement → add, drop, swap, or merge two causes of the best,
+until it stays → settle the best and its rivals
 """
 
 from __future__ import annotations

@@ -2,7 +2,8 @@
 
 A cause that does nothing while it is small has no slope, and a one-sided slope at a non-smooth point says nothing of
 the other side: real simulations try some sizes of such causes. If even κ = 4 does not come close to the records, all
-causes are tried so, and the best fitted by themselves, before a force or an onset takes the run along the records.
+causes are tried so, and the best fitted by themselves, before a force or an onset takes the run along the records. So
+they are from the nominal model where something seems wrong: a wide fit may have one large cause for many small ones.
 """
 
 from __future__ import annotations

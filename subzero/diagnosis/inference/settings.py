@@ -60,7 +60,8 @@ NON_LINEAR_SHARE, NON_LINEAR_SHARE_OF_FIRST = 0.05, 0.75
 SWEEP_SCALES = (0.25, 0.5, 1.0, 2.0)
 """Effect scales, either way, at which causes without a slope are simulated."""
 MERGED_SCALES = (0.5, 1.5)
-"""Effect scales, either way, at which one cause is simulated in the place of two."""
+"""Effect scales, either way, at which one cause is simulated in the place of all that changes: of two causes, and from
+the nominal model, of what a wide fit bends."""
 LATER_SIZES = (1.0, 1.5)
 """A cause of a hypothesis is simulated from an onset on at these multiples of its size there."""
 
