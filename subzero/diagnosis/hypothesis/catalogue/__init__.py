@@ -11,21 +11,21 @@ from collections.abc import Iterable
 from importlib.metadata import entry_points
 from pathlib import Path
 
-from subzero.diagnosis.hypothesis.catalogue import cable, fins, hull, propulsion, sensors
+from subzero.diagnosis.hypothesis.catalogue import actuators, cable, hull, sensors
 from subzero.diagnosis.hypothesis.catalogue.sensors import NOISE, SPECS, START
 from subzero.diagnosis.hypothesis.effect import Effect
 from subzero.errors import UserError
 from subzero.user_file import MOST_OF_A_PROGRAM, read_bytes
 
 __all__ = ["NOISE", "ONSETS", "SPECS", "START", "catalogue", "load"]
-ONSETS = (*fins.ONSETS, *hull.ONSETS, *propulsion.ONSETS)
+ONSETS = (*actuators.ONSETS, *hull.ONSETS)
 """What can only begin in mid-trial: a jam is no small deviation from a fin that follows, and a growth has a time to
 begin at. Neither is a tolerance of a healthy vehicle, and so no part of every fit."""
 
 
 def catalogue(channels: Iterable[str], more: Iterable[Effect] = ()) -> dict[str, Effect]:
     """Return every effect by id, with those of the sensors of these channels."""
-    shipped = (*propulsion.EFFECTS, *fins.EFFECTS, *hull.EFFECTS, *cable.EFFECTS)
+    shipped = (*actuators.EFFECTS, *hull.EFFECTS, *cable.EFFECTS)
     found = (*shipped, *sensors.sensor_effects(channels), sensors.CLOCK, *_installed(), *more)
     twice = sorted({effect.id for effect in found if [e.id for e in found].count(effect.id) > 1})
     if twice:

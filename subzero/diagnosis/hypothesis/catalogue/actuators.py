@@ -1,4 +1,4 @@
-"""What can be wrong with rudders and stern-planes."""
+"""What can be wrong with what moves and steers the vehicle: propeller, motor and battery, rudders and stern-planes."""
 
 from __future__ import annotations
 
@@ -7,7 +7,39 @@ from functools import partial
 from math import degrees, radians
 
 from subzero.diagnosis.hypothesis.configuration import Setting
-from subzero.diagnosis.hypothesis.effect import Effect, Parameter
+from subzero.diagnosis.hypothesis.effect import Effect, Parameter, growing
+
+CHARGE = 60.0
+"""What 2 A draw from the battery in 30 s: sag is told for this much. [C]"""
+
+
+def propeller_thrust_gain(setting: Setting, share: float) -> Setting:
+    """K_T0 (1 + share)."""
+    return setting.with_vehicle(propeller__thrust_constant=lambda old: old * (1.0 + share))
+
+
+def propeller_thrust_slope(setting: Setting, share: float) -> Setting:
+    """K_T1 (1 + share)."""
+    return setting.with_vehicle(propeller__thrust_slope=lambda old: old * (1.0 + share))
+
+
+def motor_lag(setting: Setting, seconds: float) -> Setting:
+    """Time constant of the shaft + seconds."""
+    return setting.with_vehicle(motor__lag=lambda old: max(old + seconds, 0.0))
+
+
+def battery_sag(setting: Setting, share: float) -> Setting:
+    """Speed lost per charge + share/60 C."""
+    return setting.with_vehicle(battery__speed_loss_per_charge=lambda old: old + share / CHARGE)
+
+
+def propeller_torque(setting: Setting, share: float) -> Setting:
+    """K_Q (1 + share) as far as it rolls the hull."""
+    return setting.with_vehicle(propeller__reaction_torque_factor=lambda old: old * (1.0 + share))
+
+
+def _motor_time(setting: Setting) -> float:
+    return setting.model.vehicle.motor.lag
 
 
 def rudder_lag(setting: Setting, seconds: float) -> Setting:
@@ -52,7 +84,7 @@ def _jam(servo: str, setting: Setting, lost: float, angle: float) -> Setting:
     return setting.with_vehicle(**changes)
 
 
-def _lag(setting: Setting) -> float:
+def _rudder_time(setting: Setting) -> float:
     return setting.model.vehicle.rudder_servo.lag
 
 
@@ -73,9 +105,25 @@ def _angle(name: str) -> Parameter:
 
 
 EFFECTS = (
+    Effect(id="propeller_thrust_gain", sentence="the propeller gives another thrust at rest", slot="propulsion",
+           parameters=(Parameter(name="share", unit="1", tolerance=0.03, scale=0.20, low=-0.9, high=3.0),),
+           apply=propeller_thrust_gain, sudden=True),
+    Effect(id="propeller_thrust_slope", sentence="the thrust falls differently with speed", slot="propulsion",
+           parameters=(Parameter(name="share", unit="1", tolerance=0.04, scale=0.40, low=-2.0, high=4.0),),
+           apply=propeller_thrust_slope),
+    Effect(id="motor_lag", sentence="the motor reaches its speed later or sooner", slot="propulsion",
+           parameters=(Parameter(name="time_constant", unit="s", tolerance=0.03, scale=0.6, low=-0.24, high=5.0,
+                                 least=0.06, nominal=_motor_time),),
+           apply=motor_lag),
+    Effect(id="battery_sag", sentence="the battery sags, and the shaft with it", slot="propulsion",
+           parameters=(Parameter(name="share_per_60_C", unit="1", tolerance=0.005, scale=0.10, low=0.0, high=0.8),),
+           apply=battery_sag),
+    Effect(id="propeller_torque", sentence="the propeller twists the hull more or less", slot="propulsion",
+           parameters=(Parameter(name="share", unit="1", tolerance=0.05, scale=0.60, low=-2.0, high=5.0),),
+           apply=propeller_torque),
     Effect(id="rudder_lag", sentence="the rudder servo lags", slot="fins",
            parameters=(Parameter(name="time_constant", unit="s", tolerance=0.03, scale=0.4, low=-0.09, high=5.0,
-                                 least=0.06, nominal=_lag),),
+                                 least=0.06, nominal=_rudder_time),),
            apply=rudder_lag),
     Effect(id="rudder_rate_limit", sentence="the rudder servo turns slowly", slot="fins",
            parameters=(Parameter(name="inverse_rate", unit="s/degree", tolerance=0.004, scale=0.1, low=0.0, high=2.0,
@@ -96,6 +144,7 @@ EFFECTS = (
            parameters=(_angle("common"), _angle("differential")), apply=stern_plane_offset, sudden=True),
 )  # fmt: skip
 """To add one: a function (setting, deviation) → setting, and a line here."""
+_BY_ID = {effect.id: effect for effect in EFFECTS}
 
 
 def _jammed(fin: str, servo: str, words: str, offset: str) -> Effect:
@@ -116,5 +165,6 @@ ONSETS = (
         "the starboard stern-plane",
         "stern_plane_offset",
     ),
+    growing(_BY_ID["propeller_thrust_gain"], "fading_thrust", "the thrust of the propeller fades or grows"),
 )
-"""What can only begin in mid-trial."""
+"""What can only begin in mid-trial, or grows from some time on."""
