@@ -29,7 +29,8 @@ from subzero.diagnosis.inference import settings
 from subzero.diagnosis.inference.laplace import Candidate, candidate_of
 from subzero.diagnosis.inference.linear_gaussian import KAPPAS, Linear, Quadratic, posterior
 from subzero.diagnosis.inference.map_fit import Fit, refit
-from subzero.diagnosis.inference.noise import Behind, Noise, Usual, estimate, log_prior_of
+from subzero.diagnosis.inference.noise import Noise, Usual, log_prior_of
+from subzero.diagnosis.inference.noise_estimate import Behind, estimate
 from subzero.diagnosis.inference.posing import sensor_of, whitened_again, with_finer_steps, with_noise_behind
 from subzero.diagnosis.inference.screening import Screening, is_flat, screening_of
 
