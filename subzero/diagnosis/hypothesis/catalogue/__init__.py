@@ -18,7 +18,7 @@ from subzero.errors import UserError
 from subzero.user_file import MOST_OF_A_PROGRAM, read_bytes
 
 __all__ = ["NOISE", "ONSETS", "SPECS", "START", "catalogue", "load"]
-ONSETS = (*actuators.ONSETS, *hull.ONSETS)
+ONSETS = (*actuators.ONSETS, *hull.ONSETS, *actuators.GROWING)
 """What can only begin in mid-trial: a jam is no small deviation from a fin that follows, and a growth has a time to
 begin at. Neither is a tolerance of a healthy vehicle, and so no part of every fit."""
 

@@ -165,6 +165,9 @@ ONSETS = (
         "the starboard stern-plane",
         "stern_plane_offset",
     ),
+)
+"""What can only begin in mid-trial."""
+GROWING = (
     growing(_BY_ID["propeller_thrust_gain"], "fading_thrust", "the thrust of the propeller fades or grows"),
 )
-"""What can only begin in mid-trial, or grows from some time on."""
+"""What grows from some time on."""
