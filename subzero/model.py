@@ -15,6 +15,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -101,10 +102,16 @@ class Model:
 
     def water(self) -> Current:
         """Return how the water moves: the uniform current, and what is added to it by depth."""
-        if self.profile is None:
-            return Current.uniform(self.current)
-        added = np.array(self.profile.velocity, dtype=float)
-        return Current.profile(down=self.profile.depth, velocity=added + np.array(self.current))
+        return _water_of(self.current, self.profile)
+
+
+@lru_cache(maxsize=4)
+def _water_of(current: tuple[float, float, float], profile: scenarios.Profile | None) -> Current:
+    """Return how the water moves, of one of the last few models: those of a sweep or a diagnosis mostly share it."""
+    if profile is None:
+        return Current.uniform(current)
+    added = np.array(profile.velocity, dtype=float)
+    return Current.profile(down=profile.depth, velocity=added + np.array(current))
 
 
 def model_of(trial: scenarios.Trial, model: object = None) -> Model:

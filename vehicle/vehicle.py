@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -115,12 +116,13 @@ class Vehicle:
 
     def _numbers(self) -> VehicleNumbers:
         density = self.water.density
-        mass_matrix = self.rigid_body.matrix() + self.added_mass.matrix()
+        rigid_body, added_mass = self.rigid_body.matrix(), self.added_mass.matrix()
+        mass_matrix = rigid_body + added_mass
         return VehicleNumbers(
             mass_matrix=mass_matrix,
             inverse_mass=np.linalg.inv(mass_matrix),
-            rigid_body=self.rigid_body.matrix(),
-            added_mass=self.added_mass.matrix(),
+            rigid_body=rigid_body,
+            added_mass=added_mass,
             munk_excess=self.added_mass.munk_factor - 1.0,
             body_lift=self.body_lift.numbers(),
             strips=self.cross_flow_drag.numbers(self.hull, density),
@@ -153,7 +155,7 @@ def _numbers_of(vehicle: Vehicle) -> VehicleNumbers:
     try:
         with np.errstate(all="ignore"):
             numbers = vehicle._numbers()
-        plain = all(np.isfinite(part).all() for part in _arrays(numbers))
+        plain = all(isfinite(part) if part.ndim == 0 else np.isfinite(part).all() for part in _parts(numbers))
     except (ArithmeticError, ValueError, np.linalg.LinAlgError):
         plain = False
     if not plain:
@@ -163,7 +165,7 @@ def _numbers_of(vehicle: Vehicle) -> VehicleNumbers:
     return numbers
 
 
-def _arrays(numbers: VehicleNumbers) -> list[Any]:
+def _parts(numbers: VehicleNumbers) -> list[Any]:
     """Return the parts that follow from several numbers and have no infinite value that means something."""
     return [part for part in numbers if part.dtype.kind == "f"] + [
         *numbers.restoring,

@@ -57,6 +57,18 @@ def test_whitening_is_the_inverse_of_a_cholesky_factor_at_uneven_times():
     assert_allclose(noise.whiten(values[:, 0]), noise.whiten(values)[:, 0])
 
 
+def test_a_record_is_whitened_channel_by_channel_also_where_one_has_no_values_any_more():
+    """What no run could tell of one channel is no news of the next."""
+    random, time = np.random.default_rng(2), np.arange(0.0, 20.0, 0.1)
+    used = {"depth": random.random(200) > 0.1, "heading": random.random(200) > 0.3}
+    noise = {name: Noise(white=0.1, slow=0.2, used=one, time=time[one]) for name, one in used.items()}
+    values = {"depth": np.where(time < 15.0, random.standard_normal(200), np.nan), "heading": np.sin(time)}
+    record = Observed(name="one", time=time, values={}, noise=noise, setting=None)
+    apart = [one.whiten(values[name]) for name, one in noise.items()]
+    assert_allclose(record.whiten(values), np.concatenate(apart), rtol=1e-12)
+    assert np.isfinite(apart[1]).all()
+
+
 def test_the_mean_of_slow_noise_scatters_as_its_covariance_says():
     noise = Noise(
         white=0.1, slow=0.2, correlation_time=3.0, used=np.ones(21, bool), time=np.arange(21) / 10.0

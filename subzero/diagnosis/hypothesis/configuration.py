@@ -26,11 +26,12 @@ def _changed(value: Value, changes: Mapping[str, Any]) -> Value:
     """Return a frozen dataclass with some of its fields changed: `dataclasses.replace` for values that check nothing,
     in a fifth of the time; a diagnosis makes a hundred thousand of them.
     """
-    if not changes.keys() <= value.__dict__.keys():
-        unknown = ", ".join(sorted(changes.keys() - value.__dict__.keys()))
-        raise TypeError(f"A {type(value).__name__} has no {unknown}; it has {', '.join(value.__dict__)}.")
-    made = object.__new__(type(value))
-    made.__dict__.update(value.__dict__, **changes)
+    made, own = object.__new__(type(value)), value.__dict__
+    made.__dict__.update(own)
+    made.__dict__.update(changes)
+    if len(made.__dict__) != len(own):
+        unknown = ", ".join(sorted(changes.keys() - own.keys()))
+        raise TypeError(f"A {type(value).__name__} has no {unknown}; it has {', '.join(own)}.")
     return made
 
 
@@ -47,6 +48,10 @@ class Sensing:
     scale: float = 0.0
     bias: float = 0.0
     lag: float = 0.0
+
+
+RIGHT = Sensing()
+"""A sensor that shows what it measures."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -97,7 +102,7 @@ class Setting:
 
     def with_sensor(self, channel: str, **changes: float) -> Setting:
         """Return the setting with a channel's sensor changed."""
-        sensor = dataclasses.replace(self.sensing.get(channel, Sensing()), **changes)
+        sensor = _changed(self.sensing.get(channel, RIGHT), changes)
         return _changed(self, {"sensing": {**self.sensing, channel: sensor}})
 
 
@@ -153,14 +158,19 @@ def _pitch(track: np.ndarray) -> np.ndarray:
 def _heading(track: np.ndarray) -> np.ndarray:
     """Return the heading without its jumps at south, but for whole turns. [degree]"""
     w, x, y, z = track[:, QUATERNION : QUATERNION + 4].T
-    return DEGREE * np.unwrap(np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)))
+    found = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+    found[1:] -= 2.0 * np.pi * np.cumsum(np.round(np.diff(found) / (2.0 * np.pi)))
+    return DEGREE * found
 
 
 def _surge_through_water(track: np.ndarray) -> np.ndarray:
     """Return u − (Rᵀ J)_x. [m/s]"""
     w, x, y, z = track[:, QUATERNION : QUATERNION + 4].T
-    forward = np.stack([1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)], axis=1)
-    return track[:, VELOCITY] - np.sum(forward * track[:, WATER : WATER + 3], axis=1)
+    north, east, down = track[:, WATER : WATER + 3].T
+    along = (
+        (1.0 - 2.0 * (y * y + z * z)) * north + 2.0 * (x * y + w * z) * east + 2.0 * (x * z - w * y) * down
+    )
+    return track[:, VELOCITY] - along
 
 
 def _over_ground(track: np.ndarray) -> np.ndarray:

@@ -25,8 +25,8 @@ from subzero.diagnosis.hypothesis.configuration import Setting, sensed, truth
 from subzero.diagnosis.hypothesis.data_error import REPEATED, DataError, corrected
 from subzero.diagnosis.hypothesis.hypotheses import PRIOR, columns_of, nameable, variances
 from subzero.diagnosis.hypothesis.logged import Logged
-from subzero.diagnosis.inference.linear_gaussian import KAPPAS, Posterior, freed, log_sum
-from subzero.diagnosis.inference.noise import Noise, usual_noise, usual_of
+from subzero.diagnosis.inference.linear_gaussian import KAPPAS, Posterior, each_freed, log_sum
+from subzero.diagnosis.inference.noise import Between, Noise, innovations_between, usual_noise, usual_of
 from subzero.diagnosis.inference.posing import pose, spikes
 from subzero.diagnosis.inference.problem import Problem
 from subzero.diagnosis.inference.simulator import Track, simulate_track
@@ -163,10 +163,15 @@ class Yardstick:
 
     def at(self, rows: np.ndarray, time: np.ndarray) -> np.ndarray:
         """Return what stands on the grid (g, …) at times (n,): linear between, held at the ends."""
-        x = np.clip(time / self.step, 0.0, rows.shape[0] - 1.000001)
-        low = x.astype(int)
-        share = (x - low).reshape(-1, *(1,) * (rows.ndim - 1))
+        low, share = self._places(time, rows.shape[0])
+        share = share.reshape(-1, *(1,) * (rows.ndim - 1))
         return (1.0 - share) * rows[low] + share * rows[low + 1]
+
+    def _places(self, time: np.ndarray, count: int) -> Between:
+        """Return between which of so many rows times (n,) lie."""
+        x = np.clip(time / self.step, 0.0, count - 1.000001)
+        low = x.astype(np.int64)
+        return Between(low, x - low)
 
     def _term(self, logged: Logged, name: str, nominal: np.ndarray) -> Term:
         time, values = logged.record.time, logged.record.values[name]
@@ -176,9 +181,10 @@ class Yardstick:
         used = np.isfinite(values) & np.isfinite(expected)
         measured = int(np.count_nonzero(used))
         used[used] = ~spikes((values - expected)[used], max(usual.level, usual.resolution))
-        noise = usual_noise(time, used, usual)
-        white = noise.whiten(np.column_stack([values - expected, self.at(self.slopes[name], time)]))
-        r, J = white[:, 0], white[:, 1:]
+        noise, slopes = usual_noise(time, used, usual), self.slopes[name]
+        r, J = noise.whiten(values - expected), np.empty((noise.count, slopes.shape[1]))
+        places = self._places(noise.time, slopes.shape[0])
+        innovations_between(slopes, places, *noise.filter, J, np.empty(slopes.shape[1]))
         out = (measured - noise.count) * (OUTLIER_LOG_DENSITY - np.log(usual.level))
         fixed, least = out - noise.log_scale, least_scale(noise)
         return Term(J.T @ J, J.T @ r, float(r @ r), noise.count, fixed, least, measured)
@@ -191,7 +197,7 @@ class Yardstick:
     @cached_property
     def as_is(self) -> Reckoned:
         """The generous evidence of the record as it is."""
-        return reckon(self.own, self.D)
+        return reckon(stacked(self.own), self.D)
 
     @cached_property
     def log_sparse(self) -> float:
@@ -201,7 +207,7 @@ class Yardstick:
     @property
     def log_none(self) -> float:
         """The evidence of nothing, of the record as it is."""
-        return reckon(self.own, self.narrow).log + float(np.log(PRIOR["none"]))
+        return reckon(stacked(self.own), self.narrow).log + float(np.log(PRIOR["none"]))
 
     def deviations(self, name: str, z: np.ndarray) -> np.ndarray:
         """Return measured − predicted of a channel (n,), with parameters in the linear problem. [display unit]"""
@@ -225,7 +231,7 @@ class Yardstick:
 
     def generous(self, terms: Mapping[str, Term]) -> float:
         """Return the log evidence with all of physics at once."""
-        return reckon(terms, self.D).log
+        return reckon(stacked(terms), self.D).log
 
     def added(self, name: str, rest: Term, as_is: Reckoned) -> float:
         """Return what samples of a channel that are not in its rest add to the log density of the record as it is."""
@@ -245,11 +251,12 @@ class Yardstick:
 
     def _each(self, terms: Mapping[str, Term]) -> list[tuple[float, Reckoned]]:
         """Return nothing and the best causes with their log posteriors."""
-        none = reckon(terms, self.narrow)
+        said = stacked(terms)
+        none = reckon(said, self.narrow)
         base = Posterior(z=none.z, M=none.M, log_evidence=none.log, log_det=0.0)
-        gains = [freed(base, self.narrow, at, self.D[list(at)])[0] for at in self.causes]
+        gains = each_freed(base, self.narrow, self.causes, self.D)
         best = sorted(range(len(gains)), key=lambda i: -gains[i])[:CAUSES_TRIED]
-        each = [reckon(terms, self._freed(self.causes[i])) for i in best]
+        each = [reckon(said, self._freed(self.causes[i])) for i in best]
         prior = float(np.log(PRIOR["single"] / max(len(self.causes), 1)))
         return [(none.log + float(np.log(PRIOR["none"])), none), *((one.log + prior, one) for one in each)]
 
@@ -259,26 +266,52 @@ class Yardstick:
         return D
 
 
-def reckon(terms: Mapping[str, Term], D: np.ndarray) -> Reckoned:
-    """Return the generous evidence of what channels say."""
+class Stacked(NamedTuple):
+    """What channels say, together: their names (c,), JᵀJ (c, k²), Jᵀr (c, k), and (c,) each of the rest of a `Term`."""
+
+    names: tuple[str, ...]
+    A: np.ndarray
+    b: np.ndarray
+    rr: np.ndarray
+    samples: np.ndarray
+    fixed: np.ndarray
+    least: np.ndarray
+
+
+def stacked(terms: Mapping[str, Term]) -> Stacked:
+    """Return what channels say, together."""
     A, b, rr, samples, fixed, least, _ = (np.array(column) for column in zip(*terms.values(), strict=True))
-    root, rows, samples = np.sqrt(D), A.reshape(len(A), -1), np.maximum(samples, 1)
+    return Stacked(tuple(terms), A.reshape(len(A), -1), b, rr, np.maximum(samples, 1), fixed, least)
+
+
+def reckon(said: Stacked, D: np.ndarray) -> Reckoned:
+    """Return the generous evidence of what channels say."""
+    names, A, b, rr, samples, fixed, least = said
+    root = np.sqrt(D)
     scales = _scales(rr, samples, least)
     for turn in range(ROUNDS + 1):
         weights = scales**-2.0
         here = weights @ b
-        P = np.eye(D.size) + root[:, None] * (weights @ rows).reshape(D.size, -1) * root
-        factor, _ = dpotrf(P, lower=1)
-        inverse, _ = dpotri(factor, lower=1)
-        M = root[:, None] * (np.tril(inverse) + np.tril(inverse, -1).T) * root
+        factor, M = _covariance((weights @ A).reshape(D.size, -1), root)
         z = M @ here
-        square = rr - 2.0 * (b @ z) + (rows @ np.outer(z, z).ravel())
-        before, scales = scales, _scales(square + rows @ M.ravel(), samples, least)
+        square = rr - 2.0 * (b @ z) + A @ (np.outer(z, z) + M).ravel()  # expected: parameters are uncertain
+        before, scales = scales, _scales(square, samples, least)
         if turn == ROUNDS or np.all(np.abs(scales - before) < SETTLED * before):
             break
     log = -0.5 * float(weights @ rr - here @ z) - float(np.sum(np.log(np.diag(factor))))
     log += float(np.sum(fixed - samples * np.log(before)))
-    return Reckoned(log, z, M, dict(zip(terms, before.tolist(), strict=True)))
+    return Reckoned(log, z, M, dict(zip(names, before.tolist(), strict=True)))
+
+
+def _covariance(A: np.ndarray, root: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return L and M = (D⁻¹ + A)⁻¹, L Lᵀ = I + √D A √D, given A (k, k) and √D (k,)."""
+    P = root[:, None] * A * root
+    P.ravel()[:: root.size + 1] += 1.0
+    factor, _ = dpotrf(P.T, lower=1, overwrite_a=1)
+    half, _ = dpotri(factor, lower=1)
+    inverse = half + half.T  # above its diagonal, half is 0
+    inverse.ravel(order="K")[:: root.size + 1] *= 0.5
+    return factor, root[:, None] * inverse * root
 
 
 def _square(one: Term, z: np.ndarray) -> float:
@@ -373,7 +406,7 @@ class Linear:
 
     def reckoned(self) -> Reckoned:
         """Return its evidence, with the scales of the noise that are best."""
-        return reckon({name: self._term(name, rows) for name, rows in self.own.items()}, self.D)
+        return reckon(stacked({name: self._term(name, rows) for name, rows in self.own.items()}), self.D)
 
     def _term(self, name: str, rows: slice) -> Term:
         r, J = self.r[rows], self.J[rows]

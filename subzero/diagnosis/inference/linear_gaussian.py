@@ -116,6 +116,20 @@ def freed(
     return base.log_evidence + gain - 0.5 * log_det, mean, covariance
 
 
+def each_freed(
+    base: Posterior, D: np.ndarray, places: Sequence[Sequence[int]], wide: np.ndarray
+) -> np.ndarray:
+    """Return the log evidence (hypotheses,) when the entries of each hypothesis, so many as it has, get the prior
+    variances that are wide (k,).
+    """
+    found, sizes = np.empty(len(places)), np.array([len(one) for one in places])
+    for size in set(sizes.tolist()):
+        alike = np.flatnonzero(sizes == size)
+        at = np.array([places[i] for i in alike.tolist()], dtype=int).reshape(-1, size)
+        found[alike] = freed(base, D, at, wide[at])[0]
+    return found
+
+
 def discrimination(G: np.ndarray, step: np.ndarray, free: np.ndarray) -> float:
     """Return the squared distance of a step from what other entries could do instead.
 

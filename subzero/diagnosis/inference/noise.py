@@ -1,17 +1,14 @@
-"""The noise of a channel: white, slow and rounded; whitening with it, and its estimate behind a fit (REML).
+"""The noise of a channel: white, slow and rounded; whitening with it, and what is known of it beforehand.
 
     e_k = w_k + x(t_k) + rounding,   w ~ N(0, σ_w²),   x ~ Ornstein-Uhlenbeck(σ_s, τ_s),   rounding ~ N(0, q²/12)
     Σ_ij = (σ_w² + q²/12) δ_ij + σ_s² exp(−|t_i − t_j|/τ_s)
 
 Σ is never made. A Kalman filter whose state is x turns e into its innovations, which are white, for any times of the
-samples; AR(1) noise is the case σ_w = 0. The parameters are the most probable ones behind a fit z*, Jacobian J:
+samples; AR(1) noise is the case σ_w = 0. Before anything is fitted,
 
-    y − h(z*) + J z*  ~  N(0, J D Jᵀ + Σ(σ_w, σ_s, τ_s, q)),        z ~ N(0, D)
-    log σ_w ~ N(log ν, 1.5²),   log σ_s ~ N(log(0.7 ν + q/√12), 1²) below `MOST_SLOW`,   log τ_s ~ N(log 1 s, 1.5²)
+    log σ_w ~ N(log ν, 1.5²),   log σ_s ~ N(log(0.7 ν + q/√12), 1²),   log τ_s ~ N(log 1 s, 1.5²)
 
-What the parameters can do is marginalised, so that a smooth misfit that the model can follow is no noise. A slow part
-has a prior: a usual sensor wanders by about its usual noise, and a wander many times as large is something to find. ν
-is the usual level of the sensor, or the known one. q is read off the values: sensors round.
+ν is the usual level of the sensor, or the known one. q is read off the values: sensors round.
 """
 
 from __future__ import annotations
@@ -75,7 +72,7 @@ class Noise:
         return float(np.sqrt(self.unrelated / max(samples, 1) + self.slow**2 * lasting))
 
     @cached_property
-    def _filter(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def filter(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """What of the slow part is left at the next sample, the gain, and the innovations' standard deviation (m,)."""
         kept = np.exp(-np.diff(self.time, append=self.time[-1:]) / self.correlation_time)
         gain, scale = np.empty(self.count), np.empty(self.count)
@@ -85,7 +82,7 @@ class Noise:
     @property
     def log_scale(self) -> float:
         """½ log det Σ over the used samples."""
-        return float(np.sum(np.log(self._filter[2])))
+        return float(np.sum(np.log(self.filter[2])))
 
     def whiten(self, values: np.ndarray) -> np.ndarray:
         """Return what makes the noise white, of level 1: values (n,) or (n, columns) → of the used samples (m, …)."""
@@ -99,13 +96,13 @@ class Noise:
         """Undo `whiten`, but for samples that are not used: (m,) or (m, columns) → the same shape."""
         columns = _as_columns(white)
         found = np.empty_like(columns)
-        coloured(*self._filter, columns, found)
+        coloured(*self.filter, columns, found)
         return found.reshape(white.shape)
 
     def _innovations(self, known: np.ndarray) -> np.ndarray:
         columns = _as_columns(known)
         white = np.empty_like(columns)
-        innovations(*self._filter, columns, white)
+        innovations(*self.filter, columns, white)
         return white.reshape(known.shape)
 
 
@@ -140,6 +137,55 @@ def innovations(
 
 
 @compiled
+def innovations_of_each(
+    ends: np.ndarray,
+    kept: np.ndarray,
+    gain: np.ndarray,
+    scale: np.ndarray,
+    values: np.ndarray,
+    white: np.ndarray,
+) -> None:
+    """Do that with the values of several channels, one behind the other (m,): each ends where the next begins, and the
+    first begins at the first of the ends (channels + 1,).
+    """
+    for k in range(ends.size - 1):
+        expected = 0.0
+        for i in range(ends[k], ends[k + 1]):
+            new = values[i] - expected
+            white[i] = new / scale[i]
+            expected = kept[i] * (expected + gain[i] * new)
+
+
+class Between(NamedTuple):
+    """Where samples lie between rows of a grid: the row before each, and how far on it is, as a share (n,)."""
+
+    low: np.ndarray
+    share: np.ndarray
+
+
+@compiled
+def innovations_between(
+    rows: np.ndarray,
+    places: Between,
+    kept: np.ndarray,
+    gain: np.ndarray,
+    scale: np.ndarray,
+    white: np.ndarray,
+    expected: np.ndarray,
+) -> None:
+    """Fill what `innovations` makes of rows of a grid (g, k), read linearly at the places of samples: (n, k);
+    given `Noise.filter`, and room to work in (k,).
+    """
+    expected[:] = 0.0
+    for i in range(kept.size):
+        low, share = places.low[i], places.share[i]
+        for j in range(rows.shape[1]):
+            new = (1.0 - share) * rows[low, j] + share * rows[low + 1, j] - expected[j]
+            white[i, j] = new / scale[i]
+            expected[j] = kept[i] * (expected[j] + gain[i] * new)
+
+
+@compiled
 def coloured(
     kept: np.ndarray, gain: np.ndarray, scale: np.ndarray, white: np.ndarray, values: np.ndarray
 ) -> None:
@@ -152,59 +198,6 @@ def coloured(
             expected = kept[i] * (expected + gain[i] * new)
 
 
-@compiled
-def log_marginal(
-    steps: np.ndarray, unrelated: float, slow: float, lasts: float, both: np.ndarray, room: np.ndarray
-) -> float:
-    """Return log N(r; 0, F Fᵀ + Σ), but for a constant: −½ (xᵀx − |L⁻¹ Gᵀx|²) − log det L − ½ log det Σ, with x and G
-    what Σ makes white of r and F, and L Lᵀ = I + Gᵀ G.
-
-    Args:
-        steps: times to the next sample (m,). [s]
-        unrelated: σ_w² + q²/12.
-        slow: σ_s².
-        lasts: τ_s. [s]
-        both: F and, in the last column, r (m, n + 1).
-        room: to work in (n + 3, n + 1).
-    """
-    many = both.shape[1]
-    expected, white, inner = room[many], room[many + 1], room[:many]
-    expected[:] = 0.0
-    inner[:] = 0.0
-    left, log_scale = slow, 0.0
-    for i in range(both.shape[0]):
-        seen, kept = left + unrelated, np.exp(-steps[i] / lasts)
-        gain = left / seen
-        log_scale += 0.5 * np.log(seen)
-        left = kept * kept * left * (1.0 - gain) + slow * (1.0 - kept * kept)
-        for j in range(many):
-            new = both[i, j] - expected[j]
-            white[j] = new / np.sqrt(seen)
-            expected[j] = kept * (expected[j] + gain * new)
-            for k in range(j + 1):
-                inner[j, k] += white[j] * white[k]
-    return -log_scale + _log_of_square(inner)
-
-
-@compiled
-def _log_of_square(inner: np.ndarray) -> float:
-    """Return −½ (xᵀx − |L⁻¹ Gᵀx|²) − log det L, given Gᵀ G, below it xᵀ G, and xᵀx (n + 1, n + 1), where L is left."""
-    last, log_det = inner.shape[0] - 1, 0.0
-    for j in range(last + 1):
-        for k in range(j + 1):
-            value = inner[j, k] + (1.0 if j == k and j < last else 0.0)
-            for i in range(k):
-                value -= inner[j, i] * inner[k, i]
-            if k < j:
-                inner[j, k] = value / inner[k, k]
-            elif j < last:
-                inner[j, j] = np.sqrt(value)
-                log_det += np.log(inner[j, j])
-            else:
-                inner[j, j] = value
-    return -0.5 * inner[last, last] - log_det
-
-
 SLOW_SHARE = 0.7
 """Usual standard deviation of a sensor's slow part, in its usual noise levels. [-]"""
 WHITE_SPREAD, SLOW_SPREAD, TIME_SPREAD = 1.5, 1.0, 1.5
@@ -213,17 +206,6 @@ USUAL_TIME = 1.0
 """Usual correlation time of a sensor's slow part. [s]"""
 KNOWN_SPREAD = 0.1
 """Standard deviation of the logarithm of a level that the user knows. [-]"""
-LEAST_SLOW, MOST_SLOW = 0.05, 4.0
-"""A slow part of more usual sizes than the last is no noise of the sensor; of less than the first is no sensor, and the
-steps of a simulation err by as much. [-]"""
-SHORTEST, LONGEST = 0.25, 1.0 / 3.0
-"""Correlation times lie between this share of a sample and that of the record. [-]"""
-FELT = 0.03
-"""A direction of the parameters that moves the samples by less than this, in usual levels, is left out. [-]"""
-MOST_WHITE, SEEN_WHITE = 3.0, 1.5
-"""σ_w is at most so many usual levels, or so many times what second differences of the samples show. [-]"""
-RATIOS, TIMES, LEVELS = (0.1, 0.5, 1.0, 3.0), 6, (0.4, 1.0, 2.5)
-"""Where the search for the best begins: σ_s/σ_w, how many τ_s, and level in the level of what is left. [-]"""
 FEWEST = 8
 """Fewer different values than this say nothing of the step that they are rounded to."""
 WHOLE, MOSTLY, FEW_WRONG = 0.02, 0.98, 0.25
@@ -234,21 +216,6 @@ EXACT = 0.05
 SAME, STEPS_TRIED = 1e-6, 3
 """Changes of less than this share of a usual level are what arithmetic leaves of none [-]; a jump by no whole step
 makes one or two steps smaller than that of the sensor: so many are tried."""
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Behind:
-    """What a fit leaves of a channel, for its noise to be found in.
-
-    Attributes:
-        residual: y − h(z*) + J z* (m,): what is left if the parameters did nothing.
-        J: sensitivities to the parameters (m, k), in the channel's unit.
-        D: prior variances of the parameters (k,).
-    """
-
-    residual: np.ndarray
-    J: np.ndarray
-    D: np.ndarray
 
 
 class Usual(NamedTuple):
@@ -275,42 +242,11 @@ def usual_noise(time: np.ndarray, used: np.ndarray, usual: Usual) -> Noise:
         used: which of them are used (n,).
         usual: of its kind.
     """
-    slow = usual.level if usual.is_known else _slow_usual(usual)
+    slow = usual.level if usual.is_known else slow_usual(usual)
     share = SLOW_SHARE / np.sqrt(1.0 + SLOW_SHARE**2) if usual.is_known else 1.0
     white = np.sqrt(max(1.0 - share**2, 0.0)) * usual.level if usual.is_known else usual.level
     return Noise(white=float(white), slow=float(share * slow), correlation_time=USUAL_TIME,
                  resolution=usual.resolution, used=used, time=time[used])  # fmt: skip
-
-
-def estimate(time: np.ndarray, behind: Behind, usual: Usual) -> Noise:
-    """Return the most probable noise of a channel behind a fit.
-
-    Args:
-        time: of the samples that are used (m,). [s]
-        behind: what the fit leaves.
-        usual: of the sensor's kind.
-
-    Returns:
-        noise of which all these samples are used.
-    """
-    from scipy.optimize import minimize
-
-    if time.size < FEWEST:
-        return usual_noise(time, np.ones(time.size, dtype=bool), usual)
-    r, F = behind.residual, _felt_directions(behind.J * np.sqrt(behind.D), usual.level)
-    low, high = _bounds(time, r, usual)
-    steps, both = np.diff(time, append=time[-1:]), np.column_stack([F, r])
-    room = np.empty((both.shape[1] + 2, both.shape[1]))
-
-    def cost(log: np.ndarray) -> float:
-        white, slow, lasts = np.exp(log).tolist()
-        unrelated = white**2 + usual.resolution**2 / 12.0
-        return -log_marginal(steps, unrelated, slow**2, lasts, both, room) - _log_prior(log, usual)
-
-    starts = sorted((np.clip(one, low, high) for one in _starts(time, r, F, usual)), key=cost)[:2]
-    found = [minimize(cost, one, method="Nelder-Mead", bounds=list(zip(low, high, strict=True)),
-                      options={"xatol": 0.02, "fatol": 0.02, "maxfev": 200}) for one in starts]  # fmt: skip
-    return _noise_of(min(found, key=lambda one: one.fun).x, time, usual)
 
 
 def resolution_of(values: np.ndarray, level: float) -> float:
@@ -323,93 +259,104 @@ def resolution_of(values: np.ndarray, level: float) -> float:
     then taken to be as coarse as the noise of a usual sensor, `level`.
     """
     known = values[np.isfinite(values)]
-    distinct, times = np.unique(known, return_counts=True)
+    ordered = np.sort(known)
+    first = np.flatnonzero(np.concatenate([[True], ordered[1:] != ordered[:-1]])[: known.size])
+    distinct, times = ordered[first], np.diff(first, append=known.size)
     if distinct.size == 1 and known.size >= FEWEST:
         return float(np.sqrt(12.0) * level)
-    changes = np.abs(np.diff(known))
+    changes = np.abs(known[1:] - known[:-1])
     changes, exact = changes[changes > SAME * level], EXACT * level
-    by_change = _whole_step(changes, exact) if changes.size >= FEWEST else 0.0
+    by_change = whole_step(changes, exact, _few_of(changes)) if changes.size >= FEWEST else 0.0
     if distinct.size < 2 or (distinct.size < FEWEST and 2 * distinct.size > known.size):
         return by_change
     away = np.abs(known - distinct[np.argmax(times)])
     away = away[away > SAME * level]
-    few = min((1.0 - MOSTLY) * known.size, FEW_WRONG * away.size)
-    return max(by_change, _whole_step(np.diff(distinct), exact), _whole_step(away, exact, few))
+    few, between = min((1.0 - MOSTLY) * known.size, FEW_WRONG * away.size), distinct[1:] - distinct[:-1]
+    return max(by_change, whole_step(between, exact, _few_of(between)), whole_step(away, exact, few))
 
 
-def _whole_step(steps: np.ndarray, exact: float, most: float | None = None) -> float:
-    """Return the one of a few least steps (n,) that nearly all, or all but one, or but `most`, are multiples of, to
-    within a share of it and `exact`; 0 if none is.
+def _few_of(steps: np.ndarray) -> float:
+    """Return how many of some steps may be wrong: all but nearly all, or one."""
+    return max(1.0, (1.0 - MOSTLY) * steps.size)
+
+
+@compiled
+def whole_step(steps: np.ndarray, exact: float, most: float) -> float:
+    """Return the one of a few least steps (n,) that all but `most` are multiples of, to within a share of it and
+    `exact`; 0 if none is. Steps that are the same to six digits are one.
     """
-    most = max(1.0, (1.0 - MOSTLY) * steps.size) if most is None else most
-    least = np.unique(np.round(steps / np.min(steps), 6))[:STEPS_TRIED] * np.min(steps)
-    for step in least.tolist():
-        beside = np.abs(steps - step * np.round(steps / step))
-        if np.count_nonzero(beside >= min(WHOLE * step, exact)) <= most:
-            return float(step)
+    least = np.inf
+    for i in range(steps.size):
+        least = min(least, steps[i])
+    ratio = 0.0
+    for _ in range(STEPS_TRIED):
+        ratio = _next_ratio(steps, least, ratio)
+        if ratio == np.inf:
+            return 0.0
+        if _are_multiples(steps, ratio * least, min(WHOLE * ratio * least, exact), most):
+            return ratio * least
     return 0.0
 
 
-def _slow_usual(usual: Usual) -> float:
+@compiled
+def _next_ratio(steps: np.ndarray, least: float, before: float) -> float:
+    """Return the least ratio of steps (n,) to the least of them, to six digits, that is more than another."""
+    found = np.inf
+    for i in range(steps.size):
+        ratio = steps[i] / least
+        if before < ratio < found:
+            ratio = np.rint(ratio * 1e6) / 1e6
+            if before < ratio < found:
+                found = ratio
+    return found
+
+
+@compiled
+def _are_multiples(steps: np.ndarray, step: float, near: float, most: float) -> bool:
+    """Say whether all but so many steps (n,) are multiples of one."""
+    off = 0
+    for i in range(steps.size):
+        if abs(steps[i] - step * np.rint(steps[i] / step)) >= near:
+            off += 1
+            if off > most:
+                return False
+    return True
+
+
+def slow_usual(usual: Usual) -> float:
+    """Return σ_s of a usual sensor, with what rounding leaves."""
     return SLOW_SHARE * usual.level + usual.resolution / np.sqrt(12.0)
-
-
-def _noise_of(log: np.ndarray, time: np.ndarray, usual: Usual) -> Noise:
-    white, slow, lasts = np.exp(log).tolist()
-    every = np.ones(time.size, dtype=bool)
-    return Noise(
-        white=white, slow=slow, correlation_time=lasts, resolution=usual.resolution, used=every, time=time
-    )
-
-
-def _felt_directions(scaled: np.ndarray, level: float) -> np.ndarray:
-    """Return F (m, few) with F Fᵀ = J D Jᵀ but for what nobody feels."""
-    U, s, _ = np.linalg.svd(scaled, full_matrices=False)
-    felt = s > FELT * level * np.sqrt(scaled.shape[0])
-    return U[:, felt] * s[felt]
 
 
 def log_prior_of(noise: Noise, usual: Usual) -> float:
     """Return the log density of a noise before the data speak, but for a constant of all noises."""
-    return _log_prior(np.log([noise.white, noise.slow, noise.correlation_time]), usual)
+    return log_density(np.log([noise.white, noise.slow, noise.correlation_time]), prior_of(usual))
 
 
-def _log_prior(log: np.ndarray, usual: Usual) -> float:
-    """Return the log density of log σ_w, log σ_s, log τ_s, but for a constant."""
-    white, slow, time = log
-    about = ((white - np.log(usual.level)) / WHITE_SPREAD) ** 2
-    about += ((slow - np.log(_slow_usual(usual))) / SLOW_SPREAD) ** 2
-    about += ((time - np.log(USUAL_TIME)) / TIME_SPREAD) ** 2
-    if usual.is_known:
-        level = 0.5 * np.log(np.exp(2.0 * white) + np.exp(2.0 * slow))
-        about += ((level - np.log(usual.level)) / KNOWN_SPREAD) ** 2
-    return -0.5 * float(about)
-
-
-def _bounds(at: np.ndarray, r: np.ndarray, usual: Usual) -> tuple[np.ndarray, np.ndarray]:
-    """Return the lowest and highest log σ_w, log σ_s, log τ_s (3,) each.
-
-    A fit that is far from the record leaves much that is no noise, and smooth: second differences hardly see it.
+class Prior(NamedTuple):
+    """What is known of log σ_w, log σ_s, log τ_s beforehand: means and standard deviations (3,), and the mean of the
+    logarithm of the level, NaN if the level is not known.
     """
-    seen = 1.4826 * float(np.median(np.abs(np.diff(r, 2)))) / np.sqrt(6.0)
-    step, span = float(np.median(np.diff(at))), float(at[-1] - at[0])
-    shortest = SHORTEST * step
-    low = [1e-3 * usual.level, LEAST_SLOW * _slow_usual(usual), shortest]
-    most_white = max(MOST_WHITE * usual.level, SEEN_WHITE * seen)
-    high = [most_white, MOST_SLOW * _slow_usual(usual), max(LONGEST * span, 2.0 * shortest)]
-    return np.log(low), np.log(high)
+
+    mean: np.ndarray
+    spread: np.ndarray
+    level: float
 
 
-def _starts(at: np.ndarray, r: np.ndarray, F: np.ndarray, usual: Usual) -> list[np.ndarray]:
-    """Return points all over the plausible (3,): what is left behind the parameters, divided in many ways."""
-    ridge = np.eye(F.shape[1]) * usual.level**2
-    left = r - F @ np.linalg.solve(F.T @ F + ridge, F.T @ r)
-    level = max(1.4826 * float(np.median(np.abs(left))), 0.1 * usual.level)
-    low, high = _bounds(at, r, usual)
-    times = np.linspace(low[2], high[2], TIMES + 2)[1:-1]
-    found = []
-    for ratio in RATIOS:
-        for share in LEVELS:
-            white = share * level / np.sqrt(1.0 + ratio**2)
-            found += [np.array([np.log(white), np.log(ratio * white), time]) for time in times]
-    return found
+def prior_of(usual: Usual) -> Prior:
+    """Return what is known of a usual sensor's noise beforehand."""
+    mean = np.log([usual.level, slow_usual(usual), USUAL_TIME])
+    spread = np.array([WHITE_SPREAD, SLOW_SPREAD, TIME_SPREAD])
+    return Prior(mean, spread, float(mean[0]) if usual.is_known else np.nan)
+
+
+@compiled
+def log_density(log: np.ndarray, prior: Prior) -> float:
+    """Return the log density of log σ_w, log σ_s, log τ_s (3,), but for a constant."""
+    about = 0.0
+    for i in range(3):
+        about += ((log[i] - prior.mean[i]) / prior.spread[i]) ** 2
+    if prior.level == prior.level:
+        level = 0.5 * np.log(np.exp(2.0 * log[0]) + np.exp(2.0 * log[1]))
+        about += ((level - prior.level) / KNOWN_SPREAD) ** 2
+    return -0.5 * about

@@ -13,23 +13,17 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.ndimage import median_filter
 
 from subzero.channels import HEADING, turned
 from subzero.diagnosis.hypothesis.catalogue import ONSETS, START, catalogue
 from subzero.diagnosis.hypothesis.catalogue.sensors import CLOCK, SPECS
 from subzero.diagnosis.hypothesis.hypotheses import entries_of, moves_nothing, with_tolerances
-from subzero.diagnosis.inference.noise import (
-    Behind,
-    Noise,
-    Usual,
-    estimate,
-    usual_noise,
-    usual_of,
-)
+from subzero.diagnosis.inference.noise import Noise, Usual, usual_noise, usual_of
+from subzero.diagnosis.inference.noise_estimate import Behind, estimate
 from subzero.diagnosis.inference.problem import Observed, Problem
 from subzero.diagnosis.inference.simulator import economical, finer, respond
 from subzero.errors import UserError
+from subzero.jit import compiled, scratch
 
 if TYPE_CHECKING:
     from subzero.diagnosis.hypothesis.configuration import Setting
@@ -146,12 +140,36 @@ def spikes(values: np.ndarray, spec: float) -> np.ndarray:
     """
     if values.size < 7:
         return np.zeros(values.size, dtype=bool)
-    inside = median_filter(values, 7)[3:-3]
-    first, last = np.median(values[:5]), np.median(values[-5:])
-    around = np.concatenate([np.full(3, first), inside, np.full(3, last)])
+    around = np.empty(values.size)
+    medians_around(values, around)
     off = np.abs(values - around)
-    level = max(1.4826 * float(np.median(off)) * 1.2, 0.5 * spec)
-    return off > SPIKE * level
+    ordered = np.sort(off)
+    usual = 0.5 * float(ordered[(off.size - 1) // 2] + ordered[off.size // 2])  # the median
+    return off > SPIKE * max(1.4826 * usual * 1.2, 0.5 * spec)
+
+
+@compiled
+def medians_around(values: np.ndarray, around: np.ndarray) -> None:
+    """Fill the median of the seven values around each; of the first and the last three that of five (m,)."""
+    last = values.size - 3
+    for i in range(3, last):
+        around[i] = _median_of(values, i - 3, 7)
+    for i in range(3):
+        around[i] = _median_of(values, 0, 5)
+        around[last + i] = _median_of(values, values.size - 5, 5)
+
+
+@compiled
+def _median_of(values: np.ndarray, first: int, count: int) -> float:
+    """Return the median of so many values, an odd number up to seven, from the first on."""
+    row = scratch(1, 7)[0]
+    for k in range(count):
+        at = k
+        while at > 0 and row[at - 1] > values[first + k]:
+            row[at] = row[at - 1]
+            at -= 1
+        row[at] = values[first + k]
+    return row[count // 2]
 
 
 def with_noise_behind(

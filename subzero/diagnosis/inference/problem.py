@@ -18,6 +18,7 @@ import numpy as np
 
 from subzero.diagnosis.hypothesis.configuration import sensed, truth
 from subzero.diagnosis.hypothesis.hypotheses import Entry, grouped
+from subzero.diagnosis.inference.noise import Noise, innovations_of_each
 from subzero.diagnosis.inference.simulator import (
     RunCache,
     Stop,
@@ -31,9 +32,6 @@ from subzero.diagnosis.inference.simulator import (
 if TYPE_CHECKING:
     from subzero.diagnosis.hypothesis.configuration import Setting
     from subzero.diagnosis.hypothesis.effect import Effect
-    from subzero.diagnosis.inference.noise import (
-        Noise,
-    )
 
 JACOBIAN_STEP = 0.2
 """Step of a sensitivity, in tolerances; a whole one from a state of rest (a play, a friction), where slopes jump."""
@@ -73,6 +71,22 @@ class Observed:
         """Return the record beside a simulation to which more is added; what was measured stays as it is."""
         both = {name: self.correction.get(name, 0.0) + column for name, column in more.items()}
         return replace(self, correction={**self.correction, **both})
+
+    def whiten(self, values: Mapping[str, np.ndarray]) -> np.ndarray:
+        """Return what makes the noise of every channel white: channel → (n,) to its used samples, one channel after the
+        other (m,).
+        """
+        known = np.concatenate([values[name][noise.used] for name, noise in self.noise.items()])
+        white = np.empty(known.size)
+        innovations_of_each(*self._filters, known, white)
+        return white
+
+    @cached_property
+    def _filters(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Where the channels end, and their filters, one behind the other."""
+        filters = zip(*(noise.filter for noise in self.noise.values()), strict=True)
+        kept, gain, scale = (np.concatenate(each) for each in filters)
+        return np.cumsum([0, *(noise.count for noise in self.noise.values())]), kept, gain, scale
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -117,9 +131,9 @@ class Problem:
     def _changed(self, setting: Setting, record: int, z: np.ndarray, *, late: bool) -> Setting:
         """Return a setting with those deviations that change a run, or with those of the sensors (`late`)."""
         numbers = z.tolist()
-        for effect, own, where in self._groups:
+        for effect, own, where in self._groups[late]:
             values = [numbers[k] for k in own]
-            if where in (-1, record) and any(values) and late == (effect.slot in POST_RUN_SLOTS):
+            if where in (-1, record) and any(values):
                 setting = effect.apply(setting, *values)
         return setting
 
@@ -135,8 +149,12 @@ class Problem:
         return [effect for effect in throughout.values() if effect.sudden] + list(self.onsets)
 
     @cached_property
-    def _groups(self) -> list[tuple[Effect, list[int], int]]:
-        return grouped(self.entries)
+    def _groups(self) -> Mapping[bool, list[tuple[Effect, list[int], int]]]:
+        """Effects with their entries: those that change a run, and those of the sensors (True)."""
+        every = grouped(self.entries)
+        return {
+            late: [one for one in every if late == (one[0].slot in POST_RUN_SLOTS)] for late in (False, True)
+        }
 
     def residual(self, z: np.ndarray) -> np.ndarray:
         """Return r(z) (m,); NaN if a run could not go on."""
@@ -158,7 +176,8 @@ class Problem:
         """
         wanted = range(len(self.entries)) if columns is None else columns
         base = self.tracks([(i, z) for i in range(len(self.records))])
-        shown = [self.whitened(i, self.setting(i, z), track) for i, track in enumerate(base)]
+        true = [self.true(i, self.setting(i, z, late=False), track) for i, track in enumerate(base)]
+        shown = [self.whitened(i, self.setting(i, z), track, true=true[i]) for i, track in enumerate(base)]
         jobs = [(k, i, self.moved(z, k, side)) for k in wanted for i in range(len(self.records))
                 if self.entries[k].record in (-1, i)]  # fmt: skip
         stops = [self._stops(i, z, wanted) for i in range(len(self.records))]
@@ -168,8 +187,8 @@ class Problem:
         J = np.zeros((sum(part.size for part in shown), len(self.entries)))
         first = np.cumsum([0, *(part.size for part in shown)])
         for k, i, moved in jobs:
-            track = base[i] if self._late(k) else next(runs)
-            change = self.whitened(i, self.setting(i, moved), track) - shown[i]
+            track, known = (base[i], true[i]) if self._late(k) else (next(runs), None)
+            change = self.whitened(i, self.setting(i, moved), track, true=known) - shown[i]
             J[first[i] : first[i + 1], k] = change / (moved[k] - z[k])
         return np.nan_to_num(J)
 
@@ -232,22 +251,36 @@ class Problem:
 
         return self.pool.map(run, jobs) if len(jobs) > 1 else map(run, jobs)
 
-    def whitened(self, record: int, setting: Setting, track: Track, *, measured: bool = False) -> np.ndarray:
-        """Return W h of a record, or W (y − h)."""
-        seen, parts = self.records[record], []
-        for channel, values in self.shown(record, setting, track).items():
-            if measured:
-                values = seen.values[channel] - values - seen.correction.get(channel, 0.0)
-            parts.append(seen.noise[channel].whiten(values))
-        return np.concatenate(parts)
+    def whitened(
+        self,
+        record: int,
+        setting: Setting,
+        track: Track,
+        *,
+        measured: bool = False,
+        true: Mapping[str, np.ndarray] | None = None,
+    ) -> np.ndarray:
+        """Return W h of a record, or W (y − h); quicker if it is known what is `true` along the track."""
+        seen, shown = self.records[record], self.shown(record, setting, track, true)
+        if measured:
+            shown = {name: seen.values[name] - values - seen.correction.get(name, 0.0)
+                     for name, values in shown.items()}  # fmt: skip
+        return seen.whiten(shown)
 
-    def shown(self, record: int, setting: Setting, track: Track) -> dict[str, np.ndarray]:
+    def shown(
+        self, record: int, setting: Setting, track: Track, true: Mapping[str, np.ndarray] | None = None
+    ) -> dict[str, np.ndarray]:
         """Return what the sensors of a record would show: channel → (n,), in its display unit."""
-        seen, (grid, states) = self.records[record], track
-        earlier = seen.time - setting.clock_offset
-        return {channel: np.interp(earlier, grid, sensed(setting.sensing.get(channel), grid,
-                                                         truth(setting, states, channel)))
-                for channel in seen.noise}  # fmt: skip
+        grid, true = track[0], self.true(record, setting, track) if true is None else true
+        earlier = self.records[record].time - setting.clock_offset
+        return {
+            name: np.interp(earlier, grid, sensed(setting.sensing.get(name), grid, values))
+            for name, values in true.items()
+        }
+
+    def true(self, record: int, setting: Setting, track: Track) -> dict[str, np.ndarray]:
+        """Return what is true of the channels of a record along a track: channel → (times of the track,)."""
+        return {name: truth(setting, track[1], name) for name in self.records[record].noise}
 
 
 Progress = Callable[[float, str], None]

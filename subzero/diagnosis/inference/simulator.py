@@ -141,9 +141,10 @@ def with_stops(setting: Setting, times: Collection[float]) -> tuple[Track, dict[
     """Return the track of a setting, and the run as it was at times [s], or at the last exchange before each."""
     trial = setting.trial
     # Even segments, however the cable begins: a mesh that changes with its initial length has no slope.
-    setup, live = prepare(trial, setting.model, setting.tethered, run_in=0.0)
+    room = 16 + int(FASTEST_PAY_OUT * trial.duration / trial.segment_length)
+    setup, live = prepare(trial, setting.model, setting.tethered, longest_exchange=trial.cable_step,
+                          run_in=0.0, room=room)  # fmt: skip
     _ease(setup)
-    live = _roomy(live, trial.start.wet_length + FASTEST_PAY_OUT * trial.duration, trial.segment_length)
     grid, steps = _exchanges(setting)
     track = np.full((1 + (grid.size - 1) * steps, COLUMNS), np.nan)
     done = {time: int(time / trial.cable_step + 1e-6) for time in times}
@@ -215,12 +216,6 @@ def _ease(setup: Setup) -> None:
     fixed: Any = setup.fixed  # a record in memory
     fixed.agreement, fixed.booked = AGREEMENT, False
     fixed.drum.friction = max(fixed.drum.friction, LEAST_FRICTION)
-
-
-def _roomy(live: Live, length: float, segment: float) -> Live:
-    """Return the same run with room for a length of cable."""
-    needed = int(length / segment) + 16
-    return live if needed <= live.line.length.size else live._replace(line=enlarged(live.line, needed))
 
 
 def _copied(value: Any) -> Any:

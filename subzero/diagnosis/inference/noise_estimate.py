@@ -1,0 +1,331 @@
+"""The most probable noise of a channel behind a fit z*, Jacobian J (REML).
+
+    y − h(z*) + J z*  ~  N(0, J D Jᵀ + Σ(σ_w, σ_s, τ_s, q)),        z ~ N(0, D),      Σ and priors as in `noise`
+
+What the parameters can do is marginalised, so that a smooth misfit that the model can follow is no noise. A slow part
+has a prior: a usual sensor wanders by about its usual noise, and a wander many times as large is something to find, so
+σ_s stays below `MOST_SLOW`.
+
+The best of a grid are made better by Nelder's and Mead's method (1965), in compiled code: a simplex of four points
+whose worst corner is reflected about the centre of the others, farther where that is best of all, less far or towards
+them where it is not even better than the worst but one; if that does not help, all are drawn to the best.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from subzero.diagnosis.inference.noise import (
+    FEWEST,
+    Noise,
+    Prior,
+    Usual,
+    log_density,
+    prior_of,
+    slow_usual,
+    usual_noise,
+)
+from subzero.jit import compiled, scratch
+
+LEAST_SLOW, MOST_SLOW = 0.05, 4.0
+"""A slow part of more usual sizes than the last is no noise of the sensor; of less than the first is no sensor, and the
+steps of a simulation err by as much. [-]"""
+SHORTEST, LONGEST = 0.25, 1.0 / 3.0
+"""Correlation times lie between this share of a sample and that of the record. [-]"""
+FELT = 0.03
+"""A direction of the parameters that moves the samples by less than this, in usual levels, is left out. [-]"""
+MOST_WHITE, SEEN_WHITE = 3.0, 1.5
+"""σ_w is at most so many usual levels, or so many times what second differences of the samples show. [-]"""
+RATIOS, TIMES, LEVELS = (0.1, 0.5, 1.0, 3.0), 6, (0.4, 1.0, 2.5)
+"""Where the search for the best begins: σ_s/σ_w, how many τ_s, and level in the level of what is left. [-]"""
+BEGUN = 2
+"""So many of them, the best, are made better."""
+FIRST_MOVE, FIRST_MOVE_OF_0 = 0.05, 0.00025
+"""The other corners of the first simplex have one number that is larger by this share; or so large if it is 0. [-]"""
+SETTLED, MOST_ASKED = 0.02, 200
+"""It ends where all corners lie as close to the best, in each logarithm and in nats; or when the likelihood was asked
+for so often."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Behind:
+    """What a fit leaves of a channel, for its noise to be found in.
+
+    Attributes:
+        residual: y − h(z*) + J z* (m,): what is left if the parameters did nothing.
+        J: sensitivities to the parameters (m, k), in the channel's unit.
+        D: prior variances of the parameters (k,).
+    """
+
+    residual: np.ndarray
+    J: np.ndarray
+    D: np.ndarray
+
+
+class Sought(NamedTuple):
+    """What the most probable noise is sought in.
+
+    Attributes:
+        steps: times to the next sample (m,). [s]
+        both: F, with F Fᵀ = J D Jᵀ, and in the last column y − h(z*) + J z* (m, n + 1).
+        rounding: q²/12.
+        prior: of log σ_w, log σ_s, log τ_s.
+        low, high: their bounds (3,).
+        room: to work in (n + 3, n + 1).
+    """
+
+    steps: np.ndarray
+    both: np.ndarray
+    rounding: float
+    prior: Prior
+    low: np.ndarray
+    high: np.ndarray
+    room: np.ndarray
+
+
+def estimate(time: np.ndarray, behind: Behind, usual: Usual) -> Noise:
+    """Return the most probable noise of a channel behind a fit.
+
+    Args:
+        time: of the samples that are used (m,). [s]
+        behind: what the fit leaves.
+        usual: of the sensor's kind.
+
+    Returns:
+        noise of which all these samples are used.
+    """
+    if time.size < FEWEST:
+        return usual_noise(time, np.ones(time.size, dtype=bool), usual)
+    r, F = behind.residual, _felt_directions(behind.J * np.sqrt(behind.D), usual.level)
+    steps, both = np.diff(time, append=time[-1:]), np.column_stack([F, r])
+    room = np.empty((both.shape[1] + 2, both.shape[1]))
+    sought = Sought(steps, both, usual.resolution**2 / 12.0, prior_of(usual), *_bounds(time, r, usual), room)
+    starts = _starts(time, r, F, usual)
+    costs = np.empty(len(starts))
+    costs_of(sought, starts, costs)
+    begun = np.argsort(costs, kind="stable")[:BEGUN]
+    for i in begun:
+        costs[i] = descend(sought, starts[i])
+    return _noise_of(starts[min(begun, key=lambda i: costs[i])], time, usual)
+
+
+@compiled
+def costs_of(sought: Sought, points: np.ndarray, costs: np.ndarray) -> None:
+    """Fill the cost of each point (n, 3)."""
+    for i in range(costs.size):
+        costs[i] = _cost(sought, points[i])
+
+
+@compiled
+def _cost(sought: Sought, log: np.ndarray) -> float:
+    """Return minus the log density of log σ_w, log σ_s, log τ_s (3,), but for a constant."""
+    white, slow, lasts = np.exp(log[0]), np.exp(log[1]), np.exp(log[2])
+    unrelated = white * white + sought.rounding
+    likelihood = log_marginal(sought.steps, unrelated, slow * slow, lasts, sought.both, sought.room)
+    return -likelihood - log_density(log, sought.prior)
+
+
+@compiled
+def descend(sought: Sought, point: np.ndarray) -> float:
+    """Overwrite a point (3,) with the best one down from it, and return the cost of that."""
+    simplex, costs = scratch(4, 3), scratch(1, 4)[0]
+    for k in range(4):
+        _corner(sought, point, k - 1, simplex[k])
+        costs[k] = _cost(sought, simplex[k])
+    asked = 4
+    _sort(simplex, costs)
+    while asked < MOST_ASKED and not _is_settled(simplex, costs):
+        asked += _improve(sought, simplex, costs)
+        _sort(simplex, costs)
+    for i in range(3):
+        point[i] = simplex[0, i]
+    return costs[0]
+
+
+@compiled
+def _corner(sought: Sought, point: np.ndarray, moved: int, corner: np.ndarray) -> None:
+    """Fill a corner of the first simplex (3,): the point with one of its numbers moved, back from a bound."""
+    for i in range(3):
+        corner[i] = point[i]
+        if i == moved:
+            corner[i] = (1.0 + FIRST_MOVE) * point[i] if point[i] != 0.0 else FIRST_MOVE_OF_0
+            if corner[i] > sought.high[i]:
+                corner[i] = 2.0 * sought.high[i] - corner[i]
+    _clip(sought, corner)
+
+
+@compiled
+def _clip(sought: Sought, point: np.ndarray) -> None:
+    """Put a point (3,) between the bounds."""
+    for i in range(3):
+        point[i] = min(max(point[i], sought.low[i]), sought.high[i])
+
+
+@compiled
+def _sort(simplex: np.ndarray, costs: np.ndarray) -> None:
+    """Put the corners into the order of their costs, the best first."""
+    for k in range(1, 4):
+        for at in range(k, 0, -1):
+            if not costs[at] < costs[at - 1]:
+                break
+            costs[at], costs[at - 1] = costs[at - 1], costs[at]
+            for i in range(3):
+                simplex[at, i], simplex[at - 1, i] = simplex[at - 1, i], simplex[at, i]
+
+
+@compiled
+def _is_settled(simplex: np.ndarray, costs: np.ndarray) -> bool:
+    """Say whether all corners are close to the best."""
+    far = costs[3] - costs[0]
+    for k in range(1, 4):
+        for i in range(3):
+            far = max(far, abs(simplex[k, i] - simplex[0, i]))
+    return far <= SETTLED
+
+
+@compiled
+def _improve(sought: Sought, simplex: np.ndarray, costs: np.ndarray) -> int:
+    """Put a better point in the place of the worst corner, or draw all to the best; return how often costs were
+    asked for.
+    """
+    first, second = scratch(1, 3)[0], scratch(1, 3)[0]
+    reflected = _beyond(sought, simplex, 1.0, first)
+    if costs[0] <= reflected < costs[2]:
+        _put(first, reflected, simplex, costs)
+        return 1
+    if reflected < costs[0]:
+        expanded = _beyond(sought, simplex, 2.0, second)
+        if expanded < reflected:
+            _put(second, expanded, simplex, costs)
+        else:
+            _put(first, reflected, simplex, costs)
+        return 2
+    outside = reflected < costs[3]
+    contracted = _beyond(sought, simplex, 0.5 if outside else -0.5, second)
+    if (contracted <= reflected) if outside else (contracted < costs[3]):
+        _put(second, contracted, simplex, costs)
+        return 2
+    for k in range(1, 4):
+        for i in range(3):
+            simplex[k, i] = simplex[0, i] + 0.5 * (simplex[k, i] - simplex[0, i])
+        costs[k] = _cost(sought, simplex[k])
+    return 5
+
+
+@compiled
+def _beyond(sought: Sought, simplex: np.ndarray, share: float, point: np.ndarray) -> float:
+    """Fill a point (3,), and return its cost: from the worst corner beyond the centre of the others, by a share of the
+    way to that.
+    """
+    for i in range(3):
+        centre = (simplex[0, i] + simplex[1, i] + simplex[2, i]) / 3.0
+        point[i] = (1.0 + share) * centre - share * simplex[3, i]
+    _clip(sought, point)
+    return _cost(sought, point)
+
+
+@compiled
+def _put(point: np.ndarray, cost: float, simplex: np.ndarray, costs: np.ndarray) -> None:
+    """Put a point (3,) in the place of the worst corner."""
+    for i in range(3):
+        simplex[3, i] = point[i]
+    costs[3] = cost
+
+
+def _noise_of(log: np.ndarray, time: np.ndarray, usual: Usual) -> Noise:
+    white, slow, lasts = np.exp(log).tolist()
+    every = np.ones(time.size, dtype=bool)
+    return Noise(
+        white=white, slow=slow, correlation_time=lasts, resolution=usual.resolution, used=every, time=time
+    )
+
+
+def _felt_directions(scaled: np.ndarray, level: float) -> np.ndarray:
+    """Return F (m, few) with F Fᵀ = J D Jᵀ but for what nobody feels."""
+    U, s, _ = np.linalg.svd(scaled, full_matrices=False)
+    felt = s > FELT * level * np.sqrt(scaled.shape[0])
+    return U[:, felt] * s[felt]
+
+
+def _bounds(at: np.ndarray, r: np.ndarray, usual: Usual) -> tuple[np.ndarray, np.ndarray]:
+    """Return the lowest and highest log σ_w, log σ_s, log τ_s (3,) each.
+
+    A fit that is far from the record leaves much that is no noise, and smooth: second differences hardly see it.
+    """
+    seen = 1.4826 * float(np.median(np.abs(np.diff(r, 2)))) / np.sqrt(6.0)
+    step, span = float(np.median(np.diff(at))), float(at[-1] - at[0])
+    shortest = SHORTEST * step
+    low = [1e-3 * usual.level, LEAST_SLOW * slow_usual(usual), shortest]
+    most_white = max(MOST_WHITE * usual.level, SEEN_WHITE * seen)
+    high = [most_white, MOST_SLOW * slow_usual(usual), max(LONGEST * span, 2.0 * shortest)]
+    return np.log(low), np.log(high)
+
+
+def _starts(at: np.ndarray, r: np.ndarray, F: np.ndarray, usual: Usual) -> np.ndarray:
+    """Return points all over the plausible (n, 3): what is left behind the parameters, divided in many ways."""
+    ridge = np.eye(F.shape[1]) * usual.level**2
+    left = r - F @ np.linalg.solve(F.T @ F + ridge, F.T @ r)
+    level = max(1.4826 * float(np.median(np.abs(left))), 0.1 * usual.level)
+    low, high = _bounds(at, r, usual)
+    times = np.linspace(low[2], high[2], TIMES + 2)[1:-1]
+    ratio, share, time = (axis.ravel() for axis in np.meshgrid(RATIOS, LEVELS, times, indexing="ij"))
+    white = share * level / np.sqrt(1.0 + ratio**2)
+    return np.clip(np.column_stack([np.log(white), np.log(ratio * white), time]), low, high)
+
+
+@compiled
+def log_marginal(
+    steps: np.ndarray, unrelated: float, slow: float, lasts: float, both: np.ndarray, room: np.ndarray
+) -> float:
+    """Return log N(r; 0, F Fᵀ + Σ), but for a constant: −½ (xᵀx − |L⁻¹ Gᵀx|²) − log det L − ½ log det Σ, with x and G
+    what Σ makes white of r and F, and L Lᵀ = I + Gᵀ G.
+
+    Args:
+        steps: times to the next sample (m,). [s]
+        unrelated: σ_w² + q²/12.
+        slow: σ_s².
+        lasts: τ_s. [s]
+        both: F and, in the last column, r (m, n + 1).
+        room: to work in (n + 3, n + 1).
+    """
+    many = both.shape[1]
+    expected, white, inner = room[many], room[many + 1], room[:many]
+    expected[:] = 0.0
+    inner[:] = 0.0
+    left, log_scale, kept = slow, 0.0, 0.0
+    for i in range(both.shape[0]):
+        if i == 0 or steps[i] != steps[i - 1]:
+            kept = np.exp(-steps[i] / lasts)
+        seen = left + unrelated
+        gain, inverse = left / seen, 1.0 / np.sqrt(seen)
+        log_scale += 0.5 * np.log(seen)
+        left = kept * kept * left * (1.0 - gain) + slow * (1.0 - kept * kept)
+        for j in range(many):
+            new = both[i, j] - expected[j]
+            white[j] = new * inverse
+            expected[j] = kept * (expected[j] + gain * new)
+            for k in range(j + 1):
+                inner[j, k] += white[j] * white[k]
+    return -log_scale + _log_of_square(inner)
+
+
+@compiled
+def _log_of_square(inner: np.ndarray) -> float:
+    """Return −½ (xᵀx − |L⁻¹ Gᵀx|²) − log det L, given Gᵀ G, below it xᵀ G, and xᵀx (n + 1, n + 1), where L is left."""
+    last, log_det = inner.shape[0] - 1, 0.0
+    for j in range(last + 1):
+        for k in range(j + 1):
+            value = inner[j, k] + (1.0 if j == k and j < last else 0.0)
+            for i in range(k):
+                value -= inner[j, i] * inner[k, i]
+            if k < j:
+                inner[j, k] = value / inner[k, k]
+            elif j < last:
+                inner[j, j] = np.sqrt(value)
+                log_det += np.log(inner[j, j])
+            else:
+                inner[j, j] = value
+    return -0.5 * inner[last, last] - log_det
