@@ -26,9 +26,8 @@ from subzero.errors import UserError
 from subzero.jit import compiled, scratch
 
 if TYPE_CHECKING:
-    from subzero.diagnosis.hypothesis.configuration import Setting
+    from subzero.diagnosis.hypothesis.configuration import Logged, Setting
     from subzero.diagnosis.hypothesis.effect import Effect
-    from subzero.diagnosis.hypothesis.logged import Logged
 
 VISIBLE_STEP_ERROR = 1.0
 """Squared size, in noise, of an error of the steps that is worth correcting."""
