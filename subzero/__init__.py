@@ -25,7 +25,7 @@ _HOME = {
     "CHANNELS": ("subzero.channels", "CHANNELS"),
     "Checkpoint": ("subzero.checkpoint", "Checkpoint"),
     "Comparison": ("subzero.comparison", "Comparison"),
-    "Logged": ("subzero.diagnosis.hypothesis.configuration", "Logged"),
+    "Logged": ("subzero.diagnosis.hypothesis.logged", "Logged"),
     "Model": ("subzero.model", "Model"),
     "Observation": ("subzero.channels", "Observation"),
     "Record": ("subzero.records.record", "Record"),

@@ -21,8 +21,9 @@ from subzero.voice import PLAIN, Voice
 if TYPE_CHECKING:
     import xarray as xr
 
-    from subzero.diagnosis.hypothesis.configuration import Logged, Setting
+    from subzero.diagnosis.hypothesis.configuration import Setting
     from subzero.diagnosis.hypothesis.effect import Effect
+    from subzero.diagnosis.hypothesis.logged import Logged
     from subzero.diagnosis.results import Verdict
 
 FINE, NO_CALIBRATION = 0, 3

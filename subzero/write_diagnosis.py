@@ -51,8 +51,9 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-    from subzero.diagnosis.hypothesis.configuration import Logged, Setting
+    from subzero.diagnosis.hypothesis.configuration import Setting
     from subzero.diagnosis.hypothesis.effect import Effect
+    from subzero.diagnosis.hypothesis.logged import Logged
     from subzero.records.record import Record
     from subzero.stage import Stage
 

@@ -18,7 +18,8 @@ import cyclopts
 
 from subzero.diagnosis.api import diagnose_trials
 from subzero.diagnosis.assessment import DECISIVE_DISCRIMINATION, LIBRARY, flown, next_trial, outlooks
-from subzero.diagnosis.hypothesis.configuration import Logged, Setting
+from subzero.diagnosis.hypothesis.configuration import Setting
+from subzero.diagnosis.hypothesis.logged import Logged
 from subzero.diagnosis.inference import Findings
 from subzero.diagnosis.results import UNDECIDED, NextTrial
 

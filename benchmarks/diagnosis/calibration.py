@@ -34,8 +34,9 @@ from subzero.diagnosis import CALIBRATED
 from subzero.diagnosis.assessment import LIBRARY
 from subzero.diagnosis.hypothesis.catalogue import START, catalogue
 from subzero.diagnosis.hypothesis.catalogue.sensors import NOISE
-from subzero.diagnosis.hypothesis.configuration import Logged, Setting
+from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.hypotheses import Entry, number_of
+from subzero.diagnosis.hypothesis.logged import Logged
 from subzero.diagnosis.inference import pose
 from subzero.model import Model
 from subzero.records.record import Record

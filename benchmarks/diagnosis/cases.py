@@ -15,7 +15,8 @@ from functools import cache
 
 import numpy as np
 
-from subzero.diagnosis.hypothesis.configuration import Logged, Setting
+from subzero.diagnosis.hypothesis.configuration import Setting
+from subzero.diagnosis.hypothesis.logged import Logged
 
 from . import outside
 from .draws import Values, hidden, nuisances, with_begun, with_values

@@ -26,9 +26,9 @@ import subzero
 from subzero.channels import BY_NAME, HEADING
 from subzero.diagnosis.api import diagnose_trials
 from subzero.diagnosis.hypothesis.catalogue import NOISE
-from subzero.diagnosis.hypothesis.configuration import Logged
 from subzero.diagnosis.hypothesis.data_error import COMMAND_GROUPS, REFERENCES, SWAPS, DataError
 from subzero.diagnosis.hypothesis.effect import with_onset
+from subzero.diagnosis.hypothesis.logged import Logged
 from subzero.diagnosis.inference import Problem, pose, respond
 from subzero.diagnosis.results import Verdict
 from subzero.records.consistency import MISTAKEN

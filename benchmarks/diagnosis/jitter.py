@@ -18,7 +18,7 @@ import cyclopts
 import numpy as np
 
 from subzero.diagnosis.api import diagnose_trials
-from subzero.diagnosis.hypothesis.configuration import Logged
+from subzero.diagnosis.hypothesis.logged import Logged
 
 from .results import results_of
 from .world import Drawn, drawn, record_of

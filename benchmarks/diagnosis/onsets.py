@@ -21,8 +21,9 @@ import numpy as np
 import subzero
 from subzero.diagnosis.api import diagnose_trials
 from subzero.diagnosis.hypothesis.catalogue import ONSETS
-from subzero.diagnosis.hypothesis.configuration import Logged, Setting
+from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.effect import Effect, with_onset
+from subzero.diagnosis.hypothesis.logged import Logged
 from subzero.diagnosis.inference import pose
 from subzero.records.record import Record
 

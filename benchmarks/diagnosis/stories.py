@@ -22,7 +22,8 @@ from subzero import write_diagnosis
 from subzero.channels import BY_NAME
 from subzero.cli_diagnosis import simulated
 from subzero.diagnosis.hypothesis.catalogue import START, catalogue
-from subzero.diagnosis.hypothesis.configuration import Logged, Setting
+from subzero.diagnosis.hypothesis.configuration import Setting
+from subzero.diagnosis.hypothesis.logged import Logged
 from subzero.diagnosis.report import tables, words
 from subzero.diagnosis.report.sections import table
 from subzero.diagnosis.report.summary import summary

@@ -29,7 +29,8 @@ import scenarios
 import subzero
 from subzero.diagnosis.api import diagnose_trials
 from subzero.diagnosis.hypothesis.catalogue.sensors import NOISE
-from subzero.diagnosis.hypothesis.configuration import Logged, Setting
+from subzero.diagnosis.hypothesis.configuration import Setting
+from subzero.diagnosis.hypothesis.logged import Logged
 from subzero.diagnosis.inference import pose
 from subzero.model import Model
 from subzero.records.record import Record

@@ -21,7 +21,7 @@ from subzero.calibration.fit import Fitted, fitted
 from subzero.calibration.numbers import USUAL, Number, full_name, numbers_of, with_free_numbers
 from subzero.calibration.results import Advice, Calibration, Profile, Source
 from subzero.diagnosis.assessment import curves
-from subzero.diagnosis.hypothesis.configuration import Logged
+from subzero.diagnosis.hypothesis.logged import Logged
 from subzero.diagnosis.inference import Progress, pose
 from subzero.diagnosis.read_trials import read_trials
 from subzero.errors import UserError

@@ -38,7 +38,7 @@ _HOME = {
     "Extended": ("results", "Extended"),
     "FoundError": ("results", "FoundError"),
     "Gain": ("results", "Gain"),
-    "Logged": ("hypothesis.configuration", "Logged"),
+    "Logged": ("hypothesis.logged", "Logged"),
     "Misfit": ("results", "Misfit"),
     "NOISE": ("hypothesis.catalogue", "NOISE"),
     "NOTHING_NEAR": ("results", "NOTHING_NEAR"),

@@ -26,9 +26,9 @@ from threadpoolctl import threadpool_limits
 from subzero.diagnosis.assessment.goodness_of_fit import misfits
 from subzero.diagnosis.assessment.identifiability import detectability, with_whole_effects
 from subzero.diagnosis.hypothesis.catalogue import load
-from subzero.diagnosis.hypothesis.configuration import Logged
 from subzero.diagnosis.hypothesis.data_error import DataError
 from subzero.diagnosis.hypothesis.effect import Effect
+from subzero.diagnosis.hypothesis.logged import Logged
 from subzero.diagnosis.inference.data_error_choice import compared, may_be_named
 from subzero.diagnosis.inference.data_error_evidence import Explained, leaves_only_noise
 from subzero.diagnosis.inference.data_error_search import SuspectedError, is_soft, suspected

@@ -20,7 +20,8 @@ import numpy as np
 import scenarios
 from subzero.channels import BY_NAME, HEADING, turned
 from subzero.diagnosis.hypothesis.catalogue.sensors import NOISE, SPECS
-from subzero.diagnosis.hypothesis.configuration import Logged, Setting
+from subzero.diagnosis.hypothesis.configuration import Setting
+from subzero.diagnosis.hypothesis.logged import Logged
 from subzero.errors import UserError, listed
 from subzero.model import Model, load
 from subzero.records.consistency import (

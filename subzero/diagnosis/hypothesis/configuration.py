@@ -1,8 +1,7 @@
 """The configuration of a trial is a value, a `Setting`: trial, model and sensors. Effects make new settings from it.
 
-A record with the configuration that it was measured in is a `Logged`, what a diagnosis takes. `sensed` is what sensors
-make of the track of a simulation, without their noise. A record's `surge_speed` is what a speed log shows: through the
-water.
+`sensed` is what sensors make of the track of its simulation, without their noise. A record's `surge_speed` is what a
+speed log shows: through the water.
 """
 
 from __future__ import annotations
@@ -10,7 +9,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -19,9 +18,6 @@ from subzero.channels import DEGREE, HEADING, turned
 from subzero.jit import compiled
 from subzero.model import Model
 from vehicle.state import QUATERNION, SHAFT, STATE_SIZE, VELOCITY
-
-if TYPE_CHECKING:  # an edit of how records are read compiles nothing
-    from subzero.records.record import Record
 
 Value = TypeVar("Value")
 
@@ -108,27 +104,6 @@ class Setting:
         """Return the setting with a channel's sensor changed."""
         sensor = _changed(self.sensing.get(channel, RIGHT), changes)
         return _changed(self, {"sensing": {**self.sensing, channel: sensor}})
-
-
-@dataclass(frozen=True, kw_only=True)
-class Logged:
-    """A record and the trial in which it was measured.
-
-    Attributes:
-        record: the channels that are diagnosed.
-        setting: the trial with its commands, and the nominal model.
-        noise: channel → standard deviation, where it is known. [display unit]
-        name: short, for figures and tables.
-        notes: what was left out, and why.
-        trusted: channels that the user has said are right as they are.
-    """
-
-    record: Record
-    setting: Setting
-    noise: Mapping[str, float] = field(default_factory=dict)
-    name: str
-    notes: tuple[str, ...] = ()
-    trusted: frozenset[str] = frozenset()
 
 
 RUDDER, VOLTAGE, TENSION, LENGTH, WATER = (STATE_SIZE + i for i in range(5))

@@ -28,7 +28,7 @@ import numpy as np
 
 import scenarios
 from subzero.channels import BY_NAME, HEADING, TURN, turned
-from subzero.diagnosis.hypothesis.configuration import Logged
+from subzero.diagnosis.hypothesis.logged import Logged
 from subzero.errors import UserError
 from subzero.records.consistency import MISTAKEN, REPORTED_COMMANDS
 from subzero.records.record import Record

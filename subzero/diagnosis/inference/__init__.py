@@ -50,7 +50,7 @@ from subzero.diagnosis.hypothesis.hypotheses import (
     variances,
     with_tolerances,
 )
-from subzero.diagnosis.inference.noise import Noise, Usual, resolution_of
+from subzero.diagnosis.inference.noise import Noise, Usual, resolution_of, spikes
 from subzero.diagnosis.inference.noise_estimate import Behind, estimate, log_marginal
 from subzero.diagnosis.hypothesis.configuration import TRUTHS
 from subzero.diagnosis.inference.simulator import (
@@ -62,7 +62,7 @@ from subzero.diagnosis.inference.simulator import (
     with_stops,
 )
 from subzero.diagnosis.inference.problem import Observed, Problem, Progress
-from subzero.diagnosis.inference.posing import pose, spikes, with_finer_steps, with_noise_behind
+from subzero.diagnosis.inference.posing import pose, with_finer_steps, with_noise_behind
 from subzero.diagnosis.inference.linear_gaussian import (
     KAPPAS,
     ForceInformation,

@@ -22,8 +22,8 @@ from typing import Protocol
 
 import numpy as np
 
-from subzero.diagnosis.hypothesis.configuration import Logged
 from subzero.diagnosis.hypothesis.data_error import corrected
+from subzero.diagnosis.hypothesis.logged import Logged
 from subzero.diagnosis.inference.data_error_evidence import (
     ALIKE,
     Explained,

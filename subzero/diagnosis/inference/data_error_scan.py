@@ -17,7 +17,6 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from subzero.channels import BY_NAME, HEADING, turned
-from subzero.diagnosis.hypothesis.configuration import Logged
 from subzero.diagnosis.hypothesis.data_error import (
     ANY,
     COMMAND_GROUPS,
@@ -27,6 +26,7 @@ from subzero.diagnosis.hypothesis.data_error import (
     SWAPS,
     DataError,
 )
+from subzero.diagnosis.hypothesis.logged import Logged
 from subzero.diagnosis.inference.noise import resolution_of, usual_noise, usual_of
 from subzero.diagnosis.inference.repeated_values import log_odds_of_frozen, steps_of
 from subzero.records.consistency import MISTAKEN

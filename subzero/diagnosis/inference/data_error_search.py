@@ -24,9 +24,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from subzero.diagnosis.hypothesis.configuration import Logged
 from subzero.diagnosis.hypothesis.data_error import DataError, corrected
 from subzero.diagnosis.hypothesis.hypotheses import MAX_CAUSES, PRIOR, columns_of, nameable, variances
+from subzero.diagnosis.hypothesis.logged import Logged
 from subzero.diagnosis.inference.change_point_scan import (
     BaseRun,
     Begun,

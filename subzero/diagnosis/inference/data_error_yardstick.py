@@ -21,12 +21,20 @@ import numpy as np
 from scipy.linalg.lapack import dpotrf, dpotri
 
 from subzero.channels import HEADING, turned
-from subzero.diagnosis.hypothesis.configuration import Logged, Setting, sensed, truth
+from subzero.diagnosis.hypothesis.configuration import Setting, sensed, truth
 from subzero.diagnosis.hypothesis.data_error import REPEATED, DataError, corrected
 from subzero.diagnosis.hypothesis.hypotheses import PRIOR, columns_of, nameable, variances
+from subzero.diagnosis.hypothesis.logged import Logged
 from subzero.diagnosis.inference.linear_gaussian import KAPPAS, Posterior, each_freed, log_sum
-from subzero.diagnosis.inference.noise import Between, Noise, innovations_between, usual_noise, usual_of
-from subzero.diagnosis.inference.posing import pose, spikes
+from subzero.diagnosis.inference.noise import (
+    Between,
+    Noise,
+    innovations_between,
+    spikes,
+    usual_noise,
+    usual_of,
+)
+from subzero.diagnosis.inference.posing import pose
 from subzero.diagnosis.inference.problem import Problem
 from subzero.diagnosis.inference.simulator import Track, simulate_track
 

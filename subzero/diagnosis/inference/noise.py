@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 
 from subzero.diagnosis.hypothesis.catalogue.sensors import SPECS
-from subzero.jit import compiled
+from subzero.jit import compiled, scratch
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -360,3 +360,50 @@ def log_density(log: np.ndarray, prior: Prior) -> float:
         level = 0.5 * np.log(np.exp(2.0 * log[0]) + np.exp(2.0 * log[1]))
         about += ((level - prior.level) / KNOWN_SPREAD) ** 2
     return -0.5 * about
+
+
+SPIKE = 5.0
+"""A sample this many noise levels off the median of its neighbours is an outlier. [-]"""
+
+
+def spikes(values: np.ndarray, spec: float) -> np.ndarray:
+    """Say which samples stand alone, far from the median of seven around them; at the ends, of the first or last five.
+
+    A record mirrored at its ends would show an outlier there twice, and two of them as a majority.
+
+    Args:
+        values: measured − simulated (m,), in the channel's unit.
+        spec: the least level of noise that is believed of the sensor.
+    """
+    if values.size < 7:
+        return np.zeros(values.size, dtype=bool)
+    around = np.empty(values.size)
+    medians_around(values, around)
+    off = np.abs(values - around)
+    ordered = np.sort(off)
+    usual = 0.5 * float(ordered[(off.size - 1) // 2] + ordered[off.size // 2])  # the median
+    return off > SPIKE * max(1.4826 * usual * 1.2, 0.5 * spec)
+
+
+@compiled
+def medians_around(values: np.ndarray, around: np.ndarray) -> None:
+    """Fill the median of the seven values around each; of the first and the last three that of five (m,)."""
+    last = values.size - 3
+    for i in range(3, last):
+        around[i] = _median_of(values, i - 3, 7)
+    for i in range(3):
+        around[i] = _median_of(values, 0, 5)
+        around[last + i] = _median_of(values, values.size - 5, 5)
+
+
+@compiled
+def _median_of(values: np.ndarray, first: int, count: int) -> float:
+    """Return the median of so many values, an odd number up to seven, from the first on."""
+    row = scratch(1, 7)[0]
+    for k in range(count):
+        at = k
+        while at > 0 and row[at - 1] > values[first + k]:
+            row[at] = row[at - 1]
+            at -= 1
+        row[at] = values[first + k]
+    return row[count // 2]

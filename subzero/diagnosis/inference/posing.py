@@ -18,24 +18,22 @@ from subzero.channels import HEADING, turned
 from subzero.diagnosis.hypothesis.catalogue import ONSETS, START, catalogue
 from subzero.diagnosis.hypothesis.catalogue.sensors import CLOCK, SPECS
 from subzero.diagnosis.hypothesis.hypotheses import entries_of, moves_nothing, with_tolerances
-from subzero.diagnosis.inference.noise import Noise, Usual, usual_noise, usual_of
+from subzero.diagnosis.inference.noise import Noise, Usual, spikes, usual_noise, usual_of
 from subzero.diagnosis.inference.noise_estimate import Behind, estimate
 from subzero.diagnosis.inference.problem import Observed, Problem
 from subzero.diagnosis.inference.simulator import economical, finer, respond
 from subzero.errors import UserError
-from subzero.jit import compiled, scratch
 
 if TYPE_CHECKING:
-    from subzero.diagnosis.hypothesis.configuration import Logged, Setting
+    from subzero.diagnosis.hypothesis.configuration import Setting
     from subzero.diagnosis.hypothesis.effect import Effect
+    from subzero.diagnosis.hypothesis.logged import Logged
 
 VISIBLE_STEP_ERROR = 1.0
 """Squared size, in noise, of an error of the steps that is worth correcting."""
 EARLIEST_CLOCK_S = -CLOCK.parameters[0].low
 """A clock may be so early: runs go on beyond the last sample, which happened later than it says, under the last
 command."""
-SPIKE = 5.0
-"""A sample this many noise levels off the median of its neighbours is an outlier. [-]"""
 NOISE_LEVEL_CHANGE = 0.1
 """Change of a noise level, as a logarithm, that is worth beginning again; of its slow part,
 SLOW_NOISE_FACTOR times as much."""
@@ -126,49 +124,6 @@ def _used(values: np.ndarray, difference: np.ndarray, usual: Usual) -> np.ndarra
     used = np.isfinite(values)
     used[used] = ~spikes(difference[used], max(usual.level, usual.resolution))
     return used
-
-
-def spikes(values: np.ndarray, spec: float) -> np.ndarray:
-    """Say which samples stand alone, far from the median of seven around them; at the ends, of the first or last five.
-
-    A record mirrored at its ends would show an outlier there twice, and two of them as a majority.
-
-    Args:
-        values: measured − simulated (m,), in the channel's unit.
-        spec: the least level of noise that is believed of the sensor.
-    """
-    if values.size < 7:
-        return np.zeros(values.size, dtype=bool)
-    around = np.empty(values.size)
-    medians_around(values, around)
-    off = np.abs(values - around)
-    ordered = np.sort(off)
-    usual = 0.5 * float(ordered[(off.size - 1) // 2] + ordered[off.size // 2])  # the median
-    return off > SPIKE * max(1.4826 * usual * 1.2, 0.5 * spec)
-
-
-@compiled
-def medians_around(values: np.ndarray, around: np.ndarray) -> None:
-    """Fill the median of the seven values around each; of the first and the last three that of five (m,)."""
-    last = values.size - 3
-    for i in range(3, last):
-        around[i] = _median_of(values, i - 3, 7)
-    for i in range(3):
-        around[i] = _median_of(values, 0, 5)
-        around[last + i] = _median_of(values, values.size - 5, 5)
-
-
-@compiled
-def _median_of(values: np.ndarray, first: int, count: int) -> float:
-    """Return the median of so many values, an odd number up to seven, from the first on."""
-    row = scratch(1, 7)[0]
-    for k in range(count):
-        at = k
-        while at > 0 and row[at - 1] > values[first + k]:
-            row[at] = row[at - 1]
-            at -= 1
-        row[at] = values[first + k]
-    return row[count // 2]
 
 
 def with_noise_behind(

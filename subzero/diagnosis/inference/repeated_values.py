@@ -33,8 +33,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from subzero.diagnosis.hypothesis.configuration import Logged
 from subzero.diagnosis.hypothesis.data_error import DataError
+from subzero.diagnosis.hypothesis.logged import Logged
 from subzero.diagnosis.inference.linear_gaussian import log_sum
 from subzero.diagnosis.inference.noise import Noise, Usual, log_prior_of, resolution_of, usual_of
 

@@ -55,7 +55,7 @@ if TYPE_CHECKING:
     from subzero.diagnosis.inference import Candidate
     from subzero.diagnosis.inference.change_point_fit import FittedChangePoint
     from subzero.diagnosis.inference.out_of_catalogue import Findings
-    from subzero.diagnosis.verdict.extension import Extension
+    from subzero.diagnosis.verdict.estimates import Extension
 
 LISTED_PROBABILITY = 1e-4
 """Hypotheses that are less probable than this are not listed."""

@@ -51,8 +51,16 @@ from subzero.diagnosis.verdict.conclude import (
     remaining_models,
     rivals_of,
 )
-from subzero.diagnosis.verdict.estimates import cause_of, name, practical_of
-from subzero.diagnosis.verdict.extension import Extension, of_causes, of_nothing, of_sudden, of_unknown
+from subzero.diagnosis.verdict.estimates import (
+    Extension,
+    cause_of,
+    name,
+    of_causes,
+    of_nothing,
+    of_sudden,
+    of_unknown,
+    practical_of,
+)
 
 if TYPE_CHECKING:
     from subzero.diagnosis.inference.map_fit import Candidate, Fit
