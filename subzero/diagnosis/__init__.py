@@ -11,7 +11,7 @@ symbol       name                                                     unit      
 z            deviations of all parameters from the nominal model      their own     hypothesis.effect
 τ, s         prior standard deviations: tolerance, size of an effect  as z          hypothesis.effect
 h(z)         what the sensors would have measured                     channel's     inference.simulator
-W            whitening by the noise: level, colour, gaps              1             inference.noise
+W            whitening by the noise: level, colour, gaps              1             hypothesis.noise
 r, J         whitened residual W (y − h(z)), and ∂(W h)/∂z            1             inference.problem
 κ            scale of all tolerances, mixed over 1, 2, 4              1             inference.linear_gaussian
 D            squared Mahalanobis distance to the closest rival        1             assessment.identifiability

@@ -22,7 +22,7 @@ from subzero.diagnosis.inference.simulator import respond
 from subzero.diagnosis.results import ChannelGain, Curves, Gain, Misfit
 
 if TYPE_CHECKING:
-    from subzero.diagnosis.inference.noise import Noise
+    from subzero.diagnosis.hypothesis.noise import Noise
     from subzero.diagnosis.inference.problem import Observed, Problem
 
 LJUNG_BOX_LAGS = 25

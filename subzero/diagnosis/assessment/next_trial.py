@@ -33,8 +33,8 @@ from subzero.diagnosis.assessment.trial_library import (
 from subzero.diagnosis.hypothesis.catalogue import START
 from subzero.diagnosis.hypothesis.catalogue.sensors import NOISE
 from subzero.diagnosis.hypothesis.hypotheses import entries_of
+from subzero.diagnosis.hypothesis.noise import Usual, usual_noise
 from subzero.diagnosis.inference.linear_gaussian import posterior
-from subzero.diagnosis.inference.noise import Usual, usual_noise
 from subzero.diagnosis.inference.problem import Observed, Problem
 from subzero.diagnosis.inference.simulator import economical
 from subzero.diagnosis.results import NextTrial

@@ -3,8 +3,8 @@
 what is computed                                          file
 --------------------------------------------------------  -----------------
 parameter vector z, its prior, prior of hypotheses        ../hypothesis/hypotheses
-noise of a channel, whitening                             noise
-its estimate behind a fit                                 noise_estimate
+noise of a channel, whitening                             ../hypothesis/noise
+its estimate behind a fit                                 ../hypothesis/noise_estimate
 h(z): what the sensors would have measured                ../hypothesis/configuration
 one simulation, from its start or from a stop             simulator
 r(z) and J of all records                                 problem
@@ -50,8 +50,8 @@ from subzero.diagnosis.hypothesis.hypotheses import (
     variances,
     with_tolerances,
 )
-from subzero.diagnosis.inference.noise import Noise, Usual, resolution_of, spikes
-from subzero.diagnosis.inference.noise_estimate import Behind, estimate, log_marginal
+from subzero.diagnosis.hypothesis.noise import Noise, Usual, resolution_of, spikes
+from subzero.diagnosis.hypothesis.noise_estimate import Behind, estimate, log_marginal
 from subzero.diagnosis.hypothesis.configuration import TRUTHS
 from subzero.diagnosis.inference.simulator import (
     RunCache,

@@ -27,7 +27,7 @@ from subzero.diagnosis.hypothesis.data_error import (
     DataError,
 )
 from subzero.diagnosis.hypothesis.logged import Logged
-from subzero.diagnosis.inference.noise import resolution_of, usual_noise, usual_of
+from subzero.diagnosis.hypothesis.noise import resolution_of, usual_noise, usual_of
 from subzero.diagnosis.inference.repeated_values import log_odds_of_frozen, steps_of
 from subzero.records.consistency import MISTAKEN
 

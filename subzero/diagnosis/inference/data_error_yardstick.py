@@ -25,8 +25,7 @@ from subzero.diagnosis.hypothesis.configuration import Setting, sensed, truth
 from subzero.diagnosis.hypothesis.data_error import REPEATED, DataError, corrected
 from subzero.diagnosis.hypothesis.hypotheses import PRIOR, columns_of, nameable, variances
 from subzero.diagnosis.hypothesis.logged import Logged
-from subzero.diagnosis.inference.linear_gaussian import KAPPAS, Posterior, each_freed, log_sum
-from subzero.diagnosis.inference.noise import (
+from subzero.diagnosis.hypothesis.noise import (
     Between,
     Noise,
     innovations_between,
@@ -34,6 +33,7 @@ from subzero.diagnosis.inference.noise import (
     usual_noise,
     usual_of,
 )
+from subzero.diagnosis.inference.linear_gaussian import KAPPAS, Posterior, each_freed, log_sum
 from subzero.diagnosis.inference.posing import pose
 from subzero.diagnosis.inference.problem import Problem
 from subzero.diagnosis.inference.simulator import Track, simulate_track

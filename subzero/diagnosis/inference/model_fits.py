@@ -25,11 +25,11 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 
 from subzero.diagnosis.hypothesis.hypotheses import Ids, columns_of, is_flat, variances
+from subzero.diagnosis.hypothesis.noise import Noise, Usual, log_prior_of
+from subzero.diagnosis.hypothesis.noise_estimate import Behind, estimate
 from subzero.diagnosis.inference import settings
 from subzero.diagnosis.inference.linear_gaussian import KAPPAS, Linear, Quadratic, posterior
 from subzero.diagnosis.inference.map_fit import Candidate, Fit, candidate_of, refit
-from subzero.diagnosis.inference.noise import Noise, Usual, log_prior_of
-from subzero.diagnosis.inference.noise_estimate import Behind, estimate
 from subzero.diagnosis.inference.posing import sensor_of, whitened_again, with_finer_steps, with_noise_behind
 from subzero.diagnosis.inference.screening import Screening, screening_of
 

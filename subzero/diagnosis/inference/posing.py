@@ -18,8 +18,8 @@ from subzero.channels import HEADING, turned
 from subzero.diagnosis.hypothesis.catalogue import ONSETS, START, catalogue
 from subzero.diagnosis.hypothesis.catalogue.sensors import CLOCK, SPECS
 from subzero.diagnosis.hypothesis.hypotheses import entries_of, moves_nothing, with_tolerances
-from subzero.diagnosis.inference.noise import Noise, Usual, spikes, usual_noise, usual_of
-from subzero.diagnosis.inference.noise_estimate import Behind, estimate
+from subzero.diagnosis.hypothesis.noise import Noise, Usual, spikes, usual_noise, usual_of
+from subzero.diagnosis.hypothesis.noise_estimate import Behind, estimate
 from subzero.diagnosis.inference.problem import Observed, Problem
 from subzero.diagnosis.inference.simulator import economical, finer, respond
 from subzero.errors import UserError

@@ -18,7 +18,7 @@ import numpy as np
 
 from subzero.diagnosis.hypothesis.configuration import sensed, truth
 from subzero.diagnosis.hypothesis.hypotheses import Entry, grouped
-from subzero.diagnosis.inference.noise import Noise, innovations_of_each
+from subzero.diagnosis.hypothesis.noise import Noise, innovations_of_each
 from subzero.diagnosis.inference.simulator import (
     RunCache,
     Stop,

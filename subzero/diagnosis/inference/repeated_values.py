@@ -35,8 +35,8 @@ import numpy as np
 
 from subzero.diagnosis.hypothesis.data_error import DataError
 from subzero.diagnosis.hypothesis.logged import Logged
+from subzero.diagnosis.hypothesis.noise import Noise, Usual, log_prior_of, resolution_of, usual_of
 from subzero.diagnosis.inference.linear_gaussian import log_sum
-from subzero.diagnosis.inference.noise import Noise, Usual, log_prior_of, resolution_of, usual_of
 
 CLEAR_LOG_ODDS = 6.0
 """Runs whose log probability by chance is less than minus this are no chance."""

@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from subzero.diagnosis.inference.noise import (
+from subzero.diagnosis.hypothesis.noise import (
     FEWEST,
     Noise,
     Prior,
