@@ -90,6 +90,16 @@ def test_what_an_early_clock_logs_last_happened_after_the_last_sample(duration):
     assert_allclose(problem.residual(early), 0.0, atol=1e-6)
 
 
+@pytest.mark.parametrize(("scenario", "late"), [("zigzag", -0.9), pytest.param("zigzag", 1.2, marks=pytest.mark.slow),
+                                                pytest.param("dive", 1.3, marks=pytest.mark.slow)])  # fmt: skip
+def test_a_clock_that_is_late_by_less_than_an_error_makes_no_error_of_data(scenario, late):
+    """It had been told as a clock 1.5 s late, the least that is an error, with certainty; without that as another rate
+    of the clock, or as two delays: what a clock does within that is not linear, either.
+    """
+    verdict = subzero.diagnose(with_late_clock(scenario, late, seed=7), budget="screen")
+    assert not verdict.data_errors
+
+
 def clock_told(verdict):
     """Return by how much a verdict has the clock late, as a cause or as an error in the data. [s]"""
     causes = [cause.parameters["late"].value for cause in verdict.causes if cause.id == "clock_offset"]

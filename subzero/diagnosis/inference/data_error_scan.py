@@ -61,6 +61,8 @@ FAR_BEHIND = 100.0
 """What is so far behind the best suspect is not looked at closer."""
 HOPELESS = -30.0
 """Nor is what is so much less probable than no error, with all of physics to help."""
+BELOW_LEAST = 0.8
+"""Is a number of this share of the least that is an error more probable, there is no error. [-]"""
 FINEST = 0.02
 """A number is found to this share of the step between those that were tried."""
 AS_GOOD = 0.5
@@ -101,9 +103,27 @@ def suspects(yardstick: Yardstick, trusted: frozenset[str] = frozenset()) -> lis
     return sorted((one for one in found.values() if one.lead > 0.0), key=lambda one: -one.lead)
 
 
+def _none(error: DataError) -> Suspect:
+    """Return an error that is out of the question."""
+    return Suspect(error, -np.inf, -np.inf)
+
+
 def judged_as_it_is(yardstick: Yardstick, error: DataError) -> Suspect:
     """Return how an error is judged in another record, or with others corrected."""
     return _judged(yardstick, error, _group_of(yardstick, error), closer=True)
+
+
+def clock_below_least(yardstick: Yardstick) -> Suspect | None:
+    """Return a clock that is late by less than an error, if that explains a record better than as it is, and than any
+    clock that is later: a cause like others, but one that the linear problem says little of.
+    """
+    least, group = LEAST["late_clock"], Group([], is_read_off=True)
+    judge = partial(_judged, yardstick, group=group, closer=True)
+    sizes = np.arange(0.5 * CLOCK_STEP_S, least + CLOCK_STEP_S, 0.5 * CLOCK_STEP_S)
+    both = [side * float(size) for size in sizes for side in (1.0, -1.0)]
+    each = [judge(DataError(kind="late_clock", amount=amount)) for amount in both]
+    best = best_number(judge, max(each, key=lambda one: one.lead), 0.5 * CLOCK_STEP_S)
+    return best if best.lead > 0.0 and abs(best.error.amount) < least else None
 
 
 def likeliest(yardstick: Yardstick, errors: Sequence[DataError]) -> DataError:
@@ -153,7 +173,7 @@ def _judged(yardstick: Yardstick, error: DataError, group: Group, *, closer: boo
     terms = {**yardstick.own, **there.terms(logged, touched)}
     is_small = not group.is_read_off and _is_small(yardstick, error)
     if min(terms[name].samples for name in touched) < FEWEST or is_small:
-        return Suspect(error, -np.inf, -np.inf)
+        return _none(error)
     odds = log_prior(error, len(group.each))
     odds += error.log_jacobian * sum(terms[name].samples for name in error.channels if name in terms)
     generous = odds + _lost(yardstick, error, terms, yardstick.as_is)
@@ -228,10 +248,13 @@ def _mean_log_density(yardstick: Yardstick, name: str) -> float:
 
 
 def _refined(yardstick: Yardstick, one: Suspect, group: Group) -> Suspect:
-    """Return an error with the numbers that are best close to those that were tried."""
+    """Return an error with the numbers that are best close to those that were tried; none if less than the least that
+    is an error is better still: that is a clock or a lag like others.
+    """
     judge = partial(_judged, yardstick, group=group, closer=True)
     if group.step:
-        return best_number(judge, one, group.step)
+        found = best_number(judge, one, group.step)
+        return _none(found.error) if _is_better_below(yardstick, found, group) else found
     time = yardstick.time
     at, span = int(np.searchsorted(time, one.error.since)), max(time.size // STEP_TIMES, 1)
     around = time[max(at - span, 1) : at + span + 1 : max(span // 4, 1)]
@@ -242,6 +265,13 @@ def _refined(yardstick: Yardstick, one: Suspect, group: Group) -> Suspect:
         )
         around = time[max(int(np.searchsorted(time, one.error.since)) - 3, 1) :][:7]
     return one
+
+
+def _is_better_below(yardstick: Yardstick, one: Suspect, group: Group) -> bool:
+    """Say whether a number below the least that is an error explains a record better."""
+    below = BELOW_LEAST * np.copysign(LEAST.get(one.error.kind, 0.0), one.error.amount)
+    smaller = replace(one.error, amount=float(below))
+    return _judged(yardstick, smaller, group._replace(is_read_off=True), closer=True).lead > one.lead
 
 
 def best_number(judge: Callable[[DataError], Suspect], one: Suspect, step: float) -> Suspect:

@@ -37,6 +37,7 @@ from subzero.diagnosis.inference.change_point_scan import (
 from subzero.diagnosis.inference.data_error_scan import (
     FAR_BEHIND,
     Suspect,
+    clock_below_least,
     judged_again,
     judged_as_it_is,
     likeliest,
@@ -158,8 +159,8 @@ def _of_record(problem: Problem, records: Sequence[Logged], record: int) -> list
     read_off = [one for one in repeated if not may_be_measured(one, logged)]
     jumps = steps_off_grid(logged, logged.trusted)
     read_off += [likeliest(begun, begun.by_whole_steps(one)) for one in jumps]
-    found = _back(begun, read_off, _forward(begun, read_off, logged.trusted))
-    found = _closer(problem, record, begun, read_off, found)
+    begun, found = _beside_clock(begun, read_off, _forward(begun, read_off, logged.trusted), logged.trusted)
+    found = _closer(problem, record, begun, read_off, _back(begun, read_off, found))
     made = [*(_Judged(Suspect(one, SIGNATURE_LEAD, SIGNATURE_LEAD), ()) for one in read_off), *found]
     against = _Against(problem=problem, records=records, record=record, begun=begun, read_off=len(read_off),
                        errors=tuple(one.suspect.error for one in made))  # fmt: skip
@@ -173,6 +174,27 @@ def _of_record(problem: Problem, records: Sequence[Logged], record: int) -> list
                        may_stand_still=may_stand_still(begun, one.error), is_read_off=i < len(read_off))
         for i, (one, alike) in enumerate(made)
     ]  # fmt: skip
+
+
+def _beside_clock(
+    begun: Yardstick, read_off: Sequence[DataError], found: list[_Judged], trusted: frozenset[str]
+) -> tuple[Yardstick, list[_Judged]]:
+    """Return errors that came out one after the other, with what they are judged by: beside a clock that is late by
+    less than an error, where a vehicle may look like some of them, and that explains more.
+    """
+    soft = any(one.suspect.error.kind in SOFT for one in found)
+    clock = clock_below_least(begun.after(read_off)) if soft else None
+    if clock is None:
+        return begun, found
+    there = replace(begun, clock=(clock.error,))
+    others = _forward(there, read_off, trusted)
+    explains_more = clock.lead + _total_lead(others) > _total_lead(found)
+    return (there, others) if explains_more else (begun, found)
+
+
+def _total_lead(found: Sequence[_Judged]) -> float:
+    """Return by how much errors are more probable than none, each judged with those before it corrected."""
+    return sum(one.suspect.lead for one in found)
 
 
 def _forward(begun: Yardstick, read_off: Sequence[DataError], trusted: frozenset[str]) -> list[_Judged]:
@@ -211,7 +233,9 @@ def _closer(
     z = np.clip(begun.after(errors).likeliest.z, *bounds(problem))
     if not np.isfinite(problem.residual(z)).all():
         return found
-    there = replace(yardstick_of(problem, record, begun.logged, z), repeated=begun.repeated)
+    there = replace(
+        yardstick_of(problem, record, begun.logged, z), repeated=begun.repeated, clock=begun.clock
+    )
     found = [_again(there, read_off, found, i) for i in range(len(found))]
     return [one for one in found if _is_suspected(one.suspect)]
 

@@ -93,6 +93,7 @@ class Yardstick:
         repeated: values that it repeats, which may be a channel that is rounded and stands still.
         corrected: errors that are corrected in it already.
         place: among those, where a further error is undone; behind them all if not given.
+        clock: that is late by less than an error, if any: a cause, which is put right behind all errors.
         kept: predictions under other commands.
         others: commands → what is judged by under them, with sensitivities of its own.
     """
@@ -110,6 +111,7 @@ class Yardstick:
     repeated: tuple[DataError, ...] = ()
     corrected: tuple[DataError, ...] = ()
     place: int | None = None
+    clock: tuple[DataError, ...] = ()
     kept: dict[str, Mapping[str, np.ndarray]] = field(default_factory=dict)
     others: dict[bytes, Yardstick] = field(default_factory=dict)
 
@@ -123,9 +125,10 @@ class Yardstick:
         """Return what the record as it is written is judged by without some errors, and by a further one in a place
         among them; with other commands it has sensitivities of its own.
         """
-        base = self.under(corrected(self.written, tuple(errors)))
-        return replace(base, written=self.written, repeated=self.repeated, corrected=tuple(errors),
-                       place=place)  # fmt: skip
+        every, here = (*errors, *self.clock), len(errors) if place is None and self.clock else place
+        base = self.under(corrected(self.written, every))
+        return replace(base, written=self.written, repeated=self.repeated, corrected=every, place=here,
+                       clock=self.clock)  # fmt: skip
 
     def is_last(self, error: DataError) -> bool:
         """Say whether a further error is undone behind all that are corrected."""
