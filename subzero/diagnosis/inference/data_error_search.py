@@ -3,7 +3,8 @@
 Forward: the best suspect of `data_error_scan` is corrected, and the scan goes on with the corrected record, until it
 finds none. Back: each error is judged again in its place, with all others corrected, and its numbers are found anew;
 what is not needed any more is dropped, the weakest first. So the first of two errors, which may have looked like
-something else while the second was there, is judged as the second is: by what it adds.
+something else while the second was there, is judged as the second is: by what it adds. A clock that is late by less
+than an error is a cause, but no linear one: where both explain more, errors are judged beside it.
 
 How far physics comes towards a record without them is looked at before any search, too:
 
