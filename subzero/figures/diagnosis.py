@@ -439,7 +439,7 @@ def _overlay(axes: Axes, drawn: Drawn, channel: str) -> None:
 
 
 def _residuals(axes: Axes, drawn: Drawn, channel: str) -> None:
-    """Draw what models leave unexplained, smoothed, beside the noise of the sensor and the step of its values."""
+    """Draw measured − simulated of each model, smoothed, beside the noise of the sensor and the step of its values."""
     time, noise = drawn.curves.time[drawn.used(channel)], drawn.noise.get(channel)
     _band(axes, noise)
     axes.axhline(0.0, color=style.GREY, linewidth=0.7)
@@ -450,7 +450,7 @@ def _residuals(axes: Axes, drawn: Drawn, channel: str) -> None:
     unit = BY_NAME[channel].unit
     label(axes, None, f"[{unit}]")
     _in_time(axes, drawn.curves)
-    headline(axes, f"Measured − simulated{_behind(noise)}")
+    headline(axes, f"Residual{_behind(noise)}")
     if noise is not None:
         _show_noise(axes, drawn, channel, noise.noise_sd, unit)
 

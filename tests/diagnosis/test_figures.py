@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.text import Text
 
 import subzero
 from subzero.diagnosis import (
@@ -175,7 +176,10 @@ def test_residuals_are_those_of_the_curves_beside_noise_and_the_step_of_the_sens
                  windows=(), noise_sd=0.02, noise_slow=0.0, noise_time=1.0, resolution=0.03, outliers=0,
                  gaps=0)  # fmt: skip
     verdict = undecided({"hull_drag": 0.9, "yaw_inertia": 0.1}, curves(rival__hull_drag=0.99), heading=row)
-    right = draw_diagnosis(verdict, TITLE)["misfit"].axes[1]
+    figure = draw_diagnosis(verdict, TITLE)["misfit"]
+    right = figure.axes[1]
+    titles = [title for one in figure.axes for title in one.get_children() if isinstance(title, Text)]
+    assert all(title.get_window_extent().x1 <= figure.bbox.x1 for title in titles), "none is cut off"
     dots = [one.get_ydata() for one in right.get_lines() if one.get_marker() == "o"]
     np.testing.assert_allclose(dots, [-0.5 * np.sin(TIME), 0.01 * np.sin(TIME)], atol=1e-12)
     low, high = right.transData.inverted().transform(right.patches[0].get_window_extent().get_points())[:, 1]
