@@ -122,7 +122,10 @@ def clock_below_least(yardstick: Yardstick) -> Suspect | None:
     sizes = np.arange(0.5 * CLOCK_STEP_S, least + CLOCK_STEP_S, 0.5 * CLOCK_STEP_S)
     both = [side * float(size) for size in sizes for side in (1.0, -1.0)]
     each = [judge(DataError(kind="late_clock", amount=amount)) for amount in both]
-    best = best_number(judge, max(each, key=lambda one: one.lead), 0.5 * CLOCK_STEP_S)
+    best = max(each, key=lambda one: one.lead)
+    if best.lead < UNREFINED:
+        return None
+    best = best_number(judge, best, 0.5 * CLOCK_STEP_S)
     return best if best.lead > 0.0 and abs(best.error.amount) < least else None
 
 
