@@ -61,8 +61,6 @@ FAR_BEHIND = 100.0
 """What is so far behind the best suspect is not looked at closer."""
 HOPELESS = -30.0
 """Nor is what is so much less probable than no error, with all of physics to help."""
-BELOW_LEAST = 0.8
-"""Is a number of this share of the least that is an error more probable, there is no error. [-]"""
 FINEST = 0.02
 """A number is found to this share of the step between those that were tried."""
 AS_GOOD = 0.5
@@ -101,11 +99,6 @@ def suspects(yardstick: Yardstick, trusted: frozenset[str] = frozenset()) -> lis
         if one.lead > found.get(one.error.id, one).lead or one.error.id not in found:
             found[one.error.id] = one
     return sorted((one for one in found.values() if one.lead > 0.0), key=lambda one: -one.lead)
-
-
-def _none(error: DataError) -> Suspect:
-    """Return an error that is out of the question."""
-    return Suspect(error, -np.inf, -np.inf)
 
 
 def judged_as_it_is(yardstick: Yardstick, error: DataError) -> Suspect:
@@ -176,7 +169,7 @@ def _judged(yardstick: Yardstick, error: DataError, group: Group, *, closer: boo
     terms = {**yardstick.own, **there.terms(logged, touched)}
     is_small = not group.is_read_off and _is_small(yardstick, error)
     if min(terms[name].samples for name in touched) < FEWEST or is_small:
-        return _none(error)
+        return Suspect(error, -np.inf, -np.inf)
     odds = log_prior(error, len(group.each))
     odds += error.log_jacobian * sum(terms[name].samples for name in error.channels if name in terms)
     generous = odds + _lost(yardstick, error, terms, yardstick.as_is)
@@ -251,13 +244,10 @@ def _mean_log_density(yardstick: Yardstick, name: str) -> float:
 
 
 def _refined(yardstick: Yardstick, one: Suspect, group: Group) -> Suspect:
-    """Return an error with the numbers that are best close to those that were tried; none if less than the least that
-    is an error is better still: that is a clock or a lag like others.
-    """
+    """Return an error with the numbers that are best close to those that were tried."""
     judge = partial(_judged, yardstick, group=group, closer=True)
     if group.step:
-        found = best_number(judge, one, group.step)
-        return _none(found.error) if _is_better_below(yardstick, found, group) else found
+        return best_number(judge, one, group.step)
     time = yardstick.time
     at, span = int(np.searchsorted(time, one.error.since)), max(time.size // STEP_TIMES, 1)
     around = time[max(at - span, 1) : at + span + 1 : max(span // 4, 1)]
@@ -268,13 +258,6 @@ def _refined(yardstick: Yardstick, one: Suspect, group: Group) -> Suspect:
         )
         around = time[max(int(np.searchsorted(time, one.error.since)) - 3, 1) :][:7]
     return one
-
-
-def _is_better_below(yardstick: Yardstick, one: Suspect, group: Group) -> bool:
-    """Say whether a number below the least that is an error explains a record better."""
-    below = BELOW_LEAST * np.copysign(LEAST.get(one.error.kind, 0.0), one.error.amount)
-    smaller = replace(one.error, amount=float(below))
-    return _judged(yardstick, smaller, group._replace(is_read_off=True), closer=True).lead > one.lead
 
 
 def best_number(judge: Callable[[DataError], Suspect], one: Suspect, step: float) -> Suspect:
