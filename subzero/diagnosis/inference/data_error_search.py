@@ -12,8 +12,8 @@ How far physics comes towards a record without them is looked at before any sear
 
 A term is a cause, throughout or from some time of a grid on, which is what a late clock looks like. The set grows by
 the term that gains most; the scales of the noise are found anew behind each set, as in `data_error_yardstick`, which
-has nothing and single causes only. An error of the data that is far ahead of that needs no search of the record as it
-is.
+has nothing and single causes only. An error of the data that is far ahead of that, and of single causes at sizes that
+are simulated, needs no search of the record as it is.
 """
 
 from __future__ import annotations
@@ -61,6 +61,8 @@ from subzero.diagnosis.inference.map_fit import bounds
 from subzero.diagnosis.inference.posing import posed_again
 from subzero.diagnosis.inference.problem import Problem
 from subzero.diagnosis.inference.repeated_values import may_be_measured, repeated_values, steps_off_grid
+from subzero.diagnosis.inference.screening import sizes_tried, slope_at
+from subzero.diagnosis.inference.settings import MERGED_SCALES
 
 MOST_ERRORS = 3
 """Of a record, beside values that are repeated."""
@@ -142,6 +144,10 @@ def suspected(problem: Problem, records: Sequence[Logged]) -> Suspicion:
     """Return what errors the data of some records may have."""
     each = [_of_record(problem, records, i) for i in range(len(records))]
     return Suspicion(errors=tuple(one for found in each for one in found))
+
+
+Physics = Callable[[Problem, int], float]
+"""By how much something physical is more probable than nothing in one of the records of a problem. [nat]"""
 
 
 class _Judged(NamedTuple):
@@ -260,7 +266,7 @@ class _Against:
         begun: its yardstick as it is.
         errors: all of them.
         read_off: so many of them, the first, are read off the record's values.
-        kept: errors that were corrected → what a few causes do beside them.
+        kept: errors that were corrected → what some physics does beside them.
     """
 
     problem: Problem
@@ -269,7 +275,7 @@ class _Against:
     begun: Yardstick
     errors: tuple[DataError, ...]
     read_off: int
-    kept: dict[tuple[int, ...], float] = field(default_factory=dict)
+    kept: dict[tuple[Physics, tuple[int, ...]], float] = field(default_factory=dict)
 
     @property
     def left(self) -> float:
@@ -284,12 +290,17 @@ class _Against:
     def few_causes_explain_more(self) -> bool:
         """Say whether soft errors, with a few causes beside them, are far behind a few causes in their place."""
         some = self.soft
-        return bool(some) and self.lead(some) + self._few_beside(self.errors) < -FAR_BEHIND
+        beside = self._beside(self.errors, most_of_physics) if some else 0.0
+        return bool(some) and self.lead(some, most_of_physics) + beside < -FAR_BEHIND
 
-    def lead(self, some: Sequence[DataError]) -> float:
-        """Return by how much some errors are more probable than a few causes, with all others corrected."""
+    def are_far_ahead(self, some: Sequence[DataError]) -> bool:
+        """Say whether some errors are far ahead of a few causes, and of one of any size, with all others corrected."""
+        return all(self.lead(some, physics) > FAR_BEHIND for physics in (most_of_physics, most_of_one_cause))
+
+    def lead(self, some: Sequence[DataError], physics: Physics) -> float:
+        """Return by how much some errors are more probable than some physics, with all others corrected."""
         held = [one for one in self.errors if not any(one is other for other in some)]
-        lead = -self._few_beside(held)
+        lead = -self._beside(held, physics)
         for one in some:
             place = sum(self._at(other) < self._at(one) for other in held)
             lead += judged_as_it_is(self.begun.after(held, place), one).lead
@@ -299,13 +310,13 @@ class _Against:
     def _at(self, one: DataError) -> int:
         return next(i for i, other in enumerate(self.errors) if other is one)
 
-    def _few_beside(self, held: Sequence[DataError]) -> float:
-        """Return by how much a few causes are more probable than at most one, where errors are corrected."""
-        key = tuple(self._at(one) for one in held)
+    def _beside(self, held: Sequence[DataError], physics: Physics) -> float:
+        """Return by how much some physics is more probable than the yardstick, where errors are corrected."""
+        key = (physics, tuple(self._at(one) for one in held))
         if key not in self.kept:
             after = self.begun.after(held)
             each = [after.logged if i == self.record else one for i, one in enumerate(self.records)]
-            most = most_of_physics(posed_again(self.problem, each), self.record)
+            most = physics(posed_again(self.problem, each), self.record)
             self.kept[key] = most + after.log_none - after.log_sparse
         return self.kept[key]
 
@@ -320,12 +331,12 @@ def _clear(against: _Against, made: Sequence[Suspect]) -> list[DataError]:
     firm = [one for one in made if not any(one.error is each for each in soft)]
     clear = [one.error for one in firm if one.lead > CLEAR_LEAD and one.generous > CLEAR_GENEROUS_LEAD]
     clear = [one for one in clear if not may_stand_still(against.begun, one)
-             or against.lead([one]) > CLEAR_LEAD]  # fmt: skip
+             or against.lead([one], most_of_physics) > CLEAR_LEAD]  # fmt: skip
     likely = [one.error for one in made if one.lead > FAR_BEHIND and any(one.error is each for each in soft)]
     likely = [one for one in likely if one.kind != "step"]
-    if not likely or against.left >= LOUD or against.lead(soft) < FAR_BEHIND:
+    if not likely or against.left >= LOUD or not against.are_far_ahead(soft):
         return clear
-    return clear + [one for one in likely if len(soft) == 1 or against.lead([one]) > FAR_BEHIND]
+    return clear + [one for one in likely if len(soft) == 1 or against.are_far_ahead([one])]
 
 
 def _is_suspected(one: Suspect) -> bool:
@@ -372,6 +383,38 @@ def most_of_physics(problem: Problem, record: int) -> float:
             break
         best = now.log + log_prior
     return best - none
+
+
+def most_of_one_cause(problem: Problem, record: int) -> float:
+    """Return by how much the best cause of the sizes that are simulated is more probable than none: the linear problem
+    at the nominal model says little of a large one. [nat]
+
+    Args:
+        problem: of all records as they are, as posed.
+        record: its number.
+    """
+    here, names = _linear(problem, record), nameable(problem.entries)
+    none = here.reckoned().log + float(np.log(PRIOR["none"]))
+    each = [one.reckoned().log for one in _at_sizes(problem, record, here)]
+    return max(each, default=-np.inf) + float(np.log(PRIOR["single"] / len(names))) - none
+
+
+def _at_sizes(problem: Problem, record: int, here: Linear) -> Iterator[Linear]:
+    """Give the linear problem of a record at each size of each cause that is simulated, with that cause free."""
+    zero, wide = np.zeros(len(problem.entries)), generous_variances(problem)
+    sizes = {k: sizes_tried(entry.parameter, MERGED_SCALES)
+             for k, entry in enumerate(problem.entries) if entry.record < 0}  # fmt: skip
+    jobs = [(k, size) for k, some in sizes.items() for size in some]
+    moved = [np.concatenate([zero[:k], [size], zero[k + 1 :]]) for k, size in jobs]
+    of: dict[int, dict[float, np.ndarray]] = {k: {0.0: here.r} for k in sizes}
+    for (k, size), z, track in zip(jobs, moved, problem.tracks([(record, z) for z in moved]), strict=True):
+        of[k][size] = problem.whitened(record, problem.setting(record, z), track, measured=True)
+    for k, size in jobs:
+        column = slope_at(of[k], size)
+        if np.isfinite(of[k][size]).all() and np.isfinite(column).all():
+            J, D = here.J.copy(), here.D.copy()
+            J[:, k], D[k] = column, wide[k]
+            yield replace(here, r=of[k][size] + column * size, J=J, D=D)
 
 
 def _linear(problem: Problem, record: int) -> Linear:

@@ -241,12 +241,12 @@ def sizes_run(
     of: dict[int, dict[float, np.ndarray]] = {k: {float(z[k]): here} for k in at}
     for (k, size), r in zip(jobs, problem.residuals(moved), strict=True):
         of[k][size] = r
-    found = [SizeRun(k, there, of[k][size], _slope(of[k], size))
+    found = [SizeRun(k, there, of[k][size], slope_at(of[k], size))
              for (k, size), there in zip(jobs, moved, strict=True)]  # fmt: skip
     return [one for one in found if np.isfinite(one.r).all() and np.isfinite(one.column).all()]
 
 
-def _slope(runs: Mapping[float, np.ndarray], size: float) -> np.ndarray:
+def slope_at(runs: Mapping[float, np.ndarray], size: float) -> np.ndarray:
     """Return the sensitivity (m,) at a size of runs, size → residual (m,), between those next to it; NaN if there is
     none.
     """
