@@ -33,7 +33,7 @@ from subzero.diagnosis.hypothesis.noise import (
     usual_noise,
     usual_of,
 )
-from subzero.diagnosis.inference.linear_gaussian import KAPPAS, Posterior, each_freed, log_sum
+from subzero.diagnosis.inference.linear_gaussian import KAPPAS, Posterior, each_freed, log_sum, precision
 from subzero.diagnosis.inference.posing import pose
 from subzero.diagnosis.inference.problem import Problem
 from subzero.diagnosis.inference.simulator import Track, simulate_track
@@ -315,9 +315,7 @@ def reckon(said: Stacked, D: np.ndarray) -> Reckoned:
 
 def _covariance(A: np.ndarray, root: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return L and M = (D⁻¹ + A)⁻¹, L Lᵀ = I + √D A √D, given A (k, k) and √D (k,)."""
-    P = root[:, None] * A * root
-    P.ravel()[:: root.size + 1] += 1.0
-    factor, _ = dpotrf(P.T, lower=1, overwrite_a=1)
+    factor, _ = dpotrf(precision(A, root).T, lower=1, overwrite_a=1)
     half, _ = dpotri(factor, lower=1)
     inverse = half + half.T  # above its diagonal, half is 0
     inverse.ravel(order="K")[:: root.size + 1] *= 0.5

@@ -81,11 +81,19 @@ class Posterior:
     log_det: float
 
 
+def precision(A: np.ndarray, root: np.ndarray) -> np.ndarray:
+    """Return I + √D A √D (k, k), given A = JᵀJ (k, k) and √D (k,), with what rounding may have taken from it on its
+    diagonal: sensitivities of a million levels of the noise leave no room for the 1 of the prior.
+    """
+    scaled = root[:, None] * A * root
+    scaled.ravel()[:: root.size + 1] += 1.0 + root.size * np.finfo(float).eps * np.trace(scaled)
+    return scaled
+
+
 def posterior(q: Quadratic, D: np.ndarray) -> Posterior:
     """Return what the data say under prior variances D (k,)."""
     root = np.sqrt(D)
-    scaled = np.eye(D.size) + root[:, None] * q.A * root
-    factor = np.linalg.cholesky(scaled)
+    factor = np.linalg.cholesky(precision(q.A, root))
     half = np.linalg.solve(factor, np.diag(root))
     M = half.T @ half
     z = M @ q.b

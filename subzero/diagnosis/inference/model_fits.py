@@ -29,7 +29,7 @@ from subzero.diagnosis.hypothesis.noise import Noise, Usual, log_prior_of
 from subzero.diagnosis.hypothesis.noise_estimate import Behind, estimate
 from subzero.diagnosis.inference import settings
 from subzero.diagnosis.inference.linear_gaussian import KAPPAS, Linear, Quadratic, posterior
-from subzero.diagnosis.inference.map_fit import Candidate, Fit, candidate_of, refit
+from subzero.diagnosis.inference.map_fit import Candidate, Fit, candidate_of, is_poor_fit, refit
 from subzero.diagnosis.inference.posing import sensor_of, whitened_again, with_finer_steps, with_noise_behind
 from subzero.diagnosis.inference.screening import Screening, screening_of
 
@@ -237,11 +237,18 @@ class Fits:
         self.candidates = {
             ids: replace(one, fit=_rewhitened(one.fit, again)) for ids, one in self.candidates.items()
         }
-        self.wide, self.economical = _rewhitened(self.wide, again), found
+        self.wide, self.economical = self._nearer(_rewhitened(self.wide, again)), found
         self.nominal = again(self.nominal[0]), again(self.nominal[1])
         self.problem = found
         self.screen = screening_of(found, self.wide, self.nominal, far=self.screen.far)
         return True
+
+    def _nearer(self, wide: Fit) -> Fit:
+        """Return a wide fit, or the best one where that comes closer to the records under the noise behind it: far from
+        them the linear problem says nothing of other causes.
+        """
+        best = self.best().fit
+        return best if is_poor_fit(wide) and best.r @ best.r < wide.r @ wide.r else wide
 
     def _give_up(self, best: Candidate) -> None:
         """Give up what is hopelessly behind the best candidate and no part of it."""
