@@ -32,6 +32,7 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from scipy.special import gammaln
 
 from subzero.diagnosis.hypothesis.data_error import DataError
 from subzero.diagnosis.hypothesis.logged import Logged
@@ -174,20 +175,28 @@ def _others(values: np.ndarray, value: float) -> np.ndarray:
 
 
 def _values_again(values: np.ndarray, level: float) -> Mapping[float, np.ndarray]:
-    """Return value → where it stands for nothing (n,), of a channel that is not rounded: several runs of one value,
-    which no chance makes, are no measurement, however close to it the channel is. Of the others most are different.
+    """Return value → where it stands for nothing (n,), of a channel that is not rounded: one that comes in several runs,
+    and more often than any chance makes it where the others hardly come twice.
+
+    A sample of N others shares its value with λ = (1 + Σ n (n − 1))/N more on average, n as often as each comes.
     """
-    known = np.flatnonzero(np.isfinite(values))
-    if known.size <= FEWEST_FROZEN:
-        return {}
-    runs = _runs(values[known])
-    unlikely = _unlikely(runs, known.size)
-    kept = values[known][np.repeat(~unlikely, runs.length)]
-    is_fine = 2 * np.unique(kept).size > kept.size and resolution_of(values[known], level) == 0.0
-    if not unlikely.any() or not is_fine:
-        return {}
-    again, times = np.unique(values[known][runs.first[unlikely]], return_counts=True)
-    return {value: values == value for value in again[times > 1].tolist()}
+    found, left = dict[float, np.ndarray](), values
+    distinct, counts = np.unique(values[np.isfinite(values)], return_counts=True)
+    for value in distinct[np.argsort(-counts)][: np.count_nonzero(counts >= FEWEST_FAR)].tolist():
+        at, others = left == value, left[left != value]
+        _, times = np.unique(others[np.isfinite(others)], return_counts=True)
+        if times.sum() < FEWEST_FROZEN or resolution_of(others, level) > 0.0:
+            return found
+        shared, more = (1.0 + float(np.sum(times * (times - 1)))) / times.sum(), np.count_nonzero(at) - 1
+        log_chance = more * np.log(shared) - gammaln(more + 1.0) + np.log(distinct.size)
+        if _is_in_several_runs(at[np.isfinite(values)]) and log_chance < -CLEAR_LOG_ODDS:
+            found[value], left = at, np.where(at, np.nan, left)
+    return found
+
+
+def _is_in_several_runs(at: np.ndarray) -> bool:
+    """Say whether what is true (n,) is so in more than one run."""
+    return np.count_nonzero(np.diff(at, prepend=False).astype(bool) & at) > 1
 
 
 def _is_far(value: float, at: int, values: np.ndarray, others: np.ndarray, level: float) -> bool:
