@@ -205,13 +205,15 @@ class Search(Fits):
 
     def fit_from_nominal(self) -> None:
         """Fit causes by themselves that real runs of some sizes, from the nominal model, have before all that is known:
-        of what bends runs the linear problem at a wide fit says little. Nothing to be done where they were so fitted
-        from afar, or where nothing seems wrong.
+        of what bends runs the linear problem at a wide fit says little. Where only wide tolerances explain the records,
+        so are the best of them in any case. Nothing to be done where they were so fitted from afar, or where nothing
+        seems wrong.
         """
         if self.screen.far or not (self.best().ids or self.is_poor()):
             return
         swept = swept_from_nominal(self.problem, *self.nominal)
-        for ids in _best_of(self._unknown(swept.log_posterior), self.best().log_posterior):
+        least = -np.inf if self.is_poor() else self.best().log_posterior
+        for ids in _best_of(self._unknown(swept.log_posterior), least):
             self._say(0.4, "fitting", ids, " by itself")
             self._take(candidate_of(self.problem, ids, self._alone(ids, swept.starts[ids])))
 
