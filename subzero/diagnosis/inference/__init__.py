@@ -17,15 +17,15 @@ add, drop, swap and merge causes                          model_search
 probabilities, decision rule                              model_average
 onsets, ranked by linear evidence                         change_point_scan
 onsets, fitted                                            change_point_fit
-a force or a drift as a process over time                 latent_force
+a force or a drift over time, and shapes of a formula     latent_force
 its evidence and its history                              input_estimation
-features and shapes of a formula                          basis
 a formula for a latent force                              force_formula
 change points, forces and drifts beside the hypotheses    out_of_catalogue
 values that a record repeats in place of measurements     repeated_values
 what physics may do with a record, its linear evidence    data_error_yardstick
 errors in the data, proposed by linear evidence           data_error_scan
-... suspected together, and how close a few causes come   data_error_search
+how close a few causes come to a record                   few_causes
+errors in the data, suspected together                    data_error_search
 ... how probable a set of them is                         data_error_evidence
 ... and held against all else                             data_error_choice
 all that only steers the search                           settings
@@ -111,9 +111,9 @@ from subzero.diagnosis.inference.latent_force import (
     force_columns,
     history,
     knots_of,
+    one_terms,
     without_force,
 )
-from subzero.diagnosis.inference.basis import one_terms
 from subzero.diagnosis.inference.input_estimation import (
     estimate_drift,
     estimate_force,

@@ -6,35 +6,20 @@ what is not needed any more is dropped, the weakest first. So the first of two e
 something else while the second was there, is judged as the second is: by what it adds. A clock that is late by less
 than an error is a cause, but no linear one: where both explain more, errors are judged beside it.
 
-How far physics comes towards a record without them is looked at before any search, too:
-
-    G = max over sets of at most MAX_CAUSES terms of  log p(y | terms) p(terms) − log p(y | nothing) p(nothing)
-
-A term is a cause, throughout or from some time of a grid on, which is what a late clock looks like. The set grows by
-the term that gains most; the scales of the noise are found anew behind each set, as in `data_error_yardstick`, which
-has nothing and single causes only. An error of the data that is far ahead of that, and of single causes at sizes that
-are simulated, needs no search of the record as it is.
+How far physics comes towards a record without them is looked at before any search, too (`few_causes`): an error of the
+data that is far ahead of that needs no search of the record as it is.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
 from subzero.diagnosis.hypothesis.data_error import DataError, corrected
-from subzero.diagnosis.hypothesis.hypotheses import MAX_CAUSES, PRIOR, columns_of, nameable, variances
 from subzero.diagnosis.hypothesis.logged import Logged
-from subzero.diagnosis.inference.change_point_scan import (
-    BaseRun,
-    Begun,
-    gain_of,
-    in_rough_steps,
-    onset_columns,
-)
 from subzero.diagnosis.inference.data_error_scan import (
     FAR_BEHIND,
     Suspect,
@@ -46,23 +31,14 @@ from subzero.diagnosis.inference.data_error_scan import (
     suspects,
 )
 from subzero.diagnosis.inference.data_error_yardstick import (
-    KAPPA_NARROW,
-    Linear,
-    Reckoned,
-    Term,
     Yardstick,
-    generous_variances,
-    least_scale,
-    to_usual_sizes,
     yardstick_of,
 )
-from subzero.diagnosis.inference.linear_gaussian import ForceInformation, Posterior, freed, seen
+from subzero.diagnosis.inference.few_causes import most_of_one_cause, most_of_physics
 from subzero.diagnosis.inference.map_fit import bounds
 from subzero.diagnosis.inference.posing import posed_again
 from subzero.diagnosis.inference.problem import Problem
 from subzero.diagnosis.inference.repeated_values import may_be_measured, repeated_values, steps_off_grid
-from subzero.diagnosis.inference.screening import sizes_tried, slope_at
-from subzero.diagnosis.inference.settings import MERGED_SCALES
 
 MOST_ERRORS = 3
 """Of a record, beside values that are repeated."""
@@ -75,6 +51,9 @@ ALIKE_LEAD = 3.0
 CLEAR_LEAD, CLEAR_GENEROUS_LEAD = 50.0, 10.0
 """With a greater lead over physics, in the linear problem, an error needs no search of the record as it is: over
 nothing and every cause, where the linear problem may err by tens of nats, and over all causes at once."""
+LEAST_SHARE = 0.5
+"""An error that something a vehicle does may look like needs no such search, either, if physics explains no more than
+the rest of what it does: the linear problem has missed a third of the evidence of a current of 0.3 m/s."""
 LOUD = 2.5
 """Noise of more usual levels hides a misfit. [-]"""
 SIGNATURE_LEAD = 60.0
@@ -294,18 +273,27 @@ class _Against:
         return bool(some) and self.lead(some, most_of_physics) + beside < -FAR_BEHIND
 
     def are_far_ahead(self, some: Sequence[DataError]) -> bool:
-        """Say whether some errors are far ahead of a few causes, and of one of any size, with all others corrected."""
-        return all(self.lead(some, physics) > FAR_BEHIND for physics in (most_of_physics, most_of_one_cause))
+        """Say whether some errors are far ahead of a few causes, and of one of any size, with all others corrected:
+        where these explain most of what the errors do, the rest may be what the linear problem does not know.
+        """
+        least = max(FAR_BEHIND, LEAST_SHARE * self._alone(some))
+        return all(self.lead(some, physics) > least for physics in (most_of_physics, most_of_one_cause))
 
     def lead(self, some: Sequence[DataError], physics: Physics) -> float:
         """Return by how much some errors are more probable than some physics, with all others corrected."""
-        held = [one for one in self.errors if not any(one is other for other in some)]
-        lead = -self._beside(held, physics)
+        return self._alone(some) - self._beside(self._others(some), physics)
+
+    def _alone(self, some: Sequence[DataError]) -> float:
+        """Return by how much some errors are more probable than none, with all others corrected."""
+        held, lead = self._others(some), 0.0
         for one in some:
             place = sum(self._at(other) < self._at(one) for other in held)
             lead += judged_as_it_is(self.begun.after(held, place), one).lead
             held.insert(place, one)
         return lead
+
+    def _others(self, some: Sequence[DataError]) -> list[DataError]:
+        return [one for one in self.errors if not any(one is other for other in some)]
 
     def _at(self, one: DataError) -> int:
         return next(i for i, other in enumerate(self.errors) if other is one)
@@ -353,129 +341,3 @@ def without(records: Sequence[Logged], found: Sequence[SuspectedError]) -> list[
         corrected(logged, tuple(one.error for one in found if one.record == i))
         for i, logged in enumerate(records)
     ]
-
-
-class Further(NamedTuple):
-    """A further term: its log prior, and about the log evidence with it; the linear problem then."""
-
-    log_prior: float
-    log_evidence: float
-    beside: Callable[[], Linear]
-
-
-def most_of_physics(problem: Problem, record: int) -> float:
-    """Return by how much a few causes, throughout or from mid-trial on, are more probable than none. [nat]
-
-    Args:
-        problem: of all records as they are, as posed.
-        record: its number.
-    """
-    here = _linear(problem, record)
-    begun = _begun(problem, record, here)
-    now, log_prior = here.reckoned(), float(np.log(PRIOR["none"]))
-    best = none = now.log + log_prior
-    for _ in range(MAX_CAUSES):
-        further = [*_causes(problem, here, now), *_onsets(problem, here, now, begun)]
-        one = max(further, key=lambda each: each.log_evidence + each.log_prior)
-        here, log_prior = one.beside(), log_prior + one.log_prior
-        now = here.reckoned()
-        if now.log + log_prior <= best:
-            break
-        best = now.log + log_prior
-    return best - none
-
-
-def most_of_one_cause(problem: Problem, record: int) -> float:
-    """Return by how much the best cause of the sizes that are simulated is more probable than none: the linear problem
-    at the nominal model says little of a large one. [nat]
-
-    Args:
-        problem: of all records as they are, as posed.
-        record: its number.
-    """
-    here, names = _linear(problem, record), nameable(problem.entries)
-    none = here.reckoned().log + float(np.log(PRIOR["none"]))
-    each = [one.reckoned().log for one in _at_sizes(problem, record, here)]
-    return max(each, default=-np.inf) + float(np.log(PRIOR["single"] / len(names))) - none
-
-
-def _at_sizes(problem: Problem, record: int, here: Linear) -> Iterator[Linear]:
-    """Give the linear problem of a record at each size of each cause that is simulated, with that cause free."""
-    zero, wide = np.zeros(len(problem.entries)), generous_variances(problem)
-    sizes = {k: sizes_tried(entry.parameter, MERGED_SCALES)
-             for k, entry in enumerate(problem.entries) if entry.record < 0}  # fmt: skip
-    jobs = [(k, size) for k, some in sizes.items() for size in some]
-    moved = [np.concatenate([zero[:k], [size], zero[k + 1 :]]) for k, size in jobs]
-    of: dict[int, dict[float, np.ndarray]] = {k: {0.0: here.r} for k in sizes}
-    for (k, size), z, track in zip(jobs, moved, problem.tracks([(record, z) for z in moved]), strict=True):
-        of[k][size] = problem.whitened(record, problem.setting(record, z), track, measured=True)
-    for k, size in jobs:
-        column = slope_at(of[k], size)
-        if np.isfinite(of[k][size]).all() and np.isfinite(column).all():
-            J, D = here.J.copy(), here.D.copy()
-            J[:, k], D[k] = column, wide[k]
-            yield replace(here, r=of[k][size] + column * size, J=J, D=D)
-
-
-def _linear(problem: Problem, record: int) -> Linear:
-    """Return the linear problem of a record, with wide tolerances; what does nothing while it is small is moved to a
-    usual size.
-    """
-    zero, seen_ = np.zeros(len(problem.entries)), problem.records[record]
-    places = [k for k, entry in enumerate(problem.entries) if entry.record in (-1, record)]
-    moved = [to_usual_sizes(problem, k, zero) for k in places]
-    base, *tracks = problem.tracks([(record, z) for z in (zero, *moved)])
-    plain = problem.whitened(record, seen_.setting, base)
-    J = np.zeros((plain.size, zero.size))
-    for k, z, track in zip(places, moved, tracks, strict=True):
-        J[:, k] = np.nan_to_num((problem.whitened(record, problem.setting(record, z), track) - plain) / z[k])
-    ends = np.cumsum([0, *(noise.count for noise in seen_.noise.values())]).tolist()
-    own = {name: slice(a, b) for name, a, b in zip(seen_.noise, ends[:-1], ends[1:], strict=True)}
-    nothing = np.zeros(0)
-    bare = {name: Term(nothing, nothing, 0.0, noise.count, -noise.log_scale, least_scale(noise), noise.count)
-            for name, noise in seen_.noise.items()}  # fmt: skip
-    r = problem.whitened(record, seen_.setting, base, measured=True)
-    return Linear(r=r, J=J, D=variances(problem.entries, (), KAPPA_NARROW), own=own, bare=bare)
-
-
-def _begun(problem: Problem, record: int, here: Linear) -> dict[Begun, np.ndarray]:
-    """Return what causes that begin at times of a grid change in the rows of a record (m, parameters)."""
-    along = in_rough_steps(BaseRun(problem, np.zeros(len(problem.entries))))
-    before = sum(noise.count for one in problem.records[:record] for noise in one.noise.values())
-    columns = onset_columns(along, problem.sudden_effects, record)
-    return {pair: C[before : before + here.r.size] for pair, C in columns.items()}
-
-
-def _causes(problem: Problem, here: Linear, now: Reckoned) -> Iterator[Further]:
-    """Give every cause that holds throughout."""
-    names, wide = nameable(problem.entries), generous_variances(problem)
-    base = Posterior(z=now.z, M=now.M, log_evidence=now.log, log_det=0.0)
-    price = float(np.log(PRIOR["single"] / len(names)))
-    for name in names:
-        at = columns_of(problem.entries, (name,))
-        D = here.D.copy()
-        D[at] = wide[at]
-        if not np.array_equal(D, here.D):
-            yield Further(price, float(freed(base, here.D, at, D[at])[0]), partial(replace, here, D=D))
-
-
-def _onsets(
-    problem: Problem, here: Linear, now: Reckoned, begun: Mapping[Begun, np.ndarray]
-) -> Iterator[Further]:
-    """Give every cause from every time on."""
-    if not begun:
-        return
-    J, r = here.scaled(now.scales, here.J), here.scaled(now.scales, here.r)
-    C = here.scaled(now.scales, np.hstack(list(begun.values())))
-    data = seen(J.T @ J, J.T @ r, here.D, J, C, r)
-    ends = np.cumsum([0, *(columns.shape[1] for columns in begun.values())]).tolist()
-    price = float(np.log(PRIOR["sudden"] / len(begun)))
-    for (effect, time), a, b in zip(begun, ends[:-1], ends[1:], strict=True):
-        gain = gain_of(ForceInformation(data.M[a:b, a:b], data.q[a:b]), effect)[0]
-        more = np.array([parameter.scale**2 for parameter in effect.parameters])
-        yield Further(price, now.log + gain, partial(_with_columns, here, begun[effect, time], more))
-
-
-def _with_columns(here: Linear, C: np.ndarray, D: np.ndarray) -> Linear:
-    """Return a linear problem with further columns (m, p), and their prior variances (p,)."""
-    return replace(here, J=np.hstack([here.J, C]), D=np.append(here.D, D))

@@ -392,37 +392,3 @@ def shown_on_grid(setting: Setting, track: Track, names: Iterable[str]) -> dict[
     if setting.clock_offset:
         shown = {name: np.interp(grid - setting.clock_offset, grid, one) for name, one in shown.items()}
     return shown
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Linear:
-    """The linear problem of a record at the nominal model, whitened with the noise of usual sensors.
-
-    Attributes:
-        r: residual (m,).
-        J: sensitivities to what is free (m, k).
-        D: prior variances (k,).
-        own: channel → its rows.
-        bare: channel → what it says of nothing, but for its sums.
-    """
-
-    r: np.ndarray
-    J: np.ndarray
-    D: np.ndarray
-    own: Mapping[str, slice]
-    bare: Mapping[str, Term]
-
-    def reckoned(self) -> Reckoned:
-        """Return its evidence, with the scales of the noise that are best."""
-        return reckon(stacked({name: self._term(name, rows) for name, rows in self.own.items()}), self.D)
-
-    def _term(self, name: str, rows: slice) -> Term:
-        r, J = self.r[rows], self.J[rows]
-        return self.bare[name]._replace(A=J.T @ J, b=J.T @ r, rr=float(r @ r))
-
-    def scaled(self, scales: Mapping[str, float], values: np.ndarray) -> np.ndarray:
-        """Return values (m, …) in noise of these scales."""
-        found = values.copy()
-        for name, rows in self.own.items():
-            found[rows] /= scales[name]
-        return found

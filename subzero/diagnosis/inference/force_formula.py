@@ -1,6 +1,6 @@
-"""A formula for a latent force: sparse regression on the dictionary of `basis`, by evidence from the data themselves.
+"""A formula for a latent force: sparse regression on the shapes of `latent_force`, by evidence from the data themselves.
 
-    w(t) = Σ c_j φ_j(t),   φ_j of `basis`;      c ~ N(0, (a/rms φ)²), amplitudes a mixed
+    w(t) = Σ c_j φ_j(t),   φ_j of `latent_force`;      c ~ N(0, (a/rms φ)²), amplitudes a mixed
     log p = log evidence of the sum (tolerances free) + log prior of its features and of their number
 
 The smoothed history enters only through what the data say of it (`ForceInformation`): nothing is fitted to a curve that
@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from subzero.diagnosis.inference.basis import (
+from subzero.diagnosis.inference.latent_force import (
     SHAPE_STEP_S,
     Shape,
     all_shapes,
@@ -26,8 +26,8 @@ from subzero.diagnosis.inference.basis import (
     shape_weight,
     shifted,
     size_of,
+    usual_force,
 )
-from subzero.diagnosis.inference.latent_force import usual_force
 from subzero.diagnosis.inference.linear_gaussian import AMPLITUDE_SHARES, ForceInformation, log_sum
 
 if TYPE_CHECKING:

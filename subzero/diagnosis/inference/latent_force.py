@@ -1,24 +1,40 @@
-"""A latent force on one axis as further parameters of the problem; and the drift of a sensor.
+"""A latent force on one axis: as further parameters of the problem, and as short formulas; and the drift of a sensor.
 
     w(t) = Σ f_k Λ((t − t_k)/Δ) on one axis,   f ~ a Gaussian process        (Λ: hat function)
 
 An effect like any other: its parameters are the knots f_k, or modes x of the process (f = L x, x ~ N(0, I)), so that
 sensitivities and fits are those of `problem` and `map_fit`. Records have histories of their own. A drift is the same in
 one channel, without a simulation. How probable either is, `input_estimation` finds.
+
+A Gaussian process costs evidence for every second in which it is free to change; a drag that grows all the time, or a
+push that lasts for some seconds, is told by one number. So there is a dictionary of formulas, with prior probabilities:
+
+    φ(t) = feature(state(t)) · window(t),   window = 1,  [t ≥ t₀],  [t₀ ≤ t < t₁],  exp(−t/T);   or  cos ωt, sin ωt
+
+Features are those of `external_force`, along a fitted track; those that usually act along an axis have a larger prior.
+`one_terms` gives the formulas of one term.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import replace
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+import vehicle
+from subzero.diagnosis.hypothesis.configuration import LENGTH, RUDDER, WATER
 from subzero.diagnosis.hypothesis.effect import Effect, Parameter
 from subzero.diagnosis.hypothesis.hypotheses import Entry
-from subzero.external_force import AXES, MissingForce
+from subzero.diagnosis.inference.linear_gaussian import Terms, log_sum
+from subzero.diagnosis.inference.simulator import simulate_track
+from subzero.external_force import AXES, FACTORS, FEATURES, MissingForce, feature_value, fill_factors
+from vehicle.dynamics import relative_velocity
+from vehicle.kinematics import rotation
+from vehicle.motor import shaft_speed
+from vehicle.state import CHARGE, SHAFT
 
 if TYPE_CHECKING:
     from subzero.diagnosis.hypothesis.configuration import Setting
@@ -35,6 +51,20 @@ AXIS_WORDS = {
 FORCE, DRIFT = "unknown_force:", "sensor_drift:"
 MAX_DRIFT_LEVELS = 20.0
 """A drift can be this many usual noise levels of the sensor; a wander of one level is noise."""
+SHAPE_STEP_S = 0.1
+"""Shapes are sampled so often. [s]"""
+DECAY_TIMES_S = (3.0, 6.0, 12.0)
+"""Times in which a force dies away. [s]"""
+WAVE_PERIODS_S = (1.5, 12.0)
+"""Of waves, the shortest and the longest; frequencies in between are a quarter of a turn of the trial apart. [s]"""
+SWITCHED = ("constant", "u|u|", "n|n|", "n u", "rudder_angle*u2", "stern_plane*u2")
+"""Features that may begin, end or die away; what grows by itself (time, length, depth) or answers (sway) does not."""
+EDGE_NUDGES_S = (-0.8, -0.6, -0.4, -0.2, 0.0, 0.2, 0.4, 0.6, 0.8)
+"""By how much edges of windows are moved in the end. [s]"""
+MIN_WINDOW_S = 1.0
+"""No window is shorter. [s]"""
+ZERO_SIZE = 1e-9
+"""A shape that is nowhere larger is none."""
 
 
 class Knots(NamedTuple):
@@ -129,3 +159,199 @@ def all_columns(problem: Problem, z: np.ndarray, knots: Knots) -> dict[str, np.n
     forces = {FORCE + axis: C for axis, C in force_columns(problem, z, AXES, knots).items()}
     channels = problem.records[0].noise
     return {**forces, **{DRIFT + channel: drift_columns(problem, channel, knots) for channel in channels}}
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Shape:
+    """One term of a formula.
+
+    Attributes:
+        feature: of FEATURES, or "wave".
+        words: what it is.
+        columns: φ at the samples (n, 1), or (n, 2) for a wave.
+        start, end: of its window; None if it holds throughout. [s]
+        decay: time in which it dies away; 0 if it does not. [s]
+        log_prior: how much less probable it is than its plain feature, by the number of its windows.
+    """
+
+    feature: str
+    words: str
+    columns: np.ndarray
+    start: float | None = None
+    end: float | None = None
+    decay: float = 0.0
+    log_prior: float = 0.0
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether it is a feature that holds throughout: what a model can have as a term."""
+        return self.feature in FEATURES and self.start is None and self.decay == 0.0
+
+
+def factors_along(setting: Setting, times: np.ndarray) -> np.ndarray:
+    """Return the factors of features (n, len(FACTORS)) along the run of a setting, at times (n,). [s]"""
+    grid, track = simulate_track(setting)
+    rows = track[np.searchsorted(grid, times + 1e-9, side="right") - 1]
+    commands = setting.trial.commands
+    assert commands is not None
+    told = commands.at(times)
+    found, numbers = np.zeros((times.size, len(FACTORS))), setting.model.vehicle.numbers()
+    R, nu_r = np.zeros((3, 3)), np.zeros(6)
+    for out, row, command, time in zip(found, rows, told, times, strict=True):
+        state = np.ascontiguousarray(row[: vehicle.STATE_SIZE])
+        rotation(state[3:7], R)
+        relative_velocity(state, R, np.ascontiguousarray(row[WATER : WATER + 3]), nu_r)
+        n = shaft_speed(state[SHAFT], state[CHARGE], command[0], nu_r[0], numbers.motor, numbers.propeller)
+        _, port, starboard = vehicle.deflections(state, command, numbers)
+        fill_factors(nu_r, n, row[RUDDER], 0.5 * (port + starboard), row[LENGTH], time, state[2], out)
+    return found
+
+
+def plain_shapes(factors: np.ndarray) -> list[Shape]:
+    """Return every feature, as it holds throughout; without those that are 0."""
+    found = [
+        Shape(feature=name, words=feature.words, columns=feature_value(name, factors)[:, None])
+        for name, feature in FEATURES.items()
+    ]
+    return _acting(found)
+
+
+def windowed(shape: Shape, times: np.ndarray, edges: np.ndarray) -> list[Shape]:
+    """Return a plain shape from every edge on, and between any two of them. [s]"""
+    pairs = [(a, b) for a in edges for b in edges if b - a >= MIN_WINDOW_S]
+    log_prior = -float(np.log(2.0 * edges.size + 2.0 * len(pairs)))
+    found = [
+        _between(shape, times, a, None, log_prior + np.log(len(pairs) / edges.size)) for a in edges if a > 0.0
+    ]
+    found += [_between(shape, times, a, b, log_prior) for a, b in pairs]
+    return _acting(found)
+
+
+def shifted(shape: Shape, plain: Shape, times: np.ndarray) -> list[Shape]:
+    """Return a windowed shape with its edges moved by less than the grid that they were found on, where it is not 0."""
+    if shape.start is None or shape.decay:
+        return [shape]
+    ends = [None] if shape.end is None else [shape.end + by for by in EDGE_NUDGES_S]
+    found = [
+        _between(plain, times, shape.start + by, end, shape.log_prior) for by in EDGE_NUDGES_S for end in ends
+    ]
+    return _acting(found)
+
+
+def _acting(shapes: list[Shape]) -> list[Shape]:
+    """Return the shapes that are not 0 throughout."""
+    return [one for one in shapes if np.abs(one.columns).max() > ZERO_SIZE]
+
+
+def _between(shape: Shape, times: np.ndarray, start: float, end: float | None, log_prior: float) -> Shape:
+    last = np.inf if end is None else end
+    inside = np.where((times >= start - 1e-9) & (times < last - 1e-9), 1.0, 0.0)
+    when = f"from {start:g} s on" if end is None else f"from {start:g} to {end:g} s"
+    return Shape(feature=shape.feature, words=f"{shape.words}, {when}", columns=shape.columns * inside[:, None],
+                 start=float(start), end=None if end is None else float(end), log_prior=float(log_prior))  # fmt: skip
+
+
+def decaying(shape: Shape, times: np.ndarray, edges: np.ndarray) -> list[Shape]:
+    """Return a plain shape that begins at an edge and dies away, in several times."""
+    log_prior = -float(np.log(8.0 * len(DECAY_TIMES_S)))
+    found = [_dying(shape, times, 0.0, T, log_prior) for T in DECAY_TIMES_S]
+    found += [
+        _dying(shape, times, edge, T, log_prior - np.log(edges.size))
+        for T in DECAY_TIMES_S
+        for edge in edges[1:]
+    ]
+    return _acting(found)
+
+
+def _dying(shape: Shape, times: np.ndarray, start: float, T: float, log_prior: float) -> Shape:
+    """Return exp(−(t − start)/T) times a shape, 0 before the start."""
+    window = np.where(times >= start - 1e-9, np.exp(-np.maximum(times - start, 0.0) / T), 0.0)
+    when = f"from {start:g} s on, dying away in {T:g} s" if start else f"dying away in {T:g} s"
+    return Shape(feature=shape.feature, words=f"{shape.words}, {when}", columns=shape.columns * window[:, None],
+                 start=float(start) or None, decay=T, log_prior=float(log_prior))  # fmt: skip
+
+
+def waves(times: np.ndarray) -> list[Shape]:
+    """Return waves of several periods, of any phase."""
+    apart = 0.25 / (times[-1] - times[0])
+    periods = 1.0 / np.arange(1.0 / WAVE_PERIODS_S[1], 1.0 / WAVE_PERIODS_S[0], apart)
+    log_prior = -float(np.log(periods.size))
+    return [
+        Shape(feature="wave", words=f"a wave with a period of {period:.2g} s", log_prior=log_prior,
+              columns=np.column_stack([trig(2.0 * np.pi * times / period) for trig in (np.cos, np.sin)]))
+        for period in periods
+    ]  # fmt: skip
+
+
+def samples_of(end: float) -> np.ndarray:
+    """Return the times that shapes are sampled at. [s]"""
+    return np.arange(0.0, end + 0.5 * SHAPE_STEP_S, SHAPE_STEP_S)
+
+
+def at_knots(times: np.ndarray, knots: np.ndarray) -> np.ndarray:
+    """Return the matrix (knots, times) that turns values at times into those of the hat functions closest to them."""
+    spacing = knots[1] - knots[0]
+    hats = np.maximum(1.0 - np.abs(np.subtract.outer(times, knots)) / spacing, 0.0)
+    return np.linalg.pinv(hats)
+
+
+SENSIBLE_FEATURES: Mapping[str, tuple[str, ...]] = {
+    "X": ("u|u|", "constant", "n|n|", "n u", "wet_length*u2", "wet_length", "time*u2"),
+    "Y": ("uv", "ur", "constant", "rudder_angle*u2", "v|v|", "u|u|"),
+    "Z": ("constant", "time", "uw", "uq", "stern_plane*u2", "w|w|", "u|u|", "depth"),
+    "K": ("n|n|", "constant", "p|p|", "u|u|"),
+    "M": ("uw", "uq", "constant", "stern_plane*u2", "q|q|", "u|u|"),
+    "N": ("uv", "ur", "rudder_angle*u2", "r|r|", "constant", "u|u|", "n|n|"),
+}
+"""What usually acts along an axis, and what is therefore more probable beforehand."""
+ODD_FEATURE_PRIOR = 0.25
+"""Prior of another feature beside a sensible one."""
+
+
+def all_shapes(factors: np.ndarray, times: np.ndarray) -> list[Shape]:
+    """Return every shape that is tried, from the factors of features at times."""
+    plain = plain_shapes(factors)
+    edges = np.arange(0.0, times[-1], 1.0 if times[-1] < 40.0 else 2.0)
+    able = [one for one in plain if one.feature in SWITCHED]
+    parts = [[*windowed(one, times, edges), *decaying(one, times, edges)] for one in able]
+    return plain + [shape for part in parts for shape in part] + waves(times)
+
+
+def size_of(shape: Shape) -> float:
+    """Return the size of a shape where it is not 0."""
+    inside = np.any(shape.columns != 0.0, axis=1)
+    return float(np.sqrt(np.mean(shape.columns[inside] ** 2)))
+
+
+def shape_weight(shape: Shape, axis: str) -> float:
+    """Return how probable a shape is along an axis beforehand, as a logarithm, but for a common constant."""
+    return shape.log_prior + (
+        0.0 if shape.feature in SENSIBLE_FEATURES[axis] else float(np.log(ODD_FEATURE_PRIOR))
+    )
+
+
+def one_terms(problem: Problem, z: np.ndarray, knots: Knots) -> Mapping[str, Terms]:
+    """Return axis → formulas of one term, each in one record, along the runs of z."""
+    records = range(len(problem.records))
+    parts = [_of_record(problem, z, knots, record) for record in records]
+    phi = np.hstack([one for one, _ in parts])
+    return {axis: Terms(phi, _normal([weights[axis] for _, weights in parts])) for axis in AXES}
+
+
+def _of_record(
+    problem: Problem, z: np.ndarray, knots: Knots, record: int
+) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """Return the terms of a record at all knots (n, terms), 0 in other records, and axis → log weights (terms,)."""
+    own = knots.record == record
+    times = samples_of(float(knots.time[own][-1]))
+    shapes = all_shapes(factors_along(problem.setting(record, z), times), times)
+    single = [shape for shape in shapes if shape.columns.shape[1] == 1]
+    phi = np.zeros((knots.time.size, len(single)))
+    phi[own] = at_knots(times, knots.time[own]) @ np.hstack([one.columns / size_of(one) for one in single])
+    return phi, {axis: np.array([shape_weight(one, axis) for one in single]) for axis in AXES}
+
+
+def _normal(weights: list[np.ndarray]) -> np.ndarray:
+    """Return log weights that sum to 1 in all."""
+    every = np.concatenate(weights)
+    return every - log_sum(every)

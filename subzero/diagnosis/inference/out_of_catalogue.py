@@ -16,7 +16,6 @@ import numpy as np
 
 from subzero.diagnosis.hypothesis.hypotheses import PRIOR, Ids, variances
 from subzero.diagnosis.inference import settings
-from subzero.diagnosis.inference.basis import one_terms
 from subzero.diagnosis.inference.change_point_fit import FittedChangePoint, fit_change_points, linearised_at
 from subzero.diagnosis.inference.change_point_scan import BaseRun, LinearisationPoint
 from subzero.diagnosis.inference.input_estimation import (
@@ -33,6 +32,7 @@ from subzero.diagnosis.inference.latent_force import (
     all_columns,
     force_columns,
     knots_of,
+    one_terms,
 )
 from subzero.diagnosis.inference.linear_gaussian import KAPPAS, Linear, Terms, log_sum
 from subzero.diagnosis.inference.map_fit import is_poor_fit

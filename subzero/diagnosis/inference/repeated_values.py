@@ -175,8 +175,8 @@ def _others(values: np.ndarray, value: float) -> np.ndarray:
 
 
 def _values_again(values: np.ndarray, level: float) -> Mapping[float, np.ndarray]:
-    """Return value → where it stands for nothing (n,), of a channel that is not rounded: one that comes in several runs,
-    and more often than any chance makes it where the others hardly come twice.
+    """Return value → where it stands for nothing (n,), of a channel that is not rounded: what comes in several runs, and
+    more often than any chance makes it where the others hardly come twice.
 
     A sample of N others shares its value with λ = (1 + Σ n (n − 1))/N more on average, n as often as each comes.
     """
@@ -196,7 +196,7 @@ def _values_again(values: np.ndarray, level: float) -> Mapping[float, np.ndarray
 
 def _is_in_several_runs(at: np.ndarray) -> bool:
     """Say whether what is true (n,) is so in more than one run."""
-    return np.count_nonzero(np.diff(at, prepend=False).astype(bool) & at) > 1
+    return bool(np.count_nonzero(np.diff(at, prepend=False).astype(bool) & at) > 1)
 
 
 def _is_far(value: float, at: int, values: np.ndarray, others: np.ndarray, level: float) -> bool:

@@ -17,7 +17,6 @@ import numpy as np
 from subzero.diagnosis.assessment.identifiability import against, information, marginal
 from subzero.diagnosis.hypothesis.catalogue.sensors import SPECS
 from subzero.diagnosis.hypothesis.hypotheses import Ids, columns_of, variances
-from subzero.diagnosis.inference.basis import samples_of
 from subzero.diagnosis.inference.force_formula import Formula, describe
 from subzero.diagnosis.inference.input_estimation import (
     EstimatedForce,
@@ -26,7 +25,7 @@ from subzero.diagnosis.inference.input_estimation import (
     estimate_force,
     fit_beside_drift,
 )
-from subzero.diagnosis.inference.latent_force import AXIS_WORDS, DRIFT, FORCE, MAX_DRIFT_LEVELS
+from subzero.diagnosis.inference.latent_force import AXIS_WORDS, DRIFT, FORCE, MAX_DRIFT_LEVELS, samples_of
 from subzero.diagnosis.inference.linear_gaussian import KAPPAS, log_sum, posterior
 from subzero.diagnosis.inference.model_average import practical_causes
 from subzero.diagnosis.results import Cause, Estimate, Extended, Rival, Unknown
