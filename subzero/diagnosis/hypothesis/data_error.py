@@ -20,7 +20,7 @@ catalogue and no errors in the data: they have any size, errors in the data are 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -423,3 +423,17 @@ def corrected(logged: Logged, errors: tuple[DataError, ...]) -> Logged:
     for error in sorted(errors, key=lambda one: one.kind not in REPEATED):
         logged = error.corrected(logged)
     return logged
+
+
+SHIFTS = ("late_clock", "clock_rate", "latency")
+"""Kinds that put samples outside the trial."""
+
+
+def places(logged: Logged, errors: Iterable[DataError]) -> dict[str, np.ndarray]:
+    """Return channel → which of the samples that were written stands where without some errors (n,); NaN where none
+    does, as a clock puts it outside the trial, or it is no measurement.
+    """
+    count = np.arange(logged.record.time.size, dtype=float)
+    written = dataclasses.replace(logged.record, values=dict.fromkeys(logged.record.values, count))
+    moved = tuple(one for one in errors if one.kind in (*SHIFTS, *REPEATED))
+    return dict(corrected(dataclasses.replace(logged, record=written), moved).record.values)

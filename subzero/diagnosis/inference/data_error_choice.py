@@ -16,13 +16,13 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Protocol
 
 import numpy as np
 
-from subzero.diagnosis.hypothesis.data_error import corrected
+from subzero.diagnosis.hypothesis.data_error import SHIFTS, places
 from subzero.diagnosis.hypothesis.logged import Logged
 from subzero.diagnosis.inference.data_error_evidence import (
     ALIKE,
@@ -45,9 +45,6 @@ from subzero.diagnosis.inference.data_error_search import (
 )
 from subzero.diagnosis.inference.model_fits import log_evidence_of
 from subzero.diagnosis.inference.out_of_catalogue import Findings, is_explained, linear_of_first
-
-SHIFTS = ("late_clock", "clock_rate", "latency")
-"""Kinds that put samples outside the trial."""
 
 
 def is_clear(errors: Sequence[SuspectedError], work: Findings) -> bool:
@@ -151,14 +148,10 @@ def _inside(one: Explained, least: Explained, records: Sequence[Logged]) -> list
 
 
 def _places(logged: Logged, errors: Sequence[SuspectedError], record: int) -> dict[str, np.ndarray]:
-    """Return channel → which of the samples that were written stands where when clocks are put right (n,); -1 where
+    """Return channel → which of the samples that were written stands where when clocks are put right (n,); NaN where
     none does.
     """
-    count = np.arange(logged.record.time.size, dtype=float)
-    written = replace(logged.record, values=dict.fromkeys(logged.record.values, count))
-    shifts = tuple(one.error for one in errors if one.record == record and one.error.kind in SHIFTS)
-    shown = corrected(replace(logged, record=written), shifts).record.values
-    return {name: np.where(np.isfinite(column), column, -1.0) for name, column in shown.items()}
+    return places(logged, [one.error for one in errors if one.record == record and one.error.kind in SHIFTS])
 
 
 @dataclass(frozen=True, eq=False)

@@ -226,21 +226,13 @@ def _stuck(yardstick: Yardstick, error: DataError, as_is: Reckoned) -> float:
 
 def _lost(yardstick: Yardstick, error: DataError, terms: Mapping[str, Term], as_is: Reckoned) -> float:
     """Return what samples that are no measurements any more added to the evidence of the record as it is, on average;
-    of channels that are exchanged, gaps only change places; of one that may only stand still, what these samples added,
-    and the odds that it does not.
+    of one that may only stand still, what these samples added, and the odds that it does not.
     """
     if may_stand_still(yardstick, error):
         return _stuck(yardstick, error, as_is)
-    lost = {name: yardstick.own[name].measured - terms[name].measured for name in yardstick.own}
-    if not any(lost.values()) or sum(lost.values()) == 0:
+    if not any(yardstick.own[name].measured - terms[name].measured for name in yardstick.own):
         return 0.0
-    return sum(count * _mean_log_density(yardstick, name) for name, count in lost.items())
-
-
-def _mean_log_density(yardstick: Yardstick, name: str) -> float:
-    """Return what a measured sample of a channel adds to the evidence of the record as it is."""
-    own, scale = yardstick.own[name], yardstick.as_is.scales[name]
-    return (own.fixed - own.samples * (float(np.log(scale)) + 0.5)) / max(own.measured, 1)
+    return sum(yardstick.of_lost(name, lost, as_is) for name, lost in yardstick.lost_by(error).items())
 
 
 def _refined(yardstick: Yardstick, one: Suspect, group: Group) -> Suspect:

@@ -22,7 +22,7 @@ from scipy.linalg.lapack import dpotrf, dpotri
 
 from subzero.channels import HEADING, turned
 from subzero.diagnosis.hypothesis.configuration import Setting, sensed, truth
-from subzero.diagnosis.hypothesis.data_error import REPEATED, DataError, corrected
+from subzero.diagnosis.hypothesis.data_error import REPEATED, DataError, corrected, places
 from subzero.diagnosis.hypothesis.hypotheses import PRIOR, columns_of, nameable, variances
 from subzero.diagnosis.hypothesis.logged import Logged
 from subzero.diagnosis.hypothesis.noise import (
@@ -184,20 +184,30 @@ class Yardstick:
         return Between(low, x - low)
 
     def _term(self, logged: Logged, name: str, nominal: np.ndarray) -> Term:
-        time, values = logged.record.time, logged.record.values[name]
-        expected, usual = self.at(nominal, time), usual_of(name, values, logged.noise)
-        if name == HEADING:
-            values = turned(values, expected)
-        used = np.isfinite(values) & np.isfinite(expected)
-        measured = int(np.count_nonzero(used))
-        used[used] = ~spikes((values - expected)[used], max(usual.level, usual.resolution))
+        time, usual = logged.record.time, usual_of(name, logged.record.values[name], logged.noise)
+        left, used = self._left(logged, name, nominal)
+        measured = int(np.count_nonzero(np.isfinite(left)))
         noise, slopes = usual_noise(time, used, usual), self.slopes[name]
-        r, J = noise.whiten(values - expected), np.empty((noise.count, slopes.shape[1]))
+        r, J = noise.whiten(left), np.empty((noise.count, slopes.shape[1]))
         places = self._places(noise.time, slopes.shape[0])
         innovations_between(slopes, places, *noise.filter, J, np.empty(slopes.shape[1]))
         out = (measured - noise.count) * (OUTLIER_LOG_DENSITY - np.log(usual.level))
         fixed, least = out - noise.log_scale, least_scale(noise)
         return Term(J.T @ J, J.T @ r, float(r @ r), noise.count, fixed, least, measured)
+
+    def _left(self, logged: Logged, name: str, nominal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return measured − predicted of a channel (n,), and which samples are measured, and no outliers (n,)."""
+        values, expected = logged.record.values[name], self.at(nominal, logged.record.time)
+        left = (turned(values, expected) if name == HEADING else values) - expected
+        usual, used = usual_of(name, values, logged.noise), np.isfinite(left)
+        used[used] = ~spikes(left[used], max(usual.level, usual.resolution))
+        return left, used
+
+    @cached_property
+    def used(self) -> dict[str, np.ndarray]:
+        """Channel → which samples of the record as it is are measured, and no outliers (n,)."""
+        nominal = self.nominal_of(self.logged)
+        return {name: self._left(self.logged, name, nominal[name])[1] for name in self.own}
 
     @cached_property
     def own(self) -> dict[str, Term]:
@@ -249,6 +259,24 @@ class Yardstick:
         square = _square(own, as_is.z) - _square(rest, as_is.z)
         lost = own.samples - rest.samples
         return own.fixed - rest.fixed - lost * float(np.log(scale)) - 0.5 * square / scale**2
+
+    def lost_by(self, error: DataError) -> dict[str, np.ndarray]:
+        """Return channel → which samples of the record as it is are no measurements without a further error (n,)."""
+        there = (*self.corrected[: self.place], error, *self._later)
+        after, here = places(self.written, there), places(self.written, self.corrected)
+        lost = {name: np.isfinite(here[name]) & ~np.isin(here[name], after[name]) for name in self.own}
+        return {name: some & np.isfinite(self.logged.record.values[name]) for name, some in lost.items()}
+
+    def of_lost(self, name: str, lost: np.ndarray, as_is: Reckoned) -> float:
+        """Return what samples of a channel (n,) add to the log density of the record as it is: each as much as another
+        of its kind, a measurement or an outlier. That one of few more is an outlier is worth as much as ten others.
+        """
+        own, used, values = self.own[name], self.used[name], self.logged.record.values[name]
+        level = usual_of(name, values, self.logged.noise).level
+        of_outlier = OUTLIER_LOG_DENSITY - float(np.log(level))
+        fixed = own.fixed - (own.measured - own.samples) * of_outlier
+        mean = fixed / max(own.samples, 1) - float(np.log(as_is.scales[name])) - 0.5
+        return np.count_nonzero(lost & used) * mean + np.count_nonzero(lost & ~used) * of_outlier
 
     def sparse(self, terms: Mapping[str, Term]) -> float:
         """Return the log evidence of nothing, and of every cause by itself, mixed; within wide tolerances."""

@@ -1,4 +1,4 @@
-"""A formula for a latent force: sparse regression on the shapes of `latent_force`, by evidence from the data themselves.
+"""A formula for a latent force: sparse regression on shapes of `latent_force`, by evidence from the data themselves.
 
     w(t) = Σ c_j φ_j(t),   φ_j of `latent_force`;      c ~ N(0, (a/rms φ)²), amplitudes a mixed
     log p = log evidence of the sum (tolerances free) + log prior of its features and of their number

@@ -175,8 +175,8 @@ def _others(values: np.ndarray, value: float) -> np.ndarray:
 
 
 def _values_again(values: np.ndarray, level: float) -> Mapping[float, np.ndarray]:
-    """Return value → where it stands for nothing (n,), of a channel that is not rounded: what comes in several runs, and
-    more often than any chance makes it where the others hardly come twice.
+    """Return value → where it stands for nothing (n,), of a channel that is not rounded: what comes in several runs,
+    and more often than any chance makes it where the others hardly come twice.
 
     A sample of N others shares its value with λ = (1 + Σ n (n − 1))/N more on average, n as often as each comes.
     """
