@@ -43,6 +43,28 @@ def test_zeros_of_a_heading_that_is_about_zero_are_one_error():
     assert found.id == "dropout:heading=0"
 
 
+@pytest.mark.parametrize("runs", [(3, 3, 4), (7, 4, 3), (2, 1, 2)])
+def test_zeros_in_short_runs_of_a_roll_angle_at_1_hz_are_one_error(runs):
+    """No run is long and no zero far from what is measured; but no other value comes twice, and zero five times."""
+    random = np.random.default_rng(20262)
+    values, at = random.normal(-0.5, 0.6, 60), 10
+    for length in runs:
+        values[at : at + length], at = 0.0, at + length + 6
+    logged = measured("dive", 20263)
+    record = Record(source="made", time=np.arange(60.0), values={"roll_angle": values})
+    (found,) = repeated_values(dataclasses.replace(logged, record=record))
+    assert (found.id, len(found.at)) == ("dropout:roll_angle=0", sum(runs))
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_values_that_come_again_by_chance_are_measured(seed):
+    """600 samples in steps of 0.001 over a range of 3: a third of the values comes twice, some four times."""
+    values = np.round(np.random.default_rng(seed).normal(0.0, 0.6, 600), 3)
+    logged = measured("dive", 20263)
+    record = Record(source="made", time=np.arange(600.0), values={"roll_angle": values})
+    assert not repeated_values(dataclasses.replace(logged, record=record))
+
+
 def test_a_rounded_depth_that_jumps_by_less_than_its_step_is_named():
     """By 0.06 m, in steps of 0.1 m: all values lie beside the multiples of before, which no motion does."""
     clean = measured("zigzag", 20264)
