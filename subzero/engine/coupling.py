@@ -31,8 +31,8 @@ MOST_EXCHANGES = 60
 ROUNDING = 1e-14
 """Places are known to this fraction, and forces to this times the cable's stiffness. [-]"""
 NOTABLE = 0.01
-"""Smaller forces need agree no closer than this one does: where a slack cable floats beside a drifting vehicle, no
-exchange made its ten thousandths of a newton agree to nine digits. [N]"""
+"""Smaller forces need agree no closer than this one does: where a slack cable floats beside a drifting vehicle,
+exchanges hardly make its ten thousandths of a newton agree to six digits of themselves. [N]"""
 MOST_HALVINGS = 8
 FASTEST = 50.0
 """Speed beyond which a run is stopped as absurd. [m/s]"""
@@ -164,7 +164,7 @@ def _forces_agree(now: Now, F: np.ndarray, agreement: float) -> bool:
             stiffness = max(stiffness, abs(now.Z[i, k]))
     # A taut cable is stiff: the last digit of the tow point's place (ROUNDING · reach) is already this much force. No
     # iteration can do better, and a stricter test would halve the step for nothing.
-    return gap <= agreement * max(size, NOTABLE) + 1e-11 + ROUNDING * stiffness * reach
+    return gap <= agreement * (size + NOTABLE) + ROUNDING * stiffness * reach
 
 
 @compiled
