@@ -22,8 +22,7 @@ from subzero.diagnosis.hypothesis.data_error import DataError, corrected
 from subzero.diagnosis.hypothesis.logged import Logged
 from subzero.diagnosis.inference import settings
 from subzero.diagnosis.inference.change_point_fit import FittedChangePoint
-from subzero.diagnosis.inference.data_error_search import LOUD, SuspectedError, Suspicion
-from subzero.diagnosis.inference.data_error_yardstick import OUTLIER_LOG_DENSITY
+from subzero.diagnosis.inference.data_error_yardstick import LOUD, OUTLIER_LOG_DENSITY
 from subzero.diagnosis.inference.latent_force import FORCE
 from subzero.diagnosis.inference.linear_gaussian import log_sum
 from subzero.diagnosis.inference.map_fit import is_poor_fit
@@ -33,6 +32,7 @@ from subzero.diagnosis.inference.problem import Observed, Problem
 from subzero.diagnosis.inference.repeated_values import log_odds_of_frozen, steps_of
 
 if TYPE_CHECKING:
+    from subzero.diagnosis.inference.data_error_search import SuspectedError, Suspicion
     from subzero.diagnosis.inference.out_of_catalogue import Findings
 
 ALIKE = 10

@@ -30,10 +30,7 @@ from subzero.diagnosis.inference.data_error_scan import (
     may_stand_still,
     suspects,
 )
-from subzero.diagnosis.inference.data_error_yardstick import (
-    Yardstick,
-    yardstick_of,
-)
+from subzero.diagnosis.inference.data_error_yardstick import LOUD, Yardstick, yardstick_of
 from subzero.diagnosis.inference.few_causes import most_of_one_cause, most_of_physics
 from subzero.diagnosis.inference.map_fit import bounds
 from subzero.diagnosis.inference.posing import posed_again
@@ -54,8 +51,6 @@ nothing and every cause, where the linear problem may err by tens of nats, and o
 LEAST_SHARE = 0.5
 """An error that something a vehicle does may look like needs no such search, either, if physics explains no more than
 the rest of what it does: the linear problem has missed a third of the evidence of a current of 0.3 m/s."""
-LOUD = 2.5
-"""Noise of more usual levels hides a misfit. [-]"""
 SIGNATURE_LEAD = 60.0
 """Lead of what is read off a record."""
 

@@ -46,6 +46,8 @@ more than that share: a hundredth costs less than 0.1 nats, as the best scales a
 never so small that a sample has more density than 1/q, which is a probability of 1."""
 OUTLIER_LOG_DENSITY = float(np.log(0.01 / 50.0))
 """Of a sample that is left out: one of a hundred, anywhere within fifty levels of the noise."""
+LOUD = 2.5
+"""Noise of more usual levels hides a misfit. [-]"""
 BESIDE_JUMP = 10
 """So many samples before and after say how large a jump is."""
 CAUSES_TRIED = 3

@@ -37,8 +37,7 @@ from subzero.diagnosis.inference.data_error_yardstick import (
 )
 from subzero.diagnosis.inference.linear_gaussian import ForceInformation, Posterior, freed, seen
 from subzero.diagnosis.inference.map_fit import bounds
-from subzero.diagnosis.inference.problem import Problem
-from subzero.diagnosis.inference.screening import sizes_tried, slope_at
+from subzero.diagnosis.inference.problem import Problem, sizes_tried, slope_at
 from subzero.diagnosis.inference.settings import MAX_ADDED, MERGED_SCALES
 
 

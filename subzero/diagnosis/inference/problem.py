@@ -31,7 +31,7 @@ from subzero.diagnosis.inference.simulator import (
 
 if TYPE_CHECKING:
     from subzero.diagnosis.hypothesis.configuration import Setting
-    from subzero.diagnosis.hypothesis.effect import Effect
+    from subzero.diagnosis.hypothesis.effect import Effect, Parameter
 
 JACOBIAN_STEP = 0.2
 """Step of a sensitivity, in tolerances; a whole one from a state of rest (a play, a friction), where slopes jump."""
@@ -285,3 +285,19 @@ class Problem:
 
 Progress = Callable[[float, str], None]
 """Called with the fraction that is done and what is being tried."""
+
+
+def slope_at(runs: Mapping[float, np.ndarray], size: float) -> np.ndarray:
+    """Return the sensitivity (m,) at a size of runs, size → residual (m,), between those next to it; NaN if there is
+    none.
+    """
+    row = sorted(one for one in runs if one == size or np.isfinite(runs[one]).all())
+    i = row.index(size)
+    below, above = row[max(i - 1, 0)], row[min(i + 1, len(row) - 1)]
+    return (runs[below] - runs[above]) / (above - below if above > below else np.nan)
+
+
+def sizes_tried(parameter: Parameter, scales: Sequence[float]) -> list[float]:
+    """Return the deviations that are tried, at some effect scales either way."""
+    both = [side * size * parameter.scale for size in scales for side in (1.0, -1.0)]
+    return [size for size in both if parameter.low <= size <= parameter.high]

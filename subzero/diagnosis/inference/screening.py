@@ -36,9 +36,9 @@ from subzero.diagnosis.inference.linear_gaussian import (
 )
 from subzero.diagnosis.inference.map_fit import Candidate, Fit, at_bad_minimum, refit, restarted_where_smooth
 from subzero.diagnosis.inference.posing import with_noise_behind
+from subzero.diagnosis.inference.problem import sizes_tried, slope_at
 
 if TYPE_CHECKING:
-    from subzero.diagnosis.hypothesis.effect import Parameter
     from subzero.diagnosis.inference.problem import Problem, Progress
 
 
@@ -244,22 +244,6 @@ def sizes_run(
     found = [SizeRun(k, there, of[k][size], slope_at(of[k], size))
              for (k, size), there in zip(jobs, moved, strict=True)]  # fmt: skip
     return [one for one in found if np.isfinite(one.r).all() and np.isfinite(one.column).all()]
-
-
-def slope_at(runs: Mapping[float, np.ndarray], size: float) -> np.ndarray:
-    """Return the sensitivity (m,) at a size of runs, size → residual (m,), between those next to it; NaN if there is
-    none.
-    """
-    row = sorted(one for one in runs if one == size or np.isfinite(runs[one]).all())
-    i = row.index(size)
-    below, above = row[max(i - 1, 0)], row[min(i + 1, len(row) - 1)]
-    return (runs[below] - runs[above]) / (above - below if above > below else np.nan)
-
-
-def sizes_tried(parameter: Parameter, scales: Sequence[float]) -> list[float]:
-    """Return the deviations that are tried, at some effect scales either way."""
-    both = [side * size * parameter.scale for size in scales for side in (1.0, -1.0)]
-    return [size for size in both if parameter.low <= size <= parameter.high]
 
 
 def mixed_evidence(problem: Problem, q: Quadratic, ids: Ids = ()) -> float:
