@@ -304,7 +304,9 @@ def is_right(record: Made, verdict: Verdict) -> bool:
     clock is the same thing whether it is told as a cause or as an error.
     """
     if not record.errors:
-        is_clock = record.hidden == "clock_offset" and {one.id for one in verdict.data_errors} == {"late_clock"}
+        is_clock = record.hidden == "clock_offset" and {one.id for one in verdict.data_errors} == {
+            "late_clock"
+        }
         return verdict.verdict != "data_error" or is_clock
     told, true = verdict.data_errors, record.errors
     return (
