@@ -50,13 +50,16 @@ def test_an_outlier_among_the_samples_that_a_clock_loses_is_worth_no_more_than_a
     assert leads[1] == pytest.approx(leads[0], abs=3.0)
 
 
-@pytest.mark.parametrize(("cause", "amount"), [("roll_stiffness", -0.5), ("rudder_lift_slope", -0.5)])
-def test_one_large_cause_explains_more_where_it_is_than_several_at_the_nominal_model(cause, amount):
-    """With the sensitivities of the nominal model three causes, or one from some time on, are 17 and 22 nats behind the
-    one that is there; a roll that is half as stiff gains 0.3 nats there, of 90.
+@pytest.mark.parametrize(
+    ("cause", "amount", "ahead"), [("roll_stiffness", -0.5, 18.0), ("rudder_lift_slope", -0.5, 12.0)]
+)
+def test_one_large_cause_explains_more_where_it_is_than_several_at_the_nominal_model(cause, amount, ahead):
+    """With the sensitivities of the nominal model three causes, or one from some time on, are 22 and 17 nats behind the
+    one that is there; a roll that is half as stiff gains 0.3 nats there, of 90. Only at the sizes that are tried, the
+    first would be 14 nats ahead.
     """
     problem = pose([turning(**{cause: amount})])
-    assert most_of_one_cause(problem, 0) > most_of_physics(problem, 0) + 10.0
+    assert most_of_one_cause(problem, 0) > most_of_physics(problem, 0) + ahead
 
 
 def test_nothing_is_explained_by_a_cause_that_is_not_there():

@@ -54,6 +54,25 @@ def test_a_clock_between_the_sizes_that_are_tried_is_seen_from_afar(scenario, la
     assert search.best().ids == ("clock_offset",)
 
 
+def test_where_only_wide_tolerances_explain_a_record_the_best_causes_are_fitted_all_the_same():
+    """Three numbers are off by five to seven tolerances: no cause by itself comes before that, in the linear problem,
+    but it errs by as much as a drum that rubs was behind there, and was never fitted.
+    """
+    trial = subzero.load_scenario("zigzag")
+    true = setting = Setting(trial=trial, model=subzero.Model.of(trial))
+    for name, amount in {"hull_drag": 0.2, "rudder_lift_slope": -0.2, "propeller_thrust_gain": -0.15}.items():
+        true = catalogue(FEW)[name].apply(true, amount)
+    record = make_record(true, np.arange(0.0, 20.0, 0.2), FEW, seed=3)
+    search = Search(
+        problem=pose([Logged(record=record, setting=setting, name="off")]), progress=lambda *_: None
+    )
+    search.begin()
+    search.only_nothing()
+    assert search.is_poor()
+    search.fit_from_nominal()
+    assert len(search.candidates) > 1
+
+
 @pytest.mark.parametrize("cause", ["clock_offset", "hull_drag", "rudder_offset"])
 def test_the_sensitivity_at_a_tried_size_is_that_of_runs_close_by(cause):
     """Between neighbours a twentieth of the effect's scale to either side, less than a tenth off; at the ends, where
@@ -127,3 +146,13 @@ def test_a_clock_that_a_wide_fit_takes_for_many_small_changes_is_told():
     verdict = subzero.diagnose(record, budget="verdict")
     assert (verdict.verdict, [one.id for one in verdict.causes]) == ("cause_named", ["clock_offset"])
     assert clock_told(verdict) == pytest.approx(planted["clock_offset"][0], abs=0.1)
+
+
+@pytest.mark.slow
+def test_a_drum_that_rubs_behind_a_vehicle_that_stops_is_told():
+    """Wide tolerances explain it by hull and propeller, until the noise behind the drum shows that they do not: linear
+    problems there had forty pairs as probable as might be.
+    """
+    logged, _ = world.record_of(world.drawn(9701, 46)[45])
+    verdict = subzero.diagnose(logged, budget="verdict")
+    assert (verdict.verdict, [one.id for one in verdict.causes]) == ("cause_named", ["drum_friction"])
