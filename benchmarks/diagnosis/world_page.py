@@ -21,7 +21,7 @@ from .scores import Score, share
 from .sections import mark, table
 
 Rows = Sequence[Mapping[str, Any]]
-SEEDS = {"world": 9703, "data_errors": 9803, "jitter": 7501, "calibration": 31337}
+SEEDS = {"world": 10001, "data_errors": 10003, "jitter": 7501, "calibration": 31337}
 """Of what the page rests on."""
 PAGE = FIGURES.parent / "diagnosis_world.md"
 KEPT = Path(__file__).parent / "kept"
