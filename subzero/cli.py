@@ -26,7 +26,7 @@ from cyclopts import Parameter
 import scenarios
 from subzero import cli_autopilot, cli_diagnosis, cli_install, cli_sweep, cli_trials
 from subzero.cli_examples import EXAMPLES, register
-from subzero.errors import UserError, printable
+from subzero.errors import UserError, nearest, printable
 from subzero.interrupts import INTERRUPTED, begin, came, say
 from subzero.voice import COMMAND, NOT_STRICT, PLAIN, StrictVoice, Voice, speak
 
@@ -40,6 +40,8 @@ if TYPE_CHECKING:
 Flag = cli_autopilot.Flag
 Export = Annotated[tuple[str, ...], Parameter(negative=())]
 FINE, MISTAKE, STOPPED = 0, 2, 3
+OPTION_LIKENESS = 0.6
+"""An option that is less like an unknown one was not meant by it, on `difflib`'s scale from 0 to 1."""
 
 
 @Parameter(name="*")
@@ -431,7 +433,17 @@ def _in_words(error: cyclopts.CycloptsError) -> str:
         return f"Unexpected argument: {' '.join(error.unused_tokens or [])}."
     if isinstance(error, cyclopts.MissingArgumentError) and error.argument and error.command_chain:
         return _missing(error.command_chain[0], error.argument)
+    if isinstance(error, cyclopts.UnknownOptionError):
+        return _unknown_option(error)
     return str(error)
+
+
+def _unknown_option(error: cyclopts.UnknownOptionError) -> str:
+    """Say which option is most like one that is unknown, by their letters: all options have the dashes in common."""
+    word = (error.token.keyword or error.token.value).split("=")[0]
+    options = {one.lstrip("-"): one for argument in error.argument_collection for one in argument.names}
+    close = nearest(word.lstrip("-"), options, likeness=OPTION_LIKENESS)
+    return f"Unknown option: {word}.{f' Did you mean {options[close[0]]}?' if close else ''}"
 
 
 def _missing(command: str, argument: cyclopts.Argument) -> str:

@@ -17,6 +17,7 @@ MESSAGES = {
     "autopilot": "subzero autopilot needs NAME, as in: subzero autopilot heading_step\n"
     "Try 'subzero autopilot --help'.",
     "simulate fig6 --oot x": "Unknown option: --oot. Did you mean --out?\nTry 'subzero simulate --help'.",
+    "simulate fig6 --set x=1": "Unknown option: --set.\nTry 'subzero simulate --help'.",
     "compare fig6 --untethered": "Unknown option: --untethered.\nTry 'subzero compare --help'.",
     "compare fig6 fig5": "Unexpected argument: fig5.\nTry 'subzero compare --help'.",
     "compare fig6 --out": "--out needs a value.\nTry 'subzero compare --help'.",
