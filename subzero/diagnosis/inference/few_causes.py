@@ -37,7 +37,7 @@ from subzero.diagnosis.inference.data_error_yardstick import (
 )
 from subzero.diagnosis.inference.linear_gaussian import ForceInformation, Posterior, freed, seen
 from subzero.diagnosis.inference.map_fit import bounds
-from subzero.diagnosis.inference.problem import Problem, sizes_tried, slope_at
+from subzero.diagnosis.inference.problem import Problem, sizes_run
 from subzero.diagnosis.inference.settings import MAX_ADDED, MERGED_SCALES
 
 
@@ -138,20 +138,12 @@ def _closer_by(problem: Problem, record: int, name: str, now: Reckoned) -> Itera
 
 def _at_sizes(problem: Problem, record: int, here: Linear) -> Iterator[tuple[int, Linear]]:
     """Give the linear problem of a record at each size of each entry that is simulated, with its cause free."""
-    zero = np.zeros(len(problem.entries))
-    sizes = {k: sizes_tried(entry.parameter, MERGED_SCALES)
-             for k, entry in enumerate(problem.entries) if entry.record < 0}  # fmt: skip
-    jobs = [(k, size) for k, some in sizes.items() for size in some]
-    moved = [np.concatenate([zero[:k], [size], zero[k + 1 :]]) for k, size in jobs]
-    of: dict[int, dict[float, np.ndarray]] = {k: {0.0: here.r} for k in sizes}
-    for (k, size), z, track in zip(jobs, moved, problem.tracks([(record, z) for z in moved]), strict=True):
-        of[k][size] = problem.whitened(record, problem.setting(record, z), track, measured=True)
-    for k, size in jobs:
-        column = slope_at(of[k], size)
-        if np.isfinite(of[k][size]).all() and np.isfinite(column).all():
-            J, D = here.J.copy(), _with_free(problem, here.D, problem.entries[k].effect.id)
-            J[:, k] = column
-            yield k, replace(here, r=of[k][size] + column * size, J=J, D=D)
+    zero, entries = np.zeros(len(problem.entries)), problem.entries
+    at = [k for k, entry in enumerate(entries) if entry.record < 0]
+    for one in sizes_run(problem, zero, here.r, at, MERGED_SCALES, [record]):
+        J, D = here.J.copy(), _with_free(problem, here.D, entries[one.k].effect.id)
+        J[:, one.k] = one.column
+        yield one.k, replace(here, r=one.r + one.column * one.z[one.k], J=J, D=D)
 
 
 def _with_free(problem: Problem, D: np.ndarray, name: str) -> np.ndarray:

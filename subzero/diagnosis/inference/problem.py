@@ -12,7 +12,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from os import cpu_count
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -160,12 +160,15 @@ class Problem:
         """Return r(z) (m,); NaN if a run could not go on."""
         return self.residuals([z])[0]
 
-    def residuals(self, several: Sequence[np.ndarray]) -> list[np.ndarray]:
-        """Return r(z) (m,) of several z, run side by side."""
-        jobs = [(i, z) for z in several for i in range(len(self.records))]
+    def residuals(
+        self, several: Sequence[np.ndarray], records: Sequence[int] | None = None
+    ) -> list[np.ndarray]:
+        """Return r(z) (m,) of several z, run side by side; of some records only, if given."""
+        wanted = range(len(self.records)) if records is None else records
+        jobs = [(i, z) for z in several for i in wanted]
         shown = [self.whitened(i, self.setting(i, z), track, measured=True)
                  for (i, z), track in zip(jobs, self.tracks(jobs), strict=True)]  # fmt: skip
-        count = len(self.records)
+        count = len(wanted)
         return [np.concatenate(shown[at : at + count]) for at in range(0, len(shown), count)]
 
     def jacobian(
@@ -287,7 +290,46 @@ Progress = Callable[[float, str], None]
 """Called with the fraction that is done and what is being tried."""
 
 
-def slope_at(runs: Mapping[float, np.ndarray], size: float) -> np.ndarray:
+class SizeRun(NamedTuple):
+    """A run with entry k of another size: deviations (k,), residual (m,), and the sensitivity to that entry (m,)."""
+
+    k: int
+    z: np.ndarray
+    r: np.ndarray
+    column: np.ndarray
+
+
+def sizes_run(
+    problem: Problem,
+    z: np.ndarray,
+    here: np.ndarray,
+    at: Sequence[int],
+    scales: Sequence[float],
+    records: Sequence[int] | None = None,
+) -> list[SizeRun]:
+    """Run sizes of entries about z, side by side; those that cannot be run are left out.
+
+    A sensitivity is the difference quotient between neighbouring sizes: what bends runs has another one at each.
+
+    Args:
+        problem: records and parameters.
+        z: where (k,).
+        here: the residual there (m,).
+        at: places of the entries.
+        scales: sizes, in effect scales, either way.
+        records: of which the residuals are; of all if not given.
+    """
+    jobs = [(k, size) for k in at for size in _sizes_tried(problem.entries[k].parameter, scales)]
+    moved = [np.concatenate([z[:k], [size], z[k + 1 :]]) for k, size in jobs]
+    of: dict[int, dict[float, np.ndarray]] = {k: {float(z[k]): here} for k in at}
+    for (k, size), r in zip(jobs, problem.residuals(moved, records), strict=True):
+        of[k][size] = r
+    found = [SizeRun(k, there, of[k][size], _slope_at(of[k], size))
+             for (k, size), there in zip(jobs, moved, strict=True)]  # fmt: skip
+    return [one for one in found if np.isfinite(one.r).all() and np.isfinite(one.column).all()]
+
+
+def _slope_at(runs: Mapping[float, np.ndarray], size: float) -> np.ndarray:
     """Return the sensitivity (m,) at a size of runs, size → residual (m,), between those next to it; NaN if there is
     none.
     """
@@ -297,7 +339,7 @@ def slope_at(runs: Mapping[float, np.ndarray], size: float) -> np.ndarray:
     return (runs[below] - runs[above]) / (above - below if above > below else np.nan)
 
 
-def sizes_tried(parameter: Parameter, scales: Sequence[float]) -> list[float]:
+def _sizes_tried(parameter: Parameter, scales: Sequence[float]) -> list[float]:
     """Return the deviations that are tried, at some effect scales either way."""
     both = [side * size * parameter.scale for size in scales for side in (1.0, -1.0)]
     return [size for size in both if parameter.low <= size <= parameter.high]

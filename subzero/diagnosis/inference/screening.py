@@ -36,7 +36,7 @@ from subzero.diagnosis.inference.linear_gaussian import (
 )
 from subzero.diagnosis.inference.map_fit import Candidate, Fit, at_bad_minimum, refit, restarted_where_smooth
 from subzero.diagnosis.inference.posing import with_noise_behind
-from subzero.diagnosis.inference.problem import sizes_tried, slope_at
+from subzero.diagnosis.inference.problem import SizeRun, sizes_run
 
 if TYPE_CHECKING:
     from subzero.diagnosis.inference.problem import Problem, Progress
@@ -198,7 +198,7 @@ def _sweep(
     best: dict[Ids, float] = {(problem.entries[k].effect.id,): -np.inf for k in at}  # that cannot be run
     for one in sizes_run(problem, z, here, at, scales):
         ids: Ids = (problem.entries[one.k].effect.id,)
-        value = _evidence_there(problem, one.quadratic(at_z, J), (), ids) + log_prior(ids, len(names))
+        value = _evidence_there(problem, _quadratic_of(one, at_z, J), (), ids) + log_prior(ids, len(names))
         if value > best[ids]:
             best[ids], found.starts[ids] = value, one.z
             if one.k in flat:
@@ -211,39 +211,16 @@ def _evidence_there(problem: Problem, q: Quadratic, held: Ids, ids: Ids) -> floa
     return linear_evidences(problem, _bases(problem, q, held), held, [ids])[ids]
 
 
-class SizeRun(NamedTuple):
-    """A run with entry k of another size: deviations (k,), residual (m,), and the sensitivity to that entry (m,)."""
-
-    k: int
-    z: np.ndarray
-    r: np.ndarray
-    column: np.ndarray
-
-    def quadratic(self, near: Quadratic, J: np.ndarray) -> Quadratic:
-        """Return the linear problem there, with all other sensitivities J (m, k), of which `near` has the products."""
-        whole = self.r + J @ self.z + (self.column - J[:, self.k]) * self.z[self.k]
-        A, b, cross = near.A.copy(), J.T @ whole, J.T @ self.column
-        cross[self.k], b[self.k] = self.column @ self.column, self.column @ whole
-        A[self.k], A[:, self.k] = cross, cross
-        return Quadratic(A=A, b=b, rr=float(whole @ whole))
-
-
-def sizes_run(
-    problem: Problem, z: np.ndarray, here: np.ndarray, at: Sequence[int], scales: Sequence[float]
-) -> list[SizeRun]:
-    """Run sizes of entries about z, side by side, with the residual `here` there.
-
-    A sensitivity is the difference quotient between neighbouring sizes: what bends runs has another one at each.
+def _quadratic_of(run: SizeRun, near: Quadratic, J: np.ndarray) -> Quadratic:
+    """Return the linear problem where a size was run, with all other sensitivities J (m, k), of which `near` has the
+    products.
     """
-    sizes = {k: sizes_tried(problem.entries[k].parameter, scales) for k in at}
-    jobs = [(k, size) for k in at for size in sizes[k]]
-    moved = [np.concatenate([z[:k], [size], z[k + 1 :]]) for k, size in jobs]
-    of: dict[int, dict[float, np.ndarray]] = {k: {float(z[k]): here} for k in at}
-    for (k, size), r in zip(jobs, problem.residuals(moved), strict=True):
-        of[k][size] = r
-    found = [SizeRun(k, there, of[k][size], slope_at(of[k], size))
-             for (k, size), there in zip(jobs, moved, strict=True)]  # fmt: skip
-    return [one for one in found if np.isfinite(one.r).all() and np.isfinite(one.column).all()]
+    k, column = run.k, run.column
+    whole = run.r + J @ run.z + (column - J[:, k]) * run.z[k]
+    A, b, cross = near.A.copy(), J.T @ whole, J.T @ column
+    cross[k], b[k] = column @ column, column @ whole
+    A[k], A[:, k] = cross, cross
+    return Quadratic(A=A, b=b, rr=float(whole @ whole))
 
 
 def mixed_evidence(problem: Problem, q: Quadratic, ids: Ids = ()) -> float:
@@ -301,7 +278,7 @@ def with_sizes_tried(
     found, at_z = dict[Ids, TriedSize](), Quadratic.at(z, here, J)
     for run in sizes_run(problem, z, here, at, scales):
         ids = tuple(sorted({*rest, entries[run.k].effect.id}))
-        log = _evidence_there(problem, run.quadratic(at_z, J), rest, ids) + log_prior(ids, len(names))
+        log = _evidence_there(problem, _quadratic_of(run, at_z, J), rest, ids) + log_prior(ids, len(names))
         if ids not in found or log > found[ids].log_posterior:
             slopes = np.column_stack([J[:, : run.k], run.column, J[:, run.k + 1 :]])
             found[ids] = TriedSize(log, run.z, slopes)
