@@ -6,19 +6,21 @@
 Σ is never made. A Kalman filter whose state is x turns e into its innovations, which are white, for any times of the
 samples; AR(1) noise is the case σ_w = 0. Before anything is fitted,
 
-    log σ_w ~ N(log ν, 1.5²),   log σ_s ~ N(log(0.7 ν + q/√12), 1²),   log τ_s ~ N(log 1 s, 1.5²)
+    log σ_w ~ N(log ν, 1.5²),   log σ_s ~ N(log(0.7 ν + q/√12), 1² or 0.5²),   log τ_s ~ N(log 1 s, 1.5²)
 
-ν is the usual level of the sensor, or the known one. q is read off the values: sensors round.
+ν is the usual level of the sensor, or the known one; σ_s has 0.5 above its median and 1 below. q is read off the
+values: sensors round. Where most channels of a record have shown a slow part, log τ_s ~ N(log of their median, 0.9²).
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+from scipy.special import betaln
 
 from subzero.diagnosis.hypothesis.catalogue.sensors import SPECS
 from subzero.jit import compiled, scratch
@@ -200,10 +202,14 @@ def coloured(
 
 SLOW_SHARE = 0.7
 """Usual standard deviation of a sensor's slow part, in its usual noise levels. [-]"""
-WHITE_SPREAD, SLOW_SPREAD, TIME_SPREAD = 1.5, 1.0, 1.5
-"""Standard deviations of the logarithms of σ_w, σ_s and τ_s about what is usual. [-]"""
+WHITE_SPREAD, SLOW_SPREAD, SLOW_SPREAD_ABOVE, TIME_SPREAD = 1.5, 1.0, 0.5, 1.5
+"""Standard deviations of the logarithms of σ_w, σ_s and τ_s about what is usual, of σ_s below it and above: a sensor
+may wander by far less than is usual, but what wanders by far more is something to find. [-]"""
 USUAL_TIME = 1.0
 """Usual correlation time of a sensor's slow part. [s]"""
+TIME_SPREAD_BESIDE, FEWEST_BESIDE, SEEN_SLOW = 0.9, 3, 0.3
+"""Standard deviation of log τ_s about the median of a record, where so many channels have a slow part of at least this
+share of σ_w: one logger, and often one filter, has made them. [-]"""
 KNOWN_SPREAD = 0.1
 """Standard deviation of the logarithm of a level that the user knows. [-]"""
 FEWEST = 8
@@ -219,11 +225,14 @@ makes one or two steps smaller than that of the sensor: so many are tried."""
 
 
 class Usual(NamedTuple):
-    """What a sensor is like: level ν and resolution q, in the channel's unit, and whether the level is known."""
+    """What a sensor is like: level ν and resolution q, in the channel's unit, whether the level is known, and the
+    correlation time that most sensors beside it have [s], None if that is not known.
+    """
 
     level: float
     resolution: float
     is_known: bool
+    time_beside: float | None = None
 
 
 def usual_of(channel: str, values: np.ndarray, known: Mapping[str, float]) -> Usual:
@@ -333,21 +342,31 @@ def log_prior_of(noise: Noise, usual: Usual) -> float:
     return log_density(np.log([noise.white, noise.slow, noise.correlation_time]), prior_of(usual))
 
 
+def time_of(several: Iterable[Noise]) -> float | None:
+    """Return the correlation time that most of several channels have [s]; None where too few have a slow part."""
+    seen = [noise.correlation_time for noise in several if noise.slow**2 >= SEEN_SLOW**2 * noise.unrelated]
+    return float(np.median(seen)) if len(seen) >= FEWEST_BESIDE else None
+
+
 class Prior(NamedTuple):
-    """What is known of log σ_w, log σ_s, log τ_s beforehand: means and standard deviations (3,), and the mean of the
-    logarithm of the level, NaN if the level is not known.
+    """What is known of log σ_w, log σ_s, log τ_s beforehand: means, and standard deviations below and above (3,), and
+    the mean of the logarithm of the level, NaN if the level is not known.
     """
 
     mean: np.ndarray
-    spread: np.ndarray
+    below: np.ndarray
+    above: np.ndarray
     level: float
 
 
 def prior_of(usual: Usual) -> Prior:
     """Return what is known of a usual sensor's noise beforehand."""
-    mean = np.log([usual.level, slow_usual(usual), USUAL_TIME])
-    spread = np.array([WHITE_SPREAD, SLOW_SPREAD, TIME_SPREAD])
-    return Prior(mean, spread, float(mean[0]) if usual.is_known else np.nan)
+    time, spread = (
+        (USUAL_TIME, TIME_SPREAD) if usual.time_beside is None else (usual.time_beside, TIME_SPREAD_BESIDE)
+    )
+    mean = np.log([usual.level, slow_usual(usual), time])
+    below, above = (np.array([WHITE_SPREAD, one, spread]) for one in (SLOW_SPREAD, SLOW_SPREAD_ABOVE))
+    return Prior(mean, below, above, float(mean[0]) if usual.is_known else np.nan)
 
 
 @compiled
@@ -355,15 +374,44 @@ def log_density(log: np.ndarray, prior: Prior) -> float:
     """Return the log density of log σ_w, log σ_s, log τ_s (3,), but for a constant."""
     about = 0.0
     for i in range(3):
-        about += ((log[i] - prior.mean[i]) / prior.spread[i]) ** 2
+        apart = log[i] - prior.mean[i]
+        about += (apart / (prior.above[i] if apart > 0.0 else prior.below[i])) ** 2
     if prior.level == prior.level:
         level = 0.5 * np.log(np.exp(2.0 * log[0]) + np.exp(2.0 * log[1]))
         about += ((level - prior.level) / KNOWN_SPREAD) ** 2
-    return -0.5 * about
+    return np.log(TIME_SPREAD / prior.below[2]) - 0.5 * about
 
 
 SPIKE = 5.0
 """A sample this many noise levels off the median of its neighbours is an outlier. [-]"""
+OUTLIERS_BEFORE, OUTLIER_LEVELS = (1.0, 99.0), 50.0
+"""Of the share of outliers, before any sample is seen, so many outliers and others: one of a hundred, but a sensor with
+heavy tails may have ten times as many; each is anywhere within so many usual levels. [-]"""
+
+
+def log_of_outliers(count: int, measured: int, level: float) -> float:
+    """Return the log probability that these of some samples are outliers, and the log density of their values; their
+    share ε ~ Beta of `OUTLIERS_BEFORE` is mixed over.
+
+    Args:
+        count: how many are outliers.
+        measured: how many there are, with these.
+        level: usual one of the sensor, in the channel's unit.
+    """
+    a, b = OUTLIERS_BEFORE
+    which = betaln(a + count, b + measured - count) - betaln(a, b)
+    return float(which) - count * float(np.log(OUTLIER_LEVELS * level))
+
+
+def log_of_outlier(count: int, measured: int, level: float) -> float:
+    """Return the log density of one further outlier beside those."""
+    a, b = OUTLIERS_BEFORE
+    return float(np.log((a + count) / (a + b + measured) / (OUTLIER_LEVELS * level)))
+
+
+NORMAL_MIDDLE, TAIL, NORMAL_TAIL = 0.6745, 0.85, 1.4395
+"""The level of noise is the larger of what half of all deviations stay below and this share does, in multiples of those
+of a normal one: noise of a real sensor may have tails of a tenth of its samples, which are no outliers. [-]"""
 
 
 def spikes(values: np.ndarray, spec: float) -> np.ndarray:
@@ -379,10 +427,10 @@ def spikes(values: np.ndarray, spec: float) -> np.ndarray:
         return np.zeros(values.size, dtype=bool)
     around = np.empty(values.size)
     medians_around(values, around)
-    off = np.abs(values - around)
-    ordered = np.sort(off)
-    usual = 0.5 * float(ordered[(off.size - 1) // 2] + ordered[off.size // 2])  # the median
-    return off > SPIKE * max(1.4826 * usual * 1.2, 0.5 * spec)
+    off = np.sort(np.abs(values - around))
+    middle = 0.5 * float(off[(off.size - 1) // 2] + off[off.size // 2])  # the median
+    usual = max(middle / NORMAL_MIDDLE, float(off[int(TAIL * off.size)]) / NORMAL_TAIL)
+    return np.abs(values - around) > SPIKE * max(1.2 * usual, 0.5 * spec)
 
 
 @compiled

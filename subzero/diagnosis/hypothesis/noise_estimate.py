@@ -86,13 +86,14 @@ class Sought(NamedTuple):
     room: np.ndarray
 
 
-def estimate(time: np.ndarray, behind: Behind, usual: Usual) -> Noise:
+def estimate(time: np.ndarray, behind: Behind, usual: Usual, known: Noise | None = None) -> Noise:
     """Return the most probable noise of a channel behind a fit.
 
     Args:
         time: of the samples that are used (m,). [s]
         behind: what the fit leaves.
         usual: of the sensor's kind.
+        known: as it was found behind something else; the search begins there, too.
 
     Returns:
         noise of which all these samples are used.
@@ -104,9 +105,15 @@ def estimate(time: np.ndarray, behind: Behind, usual: Usual) -> Noise:
     room = np.empty((both.shape[1] + 2, both.shape[1]))
     sought = Sought(steps, both, usual.resolution**2 / 12.0, prior_of(usual), *_bounds(time, r, usual), room)
     starts = _starts(time, r, F, usual)
+    if known is not None:
+        there = np.log([known.white, known.slow, known.correlation_time])
+        starts = np.vstack([starts, np.clip(there, sought.low, sought.high)])
     costs = np.empty(len(starts))
     costs_of(sought, starts, costs)
-    begun = np.argsort(costs, kind="stable")[:BEGUN]
+    begun = {
+        *np.argsort(costs, kind="stable")[:BEGUN].tolist(),
+        *([] if known is None else [len(starts) - 1]),
+    }
     for i in begun:
         costs[i] = descend(sought, starts[i])
     return _noise_of(starts[min(begun, key=lambda i: costs[i])], time, usual)

@@ -50,7 +50,16 @@ from subzero.diagnosis.hypothesis.hypotheses import (
     variances,
     with_tolerances,
 )
-from subzero.diagnosis.hypothesis.noise import Noise, Usual, resolution_of, spikes
+from subzero.diagnosis.hypothesis.noise import (
+    Noise,
+    Usual,
+    log_of_outlier,
+    log_of_outliers,
+    log_prior_of,
+    resolution_of,
+    spikes,
+    time_of,
+)
 from subzero.diagnosis.hypothesis.noise_estimate import Behind, estimate, log_marginal
 from subzero.diagnosis.hypothesis.configuration import TRUTHS
 from subzero.diagnosis.inference.simulator import (
@@ -62,7 +71,7 @@ from subzero.diagnosis.inference.simulator import (
     with_stops,
 )
 from subzero.diagnosis.inference.problem import Observed, Problem, Progress
-from subzero.diagnosis.inference.posing import pose, with_finer_steps, with_noise_behind
+from subzero.diagnosis.inference.posing import pose, whitened_again, with_finer_steps, with_noise_behind
 from subzero.diagnosis.inference.linear_gaussian import (
     KAPPAS,
     ForceInformation,
@@ -205,7 +214,10 @@ __all__ = [
     "log_gains",
     "log_marginal",
     "log_odds_of_frozen",
+    "log_of_outlier",
+    "log_of_outliers",
     "log_prior",
+    "log_prior_of",
     "may_be_measured",
     "mixed",
     "moves_nothing",
@@ -232,8 +244,10 @@ __all__ = [
     "special_cases_folded",
     "spikes",
     "steps_of",
+    "time_of",
     "times_of",
     "variances",
+    "whitened_again",
     "with_finer_steps",
     "with_noise_behind",
     "with_own_noise",

@@ -20,9 +20,10 @@ import numpy as np
 
 from subzero.diagnosis.hypothesis.data_error import DataError, corrected
 from subzero.diagnosis.hypothesis.logged import Logged
+from subzero.diagnosis.hypothesis.noise import log_of_outlier, log_of_outliers
 from subzero.diagnosis.inference import settings
 from subzero.diagnosis.inference.change_point_fit import FittedChangePoint
-from subzero.diagnosis.inference.data_error_yardstick import LOUD, OUTLIER_LOG_DENSITY
+from subzero.diagnosis.inference.data_error_yardstick import LOUD
 from subzero.diagnosis.inference.latent_force import FORCE
 from subzero.diagnosis.inference.linear_gaussian import log_sum
 from subzero.diagnosis.inference.map_fit import is_poor_fit
@@ -213,10 +214,15 @@ def samples_of(work: Findings) -> Counter[str]:
 
 def _fixed(one: Observed, name: str) -> float:
     """Return what the noise of a channel adds to its log density: −½ log det Σ, what outliers cost, and its prior."""
-    out = int(np.isfinite(one.values[name]).sum()) - one.noise[name].count
-    return out * log_outlier(one, name) + log_density_of_noise(one, name)
+    return log_of_outliers(*_outliers(one, name)) + log_density_of_noise(one, name)
 
 
 def log_outlier(one: Observed, name: str) -> float:
-    """Return the log density of an outlier of a channel."""
-    return float(OUTLIER_LOG_DENSITY - np.log(sensor_of(one, name).level))
+    """Return the log density of a further outlier of a channel."""
+    return log_of_outlier(*_outliers(one, name))
+
+
+def _outliers(one: Observed, name: str) -> tuple[int, int, float]:
+    """Return how many samples of a channel are outliers, how many were measured, and the usual level of its sensor."""
+    measured = int(np.isfinite(one.values[name]).sum())
+    return measured - one.noise[name].count, measured, sensor_of(one, name).level

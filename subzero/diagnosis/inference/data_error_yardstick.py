@@ -29,6 +29,8 @@ from subzero.diagnosis.hypothesis.noise import (
     Between,
     Noise,
     innovations_between,
+    log_of_outlier,
+    log_of_outliers,
     spikes,
     usual_noise,
     usual_of,
@@ -44,8 +46,6 @@ LEAST_SCALE, MOST_SCALE, ROUNDS, SETTLED = 0.3, 1e4, 5, 0.01
 """Scales of the noise of a channel, and how often they are found anew behind the parameters, if they still change by
 more than that share: a hundredth costs less than 0.1 nats, as the best scales are stationary. Of a rounded one it is
 never so small that a sample has more density than 1/q, which is a probability of 1."""
-OUTLIER_LOG_DENSITY = float(np.log(0.01 / 50.0))
-"""Of a sample that is left out: one of a hundred, anywhere within fifty levels of the noise."""
 LOUD = 2.5
 """Noise of more usual levels hides a misfit. [-]"""
 BESIDE_JUMP = 10
@@ -193,7 +193,7 @@ class Yardstick:
         r, J = noise.whiten(left), np.empty((noise.count, slopes.shape[1]))
         places = self._places(noise.time, slopes.shape[0])
         innovations_between(slopes, places, *noise.filter, J, np.empty(slopes.shape[1]))
-        out = (measured - noise.count) * (OUTLIER_LOG_DENSITY - np.log(usual.level))
+        out = log_of_outliers(measured - noise.count, measured, usual.level)
         fixed, least = out - noise.log_scale, least_scale(noise)
         return Term(J.T @ J, J.T @ r, float(r @ r), noise.count, fixed, least, measured)
 
@@ -275,8 +275,8 @@ class Yardstick:
         """
         own, used, values = self.own[name], self.used[name], self.logged.record.values[name]
         level = usual_of(name, values, self.logged.noise).level
-        of_outlier = OUTLIER_LOG_DENSITY - float(np.log(level))
-        fixed = own.fixed - (own.measured - own.samples) * of_outlier
+        said = own.measured - own.samples, own.measured, level
+        of_outlier, fixed = log_of_outlier(*said), own.fixed - log_of_outliers(*said)
         mean = fixed / max(own.samples, 1) - float(np.log(as_is.scales[name])) - 0.5
         return np.count_nonzero(lost & used) * mean + np.count_nonzero(lost & ~used) * of_outlier
 

@@ -18,7 +18,7 @@ from subzero.channels import HEADING, turned
 from subzero.diagnosis.hypothesis.catalogue import ONSETS, START, catalogue
 from subzero.diagnosis.hypothesis.catalogue.sensors import CLOCK, SPECS
 from subzero.diagnosis.hypothesis.hypotheses import entries_of, moves_nothing, with_tolerances
-from subzero.diagnosis.hypothesis.noise import Noise, Usual, spikes, usual_noise, usual_of
+from subzero.diagnosis.hypothesis.noise import Noise, Usual, spikes, time_of, usual_noise, usual_of
 from subzero.diagnosis.hypothesis.noise_estimate import Behind, estimate
 from subzero.diagnosis.inference.problem import Observed, Problem
 from subzero.diagnosis.inference.simulator import economical, finer, respond
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from subzero.diagnosis.hypothesis.configuration import Setting
     from subzero.diagnosis.hypothesis.effect import Effect
     from subzero.diagnosis.hypothesis.logged import Logged
+    from subzero.diagnosis.inference.map_fit import Fit
 
 VISIBLE_STEP_ERROR = 1.0
 """Squared size, in noise, of an error of the steps that is worth correcting."""
@@ -149,7 +150,7 @@ def with_noise_behind(
             own = slice(at, at + old.count)
             noise[name] = _behind(one, name, Behind(residual=rest[own], J=J[own], D=D))
             at += old.count
-        found.append(replace(one, noise=noise))
+        found.append(replace(one, noise=noise, noise_time=time_of(noise.values())))
     if all(_alike(one.noise[name], new.noise[name]) for one, new in zip(problem.records, found, strict=True)
            for name in one.noise):  # fmt: skip
         return None
@@ -166,6 +167,11 @@ def whitened_again(before: Problem, after: Problem, white: np.ndarray) -> np.nda
     return np.concatenate(found)
 
 
+def rewhitened(fit: Fit, before: Problem, after: Problem) -> Fit:
+    """Return a fit whose residual and sensitivities are made white by the noise of another problem."""
+    return replace(fit, r=whitened_again(before, after, fit.r), J=whitened_again(before, after, fit.J))
+
+
 def _without_outliers(problem: Problem, record: int, z: np.ndarray) -> Observed:
     """Return a record without the samples that lie far off behind deviations z."""
     one = problem.records[record]
@@ -179,7 +185,8 @@ def _without_outliers(problem: Problem, record: int, z: np.ndarray) -> Observed:
 
 def sensor_of(one: Observed, name: str) -> Usual:
     """Return what the sensor of a channel is like, by what is known of it and by the record as it was posed."""
-    return Usual(one.known.get(name, SPECS[name].noise), one.noise[name].resolution, name in one.known)
+    level, resolution = one.known.get(name, SPECS[name].noise), one.noise[name].resolution
+    return Usual(level, resolution, name in one.known, one.noise_time)
 
 
 def _unit(one: Observed) -> dict[str, Noise]:

@@ -57,6 +57,7 @@ class Observed:
         setting: the nominal one, in economical steps.
         known: channel → level of noise that the user knows.
         correction: channel → what is added to the simulation (n,): the error of its economical steps, a drift.
+        noise_time: correlation time that the noise of most channels has [s], None as long as that is not known.
     """
 
     name: str
@@ -66,6 +67,7 @@ class Observed:
     setting: Setting
     known: Mapping[str, float] = field(default_factory=dict)
     correction: Mapping[str, np.ndarray] = field(default_factory=dict)
+    noise_time: float | None = None
 
     def corrected(self, more: Mapping[str, np.ndarray]) -> Observed:
         """Return the record beside a simulation to which more is added; what was measured stays as it is."""
