@@ -32,6 +32,7 @@ def benchmark(
     seed: int = SEED,
     results: Path | None = None,
     page: bool = True,
+    kinds: tuple[str, ...] = (),
 ) -> None:
     """Hide effects in records, let them be found, and write docs/diagnosis_benchmark.md with its figures.
 
@@ -43,13 +44,14 @@ def benchmark(
         seed: of all cases.
         results: where they are kept, one JSON object a line; beside the code if not given.
         page: write the page.
+        kinds: only cases of these kinds, such as outside.
     """
     path = results or place(seed, "quick_" if quick else "")
     path.parent.mkdir(parents=True, exist_ok=True)
     if not resume:
         path.unlink(missing_ok=True)
     known = {one["index"] for one in read(path)}
-    wanted = cases(seed)[: QUICK if quick else count]
+    wanted = [case for case in cases(seed) if not kinds or case.kind in kinds][: QUICK if quick else count]
     measure([case for case in wanted if case.index not in known], path, workers)
     if page:
         from .page import write_page

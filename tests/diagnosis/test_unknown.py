@@ -3,10 +3,14 @@
 Configuration: fig6, 30 s, six channels with coloured noise, all parameters nominal but free within their tolerances.
 """
 
+import dataclasses
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+import subzero
+from subzero.diagnosis import SPECS, Setting, catalogue
 from subzero.diagnosis.inference import (
     AXIS_WORDS,
     ForceInformation,
@@ -23,6 +27,7 @@ from subzero.diagnosis.inference import (
     one_terms,
     without_force,
 )
+from subzero.synthetic.planted import draw_tolerances, make_record
 
 TIME = np.arange(0.0, 30.05, 0.1)
 
@@ -116,3 +121,54 @@ def test_the_evidence_is_that_of_a_normal_distribution():
     assert_allclose(log_gains(data, np.eye(5), [0.7])[0], exact, rtol=1e-4)
     mixed = log_evidence_process(data, np.arange(5.0), np.zeros(5), [1e-9])
     assert abs(mixed) < 1e-6, "no amplitude, no gain"
+
+
+CHANNELS = ("surge_speed", "heading", "yaw_rate", "pitch", "roll_angle", "depth")
+SHORT = np.arange(0.0, 20.0, 0.1)
+
+
+def one_bump(time, start, lasts):
+    """Return a bump of height 1 that rises from a start on and falls again. [s]"""
+    return np.sin(np.pi * np.clip((time - start) / lasts, 0.0, 1.0)) ** 2
+
+
+def told(change, seed, drift=None):
+    """Return the verdict on fig6 with a change to it, tolerances drawn; one channel may drift, in its unit."""
+    trial = subzero.load_scenario("fig6")
+    setting = Setting(trial=trial, model=subzero.Model.of(trial))
+    true = change(draw_tolerances(setting, catalogue(CHANNELS).values(), seed))
+    record = make_record(true, SHORT, CHANNELS, seed=seed)
+    for name, size in (drift or {}).items():
+        record = dataclasses.replace(
+            record, values={**record.values, name: record.values[name] + size(SHORT)}
+        )
+    return subzero.diagnose(subzero.Logged(record=record, setting=setting, name="fig6"), budget="verdict")
+
+
+def test_a_compass_that_wanders_by_many_levels_drifts_though_slow_noise_could_say_so_too():
+    """Behind nothing the wander is noise, and beside that noise there is little left of it: each has an optimum of its
+    own, and a drift was only looked for beside the noise behind nothing.
+    """
+    size = 8.0 * SPECS["heading"].noise
+    found = told(lambda setting: setting, 14, {"heading": lambda time: size * one_bump(time, 3.0, 14.0)})
+    assert found.verdict == "outside_catalogue"
+    assert next(iter(found.probabilities)) == "sensor_drift:heading"
+    assert found.unknown.axis == "heading"
+    middle = np.interp(10.0, found.unknown.time, found.unknown.force)
+    assert middle == pytest.approx(size, rel=0.35), "its history is that beside its own noise"
+
+
+def test_a_moment_that_heels_the_hull_for_some_seconds_is_no_noise_of_the_roll_angle():
+    heel = pushed("K", lambda time: 0.02 * one_bump(time, 2.0, 16.0))
+    found = told(heel, 17)
+    assert found.verdict == "outside_catalogue"
+    assert next(iter(found.probabilities)) in ("unknown_force:K", "sensor_drift:roll_angle")
+
+
+def test_a_compass_whose_noise_is_slow_does_not_drift():
+    """Noise of a usual level that lasts for 3 s, in one channel of six."""
+    random = np.random.default_rng(13)
+    apart = np.abs(np.subtract.outer(SHORT, SHORT))
+    half = np.linalg.cholesky(np.exp(-apart / 3.0) + 1e-12 * np.eye(SHORT.size))
+    wander = SPECS["heading"].noise * half @ random.standard_normal(SHORT.size)
+    assert told(lambda setting: setting, 13, {"heading": lambda time: wander}).verdict == "nothing_wrong"

@@ -35,6 +35,7 @@ from subzero.diagnosis.inference.latent_force import (
 )
 from subzero.diagnosis.inference.linear_gaussian import (
     AMPLITUDE_SHARES,
+    CORRELATION_TIMES,
     KAPPAS,
     ForceInformation,
     Linear,
@@ -55,6 +56,7 @@ from subzero.diagnosis.inference.linear_gaussian import (
     seen,
 )
 from subzero.diagnosis.inference.map_fit import Fit, is_poor_fit, possible, refit, with_own_jacobian
+from subzero.diagnosis.inference.posing import rewhitened, whitened_again
 from subzero.diagnosis.results import Unknown
 
 if TYPE_CHECKING:
@@ -74,6 +76,7 @@ class LatentForceCandidate:
         fit: around which the linear problem is.
         columns: sensitivities to the history at its knots (m, n).
         knots: of the history.
+        terms: axis → what a force on it may look like beside a process.
     """
 
     id: str
@@ -82,13 +85,34 @@ class LatentForceCandidate:
     fit: Fit
     columns: np.ndarray
     knots: Knots
+    terms: Mapping[str, Terms]
+
+    def made_white(self, before: Problem, after: Problem) -> LatentForceCandidate:
+        """Return what the noise of a problem has made white, made white by that of another."""
+        fit, columns = rewhitened(self.fit, before, after), whitened_again(before, after, self.columns)
+        return replace(self, fit=fit, columns=columns)
+
+    def log_evidence(self, problem: Problem, causes: Ids) -> float:
+        """Return its log evidence beside causes, in the linear problem that the noise of a problem has made white."""
+        D = variances(problem.entries, causes, self.kappa)
+        data = _seen(self.fit, D, self.columns)
+        gain = _log_gain(problem, self.id, data, self.knots, self.terms)
+        return posterior(self.fit.quadratic, D).log_evidence + gain
 
     def linear(self, problem: Problem, causes: Ids) -> tuple[Linear, np.ndarray]:
         """Return its linear problem beside causes, with the modes of the most probable history, and the prior variances
         of all that (k,).
         """
         D, size = variances(problem.entries, causes, self.kappa), max(_amplitudes(problem, self.id))
-        L = _best_modes(_seen(self.fit, D, self.columns), self.knots, size)
+        return self._with_modes(_best_modes(_seen(self.fit, D, self.columns), self.knots, size), D)
+
+    def linear_at_most(self, problem: Problem, causes: Ids) -> tuple[Linear, np.ndarray]:
+        """Return the same with the modes of the largest and quickest history that there may be."""
+        largest = ProcessShape(max(_amplitudes(problem, self.id)), min(CORRELATION_TIMES))
+        L = modes(self.knots.time, self.knots.record, largest)
+        return self._with_modes(L, variances(problem.entries, causes, self.kappa))
+
+    def _with_modes(self, L: np.ndarray, D: np.ndarray) -> tuple[Linear, np.ndarray]:
         J = np.hstack([self.fit.J, self.columns @ L])
         return Linear(self.fit.r + self.fit.J @ self.fit.z, J), np.concatenate([D, np.ones(L.shape[1])])
 
@@ -120,7 +144,9 @@ def latent_force_candidates(
         }
         gain, kappa = mixed(scales, gains)
         found.append(
-            LatentForceCandidate(id=name, log_gain=gain, kappa=kappa, fit=fit, columns=C, knots=knots)
+            LatentForceCandidate(
+                id=name, log_gain=gain, kappa=kappa, fit=fit, columns=C, knots=knots, terms=terms or {}
+            )
         )
     return sorted(found, key=lambda one: -one.log_gain)
 

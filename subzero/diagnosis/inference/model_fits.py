@@ -20,7 +20,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from os import cpu_count
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -30,7 +30,13 @@ from subzero.diagnosis.hypothesis.noise_estimate import Behind, estimate
 from subzero.diagnosis.inference import settings
 from subzero.diagnosis.inference.linear_gaussian import KAPPAS, Linear, Quadratic, posterior
 from subzero.diagnosis.inference.map_fit import Candidate, Fit, candidate_of, is_poor_fit, refit
-from subzero.diagnosis.inference.posing import sensor_of, whitened_again, with_finer_steps, with_noise_behind
+from subzero.diagnosis.inference.posing import (
+    rewhitened,
+    sensor_of,
+    whitened_again,
+    with_finer_steps,
+    with_noise_behind,
+)
 from subzero.diagnosis.inference.screening import Screening, screening_of
 
 if TYPE_CHECKING:
@@ -233,11 +239,11 @@ class Fits:
         )
         if found is None:
             return False
-        again = partial(whitened_again, self.economical, found)
+        old, again = self.economical, partial(whitened_again, self.economical, found)
         self.candidates = {
-            ids: replace(one, fit=_rewhitened(one.fit, again)) for ids, one in self.candidates.items()
+            ids: replace(one, fit=rewhitened(one.fit, old, found)) for ids, one in self.candidates.items()
         }
-        self.wide, self.economical = self._nearer(_rewhitened(self.wide, again)), found
+        self.wide, self.economical = self._nearer(rewhitened(self.wide, old, found)), found
         self.nominal = again(self.nominal[0]), again(self.nominal[1])
         self.problem = found
         self.screen = screening_of(found, self.wide, self.nominal, far=self.screen.far)
@@ -273,36 +279,40 @@ class Fits:
         return refit(self.problem, fit.z, fit.J, fit.D, most_fresh=0, made_at=fit.made_at)
 
 
-def _rewhitened(fit: Fit, again: Callable[[np.ndarray], np.ndarray]) -> Fit:
-    """Return a fit whose residual and sensitivities are made white by another noise."""
-    return replace(fit, r=again(fit.r), J=again(fit.J))
-
-
 def log_density_of_noise(one: Observed, name: str) -> float:
     """Return what the noise of a channel adds to the log density of its samples: −½ log det Σ + log p(θ)."""
     return log_prior_of(one.noise[name], sensor_of(one, name)) - one.noise[name].log_scale
 
 
-def _gained(before: Problem, after: Problem) -> float:
+def gained_by_noise(before: Problem, after: Problem) -> float:
     """Return what another noise adds to the log density of all samples, but for their residual."""
     return sum(log_density_of_noise(new, name) - log_density_of_noise(old, name)
                for old, new in zip(before.records, after.records, strict=True) for name in old.noise)  # fmt: skip
 
 
-def candidate_with_own_noise(problem: Problem, one: Candidate) -> Candidate:
-    """Return a hypothesis with the evidence that it has with the noise behind it, which may ask for another κ; its fit
-    stays as it is, white by the noise of the problem.
+class WithOwnNoise(NamedTuple):
+    """A hypothesis with the noise behind it: the problem with that, the hypothesis as it is fitted then, and as it was
+    fitted before, with the evidence that it has now.
     """
-    fit, found = one.fit, list[Candidate]()
+
+    problem: Problem
+    again: Candidate
+    before: Candidate
+
+
+def candidate_with_own_noise(problem: Problem, one: Candidate) -> WithOwnNoise:
+    """Return a hypothesis with the noise that is the most probable one behind it, which may ask for another κ."""
+    fit, found = one.fit, list[WithOwnNoise]()
     for kappa in sorted({one.kappa, min(KAPPAS)}):
         D = variances(problem.entries, one.ids, kappa)
         more = with_own_noise(problem, Linear(fit.r + fit.J @ fit.z, fit.J), D)
         J = whitened_again(problem, more, fit.J)
         new = candidate_of(more, one.ids, refit(more, fit.z, J, D, most_fresh=0, made_at=fit.made_at))
-        gain = _gained(problem, more)
+        gain = gained_by_noise(problem, more)
         log = {each: value + gain for each, value in new.log_evidence.items()}
-        found.append(replace(one, log_evidence=log, log_posterior=new.log_posterior + gain))
-    return max(found, key=lambda each: each.log_posterior)
+        again = replace(new, log_evidence=log, log_posterior=new.log_posterior + gain)
+        found.append(WithOwnNoise(more, again, replace(again, fit=fit)))
+    return max(found, key=lambda each: each.again.log_posterior)
 
 
 def gain_of_own_noise(problem: Problem, linear: Linear, D: np.ndarray) -> float:
@@ -312,7 +322,7 @@ def gain_of_own_noise(problem: Problem, linear: Linear, D: np.ndarray) -> float:
     more = with_own_noise(problem, linear, D)
     again = Linear(*(whitened_again(problem, more, one) for one in linear))
     before, after = (posterior(one.quadratic, D).log_evidence for one in (linear, again))
-    return after - before + _gained(problem, more)
+    return after - before + gained_by_noise(problem, more)
 
 
 def with_own_noise(problem: Problem, linear: Linear, D: np.ndarray) -> Problem:
@@ -382,7 +392,7 @@ class _Channel:
         apart = np.linalg.solve(half, np.column_stack([self.J.T, others.b]))
         slopes, mean = apart[:, :-1].T, np.linalg.solve(half.T, apart[:, -1])
         behind = Behind(residual=self.whole - self.J @ mean, J=slopes, D=np.ones(D.size))
-        found = estimate(self.noise.time, behind, self.usual)
+        found = estimate(self.noise.time, behind, self.usual, self.noise)
         return replace(self, noise=found)
 
 

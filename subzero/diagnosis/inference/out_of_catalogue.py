@@ -34,10 +34,17 @@ from subzero.diagnosis.inference.latent_force import (
     knots_of,
     one_terms,
 )
-from subzero.diagnosis.inference.linear_gaussian import KAPPAS, Linear, Terms, log_sum
+from subzero.diagnosis.inference.linear_gaussian import KAPPAS, Linear, Terms, log_sum, posterior
 from subzero.diagnosis.inference.map_fit import is_poor_fit
 from subzero.diagnosis.inference.model_average import FURTHER_CAUSE_ODDS
-from subzero.diagnosis.inference.model_fits import candidate_with_own_noise, gain_of_own_noise
+from subzero.diagnosis.inference.model_fits import (
+    WithOwnNoise,
+    candidate_with_own_noise,
+    gain_of_own_noise,
+    gained_by_noise,
+    with_own_noise,
+)
+from subzero.diagnosis.inference.posing import whitened_again
 from subzero.external_force import AXES
 
 if TYPE_CHECKING:
@@ -81,12 +88,14 @@ class OutOfCatalogue:
         what: a force or a drift, or a cause that begins in mid-trial.
         log_posterior: on the scale of `Candidate.log_posterior`.
         point: where it was fitted, if that explains the records.
+        own: the problem with the noise beside it, which has made a force white; None for that of the search.
     """
 
     causes: Ids
     what: LatentForceCandidate | FittedChangePoint
     log_posterior: float
     point: LinearisationPoint | None = None
+    own: Problem | None = None
 
     @property
     def id(self) -> str:
@@ -277,27 +286,72 @@ def each_with_own_noise(search: Search, outside: Sequence[OutOfCatalogue]) -> li
     """
     fits, first = search.candidates, max(search.best().log_posterior, _most(outside))
     own = partial(candidate_with_own_noise, search.problem)
-    none = own(fits[()])
+    nothing = own(fits[()])
+    none = nothing.before
     gained = max(none.log_posterior - fits[()].log_posterior, 0.0)
     least = max(first, none.log_posterior) - gained - settings.HOPELESS_NATS
     ranked = sorted(fits.values(), key=lambda one: -one.log_posterior)[: settings.MAX_RANKED]
     near = [one for one in ranked if one.ids and one.log_posterior > least]
-    fits.update({one.ids: one for one in [none, *search.side.map(own, near)]})
-    few = [one for one in outside[: settings.MAX_RANKED] if one.log_posterior > least]
-    return _sorted([_with_own_noise(search.problem, one) for one in few], list(outside[len(few) :]))
+    fits.update({one.before.ids: one.before for one in [nothing, *search.side.map(own, near)]})
+    few = [one for one in outside[: settings.MAX_RANKED]
+           if one.log_posterior > least and (one.point or not _is_force(one))]  # fmt: skip
+    found = search.side.map(partial(_with_own_noise, search.problem, nothing.problem), few)
+    forces = search.side.map(partial(_beside_nothing, search.problem, nothing), filter(_is_force, outside))
+    return _sorted([*found, *forces], [one for one in outside if one not in few and not _is_force(one)])
 
 
-def _with_own_noise(problem: Problem, one: OutOfCatalogue) -> OutOfCatalogue:
-    """Return what lies outside with the evidence that it has with the noise behind it."""
-    linear, D = _linear_of(problem, one)
-    return replace(one, log_posterior=one.log_posterior + gain_of_own_noise(problem, linear, D))
+def _is_force(one: OutOfCatalogue) -> bool:
+    """Say whether it is a force or a drift beside nothing."""
+    return isinstance(one.what, LatentForceCandidate) and not one.causes
 
 
-def _linear_of(problem: Problem, one: OutOfCatalogue) -> tuple[Linear, np.ndarray]:
-    """Return the linear problem around what lies outside, and the prior variances of all its parameters (k,)."""
+def _with_own_noise(problem: Problem, behind: Problem, one: OutOfCatalogue) -> OutOfCatalogue:
+    """Return what lies outside with the evidence that it has with the noise beside it; `behind` is the problem with
+    that behind "nothing is wrong".
+    """
     if isinstance(one.what, FittedChangePoint):
-        return one.what.linear(problem)
-    return one.what.linear(problem, one.causes)
+        gain = gain_of_own_noise(problem, *one.what.linear(problem))
+        return replace(one, log_posterior=one.log_posterior + gain)
+    log = one.log_posterior - one.what.log_evidence(problem, one.causes) + gained_by_noise(problem, behind)
+    return _beside_noise(one, one.what.made_white(problem, behind), log, behind)
+
+
+def _beside_nothing(problem: Problem, nothing: WithOwnNoise, one: OutOfCatalogue) -> OutOfCatalogue:
+    """Return a force or a drift likewise, around "nothing is wrong" as it is fitted with the noise behind it."""
+    assert isinstance(one.what, LatentForceCandidate)
+    own, none = nothing.problem, nothing.again
+    what = replace(one.what.made_white(problem, own), fit=none.fit, kappa=none.kappa)
+    without = posterior(none.fit.quadratic, variances(own.entries, (), none.kappa)).log_evidence
+    return _beside_noise(one, what, none.log_posterior + _log_prior(own) - without, own)
+
+
+def _beside_noise(
+    one: OutOfCatalogue, what: LatentForceCandidate, log: float, behind: Problem
+) -> OutOfCatalogue:
+    """Return a force or a drift with the noise behind nothing, or with that beside all that it might do: behind nothing
+    it is noise, and beside that noise there is little left of it; the two have an optimum each.
+
+    Args:
+        one: as it is.
+        what: it is, white by the noise behind nothing.
+        log: what is added to its log evidence then.
+        behind: the problem with that noise.
+    """
+
+    def log_posterior(own: Problem) -> float:
+        evidence = what.made_white(behind, own).log_evidence(own, one.causes)
+        return log + evidence + gained_by_noise(behind, own)
+
+    tried = [(log_posterior(behind), behind)]
+    linear, D = what.linear_at_most(behind, one.causes)
+    for _ in range(settings.MAX_TRIED):
+        own = with_own_noise(tried[-1][1], linear, D)
+        tried.append((log_posterior(own), own))
+        if tried[-1][0] < tried[-2][0] + settings.NEGLIGIBLE_GAIN_NATS:
+            break
+        linear, D = what.made_white(behind, own).linear(own, one.causes)
+    best, own = max(tried, key=lambda each: each[0])
+    return replace(one, what=what.made_white(behind, own), log_posterior=best, own=own)
 
 
 def linear_of_first(search: Search, outside: Sequence[OutOfCatalogue]) -> tuple[Linear, np.ndarray]:
@@ -308,6 +362,15 @@ def linear_of_first(search: Search, outside: Sequence[OutOfCatalogue]) -> tuple[
         return _linear_of(search.problem, first)
     linear = Linear(best.fit.r + best.fit.J @ best.fit.z, best.fit.J)
     return linear, variances(search.problem.entries, best.ids, best.kappa)
+
+
+def _linear_of(problem: Problem, one: OutOfCatalogue) -> tuple[Linear, np.ndarray]:
+    """Return the linear problem around what lies outside, and the prior variances of all its parameters (k,)."""
+    if isinstance(one.what, FittedChangePoint):
+        return one.what.linear(problem)
+    own = one.own or problem
+    linear, D = one.what.linear(own, one.causes)
+    return Linear(*(whitened_again(own, problem, part) for part in linear)), D
 
 
 @dataclass(kw_only=True, eq=False)

@@ -28,6 +28,7 @@ from subzero.diagnosis.inference.input_estimation import (
 from subzero.diagnosis.inference.latent_force import AXIS_WORDS, DRIFT, FORCE, MAX_DRIFT_LEVELS, samples_of
 from subzero.diagnosis.inference.linear_gaussian import KAPPAS, log_sum, posterior
 from subzero.diagnosis.inference.model_average import practical_causes
+from subzero.diagnosis.inference.posing import rewhitened
 from subzero.diagnosis.results import Cause, Estimate, Extended, Rival, Unknown
 
 if TYPE_CHECKING:
@@ -276,13 +277,16 @@ def of_nothing(work: Findings, best: Candidate) -> Extension:
 
 
 def of_unknown(work: Findings) -> Extension:
-    """Return the extension by the most probable force; beside the drift of a sensor there is nothing new but causes."""
+    """Return the extension by the most probable force, with the noise beside it; beside the drift of a sensor there is
+    nothing new but causes.
+    """
     explanation = next(one for one in work.out_of_catalogue if isinstance(one.what, LatentForceCandidate))
-    found = _estimated(work, explanation)
+    problem = explanation.own or work.problem
+    found = _estimated(work, explanation, problem)
     if found.missing is None:
-        found = replace(found, fit=fit_beside_drift(work.problem, found, found.fit.D))
-    deviations = by_effect(work.problem, found.fit.z, explanation.causes)
-    calibration = by_effect(work.problem, found.fit.z, None, but=explanation.causes)
+        found = replace(found, fit=fit_beside_drift(problem, found, found.fit.D))
+    deviations = by_effect(problem, found.fit.z, explanation.causes)
+    calibration = by_effect(problem, found.fit.z, None, but=explanation.causes)
     extended = Extended(deviations=deviations, calibration=calibration, missing=found.missing)
     unknown = found.unknown if found.missing is None else _as_formula(found.unknown, describe(found))
     return Extension(fit=found.fit, problem=found.problem, extended=extended, unknown=unknown)
@@ -299,15 +303,18 @@ def _as_formula(unknown: Unknown, formula: Formula) -> Unknown:
                    features={one: p for one, p in formula.features.items() if p >= MENTIONED_PROBABILITY})  # fmt: skip
 
 
-def _estimated(work: Findings, explanation: OutOfCatalogue) -> EstimatedForce:
+def _estimated(work: Findings, explanation: OutOfCatalogue, problem: Problem) -> EstimatedForce:
     """Return a force or a drift, fitted beside the causes that it stands beside."""
     base = work.search.candidates[explanation.causes]
     assert isinstance(explanation.what, LatentForceCandidate)
-    D = variances(work.problem.entries, base.ids, explanation.what.kappa)
+    fit, D = (
+        rewhitened(base.fit, work.problem, problem),
+        variances(problem.entries, base.ids, explanation.what.kappa),
+    )
     kind, _, which = explanation.id.partition(":")
     if kind + ":" == FORCE:
-        return estimate_force(work.problem, base.fit, which, D)
-    return estimate_drift(work.problem, base.fit, which, MAX_DRIFT_LEVELS * SPECS[which].noise, D)
+        return estimate_force(problem, fit, which, D)
+    return estimate_drift(problem, fit, which, MAX_DRIFT_LEVELS * SPECS[which].noise, D)
 
 
 def of_sudden(work: Findings, what: FittedChangePoint, cause: Cause) -> Extension:
