@@ -15,6 +15,8 @@ Result = dict[str, Any]
 CLEAR, PLAIN, SURE = 16.0, 50.0, 0.95
 EDGES = (0.0, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9, 0.95, 0.99, 1.0 + 1e-9)
 """Bins of stated probabilities."""
+CLOSE_CAUSES = {**ALSO_CAUSES, "weed": "fouling"}
+"""What is strange → the cause of the catalogue that comes close to it, which may be named for it."""
 FOREIGN = ("unknown_force:", "sensor_drift:")
 
 
@@ -65,7 +67,7 @@ def is_right(one: Result) -> bool:
     """
     if not one["strange"]:
         return first(one)[0] == truth(one)
-    close = ALSO_CAUSES.get(one["strange"], "none")
+    close = CLOSE_CAUSES.get(one["strange"], "none")
     return one["verdict"] == "outside_catalogue" or first(one)[0] == f"{close}@"
 
 

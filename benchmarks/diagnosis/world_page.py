@@ -2,8 +2,9 @@
 
     python -m benchmarks.diagnosis.world_page
 
-writes it from what is kept of `benchmarks.diagnosis.world`, `data_errors`, `jitter` and `calibration`, each of the seed
-below, which no choice was made with. Figures whose records are few have wide intervals; the page shows them.
+writes it from what is kept of `benchmarks.diagnosis.world`, `data_errors`, `jitter` and `calibration`, and of the cases
+of `benchmarks.diagnosis` outside the catalogue, each of the seed below, which no choice was made with. Figures whose
+records are few have wide intervals; the page shows them.
 """
 
 from __future__ import annotations
@@ -21,8 +22,10 @@ from .scores import Score, share
 from .sections import mark, table
 
 Rows = Sequence[Mapping[str, Any]]
-SEEDS = {"world": 10001, "data_errors": 10003, "jitter": 7501, "calibration": 31337}
+SEEDS = {"world": 10101, "data_errors": 10103, "outside": 75, "jitter": 10107, "calibration": 31337}
 """Of what the page rests on."""
+OF_CASES = {"outside": " --kinds outside --no-page"}
+"""Results that are those of cases on two manoeuvres."""
 PAGE = FIGURES.parent / "diagnosis_world.md"
 KEPT = Path(__file__).parent / "kept"
 FAMILY_COLUMNS = (
@@ -78,7 +81,7 @@ def path_of(name: str) -> Path:
 def _commands(found: Mapping[str, Rows]) -> str:
     """Return what made the results, and how many there are."""
     return "\n".join(
-        f"    python -m benchmarks.diagnosis.{name} --seed {SEEDS[name]} --count {len(rows)}"
+        f"    python -m benchmarks.diagnosis{OF_CASES.get(name, f'.{name}')} --seed {SEEDS[name]} --count {len(rows)}"
         for name, rows in found.items()
         if rows
     )
@@ -90,6 +93,7 @@ def _scores(found: Mapping[str, Rows]) -> str:
         *of_world(found["world"]),
         *of_time(found["world"]),
         *of_data_errors(found["data_errors"]),
+        *of_outside(found["outside"]),
         *of_jitter(found["jitter"]),
         *of_calibration(found["calibration"]),
     ]
@@ -146,6 +150,20 @@ def of_data_errors(results: Rows) -> list[Score]:
 
 def _is_named(one: Mapping[str, Any]) -> bool:
     return bool(one["named"])
+
+
+def of_outside(results: Rows) -> list[Score]:
+    """Return the figures of forces and drifts outside the catalogue; weed that gathers is one that fouls the hull."""
+    clear = [one for one in results if scores.smallest_D(one) >= scores.CLEAR]
+    flagged = [one for one in clear if one["outside"]["found"]]
+    return [
+        share("outside the catalogue, D ≥ 16: told so", clear, scores.is_right, "≥ 95 %", least=0.95),
+        share("… with the right axis or channel", flagged, _has_right_axis, "≥ 90 %", least=0.90),
+    ]
+
+
+def _has_right_axis(one: Mapping[str, Any]) -> bool:
+    return bool(one["outside"]["axis"] == one["outside"]["found"])
 
 
 def of_jitter(results: Rows) -> list[Score]:
