@@ -187,14 +187,14 @@ def test_a_channel_that_froze_beside_one_that_is_late_is_not_said_to_be_exchange
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("error", [DataError(kind="command_sign", channels=("rudder",)),
-                                   DataError(kind="late_clock", amount=4.0)], ids=lambda one: one.id)  # fmt: skip
-def test_an_error_that_physics_has_no_chance_against_is_corrected_before_anything_is_searched(error):
-    """Each search begins with the sensitivities of the nominal model: there is one, of the record without the error."""
-    words = list[str]()
-    verdict = subzero.diagnose(error.planted(measured("zigzag", 20251)), budget="screen",
+def test_an_error_that_physics_has_no_chance_against_is_corrected_before_anything_is_searched():
+    """Each search begins with the sensitivities of the nominal model: there is one, of the record without the error. A
+    rudder with the other sign is searched as it is, too: causes of real sizes explain half of what that does.
+    """
+    words, late = list[str](), DataError(kind="late_clock", amount=4.0)
+    verdict = subzero.diagnose(late.planted(measured("zigzag", 20251)), budget="screen",
                                progress=lambda share, doing: words.append(doing))  # fmt: skip
-    assert error.id in named(verdict)
+    assert late.id in named(verdict)
     assert words.count("sensitivities of the nominal model") == 1
 
 
