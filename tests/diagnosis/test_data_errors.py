@@ -18,7 +18,7 @@ import subzero
 from benchmarks.diagnosis import data_errors, world
 from benchmarks.diagnosis.world import ROUNDED
 from subzero import Logged
-from subzero.diagnosis import Setting, catalogue, report
+from subzero.diagnosis import SPECS, Setting, catalogue, report
 from subzero.diagnosis.inference import (
     KINDS_OF_DATA_ERRORS,
     DataError,
@@ -196,6 +196,19 @@ def test_an_error_that_physics_has_no_chance_against_is_corrected_before_anythin
                                progress=lambda share, doing: words.append(doing))  # fmt: skip
     assert late.id in named(verdict)
     assert words.count("sensitivities of the nominal model") == 1
+
+
+@pytest.mark.parametrize(("channel", "other"), [("depth", 20301), ("surge_speed", 20302)])
+def test_a_channel_whose_noise_has_tails_is_in_no_other_unit(channel, other):
+    """A tenth of the samples five levels off: in a smaller unit they would be no outliers, and a sensor that shows too
+    much, by as much, would undo it.
+    """
+    healthy, random = measured("zigzag", other), np.random.default_rng(other)
+    values = healthy.record.values[channel].copy()
+    tails = random.random(values.size) < 0.1
+    values[tails] += 5.0 * SPECS[channel].noise * random.choice([-1.0, 1.0], tails.sum())
+    record = dataclasses.replace(healthy.record, values={**healthy.record.values, channel: values})
+    assert not named(subzero.diagnose(dataclasses.replace(healthy, record=record), budget="screen"))
 
 
 @pytest.mark.slow

@@ -166,12 +166,13 @@ def _judged(yardstick: Yardstick, error: DataError, group: Group, *, closer: boo
     is_of_all = error.is_of_clock or error.is_of_commands or not yardstick.is_last(error)
     touched = list(yardstick.own) if is_of_all else list(error.channels)
     there = yardstick.under(logged) if closer and error.is_of_commands else yardstick
+    there = there.with_scale_held(error.channels) if error.kind == "unit" else there
     terms = {**yardstick.own, **there.terms(logged, touched)}
     is_small = not group.is_read_off and _is_small(yardstick, error)
     if min(terms[name].samples for name in touched) < FEWEST or is_small:
         return Suspect(error, -np.inf, -np.inf)
     odds = log_prior(error, len(group.each))
-    odds += error.log_jacobian * sum(terms[name].samples for name in error.channels if name in terms)
+    odds += error.log_jacobian * sum(terms[name].measured for name in error.channels if name in terms)
     generous = odds + _lost(yardstick, error, terms, yardstick.as_is)
     generous += there.generous(terms) - yardstick.as_is.log
     if not closer:

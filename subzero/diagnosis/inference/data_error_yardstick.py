@@ -90,6 +90,7 @@ class Yardstick:
         D: prior variances that are generous to physics: every cause at once (k,).
         narrow: prior variances of wide tolerances (k,).
         causes: places of the parameters of each cause.
+        scales: channel → the place of the scale of its sensor, if that is a cause.
         z: where it is linear (k,).
         setting: of its simulations there.
         repeated: values that it repeats, which may be a channel that is rounded and stands still.
@@ -108,6 +109,7 @@ class Yardstick:
     D: np.ndarray
     narrow: np.ndarray
     causes: Sequence[Sequence[int]]
+    scales: Mapping[str, int]
     z: np.ndarray
     setting: Setting
     repeated: tuple[DataError, ...] = ()
@@ -131,6 +133,14 @@ class Yardstick:
         base = self.under(corrected(self.written, every))
         return replace(base, written=self.written, repeated=self.repeated, corrected=every, place=here,
                        clock=self.clock)  # fmt: skip
+
+    def with_scale_held(self, channels: Iterable[str]) -> Yardstick:
+        """Return the same with the scales of some sensors within tolerances: a unit and a scale that undoes it are no
+        error at all.
+        """
+        D, at = self.D.copy(), [self.scales[name] for name in channels if name in self.scales]
+        D[at] = self.narrow[at]
+        return replace(self, D=D)
 
     def is_last(self, error: DataError) -> bool:
         """Say whether a further error is undone behind all that are corrected."""
@@ -392,9 +402,10 @@ def yardstick_of(problem: Problem, record: int, logged: Logged, z: np.ndarray | 
             slopes[name][:, k] = np.nan_to_num((there[name] - shown[name]) / (moved[k][k] - z[k]))
     nominal = {name: shown[name] - slopes[name] @ z for name in names}
     grid, causes = base[0], [columns_of(problem.entries, (name,)) for name in nameable(problem.entries)]
+    scales = {name: k for name in names for k in columns_of(problem.entries, (f"sensor_scale:{name}",))}
     return Yardstick(logged=logged, written=logged, step=float(grid[1] - grid[0]), nominal=nominal, slopes=slopes,
                      D=generous_variances(problem), narrow=variances(problem.entries, (), KAPPA_NARROW),
-                     causes=causes, z=z, setting=setting)  # fmt: skip
+                     causes=causes, scales=scales, z=z, setting=setting)  # fmt: skip
 
 
 def generous_variances(problem: Problem) -> np.ndarray:
