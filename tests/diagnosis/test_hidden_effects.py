@@ -124,7 +124,7 @@ def test_what_begins_in_mid_trial_is_named_with_its_time(told, case):
 
 PASSES_FOR_NOISE = pytest.mark.xfail(
     strict=True,
-    reason="a snag of two seconds with D 113 passes for slow noise, which is estimated behind 'nothing is wrong'",
+    reason="a snag of two seconds with D 113 passes for slow noise of the speed log, which nothing else shows",
 )
 
 

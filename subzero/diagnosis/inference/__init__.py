@@ -71,7 +71,7 @@ from subzero.diagnosis.inference.simulator import (
     with_stops,
 )
 from subzero.diagnosis.inference.problem import Observed, Problem, Progress
-from subzero.diagnosis.inference.posing import pose, whitened_again, with_finer_steps, with_noise_behind
+from subzero.diagnosis.inference.posing import pose, with_finer_steps, with_noise_behind
 from subzero.diagnosis.inference.linear_gaussian import (
     KAPPAS,
     ForceInformation,
@@ -247,7 +247,6 @@ __all__ = [
     "time_of",
     "times_of",
     "variances",
-    "whitened_again",
     "with_finer_steps",
     "with_noise_behind",
     "with_own_noise",

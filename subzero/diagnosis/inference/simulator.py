@@ -45,14 +45,6 @@ if TYPE_CHECKING:
     from subzero.run_state import Live, Setup
 
 
-TOO_LONG = 5
-"""How a run ends that takes more iterations of the cable than there may be."""
-MOST_ITERATIONS, LONG_CABLE = 25, 60
-"""... for an exchange on average, of a cable of so many nodes; of a shorter one so many more. Usual runs take 2 to 5,
-those of a cause of any size up to 18. Where several numbers are absurd at once a cable may whip about, take 200, and
-seconds: such a run counts as one that cannot go on."""
-
-
 @compiled
 def record_track(
     setup: Setup, live: Live, times: np.ndarray, first: int, last: int, track: np.ndarray
@@ -68,7 +60,7 @@ def record_track(
         track: (1 + (n − 1) · hull steps, COLUMNS); row 0 is filled when first is 1.
 
     Returns:
-        exchanges that are done, and how it ended (`coupling.FINE` …, `NO_ROOM`, TOO_LONG).
+        exchanges that are done, and how it ended (`coupling.FINE` …).
     """
     steps = hull_steps(setup, times[1] - times[0])
     if first == 1:
@@ -80,9 +72,6 @@ def record_track(
         ending = exchange(setup, live, times[row - 1], span)
         if ending != FINE:
             return row, ending
-        nodes = min(live.line.ends.count, LONG_CABLE)
-        if live.now.iterations * nodes > MOST_ITERATIONS * LONG_CABLE * times.size:
-            return row, TOO_LONG
         whole, pull, length = (
             live.now.last_step > 0.999 * span,
             track[(row - 1) * steps, TENSION],
