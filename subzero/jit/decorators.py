@@ -97,8 +97,22 @@ def _compile(function: Function, *, gate: bool, inline: bool = False, makes: boo
     if not numba.config.DISABLE_JIT:
         found._cache = MachineCode(function)  # where numba's own `cache=True` puts its own
         found._compile_for_args = _unbroken(found._compile_for_args)
+        if not gate:
+            _shut(found)
         found.get_call_template = _of_kinds(found.get_call_template)
     return cast(Function, found)
+
+
+def _shut(found: Any) -> None:
+    """Let a function without a gate to Python say so when Python calls it; the interpreter would crash."""
+
+    def refuse(*arguments: Any, **named: Any) -> None:
+        name = found.py_func.__qualname__
+        raise TypeError(f"{name} is for compiled code only; Python may call what is `gated_inlined`, or "
+                        "`compiled` without an underscore.")  # fmt: skip
+
+    found._compile_for_args = refuse
+    found.add_overload = lambda made: found.overloads.update({tuple(made.signature.args): made})
 
 
 def _unbroken(compile_for: Callable[..., Any]) -> Callable[..., Any]:

@@ -6,6 +6,8 @@ digit, which costs Newton's method twice as much. Configuration: 4 s of fig6, wi
 bit for bit; a thousandth of the noise of a speed log. The runs of the engine are asked for what no face of it offers.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 import subzero
@@ -55,3 +57,27 @@ def test_small_forces_of_a_slack_cable_agree_soon_enough_and_well_enough(monkeyp
     apart = simulate_track(setting)[1] - loose
     assert spent[0].iterations < 3000
     assert np.abs(apart[:, 7:10]).max() < 1.5e-5
+
+
+def weighed(newtons_per_metre):
+    """Return stop_and_drift with a cable of a weight in water: slack behind a vehicle that stops, it whips about."""
+    trial = subzero.load_scenario("stop_and_drift")
+    model = subzero.Model.of(trial)
+    mass = model.cable.mass_per_length + newtons_per_metre / 9.81
+    return economical(Setting(trial=trial, model=model).with_cable(mass_per_length=mass), 43.0)
+
+
+def test_a_run_may_take_many_times_what_the_nominal_one_takes_and_no_more():
+    limited, nominal_run = simulator.with_limit(weighed(0.0))
+    assert np.array_equal(simulate_track(limited)[1], nominal_run[1])
+    heavy = limited.with_model(cable=weighed(1.2).model.cable)
+    assert np.isnan(simulate_track(heavy)[1][-1]).all(), "it is given up, where it goes on for ever"
+    assert np.isfinite(simulate_track(replace(heavy, most_work=None))[1]).all(), "... which it need not"
+
+
+def test_a_nominal_cable_that_whips_about_may_do_so():
+    """A user's heavy cable takes a hundred iterations an exchange, and nothing is wrong with it."""
+    limited, nominal_run = simulator.with_limit(weighed(1.2))
+    heavier = simulate_track(limited.with_model(cable=weighed(1.3).model.cable))[1]
+    assert np.isfinite(nominal_run[1]).all()
+    assert np.isfinite(heavier).all()

@@ -65,6 +65,8 @@ class Setting:
         clock_offset: the sensors' clock is late by this: what is logged at t happened at t − offset. [s]
         tethered: with the cable.
         later: (time [s], model) from which on another model holds, in the order of time.
+        most_work: iterations of the cable's solver times nodes that a run may take for an exchange, on average; None if
+            it may take any.
     """
 
     trial: scenarios.Trial
@@ -73,6 +75,7 @@ class Setting:
     clock_offset: float = 0.0
     tethered: bool = True
     later: tuple[tuple[float, Model], ...] = ()
+    most_work: float | None = None
 
     def with_vehicle(self, **changes: float | Callable[[float], float]) -> Setting:
         """Return the setting with numbers of the vehicle changed: ``section__key=value or function``."""

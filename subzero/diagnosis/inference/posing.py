@@ -21,7 +21,7 @@ from subzero.diagnosis.hypothesis.hypotheses import entries_of, moves_nothing, w
 from subzero.diagnosis.hypothesis.noise import Noise, Usual, spikes, time_of, usual_noise, usual_of
 from subzero.diagnosis.hypothesis.noise_estimate import Behind, estimate
 from subzero.diagnosis.inference.problem import Observed, Problem
-from subzero.diagnosis.inference.simulator import economical, finer, respond
+from subzero.diagnosis.inference.simulator import economical, finer, read, respond, with_limit
 from subzero.errors import UserError
 
 if TYPE_CHECKING:
@@ -103,7 +103,8 @@ def _observed(one: Logged) -> Observed:
               if name in SPECS and np.isfinite(column).any()}  # fmt: skip
     if not values:
         raise UserError(f"'{one.name}' has no measured sample in any channel that can be diagnosed.")
-    simulated = respond(setting, time, values)
+    setting, run = with_limit(setting)
+    simulated = read(setting, run, time, values)
     if not all(np.isfinite(column).all() for column in simulated.values()):
         raise UserError(
             f"The nominal model cannot be run through '{one.name}'. Try `subzero simulate` on its scenario."

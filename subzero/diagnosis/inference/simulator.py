@@ -45,9 +45,20 @@ if TYPE_CHECKING:
     from subzero.run_state import Live, Setup
 
 
+TOO_LONG = 5
+"""How a run ends that takes more iterations than it may, beside the endings of `coupling`."""
+USUAL_WORK = 25 * 60
+"""Work that any run may take for an exchange, on average: iterations of the cable's solver times nodes. Usual runs take
+2 to 5 iterations, those of a cause of any size up to 18, for 15 to 60 nodes. Where several numbers are absurd at once a
+cable may whip about, take 200, and seconds: such a run counts as one that cannot go on."""
+TIMES_NOMINAL = 10
+"""... and a run may take so many times the work of the nominal one: a heavy cable, slack behind a vehicle that stops,
+takes 25 to 120 iterations for an exchange, and nothing is wrong with it."""
+
+
 @compiled
 def record_track(
-    setup: Setup, live: Live, times: np.ndarray, first: int, last: int, track: np.ndarray
+    setup: Setup, live: Live, times: np.ndarray, first: int, last: int, track: np.ndarray, most_work: float
 ) -> tuple[int, int]:
     """Fill the rows of a track that belong to the exchanges first … last − 1.
 
@@ -58,9 +69,10 @@ def record_track(
         first: exchange to begin with, from 1.
         last: exchange to end before.
         track: (1 + (n − 1) · hull steps, COLUMNS); row 0 is filled when first is 1.
+        most_work: that the run may take since its start, as in `work`.
 
     Returns:
-        exchanges that are done, and how it ended (`coupling.FINE` …).
+        exchanges that are done, and how it ended (`coupling.FINE` …, `NO_ROOM`, `TOO_LONG`).
     """
     steps = hull_steps(setup, times[1] - times[0])
     if first == 1:
@@ -72,6 +84,8 @@ def record_track(
         ending = exchange(setup, live, times[row - 1], span)
         if ending != FINE:
             return row, ending
+        if work(live) > most_work:
+            return row, TOO_LONG
         whole, pull, length = (
             live.now.last_step > 0.999 * span,
             track[(row - 1) * steps, TENSION],
@@ -86,6 +100,12 @@ def record_track(
                 for j in range(STATE_SIZE):
                     at[j] = share * live.state[j] + (1.0 - share) * track[(row - 1) * steps, j]
     return last, FINE
+
+
+@compiled
+def work(live: Live) -> float:
+    """Return what a run has taken: iterations times the nodes of its cable, as it is now."""
+    return live.now.iterations * live.line.ends.count
 
 
 @inner
@@ -137,8 +157,26 @@ def simulate_track(setting: Setting) -> Track:
     return with_stops(setting, ())[0]
 
 
+def with_limit(setting: Setting) -> tuple[Setting, Track]:
+    """Return a nominal setting with what runs of it, and of all that is made of it, may take; and its track."""
+    begin, grid, steps = _begun(setting)
+    _run(setting, begin, grid, steps, ())
+    nominal = work(begin.live) / (grid.size - 1)
+    limited = replace(setting, most_work=max(USUAL_WORK, TIMES_NOMINAL * nominal))
+    return limited, (_spread(grid, begin), begin.track)
+
+
 def with_stops(setting: Setting, times: Collection[float]) -> tuple[Track, dict[float, Stop]]:
     """Return the track of a setting, and the run as it was at times [s], or at the last exchange before each."""
+    begin, grid, steps = _begun(setting)
+    done = {time: int(time / setting.trial.cable_step + 1e-6) for time in times}
+    stops = _run(setting, begin, grid, steps, set(done.values()))
+    kept = {time: stops[count] for time, count in done.items() if count in stops}
+    return (_spread(grid, begin), begin.track), kept
+
+
+def _begun(setting: Setting) -> tuple[Stop, np.ndarray, int]:
+    """Return the run of a setting before its first exchange, the times of exchanges, and the hull's steps in one."""
     trial = setting.trial
     # Even segments, however the cable begins: a mesh that changes with its initial length has no slope.
     room = 16 + int(FASTEST_PAY_OUT * trial.duration / trial.segment_length)
@@ -147,10 +185,12 @@ def with_stops(setting: Setting, times: Collection[float]) -> tuple[Track, dict[
     _ease(setup)
     grid, steps = _exchanges(setting)
     track = np.full((1 + (grid.size - 1) * steps, COLUMNS), np.nan)
-    done = {time: int(time / trial.cable_step + 1e-6) for time in times}
-    stops = _run(setting, Stop(0, setup, live, track), grid, steps, set(done.values()))
-    kept = {time: stops[count] for time, count in done.items() if count in stops}
-    return (np.linspace(0.0, grid[-1], track.shape[0]), track), kept
+    return Stop(0, setup, live, track), grid, steps
+
+
+def _spread(grid: np.ndarray, run: Stop) -> np.ndarray:
+    """Return the times of the rows of a run's track. [s]"""
+    return np.linspace(0.0, grid[-1], run.track.shape[0])
 
 
 def simulate_on(setting: Setting, stop: Stop) -> Track:
@@ -184,7 +224,8 @@ def _run(
             )
             _ease(setup)
         ahead = (count + 1 for count in (*changes, *wanted) if count + 1 > row)
-        row, ending = record_track(setup, live, times, row, min([times.size, *ahead]), track)
+        most = math.inf if setting.most_work is None else setting.most_work * (times.size - 1)
+        row, ending = record_track(setup, live, times, row, min([times.size, *ahead]), track, most)
         if ending == NO_ROOM:
             live = live._replace(line=enlarged(live.line, 2 * live.line.length.size))
     return stops
@@ -255,7 +296,8 @@ def finer(setting: Setting) -> Setting:
     cable_step = min(trial.cable_step, cable_step)
     made = replace(trial, hull_step=fitting_step(cable_step, min(trial.hull_step, hull_step)), cable_step=cable_step,
                    segment_length=min(trial.segment_length, segment), every=0.0)  # fmt: skip
-    return replace(setting, trial=made)
+    more, most = setting.trial.segment_length / made.segment_length, setting.most_work
+    return replace(setting, trial=made, most_work=most and more * most)
 
 
 def multiples(times: np.ndarray, step: float) -> bool:
@@ -274,8 +316,12 @@ def respond(setting: Setting, times: np.ndarray, channels: Iterable[str]) -> dic
     Returns:
         channel → values (n,) in its display unit; NaN from where the run could not go on. Behind its end the last hold.
     """
-    grid, track = simulate_track(setting)
-    earlier = times - setting.clock_offset
+    return read(setting, simulate_track(setting), times, channels)
+
+
+def read(setting: Setting, run: Track, times: np.ndarray, channels: Iterable[str]) -> dict[str, np.ndarray]:
+    """Return what the sensors show of a run, as `respond`."""
+    (grid, track), earlier = run, times - setting.clock_offset
     return {
         name: np.interp(earlier, grid, sensed(setting.sensing.get(name), grid, truth(setting, track, name)))
         for name in channels
