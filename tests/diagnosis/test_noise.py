@@ -22,6 +22,7 @@ from subzero.diagnosis.inference import (
     Noise,
     Observed,
     Problem,
+    TimesBeside,
     Usual,
     estimate,
     gain_of_own_noise,
@@ -34,7 +35,7 @@ from subzero.diagnosis.inference import (
     resolution_of,
     spikes,
     steps_of,
-    time_of,
+    times_beside,
     with_own_noise,
 )
 
@@ -243,18 +244,24 @@ def wandering(time, *others):
 
 
 def test_the_slow_parts_of_most_channels_say_how_long_that_of_another_lasts():
-    """One logger made them all. A channel that wanders by itself for seconds is less probable beside quick ones; what
-    two channels have in common, or what is hardly there, says nothing.
+    """One logger made them all. A channel that wanders by itself for seconds is less probable beside quick ones, the
+    less so the more they are alike; what two channels have in common, or what is hardly there, says nothing.
     """
     time = np.arange(0.0, 30.0, 0.1)
     quick = wandering(time, 0.2, 0.15, 0.25, 4.0)
-    assert time_of(quick) == pytest.approx(0.225)
-    assert time_of(wandering(time, 0.2, 0.2)) is None
-    assert time_of([dataclasses.replace(one, slow=0.01) for one in quick]) is None
-    alone, beside = Usual(LEVEL, 0.0, False), Usual(LEVEL, 0.0, False, 0.2)
+    apart = np.sum(np.log(np.array([0.2, 0.15, 0.25, 4.0]) / 0.225) ** 2)
+    found = times_beside(quick)
+    assert found.median == pytest.approx(0.225)
+    assert found.spread**2 == pytest.approx((2.0 * 0.9**2 + apart) / (2.0 + 4.0))
+    assert times_beside(wandering(time, *[0.2] * 6)).spread == pytest.approx(0.45), (
+        "alike to a digit: by chance"
+    )
+    assert times_beside(wandering(time, 0.2, 0.2)) is None
+    assert times_beside([dataclasses.replace(one, slow=0.01) for one in quick]) is None
+    alone, beside = Usual(LEVEL, 0.0, False), Usual(LEVEL, 0.0, False, TimesBeside(0.2, 0.6))
     lost = {usual: log_prior_of(quick[0], usual) - log_prior_of(quick[3], usual) for usual in (alone, beside)}
     assert lost[alone] == pytest.approx((np.log(4.0) ** 2 - np.log(0.2) ** 2) / (2.0 * 1.5**2))
-    assert lost[beside] == pytest.approx(np.log(20.0) ** 2 / (2.0 * 0.9**2))
+    assert lost[beside] == pytest.approx(np.log(20.0) ** 2 / (2.0 * 0.6**2))
 
 
 def test_the_density_of_outliers_is_that_of_any_share_of_them():

@@ -9,7 +9,8 @@ samples; AR(1) noise is the case σ_w = 0. Before anything is fitted,
     log σ_w ~ N(log ν, 1.5²),   log σ_s ~ N(log(0.7 ν + q/√12), 1² or 0.5²),   log τ_s ~ N(log 1 s, 1.5²)
 
 ν is the usual level of the sensor, or the known one; σ_s has 0.5 above its median and 1 below. q is read off the
-values: sensors round. Where most channels of a record have shown a slow part, log τ_s ~ N(log of their median, 0.9²).
+values: sensors round. Where most channels of a record have shown a slow part, log τ_s ~ N(log of their median, s²), and
+s is what their times show: s² = (2 · 0.9² + Σ (log τ_i − log median)²) / (2 + n).
 """
 
 from __future__ import annotations
@@ -207,9 +208,10 @@ WHITE_SPREAD, SLOW_SPREAD, SLOW_SPREAD_ABOVE, TIME_SPREAD = 1.5, 1.0, 0.5, 1.5
 may wander by far less than is usual, but what wanders by far more is something to find. [-]"""
 USUAL_TIME = 1.0
 """Usual correlation time of a sensor's slow part. [s]"""
-TIME_SPREAD_BESIDE, FEWEST_BESIDE, SEEN_SLOW = 0.9, 3, 0.3
-"""Standard deviation of log τ_s about the median of a record, where so many channels have a slow part of at least this
-share of σ_w: one logger, and often one filter, has made them. [-]"""
+TIME_SPREAD_BESIDE, SPREAD_WEIGHT, FEWEST_BESIDE, SEEN_SLOW = 0.9, 2, 3, 0.3
+"""Standard deviation of log τ_s about the median of a record before it is seen, how many channels that counts as, and
+where it holds: so many channels have a slow part of at least this share of σ_w. One logger, and often one filter, has
+made them; how much alike they are is seen, too. [-]"""
 KNOWN_SPREAD = 0.1
 """Standard deviation of the logarithm of a level that the user knows. [-]"""
 FEWEST = 8
@@ -224,15 +226,24 @@ SAME, STEPS_TRIED = 1e-6, 3
 makes one or two steps smaller than that of the sensor: so many are tried."""
 
 
+class TimesBeside(NamedTuple):
+    """Correlation times of the noise of a record's channels: their median [s], and standard deviation of a logarithm
+    about its own. [-]
+    """
+
+    median: float
+    spread: float
+
+
 class Usual(NamedTuple):
     """What a sensor is like: level ν and resolution q, in the channel's unit, whether the level is known, and the
-    correlation time that most sensors beside it have [s], None if that is not known.
+    correlation times that sensors beside it have, None if they are not known.
     """
 
     level: float
     resolution: float
     is_known: bool
-    time_beside: float | None = None
+    times_beside: TimesBeside | None = None
 
 
 def usual_of(channel: str, values: np.ndarray, known: Mapping[str, float]) -> Usual:
@@ -342,10 +353,15 @@ def log_prior_of(noise: Noise, usual: Usual) -> float:
     return log_density(np.log([noise.white, noise.slow, noise.correlation_time]), prior_of(usual))
 
 
-def time_of(several: Iterable[Noise]) -> float | None:
-    """Return the correlation time that most of several channels have [s]; None where too few have a slow part."""
+def times_beside(several: Iterable[Noise]) -> TimesBeside | None:
+    """Return what the correlation times of several channels are like; None where too few have a slow part."""
     seen = [noise.correlation_time for noise in several if noise.slow**2 >= SEEN_SLOW**2 * noise.unrelated]
-    return float(np.median(seen)) if len(seen) >= FEWEST_BESIDE else None
+    if len(seen) < FEWEST_BESIDE:
+        return None
+    median = float(np.median(seen))
+    apart = float(np.sum(np.log(np.array(seen) / median) ** 2))
+    variance = (SPREAD_WEIGHT * TIME_SPREAD_BESIDE**2 + apart) / (SPREAD_WEIGHT + len(seen))
+    return TimesBeside(median, float(np.sqrt(variance)))
 
 
 class Prior(NamedTuple):
@@ -361,9 +377,7 @@ class Prior(NamedTuple):
 
 def prior_of(usual: Usual) -> Prior:
     """Return what is known of a usual sensor's noise beforehand."""
-    time, spread = (
-        (USUAL_TIME, TIME_SPREAD) if usual.time_beside is None else (usual.time_beside, TIME_SPREAD_BESIDE)
-    )
+    time, spread = usual.times_beside or (USUAL_TIME, TIME_SPREAD)
     mean = np.log([usual.level, slow_usual(usual), time])
     below, above = (np.array([WHITE_SPREAD, one, spread]) for one in (SLOW_SPREAD, SLOW_SPREAD_ABOVE))
     return Prior(mean, below, above, float(mean[0]) if usual.is_known else np.nan)

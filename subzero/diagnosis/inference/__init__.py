@@ -52,13 +52,14 @@ from subzero.diagnosis.hypothesis.hypotheses import (
 )
 from subzero.diagnosis.hypothesis.noise import (
     Noise,
+    TimesBeside,
     Usual,
     log_of_outlier,
     log_of_outliers,
     log_prior_of,
     resolution_of,
     spikes,
-    time_of,
+    times_beside,
 )
 from subzero.diagnosis.hypothesis.noise_estimate import Behind, estimate, log_marginal
 from subzero.diagnosis.hypothesis.configuration import TRUTHS
@@ -179,6 +180,7 @@ __all__ = [
     "Scale",
     "Screening",
     "Terms",
+    "TimesBeside",
     "Usual",
     "all_columns",
     "at_bad_minimum",
@@ -244,7 +246,7 @@ __all__ = [
     "special_cases_folded",
     "spikes",
     "steps_of",
-    "time_of",
+    "times_beside",
     "times_of",
     "variances",
     "with_finer_steps",

@@ -18,7 +18,7 @@ from subzero.channels import HEADING, turned
 from subzero.diagnosis.hypothesis.catalogue import ONSETS, START, catalogue
 from subzero.diagnosis.hypothesis.catalogue.sensors import CLOCK, SPECS
 from subzero.diagnosis.hypothesis.hypotheses import entries_of, moves_nothing, with_tolerances
-from subzero.diagnosis.hypothesis.noise import Noise, Usual, spikes, time_of, usual_noise, usual_of
+from subzero.diagnosis.hypothesis.noise import Noise, Usual, spikes, times_beside, usual_noise, usual_of
 from subzero.diagnosis.hypothesis.noise_estimate import Behind, estimate
 from subzero.diagnosis.inference.problem import Observed, Problem
 from subzero.diagnosis.inference.simulator import economical, finer, read, respond, with_limit
@@ -151,7 +151,7 @@ def with_noise_behind(
             own = slice(at, at + old.count)
             noise[name] = _behind(one, name, Behind(residual=rest[own], J=J[own], D=D))
             at += old.count
-        found.append(replace(one, noise=noise, noise_time=time_of(noise.values())))
+        found.append(replace(one, noise=noise, noise_times=times_beside(noise.values())))
     if all(_alike(one.noise[name], new.noise[name]) for one, new in zip(problem.records, found, strict=True)
            for name in one.noise):  # fmt: skip
         return None
@@ -187,7 +187,7 @@ def _without_outliers(problem: Problem, record: int, z: np.ndarray) -> Observed:
 def sensor_of(one: Observed, name: str) -> Usual:
     """Return what the sensor of a channel is like, by what is known of it and by the record as it was posed."""
     level, resolution = one.known.get(name, SPECS[name].noise), one.noise[name].resolution
-    return Usual(level, resolution, name in one.known, one.noise_time)
+    return Usual(level, resolution, name in one.known, one.noise_times)
 
 
 def _unit(one: Observed) -> dict[str, Noise]:

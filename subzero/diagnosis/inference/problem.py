@@ -18,7 +18,7 @@ import numpy as np
 
 from subzero.diagnosis.hypothesis.configuration import sensed, truth
 from subzero.diagnosis.hypothesis.hypotheses import Entry, grouped
-from subzero.diagnosis.hypothesis.noise import Noise, innovations_of_each
+from subzero.diagnosis.hypothesis.noise import Noise, TimesBeside, innovations_of_each
 from subzero.diagnosis.inference.simulator import (
     RunCache,
     Stop,
@@ -57,7 +57,7 @@ class Observed:
         setting: the nominal one, in economical steps.
         known: channel → level of noise that the user knows.
         correction: channel → what is added to the simulation (n,): the error of its economical steps, a drift.
-        noise_time: correlation time that the noise of most channels has [s], None as long as that is not known.
+        noise_times: what the correlation times of its noise are like, None as long as that is not known.
     """
 
     name: str
@@ -67,7 +67,7 @@ class Observed:
     setting: Setting
     known: Mapping[str, float] = field(default_factory=dict)
     correction: Mapping[str, np.ndarray] = field(default_factory=dict)
-    noise_time: float | None = None
+    noise_times: TimesBeside | None = None
 
     def corrected(self, more: Mapping[str, np.ndarray]) -> Observed:
         """Return the record beside a simulation to which more is added; what was measured stays as it is."""
