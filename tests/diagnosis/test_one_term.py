@@ -42,13 +42,14 @@ def test_the_evidence_of_a_term_is_that_of_a_normal_distribution():
     columns, r, phi = (
         random.standard_normal((30, 6)),
         random.standard_normal(30),
-        random.standard_normal((6, 2)),
+        random.standard_normal((6, 2, 2)),
     )
+    phi[:, 0, 1] = 0.0  # of the two terms one has a phase
     data, a = ForceInformation(columns.T @ columns, columns.T @ r), 0.8
 
     def exact(term):
-        column = columns @ phi[:, term]
-        with_it = multivariate_normal(np.zeros(30), np.eye(30) + a**2 * np.outer(column, column))
+        both = columns @ phi[:, term]
+        with_it = multivariate_normal(np.zeros(30), np.eye(30) + a**2 * both @ both.T)
         return with_it.logpdf(r) - multivariate_normal(np.zeros(30), np.eye(30)).logpdf(r)
 
     terms = Terms(phi, np.log([0.3, 0.7]))
@@ -77,7 +78,10 @@ def test_terms_are_probable_in_all_and_of_size_one(planted):
     for one in terms.values():
         assert_allclose(np.sum(np.exp(one.log_prior)), 1.0, rtol=1e-9)
         assert one.phi.shape[0] == knots.time.size
-    assert np.median(np.abs(terms["X"].phi).max(axis=0)) == pytest.approx(1.0, abs=0.3)
+    phi = terms["X"].phi
+    single = ~np.any(phi[:, :, 1] != 0.0, axis=0)
+    assert np.median(np.abs(phi[:, single, 0]).max(axis=0)) == pytest.approx(1.0, abs=0.3)
+    assert 1.0 - single.mean() < 0.1, "waves"
 
 
 def test_a_growing_heel_is_seen_as_a_term_where_a_free_force_is_not(planted):
@@ -95,7 +99,19 @@ def test_two_records_have_terms_of_their_own(planted):
     both = dataclasses.replace(planted.problem, records=(record, record))
     knots = knots_of(both)
     phi = one_terms(both, np.zeros(len(both.entries)), knots)["X"].phi
-    first = np.any(phi[knots.record == 0] != 0.0, axis=0)
-    second = np.any(phi[knots.record == 1] != 0.0, axis=0)
+    first = np.any(phi[knots.record == 0] != 0.0, axis=(0, 2))
+    second = np.any(phi[knots.record == 1] != 0.0, axis=(0, 2))
     assert not np.any(first & second)
     assert first.sum() == second.sum() == phi.shape[1] // 2
+
+
+def test_a_swell_is_seen_as_a_wave_where_a_free_force_is_not(planted):
+    """A push to and fro of any phase, in one term of two numbers."""
+    problem, fit, knots = planted.problem, planted.fit(), knots_of(planted.problem)
+    (C,) = force_columns(problem, fit.z, ("X",), knots).values()
+    push = 0.4 * np.sin(2.0 * np.pi * knots.time / 6.0 + 2.0)
+    pushed = dataclasses.replace(fit, r=fit.r + C @ push)
+    scales, terms = {1.0: Scale(0.0, fit.D)}, one_terms(problem, fit.z, knots)
+    free, told = (latent_force_candidates(problem, {FORCE + "X": C}, pushed, scales, knots, some)[0].log_gain
+                  for some in (None, terms))  # fmt: skip
+    assert told > free + 3.0

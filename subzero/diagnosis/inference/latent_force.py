@@ -166,7 +166,7 @@ class Shape:
     """One term of a formula.
 
     Attributes:
-        feature: of FEATURES, or "wave".
+        feature: of FEATURES, or WAVE.
         words: what it is.
         columns: φ at the samples (n, 1), or (n, 2) for a wave.
         start, end: of its window; None if it holds throughout. [s]
@@ -277,7 +277,7 @@ def waves(times: np.ndarray) -> list[Shape]:
     periods = 1.0 / np.arange(1.0 / WAVE_PERIODS_S[1], 1.0 / WAVE_PERIODS_S[0], apart)
     log_prior = -float(np.log(periods.size))
     return [
-        Shape(feature="wave", words=f"a wave with a period of {period:.2g} s", log_prior=log_prior,
+        Shape(feature=WAVE, words=f"a wave with a period of {period:.2g} s", log_prior=log_prior,
               columns=np.column_stack([trig(2.0 * np.pi * times / period) for trig in (np.cos, np.sin)]))
         for period in periods
     ]  # fmt: skip
@@ -304,8 +304,10 @@ SENSIBLE_FEATURES: Mapping[str, tuple[str, ...]] = {
     "N": ("uv", "ur", "rudder_angle*u2", "r|r|", "constant", "u|u|", "n|n|"),
 }
 """What usually acts along an axis, and what is therefore more probable beforehand."""
-ODD_FEATURE_PRIOR = 0.25
-"""Prior of another feature beside a sensible one."""
+ODD_FEATURE_PRIOR, WAVE_PRIOR = 0.25, 0.01
+"""Priors of another feature, and of a wave, beside a sensible one. A swell gains 20 nats and more; the noise of a real
+sensor that swings a little gains 5."""
+WAVE = "wave"
 
 
 def all_shapes(factors: np.ndarray, times: np.ndarray) -> list[Shape]:
@@ -325,30 +327,31 @@ def size_of(shape: Shape) -> float:
 
 def shape_weight(shape: Shape, axis: str) -> float:
     """Return how probable a shape is along an axis beforehand, as a logarithm, but for a common constant."""
-    return shape.log_prior + (
-        0.0 if shape.feature in SENSIBLE_FEATURES[axis] else float(np.log(ODD_FEATURE_PRIOR))
-    )
+    odd = WAVE_PRIOR if shape.feature == WAVE else ODD_FEATURE_PRIOR
+    return shape.log_prior + (0.0 if shape.feature in SENSIBLE_FEATURES[axis] else float(np.log(odd)))
 
 
 def one_terms(problem: Problem, z: np.ndarray, knots: Knots) -> Mapping[str, Terms]:
     """Return axis → formulas of one term, each in one record, along the runs of z."""
     records = range(len(problem.records))
     parts = [_of_record(problem, z, knots, record) for record in records]
-    phi = np.hstack([one for one, _ in parts])
+    phi = np.concatenate([one for one, _ in parts], axis=1)
     return {axis: Terms(phi, _normal([weights[axis] for _, weights in parts])) for axis in AXES}
 
 
 def _of_record(
     problem: Problem, z: np.ndarray, knots: Knots, record: int
 ) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """Return the terms of a record at all knots (n, terms), 0 in other records, and axis → log weights (terms,)."""
+    """Return the terms of a record at all knots (n, terms, 2), 0 in other records, and axis → log weights (terms,)."""
     own = knots.record == record
     times = samples_of(float(knots.time[own][-1]))
     shapes = all_shapes(factors_along(problem.setting(record, z), times), times)
-    single = [shape for shape in shapes if shape.columns.shape[1] == 1]
-    phi = np.zeros((knots.time.size, len(single)))
-    phi[own] = at_knots(times, knots.time[own]) @ np.hstack([one.columns / size_of(one) for one in single])
-    return phi, {axis: np.array([shape_weight(one, axis) for one in single]) for axis in AXES}
+    phi, to_knots = np.zeros((knots.time.size, len(shapes), 2)), at_knots(times, knots.time[own])
+    for column in (0, 1):
+        having = [i for i, one in enumerate(shapes) if one.columns.shape[1] > column]
+        known = np.column_stack([shapes[i].columns[:, column] / size_of(shapes[i]) for i in having])
+        phi[np.ix_(own, having, [column])] = (to_knots @ known)[:, :, None]
+    return phi, {axis: np.array([shape_weight(one, axis) for one in shapes]) for axis in AXES}
 
 
 def _normal(weights: list[np.ndarray]) -> np.ndarray:

@@ -181,7 +181,9 @@ class ForceInformation(NamedTuple):
 
 
 class Terms(NamedTuple):
-    """What a force may look like, as formulas of one term: values at the knots (n, terms), of size 1, and log prior."""
+    """What a force may look like, as formulas of one term: values at the knots (n, terms, 2), of size 1, and log prior.
+    A wave has two columns, for its phase; of other terms the second is 0.
+    """
 
     phi: np.ndarray
     log_prior: np.ndarray
@@ -252,10 +254,14 @@ def log_evidence_process(
 
 
 def log_evidence_term(data: ForceInformation, terms: Terms, amplitudes: Sequence[float]) -> float:
-    """Return the log evidence of f = c φ over that of f = 0, c ~ N(0, a²); terms and amplitudes mixed."""
-    M = np.sum(terms.phi * (data.M @ terms.phi), axis=0)
-    q, a2 = terms.phi.T @ data.q, np.square(amplitudes)[:, None]
-    table = 0.5 * a2 * q**2 / (1.0 + a2 * M) - 0.5 * np.log1p(a2 * M) + terms.log_prior
+    """Return the log evidence of f = φ c over that of f = 0, c ~ N(0, a² I); terms and amplitudes mixed."""
+    first, second = terms.phi[:, :, 0], terms.phi[:, :, 1]
+    M1, M2 = data.M @ first, data.M @ second
+    m11, m12, m22 = np.sum(first * M1, axis=0), np.sum(first * M2, axis=0), np.sum(second * M2, axis=0)
+    q1, q2, a2 = first.T @ data.q, second.T @ data.q, np.square(amplitudes)[:, None]
+    det = (1.0 + a2 * m11) * (1.0 + a2 * m22) - (a2 * m12) ** 2  # of I + a² φᵀ M φ
+    square = q1**2 * (1.0 + a2 * m22) - 2.0 * q1 * q2 * a2 * m12 + q2**2 * (1.0 + a2 * m11)
+    table = 0.5 * a2 * square / det - 0.5 * np.log(det) + terms.log_prior
     return log_sum(table.ravel()) - float(np.log(len(amplitudes)))
 
 
