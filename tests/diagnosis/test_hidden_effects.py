@@ -12,14 +12,16 @@ import sys
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 sys.path.append(str(Path(__file__).resolve().parents[2]))
 
+import subzero
 from benchmarks.diagnosis import draws, manoeuvres
 from benchmarks.diagnosis.cases import Case, cases
 from benchmarks.diagnosis.sharing import share
-from benchmarks.diagnosis.trial_of import briefly
+from benchmarks.diagnosis.trial_of import briefly, posed
 from subzero.diagnosis import catalogue
 
 SEED = 7
@@ -152,3 +154,18 @@ def test_every_effect_is_found_with_both_signs(told, case):
     assert names(result) <= set(case.causes), words(result)
     if min(result["D"].values()) >= 16.0:
         assert next(iter(result["probabilities"])) == case.causes[0], words(result)
+
+
+@pytest.mark.slow
+def test_a_swell_has_its_history_beside_noise_of_its_own():
+    """Beside the noise behind "nothing is wrong", which took most of it, three quarters of it were told, and the truth
+    lay two bands off.
+    """
+    case = next(one for one in cases(75) if one.index == 149)
+    made, *_ = posed(case)
+    verdict = subzero.diagnose(made.logged, seed=case.index)
+    told, force = verdict.unknown, made.strange.force
+    true = np.interp(told.time, force.time, np.array(force.wrench)[:, 0])
+    assert (verdict.verdict, told.axis) == ("outside_catalogue", "X"), verdict
+    assert np.sqrt(np.mean((told.force - true) ** 2)) < 1.5 * np.sqrt(np.mean(told.band**2))
+    assert told.force @ true == pytest.approx(true @ true, rel=0.15)
