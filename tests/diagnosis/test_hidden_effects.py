@@ -42,6 +42,14 @@ def slow(kind, *numbers):
     return [drawn(kind, number, marks=pytest.mark.slow) for number in numbers]
 
 
+JERKS_TAUT = pytest.mark.xfail(
+    strict=True,
+    reason="a drum of 4.5 kg more lets cable fall slack and jerk taut: even at the truth, runs in the steps of a diagnosis "
+    "miss this record by 2300 in squared noise levels, as those of a quarter of a step do by 700",
+)
+BEYOND = {("drum_inertia", 1): [JERKS_TAUT]}
+
+
 def both_signs():
     """Return a case for every id and sign that its bounds have room for."""
     for name in IDS:
@@ -49,7 +57,8 @@ def both_signs():
             if any(draws.room(parameter, sign) > 0.0 for parameter in manoeuvres.effects()[name].parameters):
                 case = Case(seed=SEED, index=900 + IDS.index(name), kind="single", number=0, manoeuvre="rich",
                             causes=(name,), sign=sign)  # fmt: skip
-                yield pytest.param(case, id=f"{name}_{'plus' if sign > 0 else 'minus'}")
+                marks = BEYOND.get((name, sign), [])
+                yield pytest.param(case, id=f"{name}_{'plus' if sign > 0 else 'minus'}", marks=marks)
 
 
 @pytest.fixture(scope="module")
