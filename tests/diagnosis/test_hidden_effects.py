@@ -44,8 +44,8 @@ def slow(kind, *numbers):
 
 JERKS_TAUT = pytest.mark.xfail(
     strict=True,
-    reason="a drum of 4.5 kg more lets cable fall slack and jerk taut: even at the truth, runs in the steps of a diagnosis "
-    "miss this record by 2300 in squared noise levels, as those of a quarter of a step do by 700",
+    reason="a drum of 4.5 kg more lets cable fall slack and jerk taut: even at the truth, runs in the steps of a "
+    "diagnosis miss this record by 2300 in squared noise levels, and those of a quarter of a step by 700",
 )
 BEYOND = {("drum_inertia", 1): [JERKS_TAUT]}
 
