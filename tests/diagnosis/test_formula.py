@@ -111,3 +111,17 @@ def test_the_drag_that_the_model_lacks_is_found_in_a_record(plant, features):
     known = -0.02 * features["wet_length"]
     assert "wet_length" in list(found.features)[:2]
     assert np.sqrt(np.mean((found.force() - known) ** 2)) < 0.3 * np.abs(known).max()
+
+
+def test_a_push_that_rises_and_falls_is_no_box(estimated):
+    """Half a sine squared, which is neither of the two: a box in its place would act before and behind it."""
+    inside = np.clip((TIMES - 9.0) / 6.0, 0.0, 1.0)
+    push = 0.3 * np.sin(np.pi * inside) ** 2
+    found = told(estimated, push, "Y")
+    (shape,) = found.shapes
+    assert shape.is_gradual
+    assert "rising and falling from" in shape.words
+    assert (shape.start, shape.end) == pytest.approx((9.0, 15.0), abs=1.0)
+    assert np.abs(found.force() - push).max() < 0.06
+    box = told(estimated, np.where((TIMES >= 9.0) & (TIMES < 15.0), 0.3, 0.0), "Y").shapes[0]
+    assert not box.is_gradual

@@ -9,7 +9,8 @@ one channel, without a simulation. How probable either is, `input_estimation` fi
 A Gaussian process costs evidence for every second in which it is free to change; a drag that grows all the time, or a
 push that lasts for some seconds, is told by one number. So there is a dictionary of formulas, with prior probabilities:
 
-    φ(t) = feature(state(t)) · window(t),   window = 1,  [t ≥ t₀],  [t₀ ≤ t < t₁],  exp(−t/T);   or  cos ωt, sin ωt
+    φ(t) = feature(state(t)) · window(t),     window = 1,  [t ≥ t₀],  [t₀ ≤ t < t₁],  Λ(t₀ … t₁),  exp(−t/T);
+    or  cos ωt, sin ωt                        (Λ: rising to the middle, and falling)
 
 Features are those of `external_force`, along a fitted track; those that usually act along an axis have a larger prior.
 `one_terms` gives the formulas of one term.
@@ -171,6 +172,7 @@ class Shape:
         columns: φ at the samples (n, 1), or (n, 2) for a wave.
         start, end: of its window; None if it holds throughout. [s]
         decay: time in which it dies away; 0 if it does not. [s]
+        is_gradual: it rises and falls between start and end.
         log_prior: how much less probable it is than its plain feature, by the number of its windows.
     """
 
@@ -180,6 +182,7 @@ class Shape:
     start: float | None = None
     end: float | None = None
     decay: float = 0.0
+    is_gradual: bool = False
     log_prior: float = 0.0
 
     @property
@@ -217,13 +220,14 @@ def plain_shapes(factors: np.ndarray) -> list[Shape]:
 
 
 def windowed(shape: Shape, times: np.ndarray, edges: np.ndarray) -> list[Shape]:
-    """Return a plain shape from every edge on, and between any two of them. [s]"""
+    """Return a plain shape from every edge on, and between any two of them [s]: at once, or rising and falling."""
     pairs = [(a, b) for a in edges for b in edges if b - a >= MIN_WINDOW_S]
     log_prior = -float(np.log(2.0 * edges.size + 2.0 * len(pairs)))
     found = [
         _between(shape, times, a, None, log_prior + np.log(len(pairs) / edges.size)) for a in edges if a > 0.0
     ]
-    found += [_between(shape, times, a, b, log_prior) for a, b in pairs]
+    each = log_prior - np.log(2.0)
+    found += [kind(shape, times, a, b, each) for a, b in pairs for kind in (_between, _gradual)]
     return _acting(found)
 
 
@@ -231,11 +235,11 @@ def shifted(shape: Shape, plain: Shape, times: np.ndarray) -> list[Shape]:
     """Return a windowed shape with its edges moved by less than the grid that they were found on, where it is not 0."""
     if shape.start is None or shape.decay:
         return [shape]
-    ends = [None] if shape.end is None else [shape.end + by for by in EDGE_NUDGES_S]
-    found = [
-        _between(plain, times, shape.start + by, end, shape.log_prior) for by in EDGE_NUDGES_S for end in ends
-    ]
-    return _acting(found)
+    starts = [shape.start + by for by in EDGE_NUDGES_S]
+    if shape.end is None:
+        return _acting([_between(plain, times, start, None, shape.log_prior) for start in starts])
+    kind, ends = _gradual if shape.is_gradual else _between, [shape.end + by for by in EDGE_NUDGES_S]
+    return _acting([kind(plain, times, a, b, shape.log_prior) for a in starts for b in ends if b > a])
 
 
 def _acting(shapes: list[Shape]) -> list[Shape]:
@@ -249,6 +253,15 @@ def _between(shape: Shape, times: np.ndarray, start: float, end: float | None, l
     when = f"from {start:g} s on" if end is None else f"from {start:g} to {end:g} s"
     return Shape(feature=shape.feature, words=f"{shape.words}, {when}", columns=shape.columns * inside[:, None],
                  start=float(start), end=None if end is None else float(end), log_prior=float(log_prior))  # fmt: skip
+
+
+def _gradual(shape: Shape, times: np.ndarray, start: float, end: float, log_prior: float) -> Shape:
+    """Return a shape that rises to the middle between two times and falls: few pushes begin and end at once."""
+    apart = np.abs(times - 0.5 * (start + end)) / (0.5 * (end - start))
+    when = f"rising and falling from {start:g} to {end:g} s"
+    return Shape(feature=shape.feature, words=f"{shape.words}, {when}", start=float(start), end=float(end),
+                 columns=shape.columns * np.maximum(1.0 - apart, 0.0)[:, None], is_gradual=True,
+                 log_prior=float(log_prior))  # fmt: skip
 
 
 def decaying(shape: Shape, times: np.ndarray, edges: np.ndarray) -> list[Shape]:
