@@ -116,7 +116,8 @@ def _healthy(results: Sequence[Result]) -> list[Score]:
 def _calibrated(sound: Sequence[Result]) -> list[Score]:
     """Return the calibration error, and what chance alone makes of it."""
     _, error = calibration(sound)
-    low, middle, high = np.percentile(by_chance(sound), [2.5, 50.0, 97.5]) if sound else (0.0, 0.0, 0.0)
+    stated = np.array([first(one)[1] for one in sound])
+    low, middle, high = np.percentile(by_chance(stated), [2.5, 50.0, 97.5]) if sound else (0.0, 0.0, 0.0)
     return [
         Score("expected calibration error", f"{error:.3f}", "≤ 0.03", "–", len(sound), error <= 0.03, error <= high),
         Score("… of an engine that is right exactly as often as it states", f"{middle:.3f}", "–",

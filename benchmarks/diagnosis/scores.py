@@ -146,9 +146,9 @@ def calibration(results: Sequence[Result]) -> tuple[list[tuple[float, float, int
     return calibration_error(stated, np.array([is_right_as_told(one) for one in results], dtype=float))
 
 
-def by_chance(results: Sequence[Result], draws: int = 1000) -> np.ndarray:
-    """Return the calibration errors (draws,) of an engine that is right as often as it states, on such cases."""
-    stated, rng = np.array([first(one)[1] for one in results]), np.random.default_rng(0)
+def by_chance(stated: np.ndarray, draws: int = 1000) -> np.ndarray:
+    """Return the calibration errors (draws,) of an engine that is right as often as it states (n,)."""
+    rng = np.random.default_rng(0)
     return np.array(
         [calibration_error(stated, 1.0 * (rng.random(stated.size) < stated))[1] for _ in range(draws)]
     )
