@@ -284,7 +284,7 @@ def _look_outside(findings: Findings, share: float, words: str) -> None:
 
 def _measure_misfit(findings: Findings) -> None:
     """Set the nominal simulation beside the records, with the noise as it is known by now."""
-    for one in findings.problem.records:
+    for one in findings.records:
         findings.misfit[one.name] = misfits(one, respond(one.setting, one.time, one.noise))
 
 

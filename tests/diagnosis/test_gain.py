@@ -1,5 +1,7 @@
 """The gain on data that were not fitted: all of it for the right cause, none for a wrong one or for nothing."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -7,6 +9,7 @@ from numpy.testing import assert_allclose
 from subzero.diagnosis import catalogue
 from subzero.diagnosis.assessment import BLOCKS, Fitted, gain, held_out, parts_of, raw, rows_of, share
 from subzero.diagnosis.inference import Noise
+from subzero.diagnosis.inference.posing import rewhitened
 
 
 def hidden(name, size):
@@ -57,6 +60,29 @@ def test_gains_repeat_with_their_seed(struck):
     planted, fits = struck
     one, same = (gain(planted.r, fits[()], fits["propeller_torque",], seed=3) for _ in range(2))
     assert one == same
+
+
+def test_an_extension_beside_noise_of_its_own_is_judged_in_the_same_units(struck):
+    """A force has the noise beside it, of which there is less; a fit that was white by that was told in levels of the
+    other, and made a speed worse that it had made better.
+    """
+    planted, fits = struck
+    known, fit = fits["propeller_torque",]
+    quieter = [
+        replace(one, noise={name: replace(noise, white=0.5 * noise.white, slow=0.3 * noise.slow)
+                            for name, noise in one.noise.items()})
+        for one in known.records
+    ]  # fmt: skip
+    own = replace(known, records=tuple(quieter))
+    there = Fitted(own, rewhitened(fit, known, own))
+    same, found = (gain(planted.r, fits[()], one) for one in (fits["propeller_torque",], there))
+    for channel, one in same.fitted.items():
+        other = found.fitted[channel]
+        assert_allclose(
+            (other.before, other.tolerance, other.after), (one.before, one.tolerance, one.after), rtol=1e-9
+        )
+        assert other.floor < one.floor
+        assert found.held_out[channel].after == pytest.approx(same.held_out[channel].after, rel=0.3)
 
 
 def test_parts_cover_the_trial_and_a_refit_without_them_is_worse(struck):

@@ -23,6 +23,7 @@ from benchmarks.diagnosis.cases import Case, cases
 from benchmarks.diagnosis.sharing import share
 from benchmarks.diagnosis.trial_of import briefly, posed
 from subzero.diagnosis import catalogue
+from subzero.diagnosis.hypothesis.catalogue import SPECS
 
 SEED = 7
 CLEAR = 25.0
@@ -178,3 +179,9 @@ def test_a_swell_has_its_history_beside_noise_of_its_own():
     assert (verdict.verdict, told.axis) == ("outside_catalogue", "X"), verdict
     assert np.sqrt(np.mean((told.force - true) ** 2)) < 1.5 * np.sqrt(np.mean(told.band**2))
     assert told.force @ true == pytest.approx(true @ true, rel=0.15)
+    speed, level = (
+        verdict.gain.held_out["surge_speed"],
+        verdict.misfit[made.logged.name]["surge_speed"].noise_sd,
+    )
+    assert speed.after < 0.9 * speed.before
+    assert level < 1.4 * SPECS["surge_speed"].noise, "twice the sensor's, with the swell in it"

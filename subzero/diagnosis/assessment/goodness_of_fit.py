@@ -12,12 +12,14 @@ over the nominal model is mostly owed to tolerances; G1 is what is owed to the n
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from scipy.special import chdtrc
 
 from subzero.diagnosis.inference.map_fit import Fit, bounds
+from subzero.diagnosis.inference.posing import rewhitened, whitened_again
 from subzero.diagnosis.inference.simulator import respond
 from subzero.diagnosis.results import ChannelGain, Curves, Gain, Misfit
 
@@ -156,17 +158,17 @@ def gain(
     """Return what an extended model explains.
 
     Args:
-        nominal: whitened residual of the nominal model (m,).
+        nominal: residual of the nominal model (m,), white by the noise of the tolerances' refit.
         tolerance: "nothing is wrong", refit within tolerances.
-        extended: what is named, refit.
+        extended: what is named, refit; its problem may have a noise of its own, by which all are judged.
         rival: the best other hypothesis; the tolerances' refit in its place if there is none.
         seed: of the bootstrap.
     """
-    problem = tolerance.problem
+    problem = extended.problem
     rows = rows_of(problem)
     parts = parts_of(problem, rows)
-    rival = rival or tolerance
-    models = (tolerance, extended, rival)
+    nominal = whitened_again(tolerance.problem, problem, nominal)
+    models = [_made_white(one, problem) for one in (tolerance, extended, rival or tolerance)]
     fitted = [nominal, *(one.fit.r for one in models)]
     held = [nominal, *(held_out(one, parts) for one in models)]
     n, t, e = (held[i] ** 2 for i in range(3))
@@ -178,6 +180,12 @@ def gain(
         owed_low=_lower(t, e, _blocks(rows), seed),
         how=TRIALS if len(problem.records) > 1 else BLOCKS,
     )
+
+
+def _made_white(model: Fitted, problem: Problem) -> Fitted:
+    """Return a fit of the same samples, white by the noise of another problem."""
+    known = replace(model.problem, records=problem.records)
+    return Fitted(known, rewhitened(model.fit, model.problem, known))
 
 
 def share(before: float, after: float, samples: float) -> float:

@@ -50,7 +50,7 @@ from subzero.external_force import AXES
 if TYPE_CHECKING:
     from subzero.diagnosis.inference.map_fit import Candidate
     from subzero.diagnosis.inference.model_search import Search
-    from subzero.diagnosis.inference.problem import Problem
+    from subzero.diagnosis.inference.problem import Observed, Problem
     from subzero.diagnosis.results import Detectability, Misfit
 
 
@@ -356,12 +356,17 @@ def _beside_noise(
 
 def linear_of_first(search: Search, outside: Sequence[OutOfCatalogue]) -> tuple[Linear, np.ndarray]:
     """Return the linear problem around the most probable explanation, and prior variances of its parameters (k,)."""
-    best = search.best()
-    first = max(outside, key=lambda one: one.log_posterior, default=None)
-    if first is not None and first.log_posterior > best.log_posterior:
+    first, best = _first(search, outside), search.best()
+    if first:
         return _linear_of(search.problem, first)
     linear = Linear(best.fit.r + best.fit.J @ best.fit.z, best.fit.J)
     return linear, variances(search.problem.entries, best.ids, best.kappa)
+
+
+def _first(search: Search, outside: Sequence[OutOfCatalogue]) -> OutOfCatalogue | None:
+    """Return what lies outside if that is the most probable explanation."""
+    first = max(outside, key=lambda one: one.log_posterior, default=None)
+    return first if first and first.log_posterior > search.best().log_posterior else None
 
 
 def _linear_of(problem: Problem, one: OutOfCatalogue) -> tuple[Linear, np.ndarray]:
@@ -405,3 +410,9 @@ class Findings:
     def problem(self) -> Problem:
         """Records and parameters, with the noise as it is known by now."""
         return self.search.problem
+
+    @property
+    def records(self) -> tuple[Observed, ...]:
+        """The records, with the noise beside the most probable explanation, as far as it has one of its own."""
+        first = _first(self.search, self.out_of_catalogue)
+        return (first.own if first and first.own else self.problem).records
