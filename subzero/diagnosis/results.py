@@ -238,6 +238,10 @@ class Extended:
     missing: MissingForce | None = None
 
 
+WAVE = "wave"
+"""In a formula the feature of what swings by itself; others are those of `subzero.external_force`."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Unknown:
     """The force or moment that no cause explains, or the drift of a sensor.

@@ -8,8 +8,7 @@ from numpy.testing import assert_allclose
 
 from subzero.diagnosis import catalogue
 from subzero.diagnosis.assessment import BLOCKS, Fitted, gain, held_out, parts_of, raw, rows_of, share
-from subzero.diagnosis.inference import Noise
-from subzero.diagnosis.inference.posing import rewhitened
+from subzero.diagnosis.inference import Noise, rewhitened
 
 
 def hidden(name, size):

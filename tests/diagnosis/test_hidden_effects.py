@@ -22,8 +22,7 @@ from benchmarks.diagnosis import draws, manoeuvres
 from benchmarks.diagnosis.cases import Case, cases
 from benchmarks.diagnosis.sharing import share
 from benchmarks.diagnosis.trial_of import briefly, posed
-from subzero.diagnosis import catalogue
-from subzero.diagnosis.hypothesis.catalogue import SPECS
+from subzero.diagnosis import SPECS, catalogue
 
 SEED = 7
 CLEAR = 25.0

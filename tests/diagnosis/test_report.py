@@ -148,6 +148,14 @@ def test_a_force_is_told_with_what_else_it_may_be_made_of():
         "not ruled out: wave (an oscillation of its own; probability 0.20), time*u2 (the time since" in said
     )
     assert "0.05" not in said, "too improbable"
+
+
+def test_a_wave_is_told_by_its_size_and_period():
+    swell = dataclasses.replace(
+        FORCE.unknown, formula=(("a wave with a period of 6.3 s", "wave", 0.36, 0.29, 0.42),)
+    )
+    said = report.words.unknown(swell)
+    assert "It looks like a wave of 0.36 (0.29 to 0.42) with a period of 6.3 s." in said
     assert "ruled out" not in report.words.unknown(dataclasses.replace(FORCE.unknown, features={"u|u|": 1.0}))
 
 

@@ -72,7 +72,7 @@ from subzero.diagnosis.inference.simulator import (
     with_stops,
 )
 from subzero.diagnosis.inference.problem import Observed, Problem, Progress
-from subzero.diagnosis.inference.posing import pose, with_finer_steps, with_noise_behind
+from subzero.diagnosis.inference.posing import pose, rewhitened, with_finer_steps, with_noise_behind
 from subzero.diagnosis.inference.linear_gaussian import (
     KAPPAS,
     ForceInformation,
@@ -237,6 +237,7 @@ __all__ = [
     "resolution_of",
     "respond",
     "restarted_where_smooth",
+    "rewhitened",
     "runnable",
     "scan",
     "seen",

@@ -31,6 +31,7 @@ from subzero.diagnosis.hypothesis.effect import Effect, Parameter
 from subzero.diagnosis.hypothesis.hypotheses import Entry
 from subzero.diagnosis.inference.linear_gaussian import Terms, log_sum
 from subzero.diagnosis.inference.simulator import simulate_track
+from subzero.diagnosis.results import WAVE
 from subzero.external_force import AXES, FACTORS, FEATURES, MissingForce, feature_value, fill_factors
 from vehicle.dynamics import relative_velocity
 from vehicle.kinematics import rotation
@@ -320,7 +321,6 @@ SENSIBLE_FEATURES: Mapping[str, tuple[str, ...]] = {
 ODD_FEATURE_PRIOR, WAVE_PRIOR = 0.25, 0.01
 """Priors of another feature, and of a wave, beside a sensible one. A swell gains 20 nats and more; the noise of a real
 sensor that swings a little gains 5."""
-WAVE = "wave"
 
 
 def all_shapes(factors: np.ndarray, times: np.ndarray) -> list[Shape]:

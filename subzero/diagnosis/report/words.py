@@ -19,6 +19,7 @@ from subzero.diagnosis.results import (
     NOTHING_WRONG,
     OUTSIDE,
     UNDECIDED,
+    WAVE,
     Cause,
     Estimate,
     FoundError,
@@ -293,6 +294,8 @@ def formula_term(term: tuple[str, str, float, float, float]) -> str:
     size = f"{value:.3g} ({low:.3g} to {high:.3g})"
     if feature == "constant":
         return f"{size}, constant{words.removeprefix(FEATURES['constant'].words)}"
+    if feature == WAVE:
+        return f"a wave of {size}{words.removeprefix('a wave')}"
     return f"{size} × {feature}, {words}"
 
 
