@@ -6,11 +6,11 @@ import math
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator, StrMethodFormatter
+from matplotlib.ticker import MaxNLocator
 
 from subzero.calibration.results import Calibration, Estimate, Profile
 from subzero.figures import style
-from subzero.figures.style import BOTTOM, TOP, WIDTH, Title, headline, legend, sheet
+from subzero.figures.style import BOTTOM, TOP, WIDTH, Title, headline, legend, log_scale, sheet
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -92,7 +92,7 @@ def errors(found: Calibration, title: Title) -> Figure:
             heights = [getattr(rows[name], key) if name in rows else math.nan for name in names]
             axes.bar(np.arange(len(names)) + 0.27 * (at - 1), heights, 0.27, color=colour, label=words)
         axes.axhline(1.0, color=style.INK, linewidth=0.9, linestyle=style.DASHES[1])
-        _log_scale(axes)
+        log_scale(axes)
         tops = [getattr(one, key) for one in rows.values() for key in bars]
         axes.set_ylim(0.3, 2.0 * max([1.0, *(x for x in tops if math.isfinite(x))]))
         axes.set_xticks(range(len(names)), [name.replace("_", " ") for name in names], fontsize=style.SMALL)
@@ -100,14 +100,6 @@ def errors(found: Calibration, title: Title) -> Figure:
         headline(axes, f"{record}: held out, {found.how}")
     legend(panels[0])
     return figure
-
-
-def _log_scale(axes: Axes) -> None:
-    """Give an axis of errors a logarithmic scale with plain numbers."""
-    axes.set_yscale("log")
-    axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    axes.yaxis.set_minor_locator(NullLocator())
-    axes.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
 
 
 def profiles(found: Calibration, title: Title) -> Figure:

@@ -24,7 +24,7 @@ from subzero.diagnosis.report.words import (
 )
 from subzero.diagnosis.results import UNDECIDED, ChannelGain, Curves, Misfit, Unknown, Verdict
 from subzero.figures import style
-from subzero.figures.style import Title, headline, label, legend, sheet, time_label
+from subzero.figures.style import Title, headline, label, legend, log_scale, sheet, time_label
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -208,7 +208,7 @@ def _gain_bars(axes: Axes, rows: Mapping[str, ChannelGain]) -> None:
         places = np.arange(len(rows)) + (at - 0.5 * (len(GAINS) - 1)) * width
         axes.bar(places, heights, width, color=colour, label=words)
     axes.axhline(1.0, color=style.INK, linewidth=0.9, linestyle=style.DASHES[1])
-    axes.set_yscale("log")
+    log_scale(axes)
     axes.set_xticks(range(len(rows)), [_words(name) for name in rows], fontsize=style.SMALL)
     if style.width() < style.ONE_COLUMN:
         axes.set_xticklabels([_words(name).replace(" ", "\n") for name in rows])

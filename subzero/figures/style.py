@@ -23,7 +23,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.textpath import TextPath
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator, StrMethodFormatter
 
 from subzero.channels import BY_NAME
 from subzero.errors import UserError
@@ -195,6 +195,14 @@ def _style(axes: Axes) -> None:
 
 LEGEND_ROW, LEGEND_MARGIN = 0.145, 0.1
 """Height of one row of a legend and of the space around it. [inch]"""
+
+
+def log_scale(axes: Axes) -> None:
+    """Give an axis of errors a logarithmic scale with plain numbers."""
+    axes.set_yscale("log")
+    axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axes.yaxis.set_minor_locator(NullLocator())
+    axes.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
 
 
 def headline(axes: Axes, text: str) -> None:
