@@ -76,8 +76,10 @@ def test_a_run_may_take_many_times_what_the_nominal_one_takes_and_no_more():
 
 
 def test_a_nominal_cable_that_whips_about_may_do_so():
-    """A user's heavy cable takes a hundred iterations an exchange, and nothing is wrong with it."""
-    limited, nominal_run = simulator.with_limit(weighed(1.2))
-    heavier = simulate_track(limited.with_model(cable=weighed(1.3).model.cable))[1]
+    """A user's heavy cable takes dozens of iterations an exchange, and nothing is wrong with it; one twice as heavy
+    takes twice as many.
+    """
+    limited, nominal_run = simulator.with_limit(weighed(0.6))
+    heavier = simulate_track(limited.with_model(cable=weighed(1.2).model.cable))[1]
     assert np.isfinite(nominal_run[1]).all()
     assert np.isfinite(heavier).all()
