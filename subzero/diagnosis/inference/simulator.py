@@ -45,8 +45,8 @@ if TYPE_CHECKING:
     from subzero.run_state import Live, Setup
 
 
-TOO_LONG = 5
-"""How a run ends that takes more iterations than it may, beside the endings of `coupling`."""
+TOO_LONG = NO_ROOM + 1
+"""How a run ends that takes more than it may, beside the endings of `coupling` and `NO_ROOM`."""
 USUAL_WORK = 25 * 60
 """Work that any run may take for an exchange, on average: iterations of the cable's solver times nodes. Usual runs take
 2 to 5 iterations, those of a cause of any size up to 18, for 15 to 60 nodes. Where several numbers are absurd at once a
