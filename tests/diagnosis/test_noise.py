@@ -237,31 +237,47 @@ def test_noise_that_is_looked_for_again_is_not_lost():
     assert log_posterior(estimate(time, left, usual, known)) > log_posterior(known) - 0.1
 
 
-def wandering(time, *others):
-    """Return noise of a channel whose slow part lasts so long [s], and of others."""
+def wandering(time, *lasting):
+    """Return noise of channels whose slow parts last so long [s]."""
     used = np.ones(time.size, bool)
-    return [Noise(white=0.1, slow=0.3, correlation_time=each, used=used, time=time) for each in others]
+    return {f"channel {i}": Noise(white=0.1, slow=0.3, correlation_time=each, used=used, time=time)
+            for i, each in enumerate(lasting)}  # fmt: skip
 
 
-def test_the_slow_parts_of_most_channels_say_how_long_that_of_another_lasts():
+def test_the_slow_parts_of_other_channels_say_how_long_that_of_one_lasts():
     """One logger made them all. A channel that wanders by itself for seconds is less probable beside quick ones, the
-    less so the more they are alike; what two channels have in common, or what is hardly there, says nothing.
+    less so the more those are alike; its own time says nothing of theirs, nor does a slow part that is hardly there.
     """
     time = np.arange(0.0, 30.0, 0.1)
-    quick = wandering(time, 0.2, 0.15, 0.25, 4.0)
-    apart = np.sum(np.log(np.array([0.2, 0.15, 0.25, 4.0]) / 0.225) ** 2)
-    found = times_beside(quick)
-    assert found.median == pytest.approx(0.225)
-    assert found.spread**2 == pytest.approx((2.0 * 0.9**2 + apart) / (2.0 + 4.0))
-    assert times_beside(wandering(time, *[0.2] * 6)).spread == pytest.approx(0.45), (
-        "alike to a digit: by chance"
-    )
-    assert times_beside(wandering(time, 0.2, 0.2)) is None
-    assert times_beside([dataclasses.replace(one, slow=0.01) for one in quick]) is None
-    alone, beside = Usual(LEVEL, 0.0, False), Usual(LEVEL, 0.0, False, TimesBeside(0.2, 0.6))
-    lost = {usual: log_prior_of(quick[0], usual) - log_prior_of(quick[3], usual) for usual in (alone, beside)}
-    assert lost[alone] == pytest.approx((np.log(4.0) ** 2 - np.log(0.2) ** 2) / (2.0 * 1.5**2))
-    assert lost[beside] == pytest.approx(np.log(20.0) ** 2 / (2.0 * 0.6**2))
+    noise = wandering(time, 0.2, 0.15, 0.25, 4.0)
+    found = times_beside(noise)
+    quick, odd = found["channel 0"], found["channel 3"]
+    assert odd.median == pytest.approx(0.2)
+    apart = np.sum(np.log(np.array([0.75, 1.25])) ** 2)
+    assert odd.spread**2 == pytest.approx((2.0 * 0.9**2 + apart) / (2.0 + 3.0))
+    assert quick.spread > 1.5 * odd.spread
+    assert times_beside(wandering(time, 0.2, 0.2)) == {}
+    none = dataclasses.replace(noise["channel 1"], slow=0.01)
+    hardly = times_beside({**noise, "channel 1": none})
+    assert hardly["channel 3"].freedom == odd.freedom - 1.0 == 4.0
+    assert hardly["channel 1"] == found["channel 1"], "a channel is not beside itself"
+
+
+def test_what_is_known_of_a_time_is_a_normal_distribution_whose_variance_is_not_known():
+    """By quadrature over the variance v: 1/v has a gamma distribution of the degrees of freedom and the scale."""
+    time, freedom, scale = np.arange(0.0, 30.0, 0.1), 5.0, 0.6
+    usual = Usual(LEVEL, 0.0, False, TimesBeside(0.2, scale, freedom))
+    log_v = np.linspace(-8.0, 12.0, 20_001)
+    v = np.exp(log_v)
+    weight = v ** (-0.5 * freedom) * np.exp(-0.5 * freedom * scale**2 / v)
+    weight /= np.sum(weight)
+    made = wandering(time, 0.2, 0.5, 4.0).values()
+    density = [np.sum(weight * np.exp(-(np.log(one.correlation_time / 0.2) ** 2) / (2.0 * v)) / np.sqrt(v))
+               for one in made]  # fmt: skip
+    alone = Usual(LEVEL, 0.0, False)
+    for one, beside in zip(made, density, strict=True):
+        normal = np.exp(-(np.log(one.correlation_time) ** 2) / (2.0 * 1.5**2)) / 1.5
+        assert log_prior_of(one, usual) - log_prior_of(one, alone) == pytest.approx(np.log(beside / normal))
 
 
 def test_the_density_of_outliers_is_that_of_any_share_of_them():

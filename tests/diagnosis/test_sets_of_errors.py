@@ -85,7 +85,7 @@ def test_a_lost_sample_counts_as_one_of_its_own_channel(channel, level):
     values = {name: one * rng.standard_normal(count) for name, one in levels.items()}
     noise = {name: Noise(white=one, slow=0.01 * one, correlation_time=2.0, resolution=0.0,
                          used=np.ones(count, dtype=bool), time=time) for name, one in levels.items()}  # fmt: skip
-    record = SimpleNamespace(noise=noise, values=values, known={}, noise_times=None)
+    record = SimpleNamespace(noise=noise, values=values, known={}, noise_times={})
     residual = np.concatenate([noise[name].whiten(column) for name, column in values.items()])
     best = SimpleNamespace(log_posterior=0.0, fit=SimpleNamespace(r=residual))
     search = SimpleNamespace(best=lambda: best, beliefs=SimpleNamespace(log_total=lambda: 0.0))

@@ -9,19 +9,20 @@ samples; AR(1) noise is the case σ_w = 0. Before anything is fitted,
     log σ_w ~ N(log ν, 1.5²),   log σ_s ~ N(log(0.7 ν + q/√12), 1² or 0.5²),   log τ_s ~ N(log 1 s, 1.5²)
 
 ν is the usual level of the sensor, or the known one; σ_s has 0.5 above its median and 1 below. q is read off the
-values: sensors round. Where most channels of a record have shown a slow part, log τ_s ~ N(log of their median, s²), and
-s is what their times show: s² = (2 · 0.9² + Σ (log τ_i − log median)²) / (2 + n).
+values: sensors round. Where n other channels of a record have shown a slow part, log τ_s is about the log of their
+median, as a Student t with 2 + n degrees of freedom and the scale that their times show (a normal distribution whose
+variance is not known):  s² = (2 · 0.9² + Σ (log τ_i − log median)²) / (2 + n).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import betaln
+from scipy.special import betaln, gammaln
 
 from subzero.diagnosis.hypothesis.catalogue.sensors import SPECS
 from subzero.jit import compiled, scratch
@@ -208,9 +209,9 @@ WHITE_SPREAD, SLOW_SPREAD, SLOW_SPREAD_ABOVE, TIME_SPREAD = 1.5, 1.0, 0.5, 1.5
 may wander by far less than is usual, but what wanders by far more is something to find. [-]"""
 USUAL_TIME = 1.0
 """Usual correlation time of a sensor's slow part. [s]"""
-TIME_SPREAD_BESIDE, SPREAD_WEIGHT, FEWEST_BESIDE, SEEN_SLOW = 0.9, 2, 3, 0.3
-"""Standard deviation of log τ_s about the median of a record before it is seen, how many channels that counts as, and
-where it holds: so many channels have a slow part of at least this share of σ_w. One logger, and often one filter, has
+TIME_SPREAD_BESIDE, SPREAD_WEIGHT, FEWEST_BESIDE, SEEN_SLOW = 0.9, 2, 2, 0.3
+"""Standard deviation of log τ_s about the median of other channels before it is seen, how many channels that counts as,
+and where it holds: so many others have a slow part of at least this share of σ_w. One logger, and often one filter, has
 made them; how much alike they are is seen, too. [-]"""
 KNOWN_SPREAD = 0.1
 """Standard deviation of the logarithm of a level that the user knows. [-]"""
@@ -227,17 +228,18 @@ makes one or two steps smaller than that of the sensor: so many are tried."""
 
 
 class TimesBeside(NamedTuple):
-    """Correlation times of the noise of a record's channels: their median [s], and standard deviation of a logarithm
-    about its own. [-]
+    """Correlation times of the noise of the channels beside one: their median [s], the scale of a logarithm about its
+    own [-], and the degrees of freedom that the scale is known with.
     """
 
     median: float
     spread: float
+    freedom: float
 
 
 class Usual(NamedTuple):
     """What a sensor is like: level ν and resolution q, in the channel's unit, whether the level is known, and the
-    correlation times that sensors beside it have, None if they are not known.
+    correlation times that sensors beside it have, None if too few are known.
     """
 
     level: float
@@ -353,34 +355,53 @@ def log_prior_of(noise: Noise, usual: Usual) -> float:
     return log_density(np.log([noise.white, noise.slow, noise.correlation_time]), prior_of(usual))
 
 
-def times_beside(several: Iterable[Noise]) -> TimesBeside | None:
-    """Return what the correlation times of several channels are like; None where too few have a slow part."""
-    seen = [noise.correlation_time for noise in several if noise.slow**2 >= SEEN_SLOW**2 * noise.unrelated]
-    if len(seen) < FEWEST_BESIDE:
-        return None
-    median = float(np.median(seen))
-    apart = float(np.sum(np.log(np.array(seen) / median) ** 2))
-    variance = (SPREAD_WEIGHT * TIME_SPREAD_BESIDE**2 + apart) / (SPREAD_WEIGHT + len(seen))
-    return TimesBeside(median, float(np.sqrt(variance)))
+def times_beside(noise: Mapping[str, Noise]) -> dict[str, TimesBeside]:
+    """Return what the correlation times beside each channel are like; without those beside which too few others have a
+    slow part.
+    """
+    slow = {name: one.correlation_time for name, one in noise.items()
+            if one.slow**2 >= SEEN_SLOW**2 * one.unrelated}  # fmt: skip
+    others = {name: np.log([time for other, time in slow.items() if other != name]) for name in noise}
+    return {name: _about_their_median(logs) for name, logs in others.items() if logs.size >= FEWEST_BESIDE}
+
+
+def _about_their_median(logs: np.ndarray) -> TimesBeside:
+    """Return what logarithms of correlation times (n,) say of a further one."""
+    median, freedom = float(np.median(logs)), SPREAD_WEIGHT + logs.size
+    variance = (SPREAD_WEIGHT * TIME_SPREAD_BESIDE**2 + float(np.sum((logs - median) ** 2))) / freedom
+    return TimesBeside(float(np.exp(median)), float(np.sqrt(variance)), float(freedom))
 
 
 class Prior(NamedTuple):
-    """What is known of log σ_w, log σ_s, log τ_s beforehand: means, and standard deviations below and above (3,), and
-    the mean of the logarithm of the level, NaN if the level is not known.
+    """What is known of log σ_w, log σ_s, log τ_s beforehand: means, and standard deviations below and above (3,); the
+    degrees of freedom of the last, infinite for a normal distribution; the mean of the logarithm of the level, NaN if
+    the level is not known; and the log density at the means, but for a constant of all noises.
     """
 
     mean: np.ndarray
     below: np.ndarray
     above: np.ndarray
+    freedom: float
     level: float
+    most: float
 
 
 def prior_of(usual: Usual) -> Prior:
     """Return what is known of a usual sensor's noise beforehand."""
-    time, spread = usual.times_beside or (USUAL_TIME, TIME_SPREAD)
+    time, spread, freedom = usual.times_beside or (USUAL_TIME, TIME_SPREAD, np.inf)
     mean = np.log([usual.level, slow_usual(usual), time])
     below, above = (np.array([WHITE_SPREAD, one, spread]) for one in (SLOW_SPREAD, SLOW_SPREAD_ABOVE))
-    return Prior(mean, below, above, float(mean[0]) if usual.is_known else np.nan)
+    level = float(mean[0]) if usual.is_known else np.nan
+    most = float(np.log(TIME_SPREAD / spread)) + _log_height(freedom)
+    return Prior(mean, below, above, freedom, level, most)
+
+
+def _log_height(freedom: float) -> float:
+    """Return the log density of a Student t at its middle, over that of a normal distribution of the same scale."""
+    if np.isinf(freedom):
+        return 0.0
+    half = 0.5 * freedom
+    return float(gammaln(half + 0.5) - gammaln(half) - 0.5 * np.log(half))
 
 
 @compiled
@@ -389,11 +410,13 @@ def log_density(log: np.ndarray, prior: Prior) -> float:
     about = 0.0
     for i in range(3):
         apart = log[i] - prior.mean[i]
-        about += (apart / (prior.above[i] if apart > 0.0 else prior.below[i])) ** 2
+        square = (apart / (prior.above[i] if apart > 0.0 else prior.below[i])) ** 2
+        far = i == 2 and prior.freedom < np.inf
+        about += (prior.freedom + 1.0) * np.log1p(square / prior.freedom) if far else square
     if prior.level == prior.level:
         level = 0.5 * np.log(np.exp(2.0 * log[0]) + np.exp(2.0 * log[1]))
         about += ((level - prior.level) / KNOWN_SPREAD) ** 2
-    return np.log(TIME_SPREAD / prior.below[2]) - 0.5 * about
+    return prior.most - 0.5 * about
 
 
 SPIKE = 5.0

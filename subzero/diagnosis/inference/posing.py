@@ -151,7 +151,7 @@ def with_noise_behind(
             own = slice(at, at + old.count)
             noise[name] = _behind(one, name, Behind(residual=rest[own], J=J[own], D=D))
             at += old.count
-        found.append(replace(one, noise=noise, noise_times=times_beside(noise.values())))
+        found.append(replace(one, noise=noise, noise_times=times_beside(noise)))
     if all(_alike(one.noise[name], new.noise[name]) for one, new in zip(problem.records, found, strict=True)
            for name in one.noise):  # fmt: skip
         return None
@@ -187,7 +187,7 @@ def _without_outliers(problem: Problem, record: int, z: np.ndarray) -> Observed:
 def sensor_of(one: Observed, name: str) -> Usual:
     """Return what the sensor of a channel is like, by what is known of it and by the record as it was posed."""
     level, resolution = one.known.get(name, SPECS[name].noise), one.noise[name].resolution
-    return Usual(level, resolution, name in one.known, one.noise_times)
+    return Usual(level, resolution, name in one.known, one.noise_times.get(name))
 
 
 def _unit(one: Observed) -> dict[str, Noise]:

@@ -57,7 +57,7 @@ class Observed:
         setting: the nominal one, in economical steps.
         known: channel → level of noise that the user knows.
         correction: channel → what is added to the simulation (n,): the error of its economical steps, a drift.
-        noise_times: what the correlation times of its noise are like, None as long as that is not known.
+        noise_times: channel → what the correlation times of the noise beside it are like, as far as that is known.
     """
 
     name: str
@@ -67,7 +67,7 @@ class Observed:
     setting: Setting
     known: Mapping[str, float] = field(default_factory=dict)
     correction: Mapping[str, np.ndarray] = field(default_factory=dict)
-    noise_times: TimesBeside | None = None
+    noise_times: Mapping[str, TimesBeside] = field(default_factory=dict)
 
     def corrected(self, more: Mapping[str, np.ndarray]) -> Observed:
         """Return the record beside a simulation to which more is added; what was measured stays as it is."""
