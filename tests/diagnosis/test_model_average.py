@@ -21,6 +21,7 @@ from subzero.diagnosis import (
 )
 from subzero.diagnosis.inference import (
     UNTRIED_LOG_POSTERIOR,
+    Added,
     Beliefs,
     Candidate,
     ChangePointSummary,
@@ -75,8 +76,11 @@ def test_a_pair_is_estimated_from_the_better_of_its_parts():
     seen = screen(none=0.0, a=5.0, b=1.0, a__b=3.0)
     beliefs = Beliefs(candidates=fitted(none=-50.0, a=-10.0), screen=seen, one_more={})
     assert beliefs.log_posteriors()[("a", "b")] == -12.0
-    beside = Beliefs(candidates=fitted(none=-50.0, a=-10.0), screen=seen, one_more={("a", "b"): -17.0})
+    one_more = {("a", "b"): Added(("a",), -7.0)}
+    beside = Beliefs(candidates=fitted(none=-50.0, a=-10.0), screen=seen, one_more=one_more)
     assert beside.log_posteriors()[("a", "b")] == -17.0, "estimated at a fit, that counts more"
+    noisier = Beliefs(candidates=fitted(none=-70.0, a=-30.0), screen=seen, one_more=one_more)
+    assert noisier.log_posteriors()[("a", "b")] == -37.0, "under another noise everything has moved"
 
 
 def test_only_causes_beyond_four_tolerances_are_large():

@@ -134,6 +134,7 @@ from subzero.diagnosis.inference.force_formula import describe
 from subzero.diagnosis.inference.screening import Screening
 from subzero.diagnosis.inference.model_average import (
     UNTRIED_LOG_POSTERIOR,
+    Added,
     Beliefs,
     ChangePointSummary,
     decide,
@@ -160,6 +161,7 @@ __all__ = [
     "PRIOR",
     "TRUTHS",
     "UNTRIED_LOG_POSTERIOR",
+    "Added",
     "BaseRun",
     "Behind",
     "Beliefs",

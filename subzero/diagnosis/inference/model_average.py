@@ -155,6 +155,15 @@ FURTHER_CAUSE_ODDS = NAMED_PROBABILITY / (1.0 - NAMED_PROBABILITY)
 """A further cause has to be this many times as probable as none: then it could be named."""
 
 
+class Added(NamedTuple):
+    """What a further cause adds to the log posterior of a hypothesis: under another noise both are others, and their
+    difference is about the same.
+    """
+
+    beside: Ids
+    log_gain: float
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Beliefs:
     """What is known of all hypotheses.
@@ -162,13 +171,13 @@ class Beliefs:
     Attributes:
         candidates: hypothesis → its real fit.
         screen: what the linear problem at the wide fit says.
-        one_more: hypothesis → log posterior, estimated at the fit of one with a cause less.
+        one_more: hypothesis → what its further cause adds, estimated at the fit of one with a cause less.
         behind: hypothesis → how far its fit was behind the best when it was given up, in log posterior.
     """
 
     candidates: Mapping[Ids, Candidate]
     screen: Screening
-    one_more: Mapping[Ids, float]
+    one_more: Mapping[Ids, Added]
     behind: Mapping[Ids, float] = field(default_factory=dict)
 
     def log_posteriors(self) -> dict[Ids, float]:
@@ -197,8 +206,9 @@ class Beliefs:
         """Return the log posterior of a hypothesis without a fit: of the best fit of a part of it, and what the linear
         problem there, or else the screen, says that the rest adds.
         """
-        if ids in self.one_more:
-            return self.one_more[ids]
+        seen = self.one_more.get(ids)
+        if seen and seen.beside in fitted:
+            return fitted[seen.beside] + seen.log_gain
         parts = [one for size in range(len(ids)) for one in combinations(ids, size) if one in fitted]
         part = max(parts, key=lambda one: fitted[one], default=())
         return fitted[part] + self.screen.adds(ids, part)

@@ -225,7 +225,7 @@ class Fits:
         sharper = with_finer_steps(self.economical, best.fit.z)
         if noise_is_new or sharper is not None:
             self.problem = sharper or self.economical
-            self._give_up(best)
+            self._give_up(self.candidates[best.ids])
             self._go_on()
 
     def _estimate_noise(self, best: Candidate) -> bool:
@@ -240,9 +240,8 @@ class Fits:
         if found is None:
             return False
         old, again = self.economical, partial(whitened_again, self.economical, found)
-        self.candidates = {
-            ids: replace(one, fit=rewhitened(one.fit, old, found)) for ids, one in self.candidates.items()
-        }
+        self.candidates = {ids: candidate_of(found, ids, rewhitened(one.fit, old, found))
+                           for ids, one in self.candidates.items()}  # fmt: skip
         self.wide, self.economical = self._nearer(rewhitened(self.wide, old, found)), found
         self.nominal = again(self.nominal[0]), again(self.nominal[1])
         self.problem = found
@@ -257,13 +256,14 @@ class Fits:
         return best if is_poor_fit(wide) and best.r @ best.r < wide.r @ wide.r else wide
 
     def _give_up(self, best: Candidate) -> None:
-        """Give up what is hopelessly behind the best candidate and no part of it."""
-        kept = {ids: one for ids, one in self.candidates.items()
-                if one.log_posterior > best.log_posterior - settings.HOPELESS_NATS
-                or set(ids) <= set(best.ids)}  # fmt: skip
-        self.behind |= {ids: one.log_posterior - best.log_posterior for ids, one in self.candidates.items()
-                        if ids not in kept}  # fmt: skip
-        self.candidates = kept
+        """Give up what is hopelessly behind the best candidate, as far as its linear problem can say, and no part of
+        it.
+        """
+        behind = {ids: one.optimistic_log_posterior - best.optimistic_log_posterior
+                  for ids, one in self.candidates.items()}  # fmt: skip
+        kept = {ids for ids in behind if behind[ids] > -settings.HOPELESS_NATS or set(ids) <= set(best.ids)}
+        self.behind |= {ids: log for ids, log in behind.items() if ids not in kept}
+        self.candidates = {ids: one for ids, one in self.candidates.items() if ids in kept}
 
     def _go_on(self) -> None:
         """Fit all candidates from where they are, with the sensitivities at hand."""

@@ -27,7 +27,7 @@ from subzero.diagnosis.inference.map_fit import (
     refit,
     restarted_where_smooth,
 )
-from subzero.diagnosis.inference.model_average import Beliefs
+from subzero.diagnosis.inference.model_average import Added, Beliefs
 from subzero.diagnosis.inference.model_fits import Fits
 from subzero.diagnosis.inference.screening import (
     TriedSize,
@@ -47,12 +47,12 @@ class Search(Fits):
 
     Attributes:
         is_far: nothing came close to the records so far, not even within wide tolerances.
-        one_more: hypothesis → log posterior, estimated at the fit of one with a cause less.
+        one_more: hypothesis → what its further cause adds, estimated at the fit of one with a cause less.
         restarted: hypotheses that were fitted from off their kinks.
     """
 
     is_far: bool = False
-    one_more: dict[Ids, float] = field(default_factory=dict)
+    one_more: dict[Ids, Added] = field(default_factory=dict)
     restarted: set[Ids] = field(default_factory=set)
 
     def grow(self) -> None:
@@ -81,7 +81,7 @@ class Search(Fits):
     def _more(self, best: Candidate) -> list[Ids]:
         """Return the hypotheses with one cause more that the linear problem at the best fit finds best."""
         found = self._unknown(with_one_added(self.problem, best))
-        self.one_more |= found
+        self.one_more |= {ids: Added(best.ids, log - best.log_posterior) for ids, log in found.items()}
         return _best_of(found, best.log_posterior - settings.FURTHER_CAUSE_NATS)
 
     def _without(self, best: Candidate, without: str) -> None:
