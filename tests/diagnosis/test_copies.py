@@ -16,12 +16,12 @@ def told(logged):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("index", "copy"), [(2, 1), (12, 3), (39, 4)])
+@pytest.mark.parametrize(("index", "copy"), [(2, 1), (12, 3)])
 def test_a_copy_has_the_verdict_the_name_and_about_the_probability_of_the_original(index, copy):
     """With seven digits, as a file has them, and with a hundredth of a noise level more in every sample.
 
-    What these three lost by the way of the search: in the first what is not fitted was judged by a noise of before, and
-    a healthy record was undecided; in the others a rival was given up by the noise of before, and missed.
+    What these two lost by the way of the search: in the first what is not fitted was judged by a noise of before, and a
+    healthy record was undecided; in the second a rival was given up by the noise of before, and missed.
     """
     drawn = world.drawn(10301, index + 1)[index]
     logged, _ = world.record_of(drawn)
