@@ -190,7 +190,12 @@ def _unknown(name: str) -> str:
 
 
 def _meant(name: str) -> str:
-    """Return the column that is probably meant: one written nearly so, else what other loggers call so; or nothing."""
+    """Return the column that is probably meant: that of the channel it begins with, one written nearly so, else what
+    other loggers call so; or nothing.
+    """
+    begun = [one for one in BY_NAME if name.lower().startswith(f"{one}_")]
+    if begun:
+        return BY_NAME[max(begun, key=len)].column
     words = re.findall(r"[a-z]+", re.sub(r"[\[(].*", "", name.lower()))  # without a unit in brackets
     others = [column for word in words for column, names in OTHER_WORDS.items() if word in names]
     likely = [*nearest(name, BY_COLUMN, likeness=SLIP_LIKENESS), *(others if "rate" not in words else ())]

@@ -64,6 +64,11 @@ REFUSED = {
         RENAME,
         "column 'time_s' is missing; it is needed, in seconds since the first command",
     ],
+    "time_s,roll_angle_deg,heading_rad\n0,1,2\n": [
+        "unknown column 'roll_angle_deg'. Did you mean 'roll_deg'?",
+        "unknown column 'heading_rad'. Did you mean 'heading_deg'?",
+        RENAME,
+    ],
     "time_s;depth_m\n0;1,5\n": [
         "its columns are separated by semicolons; separate them by commas, and write numbers with a point"
     ],
