@@ -193,10 +193,10 @@ def _meant(name: str) -> str:
     """Return the column that is probably meant: that of the channel it begins with, one written nearly so, else what
     other loggers call so; or nothing.
     """
-    begun = [one for one in BY_NAME if name.lower().startswith(f"{one}_")]
-    if begun:
-        return BY_NAME[max(begun, key=len)].column
     words = re.findall(r"[a-z]+", re.sub(r"[\[(].*", "", name.lower()))  # without a unit in brackets
+    begun = max((one for one in BY_NAME if name.lower().startswith(f"{one}_")), key=len, default="")
+    if begun and ("rate" in words) == ("rate" in begun):
+        return BY_NAME[begun].column
     others = [column for word in words for column, names in OTHER_WORDS.items() if word in names]
     likely = [*nearest(name, BY_COLUMN, likeness=SLIP_LIKENESS), *(others if "rate" not in words else ())]
     return next(iter([*likely, *nearest(name, BY_COLUMN)]), "")

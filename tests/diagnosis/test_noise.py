@@ -317,8 +317,8 @@ def test_the_evidence_of_some_samples_is_that_of_a_record_without_the_others():
 
 A_LAG_BY_CHANCE = pytest.mark.xfail(
     strict=True,
-    reason="in this dive the slow noise of the depth gauge looks like a lag of it, which is told with 0.97: one such "
-    "statement of some thirty may be wrong, and this is the only one of the healthy records of this seed",
+    reason="in this dive the slow noise of the depth gauge looks like a lag of it, which is told with 0.97: one of "
+    "some thirty such statements may be wrong",
 )
 
 

@@ -256,8 +256,8 @@ class Fits:
         return best if is_poor_fit(wide) and best.r @ best.r < wide.r @ wide.r else wide
 
     def _give_up(self, best: Candidate) -> None:
-        """Give up what is hopelessly behind the best candidate, as far as its linear problem can say, and no part of
-        it.
+        """Give up what is hopelessly behind the best candidate, also after the step that its linear problem promises
+        under the noise as it is known by now; but no part of the best.
         """
         behind = {ids: one.optimistic_log_posterior - best.optimistic_log_posterior
                   for ids, one in self.candidates.items()}  # fmt: skip

@@ -20,6 +20,8 @@ from subzero.diagnosis.hypothesis.catalogue.sensors import CLOCK, SPECS
 from subzero.diagnosis.hypothesis.hypotheses import entries_of, moves_nothing, with_tolerances
 from subzero.diagnosis.hypothesis.noise import Noise, Usual, spikes, times_beside, usual_noise, usual_of
 from subzero.diagnosis.hypothesis.noise_estimate import Behind, estimate
+from subzero.diagnosis.inference import settings
+from subzero.diagnosis.inference.map_fit import Fit, bounded_step, bounds, objective
 from subzero.diagnosis.inference.problem import Observed, Problem
 from subzero.diagnosis.inference.simulator import economical, finer, read, respond, with_limit
 from subzero.errors import UserError
@@ -28,7 +30,6 @@ if TYPE_CHECKING:
     from subzero.diagnosis.hypothesis.configuration import Setting
     from subzero.diagnosis.hypothesis.effect import Effect
     from subzero.diagnosis.hypothesis.logged import Logged
-    from subzero.diagnosis.inference.map_fit import Fit
 
 VISIBLE_STEP_ERROR = 1.0
 """Squared size, in noise, of an error of the steps that is worth correcting."""
@@ -169,8 +170,16 @@ def whitened_again(before: Problem, after: Problem, white: np.ndarray) -> np.nda
 
 
 def rewhitened(fit: Fit, before: Problem, after: Problem) -> Fit:
-    """Return a fit whose residual and sensitivities are made white by the noise of another problem."""
-    return replace(fit, r=whitened_again(before, after, fit.r), J=whitened_again(before, after, fit.J))
+    """Return a fit under the noise of another problem: its residual and its sensitivities made white by that, and what
+    a step is worth there.
+    """
+    r, J = whitened_again(before, after, fit.r), whitened_again(before, after, fit.J)
+    now, step = objective(r, fit.z, fit.D), bounded_step(J, r, fit.z, fit.D, *bounds(after))
+    left = now - objective(r - J @ step, fit.z + step, fit.D)
+    converged = left < settings.CONVERGED_GAIN_NATS
+    return replace(
+        fit, r=r, J=J, objective=now, converged=converged, predicted_gain=0.0 if converged else left
+    )
 
 
 def _without_outliers(problem: Problem, record: int, z: np.ndarray) -> Observed:
