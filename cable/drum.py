@@ -34,6 +34,10 @@ FREE, LENGTH, TENSION = 0, 1, 2
 
 CREEP = 1e-3
 """Pay-out rate at which friction has come to 0.7 of its full size. [m/s]"""
+TINY_SPEED = 1e-12
+"""Friction is taken at this speed at least. [m/s]"""
+MOST_COASTING = 60
+"""Most iterations for the speed of a coasting drum."""
 HELD = 1e-12
 """A tension or pay-out rate below this is none. [N], [m/s]"""
 
@@ -98,7 +102,9 @@ class DrumProperties:
 
 
 @inner
-def next_mode(mode: int, converged: bool, payout: float, pull: float, drum: DrumNumbers) -> int:
+def next_mode(
+    mode: int, converged: bool, payout: float, loose: float, pull: float, drum: DrumNumbers
+) -> int:
     """Return what the drum does, given the answer found by supposing that it does `mode`; the same if consistent.
 
     A drum that stands while a taut cable must get longer leaves no solution at all (`converged` is false); nor does a
@@ -108,19 +114,40 @@ def next_mode(mode: int, converged: bool, payout: float, pull: float, drum: Drum
     Args:
         mode: what was supposed.
         converged: whether a solution was found with it.
-        payout: dS/dt of that solution. [m/s]
+        payout: rate at which the water takes cable in that solution. [m/s]
+        loose: length that lies loose before the drum then. [m]
         pull: T(S) of that solution. [N]
         drum: the drum.
     """
     if mode == STANDING:
-        return TURNING if not converged or pull > HELD else STANDING
+        if converged and pull <= HELD:
+            return STANDING
+        return SPINNING if loose > 0.0 else TURNING
     if converged and payout < 0.0:
         return STANDING
     if mode == SPINNING:
-        return TURNING if not converged or pull > HELD else SPINNING
+        return TURNING if not converged or loose < 0.0 else SPINNING
     if not converged:
         return STANDING
     return SPINNING if drum.inertia > 0.0 and pull < -HELD else TURNING
+
+
+@inner
+def coasting(drum: DrumNumbers, alpha: float, past: float) -> float:
+    """Return the speed U of a drum that nothing pulls, I_d/R_d² (α U + `past`) + friction(U) = 0; never backwards. [m/s]
+
+    Friction bends one way only, so that Newton's method from rest never goes too far.
+    """
+    if drum.inertia <= 0.0 or past >= 0.0:
+        return 0.0
+    U = 0.0
+    for _ in range(MOST_COASTING):
+        held, slope = friction(drum, max(U, TINY_SPEED))
+        step = -(drum.inertia * (alpha * U + past) + held) / (drum.inertia * alpha + slope)
+        U += step
+        if step < 1e-12:
+            break
+    return max(U, 0.0)
 
 
 @inner

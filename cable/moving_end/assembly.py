@@ -35,7 +35,7 @@ from math import sqrt
 
 import numpy as np
 
-from cable.drum import FREE, LENGTH, SPINNING, STANDING, TENSION, DrumNumbers, friction
+from cable.drum import FREE, LENGTH, SPINNING, STANDING, TENSION, TURNING, DrumNumbers, coasting, friction
 from cable.moving_end.bdf2 import Weights
 from cable.moving_end.bending import add_bending
 from cable.moving_end.segment_load import (
@@ -49,6 +49,7 @@ from cable.moving_end.slack_law import fading_rate, slack_law, turning_rate
 from cable.moving_end.state import (
     BEFORE,
     DIAGONAL,
+    KNOWN_STEPS,
     LOWER,
     NEW,
     NOW,
@@ -363,23 +364,56 @@ def drum_row(line: Line, w: Weights, drum: DrumNumbers, work: Load, slopes: bool
     line.ends.drum_pull = line.tension[NEW, N] + 0.5 * Qt
     for i in range(3):
         line.ends.drum_force[i] = line.tension[NEW, N] * t[i] + 0.5 * line.load[N, i]
-    U, by_length = line.ends.payout, 1.0
-    pulled = drum.control != LENGTH and line.ends.drum_mode != STANDING
+    by_length = 1.0
+    turn_drum(line, w, drum)
+    pulled, U = drum.control != LENGTH and line.ends.drum_mode != STANDING, line.ends.payout[NEW] + line.ends.ahead[NEW]
     if not pulled:
         r[1] = line.ends.last_length[NEW] - _length_wanted(line, drum)
     elif drum.control == TENSION:
         r[1], by_length = -drum.setpoint, 0.0
+    elif line.ends.drum_mode == SPINNING:
+        r[1], by_length = 0.0, 0.0  # loose cable pulls at nothing
     else:
-        held, slope = friction(drum, U[NEW])
-        r[1] = -held - drum.inertia * (w.a0 * U[NEW] + w.a1 * U[NOW] + w.a2 * U[BEFORE])
-        by_length = (
-            -(slope + drum.inertia * w.a0) * w.b0
-        )  # ∂U/∂ℓ = b₀: the rate is differenced from the length
-    pulled = pulled and line.ends.drum_mode != SPINNING
+        alpha, beta, past = drum_history(line, w)
+        held, slope = friction(drum, U)
+        r[1] = -held - drum.inertia * (alpha * U + past)
+        by_length = -(slope + drum.inertia * alpha) * beta  # ∂U/∂ℓ = β: the rate is differenced from the length
     if pulled:
         r[1] += line.ends.drum_pull
     if slopes:
         _differentiate_drum(line, by_length, pulled, Qt, work)
+
+
+@inner
+def drum_history(line: Line, w: Weights) -> tuple[float, float, float]:
+    """Return the weights of the drum's new speed in its acceleration and of the new length in its speed [1/s], and what
+    the speeds before add to the acceleration [m/s²]. Of first order while cable is loose, and until the jerk that ends
+    that is two steps behind.
+    """
+    U, ahead = line.ends.payout, line.ends.ahead
+    if line.ends.since_loose < KNOWN_STEPS:
+        return w.first, w.first, -w.first * (U[NOW] + ahead[NOW])
+    now, before = U[NOW] + ahead[NOW], U[BEFORE] + ahead[BEFORE]
+    return w.a0, w.b0, w.a1 * now + w.a2 * before
+
+
+@inner
+def turn_drum(line: Line, w: Weights, drum: DrumNumbers) -> None:
+    """Fill what lies loose at level NEW, and how far the drum is ahead of what the water takes: nothing of both where
+    the cable pulls it; where nothing does it coasts.
+    """
+    ends = line.ends
+    alpha, beta, past = drum_history(line, w)
+    taken = ends.payout[NEW]
+    if ends.since_loose < KNOWN_STEPS:
+        taken = w.first * (ends.last_length[NEW] - ends.last_length[NOW])
+    if ends.drum_mode == TURNING:
+        ends.loose[NEW] = 0.0
+        ends.ahead[NEW] = taken - beta * ends.loose[NOW] - ends.payout[NEW]
+        return
+    U = coasting(drum, alpha, past)
+    ends.loose[NEW] = ends.loose[NOW] + (U - taken) / beta
+    ends.ahead[NEW] = U - ends.payout[NEW]
 
 
 @compiled

@@ -26,6 +26,7 @@ class Weights(NamedTuple):
         a0, a1, a2: for rates of momenta and of the pay-out.
         b0, b1, b2: for velocities from positions.
         b_now: weight of the present velocity in the new one. [-]
+        first: of first order, 1/Δt.
     """
 
     a0: float
@@ -35,6 +36,7 @@ class Weights(NamedTuple):
     b1: float
     b2: float
     b_now: float
+    first: float
 
 
 @inner
@@ -47,8 +49,8 @@ def backward_weights(step: float, previous_step: float) -> Weights:
     """
     if previous_step <= 0.0:
         slope = 1.0 / step
-        return Weights(slope, -slope, 0.0, 2.0 * slope, -2.0 * slope, 0.0, -1.0)
+        return Weights(slope, -slope, 0.0, 2.0 * slope, -2.0 * slope, 0.0, -1.0, slope)
     ratio = step / previous_step
     a0 = (1.0 + 2.0 * ratio) / (step * (1.0 + ratio))
     a2 = ratio * ratio / (step * (1.0 + ratio))
-    return Weights(a0, -(a0 + a2), a2, a0, -(a0 + a2), a2, 0.0)
+    return Weights(a0, -(a0 + a2), a2, a0, -(a0 + a2), a2, 0.0, 1.0 / step)

@@ -296,7 +296,7 @@ def _step_from_rest(
     slack law where the sharp one fails.
     """
     a = 1.0 / step if step <= LONGEST else 0.0
-    w = Weights(a, -a, 0.0, a, -a, 0.0, 0.0)
+    w = Weights(a, -a, 0.0, a, -a, 0.0, 0.0, a)
     for tolerance in (TOLERANCE, LOOSER):
         _guess(line, water, work)
         line.ends.solver.tolerance = tolerance

@@ -40,6 +40,7 @@ def lay_straight(
     for level in range(3):
         ends.last_length[level] = line.length[ends.count]
         ends.payout[level] = away
+        ends.loose[level] = ends.ahead[level] = 0.0
     _pull_straight(line, wet_length, direction, tow, drum, c)
 
 

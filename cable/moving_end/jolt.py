@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cable.drum import LENGTH, STANDING, TENSION, DrumNumbers
+from cable.drum import LENGTH, SPINNING, STANDING, TENSION, DrumNumbers
 from cable.moving_end.block_solver import solve
 from cable.moving_end.segment_load import Load, segment_momentum
 from cable.moving_end.slack_law import chord_length, squared_share
@@ -158,7 +158,8 @@ def _assemble_drum(line: Line, tangents: np.ndarray, M: np.ndarray, drum: DrumNu
     if drum.control == LENGTH or line.ends.drum_mode == STANDING:
         D[1, 1] = 1.0
         return
-    D[1, 0], D[1, 1] = 1.0, -0.25 * mass - (0.0 if drum.control == TENSION else drum.inertia)
+    turned = drum.control != TENSION and line.ends.drum_mode != SPINNING
+    D[1, 0], D[1, 1] = 1.0, -0.25 * mass - (drum.inertia if turned else 0.0)
     for i in range(3):
         for k in range(3):
             L[1, 1 + i] += 0.25 * t[k] * M[k, i]
@@ -175,6 +176,9 @@ def _apply(line: Line, tangents: np.ndarray, change: np.ndarray, c: CableNumbers
         line.velocity[NOW, N, i] -= jump[N, 1] * tangents[N, i]
     line.ends.payout[NOW] += jump[N, 1]
     line.ends.payout[BEFORE] = line.ends.payout[NOW]
+    if line.ends.drum_mode == SPINNING:
+        line.ends.ahead[NOW] -= jump[N, 1]
+    line.ends.ahead[BEFORE] = line.ends.ahead[NOW]
     line.ends.previous_step = 0.0
     for j in range(1, N + 1):
         segment_momentum(line, NOW, j, _length(line, j), c, work)

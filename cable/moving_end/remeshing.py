@@ -13,7 +13,7 @@ import numpy as np
 
 from cable.moving_end.segment_load import Load, segment_momentum
 from cable.moving_end.slack_law import KNOWN
-from cable.moving_end.state import BEFORE, LONGEST, NEW, NOW, SPLIT_AT, Line, spacing
+from cable.moving_end.state import BEFORE, KNOWN_STEPS, LONGEST, NEW, NOW, SPLIT_AT, Line, spacing
 from cable.properties import CableNumbers
 from subzero.jit import compiled, inner
 
@@ -36,10 +36,13 @@ def accept(line: Line, step: float, c: CableNumbers, work: Load) -> None:
                 line.water[level, j, i] = line.water[level - 1, j, i]
         line.ends.last_length[level] = line.ends.last_length[level - 1]
         line.ends.payout[level] = line.ends.payout[level - 1]
+        line.ends.loose[level] = line.ends.loose[level - 1]
+        line.ends.ahead[level] = line.ends.ahead[level - 1]
     for j in range(N + 1):
         line.tension[BEFORE, j] = line.tension[NOW, j]
         line.tension[NOW, j] = line.tension[NEW, j]
     fill_node_tensions(line)
+    line.ends.since_loose = 0 if line.ends.loose[NOW] > 0.0 else min(line.ends.since_loose + 1, KNOWN_STEPS)
     line.ends.previous_step = step
     line.ends.time += step
     if line.ends.layout.free_end:

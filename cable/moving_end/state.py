@@ -21,6 +21,9 @@ from subzero.jit import Record, inlined, inner, made_once
 
 NEW, NOW, BEFORE = 0, 1, 2
 
+KNOWN_STEPS = 3
+"""A drum that has caught up with the cable by a jerk turned smoothly at two levels of time after so many steps."""
+
 SPLIT_AT = 1.5
 """The last segment is split when it has grown to this many segment lengths."""
 LONGEST = 10.0
@@ -110,7 +113,10 @@ class Ends(Record):
         count: number of segments.
         settled: length of all segments but the last. [m]
         last_length: length of the last, growing segment (3 levels,). [m]
-        payout: rate dS/dt at which cable enters the water (3 levels,). [m/s]
+        payout: rate at which cable enters the water (3 levels,). [m/s]
+        loose: length of the cable that a drum has thrown out ahead of what the water takes (3 levels,). [m]
+        ahead: how much faster the drum gives cable than the water takes it (3 levels,). [m/s]
+        since_loose: steps since cable was last loose; no more are counted than `KNOWN_STEPS`.
         drum_mode: what the drum does (`cable.drum`).
         drum_pull: tension at the drum at level NEW. [N]
         drum_force: the cable's pull on it, with what acts across the last half segment (3,). [N]
@@ -127,6 +133,9 @@ class Ends(Record):
     settled: float
     last_length: np.ndarray
     payout: np.ndarray
+    loose: np.ndarray
+    ahead: np.ndarray
+    since_loose: int
     drum_mode: int
     drum_pull: float
     drum_force: np.ndarray
@@ -204,6 +213,9 @@ def _new_ends() -> Ends:
         settled=0.0,
         last_length=np.zeros(3),
         payout=np.zeros(3),
+        loose=np.zeros(3),
+        ahead=np.zeros(3),
+        since_loose=KNOWN_STEPS,
         drum_mode=TURNING,
         drum_pull=0.0,
         drum_force=np.zeros(3),
@@ -241,6 +253,12 @@ def enlarged(line: Line, capacity: int) -> Line:
         old = getattr(line, name)
         new[tuple(slice(0, size) for size in old.shape)] = old
     return line._replace(**larger)
+
+
+@inlined
+def paid_out(line: Line) -> float:
+    """Return the length that has left the drum by level NOW, with what lies loose before it. [m]."""
+    return line.ends.settled + line.ends.last_length[NOW] + line.ends.loose[NOW]
 
 
 @inlined

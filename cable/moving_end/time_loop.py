@@ -31,7 +31,7 @@ from cable.moving_end.initial_shape import (
 from cable.moving_end.jolt import take_jolt
 from cable.moving_end.remeshing import accept, end_tensions
 from cable.moving_end.segment_load import Load, new_load
-from cable.moving_end.state import NOW, Line, Solved, new_line
+from cable.moving_end.state import NOW, Line, Solved, new_line, paid_out
 from cable.moving_end.stops import describe_stop
 from cable.moving_end.time_step import try_step
 from cable.properties import CableNumbers
@@ -199,7 +199,7 @@ def write_row(line: Line, record: Record, k: int, used: int, c: CableNumbers) ->
     """Write row k of a record, with the shape of level NOW behind the `used` nodes that are there already."""
     N = line.ends.count
     record.tow_tension[k], record.drum_tension[k] = end_tensions(line)
-    record.length[k] = line.ends.settled + line.ends.last_length[NOW]
+    record.length[k] = paid_out(line)
     record.segments[k] = N
     for i in range(3):
         record.tow_force[k, i] = line.ends.tow.force[i]

@@ -88,7 +88,10 @@ def try_step(
         converged = _solve_softly(line, step, tow, water, c, drum, work, again and change == 0)
         if line.ends.count == 1 or drum.control != FREE or line.ends.layout.free_end:
             break
-        mode = next_mode(line.ends.drum_mode, converged, line.ends.payout[NEW], line.ends.drum_pull, drum)
+        ends = line.ends
+        mode = next_mode(
+            ends.drum_mode, converged, ends.payout[NEW], ends.loose[NEW], ends.drum_pull, drum
+        )
         if not converged:
             failed |= 1 << line.ends.drum_mode
         if mode == line.ends.drum_mode or (failed >> mode) & 1:

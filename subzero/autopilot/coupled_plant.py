@@ -164,7 +164,7 @@ class Tethered:
         flat, places = x[HULL_SIZE:], self._memory.places
         count = round(float(flat[places["count"]][0]))
         levels = flat[places["last_length"]]
-        length = levels[1] + flat[places["length"]][1:count].sum()
+        length = levels[1] + flat[places["length"]][1:count].sum() + flat[places["loose"]][1]
         F, R = flat[places["force"]], np.empty((3, 3))
         rotation(to_vehicle(x[: len(STATE_NAMES)])[3:7], R)
         pull = R.T @ F

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cable.moving_end import NOW
+from cable.moving_end import NOW, paid_out
 from subzero.engine.external_wrench import feel_current, row_at, tow_wrench
 from subzero.jit import compiled
 from subzero.run_state import Live, Setup
@@ -205,7 +205,7 @@ def _record_cable(live: Live, r: Recording, row: int, used: int, m1: float) -> i
     N, step = line.ends.count, line.ends.previous_step
     r.courant[row] = 0.0
     r.drum_tension[row] = line.node_tension[N]
-    r.length[row] = line.ends.settled + line.ends.last_length[NOW]
+    r.length[row] = paid_out(line)
     r.arc_length[used] = 0.0
     for j in range(N + 1):
         for i in range(3):

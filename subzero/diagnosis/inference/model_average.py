@@ -204,14 +204,22 @@ class Beliefs:
 
     def _estimated(self, ids: Ids, fitted: Mapping[Ids, float]) -> float:
         """Return the log posterior of a hypothesis without a fit: of the best fit of a part of it, and what the linear
-        problem there, or else the screen, says that the rest adds.
+        problem there, or else the screen, says that the rest adds; less what the screen has of causes whose own fits
+        did not keep it.
         """
         seen = self.one_more.get(ids)
         if seen and seen.beside in fitted:
             return fitted[seen.beside] + seen.log_gain
         parts = [one for size in range(len(ids)) for one in combinations(ids, size) if one in fitted]
         part = max(parts, key=lambda one: fitted[one], default=())
-        return fitted[part] + self.screen.adds(ids, part)
+        promised_too_much = sum(self._promised_too_much((one,), fitted) for one in ids if one not in part)
+        return fitted[part] + self.screen.adds(ids, part) - promised_too_much
+
+    def _promised_too_much(self, ids: Ids, fitted: Mapping[Ids, float]) -> float:
+        """Return how much less than the linear problem says the fit of causes by themselves has over nothing."""
+        if ids not in fitted or () not in fitted:
+            return 0.0
+        return max(self.screen.adds(ids, ()) - (fitted[ids] - fitted[()]), 0.0)
 
     def _without_small(self, problem: Problem, probabilities: Mapping[Ids, float]) -> dict[Ids, float]:
         """Return probabilities where causes of less than a practical size are not told beside others of more."""
