@@ -7,7 +7,7 @@ at the drum and leaves it at M, at half the rate, into the lump of node N − 1:
     V(S) = V_drum − U t_N,                                   V(M) = ½ (V_{N−1} + V(S))
 
     free drum    (I_d/R_d²) dU/dt + C_f/R_d = T(S), or it stands: U ≥ 0 (whichever is the smaller of the two sides);
-                 with inertia it may overrun a slack cable, T(S) = 0
+                 with inertia it may overrun the cable, which lies loose before it then, T(S) = 0 (`turning`)
     winch        U or T(S) as asked for
 
 At the near end, the force on the vehicle is
@@ -28,7 +28,20 @@ from cable.drum import LENGTH, TENSION, DrumNumbers
 from cable.lumped.balance import arm, first_tangent, load_node, neighbours
 from cable.lumped.band_solver import add
 from cable.lumped.load import evaluate_node
-from cable.lumped.rope import ANSWER, DIRECTION, GAIN, GAP, NEW, PULL, REST, SIZE, START_MOMENTUM, WATER, Rope
+from cable.lumped.rope import (
+    ANSWER,
+    DIRECTION,
+    GAIN,
+    GAP,
+    NEW,
+    PULL,
+    REST,
+    SIZE,
+    SMOOTH_STEPS,
+    START_MOMENTUM,
+    WATER,
+    Rope,
+)
 from cable.lumped.springs import drum_friction, unit_length
 from cable.properties import CableNumbers
 from subzero.jit import allocating, compiled, inner
@@ -172,14 +185,61 @@ def _drum_law(rope: Rope, g: float, drum: DrumNumbers, pull: float) -> tuple[flo
         return 0.0, 1.0, 0.0
     if drum.control == TENSION:
         return rope.ends.wanted - pull, 0.0, 1.0
-    held, slope = drum_friction(drum.friction, U)
-    own = drum.inertia * (U - rope.ends.start_payout) / g + held
-    by_own = drum.inertia / g + slope
-    feels = 0.0 if drum.inertia > 0.0 and pull < 0.0 else 1.0
-    excess = own - feels * pull
-    if excess > U:
+    own, by_own = turning(rope, g, drum)
+    if own - pull > U:
         return U, 1.0, 0.0
-    return excess, by_own, feels
+    return own - pull, by_own, 1.0
+
+
+@inner
+def turning(rope: Rope, g: float, drum: DrumNumbers) -> tuple[float, float]:
+    """Return what it takes to turn the drum with the cable, (I_d/R_d²) dU_d/dt + C_f/R_d, and its slope by U; nothing
+    where that would have to hold the drum back: it runs ahead.
+    """
+    speed, before, span, by_U = _speed_with_cable(rope, g)
+    held, slope = drum_friction(drum.friction, speed)
+    own = drum.inertia * (speed - before) / span + held
+    return (own, by_U * (drum.inertia / span + slope)) if own > 0.0 or drum.inertia == 0.0 else (0.0, 0.0)
+
+
+@inner
+def is_rough(rope: Rope) -> bool:
+    """Say whether cable is loose, or was so lately: then the drum is advanced to first order, from stage to stage."""
+    return rope.ends.since_loose < SMOOTH_STEPS or rope.ends.loose[rope.ends.leg_start] > 0.0
+
+
+@compiled
+def _speed_with_cable(rope: Rope, g: float) -> tuple[float, float, float, float]:
+    """Return how fast the drum turns if no cable is loose at the end of the stage, what its acceleration is differenced
+    with, [m/s], over which time [s], and ∂(its speed)/∂U.
+    """
+    ends = rope.ends
+    if not is_rough(rope):
+        return ends.payout[NEW], ends.start_payout, g, 1.0
+    grown = ends.last[NEW] - ends.last[ends.leg_start] - ends.loose[ends.leg_start]
+    return grown / ends.leg_span, ends.spin[ends.leg_start], ends.leg_span, g / ends.leg_span
+
+
+@inner
+def wind_off(rope: Rope, g: float, drum: DrumNumbers) -> None:
+    """Fill how fast the drum turns at the end of a stage, and how much cable is loose then: none if the cable turns it;
+    else it coasts, (I_d/R_d²) dU_d/dt + C_f/R_d = 0.
+    """
+    ends = rope.ends
+    speed, before, span, _ = _speed_with_cable(rope, g)
+    ends.spin[NEW], ends.loose[NEW] = speed, 0.0
+    if drum.inertia <= 0.0:
+        return
+    low, high = 0.0, max(before, 0.0)
+    for _ in range(60):  # friction and inertia grow with the speed: halved until it is known to rounding
+        middle = 0.5 * (low + high)
+        held, _ = drum_friction(drum.friction, middle)
+        if drum.inertia * (middle - before) / span + held > 0.0:
+            high = middle
+        else:
+            low = middle
+    if high > speed:
+        ends.spin[NEW], ends.loose[NEW] = high, span * (high - speed)
 
 
 @allocating

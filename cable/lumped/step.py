@@ -20,10 +20,10 @@ from typing import NamedTuple
 import numpy as np
 
 from cable.current import Water, water_velocity
-from cable.drum import LENGTH, DrumNumbers
+from cable.drum import FREE, LENGTH, DrumNumbers
 from cable.lumped.balance import balance_nodes, bend_nodes
 from cable.lumped.band_solver import WIDTH, solve_band
-from cable.lumped.ends import hold_end, tow_force
+from cable.lumped.ends import hold_end, tow_force, wind_off
 from cable.lumped.nodes import fill_momenta, mind_the_drum, settle
 from cable.lumped.rope import (
     FADING,
@@ -35,6 +35,7 @@ from cable.lumped.rope import (
     OLD,
     PULL,
     REST,
+    SMOOTH_STEPS,
     START_MOMENTUM,
     START_POSITION,
     START_STRETCHED,
@@ -103,14 +104,18 @@ def try_step(
     start_trapezoid(rope, g)
     rope.ends.payout[NEW] = rope.ends.payout[OLD]
     spent = 0
+    rope.ends.leg_start, rope.ends.leg_span = OLD, GAMMA * h
     for stage in range(2):
         if stage == 1:
             start_backward(rope)
+            rope.ends.leg_start, rope.ends.leg_span = MIDDLE, (1.0 - GAMMA) * h
         lead_ends(rope, legs[stage], drum)
         solved = solve_stage(rope, g, legs[stage, 0], c, drum, water)
         spent += solved.iterations
         if not solved.converged:
             return StageSolved(False, spent, solved.residual, solved.worst)
+        if drum.control == FREE and not rope.ends.free_end:
+            wind_off(rope, g, drum)
     return StageSolved(True, spent, solved.residual, solved.worst)
 
 
@@ -177,6 +182,7 @@ def start_backward(rope: Rope) -> None:
         rope.spring[START_STRETCHED, j] = new * L[NEW, j] + old * L[OLD, j]
     last, U = rope.ends.last, rope.ends.payout
     last[MIDDLE], U[MIDDLE] = last[NEW], U[NEW]
+    rope.ends.spin[MIDDLE], rope.ends.loose[MIDDLE] = rope.ends.spin[NEW], rope.ends.loose[NEW]
     rope.ends.start_last = new * last[NEW] + old * last[OLD]
     rope.ends.start_payout = new * U[NEW] + old * U[OLD]
 
@@ -196,6 +202,9 @@ def keep(rope: Rope, g: float) -> None:
         rope.stretched[OLD, j] = rope.stretched[NEW, j]
     rope.ends.payout_rate = (rope.ends.payout[NEW] - rope.ends.start_payout) / g
     rope.ends.last[OLD], rope.ends.payout[OLD] = rope.ends.last[NEW], rope.ends.payout[NEW]
+    is_loose = rope.ends.loose[NEW] > 0.0 or rope.ends.loose[MIDDLE] > 0.0
+    rope.ends.spin[OLD], rope.ends.loose[OLD] = rope.ends.spin[NEW], rope.ends.loose[NEW]
+    rope.ends.since_loose = 0 if is_loose else min(rope.ends.since_loose + 1, SMOOTH_STEPS)
 
 
 @inner

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cable.drum_motion import lead_drum
-from cable.lumped import GAMMA, REST, STATE, Rope, accept_step, try_step
+from cable.lumped import GAMMA, OLD, REST, STATE, Rope, accept_step, try_step
 from subzero.engine.coupling import _move, _solve_three, hull_steps
 from subzero.engine.recording import Recording, record_row
 from subzero.jit import allocating, compiled
@@ -203,7 +203,7 @@ def _accept(setup: Setup, live: Live, rope: Rope, span: float, segment: float) -
         now.force[i] = rope.ends.tow_force[i]
     now.last_step = span
     accept_step(rope, span, segment, setup.fixed.cable)
-    now.length = 0.0
+    now.length = rope.ends.loose[OLD]
     for j in range(1, rope.ends.count + 1):
         now.length += rope.spring[REST, j]
 
