@@ -186,7 +186,7 @@ def _drum_law(rope: Rope, g: float, drum: DrumNumbers, pull: float) -> tuple[flo
     if drum.control == TENSION:
         return rope.ends.wanted - pull, 0.0, 1.0
     own, by_own = turning(rope, g, drum)
-    if own - pull > U:
+    if own - pull > (1.0 + by_own) * U:  # a step of Newton's method from here would end below U = 0
         return U, 1.0, 0.0
     return own - pull, by_own, 1.0
 
@@ -199,7 +199,8 @@ def turning(rope: Rope, g: float, drum: DrumNumbers) -> tuple[float, float]:
     speed, before, span, by_U = _speed_with_cable(rope, g)
     held, slope = drum_friction(drum.friction, speed)
     own = drum.inertia * (speed - before) / span + held
-    return (own, by_U * (drum.inertia / span + slope)) if own > 0.0 or drum.inertia == 0.0 else (0.0, 0.0)
+    runs_ahead = own < 0.0 < before and drum.inertia > 0.0
+    return (0.0, 0.0) if runs_ahead else (own, by_U * (drum.inertia / span + slope))
 
 
 @inner

@@ -398,15 +398,21 @@ def drum_history(line: Line, w: Weights) -> tuple[float, float, float]:
 
 
 @inner
+def rate_taken(line: Line, first: float) -> float:
+    """Return the rate at which the water takes cable, as `drum_history` differences it; `first` is 1/Δt. [m/s]"""
+    if line.ends.since_loose < KNOWN_STEPS:
+        return first * (line.ends.last_length[NEW] - line.ends.last_length[NOW])
+    return line.ends.payout[NEW]
+
+
+@inner
 def turn_drum(line: Line, w: Weights, drum: DrumNumbers) -> None:
     """Fill what lies loose at level NEW, and how far the drum is ahead of what the water takes: nothing of both where
     the cable pulls it; where nothing does it coasts.
     """
     ends = line.ends
     alpha, beta, past = drum_history(line, w)
-    taken = ends.payout[NEW]
-    if ends.since_loose < KNOWN_STEPS:
-        taken = w.first * (ends.last_length[NEW] - ends.last_length[NOW])
+    taken = rate_taken(line, w.first)
     if ends.drum_mode == TURNING:
         ends.loose[NEW] = 0.0
         ends.ahead[NEW] = taken - beta * ends.loose[NOW] - ends.payout[NEW]

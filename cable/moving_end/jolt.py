@@ -24,10 +24,12 @@ from cable.moving_end.segment_load import Load, segment_momentum
 from cable.moving_end.slack_law import chord_length, squared_share
 from cable.moving_end.state import BEFORE, DIAGONAL, LOWER, NOW, RESIDUAL, UPPER, Line
 from cable.properties import CableNumbers
-from subzero.jit import allocating, inner
+from subzero.jit import allocating, inlined, inner
 
 FELT = 1e-6
 """A jump of the tow point's velocity smaller than this is none. [m/s]"""
+LOOSE = 1e-6
+"""Loose cable shorter than this is rounding. [m]"""
 SLACK_FOR = 0.01
 """A cable that would be slack for no longer is taken to follow at once. [s]"""
 
@@ -158,11 +160,17 @@ def _assemble_drum(line: Line, tangents: np.ndarray, M: np.ndarray, drum: DrumNu
     if drum.control == LENGTH or line.ends.drum_mode == STANDING:
         D[1, 1] = 1.0
         return
-    turned = drum.control != TENSION and line.ends.drum_mode != SPINNING
+    turned = drum.control != TENSION and not _is_ahead(line)
     D[1, 0], D[1, 1] = 1.0, -0.25 * mass - (drum.inertia if turned else 0.0)
     for i in range(3):
         for k in range(3):
             L[1, 1 + i] += 0.25 * t[k] * M[k, i]
+
+
+@inlined
+def _is_ahead(line: Line) -> bool:
+    """Say whether loose cable keeps a jolt from the drum."""
+    return line.ends.drum_mode == SPINNING and line.ends.loose[NOW] > LOOSE
 
 
 @inner
@@ -176,7 +184,7 @@ def _apply(line: Line, tangents: np.ndarray, change: np.ndarray, c: CableNumbers
         line.velocity[NOW, N, i] -= jump[N, 1] * tangents[N, i]
     line.ends.payout[NOW] += jump[N, 1]
     line.ends.payout[BEFORE] = line.ends.payout[NOW]
-    if line.ends.drum_mode == SPINNING:
+    if _is_ahead(line):
         line.ends.ahead[NOW] -= jump[N, 1]
     line.ends.ahead[BEFORE] = line.ends.ahead[NOW]
     line.ends.previous_step = 0.0

@@ -36,7 +36,7 @@ def accept(line: Line, step: float, c: CableNumbers, work: Load) -> None:
                 line.water[level, j, i] = line.water[level - 1, j, i]
         line.ends.last_length[level] = line.ends.last_length[level - 1]
         line.ends.payout[level] = line.ends.payout[level - 1]
-        line.ends.loose[level] = line.ends.loose[level - 1]
+        line.ends.loose[level] = max(line.ends.loose[level - 1], 0.0)
         line.ends.ahead[level] = line.ends.ahead[level - 1]
     for j in range(N + 1):
         line.tension[BEFORE, j] = line.tension[NOW, j]

@@ -15,8 +15,8 @@ from math import isfinite, sqrt
 import numpy as np
 
 from cable.current import Water
-from cable.drum import FREE, STANDING, DrumNumbers, next_mode
-from cable.moving_end.assembly import assemble, assemble_residual
+from cable.drum import FREE, SPINNING, STANDING, DrumNumbers, next_mode
+from cable.moving_end.assembly import assemble, assemble_residual, rate_taken
 from cable.moving_end.bdf2 import Weights, backward_weights
 from cable.moving_end.bending import has_residual, solve_for_step
 from cable.moving_end.block_solver import SIZE, spread
@@ -90,10 +90,10 @@ def try_step(
             break
         ends = line.ends
         mode = next_mode(
-            ends.drum_mode, converged, ends.payout[NEW], ends.loose[NEW], ends.drum_pull, drum
+            ends.drum_mode, converged, rate_taken(line, 1.0 / step), ends.loose[NEW], ends.drum_pull, drum
         )
-        if not converged:
-            failed |= 1 << line.ends.drum_mode
+        if not converged or (mode == STANDING and ends.drum_mode == SPINNING):
+            failed |= 1 << line.ends.drum_mode  # a line that would take loose cable back stands
         if mode == line.ends.drum_mode or (failed >> mode) & 1:
             break
         line.ends.drum_mode = mode
