@@ -102,9 +102,7 @@ class DrumProperties:
 
 
 @inner
-def next_mode(
-    mode: int, converged: bool, payout: float, loose: float, pull: float, drum: DrumNumbers
-) -> int:
+def next_mode(mode: int, converged: bool, payout: float, loose: float, pull: float, drum: DrumNumbers) -> int:
     """Return what the drum does, given the answer found by supposing that it does `mode`; the same if consistent.
 
     A drum that stands while a taut cable must get longer leaves no solution at all (`converged` is false); nor does a

