@@ -2,7 +2,11 @@
 
     turning    T(S) R_d = I_d dΩ/dt + C_f      (11); the cable is taut at the drum
     standing   dS/dt = 0                        nothing pulls; cable is never taken up
-    spinning   0 = I_d dΩ/dt + C_f              the drum overruns: its inertia throws cable out, slack at the drum
+    spinning   0 = I_d dΩ/dt + C_f, T(S) = 0    the drum overruns: its inertia throws cable out ahead of what is pulled
+
+What it throws out lies loose before it, outside the water, and gives way to any pull; when it is used up, the cable
+takes the drum along again by a jerk. Beyond the drum the cable is taut, as it would be from a drum without inertia: an
+overrun in the water, of a whole segment, would take its drag from the tow force, and a fit from jump to jump.
 
 Coulomb friction is rounded off at rest: C_f U/√(U² + U_c²) with the pay-out rate U and U_c = 1 mm/s (`CREEP`). A drum
 that friction holds therefore creeps by less than that, and a taut cable always has an answer.
@@ -132,7 +136,7 @@ def next_mode(mode: int, converged: bool, payout: float, loose: float, pull: flo
 
 @inner
 def coasting(drum: DrumNumbers, alpha: float, past: float) -> float:
-    """Return the speed U of a drum that nothing pulls, I_d/R_d² (α U + `past`) + friction(U) = 0; never backwards. [m/s]
+    """Return the speed U of a drum that nothing pulls, I_d/R_d² (α U + `past`) + friction(U) = 0; never backwards.
 
     Friction bends one way only, so that Newton's method from rest never goes too far.
     """

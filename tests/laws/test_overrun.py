@@ -1,11 +1,11 @@
 """A drum with inertia runs ahead of a vehicle that slows: what it throws out lies loose, and the cable is taut behind.
 
-Verifies: in a straight pull, the length that a coasting drum gives, S = S₀ + U₀t − ½ (C_f/I_d) R_d² t², and the force of
-the taut cable, ½ρπdC_t U² times its way, in two schemes that share no equation; that neither depends on segments; that
-the drum which is caught up with takes the impulse (I_d/R_d²) ΔU; that runs change smoothly with the friction of the
+Verifies: in a straight pull, the length that a coasting drum gives, S = S₀ + U₀t − ½ (C_f/I_d) R_d² t², and the force
+of the taut cable, ½ρπdC_t U² times its way, in two schemes that share no equation; that neither depends on segments;
+that a drum that is caught up with takes the impulse (I_d/R_d²) ΔU; that runs change smoothly with the friction of the
 drum (a fit is lost where they jump); that both schemes agree in a manoeuvre of three dimensions; that the slack of a
-heavy cable, which hangs at the drum, pulls there. Configuration: Table 1, drums of 0.1 kg at the rim. Tolerances: the drum
-that coasts is advanced to first order, ½ (C_f R_d/I_d) Δt a second; else those of the schemes, 1e-3.
+heavy cable, which hangs at the drum, pulls there. Configuration: Table 1, drums of 0.1 kg at the rim. Tolerances: the
+drum that coasts is advanced to first order, ½ (C_f R_d/I_d) Δt a second; else those of the schemes, 1e-3.
 """
 
 import numpy as np

@@ -287,8 +287,8 @@ def test_a_drum_that_runs_ahead_leaves_cable_loose_and_its_run_does_not_depend_o
     finer = subzero.simulate(halved(halved(trial)))
     way = np.linalg.norm([run[name].values for name in ("north", "east", "depth")], axis=0)
     assert (run["cable_length"].values - way)[-1] > 0.01  # it has run ahead
-    force, fine = run["cable_tension"].values, finer["cable_tension"].values
-    assert np.abs(force - fine).max() < 0.01 * fine.max()
+    fine = np.interp(run["time"].values, finer["time"].values, finer["cable_tension"].values)
+    assert np.abs(run["cable_tension"].values - fine).max() < 0.01 * fine.max()
     assert not subzero.warnings_of(run)
 
 
