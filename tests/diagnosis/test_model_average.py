@@ -83,6 +83,19 @@ def test_a_pair_is_estimated_from_the_better_of_its_parts():
     assert noisier.log_posteriors()[("a", "b")] == -37.0, "under another noise everything has moved"
 
 
+def test_what_the_fit_of_a_cause_refutes_comes_back_in_no_pair():
+    """A screen that has a cause 10 before nothing, whose fit is 20 behind it, was wrong by 30, beside others, too."""
+    seen = screen(none=0.0, a=10.0, b=-5.0, a__b=4.0)
+    beliefs = Beliefs(
+        candidates=fitted(none=-50.0, b=-55.0), screen=seen, one_more={}, behind={("a",): -20.0}
+    )
+    assert beliefs.log_posteriors()[("a", "b")] == -50.0 + 4.0 - 30.0
+    kept = Beliefs(candidates=fitted(none=-50.0, a=-30.0), screen=seen, one_more={})
+    assert kept.log_posteriors()[("a", "b")] == -36.0, (
+        "a fit that keeps more than was promised takes nothing away"
+    )
+
+
 def test_only_causes_beyond_four_tolerances_are_large():
     effects = [catalogue(("heading",))[name] for name in ("rudder_offset", "rudder_lag")]
     entries = [SimpleNamespace(effect=one, record=-1, parameter=one.parameters[0]) for one in effects]

@@ -106,10 +106,10 @@ def test_two_records_have_terms_of_their_own(planted):
 
 
 def test_a_swell_is_seen_as_a_wave_where_a_free_force_is_not(planted):
-    """A push to and fro of any phase, in one term of two numbers."""
+    """A push to and fro of any phase, in one term of two numbers; of half the size a free force tells as much of it."""
     problem, fit, knots = planted.problem, planted.fit(), knots_of(planted.problem)
     (C,) = force_columns(problem, fit.z, ("X",), knots).values()
-    push = 0.4 * np.sin(2.0 * np.pi * knots.time / 6.0 + 2.0)
+    push = 0.8 * np.sin(2.0 * np.pi * knots.time / 4.0 + 2.0)
     pushed = dataclasses.replace(fit, r=fit.r + C @ push)
     scales, terms = {1.0: Scale(0.0, fit.D)}, one_terms(problem, fit.z, knots)
     free, told = (latent_force_candidates(problem, {FORCE + "X": C}, pushed, scales, knots, some)[0].log_gain
