@@ -7,7 +7,7 @@ from math import inf, sqrt
 import numpy as np
 
 from cable.current import Water
-from cable.drum import TURNING, DrumNumbers
+from cable.drum import FREE, TURNING, DrumNumbers
 from cable.history import Equilibrium
 from cable.moving_end.segment_load import Load, segment_momentum
 from cable.moving_end.state import BEFORE, LONGEST, NEW, NOW, SPLIT_AT, Line, feel_water, spacing
@@ -37,6 +37,8 @@ def lay_straight(
     line.length[ends.count] = wet_length - ends.settled
     for i in range(3):
         away += (tow[i] - drum.velocity[i]) * direction[i]
+    if drum.control == FREE:  # where the vehicle backs up: a free drum takes nothing back
+        away = max(away, 0.0)
     for level in range(3):
         ends.last_length[level] = line.length[ends.count]
         ends.payout[level] = away

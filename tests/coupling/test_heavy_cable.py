@@ -116,3 +116,20 @@ def test_a_heavy_cable_and_a_turning_vehicle_go_on_without_shaking(trial_of, sim
     run = simulate(trial)
     side = run["cable_force_starboard"].values[20:]
     assert np.abs(np.diff(side, 2)).max() < 0.1 * np.abs(side).max()
+
+
+@pytest.mark.parametrize(
+    ("inertia", "friction_torque", "wet_length", "bent"),
+    [(2e-3, 2e-3, 0.02, 5e-4), (4e-4, 1e-3, 1e-6, 1e-4)],
+    ids=["two centimetres", "no cable yet"],
+)
+def test_a_start_a_little_astern_has_one_answer(
+    inertia, friction_torque, wet_length, bent, trial_of, simulate
+):
+    """A free drum takes nothing back; where the start would have reeled in, there were two answers, 3e-3 m/s apart."""
+    drum = {"inertia": inertia, "friction_torque": friction_torque}
+    speeds, steps = [], {"cable_step": 0.2, "segment_length": 1.0, "duration": 4.0}
+    for astern in np.linspace(0.001, 0.006, 26):
+        trial = trial_of(drum=drum, start={"wet_length": wet_length, "surge_speed": -astern}, **steps)
+        speeds.append(simulate(trial)["surge_speed"].values)
+    assert np.abs(np.diff(speeds, 2, axis=0)).max() < bent
