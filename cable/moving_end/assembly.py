@@ -6,7 +6,7 @@ Q_j = ∫(∂p/∂t + D − w_c k) ds, shared half and half by its two ends, the
 
     balance of node j:      f_j − f_{j+1} + ½(Q_j + Q_{j+1}) = 0          (momentum of equation (7))
     length of segment j:    φ(T_j, ½(1 + eT_j)² − ½|x_j − x_{j−1}|²/ℓ_j²) = 0    (compatibility of (7), `slack_law`)
-    drum:                   T_N + ½ t_N·Q_N = (I_d/R_d² dU/dt + C_f/R_d)  (11), U = dS/dt; see `cable.drum`
+    drum:                   T_N + ½ t_N·Q_N = (I_d/R_d² dU/dt + C_f/R_d)  (11), see `drum_end`
 
 Nodes are where the velocity lives and segments where the tension lives, so neither can alternate from node to node.
 The force on the vehicle (12) is f_1 − ½Q_1. Bending, which adds a shear force to f_j, is in `bending`.
@@ -35,9 +35,10 @@ from math import sqrt
 
 import numpy as np
 
-from cable.drum import FREE, LENGTH, SPINNING, STANDING, TENSION, TURNING, DrumNumbers, coasting, friction
+from cable.drum import FREE, STANDING, DrumNumbers
 from cable.moving_end.bdf2 import Weights
 from cable.moving_end.bending import add_bending
+from cable.moving_end.drum_end import drum_row
 from cable.moving_end.segment_load import (
     Load,
     differentiate_load,
@@ -49,7 +50,6 @@ from cable.moving_end.slack_law import fading_rate, slack_law, turning_rate
 from cable.moving_end.state import (
     BEFORE,
     DIAGONAL,
-    KNOWN_STEPS,
     LOWER,
     NEW,
     NOW,
@@ -354,102 +354,3 @@ def differentiate_influx(
             by_near[i, k] = length * (0.5 * (w.b0 + U / length) * work.q_V[i, k] - work.q_d[i, k])
             by_near[i, k] += U * c.added_mass * (Jt * B + t[i] * across_k / r)
         by_near[i, i] -= U * c.mass * U / length
-
-
-@inner
-def drum_row(line: Line, w: Weights, drum: DrumNumbers, work: Load, slopes: bool) -> None:
-    """Write the drum's equation (11), the second row of the last block; `work` still holds the last segment."""
-    N, t, r = line.ends.count, work.tangent, line.rows[RESIDUAL, line.ends.count]
-    Qt = line.load[N, 0] * t[0] + line.load[N, 1] * t[1] + line.load[N, 2] * t[2]
-    line.ends.drum_pull = line.tension[NEW, N] + 0.5 * Qt
-    for i in range(3):
-        line.ends.drum_force[i] = line.tension[NEW, N] * t[i] + 0.5 * line.load[N, i]
-    by_length = 1.0
-    turn_drum(line, w, drum)
-    pulled, U = (
-        drum.control != LENGTH and line.ends.drum_mode != STANDING,
-        line.ends.payout[NEW] + line.ends.ahead[NEW],
-    )
-    if not pulled:
-        r[1] = line.ends.last_length[NEW] - _length_wanted(line, drum)
-    elif drum.control == TENSION:
-        r[1], by_length = -drum.setpoint, 0.0
-    elif line.ends.drum_mode == SPINNING:
-        r[1], by_length = 0.0, 0.0  # loose cable pulls at nothing
-    else:
-        alpha, beta, past = drum_history(line, w)
-        held, slope = friction(drum, U)
-        r[1] = -held - drum.inertia * (alpha * U + past)
-        by_length = (
-            -(slope + drum.inertia * alpha) * beta
-        )  # ∂U/∂ℓ = β: the rate is differenced from the length
-    if pulled:
-        r[1] += line.ends.drum_pull
-    if slopes:
-        _differentiate_drum(line, by_length, pulled, Qt, work)
-
-
-@inner
-def drum_history(line: Line, w: Weights) -> tuple[float, float, float]:
-    """Return the weights of the drum's new speed in its acceleration and of the new length in its speed [1/s], and what
-    the speeds before add to the acceleration [m/s²]. Of first order while cable is loose, and until the jerk that ends
-    that is two steps behind.
-    """
-    U, ahead = line.ends.payout, line.ends.ahead
-    if line.ends.since_loose < KNOWN_STEPS:
-        return w.first, w.first, -w.first * (U[NOW] + ahead[NOW])
-    now, before = U[NOW] + ahead[NOW], U[BEFORE] + ahead[BEFORE]
-    return w.a0, w.b0, w.a1 * now + w.a2 * before
-
-
-@inner
-def rate_taken(line: Line, first: float) -> float:
-    """Return the rate at which the water takes cable, as `drum_history` differences it; `first` is 1/Δt. [m/s]"""
-    if line.ends.since_loose < KNOWN_STEPS:
-        return first * (line.ends.last_length[NEW] - line.ends.last_length[NOW])
-    return line.ends.payout[NEW]
-
-
-@inner
-def turn_drum(line: Line, w: Weights, drum: DrumNumbers) -> None:
-    """Fill what lies loose at level NEW, and how far the drum is ahead of what the water takes: nothing of both where
-    the cable pulls it; where nothing does it coasts.
-    """
-    ends = line.ends
-    alpha, beta, past = drum_history(line, w)
-    taken = rate_taken(line, w.first)
-    if ends.drum_mode == TURNING:
-        ends.loose[NEW] = 0.0
-        ends.ahead[NEW] = taken - beta * ends.loose[NOW] - ends.payout[NEW]
-        return
-    U = coasting(drum, alpha, past)
-    ends.loose[NEW] = ends.loose[NOW] + (U - taken) / beta
-    ends.ahead[NEW] = U - ends.payout[NEW]
-
-
-@compiled
-def _differentiate_drum(line: Line, by_length: float, pulled: bool, Qt: float, work: Load) -> None:
-    """Write the derivatives of the drum's equation; of the pull Q_N·t + T_N only if the drum is `pulled`."""
-    N, t, by_near, by_far = line.ends.count, work.tangent, work.by_near, work.by_far
-    D, L = line.blocks[DIAGONAL, N], line.blocks[LOWER, N]
-    D[1, 1], D[2, 2], D[3, 3] = by_length, 1.0, 1.0  # the last block has two unknowns: the others are 0 = 0
-    if not pulled:
-        return
-    D[1, 0] = 1.0
-    size, length = work.chord_length, line.ends.last_length[NEW]
-    g, fading = turning_rate(work.square), fading_rate(work.square, length, size)
-    for i in range(3):
-        D[1, 0] += 0.5 * t[i] * by_far[i, 0]
-        D[1, 1] += 0.5 * t[i] * (by_far[i, 1] - fading * line.load[N, i])
-        for k in range(3):
-            L[1, 1 + k] += 0.5 * t[i] * by_near[i, k]
-    for k in range(3):
-        L[1, 1 + k] -= 0.5 * (line.load[N, k] - g * Qt * t[k]) / size
-
-
-@compiled
-def _length_wanted(line: Line, drum: DrumNumbers) -> float:
-    """Return how long the last segment has to be: as long as it is, or what a winch asks for. [m]."""
-    if drum.control != LENGTH:
-        return line.ends.last_length[NOW]
-    return drum.setpoint - line.ends.settled

@@ -16,11 +16,12 @@ import numpy as np
 
 from cable.current import Water
 from cable.drum import FREE, SPINNING, STANDING, DrumNumbers, next_mode
-from cable.moving_end.assembly import assemble, assemble_residual, rate_taken
+from cable.moving_end.assembly import assemble, assemble_residual
 from cable.moving_end.bdf2 import Weights, backward_weights
 from cable.moving_end.bending import has_residual, solve_for_step
 from cable.moving_end.block_solver import SIZE, spread
 from cable.moving_end.chord_correction import correct_for_arc
+from cable.moving_end.drum_end import rate_taken
 from cable.moving_end.segment_load import Load
 from cable.moving_end.slack_law import KNOWN, SMOOTHING, SOFTEST, STRAIN_SCALE
 from cable.moving_end.state import (

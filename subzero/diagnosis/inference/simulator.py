@@ -135,8 +135,6 @@ a current drags a long cable, where those in the steps of a diagnosis err by 3 %
 AGREEMENT = 1e-6
 """Fraction within which the forces of hull and cable agree, in the place of 1e-9: a quarter faster, nothing seen. With
 1e-5, and the cable's balances to 1e-6, a fit of 12 m more cable ended 122 nats behind: sensitivities need it."""
-LEAST_FRICTION = 1e-3
-"""Every drum rubs as much as this: without any friction a drum with inertia chatters, and slopes are lost. [N]"""
 FASTEST_PAY_OUT = 2.0
 """Room for nodes is made for this speed, and doubled when that is not enough. [m/s]"""
 Track = tuple[np.ndarray, np.ndarray]
@@ -256,7 +254,6 @@ def _ease(setup: Setup) -> None:
     """Let a run be quicker and smoother than a simulation needs to be: forces agree less, nobody asks for energies."""
     fixed: Any = setup.fixed  # a record in memory
     fixed.agreement, fixed.booked = AGREEMENT, False
-    fixed.drum.friction = max(fixed.drum.friction, LEAST_FRICTION)
 
 
 def _copied(value: Any) -> Any:
