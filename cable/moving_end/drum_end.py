@@ -13,12 +13,16 @@ cable, the next one the rest, and the impulse is (I_d/R_d²) ΔU_d. Differences 
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from cable.drum import LENGTH, SPINNING, STANDING, TENSION, TURNING, DrumNumbers, coasting, friction
-from cable.moving_end.bdf2 import Weights
-from cable.moving_end.segment_load import Load
 from cable.moving_end.slack_law import fading_rate, turning_rate
 from cable.moving_end.state import BEFORE, DIAGONAL, KNOWN_STEPS, LOWER, NEW, NOW, RESIDUAL, Line
 from subzero.jit import compiled, inner
+
+if TYPE_CHECKING:
+    from cable.moving_end.bdf2 import Weights
+    from cable.moving_end.segment_load import Load
 
 
 @inner
