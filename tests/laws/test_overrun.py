@@ -112,3 +112,18 @@ def test_what_hangs_heavy_at_the_drum_pulls_it_on_and_is_not_loose():
                          drum=drum(0.02), start=2.0)  # fmt: skip
     assert run.outcome.completed
     assert run.length[-1] > run.length[60] + 0.1
+
+
+def test_a_jolt_takes_the_cable_along_and_not_the_drum_that_is_ahead_of_it():
+    """M S ΔU while cable is loose, (m S + I_d/R_d²) ΔU while it is taut."""
+    for pace, loose in ((0.5, True), (1.0, False)):
+
+        def motion(t, pace=pace):
+            return np.array([1.0 if t < 5.0 else pace if t < 6.0 else pace + 0.3, 0.0, 0.0])
+
+        run = cable.pull_out(motion, 6.5, drum=drum(0.0), scheme=cable.MovingEnd(time_step=0.1))
+        (k,) = np.flatnonzero(np.abs(run.time - 6.0) < 1e-6)
+        in_water = run.tow_point[k, 0]
+        assert bool(run.length[k] - in_water > 0.3) is loose
+        taken = cable.CableProperties().mass_per_length * in_water + (0.0 if loose else HEAVY)
+        assert run.tow_impulse[k, 0] == pytest.approx(-0.3 * taken, rel=1e-3)
