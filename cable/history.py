@@ -67,7 +67,7 @@ class History:
         tow_force: force of the cable on the vehicle, earth axes north, east, down (n, 3). [N]
         tow_tension: tension at the tow point T(0) (n,). [N]
         drum_tension: tension at the drum T(S) (n,). [N]
-        length: length of the cable in the water S (n,). [m]
+        length: length of the cable off the drum S (n,): in the water, and loose before a drum that runs ahead. [m]
         tow_point: position of the tow point relative to the drum (n, 3). [m]
         shapes: node positions relative to the drum, tow point first, one array (nodes, 3) per time. [m]
         tensions: tensions at the nodes, one array (nodes,) per time. [N]

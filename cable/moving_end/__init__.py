@@ -35,7 +35,7 @@ from cable.moving_end.initial_shape import lay_held, lay_straight, start_in_wate
 from cable.moving_end.jolt import take_jolt
 from cable.moving_end.remeshing import accept
 from cable.moving_end.segment_load import Load, new_load
-from cable.moving_end.state import LONGEST, NOW, Line, enlarged, new_line, paid_out
+from cable.moving_end.state import LONGEST, NOW, Line, enlarged, in_water, new_line, paid_out
 from cable.moving_end.stops import Names, describe_stop
 from cable.moving_end.time_step import impedance, try_step
 
@@ -59,6 +59,7 @@ __all__ = [
     "energy_flow",
     "enlarged",
     "impedance",
+    "in_water",
     "lay_held",
     "lay_straight",
     "new_line",

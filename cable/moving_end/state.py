@@ -256,9 +256,15 @@ def enlarged(line: Line, capacity: int) -> Line:
 
 
 @inlined
+def in_water(line: Line) -> float:
+    """Return the length of the cable in the water at level NOW. [m]."""
+    return line.ends.settled + line.ends.last_length[NOW]
+
+
+@inlined
 def paid_out(line: Line) -> float:
     """Return the length that has left the drum by level NOW, with what lies loose before it. [m]."""
-    return line.ends.settled + line.ends.last_length[NOW] + line.ends.loose[NOW]
+    return in_water(line) + line.ends.loose[NOW]
 
 
 @inlined

@@ -19,7 +19,7 @@ from __future__ import annotations
 import numpy as np
 
 from cable.drum_motion import lead_drum
-from cable.moving_end import accept, energy_flow, impedance, paid_out, try_step
+from cable.moving_end import accept, energy_flow, impedance, in_water, try_step
 from subzero.engine.energy import book, take_jolt_of_motion
 from subzero.engine.external_wrench import tow_point
 from subzero.engine.vehicle_step import advance_hull, follow_track
@@ -287,4 +287,4 @@ def _accept(setup: Setup, live: Live, start: float, span: float) -> None:
             energy_flow(live.line, setup.fixed.cable, live.load, live.now.ledger.cable_new)
         book(setup, live, start, span, steps)
     if setup.fixed.tethered:
-        live.now.length = paid_out(live.line)
+        live.now.length = in_water(live.line)

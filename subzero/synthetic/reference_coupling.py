@@ -203,7 +203,7 @@ def _accept(setup: Setup, live: Live, rope: Rope, span: float, segment: float) -
         now.force[i] = rope.ends.tow_force[i]
     now.last_step = span
     accept_step(rope, span, segment, setup.fixed.cable)
-    now.length = rope.ends.loose[OLD]
+    now.length = 0.0
     for j in range(1, rope.ends.count + 1):
         now.length += rope.spring[REST, j]
 
@@ -213,4 +213,4 @@ def _note(live: Live, rope: Rope, out: np.ndarray) -> None:
     """Fill out (5,) with pull, tension at the drum and length."""
     for i in range(3):
         out[i] = live.now.force[i]
-    out[3], out[4] = max(rope.ends.drum_pull, 0.0), live.now.length
+    out[3], out[4] = max(rope.ends.drum_pull, 0.0), live.now.length + rope.ends.loose[OLD]

@@ -331,7 +331,7 @@ def _how_slack(run: AnyRun, share: np.ndarray, longest: float) -> str:
     """Say how much of the cable is slack, when, and how long."""
     time, worst = run["time"].values, int(share.argmax())
     return (
-        f"Up to {percent(share[worst])} of the cable in the water is slack (at {time[worst]:g} s; first at "
+        f"Up to {percent(share[worst])} of the cable that is paid out is slack (at {time[worst]:g} s; first at "
         f"{first_time(time, share > 0.0):g} s, {longest:.3g} s at a stretch)"
     )
 

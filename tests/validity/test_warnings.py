@@ -256,7 +256,7 @@ def test_slack_is_not_doubted_if_a_run_four_times_as_fine_confirms_the_force():
         said = checked(run, check="slack_shape")
         assert bool(said) is told, (share, finer)
     assert said[0].startswith(
-        "Up to 6 % of the cable in the water is slack (at 20.5 s; first at 20 s, 1.1 s at a stretch)"
+        "Up to 6 % of the cable that is paid out is slack (at 20.5 s; first at 20 s, 1.1 s at a stretch)"
     )
     assert said[0].endswith(
         "up to 4 times as fine, steps and segments change it by 0.3 % of its largest value."

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 import vehicle
-from cable.moving_end import enlarged
+from cable.moving_end import enlarged, paid_out
 from scenarios.steps import fitting_step
 from subzero.diagnosis.hypothesis.configuration import (
     COLUMNS,
@@ -120,7 +120,7 @@ def _write(setup: Setup, live: Live, time: float, state: np.ndarray, out: np.nda
     out[RUDDER] = vehicle.deflections(state, command, setup.fixed.vehicle)[0]
     out[VOLTAGE] = vehicle.battery_voltage(state, command, live.now.hull.current, setup.fixed.vehicle)
     out[TENSION] = np.sqrt(force[0] * force[0] + force[1] * force[1] + force[2] * force[2])
-    out[LENGTH] = live.now.length
+    out[LENGTH] = paid_out(live.line)
 
 
 HULL_STEP_S, CABLE_STEP_S, SEGMENT_M = 0.05, 0.2, 1.0
