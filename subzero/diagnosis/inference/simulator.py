@@ -120,7 +120,7 @@ def _write(setup: Setup, live: Live, time: float, state: np.ndarray, out: np.nda
     out[RUDDER] = vehicle.deflections(state, command, setup.fixed.vehicle)[0]
     out[VOLTAGE] = vehicle.battery_voltage(state, command, live.now.hull.current, setup.fixed.vehicle)
     out[TENSION] = np.sqrt(force[0] * force[0] + force[1] * force[1] + force[2] * force[2])
-    out[LENGTH] = paid_out(live.line)
+    out[LENGTH] = paid_out(live.line) if setup.fixed.tethered else 0.0
 
 
 HULL_STEP_S, CABLE_STEP_S, SEGMENT_M = 0.05, 0.2, 1.0
