@@ -24,7 +24,7 @@ LABELS = {
     "arc_length": ("m", "distance along the nodes, from the tow point"),
     "tow_tension": ("N", "tension at the tow point"),
     "drum_tension": ("N", "tension at the drum"),
-    "length": ("m", "length of cable in the water"),
+    "length": ("m", "length of cable that has left the drum"),
     "tow_force": ("N", "force of the cable on the vehicle"),
     "tow_point": ("m", "place of the tow point relative to the drum"),
     "tow_impulse": ("N s", "impulse of the cable on the vehicle just after this time"),

@@ -136,7 +136,7 @@ stern_plane_starboard_command | degree   | \delta_{sc} | starboard stern-plane c
 # the cable, and what it does to the vehicle
 cable_tension                 | N        | T(0)        | cable tension at the tow point
 drum_tension                  | N        | T(S)        | cable tension at the drum
-cable_length                  | m        | S           | length of cable in the water
+cable_length                  | m        | S           | length of cable that has left the drum
 cable_force_forward           | N        | F_{cX}      | force of the cable on the vehicle, forward
 cable_force_starboard         | N        | F_{cY}      | force of the cable on the vehicle, to starboard
 cable_force_down              | N        | F_{cZ}      | force of the cable on the vehicle, body's down axis

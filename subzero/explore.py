@@ -78,7 +78,7 @@ NUMBERS = (
     ("heading_at_end_deg", "heading at the end [degree]", 2),
     ("depth_at_end_m", "depth at the end [m]", 3),
     ("path_length_m", "path length [m]", 2),
-    ("cable_length_at_end_m", "cable in the water at the end [m]", 2),
+    ("cable_length_at_end_m", "cable off the drum at the end [m]", 2),
     ("largest_cable_force_N", "largest cable force [N]", 4),
     ("largest_cable_moment_N_m", "largest cable moment [N m]", 4),
 )

@@ -124,7 +124,7 @@ def _rows(is_prescribed: bool) -> dict[str, Callable[[Summary], str]]:
         "heading at the end [degree]": lambda run: _plain(run["heading_at_end_deg"], 2),
         "depth at the end [m]": lambda run: _plain(run["depth_at_end_m"], 2),
         "path length [m]": lambda run: _plain(run["path_length_m"], 2),
-        "cable in the water at the end [m]": lambda run: _plain(run["cable_length_at_end_m"] or None, 2),
+        "cable off the drum at the end [m]": lambda run: _plain(run["cable_length_at_end_m"] or None, 2),
         "largest cable force [N]": lambda run: _largest(run, "force", "N"),
         "largest cable moment [N m]": lambda run: _largest(run, "moment", "N_m"),
     }

@@ -19,8 +19,7 @@ CHANNELS = ("surge_speed", "heading", "yaw_rate", "pitch", "roll_angle", "depth"
 """The six basic ones."""
 FEW = ("surge_speed", "heading")
 BRAKE = 0.1
-"""Friction of the drum on `rich`, at its rim: a free drum overruns a vehicle that slows, and what slack cable does then
-depends on everything; runs that differ by 0.01 mN would be several noise levels apart. [N]"""
+"""Friction of the drum on `rich`, at its rim, so that it does not run ahead where the vehicle slows. [N]"""
 RATE = 10.0
 """Samples of a record a second. [Hz]"""
 NAMES = ("fig6", "rich")

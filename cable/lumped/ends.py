@@ -206,7 +206,7 @@ def turning(rope: Rope, g: float, drum: DrumNumbers) -> tuple[float, float]:
 
 
 @inner
-def is_rough(rope: Rope) -> bool:
+def is_first_order(rope: Rope) -> bool:
     """Say whether cable is loose, or was so lately: then the drum is advanced to first order, over the whole step, so
     that its force is the mean of what it takes.
     """
@@ -219,7 +219,7 @@ def _speed_with_cable(rope: Rope, g: float) -> tuple[float, float, float, float]
     with, [m/s], over which time [s], and ∂(its speed)/∂U.
     """
     ends = rope.ends
-    if not is_rough(rope):
+    if not is_first_order(rope):
         return ends.payout[NEW], ends.start_payout, g, 1.0
     grown = ends.last[NEW] - ends.last[OLD] - ends.loose[OLD]
     return grown / ends.stage_end, ends.spin[OLD], ends.stage_end, g / ends.stage_end

@@ -102,7 +102,9 @@ def rope_off_drum(
     rope.velocity[:, :count] = velocity[0]
     rope.velocity[:, count] = speed[0]
     rope.position[:, count] = 0.0
-    rope.ends.payout[:] = rate[0] if led else max(U, 0.0) if isinstance(drum, DrumProperties) else U
+    if isinstance(drum, DrumProperties):  # a free drum takes nothing back
+        U = max(U, 0.0)
+    rope.ends.payout[:] = rope.ends.spin[:] = rate[0] if led else U
     rope.ends.tow_force[:], rope.ends.drum_pull = -(held + k * wet) * ahead, held
     return rope
 

@@ -9,6 +9,7 @@ The drum gives cable at the rate U_d, the water takes it at U = dℓ_N/dt, and L
 Where L = 0 for some steps, rates are differenced as all others, and U_d = U. Else to first order, with U_d from the
 lengths of two levels: the step in which L runs out takes U_d part of the way from the drum's speed to that of the
 cable, the next one the rest, and the impulse is (I_d/R_d²) ΔU_d. Differences of second order overshoot at that corner.
+A cable of one segment leaves no room for that: its drum gives what the chord asks for (`assembly`).
 """
 
 from __future__ import annotations
@@ -45,9 +46,8 @@ def drum_row(line: Line, w: Weights, drum: DrumNumbers, work: Load, slopes: bool
         U, (alpha, beta, past) = line.ends.payout[NEW] + line.ends.ahead[NEW], drum_history(line, w)
         held, slope = friction(drum, U)
         r[1] = -held - drum.inertia * (alpha * U + past)
-        by_length = (
-            -(slope + drum.inertia * alpha) * beta
-        )  # ∂U/∂ℓ = β: the rate is differenced from the length
+        # ∂U/∂ℓ = β: the rate is differenced from the length.
+        by_length = -(slope + drum.inertia * alpha) * beta
     if pulled:
         r[1] += line.ends.drum_pull
     if slopes:

@@ -44,8 +44,8 @@ def slow_and_fast(t):
     return np.array([pace, 0.3 * np.sin(t), 0.0])
 
 
-def pulled(scheme, motion, duration, *, friction=RUBS, step=0.05, segment=0.5):
-    run = cable.pull_out(motion, duration, drum=drum(friction),
+def pulled(scheme, motion, duration, *, friction=RUBS, step=0.05, segment=0.5, **more):
+    run = cable.pull_out(motion, duration, drum=drum(friction), **more,
                          scheme=SCHEMES[scheme](time_step=step, segment_length=segment))  # fmt: skip
     assert run.outcome.completed, run.outcome.message
     return run
@@ -60,6 +60,15 @@ def test_a_coasting_drum_gives_what_friction_lets_it_and_the_taut_cable_pulls(sc
     assert_allclose(run.length[late], given[late], atol=0.5 * RUBS / HEAVY * 0.05 * 26.0)
     assert_allclose(run.tow_tension[t > 14.5], (DRAG * 0.25 * way(t))[t > 14.5], rtol=1e-4)
     assert run.drum_tension[(t > 4.5)].max() < 1e-9  # what is loose does not pull
+
+
+@every_scheme
+def test_a_drum_may_run_ahead_from_the_first_step_on(scheme):
+    run = pulled(
+        scheme, lambda t: np.array([1.0 - 0.1 * t, 0.0, 0.0]), 5.0, friction=0.002, step=0.1, start=3.0
+    )
+    given = 3.0 + run.time - 0.5 * 0.002 / HEAVY * run.time**2
+    assert_allclose(run.length, given, atol=0.5 * 0.002 / HEAVY * 0.1 * 5.0 + 1e-3)
 
 
 @every_scheme
