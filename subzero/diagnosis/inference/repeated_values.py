@@ -43,8 +43,8 @@ CLEAR_LOG_ODDS = 6.0
 """Runs whose log probability by chance is less than minus this are no chance."""
 FAR_LEVELS, FEWEST_FAR, NEIGHBOURS, NEAREST = 8.0, 4, 5, 2
 """A value is no measurement if it comes at least so often, once in three samples in a row, so many noise levels from
-what is measured around it: from each of the nearest on both sides, of which one may be an outlier. Outliers that are
-rounded may be equal, but not in a row."""
+what is measured around it: from each of the nearest on both sides, or as many on one, of which two may be outliers.
+Outliers that are rounded may be equal, but not in a row."""
 MOSTLY_FAR = 0.5
 """Where so large a share of a value's places stands far off, it is no measurement there; where less does, the
 prediction has to say, as a vehicle at rest has a speed of 0, too. [-]"""
@@ -147,21 +147,38 @@ def _of(name: str, time: np.ndarray, values: np.ndarray, level: float) -> list[D
 
 def _far_values(values: np.ndarray, level: float) -> Mapping[float, np.ndarray]:
     """Return value → where it stands for nothing (n,), of those that are no measurements there: elsewhere, as where a
-    vehicle is at rest, it may be measured. The farthest first: what lies between two of its stretches is far from it.
+    vehicle is at rest, it may be measured. The farthest first: what lies between two of its stretches is far from it;
+    so each is judged again without the others.
     """
     distinct, counts = np.unique(values[np.isfinite(values)], return_counts=True)
-    often, found = distinct[counts >= FEWEST_FAR], {}
+    often, found = distinct[counts >= FEWEST_FAR], dict[float, np.ndarray]()
     for value in sorted(often.tolist(), key=lambda one: -abs(one - np.nanmedian(values))):
-        at, others = values == value, _others(values, value)
-        if others.size < FEWEST_FAR:
-            continue
-        places = np.flatnonzero(at[: others[-1]])  # what only lasts to the end is frozen
-        far = at.copy()
-        far[places] = [_is_far(value, i, values, others, level) for i in places.tolist()]
-        enough = np.count_nonzero(far[: others[-1]]) >= FEWEST_FAR
-        if enough and np.any(far[2:] & far[1:-1] & far[:-2]):
-            found[value], values = far, np.where(far, np.nan, values)
+        if (far := _where_far(value, values, found, level)).any():
+            found[value] = far
+    for value in list(found):
+        del found[value]
+        if (far := _where_far(value, values, found, level)).any():
+            found[value] = far
     return found
+
+
+def _where_far(
+    value: float, values: np.ndarray, others_far: Mapping[float, np.ndarray], level: float
+) -> np.ndarray:
+    """Return where a value stands far from what is measured around it, without what others stand for (n,); nowhere if
+    it does too seldom.
+    """
+    values = np.where(
+        np.any([np.zeros(values.size, dtype=bool), *others_far.values()], axis=0), np.nan, values
+    )
+    at, others, nowhere = values == value, _others(values, value), np.zeros(values.size, dtype=bool)
+    if others.size < FEWEST_FAR:
+        return nowhere
+    places = np.flatnonzero(at[: others[-1]])  # what only lasts to the end is frozen
+    far = at.copy()
+    far[places] = [_is_far(value, i, values, others, level) for i in places.tolist()]
+    enough = np.count_nonzero(far[: others[-1]]) >= FEWEST_FAR
+    return far if enough and np.any(far[2:] & far[1:-1] & far[:-2]) else nowhere
 
 
 def _others(values: np.ndarray, value: float) -> np.ndarray:
@@ -204,7 +221,8 @@ def _is_far(value: float, at: int, values: np.ndarray, others: np.ndarray, level
     i = int(np.searchsorted(others, at))
     around = values[others[max(i - NEIGHBOURS, 0) : i + NEIGHBOURS]]
     spread = float(np.median(np.abs(np.diff(around)))) if around.size > 1 else 0.0
-    beside = values[others[max(i - NEAREST, 0) : i + NEAREST]]
+    first = max(min(i - NEAREST, others.size - 2 * NEAREST), 0)  # at an end as many, all on one side
+    beside = values[others[first : first + 2 * NEAREST]]
     return bool(np.min(np.abs(value - beside)) > FAR_LEVELS * max(level, spread))
 
 
