@@ -367,7 +367,8 @@ def _with_possible(
     if probability < WORTH_TELLING:
         return told
     probability = min(probability, EVEN)
-    further = [one for one in more.errors if one not in less.errors]
+    known = {(one.record, one.error.id) for one in less.errors}
+    further = [one for one in more.errors if (one.record, one.error.id) not in known]
     errors = _told(records, further, probability)
     listed = {name: (1.0 - probability) * p for name, p in told.probabilities.items()}
     listed[_beside(more.errors, "none")] = probability
@@ -396,7 +397,8 @@ def _told(
         FoundError(
             id=one.error.id, record=records[one.record].name, columns=one.error.columns,
             sentence=one.error.sentence(), remedy=one.error.remedy(), probability=probability,
-            amount=one.error.amount, since=one.error.since, alike=tuple(_words(each) for each in one.alike),
+            amount=one.error.amount, amount_sd=one.error.amount_sd, since=one.error.since,
+            alike=tuple(_words(each) for each in one.alike),
         )
         for one in found
     )  # fmt: skip

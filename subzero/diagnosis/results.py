@@ -36,6 +36,7 @@ class FoundError:
         remedy: what to change, in words.
         probability: of it.
         amount: how large, of what has a number: a delay [s], a rate [1], a step [unit of the column]; else 0.
+        amount_sd: its standard deviation; 0 where it is not known.
         since: when it begins, of what does. [s]
         alike: other errors that the record cannot tell from it, in words.
     """
@@ -47,6 +48,7 @@ class FoundError:
     remedy: str
     probability: float
     amount: float = 0.0
+    amount_sd: float = 0.0
     since: float = 0.0
     alike: tuple[str, ...] = ()
 

@@ -18,7 +18,7 @@ import subzero
 from benchmarks.diagnosis import data_errors, world
 from benchmarks.diagnosis.world import ROUNDED
 from subzero import Logged
-from subzero.diagnosis import SPECS, Setting, catalogue, report
+from subzero.diagnosis import NOISE, SPECS, Setting, catalogue, report
 from subzero.diagnosis.inference import (
     KINDS_OF_DATA_ERRORS,
     DataError,
@@ -27,7 +27,7 @@ from subzero.diagnosis.inference import (
     repeated_values,
 )
 from subzero.records.record import Record
-from subzero.synthetic.planted import draw_tolerances, make_record
+from subzero.synthetic.planted import USUAL, SensorErrors, draw_tolerances, make_record
 
 CHANNELS = ("surge_speed", "heading", "yaw_rate", "pitch", "roll_angle", "depth")
 TIME = np.arange(0.0, 30.01, 0.1)
@@ -121,13 +121,15 @@ def test_an_error_is_told_with_its_column_and_a_remedy(error):
         assert all(column in error.sentence() for column in error.columns)
 
 
-def measured(scenario: str, seed: int) -> Logged:
+def measured(scenario: str, seed: int, errors: SensorErrors = USUAL) -> Logged:
     """Return a record of a healthy vehicle by the other formulation."""
     trial = subzero.load_scenario(scenario)
     setting = Setting(trial=trial, model=subzero.Model.of(trial))
     true = draw_tolerances(setting, catalogue(CHANNELS).values(), seed)
     times = np.arange(0.0, trial.duration - 0.05, 0.1)
-    return Logged(record=make_record(true, times, CHANNELS, seed=seed), setting=setting, name=scenario)
+    return Logged(
+        record=make_record(true, times, CHANNELS, seed=seed, errors=errors), setting=setting, name=scenario
+    )
 
 
 def named(verdict) -> set[str]:
@@ -235,6 +237,51 @@ def test_each_error_is_named_and_the_vehicle_is_healthy_without_it(error):
         assert found.amount == pytest.approx(error.amount, abs=0.3)
 
 
+NUMBERED = (
+    DataError(kind="late_clock", amount=4.0),
+    DataError(kind="late_clock", amount=-3.0),
+    DataError(kind="clock_rate", amount=0.12),
+    DataError(kind="clock_rate", amount=-0.06),
+    DataError(kind="latency", channels=("yaw_rate",), amount=2.0),
+    DataError(kind="step", channels=("pitch",), amount=3.0, since=12.0),
+)
+
+
+def number_of(error: DataError, family: str, seed: int) -> tuple[float, float, str]:
+    """Return what is told of the number of an error, its standard deviation, and the sentence, under slow noise."""
+    clean = measured("zigzag", seed, SensorErrors(noise=0.0, outliers=0.0))
+    rng, times = np.random.default_rng([seed, 3]), clean.record.time
+    before = error.planted(clean) if error.kind != "step" else clean
+    seen = {
+        name: one + NOISE[name] * world.noise_of(world.FAMILIES[family], times, rng)
+        for name, one in before.record.values.items()
+    }
+    noisy = dataclasses.replace(clean, record=Record(source="made", time=times, values=seen))
+    verdict = subzero.diagnose(error.planted(noisy) if error.kind == "step" else noisy, budget="verdict")
+    (found,) = [one for one in verdict.data_errors if one.id == error.id]
+    return found.amount, found.amount_sd, found.sentence
+
+
+def check_number(error: DataError, family: str, seed: int) -> None:
+    """The truth is within 3.5 standard deviations of what is told, which is no more than a tenth off, and is told."""
+    amount, sd, sentence = number_of(error, family, seed)
+    assert abs(amount - error.amount) < 3.5 * sd
+    assert 0.0 < sd < 0.1 * abs(error.amount)
+    assert "±" in sentence
+
+
+def test_the_number_of_an_error_is_told_with_its_interval_under_slow_noise():
+    """In the linear problem alone a rate of 0.12 was found several standard deviations off."""
+    check_number(NUMBERED[2], "slower", 20301)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("family", ["white", "slower", "both_rounded"])
+@pytest.mark.parametrize("error", NUMBERED, ids=lambda one: f"{one.id} {one.amount:g}")
+def test_each_number_is_told_with_its_interval(error, family):
+    check_number(error, family, 20310 + NUMBERED.index(error))
+
+
 def test_a_channel_that_is_frozen_from_the_first_sample_of_a_turn_on_is_no_value_that_stands_for_nothing():
     """At one sample a second it is far from all before; what does not come back to a measurement is frozen."""
     time, clean = np.arange(0.0, 40.0), smooth()
@@ -277,6 +324,31 @@ def test_a_rounded_depth_that_stands_still_before_an_outlier_stands_for_itself(o
     record = Record(source="made", time=time, values={"depth": depth})
     found = repeated_values(dataclasses.replace(clean, record=record))
     assert not [one for one in found if one.how]
+
+
+def test_a_rounded_heading_that_begins_steady_is_no_drop_out_before_two_outliers_in_a_row():
+    """Two outliers may round to the same; the next two samples that differ tell."""
+    time, clean = np.arange(0.0, 30.0, 0.1), smooth()
+    heading = np.round(27.0 + 3.0 * np.maximum(time - 6.0, 0.0))
+    heading[44:46] = 21.0
+    record = Record(source="made", time=time, values={"heading": heading})
+    found = repeated_values(dataclasses.replace(clean, record=record))
+    assert not [one for one in found if one.how]
+
+
+def test_a_steady_speed_between_zeros_that_are_no_measurement_is_measured():
+    """The speed stands far from zeros on both sides of it, but close to what is measured behind them."""
+    time, clean = np.arange(0.0, 40.0, 0.1), smooth()
+    speed = np.round(np.where(time < 10.0, 0.9, 0.9 * np.exp(-(time - 10.0) / 5.0)) / 0.05) * 0.05
+    speed[
+        (time < 1.0)
+        | ((time > 3.0) & (time < 4.0))
+        | ((time > 7.0) & (time < 8.5))
+        | ((time > 9.9) & (time < 10.5))
+    ] = 0.0
+    record = Record(source="made", time=time, values={"surge_speed": speed})
+    (found,) = [one for one in repeated_values(dataclasses.replace(clean, record=record)) if one.how]
+    assert found.how == "0"
 
 
 def test_zeros_of_a_rounded_yaw_rate_that_flickers_now_and_then_are_measured():
@@ -325,9 +397,13 @@ def test_a_cable_that_is_long_at_the_start_is_no_late_heading():
 
 @pytest.mark.slow
 def test_a_depth_that_is_late_is_no_drift_and_its_delay_is_found():
-    """Its delay is found where the problem is linear close to the run: at the nominal model it comes out 0.6 s off."""
+    """Its delay is found where the problem is linear close to the run: at the nominal model it comes out 0.6 s off, and
+    what is told is within 3 standard deviations, of less than 0.3 s each.
+    """
     record = data_errors.made(*data_errors.drawn(8401, 3)[2])
-    assert data_errors.is_right(record, subzero.diagnose(record.logged, budget="verdict"))
+    (found,) = subzero.diagnose(record.logged, budget="verdict").data_errors
+    assert found.id == record.errors[0].id
+    assert abs(found.amount - record.errors[0].amount) < 3.0 * found.amount_sd < 0.9
 
 
 @pytest.mark.slow
@@ -345,3 +421,12 @@ def test_a_cause_under_slow_noise_is_no_error_of_a_clock(index):
     verdict = subzero.diagnose(logged, budget="verdict")
     assert {cause.id for cause in verdict.causes} == set(planted)
     assert not named(verdict)
+
+
+@pytest.mark.slow
+def test_outliers_that_another_clock_would_explain_are_no_error_of_the_clock():
+    """A speed log in steps of 0.05 m/s has two outliers that a rate of −3 % would have told as such: 53 nats."""
+    one = next(one for one in world.drawn(11001, 196) if one.index == 195)
+    verdict = subzero.diagnose(world.record_of(one)[0], budget="verdict")
+    assert not named(verdict)
+    assert next(iter(verdict.probabilities)) == one.cause

@@ -107,6 +107,14 @@ def test_an_error_that_something_else_comes_close_to_is_named(seed, index, error
 
 
 @pytest.mark.slow
+def test_a_current_that_is_twice_as_strong_delays_no_channel():
+    """The linear problem has delays of three channels far ahead; by the same samples they explain nothing."""
+    verdict = subzero.diagnose(data_errors.made(*data_errors.drawn(11003, 134)[133]).logged, budget="verdict")
+    assert not verdict.data_errors
+    assert [one.id for one in verdict.causes] == ["current"]
+
+
+@pytest.mark.slow
 def test_a_heading_that_drifts_by_two_degrees_has_no_other_sign():
     """The linear problem has the other sign 25 nats ahead of all that physics does; a search has it 7 behind."""
     logged, _ = world.record_of(world.drawn(8301, 4)[3])

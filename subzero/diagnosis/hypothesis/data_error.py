@@ -76,6 +76,7 @@ class DataError:
         amount: of a step [unit of the channel], a delay [s] or a rate [1].
         since: when it begins. [s]
         at: samples that hold no measurement, by their times; of frozen values and drop-outs. [s]
+        amount_sd: standard deviation of the amount; 0 where it is not known.
     """
 
     kind: str
@@ -84,6 +85,7 @@ class DataError:
     amount: float = 0.0
     since: float = 0.0
     at: tuple[float, ...] = ()
+    amount_sd: float = 0.0
 
     @property
     def id(self) -> str:
@@ -352,6 +354,12 @@ def _spans(times: tuple[float, ...]) -> str:
     return f"{len(times)} samples between {times[0]:g} and {times[-1]:g} s" if times else "no sample"
 
 
+def _number(error: DataError, scale: float = 1.0) -> str:
+    """Return the size of an error's number, with half its interval of 95 %."""
+    sd = f" ± {1.96 * scale * error.amount_sd:.2g}" if error.amount_sd else ""
+    return f"{abs(scale * error.amount):.3g}{sd}"
+
+
 def _unit_remedy(error: DataError) -> str:
     factor, unit = error.factor, BY_NAME[error.channels[0]].unit
     how = f"divide it by {factor:.4g}" if factor >= 1.0 else f"multiply it by {1.0 / factor:.4g}"
@@ -376,8 +384,8 @@ KINDS: Mapping[str, Kind] = {
     "reference": Kind(0.1, _values(_to_north), _values(_from_reference),
                       lambda one: f"{_both(one)} {one.how}", _reference_remedy),
     "step": Kind(0.05, _values(_without_step), _values(_with_step),
-                 lambda one: f"{_both(one)} jumps by {one.amount:.3g} {BY_NAME[one.channels[0]].unit} at "
-                             f"{one.since:.3g} s, and nothing else does",
+                 lambda one: f"{_both(one)} jumps {'up' if one.amount > 0.0 else 'down'} by {_number(one)} "
+                             f"{BY_NAME[one.channels[0]].unit} at {one.since:.3g} s, and nothing else does",
                  lambda one: f"subtract {one.amount:.3g} {BY_NAME[one.channels[0]].unit} from {one.since:.3g} s on, or "
                              "leave gaps there"),
     "frozen": Kind(0.08, _values(_as_gaps), _values(_repeated),
@@ -391,16 +399,16 @@ KINDS: Mapping[str, Kind] = {
                     lambda one: f"{_both(one)} have each other's values",
                     lambda one: "exchange the headers of the two columns"),
     "late_clock": Kind(0.08, _earlier, _later,
-                       lambda one: f"the clock of the record is {abs(one.amount):.3g} s "
+                       lambda one: f"the clock of the record is {_number(one)} s "
                                    f"{'late' if one.amount > 0.0 else 'early'} against the commands'",
                        lambda one: f"{'subtract' if one.amount > 0.0 else 'add'} {abs(one.amount):.3g} s "
                                    f"{'from' if one.amount > 0.0 else 'to'} time_s"),
     "clock_rate": Kind(0.03, _slower, _faster,
-                       lambda one: f"the clock of the record runs {abs(100.0 * one.amount):.3g} % too "
+                       lambda one: f"the clock of the record runs {_number(one, 100.0)} % too "
                                    f"{'fast' if one.amount > 0.0 else 'slow'}",
                        lambda one: f"divide time_s by {1.0 + one.amount:.4g}"),
     "latency": Kind(0.05, _in_time, _delayed,
-                    lambda one: f"{_both(one)} is {abs(one.amount):.3g} s {'late' if one.amount > 0.0 else 'early'} "
+                    lambda one: f"{_both(one)} is {_number(one)} s {'late' if one.amount > 0.0 else 'early'} "
                                 "against the other channels",
                     lambda one: f"shift that column by {-one.amount:+.3g} s"),
     "command_sign": Kind(0.05, _commands_turned, _commands_turned,
@@ -427,6 +435,8 @@ def corrected(logged: Logged, errors: tuple[DataError, ...]) -> Logged:
 
 SHIFTS = ("late_clock", "clock_rate", "latency")
 """Kinds that put samples outside the trial."""
+NUMBERED = (*SHIFTS, "step")
+"""Kinds with a number that is found."""
 
 
 def places(logged: Logged, errors: Iterable[DataError]) -> dict[str, np.ndarray]:

@@ -15,8 +15,8 @@ sensor is always held against a search of the records with it.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Container, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Protocol
 
@@ -24,6 +24,7 @@ import numpy as np
 
 from subzero.diagnosis.hypothesis.data_error import SHIFTS, places
 from subzero.diagnosis.hypothesis.logged import Logged
+from subzero.diagnosis.inference import settings
 from subzero.diagnosis.inference.data_error_evidence import (
     ALIKE,
     Explained,
@@ -32,6 +33,7 @@ from subzero.diagnosis.inference.data_error_evidence import (
     log_outlier,
     lost_by,
     measured_by,
+    numbers_again,
     samples_of,
     standing_of,
 )
@@ -94,17 +96,21 @@ def compared(suspicion: Suspicion, records: Sequence[Logged], look: Look) -> lis
         look: searches records.
     """
     comparison = _Comparison(suspicion, records, look)
-    tried = comparison.tried
+    tried, numbers = comparison.tried, dict[int, tuple[SuspectedError, ...]]()
     try:
         comparison.with_more()
         comparison.with_fewer()
+        numbers = comparison.numbers_again()
     except KeyboardInterrupt:  # before anything was found of one of them
         if not tried:
             raise
         tried[-1].work.complete = False
     per_lost, least = least_means(tried), min(tried, key=lambda one: len(one.errors))
     return [
-        (one, one.log_evidence(per_lost) + _of_samples_outside(one, least, records, per_lost))
+        (
+            replace(one, errors=numbers.get(id(one), one.errors)),
+            one.log_evidence(per_lost) + _of_samples_outside(one, least, records, per_lost),
+        )
         for one in tried
     ]
 
@@ -188,6 +194,46 @@ class _Comparison:
             if is_clear(held, _first(self.tried).work):
                 break
             self._race(self._looks([errors]))
+
+    def numbers_again(self) -> dict[int, tuple[SuspectedError, ...]]:
+        """Find the numbers of the most probable errors anew beside what explains the records, which are searched again
+        where others explain them better; and without errors that explain nothing by the same samples: two sets may
+        differ in what they hold to be an outlier. Return the identity of what is the most probable → its errors.
+        """
+        while _is_complete(self.tried) and not (now := _first(self.tried)).work.given_up:
+            found = numbers_again(now, self.records)
+            if not found.needless:
+                break
+            self._without(found.needless, now)
+        else:
+            return {}
+        if found.gain > settings.CLOSE_NATS:
+            now = self._again(now, found.errors)
+            found = numbers_again(now, self.records)
+        return {id(now): found.errors}
+
+    def _without(self, needless: Sequence[SuspectedError], now: Explained) -> None:
+        """Search the records with some errors of a set left in them, in the place of all sets that hold one of them."""
+        gone = {(one.record, one.error.id) for one in needless}
+        left = tuple(one for one in now.errors if (one.record, one.error.id) not in gone)
+        self.tried[:] = [one for one in self.tried if not _holds_one(one, gone) and one.errors != left]
+        self._race([self._look_at(left, self.look.start(without(self.records, left)))])
+
+    def _again(self, old: Explained, errors: tuple[SuspectedError, ...]) -> Explained:
+        """Search the records without errors that have other numbers, or that were given up; return what explains more,
+        which is in the place of the other.
+        """
+        new = self._look_at(errors, self.look.start(without(self.records, errors)))
+        self._race([new])
+        more, less = (old, new) if self._explains_more(old, new) else (new, old)
+        self.tried.remove(less)
+        return more
+
+    def _explains_more(self, one: Explained, other: Explained) -> bool:
+        """Say whether errors with some numbers are more probable than with others, with what those put outside."""
+        per_lost = least_means([one, other])
+        outside = _of_samples_outside(one, other, self.records, per_lost)
+        return one.log_evidence(per_lost) + outside > other.log_evidence(per_lost)
 
     def _looks(self, more: Sequence[tuple[SuspectedError, ...]]) -> list[Explained]:
         """Give further sets of errors a first look, and return what is found, unless interrupted."""
@@ -275,6 +321,11 @@ def _is_settled(work: Findings) -> bool:
     if is_explained(work.search, work.out_of_catalogue):
         return True
     return leaves_only_noise(work) and not work.search.is_poor()
+
+
+def _holds_one(one: Explained, errors: Container[tuple[int, str]]) -> bool:
+    """Say whether a set holds one of some errors (record, id)."""
+    return any((each.record, each.error.id) in errors for each in one.errors)
 
 
 def _is_complete(tried: Sequence[Explained]) -> bool:

@@ -1,4 +1,4 @@
-"""How probable a set of errors in the data is, with what explains the records besides.
+"""How probable a set of errors in the data is, with what explains the records besides, and what its numbers are.
 
 T the corrections, y the record as written:
 
@@ -6,38 +6,65 @@ T the corrections, y the record as written:
 
 A sample that is lost counts as any other of its channel. But where a rounded channel may be frozen or stand still, what
 it repeats is certain in the one case, and in the other an interval each, no density (`repeated_values`).
+
+The scan finds a delay, a rate or a step in the linear problem about the nominal model, with noise as white as sensors
+usually have it. Where noise is slow, that prefers a number that makes the noise quick. So the number a has its density
+again in the linear problem around the best fit, with the noise behind that, all hypotheses that were fitted together:
+
+    log p(a | y) = log Σ_M p(M) ∫ p(T_a y | z) p(z | M) dz
+
+of the samples that no a that is tried puts outside the trial: so all are judged by the same ones. A parabola through
+five of its values has the mean of a and its standard deviation (`numbers_again`).
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from subzero.diagnosis.hypothesis.data_error import DataError, corrected
+from subzero.diagnosis.hypothesis.catalogue.sensors import CLOCK
+from subzero.diagnosis.hypothesis.data_error import LEAST, NUMBERED, SHIFTS, DataError, corrected, places
+from subzero.diagnosis.hypothesis.hypotheses import log_prior, nameable, variances
 from subzero.diagnosis.hypothesis.logged import Logged
 from subzero.diagnosis.hypothesis.noise import log_of_outlier, log_of_outliers
 from subzero.diagnosis.inference import settings
 from subzero.diagnosis.inference.change_point_fit import FittedChangePoint
+from subzero.diagnosis.inference.data_error_scan import log_prior as log_prior_of_error
 from subzero.diagnosis.inference.data_error_yardstick import LOUD
 from subzero.diagnosis.inference.latent_force import FORCE
-from subzero.diagnosis.inference.linear_gaussian import log_sum
+from subzero.diagnosis.inference.linear_gaussian import KAPPAS, Linear, log_sum, posterior
 from subzero.diagnosis.inference.map_fit import is_poor_fit
-from subzero.diagnosis.inference.model_fits import log_density_of_noise
-from subzero.diagnosis.inference.posing import sensor_of
+from subzero.diagnosis.inference.model_fits import gain_of_own_noise, log_density_of_noise
+from subzero.diagnosis.inference.posing import posed_again, sensor_of
 from subzero.diagnosis.inference.problem import Observed, Problem
 from subzero.diagnosis.inference.repeated_values import log_odds_of_frozen, steps_of
+from subzero.errors import UserError
 
 if TYPE_CHECKING:
     from subzero.diagnosis.inference.data_error_search import SuspectedError, Suspicion
+    from subzero.diagnosis.inference.model_search import Search
     from subzero.diagnosis.inference.out_of_catalogue import Findings
+
+    Errors = Sequence[SuspectedError]
 
 ALIKE = 10
 """So many errors of a kind share its probability, about."""
+FIRST_SHARE = 0.01
+"""Numbers are first tried so far apart, as a share of what the scan has found; then by a standard deviation. [-]"""
+APART = np.array([-2.0, -1.0, 0.0, 1.0, 2.0])
+"""Where a parabola is fitted, in those distances."""
+MOST_PARABOLAS, FARTHEST, SETTLED = 5, 4.0, 0.5
+"""So many parabolas there are at most; one reaches so many distances; a mean that moves by less than a share of one has
+settled. [-]"""
+Density = Callable[[Sequence[float]], np.ndarray]
+"""Some numbers → their log densities, but for what they have in common; minus infinity where one leaves no record."""
+Samples = list[dict[str, np.ndarray]]
+"""Record → channel → which samples, as they were written."""
 
 
 def leaves_only_noise(work: Findings) -> bool:
@@ -226,3 +253,172 @@ def _outliers(one: Observed, name: str) -> tuple[int, int, float]:
     """Return how many samples of a channel are outliers, how many were measured, and the usual level of its sensor."""
     measured = int(np.isfinite(one.values[name]).sum())
     return measured - one.noise[name].count, measured, sensor_of(one, name).level
+
+
+class Numbers(NamedTuple):
+    """Errors with their numbers found anew; by how much the records are more probable so [nat]; and those of them that
+    explain nothing, by the same samples and what is known beforehand.
+    """
+
+    errors: tuple[SuspectedError, ...]
+    gain: float = 0.0
+    needless: tuple[SuspectedError, ...] = ()
+
+
+def numbers_again(one: Explained, records: Sequence[Logged]) -> Numbers:
+    """Return the errors of an explanation with their numbers, found anew one after the other, and the gain.
+
+    Nothing is found anew where something outside the catalogue explains the records: its parameters are not free here.
+
+    Args:
+        one: errors, and what explains the records without them.
+        records: as they were written.
+    """
+    needless: list[SuspectedError] = []
+    errors, gain = list(one.errors), 0.0
+    outside = max((each.log_posterior for each in one.work.out_of_catalogue), default=-np.inf)
+    if outside > one.work.search.best().log_posterior:
+        return Numbers(one.errors)
+    samples = _known(one.work.search, records, one.errors)
+    for i, each in enumerate(one.errors):
+        if each.error.kind in NUMBERED and not each.is_read_off:
+            logs_of, begin = _density(one.work.search, samples, records, errors, i)
+            number = each.error.amount
+            found = peak(logs_of, number, begin, FIRST_SHARE * abs(number))
+            if found is not None and abs(found.mean) >= LEAST.get(each.error.kind, 0.0):
+                errors[i] = _with_number(each, found.mean, found.sd)
+                gain, number = gain + found.gain, found.mean
+            there, without_it = logs_of([number, 0.0])
+            if there - without_it + log_prior_of_error(each.error, 1) < 0.0:
+                needless.append(each)
+    return Numbers(tuple(errors), gain, tuple(needless))
+
+
+def _density(
+    search: Search, samples: Samples, records: Sequence[Logged], errors: Errors, i: int
+) -> tuple[Density, float]:
+    """Return the log density of the number of one of some errors, and where to look for its peak: what the fit has the
+    clock late besides is part of a late clock.
+    """
+    amount, z = errors[i].error.amount, search.best().fit.z.copy()
+    late = [k for k, one in enumerate(search.problem.entries) if one.effect.id == CLOCK.id]
+    more = float(z[late].sum()) if errors[i].error.kind == "late_clock" else 0.0
+    z[late] -= more
+
+    def logs_of(amounts: Sequence[float]) -> np.ndarray:
+        each = [[*errors[:i], _with_number(errors[i], one), *errors[i + 1 :]] for one in amounts]
+        try:
+            kept = _inside_of_all(samples, records, each)
+            return np.array([_log_density(search, z, records, some, kept) for some in each])
+        except UserError:  # a number leaves no record
+            return np.full(len(each), -np.inf)
+
+    return logs_of, amount + more
+
+
+def _with_number(one: SuspectedError, amount: float, sd: float = 0.0) -> SuspectedError:
+    return replace(one, error=replace(one.error, amount=float(amount), amount_sd=float(sd)))
+
+
+class Peak(NamedTuple):
+    """Mean and standard deviation of a number, and by how much its log density is greater there than at first."""
+
+    mean: float
+    sd: float
+    gain: float
+
+
+def peak(logs_of: Density, known: float, first: float, apart: float) -> Peak | None:
+    """Return where a log density is greatest, by parabolas; None if there is no peak near by.
+
+    Args:
+        logs_of: the density.
+        known: the number so far, which the gain is over.
+        first: where to begin.
+        apart: how far apart numbers are tried at first.
+    """
+    at = first
+    for _ in range(MOST_PARABOLAS):
+        logs = logs_of((at + apart * APART).tolist())
+        if not np.isfinite(logs).all():
+            return None
+        c, b, _ = np.polyfit(APART, logs, 2)
+        sd = apart / np.sqrt(-2.0 * c) if c < 0.0 else np.inf
+        move = float(np.clip(-b / (2.0 * c) if c < 0.0 else FARTHEST * np.sign(b), -FARTHEST, FARTHEST))
+        at += apart * move
+        if abs(move) * apart < SETTLED * sd < SETTLED * FARTHEST * apart:
+            then, before = logs_of([at, known])
+            return Peak(at, float(sd), float(then - before))
+        apart = float(np.clip(sd, apart / FARTHEST, apart * FARTHEST))
+    return None
+
+
+def _known(search: Search, records: Sequence[Logged], errors: Errors) -> Samples:
+    """Return the samples that the fits without errors are made to: no outliers."""
+    found = Samples()
+    for i, (logged, one) in enumerate(zip(records, search.problem.records, strict=True)):
+        where = _places(logged, errors, i)
+        found.append({name: where[name][noise.used] for name, noise in one.noise.items()})
+    return found
+
+
+def _inside_of_all(known: Samples, records: Sequence[Logged], several: Sequence[Errors]) -> Samples:
+    """Return those of known samples that none of several sets of errors puts outside the trial."""
+    found = [dict(one) for one in known]
+    for errors in several:
+        for i, logged in enumerate(records):
+            where = _places(logged, errors, i)
+            found[i] = {name: np.intersect1d(some, where[name]) for name, some in found[i].items()}
+    return found
+
+
+def _without(records: Sequence[Logged], errors: Errors) -> list[Logged]:
+    """Return records without errors in them."""
+    return [corrected(logged, tuple(one.error for one in errors if one.record == i))
+            for i, logged in enumerate(records)]  # fmt: skip
+
+
+def _places(logged: Logged, errors: Errors, record: int) -> dict[str, np.ndarray]:
+    """Return channel → which of the samples that were written stands where without errors (n,)."""
+    own = [one.error for one in errors if one.record == record and one.error.kind in SHIFTS]
+    return places(logged, own)
+
+
+def _log_density(
+    search: Search, z: np.ndarray, records: Sequence[Logged], errors: Errors, kept: Samples
+) -> float:
+    """Return the log density of some samples of records in the linear problem around z (k,), but for what does not
+    depend on the numbers of errors: all hypotheses that were fitted together, as a cause may do what a number does, and
+    is none where the number is right; with the noise that is the most probable beside the best of them.
+    """
+    problem = _posed_like(search, records, errors, kept)
+    J, count = problem.jacobian(z), len(nameable(problem.entries))
+    linear = Linear(problem.residual(z) + J @ z, J)
+    each = [(log_prior(ids, count) + np.log(KAPPAS[kappa]), variances(problem.entries, ids, kappa))
+            for ids in search.candidates for kappa in KAPPAS]  # fmt: skip
+    q = linear.quadratic
+    logs = [prior + posterior(q, D).log_evidence for prior, D in each]
+    found = log_sum(logs) + gain_of_own_noise(problem, linear, each[int(np.argmax(logs))][1])
+    return found + sum(log_density_of_noise(one, name) for one in problem.records for name in one.noise)
+
+
+def _posed_like(search: Search, records: Sequence[Logged], errors: Errors, kept: Samples) -> Problem:
+    """Return the problem of some samples of records without errors, with the noise behind the best fit."""
+    new = posed_again(search.problem, _without(records, errors))
+    pairs = enumerate(zip(search.problem.records, new.records, strict=True))
+    made = [_seen_like(old, seen, kept[i], _places(records[i], errors, i)) for i, (old, seen) in pairs]
+    return replace(new, records=tuple(made))
+
+
+def _seen_like(
+    old: Observed, new: Observed, kept: Mapping[str, np.ndarray], where: Mapping[str, np.ndarray]
+) -> Observed:
+    """Return a record with the noise of another, and with what is known of the error of its steps; only with some of
+    the samples that were written, which stand somewhere in it (n,).
+    """
+    noise = {}
+    for name, each in old.noise.items():
+        used = np.isin(where[name], kept[name])
+        noise[name] = replace(each, used=used, time=new.time[used])
+    steps = {name: np.interp(new.time, old.time, column) for name, column in old.correction.items()}
+    return replace(new, noise=noise, correction=steps, noise_times=old.noise_times)
