@@ -282,6 +282,16 @@ def test_each_number_is_told_with_its_interval(error, family):
     check_number(error, family, 20310 + NUMBERED.index(error))
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(("seed", "index"), [(11003, 68), (9803, 10), (9803, 44)])
+def test_a_number_that_the_scan_has_far_off_is_found(seed, index):
+    """The scan alone has them 10, 5 and 6 standard deviations off; beside the first the fit has a clock_offset."""
+    record = data_errors.made(*data_errors.drawn(seed, index + 1)[index])
+    (error,), (found,) = record.errors, subzero.diagnose(record.logged, budget="verdict").data_errors
+    assert found.id == error.id
+    assert abs(found.amount - error.amount) < 3.5 * found.amount_sd < 0.1 * abs(error.amount)
+
+
 def test_a_channel_that_is_frozen_from_the_first_sample_of_a_turn_on_is_no_value_that_stands_for_nothing():
     """At one sample a second it is far from all before; what does not come back to a measurement is frozen."""
     time, clean = np.arange(0.0, 40.0), smooth()
