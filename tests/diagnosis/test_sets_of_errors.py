@@ -164,3 +164,42 @@ def test_a_delay_of_nothing_but_noise_is_as_probable_as_beforehand(outlier):
     noise is found anew without these samples: a nat.
     """
     assert lead_of_a_delay(outlier) == pytest.approx(log_prior(LATE, 10), abs=1.0)
+
+
+class Interrupted(Look):
+    """A search that is interrupted when it has been started so often."""
+
+    def __init__(self, *args, at: int) -> None:
+        super().__init__(*args)
+        self.left = at
+
+    def start(self, records):
+        self.left -= 1
+        if self.left == 0:
+            raise KeyboardInterrupt
+        return super().start(records)
+
+
+def step_explains_nothing(one, records):
+    """Hold a step to explain nothing by the same samples."""
+    return Numbers(one.errors, needless=one.errors)
+
+
+def test_an_error_that_explains_nothing_gives_way_to_a_whole_search_without_it(monkeypatch):
+    """That had been given up, as the set with the error seemed to explain more."""
+    monkeypatch.setattr(data_error_choice, "numbers_again", step_explains_nothing)
+    step = SuspectedError(record=0, error=STEP, lead=100.0, generous=90.0, left=0.6)
+    look = Look(plain=-1000.0, helped=-1000.0, put_right=0.0)
+    ((found, _),) = compared(Suspicion(errors=(step,)), [PLAIN], look)
+    assert not found.errors
+    assert not found.work.given_up
+    assert look.finished == ["put right", "as it is"]
+
+
+def test_an_interrupt_of_that_search_keeps_what_was_found(monkeypatch):
+    monkeypatch.setattr(data_error_choice, "numbers_again", step_explains_nothing)
+    step = SuspectedError(record=0, error=STEP, lead=100.0, generous=90.0, left=0.6)
+    look = Interrupted(-1000.0, -1000.0, 0.0, at=3)
+    tried = compared(Suspicion(errors=(step,)), [PLAIN], look)
+    assert {len(one.errors) for one, _ in tried} == {0, 1}
+    assert not all(one.work.complete for one, _ in tried)

@@ -22,7 +22,6 @@ from typing import Protocol
 
 import numpy as np
 
-from subzero.diagnosis.hypothesis.data_error import SHIFTS, places
 from subzero.diagnosis.hypothesis.logged import Logged
 from subzero.diagnosis.inference import settings
 from subzero.diagnosis.inference.data_error_evidence import (
@@ -34,8 +33,10 @@ from subzero.diagnosis.inference.data_error_evidence import (
     lost_by,
     measured_by,
     numbers_again,
+    places_of,
     samples_of,
     standing_of,
+    without,
 )
 from subzero.diagnosis.inference.data_error_scan import log_prior
 from subzero.diagnosis.inference.data_error_search import (
@@ -43,7 +44,6 @@ from subzero.diagnosis.inference.data_error_search import (
     Suspicion,
     explain,
     is_soft,
-    without,
 )
 from subzero.diagnosis.inference.model_fits import log_evidence_of
 from subzero.diagnosis.inference.out_of_catalogue import Findings, is_explained, linear_of_first
@@ -148,16 +148,9 @@ def _inside(one: Explained, least: Explained, records: Sequence[Logged]) -> list
     """Return channel → which samples of the records with the least errors are inside the trial with others (n,)."""
     found = []
     for i, logged in enumerate(records):
-        places, here = _places(logged, one.errors, i), _places(logged, least.errors, i)
+        places, here = places_of(logged, one.errors, i), places_of(logged, least.errors, i)
         found.append({name: np.isin(column, places[name]) for name, column in here.items()})
     return found
-
-
-def _places(logged: Logged, errors: Sequence[SuspectedError], record: int) -> dict[str, np.ndarray]:
-    """Return channel → which of the samples that were written stands where when clocks are put right (n,); NaN where
-    none does.
-    """
-    return places(logged, [one.error for one in errors if one.record == record and one.error.kind in SHIFTS])
 
 
 @dataclass(frozen=True, eq=False)
@@ -213,16 +206,20 @@ class _Comparison:
         return {id(now): found.errors}
 
     def _without(self, needless: Sequence[SuspectedError], now: Explained) -> None:
-        """Search the records with some errors of a set left in them, in the place of all sets that hold one of them."""
-        gone = {(one.record, one.error.id) for one in needless}
+        """Search the records with some errors of a set left in them, in the place of all sets that hold one of them; if
+        that is interrupted before anything is found, what there was stays.
+        """
+        gone, before = {(one.record, one.error.id) for one in needless}, self.tried[:]
         left = tuple(one for one in now.errors if (one.record, one.error.id) not in gone)
         self.tried[:] = [one for one in self.tried if not _holds_one(one, gone) and one.errors != left]
-        self._race([self._look_at(left, self.look.start(without(self.records, left)))])
+        try:
+            self._race([self._look_at(left, self.look.start(without(self.records, left)))])
+        except KeyboardInterrupt:
+            self.tried[:] = self.tried or before
+            raise
 
     def _again(self, old: Explained, errors: tuple[SuspectedError, ...]) -> Explained:
-        """Search the records without errors that have other numbers, or that were given up; return what explains more,
-        which is in the place of the other.
-        """
+        """Search the records without errors that have other numbers; return what explains more, and drop the other."""
         new = self._look_at(errors, self.look.start(without(self.records, errors)))
         self._race([new])
         more, less = (old, new) if self._explains_more(old, new) else (new, old)

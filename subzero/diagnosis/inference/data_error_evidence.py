@@ -218,6 +218,19 @@ def least_means(several: Sequence[Explained]) -> dict[str, float]:
     return {name: min(one[name] for one in means if name in one) for name in set().union(*means)}
 
 
+def without(records: Sequence[Logged], errors: Errors) -> list[Logged]:
+    """Return records without errors in them."""
+    return [corrected(logged, tuple(one.error for one in errors if one.record == i))
+            for i, logged in enumerate(records)]  # fmt: skip
+
+
+def places_of(logged: Logged, errors: Errors, record: int) -> dict[str, np.ndarray]:
+    """Return channel → which of the samples that were written stands where when clocks are put right (n,); NaN where
+    none does.
+    """
+    return places(logged, [one.error for one in errors if one.record == record and one.error.kind in SHIFTS])
+
+
 def measured_by(logged: Logged, error: DataError) -> int:
     """Return how many samples of an error's channels were measured."""
     return sum(int(np.isfinite(logged.record.values[name]).sum()) for name in error.channels
@@ -357,7 +370,7 @@ def _known(search: Search, records: Sequence[Logged], errors: Errors) -> Samples
     """Return the samples that the fits without errors are made to: no outliers."""
     found = Samples()
     for i, (logged, one) in enumerate(zip(records, search.problem.records, strict=True)):
-        where = _places(logged, errors, i)
+        where = places_of(logged, errors, i)
         found.append({name: where[name][noise.used] for name, noise in one.noise.items()})
     return found
 
@@ -367,21 +380,9 @@ def _inside_of_all(known: Samples, records: Sequence[Logged], several: Sequence[
     found = [dict(one) for one in known]
     for errors in several:
         for i, logged in enumerate(records):
-            where = _places(logged, errors, i)
+            where = places_of(logged, errors, i)
             found[i] = {name: np.intersect1d(some, where[name]) for name, some in found[i].items()}
     return found
-
-
-def _without(records: Sequence[Logged], errors: Errors) -> list[Logged]:
-    """Return records without errors in them."""
-    return [corrected(logged, tuple(one.error for one in errors if one.record == i))
-            for i, logged in enumerate(records)]  # fmt: skip
-
-
-def _places(logged: Logged, errors: Errors, record: int) -> dict[str, np.ndarray]:
-    """Return channel → which of the samples that were written stands where without errors (n,)."""
-    own = [one.error for one in errors if one.record == record and one.error.kind in SHIFTS]
-    return places(logged, own)
 
 
 def _log_density(
@@ -404,9 +405,9 @@ def _log_density(
 
 def _posed_like(search: Search, records: Sequence[Logged], errors: Errors, kept: Samples) -> Problem:
     """Return the problem of some samples of records without errors, with the noise behind the best fit."""
-    new = posed_again(search.problem, _without(records, errors))
+    new = posed_again(search.problem, without(records, errors))
     pairs = enumerate(zip(search.problem.records, new.records, strict=True))
-    made = [_seen_like(old, seen, kept[i], _places(records[i], errors, i)) for i, (old, seen) in pairs]
+    made = [_seen_like(old, seen, kept[i], places_of(records[i], errors, i)) for i, (old, seen) in pairs]
     return replace(new, records=tuple(made))
 
 

@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from subzero.diagnosis.hypothesis.data_error import DataError, corrected
+from subzero.diagnosis.hypothesis.data_error import DataError
 from subzero.diagnosis.hypothesis.logged import Logged
 from subzero.diagnosis.inference.data_error_scan import (
     FAR_BEHIND,
@@ -330,11 +330,3 @@ def _is_suspected(one: Suspect) -> bool:
 
 def _least(one: Suspect) -> float:
     return LEAST_SOFT_LEAD if one.error.kind in SOFT else LEAST_LEAD
-
-
-def without(records: Sequence[Logged], found: Sequence[SuspectedError]) -> list[Logged]:
-    """Return records without the errors that were found in them."""
-    return [
-        corrected(logged, tuple(one.error for one in found if one.record == i))
-        for i, logged in enumerate(records)
-    ]
