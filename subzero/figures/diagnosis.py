@@ -15,6 +15,7 @@ import numpy as np
 from subzero.channels import BY_NAME
 from subzero.diagnosis.report.tables import CLEAR_FROM, CONFUSED_BELOW, SEEN_SIGNAL, WORTH_A_LINE
 from subzero.diagnosis.report.words import (
+    beside_errors,
     explanation,
     formula_term,
     is_told,
@@ -109,7 +110,7 @@ def evidence(verdict: Verdict, title: Title) -> Figure | None:
     ranked = [(name, p) for name, p in ranked if p >= LEAST]
     if not ranked:
         return None
-    names = [_wrapped(_beside_errors(name, verdict)) for name, _ in ranked]
+    names = [_wrapped(beside_errors(name, verdict)) for name, _ in ranked]
     rows = sum(1 + name.count("\n") for name in names)
     figure, (plain, logarithmic) = _bars(2, rows, title, left=0.42, apart=0.2)
     colours = [style.BLUE if is_told(name, verdict) else style.GREY for name, _ in ranked]
@@ -124,15 +125,6 @@ def evidence(verdict: Verdict, title: Title) -> Figure | None:
     _names(logarithmic, [""] * len(ranked))
     headline(logarithmic, "Small ones too")
     return figure
-
-
-def _beside_errors(name: str, verdict: Verdict) -> str:
-    """Return a hypothesis in words, without the errors in the data that are told."""
-    told = {one.id for one in verdict.data_errors} if verdict.then else set()
-    rest = " + ".join(one for one in name.split(" + ") if one not in told)
-    if not rest and name != "none":
-        return "nothing else is wrong"
-    return explanation(rest or name, sentences(verdict))
 
 
 NAME_LENGTH, NARROW_NAME_LENGTH = 50, 36

@@ -150,6 +150,19 @@ def test_a_force_is_told_with_what_else_it_may_be_made_of():
     assert "0.05" not in said, "too improbable"
 
 
+def test_what_comes_next_beside_an_error_in_the_data_is_told_without_that():
+    """As in the figure: the error is in all explanations, and is no alternative to itself."""
+    error = FoundError(id="clock_rate", record="record", columns=("time_s",), probability=0.9995, remedy="divide it",
+                       sentence="the clock runs too fast")  # fmt: skip
+    listed = {f"clock_rate + {name}": p for name, p in NAMED.probabilities.items() if name != "none"}
+    both = dataclasses.replace(NAMED, verdict=DATA_ERROR, then=NAMED.verdict, data_errors=(error,))
+    said = answers(dataclasses.replace(both, probabilities=listed))["How sure is that"]
+    assert "What comes next: the yaw inertia differs (probability 0.020); these records can tell" in said
+    alone = {next(iter(listed)): 0.97, "clock_rate": 0.02}
+    said = answers(dataclasses.replace(both, probabilities=alone))["How sure is that"]
+    assert "What comes next: nothing else is wrong (probability 0.020)" in said
+
+
 def test_a_wave_is_told_by_its_size_and_period():
     swell = dataclasses.replace(
         FORCE.unknown, formula=(("a wave with a period of 6.3 s", "wave", 0.36, 0.29, 0.42),)

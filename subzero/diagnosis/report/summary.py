@@ -166,10 +166,10 @@ def _runner_up(verdict: Verdict) -> Iterator[str]:
     if not others:
         return
     first = max(others, key=lambda name: verdict.probabilities[name])
-    said = words.explanation(first, words.sentences(verdict))
+    said, ids = words.beside_errors(first, verdict), words.without_errors(first, verdict)
     said = f"What comes next: {said} (probability {words.probability(verdict.probabilities[first])})"
     D = next(
-        (one.discrimination for one in verdict.rivals if (" + ".join(one.ids) or "none") == first), math.nan
+        (one.discrimination for one in verdict.rivals if (" + ".join(one.ids) or "none") == ids), math.nan
     )
     yield f"{said}{_apart(D)}."
 

@@ -125,6 +125,20 @@ def explanation(name: str, known: Mapping[str, str] | None = None) -> str:
     return " and ".join(_explained(one, known or {}) for one in name.split(" + "))
 
 
+def without_errors(name: str, verdict: Verdict) -> str:
+    """Return a hypothesis without the errors in the data that are told."""
+    told = {one.id for one in verdict.data_errors} if verdict.then else set()
+    return " + ".join(one for one in name.split(" + ") if one not in told) or "none"
+
+
+def beside_errors(name: str, verdict: Verdict) -> str:
+    """Return a hypothesis in words, without the errors in the data that are told."""
+    rest = without_errors(name, verdict)
+    if rest == "none" and name != "none":
+        return "nothing else is wrong"
+    return explanation(rest, sentences(verdict))
+
+
 def _explained(one: str, known: Mapping[str, str]) -> str:
     """Return a single cause, force or drift in words."""
     if one in known:
@@ -179,8 +193,7 @@ def headline(verdict: Verdict) -> str:
 
 def is_told(name: str, verdict: Verdict) -> bool:
     """Say whether a hypothesis is what the verdict tells: its causes, whenever they began, or its force or drift."""
-    beside = {one.id for one in verdict.data_errors} if verdict.then else set()
-    parts = [one for one in name.split(" + ") if one not in beside and one != "none"]
+    parts = [one for one in without_errors(name, verdict).split(" + ") if one != "none"]
     if verdict.on_model == UNDECIDED:
         return False
     if verdict.on_model == OUTSIDE and verdict.unknown is not None:
@@ -239,8 +252,7 @@ def on_model(verdict: Verdict) -> str:
 def _within(verdict: Verdict) -> str:
     """Return what the most probable hypothesis has, if it is a cause that is no larger than calibration may make it."""
     first = max(verdict.probabilities, key=lambda name: verdict.probabilities[name], default="none")
-    errors = {one.id for one in verdict.data_errors} if verdict.then else set()
-    first = " + ".join(one for one in first.split(" + ") if one not in errors) or "none"
+    first = without_errors(first, verdict)
     if first == "none":
         return ""
     return (
