@@ -105,10 +105,8 @@ def fit_change_points(
             done[name] = max(one, done.get(name, one), key=lambda each: each.log_posterior)
         best = max(done.values(), key=lambda one: one.log_posterior)
         candidates = [one for one in candidates if not any(one is each for each in worth)]
-        if is_poor_fit(best.fit):
+        if is_poor_fit(best.fit) or best.log_posterior < least - settings.HOPELESS_NATS:  # no place to look from
             continue
-        if best.log_posterior < least - settings.HOPELESS_NATS:  # no place to look from
-            break
         candidates = ranked_in(problem, linearised_at(problem, best), able, record)
     return list(done.values())
 

@@ -107,7 +107,8 @@ def scan(
     *,
     best: int = 3,
 ) -> list[ChangePoint]:
-    """Return every sudden effect at its best time, most probable first; the `best` of them with finer times.
+    """Return every sudden effect at its best time, most probable first; the `best` of them with finer times around
+    those of the grid that come out about as well: a jam that begins between two commands has several peaks.
 
     Args:
         point: close to the data.
@@ -118,13 +119,22 @@ def scan(
     """
     along, spacing = in_rough_steps(point.along), spacing_of(point.along.problem, record)
     columns = onset_columns(along, effects, record)
-    found = _strongest(_tried(point, D, columns, record))
-    worth = [one for one in found[:best] if one.log_gain > settings.SCAN_GAIN_NATS]
-    finer = [(one.effect, time) for one in worth for time in _around(one.time, spacing)]
+    found = _tried(point, D, columns, record)
+    first = _strongest(found)
+    worth = [one for one in first[:best] if one.log_gain > settings.SCAN_GAIN_NATS]
+    near = [(one.effect, time) for one in worth for time in _peaks(one, found)]
+    finer = list(dict.fromkeys((effect, at) for effect, time in near for at in _around(time, spacing)))
     if not finer:
-        return found
+        return first
     columns = dict(zip(finer, change_point_columns(along, finer, record), strict=True))
     return _strongest(found + _tried(point, D, columns, record))
+
+
+def _peaks(best: ChangePoint, found: list[ChangePoint]) -> list[float]:
+    """Return the times of a grid at which an effect comes out about as well as at its best one, that one first."""
+    least = best.log_gain - settings.LINEAR_NATS
+    alike = [one for one in found if one.effect.id == best.effect.id and one.log_gain > least]
+    return [one.time for one in sorted(alike, key=lambda one: -one.log_gain)[: settings.MAX_TRIED]]
 
 
 def in_rough_steps(along: BaseRun) -> BaseRun:
