@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from subzero.diagnosis.inference import PRIOR, Observed, log_prior
+from subzero.diagnosis.inference.linear_gaussian import Quadratic, log_beyond, posterior
 
 
 def test_prior_probabilities_sum_to_one():
@@ -23,3 +24,35 @@ def test_a_correction_of_the_simulation_leaves_what_was_measured():
     twice = record.corrected({"depth": np.array([0.5, 0.0])}).corrected({"depth": np.array([0.25, 1.0])})
     assert twice.values["depth"].tolist() == [1.0, 2.0]
     assert twice.correction["depth"].tolist() == [0.75, 1.0]
+
+
+def test_the_evidence_of_causes_beyond_calibration_is_its_integral():
+    """By quadrature over two causes, beside what is within its tolerance."""
+    rng = np.random.default_rng(1)
+    Q, _ = np.linalg.qr(rng.standard_normal((30, 3)))  # so that the causes are independent, given the data
+    J, D, within = Q * [1.0, 4.0, 9.0], np.array([0.01, 0.5, 0.3]), np.array([0.02, 0.01])
+    r = J @ np.array([0.1, 0.4, -0.1]) + rng.standard_normal(30)
+    S = np.eye(30) + D[0] * np.outer(J[:, 0], J[:, 0])
+    at = np.linspace(-6.0, 6.0, 1201)
+    z = np.stack(np.meshgrid(at, at, indexing="ij"), axis=-1).reshape(-1, 2)
+    A, b = (J[:, 1:].T @ np.linalg.solve(S, part) for part in (J[:, 1:], r))
+    log = (
+        -0.5 * (r @ np.linalg.solve(S, r) - 2.0 * z @ b + np.sum(z @ A * z, axis=1))
+        - 0.5 * np.linalg.slogdet(S)[1]
+    )
+    normal = np.prod(np.exp(-0.5 * z**2 / D[1:]) / np.sqrt(2.0 * np.pi * D[1:]), axis=1)
+    beyond = np.prod(-np.expm1(-0.5 * z**2 / within), axis=1)
+    exact = np.log(np.sum(np.exp(log) * normal * beyond) / np.sum(normal * beyond))
+    said = posterior(Quadratic.at(np.zeros(3), r, J), D)
+    found = said.log_evidence + log_beyond(said.z[1:], np.diag(said.M)[1:], D[1:], within, [1, 1])
+    assert found == pytest.approx(exact, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("mean", "variance", "least", "most"),
+    [(0.0, 1e-6, -20.0, -8.0), (0.0, 1.0, 0.0, 0.0), (5.0, 1e-4, 0.0, 0.5)],
+)
+def test_only_a_cause_that_surely_does_next_to_nothing_is_less_probable(mean, variance, least, most):
+    """Not one that is not seen, nor one that is large."""
+    found = log_beyond(np.array([mean]), np.array([variance]), np.array([1.0]), np.array([0.09]), [1])
+    assert least - 1e-9 <= found <= most + 1e-9

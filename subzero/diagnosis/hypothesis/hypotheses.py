@@ -128,6 +128,9 @@ Ids = tuple[str, ...]
 _ODDS = {"none": 0.50, "single": 0.40, "pair": 0.06, "unknown": 0.04, "sudden": 0.04, "more": 0.004}
 PRIOR = {kind: odds / sum(_ODDS.values()) for kind, odds in _ODDS.items()}
 """Probability of each kind, shared by all hypotheses of the kind; they sum to one."""
+PRACTICAL_TOLERANCES, PRACTICAL_TOLERANCES_SUDDEN = 4.0, 2.0
+"""A deviation within so many tolerances is a matter of calibration, and no cause; calibration changes nothing in the
+middle of a trial, so that half of it is one there. [κτ]"""
 MAX_CAUSES = 3
 """Most causes of a hypothesis; "more" are as many."""
 

@@ -17,7 +17,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from subzero.diagnosis.hypothesis.hypotheses import log_prior, nameable, variances
+from subzero.diagnosis.hypothesis.hypotheses import (
+    PRACTICAL_TOLERANCES_SUDDEN,
+    log_prior,
+    nameable,
+    variances,
+)
 from subzero.diagnosis.inference import settings
 from subzero.diagnosis.inference.change_point_scan import (
     BaseRun,
@@ -105,9 +110,9 @@ def fit_change_points(
             done[name] = max(one, done.get(name, one), key=lambda each: each.log_posterior)
         best = max(done.values(), key=lambda one: one.log_posterior)
         candidates = [one for one in candidates if not any(one is each for each in worth)]
-        if is_poor_fit(best.fit) or best.log_posterior < least - settings.HOPELESS_NATS:  # no place to look from
-            continue
-        candidates = ranked_in(problem, linearised_at(problem, best), able, record)
+        is_place = best.log_posterior > least - settings.HOPELESS_NATS and not is_poor_fit(best.fit)
+        if is_place:
+            candidates = ranked_in(problem, linearised_at(problem, best), able, record)
     return list(done.values())
 
 
@@ -138,7 +143,7 @@ def _fitted(problem: Problem, candidate: RankedChangePoint) -> FittedChangePoint
     D, J = _prior(problem, more, 1.0), np.hstack([point.fit.J[:, :n], slopes])
     fit = continued(more, with_own_jacobian(more, refit(more, start, J, D, most_fresh=1)))
     under = {kappa: _prior(problem, more, kappa) for kappa in KAPPAS}
-    log = laplace(more.entries, fit, under)
+    log = laplace(more.entries, fit, under, [range(n, fit.z.size - 1)], PRACTICAL_TOLERANCES_SUDDEN)
     mixed = log_sum([float(np.log(prior)) + log[kappa] for kappa, prior in KAPPAS.items()])
     kappa = max(KAPPAS, key=lambda kappa: np.log(KAPPAS[kappa]) + log[kappa])
     change_point = replace(

@@ -16,10 +16,24 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from subzero.diagnosis.hypothesis.effect import MINUTE_S, Effect, with_free_onset, with_onset
-from subzero.diagnosis.hypothesis.hypotheses import Entry, columns_of, log_prior, nameable, variances
+from subzero.diagnosis.hypothesis.hypotheses import (
+    PRACTICAL_TOLERANCES_SUDDEN,
+    Entry,
+    columns_of,
+    log_prior,
+    nameable,
+    variances,
+)
 from subzero.diagnosis.inference import settings
-from subzero.diagnosis.inference.linear_gaussian import KAPPAS, ForceInformation, Quadratic, posterior, seen
-from subzero.diagnosis.inference.map_fit import Candidate, Fit, bounds, possible
+from subzero.diagnosis.inference.linear_gaussian import (
+    KAPPAS,
+    ForceInformation,
+    Posterior,
+    Quadratic,
+    posterior,
+    seen,
+)
+from subzero.diagnosis.inference.map_fit import Candidate, Fit, bounds, of_sizes, possible
 from subzero.diagnosis.inference.simulator import Stop, Track, simulate_on, simulate_track, with_stops
 
 if TYPE_CHECKING:
@@ -222,8 +236,12 @@ def gain_of(data: ForceInformation, effect: Effect) -> tuple[float, np.ndarray]:
     M = np.linalg.solve(inner, np.diag(variance))
     mean = M @ data.q
     log = 0.5 * float(data.q @ mean) - 0.5 * float(np.linalg.slogdet(inner)[1])
-    entries = [Entry(effect, i, -1) for i in range(variance.size)]
-    return log + possible(entries, range(variance.size), mean, np.sqrt(np.diag(M))), mean
+    said = Posterior(z=mean, M=M, log_evidence=log, log_det=float(np.linalg.slogdet(inner)[1]))
+    entries, every = [Entry(effect, i, -1) for i in range(variance.size)], range(variance.size)
+    log += possible(entries, every, mean, np.sqrt(np.diag(M))) + of_sizes(
+        entries, said, variance, [every], PRACTICAL_TOLERANCES_SUDDEN
+    )
+    return log, mean
 
 
 SAME_RUN_LEVELS = 1.0

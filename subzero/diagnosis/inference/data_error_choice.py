@@ -203,7 +203,7 @@ class _Comparison:
         if found.gain > settings.CLOSE_NATS:
             now = self._again(now, found.errors)
             found = numbers_again(now, self.records)
-        return {id(now): found.errors}
+        return {id(now): found.errors} if found.may_be_told else {}
 
     def _without(self, needless: Sequence[SuspectedError], now: Explained) -> None:
         """Search the records with some errors of a set left in them, in the place of all sets that hold one of them; if

@@ -37,12 +37,13 @@ from subzero.diagnosis.inference.change_point_fit import FittedChangePoint
 from subzero.diagnosis.inference.data_error_scan import log_prior as log_prior_of_error
 from subzero.diagnosis.inference.data_error_yardstick import LOUD
 from subzero.diagnosis.inference.latent_force import FORCE
-from subzero.diagnosis.inference.linear_gaussian import KAPPAS, Linear, log_sum, posterior
+from subzero.diagnosis.inference.linear_gaussian import KAPPAS, Linear, log_sum
 from subzero.diagnosis.inference.map_fit import is_poor_fit
 from subzero.diagnosis.inference.model_fits import gain_of_own_noise, log_density_of_noise
 from subzero.diagnosis.inference.posing import posed_again, sensor_of
 from subzero.diagnosis.inference.problem import Observed, Problem
 from subzero.diagnosis.inference.repeated_values import log_odds_of_frozen, steps_of
+from subzero.diagnosis.inference.screening import linear_evidence
 from subzero.errors import UserError
 
 if TYPE_CHECKING:
@@ -269,19 +270,19 @@ def _outliers(one: Observed, name: str) -> tuple[int, int, float]:
 
 
 class Numbers(NamedTuple):
-    """Errors with their numbers found anew; by how much the records are more probable so [nat]; and those of them that
-    explain nothing, by the same samples and what is known beforehand.
+    """Errors with their numbers found anew; by how much the records are more probable so [nat]; those of them that
+    explain nothing, by the same samples and what is known beforehand; and whether the numbers can be told: they are
+    those beside hypotheses, and something outside the catalogue may explain the records better.
     """
 
     errors: tuple[SuspectedError, ...]
     gain: float = 0.0
     needless: tuple[SuspectedError, ...] = ()
+    may_be_told: bool = True
 
 
 def numbers_again(one: Explained, records: Sequence[Logged]) -> Numbers:
     """Return the errors of an explanation with their numbers, found anew one after the other, and the gain.
-
-    Nothing is found anew where something outside the catalogue explains the records: its parameters are not free here.
 
     Args:
         one: errors, and what explains the records without them.
@@ -290,8 +291,7 @@ def numbers_again(one: Explained, records: Sequence[Logged]) -> Numbers:
     needless: list[SuspectedError] = []
     errors, gain = list(one.errors), 0.0
     outside = max((each.log_posterior for each in one.work.out_of_catalogue), default=-np.inf)
-    if outside > one.work.search.best().log_posterior:
-        return Numbers(one.errors)
+    may_be_told = outside <= one.work.search.best().log_posterior
     samples = _known(one.work.search, records, one.errors)
     for i, each in enumerate(one.errors):
         if each.error.kind in NUMBERED and not each.is_read_off:
@@ -302,9 +302,9 @@ def numbers_again(one: Explained, records: Sequence[Logged]) -> Numbers:
                 errors[i] = _with_number(each, found.mean, found.sd)
                 gain, number = gain + found.gain, found.mean
             there, without_it = logs_of([number, 0.0])
-            if there - without_it + log_prior_of_error(each.error, 1) < 0.0:
+            if may_be_told and there - without_it + log_prior_of_error(each.error, 1) < 0.0:
                 needless.append(each)
-    return Numbers(tuple(errors), gain, tuple(needless))
+    return Numbers(tuple(errors), gain, tuple(needless), may_be_told)
 
 
 def _density(
@@ -395,11 +395,12 @@ def _log_density(
     problem = _posed_like(search, records, errors, kept)
     J, count = problem.jacobian(z), len(nameable(problem.entries))
     linear = Linear(problem.residual(z) + J @ z, J)
-    each = [(log_prior(ids, count) + np.log(KAPPAS[kappa]), variances(problem.entries, ids, kappa))
-            for ids in search.candidates for kappa in KAPPAS]  # fmt: skip
+    each = [(ids, kappa) for ids in search.candidates for kappa in KAPPAS]
     q = linear.quadratic
-    logs = [prior + posterior(q, D).log_evidence for prior, D in each]
-    found = log_sum(logs) + gain_of_own_noise(problem, linear, each[int(np.argmax(logs))][1])
+    logs = [log_prior(ids, count) + np.log(KAPPAS[kappa]) + linear_evidence(problem, q, ids, kappa)
+            for ids, kappa in each]  # fmt: skip
+    best = variances(problem.entries, *each[int(np.argmax(logs))])
+    found = log_sum(logs) + gain_of_own_noise(problem, linear, best)
     return found + sum(log_density_of_noise(one, name) for one in problem.records for name in one.noise)
 
 

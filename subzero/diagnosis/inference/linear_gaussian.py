@@ -101,6 +101,37 @@ def posterior(q: Quadratic, D: np.ndarray) -> Posterior:
     return Posterior(z=z, M=M, log_evidence=-0.5 * (q.rr - float(q.b @ z)) - 0.5 * log_det, log_det=log_det)
 
 
+def log_beyond(
+    mean: np.ndarray, variance: np.ndarray, prior: np.ndarray, within: np.ndarray, sizes: Sequence[int]
+) -> np.ndarray:
+    """Return what is added to a log evidence (…) made with normal priors if what calibration may do is no cause:
+
+        p(z) ∝ N(z; 0, s²) (1 − exp(−½ z²/w²)),
+        log p(y) − log p_normal(y) = log (1 − E[exp(−½ z²/w²) | y]) − log (1 − E[exp(−½ z²/w²)]).
+
+    So a cause that surely does next to nothing is none, one that is not seen
+    is as before, and one that is large, too: a non-local prior (Johnson & Rossell 2010) with the tails of the normal.
+    Parameters are taken to be independent, given the data.
+
+    Args:
+        mean: of the causes' parameters under normal priors, one cause after the other (…, k).
+        variance: theirs (…, k).
+        prior: s² (…, k).
+        within: w² (…, k).
+        sizes: how many parameters each cause has.
+    """
+    if not sizes:
+        return np.zeros(mean.shape[:-1])
+    first = np.cumsum([0, *sizes[:-1]])
+
+    def log_outside(mean: np.ndarray, variance: np.ndarray) -> np.ndarray:
+        log = -0.5 * (np.log1p(variance / within) + mean**2 / (within + variance))
+        inside = np.minimum(np.add.reduceat(log, first, axis=-1), -np.finfo(float).tiny)
+        return np.sum(np.log(-np.expm1(inside)), axis=-1)
+
+    return log_outside(mean, variance) - log_outside(np.zeros_like(mean), prior)
+
+
 def freed(
     base: Posterior, D: np.ndarray, places: Sequence[int] | np.ndarray, variance: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

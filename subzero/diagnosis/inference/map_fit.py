@@ -21,9 +21,26 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from scipy.special import log_ndtr
 
-from subzero.diagnosis.hypothesis.hypotheses import Entry, Ids, log_prior, nameable, variances
+from subzero.diagnosis.hypothesis.hypotheses import (
+    PRACTICAL_TOLERANCES,
+    Entry,
+    Ids,
+    columns_of,
+    log_prior,
+    nameable,
+    variances,
+)
 from subzero.diagnosis.inference import settings
-from subzero.diagnosis.inference.linear_gaussian import KAPPAS, Quadratic, Scale, Scales, log_sum, posterior
+from subzero.diagnosis.inference.linear_gaussian import (
+    KAPPAS,
+    Posterior,
+    Quadratic,
+    Scale,
+    Scales,
+    log_beyond,
+    log_sum,
+    posterior,
+)
 
 if TYPE_CHECKING:
     from subzero.diagnosis.inference.problem import Problem
@@ -364,12 +381,27 @@ def candidate_of(problem: Problem, ids: Ids, fit: Fit) -> Candidate:
 
 def _evidence(problem: Problem, ids: Ids, fit: Fit) -> dict[float, float]:
     """Return κ → log evidence of a hypothesis."""
-    return laplace(problem.entries, fit, {kappa: variances(problem.entries, ids, kappa) for kappa in KAPPAS})
+    under = {kappa: variances(problem.entries, ids, kappa) for kappa in KAPPAS}
+    causes = [columns_of(problem.entries, (one,)) for one in ids]
+    return laplace(problem.entries, fit, under, causes, PRACTICAL_TOLERANCES)
 
 
-def laplace(entries: Sequence[Entry], fit: Fit, under: Mapping[float, np.ndarray]) -> dict[float, float]:
+def laplace(
+    entries: Sequence[Entry],
+    fit: Fit,
+    under: Mapping[float, np.ndarray],
+    causes: Sequence[Sequence[int]],
+    practical: float,
+) -> dict[float, float]:
     """Return κ → log evidence under prior variances (k,): that of the linear problem, moved to what the real run leaves
     under the fit's own κ.
+
+    Args:
+        entries: of z.
+        fit: the best one.
+        under: κ → prior variances.
+        causes: places of the parameters of each.
+        practical: size from which on they are causes. [κτ]
     """
     q = fit.quadratic
     found = {kappa: posterior(q, D) for kappa, D in under.items()}
@@ -377,9 +409,34 @@ def laplace(entries: Sequence[Entry], fit: Fit, under: Mapping[float, np.ndarray
     here = -fit.objective - found[nearest].log_evidence - 0.5 * found[nearest].log_det
     every = range(len(entries))
     return {
-        kappa: one.log_evidence + here + possible(entries, every, one.z, np.sqrt(np.diag(one.M)), held=True)
+        kappa: one.log_evidence
+        + here
+        + possible(entries, every, one.z, np.sqrt(np.diag(one.M)), held=True)
+        + of_sizes(entries, one, under[kappa], causes, practical * kappa)
         for kappa, one in found.items()
     }
+
+
+def of_sizes(
+    entries: Sequence[Entry],
+    said: Posterior,
+    D: np.ndarray,
+    causes: Sequence[Sequence[int]],
+    practical: float,
+) -> float:
+    """Return what is added to a log evidence because what calibration may do is no cause (`log_beyond`).
+
+    Args:
+        entries: of z.
+        said: what the data say of them under normal priors.
+        D: the variances of these (k,).
+        causes: places of the parameters of each.
+        practical: size from which on they are causes. [τ]
+    """
+    at = [k for own in causes for k in own]
+    within = np.array([(practical * entries[k].parameter.tolerance) ** 2 for k in at])
+    mean = np.maximum(said.z[at], [-np.inf if entries[k].parameter.low < 0.0 else 0.0 for k in at])
+    return float(log_beyond(mean, np.diag(said.M)[at], D[at], within, [len(own) for own in causes]))
 
 
 def possible(

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 import numpy as np
 
-from subzero.diagnosis.hypothesis.hypotheses import Entry, Ids, columns_of
+from subzero.diagnosis.hypothesis.hypotheses import PRACTICAL_TOLERANCES, Entry, Ids, columns_of
 from subzero.diagnosis.inference.linear_gaussian import KAPPAS, log_sum
 from subzero.diagnosis.results import (
     CALIBRATED,
@@ -45,8 +45,6 @@ MIN_DISCRIMINATION = 9.0
 """With less than this squared distance to a rival no cause is named, whatever the record happens to say."""
 REFUTED_NATS = 16.0
 """A rival whose fit is this far behind the best is refuted: where D is 9, luck would have to be worth 3 σ."""
-PRACTICAL_TOLERANCES = 4.0
-"""A deviation within this many tolerances is a matter of calibration, whatever its evidence."""
 
 
 def sizes_in_tolerances(entries: Sequence[Entry], ids: Ids, z: np.ndarray, kappa: float) -> dict[str, float]:

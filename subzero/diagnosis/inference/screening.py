@@ -16,6 +16,7 @@ import numpy as np
 from scipy.special import log_ndtr
 
 from subzero.diagnosis.hypothesis.hypotheses import (
+    PRACTICAL_TOLERANCES,
     Ids,
     columns_of,
     is_flat,
@@ -31,10 +32,18 @@ from subzero.diagnosis.inference.linear_gaussian import (
     Posterior,
     Quadratic,
     freed,
+    log_beyond,
     log_sum,
     posterior,
 )
-from subzero.diagnosis.inference.map_fit import Candidate, Fit, at_bad_minimum, refit, restarted_where_smooth
+from subzero.diagnosis.inference.map_fit import (
+    Candidate,
+    Fit,
+    at_bad_minimum,
+    of_sizes,
+    refit,
+    restarted_where_smooth,
+)
 from subzero.diagnosis.inference.posing import with_noise_behind
 from subzero.diagnosis.inference.problem import SizeRun, sizes_run
 
@@ -152,30 +161,44 @@ def linear_evidences(
     problem: Problem, base: Mapping[float, Base], held: Ids, several: Sequence[Ids]
 ) -> dict[Ids, float]:
     """Return hypothesis → log evidence, mixed over κ, with its causes freed beside those that are free in `base`."""
-    entries, by_size = problem.entries, dict[int, list[tuple[Ids, list[int]]]]()
-    own = {one: columns_of(entries, (one,)) for one in {one for ids in several for one in ids}}
+    entries, by_sizes = problem.entries, dict[tuple[int, ...], list[tuple[Ids, list[int]]]]()
+    own = {one: columns_of(entries, (one,)) for one in {one for ids in (*several, held) for one in ids}}
     for ids in several:
-        at = [k for one in ids if one not in held for k in own[one]]
-        by_size.setdefault(len(at), []).append((ids, at))
+        more = [own[one] for one in ids if one not in held]
+        sizes = tuple(len(at) for at in more)
+        by_sizes.setdefault(sizes, []).append((ids, [k for at in more for k in at]))
+    known = {
+        kappa: np.log(prior)
+        + of_sizes(entries, *base[kappa], [own[one] for one in held], PRACTICAL_TOLERANCES * kappa)
+        for kappa, prior in KAPPAS.items()
+    }
     found = dict[Ids, float]()
-    for alike in by_size.values():
+    for sizes, alike in by_sizes.items():
         places = np.array([at for _, at in alike], dtype=int)
         logs = [
-            np.log(prior) + _freed_evidence(problem, base[kappa], kappa, places)
-            for kappa, prior in KAPPAS.items()
+            log + _freed_evidence(problem, base[kappa], kappa, places, sizes) for kappa, log in known.items()
         ]
         found |= zip([ids for ids, _ in alike], np.logaddexp.reduce(logs).tolist(), strict=True)
     return {ids: found[ids] for ids in several}
 
 
-def _freed_evidence(problem: Problem, base: Base, kappa: float, places: np.ndarray) -> np.ndarray:
-    """Return the log evidence (n,) of n hypotheses that free the entries at places (n, p) under a κ."""
-    every, bounded = range(len(problem.entries)), _lowest(problem) == 0.0
-    value, mean, covariance = freed(
-        base.known, base.D, places, variances_named(problem.entries, every, kappa)[places]
+def _freed_evidence(
+    problem: Problem, base: Base, kappa: float, places: np.ndarray, sizes: Sequence[int]
+) -> np.ndarray:
+    """Return the log evidence (n,) of n hypotheses that free the entries at places (n, p) under a κ, of causes with so
+    many parameters each.
+    """
+    every, bounded = range(len(problem.entries)), (_lowest(problem) == 0.0)[places]
+    prior = variances_named(problem.entries, every, kappa)[places]
+    value, mean, covariance = freed(base.known, base.D, places, prior)
+    variance = np.diagonal(covariance, axis1=-2, axis2=-1)
+    value = value + np.sum(np.where(bounded, log_ndtr(mean / np.sqrt(variance)) + np.log(2.0), 0.0), axis=-1)
+    tolerance = np.array([entry.parameter.tolerance for entry in problem.entries])[places]
+    within, mean = (
+        (PRACTICAL_TOLERANCES * kappa * tolerance) ** 2,
+        np.where(bounded, np.maximum(mean, 0.0), mean),
     )
-    x = mean / np.sqrt(np.diagonal(covariance, axis1=-2, axis2=-1))
-    return value + np.sum(np.where(bounded[places], log_ndtr(x) + np.log(2.0), 0.0), axis=-1)
+    return value + log_beyond(mean, variance, prior, within, sizes)
 
 
 def _without_slope(problem: Problem, J: np.ndarray) -> list[int]:
@@ -225,8 +248,17 @@ def _quadratic_of(run: SizeRun, near: Quadratic, J: np.ndarray) -> Quadratic:
 
 def mixed_evidence(problem: Problem, q: Quadratic, ids: Ids = ()) -> float:
     """Return the log evidence of some causes, or with nothing but tolerances, mixed over κ."""
-    return log_sum([np.log(prior) + posterior(q, variances(problem.entries, ids, kappa)).log_evidence
-                    for kappa, prior in KAPPAS.items()])  # fmt: skip
+    return log_sum(
+        [np.log(prior) + linear_evidence(problem, q, ids, kappa) for kappa, prior in KAPPAS.items()]
+    )
+
+
+def linear_evidence(problem: Problem, q: Quadratic, ids: Ids, kappa: float) -> float:
+    """Return the log evidence of some causes, or of nothing, under a κ."""
+    D = variances(problem.entries, ids, kappa)
+    said = posterior(q, D)
+    causes = [columns_of(problem.entries, (one,)) for one in ids]
+    return said.log_evidence + of_sizes(problem.entries, said, D, causes, PRACTICAL_TOLERANCES * kappa)
 
 
 def with_one_added(problem: Problem, one: Candidate) -> dict[Ids, float]:

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 from subzero.diagnosis.hypothesis.catalogue.sensors import SPECS
+from subzero.diagnosis.hypothesis.hypotheses import PRACTICAL_TOLERANCES_SUDDEN
 from subzero.diagnosis.inference.model_average import (
     HEALTHY_PROBABILITY,
-    PRACTICAL_TOLERANCES,
     ChangePointSummary,
     credible_set,
     decide,
@@ -114,7 +114,7 @@ def is_large(one: FittedChangePoint) -> bool:
     """
     sizes = zip(one.change_point.mean, one.change_point.effect.parameters, strict=True)
     return any(
-        abs(float(z)) > 0.5 * PRACTICAL_TOLERANCES * one.change_point.kappa * p.tolerance for z, p in sizes
+        abs(float(z)) > PRACTICAL_TOLERANCES_SUDDEN * one.change_point.kappa * p.tolerance for z, p in sizes
     )
 
 
