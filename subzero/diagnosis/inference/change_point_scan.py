@@ -186,7 +186,8 @@ def grown(
 
 def _around(time: float, spacing: float) -> list[float]:
     """Return the finer times between a time of the grid and its neighbours."""
-    return [time + i * spacing / FINE_PER_COARSE for i in range(1 - FINE_PER_COARSE, FINE_PER_COARSE) if i]
+    finer = [time + i * spacing / FINE_PER_COARSE for i in range(1 - FINE_PER_COARSE, FINE_PER_COARSE) if i]
+    return [round(one, 6) for one in finer]  # those of two neighbours are the same
 
 
 def _strongest(found: list[ChangePoint]) -> list[ChangePoint]:

@@ -143,6 +143,7 @@ def _of_record(problem: Problem, records: Sequence[Logged], record: int) -> list
     jumps = steps_off_grid(logged, logged.trusted)
     read_off += [likeliest(begun, begun.by_whole_steps(one)) for one in jumps]
     begun, found = _beside_clock(begun, read_off, _forward(begun, read_off, logged.trusted), logged.trusted)
+    found = _by_clock_of_others(begun, read_off, found, logged.trusted)
     found = _closer(problem, record, begun, read_off, _back(begun, read_off, found))
     made = [*(_Judged(Suspect(one, SIGNATURE_LEAD, SIGNATURE_LEAD), ()) for one in read_off), *found]
     against = _Against(problem=problem, records=records, record=record, begun=begun, read_off=len(read_off),
@@ -180,10 +181,27 @@ def _total_lead(found: Sequence[_Judged]) -> float:
     return sum(one.suspect.lead for one in found)
 
 
-def _forward(begun: Yardstick, read_off: Sequence[DataError], trusted: frozenset[str]) -> list[_Judged]:
+def _by_clock_of_others(
+    begun: Yardstick, read_off: Sequence[DataError], found: list[_Judged], trusted: frozenset[str]
+) -> list[_Judged]:
+    """Return errors, or what comes out better with the clock of a channel that seems to be late besides: if most channels
+    say little, the one that is early by itself has set the clock of all.
+    """
+    clocks = [one.suspect.error for one in found if one.suspect.error.kind == "late_clock"]
+    later = [one.suspect.error.amount for one in found if one.suspect.error.kind == "latency"]
+    tried = [found]
+    for error in (replace(clock, amount=clock.amount + more) for clock in clocks for more in later):
+        first = _Judged(judged_again(begun.after(read_off), error), ())
+        tried.append(_forward(begun, read_off, trusted, [first]))
+    return max(tried, key=_total_lead)
+
+
+def _forward(
+    begun: Yardstick, read_off: Sequence[DataError], trusted: frozenset[str], first: Sequence[_Judged] = ()
+) -> list[_Judged]:
     """Return the errors that come out best one after the other, each with those before it corrected."""
-    found = list[_Judged]()
-    for _ in range(MOST_ERRORS):
+    found = [*first]
+    for _ in range(MOST_ERRORS - len(found)):
         ranked = suspects(begun.after([*read_off, *(one.suspect.error for one in found)]), trusted)
         if not ranked or not _is_suspected(ranked[0]):
             break
