@@ -184,8 +184,8 @@ def _total_lead(found: Sequence[_Judged]) -> float:
 def _by_clock_of_others(
     begun: Yardstick, read_off: Sequence[DataError], found: list[_Judged], trusted: frozenset[str]
 ) -> list[_Judged]:
-    """Return errors, or what comes out better with the clock of a channel that seems to be late besides: if most channels
-    say little, the one that is early by itself has set the clock of all.
+    """Return errors, or what comes out better with the clock of a channel that seems to be late besides: if most
+    channels say little, the one that is early by itself has set the clock of all.
     """
     clocks = [one.suspect.error for one in found if one.suspect.error.kind == "late_clock"]
     later = [one.suspect.error.amount for one in found if one.suspect.error.kind == "latency"]
