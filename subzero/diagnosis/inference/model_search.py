@@ -13,13 +13,12 @@ from itertools import chain, combinations
 
 import numpy as np
 
-from subzero.diagnosis.hypothesis.hypotheses import MAX_CAUSES, Ids, columns_of, nameable, variances
+from subzero.diagnosis.hypothesis.hypotheses import MAX_CAUSES, Ids, columns_of, is_flat, nameable, variances
 from subzero.diagnosis.inference import settings
 from subzero.diagnosis.inference.linear_gaussian import KAPPAS
 from subzero.diagnosis.inference.map_fit import (
     Candidate,
     Fit,
-    at_bad_minimum,
     candidate_of,
     continued,
     is_poor_fit,
@@ -70,8 +69,7 @@ class Search(Fits):
             for without in best.ids:
                 self._without(best, without)
             self._beside_others(best)
-            self._non_smooth(best)
-            self._parts_again(best)
+            self._without_slope(best)
             self.refine(settings.MAX_ADDED, settings.CLOSE_NATS)
             self.cross()
             self.sharpen()
@@ -104,18 +102,21 @@ class Search(Fits):
         for ids in sorted(found, key=lambda ids: -found[ids][0])[: settings.MAX_ADDED]:
             self.fit(ids, found[ids][1])
 
-    def _non_smooth(self, best: Candidate) -> None:
-        """Fit causes that runs have kinks in beside the best, or in the place of one of its causes."""
-        found = dict[Ids, TriedSize]()
+    def _without_slope(self, best: Candidate) -> None:
+        """Fit causes that do nothing while they are small beside the best, or in the place of one of its causes: no
+        linear problem knows of them.
+        """
+        found, entries = dict[Ids, TriedSize](), self.problem.entries
+        flat = {k for k in non_smooth(self.problem, ()) if is_flat(entries[k], best.fit.J[:, k])}
         rests = [tuple(one for one in best.ids if one != without) for without in best.ids]
         for rest in [best.ids, *rests] if len(best.ids) < MAX_CAUSES else rests:
             for ids, one in with_sizes_tried(
-                self.problem, best, rest, non_smooth(self.problem, rest), settings.SWEEP_SCALES
+                self.problem, best, rest, sorted(flat - set(columns_of(entries, rest))), settings.SWEEP_SCALES
             ).items():
                 if ids not in found or one.log_posterior > found[ids].log_posterior:
                     found[ids] = one
         for ids in self._worth_fitting(found, best, -settings.FURTHER_CAUSE_NATS):
-            D = variances(self.problem.entries, ids, best.kappa)
+            D = variances(entries, ids, best.kappa)
             fit = refit(self.problem, found[ids].z, found[ids].J, D, most_fresh=0)
             self._take(candidate_of(self.problem, ids, fit))
 
@@ -150,14 +151,6 @@ class Search(Fits):
                 candidate_of(self.problem, one.ids, restarted_where_smooth(self.problem, one.fit, one.ids, D))
             )
         return self.best()
-
-    def _parts_again(self, best: Candidate) -> None:
-        """Fit the best candidate without one of its causes from off its kinks, where that went astray."""
-        for without in best.ids:
-            ids = tuple(one for one in best.ids if one != without)
-            fit, D = self.candidates[ids].fit, variances(self.problem.entries, ids, 1.0)
-            if at_bad_minimum(self.problem, fit, ids):
-                self._take(candidate_of(self.problem, ids, restarted_where_smooth(self.problem, fit, ids, D)))
 
     def _unknown(self, found: dict[Ids, float]) -> dict[Ids, float]:
         """Return those of estimated log posteriors that no fit is known of, or only one that went astray from afar."""
