@@ -96,7 +96,9 @@ def test_a_rounded_heading_that_is_hardly_ever_left_is_no_drop_out_between_its_o
     [(7401, 48, {"command_sign:stern_plane_port"}),  # was a stern-plane that jams at 1 s, with certainty
      (7401, 38, {"step:pitch", "clock_rate"}),  # was another rate, and a late clock
      (7401, 14, {"step:depth", "clock_rate"}),  # was a clock, and a drift of the depth
-     (71125, 6, {"sign:heading", "command_swap:rudder/stern_planes"})],  # was the sign of the yaw rate
+     (71125, 6, {"sign:heading", "command_swap:rudder/stern_planes"}),  # was the sign of the yaw rate
+     (11013, 62, {"late_clock", "latency:surge_speed"}),  # was the clock of the speed log, and others late
+     (11013, 22, {"late_clock", "reference:heading=counts counter-clockwise from south"})],  # was 0.9 s off
 )  # fmt: skip
 def test_an_error_that_something_else_comes_close_to_is_named(seed, index, errors):
     record = data_errors.made(*data_errors.drawn(seed, index + 1)[index])
