@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import runpy
 from collections.abc import Iterable
+from functools import cache
 from importlib.metadata import entry_points
 from pathlib import Path
 
@@ -58,6 +59,7 @@ def load(path: str | Path) -> tuple[Effect, ...]:
     return tuple(found)
 
 
+@cache
 def _installed() -> tuple[Effect, ...]:
-    """Return the effects that installed packages bring."""
+    """Return the effects that installed packages bring; to look for them takes as long as several runs."""
     return tuple(effect for entry in entry_points(group="subzero.effects") for effect in entry.load())
