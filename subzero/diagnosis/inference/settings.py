@@ -27,7 +27,7 @@ HOPELESS_NATS = 6.0
 a local minimum, and is fitted again."""
 LINEAR_NATS = 12.0
 """Linear evidence far from a fit may err by this much: within it, screened hypotheses and one cause in the place of two
-are fitted, and forces, drifts and large hypotheses are looked at around fits of their own."""
+are fitted, forces, drifts and large hypotheses are looked at around fits of their own, and onsets on the fine grid."""
 DECISIVE_NATS = 30.0
 """No sum of causes gains more over an explanation that leaves only noise; a fit that predicts this much more is
 continued."""
@@ -72,8 +72,8 @@ MAX_ADDED = 2
 """Most fits with something more (a further cause, a bent cause by itself, along a force, from a large hypothesis), and
 how often one is repeated with what it showed: rivals from one another's optimum, the noise behind the wide fit."""
 MAX_TRIED = 3
-"""Most fits of one kind in one look (swapped causes, restarts, change points, forces, rivals to refute), and most
-looks: at change points, at what has not settled, and where a fit might go on."""
+"""Most fits of one kind in one look (swapped causes, restarts, change points, forces, rivals to refute), most peaks of
+an onset, and most looks: at change points, at what has not settled, and where a fit might go on."""
 MAX_PAIRS = 4
 """Most screened pairs that are fitted; from afar, most causes by themselves."""
 MAX_RANKED = 7
