@@ -16,7 +16,7 @@ from benchmarks.diagnosis import data_errors, world
 from benchmarks.diagnosis.world import ROUNDED
 from subzero import Logged
 from subzero.diagnosis import Setting, catalogue
-from subzero.diagnosis.inference import DataError, repeated_values
+from subzero.diagnosis.inference import DataError, pose, repeated_values
 from subzero.records.record import Record
 from subzero.synthetic.planted import draw_tolerances, make_record
 
@@ -88,6 +88,31 @@ def test_a_rounded_heading_that_is_hardly_ever_left_is_no_drop_out_between_its_o
     record = dataclasses.replace(clean.record, values={**clean.record.values, "heading": heading})
     found = repeated_values(dataclasses.replace(clean, record=record))
     assert not [one for one in found if one.channels == ("heading",) and one.how]
+
+
+@pytest.mark.parametrize(
+    "error",
+    [DataError(kind="latency", channels=("depth",), amount=2.0), DataError(kind="late_clock", amount=2.0)],
+    ids=["latency", "late_clock"],
+)
+def test_a_rounded_depth_is_as_coarse_where_a_delay_leaves_one_of_its_values(error):
+    """Which steps a sensor shows in is read off all that it has shown: one value by itself might be as fine as any."""
+    clean = measured("zigzag", 20264)
+    depth = np.where(clean.record.time < 1.5, 1.0, 1.1)
+    record = Record(source="made", time=clean.record.time, values={**clean.record.values, "depth": depth})
+    logged = error.corrected(dataclasses.replace(clean, record=record))
+    assert set(logged.record.values["depth"][np.isfinite(logged.record.values["depth"])]) == {1.1}
+    (posed,) = pose([logged]).records
+    assert posed.noise["depth"].resolution == pytest.approx(0.1)
+
+
+@pytest.mark.slow
+def test_a_rounded_depth_that_stands_still_is_not_late():
+    """Without its first two seconds it shows one value, and had seemed to be twice as fine: worth 165 nats."""
+    logged, _ = world.record_of(world.drawn(12001, 123)[122])
+    verdict = subzero.diagnose(logged, budget="verdict")
+    assert verdict.verdict == "nothing_wrong"
+    assert not verdict.data_errors
 
 
 @pytest.mark.slow

@@ -29,6 +29,7 @@ import numpy as np
 import scenarios
 from subzero.channels import BY_NAME, HEADING, TURN, turned
 from subzero.diagnosis.hypothesis.logged import Logged
+from subzero.diagnosis.hypothesis.noise import usual_of
 from subzero.errors import UserError
 from subzero.records.consistency import MISTAKEN, REPORTED_COMMANDS
 from subzero.records.record import Record
@@ -164,7 +165,8 @@ def _with(logged: Logged, time: np.ndarray | None = None, **values: np.ndarray) 
         time=record.time if time is None else time,
         values={**record.values, **values},
     )
-    return dataclasses.replace(logged, record=made)
+    steps = {name: step for name, step in logged.steps.items() if name not in values}
+    return dataclasses.replace(logged, record=made, steps=steps)
 
 
 def unturned(heading: np.ndarray) -> np.ndarray:
@@ -250,7 +252,14 @@ def _inside(logged: Logged, time: np.ndarray) -> Logged:
         raise UserError(f"'{logged.name}' has no sample within its trial once its clock is set right.")
     values = {name: column[kept] for name, column in logged.record.values.items()}
     record = Record(source=logged.record.source, time=np.maximum(time[kept], 0.0), values=values)
-    return dataclasses.replace(logged, record=record)
+    return dataclasses.replace(logged, record=record, steps=_steps(logged, values))
+
+
+def _steps(logged: Logged, channels: Iterable[str]) -> dict[str, float]:
+    """Return channel → step between its values, of all that there are: samples are to be put outside the trial."""
+    values = logged.record.values
+    shown = {name: usual_of(name, values[name], logged.noise, logged.steps).resolution for name in channels}
+    return {**logged.steps, **shown}
 
 
 def _earlier(error: DataError, logged: Logged) -> Logged:
@@ -300,7 +309,8 @@ def _in_time(error: DataError, logged: Logged) -> Logged:
         name: _spread(column, place[: record.time.size], time.size) for name, column in record.values.items()
     }
     values[channel] = _spread(record.values[channel][inside], place[record.time.size :], time.size)
-    return dataclasses.replace(logged, record=Record(source=record.source, time=time, values=values))
+    made = Record(source=record.source, time=time, values=values)
+    return dataclasses.replace(logged, record=made, steps=_steps(logged, [channel]))
 
 
 def _spread(values: np.ndarray, place: np.ndarray, size: int) -> np.ndarray:

@@ -23,6 +23,7 @@ class Logged:
         name: short, for figures and tables.
         notes: what was left out, and why.
         trusted: channels that the user has said are right as they are.
+        steps: channel → step between its values, where more of them show it than are left. [display unit]
     """
 
     record: Record
@@ -31,3 +32,4 @@ class Logged:
     name: str
     notes: tuple[str, ...] = ()
     trusted: frozenset[str] = frozenset()
+    steps: Mapping[str, float] = field(default_factory=dict)

@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -248,12 +249,19 @@ class Usual(NamedTuple):
     times_beside: TimesBeside | None = None
 
 
-def usual_of(channel: str, values: np.ndarray, known: Mapping[str, float]) -> Usual:
+NOT_KNOWN: Mapping[str, float] = MappingProxyType({})
+"""Steps of channels that only their values tell."""
+
+
+def usual_of(
+    channel: str, values: np.ndarray, known: Mapping[str, float], steps: Mapping[str, float] = NOT_KNOWN
+) -> Usual:
     """Return what a channel's sensor is like, before anything is fitted: its level as known or usual, its resolution as
-    its values (n,) show it.
+    its values (n,) show it, or as more of them have shown: channel → step.
     """
     level = known.get(channel, SPECS[channel].noise)
-    return Usual(level, resolution_of(values, level), channel in known)
+    step = steps[channel] if channel in steps else resolution_of(values, level)
+    return Usual(level, step, channel in known)
 
 
 def usual_noise(time: np.ndarray, used: np.ndarray, usual: Usual) -> Noise:

@@ -196,7 +196,8 @@ class Yardstick:
         return Between(low, x - low)
 
     def _term(self, logged: Logged, name: str, nominal: np.ndarray) -> Term:
-        time, usual = logged.record.time, usual_of(name, logged.record.values[name], logged.noise)
+        time, values = logged.record.time, logged.record.values[name]
+        usual = usual_of(name, values, logged.noise, logged.steps)
         left, used = self._left(logged, name, nominal)
         measured = int(np.count_nonzero(np.isfinite(left)))
         noise, slopes = usual_noise(time, used, usual), self.slopes[name]
@@ -211,7 +212,7 @@ class Yardstick:
         """Return measured − predicted of a channel (n,), and which samples are measured, and no outliers (n,)."""
         values, expected = logged.record.values[name], self.at(nominal, logged.record.time)
         left = (turned(values, expected) if name == HEADING else values) - expected
-        usual, used = usual_of(name, values, logged.noise), np.isfinite(left)
+        usual, used = usual_of(name, values, logged.noise, logged.steps), np.isfinite(left)
         used[used] = ~spikes(left[used], max(usual.level, usual.resolution))
         return left, used
 

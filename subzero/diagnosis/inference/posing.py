@@ -112,7 +112,7 @@ def _observed(one: Logged) -> Observed:
         )
     if HEADING in values:
         values[HEADING] = turned(values[HEADING], simulated[HEADING])
-    noise = {name: _usual(time, column, column - simulated[name], usual_of(name, column, one.noise))
+    noise = {name: _usual(time, column, column - simulated[name], usual_of(name, column, one.noise, one.steps))
              for name, column in values.items()}  # fmt: skip
     return Observed(name=one.name, time=time, values=values, noise=noise, setting=setting, known=one.noise)
 
