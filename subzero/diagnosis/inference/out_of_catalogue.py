@@ -16,7 +16,12 @@ import numpy as np
 
 from subzero.diagnosis.hypothesis.hypotheses import PRIOR, Ids, variances
 from subzero.diagnosis.inference import settings
-from subzero.diagnosis.inference.change_point_fit import FittedChangePoint, fit_change_points, linearised_at
+from subzero.diagnosis.inference.change_point_fit import (
+    FittedChangePoint,
+    fit_change_points,
+    gain_of_fit_with_own_noise,
+    linearised_at,
+)
 from subzero.diagnosis.inference.change_point_scan import BaseRun, LinearisationPoint
 from subzero.diagnosis.inference.input_estimation import (
     LatentForceCandidate,
@@ -40,7 +45,6 @@ from subzero.diagnosis.inference.model_average import FURTHER_CAUSE_ODDS
 from subzero.diagnosis.inference.model_fits import (
     WithOwnNoise,
     candidate_with_own_noise,
-    gain_of_own_noise,
     gained_by_noise,
     with_own_noise,
 )
@@ -310,7 +314,7 @@ def _with_own_noise(problem: Problem, behind: Problem, one: OutOfCatalogue) -> O
     that behind "nothing is wrong".
     """
     if isinstance(one.what, FittedChangePoint):
-        gain = gain_of_own_noise(problem, *one.what.linear(problem))
+        gain = gain_of_fit_with_own_noise(problem, one.what)
         return replace(one, log_posterior=one.log_posterior + gain)
     log = one.log_posterior - one.what.log_evidence(problem, one.causes) + gained_by_noise(problem, behind)
     return _beside_noise(one, one.what.made_white(problem, behind), log, behind)
