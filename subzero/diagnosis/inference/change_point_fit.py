@@ -45,8 +45,6 @@ from subzero.diagnosis.inference.map_fit import (
     refit,
     with_own_jacobian,
 )
-from subzero.diagnosis.inference.model_fits import gained_by_noise, with_own_noise
-from subzero.diagnosis.inference.posing import whitened_again
 
 if TYPE_CHECKING:
     from subzero.diagnosis.hypothesis.effect import Effect
@@ -145,10 +143,10 @@ def _fitted(problem: Problem, candidate: RankedChangePoint) -> FittedChangePoint
     D, J = _prior(problem, more, 1.0), np.hstack([point.fit.J[:, :n], slopes])
     fit = continued(more, with_own_jacobian(more, refit(more, start, J, D, most_fresh=1)))
     time = round(change_point.time + float(fit.z[-1]), 2)
-    return _as_fitted(problem, more, replace(change_point, time=time), fit)
+    return as_fitted(problem, more, replace(change_point, time=time), fit)
 
 
-def _as_fitted(problem: Problem, more: Problem, change_point: ChangePoint, fit: Fit) -> FittedChangePoint:
+def as_fitted(problem: Problem, more: Problem, change_point: ChangePoint, fit: Fit) -> FittedChangePoint:
     """Return a sudden cause with its fit, in the problem with its parameters behind those of another, and its evidence,
     mixed over κ.
     """
@@ -164,18 +162,6 @@ def _as_fitted(problem: Problem, more: Problem, change_point: ChangePoint, fit: 
         problem=more,
         fit=fit,
     )
-
-
-def gain_of_fit_with_own_noise(problem: Problem, one: FittedChangePoint) -> float:
-    """Return what the log evidence of a sudden cause gains with the noise that is the most probable beside it, fitted
-    again with that: no linear problem knows that a fin cannot lose more than all of its command.
-    """
-    own = with_own_noise(problem, *one.linear(problem))
-    more, fit = replace(one.problem, records=own.records), one.fit
-    J = whitened_again(problem, own, fit.J)
-    again = refit(more, fit.z, J, fit.D, most_fresh=0, made_at=fit.made_at)
-    found = _as_fitted(own, more, one.change_point, again)
-    return found.log_posterior - one.log_posterior + gained_by_noise(problem, own)
 
 
 def _begin(problem: Problem, more: Problem, candidate: RankedChangePoint) -> np.ndarray:

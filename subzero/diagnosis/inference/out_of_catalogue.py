@@ -18,8 +18,8 @@ from subzero.diagnosis.hypothesis.hypotheses import PRIOR, Ids, variances
 from subzero.diagnosis.inference import settings
 from subzero.diagnosis.inference.change_point_fit import (
     FittedChangePoint,
+    as_fitted,
     fit_change_points,
-    gain_of_fit_with_own_noise,
     linearised_at,
 )
 from subzero.diagnosis.inference.change_point_scan import BaseRun, LinearisationPoint
@@ -40,7 +40,7 @@ from subzero.diagnosis.inference.latent_force import (
     one_terms,
 )
 from subzero.diagnosis.inference.linear_gaussian import KAPPAS, Linear, Terms, log_sum, posterior
-from subzero.diagnosis.inference.map_fit import is_poor_fit
+from subzero.diagnosis.inference.map_fit import is_poor_fit, refit
 from subzero.diagnosis.inference.model_average import FURTHER_CAUSE_ODDS
 from subzero.diagnosis.inference.model_fits import (
     WithOwnNoise,
@@ -314,10 +314,21 @@ def _with_own_noise(problem: Problem, behind: Problem, one: OutOfCatalogue) -> O
     that behind "nothing is wrong".
     """
     if isinstance(one.what, FittedChangePoint):
-        gain = gain_of_fit_with_own_noise(problem, one.what)
-        return replace(one, log_posterior=one.log_posterior + gain)
+        return replace(one, log_posterior=one.log_posterior + _gain_of_own_noise(problem, one.what))
     log = one.log_posterior - one.what.log_evidence(problem, one.causes) + gained_by_noise(problem, behind)
     return _beside_noise(one, one.what.made_white(problem, behind), log, behind)
+
+
+def _gain_of_own_noise(problem: Problem, one: FittedChangePoint) -> float:
+    """Return what the log evidence of a sudden cause gains with the noise that is the most probable beside it, fitted
+    again with that: no linear problem knows that a fin cannot lose more than all of its command.
+    """
+    own = with_own_noise(problem, *one.linear(problem))
+    more, fit = replace(one.problem, records=own.records), one.fit
+    J = whitened_again(problem, own, fit.J)
+    again = refit(more, fit.z, J, fit.D, most_fresh=0, made_at=fit.made_at)
+    found = as_fitted(own, more, one.change_point, again)
+    return found.log_posterior - one.log_posterior + gained_by_noise(problem, own)
 
 
 def _beside_nothing(problem: Problem, nothing: WithOwnNoise, one: OutOfCatalogue) -> OutOfCatalogue:
