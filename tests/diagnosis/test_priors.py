@@ -1,12 +1,26 @@
 """What is believed before a record is seen; that what is measured stays as it was."""
 
 from math import comb
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from subzero.diagnosis.inference import PRIOR, Observed, log_prior
-from subzero.diagnosis.inference.linear_gaussian import Quadratic, log_beyond, posterior
+from subzero.diagnosis import catalogue
+from subzero.diagnosis.inference import (
+    PRIOR,
+    Fit,
+    Observed,
+    Quadratic,
+    candidate_of,
+    entries_of,
+    log_prior,
+    objective,
+    posterior,
+    variances,
+)
+from subzero.diagnosis.inference.linear_gaussian import log_beyond
+from subzero.diagnosis.inference.screening import with_one_added
 
 
 def test_prior_probabilities_sum_to_one():
@@ -56,3 +70,33 @@ def test_only_a_cause_that_surely_does_next_to_nothing_is_less_probable(mean, va
     """Not one that is not seen, nor one that is large."""
     found = log_beyond(np.array([mean]), np.array([variance]), np.array([1.0]), np.array([0.09]), [1])
     assert least - 1e-9 <= found <= most + 1e-9
+
+
+def test_a_fitted_cause_and_one_that_is_freed_in_the_linear_problem_have_the_same_evidence():
+    """Two formulas: around the fit of the cause, and from that of none; causes with one parameter and with two."""
+    names = ("rudder_offset", "stern_plane_offset", "rudder_lift_slope")
+    entries = entries_of([catalogue(())[name] for name in names], (), 1)
+    problem, rng = SimpleNamespace(entries=entries), np.random.default_rng(3)
+    J = rng.standard_normal((60, len(entries))) / np.sqrt(variances(entries, (), 4.0))
+    whole = J @ (0.3 * np.sqrt(variances(entries, (), 4.0))) + rng.standard_normal(60)
+
+    def fitted(ids):
+        D = variances(entries, ids, 1.0)
+        z = posterior(Quadratic.at(np.zeros(len(entries)), whole, J), D).z
+        r = whole - J @ z
+        fit = Fit(
+            z=z,
+            r=r,
+            J=J,
+            D=D,
+            objective=objective(r, z, D),
+            converged=True,
+            predicted_gain=0.0,
+            fresh=0,
+            made_at=z,
+        )
+        return candidate_of(problem, ids, fit)
+
+    freed = with_one_added(problem, fitted(()))
+    for name in names:
+        assert fitted((name,)).log_posterior == pytest.approx(freed[(name,)], abs=1e-6)

@@ -123,7 +123,8 @@ def test_a_rounded_depth_that_stands_still_is_not_late():
      (7401, 14, {"step:depth", "clock_rate"}),  # was a clock, and a drift of the depth
      (71125, 6, {"sign:heading", "command_swap:rudder/stern_planes"}),  # was the sign of the yaw rate
      (11013, 62, {"late_clock", "latency:surge_speed"}),  # was the clock of the speed log, and others late
-     (11013, 22, {"late_clock", "reference:heading=counts counter-clockwise from south"})],  # was 0.9 s off
+     (11013, 22, {"late_clock", "reference:heading=counts counter-clockwise from south"}),  # was 0.9 s off
+     (12013, 14, {"command_sign:rudder", "unit:pitch=radians"})],  # was a rudder that jams at 8 s
 )  # fmt: skip
 def test_an_error_that_something_else_comes_close_to_is_named(seed, index, errors):
     record = data_errors.made(*data_errors.drawn(seed, index + 1)[index])
