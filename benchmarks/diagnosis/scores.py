@@ -48,7 +48,7 @@ def first(one: Result) -> tuple[str, float]:
 
 def is_foreign(name: str) -> bool:
     """Say whether a hypothesis is outside the catalogue."""
-    return name.startswith(FOREIGN)
+    return any(one.startswith(FOREIGN) for one in name.split(" + "))
 
 
 def truth(one: Result) -> str:

@@ -21,6 +21,7 @@ from subzero.diagnosis.inference import (
     variances,
 )
 from subzero.diagnosis.inference.model_search import Search
+from subzero.diagnosis.inference.out_of_catalogue import shares
 from subzero.diagnosis.verdict.conclude import conclude, decided, remaining_models
 from subzero.diagnosis.verdict.estimates import deviations
 from subzero.diagnosis.verdict.follow_up import follow_up, ranked
@@ -93,3 +94,20 @@ def test_an_interval_is_that_of_the_scale_that_is_believed(sure):
     told = deviations(SimpleNamespace(problem=SimpleNamespace(entries=entries)), one)
     tolerance = np.array([entry.parameter.tolerance for entry in entries])
     assert_allclose([sd for _, sd in told.values()] * tolerance, np.sqrt(np.diag(found.M)), rtol=1e-8)
+
+
+def test_a_drift_is_told_with_the_cause_beside_it_that_it_needs_and_without_one_that_it_does_not():
+    """By itself the first explains nothing; the second explains by itself what it does beside a cause."""
+    beliefs = SimpleNamespace(probabilities=lambda problem: {("roll_stiffness",): 1.0}, log_total=lambda: 0.0)
+    log = {
+        ("roll_stiffness", "sensor_drift:surge_speed"): -1.0,
+        ("sensor_drift:surge_speed",): -50.0,
+        ("roll_stiffness", "unknown_force:X"): -1.0,
+        ("unknown_force:X",): -2.0,
+    }
+    outside = [
+        SimpleNamespace(causes=ids[:-1], id=ids[-1], log_posterior=value) for ids, value in log.items()
+    ]
+    inside, found = shares(SimpleNamespace(beliefs=beliefs, problem=None), outside)
+    assert list(found) == [("unknown_force:X",), ("roll_stiffness", "sensor_drift:surge_speed")]
+    assert sum(inside.values()) + sum(found.values()) == pytest.approx(1.0, abs=1e-12)

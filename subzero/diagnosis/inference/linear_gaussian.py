@@ -109,9 +109,8 @@ def log_beyond(
         p(z) ∝ N(z; 0, s²) (1 − exp(−½ z²/w²)),
         log p(y) − log p_normal(y) = log (1 − E[exp(−½ z²/w²) | y]) − log (1 − E[exp(−½ z²/w²)]).
 
-    So a cause that surely does next to nothing is none, one that is not seen
-    is as before, and one that is large, too: a non-local prior (Johnson & Rossell 2010) with the tails of the normal.
-    Parameters are taken to be independent, given the data.
+    So a cause that surely does next to nothing is none; one that is not seen, or is large, is as before: a non-local
+    prior (Johnson & Rossell 2010) with the tails of the normal. Parameters are taken to be independent, given the data.
 
     Args:
         mean: of the causes' parameters under normal priors, one cause after the other (…, k).

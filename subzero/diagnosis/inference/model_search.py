@@ -13,7 +13,7 @@ from itertools import chain, combinations
 
 import numpy as np
 
-from subzero.diagnosis.hypothesis.hypotheses import MAX_CAUSES, Ids, columns_of, is_flat, nameable, variances
+from subzero.diagnosis.hypothesis.hypotheses import MAX_CAUSES, Ids, columns_of, nameable, variances
 from subzero.diagnosis.inference import settings
 from subzero.diagnosis.inference.linear_gaussian import KAPPAS
 from subzero.diagnosis.inference.map_fit import (
@@ -22,7 +22,6 @@ from subzero.diagnosis.inference.map_fit import (
     candidate_of,
     continued,
     is_poor_fit,
-    non_smooth,
     refit,
     restarted_where_smooth,
 )
@@ -37,6 +36,7 @@ from subzero.diagnosis.inference.screening import (
     with_one_added,
     with_one_swapped,
     with_sizes_tried,
+    without_slope,
 )
 
 
@@ -69,7 +69,7 @@ class Search(Fits):
             for without in best.ids:
                 self._without(best, without)
             self._beside_others(best)
-            self._without_slope(best)
+            self._of_real_size(best)
             self.refine(settings.MAX_ADDED, settings.CLOSE_NATS)
             self.cross()
             self.sharpen()
@@ -102,12 +102,12 @@ class Search(Fits):
         for ids in sorted(found, key=lambda ids: -found[ids][0])[: settings.MAX_ADDED]:
             self.fit(ids, found[ids][1])
 
-    def _without_slope(self, best: Candidate) -> None:
+    def _of_real_size(self, best: Candidate) -> None:
         """Fit causes that do nothing while they are small beside the best, or in the place of one of its causes: no
         linear problem knows of them.
         """
         found, entries = dict[Ids, TriedSize](), self.problem.entries
-        flat = {k for k in non_smooth(self.problem, ()) if is_flat(entries[k], best.fit.J[:, k])}
+        flat = set(without_slope(self.problem, best.fit.J))
         rests = [tuple(one for one in best.ids if one != without) for without in best.ids]
         for rest in [best.ids, *rests] if len(best.ids) < MAX_CAUSES else rests:
             for ids, one in with_sizes_tried(

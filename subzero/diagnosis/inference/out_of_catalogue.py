@@ -41,7 +41,7 @@ from subzero.diagnosis.inference.latent_force import (
 )
 from subzero.diagnosis.inference.linear_gaussian import KAPPAS, Linear, Terms, log_sum, posterior
 from subzero.diagnosis.inference.map_fit import is_poor_fit, refit
-from subzero.diagnosis.inference.model_average import FURTHER_CAUSE_ODDS
+from subzero.diagnosis.inference.model_average import FURTHER_CAUSE_ODDS, occam_folded
 from subzero.diagnosis.inference.model_fits import (
     WithOwnNoise,
     candidate_with_own_noise,
@@ -269,17 +269,20 @@ def special_cases_folded(made: Sequence[FittedChangePoint]) -> list[tuple[Fitted
 
 def shares(
     search: Search, out_of_catalogue: list[OutOfCatalogue]
-) -> tuple[dict[Ids, float], dict[str, float]]:
-    """Return the probabilities of hypotheses, and of everything outside by id; together they sum to 1."""
+) -> tuple[dict[Ids, float], dict[Ids, float]]:
+    """Return the probabilities of hypotheses, and of everything outside with the causes that it stands beside, if they
+    are needed (`occam_folded`); together they sum to 1.
+    """
     inside = search.beliefs.probabilities(search.problem)
     scale = search.beliefs.log_total()
     outside = log_sum([one.log_posterior for one in out_of_catalogue]) if out_of_catalogue else -np.inf
     total = log_sum([scale, outside])
-    found: dict[str, float] = {}
+    found: dict[Ids, float] = {}
     for one in out_of_catalogue:
-        found[one.id] = found.get(one.id, 0.0) + float(np.exp(one.log_posterior - total))
+        ids = (*one.causes, one.id)
+        found[ids] = found.get(ids, 0.0) + float(np.exp(one.log_posterior - total))
     kept = float(np.exp(scale - total))
-    return {ids: kept * p for ids, p in inside.items()}, found
+    return {ids: kept * p for ids, p in inside.items()}, occam_folded(found)
 
 
 def each_with_own_noise(search: Search, outside: Sequence[OutOfCatalogue]) -> list[OutOfCatalogue]:

@@ -111,7 +111,7 @@ def screening_of(
     several: list[Ids] = [(), *((one,) for one in names), *pairs_of(problem.entries, names)]
     for ids, log in linear_evidences(problem, base, (), several).items():
         found.log_posterior[ids] = log + log_prior(ids, len(names))
-    _sweep(problem, wide.z, wide.J, _without_slope(problem, wide.J), found, wide.r, settings.SWEEP_SCALES)
+    _sweep(problem, wide.z, wide.J, without_slope(problem, wide.J), found, wide.r, settings.SWEEP_SCALES)
     return found
 
 
@@ -201,7 +201,7 @@ def _freed_evidence(
     return value + log_beyond(mean, variance, prior, within, sizes)
 
 
-def _without_slope(problem: Problem, J: np.ndarray) -> list[int]:
+def without_slope(problem: Problem, J: np.ndarray) -> list[int]:
     """Return the entries that do nothing when they are small."""
     return [k for k, entry in enumerate(problem.entries)
             if entry.record < 0 and entry.parameter.low == 0.0 and is_flat(entry, J[:, k])]  # fmt: skip
@@ -217,7 +217,7 @@ def _sweep(
     scales: Sequence[float],
 ) -> None:
     """Try sizes of entries about z, side by side, with the residual `here` there; keep the best of every cause."""
-    names, flat, at_z = nameable(problem.entries), _without_slope(problem, J), Quadratic.at(z, here, J)
+    names, flat, at_z = nameable(problem.entries), without_slope(problem, J), Quadratic.at(z, here, J)
     best: dict[Ids, float] = {(problem.entries[k].effect.id,): -np.inf for k in at}  # that cannot be run
     for one in sizes_run(problem, z, here, at, scales):
         ids: Ids = (problem.entries[one.k].effect.id,)

@@ -78,7 +78,7 @@ class Ranked:
 
     Attributes:
         inside: hypothesis → probability; with those outside the catalogue they sum to 1.
-        outside: id of a latent force, a drift or a change point → probability.
+        outside: a latent force, a drift or a change point, last, with the causes beside it → probability.
         best: the most probable hypothesis that has a fit.
         close_to_best: the closest rival of its causes of a practical size.
         change_points: those with a fit of their own, the most probable first.
@@ -86,7 +86,7 @@ class Ranked:
     """
 
     inside: Mapping[Ids, float]
-    outside: Mapping[str, float]
+    outside: Mapping[Ids, float]
     best: Candidate
     close_to_best: ClosestRival
     change_points: Sequence[FittedChangePoint]
@@ -95,7 +95,7 @@ class Ranked:
     @property
     def probabilities(self) -> dict[Ids, float]:
         """Every explanation → probability."""
-        return {**self.inside, **{(key,): p for key, p in self.outside.items()}}
+        return {**self.inside, **self.outside}
 
     @property
     def change_point(self) -> ChangePointSummary:
@@ -104,7 +104,7 @@ class Ranked:
             return ChangePointSummary()
         first = self.change_points[0]
         return ChangePointSummary(
-            self.outside[first.id], is_large(first), self.close_to_change_point.discrimination
+            self.outside[(first.id,)], is_large(first), self.close_to_change_point.discrimination
         )
 
 
@@ -119,13 +119,13 @@ def is_large(one: FittedChangePoint) -> bool:
 
 
 class RemainingModels(NamedTuple):
-    """What the records leave: hypotheses, change points, and ids of latent forces and drifts; and the smallest set of
-    explanations that is probable enough.
+    """What the records leave: hypotheses, change points, latent forces and drifts with the causes beside them; and the
+    smallest set of explanations that is probable enough.
     """
 
     hypotheses: list[Ids]
     change_points: list[FittedChangePoint]
-    forces: list[str]
+    forces: list[Ids]
     credible: list[Ids]
 
 
@@ -154,7 +154,7 @@ class FollowUp:
 
 def decided(findings: Findings, ranked: Ranked) -> str:
     """Return the verdict that probabilities, sizes and distances make."""
-    forces = sum(p for key, p in ranked.outside.items() if "@" not in key)
+    forces = sum(p for ids, p in ranked.outside.items() if "@" not in ids[-1])
     is_practical = bool(practical_of(findings, ranked.best))
     apart = ranked.close_to_best.discrimination
     verdict = decide(ranked.inside, forces, is_practical, apart, ranked.change_point)
@@ -167,7 +167,7 @@ def remaining_models(ranked: Ranked) -> RemainingModels:
     return RemainingModels(
         hypotheses=[ids for ids in credible if ids in ranked.inside],
         change_points=[one for one in ranked.change_points if (one.id,) in credible],
-        forces=[ids[0] for ids in credible if ids and ids[0] in OUTSIDE_SENTENCES],
+        forces=[ids for ids in credible if ids and ids[-1] in OUTSIDE_SENTENCES],
         credible=credible,
     )
 
@@ -180,9 +180,11 @@ def rivals_of(
     found = rivals(findings, best, ranked.inside, remaining.hypotheses, None if is_undecided else best.ids)
     if new.cause:
         found = (closest_rival(findings, ranked.inside, *ranked.close_to_change_point),)
-    late = [rival_of(findings, one, ranked.outside[one.id]) for one in remaining.change_points
+    late = [rival_of(findings, one, ranked.outside[(one.id,)]) for one in remaining.change_points
             if one.id != new.id]  # fmt: skip
-    forces = [force_rival(key, ranked.outside[key]) for key in remaining.forces] if is_undecided else []
+    forces = (
+        [force_rival(findings, ids, ranked.outside[ids]) for ids in remaining.forces] if is_undecided else []
+    )
     return tuple(sorted([*found, *late, *forces], key=lambda one: -one.probability))
 
 
@@ -201,7 +203,7 @@ def conclude(findings: Findings, ranked: Ranked, follow_up: FollowUp) -> Verdict
         gain=follow_up.gain,
         next_trial=follow_up.next_trial,
         curves=follow_up.curves,
-        probabilities=_listed(ranked.inside, ranked.outside),
+        probabilities=_listed(ranked.probabilities),
         tolerance_scale=tolerance_scale(findings.search.candidates.values()),
         detectable=findings.detectable,
         misfit=findings.misfit,
@@ -223,10 +225,10 @@ def _named(findings: Findings, ranked: Ranked, verdict: str, new: Extension) -> 
     )
 
 
-def _listed(inside: Mapping[Ids, float], outside: Mapping[str, float]) -> dict[str, float]:
+def _listed(probabilities: Mapping[Ids, float]) -> dict[str, float]:
     """Return hypothesis → probability, the most probable first."""
-    listed = {name(ids): p for ids, p in inside.items()} | dict(outside)
-    return {key: p for key, p in sorted(listed.items(), key=lambda pair: -pair[1]) if p > LISTED_PROBABILITY}
+    listed = sorted(probabilities.items(), key=lambda pair: -pair[1])
+    return {name(ids): p for ids, p in listed if p > LISTED_PROBABILITY}
 
 
 def _notes(work: Findings, best: Candidate, inside: float) -> tuple[str, ...]:

@@ -213,11 +213,10 @@ OUTSIDE_SENTENCES = {
 """Forces and drifts in words."""
 
 
-def force_rival(key: str, probability: float) -> Rival:
-    """Return a force or a drift as a rival."""
-    return Rival(
-        ids=(key,), sentence=OUTSIDE_SENTENCES[key], probability=probability, discrimination=math.nan
-    )
+def force_rival(work: Findings, ids: Ids, probability: float) -> Rival:
+    """Return a force or a drift, with the causes beside it, as a rival."""
+    words = [*(sentence_of(work.problem, one) for one in ids[:-1]), OUTSIDE_SENTENCES[ids[-1]]]
+    return Rival(ids=ids, sentence=" and ".join(words), probability=probability, discrimination=math.nan)
 
 
 def names_of(whole: Sequence[Ids], others: Sequence[Rival]) -> list[str]:
