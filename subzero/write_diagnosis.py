@@ -24,7 +24,6 @@ from rich.table import Table
 from rich.text import Text
 
 from subzero.diagnosis.hypothesis.catalogue import all_effects
-from subzero.diagnosis.hypothesis.effect import plain_id
 from subzero.diagnosis.hypothesis.hypotheses import apply_extended
 from subzero.diagnosis.report import json_file, tables, words
 from subzero.diagnosis.report.sections import Section as Told
@@ -318,7 +317,7 @@ def replayed(
     if not verdict.complete:
         return (), ""
     known = all_effects(effects)
-    name, extended = _best(verdict, known)
+    name, extended = _best(verdict)
     nominal = run(logged.setting)
     if nominal.sizes["time"] < 2 or not all(part in _vehicle(nominal) for part in HULL):
         return (), ""
@@ -351,18 +350,14 @@ def _vehicle(run: xr.Dataset) -> dict[str, Any]:
     return dict(json.loads(run.attrs["parameters"]).get("vehicle", {}))
 
 
-def _best(verdict: Verdict, known: Mapping[str, Effect]) -> tuple[str, Extended | None]:
+def _best(verdict: Verdict) -> tuple[str, Extended | None]:
     """Return the model that explains the records best, as the figures have it, and its name."""
     extended = verdict.extended
     if verdict.on_model in (CAUSE_NAMED, OUTSIDE):
         return "extended model", extended
     first = verdict.rivals[0] if verdict.on_model == UNDECIDED and verdict.rivals else None
-    if first is not None and first.ids and all(plain_id(one) in known for one in first.ids):
-        deviations = {
-            cause: {name: one.deviation for name, one in numbers.items()}
-            for cause, numbers in first.parameters.items()
-        }
-        return "most probable model", dataclasses.replace(extended, deviations=deviations)
+    if first is not None and first.ids and first.extended is not None:
+        return "most probable model", first.extended
     return ("calibrated model", extended) if extended.calibration else ("", None)
 
 

@@ -104,6 +104,7 @@ class Rival:
         discrimination: D between it and what is told, or what is most probable: below 9 the records cannot tell them
             apart; NaN of that itself, and where it is not known. [-]
         parameters: cause id → name → estimate.
+        extended: the whole model with it, as it was fitted; None where it was not, and of a force or a drift.
     """
 
     ids: tuple[str, ...]
@@ -111,6 +112,7 @@ class Rival:
     probability: float
     discrimination: float
     parameters: Mapping[str, Mapping[str, Estimate]] = field(default_factory=dict)
+    extended: Extended | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,6 +8,7 @@ centimetre for trapezia every 0.1 s.
 from __future__ import annotations
 
 import dataclasses
+import math
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,7 @@ from subzero.diagnosis import (
     CAUSE_NAMED,
     DATA_ERROR,
     OUTSIDE,
+    UNDECIDED,
     Cause,
     Curves,
     Estimate,
@@ -161,6 +163,21 @@ def test_the_replay_has_the_extended_model_solid_and_simulated_and_measured_as_g
     depth = np.interp(measured["time"], true["time"], true["depth"])
     np.testing.assert_allclose(measured["depth"], depth, atol=0.02, err_msg="with its outlier left out")
     assert float(measured["north"][0]) == float(true["north"][0])
+
+
+def test_of_what_is_undecided_the_most_probable_model_is_replayed_as_it_was_fitted(
+    verdict: Verdict, logged: Logged
+) -> None:
+    """Not with the numbers of a vehicle with nothing wrong, which had to bend without the cause."""
+    first = Rival(ids=("rudder_offset",), sentence="the rudder is off its centre", probability=0.7,
+                  discrimination=math.nan, extended=Extended(deviations=OFF))  # fmt: skip
+    bent = Extended(calibration={"rudder_lift_slope": {"share": 0.5}})
+    told = dataclasses.replace(verdict, verdict=UNDECIDED, causes=(), rivals=(first,), extended=bent)
+    (found, *_), said = replayed(told, logged, run)
+    (fitted, *_), _ = replayed(verdict, logged, run)
+    assert found.name == "most probable model"
+    assert "Solid: the most probable model." in said
+    np.testing.assert_array_equal(found.run["heading"], fitted.run["heading"])
 
 
 def test_a_record_with_errors_in_its_data_is_replayed_as_it_is_once_they_are_put_right(

@@ -160,6 +160,7 @@ def _rival(work: Findings, best: Candidate, ids: Ids, p: float) -> Rival:
         probability=p,
         discrimination=between(work.problem, best.fit, best.ids, ids) if ids != best.ids else np.nan,
         parameters=numbers,
+        extended=of_causes(work, candidate, ids).extended if candidate else None,
     )
 
 
@@ -189,7 +190,8 @@ def rival_of(work: Findings, what: FittedChangePoint, probability: float) -> Riv
     cause = cause_of(work, what, probability)
     sentence = what.change_point.with_onset.sentence
     return Rival(ids=(what.id,), sentence=sentence, probability=probability, discrimination=np.nan,
-                 parameters={what.id: cause.parameters})  # fmt: skip
+                 parameters={what.id: cause.parameters},
+                 extended=of_sudden(work, what, cause).extended)  # fmt: skip
 
 
 def closest_rival(work: Findings, inside: Mapping[Ids, float], D: float, ids: Ids) -> Rival:
