@@ -1,7 +1,7 @@
 """The drum: what it is, and what it can do: turn with the cable, stand and hold it, or spin ahead of it.
 
     turning    T(S) R_d = I_d dΩ/dt + C_f      (11); the cable is taut at the drum
-    standing   dS/dt = 0                        nothing pulls; cable is never taken up
+    standing   dS/dt = 0                        it is held; cable is never taken up
     spinning   0 = I_d dΩ/dt + C_f, T(S) = 0    the drum overruns: its inertia throws cable out ahead of what is pulled
 
 What it throws out lies loose before it, outside the water, and gives way to any pull; when it is used up, the cable
@@ -9,7 +9,9 @@ takes the drum along again by a jerk. Beyond the drum the cable is taut, as it w
 overrun in the water, of a whole segment, would take its drag from the tow force, and a fit from jump to jump.
 
 Coulomb friction is rounded off at rest: C_f U/√(U² + U_c²) with the pay-out rate U and U_c = 1 mm/s (`CREEP`). A drum
-that friction holds therefore creeps by less than that, and a taut cable always has an answer.
+that friction holds therefore creeps by less than that, and a taut cable always has an answer. One that has stood stays
+so until it is pulled by what friction has at U_c: where a slack cable stirs, an equation that is that steep at rest,
+and flat at any speed, often has no answer that Newton's method finds.
 
 A winch instead of the free drum either follows a prescribed length S(t) (a brake: a constant one), or keeps the tension
 T(S) at a prescribed value, paying out and reeling in as needed.
@@ -122,7 +124,8 @@ def next_mode(mode: int, converged: bool, payout: float, loose: float, pull: flo
         drum: the drum.
     """
     if mode == STANDING:
-        if converged and pull <= HELD:
+        holds = 0.0 if loose > 0.0 else friction(drum, CREEP)[0]
+        if converged and pull <= max(HELD, holds):
             return STANDING
         return SPINNING if loose > 0.0 else TURNING
     if converged and payout < 0.0:

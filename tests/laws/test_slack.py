@@ -98,6 +98,19 @@ def test_a_rubbing_drum_stops_with_the_vehicle_and_holds_what_its_friction_holds
     assert 0.0 < run.tow_tension[-1] <= 0.05 * (1.0 + 1e-9)  # between slack and C_f/R_d
 
 
+@pytest.mark.parametrize("name", ["stops", "stops at once", "backs up", "turns and stops"])
+def test_a_rubbing_drum_that_has_stood_gives_nothing_to_a_weaker_pull(name):
+    """It creeps where it was never at rest; from rest, Coulomb friction holds, to seven tenths of its full size."""
+    friction = 0.02 / 0.1
+    run = cable.pull_out(MANOEUVRES[name], 16.0, drum=cable.DrumProperties(friction_torque=0.02))
+    growth, at_drum = np.diff(run.length), np.array([tension[-1] for tension in run.tensions])[1:]
+    stood = int(np.argmax(growth <= 1e-12))
+    assert 0 < stood < growth.size - 20
+    later = slice(stood, None)
+    assert 0.0 < at_drum[later].max() < 0.7 * friction
+    assert growth[later].max() <= 1e-12
+
+
 def test_a_heavy_drum_that_is_not_braked_throws_cable_out_after_a_sudden_stop():
     heavy = cable.DrumProperties(inertia=1e-3)
     run = cable.pull_out(MANOEUVRES["stops at once"], 10.0, drum=heavy)
