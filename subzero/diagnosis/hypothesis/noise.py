@@ -253,13 +253,18 @@ NOT_KNOWN: Mapping[str, float] = MappingProxyType({})
 """Steps of channels that only their values tell."""
 
 
+def level_of(channel: str, known: Mapping[str, float]) -> float:
+    """Return the level ν of a channel's sensor, as known or usual, in the channel's unit."""
+    return known.get(channel, SPECS[channel].noise)
+
+
 def usual_of(
     channel: str, values: np.ndarray, known: Mapping[str, float], steps: Mapping[str, float] = NOT_KNOWN
 ) -> Usual:
     """Return what a channel's sensor is like, before anything is fitted: its level as known or usual, its resolution as
     its values (n,) show it, or as more of them have shown: channel → step.
     """
-    level = known.get(channel, SPECS[channel].noise)
+    level = level_of(channel, known)
     step = steps[channel] if channel in steps else resolution_of(values, level)
     return Usual(level, step, channel in known)
 

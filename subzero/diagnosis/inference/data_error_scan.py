@@ -27,7 +27,7 @@ from subzero.diagnosis.hypothesis.data_error import (
     DataError,
 )
 from subzero.diagnosis.hypothesis.logged import Logged
-from subzero.diagnosis.hypothesis.noise import resolution_of, usual_noise, usual_of
+from subzero.diagnosis.hypothesis.noise import level_of, resolution_of, usual_noise, usual_of
 from subzero.diagnosis.inference.repeated_values import log_odds_of_frozen, steps_of
 from subzero.records.consistency import MISTAKEN
 
@@ -333,7 +333,7 @@ def _is_quiet(yardstick: Yardstick, error: DataError) -> bool:
     (name,) = error.channels
     record = error.corrected(yardstick.logged).record
     known = record.values[name][np.isfinite(record.values[name])]
-    level = usual_of(name, known, yardstick.logged.noise).level
+    level = level_of(name, yardstick.logged.noise)
     if known.size < FEWEST or np.ptp(known) == 0.0:
         return False
     expected = yardstick.at(yardstick.nominal[name], record.time)

@@ -28,7 +28,9 @@ from subzero.diagnosis.hypothesis.logged import Logged
 from subzero.diagnosis.hypothesis.noise import (
     Between,
     Noise,
+    Usual,
     innovations_between,
+    level_of,
     log_of_outlier,
     log_of_outliers,
     spikes,
@@ -198,7 +200,7 @@ class Yardstick:
     def _term(self, logged: Logged, name: str, nominal: np.ndarray) -> Term:
         time, values = logged.record.time, logged.record.values[name]
         usual = usual_of(name, values, logged.noise, logged.steps)
-        left, used = self._left(logged, name, nominal)
+        left, used = self._left(logged, name, nominal, usual)
         measured = int(np.count_nonzero(np.isfinite(left)))
         noise, slopes = usual_noise(time, used, usual), self.slopes[name]
         r, J = noise.whiten(left), np.empty((noise.count, slopes.shape[1]))
@@ -208,19 +210,24 @@ class Yardstick:
         fixed, least = out - noise.log_scale, least_scale(noise)
         return Term(J.T @ J, J.T @ r, float(r @ r), noise.count, fixed, least, measured)
 
-    def _left(self, logged: Logged, name: str, nominal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _left(
+        self, logged: Logged, name: str, nominal: np.ndarray, usual: Usual
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Return measured − predicted of a channel (n,), and which samples are measured, and no outliers (n,)."""
         values, expected = logged.record.values[name], self.at(nominal, logged.record.time)
         left = (turned(values, expected) if name == HEADING else values) - expected
-        usual, used = usual_of(name, values, logged.noise, logged.steps), np.isfinite(left)
+        used = np.isfinite(left)
         used[used] = ~spikes(left[used], max(usual.level, usual.resolution))
         return left, used
 
     @cached_property
     def used(self) -> dict[str, np.ndarray]:
         """Channel → which samples of the record as it is are measured, and no outliers (n,)."""
-        nominal = self.nominal_of(self.logged)
-        return {name: self._left(self.logged, name, nominal[name])[1] for name in self.own}
+        nominal, values = self.nominal_of(self.logged), self.logged.record.values
+        usual = {
+            name: usual_of(name, values[name], self.logged.noise, self.logged.steps) for name in self.own
+        }
+        return {name: self._left(self.logged, name, nominal[name], usual[name])[1] for name in self.own}
 
     @cached_property
     def own(self) -> dict[str, Term]:
@@ -284,9 +291,8 @@ class Yardstick:
         """Return what samples of a channel (n,) add to the log density of the record as it is: each as much as another
         of its kind, a measurement or an outlier. That one of few more is an outlier is worth as much as ten others.
         """
-        own, used, values = self.own[name], self.used[name], self.logged.record.values[name]
-        level = usual_of(name, values, self.logged.noise).level
-        said = own.measured - own.samples, own.measured, level
+        own, used = self.own[name], self.used[name]
+        said = own.measured - own.samples, own.measured, level_of(name, self.logged.noise)
         of_outlier, fixed = log_of_outlier(*said), own.fixed - log_of_outliers(*said)
         mean = fixed / max(own.samples, 1) - float(np.log(as_is.scales[name])) - 0.5
         return np.count_nonzero(lost & used) * mean + np.count_nonzero(lost & ~used) * of_outlier

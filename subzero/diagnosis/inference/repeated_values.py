@@ -36,7 +36,7 @@ from scipy.special import gammaln
 
 from subzero.diagnosis.hypothesis.data_error import DataError
 from subzero.diagnosis.hypothesis.logged import Logged
-from subzero.diagnosis.hypothesis.noise import Noise, Usual, log_prior_of, resolution_of, usual_of
+from subzero.diagnosis.hypothesis.noise import Noise, Usual, level_of, log_prior_of, resolution_of, usual_of
 from subzero.diagnosis.inference.linear_gaussian import log_sum
 
 CLEAR_LOG_ODDS = 6.0
@@ -114,7 +114,7 @@ def may_be_measured(error: DataError, logged: Logged) -> bool:
     if error.how:
         places = np.count_nonzero(left == float(error.how)) + len(error.at)
         return bool(len(error.at) < MOSTLY_FAR * places)
-    level = usual_of(channel, left, logged.noise).level
+    level = level_of(channel, logged.noise)
     return resolution_of(left, level) > 0.0
 
 
