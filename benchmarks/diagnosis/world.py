@@ -1,7 +1,8 @@
 """Records as the world has them, not as the engine was made on: ``python -m benchmarks.diagnosis.world``.
 
 Any shipped manoeuvre or a random one, noise of any family, healthy or with one hidden cause; truths by the other
-formulation, all numbers drawn from their tolerances. D is measured with the true noise.
+formulation, all numbers drawn from their tolerances. D is measured with the true noise; that of a rounded channel is
+what fits its errors best.
 
     white     from sample to sample              slow, slower   AR(1), ρ 0.9 and 0.97 at 10 Hz
     mild      AR(1), ρ 0.5 at 10 Hz              both           slow (5 s) and white at once
@@ -21,6 +22,7 @@ from typing import Any, NamedTuple
 
 import cyclopts
 import numpy as np
+from scipy.optimize import minimize
 
 import scenarios
 import subzero
@@ -116,8 +118,21 @@ def drawn(seed: int, count: int) -> list[Drawn]:
     ]
 
 
+class Made(NamedTuple):
+    """A record with its nominal trial, what is hidden in it, and what its samples are off by: channel → (n,)."""
+
+    logged: Logged
+    planted: Values
+    errors: Mapping[str, np.ndarray]
+
+
 def record_of(one: Drawn, shaken: np.random.Generator | None = None) -> tuple[Logged, Values]:
-    """Return a record with its nominal trial, and what is hidden in it; drawn again where there is no one truth.
+    """Return a record with its nominal trial, and what is hidden in it, as `made`."""
+    return made(one, shaken)[:2]
+
+
+def made(one: Drawn, shaken: np.random.Generator | None = None) -> Made:
+    """Return a record; drawn again where there is no one truth.
 
     Args:
         one: what is drawn.
@@ -136,7 +151,8 @@ def record_of(one: Drawn, shaken: np.random.Generator | None = None) -> tuple[Lo
             continue
         values = {name: seen_by(family, name, column, times, rng, shaken) for name, column in shown.items()}
         record = Record(source="world", time=times, values=values)
-        return Logged(record=record, setting=setting, name=one.flown), planted
+        errors = {name: values[name] - column for name, column in shown.items()}
+        return Made(Logged(record=record, setting=setting, name=one.flown), planted, errors)
     message = f"Record {one.index} ({one.cause} on {one.flown}) has no truth."
     raise NoRunError(message)
 
@@ -199,11 +215,18 @@ def shown(family: Family, name: str, noisy: np.ndarray, rng: np.random.Generator
     return np.where(rng.random(noisy.size) < GAPS, np.nan, rounded)
 
 
-def with_true_noise(problem: Problem, family: Family) -> Problem:
-    """Return the problem of records with the noise that they have."""
+def with_true_noise(
+    problem: Problem, family: Family, errors: Mapping[str, np.ndarray] | None = None
+) -> Problem:
+    """Return the problem of records with the noise that they have: of one record that is rounded, with that of its
+    errors. What rounding takes off is no noise from sample to sample: beside little other noise it lasts as long as
+    what is measured stands still.
+    """
     spread = np.sqrt(family.freedom / (family.freedom - 2.0)) if family.freedom else 1.0
 
     def noise(name: str, old: Noise) -> Noise:
+        if errors and family.rounded:
+            return likeliest_noise(errors[name], old)
         return Noise(
             white=family.white * spread * NOISE[name],
             slow=family.slow * NOISE[name],
@@ -220,12 +243,29 @@ def with_true_noise(problem: Problem, family: Family) -> Problem:
     return replace(problem, records=records)
 
 
+def likeliest_noise(errors: np.ndarray, old: Noise) -> Noise:
+    """Return the noise, white and slow, that gives errors (n,) the greatest density; of the samples of another."""
+
+    def noise(log: np.ndarray) -> Noise:
+        white, slow, time = np.exp(log)
+        return replace(old, white=white, slow=slow, correlation_time=time, resolution=0.0)
+
+    def cost(log: np.ndarray) -> float:
+        guess = noise(log)
+        white = guess.whiten(errors)
+        return float(0.5 * white @ white + guess.log_scale)
+
+    half = 0.7 * np.std(errors[old.used])
+    found = [minimize(cost, np.log([half, half, time]), method="Nelder-Mead") for time in (0.3, 3.0)]
+    return noise(min(found, key=lambda one: one.fun).x)
+
+
 def result_of(one: Drawn) -> dict[str, Any]:
     """Return what a record is and what the diagnosis says of it."""
     found = {"index": one.index, "flown": one.flown, "family": one.family, "cause": one.cause}
     try:
-        logged, planted = record_of(one)
-        problem = with_true_noise(pose([logged]), FAMILIES[one.family])
+        logged, planted, errors = made(one)
+        problem = with_true_noise(pose([logged]), FAMILIES[one.family], errors)
         D = discriminations(problem, sensitivities(problem), planted) if planted else {}
         start, cpu = perf_counter(), process_time()
         verdict = diagnose_trials([logged], seed=one.index, budget="verdict")

@@ -22,7 +22,7 @@ from .scores import Score, share
 from .sections import mark, table
 
 Rows = Sequence[Mapping[str, Any]]
-SEEDS = {"world": 12001, "data_errors": 12101, "outside": 85, "jitter": 10505, "calibration": 31337}
+SEEDS = {"world": 12001, "data_errors": 12101, "outside": 91, "jitter": 10505, "calibration": 31337}
 """Of what the page rests on."""
 OF_CASES = {"outside": " --kinds outside --no-page"}
 """Results that are those of cases on two manoeuvres."""

@@ -41,7 +41,7 @@ from subzero.diagnosis.inference.out_of_catalogue import (
     explanations_outside,
     is_explained,
 )
-from subzero.diagnosis.inference.posing import pose, posed_again
+from subzero.diagnosis.inference.posing import pose, posed_again, sensitive_runs
 from subzero.diagnosis.inference.problem import Problem, Progress
 from subzero.diagnosis.inference.simulator import respond
 from subzero.diagnosis.read_trials import read_trials
@@ -272,6 +272,7 @@ def _look_closer(findings: Findings) -> None:
         _look_outside(findings, 0.8, "forces that no cause explains")
     with _timed(findings, "outside"):
         findings.refuted = refuted_rivals(search)
+        findings.sensitive = sensitive_runs(search.problem, search.best().fit.z)
         findings.out_of_catalogue = each_with_own_noise(search, findings.out_of_catalogue)
         _measure_misfit(findings)
 

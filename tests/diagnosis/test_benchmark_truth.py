@@ -1,15 +1,17 @@
 """The truths of the benchmark: runs with segments of two lengths must say the same.
 
 Verifies: the first run that a coarser one agrees with is taken; where none agrees, or one cannot be run, there is no
-truth. Configuration: a formulation that is made up.
+truth. What a sensor of the world is off by: rounding lasts where a value stands still, and is as good as white noise
+where it does not. Configuration: a formulation that is made up.
 """
 
 import numpy as np
 import pytest
 
-from benchmarks.diagnosis import manoeuvres, truth
+from benchmarks.diagnosis import manoeuvres, truth, world
 from benchmarks.diagnosis.cases import HEAVY, cases
 from subzero.diagnosis import SPECS
+from subzero.diagnosis.inference import Noise
 from subzero.synthetic.reference_run import NoTruthError
 
 TIMES, CHANNELS = np.linspace(0.0, 10.0, 101), ("heading",)
@@ -51,3 +53,18 @@ def test_heavy_drums_are_hidden_where_they_have_a_truth():
     hidden = [case for case in cases() if HEAVY in case.causes]
     assert hidden
     assert all(case.manoeuvre != "rich" for case in hidden)
+
+
+@pytest.mark.parametrize(("speed", "lasting"), [(0.02, True), (7.3, False)])
+def test_what_rounding_takes_off_lasts_as_long_as_a_value_stands_still(speed, lasting):
+    """A ramp of `speed` steps a second, ten samples a second, little noise: a sawtooth of 1/speed seconds, or none."""
+    time = np.linspace(0.0, 100.0, 1001)
+    truth_there = speed * time + 0.03 * np.random.default_rng(5).standard_normal(time.size)
+    used = np.ones(time.size, dtype=bool)
+    errors = np.round(truth_there) - speed * time
+    noise = world.likeliest_noise(errors, Noise(white=1.0, used=used, time=time))
+    assert noise.sd == pytest.approx(np.sqrt(1.0 / 12.0), rel=0.3)
+    longer = noise.lasting / (
+        0.1 * noise.sd**2
+    )  # spectral density at low frequencies, over that of white noise
+    assert longer > 50.0 if lasting else longer < 3.0

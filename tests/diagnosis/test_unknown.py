@@ -10,6 +10,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import subzero
+from benchmarks.diagnosis import wide
 from subzero.diagnosis import SPECS, Setting, catalogue
 from subzero.diagnosis.inference import (
     AXIS_WORDS,
@@ -172,3 +173,19 @@ def test_a_compass_whose_noise_is_slow_does_not_drift():
     half = np.linalg.cholesky(np.exp(-apart / 3.0) + 1e-12 * np.eye(SHORT.size))
     wander = SPECS["heading"].noise * half @ random.standard_normal(SHORT.size)
     assert told(lambda setting: setting, 13, {"heading": lambda time: wander}).verdict == "nothing_wrong"
+
+
+@pytest.mark.slow  # 50 s: every run of this vehicle is fitted from afar
+def test_no_force_is_named_in_an_unstable_motion_that_no_run_follows():
+    """A REMUS 100 steered by an autopilot, flown again with its commands alone: errors of a run double in 1.6 s, and
+    after 20 s two codes that agree to 1e-3 degrees per second at first are 20 noise levels apart.
+    """
+    records, planted = wide.records_of(wide.drawn(1301, 0))
+    assert not planted
+    verdict = subzero.diagnose(records, budget="verdict")
+    assert verdict.verdict not in ("outside_catalogue", "cause_named", "data_error")
+    assert any("an unstable motion, which no simulation follows for long" in note for note in verdict.notes)
+
+
+def test_a_motion_that_is_stable_is_not_called_unstable():
+    assert not any("unstable" in note for note in told(lambda setting: setting, 19).notes)

@@ -54,6 +54,7 @@ from subzero.external_force import AXES
 if TYPE_CHECKING:
     from subzero.diagnosis.inference.map_fit import Candidate
     from subzero.diagnosis.inference.model_search import Search
+    from subzero.diagnosis.inference.posing import SensitiveRun
     from subzero.diagnosis.inference.problem import Observed, Problem
     from subzero.diagnosis.results import Detectability, Misfit
 
@@ -406,6 +407,7 @@ class Findings:
         misfit: record → channel → how the nominal model fails.
         out_of_catalogue: what lies outside the list.
         refuted: rivals of the best that simulations refute, however alike the linear problem has them.
+        sensitive: records whose motion no run follows for long.
         seconds: how long each part took.
         complete: nothing was left out.
         given_up: nothing that is left to be found brings it close to what explains the records otherwise.
@@ -418,6 +420,7 @@ class Findings:
     misfit: dict[str, dict[str, Misfit]] = field(default_factory=dict)
     out_of_catalogue: list[OutOfCatalogue] = field(default_factory=list)
     refuted: frozenset[str] = frozenset()
+    sensitive: tuple[SensitiveRun, ...] = ()
     seconds: dict[str, float] = field(default_factory=dict)
     complete: bool = True
     given_up: bool = False
