@@ -202,12 +202,23 @@ def _forward(
     """Return the errors that come out best one after the other, each with those before it corrected."""
     found = [*first]
     for _ in range(MOST_ERRORS - len(found)):
-        ranked = suspects(begun.after([*read_off, *(one.suspect.error for one in found)]), trusted)
+        before = [*read_off, *(one.suspect.error for one in found)]
+        ranked = suspects(begun.after(before), trusted)
+        while ranked and _is_suspected(ranked[0]) and _makes_loud(begun, before, ranked[0].error):
+            ranked = ranked[1:]
         if not ranked or not _is_suspected(ranked[0]):
             break
         alike = tuple(one.error for one in ranked[1:] if one.lead > ranked[0].lead - ALIKE_LEAD)
         found.append(_Judged(ranked[0], alike))
     return found
+
+
+def _makes_loud(begun: Yardstick, before: Sequence[DataError], error: DataError) -> bool:
+    """Say whether a channel is no more that of a usual sensor without an error, and is with it: where a rounded heading
+    hardly leaves a value, radians explain its steps, and nothing else of it.
+    """
+    scales, after = begun.after(before).as_is.scales, begun.after([*before, error]).as_is.scales
+    return any(scales.get(name, 0.0) < LOUD <= after.get(name, 0.0) for name in error.channels)
 
 
 def _back(begun: Yardstick, read_off: Sequence[DataError], found: list[_Judged]) -> list[_Judged]:
