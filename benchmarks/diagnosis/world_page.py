@@ -42,9 +42,11 @@ HEAD = """# How often verdicts are right on records of the world
 Records that were not made for the engine: any shipped manoeuvre or random commands, nine families of noise, healthy or
 with one hidden cause of any size; errors in the data; copies that say the same. Truths are by the other formulation,
 with every number drawn from its tolerance. Nothing was chosen with these seeds before they were judged. Record 122 of
-the world then led to a change of the engine, by which its depth is no more accused of a delay; it counts here as it was
-told, and the 221 records before that change as they were. Errors in the data are those of the engine as it is; what is
-outside, copies and calibration rest on earlier states of it. The page is written by
+the world then led to a change of the engine, by which its depth is no more accused of a delay, and 554 to one by which
+its verdict takes a tenth of the time; both count here as they were told, and the 221 records before the first change as
+they were. D of rounded records is that of the noise that fits their errors best, which lasts where a value stands
+still. The first 61 records with errors in the data, copies and calibration rest on slightly earlier states of the
+engine. The page is written by
 
     python -m benchmarks.diagnosis.world_page
 
