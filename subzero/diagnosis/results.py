@@ -319,6 +319,7 @@ class Verdict:
         complete: False if it was interrupted.
         data_errors: what is wrong with the data; all else is said of the records without it.
         then: the verdict on the records without it; "" if nothing is wrong with the data.
+        unstable: records whose motion is unstable, so that no simulation follows them for long.
     """
 
     verdict: str
@@ -341,6 +342,7 @@ class Verdict:
     complete: bool = True
     data_errors: tuple[FoundError, ...] = ()
     then: str = ""
+    unstable: tuple[str, ...] = ()
 
     @property
     def on_model(self) -> str:

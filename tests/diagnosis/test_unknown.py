@@ -28,6 +28,7 @@ from subzero.diagnosis.inference import (
     one_terms,
     without_force,
 )
+from subzero.diagnosis.report import summary
 from subzero.synthetic.planted import draw_tolerances, make_record
 
 TIME = np.arange(0.0, 30.05, 0.1)
@@ -184,8 +185,10 @@ def test_no_force_is_named_in_an_unstable_motion_that_no_run_follows():
     assert not planted
     verdict = subzero.diagnose(records, budget="verdict")
     assert verdict.verdict not in ("outside_catalogue", "cause_named", "data_error")
+    assert verdict.unstable == (records[0].name,)
     assert any("an unstable motion, which no simulation follows for long" in note for note in verdict.notes)
+    assert "is unstable, and no simulation follows it for long" in str(summary(verdict))
 
 
 def test_a_motion_that_is_stable_is_not_called_unstable():
-    assert not any("unstable" in note for note in told(lambda setting: setting, 19).notes)
+    assert not told(lambda setting: setting, 19).unstable

@@ -53,6 +53,7 @@ def mapping(
         "deviations": {name: {"mean": mean, "sd": sd} for name, (mean, sd) in verdict.deviations.items()},
         "records": _plain(records or {}),
         "notes": list(verdict.notes),
+        "unstable": list(verdict.unstable),
         "seconds": _plain(verdict.seconds),
         "seed": verdict.seed,
     }

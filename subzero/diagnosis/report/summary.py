@@ -126,6 +126,11 @@ def _sure(verdict: Verdict) -> Iterator[str]:
         yield from _not_seen(verdict)
     elif verdict.on_model != UNDECIDED:
         yield from _runner_up(verdict)
+    for record in verdict.unstable:
+        yield (
+            f"The motion of '{record}' is unstable, and no simulation follows it for long: what the best one leaves "
+            "says little, and a force least of all."
+        )
     if not verdict.complete:
         yield "The diagnosis was interrupted: this is as far as it came."
 

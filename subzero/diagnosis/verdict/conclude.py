@@ -214,6 +214,7 @@ def conclude(findings: Findings, ranked: Ranked, follow_up: FollowUp) -> Verdict
         seconds=findings.seconds,
         seed=findings.seed,
         complete=findings.complete,
+        unstable=tuple(run.record for run in findings.sensitive),
     )
 
 
