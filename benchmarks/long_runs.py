@@ -153,16 +153,16 @@ LONG = {
 
 def measure(name: str) -> dict[str, float]:
     """Return what a long run costs, files and all but figures, in this process."""
+    from subzero.atomic_output import open_output_folder
     from subzero.output import write_run
-    from subzero.stage import staged
 
     subzero.simulate("fig6")  # whatever is loaded or compiled once
     trial, begun = trial_of(**LONG[name]), process_time()  # type: ignore[arg-type]
     run = subzero.simulate(trial)
     took = process_time() - begun
     with tempfile.TemporaryDirectory() as folder:
-        with staged(Path(folder) / "run") as stage:
-            write_run(run, stage, "tethered")
+        with open_output_folder(Path(folder) / "run") as output_folder:
+            write_run(run, output_folder, "tethered")
         size = (Path(folder) / "run" / "tethered.nc").stat().st_size
     accuracy = json.loads(run.attrs["accuracy"])
     return {

@@ -200,10 +200,11 @@ def peak_memory(members):
     code = (
         "import resource, sys, subzero; from benchmarks.sweep import plan, SHORT, GRID;"
         "import tempfile; from pathlib import Path; from subzero.sweeps.api import finished;"
-        "from subzero.stage import staged;"
+        "from subzero.atomic_output import open_output_folder;"
         "from subzero.sweeps.tell import write_sweep;"
         "d = tempfile.mkdtemp(); one = plan({}, SHORT);\n"
-        "with finished(one, Path(d), workers=2) as store, staged(Path(d)) as stage: write_sweep(one, store, stage)\n"
+        "with finished(one, Path(d), workers=2) as done, open_output_folder(Path(d)) as out:\n"
+        "    write_sweep(one, done, out)\n"
         "peak = [resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)];"
         "print(*peak);"
         "import shutil; shutil.rmtree(d)"

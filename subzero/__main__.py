@@ -3,26 +3,32 @@
 from __future__ import annotations
 
 import gc
+import sys
 
-from subzero import interrupts
+from subzero import interrupts, standard_streams
 
 YOUNG = 50_000
 """So many new objects before Python looks for garbage among them. A command lives for seconds and keeps most of what it
 makes: looking at 700, as Python does, is a tenth of it."""
 
+UNWRITABLE = 2
+"""Exit code where standard output could not be written; files are complete all the same."""
+
 
 def run() -> None:
     """Run the command line with the words of this process, and end it with its exit code."""
     gc.set_threshold(YOUNG)
+    standard_streams.protect()
     try:
         interrupts.watch()
         from subzero.cli import main
 
         code = main()
-        interrupts.ignore()  # all is done: what comes now cannot change it
+        if error := standard_streams.output_error():
+            print(f"Standard output cannot be written: {error.strerror}.", file=sys.stderr)
+            code = code or UNWRITABLE
     except KeyboardInterrupt:  # before the command line was ready, or while it said so
-        interrupts.ignore()
-        interrupts.say()
+        interrupts.say_interrupted()
         code = interrupts.INTERRUPTED
     gc.freeze()  # what is left goes with the process: to take it apart first takes a second
     interrupts.leave(code)

@@ -29,10 +29,10 @@ from zipfile import BadZipFile
 
 import numpy as np
 
+from subzero.atomic_output import DISK_FULL
 from subzero.engine.recording import BY_NODE, BY_TIME, Recording, Standing, new_recording, row_of
 from subzero.errors import UserError, checked, printable
 from subzero.jit import Record
-from subzero.stage import FULL
 
 MANIFEST, STATE, LOCK = "manifest.json", "state.npz", "lock"
 MINUTE_S = 60.0
@@ -300,7 +300,7 @@ def _told(folder: Path) -> Iterator[None]:
             " folder."
         ) from error
     except OSError as error:
-        if error.filename is None and error.errno not in FULL:
+        if error.filename is None and error.errno not in DISK_FULL:
             raise
         raise UserError(
             f"The checkpoint {name} cannot be written: {error.strerror}. What it has is kept: make room, and start the"

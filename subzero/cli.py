@@ -27,7 +27,7 @@ import scenarios
 from subzero import cli_autopilot, cli_diagnosis, cli_install, cli_sweep, cli_trials
 from subzero.cli_examples import EXAMPLES, register
 from subzero.errors import UserError, nearest, printable
-from subzero.interrupts import INTERRUPTED, begin, came, say
+from subzero.interrupts import INTERRUPTED, reset, say_interrupted, was_interrupted
 from subzero.voice import COMMAND, NOT_STRICT, PLAIN, StrictVoice, Voice, speak
 
 if TYPE_CHECKING:
@@ -147,7 +147,7 @@ class Kept:
             yield {}
             return
         from subzero.checkpoint import Checkpoint
-        from subzero.interrupts import leaves
+        from subzero.interrupts import set_exit_message
 
         kept = Checkpoint(folder=folder / "checkpoint", minutes=self.checkpoint)
         where = printable(str(kept.folder))
@@ -158,7 +158,7 @@ class Kept:
                 return "nothing was kept yet"
             return f"the run up to t = {time:g} s is kept in {where}; the same command goes on from there"
 
-        leaves(left)
+        set_exit_message(left)
         if (time := kept.stands_at()) is not None:
             print(f"Going on from t = {time:g} s, which is kept in {where}.", file=sys.stderr)
         try:
@@ -210,12 +210,12 @@ def simulate(
         voice: how the command speaks.
     """
     from subzero import write_results
-    from subzero.output import staged
+    from subzero.output import open_output_folder
 
     trial = inputs.read(scenario)
     outputs.check()
     folder = kept.folder(kept.of(trial))
-    with kept.kept_in(folder) as checkpoint, staged(folder) as stage:
+    with kept.kept_in(folder) as checkpoint, open_output_folder(folder) as output_folder:
         trial, extended = inputs.checked(scenario)
         trial = kept.of(trial)
         with _progress(trial) as progress:
@@ -224,9 +224,9 @@ def simulate(
             result = run(trial, tethered=not untethered, **extended, **checkpoint, progress=progress)
         runs = {"untethered" if untethered else "tethered": result}
         runs = _refined(runs, trial, extended) if check else runs
-        summary = write_results.write_all(runs, None, stage, **outputs.kinds(), float64=kept.float64)
-        write_results.write_film(outputs.animate, stage)
-    return FINE if write_results.tell(summary, stage, strict=voice.strict, voice=voice) else STOPPED
+        summary = write_results.write_all(runs, None, output_folder, **outputs.kinds(), float64=kept.float64)
+        write_results.write_film(outputs.animate, output_folder)
+    return FINE if write_results.tell(summary, output_folder, strict=voice.strict, voice=voice) else STOPPED
 
 
 def compare(
@@ -252,14 +252,14 @@ def compare(
         voice: how the command speaks.
     """
     from subzero import write_results
-    from subzero.output import staged
+    from subzero.output import open_output_folder
     from subzero.records.record import read_record
 
     trial = inputs.read(scenario)
     record = read_record(measured) if measured is not None else None
     outputs.check()
     folder = kept.folder(kept.of(trial))
-    with kept.kept_in(folder) as checkpoint, staged(folder) as stage:
+    with kept.kept_in(folder) as checkpoint, open_output_folder(folder) as output_folder:
         trial, extended = inputs.checked(scenario)
         trial = kept.of(trial)
         with _progress(trial) as progress:
@@ -268,10 +268,10 @@ def compare(
             result = run(trial, measured=record, **extended, **checkpoint, progress=progress)
         runs = _refined(result.runs, trial, extended) if check else result.runs
         summary = write_results.write_all(
-            runs, result.measured, stage, **outputs.kinds(), float64=kept.float64
+            runs, result.measured, output_folder, **outputs.kinds(), float64=kept.float64
         )
-        write_results.write_film(outputs.animate, stage)
-    return FINE if write_results.tell(summary, stage, strict=voice.strict, voice=voice) else STOPPED
+        write_results.write_film(outputs.animate, output_folder)
+    return FINE if write_results.tell(summary, output_folder, strict=voice.strict, voice=voice) else STOPPED
 
 
 def plot(
@@ -292,19 +292,19 @@ def plot(
         format: of the files.
         voice: how the command speaks.
     """
-    from subzero.stage import staged
+    from subzero.atomic_output import open_output_folder
 
     names = [f"{run.stem}_{name}.{format}" for name in what or ()]
-    with staged(out or run.parent, names) as stage:
+    with open_output_folder(out or run.parent, names) as output_folder:
         from subzero.accessor import figures_of, open_run
         from subzero.output import lacking_letters_as_boxes
 
         dataset = open_run(run)
         for name, figure in figures_of(dataset, what).items():
             with lacking_letters_as_boxes():
-                figure.savefig(stage.path / f"{run.stem}_{name}.{format}")
-    with voice.tells(stage.files()):
-        print(stage.words())
+                figure.savefig(output_folder.path / f"{run.stem}_{name}.{format}")
+    with voice.tells(output_folder.files()):
+        print(output_folder.words())
     return FINE
 
 
@@ -325,7 +325,7 @@ def explore(
         voice: how the command speaks.
     """
     from subzero import explore_page
-    from subzero.interrupts import leaves
+    from subzero.interrupts import set_exit_message
 
     trial = scenarios.load(scenario)
     with explore_page.address(port) as (url, listening):
@@ -340,7 +340,7 @@ def explore(
         with voice.tells({"url": url}):
             print(f"Exploring {printable(trial.name)} at {url}. Ctrl-C ends it.")
         sys.stdout.flush()
-        leaves(lambda: "the page is closed, and files that were saved stay")
+        set_exit_message(lambda: "the page is closed, and files that were saved stay")
         page.serve(listening, url, browser=not no_browser)
     return FINE
 
@@ -359,7 +359,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         arguments: words behind ``subzero``; those of this process if None.
     """
     _never_choke(sys.stdout, sys.stderr)
-    begin()
+    reset()
     _note_command(sys.argv[1:] if arguments is None else arguments)
     try:
         command, bound, _ = app.parse_args(arguments, exit_on_error=False, print_error=False)
@@ -372,12 +372,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except UserError as error:
         return _refuse(str(error))
     except KeyboardInterrupt:
-        say()
+        say_interrupted()
         return INTERRUPTED
     except Exception:  # matplotlib's drawing in C++ made a ValueError of an interrupt in a call back
-        if not came():
+        if not was_interrupted():
             raise
-        say()
+        say_interrupted()
         return INTERRUPTED
 
 

@@ -173,19 +173,19 @@ def _deliver(
 ) -> int:
     """Fly with the cable and without, write and tell; return the exit code."""
     from subzero.autopilot import AutopilotWarning, output
-    from subzero.output import staged
+    from subzero.output import open_output_folder
     from subzero.progress import costs_of, progress_bar
     from subzero.write_results import refuse_warnings
 
-    with staged(folder) as stage:
+    with open_output_folder(folder) as output_folder:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", AutopilotWarning)  # the outcome tells it, below
             measured: Measured = {}
             for label in RUNS:
                 with progress_bar(f"Flying {trial.name}, {label}", lambda: costs_of(trial)) as progress:
                     measured[label] = fly(label, progress)
-        summary = output.write(measured, title, *shown, stage)
-    stopped = output.tell(summary, list(measured), stage, voice)
+        summary = output.write(measured, title, *shown, output_folder)
+    stopped = output.tell(summary, list(measured), output_folder, voice)
     for message in stopped:
         print(message, file=sys.stderr)
     return STOPPED if stopped or (voice.strict and refuse_warnings(summary)) else FINE

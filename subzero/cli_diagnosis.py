@@ -14,7 +14,7 @@ from cyclopts import Parameter
 import scenarios
 from subzero.cli_examples import register
 from subzero.errors import UserError, printable
-from subzero.interrupts import INTERRUPTED, patience, say
+from subzero.interrupts import INTERRUPTED, patience, say_interrupted
 from subzero.progress import progress_bar
 from subzero.voice import PLAIN, Voice
 
@@ -103,12 +103,12 @@ def diagnose(
         search: how it is searched.
         voice: how the command speaks.
     """
-    from subzero.output import staged
+    from subzero.output import open_output_folder
 
     scenario, records = _sorted(files, scenario)
     if scenario is not None:
         scenarios.load(scenario)  # a mistake in it answers at once
-    with staged(out) as stage:
+    with open_output_folder(out) as output_folder:
         own = _own(effects)
         logged = _read(records, scenario, commands)
         from subzero import write_diagnosis
@@ -116,11 +116,11 @@ def diagnose(
         with patience(LAST_WORDS_S):
             verdict = _ask(logged, own, search, voice)
             write_diagnosis.write_all(
-                verdict, logged, stage, run=simulated, effects=own, effects_file=effects
+                verdict, logged, output_folder, run=simulated, effects=own, effects_file=effects
             )
-    write_diagnosis.tell(verdict, stage, scenario=logged[0].setting.trial.name, voice=voice)
+    write_diagnosis.tell(verdict, output_folder, scenario=logged[0].setting.trial.name, voice=voice)
     if not verdict.complete:
-        say("Interrupted; what it has is written.")
+        say_interrupted("Interrupted; what it has is written.")
     return FINE if verdict.complete else INTERRUPTED
 
 
@@ -146,22 +146,22 @@ def calibrate(
         estimation: what is estimated.
         voice: how the command speaks.
     """
+    from subzero.atomic_output import open_output_folder
     from subzero.calibration.numbers import full_name
-    from subzero.stage import staged
     from subzero.write_calibration import files_of, tell, write_all
 
     names = files_of(out)
     wanted = [full_name(name) for name in estimation.free or ()]
     if scenario is not None:
         scenarios.load(scenario)  # a mistake in it answers at once
-    with staged(out.parent, names) as stage:
+    with open_output_folder(out.parent, names) as output_folder:
         logged = _read(records, scenario, commands)
         from subzero.calibration.api import calibrate as run
 
         with progress_bar("Calibrating", lambda: COSTS) as progress:
             found = run(logged, free=wanted, vehicle=vehicle, progress=progress, quick=estimation.quick)
-        write_all(found, stage, out.stem)
-    tell(found, stage, out, voice=voice)
+        write_all(found, output_folder, out.stem)
+    tell(found, output_folder, out, voice=voice)
     return NO_CALIBRATION if found.refused else FINE
 
 
@@ -190,13 +190,13 @@ def challenge(
             print(answer)
         return FINE
     scenarios.load(scenario)
-    from subzero.output import staged
+    from subzero.output import open_output_folder
     from subzero.synthetic.challenge import challenge as hide
 
-    with staged(out) as stage, progress_bar("Hiding an effect"):
-        hide(scenario, seed, stage.path)
-    with voice.tells(stage.files()):
-        print(stage.words())
+    with open_output_folder(out) as output_folder, progress_bar("Hiding an effect"):
+        hide(scenario, seed, output_folder.path)
+    with voice.tells(output_folder.files()):
+        print(output_folder.words())
         print(f"Find it: subzero diagnose {scenario} {out / 'record.csv'}")
         print(f"Be told: subzero challenge --reveal {out}")
     return FINE

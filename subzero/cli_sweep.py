@@ -19,7 +19,7 @@ from subzero.errors import UserError, printable, whole
 from subzero.voice import NOT_STRICT, StrictVoice
 
 if TYPE_CHECKING:
-    from subzero.stage import Stage
+    from subzero.atomic_output import OutputFolder
     from subzero.sweeps.api import Standing
 
 FINE, STOPPED = 0, 3
@@ -52,14 +52,14 @@ def sweep(
     if workers is not None and scheduler is not None:
         raise UserError("--workers are processes here, and --scheduler has its own. Leave out one of them.")
     with _executor(workers, scheduler) as executor:
-        summary, stage = _swept(spec, out, executor, retry)
+        summary, output_folder = _swept(spec, out, executor, retry)
     from subzero.sweeps.tell import tell_sweep
 
-    tell_sweep(summary, stage, voice)
+    tell_sweep(summary, output_folder, voice)
     return STOPPED if summary["failed"] or (voice.strict and summary["warnings"]) else FINE
 
 
-def _swept(spec: Path, out: Path | None, executor: Any, retry: bool) -> tuple[dict[str, Any], Stage]:
+def _swept(spec: Path, out: Path | None, executor: Any, retry: bool) -> tuple[dict[str, Any], OutputFolder]:
     """Run what a file asks for, write all of it, and return the summary and where the files are."""
     from subzero.sweeps.workers import WorkerPool, rehearse_file
 
@@ -68,7 +68,7 @@ def _swept(spec: Path, out: Path | None, executor: Any, retry: bool) -> tuple[di
     from subzero.sweeps.plan import read_plan
 
     plan = read_plan(spec)
-    from subzero.stage import staged
+    from subzero.atomic_output import open_output_folder
     from subzero.sweeps.api import finished
 
     folder, artists = out or Path(spec.stem or "sweep"), _Artists(executor)
@@ -78,9 +78,9 @@ def _swept(spec: Path, out: Path | None, executor: Any, retry: bool) -> tuple[di
     ):
         from subzero.sweeps.tell import FILES, write_sweep
 
-        with staged(folder, FILES) as stage, artists.pool() as pool:
-            summary = write_sweep(plan, store, stage, pool)
-    return summary, stage
+        with open_output_folder(folder, FILES) as output_folder, artists.pool() as pool:
+            summary = write_sweep(plan, store, output_folder, pool)
+    return summary, output_folder
 
 
 class _Artists:
@@ -174,7 +174,7 @@ class _Bar:
             words, lambda: "Workers compile what is not compiled yet in their first run."
         )
         self._said, self._members, self._finished, self._folder = monotonic(), members, 0, folder
-        interrupts.leaves(self._left)
+        interrupts.set_exit_message(self._left)
 
     def __enter__(self) -> Self:
         self._bar.__enter__()

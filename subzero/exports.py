@@ -23,15 +23,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from subzero.atomic_output import friendly_errors
 from subzero.channels import CHANNELS, TIME
 from subzero.errors import UserError, chosen, printable
 from subzero.page.replay import cable_origin
-from subzero.stage import told
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from subzero.stage import Stage
+    from subzero.atomic_output import OutputFolder
 
 EPOCH = "2000-01-01 00:00:00"
 """Time 0 of a run in CF, which knows no time without a date."""
@@ -72,11 +72,11 @@ def writer_of(kind: str) -> Callable[[xr.Dataset, Path], None]:
     return write
 
 
-def write_exports(run: xr.Dataset, label: str, kinds: Iterable[str], stage: Stage) -> None:
+def write_exports(run: xr.Dataset, label: str, kinds: Iterable[str], output_folder: OutputFolder) -> None:
     """Write a run in some formats: ``tethered.mcap``, ``tethered.mat``, ``tethered.parquet``, ``tethered_cf.nc``."""
-    with told(stage.folder):
+    with friendly_errors(output_folder.folder):
         for kind in kinds:
-            writer_of(kind)(run, stage.path / (label + KINDS[kind][0]))
+            writer_of(kind)(run, output_folder.path / (label + KINDS[kind][0]))
 
 
 # MCAP: messages in JSON, of schemas that viewers know by their names.

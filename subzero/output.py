@@ -1,4 +1,4 @@
-"""Write what a command leaves behind: runs, summaries and figures, to a stage that delivers all of them or none."""
+"""Write what a command leaves behind: runs, summaries and figures; all of them are delivered, or none."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
 
-from subzero import stage as stages
+from subzero import atomic_output
+from subzero.atomic_output import OutputFolder
 from subzero.channels import CHANNELS, TIME
-from subzero.stage import Stage
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -33,28 +33,28 @@ DIAGNOSIS_FILES = ("diagnosis.json", "extended.toml", "report.md", "report.html"
 
 
 @contextmanager
-def staged(folder: Path) -> Iterator[Stage]:
-    """Give a stage to write to, as `subzero.stage.staged`; what commands write must not be names of folders there.
+def open_output_folder(folder: Path) -> Iterator[OutputFolder]:
+    """Give a folder to write to, as `atomic_output.open_output_folder`; files of commands must not be folders there.
 
     Raises:
         UserError: at once, if `folder` cannot be made or written.
     """
-    with stages.staged(folder, (*RUN_FILES, *DIAGNOSIS_FILES)) as stage:
-        yield stage
+    with atomic_output.open_output_folder(folder, (*RUN_FILES, *DIAGNOSIS_FILES)) as output_folder:
+        yield output_folder
 
 
-def write_run(run: xr.Dataset, stage: Stage, name: str, *, float64: bool = False) -> None:
+def write_run(run: xr.Dataset, output_folder: OutputFolder, name: str, *, float64: bool = False) -> None:
     """Write a run as ``name.nc`` (everything, with units and provenance) and ``name.csv`` (the channels).
 
     Args:
         run: the run.
-        stage: where to.
+        output_folder: where to.
         name: of both files.
         float64: in double precision throughout; by default the arrays of `storage` have single precision.
     """
-    with stages.told(stage.folder):
-        write_netcdf(run, stage.path / f"{name}.nc", float64)
-        write_csv(run, stage.path / f"{name}.csv")
+    with atomic_output.friendly_errors(output_folder.folder):
+        write_netcdf(run, output_folder.path / f"{name}.nc", float64)
+        write_csv(run, output_folder.path / f"{name}.csv")
 
 
 CHUNKS, CHANNEL_CHUNK = {"time": 128, "node": 64}, 4096
@@ -167,17 +167,17 @@ def write_csv(run: xr.Dataset, path: Path) -> None:
             writer.writerows([_cell(value) for value in row] for row in zip(*block, strict=True))
 
 
-def write_summary(summary: dict[str, Any], stage: Stage) -> None:
+def write_summary(summary: dict[str, Any], output_folder: OutputFolder) -> None:
     """Write ``summary.json``."""
     text = json.dumps(summary, indent=2, ensure_ascii=False, allow_nan=False)
-    with stages.told(stage.folder):
-        (stage.path / "summary.json").write_text(text + "\n", encoding="utf-8")
+    with atomic_output.friendly_errors(output_folder.folder):
+        (output_folder.path / "summary.json").write_text(text + "\n", encoding="utf-8")
 
 
-def write_page(page: str, stage: Stage) -> None:
+def write_page(page: str, output_folder: OutputFolder) -> None:
     """Write ``report.html``."""
-    with stages.told(stage.folder):
-        (stage.path / "report.html").write_text(page, encoding="utf-8")
+    with atomic_output.friendly_errors(output_folder.folder):
+        (output_folder.path / "report.html").write_text(page, encoding="utf-8")
 
 
 DRAWING: dict[Any, Any] = {"svg.hashsalt": "subzero", "svg.fonttype": "path", "pdf.fonttype": 42}
@@ -198,11 +198,11 @@ def lacking_letters_as_boxes() -> Iterator[None]:
         yield
 
 
-def write_figures(figures: Mapping[str, Figure], stage: Stage, kind: str = "png") -> None:
+def write_figures(figures: Mapping[str, Figure], output_folder: OutputFolder, kind: str = "png") -> None:
     """Write each figure as ``name.png``, or as a drawing, ``name.svg`` or ``name.pdf``."""
-    with stages.told(stage.folder):
+    with atomic_output.friendly_errors(output_folder.folder):
         for name, figure in figures.items():
-            save(figure, stage.path / f"{name}.{kind}", kind)
+            save(figure, output_folder.path / f"{name}.{kind}", kind)
 
 
 def save(figure: Figure, to: Path | IO[bytes], kind: str) -> None:

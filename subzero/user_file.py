@@ -3,8 +3,8 @@
 Every reader of scenarios, records, sidecars, models and answers opens its file here. What is no plain file (a folder,
 a device, a pipe, a socket) is refused before it is opened, so that no read waits for somebody else. A file that is
 larger than anything of its kind has reason to be is refused before it fills the memory. And a result of ours whose
-folder was left in the middle of a write (`subzero.stage`) is refused, because its neighbours may be of another run.
-What a file says is shown to people through `errors.printable`.
+folder was left in the middle of a write (`subzero.atomic_output`) is refused, because its neighbours may be
+of another run. What a file says is shown to people through `errors.printable`.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ MOST_COLUMNS = 1000
 """Of a table; a run has fifty channels. Of every unknown column the nearest known one is looked for."""
 
 INCOMPLETE = "incomplete-subzero.json"
-"""Stands in an output folder as long as files move into it: which ones, and from where."""
+"""Stands in an output folder as long as files are replaced in it: their names."""
 
 
 class UnreadableFileError(UserError):
@@ -133,9 +133,10 @@ def _first_bytes(path: Path, count: int) -> bytes | None:
 def _refuse_half_written(path: Path) -> None:
     """Refuse a result whose folder holds files of two runs."""
     if path.name in interrupted_files(path.parent):
-        why = f"a command was interrupted while it wrote {printable(str(path.parent))}: its files are of two runs"
+        why = f"a command was killed while it wrote {printable(str(path.parent))}: its files are of two runs"
         remedy = (
-            f"Run the command again with --out {printable(str(path.parent))}, which finishes what was begun."
+            f"Run the command again with --out {printable(str(path.parent))}; if the files are your own, remove"
+            f" {INCOMPLETE} there."
         )
         raise UnreadableFileError(str(path), why, remedy)
 

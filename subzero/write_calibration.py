@@ -21,7 +21,7 @@ from subzero.errors import UserError, printable
 from subzero.voice import PLAIN, Voice
 
 if TYPE_CHECKING:
-    from subzero.stage import Stage
+    from subzero.atomic_output import OutputFolder
 
 ENDINGS = (".toml", "_cable.toml", ".json", "_numbers.png", "_errors.png", "_profiles.png")
 """Of the files that are written, behind the name of the vehicle."""
@@ -39,7 +39,7 @@ def files_of(out: Path) -> tuple[str, ...]:
     return tuple(f"{out.stem}{ending}" for ending in ENDINGS)
 
 
-def write_all(found: Calibration, stage: Stage, stem: str) -> None:
+def write_all(found: Calibration, output_folder: OutputFolder, stem: str) -> None:
     """Write the vehicle (and the cable), the JSON file and the figures, under a common name."""
     from subzero.figures.calibration import draw_calibration
     from subzero.figures.style import Title
@@ -48,21 +48,21 @@ def write_all(found: Calibration, stage: Stage, stem: str) -> None:
     for kind, content in found.files.items():
         ending = ".toml" if kind == "vehicle" else "_cable.toml"
         if content:
-            (stage.path / f"{stem}{ending}").write_text(content, encoding="utf-8")
-    (stage.path / f"{stem}.json").write_text(text(found), encoding="utf-8")
+            (output_folder.path / f"{stem}{ending}").write_text(content, encoding="utf-8")
+    (output_folder.path / f"{stem}.json").write_text(text(found), encoding="utf-8")
     trials = ", ".join(dict.fromkeys(one.trial for one in found.records))
     title = Title(words=f"Calibration of {', '.join(one.name for one in found.records)}", scenario=trials)
     figures = draw_calibration(found, title)
-    write_figures({f"{stem}_{name}": figure for name, figure in figures.items()}, stage)
+    write_figures({f"{stem}_{name}": figure for name, figure in figures.items()}, output_folder)
 
 
-def tell(found: Calibration, stage: Stage, out: Path, *, voice: Voice = PLAIN) -> None:
+def tell(found: Calibration, output_folder: OutputFolder, out: Path, *, voice: Voice = PLAIN) -> None:
     """Print the numbers, what the records do not determine, and where the files are."""
-    with voice.tells(plain(mapping(found)) | stage.files()):
-        _tell(found, stage, out, Console())
+    with voice.tells(plain(mapping(found)) | output_folder.files()):
+        _tell(found, output_folder, out, Console())
 
 
-def _tell(found: Calibration, stage: Stage, out: Path, console: Console) -> None:
+def _tell(found: Calibration, output_folder: OutputFolder, out: Path, console: Console) -> None:
     table = Table(box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=(0, 1, 0, 0))
     for name in ("number", "before", "calibrated", "95 %", "change"):
         words = name in ("number", "change")
@@ -74,7 +74,7 @@ def _tell(found: Calibration, stage: Stage, out: Path, console: Console) -> None
     console.print(table, highlight=False)
     for line in (headline(found), *story(found)):
         console.print(printable(line), highlight=False, markup=False)
-    console.print(stage.words(), highlight=False, markup=False)
+    console.print(output_folder.words(), highlight=False, markup=False)
     if not found.refused:
         console.print(f'Fly it: vehicle = "{out.name}" in a trial beside it.', highlight=False, markup=False)
 

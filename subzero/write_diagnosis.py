@@ -50,11 +50,11 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
+    from subzero.atomic_output import OutputFolder
     from subzero.diagnosis.hypothesis.configuration import Setting
     from subzero.diagnosis.hypothesis.effect import Effect
     from subzero.diagnosis.hypothesis.logged import Logged
     from subzero.records.record import Record
-    from subzero.stage import Stage
 
 Run = Callable[["Setting"], "xr.Dataset"]
 """Simulates a setting as the diagnosis has simulated it."""
@@ -90,7 +90,7 @@ def _tell_hidden(verdict: Verdict, console: Console) -> None:
 
 def tell(
     verdict: Verdict,
-    stage: Stage,
+    output_folder: OutputFolder,
     console: Console | None = None,
     *,
     scenario: str = "SCENARIO",
@@ -100,18 +100,18 @@ def tell(
 
     Args:
         verdict: of `subzero.diagnose`.
-        stage: where the files are.
+        output_folder: where the files are.
         console: where to print.
         scenario: the trial's name, for lines of the shell.
         voice: how the command speaks.
     """
-    with voice.tells(json_file.mapping(verdict) | stage.files()):
-        _tell(verdict, stage, console or Console(), scenario)
+    with voice.tells(json_file.mapping(verdict) | output_folder.files()):
+        _tell(verdict, output_folder, console or Console(), scenario)
 
 
-def _tell(verdict: Verdict, stage: Stage, console: Console, scenario: str) -> None:
+def _tell(verdict: Verdict, output_folder: OutputFolder, console: Console, scenario: str) -> None:
     console.print(f"\n[bold]{escape(words.headline(verdict))}[/bold]", highlight=False)
-    extended = shlex.quote(printable(str(stage.folder / "extended.toml")))
+    extended = shlex.quote(printable(str(output_folder.folder / "extended.toml")))
     for answer in summary(verdict, scenario, extended):
         console.print(f"[bold]{answer.question}[/bold]", highlight=False)
         for line in answer.words:
@@ -126,7 +126,7 @@ def _tell(verdict: Verdict, stage: Stage, console: Console, scenario: str) -> No
         console.print(f"Root mean square error, {name}:", highlight=False, markup=False)
         console.print(_rich(table, console.width), highlight=False)
     _tell_hidden(verdict, console)
-    console.print(stage.words(), highlight=False, markup=False)
+    console.print(output_folder.words(), highlight=False, markup=False)
 
 
 COLUMN_GAP = 3
@@ -166,7 +166,7 @@ def _longest_word(name: str, cells: Sequence[str]) -> int:
 def write_all(
     verdict: Verdict,
     logged: Sequence[Logged],
-    stage: Stage,
+    output_folder: OutputFolder,
     *,
     run: Run,
     effects: Iterable[Effect] = (),
@@ -177,31 +177,35 @@ def write_all(
     Args:
         verdict: of `subzero.diagnose`.
         logged: the records that were explained.
-        stage: where to.
+        output_folder: where to.
         run: simulates what the page replays.
         effects: causes of the user's own.
         effects_file: where they are from.
     """
-    stage.failed = not verdict.complete
+    output_folder.failed = not verdict.complete
     if effects_file is not None:
-        shutil.copyfile(effects_file, stage.path / effects_file.name)
+        shutil.copyfile(effects_file, output_folder.path / effects_file.name)
     sources = ", ".join(one.record.source for one in logged)
     own = effects_file.name if effects_file is not None else None
     extended = text_of(verdict.extended, logged[0].setting, effects=all_effects(effects), effects_file=own,
                        source=sources)  # fmt: skip
-    _write(stage, "extended.toml", extended)
+    _write(output_folder, "extended.toml", extended)
     told = {one.name: _about(one) for one in logged}
-    _write(stage, "diagnosis.json", json_file.text(verdict, told, logged[0].setting.trial.name))
-    figures = _draw(verdict, logged, stage)
-    _write(stage, "report.md", markdown(verdict, about(logged), tuple(figures), logged[0].setting.trial.name))
+    _write(output_folder, "diagnosis.json", json_file.text(verdict, told, logged[0].setting.trial.name))
+    figures = _draw(verdict, logged, output_folder)
+    _write(
+        output_folder,
+        "report.md",
+        markdown(verdict, about(logged), tuple(figures), logged[0].setting.trial.name),
+    )
     command = COMMAND.get()
     page = page_of_diagnosis(
         verdict, logged, figures, command=command, run=run, extended_toml=extended, effects=effects
     )
-    _write(stage, "report.html", page)
+    _write(output_folder, "report.html", page)
 
 
-def _draw(verdict: Verdict, logged: Sequence[Logged], stage: Stage) -> dict[str, Figure]:
+def _draw(verdict: Verdict, logged: Sequence[Logged], output_folder: OutputFolder) -> dict[str, Figure]:
     """Draw the figures, write each as a picture, and return them by name."""
     from subzero.figures.diagnosis import draw_diagnosis
     from subzero.figures.style import Title
@@ -211,7 +215,7 @@ def _draw(verdict: Verdict, logged: Sequence[Logged], stage: Stage) -> dict[str,
     title = f"Diagnosis of {records}: {words.headline(verdict)}"
     figures = draw_diagnosis(verdict, Title(words=title, scenario=names))
     for name, figure in figures.items():
-        (stage.path / f"{name}.png").write_bytes(_png(figure))
+        (output_folder.path / f"{name}.png").write_bytes(_png(figure))
     return figures
 
 
@@ -381,5 +385,5 @@ def _png(figure: Figure) -> bytes:
     return held.getvalue()
 
 
-def _write(stage: Stage, name: str, text: str) -> None:
-    (stage.path / name).write_text(text, encoding="utf-8")
+def _write(output_folder: OutputFolder, name: str, text: str) -> None:
+    (output_folder.path / name).write_text(text, encoding="utf-8")

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
     import scenarios
+    from subzero.atomic_output import OutputFolder
     from subzero.records.record import Record
-    from subzero.stage import Stage
 
 
 def default_folder(trial: scenarios.Trial) -> Path:
@@ -29,7 +29,7 @@ def default_folder(trial: scenarios.Trial) -> Path:
 def write_all(
     runs: dict[str, xr.Dataset],
     record: Record | None,
-    stage: Stage,
+    output_folder: OutputFolder,
     *,
     width: float | None = None,
     kind: str = "png",
@@ -41,7 +41,7 @@ def write_all(
     Args:
         runs: by label.
         record: what was measured, if anything was.
-        stage: where to.
+        output_folder: where to.
         width: of the figures; None for two columns of a page. [inch]
         kind: of the figures: png, svg or pdf.
         exports: kinds of files for other programs (`subzero.exports`).
@@ -54,15 +54,17 @@ def write_all(
     from subzero.summary import summary_of
 
     summary = summary_of(runs, record)
-    stage.failed = any(run.attrs["outcome"] != "completed" for run in runs.values())
+    output_folder.failed = any(run.attrs["outcome"] != "completed" for run in runs.values())
     for label, run in runs.items():
-        output.write_run(run, stage, label, float64=float64)
-        write_exports(run, label, exports, stage)
-    output.write_summary(summary, stage)
+        output.write_run(run, output_folder, label, float64=float64)
+        write_exports(run, label, exports, output_folder)
+    output.write_summary(summary, output_folder)
     with page_width(WIDTH if width is None else width):
         figures = draw(runs, record)
-        output.write_figures(figures, stage, kind)
-    output.write_page(page_of_runs(runs, summary, figures, command=COMMAND.get(), record=record), stage)
+        output.write_figures(figures, output_folder, kind)
+    output.write_page(
+        page_of_runs(runs, summary, figures, command=COMMAND.get(), record=record), output_folder
+    )
     return summary
 
 
@@ -79,7 +81,7 @@ def check_pictures(width: float | None, film: str | None) -> None:
         check_film()
 
 
-def write_film(kind: str | None, stage: Stage) -> None:
+def write_film(kind: str | None, output_folder: OutputFolder) -> None:
     """Write the replay of ``report.html`` as ``replay.gif`` or ``replay.mp4``, if it is asked for."""
     if kind is None:
         return
@@ -87,10 +89,12 @@ def write_film(kind: str | None, stage: Stage) -> None:
     from subzero.progress import progress_bar
 
     with progress_bar("Filming") as progress:
-        film(stage.path / "report.html", stage.path / f"replay.{kind}", progress)
+        film(output_folder.path / "report.html", output_folder.path / f"replay.{kind}", progress)
 
 
-def tell(summary: dict[str, Any], stage: Stage, *, strict: bool = False, voice: Voice = PLAIN) -> bool:
+def tell(
+    summary: dict[str, Any], output_folder: OutputFolder, *, strict: bool = False, voice: Voice = PLAIN
+) -> bool:
     """Print the summary and where the files are; say why runs could not go on, and if `strict`, that some warn.
 
     Returns:
@@ -98,10 +102,10 @@ def tell(summary: dict[str, Any], stage: Stage, *, strict: bool = False, voice: 
     """
     from subzero.report import RUNS, show
 
-    with voice.tells(summary | stage.files()):
+    with voice.tells(summary | output_folder.files()):
         console = Console()
         show(summary, console, whole=voice.verbose)
-        console.print(stage.words(), highlight=False, markup=False)
+        console.print(output_folder.words(), highlight=False, markup=False)
     stopped = [label for label in RUNS if summary.get(label, {}).get("outcome") == "stopped"]
     for label in stopped:
         print(f"The {label} run stopped: {summary[label]['outcome_message']}", file=sys.stderr)

@@ -30,7 +30,7 @@ from subzero.diagnosis.report.summary import summary
 from subzero.diagnosis.results import Verdict
 from subzero.figures.diagnosis import draw_diagnosis
 from subzero.figures.style import Title
-from subzero.output import staged
+from subzero.output import open_output_folder
 from subzero.synthetic.challenge import SAMPLE_S
 from subzero.synthetic.planted import Hidden, draw_deviations, hide, make_record
 
@@ -91,12 +91,14 @@ def write(sections: dict[str, str]) -> None:
 
 def keep(logged: Logged, verdict: Verdict, folder: Path) -> None:
     """Write the record, and all files of its diagnosis."""
-    with staged(folder / logged.name) as stage:
+    with open_output_folder(folder / logged.name) as output_folder:
         names = list(logged.record.values)
         header = ",".join(["time_s", *(BY_NAME[name].column for name in names)])
         columns = np.column_stack([logged.record.time, *(logged.record.values[name] for name in names)])
-        np.savetxt(stage.path / "record.csv", columns, fmt="%.6g", delimiter=",", header=header, comments="")
-        write_diagnosis.write_all(verdict, [logged], stage, run=simulated)
+        np.savetxt(
+            output_folder.path / "record.csv", columns, fmt="%.6g", delimiter=",", header=header, comments=""
+        )
+        write_diagnosis.write_all(verdict, [logged], output_folder, run=simulated)
 
 
 def main() -> None:

@@ -35,14 +35,16 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from subzero.stage import Stage
+    from subzero.atomic_output import OutputFolder
 
 
 Measured = dict[str, tuple["xr.Dataset", dict[str, float]]]
 """Name of a run, tethered or untethered → the run and its indices."""
 
 
-def write(measured: Measured, title: str, answer: str, command: str, stage: Stage) -> dict[str, Any]:
+def write(
+    measured: Measured, title: str, answer: str, command: str, output_folder: OutputFolder
+) -> dict[str, Any]:
     """Write runs, ``summary.json`` with their indices, and a figure; return the summary.
 
     Args:
@@ -50,7 +52,7 @@ def write(measured: Measured, title: str, answer: str, command: str, stage: Stag
         title: in words.
         answer: channel that shows the answer of the vehicle.
         command: channel that was commanded.
-        stage: where to.
+        output_folder: where to.
     """
     from subzero.page import page_of_runs
     from subzero.summary import summary_of
@@ -58,18 +60,20 @@ def write(measured: Measured, title: str, answer: str, command: str, stage: Stag
     runs = {name: run for name, (run, _) in measured.items()}
     summary = summary_of(runs, None)
     summary["title"] = title = printable(title)
-    stage.failed = any(run.attrs["outcome"] != "completed" for run in runs.values())
+    output_folder.failed = any(run.attrs["outcome"] != "completed" for run in runs.values())
     for name, (run, indices) in measured.items():
-        output.write_run(run, stage, name)
+        output.write_run(run, output_folder, name)
         summary[name]["indices"] = {key: _number(value) for key, value in indices.items()}
-    output.write_summary(summary, stage)
+    output.write_summary(summary, output_folder)
     figures = {"manoeuvre": picture(runs, title, answer, command)}
-    output.write_figures(figures, stage)
-    output.write_page(page_of_runs(runs, summary, figures, command=COMMAND.get()), stage)
+    output.write_figures(figures, output_folder)
+    output.write_page(page_of_runs(runs, summary, figures, command=COMMAND.get()), output_folder)
     return summary
 
 
-def tell(summary: dict[str, Any], names: list[str], stage: Stage, voice: Voice = PLAIN) -> list[str]:
+def tell(
+    summary: dict[str, Any], names: list[str], output_folder: OutputFolder, voice: Voice = PLAIN
+) -> list[str]:
     """Print indices, warnings and where the files are; return the messages of runs that could not go on."""
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     table.add_column("")
@@ -80,12 +84,12 @@ def tell(summary: dict[str, Any], names: list[str], stage: Stage, voice: Voice =
         table.add_row(
             escape(index_words(key)), *(NOTHING if cell is None else f"{cell:.4g}" for cell in cells)
         )
-    with voice.tells(summary | stage.files()):
+    with voice.tells(summary | output_folder.files()):
         console = Console()
         console.print(f"{summary['scenario']}: {summary['title']}", highlight=False, markup=False)
         console.print(table, highlight=False)
         show_warnings({name: summary[name] for name in names}, console)
-        console.print(stage.words(), highlight=False, markup=False)
+        console.print(output_folder.words(), highlight=False, markup=False)
     return [
         f"The {name} run stopped: {summary[name]['outcome_message']}"
         for name in names

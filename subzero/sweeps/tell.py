@@ -32,8 +32,8 @@ from subzero.sweeps.workers import WorkerDiedError
 from subzero.voice import COMMAND, PLAIN, Voice
 
 if TYPE_CHECKING:
+    from subzero.atomic_output import OutputFolder
     from subzero.page.report import Table as Rows
-    from subzero.stage import Stage
     from subzero.sweeps.workers import WorkerPool
 
 FIGURES = ("bands", "histograms", "against", "tornado")
@@ -47,15 +47,17 @@ KEPT_REASONS = 100
 """So many stand in the summary; the table has all."""
 
 
-def write_sweep(plan: Plan, store: Store, stage: Stage, pool: WorkerPool | None = None) -> dict[str, Any]:
+def write_sweep(
+    plan: Plan, store: Store, output_folder: OutputFolder, pool: WorkerPool | None = None
+) -> dict[str, Any]:
     """Write everything that belongs to a finished sweep, and return its summary; a pool draws, if there is one."""
-    from subzero.stage import told
+    from subzero.atomic_output import friendly_errors
 
-    with told(stage.folder):
-        found = write_result(store, plan.job, plan.points, plan.attributes, stage.path)
+    with friendly_errors(output_folder.folder):
+        found = write_result(store, plan.job, plan.points, plan.attributes, output_folder.path)
     effects = effects_of(plan.points, found)
     summary = summary_of(plan, store, found, effects)
-    output.write_summary(summary, stage)
+    output.write_summary(summary, output_folder)
     below = _in_short(summary)
     shown = Shown(
         points=plan.points,
@@ -66,11 +68,11 @@ def write_sweep(plan: Plan, store: Store, stage: Stage, pool: WorkerPool | None 
         warnings=below,
     )
     made = pictures(shown, pool)
-    with told(stage.folder):
+    with friendly_errors(output_folder.folder):
         for name, one in made.items():
-            (stage.path / f"{name}.png").write_bytes(one.png)
+            (output_folder.path / f"{name}.png").write_bytes(one.png)
     figures = {name: one.drawn for name, one in made.items()}
-    output.write_page(page_of_sweep(plan, summary, figures, COMMAND.get()), stage)
+    output.write_page(page_of_sweep(plan, summary, figures, COMMAND.get()), output_folder)
     return summary
 
 
@@ -168,13 +170,13 @@ def _in_short(summary: dict[str, Any]) -> str:
     return "; ".join([*failed, *warned])
 
 
-def tell_sweep(summary: dict[str, Any], stage: Stage, voice: Voice = PLAIN) -> None:
+def tell_sweep(summary: dict[str, Any], output_folder: OutputFolder, voice: Voice = PLAIN) -> None:
     """Print what came of a sweep."""
-    with voice.tells(summary | stage.files()):
-        _tell(summary, stage, Console())
+    with voice.tells(summary | output_folder.files()):
+        _tell(summary, output_folder, Console())
 
 
-def _tell(summary: dict[str, Any], stage: Stage, console: Console) -> None:
+def _tell(summary: dict[str, Any], output_folder: OutputFolder, console: Console) -> None:
     console.print(f"{summary['scenario']}: {summary['title']}", highlight=False, markup=False)
     console.print(_rich(numbers(summary), words=1), highlight=False)
     if summary["sensitivity"]["effects"]:
@@ -184,7 +186,7 @@ def _tell(summary: dict[str, Any], stage: Stage, console: Console) -> None:
     for line in _troubles(summary):
         console.print(printable(line), highlight=False, markup=False, soft_wrap=True)
     kept = f"{FILE} keeps its members: the same command does not run them again."
-    console.print(f"{stage.words()}\n{kept}", highlight=False, markup=False)
+    console.print(f"{output_folder.words()}\n{kept}", highlight=False, markup=False)
 
 
 def _rich(rows: Rows, *, words: int) -> Table:

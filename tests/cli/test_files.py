@@ -14,7 +14,7 @@ from numpy.testing import assert_allclose
 
 from subzero.channels import BY_COLUMN, CHANNELS, column_name
 from subzero.cli import FINE, STOPPED, main
-from subzero.output import staged, storage, write_netcdf
+from subzero.output import open_output_folder, storage, write_netcdf
 from subzero.records.record import read_record
 
 PICTURES = {"fig6.png", "attitude.png", "cable.png", "tension.png", "forces.png"}
@@ -114,8 +114,8 @@ def test_files_of_the_user_stay_and_old_results_are_replaced(tmp_path, rails):
 
 def test_a_failure_while_writing_leaves_nothing_half_written(tmp_path):
     def write_half():
-        with staged(tmp_path / "out") as stage:
-            (stage.path / "half.csv").write_text("half")
+        with open_output_folder(tmp_path / "out") as output_folder:
+            (output_folder.path / "half.csv").write_text("half")
             raise ZeroDivisionError
 
     with pytest.raises(ZeroDivisionError):

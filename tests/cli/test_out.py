@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import os
 import resource
 import sys
+import threading
 
 import pytest
 
@@ -95,7 +95,7 @@ def test_a_run_that_stops_never_replaces_one_that_did_not(tmp_path, rails, stops
     assert outcome(tmp_path / "stopped") == "stopped"
     said = "".join(capsys.readouterr().out.split())  # a terminal breaks a long path anywhere
     assert "stopped/:attitude.png" in said
-    assert "staysasitwas." in said
+    assert "werenotchanged." in said
     assert simulate(tmp_path) == STOPPED  # again, in place of the other failure
     assert {path.name for path in tmp_path.iterdir()} == {*good, "stopped"}
 
@@ -124,46 +124,35 @@ def test_a_full_disk_is_one_message_and_leaves_the_old_result(tmp_path, rails, c
 
 
 def killed(folder):
-    """Leave what a command leaves that is killed before its second move."""
-    root = folder / ".subzero-1-abc"
-    (root / "new").mkdir(parents=True)
-    (root / "lock").touch()
-    (root / "new" / "tethered.csv").write_text("time_s,depth_m\n0,9\n1,9\n")
+    """Leave what a command leaves that is killed while it replaces files."""
+    (folder / ".subzero-1-abc" / "new").mkdir(parents=True)
+    (folder / ".subzero-1-abc" / "new" / "tethered.csv").write_text("time_s,depth_m\n0,9\n1,9\n")
     (folder / "tethered.csv").write_text("time_s,depth_m\n0,1\n1,2\n")
-    said = {"files": ["summary.json", "tethered.csv"], "from": str(root), "doubtful": []}
-    (folder / INCOMPLETE).write_text(json.dumps(said))
+    (folder / INCOMPLETE).write_text(json.dumps({"files": ["summary.json", "tethered.csv"]}))
 
 
 def test_a_result_that_was_being_replaced_is_refused_as_a_record(tmp_path, rails, capsys):
     killed(tmp_path)
     assert main(["compare", "fig6", "--measured", str(tmp_path / "tethered.csv")]) == MISTAKE
-    said = capsys.readouterr().err
-    assert "a command was interrupted while it wrote" in said
-    assert "Run the command again with --out" in said
+    message = capsys.readouterr().err
+    assert "a command was killed while it wrote" in message
+    assert "Run the command again with --out" in message
     assert rails == []
 
 
-def test_the_next_command_finishes_what_was_begun(tmp_path, rails):
+def test_files_are_in_doubt_until_a_command_writes_them_anew(tmp_path, rails):
     killed(tmp_path)
-    assert main(["simulate", "fig6", "--untethered", "--out", str(tmp_path)]) == FINE
-    assert (tmp_path / "tethered.csv").read_text().startswith("time_s,depth_m\n0,9\n")
-    assert not [path.name for path in tmp_path.iterdir() if "subzero" in path.name]
-
-
-def test_files_stay_in_doubt_if_nothing_is_left_to_finish_them_with(tmp_path, rails):
-    killed(tmp_path)
-    os.rename(tmp_path / ".subzero-1-abc", tmp_path / "moved")
     assert main(["simulate", "fig6", "--untethered", "--out", str(tmp_path)]) == FINE
     assert main(["compare", "fig6", "--measured", str(tmp_path / "tethered.csv")]) == MISTAKE
-    assert simulate(tmp_path) == FINE  # writes them all anew
+    assert simulate(tmp_path) == FINE
     assert not (tmp_path / INCOMPLETE).exists()
 
 
 def test_a_living_command_keeps_its_hidden_folder(tmp_path):
-    from subzero.output import staged
+    from subzero.output import open_output_folder
 
-    with staged(tmp_path / "one") as first:
-        with staged(tmp_path / "two") as second:
+    with open_output_folder(tmp_path / "one") as first:
+        with open_output_folder(tmp_path / "two") as second:
             (second.path / "b").write_text("b")
         (first.path / "a").write_text("a")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["one", "two"]
@@ -171,12 +160,12 @@ def test_a_living_command_keeps_its_hidden_folder(tmp_path):
 
 def test_a_full_disk_is_told_whoever_writes(tmp_path):
     from subzero.errors import UserError
-    from subzero.output import staged
+    from subzero.output import open_output_folder
 
     def write():
-        with staged(tmp_path / "out") as stage:
-            (stage.path / "full").symlink_to("/dev/full")
-            (stage.path / "full").write_text("x" * 100_000)
+        with open_output_folder(tmp_path / "out") as output_folder:
+            (output_folder.path / "full").symlink_to("/dev/full")
+            (output_folder.path / "full").write_text("x" * 100_000)
 
     with pytest.raises(UserError, match="No space left on device"):
         write()
@@ -194,8 +183,9 @@ def test_an_interrupt_after_the_last_move_is_told_as_it_is(tmp_path, rails, monk
 
 def test_a_command_says_nothing_of_a_former_one_in_the_same_process(tmp_path, rails, monkeypatch, capsys):
     """What an interrupted sweep had kept was told of the next command, whose errors would have passed as well."""
-    interrupts.leaves(lambda: "3 of 6 members are kept")
-    monkeypatch.setattr(interrupts, "_raised", [True])
+    interrupts.set_exit_message(lambda: "3 of 6 members are kept")
+    monkeypatch.setattr(interrupts, "_interrupted", threading.Event())
+    interrupts._interrupted.set()
 
     def broken(*_, **__):
         raise RuntimeError("a bug")
@@ -203,7 +193,8 @@ def test_a_command_says_nothing_of_a_former_one_in_the_same_process(tmp_path, ra
     monkeypatch.setattr("subzero.write_results.tell", broken)
     with pytest.raises(RuntimeError, match="a bug"):
         simulate(tmp_path)
-    assert "members" not in interrupts.words()
+    interrupts.say_interrupted()
+    assert "members" not in capsys.readouterr().err
 
 
 def test_control_characters_of_a_description_are_shown_escaped(tmp_path):

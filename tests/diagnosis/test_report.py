@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
+from subzero.atomic_output import OutputFolder
 from subzero.diagnosis import (
     CALIBRATED,
     CAUSE_NAMED,
@@ -37,7 +38,6 @@ from subzero.diagnosis import (
 from subzero.diagnosis.assessment import detectability
 from subzero.figures.diagnosis import draw_diagnosis
 from subzero.figures.style import Title
-from subzero.stage import Stage
 from subzero.write_diagnosis import tell
 
 TIME = np.linspace(0.0, 30.0, 301)
@@ -303,8 +303,8 @@ def test_a_share_is_told_as_more_or_less_than_in_the_model():
 
 
 def test_the_terminal_names_the_file_that_is_simulated_with_and_shows_every_error(tmp_path, capsys):
-    stage = Stage(tmp_path, Path("some where"))
-    tell(NAMED, stage, Console(width=80), scenario="fig6")
+    output_folder = OutputFolder(tmp_path, Path("some where"))
+    tell(NAMED, output_folder, Console(width=80), scenario="fig6")
     said = capsys.readouterr().out
     assert "subzero simulate fig6 --with 'some where/extended.toml'" in said
     assert " ".join(said.split()).count("nominal extended best rival noise floor") == 1

@@ -2,8 +2,8 @@
 
 One process delivers three files, `a`, `b` and `c`, to a folder that has an old `a` and `b` and the user's own `notes`.
 It is broken off at its first line, at its second, and so on to the last, by an interrupt, by a full disk, and by
-being killed. Whatever is found then has to be all old or all new, or has to be refused by every reader; and it has to
-be all old or all new after the next command with that folder.
+being killed. Whatever is found then has to be all old or all new, or has to be refused by every reader; and it is all
+new after the same command once more. Nothing that the process did not make is ever removed or moved.
 """
 
 from __future__ import annotations
@@ -18,19 +18,23 @@ from pathlib import Path
 
 import pytest
 
+from subzero.atomic_output import open_output_folder
+from subzero.errors import UserError
+from subzero.user_file import INCOMPLETE, read_bytes
+
 BREAKER = '''
 import errno, json, os, shutil, signal, sys
 from pathlib import Path
-from subzero import stage as module
+from subzero import atomic_output as module
 from subzero.user_file import interrupted_files, read_bytes
 from subzero.errors import UserError
 
 how, is_new, twice, top = sys.argv[1], sys.argv[2] == "new", sys.argv[3] == "twice", Path(sys.argv[4])
 OLD, NEW = {"a": "old", "b": "old"}, {"a": "new", "b": "new", "c": "new"}
 raised = {"interrupt": KeyboardInterrupt, "full": lambda: OSError(errno.ENOSPC, "No space left on device")}
-# Sweeping up at the end is suppressed when it fails, and a refused lock is not a failure: fail only what can fail.
-UNTOUCHED = ("told", "_is_of_disk", "interruption")
-FALLIBLE = ("_force", "_keep", "_move_all", "_settle", "_deliver", "_renamed", "write")
+# Cleaning up at the end is suppressed when it fails: fail only what can fail.
+UNTOUCHED = ("friendly_errors", "_is_of_disk", "state_of_output")
+FALLIBLE = ("_replace_each", "_deliver", "_rename_whole")
 
 def deliver(folder, files, at=(), seen=None):
     """Deliver, and break off at the lines `at`, counted in the code of the module."""
@@ -51,9 +55,9 @@ def deliver(folder, files, at=(), seen=None):
         return trace
     sys.settrace(trace)
     try:
-        with module.staged(folder) as stage:
+        with module.open_output_folder(folder) as output:
             for name, text in files.items():
-                (stage.path / name).write_text(text)
+                (output.path / name).write_text(text)
     finally:
         sys.settrace(None)
         if seen is not None:
@@ -94,7 +98,7 @@ def broken(k, at):
         try:
             deliver(folder, NEW, at)
         except (KeyboardInterrupt, UserError, OSError) as error:
-            said = module.interruption() + "|" + type(error).__name__
+            said = module.state_of_output() + "|" + type(error).__name__
         os.write(write, said.encode())
         os._exit(0)
     os.close(write)
@@ -103,11 +107,12 @@ def broken(k, at):
     os.waitpid(child, 0)
     marked = bool(interrupted_files(folder)) and refused(folder)
     first = state(folder)
-    deliver(folder, {"d": "other"})
-    (folder / "d").unlink()
+    deliver(folder, NEW)
     second = state(folder)
     left = sorted(p.name for p in folder.iterdir() if p.name not in NEW)
     above = [p.name for p in folder.parent.iterdir() if p != folder]
+    if how != "full":  # a temporary folder remains of a killed process, and of an interrupt while it is removed
+        left, above = ([name for name in names if not name.startswith(module.TEMPORARY)] for names in (left, above))
     shutil.rmtree(folder.parent)
     return [first, marked, second, left == ([] if is_new else ["notes"]), above, said]
 
@@ -156,13 +161,12 @@ def broken(place):
 @pytest.mark.parametrize("kind", ["new", "old"])
 def test_broken_off_at_any_line_a_folder_is_all_old_or_all_new_or_says_so(broken, how, kind):
     lines, found = broken(how, kind)
-    assert lines > 30
+    assert lines > 10
     for spot, first, marked, second, kept, above, _ in found:
         assert first in ("old", "new") or marked, spot
-        assert second in ("old", "new"), spot
+        assert second == "new", spot
         assert kept, spot
-        if how == "kill":
-            assert above == [], spot
+        assert above == [], spot
     assert {one[1] for one in found} >= {"old"}
 
 
@@ -170,10 +174,9 @@ def test_broken_off_at_any_line_a_folder_is_all_old_or_all_new_or_says_so(broken
 @pytest.mark.parametrize("how", ["interrupt", "kill"])
 def test_broken_off_again_while_it_is_put_back_it_still_says_so(broken, how):
     _, found = broken(how, "old", "twice")
-    for spot, first, marked, second, kept, _above, _ in found:
+    for spot, first, marked, second, *_ in found:
         assert first in ("old", "new") or marked, spot
-        assert second in ("old", "new"), spot
-        assert kept, spot
+        assert second == "new", spot
 
 
 def test_what_is_said_after_an_interrupt_is_true(broken):
@@ -186,3 +189,81 @@ def test_what_is_said_after_an_interrupt_is_true(broken):
                 first,
                 said,
             )
+
+
+def tree(folder):
+    return {
+        str(path.relative_to(folder)): path.read_text()
+        for path in sorted(folder.rglob("*"))
+        if path.is_file()
+    }
+
+
+def deliver(folder, **files):
+    with open_output_folder(folder) as output:
+        for name, text in files.items():
+            (output.path / name).write_text(text)
+
+
+def test_no_folder_of_the_user_is_ever_removed_whatever_its_name(tmp_path):
+    """Folders called .subzero-… beside the output and up to two levels above were taken for leftovers, and removed."""
+    mine = {
+        ".subzero-notes/thesis": "a", "project/.subzero-venv/lib": "b", "project/x/.subzero-1-abc/new/file": "c",
+        "project/x/out/.subzero-2-abc/old/file": "d", "project/x/out/.subzero-gone/lock": "",
+    }  # fmt: skip
+    for name, text in mine.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text)
+    deliver(tmp_path / "project" / "x" / "out", a="new")
+    deliver(tmp_path / "project" / "x" / "other", a="new")
+    assert tree(tmp_path) == mine | {"project/x/out/a": "new", "project/x/other/a": "new"}
+
+
+@pytest.mark.parametrize("target", ["elsewhere/.subzero-evil", "victim/.subzero-evil", "victim"])
+def test_a_list_of_incomplete_files_moves_and_removes_nothing(tmp_path, target):
+    """A marker in a folder received from elsewhere named a folder, whose files were moved and which was removed."""
+    evil = tmp_path / target
+    (evil / "new").mkdir(parents=True)
+    (evil / "new" / "file").write_text("mine")
+    victim = tmp_path / "victim"
+    victim.mkdir(exist_ok=True)
+    marker = {"from": str(evil), "files": ["a", "../elsewhere", str(evil)], "doubtful": []}
+    (victim / INCOMPLETE).write_text(json.dumps(marker))
+    deliver(victim, a="new")
+    assert (evil / "new" / "file").read_text() == "mine"
+    assert (victim / "a").read_text() == "new"
+    assert not (victim / "file").exists()
+
+
+def test_files_that_a_killed_command_left_in_doubt_are_refused_until_they_are_written_again(tmp_path):
+    deliver(tmp_path / "out", a="old", b="old")
+    (tmp_path / "out" / INCOMPLETE).write_text(json.dumps({"files": ["a", "b"]}))
+    deliver(tmp_path / "out", b="new")
+    assert read_bytes(tmp_path / "out" / "b", 99) == b"new"
+    with pytest.raises(UserError, match="killed"):
+        read_bytes(tmp_path / "out" / "a", 99)
+    deliver(tmp_path / "out", a="new")
+    assert tree(tmp_path / "out") == {"a": "new", "b": "new"}
+
+
+def test_a_file_that_cannot_be_replaced_leaves_all_as_they_were(tmp_path, monkeypatch):
+    """As where another program holds one of them open, which some systems forbid to replace."""
+    deliver(tmp_path / "out", a="old", b="old", c="old")
+    replace = os.replace
+
+    def refusing(source, to):
+        if Path(to) == tmp_path / "out" / "b" and Path(source).read_text() == "new":
+            raise PermissionError(13, "it is in use", str(to))
+        replace(source, to)
+
+    monkeypatch.setattr(os, "replace", refusing)
+    with pytest.raises(UserError, match="in use"):
+        deliver(tmp_path / "out", a="new", b="new", c="new")
+    assert tree(tmp_path) == {"out/a": "old", "out/b": "old", "out/c": "old"}
+
+
+def test_parents_made_for_nothing_are_removed_and_no_others(tmp_path):
+    (tmp_path / "there").mkdir()
+    with pytest.raises(RuntimeError), open_output_folder(tmp_path / "there" / "new" / "out"):
+        raise RuntimeError
+    assert [path.name for path in tmp_path.rglob("*")] == ["there"]

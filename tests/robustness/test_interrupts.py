@@ -24,8 +24,8 @@ from pathlib import Path
 
 import pytest
 
+from subzero.atomic_output import TEMPORARY
 from subzero.cli import INTERRUPTED
-from subzero.stage import HIDDEN
 from subzero.user_file import INCOMPLETE
 
 DRIVER = Path(__file__).with_name("interrupted.py")
@@ -166,7 +166,7 @@ def check(code, out, err, folder, whole):
     """An interrupted command says so once, and leaves all of its files or none."""
     assert "Traceback" not in out + err, err
     left = [one for one in listing(folder) if one != "record.csv"]
-    assert not any(HIDDEN in one or INCOMPLETE in one for one in left), left
+    assert not any(TEMPORARY in one or INCOMPLETE in one for one in left), left
     if code == 0:  # the signal came behind its last line
         return
     assert code == INTERRUPTED, (code, out, err)
@@ -258,39 +258,12 @@ def test_a_signal_behind_the_last_line_of_a_command_changes_nothing(name):
     assert "fig6" in done.stdout
 
 
-SWALLOWED = """
-import ctypes, os, signal, sys, time
-from subzero import interrupts
-interrupts.watch()
-
-@ctypes.CFUNCTYPE(None)
-def called_back():
-    os.kill(os.getpid(), signal.SIGINT)
-    for _ in range(100):
-        pass
-
-try:
-    called_back()
-    time.sleep(60.0)
-except KeyboardInterrupt:
-    print("heard")
-"""
-
-
-def test_an_interrupt_that_machine_code_would_swallow_is_heard():
-    """A call back from LLVM lost it, and a traceback was told; the command went on until its patience was over."""
-    done = subprocess.run(
-        [sys.executable, "-c", SWALLOWED], capture_output=True, text=True, check=False, preexec_fn=heed_again
-    )
-    assert (done.stdout, done.stderr) == ("heard\n", "")
-
-
 MADE_AN_ERROR = """
 import os, signal, sys
 from contextlib import nullcontext
 from pathlib import Path
 from types import SimpleNamespace
-from subzero import cli, stage
+from subzero import atomic_output, cli
 
 def parsed(*arguments, **options):
     try:
@@ -299,7 +272,7 @@ def parsed(*arguments, **options):
             pass
     except KeyboardInterrupt:
         pass
-    with stage.told(Path("out")) if sys.argv[2] == "drawing" else nullcontext():
+    with atomic_output.friendly_errors(Path("out")) if sys.argv[2] == "drawing" else nullcontext():
         raise ValueError("Invalid bounding box")
 
 cli.app = SimpleNamespace(parse_args=parsed)
@@ -419,10 +392,10 @@ FORCED = """
 import sys, time
 from pathlib import Path
 from subzero import interrupts
-from subzero.stage import staged
+from subzero.atomic_output import open_output_folder
 interrupts.watch()
-with staged(Path("out")) as stage:
-    (stage.path / "file").write_text("half")
+with open_output_folder(Path("out")) as output:
+    (output.path / "file").write_text("half")
     while True:  # as machine code that does not come back
         try:
             print("begun", flush=True)
@@ -445,7 +418,7 @@ def test_a_command_that_has_to_be_ended_leaves_no_hidden_files(tmp_path):
     assert len(listing(tmp_path)) > 0
     command.send_signal(signal.SIGTERM)
     _, err = command.communicate(timeout=60.0)
-    assert (command.returncode, err) == (INTERRUPTED, "\nInterrupted; nothing was written.\n")
+    assert (command.returncode, err) == (INTERRUPTED, "Interrupted; nothing was written.\n")
     assert list(tmp_path.iterdir()) == []
 
 
@@ -473,3 +446,75 @@ def test_a_command_that_is_ended_behind_its_last_words_has_said_them_once():
         [sys.executable, "-c", LATE], capture_output=True, text=True, check=False, preexec_fn=heed_again
     )
     assert (done.returncode, done.stderr) == (INTERRUPTED, "Interrupted; nothing was written.\n")
+
+
+ENDLESS = """
+import sys, time
+from types import SimpleNamespace
+from subzero import cli
+from subzero.__main__ import run
+
+def parsed(*_, **__):
+    print("begun", file=sys.stderr, flush=True)
+    while True:
+        try:
+            print("words " * 10_000, flush=True)
+            print("words " * 10_000, file=sys.stderr, flush=True)
+            time.sleep(0.1)
+        except KeyboardInterrupt:
+            if sys.argv[1] == "heeds":
+                raise
+
+cli.app = SimpleNamespace(parse_args=parsed)
+run()
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize("streams", ["closed", "full disk", "full pipe", "no reader"])
+@pytest.mark.parametrize("how", ["heeds", "goes on"])
+def test_a_command_ends_whatever_became_of_its_streams(number, streams, how):
+    """Where the reader of stderr had gone, the thread that ends a command died of it with a lock in its hands: the
+    command ignored every further signal.
+    """
+    reading, writing = os.pipe()
+    full = open("/dev/full", "w")  # noqa: SIM115
+    to = {"closed": None, "full disk": full, "full pipe": writing, "no reader": writing}[streams]
+    options = {"stdout": to, "stderr": to}
+    if streams == "closed":
+        options = {"preexec_fn": lambda: (heed_again(), os.close(1), os.close(2))}
+    command = subprocess.Popen([sys.executable, "-c", ENDLESS, how], **({"preexec_fn": heed_again} | options))
+    os.close(writing)
+    if streams == "no reader":
+        os.close(reading)
+    try:
+        while not heeds(command.pid):
+            time.sleep(0.001)
+        time.sleep(0.3)
+        command.send_signal(number)
+        assert command.wait(30.0) == INTERRUPTED
+    finally:
+        command.kill()
+        full.close()
+        if streams != "no reader":
+            os.close(reading)
+
+
+UNREAD = {
+    "full disk": (">/dev/full", 2), "full error": ("2>/dev/full", 0), "closed": (">&-", 0), "no reader": ("| true", 0),
+    "closed error": ("2>&-", 0), "first line": ("2>&1 | head -n 1", 0),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("streams", UNREAD)
+@pytest.mark.parametrize("words", ["list", "show fig6", "list --json", "simulate none"])
+def test_output_that_nothing_reads_is_no_traceback_and_no_silent_failure(streams, words):
+    """`> /dev/full` and `| head` were tracebacks, or an exit code of 1 without a word."""
+    where, code = UNREAD[streams]
+    line = f"set -o pipefail; {sys.executable} -m subzero {words} {where}"
+    done = subprocess.run(["bash", "-c", line], capture_output=True, text=True, check=False)
+    assert "Traceback" not in done.stdout + done.stderr
+    expected = 2 if words == "simulate none" else code
+    assert done.returncode == expected
+    if code and words != "simulate none":
+        assert done.stderr == "Standard output cannot be written: No space left on device.\n"

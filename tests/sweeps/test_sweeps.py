@@ -11,6 +11,8 @@ import random
 import re
 import signal
 import sqlite3
+import subprocess
+import sys
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from functools import partial
 
@@ -569,3 +571,25 @@ def test_batches_get_as_long_as_they_should_and_shrink_towards_the_end():
     assert max(sizes) == 10  # half a second
     assert sizes[-1] == 1
     assert sizes == sorted(sizes, reverse=True)
+
+
+PARENT = """
+import os, time
+from subzero.sweeps.workers import WorkerPool
+
+def work():
+    print(os.getpid(), flush=True)  # a worker prints on standard error
+    time.sleep(600.0)
+
+pool = WorkerPool(2)
+[pool.submit(work) for _ in range(2)][0].result()
+"""
+
+
+def test_a_worker_that_is_at_a_task_ends_with_its_parent():
+    """It went on with its task for as long as that took."""
+    parent = subprocess.Popen([sys.executable, "-c", PARENT], stderr=subprocess.PIPE)
+    for _ in range(2):
+        parent.stderr.readline()
+    parent.kill()
+    assert parent.stderr.read() == b""  # ends when the last process that has the pipe has ended
