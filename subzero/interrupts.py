@@ -31,7 +31,7 @@ SIGNALS = tuple(
 _patience = [PATIENCE_S]
 _interrupted = threading.Event()
 _last_words = threading.Lock()
-"""Taken for good by the thread that says them."""
+"""Taken by the thread that says them, for the rest of the command."""
 _exit_message: list[Callable[[], str]] = []
 
 
@@ -72,6 +72,8 @@ def reset() -> None:
     """Forget what a former command of this process set."""
     _exit_message.clear()
     _interrupted.clear()
+    if _last_words.locked():
+        _last_words.release()
 
 
 def was_interrupted() -> bool:

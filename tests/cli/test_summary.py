@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from subzero.output import Stage, write_csv, write_summary
+from subzero.output import OutputFolder, write_csv, write_summary
 from subzero.progress import ProgressBar
 from subzero.report import show
 from subzero.summary import summarise, summary_of
@@ -92,7 +92,7 @@ def test_what_only_a_numerical_analyst_reads_is_printed_if_asked_for(run):
 
 def test_what_does_not_exist_is_null_in_json_and_empty_in_csv(run, tmp_path):
     run = run.assign(battery_voltage=("time", np.full(3, np.nan)), heading=("time", np.full(3, np.nan)))
-    write_summary(summary_of({"tethered": run}, None), Stage(tmp_path, tmp_path))
+    write_summary(summary_of({"tethered": run}, None), OutputFolder(tmp_path, tmp_path))
     write_csv(run, tmp_path / "run.csv")
     assert json.loads((tmp_path / "summary.json").read_text())["tethered"]["heading_at_end_deg"] is None
     header, first, *_ = (tmp_path / "run.csv").read_text().splitlines()

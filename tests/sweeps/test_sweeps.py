@@ -588,8 +588,8 @@ pool = WorkerPool(2)
 
 def test_a_worker_that_is_at_a_task_ends_with_its_parent():
     """It went on with its task for as long as that took."""
-    parent = subprocess.Popen([sys.executable, "-c", PARENT], stderr=subprocess.PIPE)
-    for _ in range(2):
-        parent.stderr.readline()
-    parent.kill()
-    assert parent.stderr.read() == b""  # ends when the last process that has the pipe has ended
+    with subprocess.Popen([sys.executable, "-c", PARENT], stderr=subprocess.PIPE) as parent:
+        for _ in range(2):
+            parent.stderr.readline()
+        parent.kill()
+        assert parent.stderr.read() == b""  # ends when the last process that has the pipe has ended
