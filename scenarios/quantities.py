@@ -79,6 +79,7 @@ far_length_m     | m | 0      | 100000 | 40  | farther from both ends of the cab
 far_grading      | 1 | 0      | 0.5   | 0.2  | by how much longer per metre of cable beyond; 0: none are joined
 every_s          | s | 0      | 86400 | 0    | time between kept results, whole cable steps; 0: all, fewer of long runs
 rtol             | 1 | 0      | 0.5   | 0.02 | error of the tow force that is allowed, as a share of its largest; 0: any
+budget_s         | s | 0      | 86400 | 0    | time for finer runs where it errs by more; 0: ten times the run's, or 2 s
 """)
 
 START = _read("""

@@ -116,6 +116,7 @@ def load(
         far_grading=run["far_grading"],
         every=run["every_s"],
         rtol=run["rtol"],
+        budget=run["budget_s"],
         scheme=run["scheme"],
         start=_start(start, prescribed),
         vehicle=vehicle,

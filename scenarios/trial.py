@@ -248,6 +248,7 @@ class Trial:
         every: time between results that are kept, a whole number of cable steps; 0 keeps all. The last is kept. [s]
         rtol: error of the tow force that is allowed, as a share of its largest: where the run and a coarser one differ
             by more, steps and segments are halved (`subzero.convergence`); 0 takes them as they are. [-]
+        budget: how long runs with halved steps may take in all; 0 for ten times the plain run. [s]
         scheme: one of `SCHEMES`.
         start: how the vehicle lies at t = 0.
         vehicle: section → key → SI value; sections may hold sections.
@@ -277,6 +278,7 @@ class Trial:
     far_grading: float = 0.2
     every: float = 0.0
     rtol: float = 0.02
+    budget: float = 0.0
     scheme: str = "moving_end"
     start: Start
     vehicle: Mapping[str, Any]

@@ -1,28 +1,25 @@
-"""Is a run fine enough? Each tethered run is set beside a coarser one, and taken again finer where the two disagree.
+"""Is a run fine enough? Each tethered run is compared with a coarser one, and repeated finer where the two disagree.
 
     e_h = max |F_h − F_2h| / max |F_h|,    F the cable's force on the hull (12), steps and segments h and 2h
 
-If each halving divides the change by r, what is left is e_h/(r − 1) (Richardson): a third of e_h at second order, e_h
-at first. Of one pair r is not known, and the first order is supposed. The coarse run has a quarter of the nodes and
-steps. Where the error is above `rtol`, the run is repeated with steps and segments halved, `MOST_HALVINGS` times;
-what was the run is then the coarse one, and r = e_2h/e_h. A cable that comes taut makes r irregular: it does so
-between two samples, and the largest change hangs on which. So does a command that changes between two. So while
-another halving is cheap (`CHEAP_WORK`), no order is believed: halves are taken on until one changes no more than
-`rtol`. Before any doubt is told, they are taken on as long as that is cheap, and once more where the first order
-would then settle it; from the third on, what the last halving changes is the error. Where that stays above `rtol`,
-the answer depends on the resolution, and the run says so: a jolt, or an ill-posed drum (`docs/theory.md`).
+The error that is reported is the last change e_h: no order is believed, for a cable that comes taut between two samples
+follows none. Where e_h is above `rtol`, the run is repeated with steps and segments halved; what was the run is then
+the coarse one.
 
 The first `START_ROWS` samples follow no such law. A start is a jolt: a current, a winch or the propeller takes hold of
 the cable at once, what it sets off fades or rings within a few steps, and the coarse run has no sample in the first.
-But they are cheap. So there the error is found, not estimated, by a run of these samples alone with steps and segments
-a quarter as long (`START_REFINEMENTS`).
+So there the error is found by a run of these samples alone with steps and segments a quarter as long
+(`START_REFINEMENTS`).
 
-A doubt is proved where that does not take long. A run may be right since its last halving, which only another would
-show; and one that confirms itself may be doubted for what it does, as an ill-posed drum may be the same on segments of
-one and of half a metre. So every run that would end with a doubt that finer ones can settle
-(`subzero.validity.refinement_that_settles`) is held against runs two, four and, where it must be, eight times as fine,
-of which the first that contradicts is the last (`prove`). So is one whose error is estimated at more than three
-quarters of `rtol`: an estimate is not as good as that. What they change is its error, whatever was estimated before.
+A doubt is proved where that does not take long. A run may confirm itself and be doubted for what it does, as an
+ill-posed drum may be the same on segments of one and of half a metre. So every run that would end with a doubt that
+finer ones can settle (`subzero.validity.refinement_that_settles`) is compared with runs two, four and, where it must
+be, eight times as fine, of which the first that contradicts is the last (`prove`). What they change is its error.
+
+All of these runs share one `Budget`: `[run] budget_s`, or else ten times the work of the run as it was asked for, at
+least two seconds of it. It is counted in nodes times iterations, not by a clock, so that the same trial gives the same
+numbers on every machine. A run of an ill-posed problem takes ever more iterations as it is refined, so the budget ends
+its refinement soon; then the last change is the error, and the run says that it is not resolved.
 
 That looks at the whole error, of segments, steps, slack and coupling alike, which an estimate inside a step does not: a
 cable that is bent sharply beside the drum errs in its segments only, and its steps look perfect.
@@ -46,16 +43,14 @@ from subzero.errors import UserError
 if TYPE_CHECKING:
     from subzero.engine.recording import Run
 
-MOST_HALVINGS, CHEAP_HALVINGS = 2, 4
-"""Steps and segments a quarter as long cost sixteen times as much. Up to `CHEAP_HALVINGS` are taken where they are
-cheap; and a third one where the error is within `LEAST_GAIN` of `rtol`."""
-MOST_WORK, CHEAP_WORK = 1e7, 3e5
-"""Nodes times exchanges that a repeated run may take, half a minute or so; and that are cheap, a second or so. [-]"""
-PROOFS, PROOF_WORK = (2, 4, 8), 3e7
-"""How much finer the runs of a proof are; and nodes times iterations that the finest may take, at half a microsecond
-each. [-]"""
-LEAST_GAIN, MOST_GAIN = 2.0, 4.0
-"""Gain of a halving, of the first and of the second order; more or less than these is chance, and not believed. [-]"""
+MOST_HALVINGS = 4
+"""Steps and segments a sixteenth as long cost 256 times as much. [-]"""
+PROOFS = (2, 4, 8)
+"""How much finer the runs of a proof are. [-]"""
+NODE_ITERATION_S = 5e-7
+"""Time that one iteration of Newton's method takes for one node. [s]"""
+BUDGET_RATIO, LEAST_BUDGET_S = 10.0, 2.0
+"""Finer runs may take so many times what the run as asked for takes, or so long if that is more. [-], [s]"""
 START_ROWS, START_REFINEMENTS = 5, (4, 2)
 """Samples that belong to the start, and how much finer these are taken to see their error: half as fine where a run of
 a stiff cable does not get so far. [-]"""
@@ -82,6 +77,7 @@ class Accuracy:
         proof_error: change of the force to the finest run of a proof, as that share; 0 without a proof. [-]
         proof_time: when that is largest. [s]
         proof_finer: how many times as fine that run is; 0 without a proof.
+        budget_spent: the budget ended the refinement.
     """
 
     force_error: float
@@ -94,6 +90,7 @@ class Accuracy:
     proof_error: float = 0.0
     proof_time: float = 0.0
     proof_finer: int = 0
+    budget_spent: bool = False
 
     @property
     def converged(self) -> bool:
@@ -109,14 +106,69 @@ class Change:
     time: float
 
 
+class Budget:
+    """Work that may still be spent on finer runs of a trial.
+
+    Args:
+        seconds: how long they may take; 0 for `BUDGET_RATIO` times the run as it was asked for. [s]
+
+    Attributes:
+        is_spent: a run that was wanted is beyond it.
+    """
+
+    def __init__(self, seconds: float = 0.0) -> None:
+        self._seconds, self._left, self.is_spent = seconds, 0.0, False
+
+    def grant(self, run: Run) -> None:
+        """Make the budget that of a run as it was asked for."""
+        seconds = self._seconds or max(BUDGET_RATIO * NODE_ITERATION_S * _iterated(run), LEAST_BUDGET_S)
+        self._left = seconds / NODE_ITERATION_S
+
+    def allows(self, like: Run, finer: float, times: float = 1.0) -> bool:
+        """Return whether a run so many times as fine as another, of a share of its times, is within the budget."""
+        is_within = _iterated(like) * finer**2 * times <= self._left
+        self.is_spent |= not is_within
+        return is_within
+
+    def spend(
+        self,
+        take: Take,
+        like: Run,
+        finer: float,
+        trial: scenarios.Trial | None,
+        grid: Grid,
+        progress: Progress | None,
+    ) -> Run | None:
+        """Return a finer run; None where it is refused, costs too much or, found in the midst of it, more than that.
+
+        Args:
+            take: makes a run.
+            like: a run whose nodes are known.
+            finer: how many times as fine as that the trial is; a run takes the square as long, or more.
+            trial: what is run; None beyond the limits of a trial.
+            grid: its times and what is kept.
+            progress: told the fraction that is done.
+        """
+        times = grid.times.size / like.all_times.size  # the start alone has few of them
+        if trial is None or not self.allows(like, finer, times):
+            return None
+        nodes = finer * _mean_nodes(like)
+        run = _taken(take, trial, grid._replace(iterations=self._left / nodes), progress)
+        if run is not None:
+            self._left -= _iterated(run)
+            self.is_spent |= self._left <= 0.0
+        return run
+
+
 def run_converged(
-    trial: scenarios.Trial, take: Take, progress: Progress | None = None
+    trial: scenarios.Trial, take: Take, budget: Budget, progress: Progress | None = None
 ) -> tuple[Run, Accuracy | None]:
-    """Run a trial as finely as its `rtol` asks for, and say how far its force can be trusted.
+    """Run a trial as finely as its `rtol` asks for and a budget allows, and say how far its force can be trusted.
 
     Args:
         trial: a tethered one of the default scheme.
         take: makes a run.
+        budget: of the finer runs; granted here.
         progress: told the fraction that is done; it goes back where a run is repeated.
 
     Returns:
@@ -130,33 +182,21 @@ def run_converged(
         return take(trial, whole, progress), None
     coarse = _taken(take, coarser, _only_traced(coarse_times, 1), _share(progress, 0.0, 0.2))
     run = take(trial, whole, _share(progress, 0.2, 0.8))
+    budget.grant(run)
     if coarse is None:
         return run, None
-    change = _after_start(coarse, run)
-    accuracy = _accuracy(trial, take, run, change, None, 0)
-    for halvings in range(1, CHEAP_HALVINGS + 1):
-        work = _finer_work(run, halvings)
-        if work > _allowed(accuracy) or _settled(accuracy, work <= CHEAP_WORK):
+    accuracy = _accuracy(trial, take, budget, run, _after_start(coarse, run), 0)
+    for halvings in range(1, MOST_HALVINGS + 1):
+        if accuracy.converged:
             break
-        finer = resolved(trial, 0.5**halvings)
         grid = whole._replace(parts=2**halvings)
-        fine = None if finer is None else _taken(take, finer, grid, progress)
+        fine = budget.spend(take, run, 2.0, resolved(trial, 0.5**halvings), grid, progress)
         if fine is None or (run.completed and not fine.completed):
+            accuracy = dataclasses.replace(accuracy, budget_spent=budget.is_spent)
             break
-        run, before, change = fine, change, _after_start(run, fine)
-        accuracy = _accuracy(trial, take, run, change, before, halvings)
+        run, change = fine, _after_start(run, fine)
+        accuracy = _accuracy(trial, take, budget, run, change, halvings)
     return run, accuracy
-
-
-def _settled(accuracy: Accuracy, is_cheap: bool) -> bool:
-    """Say whether no other halving is needed; a cheap one is, where only the order says that the error is small."""
-    return accuracy.converged and not (is_cheap and accuracy.change > accuracy.rtol)
-
-
-def _allowed(accuracy: Accuracy) -> float:
-    """Return the work that one more halving may take. [-]"""
-    near = accuracy.halvings == MOST_HALVINGS and accuracy.force_error <= LEAST_GAIN * accuracy.rtol
-    return MOST_WORK if accuracy.halvings < MOST_HALVINGS or near else CHEAP_WORK
 
 
 def prove(
@@ -165,9 +205,10 @@ def prove(
     run: Run,
     accuracy: Accuracy,
     finest: int,
+    budget: Budget,
     progress: Progress | None = None,
 ) -> Accuracy:
-    """Hold a run that is doubted against finer ones, up to `finest` times as fine; stop at what contradicts it.
+    """Compare a run that is doubted with finer ones, up to `finest` times as fine; stop at what contradicts it.
 
     Args:
         trial: a tethered one of the default scheme.
@@ -175,18 +216,23 @@ def prove(
         run: of the trial, as `run_converged` gives it; of its recording, trace and iterations are needed.
         accuracy: of the run.
         finest: one of `PROOFS`.
+        budget: what `run_converged` has left of it.
         progress: told the fraction that is done of each run.
 
     Returns:
         the accuracy with the error that was found, where all of them agree or one contradicts. The error stays as it
-        was where the finest would take more than `PROOF_WORK`, as far as the one before tells, and where one of them is
-        refused or does not reach the end: that proves nothing.
+        was where the budget does not allow the finest, as far as the one before tells, and where one of them is refused
+        or does not reach the end: that proves nothing.
     """
-    latest, reached, worst = run, 1, 0.0
+    latest, reached, worst, given = run, 1, 0.0, 2**accuracy.halvings
     for finer in PROOFS[: PROOFS.index(finest) + 1]:
-        too_long = _iterated(latest) * (finest / reached) ** 2 > PROOF_WORK
-        fine = None if too_long else _finer(trial, take, run, 2**accuracy.halvings, finer, progress)
-        if fine is None:
+        if not budget.allows(latest, finest / reached):
+            break
+        grid = _only_traced(run.all_times, finer * given)
+        fine = budget.spend(
+            take, latest, finer / reached, resolved(trial, 1.0 / (finer * given)), grid, progress
+        )
+        if fine is None or not fine.completed:
             break
         found = _change(run, fine, 1, _largest(run))
         latest, reached, worst = fine, finer, max(worst, found.size)
@@ -196,28 +242,6 @@ def prove(
         if finer == finest or worst > accuracy.rtol:
             return dataclasses.replace(accuracy, force_error=worst)
     return accuracy
-
-
-def _finer(
-    trial: scenarios.Trial, take: Take, run: Run, given: int, finer: int, progress: Progress | None
-) -> Run | None:
-    """Return a run of a proof; None where it is refused, takes more than `PROOF_WORK`, or does not reach the end.
-
-    Args:
-        trial: of the run.
-        take: makes a run.
-        run: what is proved.
-        given: how many times as fine as its trial that is.
-        finer: how many times as fine as that.
-        progress: told the fraction that is done.
-    """
-    other = resolved(trial, 1.0 / (finer * given))
-    if other is None:
-        return None
-    most = PROOF_WORK / (finer * _mean_nodes(run))
-    grid = _only_traced(run.all_times, finer * given)._replace(iterations=most)
-    fine = _taken(take, other, grid, progress)
-    return fine if fine is not None and fine.completed else None
 
 
 def _only_traced(times: np.ndarray, parts: int) -> Grid:
@@ -253,19 +277,16 @@ def _every_other(times: np.ndarray) -> np.ndarray:
 
 
 def _accuracy(
-    trial: scenarios.Trial, take: Take, run: Run, change: Change, before: Change | None, halvings: int
+    trial: scenarios.Trial, take: Take, budget: Budget, run: Run, change: Change, halvings: int
 ) -> Accuracy:
-    """Return the accuracy of a run; `change` is what the last halving brought, `before` the one before, if any.
+    """Return the accuracy of a run; `change` is what the last halving brought.
 
     A run that will be repeated anyhow needs no look at its start.
     """
-    known = before is not None and isfinite(before.size) and halvings <= MOST_HALVINGS
-    gain = before.size / max(change.size, 1e-12) if before is not None and known else LEAST_GAIN
-    error = change.size / (min(max(gain, LEAST_GAIN), MOST_GAIN) - 1.0)
-    looks = error <= trial.rtol or halvings >= MOST_HALVINGS
-    start = _start(trial, take, run, halvings) if looks else Change(size=0.0, time=0.0)
+    fine_enough = change.size <= trial.rtol or not budget.allows(run, 2.0) or halvings == MOST_HALVINGS
+    start = _start(trial, take, budget, run, halvings) if fine_enough else Change(size=0.0, time=0.0)
     return Accuracy(
-        force_error=max(error, start.size),
+        force_error=max(change.size, start.size),
         change=change.size,
         time=change.time,
         start_error=start.size,
@@ -282,12 +303,12 @@ def _after_start(coarse: Run, fine: Run) -> Change:
     return _change(coarse, fine, START_ROWS + 1, _largest(fine))
 
 
-def _start(trial: scenarios.Trial, take: Take, run: Run, halvings: int) -> Change:
+def _start(trial: scenarios.Trial, take: Take, budget: Budget, run: Run, halvings: int) -> Change:
     """Return what finer steps and segments change in the first samples; nothing where no finer run gets so far."""
     times = run.all_times[: START_ROWS + 1]
     for finer in START_REFINEMENTS if times.size > 1 else ():
-        other = resolved(trial, 0.5**halvings / finer)
-        fine = None if other is None else _taken(take, other, _only_traced(times, finer * 2**halvings), None)
+        grid = _only_traced(times, finer * 2**halvings)
+        fine = budget.spend(take, run, finer, resolved(trial, 0.5**halvings / finer), grid, None)
         if fine is not None and fine.completed:
             return _change(run, fine, 1, _largest(run))
     return Change(size=0.0, time=0.0)
@@ -313,11 +334,6 @@ def _largest(run: Run) -> float:
     return max(float(np.linalg.norm(run.recording.trace[:, :3], axis=1).max()), SMALLEST_FORCE)
 
 
-def _work(run: Run) -> float:
-    """Return nodes times times of a run, summed up as it grows. [-]"""
-    return float(run.recording.trace[:, 3].sum())
-
-
 def _mean_nodes(run: Run) -> float:
     """Return how many nodes a run has, on average. [-]"""
     return float(run.recording.trace[:, 3].mean())
@@ -326,11 +342,6 @@ def _mean_nodes(run: Run) -> float:
 def _iterated(run: Run) -> float:
     """Return nodes times iterations of Newton's method of a run: what it took, half a microsecond each. [-]"""
     return float(run.recording.iterations[-1]) * _mean_nodes(run)
-
-
-def _finer_work(run: Run, halvings: int) -> float:
-    """Return nodes times exchanges of a run with so many halvings, from the one before, with half as many nodes. [-]"""
-    return _work(run) * 2.0 ** (1 + halvings)
 
 
 def _share(progress: Progress | None, start: float, size: float) -> Progress | None:

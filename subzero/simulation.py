@@ -16,7 +16,7 @@ import numpy as np
 
 import scenarios
 from cable.moving_end import Names, describe_stop, enlarged
-from subzero.convergence import Accuracy, Take, prove, run_converged
+from subzero.convergence import Accuracy, Budget, Take, prove, run_converged
 from subzero.dataset import PlainRun, plain_run, tell_accuracy
 from subzero.engine import coupling
 from subzero.engine.initial_conditions import Later, checked_later, go_on_with, prepare, rows_of_changes
@@ -118,10 +118,11 @@ def simulate_plainly(
     trial = scenario if isinstance(scenario, scenarios.Trial) else load(scenario)
     model, tethered, later = model_of(trial, model), truth("tethered", tethered), checked_later(later)
     with _kept(checkpoint, trial, model, tethered, later) as keeper:
-        run, accuracy = _as_fine_as_asked(trial, model, tethered, progress, later, keeper)
+        budget = Budget(trial.budget)
+        run, accuracy = _as_fine_as_asked(trial, model, tethered, budget, progress, later, keeper)
         result = plain_run(trial, model, tethered, run, accuracy, spends=True)
         if accuracy is not None and (finest := refinement_that_settles(result, trial, model)):
-            found = prove(trial, _taker(model, keeper), run, accuracy, finest, progress)
+            found = prove(trial, _taker(model, keeper), run, accuracy, finest, budget, progress)
             tell_accuracy(result, trial, model, found)
     if later:
         result.attrs["later"] = json.dumps([[time, changed.parameters()] for time, changed in later])
@@ -196,6 +197,7 @@ def _as_fine_as_asked(
     trial: scenarios.Trial,
     model: Model,
     tethered: bool,
+    budget: Budget,
     progress: Progress | None,
     later: Later,
     keeper: Keeper | None,
@@ -206,7 +208,7 @@ def _as_fine_as_asked(
     refuse_what_cannot_fit(
         trial, model, tethered, Grid(trial.times(), 1, trial.stride)
     )  # before a coarser run
-    return run_converged(trial, _taker(model, keeper), progress)
+    return run_converged(trial, _taker(model, keeper), budget, progress)
 
 
 def _taker(model: Model, keeper: Keeper | None) -> Take:

@@ -103,12 +103,15 @@ def resolution(run: AnyRun, trial: scenarios.Trial, _: Model) -> list[str]:
             "start, by a winch, a current or the propeller, and the samples do not follow how that fades or rings. "
             "Shorten cable_step_s, let commands and the winch begin gently, or leave these samples out."
         ]
+    spent = (
+        " Finer runs would take longer than [run] budget_s allows." if accuracy.get("budget_spent") else ""
+    )
     return [
         f"The tow force depends on steps and segments: from twice as long ones to these {finer} it changes by "
         f"{_told(change)} (at {accuracy['time']:g} s; {asked}). Either they are "
         "still too long, or the problem is ill-posed: a heavy cable, or one in a cross current, on a drum that does "
         "not hold it, or a cable that snaps taut. Give the drum friction_torque or a [winch], or the cable "
-        "bending_stiffness."
+        f"bending_stiffness.{spent}"
     ]
 
 

@@ -16,7 +16,7 @@ import pytest
 
 import scenarios
 import subzero
-from subzero.convergence import Accuracy, prove, run_converged
+from subzero.convergence import Accuracy, Budget, prove, run_converged
 from subzero.engine.recording import Grid
 from subzero.simulation import run_trial
 
@@ -157,27 +157,11 @@ def jolted(forces, nodes=20):
     return take
 
 
-@pytest.mark.parametrize(
-    "forces, halvings, error",
-    [
-        ((0.90, 0.86, 0.83, 0.80, 0.785), 3, 0.015),
-        ((0.90, 0.86, 0.83, 0.80, 0.83), 3, 0.03),
-        ((0.90, 0.60, 0.80, 0.70, 0.70), 2, 0.10),
-        ((0.90, 0.86, 0.845, 0.84, 0.84), 1, 0.009),
-    ],
-    ids=["settled by a last halving", "not settled by it", "too far from it", "settled before"],
-)
-def test_what_the_first_order_would_settle_with_one_halving_more_is_halved_before_it_is_doubted(
-    forces, halvings, error
-):
-    """A sample's force with segments of 1, 0.5 … 0.0625 m, and rtol = 2 %: a jolt that gains less than its order.
-
-    101 times and 200 nodes: 1.3e6 nodes times exchanges with three halvings, which is not cheap.
-    """
-    _, found = run_converged(changed("fig6", duration=10.0), jolted(forces, nodes=200))
-    assert found.halvings == halvings
-    assert found.force_error == pytest.approx(error, rel=1e-6)
-    assert found.converged == (error <= 0.02)
+def granted(run, seconds=0.0):
+    """Return the budget of a run."""
+    budget = Budget(seconds)
+    budget.grant(run)
+    return budget
 
 
 @pytest.mark.parametrize(
@@ -186,22 +170,39 @@ def test_what_the_first_order_would_settle_with_one_halving_more_is_halved_befor
         ((0.90, 0.60, 0.80, 0.70, 0.70), 3, 0.0),
         ((0.90, 0.60, 0.80, 0.70, 0.665, 0.66), 4, 0.005),
         ((0.90, 0.60, 0.80, 0.70, 0.80, 0.70, 0.70), 4, 0.10),
-        ((0.90, 0.80, 0.77, 0.73, 0.73), 3, 0.0),
-        ((0.90, 0.80, 0.77, 0.76, 0.76), 2, 0.005),
+        ((0.90, 0.80, 0.77, 0.76, 0.76), 2, 0.0),
+        ((0.90, 0.89, 0.77, 0.60, 0.50), 0, 0.01),
     ],
     ids=[
         "settled by a third",
-        "no order believed in a third",
+        "settled by a fourth",
         "never settled",
-        "not by an order",
-        "nor where it holds",
+        "settled by a second",
+        "fine as it was",
     ],
 )
-def test_what_is_cheap_is_halved_on_before_it_is_doubted(forces, halvings, error):
-    """20 nodes: 1.3e5 nodes times exchanges with three halvings. The third changes 3.5 %, a third of the second."""
-    _, found = run_converged(changed("fig6", duration=10.0), jolted(forces))
+def test_steps_are_halved_until_that_changes_the_force_by_no_more_than_rtol(forces, halvings, error):
+    """The force of one sample with segments of 1, 0.5 … m, and rtol = 2 %; the error is the last change."""
+    _, found = run_converged(changed("fig6", duration=10.0), jolted(forces), Budget())
+    last = abs(forces[halvings + 1] - forces[halvings])
     assert found.halvings == halvings
-    assert found.force_error == pytest.approx(error, abs=1e-9)
+    assert found.change == pytest.approx(last, abs=1e-9)
+    assert found.converged == (last <= 0.02)
+
+
+@pytest.mark.parametrize(
+    "nodes, seconds, halvings",
+    [(20, 0.0, 4), (2_000, 1.0, 0), (2_000, 3.0, 1), (2_000, 12.0, 3), (20, 1e-3, 0)],
+)
+def test_a_budget_ends_the_refinement_and_says_so(nodes, seconds, halvings):
+    """101 times of five iterations: 2000 nodes take half a second, and twice as long with each halving, which keeps
+    their number; four times as long is expected. So 3 s allow the first (2 s) but not the second (4 s), after 1 s.
+    """
+    take = jolted((0.9, 0.6, 0.8, 0.7, 0.8, 0.7), nodes=nodes)
+    _, found = run_converged(changed("fig6", duration=10.0), take, Budget(seconds))
+    assert found.halvings == halvings
+    assert found.budget_spent == (halvings < 4)
+    assert not found.converged
 
 
 TRUSTED = Accuracy(
@@ -234,10 +235,10 @@ DOUBTED = dataclasses.replace(TRUSTED, force_error=0.04, change=0.04)
     ],
 )
 def test_a_run_is_proved_by_finer_ones_until_one_contradicts_it(given, forces, finest, nodes, proved, error):
-    """101 times, five iterations and 940 nodes: 3.04e7 in a run eight times as fine, above `PROOF_WORK`."""
+    """101 times, five iterations and 940 nodes: 3.04e7 in a run eight times as fine, above 15 s."""
     trial, take = changed("fig6", duration=10.0), jolted(forces, nodes)
     run = take(trial, SimpleNamespace(times=trial.times()), None)
-    found = prove(trial, take, run, given, finest)
+    found = prove(trial, take, run, given, finest, granted(run, 15.0))
     assert found.proof_finer == proved
     assert found.force_error == pytest.approx(error, rel=1e-6)
     assert found.converged == (error <= 0.02)
@@ -256,7 +257,7 @@ def test_a_finer_run_that_takes_more_than_it_may_proves_nothing(growth, tried):
         return run
 
     run = plain(trial, SimpleNamespace(times=trial.times()), None)
-    found = prove(trial, take, run, DOUBTED, 4)
+    found = prove(trial, take, run, DOUBTED, 4, granted(run, 15.0))
     assert (taken, found.proof_finer, found.force_error) == (tried, 2, 0.04)
 
 
@@ -316,7 +317,7 @@ def test_a_finer_run_that_is_refused_proves_nothing():
     def refused(*_):
         raise subzero.UserError("it does not fit")
 
-    assert prove(trial, refused, run, DOUBTED, 8) == DOUBTED
+    assert prove(trial, refused, run, DOUBTED, 8, granted(run)) == DOUBTED
 
 
 def test_a_last_step_that_is_no_whole_one_is_covered_too():
@@ -336,7 +337,7 @@ def test_what_is_refused_at_another_resolution_leaves_the_run_as_it_was_asked_fo
             raise subzero.UserError("it does not fit")
         return run_trial(one, subzero.Model.of(one), True, grid=grid)
 
-    run, found = run_converged(trial, take)
+    run, found = run_converged(trial, take, Budget())
     assert taken - {0.125, 0.0625} == tried, "beside the start alone, a quarter as coarse"
     assert run.completed
     assert (found is None) == (refused == 1.0)
