@@ -118,7 +118,7 @@ def diagnose(
             write_diagnosis.write_all(
                 verdict, logged, output_folder, run=simulated, effects=own, effects_file=effects
             )
-    write_diagnosis.tell(verdict, output_folder, scenario=logged[0].setting.trial.name, voice=voice)
+    write_diagnosis.tell(verdict, output_folder, scenario=logged[0].setting.trial.source, voice=voice)
     if not verdict.complete:
         say_interrupted("Interrupted; what it has is written.")
     return FINE if verdict.complete else INTERRUPTED

@@ -102,7 +102,7 @@ def tell(
         verdict: of `subzero.diagnose`.
         output_folder: where the files are.
         console: where to print.
-        scenario: the trial's name, for lines of the shell.
+        scenario: the trial as the user named it, a name or a path, for lines of the shell.
         voice: how the command speaks.
     """
     with voice.tells(json_file.mapping(verdict) | output_folder.files()):
@@ -191,12 +191,12 @@ def write_all(
                        source=sources)  # fmt: skip
     _write(output_folder, "extended.toml", extended)
     told = {one.name: _about(one) for one in logged}
-    _write(output_folder, "diagnosis.json", json_file.text(verdict, told, logged[0].setting.trial.name))
+    _write(output_folder, "diagnosis.json", json_file.text(verdict, told, logged[0].setting.trial.source))
     figures = _draw(verdict, logged, output_folder)
     _write(
         output_folder,
         "report.md",
-        markdown(verdict, about(logged), tuple(figures), logged[0].setting.trial.name),
+        markdown(verdict, about(logged), tuple(figures), logged[0].setting.trial.source),
     )
     command = COMMAND.get()
     page = page_of_diagnosis(
@@ -250,7 +250,7 @@ def page_of_diagnosis(
             version=version("subzero"),
             outcome=_outcome(verdict, logged),
             command=command,
-            answers=[Answer(**one._asdict()) for one in summary(verdict, trials[0])],
+            answers=[Answer(**one._asdict()) for one in summary(verdict, logged[0].setting.trial.source)],
             warnings={"What else to know": verdict.notes} if verdict.notes else {},
             sections=[
                 _section(one, figures) for one in sections(verdict, about(logged)) if _is_there(one, figures)

@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import scenarios
 from subzero.cli import FINE, INTERRUPTED, MISTAKE, main
 from subzero.diagnosis import (
     CAUSE_NAMED,
@@ -261,3 +262,18 @@ def test_no_id_and_no_word_of_a_table_is_broken_however_narrow_the_terminal(widt
     assert set(ids) <= set(words)
     assert {"signal", "too", "little"} - set(words) <= {"signal"}
     assert max(map(len, text.getvalue().splitlines())) <= width
+
+
+def test_the_next_command_names_the_scenario_as_it_was_given(engine, tmp_path, capsys):
+    """It named the trial, which is no file of the user's: it failed for everybody's own trial."""
+    mine = tmp_path / "my trials" / "mine.toml"
+    mine.parent.mkdir()
+    mine.write_text(scenarios.path("fig6").read_text(encoding="utf-8"), encoding="utf-8")
+    assert main(["diagnose", "record.csv", "--scenario", str(mine), "--out", "found"]) == FINE
+    command = f"subzero simulate '{mine}' --with found/extended.toml"
+    assert command in capsys.readouterr().out.replace("\n", "")
+    report = (tmp_path / "found" / "report.md").read_text(encoding="utf-8")
+    assert f"subzero simulate '{mine}'" in report
+    assert f"subzero simulate '{mine}'" in json.dumps(
+        json.loads((tmp_path / "found" / "diagnosis.json").read_text())
+    )

@@ -156,7 +156,7 @@ def markdown(
         verdict: of `subzero.diagnose`.
         records: name → what it is, in a line.
         figures: names of the figures beside it, without their ending.
-        scenario: the trial's name, for lines of the shell.
+        scenario: the trial as the user named it, a name or a path, for lines of the shell.
     """
     lines = [f"# {words.headline(verdict)}", ""]
     for answer in summary(verdict, scenario):

@@ -7,6 +7,7 @@ page, ``report.md`` and ``diagnosis.json`` say the same answers; ids and tables 
 from __future__ import annotations
 
 import math
+import shlex
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
@@ -69,7 +70,7 @@ def summary(
 
     Args:
         verdict: of `subzero.diagnose`.
-        scenario: the trial's name, for lines of the shell.
+        scenario: the trial as the user named it, a name or a path, for lines of the shell.
         extended: path of the extended model, likewise.
     """
     return (
@@ -83,6 +84,7 @@ def summary(
 
 def _command(verdict: Verdict, scenario: str, extended: str) -> str:
     """Return the line of the shell that does what is to be done next, "" if there is none."""
+    scenario = shlex.quote(scenario)
     if verdict.on_model in (CALIBRATED, NOTHING_NEAR):
         return f"subzero calibrate RECORDS --scenario {scenario} --out my_vehicle.toml"
     return f"subzero simulate {scenario} --with {extended}" if _is_new(verdict) else ""
