@@ -21,12 +21,12 @@ import numpy as np
 import xarray as xr
 
 import scenarios
-from subzero.channels import BY_NAME, CHANNELS, UNITS
+from subzero.channels import BY_NAME, CHANNELS, HEADING, UNITS
 from subzero.engine.initial_conditions import Later
 from subzero.errors import UserError
 from subzero.model import Model, load, model_of
 from subzero.overview import Overview
-from subzero.records.record import Fit, Record, beside, fits, read_record
+from subzero.records.record import Fit, Record, beside, fits, modelled, read_record
 from subzero.room import THINNED, told_of_results, with_fewer_results
 from subzero.simulation import simulate
 from subzero.summary import FORCE, MOMENT, summarise, summary_of
@@ -141,8 +141,8 @@ def compare(
     if trial is not asked and record is None:
         for run in (tethered, untethered):
             run.attrs[THINNED] = told_of_results(trial)
-    record = beside(record, tethered) if record is not None else None
     if record is not None:
+        record = beside(record, modelled(tethered, HEADING, record.time))
         from subzero.diagnosis.read_trials import check_beside
 
         check_beside(record, {"tethered": tethered, "untethered": untethered}, sidecar)

@@ -18,7 +18,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 import scenarios
-from subzero.channels import BY_NAME, HEADING, turned
+from scenarios.heading import turned
+from subzero.channels import BY_NAME, HEADING
 from subzero.diagnosis.hypothesis.catalogue.sensors import NOISE, SPECS
 from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.logged import Logged
@@ -38,7 +39,7 @@ from subzero.records.consistency import (
     without_repeats,
 )
 from subzero.records.metadata import Metadata, read_metadata
-from subzero.records.record import Record, fits, modelled, read_record
+from subzero.records.record import Record, beside, fits, modelled, read_record
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -154,8 +155,9 @@ def _channels(record: Record, sidecar: Metadata) -> tuple[dict[str, np.ndarray],
 
 def _checked(logged: Logged, sidecar: Metadata, simulated: Simulated | None) -> Logged:
     """Return a record whose channels look like its trial."""
-    record, values = logged.record, logged.record.values
-    nominal = (simulated or _nominal())(logged.setting, record.time, tuple(values))
+    nominal = (simulated or _nominal())(logged.setting, logged.record.time, tuple(logged.record.values))
+    record = beside(logged.record, nominal.get(HEADING))
+    values = record.values
     noise = {channel: logged.noise.get(channel, NOISE[channel]) for channel in values}
     suspects = {channel: column for channel, column in values.items() if not sidecar.trusts(channel)}
     still = [channel for channel, column in suspects.items() if is_constant(column)]
@@ -163,7 +165,7 @@ def _checked(logged: Logged, sidecar: Metadata, simulated: Simulated | None) -> 
     kept = {channel: column for channel, column in values.items() if channel not in still}
     if not kept:
         raise UserError(f"{record.source}: no channel moves. A diagnosis needs one that the trial moves.")
-    notes = (*logged.notes, *_notes(still, repeating(kept)))
+    notes = (*logged.notes, *record.notes, *_notes(still, repeating(kept)))
     trusted = frozenset(kept) - frozenset(suspects)
     return dataclasses.replace(
         logged, record=dataclasses.replace(record, values=kept), notes=notes, trusted=trusted

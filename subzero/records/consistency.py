@@ -16,8 +16,9 @@ from math import radians
 import numpy as np
 
 import scenarios
+from scenarios.heading import continuous, turned
 from scenarios.steps import held
-from subzero.channels import BY_NAME, DEGREE, HEADING, TURN, turned
+from subzero.channels import BY_NAME, DEGREE, HEADING
 from subzero.errors import UserError
 from subzero.records.record import Record
 
@@ -120,8 +121,8 @@ def _other_unit(name: str, measured: np.ndarray, simulated: np.ndarray, noise: f
 
 
 def _converted(name: str, values: np.ndarray, simulated: np.ndarray) -> np.ndarray:
-    """Return values in another unit; a heading without the jumps at north that it may have there."""
-    return turned(np.unwrap(values, period=TURN), simulated) if name == HEADING else values
+    """Return values in another unit; a heading with the turns of the simulation."""
+    return turned(continuous(values, simulated), simulated) if name == HEADING else values
 
 
 def _question(name: str, words: str, factor: float) -> str:

@@ -3,10 +3,11 @@
 A record has the column ``time_s`` and any columns of `subzero.channels`, such as ``surge_speed_m_s`` or
 ``heading_deg``. An empty cell or ``nan`` is a gap. Lines that start with ``#`` are remarks. A file that
 cannot be used is refused with all its problems at once. A heading that jumps from 360 to 0 degrees is made
-continuous.
+continuous (`scenarios.heading`).
 
 A heading is known but for whole turns: one compass begins at 359 degrees where another, or a run, begins at −1. So a
-run's heading is counted from its trial's start, without a jump wherever that lies, and a record's from the run's.
+run's heading is counted from its trial's start, without a jump wherever that lies, and a record's from the run's, with
+the turns of its yaw rate, or else of the run (`beside`).
 
 The files that a run writes are themselves records, so one run can be compared with another.
 
@@ -25,7 +26,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from subzero.channels import BY_COLUMN, BY_NAME, HEADING, TIME, TURN, turned
+from scenarios.heading import continuous, contradicted, expected, turned
+from subzero.channels import BY_COLUMN, BY_NAME, HEADING, TIME
 from subzero.errors import UserError, listed, nearest, printable
 from subzero.errors import short as shown
 from subzero.user_file import MOST_COLUMNS, MOST_OF_A_CSV, UnreadableFileError, read_text
@@ -33,6 +35,9 @@ from subzero.user_file import MOST_COLUMNS, MOST_OF_A_CSV, UnreadableFileError, 
 if TYPE_CHECKING:
     import xarray as xr
 
+
+YAW_RATE = "yaw_rate"
+"""The channel that tells how often a heading has turned."""
 
 GAPS = ("", "nan", "+nan", "-nan")
 """Cells that hold no measurement; numerical libraries write a NaN with either sign."""
@@ -55,11 +60,13 @@ class Record:
         source: the file, as the user named it.
         time: time of each sample, increasing. Shape (samples,). [s]
         values: channel name → measured values in the channel's display unit, NaN where there is a gap.
+        notes: what was set aside in it, and why, in sentences.
     """
 
     source: str
     time: np.ndarray
     values: Mapping[str, np.ndarray]
+    notes: tuple[str, ...] = ()
 
 
 def read_record(path: str | Path) -> Record:
@@ -83,7 +90,7 @@ def read_record(path: str | Path) -> Record:
     _refuse(path, problems)
     values = {BY_COLUMN[name].name: column for name, column in columns.items() if name != TIME.column}
     if HEADING in values:
-        values[HEADING] = _continuous(values[HEADING])
+        values[HEADING] = continuous(values[HEADING], expected(columns[TIME.column], values.get(YAW_RATE)))
     return Record(source=_name(path), time=columns[TIME.column], values=values)
 
 
@@ -246,14 +253,6 @@ def _empty_problems(columns: Mapping[str, np.ndarray]) -> list[str]:
     ]
 
 
-def _continuous(angle: np.ndarray) -> np.ndarray:
-    """Return an angle without jumps of a whole turn; gaps stay gaps. [degree]"""
-    known = np.isfinite(angle)
-    smooth = angle.copy()
-    smooth[known] = np.unwrap(angle[known], period=TURN)
-    return smooth
-
-
 @dataclass(frozen=True, kw_only=True)
 class Fit:
     """How well a model explains one measured channel, in the channel's unit; error = model − measured.
@@ -297,9 +296,28 @@ def fits(runs: dict[str, xr.Dataset], record: Record) -> dict[str, dict[str, Fit
     return {name: {label: fit(run, record, name) for label, run in runs.items()} for name in record.values}
 
 
-def beside(record: Record, run: xr.Dataset) -> Record:
-    """Return the record with its heading shifted by whole turns, so that it starts next to the run's."""
-    if HEADING not in record.values:
+def beside(record: Record, simulated: np.ndarray | None) -> Record:
+    """Return a record whose heading is counted as that of a simulation, without samples that contradict those around.
+
+    Args:
+        record: with or without a heading.
+        simulated: heading of the simulation at the record's times, NaN outside its time (n,). [degree]
+    """
+    if HEADING not in record.values or simulated is None:
         return record
-    heading = turned(record.values[HEADING], modelled(run, HEADING, record.time))
-    return replace(record, values={**record.values, HEADING: heading})
+    values, like = record.values[HEADING], expected(record.time, record.values.get(YAW_RATE), simulated)
+    gone = contradicted(values, like)
+    heading = turned(continuous(np.where(gone, np.nan, values), like), simulated)
+    notes = record.notes + (
+        (_contradicted(record.time[gone], BY_NAME[HEADING].column),) if gone.any() else ()
+    )
+    return replace(record, values={**record.values, HEADING: heading}, notes=notes)
+
+
+def _contradicted(time: np.ndarray, column: str) -> str:
+    """Return what is said of samples that contradict those around them, at these times [s]."""
+    when = f"at {time[0]:g} s" if time.size == 1 else f"between {time[0]:g} and {time[-1]:g} s"
+    return (
+        f"{column}: {time.size} sample{'s' * (time.size > 1)} {when} contradict{'s' * (time.size == 1)} those "
+        "before and after, as if averaged or interpolated across north; left out."
+    )
