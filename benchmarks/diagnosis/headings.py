@@ -4,15 +4,19 @@
 
 Each record is a run across north with white noise (heading 0.4°, yaw rate 0.3°/s), with and without a logged yaw rate.
 One of these is done to its heading as a compass shows it, 0 to 360°: a sample averaged across north, samples shifted by
-179°, a second interpolated across north, a gap of 20 s in the turn, or all rows of that gap lost. Reported: how many have
-a heading error (RMSE) within 10 % of the same record's before, how many diagnoses say that nothing is wrong, and how
-many ended in an exception.
+179°, a second interpolated across north, a gap of 20 s in the turn, or all rows of that gap lost. Reported:
+how many have a heading error (RMSE) within 10 % of the same record's before, how many diagnoses say that nothing is
+wrong, and how many ended in an exception.
 """
 
 from __future__ import annotations
 
 import argparse
+import re
+import tempfile
 from collections.abc import Callable
+from importlib import resources
+from pathlib import Path
 
 import numpy as np
 
@@ -29,8 +33,8 @@ NOISE = {
 }
 WITHIN = 1.1
 TRIALS = {
-    "turn": {"start.heading_deg": 330.0, "commands.rudder_deg": 7.0},
-    "straight": {"start.heading_deg": 357.0},
+    "turn": (330.0, 7.0),
+    "straight": (357.0, 0.5),
 }
 
 Rng = np.random.Generator
@@ -107,13 +111,14 @@ def rmse(run, record: Record) -> float:
     return fit(run, beside(record, modelled(run, "heading", record.time)), "heading").rmse
 
 
-def trial_of(changes):
-    trial = subzero.load_scenario("fig6")
-    steps = {name: value for name, value in changes.items() if name.startswith("start.")}
-    if "commands.rudder_deg" in changes:
-        for row in (1, 2):
-            steps[f"commands.rudder_deg[{row}]"] = changes["commands.rudder_deg"]
-    return trial.with_changes(steps)
+def scenario(folder: Path, heading: float, rudder: float) -> Path:
+    """Write fig6 with another heading at the start and another rudder to the end."""
+    text = (resources.files("scenarios") / "trials" / "fig6.toml").read_text(encoding="utf-8")
+    text = re.sub(r"(?m)^heading_deg = [^#]*", f"heading_deg = {heading} ", text)
+    text = re.sub(r"(?m)^rudder_deg .*$", f"rudder_deg = [0.0, {rudder}, {rudder}]", text)
+    path = folder / f"heading_{heading:g}.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
 
 
 def main() -> None:
@@ -123,7 +128,8 @@ def main() -> None:
     parser.add_argument("--diagnose", type=int, default=4)
     parser.add_argument("--seed", type=int, default=0)
     args = parser.parse_args()
-    trials = {name: trial_of(changes) for name, changes in TRIALS.items()}
+    folder = Path(tempfile.mkdtemp())
+    trials = {name: scenario(folder, *numbers) for name, numbers in TRIALS.items()}
     runs = {name: subzero.simulate(trial) for name, trial in trials.items()}
     near, healthy, broken, worst = 0, 0, 0, 0.0
     for k in range(args.count):

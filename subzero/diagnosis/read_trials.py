@@ -39,7 +39,7 @@ from subzero.records.consistency import (
     without_repeats,
 )
 from subzero.records.metadata import Metadata, read_metadata
-from subzero.records.record import Record, beside, fits, modelled, read_record
+from subzero.records.record import Record, beside, fits, measured_alone, modelled, read_record
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -72,7 +72,7 @@ def read_trials(
     in_hand = [one for one in given if isinstance(one, Record)]
     names = [*_names(files), *(_name_in_hand(at, len(in_hand)) for at in range(len(in_hand)))]
     sidecars = [*(read_metadata(file.with_suffix(".toml")) for file in files), *(Metadata() for _ in in_hand)]
-    records = [*map(read_record, files), *in_hand]
+    records = [*map(read_record, files), *map(measured_alone, in_hand)]
     logged = [_logged(record, sidecar, name, scenario, commands)
               for record, sidecar, name in zip(records, sidecars, names, strict=True)]  # fmt: skip
     return [_checked(one, sidecar, simulated) for one, sidecar in zip(logged, sidecars, strict=True)]
@@ -122,7 +122,7 @@ def _logged(
     if HEADING in values:
         values[HEADING] = turned(values[HEADING], math.degrees(trial.start.heading))
     return Logged(
-        record=Record(source=record.source, time=record.time, values=values),
+        record=dataclasses.replace(record, values=values),
         setting=Setting(trial=trial, model=Model.of(trial), tethered=sidecar.tethered),
         noise={channel: sd for channel, sd in sidecar.noise.items() if channel in values},
         name=name,

@@ -30,6 +30,7 @@ from scenarios.heading import continuous, contradicted, expected, turned
 from subzero.channels import BY_COLUMN, BY_NAME, HEADING, TIME
 from subzero.errors import UserError, listed, nearest, printable
 from subzero.errors import short as shown
+from subzero.records.sampling import measurements_alone
 from subzero.user_file import MOST_COLUMNS, MOST_OF_A_CSV, UnreadableFileError, read_text
 
 if TYPE_CHECKING:
@@ -89,9 +90,17 @@ def read_record(path: str | Path) -> Record:
     problems += _empty_problems(columns)
     _refuse(path, problems)
     values = {BY_COLUMN[name].name: column for name, column in columns.items() if name != TIME.column}
-    if HEADING in values:
-        values[HEADING] = continuous(values[HEADING], expected(columns[TIME.column], values.get(YAW_RATE)))
-    return Record(source=_name(path), time=columns[TIME.column], values=values)
+    record = measured_alone(Record(source=_name(path), time=columns[TIME.column], values=values))
+    if HEADING not in values:
+        return record
+    like = expected(record.time, record.values.get(YAW_RATE))
+    return replace(record, values={**record.values, HEADING: continuous(record.values[HEADING], like)})
+
+
+def measured_alone(record: Record) -> Record:
+    """Return a record without the values that a logger filled in between measurements (`subzero.records.sampling`)."""
+    values, notes = measurements_alone(record.time, record.values)
+    return replace(record, values=values, notes=record.notes + notes)
 
 
 def _name(path: str | Path) -> str:
