@@ -2,8 +2,8 @@
 
     python -m benchmarks.diagnosis.sampled [--count 100] [--seed 0]
 
-Records of fig6 with white noise, whose channels, all or some of them, come from 1, 2 or 5 Hz and are held, interpolated,
-or averaged over the rows between and held, at 10 Hz. Reported: how many diagnoses say anything but that nothing is wrong.
+Records of fig6 with white noise, whose channels, all or some, come from 1, 2 or 5 Hz and are held, interpolated, or
+averaged over the rows between and held, at 10 Hz. Reported: how many diagnoses say that something is wrong.
 """
 
 from __future__ import annotations

@@ -151,7 +151,8 @@ def diagnose_trials(
         "budget": budget,
     }
     try:
-        return _diagnosed(records, **asked)
+        verdict = _diagnosed(records, **asked)
+        return replace(verdict, notes=(*verdict.notes, *(note for one in records for note in one.notes)))
     except np.linalg.LinAlgError:
         kept, note = _without_worst_channel(records)
     verdict = diagnose_trials(kept, **asked)

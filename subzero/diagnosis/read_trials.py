@@ -165,7 +165,8 @@ def _checked(logged: Logged, sidecar: Metadata, simulated: Simulated | None) -> 
     kept = {channel: column for channel, column in values.items() if channel not in still}
     if not kept:
         raise UserError(f"{record.source}: no channel moves. A diagnosis needs one that the trial moves.")
-    notes = (*logged.notes, *record.notes, *_notes(still, repeating(kept)))
+    asked = unit_questions({name: one for name, one in kept.items() if name in suspects}, nominal, noise)
+    notes = (*logged.notes, *record.notes, *_notes(still, repeating(kept)), *(f"{words}." for words in asked))
     trusted = frozenset(kept) - frozenset(suspects)
     return dataclasses.replace(
         logged, record=dataclasses.replace(record, values=kept), notes=notes, trusted=trusted

@@ -24,7 +24,7 @@ from subzero.records.record import Record
 
 MISTAKEN: dict[str, dict[str, float]] = {
     "m/s": {"knots": 1.944, "km/h": 3.6, "feet per second": 3.281, "cm/s": 100.0},
-    "degree": {"radians": np.pi / 180.0},
+    "degree": {"radians": np.pi / 180.0, "centidegrees": 100.0},
     "degree/s": {"radians per second": np.pi / 180.0},
     "m": {"feet": 3.281, "centimetres": 100.0},
     "rev/s": {"revolutions per minute": 60.0, "radians per second": 2.0 * np.pi},
