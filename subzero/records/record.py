@@ -27,10 +27,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from scenarios.heading import TURN, continuous, contradicted, expected, turned
+from scenarios.sampling import measurements_alone
 from subzero.channels import BY_COLUMN, BY_NAME, HEADING, TIME
 from subzero.errors import UserError, listed, nearest, printable
 from subzero.errors import short as shown
-from subzero.records.sampling import measurements_alone
 from subzero.user_file import MOST_COLUMNS, MOST_OF_A_CSV, UnreadableFileError, read_text
 
 if TYPE_CHECKING:
@@ -111,7 +111,7 @@ def read_record(path: str | Path) -> Record:
 
 
 def measured_alone(record: Record) -> Record:
-    """Return a record without the values that a logger filled in between measurements (`subzero.records.sampling`)."""
+    """Return a record without the values that a logger filled in between measurements (`scenarios.sampling`)."""
     values, notes = measurements_alone(record.time, record.values)
     return replace(record, values=values, notes=record.notes + notes)
 
