@@ -10,12 +10,14 @@ whose motion is linear between a few times. Both are a `Motion`.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
 
 from scenarios.checks import Checks
+from scenarios.heading import continuous, expected
 from scenarios.quantities import COMMANDS, INTERPOLATIONS, LINEAR, MOTION, SMOOTH, by_field
 from scenarios.steps import held
 from subzero.errors import short as shown
@@ -125,12 +127,18 @@ class Motion:
         object.__setattr__(self, "interpolation", interpolation_of(given, self.interpolation))
         for name, array in arrays.items():
             if array is not None:
-                turns = self.is_smooth and name in ("heading", "roll")
-                check.freeze(name, np.unwrap(array) if turns else array)
+                check.freeze(name, self._continuous(name, array) if self.is_smooth else array)
         at = gap_at(self.time) if self.is_smooth else None
         if at is not None:
             check.say(f"time[{at}]", *gap_words(self.time, at), self.time[at])
         check.refuse()
+
+    def _continuous(self, name: str, angle: np.ndarray) -> np.ndarray:
+        """Return a heading or a roll without jumps of whole turns; other fields as they are."""
+        rates = {"heading": self.yaw_rate, "roll": self.roll_rate}
+        if name not in rates:
+            return angle
+        return continuous(angle, expected(np.asarray(self.time), rates[name]), math.tau)
 
     @property
     def is_smooth(self) -> bool:

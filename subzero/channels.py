@@ -18,8 +18,6 @@ import math
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
-import numpy as np
-
 DEGREE = 180.0 / math.pi
 REVOLUTION = 1.0
 
@@ -222,15 +220,3 @@ class Observation(NamedTuple):
 
 
 HEADING = "heading"
-TURN = 360.0
-FIRST = 9
-"""Samples that say where a record begins: a few of them may be outliers."""
-
-
-def turned(heading: np.ndarray, like: np.ndarray | float) -> np.ndarray:
-    """Return a heading (n,) with the whole turns more or less that bring its first samples close to those of another,
-    (n,) or one. [degree]
-    """
-    apart = np.asarray(like - heading)
-    first = apart[np.isfinite(apart)][:FIRST]
-    return heading + TURN * np.round(np.median(first) / TURN) if first.size else heading

@@ -21,12 +21,12 @@ import numpy as np
 import xarray as xr
 
 import scenarios
-from subzero.channels import BY_NAME, CHANNELS, UNITS
+from subzero.channels import BY_NAME, CHANNELS, HEADING, UNITS
 from subzero.engine.initial_conditions import Later
 from subzero.errors import UserError
 from subzero.model import Model, load, model_of
 from subzero.overview import Overview
-from subzero.records.record import Fit, Record, beside, fits, read_record
+from subzero.records.record import Fit, Record, beside, fits, measured_alone, modelled, read_record
 from subzero.room import THINNED, told_of_results, with_fewer_results
 from subzero.simulation import simulate
 from subzero.summary import FORCE, MOMENT, summarise, summary_of
@@ -126,7 +126,9 @@ def compare(
     """
     trial = scenario if isinstance(scenario, scenarios.Trial) else load(scenario)
     trial = trial if every is None else dataclasses.replace(trial, every=every)
-    record = read_record(measured) if isinstance(measured, str | Path) else measured
+    record = (
+        read_record(measured) if isinstance(measured, str | Path) else measured and measured_alone(measured)
+    )
     if record is not None and trial.stride > 1:
         raise UserError(
             f"Every {trial.every:g} s is too seldom to set a measured record beside the results of '{trial.name}'. "
@@ -141,8 +143,8 @@ def compare(
     if trial is not asked and record is None:
         for run in (tethered, untethered):
             run.attrs[THINNED] = told_of_results(trial)
-    record = beside(record, tethered) if record is not None else None
     if record is not None:
+        record = beside(record, modelled(tethered, HEADING, record.time))
         from subzero.diagnosis.read_trials import check_beside
 
         check_beside(record, {"tethered": tethered, "untethered": untethered}, sidecar)

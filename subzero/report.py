@@ -75,6 +75,8 @@ def show(summary: Summary, console: Console, *, whole: bool = False) -> None:
             console.print(_refinement_table(label, run["refinement"]), highlight=False)
     if summary["measured"] is not None:
         console.print(_fit_table(summary["measured"]), highlight=False)
+        for words in summary["measured"]["notes"]:
+            console.print(words, highlight=False, markup=False, soft_wrap=True)
     show_warnings(runs, console)
 
 

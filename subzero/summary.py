@@ -91,7 +91,8 @@ def summary_of(runs: dict[str, xr.Dataset], record: Record | None) -> dict[str, 
     first = next(iter(runs.values()))
     head = {key: first.attrs[key] for key in ("scenario", "title", "subzero_version")}
     body = {label: summarise(run) for label, run in runs.items()}
-    measured = None if record is None else {"source": record.source, "channels": _explained(runs, record)}
+    measured = None if record is None else {
+        "source": record.source, "channels": _explained(runs, record), "notes": list(record.notes)}  # fmt: skip
     return {**head, "prescribed": bool(first.attrs["prescribed"]), **body, "measured": measured}
 
 

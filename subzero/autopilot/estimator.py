@@ -11,10 +11,11 @@ cable is not in the filter's model: feed-forward cancels it, and the integral ta
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import inf, pi, radians
+from math import inf, radians
 
 import numpy as np
 
+from scenarios.heading import shortest
 from subzero.autopilot.design import Gains, Schedule, design_gains
 from subzero.autopilot.linear import linearise, subsystem
 from subzero.autopilot.loops import refuse_unknown
@@ -177,10 +178,10 @@ class EstimatorLoop:
         assert self.estimate is not None
         model, gain = self.matrices.model.at(speed), self.matrices.filter.at(speed)
         innovation = np.array([reading.yaw_rate, reading.heading]) - MEASURED @ self.estimate
-        innovation[1] -= 2.0 * pi * round(innovation[1] / (2.0 * pi)) if abs(innovation[1]) > pi else 0.0
+        innovation[1] = shortest(float(innovation[1]))
         self.estimate = model[:, :4] @ self.estimate + model[:, 4] * command + gain @ innovation
 
 
 def _limited(error: float) -> float:
-    """Return an error within ±`LARGEST_ERROR`. [rad]"""
-    return max(-LARGEST_ERROR, min(LARGEST_ERROR, error))
+    """Return an error by the shorter way, within ±`LARGEST_ERROR`. [rad]"""
+    return max(-LARGEST_ERROR, min(LARGEST_ERROR, shortest(error)))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Sequence
-from math import ceil, isinf
+from math import ceil, isinf, pi, tau
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
@@ -14,7 +14,7 @@ import scenarios
 from scenarios.steps import holding_rows
 from subzero.autopilot.sensors import PERFECT, Sensor, Sensors
 from subzero.autopilot.standard import Wanted
-from subzero.channels import DEGREE, Observation
+from subzero.channels import DEGREE, HEADING, Observation
 from subzero.errors import BadValueError, UserError, short
 from subzero.model import Model
 from subzero.simulation import Progress
@@ -87,10 +87,11 @@ def fly(
     told = sensors if isinstance(sensors, Sensors) else Sensors(sensors)
     autopilot.reset()
     told.reset()
-    goals, trouble, seen = [(0.0, *_goal(wanted, 0.0)[:3])], "", sim.observation
+    seen, trouble = sim.observation, ""
+    goals = [(0.0, *_goal(wanted, 0.0, seen.heading)[:3])]
     samples = max(1, ceil(sim.trial.duration / sim.sample_time - 1e-9))
     for sample in range(samples):
-        goal = _goal(wanted, seen.time)
+        goal = _goal(wanted, seen.time, goals[-1][2])
         goals.append((seen.time, *goal[:3]))
         try:
             seen = sim.step(_command(autopilot, told.read(seen), goal))
@@ -109,8 +110,11 @@ def fly(
     return _with_goals(sim.result(), np.array(goals), trouble)
 
 
-def _goal(wanted: Callable[[float], Wanted], time: float) -> Wanted:
-    """Return what is wanted at a time, in plain numbers, or refuse what is none; NaN is for who wants nothing."""
+def _goal(wanted: Callable[[float], Wanted], time: float, before: float) -> Wanted:
+    """Return what is wanted at a time, in plain numbers, or refuse what is none; NaN is for who wants nothing.
+
+    A heading that is more than a turn from the one `before` [rad], or a roll of more than half a turn, is in degrees.
+    """
     given = wanted(time)
     try:
         goal = Wanted(*map(float, given))
@@ -121,6 +125,14 @@ def _goal(wanted: Callable[[float], Wanted], time: float) -> Wanted:
             f"fly: what is wanted at t = {time:g} s is {short(given)}. Allowed: a Wanted with numbers that are finite,"
             " or NaN for nothing."
         )
+    for name, angle, most in (("heading", goal.heading - before, tau), ("roll", goal.roll, pi)):
+        if abs(angle) > most:
+            number = getattr(goal, name)
+            raise BadValueError(
+                f"fly: the {name} that is wanted at t = {time:g} s is {number:g} rad, {number * DEGREE:g} degrees: "
+                f"more than {'a turn away' if name == HEADING else 'half a turn'}. Give radians; if degrees are meant, "
+                f"{name}=math.radians({number:g})."
+            )
     return goal
 
 

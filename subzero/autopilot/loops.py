@@ -14,8 +14,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import inf, isfinite
 
+from scenarios.heading import shortest
 from subzero.autopilot.design import Schedule
-from subzero.channels import Observation
+from subzero.channels import HEADING, Observation
 from subzero.errors import UserError
 
 
@@ -135,10 +136,12 @@ class Loop:
         self._wanted = wanted
         *_, k, _, b = self.law.gains.at(speed).tolist()
         measured = getattr(reading, self.law.measured[-1])
-        return float((1.0 - b) * k * (self._limited(wanted - measured) - self._limited(before - measured)))
+        return float((1.0 - b) * k * (self._error(wanted, measured) - self._error(before, measured)))
 
-    def _limited(self, error: float) -> float:
-        """Return an error within ±`largest_error`."""
+    def _error(self, wanted: float, measured: float) -> float:
+        """Return how far it is to a set-point, within ±`largest_error`; of a heading by the shorter way."""
+        apart = wanted - measured
+        error = shortest(apart) if self.law.measured[-1] == HEADING else apart
         return max(-self.law.largest_error, min(self.law.largest_error, error))
 
     def _feedback(
@@ -147,7 +150,7 @@ class Loop:
         """Return the proportional and rate feedback, and the increment of the integral."""
         *gains, k_integral, _ = self.law.gains.at(speed).tolist()
         *others, tracked = self.law.measured
-        error = self._limited(wanted - getattr(reading, tracked))
+        error = self._error(wanted, getattr(reading, tracked))
         total = gains[-1] * error
         for gain, name in zip(gains, others, strict=False):
             total += gain * (rate - getattr(reading, name))

@@ -39,7 +39,7 @@ class Wanted(NamedTuple):
 
     Attributes:
         speed: forward, through the water as far as the speed log knows. [m/s]
-        heading: continuous. [rad]
+        heading: clockwise from north, held by the shorter way. [rad]
         depth: NaN for level motion instead. [m]
         roll: [rad]
         turn_rate: rate of the wanted heading. [rad/s]

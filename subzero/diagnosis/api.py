@@ -19,17 +19,20 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from subzero.channels import BY_NAME
 from subzero.diagnosis.assessment.goodness_of_fit import misfits
 from subzero.diagnosis.assessment.identifiability import detectability, with_whole_effects
 from subzero.diagnosis.hypothesis.catalogue import load
 from subzero.diagnosis.hypothesis.data_error import DataError
 from subzero.diagnosis.hypothesis.effect import Effect
 from subzero.diagnosis.hypothesis.logged import Logged
-from subzero.diagnosis.inference.data_error_choice import compared, may_be_named
+from subzero.diagnosis.hypothesis.noise import level_of
+from subzero.diagnosis.inference.data_error_choice import compared
 from subzero.diagnosis.inference.data_error_evidence import Explained, leaves_only_noise
 from subzero.diagnosis.inference.data_error_search import SuspectedError, is_soft, suspected
 from subzero.diagnosis.inference.linear_gaussian import log_sum
@@ -45,9 +48,18 @@ from subzero.diagnosis.inference.posing import pose, posed_again, sensitive_runs
 from subzero.diagnosis.inference.problem import Problem, Progress
 from subzero.diagnosis.inference.simulator import respond
 from subzero.diagnosis.read_trials import read_trials
-from subzero.diagnosis.results import DATA_ERROR, UNDECIDED, Detectability, FoundError, Rival, Verdict
-from subzero.diagnosis.verdict.conclude import conclude
+from subzero.diagnosis.results import (
+    DATA_ERROR,
+    NOTHING_NEAR,
+    UNDECIDED,
+    Detectability,
+    FoundError,
+    Rival,
+    Verdict,
+)
+from subzero.diagnosis.verdict.conclude import conclude, decided
 from subzero.diagnosis.verdict.follow_up import follow_up, ranked, refuted_rivals
+from subzero.errors import UserError
 from subzero.model import Model
 from subzero.records.record import Record
 
@@ -130,7 +142,33 @@ def diagnose_trials(
     Raises:
         UserError: the nominal model cannot be run through a trial.
     """
-    effects, begun = tuple(effects), perf_counter()
+    effects = tuple(effects)
+    asked: dict[str, Any] = {
+        "effects": effects,
+        "progress": progress,
+        "seen": seen,
+        "seed": seed,
+        "budget": budget,
+    }
+    try:
+        verdict = _diagnosed(records, **asked)
+        return replace(verdict, notes=(*verdict.notes, *(note for one in records for note in one.notes)))
+    except np.linalg.LinAlgError:
+        kept, note = _without_worst_channel(records)
+    verdict = diagnose_trials(kept, **asked)
+    return replace(verdict, notes=(note, *verdict.notes))
+
+
+def _diagnosed(
+    records: Sequence[Logged],
+    effects: tuple[Effect, ...],
+    progress: Progress | None,
+    seen: Seen | None,
+    seed: int,
+    budget: str,
+) -> Verdict:
+    """Diagnose records whose channels all hold."""
+    begun = perf_counter()
     problem = pose(records, effects)
     with threadpool_limits(limits=1, user_api="blas"):  # runs have the cores; matrices are small
         suspicion = suspected(problem, records)
@@ -145,6 +183,34 @@ def diagnose_trials(
             looking.finish(work)
             return _concluded(work)
         return _on_records(records, compared(suspicion, records, looking), _concluded)
+
+
+def _without_worst_channel(records: Sequence[Logged]) -> tuple[list[Logged], str]:
+    """Return records without the channel that is farthest from its simulation, in levels of its sensor's noise, where a
+    diagnosis breaks; and a sentence that names it.
+
+    Raises:
+        UserError: there is no other channel in that record.
+    """
+    far: dict[tuple[int, str], float] = {}
+    for i, one in enumerate(records):
+        for name, shown in respond(one.setting, one.record.time, tuple(one.record.values)).items():
+            left = one.record.values[name] - shown
+            far[i, name] = float(np.sqrt(np.nanmean(left**2))) / level_of(name, one.noise)
+    at, name = max(far, key=lambda key: far[key])
+    record, column = records[at].record, BY_NAME[name].column
+    if len(record.values) < 2:
+        raise UserError(
+            f"{record.source}: {column}, its only channel, is {far[at, name]:.2g} levels of noise away from the "
+            "simulation, too far for a diagnosis. Check its unit and the trial."
+        )
+    values = {channel: column for channel, column in record.values.items() if channel != name}
+    kept = list(records)
+    kept[at] = replace(records[at], record=replace(record, values=values))
+    return (
+        kept,
+        f"{record.source}: {column} is set aside: no diagnosis can be computed with it. Check its values.",
+    )
 
 
 @dataclass(kw_only=True, eq=False)
@@ -340,7 +406,10 @@ def _on_records(
 
 
 def _is_named(one: Explained, probability: float) -> bool:
-    return probability >= NAMED_PROBABILITY and may_be_named(one.errors, one.work)
+    """Say whether errors may be the verdict: they are probable, and without them the records are explained."""
+    if probability < NAMED_PROBABILITY or not leaves_only_noise(one.work):
+        return False
+    return decided(one.work, ranked(one.work)) != NOTHING_NEAR
 
 
 def _with_errors(
@@ -380,7 +449,7 @@ def _with_possible(
     ranked = dict(sorted(listed.items(), key=lambda pair: -pair[1]))
     beside = replace(told, rivals=rivals, probabilities=ranked, sentence=f"{told.sentence} Or {words}.",
                      data_errors=told.data_errors or errors)  # fmt: skip
-    if probability <= 1.0 - NAMED_PROBABILITY:
+    if probability <= 1.0 - NAMED_PROBABILITY or told.on_model == NOTHING_NEAR:
         return beside
     return replace(beside, then=UNDECIDED) if told.then else replace(beside, verdict=UNDECIDED)
 

@@ -18,7 +18,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 import scenarios
-from subzero.channels import BY_NAME, HEADING, turned
+from scenarios.heading import turned
+from subzero.channels import BY_NAME, HEADING
 from subzero.diagnosis.hypothesis.catalogue.sensors import NOISE, SPECS
 from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.logged import Logged
@@ -38,7 +39,7 @@ from subzero.records.consistency import (
     without_repeats,
 )
 from subzero.records.metadata import Metadata, read_metadata
-from subzero.records.record import Record, fits, modelled, read_record
+from subzero.records.record import Record, beside, fits, measured_alone, modelled, read_record
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -71,7 +72,7 @@ def read_trials(
     in_hand = [one for one in given if isinstance(one, Record)]
     names = [*_names(files), *(_name_in_hand(at, len(in_hand)) for at in range(len(in_hand)))]
     sidecars = [*(read_metadata(file.with_suffix(".toml")) for file in files), *(Metadata() for _ in in_hand)]
-    records = [*map(read_record, files), *in_hand]
+    records = [*map(read_record, files), *map(measured_alone, in_hand)]
     logged = [_logged(record, sidecar, name, scenario, commands)
               for record, sidecar, name in zip(records, sidecars, names, strict=True)]  # fmt: skip
     return [_checked(one, sidecar, simulated) for one, sidecar in zip(logged, sidecars, strict=True)]
@@ -121,7 +122,7 @@ def _logged(
     if HEADING in values:
         values[HEADING] = turned(values[HEADING], math.degrees(trial.start.heading))
     return Logged(
-        record=Record(source=record.source, time=record.time, values=values),
+        record=dataclasses.replace(record, values=values),
         setting=Setting(trial=trial, model=Model.of(trial), tethered=sidecar.tethered),
         noise={channel: sd for channel, sd in sidecar.noise.items() if channel in values},
         name=name,
@@ -154,8 +155,9 @@ def _channels(record: Record, sidecar: Metadata) -> tuple[dict[str, np.ndarray],
 
 def _checked(logged: Logged, sidecar: Metadata, simulated: Simulated | None) -> Logged:
     """Return a record whose channels look like its trial."""
-    record, values = logged.record, logged.record.values
-    nominal = (simulated or _nominal())(logged.setting, record.time, tuple(values))
+    nominal = (simulated or _nominal())(logged.setting, logged.record.time, tuple(logged.record.values))
+    record = beside(logged.record, nominal.get(HEADING))
+    values = record.values
     noise = {channel: logged.noise.get(channel, NOISE[channel]) for channel in values}
     suspects = {channel: column for channel, column in values.items() if not sidecar.trusts(channel)}
     still = [channel for channel, column in suspects.items() if is_constant(column)]
@@ -163,7 +165,8 @@ def _checked(logged: Logged, sidecar: Metadata, simulated: Simulated | None) -> 
     kept = {channel: column for channel, column in values.items() if channel not in still}
     if not kept:
         raise UserError(f"{record.source}: no channel moves. A diagnosis needs one that the trial moves.")
-    notes = (*logged.notes, *_notes(still, repeating(kept)))
+    asked = unit_questions({name: one for name, one in kept.items() if name in suspects}, nominal, noise)
+    notes = (*logged.notes, *record.notes, *_notes(still, repeating(kept)), *(f"{words}." for words in asked))
     trusted = frozenset(kept) - frozenset(suspects)
     return dataclasses.replace(
         logged, record=dataclasses.replace(record, values=kept), notes=notes, trusted=trusted

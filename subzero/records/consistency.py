@@ -16,14 +16,15 @@ from math import radians
 import numpy as np
 
 import scenarios
+from scenarios.heading import continuous, turned
 from scenarios.steps import held
-from subzero.channels import BY_NAME, DEGREE, HEADING, TURN, turned
+from subzero.channels import BY_NAME, DEGREE, HEADING
 from subzero.errors import UserError
 from subzero.records.record import Record
 
 MISTAKEN: dict[str, dict[str, float]] = {
     "m/s": {"knots": 1.944, "km/h": 3.6, "feet per second": 3.281, "cm/s": 100.0},
-    "degree": {"radians": np.pi / 180.0},
+    "degree": {"radians": np.pi / 180.0, "centidegrees": 100.0},
     "degree/s": {"radians per second": np.pi / 180.0},
     "m": {"feet": 3.281, "centimetres": 100.0},
     "rev/s": {"revolutions per minute": 60.0, "radians per second": 2.0 * np.pi},
@@ -120,8 +121,8 @@ def _other_unit(name: str, measured: np.ndarray, simulated: np.ndarray, noise: f
 
 
 def _converted(name: str, values: np.ndarray, simulated: np.ndarray) -> np.ndarray:
-    """Return values in another unit; a heading without the jumps at north that it may have there."""
-    return turned(np.unwrap(values, period=TURN), simulated) if name == HEADING else values
+    """Return values in another unit; a heading with the turns of the simulation."""
+    return turned(continuous(values, simulated), simulated) if name == HEADING else values
 
 
 def _question(name: str, words: str, factor: float) -> str:

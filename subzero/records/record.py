@@ -3,10 +3,11 @@
 A record has the column ``time_s`` and any columns of `subzero.channels`, such as ``surge_speed_m_s`` or
 ``heading_deg``. An empty cell or ``nan`` is a gap. Lines that start with ``#`` are remarks. A file that
 cannot be used is refused with all its problems at once. A heading that jumps from 360 to 0 degrees is made
-continuous.
+continuous (`scenarios.heading`).
 
 A heading is known but for whole turns: one compass begins at 359 degrees where another, or a run, begins at −1. So a
-run's heading is counted from its trial's start, without a jump wherever that lies, and a record's from the run's.
+run's heading is counted from its trial's start, without a jump wherever that lies, and a record's from the run's, with
+the turns of its yaw rate, or else of the run (`beside`).
 
 The files that a run writes are themselves records, so one run can be compared with another.
 
@@ -25,7 +26,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from subzero.channels import BY_COLUMN, BY_NAME, HEADING, TIME, TURN, turned
+from scenarios.heading import TURN, continuous, contradicted, expected, turned
+from scenarios.sampling import measurements_alone
+from subzero.channels import BY_COLUMN, BY_NAME, HEADING, TIME
 from subzero.errors import UserError, listed, nearest, printable
 from subzero.errors import short as shown
 from subzero.user_file import MOST_COLUMNS, MOST_OF_A_CSV, UnreadableFileError, read_text
@@ -34,14 +37,28 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
+YAW_RATE = "yaw_rate"
+"""The channel that tells how often a heading has turned."""
+
 GAPS = ("", "nan", "+nan", "-nan")
 """Cells that hold no measurement; numerical libraries write a NaN with either sign."""
 
 LARGEST = 1e9
 """No channel measures more than this, in whatever unit; squares of it are still far from an overflow."""
 
-LATEST = 1e13
-"""A time that is larger is none; one beyond LARGEST counts from 1970, in seconds or in thousandths. [s]"""
+EPOCHS = {
+    1e17: ("nanoseconds", 1e9),
+    1e14: ("microseconds", 1e6),
+    1e11: ("milliseconds", 1e3),
+    LARGEST: ("seconds", 1.0),
+}
+"""A first time beyond this counts from 1970 in that unit, of which so many make a second."""
+
+TIMES_OF_DAY = {
+    r"\d{4}-\d\d-\d\d[T ]": "dates and times",
+    r"(\d+ days? )?\d+:\d\d(:\d\d)?([.,]\d+)?$": "hours, minutes and seconds",
+}
+"""What a time looks like that is no number, and what it is."""
 
 Row = tuple[int, list[str]]
 """Line number in the file (from 1), and its cells."""
@@ -55,11 +72,13 @@ class Record:
         source: the file, as the user named it.
         time: time of each sample, increasing. Shape (samples,). [s]
         values: channel name → measured values in the channel's display unit, NaN where there is a gap.
+        notes: what was set aside in it, and why, in sentences.
     """
 
     source: str
     time: np.ndarray
     values: Mapping[str, np.ndarray]
+    notes: tuple[str, ...] = ()
 
 
 def read_record(path: str | Path) -> Record:
@@ -77,14 +96,24 @@ def read_record(path: str | Path) -> Record:
         problems = [f"line {line}: {len(row)} cells, but the header has {len(header)} columns"
                     for line, row in rows if len(row) != len(header)]  # fmt: skip
     _refuse(path, problems)
+    _refuse(path, _format_of_time([row[header.index(TIME.column)] for _, row in rows]))
     columns = {name: _numbers(name, at, rows, problems) for at, name in enumerate(header)}
     problems += _time_problems(columns[TIME.column], rows, header.index(TIME.column))
     problems += _empty_problems(columns)
+    problems += _heading_problems(columns.get(BY_NAME[HEADING].column, np.empty(0)))
     _refuse(path, problems)
     values = {BY_COLUMN[name].name: column for name, column in columns.items() if name != TIME.column}
-    if HEADING in values:
-        values[HEADING] = _continuous(values[HEADING])
-    return Record(source=_name(path), time=columns[TIME.column], values=values)
+    record = measured_alone(Record(source=_name(path), time=columns[TIME.column], values=values))
+    if HEADING not in values:
+        return record
+    like = expected(record.time, record.values.get(YAW_RATE))
+    return replace(record, values={**record.values, HEADING: continuous(record.values[HEADING], like)})
+
+
+def measured_alone(record: Record) -> Record:
+    """Return a record without the values that a logger filled in between measurements (`scenarios.sampling`)."""
+    values, notes = measurements_alone(record.time, record.values)
+    return replace(record, values=values, notes=record.notes + notes)
 
 
 def _name(path: str | Path) -> str:
@@ -150,6 +179,9 @@ OTHER_WORDS = {
 USUAL = "surge_speed_m_s, heading_deg, yaw_rate_deg_s, pitch_deg, roll_deg, depth_m, cable_tension_N"
 """Columns that many records have."""
 
+PLACE_ON_EARTH = r"(.*[^a-z])?(lat|latitude|lon|lng|long|longitude)([^a-z].*)?$"
+"""Names of columns of latitude and longitude, in small letters."""
+
 SLIP_LIKENESS = 0.75
 """A name that is so much like a column is that column with a slip of the pen."""
 
@@ -164,6 +196,12 @@ def _header_problems(header: list[str]) -> list[str]:
     if between:
         return [
             f"its columns are separated by {between}; separate them by commas, and write numbers with a point"
+        ]
+    places = [name for name in header if re.match(PLACE_ON_EARTH, name.lower())]
+    if places:
+        return [
+            f"columns {', '.join(map(shown, places))} are latitude and longitude; replace them by north_m and east_m "
+            "from the start: 111 320 m a degree, east times the cosine of the latitude (integers are 1e-7 degrees)"
         ]
     problems = [_unknown(name) for name in header if name not in BY_COLUMN]
     if problems:
@@ -214,7 +252,7 @@ def _numbers(name: str, at: int, rows: list[Row], problems: list[str]) -> np.nda
         except ValueError:
             problems.append(f"line {line}, column '{name}': {shown(cell)} is not a number; leave a gap empty")
             continue
-        if abs(value) <= (LATEST if name == TIME.column else LARGEST):
+        if abs(value) <= LARGEST:
             column[index] = value
         else:
             why = f"outside ±{LARGEST:g}" if np.isfinite(value) else "not finite"
@@ -222,19 +260,59 @@ def _numbers(name: str, at: int, rows: list[Row], problems: list[str]) -> np.nda
     return column
 
 
+def _format_of_time(cells: list[str]) -> list[str]:
+    """Return in one line what times are written as that are no seconds from a start; nothing of those that are."""
+    first = next((cell for cell in cells if cell.lower() not in GAPS), "")
+    remedy = "subtract the first one, and write seconds since the first command"
+    for pattern, words in TIMES_OF_DAY.items():
+        if re.match(pattern, first):
+            zones = {zone.group() for cell in cells if (zone := re.search(r"(Z|[+-]\d\d:?\d\d)$", cell[10:]))}
+            utc = f"convert all to UTC ({len(zones)} time zones occur), " if len(zones) > 1 else ""
+            return [f"'{TIME.column}' holds {words}, such as {shown(first)}: {utc}{remedy}"]
+    try:
+        number = float(first)
+    except ValueError:
+        return []
+    for least, (unit, count) in EPOCHS.items():
+        if least < number < np.inf:
+            how = f", divided by {count:g}" if count > 1.0 else ""
+            return [f"the first time is {shown(first)}, {unit} since 1970, a time of day: {remedy}{how}"]
+    return []
+
+
 def _time_problems(time: np.ndarray, rows: list[Row], at: int) -> list[str]:
-    """Time counts from the start of the trial, has no gaps and increases."""
-    if time.size and time[0] > LARGEST:
-        return [
-            f"the first time is {time[0]:.0f}, which is a time of day; '{TIME.column}' counts in seconds from the "
-            "start of the trial: subtract the time of its start"
-        ]
-    gaps = [line for line, row in rows if row[at].lower() in GAPS]
+    """Time has no gaps and increases; what breaks in all rows alike is said once."""
     lines = [line for line, _ in rows]
-    return [f"line {line}: the time is missing; every sample needs one" for line in gaps] + [
-        f"line {line}: the time {now:g} s does not come after {before:g} s; time must increase"
-        for line, before, now in zip(lines[1:], time[:-1], time[1:], strict=True)
-        if now <= before
+    gaps = [line for line, row in rows if row[at].lower() in GAPS]
+    problems = [f"line {line}: the time is missing; every sample needs one" for line in gaps]
+    same, back = np.flatnonzero(np.diff(time) == 0.0) + 1, np.flatnonzero(np.diff(time) < 0.0) + 1
+    if same.size > 1:
+        problems.append(
+            f"{same.size} rows have the time of the row before, from line {lines[same[0]]} on: fractions of a second "
+            "are lost; write times with them, and nanoseconds with their leading zeros"
+        )
+        same = same[:0]
+    if back.size and np.all(time[back] <= time[:2].max()):
+        parts = f"line{'s' * (back.size > 1)} {', '.join(str(lines[k]) for k in back[:3])}"
+        problems.append(
+            f"the time begins anew at {parts}: the logger was restarted; make a record of each part, and leave out "
+            "those without the first command"
+        )
+        back = back[:0]
+    return problems + [
+        f"line {lines[k]}: the time {time[k]:g} s does not come after {time[k - 1]:g} s; time must increase"
+        for k in sorted([*same, *back])
+    ]
+
+
+def _heading_problems(heading: np.ndarray) -> list[str]:
+    """A heading begins within two turns, else it is in a hundredth of a degree."""
+    first = heading[np.isfinite(heading)][:1]
+    if not first.size or abs(first[0]) <= 2.0 * TURN:
+        return []
+    return [
+        f"'heading_deg' begins at {first[0]:g}, more than two turns, so that it is probably in centidegrees: divide it "
+        "by 100"
     ]
 
 
@@ -244,14 +322,6 @@ def _empty_problems(columns: Mapping[str, np.ndarray]) -> list[str]:
         for name, column in columns.items()
         if name != TIME.column and not np.isfinite(column).any()
     ]
-
-
-def _continuous(angle: np.ndarray) -> np.ndarray:
-    """Return an angle without jumps of a whole turn; gaps stay gaps. [degree]"""
-    known = np.isfinite(angle)
-    smooth = angle.copy()
-    smooth[known] = np.unwrap(angle[known], period=TURN)
-    return smooth
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -297,9 +367,28 @@ def fits(runs: dict[str, xr.Dataset], record: Record) -> dict[str, dict[str, Fit
     return {name: {label: fit(run, record, name) for label, run in runs.items()} for name in record.values}
 
 
-def beside(record: Record, run: xr.Dataset) -> Record:
-    """Return the record with its heading shifted by whole turns, so that it starts next to the run's."""
-    if HEADING not in record.values:
+def beside(record: Record, simulated: np.ndarray | None) -> Record:
+    """Return a record whose heading is counted as that of a simulation, without samples that contradict those around.
+
+    Args:
+        record: with or without a heading.
+        simulated: heading of the simulation at the record's times, NaN outside its time (n,). [degree]
+    """
+    if HEADING not in record.values or simulated is None:
         return record
-    heading = turned(record.values[HEADING], modelled(run, HEADING, record.time))
-    return replace(record, values={**record.values, HEADING: heading})
+    values, like = record.values[HEADING], expected(record.time, record.values.get(YAW_RATE), simulated)
+    gone = contradicted(values, like)
+    heading = turned(continuous(np.where(gone, np.nan, values), like), simulated)
+    notes = record.notes + (
+        (_contradicted(record.time[gone], BY_NAME[HEADING].column),) if gone.any() else ()
+    )
+    return replace(record, values={**record.values, HEADING: heading}, notes=notes)
+
+
+def _contradicted(time: np.ndarray, column: str) -> str:
+    """Return what is said of samples that contradict those around them, at these times [s]."""
+    when = f"at {time[0]:g} s" if time.size == 1 else f"between {time[0]:g} and {time[-1]:g} s"
+    return (
+        f"{column}: {time.size} sample{'s' * (time.size > 1)} {when} contradict{'s' * (time.size == 1)} those "
+        "before and after, as if averaged or interpolated across north; left out."
+    )

@@ -11,8 +11,9 @@ from pathlib import Path
 import numpy as np
 
 import scenarios
+from scenarios.heading import TURN
 from scenarios.steps import sample_times
-from subzero.channels import HEADING, TIME, TURN, column_name
+from subzero.channels import HEADING, TIME, column_name
 from subzero.diagnosis.hypothesis.catalogue import START, catalogue
 from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.effect import Effect

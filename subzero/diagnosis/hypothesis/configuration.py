@@ -14,7 +14,8 @@ from typing import Any, TypeVar
 import numpy as np
 
 import scenarios
-from subzero.channels import DEGREE, HEADING, turned
+from scenarios.heading import turned
+from subzero.channels import DEGREE, HEADING
 from subzero.jit import compiled
 from subzero.model import Model
 from vehicle.state import QUATERNION, SHAFT, STATE_SIZE, VELOCITY

@@ -27,7 +27,8 @@ from typing import NamedTuple
 import numpy as np
 
 import scenarios
-from subzero.channels import BY_NAME, HEADING, TURN, turned
+from scenarios.heading import TURN, continuous, turned
+from subzero.channels import BY_NAME, HEADING
 from subzero.diagnosis.hypothesis.logged import Logged
 from subzero.diagnosis.hypothesis.noise import usual_of
 from subzero.errors import UserError
@@ -192,10 +193,7 @@ def _negative(error: DataError, time: np.ndarray, values: np.ndarray) -> np.ndar
 def _in_right_unit(error: DataError, time: np.ndarray, values: np.ndarray) -> np.ndarray:
     if error.channels[0] != HEADING:
         return values / error.factor
-    known = np.isfinite(values)
-    found = unturned(values) / error.factor
-    found[known] = np.unwrap(found[known], period=TURN)
-    return found
+    return continuous(unturned(values) / error.factor)
 
 
 def _in_wrong_unit(error: DataError, time: np.ndarray, values: np.ndarray) -> np.ndarray:

@@ -141,6 +141,7 @@ from subzero.diagnosis.inference.model_average import (
     is_noise,
     occam_folded,
     practical_causes,
+    is_near,
     qualified,
 )
 from subzero.diagnosis.inference.model_fits import gain_of_own_noise, log_evidence_of, with_own_noise
@@ -206,6 +207,7 @@ __all__ = [
     "gain_of_own_noise",
     "grown",
     "history",
+    "is_near",
     "is_noise",
     "is_poor_fit",
     "knots_of",

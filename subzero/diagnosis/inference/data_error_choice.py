@@ -43,7 +43,6 @@ from subzero.diagnosis.inference.data_error_search import (
     SuspectedError,
     Suspicion,
     explain,
-    is_soft,
 )
 from subzero.diagnosis.inference.model_fits import log_evidence_of
 from subzero.diagnosis.inference.out_of_catalogue import Findings, is_explained, linear_of_first
@@ -56,11 +55,6 @@ def is_clear(errors: Sequence[SuspectedError], work: Findings) -> bool:
     outside = max((one.log_posterior for one in work.out_of_catalogue), default=-np.inf)
     explained = work.search.best().log_posterior > outside and leaves_only_noise(work)
     return explained and all(one.is_clear for one in errors)
-
-
-def may_be_named(errors: Sequence[SuspectedError], work: Findings) -> bool:
-    """Say whether errors may be the verdict: those that something else may look like only if they explain all."""
-    return leaves_only_noise(work) or not any(is_soft(one) for one in errors)
 
 
 class Look(Protocol):

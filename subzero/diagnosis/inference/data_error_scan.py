@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from subzero.channels import BY_NAME, HEADING, turned
+from scenarios.heading import turned
+from subzero.channels import BY_NAME, HEADING
 from subzero.diagnosis.hypothesis.data_error import (
     ANY,
     COMMAND_GROUPS,

@@ -20,7 +20,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg.lapack import dpotrf, dpotri
 
-from subzero.channels import HEADING, turned
+from scenarios.heading import turned
+from subzero.channels import HEADING
 from subzero.diagnosis.hypothesis.configuration import Setting, sensed, truth
 from subzero.diagnosis.hypothesis.data_error import REPEATED, DataError, corrected, places
 from subzero.diagnosis.hypothesis.hypotheses import PRIOR, columns_of, nameable, variances

@@ -3,7 +3,8 @@
 nothing_wrong      p(none) ≥ 0.5, or the named size is within the practical one
 calibrated         the same, but numbers had to move by more than 4 tolerances, or tolerances 4 times as wide explain
                    the records best: the model wants calibration
-nothing_near       nothing is named, and what the best fit leaves is no noise
+nothing_near       nothing is named, and what the best fit leaves is no noise; or the best explanation, whatever it
+                   names, moves what it does not name beyond any calibration
 cause_named        one hypothesis, or one cause that begins in mid-trial, with p ≥ 0.9, D ≥ 9 to its closest rival,
                    its size beyond 4 tolerances
 outside_catalogue  a latent force or a drift that no cause explains has p ≥ 0.9
@@ -129,6 +130,30 @@ def has_moved(entries: Sequence[Entry], z: np.ndarray, kappa: float) -> bool:
     shared = [k for k, entry in enumerate(entries) if entry.record < 0]
     sizes = [abs(float(z[k])) / entries[k].parameter.tolerance for k in shared]
     return kappa == max(KAPPAS) or max(sizes, default=0.0) > PRACTICAL_TOLERANCES
+
+
+FARTHEST_TOLERANCES = PRACTICAL_TOLERANCES * max(KAPPAS)
+"""A number that is not named and is off by more than this is no calibration, at any scale of the tolerances. [τ]"""
+AT_BOUND = 0.99
+"""A sensor's number at this share of its bound is where its fit was stopped. [-]"""
+
+
+def is_near(entries: Sequence[Entry], z: np.ndarray, named: Ids) -> bool:
+    """Say whether an explanation z (k,) is near the records: it moves no number of the vehicle and its sensors that it
+    does not name farther than any calibration may, and none of a sensor that it names beyond what a sensor can be.
+    """
+    for entry, value in zip(entries, z.tolist(), strict=False):
+        parameter = entry.parameter
+        if entry.record >= 0:
+            continue
+        if entry.effect.id not in named and abs(value) > FARTHEST_TOLERANCES * parameter.tolerance:
+            return False
+        is_sensor = entry.effect.id in named and entry.effect.slot == "sensors"
+        if is_sensor and (
+            value >= AT_BOUND * parameter.high or value <= min(AT_BOUND * parameter.low, -parameter.tolerance)
+        ):
+            return False
+    return True
 
 
 def is_noise(r: np.ndarray) -> bool:

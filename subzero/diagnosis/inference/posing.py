@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from subzero.channels import HEADING, turned
+from scenarios.heading import turned
+from subzero.channels import HEADING
 from subzero.diagnosis.hypothesis.catalogue import ONSETS, START, catalogue
 from subzero.diagnosis.hypothesis.catalogue.sensors import CLOCK, SPECS
 from subzero.diagnosis.hypothesis.hypotheses import entries_of, moves_nothing, with_tolerances

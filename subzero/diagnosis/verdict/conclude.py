@@ -19,6 +19,7 @@ from subzero.diagnosis.inference.model_average import (
     ChangePointSummary,
     credible_set,
     decide,
+    is_near,
     qualified,
     tolerance_scale,
 )
@@ -51,7 +52,9 @@ from subzero.diagnosis.verdict.estimates import (
 )
 
 if TYPE_CHECKING:
-    from subzero.diagnosis.hypothesis.hypotheses import Ids
+    import numpy as np
+
+    from subzero.diagnosis.hypothesis.hypotheses import Entry, Ids
     from subzero.diagnosis.inference import Candidate
     from subzero.diagnosis.inference.change_point_fit import FittedChangePoint
     from subzero.diagnosis.inference.out_of_catalogue import Findings
@@ -160,7 +163,20 @@ def decided(findings: Findings, ranked: Ranked) -> str:
     verdict = decide(ranked.inside, forces, is_practical, apart, ranked.change_point)
     if verdict == OUTSIDE and findings.sensitive:
         verdict = UNDECIDED  # an error of a run that grows is a force to those who do not know better
+    if not is_near(*_explanation(findings, ranked, verdict)):
+        return NOTHING_NEAR
     return qualified(verdict, findings.problem.entries, ranked.best)
+
+
+def _explanation(findings: Findings, ranked: Ranked, verdict: str) -> tuple[Sequence[Entry], np.ndarray, Ids]:
+    """Return the numbers of the explanation that a verdict is about, their deviations (k,), and the causes it names."""
+    if verdict == CAUSE_NAMED and ranked.change_point.is_named:
+        first = ranked.change_points[0]
+        return first.problem.entries, first.fit.z, (first.change_point.effect.id,)
+    strange = max(findings.out_of_catalogue, key=lambda one: one.log_posterior, default=None)
+    if strange and strange.point and strange.log_posterior > ranked.best.log_posterior:
+        return findings.problem.entries, strange.point.fit.z, ranked.best.ids
+    return findings.problem.entries, ranked.best.fit.z, ranked.best.ids
 
 
 def remaining_models(ranked: Ranked) -> RemainingModels:
@@ -277,7 +293,9 @@ def _sentence(
             "`subzero calibrate` estimates them."
         )
     if verdict == NOTHING_NEAR:
-        return "Nothing comes near: what the best explanation leaves of these records is no noise."
+        return (
+            "Nothing comes near: the best explanation leaves more than noise, or bends what it does not name."
+        )
     if verdict == CAUSE_NAMED:
         since = f"From {named[0].start_time:g} s on, " if named[0].start_time is not None else ""
         words = since + ", and ".join(cause.sentence for cause in named)
