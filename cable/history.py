@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cable.current import Current
+from cable.doubts import SLACK_SHARE, doubts_of
 from cable.properties import CableProperties
 from subzero.errors import BadValueError, real, short
 from subzero.overview import Overview
@@ -113,6 +114,12 @@ class History:
             [np.linalg.norm(shape[0] - x) for shape, x in zip(self.shapes, self.tow_point, strict=True)]
         )
 
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Why the numbers of the run may be wrong, in sentences; none if nothing is known against them."""
+        how = self.outcome.energy_residual
+        return doubts_of(self.time, self.tow_force, self.length, self.shapes, self.tensions, how)
+
     def diagnostics(self) -> Mapping[str, float]:
         """Return the numbers that tell how far to trust the run, by name."""
         return {
@@ -185,6 +192,7 @@ class History:
                             f"at {self.time[largest]:.4g} s"),
             ("drum tension", f"{self.drum_tension[-1]:.4g} N at the end"),
             ("outcome", self.outcome.message),
+            *(("warning", words) for words in self.warnings),
             ("more", "shape(t), tension(t), diagnostics(), to_dataset()"),
         ]  # fmt: skip
         return Overview(f"Cable run, scheme {self.scheme}", rows)
@@ -241,3 +249,39 @@ class Equilibrium:
         chords = np.linalg.norm(np.diff(self.shape, axis=0), axis=1)
         stretched = self.segment_lengths * (1.0 + self.cable.compliance * self.segment_tensions)
         return float(self.segment_lengths[chords < (1.0 - 1e-6) * stretched].sum())
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Why the numbers may be wrong, in sentences; none if nothing is known against them."""
+        share = self.slack_length / self.length
+        if share <= SLACK_SHARE:
+            return ()
+        return (f"{100.0 * share:.3g} % of the cable is slack: there its shape means nothing.",)
+
+    def __repr__(self) -> str:
+        """Return the cable at rest in a few lines."""
+        return self._overview().text()
+
+    def _repr_html_(self) -> str:
+        """Return the same for a notebook."""
+        return self._overview().html()
+
+    def _overview(self) -> Overview:
+        """Return its length, its span, and how it pulls at both ends."""
+        span = float(np.linalg.norm(self.shape[-1] - self.shape[0]))
+        ends = {"first end": self.tow_force, "second end": self.drum_force}
+        rows = [
+            ("length", f"{self.length:.4g} m between ends {span:.4g} m apart"),
+            *(
+                (
+                    name,
+                    f"{np.linalg.norm(force):.4g} N: "
+                    + ", ".join(f"{part:.4g}" for part in force)
+                    + " N north, east, down",
+                )
+                for name, force in ends.items()
+            ),
+            ("tension", f"{self.tensions.min():.4g} to {self.tensions.max():.4g} N"),
+            *(("warning", words) for words in self.warnings),
+        ]
+        return Overview("Cable at rest", rows)

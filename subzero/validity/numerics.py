@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cable import doubts
+from cable.doubts import LIMP, NO_FORCE, RESIDUAL, ROUGH, SLACK_SHARE
 from subzero.validity.limits import blocks_of, first_time, longest_span, percent
 
 if TYPE_CHECKING:
@@ -15,15 +17,8 @@ if TYPE_CHECKING:
     from subzero.channels import AnyRun
     from subzero.model import Model
 
-RESIDUAL = 0.01
-"""A residual above this share of the largest energy of the run is too much. [-]"""
-NO_ENERGY, NO_FORCE = 1e-9, 1e-6
-"""Below this nothing has happened yet. [J], [N]"""
-
-ROUGH = 0.03
-"""A tow force whose second difference from sample to sample exceeds this share of the largest force is not resolved by
-the steps. Of 160 trials of `benchmarks.trust` all 117 that were wrong by more than 3 % had more, and none of the 13
-that were right within 1 % (0.2 to 2.5 %). [-]"""
+NO_ENERGY = 1e-9
+"""Below this nothing has happened yet. [J]"""
 
 OVERRUN, SAGGING, ILL_POSED_TIME = 1.2, 0.2, 2.0
 """A drum that runs so many times faster than the tow point goes away feeds itself; a cable whose weight is more than
@@ -44,12 +39,8 @@ an error that is estimated at more than the second may be larger than `rtol`: wh
 no order holds, and estimates are good to a third at best. Of 216 trials of `benchmarks.trust` without a warning, one
 of 41 above it was off by more than 3 %, and none of the others by more than 2.3 %. [-]"""
 
-LIMP = 1e-6
-"""A cable with less tension than this at both ends of a segment does not pull there. [N]"""
-SLACK_SHARE, SLACK_TIME = 0.05, 1.0
-"""Slack is warned of from this share of the length on, and when it lasts longer than this. [-], [s]"""
-FOLDED = 1e-3
-"""A cable whose segments are shorter than their cable by more than this share is folded somewhere. [-]"""
+SLACK_TIME = 1.0
+"""Slack is warned of, too, when it lasts longer than this. [s]"""
 
 CLOSED = 0.01
 """A cable that ends farther from the tow point than this share of its length is not the cable of this vehicle. [-]"""
@@ -164,17 +155,10 @@ def tow_force(run: AnyRun, trial: scenarios.Trial, model: Model) -> list[str]:
 
 
 def roughness(run: AnyRun) -> np.ndarray:
-    """Return |F(t−h) − 2F(t) + F(t+h)| of the tow force, as a share of its largest value (samples − 3,). [-].
-
-    Between evenly spaced samples an eighth of it is what a straight line misses. The first sample is left out: the
-    force at the start is a guess.
-    """
-    F = np.array([run[f"cable_force_{axis}"].values for axis in ("forward", "starboard", "down")])
-    largest = np.linalg.norm(F, axis=0).max()
-    if largest < NO_FORCE or F.shape[1] < 4:
-        return np.zeros(0)
-    jumps: np.ndarray = np.linalg.norm(F[:, 3:] - 2.0 * F[:, 2:-1] + F[:, 1:-2], axis=0) / largest
-    return jumps
+    """Return how the tow force jumps from sample to sample, as `cable.doubts.roughness` (samples − 3,). [-]."""
+    return doubts.roughness(
+        np.stack([run[f"cable_force_{axis}"].values for axis in ("forward", "starboard", "down")], axis=1)
+    )
 
 
 def ill_posed_drum(run: AnyRun, _: scenarios.Trial, model: Model) -> list[str]:
@@ -342,16 +326,7 @@ def _how_slack(run: AnyRun, share: np.ndarray, longest: float) -> str:
 def slack_share(run: AnyRun) -> np.ndarray:
     """Return which share of the cable is slack, or folded away in segments that are too short (samples,). [-]."""
     S, P, T = (run[name].values for name in ("cable_length", "cable_position", "cable_node_tension"))
-    return np.concatenate([_slack_share(S[one], P[one], T[one]) for one in blocks_of(S.size)])
-
-
-def _slack_share(S: np.ndarray, P: np.ndarray, T: np.ndarray) -> np.ndarray:
-    """Return the share of some samples, from length (samples,), places (samples, nodes, 3) and tensions."""
-    chord, S = _chords(P), np.maximum(S, 1e-9)
-    folded = 1.0 - chord.sum(axis=1) / S
-    limp = (T[:, 1:] < LIMP) & (T[:, :-1] < LIMP)
-    share = np.where(limp, chord, 0.0).sum(axis=1) / S + folded
-    return np.where(folded > FOLDED, np.clip(share, 0.0, 1.0), 0.0)
+    return np.concatenate([doubts.slack_share(S[at], _chords(P[at]), T[at]) for at in blocks_of(S.size)])
 
 
 def closure(run: AnyRun, trial: scenarios.Trial, _: Model) -> list[str]:
