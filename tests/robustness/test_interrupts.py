@@ -470,9 +470,14 @@ run()
 """
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-@pytest.mark.parametrize("streams", ["closed", "full disk", "full pipe", "no reader"])
-@pytest.mark.parametrize("how", ["heeds", "goes on"])
+STREAMS = ("closed", "full disk", "full pipe", "no reader")
+ENDINGS = [
+    *((signal.SIGINT, streams, "goes on") for streams in STREAMS),
+    *((number, streams, "heeds") for number in (signal.SIGTERM, signal.SIGHUP) for streams in STREAMS[2:]),
+]
+
+
+@pytest.mark.parametrize(("number", "streams", "how"), ENDINGS)
 def test_a_command_ends_whatever_became_of_its_streams(number, streams, how):
     """Where the reader of stderr had gone, the thread that ends a command died of it with a lock in its hands: the
     command ignored every further signal.
