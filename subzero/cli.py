@@ -328,7 +328,7 @@ def explore(
     from subzero.interrupts import set_exit_message
 
     trial = scenarios.load(scenario)
-    with explore_page.address(port) as (url, listening):
+    with explore_page.address(port) as (access, listening):
         from subzero.explore import Exploration
         from subzero.model import load
         from subzero.simulation import simulate as run
@@ -337,11 +337,11 @@ def explore(
         with _progress(trial) as progress:
             nominal = run(trial, progress=progress)
         page = explore_page.Page(Exploration(trial=trial, nominal=nominal, simulate=run))
-        with voice.tells({"url": url}):
-            print(f"Exploring {printable(trial.name)} at {url}. Ctrl-C ends it.")
+        with voice.tells({"url": access.url}):
+            print(f"Exploring {printable(trial.name)} at {access.url} . Ctrl-C ends it.")
         sys.stdout.flush()
         set_exit_message(lambda: "the page is closed, and files that were saved stay")
-        page.serve(listening, url, browser=not no_browser)
+        page.serve(listening, access, browser=not no_browser)
     return FINE
 
 

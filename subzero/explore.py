@@ -12,8 +12,8 @@ import os
 import threading
 import tomllib
 import traceback
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from time import perf_counter
@@ -39,6 +39,13 @@ if TYPE_CHECKING:
 
 Values = Mapping[str, float]
 """Name of a slider → where it stands, in its unit; those that are left out stand where the trial has them."""
+
+Progress = Callable[[float], None]
+"""Told the fraction that is done."""
+
+ATTEMPT_S = 0.2
+"""An answer is there within a second: so long for an attempt, as long to repeat it as far as it came, and the rest.
+[s]"""
 
 Request = TypeVar("Request")
 Found = TypeVar("Found")
@@ -198,12 +205,20 @@ class Answer:
         refusals: name of a slider → what is wrong with it, in the words of the reader of files; "" where it is no
             slider of its own.
         seconds: how long it took. [s]
+        rough: how the run is rough, in words; empty for the run that `subzero.simulate` gives.
+        is_part: the run ends before its trial does.
     """
 
     values: Values
     run: xr.Dataset | None
     refusals: Mapping[str, str] = field(default_factory=dict)
     seconds: float
+    rough: str = ""
+    is_part: bool = False
+
+
+class _TakesLongError(Exception):
+    """A run takes longer than an answer may."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -234,22 +249,59 @@ class Exploration:
             for key, one in self.sliders[name].changes(value).items()
         }
 
-    def answer(self, values: Values, progress: Callable[[float], None] | None = None) -> Answer:
+    def answer(self, values: Values, progress: Progress = lambda fraction: None) -> Answer:
         """Return the run of some positions of the sliders, or why there is none.
 
         Args:
             values: the positions.
             progress: told the fraction that is done; what it raises ends the run.
         """
+        *_, last = self.answers(values, progress)
+        return last
+
+    def answers(self, values: Values, progress: Progress = lambda fraction: None) -> Iterator[Answer]:
+        """Give a rough answer at once, and then that of `answer`, behind whatever refinement it takes.
+
+        The rough one is the run without refinement; where that takes longer than `ATTEMPT_S`, of the trial's first
+        seconds.
+        """
         began, changes = perf_counter(), self.changes(values)
-        run: xr.Dataset | None = self.nominal
-        refusals: dict[str, str] = {}
-        if changes:
-            try:
-                run = self.simulate(self.trial.with_changes(changes), progress=progress)
-            except UserError as error:
-                run, refusals = None, self._refusals(error)
-        return Answer(values=dict(values), run=run, refusals=refusals, seconds=perf_counter() - began)
+
+        def found(run: xr.Dataset | None, **how: Any) -> Answer:
+            return Answer(values=dict(values), run=run, seconds=perf_counter() - began, **how)
+
+        if not changes:
+            yield found(self.nominal)
+            return
+        try:
+            trial = self.trial.with_changes(changes)
+            run = self._at_once(trial, progress)
+            reached = float(run["time"][-1])
+            is_part = reached + 0.5 * trial.cable_step < trial.duration
+            if trial.rtol > 0.0 or is_part:
+                words = f"the first {reached:g} s" if is_part else "not refined yet"
+                yield found(run, rough=f"Rough: {words}.", is_part=is_part)
+                run = self.simulate(trial, progress=progress)
+            yield found(run)
+        except UserError as error:
+            yield found(None, refusals=self._refusals(error))
+
+    def _at_once(self, trial: Trial, progress: Progress) -> xr.Dataset:
+        """Return a trial's run without refinement, as far as it gets in `ATTEMPT_S`."""
+        began, reached, plain = perf_counter(), 0.0, replace(trial, rtol=0.0)
+
+        def told(fraction: float) -> None:
+            nonlocal reached
+            progress(fraction)
+            if fraction < 1.0 and perf_counter() - began > ATTEMPT_S:
+                raise _TakesLongError
+            reached = fraction
+
+        try:
+            return self.simulate(plain, progress=told)
+        except _TakesLongError:  # the same steps up to there take the same time again
+            steps = max(1, math.floor(reached * trial.duration / trial.cable_step))
+            return self.simulate(replace(plain, duration=steps * trial.cable_step), progress=progress)
 
     def _refusals(self, error: UserError) -> dict[str, str]:
         """Return what is wrong, slider by slider."""
@@ -396,15 +448,17 @@ class Newest(Generic[Request, Found]):
     ) -> None:
         self._work, self._done, self._failed = work, done, failed
         self._waiting: list[Request] = []
-        self._ended = False
+        self._begun = self._ended = False
         self._news = threading.Condition()
-        threading.Thread(target=self._go_on, daemon=True).start()
 
     def ask(self, request: Request) -> None:
         """Want this, and nothing else any more."""
         with self._news:
             self._waiting = [request]
             self._news.notify()
+            if not self._begun:  # a page that is only looked at needs no thread
+                self._begun = True
+                threading.Thread(target=self._go_on, daemon=True).start()
 
     def end(self) -> None:
         """Want nothing any more."""

@@ -1,8 +1,8 @@
 """The page of `subzero.explore` on this machine: sliders, the replay and the plots of the report's own player, numbers.
 
 Every tab has its own positions of the sliders and its own thread, which runs the newest of them. The replay stands in
-a frame, which is loaded once and then takes other runs: camera and time stay where they are. Only this machine can
-reach the page, and only by its own name: what another site asks for in this machine's browser is refused.
+a frame, which is loaded once and then takes other runs: camera and time stay where they are. Who may reach the page is
+`subzero.local_access`. What a browser sends may be anything: it is checked where it comes in, `_position` and `_take`.
 
 Needs the extra ``[explore]``; NiceGUI takes a second to import, and is imported where a page is served.
 """
@@ -11,12 +11,14 @@ from __future__ import annotations
 
 import asyncio
 import errno
+import gc
 import json
 import shlex
 import socket
+import tempfile
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass
 from functools import cached_property, partial
 from importlib.resources import files
@@ -25,19 +27,24 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from uuid import uuid4
 
-from subzero.errors import UserError, printable
+from subzero.errors import UserError, printable, real
 from subzero.explore import Answer, Exploration, Newest, Slider, Values
+from subzero.local_access import HOST, Access
 
 if TYPE_CHECKING:
     import xarray as xr
 
-HOST = "127.0.0.1"
 HIGHEST_PORT = 65535
 NEEDED = ("nicegui", "tomlkit")
 DIGITS = 6
 """Significant ones of a slider's position."""
 LOOK_S = 0.2
 """So often the bar of a run is moved. [s]"""
+MOST_TABS = 16
+"""Pages that are open at a time; each takes a megabyte, and one that is never shown goes only after a minute. [-]"""
+YOUNG = 700
+"""Python's own number: a command that lives for seconds looks for garbage more rarely, and closed pages would pile up.
+[objects]"""
 TITLES = {
     "commands": "Commands, at their largest",
     "motion": "Prescribed motion, at its largest",
@@ -52,8 +59,8 @@ TITLES = {
 
 
 @contextmanager
-def address(port: int) -> Iterator[tuple[str, socket.socket]]:
-    """Give the address of a page and the socket that listens there, before anything is simulated.
+def address(port: int) -> Iterator[tuple[Access, socket.socket]]:
+    """Give who may reach a page, with its address, and the socket that listens there, before anything is simulated.
 
     Raises:
         UserError: what the page needs is not installed; the port cannot be had.
@@ -71,7 +78,7 @@ def address(port: int) -> Iterator[tuple[str, socket.socket]]:
         except OSError as error:
             why = "is in use" if error.errno == errno.EADDRINUSE else f"cannot be had: {error.strerror}"
             raise UserError(f"Port {port} of {HOST} {why}. Give another one, or --port 0 for any.") from None
-        yield f"http://{HOST}:{listening.getsockname()[1]}", listening
+        yield Access(listening.getsockname()[1]), listening
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,28 +101,25 @@ class Page:
         self.exploration = exploration
         self.tabs: dict[str, Tab] = {}
 
-    def serve(self, listening: socket.socket, url: str, *, browser: bool) -> None:
+    def serve(self, listening: socket.socket, access: Access, *, browser: bool) -> None:
         """Serve the page in a thread until the process is interrupted; open a browser on it if asked for."""
         import uvicorn
 
-        server = uvicorn.Server(uvicorn.Config(self._application(), log_level="error"))
+        gc.set_threshold(YOUNG)
+        application: Any = access.guarded(self._application())
+        server = uvicorn.Server(uvicorn.Config(application, log_level="error"))
         thread = threading.Thread(target=server.run, kwargs={"sockets": [listening]}, daemon=True)
         thread.start()
-        if browser:
-            import webbrowser
-
-            webbrowser.open(url)
-        while thread.is_alive():
-            thread.join(LOOK_S)
+        with _opened(access.url) if browser else nullcontext():
+            while thread.is_alive():
+                thread.join(LOOK_S)
 
     def _application(self) -> Any:
         from fastapi import FastAPI
         from fastapi.responses import HTMLResponse
-        from nicegui import ui
-        from starlette.middleware.trustedhost import TrustedHostMiddleware
+        from nicegui import core, ui
 
-        application = FastAPI()
-        application.add_middleware(TrustedHostMiddleware, allowed_hosts=[HOST, "localhost"])
+        application = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
         application.get("/replay")(lambda: HTMLResponse(self.frame))
         application.get("/runs/{tab}")(self.run_of)
         ui.page("/")(self.open_tab)
@@ -125,6 +129,7 @@ class Page:
             dark=None,
             show_welcome_message=False,
         )
+        core.sio.on("event", partial(_take, core.sio.handlers["/"]["event"]))
         return application
 
     def run_of(self, tab: str) -> Any:
@@ -163,21 +168,31 @@ class Page:
 
         return encode((Actor(name="nominal", run=self.exploration.nominal, ghost=True),))
 
-    def look_at(self, values: Values, progress: Callable[[float], None]) -> Shown:
-        """Return what a tab shows for some positions of the sliders."""
+    @cached_property
+    def as_in_file(self) -> Shown:
+        """What a tab shows at first."""
+        return self.shown(self.exploration.answer({}))
+
+    def shown(self, answer: Answer) -> Shown:
+        """Return what a tab shows of an answer."""
         from subzero.summary import summarise
 
-        answer = self.exploration.answer(values, progress)
         if answer.run is None:
             return Shown(answer=answer, summary=None, replay=None)
         replay = self.replay(answer.run)
         text = None if replay is None else json.dumps(replay, allow_nan=False, separators=(",", ":"))
-        return Shown(answer=answer, summary=summarise(answer.run), replay=text)
+        summary = (
+            None if answer.is_part else summarise(answer.run)
+        )  # its last numbers are not those of the end
+        return Shown(answer=answer, summary=summary, replay=text)
 
     async def open_tab(self) -> None:
         """Fill a tab of the browser."""
         from nicegui import ui
 
+        while len(self.tabs) >= MOST_TABS:  # the oldest, of those that nobody looks at if there is one
+            tabs = self.tabs.values()
+            min(tabs, key=lambda tab: tab.client.has_socket_connection).client.delete()
         name = uuid4().hex
         self.tabs[name] = tab = Tab(self, name)
         ui.context.client.on_delete(partial(self.close_tab, tab))
@@ -211,6 +226,9 @@ class Tab:
                 self._say, f"This is a bug of subzero: {error!r}. The terminal has more."
             ),
         )
+        ui.add_head_html(
+            "<script>history.replaceState(null, '', '/')</script>"
+        )  # the token is in the cookie now
         ui.add_css(files("subzero.page").joinpath("assets", "explore.css").read_text(encoding="utf-8"))
         with ui.row().classes("whole"):
             with ui.column().classes("sliders"):
@@ -218,18 +236,24 @@ class Tab:
             with ui.column().classes("seen"):
                 self._seen()
         ui.timer(LOOK_S, self._move_bar)
-        self.show(page.look_at({}, lambda fraction: None))
+        self.show(page.as_in_file)
 
     def _later(self, act: Callable[[Any], None], what: Any) -> None:
         """Do something in the thread of the page."""
         self.loop.call_soon_threadsafe(act, what)
 
     def _work(self, values: Values, progress: Callable[[float], None]) -> Shown:
+        """Show rough answers as they come, and return the last one."""
+
         def told(fraction: float) -> None:
             self.fraction = fraction
             progress(fraction)
 
-        return self.page.look_at(values, told)
+        for answer in self.page.exploration.answers(values, told):
+            shown = self.page.shown(answer)
+            if answer.rough:
+                self._later(self.show, shown)
+        return shown
 
     def _sliders(self) -> None:
         from nicegui import ui
@@ -299,7 +323,7 @@ class Tab:
         """Write a scenario file of the sliders into the working folder, and say what to do with it."""
         name = str(self.file.value or "")
         try:
-            _refuse_folders(name)
+            _check_name(name)
             self.page.exploration.save(self.values, Path(name))
         except UserError as error:
             self.saved.set_text(str(error))
@@ -313,14 +337,14 @@ class Tab:
             knob.say(answer.refusals.get(name, ""))
         self._say(answer.refusals.get("", ""))
         self.fraction = 0.0
-        if shown.summary is None:
+        if answer.run is None:
             self.status.set_text("Refused; what is shown is the run before.")
             return
         changed = self.page.exploration.changes(answer.values)
-        self.status.set_text(
-            f"Changed; the run took {answer.seconds:.2f} s." if changed else "As in the file."
-        )
-        self._show_numbers(shown.summary)
+        words = answer.rough or f"Changed; the run took {answer.seconds:.2f} s."
+        self.status.set_text(words if changed else "As in the file.")
+        if shown.summary is not None:
+            self._show_numbers(shown.summary)
         if shown.replay is not None:
             self.replay = shown.replay
             self.client.run_javascript(
@@ -351,10 +375,43 @@ class Tab:
         self.bar.set_value(self.fraction)
 
 
-def _refuse_folders(name: str) -> None:
-    """Refuse the name of a file that leads out of the working folder."""
-    if Path(name).name != name:
+def _check_name(name: str) -> None:
+    """Refuse the name of a file that leads out of the working folder, or that a terminal or a command would obey."""
+    if set(name) & {"/", "\\"}:
         raise UserError(f"Give a name without folders: the file goes to {printable(str(Path.cwd()))}.")
+    if not name.isprintable() or name.startswith("-"):
+        raise UserError(
+            f"{printable(name)} is no name for a file. Give printable characters, and no - at the front."
+        )
+
+
+@contextmanager
+def _opened(url: str) -> Iterator[None]:
+    """Open a browser on an address by a file that only its owner can read: anybody may read what a command is given."""
+    import webbrowser
+
+    with tempfile.NamedTemporaryFile("w", prefix="subzero-", suffix=".html") as page:
+        page.write(f'<meta http-equiv="refresh" content="0; url={url}"><a href="{url}">subzero explore</a>')
+        page.flush()
+        webbrowser.open(Path(page.name).as_uri())
+        yield
+
+
+def _take(take: Callable[..., None], sender: str, *message: Any) -> None:
+    """Take what a browser sends, unless it is no event at all."""
+    with suppress(
+        ValueError, TypeError, LookupError, AttributeError
+    ):  # errors in what it causes are caught inside
+        take(sender, *message)
+
+
+def _position(event: Any) -> float | None:
+    """Return the number that a browser has sent; None for what is none."""
+    sent = event.args
+    try:
+        return real(float(sent)) if isinstance(sent, str) else real(sent)
+    except ValueError:
+        return None
 
 
 def _cell(kind: str, text: str) -> Any:
@@ -397,6 +454,8 @@ class Knob:
                 min=slider.low, max=slider.high, step=slider.step, value=slider.nominal,
                 on_change=lambda event: self.turn(event.value),
             ).props(f'aria-label="{slider.words}{unit}"')  # fmt: skip
+            for element in (self.number, self.handle):
+                element._event_args_to_value = _position  # type: ignore[assignment, method-assign]  # NiceGUI's fail with what is none
             ui.label(_range_words(slider)).classes("range")
             self.refused = ui.label().classes("refused")
         self.put(slider.nominal)

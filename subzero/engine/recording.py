@@ -21,8 +21,9 @@ from vehicle import BREAKDOWN, STATE_SIZE, battery_voltage, breakdown, deflectio
 
 BREATH_S = 0.1
 """Compiled code computes for about so long before Python moves the progress bar and heeds an interrupt. [s]"""
-MOST_QUICKER = 16.0
-"""So many times as many rows are filled at a time as the last time, at most: later ones may take longer. [-]"""
+MOST_QUICKER = 2.0
+"""So many times as many rows are filled at a time as the last time, at most: with more cable, later ones take longer.
+[-]"""
 
 
 class Recording(NamedTuple):
