@@ -87,6 +87,29 @@ def with_parameters(trial: Trial, values: Mapping[str, float]) -> Trial:
     return replace(trial, **changed)
 
 
+def element_values(trial: Trial, values: Mapping[str, object]) -> dict[str, Any]:
+    """Return values in which a sequence for a whole list stands element by element: ``commands.rudder_deg[0]``, ….
+
+    Raises:
+        ScenarioError: a sequence that is not as long as its list.
+    """
+    found: dict[str, Any] = {}
+    for name, value in values.items():
+        row = _row(trial, name) if isinstance(value, list | tuple | np.ndarray) else None
+        if row is None or name.partition(".")[0] not in _LISTS:
+            found[name] = value
+            continue
+        elements = list(value)  # type: ignore[call-overload]
+        if len(elements) != row[1]:
+            why = f"this list has {row[1]} values"
+            remedy = "Give as many, one for each time of the trial."
+            raise ScenarioError(
+                [Problem(file=trial.name, key=name, found=shown(value), why=why, remedy=remedy)]
+            )
+        found |= {f"{name}[{at}]": element for at, element in enumerate(elements)}
+    return found
+
+
 def parameter(trial: Trial, name: str) -> float:
     """Return the value of a number of a trial, in the unit of the files; of a whole list its first.
 

@@ -84,7 +84,7 @@ budget_s         | s | 0      | 86400 | 0    | time for finer runs where it errs
 
 START = _read("""
 heading_deg     | degree | -360   | 360   | 0 | heading, clockwise from north
-pitch_deg       | degree | -89    | 89    | 0 | pitch, positive nose up
+pitch_deg       | degree | -90    | 90    | 0 | pitch, positive nose up
 roll_deg        | degree | -180   | 180   | 0 | roll, positive starboard side down
 depth_m         | m      | 0      | 11000 | 0 | depth of the hull centre, positive down
 surge_speed_m_s | m/s    | -20    | 20    | 0 | forward speed over ground

@@ -11,7 +11,7 @@ turns the heading to starboard (it increases); positive stern-planes (both) pitc
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from importlib import import_module
 from typing import Any
@@ -328,7 +328,7 @@ class Trial:
         """Every so many times a result is kept. [-]"""
         return max(1, round(self.every / self.cable_step))
 
-    def with_changes(self, changes: Mapping[str, float]) -> Trial:
+    def with_changes(self, changes: Mapping[str, float | Sequence[float]]) -> Trial:
         """Return a trial with other values for some of its numbers; this one stays as it is.
 
         >>> import scenarios
@@ -338,19 +338,21 @@ class Trial:
 
         Args:
             changes: dotted name → value, in the units of the files: "vehicle.rigid_body.mass", "run.duration_s",
-                "water.current_east_m_s", "commands.rudder_deg[1]" (`scenarios.parameters` has them all).
+                "water.current_east_m_s", "commands.rudder_deg[1]" (`scenarios.parameters` has them all). A list
+                takes one value for all its elements, or a sequence of as many.
 
         Raises:
             ScenarioError: as the reader of files says it, all that is wrong at once: names that the trial does not
                 have, values outside their limits, values that do not fit together.
         """
         # The names of all numbers stand above trials, and are fetched only where they are needed.
-        with_parameters = import_module("scenarios.parameters").with_parameters
+        parameters = import_module("scenarios.parameters")
         if not isinstance(changes, Mapping) or not all(isinstance(name, str) for name in changes):
             why, remedy = "this is no mapping of names to values", 'Write {"cable.diameter": 0.003}.'
             raise ScenarioError([Problem(file=self.name, found=short(changes), why=why, remedy=remedy)])
-        changed: Trial = with_parameters(self, changes)
-        told = "".join(f"# changed: {name} = {float(value)!r}\n" for name, value in changes.items())
+        single: dict[str, float] = parameters.element_values(self, changes)
+        changed: Trial = parameters.with_parameters(self, single)
+        told = "".join(f"# changed: {name} = {float(value)!r}\n" for name, value in single.items())
         return replace(changed, text=f"{self.text.rstrip()}\n{told}" if told else self.text)
 
     def __repr__(self) -> str:

@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from subzero.errors import UserError, suggestion
+from subzero.overview import Overview
 
 if TYPE_CHECKING:
     import control
@@ -57,6 +58,17 @@ class Gains:
     R: np.ndarray
     ahead: float
     loop: control.StateSpace
+
+    def __repr__(self) -> str:
+        """Return the gains by name."""
+        rows = [(name, f"{gain:.4g}") for name, gain in zip(self.states, self.feedback, strict=True)]
+        rows += [
+            (f"integral of {self.tracked}", f"{self.integral:.4g}"),
+            ("fed forward", f"{self.ahead:.4g}"),
+        ]
+        return Overview(
+            f"Gains from a deviation [SI, rad] to a command, tracking {self.tracked}", rows
+        ).text()
 
     @property
     def share(self) -> float:

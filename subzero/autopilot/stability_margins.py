@@ -21,6 +21,7 @@ from subzero.autopilot.linear import linearise, subsystem
 from subzero.autopilot.tuning import Tuning
 from subzero.errors import UserError, suggestion
 from subzero.model import Model
+from subzero.overview import Overview
 from subzero.steady_motion.trim import trim
 
 if TYPE_CHECKING:
@@ -44,6 +45,15 @@ class Margins:
     phase: float
     delay: float
     crossover: float
+
+    def __repr__(self) -> str:
+        """Return the margins with their units."""
+        rows = [
+            ("gain", f"times {self.gain:.4g}, or times {self.gain_down:.4g}"),
+            ("phase", f"{np.degrees(self.phase):.4g} degree at {self.crossover:.4g} rad/s"),
+            ("delay", f"{self.delay:.4g} s"),
+        ]
+        return Overview("Stability margins", rows).text()
 
 
 def margins(loop: control.StateSpace, *, delay: float = 0.0) -> Margins:

@@ -39,13 +39,15 @@ __all__ = [
 ]
 
 
-def draw(runs: Runs, record: Record | None = None) -> dict[str, Figure]:
+def draw(runs: Runs | xr.Dataset, record: Record | None = None) -> dict[str, Figure]:
     """Return the figures of some runs of one trial, by the name of their file.
 
     Args:
-        runs: ``{"tethered": ..., "untethered": ...}`` or one of the two.
+        runs: one run; or ``{"tethered": ..., "untethered": ...}``, or one of the two.
         record: what was measured, drawn as dots.
     """
+    if not isinstance(runs, dict):
+        runs = {"tethered" if runs.attrs["tethered"] else "untethered": runs}
     first = next(iter(runs.values()))
     title = Title(
         words=first.attrs["title"], scenario=first.attrs["scenario"], warnings=warnings_in_short(runs)

@@ -32,6 +32,7 @@ import numpy as np
 
 from subzero.errors import UserError, real, short
 from subzero.model import Model
+from subzero.overview import Overview
 from subzero.steady_motion.hull_state_space import (
     DEPTH,
     PITCH,
@@ -251,6 +252,20 @@ class Trim:
     def named(self) -> dict[str, float]:
         """Return the state by name, SI and radians."""
         return dict(zip(STATE_NAMES, self.state.tolist(), strict=True))
+
+    def __repr__(self) -> str:
+        """Return the motion in a few lines."""
+        rudder, port, starboard = np.degrees(self.command[1:])
+        roll, pitch = (np.degrees(self.named()[name]) for name in ("roll", "pitch"))
+        motion = [f"{self.speed:.4g} m/s", f"{self.depth_rate:.4g} m/s down"]
+        rows = [
+            ("motion", *motion, f"{np.degrees(self.turn_rate):.4g} degree/s to starboard"),
+            ("attitude", f"pitch {pitch:.4g} degree", f"roll {roll:.4g} degree"),
+            ("propeller", f"{self.propeller_rps:.4g} rev/s"),
+            ("fins", f"rudder {rudder:.4g} degree", f"stern-planes {port:.4g} and {starboard:.4g} degree"),
+            ("cable", f"{self.wet_length:.4g} m", f"pulls {np.linalg.norm(self.wrench[:3]):.4g} N"),
+        ]
+        return Overview("Steady motion", rows).text()
 
 
 Pull = Callable[[np.ndarray, Asked], np.ndarray]
