@@ -447,3 +447,21 @@ def test_a_drift_has_the_unit_of_its_channel_in_words_figure_and_file():
 def test_forces_and_moments_have_their_units():
     units = [dataclasses.replace(FORCE.unknown, axis=axis).unit for axis in "XYZKMN"]
     assert units == ["N"] * 3 + ["N m"] * 3
+
+
+def test_an_undecided_diagnosis_says_first_what_every_explanation_has():
+    """A roll stiffness with p = 0.999 stood in every explanation, and only "undecided" was said."""
+    undecided = dataclasses.replace(
+        NAMED, verdict=UNDECIDED, causes=(),
+        probabilities={"hull_drag + yaw_inertia": 0.55, "rudder_lag + yaw_inertia": 0.44, "none": 0.01},
+        rivals=(dataclasses.replace(NAMED.rivals[0], ids=("hull_drag", "yaw_inertia"),
+                                    parameters={"yaw_inertia": {"share": INERTIA}}),),
+    )  # fmt: skip
+    first, *rest = report.summary(undecided)[0].words
+    assert first.startswith("In every explanation (probability 0.99")
+    assert "inertia" in first
+    assert f"{100.0 * abs(INERTIA.value):.3g} %" in first
+    assert ("more than in the model" in first) == (INERTIA.value > 0.0)
+    assert not any("In every" in line for line in rest)
+    apart = dataclasses.replace(undecided, probabilities={"hull_drag": 0.55, "rudder_lag": 0.45})
+    assert not any("In every" in line for line in report.summary(apart)[0].words)

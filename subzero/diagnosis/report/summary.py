@@ -24,8 +24,12 @@ from subzero.diagnosis.results import (
     NOTHING_WRONG,
     OUTSIDE,
     UNDECIDED,
+    Cause,
     Verdict,
 )
+
+IN_EVERY = 0.9
+"""A cause is known that explanations of this probability share, the same that names one. [-]"""
 
 SURE = {
     0.999: "As sure as records can make one",
@@ -108,7 +112,23 @@ def _wrong(verdict: Verdict) -> Iterator[str]:
     elif verdict.on_model == OUTSIDE and verdict.unknown is not None:
         yield words.unknown(verdict.unknown)
     else:
+        if verdict.on_model == UNDECIDED:
+            yield from _in_every_explanation(verdict)
         yield words.on_model(verdict)
+
+
+def _in_every_explanation(verdict: Verdict) -> Iterator[str]:
+    """Give the causes that hardly any probable explanation lacks: they are known, however undecided the rest is."""
+    parts = {name: without.split(" + ") for name in verdict.probabilities
+             if (without := words.without_errors(name, verdict)) != "none"}  # fmt: skip
+    for cause in dict.fromkeys(part for ids in parts.values() for part in ids):
+        probability = sum(verdict.probabilities[name] for name, ids in parts.items() if cause in ids)
+        if probability < IN_EVERY:
+            continue
+        fitted = next((rival.parameters[cause] for rival in verdict.rivals if cause in rival.parameters), {})
+        sentence = words.explanation(cause, words.sentences(verdict))
+        known = Cause(id=cause, sentence=sentence, probability=probability, parameters=fitted)
+        yield f"In every explanation (probability {words.probability(probability)}): {words.cause_in_short(known)}"
 
 
 def _sure(verdict: Verdict) -> Iterator[str]:
