@@ -438,10 +438,10 @@ def test_a_drift_has_the_unit_of_its_channel_in_words_figure_and_file():
     )
     assert axes.get_ylabel() == "[degree]"
     assert json.loads(report.json_file.text(DRIFT))["unknown"]["unit"] == "degree"
-    assert "nothing new in it" in report.markdown(DRIFT, {})
-    assert "nothing new in it" not in report.markdown(FORCE, {})
+    assert "is the extended model" not in report.markdown(DRIFT, {})
+    assert "is the extended model" in report.markdown(FORCE, {})
     beside = dataclasses.replace(DRIFT, extended=Extended(deviations={"hull_drag": {"share": 0.4}}))
-    assert "nothing new in it" not in report.markdown(beside, {}), "a cause stands beside the drift"
+    assert "is the extended model" in report.markdown(beside, {}), "a cause stands beside the drift"
 
 
 def test_forces_and_moments_have_their_units():
@@ -465,3 +465,13 @@ def test_an_undecided_diagnosis_says_first_what_every_explanation_has():
     assert not any("In every" in line for line in rest)
     apart = dataclasses.replace(undecided, probabilities={"hull_drag": 0.55, "rudder_lag": 0.45})
     assert not any("In every" in line for line in report.summary(apart)[0].words)
+
+
+def test_a_model_that_names_nothing_says_how_far_its_numbers_are_bent():
+    """It said "calibrated within its tolerances, with nothing new in it" with a number at 26 of them."""
+    bent = dataclasses.replace(
+        NAMED,
+        verdict=UNDECIDED,
+        deviations={"yaw_damping.share": (0.1, 0.9), "roll_stiffness.share": (-26.0, 1.0)},
+    )
+    assert "roll_stiffness.share is bent farthest, by 26 tolerances" in report.markdown(bent, {})

@@ -36,7 +36,7 @@ def undecided(verdict=UNDECIDED, drawn=2, rivals=(DRAG, SLOPE, NONE)):
 def test_the_report_says_what_the_records_allow_and_that_nothing_is_new_in_the_model():
     text = report.markdown(undecided(), {"record": "record.csv, fig6"})
     assert "What the records allow (D: how far from what is most probable):" in text
-    assert "nothing new in it" in text
+    assert "is the extended model" not in text
     named = dataclasses.replace(undecided(rivals=(SLOPE, NONE)), verdict=CAUSE_NAMED)
     assert "What else the records allow (D: how far from what is told):" in report.markdown(named, {})
     assert report.tables.rivals(undecided(), short=True).header[0] == "what explains the records"

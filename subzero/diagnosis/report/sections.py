@@ -113,12 +113,17 @@ def _next_trial(verdict: Verdict) -> list[str | tables.Table]:
 def _extended(verdict: Verdict) -> list[str | tables.Table]:
     drifts = verdict.unknown is not None and verdict.unknown.is_drift
     new = verdict.on_model in (CAUSE_NAMED, OUTSIDE) and (not drifts or bool(verdict.extended.deviations))
-    what = (
-        "the extended model"
-        if new
-        else "the model as calibrated within its tolerances, with nothing new in it"
-    )
+    what = "the extended model" if new else _fitted(verdict)
     return [f"extended.toml is {what}: subzero simulate SCENARIO --with extended.toml."]
+
+
+def _fitted(verdict: Verdict) -> str:
+    """Return what the model is of a diagnosis that names nothing: how far its numbers were bent for it."""
+    farthest = max(verdict.deviations, key=lambda name: abs(verdict.deviations[name][0]), default="")
+    if not farthest:
+        return "the nominal model"
+    size = abs(verdict.deviations[farthest][0])
+    return f"the model as it fits best, with no cause in it: {farthest} is bent farthest, by {size:.2g} tolerances"
 
 
 def _detectable(verdict: Verdict) -> list[str | tables.Table]:
