@@ -474,4 +474,4 @@ def test_a_model_that_names_nothing_says_how_far_its_numbers_are_bent():
         verdict=UNDECIDED,
         deviations={"yaw_damping.share": (0.1, 0.9), "roll_stiffness.share": (-26.0, 1.0)},
     )
-    assert "roll_stiffness.share is bent farthest, by 26 tolerances" in report.markdown(bent, {})
+    assert r"roll\_stiffness.share is bent farthest, by 26 tolerances" in report.markdown(bent, {})
