@@ -11,6 +11,7 @@
 
 from __future__ import annotations
 
+import json
 import textwrap
 from collections.abc import Sequence
 from pathlib import Path
@@ -19,8 +20,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from subzero.channels import BY_NAME, RENAMED_CHANNELS
+from subzero.channels import BY_NAME, RENAMED_CHANNELS, TIME
 from subzero.errors import UserError, printable, short, suggestion
+from subzero.integrity import DamagedError, check_arrays, check_digest
 from subzero.user_file import UnreadableFileError, check_readable
 from subzero.validity import RunWarning, warnings_of
 
@@ -34,6 +36,19 @@ RENAMED_TERMS = {"external": "cable"}
 
 NEEDED = ("time", "surge_speed", "cable_tension", "cable_position", "force_breakdown")
 """What every run has, and hardly another netCDF file."""
+LAYOUT = {
+    "force_breakdown": ("f", ("time", "term", "component")),
+    "cable_position": ("f", ("time", "node", "earth_axis")),
+    "cable_node_tension": ("f", ("time", "node")),
+    "arc_length": ("f", ("time", "node")),
+}
+"""Variable of more than time → kind and dimensions; channels have the dimension time alone."""
+TEXTS, TABLES, NUMBERS = (
+    ("scenario", "title", "outcome", "outcome_message"),
+    ("parameters", "versions", "warnings", "accuracy"),
+    ("tethered", "prescribed"),
+)
+"""Attributes of a run: words, words in JSON, numbers."""
 
 
 def open_run(path: str | Path) -> xr.Dataset:
@@ -51,22 +66,65 @@ def open_run(path: str | Path) -> xr.Dataset:
     name = printable(str(path))
     try:
         check_readable(path)
+        check_digest(Path(path))
+        run = _loaded(Path(path))
     except UnreadableFileError as error:
         raise UserError(f"The run {name} cannot be read: {error.why}. {error.remedy}".rstrip()) from None
-    try:
-        with xr.open_dataset(path) as file:
-            run = file.load()
-    except (OSError, ValueError, RuntimeError) as error:
+    except DamagedError as error:
         raise UserError(
-            f"The run {name} cannot be read: it is no netCDF file ({type(error).__name__})."
+            f"The run {name} is damaged: {error}. Take a copy of it, or run the command that wrote it again."
         ) from None
-    missing = [variable for variable in NEEDED if variable not in run.variables]
-    if missing or "scenario" not in run.attrs:
+    return up_to_date(run)
+
+
+def _loaded(path: Path) -> xr.Dataset:
+    """Return the dataset in a file, once its arrays are known to be those of a run."""
+    import netCDF4
+
+    name = printable(str(path))
+    try:
+        file = netCDF4.Dataset(path)
+    except Exception:  # the libraries raise whatever they meet
+        raise UserError(f"The run {name} cannot be read: it is no netCDF file.") from None
+    try:
+        with file:
+            _check_layout(file, name)
+        with xr.open_dataset(path) as lazy:
+            run = lazy.load()
+        _check_values(run)
+    except (UserError, DamagedError):
+        raise
+    except Exception as error:
+        raise DamagedError(f"what it says cannot be read ({type(error).__name__})") from error
+    return run
+
+
+def _check_layout(file: Any, name: str) -> None:
+    """Refuse a file without a run, and arrays that are not those of a run."""
+    missing = [variable for variable in NEEDED if variable not in file.variables]
+    if missing or "scenario" not in file.ncattrs():
         raise UserError(
             f"{name} holds no run of subzero: it has no {', '.join(missing) or 'attribute scenario'}. "
             "Give a tethered.nc or untethered.nc."
         )
-    return up_to_date(run)
+    today = {variable: RENAMED_CHANNELS.get(variable, variable) for variable in file.variables}
+    channels = {old: ("fiu", (TIME.name,)) for old, channel in today.items() if channel in BY_NAME}
+    check_arrays(
+        file.variables, channels | {key: row for key, row in LAYOUT.items() if key in file.variables}
+    )
+
+
+def _check_values(run: xr.Dataset) -> None:
+    """Refuse times that are none and attributes of another kind; raise whatever reading them raises."""
+    times = run["time"].values
+    if not (times.size and np.isfinite(times).all() and (np.diff(times) > 0.0).all()):
+        raise DamagedError("its times do not rise")
+    for kind, names in ((str, (*TEXTS, *TABLES)), ((int, float, np.number), NUMBERS)):
+        for attribute in names:
+            if attribute in run.attrs and not isinstance(run.attrs[attribute], kind):
+                raise DamagedError(f"its attribute {attribute} is of another kind")
+    for attribute in TABLES:
+        json.loads(run.attrs.get(attribute, "{}"))
 
 
 def up_to_date(run: xr.Dataset) -> xr.Dataset:

@@ -10,7 +10,8 @@ Every file is written beside its place, forced to the disk and renamed, the stat
 killed, the state and the rows that it names are whole. What is read back are the same bits, and a run does not know how
 many of its steps were taken at a time: so the rest of the run is the same to the last bit, too.
 
-The files hold numbers only (``allow_pickle=False``); what they belong to stands in ``manifest.json``, as digests.
+The files hold numbers only (``allow_pickle=False``), with a digest of their own; kinds and shapes of all arrays are
+proved before compiled code, which does not look at bounds, gets them. What they belong to stands in ``manifest.json``.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ import shutil
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
 from time import monotonic
 from typing import Any
@@ -29,13 +31,20 @@ from zipfile import BadZipFile
 
 import numpy as np
 
+from cable.memory import fits
+from cable.moving_end import enlarged
 from subzero.atomic_output import DISK_FULL
 from subzero.engine.recording import BY_NODE, BY_TIME, Recording, Standing, new_recording, row_of
 from subzero.errors import UserError, checked, printable
+from subzero.integrity import DamagedError, append_digest, check_arrays, without_digest
 from subzero.jit import Record
 
 MANIFEST, STATE, LOCK = "manifest.json", "state.npz", "lock"
+COUNTS = ("files", "rows", "nodes", "times", "behind", "used", "ending", "room")
+"""Of a state: files, rows, nodes and times kept; times behind, nodes in use, how the last call ended, nodes at most."""
 MINUTE_S = 60.0
+BYTES_A_NODE = 5 * 8
+"""Place, tension and arc length."""
 
 
 class _UnreadableError(Exception):
@@ -110,26 +119,37 @@ class KeptRun:
 
     def go_on(self, begun: Standing) -> Standing:
         """Return where the run stands that was kept here; what has `begun` where none was."""
-        if not (self._folder / STATE).exists():
+        path = self._folder / STATE
+        if not path.exists():
             return begun
-        state = _read(self._folder / STATE)
-        room = new_recording(
-            begun.recording.state.shape[0], state["room"].item(), begun.recording.trace.shape[0]
+        state = _read(path)
+        with _named(path):
+            counts = {name: _count(state, name) for name in COUNTS}
+            line = enlarged(begun.live.line, _capacity(begun, state))
+            like = _arrays(begun.setup, "setup") | _arrays(begun.live._replace(line=line), "live")
+            check_arrays(state, {name: _layout(array) for name, array in like.items()})
+            rows, times = begun.recording.state.shape[0], begun.recording.trace.shape[0]
+            most = {
+                "rows": rows,
+                "times": times,
+                "behind": times,
+                "nodes": counts["room"],
+                "used": counts["room"],
+            }
+            if not fits(BYTES_A_NODE * counts["room"]) or any(counts[name] > most[name] for name in most):
+                raise DamagedError("it has more rows than its run")
+        room = new_recording(rows, counts["room"], times)
+        for number in range(counts["files"]):
+            self._fill(room, self._folder / _rows_file(number))
+        self._files, self._rows, self._nodes, self._times = (
+            counts[name] for name in ("files", "rows", "nodes", "times")
         )
-        for number in range(state["files"].item()):
-            self._fill(room, _read(self._folder / _rows_file(number)))
-        try:
-            self._files, self._rows, self._nodes, self._times = (
-                state[name].item() for name in ("files", "rows", "nodes", "times")
-            )
-            return Standing(
-                setup=_restored(begun.setup, "setup", state),
-                live=_restored(begun.live, "live", state),
-                recording=room,
-                **{name: state[name].item() for name in ("behind", "used", "ending")},
-            )
-        except (KeyError, ValueError) as error:
-            raise _UnreadableError(self._folder / STATE) from error
+        return Standing(
+            setup=_restored(begun.setup, "setup", state),
+            live=_restored(begun.live, "live", state),
+            recording=room,
+            **{name: counts[name] for name in ("behind", "used", "ending")},
+        )
 
     def keep(self, now: Standing, times: np.ndarray, stride: int, *, at_once: bool = False) -> None:
         """Keep where the run stands, if it is time for that, or at once."""
@@ -163,14 +183,37 @@ class KeptRun:
         arrays = {name: np.array(number) for name, number in numbers.items()}
         _write(self._folder / STATE, arrays | _arrays(now.setup, "setup") | _arrays(now.live, "live"))
 
-    def _fill(self, room: Recording, kept: Mapping[str, np.ndarray]) -> None:
+    def _fill(self, room: Recording, path: Path) -> None:
         """Put rows that were kept back to their place; the last of a file may stand in the next one again."""
-        try:
+        kept = _read(path)
+        with _named(path):
+            firsts = {kind: _count(kept, f"first of {kind}") for kind in ("rows", "nodes", "times")}
             for name, values in room._asdict().items():
-                first = kept[f"first of {_kind(name)}"].item()
-                values[first : first + kept[name].shape[0]] = kept[name]
-        except (KeyError, ValueError) as error:
-            raise _UnreadableError(self._folder) from error
+                first, part = firsts[_kind(name)], kept[name]
+                here = values[first : first + len(part)]
+                check_arrays({name: part}, {name: _layout(here)})
+                here[:] = part
+
+
+def _count(arrays: Mapping[str, np.ndarray], name: str) -> int:
+    """Return a count, which no other kind of array is."""
+    check_arrays(arrays, {name: ("iu", ())})
+    count = int(arrays[name])
+    if count < 0:
+        raise DamagedError(f"{name} is {count}")
+    return count
+
+
+def _capacity(begun: Standing, state: Mapping[str, np.ndarray]) -> int:
+    """Return for how many segments the kept line has room: at least as many as at the start."""
+    name = "live.line.length"
+    check_arrays(state, {name: (np.dtype(float), state[name].shape[:1])})
+    return max(state[name].size, begun.live.line.length.size) - 1
+
+
+def _layout(array: np.ndarray) -> tuple[np.dtype, tuple[int, ...]]:
+    """Return kind and shape of an array, as `check_arrays` expects them."""
+    return array.dtype, array.shape
 
 
 def _kind(name: str) -> str:
@@ -208,7 +251,8 @@ def _write(path: Path, arrays: Mapping[str, np.ndarray]) -> None:
     beside = path.with_suffix(".new")
     with open(beside, "wb") as file:
         np.savez(file, allow_pickle=False, **arrays)
-        file.flush()
+    append_digest(beside)
+    with open(beside, "rb") as file:
         os.fsync(file.fileno())
     _rename(beside, path)
 
@@ -223,11 +267,19 @@ def _rename(beside: Path, path: Path) -> None:
 
 
 def _read(path: Path) -> dict[str, np.ndarray]:
-    """Return the arrays of a file."""
-    try:
-        with open(path, "rb") as whole, np.load(whole, allow_pickle=False) as file:
+    """Return the arrays of a file, if it is what was written."""
+    with _named(path):
+        inside = BytesIO(without_digest(path.read_bytes()))
+        with np.load(inside, allow_pickle=False) as file:
             return {name: file[name] for name in file.files}
-    except (BadZipFile, ValueError, EOFError, FileNotFoundError) as error:
+
+
+@contextmanager
+def _named(path: Path) -> Iterator[None]:
+    """Say of which file it is what is wrong with it."""
+    try:
+        yield
+    except (DamagedError, BadZipFile, ValueError, EOFError, LookupError, FileNotFoundError) as error:
         raise _UnreadableError(path) from error
 
 

@@ -15,6 +15,7 @@ import numpy as np
 from subzero import atomic_output
 from subzero.atomic_output import OutputFolder
 from subzero.channels import CHANNELS, TIME
+from subzero.integrity import append_digest
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -106,6 +107,7 @@ def write_netcdf(run: xr.Dataset, path: Path, float64: bool = False) -> None:
             path, engine="netcdf4", encoding={name: stored[name] for name in stored if name in rest.variables}
         )
         _append(run, path, {str(name): stored[str(name)] for name in large})
+        append_digest(path)
     except RuntimeError as error:
         if "HDF error" not in str(error):
             raise

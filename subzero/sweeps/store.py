@@ -11,9 +11,10 @@ without leaving half a file behind, and it is in every Python.
 
 from __future__ import annotations
 
+import hashlib
 import json
 import sqlite3
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -29,10 +30,13 @@ TABLES = """
 CREATE TABLE IF NOT EXISTS manifest (key TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID;
 CREATE TABLE IF NOT EXISTS members (
     member INTEGER PRIMARY KEY, reason TEXT NOT NULL, warnings TEXT NOT NULL, own TEXT NOT NULL,
-    scalars BLOB NOT NULL, channels BLOB NOT NULL, seconds REAL NOT NULL
+    scalars BLOB NOT NULL, channels BLOB NOT NULL, seconds REAL NOT NULL, digest BLOB NOT NULL
 );
 """
 COLUMNS = "member, reason, warnings, own, scalars, channels, seconds"
+"""Of a row, in the order of its digest, which stands behind them."""
+OF_THE_DISK = (sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR, sqlite3.SQLITE_READONLY, sqlite3.SQLITE_CANTOPEN)
+"""Errors of SQLite that are no fault of the file."""
 BLOCK = 512
 """So many members are read at a time. [-]"""
 
@@ -50,11 +54,16 @@ class Store:
         self._file, self.path, self._shape = connection, path, shape
 
     def finished(self, members: int) -> np.ndarray:
-        """Return which of so many members are finished (members,)."""
-        done = np.zeros(members, dtype=bool)
-        with _told(self.path):
-            for (member,) in self._file.execute("SELECT member FROM members"):
-                done[member] = True
+        """Return which of so many members are finished (members,); damaged rows are taken out, to be run again."""
+        done, damaged = np.zeros(members, dtype=bool), []
+        with _told(self.path), self._file:
+            for *row, digest in self._file.execute(f"SELECT {COLUMNS}, digest FROM members"):
+                if digest == _digest(row) and row[0] < members:
+                    done[row[0]] = True
+                else:
+                    damaged.append(row[:1])
+            self._file.execute("BEGIN")
+            self._file.executemany("DELETE FROM members WHERE member = ?", damaged)
         return done
 
     def add(self, members: Iterable[Member]) -> None:
@@ -65,16 +74,17 @@ class Store:
         """
         rows = [
             (
-                one.index, one.reason, json.dumps(one.warnings) if one.warnings else "",
+                int(one.index), one.reason, json.dumps(one.warnings) if one.warnings else "",
                 json.dumps(one.own) if one.own else "", one.scalars.tobytes(),
-                b"" if one.reason else one.channels.tobytes(), one.seconds,
+                b"" if one.reason else one.channels.tobytes(), float(one.seconds),
             )
             for one in members
         ]  # fmt: skip
         with _told(self.path), self._file:
             self._file.execute("BEGIN")
             self._file.executemany(
-                f"INSERT OR IGNORE INTO members ({COLUMNS}) VALUES (?, ?, ?, ?, ?, ?, ?)", rows
+                f"INSERT OR IGNORE INTO members ({COLUMNS}, digest) VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
+                [(*row, _digest(row)) for row in rows],
             )
 
     def forget_failed(self) -> int:
@@ -126,6 +136,15 @@ class Store:
         )
 
 
+def _digest(row: Sequence[Any]) -> bytes:
+    """Return the SHA-256 of a row: kinds, lengths and values."""
+    found = hashlib.sha256()
+    for value in row:
+        data = value if isinstance(value, bytes) else repr(value).encode()
+        found.update(f"{type(value).__name__} {len(data)} ".encode() + data)
+    return found.digest()
+
+
 @contextmanager
 def opened(folder: Path, manifest: Mapping[str, str], shape: tuple[int, int]) -> Iterator[Store]:
     """Give the store of a sweep in a folder, a new one or that of the same sweep.
@@ -149,6 +168,10 @@ def opened(folder: Path, manifest: Mapping[str, str], shape: tuple[int, int]) ->
             )  # before WAL: then no memory is shared, on any disk
             connection.execute("PRAGMA journal_mode = WAL")
             connection.execute("PRAGMA synchronous = NORMAL")
+            connection.text_factory = lambda data: data.decode(
+                "utf-8", "replace"
+            )  # a damaged text fails its digest
+            _check(connection)
             connection.executescript(TABLES)
             known = dict(connection.execute("SELECT key, value FROM manifest"))
         _refuse_another(path, known, manifest)
@@ -158,6 +181,13 @@ def opened(folder: Path, manifest: Mapping[str, str], shape: tuple[int, int]) ->
         yield Store(connection, path, shape)
     finally:
         connection.close()
+
+
+def _check(connection: sqlite3.Connection) -> None:
+    """Refuse a file whose pages do not fit together, before any of them is used."""
+    (found,) = connection.execute("PRAGMA quick_check(1)").fetchone()
+    if found != "ok":
+        raise sqlite3.DatabaseError(" ".join(str(found).split()))
 
 
 def _refuse_another(path: Path, known: Mapping[str, str], wanted: Mapping[str, str]) -> None:
@@ -183,11 +213,17 @@ def _told(path: Path) -> Iterator[None]:
                 "another command is running this sweep",
                 "Wait for it, or give another folder with --out DIR",
             )
-        else:
+        elif error.sqlite_errorcode & 0xFF in (
+            sqlite3.SQLITE_FULL,
+            sqlite3.SQLITE_IOERR,
+            sqlite3.SQLITE_READONLY,
+        ):
             why = str(error)
             remedy = "What it has is kept: make room, and run the same command again"
+        else:
+            why, remedy = f"it is damaged ({error})", "Remove it, or give another folder with --out DIR"
         raise UserError(f"{name}: {why}. {remedy}.") from error
-    except sqlite3.DatabaseError as error:
+    except sqlite3.Error as error:
         raise UserError(
             f"{name} is no store of a sweep ({error}). Remove it, or give another folder with --out DIR."
         ) from error
