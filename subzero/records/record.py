@@ -292,7 +292,7 @@ def _time_problems(time: np.ndarray, rows: list[Row], at: int) -> list[str]:
             "are lost; write times with them, and nanoseconds with their leading zeros"
         )
         same = same[:0]
-    if back.size and np.all(time[back] <= time[:2].max()):
+    if 0 < 2 * back.size < time.size and np.all(time[back] <= time[:2].max()):
         parts = f"line{'s' * (back.size > 1)} {', '.join(str(lines[k]) for k in back[:3])}"
         problems.append(
             f"the time begins anew at {parts}: the logger was restarted; make a record of each part, and leave out "

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 import xarray as xr
 
-import scenarios
 import subzero
 from scenarios.heading import continuous, contradicted, expected
 from subzero import autopilot
@@ -79,22 +78,6 @@ def test_a_compass_that_is_shifted_for_good_and_one_of_five_degrees_are_believed
     stepped = as_shown(TURNING + shift * (TIME > 15.0))
     assert not contradicted(stepped).any()
     assert not contradicted(5.0 * np.round(as_shown(TURNING) / 5.0)).any()
-
-
-def test_a_prescribed_motion_with_a_heading_averaged_across_north_is_refused_with_its_line(tmp_path):
-    heading = as_shown(TURNING)
-    averaged(heading)
-    at = int(np.flatnonzero(np.abs(np.diff(heading)) > 90.0)[0])
-    rows = "\n".join(f"{t:g},1.0,0.0,{h:.3f}" for t, h in zip(TIME, heading, strict=True))
-    path = tmp_path / "motion.csv"
-    path.write_text(f"time_s,surge_speed_m_s,pitch_deg,heading_deg\n{rows}\n")
-    trial = tmp_path / "trial.toml"
-    trial.write_text(
-        'description = "a log"\nvehicle = "subzero2"\ncable = "table1"\n[run]\nduration_s = 29.0\n'
-        "[start]\ndepth_m = 1.0\n[motion]\nfile = 'motion.csv'\n"
-    )
-    with pytest.raises(scenarios.ScenarioError, match=f"line {at + 3}.*contradicts"):
-        scenarios.load(trial)
 
 
 @pytest.mark.parametrize(

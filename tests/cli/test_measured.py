@@ -73,8 +73,8 @@ REFUSED = {
         "its columns are separated by semicolons; separate them by commas, and write numbers with a point"
     ],
     "time_s,depth_m\n1700000000,1\n1700000001,2\n": [
-        "the first time is 1700000000, which is a time of day; 'time_s' counts in seconds from the start of the "
-        "trial: subtract the time of its start"
+        "the first time is '1700000000', seconds since 1970, a time of day: subtract the first one, and write seconds "
+        "since the first command"
     ],
     "depth_m,depth_m\n0,1\n": [
         "column 'depth_m' occurs twice; keep one",

@@ -13,7 +13,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import subzero
-from subzero.channels import turned
+from scenarios.heading import turned
 from subzero.diagnosis import START, Logged, Setting
 from subzero.diagnosis.inference import pose, respond
 from subzero.records.consistency import unit_questions

@@ -304,6 +304,7 @@ def test_a_long_run_is_answered_by_its_first_seconds(short: Exploration) -> None
 
 @needs_extra
 @needs_browser
+@pytest.mark.slow  # a loaded machine replaces runs before their page has fetched them
 def test_the_page_opens_with_the_token_alone_and_hides_it(server: Server) -> None:
     from subzero.page import browser
 

@@ -104,7 +104,7 @@ def test_a_name_that_is_none_is_answered_with_the_nearest(name, said, fig6):
 @pytest.mark.parametrize(
     ("name", "value"),
     [
-        ("start.pitch_deg", 90.0),
+        ("start.pitch_deg", 91.0),
         ("cable.diameter", 0.0),
         ("water.current_east_m_s", np.nan),
         ("run.rtol", "x"),
