@@ -223,7 +223,7 @@ def _told(path: Path) -> Iterator[None]:
         else:
             why, remedy = f"it is damaged ({error})", "Remove it, or give another folder with --out DIR"
         raise UserError(f"{name}: {why}. {remedy}.") from error
-    except sqlite3.Error as error:
+    except (sqlite3.Error, UnicodeDecodeError) as error:
         raise UserError(
             f"{name} is no store of a sweep ({error}). Remove it, or give another folder with --out DIR."
         ) from error
