@@ -97,8 +97,29 @@ def contradicted(heading: np.ndarray, like: np.ndarray | None = None, turn: floa
     jump = max(USUAL_STEPS * float(np.median(steps)), COMMON_STEPS[1] * max(common, finest))
     begins = np.flatnonzero(np.r_[True, steps > jump])
     if begins.size > 1:
-        found[known] = ~_longest_chain(away, begins, jump, common, turn)
+        believed = _longest_chain(away, begins, jump, common, turn)
+        found[known] = ~believed & _is_no_turn(away, heading[known], believed, jump, turn)
     return found
+
+
+def _is_no_turn(
+    away: np.ndarray, written: np.ndarray, believed: np.ndarray, jump: float, turn: float
+) -> np.ndarray:
+    """Say of doubted samples whether no vehicle did that (m,): a quick turn that a few samples catch is a measurement.
+
+    Between the same two believed samples some point away from both by more than a right angle, as a needle's other end.
+    Or numbers around lie on either side of north, where means of numbers are no means of angles, and a sample does not
+    lie on the way from the one to the other.
+    """
+    sound, rows = np.flatnonzero(believed), np.arange(away.size)
+    before = np.maximum(np.searchsorted(sound, rows, side="right") - 1, 0)
+    after = np.minimum(np.searchsorted(sound, rows), sound.size - 1)
+    apart = [np.abs(_on_circle(away - away[sound[side]], turn)) for side in (before, after)]
+    way = np.abs(_on_circle(away[sound[after]] - away[sound[before]], turn))
+    opposite = (np.minimum(*apart) > 0.25 * turn) & ~believed
+    around = np.clip(np.arange(FIRST)[:, None] - FIRST // 2 + after, 0, sound.size - 1)
+    crosses = np.ptp(written[sound[around]], axis=0) > 0.5 * turn
+    return np.isin(after, after[opposite]) | (crosses & (0.5 * (apart[0] + apart[1] - way) > jump))
 
 
 def _longest_chain(

@@ -25,7 +25,7 @@ import numpy as np
 
 from scenarios.errors import Problem, ScenarioError, nearest_or_all
 from scenarios.files import Source, read_text
-from scenarios.heading import continuous, expected
+from scenarios.heading import continuous, contradicted, expected
 from scenarios.instructions import (
     REACH_THE_END,
     Commands,
@@ -136,6 +136,7 @@ def read_instructions(
             found[kind] = samples
             problems += check_times(samples, duration)
             problems += check_motion(samples) if kind == "motion" else []
+            problems += _bad_headings(samples) if kind == "motion" and not problems else []
     return found, problems
 
 
@@ -273,6 +274,17 @@ def motion(samples: Samples) -> Motion:
 def _expected(given: Mapping[str, np.ndarray]) -> np.ndarray:
     """Return how the heading of a motion is expected to go on. [rad]"""
     return expected(given["time"], given.get("yaw_rate"))
+
+
+def _bad_headings(samples: Samples) -> list[Problem]:
+    """Return the problem of headings of a log that contradict those around them: the vehicle would be spun round."""
+    given = {name: _inner(samples, q) for name, q in by_field(MOTION).items() if q.name in samples.columns}
+    bad = np.flatnonzero(contradicted(given["heading"], _expected(given), math.tau))
+    if not samples.lines or not bad.size:
+        return []
+    more = f", and {bad.size - 1} more to {given['time'][bad[-1]]:g} s" if bad.size > 1 else ""
+    why = f"its heading contradicts those before and after{more}, as if averaged across north"
+    return [samples.problem(int(bad[0]), why, "Leave such rows out.")]
 
 
 def _inner(samples: Samples, quantity: Quantity) -> np.ndarray:

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+import scenarios
 import subzero
 from scenarios.heading import continuous, contradicted, expected
 from subzero import autopilot
@@ -168,3 +169,41 @@ def test_a_rounded_sensor_and_commands_that_step_are_measurements(tmp_path):
     rows = "".join(f"{0.1 * k:.6g},{a:.6g},{5.0 * (10 <= k < 30)}\n" for k, a in enumerate(rounded))
     path.write_text(f"time_s,depth_m,rudder_command_deg\n{rows}")
     assert read_record(path).notes == ()
+
+
+def test_a_prescribed_motion_with_a_heading_averaged_across_north_is_refused_with_its_line(tmp_path):
+    heading = as_shown(TURNING)
+    averaged(heading)
+    at = int(np.flatnonzero(np.abs(np.diff(heading)) > 90.0)[0])
+    rows = "\n".join(f"{t:g},1.0,0.0,{h:.3f}" for t, h in zip(TIME, heading, strict=True))
+    path = tmp_path / "motion.csv"
+    path.write_text(f"time_s,surge_speed_m_s,pitch_deg,heading_deg\n{rows}\n")
+    trial = tmp_path / "trial.toml"
+    trial.write_text(
+        'description = "a log"\nvehicle = "subzero2"\ncable = "table1"\n[run]\nduration_s = 29.0\n'
+        "[start]\ndepth_m = 1.0\n[motion]\nfile = 'motion.csv'\n"
+    )
+    with pytest.raises(scenarios.ScenarioError, match=f"line {at + 3}.*contradicts"):
+        scenarios.load(trial)
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.01, 0.4])
+@pytest.mark.parametrize("every", [1, 10])
+@pytest.mark.parametrize("shift", [0.0, -31.0])
+@pytest.mark.parametrize("name", ["fig6", "current", "wide_turn", "zigzag", "stop_and_drift"])
+def test_a_quick_turn_that_a_few_samples_catch_is_no_bad_heading(name, shift, every, noise):
+    """Samples of the turn of fig6, once a second, were left out as if averaged across north: what a simulation that
+    lacks the turn gets wrong went unseen. Shifted, the turn of fig6 leads through north.
+    """
+    heading = shift + subzero.simulate(name, tethered=False)["heading"].values[::every]
+    shown = (heading + noise * np.random.default_rng(0).standard_normal(heading.size)) % 360.0
+    assert not contradicted(shown).any()
+
+
+@pytest.mark.parametrize("share", [0.2, 0.5, 0.8])
+def test_a_mean_across_north_is_a_bad_heading_whatever_its_share(share):
+    """Numbers of a compass that swings slowly through north: one is a mean of 359 and 1."""
+    heading = np.linspace(350.0, 370.0, 41) % 360.0
+    at = int(np.argmin(heading))
+    heading[at] = share * heading[at - 1] + (1.0 - share) * heading[at + 1]
+    assert np.flatnonzero(contradicted(heading)).tolist() == [at]
