@@ -119,7 +119,8 @@ def _is_no_turn(
     opposite = (np.minimum(*apart) > 0.25 * turn) & ~believed
     around = np.clip(np.arange(FIRST)[:, None] - FIRST // 2 + after, 0, sound.size - 1)
     crosses = np.ptp(written[sound[around]], axis=0) > 0.5 * turn
-    return np.isin(after, after[opposite]) | (crosses & (0.5 * (apart[0] + apart[1] - way) > jump))
+    bad: np.ndarray = np.isin(after, after[opposite]) | (crosses & (0.5 * (apart[0] + apart[1] - way) > jump))
+    return bad
 
 
 def _longest_chain(
