@@ -19,8 +19,6 @@ from typing import Any
 
 import numpy as np
 
-from cable.memory import fits
-
 MARK = b"subzero sha-256:"
 TAIL = len(MARK) + hashlib.sha256().digest_size
 HDF5 = b"\x89HDF\r\n\x1a\n"
@@ -105,6 +103,8 @@ def check_arrays(
             raise DamagedError(f"{name} is of another kind ({kind})")
         if tuple(getattr(found, "dimensions", found.shape)) != shape:
             raise DamagedError(f"{name} has another shape")
+    from cable.memory import fits  # heavy, and a command that only writes needs none of it
+
     size = sum(
         float(np.prod(array.shape, dtype=float)) * np.dtype(array.dtype).itemsize for array in arrays.values()
     )

@@ -93,7 +93,7 @@ def check(row):
     blue = [name for name, (_, _, colour) in zip(names, shown, strict=True) if colour[:3] == rgb(BLUE)]
     if verdict.verdict == UNDECIDED:
         assert not blue
-        assert said["What is wrong"].startswith(f"these records cannot tell apart: {names[0]} (")
+        assert f"these records cannot tell apart: {names[0]} (" in said["What is wrong"]
     if verdict.verdict in (CAUSE_NAMED, OUTSIDE):
         assert blue == names[:1]
         wrong = since(said["What is wrong"].replace(" as no cause explains", ""))
