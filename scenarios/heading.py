@@ -25,7 +25,7 @@ FIRST = 9
 USUAL_STEPS = 15.0
 """A step that is so many times the median one is a jump: ten standard deviations of normal noise. [-]"""
 COMMON_STEPS = 0.9, 2.0
-"""So is none that is less than twice what nine of ten steps stay below: a vehicle that turns now and then. [-]"""
+"""A step is no jump that is less than twice what nine of ten steps are below: a vehicle turns now and then. [-]"""
 LOOKED_BACK = 1000
 """A sample is held against the ends of so many stretches before it: work grows no faster than the record. [-]"""
 
@@ -79,9 +79,9 @@ def continuous(heading: np.ndarray, like: np.ndarray | None = None, turn: float 
     turns = np.concatenate([[0.0], np.cumsum(-np.round(np.diff(away[sound]) / turn))])
     known = np.flatnonzero(np.isfinite(heading))
     before = np.maximum(np.searchsorted(sound, known, side="right") - 1, 0)
-    beside = -np.round((away[known] - away[sound[before]]) / turn)
+    extra = -np.round((away[known] - away[sound[before]]) / turn)
     found = heading.copy()
-    found[known] += turn * (turns[before] + np.where(known == sound[before], 0.0, beside))
+    found[known] += turn * (turns[before] + np.where(known == sound[before], 0.0, extra))
     return found
 
 

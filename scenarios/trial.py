@@ -352,8 +352,8 @@ class Trial:
             raise ScenarioError([Problem(file=self.name, found=short(changes), why=why, remedy=remedy)])
         single: dict[str, float] = parameters.element_values(self, changes)
         changed: Trial = parameters.with_parameters(self, single)
-        told = "".join(f"# changed: {name} = {float(value)!r}\n" for name, value in single.items())
-        return replace(changed, text=f"{self.text.rstrip()}\n{told}" if told else self.text)
+        changes_made = "".join(f"# changed: {name} = {float(value)!r}\n" for name, value in single.items())
+        return replace(changed, text=f"{self.text.rstrip()}\n{changes_made}" if changes_made else self.text)
 
     def __repr__(self) -> str:
         """Return the trial in a few lines."""

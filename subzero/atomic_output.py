@@ -9,7 +9,7 @@
    that moment the list remains, and readers refuse the files in it until a command has written them again.
 
 Only the temporary folder that this very process made is ever removed. A killed process leaves its own behind
-(``.subzero-…`` in the output folder or beside it): it is safe to remove by hand, and no command removes it.
+(``.subzero-…`` in the output folder or its parent): it is safe to remove by hand, and no command removes it.
 """
 
 from __future__ import annotations
@@ -189,7 +189,7 @@ def _refuse_occupied(folder: Path, names: Iterable[str]) -> None:
 
 @contextmanager
 def _temporary_folder(folder: Path) -> Iterator[Path]:
-    """Make a temporary folder in the output folder, or beside it with the parents it needs; remove it at the end."""
+    """Make a temporary folder in the output folder or its parent, which is made if need be; remove it at the end."""
     home = folder.absolute()
     home = home if home.is_dir() else home.parent
     parents = [path for path in (home, *home.parents) if not path.exists()]

@@ -275,8 +275,8 @@ def _format_of_time(cells: list[str]) -> list[str]:
         return []
     for least, (unit, count) in EPOCHS.items():
         if least < number < np.inf:
-            how = f", divided by {count:g}" if count > 1.0 else ""
-            return [f"the first time is {shown(first)}, {unit} since 1970, a time of day: {remedy}{how}"]
+            divide = f"divide by {count:g}, " if count > 1.0 else ""
+            return [f"the first time is {shown(first)}, {unit} since 1970, a time of day: {divide}{remedy}"]
     return []
 
 

@@ -12,18 +12,11 @@ import numpy as np
 import pytest
 
 import subzero
+from benchmarks.diagnosis.headings import NOISE
 from subzero.diagnosis import api
 from subzero.records.record import Record
 
 PEER = Path(__file__).parents[1] / "data" / "pvs_remus100" / "step.csv"
-NOISE = {
-    "surge_speed": 0.015,
-    "heading": 0.4,
-    "yaw_rate": 0.3,
-    "pitch": 0.2,
-    "roll_angle": 0.3,
-    "depth": 0.015,
-}
 PEER_COLUMNS = {
     "surge_speed": ("u_m_s", 1.0),
     "heading": ("psi_rad", 57.3),

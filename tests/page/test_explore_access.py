@@ -304,7 +304,6 @@ def test_a_long_run_is_answered_by_its_first_seconds(short: Exploration) -> None
 
 @needs_extra
 @needs_browser
-@pytest.mark.slow  # a loaded machine replaces runs before their page has fetched them
 def test_the_page_opens_with_the_token_alone_and_hides_it(server: Server) -> None:
     from subzero.page import browser
 
@@ -315,4 +314,6 @@ def test_the_page_opens_with_the_token_alone_and_hides_it(server: Server) -> Non
         assert driver.current_url == f"http://{server.host}/"
         driver.refresh()
         soon(driver, lambda _: driver.execute_script("return Boolean(replay.contentWindow.subzero)"))
-        assert driver.get_log("browser") == []
+        # On a slow machine NiceGUI gives a page up before its browser connects, and loads it again: the run of the
+        # first one is gone by then.
+        assert [line for line in driver.get_log("browser") if "/runs/" not in line["message"]] == []
