@@ -162,7 +162,7 @@ def _distribution(name: str, unit: str, said: Mapping[str, Any]) -> Spread:
     if set(said) == {"normal"}:
         return _normal(name, unit, said["normal"])
     if {"from", "to"} <= set(said) <= {"from", "to", "count", "log"}:
-        count = whole(f"{name}: count", said.get("count", 0))
+        count = _at_most(f"{name}: count", whole(f"{name}: count", said.get("count", 0)))
         low, high = (_number(name, said[key]) for key in ("from", "to"))
         return _uniform(name, unit, low, high, count=count, log=bool(said.get("log", False)))
     raise UserError(f"{name}: {short(dict(said))} is no spread. {ALLOWED}")
@@ -177,6 +177,12 @@ def _number(name: str, value: Any) -> float:
 
 def _listed(name: str, unit: str, values: Any) -> Spread:
     """Return a list of values, each as likely as the others."""
+    try:
+        _at_most(f"{name}: the number of values", len(values))  # before there are so many
+    except (TypeError, OverflowError):  # an array of no axis; a range of more than 2**63 numbers
+        raise UserError(
+            f"{name}: {short(values)} is no list of at most {MOST_MEMBERS} values. {ALLOWED}"
+        ) from None
     levels = tuple(_number(name, value) for value in values)
     if not levels:
         raise UserError(f"{name}: the list is empty. {ALLOWED}")
@@ -241,9 +247,13 @@ def _samples(design: str, samples: int | None) -> int:
         return 0
     if samples is None:
         raise UserError(f'A "{design}" design needs samples, how many points it has.')
-    count = whole("samples", samples, least=1)
+    return _at_most("samples", whole("samples", samples, least=1))
+
+
+def _at_most(name: str, count: int) -> int:
+    """Return a number of points, or refuse more than a sweep can have."""
     if count > MOST_MEMBERS:
-        raise UserError(f"samples is {count}. Allowed: up to {MOST_MEMBERS}.")
+        raise UserError(f"{name} is {short(count)}. Allowed: up to {MOST_MEMBERS}.")
     return count
 
 

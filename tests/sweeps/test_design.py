@@ -105,3 +105,13 @@ def test_what_cannot_be_a_plan_is_refused_with_what_to_do(spreads, options, said
     with pytest.raises(subzero.UserError) as caught:
         points_of(fig6, spreads, Design(**options))
     assert said in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "spread",
+    [range(10**9), range(10**20), {"values": range(10**9)}, {"from": 0.01, "to": 0.02, "count": 10**9}],
+)
+def test_more_values_than_a_sweep_can_have_are_refused_before_there_are_so_many(spread):
+    """A range of a billion numbers was expanded first: it took the machine."""
+    with pytest.raises(subzero.UserError, match=r"run\.rtol"):
+        subzero.plan_sweep("fig6", {"run.rtol": spread})
