@@ -58,9 +58,8 @@ def patience(seconds: float) -> Iterator[None]:
 
 def leave(code: int) -> Never:
     """End the process; after an interrupt at once, without waiting for threads that still compute."""
-    for number in SIGNALS:  # the command is done: a signal that comes now ends it, and changes nothing
-        if signal.getsignal(number) is _interrupt:
-            signal.signal(number, lambda *_: os._exit(code))
+    for number in SIGNALS:  # the command is done; Python, while it ends, would let a signal kill the process
+        signal.signal(number, signal.SIG_IGN)
     if code != INTERRUPTED:
         sys.exit(code)
     with suppress(OSError, ValueError):  # nothing reads it any more
@@ -118,7 +117,7 @@ def _end_late(woken: socket.socket, waker: socket.socket) -> None:
             woken.recv(1)
         if output := sys.modules.get("subzero.atomic_output"):
             output.remove_temporary()
-        _say_in_time(say_interrupted)
+        _say_in_time(lambda: say_interrupted(f"\nInterrupted; {_state()}."))  # a progress line may be open
     finally:
         os._exit(INTERRUPTED)
 

@@ -418,7 +418,7 @@ def test_a_command_that_has_to_be_ended_leaves_no_hidden_files(tmp_path):
     assert len(listing(tmp_path)) > 0
     command.send_signal(signal.SIGTERM)
     _, err = command.communicate(timeout=60.0)
-    assert (command.returncode, err) == (INTERRUPTED, "Interrupted; nothing was written.\n")
+    assert (command.returncode, err) == (INTERRUPTED, "\nInterrupted; nothing was written.\n")
     assert list(tmp_path.iterdir()) == []
 
 
