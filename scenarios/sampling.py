@@ -7,8 +7,8 @@ The sampling model of a channel, decided from its values alone, is one of
     interpolated   y_k = ½ (y_(k−1) + y_(k+1)), but for every m-th row, to the digits that are written
 
 with one m for the whole channel, at least half of whose m-th rows are new. Means over the same rows look like the one
-or the other, and are treated alike. Running means, and sensors whose rows are not evenly spread, are taken for fresh.
-So is a rounded sensor that stands still, whose values change at any row.
+or the other; a diagnosis leaves open when in its interval a value was measured. Running means, and sensors whose rows
+are not evenly spread, are taken for fresh. So is a rounded sensor that stands still, whose values change at any row.
 """
 
 from __future__ import annotations
@@ -17,8 +17,6 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
-
-from subzero.channels import BY_NAME
 
 WRITTEN = 2e-5
 """Numbers that differ by less than this share are the same: a log has five digits or more. [-]"""
@@ -52,14 +50,15 @@ def sampling_of(values: np.ndarray) -> Sampling | None:
 
 def measurements_alone(
     time: np.ndarray, values: Mapping[str, np.ndarray]
-) -> tuple[dict[str, np.ndarray], tuple[str, ...]]:
-    """Return the channels (n,) with gaps in place of what was not measured, and a sentence if there are some.
+) -> tuple[dict[str, np.ndarray], dict[str, float]]:
+    """Return the channels (n,) with gaps in place of what was not measured, and the time between two measurements of
+    those that have such gaps. [s]
 
     Args:
         time: of the rows (n,). [s]
         values: channel → values, NaN in gaps (n,).
     """
-    found, words = dict(values), list[str]()
+    found, intervals = dict(values), dict[str, float]()
     for name, column in values.items():
         known = np.flatnonzero(np.isfinite(column))
         sampling = sampling_of(column[known])
@@ -68,11 +67,5 @@ def measurements_alone(
         kept = known[sampling.first :: sampling.every]
         found[name] = np.full(column.size, np.nan)
         found[name][kept] = column[kept]
-        words.append(
-            f"{BY_NAME[name].column} ({sampling.kind}, every {np.median(np.diff(time[kept])):.3g} s)"
-        )
-    if not words:
-        return found, ()
-    return found, (
-        f"Only measurements are used, not what a logger filled in between them: {', '.join(words)}.",
-    )
+        intervals[name] = float(np.median(np.diff(time[kept])))
+    return found, intervals

@@ -121,9 +121,12 @@ def _logged(
         notes += (f"Its sidecar names the trial {sidecar.scenario}, so {scenario} is not taken for it.",)
     if HEADING in values:
         values[HEADING] = turned(values[HEADING], math.degrees(trial.start.heading))
+    setting = Setting(
+        trial=trial, model=Model.of(trial), tethered=sidecar.tethered, intervals=record.intervals
+    )
     return Logged(
         record=dataclasses.replace(record, values=values),
-        setting=Setting(trial=trial, model=Model.of(trial), tethered=sidecar.tethered),
+        setting=setting,
         noise={channel: sd for channel, sd in sidecar.noise.items() if channel in values},
         name=name,
         notes=notes,

@@ -20,7 +20,7 @@ import csv
 import io
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -73,12 +73,14 @@ class Record:
         time: time of each sample, increasing. Shape (samples,). [s]
         values: channel name → measured values in the channel's display unit, NaN where there is a gap.
         notes: what was set aside in it, and why, in sentences.
+        intervals: channel → time between two measurements, where a logger filled in what lies between. [s]
     """
 
     source: str
     time: np.ndarray
     values: Mapping[str, np.ndarray]
     notes: tuple[str, ...] = ()
+    intervals: Mapping[str, float] = field(default_factory=dict)
 
 
 def read_record(path: str | Path) -> Record:
@@ -112,8 +114,12 @@ def read_record(path: str | Path) -> Record:
 
 def measured_alone(record: Record) -> Record:
     """Return a record without the values that a logger filled in between measurements (`scenarios.sampling`)."""
-    values, notes = measurements_alone(record.time, record.values)
-    return replace(record, values=values, notes=record.notes + notes)
+    values, intervals = measurements_alone(record.time, record.values)
+    if not intervals:
+        return record
+    words = ", ".join(f"{BY_NAME[name].column} (every {every:.3g} s)" for name, every in intervals.items())
+    note = f"Only measurements are used, not what a logger filled in between them: {words}."
+    return replace(record, values=values, notes=(*record.notes, note), intervals=intervals)
 
 
 def _name(path: str | Path) -> str:

@@ -158,8 +158,9 @@ def test_values_that_a_logger_filled_in_are_left_out(kind, tmp_path):
     record = read_record(path)
     np.testing.assert_array_equal(np.flatnonzero(np.isfinite(record.values["depth"])), np.arange(0, 301, 10))
     assert np.isfinite(record.values["surge_speed"]).all()
+    assert record.intervals == {"depth": pytest.approx(1.0)}
     assert record.notes == (
-        f"Only measurements are used, not what a logger filled in between them: depth_m ({kind}, every 1 s).",
+        "Only measurements are used, not what a logger filled in between them: depth_m (every 1 s).",
     )
 
 

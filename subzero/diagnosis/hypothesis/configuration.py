@@ -64,6 +64,9 @@ class Setting:
         model: vehicle, cable, drum, water.
         sensing: channel → how its sensor is wrong; channels without an entry are right.
         clock_offset: the sensors' clock is late by this: what is logged at t happened at t − offset. [s]
+        intervals: channel → time between two measurements, where a logger filled in what lies between. [s]
+        sampled: such a measurement happened later than it says by this share of its interval: ½ if it is the mean over
+            the interval that begins there, −½ over the one that ends there. [-]
         tethered: with the cable.
         later: (time [s], model) from which on another model holds, in the order of time.
         most_work: iterations of the cable's solver times nodes that a run may take for an exchange, on average; None if
@@ -74,9 +77,15 @@ class Setting:
     model: Model
     sensing: Mapping[str, Sensing] = field(default_factory=dict)
     clock_offset: float = 0.0
+    intervals: Mapping[str, float] = field(default_factory=dict)
+    sampled: float = 0.0
     tethered: bool = True
     later: tuple[tuple[float, Model], ...] = ()
     most_work: float | None = None
+
+    def happened(self, times: np.ndarray, channel: str) -> np.ndarray:
+        """Return when what a channel's log says of some times (n,) happened. [s]"""
+        return times - self.clock_offset + self.sampled * self.intervals.get(channel, 0.0)
 
     def with_vehicle(self, **changes: float | Callable[[float], float]) -> Setting:
         """Return the setting with numbers of the vehicle changed: ``section__key=value or function``."""

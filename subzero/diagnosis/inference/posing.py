@@ -17,7 +17,7 @@ import numpy as np
 
 from scenarios.heading import turned
 from subzero.channels import HEADING
-from subzero.diagnosis.hypothesis.catalogue import ONSETS, START, catalogue
+from subzero.diagnosis.hypothesis.catalogue import ONSETS, SAMPLED, START, catalogue
 from subzero.diagnosis.hypothesis.catalogue.sensors import CLOCK, SPECS
 from subzero.diagnosis.hypothesis.hypotheses import entries_of, moves_nothing, with_tolerances
 from subzero.diagnosis.hypothesis.noise import Noise, Usual, spikes, times_beside, usual_noise, usual_of
@@ -66,7 +66,8 @@ def pose(records: Sequence[Logged], more: Iterable[Effect] = ()) -> Problem:
         if _possible(effect, observed) and not moves_nothing(effect, nominal)
     ]
     onsets = tuple(effect for effect in ONSETS if _possible(effect, observed))
-    return Problem(records=observed, entries=entries_of(effects, START, len(observed)), onsets=onsets)
+    own = (*START, SAMPLED) if any(one.setting.intervals for one in observed) else START
+    return Problem(records=observed, entries=entries_of(effects, own, len(observed)), onsets=onsets)
 
 
 def posed_again(problem: Problem, records: Sequence[Logged], more: Iterable[Effect] = ()) -> Problem:

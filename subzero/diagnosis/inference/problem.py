@@ -277,9 +277,11 @@ class Problem:
     ) -> dict[str, np.ndarray]:
         """Return what the sensors of a record would show: channel → (n,), in its display unit."""
         grid, true = track[0], self.true(record, setting, track) if true is None else true
-        earlier = self.records[record].time - setting.clock_offset
+        time = self.records[record].time
         return {
-            name: np.interp(earlier, grid, sensed(setting.sensing.get(name), grid, values))
+            name: np.interp(
+                setting.happened(time, name), grid, sensed(setting.sensing.get(name), grid, values)
+            )
             for name, values in true.items()
         }
 

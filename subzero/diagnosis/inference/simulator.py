@@ -318,11 +318,9 @@ def respond(setting: Setting, times: np.ndarray, channels: Iterable[str]) -> dic
 
 def read(setting: Setting, run: Track, times: np.ndarray, channels: Iterable[str]) -> dict[str, np.ndarray]:
     """Return what the sensors show of a run, as `respond`."""
-    (grid, track), earlier = run, times - setting.clock_offset
-    return {
-        name: np.interp(earlier, grid, sensed(setting.sensing.get(name), grid, truth(setting, track, name)))
-        for name in channels
-    }
+    grid, track = run
+    shown = {name: sensed(setting.sensing.get(name), grid, truth(setting, track, name)) for name in channels}
+    return {name: np.interp(setting.happened(times, name), grid, values) for name, values in shown.items()}
 
 
 CACHE_BYTES, SETTINGS_KEPT = 250_000_000, 500

@@ -13,12 +13,12 @@ from importlib.metadata import entry_points
 from pathlib import Path
 
 from subzero.diagnosis.hypothesis.catalogue import cable, fins, hull, propulsion, sensors
-from subzero.diagnosis.hypothesis.catalogue.sensors import NOISE, SPECS, START
+from subzero.diagnosis.hypothesis.catalogue.sensors import NOISE, SAMPLED, SPECS, START
 from subzero.diagnosis.hypothesis.effect import Effect
 from subzero.errors import UserError
 from subzero.user_file import MOST_OF_A_PROGRAM, read_bytes
 
-__all__ = ["NOISE", "ONSETS", "SPECS", "START", "all_effects", "catalogue", "load"]
+__all__ = ["NOISE", "ONSETS", "SAMPLED", "SPECS", "START", "all_effects", "catalogue", "load"]
 ONSETS = (*fins.ONSETS, *hull.ONSETS, *propulsion.ONSETS)
 """What can only begin in mid-trial: a jam is no small deviation from a fin that follows, and a growth has a time to
 begin at. Neither is a tolerance of a healthy vehicle, and so no part of every fit."""
@@ -36,7 +36,7 @@ def catalogue(channels: Iterable[str], more: Iterable[Effect] = ()) -> dict[str,
 
 def all_effects(more: Iterable[Effect] = ()) -> dict[str, Effect]:
     """Return every effect there is, by id: of the start, of all sensors, and what only begins in mid-trial, too."""
-    return {**catalogue(sensors.SPECS, more), **{effect.id: effect for effect in (*START, *ONSETS)}}
+    return {**catalogue(sensors.SPECS, more), **{effect.id: effect for effect in (*START, SAMPLED, *ONSETS)}}
 
 
 def load(path: str | Path) -> tuple[Effect, ...]:

@@ -101,6 +101,26 @@ CLOCK = Effect(
 )
 
 
+def _sampled(setting: Setting, share: float) -> Setting:
+    """Share of its interval by which a measurement happened later than it says + share."""
+    from dataclasses import replace
+
+    return replace(setting, sampled=setting.sampled + share)
+
+
+SAMPLED = Effect(
+    id="start:sampled",
+    sentence="measurements are means over their interval",
+    slot="clock",
+    parameters=(
+        Parameter(name="share", unit="1", tolerance=12.0**-0.5, scale=12.0**-0.5, low=-0.5, high=0.5),
+    ),
+    apply=_sampled,
+)
+"""When in its interval a measurement happened that a logger held, drew lines to, or averaged: any time is as likely, so
+that the variance is 1/12. Each record has its own, never named."""
+
+
 def _turned(key: str) -> Callable[[Setting, float], Setting]:
     def apply(setting: Setting, angle: float) -> Setting:
         return setting.with_start(**{key: getattr(setting.trial.start, key) + radians(angle)})
