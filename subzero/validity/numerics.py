@@ -72,7 +72,7 @@ def energy_residual(run: AnyRun, trial: scenarios.Trial, _: Model) -> list[str]:
     ]
 
 
-def resolution(run: AnyRun, trial: scenarios.Trial, _: Model) -> list[str]:
+def resolution(run: AnyRun, trial: scenarios.Trial, model: Model) -> list[str]:
     """Steps and segments twice as long give another tow force, however fine they are: `subzero.convergence`."""
     accuracy = json.loads(run.attrs.get("accuracy", "{}"))
     if not accuracy or is_resolved(run):
@@ -90,9 +90,9 @@ def resolution(run: AnyRun, trial: scenarios.Trial, _: Model) -> list[str]:
     if start > max(trial.rtol, change):
         return [
             f"The tow force of the start depends on steps and segments: four times as fine as these {finer} they "
-            f"change it by {_told(start)} (at {accuracy['start_time']:g} s; {asked}). The cable is jerked at the "
-            "start, by a winch, a current or the propeller, and the samples do not follow how that fades or rings. "
-            "Shorten cable_step_s, let commands and the winch begin gently, or leave these samples out."
+            f"change it by {_told(start)} (at {accuracy['start_time']:g} s; {asked}). The cable is jerked out of "
+            f"its shape at rest{_start_imbalance(run, trial, model)}, and the samples do not follow how that fades or "
+            "rings. Shorten cable_step_s, let these begin gently, or leave the first samples out."
         ]
     spent = (
         " Finer runs would take longer than [run] budget_s allows." if accuracy.get("budget_spent") else ""
@@ -104,6 +104,23 @@ def resolution(run: AnyRun, trial: scenarios.Trial, _: Model) -> list[str]:
         "not hold it, or a cable that snaps taut. Give the drum friction_torque or a [winch], or the cable "
         f"bending_stiffness.{spent}"
     ]
+
+
+def _start_imbalance(run: AnyRun, trial: scenarios.Trial, model: Model) -> str:
+    """Return what moves or pulls at time 0 of a run, where a cable at rest is laid: ": the water by 0.3 m/s, …"."""
+    winch, vessel = model.winch, model.vessel
+    flow = model.water().at((0.0, 0.0, trial.start.depth))
+    speeds = {  # a cable that hangs is at rest in the current, one that is laid straight is not
+        "the water": float(np.linalg.norm(flow)) if trial.start.drum is None else 0.0,
+        "the vessel": float(np.linalg.norm(vessel.velocity[0])) if vessel else 0.0,
+        "the vehicle": abs(float(run["surge_speed"].values[0])),
+        "the winch": abs(winch.setpoint[0]) if winch and winch.control == "pay_out_rate" else 0.0,
+    }
+    found = [f"{name} by {speed:.2g} m/s" for name, speed in speeds.items() if speed > 0.0]
+    if winch and winch.control == "constant_tension":
+        excess = winch.setpoint[0] - float(run["drum_tension"].values[0])
+        found.append(f"the winch asks for {excess:+.2g} N")
+    return f": {', '.join(found)}" if found else " by the propeller"
 
 
 def _share(number: float | None) -> float:

@@ -4,6 +4,8 @@ Verifies: that a prescribed vehicle at rest feels the hanging cable of `cable.ho
 that nothing moves; what is said where the cable does not reach. Tolerance: 1e-6 of the force, left by Newton's method.
 """
 
+import json
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -12,6 +14,7 @@ import cable
 import subzero
 from subzero.errors import UserError
 from subzero.model import Model
+from subzero.validity import check_run
 
 TRIAL = """
 description = "An umbilical hangs between a vehicle that waits and a vessel's winch"
@@ -70,3 +73,38 @@ def test_a_trial_begins_with_a_cable_that_hangs_and_goes_on_so(tmp_path):
 def test_a_cable_that_does_not_reach_is_said(tmp_path):
     with pytest.raises(UserError, match="it would stretch by 800 %"):
         subzero.simulate(written(tmp_path, 5.0))
+
+
+@pytest.mark.parametrize(
+    ("winch", "words"),
+    [
+        (
+            'control = "brake"\n[vessel]\ntime_s = [0.0]\nvelocity_down_m_s = [0.5]',
+            "rest: the vessel by 0.5 m/s, and",
+        ),
+        (
+            'control = "pay_out_rate"\ntime_s = [0.0]\npay_out_rate_m_s = [-0.3]',
+            "rest: the winch by 0.3 m/s, and",
+        ),
+        (
+            'control = "constant_tension"\ntime_s = [0.0]\ntension_N = [{tension:g}]',
+            "rest: the winch asks for +2 N, and",
+        ),
+    ],
+)
+def test_a_doubtful_start_says_what_it_is_out_of_balance_by(winch, words, tmp_path):
+    """A winch that is asked for 2 N more than the hanging cable pulls with at the drum is out of balance by +2 N."""
+    still = Model.of(subzero.load_scenario(written(tmp_path, 50.0))).cable
+    ends = ((0.0, 0.0, 40.0), (-20.0, 5.0, 0.0))
+    hanging = cable.hold(ends, 50.0, (0.0, 0.2, 0.0), cable=still, segment_length=0.5)
+    path = written(tmp_path, 50.0)
+    text = path.read_text().replace('control = "brake"', winch.format(tension=hanging.tensions[-1] + 2.0))
+    path.write_text(text)
+    trial = subzero.load_scenario(path)
+    run = subzero.simulate(trial.with_changes({"run.rtol": 0.0, "run.duration_s": 0.5}))
+    error = {"start_error": 0.1, "start_time": 0.1, "change": 0.0, "proof_error": 0.0, "force_error": 0.1}
+    run.attrs["accuracy"] = json.dumps({**error, "rtol": 0.02, "halvings": 0, "proof_finer": 0})
+    (doubt,) = [
+        warning for warning in check_run(run, trial, Model.of(trial)) if "of the start" in warning.message
+    ]
+    assert words in doubt.message
