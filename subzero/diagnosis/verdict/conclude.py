@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from subzero.diagnosis.hypothesis.catalogue.sensors import SPECS
 from subzero.diagnosis.hypothesis.hypotheses import PRACTICAL_TOLERANCES_SUDDEN
+from subzero.diagnosis.inference.linear_gaussian import KAPPAS
 from subzero.diagnosis.inference.model_average import (
     HEALTHY_PROBABILITY,
     ChangePointSummary,
@@ -44,6 +45,7 @@ from subzero.diagnosis.verdict.estimates import (
     closest_rival,
     deviations,
     force_rival,
+    most_probable_force,
     name,
     names_of,
     practical_of,
@@ -163,20 +165,29 @@ def decided(findings: Findings, ranked: Ranked) -> str:
     verdict = decide(ranked.inside, forces, is_practical, apart, ranked.change_point)
     if verdict == OUTSIDE and findings.sensitive:
         verdict = UNDECIDED  # an error of a run that grows is a force to those who do not know better
-    if not is_near(*_explanation(findings, ranked, verdict)):
+    entries, z, named, kappa = _explanation(findings, ranked, verdict)
+    names_something = verdict in (CAUSE_NAMED, OUTSIDE)
+    if not is_near(entries, z, named) or (names_something and kappa == max(KAPPAS)):
         return NOTHING_NEAR
     return qualified(verdict, findings.problem.entries, ranked.best)
 
 
-def _explanation(findings: Findings, ranked: Ranked, verdict: str) -> tuple[Sequence[Entry], np.ndarray, Ids]:
-    """Return the numbers of the explanation that a verdict is about, their deviations (k,), and the causes it names."""
+def _explanation(
+    findings: Findings, ranked: Ranked, verdict: str
+) -> tuple[Sequence[Entry], np.ndarray, Ids, float]:
+    """Return the numbers of the explanation that a verdict is about, their deviations (k,), the causes it names, and
+    the scale κ of the tolerances under which it is most probable.
+    """
+    best, entries = ranked.best, findings.problem.entries
+    kappa = most_probable_force(findings)[1].kappa if verdict == OUTSIDE else best.kappa
     if verdict == CAUSE_NAMED and ranked.change_point.is_named:
         first = ranked.change_points[0]
-        return first.problem.entries, first.fit.z, (first.change_point.effect.id,)
+        change = first.change_point
+        return first.problem.entries, first.fit.z, (change.effect.id,), change.kappa
     strange = max(findings.out_of_catalogue, key=lambda one: one.log_posterior, default=None)
-    if strange and strange.point and strange.log_posterior > ranked.best.log_posterior:
-        return findings.problem.entries, strange.point.fit.z, ranked.best.ids
-    return findings.problem.entries, ranked.best.fit.z, ranked.best.ids
+    if strange and strange.point and strange.log_posterior > best.log_posterior:
+        return entries, strange.point.fit.z, best.ids, kappa
+    return entries, best.fit.z, best.ids, kappa
 
 
 def remaining_models(ranked: Ranked) -> RemainingModels:

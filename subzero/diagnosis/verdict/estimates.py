@@ -277,13 +277,20 @@ def of_nothing(work: Findings, best: Candidate) -> Extension:
     )
 
 
+def most_probable_force(work: Findings) -> tuple[OutOfCatalogue, LatentForceCandidate]:
+    """Return the most probable latent force or drift, with the causes that it was found with."""
+    return next(
+        (one, one.what) for one in work.out_of_catalogue if isinstance(one.what, LatentForceCandidate)
+    )
+
+
 def of_unknown(work: Findings) -> Extension:
     """Return the extension by the most probable force, with the noise beside it; beside the drift of a sensor there is
     nothing new but causes.
     """
-    explanation = next(one for one in work.out_of_catalogue if isinstance(one.what, LatentForceCandidate))
+    explanation, what = most_probable_force(work)
     problem = explanation.own or work.problem
-    found = _estimated(work, explanation, problem)
+    found = _estimated(work, explanation, what, problem)
     if found.missing is None:
         found = replace(found, fit=fit_beside_drift(problem, found, found.fit.D))
     deviations = by_effect(problem, found.fit.z, explanation.causes)
@@ -304,14 +311,12 @@ def _as_formula(unknown: Unknown, formula: Formula) -> Unknown:
                    features={one: p for one, p in formula.features.items() if p >= MENTIONED_PROBABILITY})  # fmt: skip
 
 
-def _estimated(work: Findings, explanation: OutOfCatalogue, problem: Problem) -> EstimatedForce:
-    """Return a force or a drift, fitted beside the causes that it stands beside."""
+def _estimated(
+    work: Findings, explanation: OutOfCatalogue, what: LatentForceCandidate, problem: Problem
+) -> EstimatedForce:
+    """Return a force or a drift, fitted together with the causes that it was found with."""
     base = work.search.candidates[explanation.causes]
-    assert isinstance(explanation.what, LatentForceCandidate)
-    fit, D = (
-        rewhitened(base.fit, work.problem, problem),
-        variances(problem.entries, base.ids, explanation.what.kappa),
-    )
+    fit, D = rewhitened(base.fit, work.problem, problem), variances(problem.entries, base.ids, what.kappa)
     kind, _, which = explanation.id.partition(":")
     if kind + ":" == FORCE:
         return estimate_force(problem, fit, which, D)
