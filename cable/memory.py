@@ -13,11 +13,13 @@ GIB = 1024.0**3
 
 def free_memory() -> float:
     """Return how much memory can be had without swapping, within the limit of this process. [bytes]."""
-    import resource
-
     import psutil
 
     free = float(psutil.virtual_memory().available)
+    try:
+        import resource
+    except ImportError:  # Windows sets no such limit
+        return free
     limit, _ = resource.getrlimit(resource.RLIMIT_AS)
     if limit != resource.RLIM_INFINITY:
         free = min(free, float(limit) - psutil.Process().memory_info().vms)

@@ -16,7 +16,6 @@ proved before compiled code, which does not look at bounds, gets them. What they
 
 from __future__ import annotations
 
-import fcntl
 import json
 import os
 import shutil
@@ -259,11 +258,12 @@ def _write(path: Path, arrays: Mapping[str, np.ndarray]) -> None:
 
 def _rename(beside: Path, path: Path) -> None:
     os.replace(beside, path)
-    handle = os.open(path.parent, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)
+    with suppress(PermissionError):  # Windows opens no folder
+        handle = os.open(path.parent, os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
 
 
 def _read(path: Path) -> dict[str, np.ndarray]:
@@ -306,18 +306,16 @@ def opened(checkpoint: Checkpoint, label: str, manifest: Mapping[str, str]) -> I
 @contextmanager
 def _locked(folder: Path) -> Iterator[None]:
     """Lock a folder as long as this process lives, or the block lasts."""
-    handle = os.open(folder / LOCK, os.O_RDWR | os.O_CREAT, 0o600)
+    from filelock import FileLock, Timeout  # half a second, which only a run with a checkpoint has to spend
+
     try:
-        try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise UserError(
-                f"Another command is at work with the checkpoint {printable(str(folder))}. Wait for it, or give"
-                " another folder."
-            ) from None
-        yield
-    finally:
-        os.close(handle)
+        with FileLock(folder / LOCK, timeout=0.0, mode=0o600):
+            yield
+    except Timeout:
+        raise UserError(
+            f"Another command is at work with the checkpoint {printable(str(folder))}. Wait for it, or give"
+            " another folder."
+        ) from None
 
 
 def _refuse_another(folder: Path, manifest: Mapping[str, str]) -> None:

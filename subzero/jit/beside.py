@@ -12,7 +12,6 @@ another process has one at work on the same folder, or this process itself is on
 
 from __future__ import annotations
 
-import fcntl
 import os
 import pickle
 import subprocess
@@ -24,9 +23,12 @@ from contextlib import suppress
 from importlib import import_module
 from multiprocessing import parent_process
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numba
+
+if TYPE_CHECKING:
+    from filelock import BaseFileLock
 
 Call = tuple[Callable[..., Any], tuple[Any, ...]]
 """A compiled function, and numba's types of the arguments that it will be called with."""
@@ -78,9 +80,7 @@ def compile_beside(last: Callable[[], Sequence[Call]], meanwhile: Callable[[], S
             _start(calls, files, lock)
             _meanwhile.extend(meanwhile())
         except OSError:  # no more processes, or it is gone already: this one compiles all
-            return
-        finally:
-            os.close(lock)
+            lock.release()
 
 
 def _may_have_one() -> bool:
@@ -90,22 +90,20 @@ def _may_have_one() -> bool:
     return cores > 1 and is_alone and bool(sys.executable)
 
 
-def _locked(folder: Path) -> int | None:
-    """Return the open lock of a folder; None if another process has it, or nothing can be written there."""
+def _locked(folder: Path) -> BaseFileLock | None:
+    """Return the lock of a folder; None if another process has it, or nothing can be written there."""
+    from filelock import FileLock, Timeout  # half a second, which only a process that compiles has to spend
+
+    lock = FileLock(folder / LOCK, timeout=0.0, mode=0o600, thread_local=False)
     try:
-        lock = os.open(folder / LOCK, os.O_CREAT | os.O_RDWR | os.O_NOFOLLOW | os.O_CLOEXEC, 0o600)
-    except OSError:
-        return None
-    try:
-        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
-        os.close(lock)
+        lock.acquire()
+    except (Timeout, OSError):
         return None
     return lock
 
 
-def _start(calls: Sequence[Call], files: Sequence[Path], lock: int) -> None:
-    """Start the second process, which holds the lock as long as it lives."""
+def _start(calls: Sequence[Call], files: Sequence[Path], lock: BaseFileLock) -> None:
+    """Start the second process; the lock is held as long as it lives."""
     told = pickle.dumps(
         [
             (each.__module__, each.__name__, str(file.parent), types)
@@ -117,24 +115,24 @@ def _start(calls: Sequence[Call], files: Sequence[Path], lock: int) -> None:
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
-        pass_fds=(lock,),
         start_new_session=True,  # Ctrl-C is for this process, which takes it along
     )
     _second.append(second)
     _promised.update(files)
-    threading.Thread(target=_see_it_end, args=(second,), daemon=True).start()
+    threading.Thread(target=_see_it_end, args=(second, lock), daemon=True).start()
     assert second.stdin is not None
     second.stdin.write(told)
     second.stdin.flush()  # and stays open: where it breaks, the second process ends
 
 
-def _see_it_end(second: subprocess.Popen[bytes]) -> None:
+def _see_it_end(second: subprocess.Popen[bytes], lock: BaseFileLock) -> None:
     """Hear what the second process tells, and wait for it, so that no dead one is left behind; close both pipes."""
     assert second.stdin is not None
     assert second.stdout is not None
     while second.stdout.read(len(MADE)):
         _told[0] += 1
     second.wait()
+    lock.release()
     for pipe in (second.stdin, second.stdout):
         with suppress(OSError):
             pipe.close()

@@ -60,6 +60,9 @@ DAY_S = 86400.0
 OUT_OF_USE_S, KEPT = 30 * DAY_S, 8
 """A folder is removed that was not used for so long [s], or for a day if so many of its package are newer."""
 
+SAFELY = sum(getattr(os, name, 0) for name in ("O_NOFOLLOW", "O_NONBLOCK", "O_CLOEXEC", "O_BINARY"))
+"""How a file is opened that may be anything, as far as the system has such flags."""
+
 _OUR_FOLDER = re.compile(rf"({'|'.join((*PACKAGES, OTHERS))})-[0-9a-f]{{12}}")
 _NO_MATTER = re.compile("CACHE|THREAD|CUDA|GDB_BINARY|COLOR|SHOW_HELP|HAVE_YAML")
 """Settings of numba that change with the machine, the terminal or what else is installed, and never the code."""
@@ -178,6 +181,8 @@ def _distrust(about: os.stat_result) -> str:
     """Return why somebody else could have put code into a folder or file; empty if nobody could."""
     if not (stat.S_ISDIR(about.st_mode) or stat.S_ISREG(about.st_mode)):
         return "it is no folder"
+    if not hasattr(os, "geteuid"):  # Windows: a home folder has access rules of its own
+        return ""
     if about.st_uid not in (0, os.geteuid()):
         return f"it belongs to another user (number {about.st_uid})"
     return "others may write there" if about.st_mode & (stat.S_IWGRP | stat.S_IWOTH) else ""
@@ -185,7 +190,7 @@ def _distrust(about: os.stat_result) -> str:
 
 def _own_bytes(path: Path) -> bytes:
     """Return what is in a file; nothing of one that others can have written."""
-    handle = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
+    handle = os.open(path, os.O_RDONLY | SAFELY)
     with open(handle, "rb") as file:
         about = os.fstat(handle)
         return b"" if _distrust(about) or not stat.S_ISREG(about.st_mode) else file.read()
@@ -213,7 +218,7 @@ def sweep(base: Path, used: str) -> None:
         for entry in os.scandir(base):
             about = entry.stat(follow_symlinks=False)
             kind = _OUR_FOLDER.fullmatch(entry.name)
-            if kind and stat.S_ISDIR(about.st_mode) and about.st_uid == os.geteuid() and entry.name != used:
+            if kind and stat.S_ISDIR(about.st_mode) and not _distrust(about) and entry.name != used:
                 ages.setdefault(kind[1], []).append((now - about.st_mtime, entry.path))
     for of_a_package in ages.values():
         for rank, (age, path) in enumerate(sorted(of_a_package), start=1):

@@ -12,6 +12,7 @@ fork, each is a fresh Python of its own.
 from __future__ import annotations
 
 import gc
+import io
 import os
 import pickle
 import queue
@@ -24,7 +25,6 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from math import inf
-from multiprocessing.connection import Connection
 from time import monotonic, sleep
 from typing import Any, NoReturn, Protocol
 
@@ -36,6 +36,8 @@ ONE_THREAD = dict.fromkeys(
     ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1"
 )
 """Each process has one core; more threads would only be in one another's way."""
+LENGTH_BYTES = 8
+"""Of the length of a message between processes."""
 LONGEST_WORD = 100
 """Of a request to the fork server. [bytes]"""
 LIVES, LOOK_S = 1000, 0.002
@@ -54,6 +56,45 @@ class Life(Protocol):
         """Return its exit code once it has ended, negative for a signal; subprocess.TimeoutExpired if it has not."""
 
 
+class Pipe:
+    """One end of a pipe for messages: the length of each in eight bytes, and the message.
+
+    `multiprocessing.connection.Connection` takes such a handle for a socket on Windows.
+    """
+
+    def __init__(self, handle: int, mode: str) -> None:
+        self._file = io.FileIO(handle, mode)
+
+    def send(self, message: bytes) -> None:
+        """Send a message; OSError if nobody can receive it."""
+        rest = memoryview(len(message).to_bytes(LENGTH_BYTES, "little") + message)
+        while rest:
+            rest = rest[self._opened().write(rest) :]
+
+    def receive(self) -> bytes:
+        """Wait for the next message; EOFError if there is none to come."""
+        return self._read(int.from_bytes(self._read(LENGTH_BYTES), "little"))
+
+    def _read(self, count: int) -> bytes:
+        parts, left = [], count
+        while left:
+            part = self._opened().read(left)
+            if not part:
+                raise EOFError
+            parts.append(part)
+            left -= len(part)
+        return b"".join(parts)
+
+    def _opened(self) -> io.FileIO:
+        if self._file.closed:
+            raise OSError("the pipe is closed")
+        return self._file
+
+    def close(self) -> None:
+        """Close it."""
+        self._file.close()
+
+
 class Worker:
     """A process that does tasks.
 
@@ -64,13 +105,13 @@ class Worker:
     """
 
     def __init__(self, tasks: int, answers: int, life: Life) -> None:
-        self._to, self._from = Connection(tasks, readable=False), Connection(answers, writable=False)
+        self._to, self._from = Pipe(tasks, "w"), Pipe(answers, "r")
         self._life = life
 
     def send(self, task: bytes) -> bool:
         """Hand it a task; return whether it took it."""
         try:
-            self._to.send_bytes(task)
+            self._to.send(task)
         except OSError:
             self.close()
             return False
@@ -82,7 +123,7 @@ class Worker:
         Raises:
             EOFError: it has died.
         """
-        return self._from.recv_bytes()
+        return self._from.receive()
 
     @property
     def ended_by_itself(self) -> bool:
@@ -304,7 +345,7 @@ def _forked(handles: list[int], connection: socket.socket) -> int:
         return 0
     if pid == 0:
         connection.close()
-        _serve(Connection(handles[0], writable=False), Connection(handles[1], readable=False))
+        _serve(Pipe(handles[0], "r"), Pipe(handles[1], "w"))
         os._exit(0)
     return pid
 
@@ -325,29 +366,29 @@ def _rehearse(handle: int) -> None:
 def serve() -> None:
     """Do tasks from standard input until it ends; what they print goes to standard error."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    answers = Connection(os.dup(1), readable=False)
+    answers = Pipe(os.dup(1), "w")
     os.dup2(2, 1)
     _load()
-    _serve(Connection(os.dup(0), writable=False), answers)
+    _serve(Pipe(os.dup(0), "r"), answers)
 
 
-def _serve(tasks: Connection, answers: Connection) -> None:
+def _serve(tasks: Pipe, answers: Pipe) -> None:
     """Do tasks until their pipe ends."""
     received: queue.SimpleQueue[bytes] = queue.SimpleQueue()
     threading.Thread(target=_receive, args=(tasks, received), daemon=True).start()
     with suppress(OSError):  # the parent is gone
-        answers.send_bytes(READY)
-        answers.send_bytes(_done(received.get()))
+        answers.send(READY)
+        answers.send(_done(received.get()))
         gc.freeze()  # what is imported and compiled by now stays: looking through it again takes a tenth of the time
         while True:
-            answers.send_bytes(_done(received.get()))
+            answers.send(_done(received.get()))
 
 
-def _receive(tasks: Connection, received: queue.SimpleQueue[bytes]) -> NoReturn:
+def _receive(tasks: Pipe, received: queue.SimpleQueue[bytes]) -> NoReturn:
     """Receive tasks; end the process with its parent, at once, whatever task it is at."""
     with suppress(EOFError, OSError):
         while True:
-            received.put(tasks.recv_bytes())
+            received.put(tasks.receive())
     os._exit(0)
 
 

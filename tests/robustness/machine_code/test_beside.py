@@ -173,7 +173,7 @@ def test_there_is_none_where_another_process_has_one(scaled, started):
     lock = beside._locked(scaled._cache.file_for((numba.float64,)).parent)
     ask(scaled)
     assert not started
-    os.close(lock)
+    lock.release()
     beside._asked[0] = False
     ask(scaled)
     assert len(started) == 1
