@@ -21,6 +21,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from subzero.arguments import checked_arguments
 from subzero.errors import BadValueError, short
 from subzero.jit import allocating, inlined, inner
 
@@ -41,6 +42,7 @@ class Water(NamedTuple):
     velocity: np.ndarray
 
 
+@checked_arguments
 @dataclass(frozen=True, kw_only=True)
 class Current:
     """Velocity of the water on a grid.
@@ -78,6 +80,7 @@ class Current:
         object.__setattr__(self, "velocity", velocity)
 
     @classmethod
+    @checked_arguments
     def uniform(cls, velocity: Sequence[float] | np.ndarray) -> Current:
         """Return the same current everywhere and always: north, east, down (3,). [m/s]."""
         numbers = _numbers("velocity", velocity)
@@ -88,11 +91,13 @@ class Current:
         return cls(velocity=numbers.reshape(1, 1, 1, 1, 3))
 
     @classmethod
+    @checked_arguments
     def profile(cls, down: Sequence[float], velocity: Sequence[Sequence[float]]) -> Current:
         """Return a current that changes with depth: velocities (n, 3) [m/s] at n depths [m]."""
         return cls(down=_numbers("down", down), velocity=_numbers("velocity", velocity)[None, None, None])
 
     @classmethod
+    @checked_arguments
     def sampled(
         cls,
         function: WaterVelocity,
@@ -120,6 +125,7 @@ class Current:
         """Largest speed on the grid. [m/s]."""
         return float(np.linalg.norm(self.velocity, axis=-1).max())
 
+    @checked_arguments
     def at(self, place: Sequence[float] | np.ndarray, time: float = 0.0) -> np.ndarray:
         """Return the velocity (3,) at a place (north, east, down) [m] and time [s]. [m/s]."""
         values = self.velocity

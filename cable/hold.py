@@ -15,6 +15,7 @@ from cable.moving_end.state import NOW, Line, new_line
 from cable.properties import CableProperties
 from cable.task import check_kinds, current_of
 from cable.winch import Brake
+from subzero.arguments import checked_arguments
 from subzero.errors import UserError, real, short
 
 Place = Sequence[float] | np.ndarray
@@ -39,6 +40,7 @@ class HoldError(UserError, ValueError):
     """A cable that cannot be held so, or whose equilibrium was not found; the message says what to change."""
 
 
+@checked_arguments
 def hold(
     ends: Sequence[Place] | np.ndarray,
     length: float,

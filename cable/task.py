@@ -18,6 +18,7 @@ from cable.properties import CableProperties
 from cable.schemes import SHORTEST_S
 from cable.tow_path import Velocity
 from cable.winch import Brake, ConstantTension, PayOutRate, Winch
+from subzero.arguments import checked_arguments
 from subzero.errors import BadValueError, checked, short
 
 Drum = DrumProperties | Winch
@@ -31,6 +32,7 @@ EVERYTHING = frozenset({WINCH, MOVING_DRUM, UNEVEN_CURRENT, WET_LENGTH, EQUILIBR
 """What a task may ask for beyond a free drum on the shore, uniform water and no cable at the start."""
 
 
+@checked_arguments
 @dataclass(frozen=True, kw_only=True)
 class MovingDrum:
     """A drum that is carried, by a boat for example.

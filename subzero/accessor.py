@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
+from subzero.arguments import checked_arguments
 from subzero.channels import BY_NAME, RENAMED_CHANNELS, TIME
 from subzero.errors import UserError, printable, short, suggestion
 from subzero.integrity import DamagedError, check_arrays, check_digest
@@ -51,6 +52,7 @@ TEXTS, TABLES, NUMBERS = (
 """Attributes of a run: words, words in JSON, numbers."""
 
 
+@checked_arguments
 def open_run(path: str | Path) -> xr.Dataset:
     """Return a run from the netCDF file that `simulate`, `compare`, `manoeuvre` or `autopilot` has written.
 
@@ -237,6 +239,7 @@ class RunPlots:
 
         return shape(self._run, self._title())
 
+    @checked_arguments
     def channel(self, name: str) -> Figure:
         """Return one channel over time."""
         from subzero.figures.style import channel_panel, headline, sheet, time_label
@@ -256,6 +259,7 @@ class RunPlots:
         return Title(words=run.attrs["title"], scenario=run.attrs["scenario"], warnings=warns)
 
 
+@checked_arguments
 def figures_of(run: xr.Dataset, what: Sequence[str] | None = None) -> dict[str, Figure]:
     """Return figures of a run by name.
 

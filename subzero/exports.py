@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from subzero.arguments import checked_arguments
 from subzero.atomic_output import friendly_errors
 from subzero.channels import CHANNELS, TIME
 from subzero.errors import UserError, chosen, printable
@@ -37,6 +38,7 @@ EPOCH = "2000-01-01 00:00:00"
 """Time 0 of a run in CF, which knows no time without a date."""
 
 
+@checked_arguments
 def export(run: xr.Dataset, path: str | Path, kind: str | None = None) -> None:
     """Write a run in another format.
 

@@ -24,6 +24,7 @@ import numpy as np
 import scenarios
 from cable import CableProperties, DrumProperties
 from cable.current import Current
+from subzero.arguments import checked_arguments
 from subzero.errors import BadValueError, real, short, suggestion
 from subzero.external_force import MissingForce
 from vehicle import Vehicle, VehicleError, from_mapping, to_mapping
@@ -31,6 +32,7 @@ from vehicle import Vehicle, VehicleError, from_mapping, to_mapping
 Part = TypeVar("Part", CableProperties, DrumProperties)
 
 
+@checked_arguments
 @dataclass(frozen=True, kw_only=True)
 class Model:
     """Everything physical about a tethered vehicle.
@@ -73,6 +75,7 @@ class Model:
         object.__setattr__(self, "current", current)
 
     @classmethod
+    @checked_arguments
     def of(cls, trial: scenarios.Trial) -> Model:
         """Return the model that a trial describes.
 
@@ -160,6 +163,7 @@ def _plain(value: Any) -> dict[str, Any] | None:
     return None if value is None else dataclasses.asdict(value)
 
 
+@checked_arguments
 def load(
     name_or_path: str | Path,
     *,

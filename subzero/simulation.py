@@ -16,6 +16,7 @@ import numpy as np
 
 import scenarios
 from cable.moving_end import Names, describe_stop, enlarged
+from subzero.arguments import checked_arguments
 from subzero.convergence import Accuracy, Budget, Take, prove, run_converged
 from subzero.dataset import PlainRun, plain_run, tell_accuracy
 from subzero.engine import coupling
@@ -56,6 +57,7 @@ Progress = Callable[[float], None]
 """Called now and then with the fraction that is done, 0 to 1."""
 
 
+@checked_arguments
 def simulate(
     scenario: str | Path | scenarios.Trial,
     *,
@@ -152,6 +154,7 @@ def _kept(
         yield keeper
 
 
+@checked_arguments
 def simulate_many(
     trials: Sequence[str | Path | scenarios.Trial],
     *,

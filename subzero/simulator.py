@@ -24,6 +24,7 @@ import numpy as np
 
 import scenarios
 from scenarios.steps import whole_steps
+from subzero.arguments import checked_arguments
 from subzero.channels import Observation
 from subzero.engine import coupling
 from subzero.engine.initial_conditions import prepare
@@ -95,6 +96,7 @@ class Simulator:
         observation: what is true now.
     """
 
+    @checked_arguments
     def __init__(
         self,
         scenario: str | Path | scenarios.Trial,

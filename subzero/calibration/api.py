@@ -16,6 +16,7 @@ from threadpoolctl import threadpool_limits
 
 import scenarios
 from scenarios.parameters import changes_of, part_file, ranges_in, with_vehicle
+from subzero.arguments import checked_arguments
 from subzero.calibration import assessment, vehicle_file
 from subzero.calibration.fit import Fitted, fitted
 from subzero.calibration.numbers import USUAL, Number, full_name, numbers_of, with_free_numbers
@@ -30,6 +31,7 @@ from subzero.model import Model
 Given = Logged | str | Path
 
 
+@checked_arguments
 def calibrate(
     records: Given | Sequence[Given],
     scenario: str | Path | None = None,
@@ -70,6 +72,7 @@ def calibrate(
         return work.calibration(logged, names, vehicle, quick)
 
 
+@checked_arguments
 def read(
     records: Sequence[Given],
     scenario: str | Path | None,

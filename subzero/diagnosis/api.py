@@ -24,6 +24,7 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from subzero.arguments import checked_arguments
 from subzero.channels import BY_NAME
 from subzero.diagnosis.assessment.goodness_of_fit import misfits
 from subzero.diagnosis.assessment.identifiability import detectability, with_whole_effects
@@ -75,6 +76,7 @@ Given = Logged | Record | str | Path
 Seen = Callable[[tuple[Detectability, ...]], None]
 
 
+@checked_arguments
 def diagnose(
     records: Given | Sequence[Given],
     model: str | Path | Model | None = None,
@@ -120,6 +122,7 @@ def _logged(records: Sequence[Given], model: str | Path | Model | None, commands
     return [dataclasses.replace(one, setting=dataclasses.replace(one.setting, model=model)) for one in found]
 
 
+@checked_arguments
 def diagnose_trials(
     records: Sequence[Logged],
     *,

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from subzero.arguments import checked_arguments
 from subzero.figures.cable import deployment, is_deployed, shape, tension
 from subzero.figures.forces import forces
 from subzero.figures.motion import attitude, figure_6, measured
@@ -39,6 +40,7 @@ __all__ = [
 ]
 
 
+@checked_arguments
 def draw(runs: Runs | xr.Dataset, record: Record | None = None) -> dict[str, Figure]:
     """Return the figures of some runs of one trial, by the name of their file.
 

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from subzero.arguments import checked_arguments
 from subzero.channels import BY_NAME, AnyRun
 from subzero.errors import UserError, real, short, suggestion
 
@@ -68,6 +69,7 @@ DEFAULT_INTERVALS = 100
 """A run is kept at so many intervals where no `every` says otherwise."""
 
 
+@checked_arguments
 @dataclass(frozen=True, kw_only=True)
 class Kept:
     """What is asked for of each run.

@@ -32,6 +32,7 @@ from typing import Any, TypedDict
 import scenarios
 from scenarios.files import Source, read_toml
 from scenarios.parameters import with_parameters
+from subzero.arguments import checked_arguments
 from subzero.errors import UserError, listed, printable, short, suggestion, truth
 from subzero.model import load
 from subzero.provenance import code_digest, trial_digest
@@ -107,6 +108,7 @@ class Planned(TypedDict, total=False):
     description: str
 
 
+@checked_arguments
 def plan_sweep(
     scenario: str | Path | scenarios.Trial,
     parameters: Mapping[str, Any],

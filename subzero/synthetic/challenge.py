@@ -13,6 +13,7 @@ import numpy as np
 import scenarios
 from scenarios.heading import TURN
 from scenarios.steps import sample_times
+from subzero.arguments import checked_arguments
 from subzero.channels import HEADING, TIME, column_name
 from subzero.diagnosis.hypothesis.catalogue import START, catalogue
 from subzero.diagnosis.hypothesis.configuration import Setting
@@ -63,6 +64,7 @@ def draw_hidden(
     return Hidden(effects=drawn, starts={chosen[0]: begins} if kind == "sudden" else {})
 
 
+@checked_arguments
 def challenge(
     scenario: str | Path | scenarios.Trial = "fig6",
     seed: int = 0,

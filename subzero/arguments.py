@@ -1,0 +1,155 @@
+"""Refuse an argument of another kind than a function declares, in one sentence, before the function begins.
+
+    @checked_arguments
+    def simulate(scenario: str | Path | Trial, *, progress: Progress | None = None) -> Dataset: ...
+
+    simulate("fig6", progress=[])   simulate: progress is []; it must be a function of 1 argument or None.
+
+The annotations say what is allowed; there is no other table. Whether a number is within its limits is for the function
+to say (`subzero.errors.checked`).
+
+Why no library: pydantic copies and converts what it checks; beartype looks at one item of a list, and at no signature
+of a callback; typeguard imports for 0.2 s, and refuses numpy's numbers and arrays. None knows names that a module
+imports for its annotations only. What is left to write for any of them is as long as this.
+"""
+
+from __future__ import annotations
+
+import builtins
+import functools
+import inspect
+import sys
+import typing
+from collections.abc import Callable, Collection, Mapping, Sequence
+from importlib import import_module
+from itertools import islice
+from numbers import Integral
+from types import NoneType, SimpleNamespace, UnionType
+from typing import Any, TypeVar
+
+import numpy as np
+
+from subzero.errors import BadValueError, real, short
+
+Made = TypeVar("Made", bound=Callable[..., Any])
+
+MOST_ITEMS = 20_000_000
+"""More items than this fill the memory before anything is computed with them."""
+
+MOST_SEEN = 1000
+"""So many items of a list are looked at: more would take longer than many a function."""
+
+
+def checked_arguments(made: Made) -> Made:
+    """Return a function that refuses, before it begins, arguments of other kinds than its annotations say.
+
+    Args:
+        made: a function; or a class, whose constructor is checked.
+
+    Raises:
+        BadValueError: from the function that is returned.
+    """
+    if isinstance(made, type):
+        made.__init__ = checked_arguments(made.__init__)  # type: ignore[misc]
+        return made
+    signature, owner = inspect.signature(made), made.__qualname__.removesuffix(".__init__")
+
+    @functools.wraps(made)
+    def checking(*positional: Any, **named: Any) -> Any:
+        given = signature.bind(*positional, **named).arguments
+        for name, hint in _hints(made).items():
+            if name in given and not _fits(given[name], hint):
+                raise BadValueError(f"{owner}: {name} is {short(given[name])}; it must be {_words(hint)}.")
+        return made(*positional, **named)
+
+    return typing.cast(Made, checking)
+
+
+class _Names(dict[str, Any]):
+    """The names of a module, with those that it imports for its annotations only."""
+
+    def __missing__(self, name: str) -> Any:
+        subzero = sys.modules["subzero"]
+        return (
+            getattr(subzero, name)
+            if name in subzero.__all__
+            else import_module({"xr": "xarray"}.get(name, name))
+        )
+
+
+@functools.cache
+def _hints(function: Callable[..., Any]) -> dict[str, Any]:
+    """Return argument → what it may be, of the arguments that have a place or a name of their own."""
+    parameters = inspect.signature(function).parameters.values()
+    single = {
+        one.name: one.annotation
+        for one in parameters
+        if one.kind not in (one.VAR_POSITIONAL, one.VAR_KEYWORD)
+    }
+    annotations = SimpleNamespace(
+        __annotations__={k: v for k, v in single.items() if v is not inspect.Parameter.empty}
+    )
+    return typing.get_type_hints(annotations, {}, _Names(vars(builtins) | function.__globals__))
+
+
+def _is_list(value: Any) -> bool:
+    """Say whether a value is a list, a tuple, an array or their like, that is not endless."""
+    try:
+        is_list = isinstance(value, Sequence | np.ndarray) and not isinstance(value, str | bytes)
+        return is_list and len(value) <= MOST_ITEMS
+    except (TypeError, OverflowError):  # an array of no axis; a range of more than 2**63 numbers
+        return False
+
+
+_LIST = ("a list", _is_list)
+_KINDS: dict[Any, tuple[str, Callable[[Any], bool]]] = {
+    bool: ("True or False", lambda value: isinstance(value, bool | np.bool_)),
+    int: ("a whole number", lambda value: isinstance(value, Integral) and not isinstance(value, bool)),
+    float: ("a finite number", lambda value: real(value) is not None),
+    str: ("a text", lambda value: isinstance(value, str)),
+    NoneType: ("None", lambda value: value is None),
+    Any: ("anything", lambda value: True),
+    **dict.fromkeys((Mapping, dict), ("a mapping", lambda value: isinstance(value, Mapping))),
+    **dict.fromkeys((Sequence, list, tuple, np.ndarray), _LIST),
+}
+"""Kind → what it is called, and whether a value is one; any other kind is a class."""
+
+
+def _fits(value: Any, hint: Any) -> bool:
+    """Say whether a value is of an annotated kind."""
+    kind, inside = typing.get_origin(hint) or hint, typing.get_args(hint)
+    if kind in (typing.Union, UnionType):
+        return any(_fits(value, part) for part in inside)
+    if kind is Callable:
+        return _takes(value, inside[0])
+    if kind not in _KINDS:
+        return not isinstance(kind, type) or isinstance(value, kind)
+    if not _KINDS[kind][1](value):
+        return False
+    if kind in (Mapping, dict):
+        return all(
+            _fits(key, inside[0]) and _fits(item, inside[1]) for key, item in islice(value.items(), MOST_SEEN)
+        )
+    return len(inside) != 1 or all(_fits(item, inside[0]) for item in islice(value, MOST_SEEN))
+
+
+def _takes(function: Any, arguments: Collection[Any]) -> bool:
+    """Say whether a value can be called with so many arguments, as far as Python knows."""
+    try:
+        inspect.signature(function).bind(*arguments)
+    except TypeError:
+        return False
+    except ValueError:  # a built-in one
+        return callable(function)
+    return True
+
+
+def _words(hint: Any) -> str:
+    """Return what an annotation asks for, in words."""
+    kind, inside = typing.get_origin(hint) or hint, typing.get_args(hint)
+    if kind in (typing.Union, UnionType):
+        return " or ".join(dict.fromkeys(map(_words, inside)))
+    if kind is Callable:
+        return f"a function of {len(inside[0])} argument{'s' * (len(inside[0]) != 1)}"
+    each = f" (each {_words(inside[-1])})" if len(inside) == 1 or kind is Mapping or kind is dict else ""
+    return _KINDS[kind][0] + each if kind in _KINDS else kind.__name__
