@@ -13,7 +13,7 @@ from cable.moving_end.equilibrium import hang, relax
 from cable.moving_end.segment_load import new_load
 from cable.moving_end.state import NOW, Line, new_line
 from cable.properties import CableProperties
-from cable.task import check_kinds, current_of
+from cable.task import current_of
 from cable.winch import Brake
 from subzero.arguments import checked_arguments
 from subzero.errors import UserError, real, short
@@ -75,7 +75,6 @@ def hold(
             equilibrium found.
     """
     cable, water = CableProperties() if cable is None else cable, current_of(current)
-    check_kinds(cable=(cable, (CableProperties,)))
     places = _checked_ends(ends)
     length = _checked_length(places, length, cable)
     line = _between(places, length, _segments(length, segment_length))

@@ -20,7 +20,7 @@ import functools
 import inspect
 import sys
 import typing
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from importlib import import_module
 from itertools import islice
 from numbers import Integral
@@ -101,7 +101,12 @@ def _is_list(value: Any) -> bool:
         return False
 
 
-_LIST = ("a list", _is_list)
+def _is_series(value: Any) -> bool:
+    """Say whether a value is a list, or gives items in another way: a set, a mapping, a generator."""
+    is_other = isinstance(value, Iterable) and not isinstance(value, Sequence | np.ndarray)
+    return is_other or _is_list(value)
+
+
 _KINDS: dict[Any, tuple[str, Callable[[Any], bool]]] = {
     bool: ("True or False", lambda value: isinstance(value, bool | np.bool_)),
     int: ("a whole number", lambda value: isinstance(value, Integral) and not isinstance(value, bool)),
@@ -110,7 +115,8 @@ _KINDS: dict[Any, tuple[str, Callable[[Any], bool]]] = {
     NoneType: ("None", lambda value: value is None),
     Any: ("anything", lambda value: True),
     **dict.fromkeys((Mapping, dict), ("a mapping", lambda value: isinstance(value, Mapping))),
-    **dict.fromkeys((Sequence, list, tuple, np.ndarray), _LIST),
+    **dict.fromkeys((Sequence, list, tuple, np.ndarray), ("a list", _is_list)),
+    Iterable: ("a list", _is_series),
 }
 """Kind → what it is called, and whether a value is one; any other kind is a class."""
 
@@ -130,7 +136,11 @@ def _fits(value: Any, hint: Any) -> bool:
         return all(
             _fits(key, inside[0]) and _fits(item, inside[1]) for key, item in islice(value.items(), MOST_SEEN)
         )
-    return len(inside) != 1 or all(_fits(item, inside[0]) for item in islice(value, MOST_SEEN))
+    if kind is tuple and inside[1:] not in ((), (...,)):
+        return len(value) == len(inside) and all(map(_fits, value, inside))
+    return not (inside and isinstance(value, Collection)) or all(
+        _fits(item, inside[0]) for item in islice(value, MOST_SEEN)
+    )
 
 
 def _takes(function: Any, arguments: Collection[Any]) -> bool:
@@ -151,5 +161,8 @@ def _words(hint: Any) -> str:
         return " or ".join(dict.fromkeys(map(_words, inside)))
     if kind is Callable:
         return f"a function of {len(inside[0])} argument{'s' * (len(inside[0]) != 1)}"
-    each = f" (each {_words(inside[-1])})" if len(inside) == 1 or kind is Mapping or kind is dict else ""
-    return _KINDS[kind][0] + each if kind in _KINDS else kind.__name__
+    items = inside[1:] if kind in (Mapping, dict) else [part for part in inside if part is not ...]
+    if kind not in _KINDS or not items:
+        return _KINDS[kind][0] if kind in _KINDS else kind.__name__
+    count = f" of {len(items)}" if len(items) > 1 else ""
+    return f"{_KINDS[kind][0]}{count} (each {' or '.join(dict.fromkeys(map(_words, items)))})"

@@ -25,7 +25,7 @@ from scipy.spatial.transform import Rotation
 
 from subzero.arguments import checked_arguments
 from subzero.atomic_output import friendly_errors
-from subzero.channels import CHANNELS, TIME
+from subzero.channels import CHANNELS, TIME, check_is_run
 from subzero.errors import UserError, chosen, printable
 from subzero.page.replay import cable_origin
 
@@ -50,6 +50,7 @@ def export(run: xr.Dataset, path: str | Path, kind: str | None = None) -> None:
     Raises:
         UserError: no such kind; its library is not installed; the file cannot be written.
     """
+    check_is_run("export", run)
     path = Path(path)
     write = writer_of(kind or {"nc": "cf"}.get(path.suffix[1:], path.suffix[1:]))
     try:

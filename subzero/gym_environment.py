@@ -169,7 +169,7 @@ def _shares(actions: Any, count: int) -> list[float]:
             given = np.asarray(actions)
             if given.size == count and given.dtype.kind in "iuf" and not np.isnan(given).any():
                 return [min(max(float(share), -1.0), 1.0) for share in given.reshape(-1).tolist()]
-    except (ValueError, OverflowError):
+    except (TypeError, ValueError, OverflowError):
         pass
     raise BadValueError(f"The action is {short(actions)}; it must be {count} numbers from -1 to 1.")
 

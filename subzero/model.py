@@ -25,7 +25,7 @@ import scenarios
 from cable import CableProperties, DrumProperties
 from cable.current import Current
 from subzero.arguments import checked_arguments
-from subzero.errors import BadValueError, real, short, suggestion
+from subzero.errors import BadValueError, short, suggestion
 from subzero.external_force import MissingForce
 from vehicle import Vehicle, VehicleError, from_mapping, to_mapping
 
@@ -58,21 +58,8 @@ class Model:
     missing: MissingForce | None = None
 
     def __post_init__(self) -> None:
-        """Refuse parts that are none."""
-        for name, kind in PARTS.items():
-            part, optional = getattr(self, name), name in OPTIONAL
-            if not isinstance(part, kind) and not (optional and part is None):
-                words = kind.__name__ + (" or None" if optional else "")
-                raise BadValueError(f"Model: {name} is {short(part)}; it must be a {words}.")
-        try:
-            current = tuple(real(one) for one in self.current)
-        except TypeError:
-            current = ()
-        if len(current) != 3 or None in current:
-            raise BadValueError(
-                f"Model: current is {short(self.current)}; it must be three finite numbers, north, east, down in m/s."
-            )
-        object.__setattr__(self, "current", current)
+        """Keep the current as plain numbers."""
+        object.__setattr__(self, "current", tuple(map(float, self.current)))
 
     @classmethod
     @checked_arguments
@@ -128,19 +115,6 @@ def model_of(trial: scenarios.Trial, model: object = None) -> Model:
     if not isinstance(model, Model):
         raise BadValueError(f"model is {short(model)}; it must be a Model or None.")
     return model
-
-
-PARTS = {
-    "vehicle": Vehicle,
-    "cable": CableProperties,
-    "drum": DrumProperties,
-    "profile": scenarios.Profile,
-    "winch": scenarios.Winch,
-    "vessel": scenarios.Vessel,
-    "missing": MissingForce,
-}
-"""Field of a model → what it must be."""
-OPTIONAL = ("profile", "winch", "vessel", "missing")
 
 
 def _made(kind: type[Part], numbers: Mapping[str, Any]) -> Part:

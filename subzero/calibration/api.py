@@ -99,6 +99,8 @@ def _with_vehicle(one: Logged, vehicle: str | Path) -> Logged:
 
 def _check(logged: Sequence[Logged]) -> None:
     """Refuse records that no number of one vehicle can be estimated from."""
+    if not logged:
+        raise UserError("No measured record is given. Give the path of a CSV file, or of a folder of them.")
     first = logged[0]
     for one in logged:
         if one.setting.trial.commands is None:

@@ -60,7 +60,7 @@ from subzero.diagnosis.results import (
 )
 from subzero.diagnosis.verdict.conclude import conclude, decided
 from subzero.diagnosis.verdict.follow_up import follow_up, ranked, refuted_rivals
-from subzero.errors import UserError
+from subzero.errors import UserError, chosen, whole
 from subzero.model import Model
 from subzero.records.record import Record
 
@@ -143,8 +143,12 @@ def diagnose_trials(
         budget: one of BUDGETS.
 
     Raises:
-        UserError: the nominal model cannot be run through a trial.
+        UserError: no record, seed or budget; the nominal model cannot be run through a trial.
     """
+    if not records:
+        raise UserError("No measured record is given. Give the path of a CSV file, or of a folder of them.")
+    whole("seed", seed)
+    chosen(dict.fromkeys(BUDGETS), budget, "budget")
     effects = tuple(effects)
     asked: dict[str, Any] = {
         "effects": effects,

@@ -144,7 +144,7 @@ def plan_sweep(
     """
     trial = scenario if isinstance(scenario, scenarios.Trial) else load(scenario)
     trial = with_parameters(trial, changes or {})
-    both = sorted(set(changes or {}) & set(parameters)) if isinstance(parameters, Mapping) else []
+    both = sorted(set(changes or {}) & set(parameters))
     if both:
         raise UserError(f"{', '.join(both)}: in changes and in parameters too. Keep one of them.")
     points = points_of(trial, parameters, design)
@@ -152,7 +152,7 @@ def plan_sweep(
         trial=trial,
         names=points.names,
         outcomes=outcomes_of(kept, trial.duration),
-        tethered=truth("tethered", tethered),
+        tethered=bool(tethered),
         code=code_digest(),
     )
     words = description or f"{len(points.values)} members of {trial.name}, {points.design.replace('_', ' ')}"

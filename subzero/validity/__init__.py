@@ -18,7 +18,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from subzero.arguments import checked_arguments
-from subzero.channels import AnyRun
+from subzero.channels import AnyRun, check_is_run
 from subzero.validity.limits import above_surface, actuators, below_sea_bed, bend_radius, strength
 from subzero.validity.numerics import (
     DRUM_PROOF,
@@ -54,6 +54,7 @@ class RunWarning(NamedTuple):
 @checked_arguments
 def check_run(run: AnyRun, trial: scenarios.Trial, model: Model) -> list[RunWarning]:
     """Return everything that may be wrong with a run of a trial with a model, in the order of `CHECKS`."""
+    check_is_run("check_run", run)
     return [RunWarning(name, words) for name, check in CHECKS.items() for words in check(run, trial, model)]
 
 

@@ -1,7 +1,7 @@
 """Every public function, called with a value of a wrong kind in the place of each of its arguments.
 
-Verifies: what `subzero` and `cable` export, sweeps, calibration, diagnosis, exports, figures, validity, synthetic records,
-the Gymnasium environment, the methods of `Simulator`, the accessor of runs, `Current`.
+Verifies: what `subzero` and `cable` export, sweeps, calibration, diagnosis, exports, figures, validity, synthetic
+records, the Gymnasium environment, `Simulator`, the accessor of runs, `Current`.
 Configuration: calls that work, of a fraction of a second, each with one argument replaced.
 Tolerance: none; a call raises `UserError`, or is listed as legal and succeeds.
 """
@@ -11,17 +11,23 @@ from __future__ import annotations
 import dataclasses
 import functools
 import inspect
-from collections.abc import Callable
+import time
+from collections import UserList
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from fractions import Fraction
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
+import pytest
 import xarray as xr
 
 import cable
 import subzero
 from subzero import diagnosis, sweeps, validity
 from subzero.accessor import figures_of
+from subzero.arguments import checked_arguments
 from subzero.calibration.api import read
 from subzero.diagnosis.hypothesis.logged import Logged
 from subzero.gym_environment import TetheredHeading, TetheredHeadings
@@ -38,6 +44,7 @@ ODD = {
     "bytes": b"x",
     "object": object(),
     "[]": [],
+    "{}": {},
     "[None]": [None],
     "{x: None}": {"x": None},
     "array": np.zeros((2, 2)),
@@ -46,6 +53,43 @@ ODD = {
     "empty dataset": xr.Dataset(),
 }
 """Name → a value that hardly any argument can have."""
+
+LEGAL = {
+    "True":
+        "simulate.tethered simulate_many.tethered check.tethered plan_sweep.tethered Simulator.tethered "
+        "TetheredHeading.tethered Paper.implicit",
+    "None":
+        "Design.samples Kept.channels Kept.every Kept.function Kept.scalars Model.missing Model.profile "
+        "Model.vessel Model.winch Simulator.model Simulator.sample_time Simulator.step.command "
+        "TetheredHeading.reset.options TetheredHeading.reset.seed TetheredHeading.sample_time "
+        "TetheredHeadings.workers calibration.read.commands calibration.read.scenario calibration.read.vehicle "
+        "check.model check.progress compare.checkpoint compare.every compare.measured compare.model "
+        "compare.progress draw.record export.kind extended_toml.effects extended_toml.effects_file hold.cable "
+        "hold.current hold.segment_length hold.start load_scenario.commands_csv load_scenario.motion_csv "
+        "plan_sweep.changes pull_out.cable pull_out.current pull_out.drum simulate.checkpoint simulate.every "
+        "simulate.model simulate.progress simulate_many.every simulate_many.progress simulate_many.workers "
+        "tow.cable tow.current",
+    "[]":
+        "simulate.later simulate_many.trials compare.later check.later read_trials.paths catalogue.channels "
+        "catalogue.more all_effects.more calibration.read.records Kept.scalars Kept.channels",
+    "400 digits":
+        "simulate_many.workers Design.seed TetheredHeading.reset.seed TetheredHeadings.workers",
+    "{}":
+        "with_changes.changes catalogue.channels catalogue.more all_effects.more apply_extended.effects "
+        "extended_toml.effects unseen.effects plan_sweep.changes TetheredHeading.reset.options",
+    "empty dataset":
+        "with_changes.changes catalogue.channels catalogue.more all_effects.more apply_extended.effects "
+        "extended_toml.effects unseen.effects warnings_of.run plan_sweep.changes TetheredHeading.reset.options",
+    "text":
+        "Checkpoint.folder extended_toml.effects_file extended_toml.source calibration.read.scenario "
+        "calibration.read.commands plan_sweep.description",
+    "-1":
+        "with_onset.time with_free_onset.time with_free_onset.end TetheredHeading.propeller_rps turn.turn "
+        "TetheredHeading.step.action Current.at.time",
+    "{x: None}":
+        "TetheredHeading.reset.options",
+}  # fmt: skip
+"""Odd value → where it is none: function.argument."""
 
 
 def ahead(_: float) -> tuple[float, float, float]:
@@ -82,7 +126,9 @@ def calls() -> dict[str, tuple[Callable[..., Any], dict[str, Any]]]:
         "load_effects": (diagnosis.load_effects, {"path": missing}),
         "catalogue": (diagnosis.catalogue, {"channels": ["heading"]}),
         "all_effects": (diagnosis.all_effects, {}),
-        "apply_extended": (diagnosis.apply_extended, {"extended": diagnosis.Extended(), "setting": setting, "effects": {}}),
+        "apply_extended": (
+            diagnosis.apply_extended, {"extended": diagnosis.Extended(), "setting": setting, "effects": {}},
+        ),
         "extended_toml": (diagnosis.extended_toml, {"extended": diagnosis.Extended(), "setting": setting}),
         "read_extended": (diagnosis.read_extended, {"path": missing}),
         "unseen": (diagnosis.unseen, {"extended": diagnosis.Extended(), "effects": {}}),
@@ -138,58 +184,105 @@ def calls() -> dict[str, tuple[Callable[..., Any], dict[str, Any]]]:
     }  # fmt: skip
 
 
-def arguments_of(call, good):
+def arguments_of(call):
+    """Return the names of the arguments of a call; those of `Kept`, where it says none."""
     kinds = (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD)
     named = [name for name, one in inspect.signature(call).parameters.items() if one.kind not in kinds]
     return named or [one.name for one in dataclasses.fields(sweeps.Kept)]
 
 
-if __name__ == "__main__":
-    import collections
-    import os
-    import signal
-    import sys
-    import tempfile
-    import time
-    import warnings
-
-    warnings.simplefilter("ignore")
-
-    class Late(BaseException):
-        pass
-
-    def late(*_):
-        raise Late
-
-    signal.signal(signal.SIGALRM, late)
-    os.chdir(tempfile.mkdtemp())
-    n, raw, legal, slow = (
-        collections.Counter(),
-        collections.defaultdict(list),
-        collections.defaultdict(list),
-        [],
-    )
+def places():
+    """Give name, call, good arguments and the argument to replace, of every argument of every call."""
     for public, (call, good) in calls().items():
-        for name in arguments_of(call, good):
-            for odd, value in ODD.items():
-                t = time.perf_counter()
-                signal.alarm(3)
-                print(public, name, odd, file=sys.stderr, flush=True)
-                try:
-                    call(**good | {name: value})
-                    n["legal"] += 1
-                    legal[f"{public}.{name}"].append(odd)
-                except subzero.UserError as e:
-                    n["refused"] += 1
-                    m = str(e)
-                except (Exception, Late) as e:
-                    n["raw"] += 1
-                    raw[f"{public}.{name}"].append(f"{odd}: {type(e).__name__} {str(e)[:60]}")
-                if time.perf_counter() - t > 0.3:
-                    slow.append((public, name, odd, round(time.perf_counter() - t, 1)))
-    print(n)
-    print("RAW")
-    [print(k, v) for k, v in raw.items()]
-    print("LEGAL")
-    [print(k, v) for k, v in legal.items()]
-    print("SLOW", slow)
+        for name in arguments_of(call):
+            yield f"{public}.{name}", call, good, name
+
+
+def test_an_odd_value_in_any_place_is_refused_in_words_or_legal(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    legal = {(odd, place) for odd, listed in LEGAL.items() for place in listed.split()}
+    wrong, seen = [], 0
+    for place, call, good, name in places():
+        for odd, value in ODD.items():
+            seen += 1
+            try:
+                call(**good | {name: value})
+                wrong += [] if (odd, place) in legal else [f"{place} = {odd}: it is taken"]
+            except subzero.UserError as error:
+                is_wrong = (odd, place) in legal or not 10 < len(str(error)) < 2000
+                wrong += [f"{place} = {odd}: refused, {error}"] if is_wrong else []
+            except Exception as error:
+                wrong.append(f"{place} = {odd}: {type(error).__name__}: {str(error)[:80]}")
+    assert not wrong, "\n".join([f"{len(wrong)} of {seen}", *wrong])
+    assert seen > 3000
+
+
+@pytest.mark.parametrize(
+    "call, said",
+    [
+        (lambda: subzero.simulate("fig6", progress=[]),
+         "simulate: progress is []; it must be a function of 1 argument or None."),
+        (lambda: subzero.simulate("fig6", progress=lambda: None), "it must be a function of 1 argument or None."),
+        (lambda: subzero.simulate("fig6", tethered=1), "simulate: tethered is 1; it must be True or False."),
+        (lambda: subzero.simulate("fig6", every=float("nan")), "every is nan; it must be a finite number or None."),
+        (lambda: subzero.simulate("fig6", later=[(1.0, 2.0)]), "each a list of 2 (each a finite number or Model))."),
+        (lambda: subzero.open_run(np.zeros(2)), "open_run: path is array([0., 0.]); it must be a text or Path."),
+        (lambda: subzero.compare("fig6", measured=3), "measured is 3; it must be a text or Path or Record or None."),
+        (lambda: subzero.draw(5), "draw: runs is 5; it must be a mapping (each Dataset) or Dataset."),
+        (lambda: subzero.draw({"tethered": 5}), "draw: runs is {'tethered': 5}; it must be a mapping (each Dataset)"),
+        (lambda: subzero.export(xr.Dataset(), "x.mat"), "it must be a run, such as of subzero.simulate."),
+        (lambda: subzero.calibrate("x.csv", free=["rudder.lift_slope", 3]), "it must be a list (each a text)."),
+        (lambda: subzero.sweep("fig6", {"run.rtol": [0.0]}, out=np.datetime64("NaT")), "sweep: out is "),
+        (lambda: TetheredHeading(propeller_rps="fast"), "TetheredHeading: propeller_rps is 'fast'; it must"),
+    ],
+)  # fmt: skip
+def test_the_message_names_function_argument_value_and_what_is_allowed(call, said):
+    with pytest.raises(subzero.UserError) as caught:
+        call()
+    assert said in str(caught.value)
+
+
+class OwnPath(type(Path())):
+    """A path of somebody's own."""
+
+
+class OwnFloat(float):
+    """A number of somebody's own."""
+
+
+def test_right_values_of_every_kind_are_taken(tmp_path):
+    @checked_arguments
+    def taken(
+        number: float = 0.0,
+        count: int = 0,
+        flag: bool = True,
+        path: str | Path = "",
+        names: Sequence[str] = (),
+        more: Iterable[str] = (),
+        numbers: Sequence[float] | np.ndarray = (),
+        values: Mapping[str, float] | None = None,
+        progress: Callable[[float], None] | None = None,
+    ) -> bool:
+        return True
+
+    right = {
+        "number": (1, np.float32(1.0), np.int64(1), OwnFloat(1.0), Fraction(1, 3)),
+        "count": (3, np.int32(3), np.uint8(3), 10**400),
+        "flag": (False, np.bool_(True)),
+        "path": ("x", np.str_("x"), OwnPath("x"), tmp_path),
+        "names": ((), [], ["x"], ("x",), np.array(["x"]), UserList(["x"])),
+        "more": ({"x"}, {"x": 1}.keys(), (name for name in "xy"), ["x"]),
+        "numbers": ([1, 2.0], (np.float32(1.0),), np.zeros((2, 2)), range(3)),
+        "values": ({}, {"x": 1}, MappingProxyType({"x": np.float64(1.0)}), None),
+        "progress": (print, lambda _: None, lambda *_: None, functools.partial(print, "x"), [].append, None),
+    }
+    for name, values in right.items():
+        for value in values:
+            assert taken(**{name: value})
+
+
+def test_arguments_are_looked_at_in_microseconds():
+    begun = time.perf_counter()
+    for _ in range(1000):
+        cable.Current.uniform((0.1, 0.0, 0.0))
+    assert time.perf_counter() - begun < 1.0
