@@ -20,8 +20,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from subzero.arguments import checked_arguments
-from subzero.channels import BY_NAME, RENAMED_CHANNELS, TIME, check_is_run
+from subzero.arguments import check_is_run, checked_arguments
+from subzero.channels import BY_NAME, RENAMED_CHANNELS, TIME
 from subzero.errors import UserError, chosen, printable, short, suggestion
 from subzero.integrity import DamagedError, check_arrays, check_digest
 from subzero.user_file import UnreadableFileError, check_readable

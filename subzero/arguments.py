@@ -65,6 +65,16 @@ def checked_arguments(made: Made) -> Made:
     return typing.cast(Made, checking)
 
 
+def check_is_run(owner: str, run: Any) -> None:
+    """Refuse a dataset that is no run.
+
+    Raises:
+        BadValueError: it does not say which scenario was simulated.
+    """
+    if "scenario" not in run.attrs:
+        raise BadValueError(f"{owner}: run is {short(run)}; it must be a run, such as of subzero.simulate.")
+
+
 class _Names(dict[str, Any]):
     """The names of a module, with those that it imports for its annotations only."""
 

@@ -18,8 +18,6 @@ import math
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol, runtime_checkable
 
-from subzero.errors import BadValueError, short
-
 DEGREE = 180.0 / math.pi
 REVOLUTION = 1.0
 
@@ -184,16 +182,6 @@ class AnyRun(Protocol):
 
     def __getitem__(self, name: str, /) -> Any:
         """Return a variable; its ``values`` are an array."""
-
-
-def check_is_run(owner: str, run: AnyRun) -> None:
-    """Refuse a dataset that is no run.
-
-    Raises:
-        BadValueError: it does not say which scenario was simulated.
-    """
-    if "scenario" not in run.attrs:
-        raise BadValueError(f"{owner}: run is {short(run)}; it must be a run, such as of subzero.simulate.")
 
 
 class Observation(NamedTuple):

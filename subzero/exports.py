@@ -23,9 +23,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from subzero.arguments import checked_arguments
+from subzero.arguments import check_is_run, checked_arguments
 from subzero.atomic_output import friendly_errors
-from subzero.channels import CHANNELS, TIME, check_is_run
+from subzero.channels import CHANNELS, TIME
 from subzero.errors import UserError, chosen, printable
 from subzero.page.replay import cable_origin
 

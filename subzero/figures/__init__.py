@@ -11,8 +11,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from subzero.arguments import checked_arguments
-from subzero.channels import check_is_run
+from subzero.arguments import check_is_run, checked_arguments
 from subzero.errors import BadValueError
 from subzero.figures.cable import deployment, is_deployed, shape, tension
 from subzero.figures.forces import forces

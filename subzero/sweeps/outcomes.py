@@ -23,12 +23,10 @@ from subzero.channels import BY_NAME, AnyRun
 from subzero.errors import UserError, real, short, suggestion
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from subzero.dataset import PlainRun
 
-Function = Callable[["xr.Dataset"], Any]
-"""Of one's own: takes a run, returns a number, or numbers by name."""
+Function = Callable[[Any], Any]
+"""Of one's own: takes a run, a dataset of xarray, returns a number, or numbers by name."""
 
 STATISTICS: dict[str, Callable[[np.ndarray], float]] = {
     "max": lambda values: float(np.nanmax(values)),

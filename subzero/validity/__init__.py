@@ -17,8 +17,8 @@ import json
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from subzero.arguments import checked_arguments
-from subzero.channels import AnyRun, check_is_run
+from subzero.arguments import check_is_run, checked_arguments
+from subzero.channels import AnyRun
 from subzero.validity.limits import above_surface, actuators, below_sea_bed, bend_radius, strength
 from subzero.validity.numerics import (
     DRUM_PROOF,
