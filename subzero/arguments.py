@@ -24,6 +24,7 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from importlib import import_module
 from itertools import islice
 from numbers import Integral
+from pathlib import Path
 from types import NoneType, SimpleNamespace, UnionType
 from typing import Any, TypeVar
 
@@ -121,7 +122,11 @@ _KINDS: dict[Any, tuple[str, Callable[[Any], bool]]] = {
     bool: ("True or False", lambda value: isinstance(value, bool | np.bool_)),
     int: ("a whole number", lambda value: isinstance(value, Integral) and not isinstance(value, bool)),
     float: ("a finite number", lambda value: real(value) is not None),
-    str: ("a text", lambda value: isinstance(value, str)),
+    str: (
+        "a text",
+        lambda value: isinstance(value, str) and "\0" not in value,
+    ),  # no file can have such a name
+    Path: ("a Path", lambda value: isinstance(value, Path) and "\0" not in str(value)),
     NoneType: ("None", lambda value: value is None),
     Any: ("anything", lambda value: True),
     **dict.fromkeys((Mapping, dict), ("a mapping", lambda value: isinstance(value, Mapping))),
