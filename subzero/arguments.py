@@ -91,16 +91,14 @@ class _Names(dict[str, Any]):
 @functools.cache
 def _hints(function: Callable[..., Any]) -> dict[str, Any]:
     """Return argument → what it may be, of the arguments that have a place or a name of their own."""
-    parameters = inspect.signature(function).parameters.values()
-    single = {
-        one.name: one.annotation
-        for one in parameters
-        if one.kind not in (one.VAR_POSITIONAL, one.VAR_KEYWORD)
+    several = inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD
+    annotated = {
+        name: parameter.annotation
+        for name, parameter in inspect.signature(function).parameters.items()
+        if parameter.kind not in several and parameter.annotation is not parameter.empty
     }
-    annotations = SimpleNamespace(
-        __annotations__={k: v for k, v in single.items() if v is not inspect.Parameter.empty}
-    )
-    return typing.get_type_hints(annotations, {}, _Names(vars(builtins) | function.__globals__))
+    names = _Names(vars(builtins) | function.__globals__)
+    return typing.get_type_hints(SimpleNamespace(__annotations__=annotated), {}, names)
 
 
 def _is_list(value: Any) -> bool:

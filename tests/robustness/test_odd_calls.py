@@ -185,8 +185,8 @@ def calls() -> dict[str, tuple[Callable[..., Any], dict[str, Any]]]:
 def arguments_of(call):
     """Return the names of the arguments of a call; those of `Kept`, where it says none."""
     kinds = (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD)
-    named = [name for name, one in inspect.signature(call).parameters.items() if one.kind not in kinds]
-    return named or [one.name for one in dataclasses.fields(sweeps.Kept)]
+    named = [name for name, row in inspect.signature(call).parameters.items() if row.kind not in kinds]
+    return named or [field.name for field in dataclasses.fields(sweeps.Kept)]
 
 
 def places():
