@@ -21,6 +21,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from subzero.arguments import checked_arguments
 from subzero.errors import BadValueError, short
 from subzero.jit import allocating, inlined, inner
 
@@ -41,6 +42,7 @@ class Water(NamedTuple):
     velocity: np.ndarray
 
 
+@checked_arguments
 @dataclass(frozen=True, kw_only=True)
 class Current:
     """Velocity of the water on a grid.
@@ -78,21 +80,19 @@ class Current:
         object.__setattr__(self, "velocity", velocity)
 
     @classmethod
+    @checked_arguments
     def uniform(cls, velocity: Sequence[float] | np.ndarray) -> Current:
         """Return the same current everywhere and always: north, east, down (3,). [m/s]."""
-        numbers = _numbers("velocity", velocity)
-        if numbers.shape != (3,):
-            raise BadValueError(
-                f"current must be three finite numbers (north, east, down in m/s); got {short(velocity)}."
-            )
-        return cls(velocity=numbers.reshape(1, 1, 1, 1, 3))
+        return cls(velocity=_three("current", velocity).reshape(1, 1, 1, 1, 3))
 
     @classmethod
+    @checked_arguments
     def profile(cls, down: Sequence[float], velocity: Sequence[Sequence[float]]) -> Current:
         """Return a current that changes with depth: velocities (n, 3) [m/s] at n depths [m]."""
         return cls(down=_numbers("down", down), velocity=_numbers("velocity", velocity)[None, None, None])
 
     @classmethod
+    @checked_arguments
     def sampled(
         cls,
         function: WaterVelocity,
@@ -105,10 +105,8 @@ class Current:
         """Return the current that a function of (north, east, down, time) describes, sampled on a grid."""
         given = {"north": north, "east": east, "down": down, "time": time}
         grid = {name: np.atleast_1d(_numbers(name, points)) for name, points in given.items()}
-        if any(points.ndim != 1 for points in grid.values()) or not callable(function):
-            raise BadValueError(
-                "Current.sampled: give a function, and grid points as plain sequences of numbers."
-            )
+        if any(points.ndim != 1 for points in grid.values()):
+            raise BadValueError("Current.sampled: give grid points as plain sequences of numbers.")
         axes = [grid[name].tolist() for name in ("time", "north", "east", "down")]
         values = [
             [[[function(n, e, d, t) for d in axes[3]] for e in axes[2]] for n in axes[1]] for t in axes[0]
@@ -120,10 +118,13 @@ class Current:
         """Largest speed on the grid. [m/s]."""
         return float(np.linalg.norm(self.velocity, axis=-1).max())
 
+    @checked_arguments
     def at(self, place: Sequence[float] | np.ndarray, time: float = 0.0) -> np.ndarray:
         """Return the velocity (3,) at a place (north, east, down) [m] and time [s]. [m/s]."""
         values = self.velocity
-        for points, x in zip((self.time, self.north, self.east, self.down), (time, *place), strict=True):
+        for points, x in zip(
+            (self.time, self.north, self.east, self.down), (time, *_three("place", place)), strict=True
+        ):
             k = int(np.clip(np.searchsorted(points, x) - 1, 0, max(points.size - 2, 0)))
             f = np.clip((x - points[k]) / (points[k + 1] - points[k]), 0.0, 1.0) if points.size > 1 else 0.0
             values = values[k] if f == 0.0 else (1.0 - f) * values[k] + f * values[k + 1]
@@ -146,6 +147,14 @@ def _numbers(name: str, values: Any) -> np.ndarray:
     except (ValueError, TypeError, OverflowError):
         pass
     raise BadValueError(f"Current: {name} must be finite numbers; got {short(values)}.")
+
+
+def _three(name: str, values: Any) -> np.ndarray:
+    """Return three finite numbers as an array, or refuse what is none."""
+    numbers = _numbers(name, values)
+    if numbers.shape != (3,):
+        raise BadValueError(f"{name} must be three finite numbers (north, east, down); got {short(values)}.")
+    return numbers
 
 
 @inlined

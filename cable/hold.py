@@ -13,8 +13,9 @@ from cable.moving_end.equilibrium import hang, relax
 from cable.moving_end.segment_load import new_load
 from cable.moving_end.state import NOW, Line, new_line
 from cable.properties import CableProperties
-from cable.task import check_kinds, current_of
+from cable.task import current_of
 from cable.winch import Brake
+from subzero.arguments import checked_arguments
 from subzero.errors import UserError, real, short
 
 Place = Sequence[float] | np.ndarray
@@ -39,6 +40,7 @@ class HoldError(UserError, ValueError):
     """A cable that cannot be held so, or whose equilibrium was not found; the message says what to change."""
 
 
+@checked_arguments
 def hold(
     ends: Sequence[Place] | np.ndarray,
     length: float,
@@ -73,7 +75,6 @@ def hold(
             equilibrium found.
     """
     cable, water = CableProperties() if cable is None else cable, current_of(current)
-    check_kinds(cable=(cable, (CableProperties,)))
     places = _checked_ends(ends)
     length = _checked_length(places, length, cable)
     line = _between(places, length, _segments(length, segment_length))

@@ -19,6 +19,7 @@ from cable.properties import CableProperties
 from cable.schemes import Equation7, Lumped, MovingEnd, Options, Paper
 from cable.task import EQUILIBRIUM, EVERYTHING, Drum, MovingDrum, PullOut, Tow
 from cable.tow_path import Velocity
+from subzero.arguments import checked_arguments
 from subzero.errors import BadValueError, short, suggestion
 
 
@@ -69,6 +70,7 @@ SCHEMES: Mapping[str, Scheme] = {
 """Name → the scheme; the first is the default, and "paper" the usable reading of the paper's."""
 
 
+@checked_arguments
 def pull_out(
     tow_velocity: Velocity,
     duration: float,
@@ -125,6 +127,7 @@ def pull_out(
     return row.pull_out(task, options)
 
 
+@checked_arguments
 def tow(
     tow_velocity: Velocity,
     length: float,

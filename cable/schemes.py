@@ -16,6 +16,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
+from subzero.arguments import checked_arguments
 from subzero.errors import BadValueError, checked, short, suggestion, truth
 
 SHORTEST_S = 1e-9
@@ -108,6 +109,7 @@ class Equation7:
         _check_steps(self)
 
 
+@checked_arguments
 @dataclass(frozen=True, kw_only=True)
 class Paper:
     """The scheme of Feng & Allen (2004) as printed, (14)-(26): one new node a step, so a step is a segment.

@@ -17,11 +17,11 @@ from cable.history import Equilibrium
 from cable.properties import CableProperties
 from cable.schemes import SHORTEST_S
 from cable.tow_path import Velocity
-from cable.winch import Brake, ConstantTension, PayOutRate, Winch
-from subzero.errors import BadValueError, checked, short
+from cable.winch import Winch
+from subzero.arguments import checked_arguments
+from subzero.errors import checked
 
 Drum = DrumProperties | Winch
-DRUMS = (DrumProperties, PayOutRate, Brake, ConstantTension)
 START_LENGTH = 1e-6
 """A run "without cable" starts with this length in the water, so that there is a direction. [m]"""
 
@@ -31,6 +31,7 @@ EVERYTHING = frozenset({WINCH, MOVING_DRUM, UNEVEN_CURRENT, WET_LENGTH, EQUILIBR
 """What a task may ask for beyond a free drum on the shore, uniform water and no cable at the start."""
 
 
+@checked_arguments
 @dataclass(frozen=True, kw_only=True)
 class MovingDrum:
     """A drum that is carried, by a boat for example.
@@ -42,11 +43,6 @@ class MovingDrum:
 
     velocity: Velocity
     drum: Drum = field(default_factory=DrumProperties)
-
-    def __post_init__(self) -> None:
-        """Refuse what is no motion and what is no drum."""
-        _check_motion("MovingDrum: velocity", self.velocity)
-        check_kinds(**{"MovingDrum: drum": (self.drum, DRUMS)})
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -96,8 +92,6 @@ class PullOut:
         else:
             start = checked("", "start", start, least=0.0, unit="m, or what cable.hold gives")
         cable, drum = _cable_of(cable), DrumProperties() if drum is None else drum
-        check_kinds(drum=(drum, (*DRUMS, MovingDrum)))
-        _check_motion("tow_velocity", tow_velocity)
         return cls(
             tow_velocity=tow_velocity,
             duration=checked_duration(duration),
@@ -162,7 +156,6 @@ class Tow:
         Raises:
             subzero.UserError: what makes no sense by itself.
         """
-        _check_motion("tow_velocity", tow_velocity)
         return cls(
             tow_velocity=tow_velocity,
             length=checked("", "length", length, above=0.0),
@@ -176,16 +169,6 @@ class Tow:
     def tail_drag(self) -> float:
         """½ρC_dA of the drogue. [kg/m]."""
         return 0.5 * self.cable.water_density * self.drogue_drag_area
-
-
-def check_kinds(**wanted: tuple[object, tuple[type, ...]]) -> None:
-    """Refuse an argument, name → (value, kinds), that is of none of its kinds."""
-    for name, (value, kinds) in wanted.items():
-        if not isinstance(value, kinds):
-            words = " or ".join(kind.__name__ for kind in kinds)
-            raise BadValueError(
-                f"{name} is {short(value)}, of type {type(value).__name__}; it must be {words}."
-            )
 
 
 def checked_duration(value: float) -> float:
@@ -202,14 +185,4 @@ def current_of(current: Sequence[float] | np.ndarray | Current | None) -> Curren
 
 def _cable_of(cable: CableProperties | None) -> CableProperties:
     """Return the cable, that of Table 1 when none is given."""
-    cable = CableProperties() if cable is None else cable
-    check_kinds(cable=(cable, (CableProperties,)))
-    return cable
-
-
-def _check_motion(name: str, velocity: object) -> None:
-    """Refuse a motion that is no function of time."""
-    if not callable(velocity):
-        raise BadValueError(
-            f"{name} is {short(velocity)}; it must be a function of time that gives a velocity."
-        )
+    return CableProperties() if cable is None else cable

@@ -20,8 +20,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
+from subzero.arguments import check_is_run, checked_arguments
 from subzero.channels import BY_NAME, RENAMED_CHANNELS, TIME
-from subzero.errors import UserError, printable, short, suggestion
+from subzero.errors import UserError, chosen, printable, short, suggestion
 from subzero.integrity import DamagedError, check_arrays, check_digest
 from subzero.user_file import UnreadableFileError, check_readable
 from subzero.validity import RunWarning, warnings_of
@@ -51,6 +52,7 @@ TEXTS, TABLES, NUMBERS = (
 """Attributes of a run: words, words in JSON, numbers."""
 
 
+@checked_arguments
 def open_run(path: str | Path) -> xr.Dataset:
     """Return a run from the netCDF file that `simulate`, `compare`, `manoeuvre` or `autopilot` has written.
 
@@ -186,6 +188,7 @@ class RunPlots:
     """
 
     def __init__(self, run: xr.Dataset) -> None:
+        check_is_run("plot", run)
         self._run = run
 
     def tension(self) -> Figure:
@@ -237,14 +240,20 @@ class RunPlots:
 
         return shape(self._run, self._title())
 
+    @checked_arguments
     def channel(self, name: str) -> Figure:
-        """Return one channel over time."""
+        """Return one channel over time.
+
+        Raises:
+            UserError: the run has no such channel.
+        """
         from subzero.figures.style import channel_panel, headline, sheet, time_label
 
+        channel = chosen({key: row for key, row in BY_NAME.items() if key in self._run}, name, "channel")
         label = "tethered" if self._run.attrs["tethered"] else "untethered"
         figure, panels = sheet(1, 1, self._title())
         channel_panel(panels[0], {label: self._run}, name)
-        headline(panels[0], BY_NAME[name].long_name)
+        headline(panels[0], channel.long_name)
         time_label(panels, 1)
         return figure
 
@@ -256,6 +265,7 @@ class RunPlots:
         return Title(words=run.attrs["title"], scenario=run.attrs["scenario"], warnings=warns)
 
 
+@checked_arguments
 def figures_of(run: xr.Dataset, what: Sequence[str] | None = None) -> dict[str, Figure]:
     """Return figures of a run by name.
 
@@ -266,6 +276,7 @@ def figures_of(run: xr.Dataset, what: Sequence[str] | None = None) -> dict[str, 
     Raises:
         UserError: neither a figure nor a channel of this name.
     """
+    plots = RunPlots(run)
     for name in what or ():
         if name not in PLOTS and (name not in BY_NAME or name not in run):
             hint = suggestion(name, (*PLOTS, *BY_NAME))
@@ -273,7 +284,7 @@ def figures_of(run: xr.Dataset, what: Sequence[str] | None = None) -> dict[str, 
                 f"There is no figure and no channel {short(name)}.{hint} Figures: {', '.join(PLOTS)}; or a channel of "
                 "the run, such as heading, depth, cable_tension."
             )
-    plots, usual = RunPlots(run), PLOTS if run.attrs["tethered"] else UNTETHERED_PLOTS
+    usual = PLOTS if run.attrs["tethered"] else UNTETHERED_PLOTS
     return {name: getattr(plots, name)() if name in PLOTS else plots.channel(name) for name in what or usual}
 
 

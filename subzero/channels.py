@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 DEGREE = 180.0 / math.pi
 REVOLUTION = 1.0
@@ -172,6 +172,7 @@ def channel_of_column(column: str) -> Channel | None:
     return BY_COLUMN.get(column)
 
 
+@runtime_checkable
 class AnyRun(Protocol):
     """A run by the names of its variables: the dataset of `subzero.simulate`, or a `subzero.dataset.PlainRun`."""
 

@@ -32,6 +32,7 @@ import numpy as np
 
 from cable.memory import fits
 from cable.moving_end import enlarged
+from subzero.arguments import checked_arguments
 from subzero.atomic_output import DISK_FULL
 from subzero.engine.recording import BY_NODE, BY_TIME, Recording, Standing, new_recording, row_of
 from subzero.errors import UserError, checked, printable
@@ -50,6 +51,7 @@ class _UnreadableError(Exception):
     """A file of a checkpoint is not what was written."""
 
 
+@checked_arguments
 @dataclass(frozen=True, kw_only=True)
 class Checkpoint:
     """Where a run keeps where it stands, and how often.

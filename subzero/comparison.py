@@ -21,6 +21,7 @@ import numpy as np
 import xarray as xr
 
 import scenarios
+from subzero.arguments import checked_arguments
 from subzero.channels import BY_NAME, CHANNELS, HEADING, UNITS
 from subzero.engine.initial_conditions import Later
 from subzero.errors import UserError
@@ -99,6 +100,7 @@ class Comparison:
         return summary_of(self.runs, self.measured)
 
 
+@checked_arguments
 def compare(
     scenario: str | Path | scenarios.Trial,
     *,
@@ -251,6 +253,7 @@ class Refinement:
         return "\n".join([head, *lines[:10], *(["…"] if len(lines) > 10 else [])])
 
 
+@checked_arguments
 def check(
     scenario: str | Path | scenarios.Trial,
     model: Model | None = None,

@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from subzero.arguments import check_is_run, checked_arguments
 from subzero.atomic_output import friendly_errors
 from subzero.channels import CHANNELS, TIME
 from subzero.errors import UserError, chosen, printable
@@ -37,6 +38,7 @@ EPOCH = "2000-01-01 00:00:00"
 """Time 0 of a run in CF, which knows no time without a date."""
 
 
+@checked_arguments
 def export(run: xr.Dataset, path: str | Path, kind: str | None = None) -> None:
     """Write a run in another format.
 
@@ -48,6 +50,7 @@ def export(run: xr.Dataset, path: str | Path, kind: str | None = None) -> None:
     Raises:
         UserError: no such kind; its library is not installed; the file cannot be written.
     """
+    check_is_run("export", run)
     path = Path(path)
     write = writer_of(kind or {"nc": "cf"}.get(path.suffix[1:], path.suffix[1:]))
     try:

@@ -15,6 +15,7 @@ at each reset. ``gymnasium.make_vec("subzero/TetheredHeading-v0", num_envs=8)`` 
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from itertools import chain, repeat
 from math import cos, pi, radians, sin
@@ -22,8 +23,9 @@ from typing import Any
 
 import numpy as np
 
+from subzero.arguments import checked_arguments
 from subzero.channels import Observation
-from subzero.errors import UserError, whole
+from subzero.errors import BadValueError, UserError, checked, short, whole
 from subzero.model import load
 from subzero.simulator import RunStoppedError, Simulator
 
@@ -45,6 +47,9 @@ RUDDER_PRICE = 0.1
 MANY_EXCHANGES = 10
 """A step of so many exchanges of vehicle and cable, a second of fig6, takes 0.3 ms and more: from there on threads pay.
 One of a single exchange takes 0.05 ms, and to hand Python's lock over takes half of that. [-]"""
+
+MOST_ENVIRONMENTS = 100_000
+"""More of them are a slip of the pen: each takes a tenth of a megabyte and more. [-]"""
 
 LIMITS = {
     "sine of the heading error": (-1.0, 1.0),
@@ -74,6 +79,7 @@ class TetheredHeading(gymnasium.Env[np.ndarray, np.ndarray]):
 
     metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012  # as Gymnasium declares it
 
+    @checked_arguments
     def __init__(
         self,
         scenario: str = "fig6",
@@ -90,20 +96,22 @@ class TetheredHeading(gymnasium.Env[np.ndarray, np.ndarray]):
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (1,), dtype=np.float32)
         self._wanted, self._taken, self.seen = 0.0, 0, self._sim.observation
 
+    @checked_arguments
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[np.ndarray, dict[str, Any]]:
         """Begin again; a heading to turn to is drawn, or is options["turn"] [rad], from the one at the start."""
-        super().reset(seed=seed)
+        super().reset(seed=None if seed is None else whole("TetheredHeading.reset: seed", seed))
         drawn = self.np_random.uniform(-LARGEST_TURN, LARGEST_TURN)
+        turn = checked("TetheredHeading.reset", "turn", (options or {}).get("turn", drawn), unit="rad")
         self.seen = self._sim.reset()
-        self._wanted = self.seen.heading + float((options or {}).get("turn", drawn))
+        self._wanted = self.seen.heading + turn
         self._taken = 0
         return self._observed(), self._info()
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
         """Hold the rudder for one sample time."""
-        share = float(np.clip(np.asarray(action, dtype=float).reshape(-1)[0], -1.0, 1.0))
+        (share,) = _shares(action, 1)
         stopped = self.hold(share)
         return self._observed(), self.reward(share), stopped, self.is_over, self._info()
 
@@ -154,6 +162,18 @@ class TetheredHeading(gymnasium.Env[np.ndarray, np.ndarray]):
         return dict(zip(TRUTH, self.truth, strict=True))
 
 
+def _shares(actions: Any, count: int) -> list[float]:
+    """Return so many rudders, each as a share of its limit, or refuse what are none; plain code, as it is in loops."""
+    try:
+        if not isinstance(actions, Sequence) or len(actions) == count:
+            given = np.asarray(actions)
+            if given.size == count and given.dtype.kind in "iuf" and not np.isnan(given).any():
+                return [min(max(float(share), -1.0), 1.0) for share in given.reshape(-1).tolist()]
+    except (TypeError, ValueError, OverflowError):
+        pass
+    raise BadValueError(f"The action is {short(actions)}; it must be {count} numbers from -1 to 1.")
+
+
 class TetheredHeadings(gymnasium.vector.SyncVectorEnv):
     """Many environments, one after another or in threads: the compiled simulation lets go of Python's lock.
 
@@ -167,7 +187,9 @@ class TetheredHeadings(gymnasium.vector.SyncVectorEnv):
         **how: of each, see `TetheredHeading`.
     """
 
+    @checked_arguments
     def __init__(self, num_envs: int = 1, *, workers: int | None = None, **how: Any) -> None:
+        num_envs = int(checked("TetheredHeadings", "num_envs", num_envs, least=1, most=MOST_ENVIRONMENTS))
         super().__init__([lambda: TetheredHeading(**how)] * num_envs)
         self._ours: list[Any] = list(self.envs)
         if workers is None:
@@ -181,7 +203,7 @@ class TetheredHeadings(gymnasium.vector.SyncVectorEnv):
         self, actions: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         """Hold each rudder for one sample time, (num_envs, 1); return the same in arrays as each environment does."""
-        rudders = np.clip(np.asarray(actions, dtype=float).reshape(self.num_envs), -1.0, 1.0).tolist()
+        rudders = _shares(actions, self.num_envs)
         parts = self._map(self._held, self._parts, repeat(rudders))
         rewards, ended = map(np.array, zip(*chain.from_iterable(parts), strict=True))
         cut = np.array([one.is_over for one in self._ours])

@@ -24,13 +24,15 @@ import numpy as np
 import scenarios
 from cable import CableProperties, DrumProperties
 from cable.current import Current
-from subzero.errors import BadValueError, real, short, suggestion
+from subzero.arguments import checked_arguments
+from subzero.errors import BadValueError, short, suggestion
 from subzero.external_force import MissingForce
 from vehicle import Vehicle, VehicleError, from_mapping, to_mapping
 
 Part = TypeVar("Part", CableProperties, DrumProperties)
 
 
+@checked_arguments
 @dataclass(frozen=True, kw_only=True)
 class Model:
     """Everything physical about a tethered vehicle.
@@ -56,23 +58,11 @@ class Model:
     missing: MissingForce | None = None
 
     def __post_init__(self) -> None:
-        """Refuse parts that are none."""
-        for name, kind in PARTS.items():
-            part, optional = getattr(self, name), name in OPTIONAL
-            if not isinstance(part, kind) and not (optional and part is None):
-                words = kind.__name__ + (" or None" if optional else "")
-                raise BadValueError(f"Model: {name} is {short(part)}; it must be a {words}.")
-        try:
-            current = tuple(real(one) for one in self.current)
-        except TypeError:
-            current = ()
-        if len(current) != 3 or None in current:
-            raise BadValueError(
-                f"Model: current is {short(self.current)}; it must be three finite numbers, north, east, down in m/s."
-            )
-        object.__setattr__(self, "current", current)
+        """Keep the current as plain numbers."""
+        object.__setattr__(self, "current", tuple(map(float, self.current)))
 
     @classmethod
+    @checked_arguments
     def of(cls, trial: scenarios.Trial) -> Model:
         """Return the model that a trial describes.
 
@@ -127,19 +117,6 @@ def model_of(trial: scenarios.Trial, model: object = None) -> Model:
     return model
 
 
-PARTS = {
-    "vehicle": Vehicle,
-    "cable": CableProperties,
-    "drum": DrumProperties,
-    "profile": scenarios.Profile,
-    "winch": scenarios.Winch,
-    "vessel": scenarios.Vessel,
-    "missing": MissingForce,
-}
-"""Field of a model → what it must be."""
-OPTIONAL = ("profile", "winch", "vessel", "missing")
-
-
 def _made(kind: type[Part], numbers: Mapping[str, Any]) -> Part:
     """Return a cable or a drum from numbers by name; refuse names that it does not have."""
     known = [field.name for field in dataclasses.fields(kind)]
@@ -160,6 +137,7 @@ def _plain(value: Any) -> dict[str, Any] | None:
     return None if value is None else dataclasses.asdict(value)
 
 
+@checked_arguments
 def load(
     name_or_path: str | Path,
     *,

@@ -16,10 +16,11 @@ import numpy as np
 
 import scenarios
 from cable.moving_end import Names, describe_stop, enlarged
+from subzero.arguments import checked_arguments
 from subzero.convergence import Accuracy, Budget, Take, prove, run_converged
 from subzero.dataset import PlainRun, plain_run, tell_accuracy
 from subzero.engine import coupling
-from subzero.engine.initial_conditions import Later, checked_later, go_on_with, prepare, rows_of_changes
+from subzero.engine.initial_conditions import Later, go_on_with, prepare, rows_of_changes
 from subzero.engine.recording import (
     BY_NODE,
     Grid,
@@ -32,7 +33,7 @@ from subzero.engine.recording import (
     run_so_far,
 )
 from subzero.engine.time_loop import NO_ROOM, run_rows
-from subzero.errors import UserError, truth, whole
+from subzero.errors import UserError, whole
 from subzero.model import Model, load, model_of
 from subzero.provenance import code_digest, digest_of, processor, trial_digest
 from subzero.room import (
@@ -56,6 +57,7 @@ Progress = Callable[[float], None]
 """Called now and then with the fraction that is done, 0 to 1."""
 
 
+@checked_arguments
 def simulate(
     scenario: str | Path | scenarios.Trial,
     *,
@@ -93,7 +95,7 @@ def simulate(
     trial = scenario if isinstance(scenario, scenarios.Trial) else load(scenario)
     trial = trial if every is None else dataclasses.replace(trial, every=every)
     model = model_of(trial, model)
-    kept = with_fewer_results(trial, model, truth("tethered", tethered))
+    kept = with_fewer_results(trial, model, tethered)
     run = simulate_plainly(
         kept, tethered=tethered, model=model, later=later, checkpoint=checkpoint, progress=progress
     )
@@ -116,7 +118,7 @@ def simulate_plainly(
     Its results are all that the trial asks for, however many.
     """
     trial = scenario if isinstance(scenario, scenarios.Trial) else load(scenario)
-    model, tethered, later = model_of(trial, model), truth("tethered", tethered), checked_later(later)
+    model, tethered = model_of(trial, model), bool(tethered)
     with _kept(checkpoint, trial, model, tethered, later) as keeper:
         budget = Budget(trial.budget)
         run, accuracy = _as_fine_as_asked(trial, model, tethered, budget, progress, later, keeper)
@@ -152,6 +154,7 @@ def _kept(
         yield keeper
 
 
+@checked_arguments
 def simulate_many(
     trials: Sequence[str | Path | scenarios.Trial],
     *,

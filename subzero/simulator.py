@@ -24,12 +24,13 @@ import numpy as np
 
 import scenarios
 from scenarios.steps import whole_steps
+from subzero.arguments import checked_arguments
 from subzero.channels import Observation
 from subzero.engine import coupling
 from subzero.engine.initial_conditions import prepare
 from subzero.engine.recording import Recording, Run, cut, new_recording, record_row
 from subzero.engine.time_loop import ENDING, NO_ROOM, ROW, USED, advance, hold, observe
-from subzero.errors import UserError, real, short, truth
+from subzero.errors import UserError, real, short
 from subzero.model import Model, load, model_of
 from subzero.run_state import Live, Orders, Setup
 from subzero.simulation import WENT_WELL, in_words, more_room
@@ -95,6 +96,7 @@ class Simulator:
         observation: what is true now.
     """
 
+    @checked_arguments
     def __init__(
         self,
         scenario: str | Path | scenarios.Trial,
@@ -116,7 +118,7 @@ class Simulator:
         """
         self.trial = scenario if isinstance(scenario, scenarios.Trial) else load(scenario)
         self.model = model_of(self.trial, model)
-        self._tethered = truth("tethered", tethered)
+        self._tethered = bool(tethered)
         self._exchanges = _exchanges(self.trial, sample_time, self._tethered)
         self.sample_time = self._exchanges * self.trial.cable_step
         self.reset()

@@ -16,6 +16,7 @@ from threadpoolctl import threadpool_limits
 
 import scenarios
 from scenarios.parameters import changes_of, part_file, ranges_in, with_vehicle
+from subzero.arguments import checked_arguments
 from subzero.calibration import assessment, vehicle_file
 from subzero.calibration.fit import Fitted, fitted
 from subzero.calibration.numbers import USUAL, Number, full_name, numbers_of, with_free_numbers
@@ -30,6 +31,7 @@ from subzero.model import Model
 Given = Logged | str | Path
 
 
+@checked_arguments
 def calibrate(
     records: Given | Sequence[Given],
     scenario: str | Path | None = None,
@@ -70,6 +72,7 @@ def calibrate(
         return work.calibration(logged, names, vehicle, quick)
 
 
+@checked_arguments
 def read(
     records: Sequence[Given],
     scenario: str | Path | None,
@@ -96,6 +99,8 @@ def _with_vehicle(one: Logged, vehicle: str | Path) -> Logged:
 
 def _check(logged: Sequence[Logged]) -> None:
     """Refuse records that no number of one vehicle can be estimated from."""
+    if not logged:
+        raise UserError("No measured record is given. Give the path of a CSV file, or of a folder of them.")
     first = logged[0]
     for one in logged:
         if one.setting.trial.commands is None:

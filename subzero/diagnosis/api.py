@@ -24,6 +24,7 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from subzero.arguments import checked_arguments
 from subzero.channels import BY_NAME
 from subzero.diagnosis.assessment.goodness_of_fit import misfits
 from subzero.diagnosis.assessment.identifiability import detectability, with_whole_effects
@@ -59,7 +60,7 @@ from subzero.diagnosis.results import (
 )
 from subzero.diagnosis.verdict.conclude import conclude, decided
 from subzero.diagnosis.verdict.follow_up import follow_up, ranked, refuted_rivals
-from subzero.errors import UserError
+from subzero.errors import UserError, chosen, whole
 from subzero.model import Model
 from subzero.records.record import Record
 
@@ -75,6 +76,7 @@ Given = Logged | Record | str | Path
 Seen = Callable[[tuple[Detectability, ...]], None]
 
 
+@checked_arguments
 def diagnose(
     records: Given | Sequence[Given],
     model: str | Path | Model | None = None,
@@ -120,6 +122,7 @@ def _logged(records: Sequence[Given], model: str | Path | Model | None, commands
     return [dataclasses.replace(one, setting=dataclasses.replace(one.setting, model=model)) for one in found]
 
 
+@checked_arguments
 def diagnose_trials(
     records: Sequence[Logged],
     *,
@@ -140,8 +143,12 @@ def diagnose_trials(
         budget: one of BUDGETS.
 
     Raises:
-        UserError: the nominal model cannot be run through a trial.
+        UserError: no record, seed or budget; the nominal model cannot be run through a trial.
     """
+    if not records:
+        raise UserError("No measured record is given. Give the path of a CSV file, or of a folder of them.")
+    whole("seed", seed)
+    chosen(dict.fromkeys(BUDGETS), budget, "budget")
     effects = tuple(effects)
     asked: dict[str, Any] = {
         "effects": effects,

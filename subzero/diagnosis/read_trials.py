@@ -19,6 +19,7 @@ import numpy as np
 
 import scenarios
 from scenarios.heading import turned
+from subzero.arguments import checked_arguments
 from subzero.channels import BY_NAME, HEADING
 from subzero.diagnosis.hypothesis.catalogue.sensors import NOISE, SPECS
 from subzero.diagnosis.hypothesis.configuration import Setting
@@ -48,6 +49,7 @@ Simulated = Callable[[Setting, np.ndarray, Sequence[str]], Mapping[str, np.ndarr
 """(setting, times, channels) → channel → what the sensors would have measured."""
 
 
+@checked_arguments
 def read_trials(
     paths: Sequence[str | Path | Record] | str | Path | Record,
     *,

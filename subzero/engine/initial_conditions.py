@@ -15,7 +15,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import degrees
-from typing import Any
 
 import numba
 import numpy as np
@@ -46,7 +45,7 @@ from subzero.engine.external_wrench import feel_current, tow_point, way_of_tow_p
 from subzero.engine.prescribed_motion import knots
 from subzero.engine.recording import new_recording, record_row
 from subzero.engine.vehicle_step import pose
-from subzero.errors import BadValueError, UserError, printable, real, short
+from subzero.errors import UserError, printable
 from subzero.external_force import MissingForce
 from subzero.jit import Call, allocating, compile_beside, compiled, made_once
 from subzero.model import Model
@@ -367,16 +366,6 @@ CLOSE = 1e-6
 """A time of a change is that of a row if it is as near as this. [s]"""
 
 
-def checked_later(later: object) -> Later:
-    """Return times and models; refuse what are none."""
-    pairs: list[Any] = list(later) if isinstance(later, Sequence) else [later]
-    for pair in pairs:
-        good = isinstance(pair, Sequence) and len(pair) == 2
-        if not (good and real(pair[0]) is not None and isinstance(pair[1], Model)):
-            raise BadValueError(f"later holds {short(pair)}; it must hold pairs of a time [s] and a Model.")
-    return pairs
-
-
 def rows_of_changes(
     trial: scenarios.Trial, tethered: bool, times: np.ndarray, later: Later
 ) -> dict[int, Model]:
@@ -390,7 +379,7 @@ def rows_of_changes(
             f"'{trial.name}' has the scheme '{trial.scheme}'; only 'moving_end' can go on with another model."
         )
     changes = {}
-    for time, model in checked_later(later):
+    for time, model in later:
         row = int(np.argmin(np.abs(times - time)))
         if not abs(times[row] - time) < CLOSE:
             raise UserError(

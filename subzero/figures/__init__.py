@@ -11,6 +11,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from subzero.arguments import check_is_run, checked_arguments
+from subzero.errors import BadValueError
 from subzero.figures.cable import deployment, is_deployed, shape, tension
 from subzero.figures.forces import forces
 from subzero.figures.motion import attitude, figure_6, measured
@@ -39,13 +41,21 @@ __all__ = [
 ]
 
 
+@checked_arguments
 def draw(runs: Runs | xr.Dataset, record: Record | None = None) -> dict[str, Figure]:
     """Return the figures of some runs of one trial, by the name of their file.
 
     Args:
         runs: one run; or ``{"tethered": ..., "untethered": ...}``, or one of the two.
         record: what was measured, drawn as dots.
+
+    Raises:
+        UserError: a dataset that is no run, or nothing.
     """
+    if not runs:
+        raise BadValueError("draw: runs is empty; give a run, or runs by name.")
+    for run in runs.values() if isinstance(runs, dict) else (runs,):
+        check_is_run("draw", run)
     if not isinstance(runs, dict):
         runs = {"tethered" if runs.attrs["tethered"] else "untethered": runs}
     first = next(iter(runs.values()))

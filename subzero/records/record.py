@@ -28,6 +28,7 @@ import numpy as np
 
 from scenarios.heading import TURN, continuous, contradicted, expected, turned
 from scenarios.sampling import measurements_alone
+from subzero.arguments import checked_arguments
 from subzero.channels import BY_COLUMN, BY_NAME, HEADING, TIME
 from subzero.errors import UserError, listed, nearest, printable
 from subzero.errors import short as shown
@@ -83,6 +84,7 @@ class Record:
     intervals: Mapping[str, float] = field(default_factory=dict)
 
 
+@checked_arguments
 def read_record(path: str | Path) -> Record:
     """Read a measured record from a CSV file, and check all of it.
 

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Unpack
 import numpy as np
 
 import scenarios
+from subzero.arguments import checked_arguments
 from subzero.errors import UserError, short, suggestion, whole
 from subzero.sweeps.member import Member
 from subzero.sweeps.plan import Plan, Planned, plan_sweep
@@ -53,6 +54,7 @@ Progress = Callable[[Standing], None]
 """Told after every batch how far the sweep is."""
 
 
+@checked_arguments
 def sweep(
     scenario: str | Path | scenarios.Trial | Plan,
     parameters: Mapping[str, Any] | None = None,

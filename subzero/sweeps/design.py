@@ -27,6 +27,7 @@ import numpy as np
 
 import scenarios
 from scenarios.parameters import declared_ranges, parameter, parameter_unit, with_parameters
+from subzero.arguments import checked_arguments
 from subzero.errors import UserError, chosen, real, short, suggestion, whole
 
 MOST_MEMBERS = 20_000_000
@@ -371,6 +372,7 @@ COUNT_THEMSELVES = ("grid", "together")
 """Designs whose values say how many points they have."""
 
 
+@checked_arguments
 @dataclass(frozen=True, kw_only=True)
 class Design:
     """How the points of a sweep are chosen.

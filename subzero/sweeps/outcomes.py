@@ -18,16 +18,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from subzero.arguments import checked_arguments
 from subzero.channels import BY_NAME, AnyRun
 from subzero.errors import UserError, real, short, suggestion
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from subzero.dataset import PlainRun
 
-Function = Callable[["xr.Dataset"], Any]
-"""Of one's own: takes a run, returns a number, or numbers by name."""
+Function = Callable[[Any], Any]
+"""Of one's own: takes a run, a dataset of xarray, returns a number, or numbers by name."""
 
 STATISTICS: dict[str, Callable[[np.ndarray], float]] = {
     "max": lambda values: float(np.nanmax(values)),
@@ -68,6 +67,7 @@ DEFAULT_INTERVALS = 100
 """A run is kept at so many intervals where no `every` says otherwise."""
 
 
+@checked_arguments
 @dataclass(frozen=True, kw_only=True)
 class Kept:
     """What is asked for of each run.

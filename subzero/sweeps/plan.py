@@ -32,6 +32,7 @@ from typing import Any, TypedDict
 import scenarios
 from scenarios.files import Source, read_toml
 from scenarios.parameters import with_parameters
+from subzero.arguments import checked_arguments
 from subzero.errors import UserError, listed, printable, short, suggestion, truth
 from subzero.model import load
 from subzero.provenance import code_digest, trial_digest
@@ -107,6 +108,7 @@ class Planned(TypedDict, total=False):
     description: str
 
 
+@checked_arguments
 def plan_sweep(
     scenario: str | Path | scenarios.Trial,
     parameters: Mapping[str, Any],
@@ -142,7 +144,7 @@ def plan_sweep(
     """
     trial = scenario if isinstance(scenario, scenarios.Trial) else load(scenario)
     trial = with_parameters(trial, changes or {})
-    both = sorted(set(changes or {}) & set(parameters)) if isinstance(parameters, Mapping) else []
+    both = sorted(set(changes or {}) & set(parameters))
     if both:
         raise UserError(f"{', '.join(both)}: in changes and in parameters too. Keep one of them.")
     points = points_of(trial, parameters, design)
@@ -150,7 +152,7 @@ def plan_sweep(
         trial=trial,
         names=points.names,
         outcomes=outcomes_of(kept, trial.duration),
-        tethered=truth("tethered", tethered),
+        tethered=bool(tethered),
         code=code_digest(),
     )
     words = description or f"{len(points.values)} members of {trial.name}, {points.design.replace('_', ' ')}"

@@ -13,12 +13,13 @@ import numpy as np
 import scenarios
 from scenarios.heading import TURN
 from scenarios.steps import sample_times
+from subzero.arguments import checked_arguments
 from subzero.channels import HEADING, TIME, column_name
 from subzero.diagnosis.hypothesis.catalogue import START, catalogue
 from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.effect import Effect
 from subzero.diagnosis.hypothesis.hypotheses import with_tolerances
-from subzero.errors import UserError, printable
+from subzero.errors import UserError, checked, chosen, printable, whole
 from subzero.model import Model, load
 from subzero.records.consistency import REPORTED_COMMANDS
 from subzero.records.record import Record
@@ -63,6 +64,7 @@ def draw_hidden(
     return Hidden(effects=drawn, starts={chosen[0]: begins} if kind == "sudden" else {})
 
 
+@checked_arguments
 def challenge(
     scenario: str | Path | scenarios.Trial = "fig6",
     seed: int = 0,
@@ -83,6 +85,10 @@ def challenge(
     Raises:
         UserError: the motion is prescribed, or there is no truth for anything that was drawn.
     """
+    whole("challenge: seed", seed)
+    checked("challenge", "spread", spread, least=0.0)
+    if kind is not None:
+        chosen(KIND_PROBABILITIES, kind, "kind of challenge")
     trial = scenario if isinstance(scenario, scenarios.Trial) else load(scenario)
     if trial.commands is None:
         raise UserError(

@@ -12,6 +12,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
+from subzero.arguments import checked_arguments
 from subzero.diagnosis.hypothesis.effect import plain_id
 from subzero.diagnosis.report import words
 from subzero.errors import UserError, printable
@@ -78,6 +79,7 @@ def seal(answer: Answer) -> str:
     return json.dumps({"sha256": hashlib.sha256(text).hexdigest(), "sealed": packed}, indent=1) + "\n"
 
 
+@checked_arguments
 def reveal(folder: str | Path) -> Answer:
     """Return what is hidden in the record of a folder.
 

@@ -17,6 +17,8 @@ import json
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from subzero.arguments import check_is_run, checked_arguments
+from subzero.channels import AnyRun
 from subzero.validity.limits import above_surface, actuators, below_sea_bed, bend_radius, strength
 from subzero.validity.numerics import (
     DRUM_PROOF,
@@ -49,8 +51,10 @@ class RunWarning(NamedTuple):
     message: str
 
 
+@checked_arguments
 def check_run(run: AnyRun, trial: scenarios.Trial, model: Model) -> list[RunWarning]:
     """Return everything that may be wrong with a run of a trial with a model, in the order of `CHECKS`."""
+    check_is_run("check_run", run)
     return [RunWarning(name, words) for name, check in CHECKS.items() for words in check(run, trial, model)]
 
 
@@ -65,6 +69,7 @@ class _Supposed:
         return self._run[name]
 
 
+@checked_arguments
 def refinement_that_settles(run: AnyRun, trial: scenarios.Trial, model: Model) -> int:
     """Return how much finer a run would have to confirm the tow force so that no number is doubted any more.
 
@@ -84,6 +89,7 @@ def refinement_that_settles(run: AnyRun, trial: scenarios.Trial, model: Model) -
     return 0
 
 
+@checked_arguments
 def warnings_of(run: AnyRun) -> tuple[RunWarning, ...]:
     """Return the warnings that a run carries in its attributes; none from a version that did not know them."""
     told = json.loads(run.attrs.get("warnings", "[]"))

@@ -13,6 +13,7 @@ from functools import partial
 
 import numpy as np
 
+from subzero.arguments import checked_arguments
 from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.model import Model
 
@@ -119,6 +120,7 @@ ONSET_LINEAR_WITHIN_S = 0.5
 """Sensitivities hold as long as the time moves less than this. [s]"""
 
 
+@checked_arguments
 def with_onset(effect: Effect, time: float) -> Effect:
     """Return the effect as it begins at a time [s]: id "<id>@<time>". To be applied after all that hold throughout."""
     return replace(
@@ -135,6 +137,7 @@ def plain_id(name: str) -> str:
     return name.partition("@")[0]
 
 
+@checked_arguments
 def with_free_onset(effect: Effect, time: float, end: float) -> Effect:
     """Return the effect as it begins at about a time [s] of a trial until `end`: when exactly is its last parameter, as
     likely at any time.

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from subzero.arguments import checked_arguments
 from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.effect import Effect, Parameter, plain_id, with_onset
 from subzero.diagnosis.results import Extended
@@ -176,6 +177,7 @@ def variances_named(entries: Sequence[Entry], at: Sequence[int], kappa: float) -
     return np.array([max(one.scale, 2.0 * kappa * one.tolerance) ** 2 for one in own])
 
 
+@checked_arguments
 def apply_extended(extended: Extended, setting: Setting, effects: Mapping[str, Effect]) -> Setting:
     """Return a setting with an extended model; causes that begin in mid-trial hold from the next exchange on.
 
@@ -213,6 +215,7 @@ def _with_later(setting: Setting, effect: Effect, numbers: Mapping[str, float], 
     return replace(setting, later=(*setting.later, (start, changed)))
 
 
+@checked_arguments
 def unseen(extended: Extended, effects: Mapping[str, Effect]) -> list[str]:
     """Return the named causes of sensors and their clock, which change what is shown and not what is."""
     return [name for name in extended.deviations if effects[plain_id(name)].slot in ("sensors", "clock")]

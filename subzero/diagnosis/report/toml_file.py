@@ -38,6 +38,7 @@ import numpy as np
 
 from scenarios import ScenarioError
 from scenarios.files import Source, read_toml
+from subzero.arguments import checked_arguments
 from subzero.channels import RENAMED_CHANNELS
 from subzero.diagnosis.hypothesis.catalogue import all_effects
 from subzero.diagnosis.hypothesis.configuration import Setting
@@ -80,6 +81,7 @@ def force_key(axis: str) -> str:
     return "force_N" if axis in "XYZ" else "moment_N_m"
 
 
+@checked_arguments
 def text_of(
     extended: Extended,
     setting: Setting,
@@ -170,6 +172,7 @@ MOST_PARTS = 100
 """So many forces are read of one kind: a dozen for each axis and more; each costs in every step of a run."""
 
 
+@checked_arguments
 def read_extended(path: str | Path, effects: Iterable[Effect] = ()) -> ExtendedFile:
     """Read an extended model.
 

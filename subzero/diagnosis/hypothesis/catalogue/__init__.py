@@ -12,6 +12,7 @@ from functools import cache
 from importlib.metadata import entry_points
 from pathlib import Path
 
+from subzero.arguments import checked_arguments
 from subzero.diagnosis.hypothesis.catalogue import cable, fins, hull, propulsion, sensors
 from subzero.diagnosis.hypothesis.catalogue.sensors import NOISE, SAMPLED, SPECS, START
 from subzero.diagnosis.hypothesis.effect import Effect
@@ -24,6 +25,7 @@ ONSETS = (*fins.ONSETS, *hull.ONSETS, *propulsion.ONSETS)
 begin at. Neither is a tolerance of a healthy vehicle, and so no part of every fit."""
 
 
+@checked_arguments
 def catalogue(channels: Iterable[str], more: Iterable[Effect] = ()) -> dict[str, Effect]:
     """Return every effect by id, with those of the sensors of these channels."""
     shipped = (*propulsion.EFFECTS, *fins.EFFECTS, *hull.EFFECTS, *cable.EFFECTS)
@@ -34,11 +36,13 @@ def catalogue(channels: Iterable[str], more: Iterable[Effect] = ()) -> dict[str,
     return {effect.id: effect for effect in found}
 
 
+@checked_arguments
 def all_effects(more: Iterable[Effect] = ()) -> dict[str, Effect]:
     """Return every effect there is, by id: of the start, of all sensors, and what only begins in mid-trial, too."""
     return {**catalogue(sensors.SPECS, more), **{effect.id: effect for effect in (*START, SAMPLED, *ONSETS)}}
 
 
+@checked_arguments
 def load(path: str | Path) -> tuple[Effect, ...]:
     """Return the effects of a user's file, which is run.
 

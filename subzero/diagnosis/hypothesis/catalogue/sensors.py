@@ -14,6 +14,7 @@ from typing import NamedTuple
 from subzero.channels import BY_NAME
 from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.effect import Effect, Parameter
+from subzero.errors import chosen
 
 
 class Spec(NamedTuple):
@@ -67,7 +68,9 @@ def _clock(setting: Setting, seconds: float) -> Setting:
 
 def sensor_effects(channels: Iterable[str]) -> tuple[Effect, ...]:
     """Return scale, bias and lag of every channel."""
-    return tuple(effect for channel in channels for effect in _of(channel, SPECS[channel]))
+    return tuple(
+        effect for channel in channels for effect in _of(channel, chosen(SPECS, channel, "sensor of"))
+    )
 
 
 def _of(channel: str, spec: Spec) -> tuple[Effect, ...]:
