@@ -17,7 +17,14 @@ import json
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from subzero.validity.limits import above_surface, actuators, below_sea_bed, bend_radius, strength
+from subzero.validity.limits import (
+    above_surface,
+    actuators,
+    below_sea_bed,
+    bend_radius,
+    strength,
+    unstable_pitch,
+)
 from subzero.validity.numerics import (
     DRUM_PROOF,
     PROOF,
@@ -109,6 +116,7 @@ CHECKS: dict[str, Check] = {
     "strength": strength,
     "bend_radius": bend_radius,
     "actuators": actuators,
+    "unstable_pitch": unstable_pitch,
 }
 """Name → check; the names stand in ``summary.json`` and in the attributes of a run."""
 DOUBTS = ("energy_residual", "resolution", "tow_force", "ill_posed_drum", "slack", "closure", "push")
