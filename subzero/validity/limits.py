@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cable.doubts import ROUNDING
 from subzero.channels import DEGREE, AnyRun
 from subzero.steady_motion.hull_state_space import ACTUATORS, PLACE, STATES, SURGE, ideal, rate
 
@@ -38,8 +39,6 @@ def percent(share: float) -> str:
     return f"{100.0 * share:.3g} %"
 
 
-ROUNDING = 1e-6
-"""What is beyond surface or bed by less than this is at it. [m]"""
 TAUT = 1e-4
 """A bend counts where the cable pulls harder than this. [N]"""
 STRAIGHT = 1e-6
