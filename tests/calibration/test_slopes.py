@@ -7,7 +7,7 @@ needs no run, whose residual is a curve: a square; one that stays flat far out; 
 import numpy as np
 import pytest
 
-from subzero.calibration.fit import ends_checked
+from subzero.calibration.fit import ends_checked, is_settled
 from subzero.diagnosis import Effect, Parameter
 from subzero.diagnosis.inference import Fit, Problem, entries_of
 
@@ -88,6 +88,18 @@ def checked(kind):
     fit = Fit(z=np.zeros(1), r=r, J=np.array([[10.0]]), D=D, objective=0.5 * float(r @ r), converged=True,
               predicted_gain=0.0, fresh=0, made_at=np.zeros(1))  # fmt: skip
     return ends_checked(one, fit, np.array([[0.01]]), 1)
+
+
+@pytest.mark.parametrize(
+    "entry, off, free, settled", [(0, 0.5, 1, True), (0, 2.0, 1, False), (1, 2.0, 1, True)]
+)
+def test_a_fit_has_settled_if_the_whole_step_moves_no_calibrated_number(entry, off, free, settled):
+    """However little the damped step of a fit would gain; by so many standard deviations of 0.1; a start may move."""
+    one, D, z = problem(2, Straight), np.full(2, 100.0), np.zeros(2)
+    z[entry] = 0.1 * off
+    fit = Fit(z=z, r=one.residual(z), J=10.0 * np.eye(2), D=D, objective=0.0, converged=True, predicted_gain=0.0,
+              fresh=0, made_at=z)  # fmt: skip
+    assert is_settled(one, fit, 0.01 * np.eye(2), free) == settled
 
 
 def test_an_interval_at_whose_ends_the_posterior_has_not_fallen_is_widened():
