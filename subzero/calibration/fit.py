@@ -124,7 +124,7 @@ def fitted(problem: Problem, free: int, D: np.ndarray, progress: Progress) -> Fi
             break
         fit = _settled(problem, better, D)
     settled = better is None and is_settled(problem, fit, M, free)
-    wider = np.maximum(wider, spread)
+    wider = np.maximum(wider, spread) * wider_by_rows(problem, fit, M)
     M = wider[:, None] * M * wider
     return Fitted(problem=problem, fit=fit, M=M, settled=settled, repeated=repeated)
 
@@ -138,6 +138,36 @@ def is_settled(problem: Problem, fit: Fit, M: np.ndarray, free: int) -> bool:
     step = bounded_step(fit.J, fit.r, fit.z, fit.D, *bounds(problem))
     sd = np.sqrt(np.diag(M))
     return bool(np.max(np.abs(step[:free]) / sd[:free]) < np.sqrt(2.0 * SETTLED_GAIN))
+
+
+def wider_by_rows(problem: Problem, fit: Fit, M: np.ndarray) -> np.ndarray:
+    """Return by which factors intervals must be wider (k,) to hold what outliers that stand in a row say.
+
+    An outlier stands alone; several in a row, as in a transient, are what the model does not follow. A number that
+    would move if they were used depends on their being left out.
+    """
+    again = with_rows_of_outliers(problem)
+    if again is None:
+        return np.ones(fit.z.size)
+    J, r = again.central_jacobian(fit.z), again.residual(fit.z)
+    step = bounded_step(J, r, fit.z, fit.D, *bounds(again))
+    step -= bounded_step(fit.J, fit.r, fit.z, fit.D, *bounds(problem))
+    wider: np.ndarray = np.sqrt(1.0 + step**2 / np.diag(M))
+    return wider
+
+
+def with_rows_of_outliers(problem: Problem) -> Problem | None:
+    """Return the problem with the samples that were left out side by side; None if there are none."""
+    records, any_row = [], False
+    for one in problem.records:
+        noise = {}
+        for name, old in one.noise.items():
+            out = np.isfinite(one.values[name]) & ~old.used
+            row = out & (np.r_[False, out[:-1]] | np.r_[out[1:], False])
+            any_row |= bool(row.any())
+            noise[name] = replace(old, used=old.used | row, time=one.time[old.used | row])
+        records.append(replace(one, noise=noise))
+    return replace(problem, records=tuple(records)) if any_row else None
 
 
 def _first(
