@@ -3,6 +3,7 @@
     energy      what is missing in the balance of work and losses, as a share of them
     roughness   |F(t−h) − 2F(t) + F(t+h)| / max |F|: a tow force that jumps from sample to sample is not resolved
     slack       cable that is longer than the way between its nodes, or pulls at neither end of a segment
+    surface     cable above down = 0 and above its ends: in the air, if down is depth
 
 Pure functions of arrays; `subzero.validity` says the same of coupled runs, with times and remedies of its own.
 """
@@ -25,6 +26,8 @@ LIMP = 1e-6
 """A cable with less tension than this at both ends of a segment does not pull there. [N]"""
 SLACK_SHARE = 0.05
 """Slack is warned of from this share of the length on. [-]"""
+ROUNDING = 1e-6
+"""What is beyond surface or bed by less than this is at it. [m]"""
 FOLDED = 1e-3
 """A cable whose segments are shorter than their cable by more than this share is folded somewhere. [-]"""
 
@@ -55,6 +58,23 @@ def slack_share(length: np.ndarray, chord: np.ndarray, tension: np.ndarray) -> n
     limp = (tension[:, 1:] < LIMP) & (tension[:, :-1] < LIMP)
     share = np.where(limp, chord, 0.0).sum(axis=1) / length + folded
     return np.where(folded > FOLDED, np.clip(share, 0.0, 1.0), 0.0)
+
+
+def above_surface(shapes: Sequence[np.ndarray], held: Sequence[np.ndarray]) -> tuple[str, ...]:
+    """Say by how much a cable is above down = 0 and above the ends that it is held at; nothing if it is not.
+
+    Args:
+        shapes: node positions, an array (nodes, 3) a sample. [m]
+        held: of each sample, places that a cable is held at (ends, 3). [m]
+    """
+    above = [min(0.0, ends[:, 2].min()) - shape[:, 2].min() for shape, ends in zip(shapes, held, strict=True)]
+    if max(above) <= ROUNDING:
+        return ()
+    highest = min(float(shape[:, 2].min()) for shape in shapes)
+    return (
+        f"Part of the cable is above down = 0, by up to {-highest:.3g} m: where that is the surface, it is in the air, "
+        "and the equations know only water. Hold its ends deeper, or take a heavier cable.",
+    )
 
 
 def doubts_of(
@@ -93,7 +113,7 @@ def doubts_of(
             f"Up to {100.0 * share.max():.3g} % of the cable is slack (at {time[int(share.argmax())]:g} s): there its "
             "shape means nothing, and the tow force jumps when it comes taut."
         )
-    return tuple(found)
+    return (*found, *above_surface(shapes, [shape[:1] for shape in shapes]))
 
 
 def _share(length: float, shape: np.ndarray, tension: np.ndarray) -> float:

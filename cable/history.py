@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cable.current import Current
-from cable.doubts import SLACK_SHARE, doubts_of
+from cable.doubts import SLACK_SHARE, above_surface, doubts_of
 from cable.properties import CableProperties
 from subzero.errors import BadValueError, real, short
 from subzero.overview import Overview
@@ -253,10 +253,10 @@ class Equilibrium:
     @property
     def warnings(self) -> tuple[str, ...]:
         """Why the numbers may be wrong, in sentences; none if nothing is known against them."""
-        share = self.slack_length / self.length
+        share, high = self.slack_length / self.length, above_surface([self.shape], [self.shape[[0, -1]]])
         if share <= SLACK_SHARE:
-            return ()
-        return (f"{100.0 * share:.3g} % of the cable is slack: there its shape means nothing.",)
+            return high
+        return (f"{100.0 * share:.3g} % of the cable is slack: there its shape means nothing.", *high)
 
     def __repr__(self) -> str:
         """Return the cable at rest in a few lines."""

@@ -2,6 +2,7 @@
 
     run = subzero.simulate("fig6")                # or subzero.open_run("fig6/tethered.nc")
     run.subzero.plot.tension()                    # a matplotlib figure; so do .shape3d(), .motion(), .forces()
+    run.subzero.to_dataframe()                    # its channels as a table, one row for each time
     run.subzero.warnings                          # what may be wrong with it
     run.subzero                                   # the run in a few lines
 
@@ -28,6 +29,7 @@ from subzero.user_file import UnreadableFileError, check_readable
 from subzero.validity import RunWarning, warnings_of
 
 if TYPE_CHECKING:
+    import pandas as pd  # type: ignore[import-untyped]
     from matplotlib.figure import Figure
 
     from subzero.figures.style import Title
@@ -164,6 +166,11 @@ class RunAccessor:
     def warnings(self) -> tuple[RunWarning, ...]:
         """What may be wrong with the run; none is best."""
         return tuple(warnings_of(self._run))
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return the channels as a table, one row for each time; xarray's own has one for each node, term and axis."""
+        channels = [name for name, values in self._run.data_vars.items() if values.dims == (TIME.name,)]
+        return self._run[channels].to_dataframe()
 
     def __repr__(self) -> str:
         """Return the run in a few lines."""

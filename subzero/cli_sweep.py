@@ -204,6 +204,9 @@ def _in_words(standing: Standing) -> str:
     parts = [f"{standing.finished} of {standing.members} members"]
     if standing.rate > 0.0:
         parts += [f"{standing.rate:.3g}/s", f"{_span(standing.seconds_left)} left"]
+    member, seconds = standing.slowest
+    if member >= 0:
+        parts += [f"member {member} alone took {_span(seconds)}"]
     return ", ".join([*parts, *([f"{standing.failed} failed"] if standing.failed else [])])
 
 

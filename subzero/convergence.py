@@ -78,6 +78,7 @@ class Accuracy:
         proof_time: when that is largest. [s]
         proof_finer: how many times as fine that run is; 0 without a proof.
         budget_spent: the budget ended the refinement.
+        refinement_share: of the work of the run as it was asked for and of all finer ones, what these took. [-]
     """
 
     force_error: float
@@ -91,6 +92,7 @@ class Accuracy:
     proof_time: float = 0.0
     proof_finer: int = 0
     budget_spent: bool = False
+    refinement_share: float = 0.0
 
     @property
     def converged(self) -> bool:
@@ -118,11 +120,17 @@ class Budget:
 
     def __init__(self, seconds: float = 0.0) -> None:
         self._seconds, self._left, self.is_spent = seconds, 0.0, False
+        self._asked = self._spent = 0.0
+
+    @property
+    def share(self) -> float:
+        """Work of finer runs, as a share of that and of the run as it was asked for. [-]"""
+        return self._spent / max(self._asked + self._spent, 1.0)
 
     def grant(self, run: Run) -> None:
         """Make the budget that of a run as it was asked for."""
         seconds = self._seconds or max(BUDGET_RATIO * NODE_ITERATION_S * _iterated(run), LEAST_BUDGET_S)
-        self._left = seconds / NODE_ITERATION_S
+        self._left, self._asked = seconds / NODE_ITERATION_S, _iterated(run)
 
     def allows(self, like: Run, finer: float, times: float = 1.0) -> bool:
         """Return whether a run so many times as fine as another, of a share of its times, is within the budget."""
@@ -156,6 +164,7 @@ class Budget:
         run = _taken(take, trial, grid._replace(iterations=self._left / nodes), progress)
         if run is not None:
             self._left -= _iterated(run)
+            self._spent += _iterated(run)
             self.is_spent |= self._left <= 0.0
         return run
 

@@ -18,7 +18,7 @@ import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from itertools import chain, repeat
-from math import cos, pi, radians, sin
+from math import cos, degrees, pi, radians, sin
 from typing import Any
 
 import numpy as np
@@ -75,9 +75,10 @@ class TetheredHeading(gymnasium.Env[np.ndarray, np.ndarray]):
         propeller_rps: constant propeller command. [rev/s]
         tethered: with the cable.
         sample_time: of an action. [s]
+        render_mode: "rgb_array" for `render`.
     """
 
-    metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012  # as Gymnasium declares it
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array"]}  # noqa: RUF012  # as Gymnasium declares it
 
     @checked_arguments
     def __init__(
@@ -87,8 +88,11 @@ class TetheredHeading(gymnasium.Env[np.ndarray, np.ndarray]):
         propeller_rps: float = 25.0,
         tethered: bool = True,
         sample_time: float | None = None,
+        render_mode: str | None = None,
     ) -> None:
         self._sim = Simulator(load(scenario), tethered=tethered, sample_time=sample_time)
+        self.render_mode = render_mode
+        self.metadata = self.metadata | {"render_fps": round(1.0 / self._sim.sample_time)}
         self._propeller = float(propeller_rps)
         self._most = float(self._sim.model.vehicle.rudder_servo.deflection_limit)
         low, high = np.array(list(LIMITS.values()), dtype=np.float32).T
@@ -114,6 +118,32 @@ class TetheredHeading(gymnasium.Env[np.ndarray, np.ndarray]):
         (share,) = _shares(action, 1)
         stopped = self.hold(share)
         return self._observed(), self.reward(share), stopped, self.is_over, self._info()
+
+    def render(self) -> Any:
+        """Return the way, the cable, the tow point and the wanted heading from above (height, width, 3), or None."""
+        if self.render_mode is None:
+            return None
+        from subzero.figures import style
+        from subzero.figures.cable import in_scale
+
+        run = self._sim.result()
+        words = f"Heading {degrees(self.seen.heading):.0f}°, wanted {degrees(self._wanted):.0f}°"
+        figure, (axes,) = style.sheet(1, 1, style.Title(words=words, scenario=self._sim.trial.name))
+        way = run[["east", "north"]].to_array().values.T
+        if run.attrs["tethered"]:
+            way, cable = run["cable_position"].values[:, 0, 1::-1], run["cable_position"].values[-1]
+            axes.plot(cable[:, 1], cable[:, 0], color=style.BLUE, label="cable")
+        axes.plot(*way.T, color=style.GREY, linestyle=":", label="way of the tow point")
+        axes.plot(*way[-1], "o", color=style.INK, label="tow point")
+        axes.quiver(
+            *way[-1], sin(self._wanted), cos(self._wanted), color=style.ORANGE, label="wanted heading"
+        )
+        style.label(axes, "east [m]", "north [m]")
+        in_scale(axes)
+        style.legend(axes)
+        canvas: Any = figure.canvas
+        canvas.draw()
+        return np.asarray(canvas.buffer_rgba())[..., :3].copy()
 
     def hold(self, share: float) -> bool:
         """Hold the rudder at a share of its limit for one sample time; return whether the simulation stopped."""

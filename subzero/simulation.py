@@ -122,10 +122,12 @@ def simulate_plainly(
     with _kept(checkpoint, trial, model, tethered, later) as keeper:
         budget = Budget(trial.budget)
         run, accuracy = _as_fine_as_asked(trial, model, tethered, budget, progress, later, keeper)
+        if accuracy is not None:
+            accuracy = dataclasses.replace(accuracy, refinement_share=budget.share)
         result = plain_run(trial, model, tethered, run, accuracy, spends=True)
         if accuracy is not None and (finest := refinement_that_settles(result, trial, model)):
             found = prove(trial, _taker(model, keeper), run, accuracy, finest, budget, progress)
-            tell_accuracy(result, trial, model, found)
+            tell_accuracy(result, trial, model, dataclasses.replace(found, refinement_share=budget.share))
     if later:
         result.attrs["later"] = json.dumps([[time, changed.parameters()] for time, changed in later])
     return result

@@ -252,7 +252,8 @@ def manoeuvre(
     Args:
         name: one of `MANOEUVRES`.
         scenario: whose vehicle, cable and start; its commands are not used.
-        size: rudder or planes [degree], or the share of the propeller speed of a crash stop; the table's by default.
+        size: rudder or planes [degree], or the share of the propeller speed of a crash stop; by default the table's, as
+            far as the fins go.
         speed: of the bare hull in the straight run, which the propeller is set for. [m/s]
         tethered: with the cable.
         model: another model than the scenario's.
@@ -264,8 +265,7 @@ def manoeuvre(
     line = chosen(MANOEUVRES, name, "manoeuvre")
     trial = scenario if isinstance(scenario, scenarios.Trial) else load(scenario)
     model = model_of(trial, model)
-    asked = line.size if size is None else size
-    inner = _checked_size(line, asked, model)
+    inner = _checked_size(line, min(line.size, _largest(line, model)) if size is None else size, model)
     straight = tuple(trim(model, speed=speed).command.tolist())
     program = line.program(straight=straight, size=inner, name=name, sample_time=trial.cable_step)
     begin = replace(trial, start=replace(trial.start, surge_speed=speed), duration=RUN_IN + line.duration)
@@ -280,11 +280,16 @@ _NOTHING = Wanted(float("nan"), float("nan"))
 def _checked_size(line: Manoeuvre, asked: float, model: Model) -> float:
     """Return a size in radians (or as a share), if fins can do it."""
     size = checked("", "size", asked)
-    most = 5.0 if line.unit == "1" else degrees(model.vehicle.rudder_servo.deflection_limit)
+    most = _largest(line, model)
     if not 0.0 < abs(size) <= most:
         unit = "" if line.unit == "1" else " degrees"
         raise UserError(f"A size of {size:g}{unit} cannot be done. Allowed: up to {most:.3g}{unit}, not 0.")
     return size if line.unit == "1" else radians(size)
+
+
+def _largest(line: Manoeuvre, model: Model) -> float:
+    """Return the largest size that fins, or a propeller astern, can do. [degree; 1]"""
+    return 5.0 if line.unit == "1" else degrees(model.vehicle.rudder_servo.deflection_limit)
 
 
 def _inner(run: xr.Dataset) -> dict[str, np.ndarray]:

@@ -16,14 +16,14 @@ from subzero.autopilot.design import WEIGHTS, Gains, Schedule, Weights, checked,
 from subzero.autopilot.linear import linearise, subsystem
 from subzero.model import Model
 from subzero.steady_motion.trim import trim
-from subzero.steady_motion.trim_point import Trim
+from subzero.steady_motion.trim_point import Trim, held_speeds
 from vehicle.propeller import thrust
 
 if TYPE_CHECKING:
     import control
 
 SPEEDS = (0.4, 0.6, 0.8, 1.0, 1.2, 1.4)
-"""Speeds that gains are designed at. [m/s]"""
+"""Speeds that gains are designed at, if the hull holds them; else as many over the range that it holds. [m/s]"""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -58,13 +58,13 @@ class Tuning:
 
 
 def tune(
-    model: Model, *, speeds: tuple[float, ...] = SPEEDS, weights: Mapping[str, Weights] | None = None
+    model: Model, *, speeds: tuple[float, ...] | None = None, weights: Mapping[str, Weights] | None = None
 ) -> Tuning:
     """Return the gain schedule of a vehicle: linear models and gains at several speeds.
 
     Args:
         model: of the vehicle; its cable is not used.
-        speeds: increasing; beyond them the gains of the ends hold. [m/s]
+        speeds: increasing; beyond them the gains of the ends hold; by default those of `speeds_of`. [m/s]
         weights: loop → weights that replace those of `WEIGHTS`.
 
     Raises:
@@ -72,6 +72,7 @@ def tune(
         UserError: there is no such loop or weight, or a weight is not above 0.
     """
     weights = WEIGHTS | checked(dict(weights or {}))
+    speeds = speeds_of(model) if speeds is None else speeds
     trims = [trim(model, speed=speed) for speed in speeds]
     lines = [linearise(model, steady) for steady in trims]
     designs = {name: tuple(design_loop(line, weight) for line in lines) for name, weight in weights.items()}
@@ -97,6 +98,14 @@ def tune(
         sway_per_yaw=over_speed([_steady_turn(line)[0] for line in lines]),
         rudder_per_yaw=over_speed([_steady_turn(line)[1] for line in lines]),
     )
+
+
+def speeds_of(model: Model) -> tuple[float, ...]:
+    """Return `SPEEDS`, or where the hull holds one of them not, as many that it holds. [m/s]"""
+    slowest, fastest = held_speeds(model)
+    if slowest <= SPEEDS[0] and SPEEDS[-1] <= fastest:
+        return SPEEDS
+    return tuple(np.linspace(max(slowest, SPEEDS[0]), fastest, len(SPEEDS)).tolist()) if fastest else SPEEDS
 
 
 def design_loop(linear: control.StateSpace, weights: Weights) -> Gains:

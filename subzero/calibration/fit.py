@@ -81,7 +81,7 @@ class Fitted:
         problem: with the noise that was estimated behind the fit.
         fit: the most probable deviations.
         M: their covariance (k, k), inflated.
-        settled: no step would gain more.
+        settled: no step would move a calibrated number (`is_settled`), nor did one from the ends of an interval.
         repeated: another start ended in the same minimum.
     """
 
@@ -103,31 +103,71 @@ def fitted(problem: Problem, free: int, D: np.ndarray, progress: Progress) -> Fi
     """
     first, spread, repeated = _first(problem, free, D, progress)
     progress(0.5, "fit with usual noise")
-    fit, settled = _settled(problem, first, D)
+    fit = _settled(problem, first, D)
     for round in range(MAX_NOISE_ROUNDS):
         progress(0.6 + 0.1 * round, "noise behind the fit")
         again = with_noise_behind(problem, fit.z, D)
         if again is None:
             break
         problem = again
-        fit, settled = _settled(problem, fit.z, D)
+        fit = _settled(problem, fit.z, D)
     progress(0.8, "errors of the time steps")
     corrected = with_finer_steps(problem, fit.z)
     if corrected is not None:
         problem = corrected
-        fit, settled = _settled(problem, fit.z, D)
+        fit = _settled(problem, fit.z, D)
     for round in range(MAX_CHECKS):
         progress(0.85 + 0.05 * round, "ends of the intervals")
         M = covariance(problem, fit)
         wider, better = ends_checked(problem, fit, M, free)
         if better is None:
             break
-        fit, settled = _settled(problem, better, D)
-    else:
-        settled = False
-    wider = np.maximum(wider, spread)
+        fit = _settled(problem, better, D)
+    settled = better is None and is_settled(problem, fit, M, free)
+    wider = np.maximum(wider, spread) * wider_by_rows(problem, fit, M)
     M = wider[:, None] * M * wider
     return Fitted(problem=problem, fit=fit, M=M, settled=settled, repeated=repeated)
+
+
+def is_settled(problem: Problem, fit: Fit, M: np.ndarray, free: int) -> bool:
+    """Whether the whole step that the linear problem asks for moves no calibrated number out of its interval.
+
+    By less than √(2 `SETTLED_GAIN`) of its standard deviation, which is worth that gain. The damped steps of the fit
+    get as short as one likes, so what they promise says nothing; what a step does to sensors and starts is no matter.
+    """
+    step = bounded_step(fit.J, fit.r, fit.z, fit.D, *bounds(problem))
+    sd = np.sqrt(np.diag(M))
+    return bool(np.max(np.abs(step[:free]) / sd[:free]) < np.sqrt(2.0 * SETTLED_GAIN))
+
+
+def wider_by_rows(problem: Problem, fit: Fit, M: np.ndarray) -> np.ndarray:
+    """Return by which factors intervals must be wider (k,) to hold what outliers that stand in a row say.
+
+    An outlier stands alone; several in a row, as in a transient, are what the model does not follow. A number that
+    would move if they were used depends on their being left out.
+    """
+    again = with_rows_of_outliers(problem)
+    if again is None:
+        return np.ones(fit.z.size)
+    J, r = again.central_jacobian(fit.z), again.residual(fit.z)
+    step = bounded_step(J, r, fit.z, fit.D, *bounds(again))
+    step -= bounded_step(fit.J, fit.r, fit.z, fit.D, *bounds(problem))
+    wider: np.ndarray = np.sqrt(1.0 + step**2 / np.diag(M))
+    return wider
+
+
+def with_rows_of_outliers(problem: Problem) -> Problem | None:
+    """Return the problem with the samples that were left out side by side; None if there are none."""
+    records, any_row = [], False
+    for one in problem.records:
+        noise = {}
+        for name, old in one.noise.items():
+            out = np.isfinite(one.values[name]) & ~old.used
+            row = out & (np.r_[False, out[:-1]] | np.r_[out[1:], False])
+            any_row |= bool(row.any())
+            noise[name] = replace(old, used=old.used | row, time=one.time[old.used | row])
+        records.append(replace(one, noise=noise))
+    return replace(problem, records=tuple(records)) if any_row else None
 
 
 def _first(
@@ -210,11 +250,11 @@ def _fit_from(problem: Problem, z: np.ndarray, D: np.ndarray, shares: Sequence[f
             if not np.isfinite(misfit):
                 break
             factor = max(misfit / FIRST_MISFIT, 1.0)
-            fit, _ = _settled(with_more_noise(short, factor), z, D, is_first=True)
+            fit = _settled(with_more_noise(short, factor), z, D, is_first=True)
             z = fit.z
             if factor == 1.0 or factor * np.sqrt(np.mean(fit.r**2)) > FAILED_SHARE * misfit:
                 break
-    return _settled(problem, z, D, is_first=True)[0]
+    return _settled(problem, z, D, is_first=True)
 
 
 def beginnings(problem: Problem, share: float) -> Problem:
@@ -232,8 +272,8 @@ def beginnings(problem: Problem, share: float) -> Problem:
     return replace(problem, records=tuple(records))
 
 
-def _settled(problem: Problem, z: np.ndarray, D: np.ndarray, *, is_first: bool = False) -> tuple[Fit, bool]:
-    """Return a fit with sensitivities of its own, and whether a further step would gain nothing.
+def _settled(problem: Problem, z: np.ndarray, D: np.ndarray, *, is_first: bool = False) -> Fit:
+    """Return a fit with sensitivities of its own.
 
     A first one, which only leads to the next, takes fewer steps, and makes do with one-sided sensitivities close by.
 
@@ -267,9 +307,8 @@ def _settled(problem: Problem, z: np.ndarray, D: np.ndarray, *, is_first: bool =
             damping, harder = max(damping, FIRST_DAMPING) * harder, 2.0 * harder
         if share < FRESH_SHARE and not fresh:
             J, made_at = slopes(z), z
-    fit = Fit(z=z, r=r, J=J, D=D, objective=now, converged=left < SETTLED_GAIN, predicted_gain=left, fresh=0,
-              made_at=made_at)  # fmt: skip
-    return fit, fit.converged
+    return Fit(z=z, r=r, J=J, D=D, objective=now, converged=left < SETTLED_GAIN, predicted_gain=left, fresh=0,
+               made_at=made_at)  # fmt: skip
 
 
 def _apart(problem: Problem, z: np.ndarray, other: np.ndarray) -> float:

@@ -14,7 +14,7 @@ stands beside the diagnosis as possible, if it is not improbable.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -26,7 +26,7 @@ from threadpoolctl import threadpool_limits
 
 from subzero.arguments import checked_arguments
 from subzero.channels import BY_NAME
-from subzero.diagnosis.assessment.goodness_of_fit import misfits
+from subzero.diagnosis.assessment.goodness_of_fit import curves, misfits
 from subzero.diagnosis.assessment.identifiability import detectability, with_whole_effects
 from subzero.diagnosis.hypothesis.catalogue import load
 from subzero.diagnosis.hypothesis.data_error import DataError
@@ -53,6 +53,7 @@ from subzero.diagnosis.results import (
     DATA_ERROR,
     NOTHING_NEAR,
     UNDECIDED,
+    Curves,
     Detectability,
     FoundError,
     Rival,
@@ -427,11 +428,27 @@ def _with_errors(
     """
     share = EVEN if probability is None else probability
     errors = _told(records, one.errors, share)
+    curves = {
+        name: replace(own, recorded=_recorded(records, one.errors, name))
+        for name, own in after.curves.items()
+    }
     listed = {_beside(one.errors, name): share * p for name, p in after.probabilities.items()}
     words = " ".join(f"{error.record}: {error.sentence}: {error.remedy}." for error in errors)
     return replace(after, verdict=UNDECIDED if probability is None else DATA_ERROR, data_errors=errors,
                    then=after.verdict, sentence=f"{words} After that: {after.sentence}",
-                   probabilities=listed)  # fmt: skip
+                   probabilities=listed, curves=curves)  # fmt: skip
+
+
+def _recorded(
+    records: Sequence[Logged], found: Sequence[SuspectedError], name: str
+) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """Return channel → times and values as a record has them, of channels with errors in their data."""
+    return {
+        channel: (records[one.record].record.time, records[one.record].record.values[channel])
+        for one in found
+        for channel in (() if one.error.is_of_commands else one.error.channels)
+        if records[one.record].name == name
+    }
 
 
 def _with_possible(
@@ -452,13 +469,34 @@ def _with_possible(
     words = " and ".join(one.sentence for one in errors)
     rival = Rival(ids=tuple(one.id for one in errors), sentence=words, probability=probability,
                   discrimination=np.nan)  # fmt: skip
+    drawn = _with_planted(told.curves, records, more, further, f"rival: {_beside(more.errors, 'none')}")
     rivals = tuple(sorted([*told.rivals, rival], key=lambda one: -one.probability))
     ranked = dict(sorted(listed.items(), key=lambda pair: -pair[1]))
-    beside = replace(told, rivals=rivals, probabilities=ranked, sentence=f"{told.sentence} Or {words}.",
+    beside = replace(told, rivals=rivals, curves=drawn, probabilities=ranked, sentence=f"{told.sentence} Or {words}.",
                      data_errors=told.data_errors or errors)  # fmt: skip
     if probability <= 1.0 - NAMED_PROBABILITY or told.on_model == NOTHING_NEAR:
         return beside
     return replace(beside, then=UNDECIDED) if told.then else replace(beside, verdict=UNDECIDED)
+
+
+def _with_planted(
+    shown: Mapping[str, Curves],
+    records: Sequence[Logged],
+    more: Explained,
+    further: Sequence[SuspectedError],
+    label: str,
+) -> dict[str, Curves]:
+    """Return record → curves, also what explains the records without further errors, as recorded with these."""
+    found, made = dict(shown), curves(more.work.problem, {label: more.work.search.best().fit})
+    for i, one in enumerate(records):
+        own = made[one.name]
+        logged = replace(one, record=Record(source="", time=own.time, values=own.models[label]))
+        for each in further:
+            logged = each.error.planted(logged) if each.record == i else logged
+        time, values = logged.record.time, logged.record.values
+        model = {name: np.interp(shown[one.name].time, time, column) for name, column in values.items()}
+        found[one.name] = replace(shown[one.name], models={**shown[one.name].models, label: model})
+    return found
 
 
 def _beside(found: Sequence[SuspectedError], name: str) -> str:

@@ -5,12 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import isfinite
+from typing import TypeVar
 
 import numpy as np
 
 from subzero.channels import BY_NAME
 from subzero.external_force import MissingForce
 from subzero.overview import Overview
+
+Name = TypeVar("Name")
 
 NOTHING_WRONG, CALIBRATED, CAUSE_NAMED, UNDECIDED, OUTSIDE, NOTHING_NEAR, DATA_ERROR = (
     "nothing_wrong",
@@ -22,6 +25,14 @@ NOTHING_WRONG, CALIBRATED, CAUSE_NAMED, UNDECIDED, OUTSIDE, NOTHING_NEAR, DATA_E
     "data_error",
 )
 """The seven verdicts."""
+NAMED_FROM, MAX_NAMED = 0.01, 5
+"""What is less probable than that is not said to explain the records as well; so many explanations are named."""
+
+
+def worth_naming(probabilities: Mapping[Name, float]) -> list[Name]:
+    """Return the explanations that words and figures name where nothing is decided, at least two of them."""
+    ranked = sorted(probabilities, key=lambda name: -probabilities[name])[:MAX_NAMED]
+    return ranked[: max(sum(probabilities[name] >= NAMED_FROM for name in ranked), 2)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -286,12 +297,14 @@ class Curves:
         measured: channel → values, NaN in gaps.
         models: "nominal", "tolerance", "extended", "rival: <ids>" → channel → values.
         used: channel → which samples were used.
+        recorded: channel → times and values as they were before errors in its data were put right.
     """
 
     time: np.ndarray
     measured: Mapping[str, np.ndarray]
     models: Mapping[str, Mapping[str, np.ndarray]]
     used: Mapping[str, np.ndarray]
+    recorded: Mapping[str, tuple[np.ndarray, np.ndarray]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Mapping
+from itertools import cycle
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -22,8 +23,17 @@ from subzero.diagnosis.report.words import (
     number,
     sentences,
     something,
+    without_errors,
 )
-from subzero.diagnosis.results import UNDECIDED, ChannelGain, Curves, Misfit, Unknown, Verdict
+from subzero.diagnosis.results import (
+    UNDECIDED,
+    ChannelGain,
+    Curves,
+    Misfit,
+    Unknown,
+    Verdict,
+    worth_naming,
+)
 from subzero.figures import style
 from subzero.figures.style import Title, headline, label, legend, log_scale, sheet, time_label
 
@@ -270,7 +280,6 @@ MODEL_WORDS = {
 """What the models are called wherever they are drawn."""
 
 RIVAL = "rival: "
-MOST_RIVALS = 2
 BAND = 1.96
 """The noise band holds 95 % of what a right model leaves."""
 
@@ -323,12 +332,30 @@ class Drawn(NamedTuple):
         return sorted(found, key=lambda model: -self._probability(model)) or [CALIBRATED]
 
     @property
+    def named(self) -> list[str]:
+        """The explanations that are drawn: all that the words of an undecided verdict name; else those with curves."""
+        if self.verdict.on_model != UNDECIDED:
+            return self.ranked
+        words = worth_naming(self._probabilities)
+        return [model for model in self.ranked if self._key(model) in words]
+
+    @property
     def _is_rival(self) -> bool:
         """Whether "nothing is wrong", which the calibrated model stands for, is among what is left."""
         return self.verdict.on_model == UNDECIDED and self._probability(CALIBRATED) >= WORTH_A_LINE
 
     def _probability(self, model: str) -> float:
-        return self.verdict.probabilities.get(model.removeprefix(RIVAL).replace(CALIBRATED, "none"), 0.0)
+        return self._probabilities.get(self._key(model), 0.0)
+
+    @property
+    def _probabilities(self) -> dict[str, float]:
+        """Explanation → probability, without the errors in the data that are reported."""
+        return {without_errors(name, self.verdict): p for name, p in self.verdict.probabilities.items()}
+
+    @staticmethod
+    def _key(model: str) -> str:
+        """Return the explanation that a model stands for, as in `Verdict.probabilities`."""
+        return model.removeprefix(RIVAL).replace(CALIBRATED, "none")
 
     @property
     def best(self) -> str:
@@ -372,7 +399,7 @@ def misfit(drawn: Drawn, title: Title) -> Figure | None:
 def rivals(drawn: Drawn, title: Title) -> Figure | None:
     """Draw what it would have looked like if a rival were true: what was measured would lie on the rival's line."""
     curves, best = drawn.curves, drawn.best
-    names = [model for model in drawn.ranked if model in curves.models and model != best][:MOST_RIVALS]
+    names = [model for model in drawn.named if model in curves.models and model != best]
     if not names or not any(name.startswith(RIVAL) for name in (best, *names)):
         return None
     worst = sorted(curves.measured, key=lambda channel: -_apart(drawn, channel, names))[:6]
@@ -404,7 +431,9 @@ def _beside(axes: Axes, drawn: Drawn, channel: str, names: list[str]) -> None:
     smooth = _smooth(time, drawn.left(channel, best))
     axes.plot(time, smooth, color=style.INK, linewidth=0.9, alpha=0.6, label="measured")
     axes.axhline(0.0, **MODELS["extended"], label=drawn.words(best))
-    looks = zip(names, (style.GREEN, style.PURPLE), style.DASHES[1:], strict=False)
+    looks = zip(
+        names, (style.GREEN, style.PURPLE, style.AMBER, style.SKY), cycle(style.DASHES[1:]), strict=False
+    )
     for name, colour, dash in looks:
         apart = curves.models[name][channel] - curves.models[best][channel]
         axes.plot(curves.time, apart, color=colour, linestyle=dash, label=drawn.words(name))
@@ -422,12 +451,23 @@ def _overlay(axes: Axes, drawn: Drawn, channel: str) -> None:
         axes.plot(
             curves.time[left_out], values[left_out], "x", color=style.GREY, markersize=4, label="left out"
         )
+    wrong = _recorded_wrong(curves, channel)
+    if wrong.size:
+        axes.plot(*wrong.T, "x", color=style.ORANGE, markersize=4, label="as recorded")
     for name, look in drawn.shown.items():
         axes.plot(curves.time, curves.models[name][channel], label=drawn.words(name), **look)
     label(axes, None, f"${BY_NAME[channel].symbol}$ [{BY_NAME[channel].unit}]")
     _in_time(axes, curves)
-    if left_out.any():
+    if left_out.any() or wrong.size:
         _fit_to(axes, [values[used], *(one[channel] for one in curves.models.values())])
+
+
+def _recorded_wrong(curves: Curves, channel: str) -> np.ndarray:
+    """Return time and value of the samples that an error in the data befalls, as they were recorded (n, 2)."""
+    time, values = curves.recorded.get(channel, (np.empty(0), np.empty(0)))
+    right = set(zip(np.round(curves.time, 6), curves.measured[channel], strict=True))
+    pairs = zip(np.round(time, 6), values, strict=True)
+    return np.array([pair for pair in pairs if np.isfinite(pair[1]) and pair not in right]).reshape(-1, 2)
 
 
 def _residuals(axes: Axes, drawn: Drawn, channel: str) -> None:

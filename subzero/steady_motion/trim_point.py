@@ -25,7 +25,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
-from math import cos, degrees, floor, radians, sin, sqrt
+from math import ceil, cos, degrees, floor, radians, sin, sqrt
 from typing import NoReturn
 
 import numpy as np
@@ -38,6 +38,7 @@ from subzero.steady_motion.hull_state_space import (
     PITCH,
     ROLL,
     STATE_NAMES,
+    SURGE,
     VELOCITY,
     commands,
     demands,
@@ -205,7 +206,7 @@ def level_propeller(motion: Motion) -> float:
 STEPS = 20
 """A motion that is not found at once is approached in so many steps."""
 SLOWEST = 1e-2
-"""The largest speed that can be held is not looked for below this. [m/s]"""
+"""Speeds that can be held are not looked for below this. [m/s]"""
 PASSES = 6
 """How often hull and cable model are solved in turn: the pull hardly changes the attitude, three digits a pass."""
 
@@ -287,33 +288,48 @@ def steady_motion(model: Model, asked: Asked, pull_of: Pull | None = None) -> Tr
     try:
         return _trim(model, asked, pull_of)
     except NoTrimError as error:
-        is_level = not (asked.depth_rate or asked.turn_rate or asked.roll)
-        most = fastest(model, asked.speed, asked.wet_length) if is_level else 0.0
-        if not most:
+        slowest, most = held_speeds(model, asked.wet_length)
+        if slowest <= asked.speed <= most or not most:
             raise
         behind = f" on {asked.wet_length:g} m of cable" if asked.wet_length else ""
-        raise NoTrimError(
-            f"{error} Straight ahead{behind} the hull holds {floor(1e3 * most) / 1e3:g} m/s at most."
-        ) from None
+        held = f"{floor(1e3 * most) / 1e3:g} m/s at most"
+        if asked.speed < slowest:
+            held = f"{ceil(1e3 * slowest) / 1e3:g} m/s at least"
+        raise NoTrimError(f"{error} Straight ahead{behind} the hull holds {held}.") from None
 
 
-def fastest(model: Model, above: float, wet_length: float = 0.0) -> float:
-    """Return the largest speed below another that can be held straight and level, by halving; 0 if there is none. [m/s]
+def held_speeds(model: Model, wet_length: float = 0.0) -> tuple[float, float]:
+    """Return the slowest and the fastest speed that can be held straight and level, (0, 0) if there is none. [m/s]
 
-    Args:
-        model: vehicle and cable.
-        above: a speed that cannot be held. [m/s]
-        wet_length: of cable. [m]
+    Planes too small for the net buoyancy set the slowest, the propeller the fastest. A range that does not reach from
+    a speed to its double may be missed.
     """
-    low, high = 0.0, above
-    while high - low > 1e-3 * high and high > SLOWEST:
-        middle = 0.5 * (low + high)
-        try:
-            _trim(model, Asked(speed=middle, wet_length=wet_length))
-            low = middle
-        except NoTrimError:
-            high = middle
-    return low
+    speeds = [SLOWEST]
+    while 2.0 * speeds[-1] < FASTEST:
+        speeds.append(2.0 * speeds[-1])
+    held = [_is_held(model, speed, wet_length) for speed in speeds]
+    if not any(held):
+        return 0.0, 0.0
+    first, last = held.index(True), len(held) - 1 - held[::-1].index(True)
+    slowest = _edge(model, wet_length, speeds[first], speeds[first - 1]) if first else speeds[0]
+    return slowest, _edge(model, wet_length, speeds[last], (*speeds, FASTEST)[last + 1])
+
+
+def _is_held(model: Model, speed: float, wet_length: float) -> bool:
+    """Whether a speed can be held straight and level."""
+    try:
+        _trim(model, Asked(speed=speed, wet_length=wet_length))
+    except NoTrimError:
+        return False
+    return True
+
+
+def _edge(model: Model, wet_length: float, held: float, beyond: float) -> float:
+    """Return the last speed that is held on the way from one that is to one that is not, by halving. [m/s]"""
+    while abs(beyond - held) > 1e-3 * held:
+        middle = 0.5 * (held + beyond)
+        held, beyond = (middle, beyond) if _is_held(model, middle, wet_length) else (held, middle)
+    return held
 
 
 def _trim(model: Model, asked: Asked, pull_of: Pull | None = None) -> Trim:
@@ -361,13 +377,19 @@ def check_limits(hull: Vehicle, x: np.ndarray) -> None:
             f"the {one.name} would need {one.value:.3g} {one.unit}, its limit is {one.limit:.3g}"
             for one in beyond
         )
-        raise NoTrimError(f"There is no such steady motion: {said}. Ask for less speed, turn or depth rate.")
+        raise NoTrimError(
+            f"There is no such steady motion: {said}. Ask for less turn or depth rate, or another speed."
+        )
 
 
 def say_how_far(hull: Vehicle, x: np.ndarray, share: float) -> NoReturn:
     """Raise the error of a motion that has no balance."""
     check_limits(hull, x)
-    most = max(demands(hull, x), key=lambda one: one.value / one.limit)
+    if share == 0.0:
+        raise NoTrimError(
+            f"There is no such steady motion: not even straight and level do the forces balance at {x[SURGE]:g} m/s."
+        )
+    most = max(demands(hull, x), key=lambda demand: demand.value / demand.limit)
     raise NoTrimError(
         f"There is no such steady motion: there is no balance beyond {share:.0%} of the asked depth rate, turn rate and"
         f" roll, where the {most.name} stands at {most.value:.3g} {most.unit} (limit {most.limit:.3g}): they stall."

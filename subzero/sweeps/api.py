@@ -37,12 +37,15 @@ class Standing:
         members: all of them.
         failed: of those that are finished.
         rate: members a second since it began. [1/s]
+        slowest: number of the member that took longest since it began, and how long; −1 if none took much longer than
+            the others. [s]
     """
 
     finished: int
     members: int
     failed: int
     rate: float
+    slowest: tuple[int, float] = (-1, 0.0)
 
     @property
     def seconds_left(self) -> float:
@@ -170,19 +173,35 @@ class _Tally:
         self._store, self._members, self._progress = store, members, progress
         self._finished, self._before = finished, finished
         self._failed, self._begun = store.failures(), monotonic()
+        self._slowest, self._seconds = (-1, 0.0), 0.0
         self._tell()
 
     def keep(self, members: Sequence[Member]) -> None:
         self._store.add(members)
         self._finished += len(members)
         self._failed += sum(bool(one.reason) for one in members)
+        self._seconds += sum(one.seconds for one in members)
+        self._slowest = max(
+            self._slowest, *((one.index, one.seconds) for one in members), key=lambda pair: pair[1]
+        )
         self._tell()
 
     def _tell(self) -> None:
         if self._progress is not None:
-            rate = (self._finished - self._before) / max(monotonic() - self._begun, 1e-9)
+            count = self._finished - self._before
+            rate = count / max(monotonic() - self._begun, 1e-9)
+            others = (self._seconds - self._slowest[1]) / max(count - 1, 1)
+            from subzero.convergence import BUDGET_RATIO  # heavy, and there is no member without it
+
+            slowest = self._slowest if count > 1 and self._slowest[1] > BUDGET_RATIO * others else (-1, 0.0)
             self._progress(
-                Standing(finished=self._finished, members=self._members, failed=self._failed, rate=rate)
+                Standing(
+                    finished=self._finished,
+                    members=self._members,
+                    failed=self._failed,
+                    rate=rate,
+                    slowest=slowest,
+                )
             )
 
 

@@ -43,6 +43,7 @@ class Member:
         channels: (channels, times), float32; NaN if it failed.
         own: what a function of one's own returned, by name.
         seconds: how long it took, which is no part of a result. [s]
+        refinement_share: share of its work that runs with finer steps took. [-]
     """
 
     index: int
@@ -52,6 +53,7 @@ class Member:
     channels: np.ndarray
     own: dict[str, float]
     seconds: float
+    refinement_share: float = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -114,6 +116,7 @@ class Job:
             channels=channels_of(run, self.outcomes),
             own=own_numbers(run, self.outcomes.function),
             seconds=perf_counter() - begun,
+            refinement_share=json.loads(run.attrs["accuracy"]).get("refinement_share", 0.0),
         )
 
     def failed(

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 RESULT, TABLE = "sweep.nc", "members.csv"
 COMPRESSION = 4
 """Of zlib; more costs time and gains nothing. [-]"""
-TAKEN = ("member", "time", "failed", "reason", "warnings")
+TAKEN = ("member", "time", "failed", "reason", "warnings", "refinement_share")
 """Names of variables that no number of one's own may have."""
 MOST_DRAWN = 1000
 """So many members are kept in memory for the bands of a figure: the rank of what is drawn as the median is then right
@@ -165,8 +165,10 @@ def _head(file: Any, job: Job, points: Points, names: tuple[str, ...], attribute
             file, name, "f8", ("member",), {"units": unit_of(name), "long_name": name.replace("_", " ")}
         )
     _variable(file, "failed", "i1", ("member",), {"long_name": "1 where the run could not go on"})
-    for name, about in (("reason", "why it failed"), ("warnings", "checks that its run warns of")):
-        _variable(file, name, str, ("member",), {"long_name": about})
+    about = {"units": "1", "long_name": "share of its work that runs with finer steps took"}
+    _variable(file, "refinement_share", "f8", ("member",), about)
+    for name, words in (("reason", "why it failed"), ("warnings", "checks that its run warns of")):
+        _variable(file, name, str, ("member",), {"long_name": words})
     if job.outcomes.channels:
         file.createDimension("time", times.size)
         _variable(file, "time", "f8", ("time",), TIME.attributes)[:] = times
@@ -208,6 +210,7 @@ def _write_block(file: Any, block: list[Member], job: Job, found: Gathered) -> N
     for name, column in zip(found.names, found.scalars[at].T, strict=True):
         file[name][at] = column
     file["failed"][at] = found.failed[at]
+    file["refinement_share"][at] = [one.refinement_share for one in block]
     file["reason"][at] = np.array([one.reason for one in block], dtype=object)
     file["warnings"][at] = np.array([_checks(one) for one in block], dtype=object)
     if job.outcomes.channels:

@@ -30,10 +30,11 @@ TABLES = """
 CREATE TABLE IF NOT EXISTS manifest (key TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID;
 CREATE TABLE IF NOT EXISTS members (
     member INTEGER PRIMARY KEY, reason TEXT NOT NULL, warnings TEXT NOT NULL, own TEXT NOT NULL,
-    scalars BLOB NOT NULL, channels BLOB NOT NULL, seconds REAL NOT NULL, digest BLOB NOT NULL
+    scalars BLOB NOT NULL, channels BLOB NOT NULL, seconds REAL NOT NULL, refinement_share REAL NOT NULL,
+    digest BLOB NOT NULL
 );
 """
-COLUMNS = "member, reason, warnings, own, scalars, channels, seconds"
+COLUMNS = "member, reason, warnings, own, scalars, channels, seconds, refinement_share"
 """Of a row, in the order of its digest, which stands behind them."""
 OF_THE_DISK = (sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR, sqlite3.SQLITE_READONLY, sqlite3.SQLITE_CANTOPEN)
 """Errors of SQLite that are no fault of the file."""
@@ -77,13 +78,14 @@ class Store:
                 int(one.index), one.reason, json.dumps(one.warnings) if one.warnings else "",
                 json.dumps(one.own) if one.own else "", one.scalars.tobytes(),
                 b"" if one.reason else one.channels.tobytes(), float(one.seconds),
+                float(one.refinement_share),
             )
             for one in members
         ]  # fmt: skip
         with _told(self.path), self._file:
             self._file.execute("BEGIN")
             self._file.executemany(
-                f"INSERT OR IGNORE INTO members ({COLUMNS}, digest) VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
+                f"INSERT OR IGNORE INTO members ({COLUMNS}, digest) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)",
                 [(*row, _digest(row)) for row in rows],
             )
 
@@ -119,7 +121,7 @@ class Store:
             ).fetchall()
 
     def _member(self, row: Any) -> Member:
-        member, reason, warned, own, scalars, channels, seconds = row
+        member, reason, warned, own, scalars, channels, seconds, refinement_share = row
         shown = (
             np.frombuffer(channels, dtype=np.float32)
             if channels
@@ -133,6 +135,7 @@ class Store:
             channels=shown.reshape(self._shape),
             own=json.loads(own or "{}"),
             seconds=seconds,
+            refinement_share=refinement_share,
         )
 
 

@@ -19,7 +19,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from subzero.arguments import check_is_run, checked_arguments
 from subzero.channels import AnyRun
-from subzero.validity.limits import above_surface, actuators, below_sea_bed, bend_radius, strength
+from subzero.validity.limits import (
+    above_surface,
+    actuators,
+    below_sea_bed,
+    bend_radius,
+    strength,
+    unstable_pitch,
+)
 from subzero.validity.numerics import (
     DRUM_PROOF,
     PROOF,
@@ -115,6 +122,7 @@ CHECKS: dict[str, Check] = {
     "strength": strength,
     "bend_radius": bend_radius,
     "actuators": actuators,
+    "unstable_pitch": unstable_pitch,
 }
 """Name → check; the names stand in ``summary.json`` and in the attributes of a run."""
 DOUBTS = ("energy_residual", "resolution", "tow_force", "ill_posed_drum", "slack", "closure", "push")

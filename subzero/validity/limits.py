@@ -1,4 +1,4 @@
-"""Where the equations do not hold, or what was asked for cannot be: air, sea bed, strength, bends and actuators.
+"""Where the equations do not hold, or what was asked for cannot be: air, sea bed, strength, bends, actuators, pitch.
 
 Also the words for when and for how long, which all warnings share.
 """
@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cable.doubts import ROUNDING
 from subzero.channels import DEGREE, AnyRun
+from subzero.steady_motion.hull_state_space import ACTUATORS, PLACE, STATES, SURGE, ideal, rate
 
 if TYPE_CHECKING:
     import scenarios
@@ -37,8 +39,6 @@ def percent(share: float) -> str:
     return f"{100.0 * share:.3g} %"
 
 
-ROUNDING = 1e-6
-"""What is beyond surface or bed by less than this is at it. [m]"""
 TAUT = 1e-4
 """A bend counts where the cable pulls harder than this. [N]"""
 STRAIGHT = 1e-6
@@ -221,6 +221,49 @@ def _throughout(time: np.ndarray, at_limit: np.ndarray, short: float = SHORT) ->
         return f"from {begin:g} s on for {longest:.3g} s"
     most = longest > short and at_limit.mean() > MOST_OF_THE_RUN
     return f"for {percent(at_limit.mean())} of the run" if most else ""
+
+
+def unstable_pitch(run: AnyRun, _: scenarios.Trial, model: Model) -> list[str]:
+    """The nose goes far up or down although the planes are held still: the hull is unstable in pitch."""
+    if run.attrs["prescribed"]:
+        return []
+    time, pitch = run["time"].values, run["pitch"].values
+    steep = np.abs(pitch) > model.vehicle.stern_planes.stall_angle * DEGREE
+    if not steep.any():
+        return []
+    planes = np.stack([run[f"stern_plane_{side}_command"].values for side in ("port", "starboard")])
+    row = int(np.argmax(steep))
+    moved = np.flatnonzero(np.any(np.diff(planes[:, : row + 1]) != 0.0, axis=0))
+    since, speed = (
+        float(time[moved[-1] + 1] if moved.size else time[0]),
+        float(run["surge_speed"].values[row]),
+    )
+    growth = pitch_growth(model, speed) if speed > 0.0 else 0.0
+    if growth * (time[row] - since) < np.log(2.0):
+        return []
+    worst, deepest = pitch[np.abs(pitch).argmax()], float(run["depth"].values.max())
+    doubles = np.log(2.0) / growth
+    return [
+        f"The pitch passes {pitch[row]:.3g}° at {time[row]:g} s and reaches {worst:.3g}° (greatest depth: "
+        f"{deepest:.3g} m), with stern-planes that are held still from {since:g} s on: at {speed:.2g} m/s this hull "
+        f"is unstable in pitch, a deviation doubles in {doubles:.2g} s. Let an autopilot steer it (subzero autopilot)."
+    ]
+
+
+def pitch_growth(model: Model, speed: float) -> float:
+    """Return how fast pitch, heave and pitch rate of the hull, fins fixed, grow at most about level motion. [1/s]
+
+    The largest real part of the eigenvalues of ∂(θ', w', q')/∂(θ, w, q), below 0 of a stable hull.
+    """
+    numbers, level = ideal(model.vehicle).numbers(), np.zeros(len(STATES))
+    level[SURGE] = speed
+    kept = [PLACE[name] for name in ("pitch", "heave_speed", "pitch_rate")]
+    nudges = 1e-5 * np.eye(len(STATES))[kept]
+    pairs = [
+        rate(level + nudge, level[ACTUATORS], numbers) - rate(level - nudge, level[ACTUATORS], numbers)
+        for nudge in nudges
+    ]
+    return float(np.linalg.eigvals(np.array(pairs)[:, kept] / 2e-5).real.max())
 
 
 def _depth_of_start(run: AnyRun, model: Model) -> float:

@@ -28,6 +28,22 @@ def test_gymnasiums_own_checker_finds_nothing(env):
     check_env(env.unwrapped)
 
 
+@pytest.mark.parametrize("tethered", [True, False], ids=["tethered", "untethered"])
+def test_it_is_drawn_from_above_and_gymnasiums_checker_finds_nothing(tethered):
+    made = gymnasium.make("subzero/TetheredHeading-v0", render_mode="rgb_array", tethered=tethered)
+    check_env(made.unwrapped)
+    made.reset(seed=3)
+    first = made.render()
+    for _ in range(30):
+        made.step(np.ones(1, dtype=np.float32))
+    last = made.render()
+    assert first.dtype == np.uint8
+    assert first.shape == last.shape
+    assert first.shape[2] == 3
+    assert (first != last).any()
+    made.close()
+
+
 def episode(env, policy, turn=0.3):
     seen, info = env.reset(seed=3, options={"turn": turn})
     total, over = 0.0, False

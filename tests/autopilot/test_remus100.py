@@ -5,12 +5,15 @@ of the adjusted set (2001), and its cruise; and that it differs from another sim
 names. Tolerance: 2 % for coefficients, printed to three digits; 5 % for what is left when all terms are exchanged.
 """
 
+import re
+
 import numpy as np
 import pytest
 
 import subzero
 import vehicle
 from benchmarks.validation import remus
+from subzero import autopilot
 
 
 @pytest.fixture(scope="module")
@@ -63,6 +66,50 @@ def test_a_trial_takes_the_vehicle_by_its_name(tmp_path):
     run = subzero.simulate(trial, tethered=False)
     assert run.attrs["outcome"] == "completed"
     assert float(run["yaw_rate"][-1]) > 1.0
+
+
+@pytest.fixture(scope="module")
+def fig6(tmp_path_factory):
+    path = tmp_path_factory.mktemp("remus100") / "fig6.toml"
+    text = subzero.load_scenario("fig6").text.replace('"subzero2"', '"remus100"')
+    path.write_text(text, encoding="utf-8")
+    return subzero.load_scenario(path)
+
+
+def test_a_speed_too_slow_for_its_buoyancy_is_refused_with_the_slowest_that_it_holds(fig6):
+    """7 N of net buoyancy: at 1 m/s hull and planes have too little lift."""
+    with pytest.raises(autopilot.NoTrimError) as caught:
+        autopilot.manoeuvre("zigzag", fig6)
+    slowest = float(re.search(r"the hull holds ([0-9.]+) m/s at least", str(caught.value)).group(1))
+    autopilot.trim(subzero.Model.of(fig6), speed=slowest)
+    with pytest.raises(autopilot.NoTrimError):
+        autopilot.trim(subzero.Model.of(fig6), speed=0.99 * slowest)
+
+
+@pytest.mark.parametrize("name", autopilot.MANOEUVRES)
+def test_every_manoeuvre_flies_at_a_speed_that_it_holds(fig6, name):
+    run, measured = autopilot.manoeuvre(name, fig6, speed=2.0, tethered=False)
+    assert run.attrs["outcome"] == "completed"
+    assert np.isfinite(list(measured.values())).all()
+
+
+@pytest.mark.parametrize("pilot", ["pid", "lqr"])
+def test_an_autopilot_is_designed_at_speeds_that_it_holds_and_keeps_the_depth(fig6, pilot):
+    run, measured = autopilot.step(
+        "heading_step", fig6, speed=2.0, tethered=False, pilot=autopilot.Pilot(autopilot=pilot)
+    )
+    assert abs(measured["steady_error_deg"]) < 1.0
+    assert abs(run["depth"].values - 1.0).max() < 0.5
+    assert "unstable_pitch" not in {warning.check for warning in subzero.warnings_of(run)}
+
+
+def test_a_dive_that_planes_held_still_do_not_ask_for_is_warned_of(fig6):
+    run = subzero.simulate(fig6, tethered=False)
+    (said,) = [warning.message for warning in subzero.warnings_of(run)]
+    assert run["depth"].max() > 30.0
+    assert "stern-planes that are held still from 0 s on" in said
+    assert "unstable in pitch" in said
+    assert said.endswith("Let an autopilot steer it (subzero autopilot).")
 
 
 def test_nothing_unnamed_is_left_between_ours_and_the_other_simulator():

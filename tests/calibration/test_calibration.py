@@ -297,3 +297,15 @@ def test_twelve_numbers_off_by_up_to_40_percent_come_back(index):
     assert one["error"]["before"] > 2.0
     assert one["later_error"] < 1.2
     assert one["verdict"] == "calibrated"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("seed", "index", "verdict"), [(2, 6, "calibrated"), (1, 9, "nothing_near")])
+def test_a_fit_is_refused_where_numbers_would_move_and_not_where_sensors_would(seed, index, verdict):
+    """In the first, starts would gain 0.7 nat, and no number moves by 0.3 standard deviations; in the second, damped
+    steps had become so short that they promised nothing, while numbers were to move by 2 standard deviations: off by
+    8 from the truth, they were "determined".
+    """
+    from benchmarks.diagnosis.calibration import Case, result_of
+
+    assert result_of(Case(seed=seed, index=index))["verdict"] == verdict

@@ -64,8 +64,8 @@ def drawn():
 
 
 def fit_of(problem, D, start=0.0):
-    fit, settled = _settled(problem, np.full(D.size, start), D)
-    assert settled
+    fit = _settled(problem, np.full(D.size, start), D)
+    assert fit.converged
     return fit
 
 

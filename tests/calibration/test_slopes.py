@@ -4,12 +4,14 @@ Verifies: `Problem.central_jacobian`, `subzero.calibration.fit.ends_checked`. Co
 needs no run, whose residual is a curve: a square; one that stays flat far out; a line that is 0 elsewhere.
 """
 
+import dataclasses
+
 import numpy as np
 import pytest
 
-from subzero.calibration.fit import ends_checked
+from subzero.calibration.fit import ends_checked, is_settled, wider_by_rows
 from subzero.diagnosis import Effect, Parameter
-from subzero.diagnosis.inference import Fit, Problem, entries_of
+from subzero.diagnosis.inference import Fit, Noise, Problem, entries_of
 
 LOW, HIGH = -1.0, 2.0
 
@@ -90,6 +92,18 @@ def checked(kind):
     return ends_checked(one, fit, np.array([[0.01]]), 1)
 
 
+@pytest.mark.parametrize(
+    "entry, off, free, settled", [(0, 0.5, 1, True), (0, 2.0, 1, False), (1, 2.0, 1, True)]
+)
+def test_a_fit_has_settled_if_the_whole_step_moves_no_calibrated_number(entry, off, free, settled):
+    """However little the damped step of a fit would gain; by so many standard deviations of 0.1; a start may move."""
+    one, D, z = problem(2, Straight), np.full(2, 100.0), np.zeros(2)
+    z[entry] = 0.1 * off
+    fit = Fit(z=z, r=one.residual(z), J=10.0 * np.eye(2), D=D, objective=0.0, converged=True, predicted_gain=0.0,
+              fresh=0, made_at=z)  # fmt: skip
+    assert is_settled(one, fit, 0.01 * np.eye(2), free) == settled
+
+
 def test_an_interval_at_whose_ends_the_posterior_has_not_fallen_is_widened():
     wider, better = checked(Flat)
     assert better is None
@@ -100,6 +114,38 @@ def test_an_interval_of_a_normal_posterior_stays_as_it_is():
     wider, better = checked(Straight)
     assert better is None
     assert wider == pytest.approx([1.0], rel=1e-3)
+
+
+@dataclasses.dataclass(frozen=True)
+class Levels:
+    """A channel that shows a level of 0 with noise of 1, but for three samples that show 30 and were left out."""
+
+    time: np.ndarray
+    values: dict[str, np.ndarray]
+    noise: dict[str, Noise]
+
+
+class Level(Curve):
+    """The level that all samples show which are used."""
+
+    def whitened(self, record, setting, track, *, measured=False, true=None):
+        one = self.records[0]
+        return float(setting[0]) - one.values["depth"][one.noise["depth"].used]
+
+
+@pytest.mark.parametrize(
+    ("at", "factor"), [([10, 11, 12], np.sqrt(1.0 + 0.9**2 * 100.0)), ([10, 30, 50], 1.0)]
+)
+def test_an_interval_holds_what_outliers_in_a_row_would_make_of_it_and_not_what_single_ones_would(at, factor):
+    """100 samples: with the three the level is 0.9, nine of its standard deviations of 0.1 off."""
+    values, used, time = np.zeros(100), np.ones(100, bool), np.arange(100.0)
+    values[at], used[at] = 30.0, False
+    record = Levels(time, {"depth": values}, {"depth": Noise(white=1.0, used=used, time=time[used])})
+    one, D = dataclasses.replace(problem(1, Level), records=(record,)), np.array([1e6])
+    z = np.zeros(1)
+    fit = Fit(z=z, r=one.residual(z), J=np.ones((97, 1)), D=D, objective=0.0, converged=True, predicted_gain=0.0,
+              fresh=0, made_at=z)  # fmt: skip
+    assert wider_by_rows(one, fit, np.array([[0.01]])) == pytest.approx([factor], rel=1e-3)
 
 
 def test_what_is_better_at_the_end_of_an_interval_is_told():

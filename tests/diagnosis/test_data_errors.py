@@ -26,6 +26,8 @@ from subzero.diagnosis.inference import (
     may_be_measured,
     repeated_values,
 )
+from subzero.figures import Title
+from subzero.figures.diagnosis import draw_diagnosis
 from subzero.records.record import Record
 from subzero.synthetic.planted import USUAL, SensorErrors, draw_tolerances, make_record
 
@@ -177,7 +179,21 @@ def test_a_rounded_channel_that_froze_is_named_at_the_public_face():
         source="made", time=whole.time[short], values={name: one[short] for name, one in few.items()}
     )
     wrong = frozen(rounded(dataclasses.replace(measured("zigzag", 20262), record=record)), "heading", 12.0)
-    assert named(subzero.diagnose(wrong, budget="screen")) == {"frozen:heading"}
+    found = subzero.diagnose(wrong, budget="screen")
+    assert named(found) == {"frozen:heading"}
+    time, shown = crosses(found, "heading")
+    assert time[0] == pytest.approx(found.data_errors[0].since, abs=0.1 + 1e-6), "where the words say"
+    assert time[-1] == pytest.approx(wrong.record.time[-1]), "as far as the record goes"
+    assert len(set(shown)) == 1
+
+
+def crosses(found, channel):
+    """Return times and values that the panel of a channel marks as recorded wrongly."""
+    figure = draw_diagnosis(found, Title(words="a trial", scenario="zigzag"))["misfit"]
+    (curves,) = found.curves.values()
+    panel = figure.axes[2 * list(curves.measured).index(channel)]
+    (line,) = [one for one in panel.get_lines() if one.get_label() == "as recorded"]
+    return line.get_data()
 
 
 @pytest.mark.slow

@@ -55,6 +55,29 @@ def test_the_others_are_drawn_beside_the_most_probable():
     assert {"simulated", "if the hull drags more"} < set(overlay)
 
 
+def test_what_the_words_do_not_name_is_not_drawn_and_what_they_name_is():
+    """Two explanations to be told apart, one a drift of a sensor, and a third that is improbable but was fitted."""
+    shown = undecided()
+    drift = "hull_drag + sensor_drift:surge_speed"
+    curves = shown.curves["record"]
+    models = {**curves.models, f"rival: {drift}": curves.models["tolerance"]}
+    both = dataclasses.replace(
+        shown,
+        probabilities={"hull_drag": 0.75, drift: 0.25, "propeller_thrust_slope": 1e-5},
+        curves={"record": dataclasses.replace(curves, models=models)},
+    )
+    legend = draw_diagnosis(both, TITLE)["rivals"].axes[0].get_legend().get_texts()
+    words = [text.get_text().replace("\n", " ") for text in legend]
+    assert words[1:] == [
+        "if the hull drags more",
+        "if the hull drags more and the sensor of the surge speed drifts",
+    ]
+    assert (
+        "these records cannot tell apart: the hull drags more (0.750); "
+        in report.words.sentence(both).lower()
+    )
+
+
 def test_one_alone_has_nothing_beside_it():
     alone = dataclasses.replace(undecided(drawn=1), probabilities={"hull_drag": 1.0})
     assert "rivals" not in draw_diagnosis(alone, TITLE)

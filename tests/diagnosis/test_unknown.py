@@ -4,6 +4,7 @@ Configuration: fig6, 30 s, six channels with coloured noise, all parameters nomi
 """
 
 import dataclasses
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -32,6 +33,8 @@ from subzero.diagnosis.report import summary
 from subzero.synthetic.planted import draw_tolerances, make_record
 
 TIME = np.arange(0.0, 30.05, 0.1)
+
+UNDECIDED = Path(__file__).parents[1] / "data" / "undecided"
 
 
 def pulse(time):
@@ -158,6 +161,19 @@ def test_a_compass_that_wanders_by_many_levels_drifts_though_slow_noise_could_sa
     assert found.unknown.axis == "heading"
     middle = np.interp(10.0, found.unknown.time, found.unknown.force)
     assert middle == pytest.approx(size, rel=0.35), "its history is that beside its own noise"
+
+
+@pytest.mark.slow
+def test_every_explanation_that_an_undecided_verdict_names_has_its_curve():
+    """A vehicle that is softer in roll, and a speed log that drifts or does not: `tests/data/undecided`."""
+    found = subzero.diagnose(UNDECIDED / "fig6_soft_in_roll.csv", "fig6", budget="verdict")
+    named = [name for name, p in found.probabilities.items() if p >= 0.01]
+    assert found.verdict == "undecided"
+    assert "roll_stiffness + sensor_drift:surge_speed" in named
+    (curves,) = found.curves.values()
+    assert {f"rival: {name}" for name in named} == {
+        name for name in curves.models if name.startswith("rival: ")
+    }
 
 
 def test_a_moment_that_heels_the_hull_for_some_seconds_is_no_noise_of_the_roll_angle():

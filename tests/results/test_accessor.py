@@ -55,6 +55,14 @@ def test_the_shapes_in_space_are_those_of_the_run_and_down_is_down(run):
     assert axes.zaxis_inverted()
 
 
+def test_the_channels_are_a_table_of_one_row_for_each_time(run):
+    for one in (run, subzero.simulate("fig6", tethered=False), subzero.simulate("fig4")):
+        table = one.subzero.to_dataframe()
+        np.testing.assert_array_equal(table.index, one["time"])
+        np.testing.assert_array_equal(table["surge_speed"], one["surge_speed"])
+        assert "cable_node_tension" not in table
+
+
 def test_a_file_of_a_run_is_opened_and_drawn_again(run, tmp_path):
     run.to_netcdf(tmp_path / "tethered.nc")
     again = subzero.open_run(tmp_path / "tethered.nc")

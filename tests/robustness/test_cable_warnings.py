@@ -51,3 +51,26 @@ def test_a_cable_at_rest_that_nothing_pulls_says_that_it_has_no_shape(properties
     found = cable.hold(((0.0, 0.0, 0.0), (10.0, 0.0, 0.0)), 20.0, cable=properties)
     assert bool(found.warnings) == warns
     assert ("slack" in repr(found)) == warns
+
+
+BUOYANT = cable.CableProperties(mass_per_length=0.4, cross_section_area=4.91e-4, diameter=0.025)
+"""A quarter lighter than the water that it displaces."""
+
+
+def test_a_buoyant_cable_that_arches_out_of_the_water_says_how_high_it_is():
+    """Ends 1 m deep and 20 m apart, 30 m of cable: it floats up to 9 m above the surface."""
+    found = cable.hold(((0.0, 0.0, 1.0), (20.0, 0.0, 1.0)), 30.0, cable=BUOYANT)
+    (said,) = found.warnings
+    assert f"by up to {-found.shape[:, 2].min():.3g} m" in said
+    assert "in the air" in repr(found)
+    deep = cable.hold(((0.0, 0.0, 50.0), (20.0, 0.0, 50.0)), 30.0, cable=BUOYANT)
+    assert deep.warnings == ()
+
+
+@pytest.mark.parametrize("properties, warns", [(BUOYANT, True), (cable.CableProperties(), False)])
+def test_a_cable_that_floats_above_its_drum_and_tow_point_is_warned_of(properties, warns):
+    for run in (
+        cable.pull_out(straight, 10.0, cable=properties, start=10.0),
+        cable.tow(lambda t: (max(1.0 - 0.2 * t, 0.1), 0.0, 0.0), 10.0, 10.0, cable=properties),
+    ):
+        assert any("is above down = 0" in words for words in run.warnings) == warns

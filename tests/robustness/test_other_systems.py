@@ -57,7 +57,12 @@ run()
 def started(code, folder):
     env = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
     return subprocess.run(
-        [sys.executable, "-c", PRELUDE + code], cwd=folder, env=env, capture_output=True, text=True, timeout=600
+        [sys.executable, "-c", PRELUDE + code],
+        cwd=folder,
+        env=env,
+        capture_output=True,
+        text=True,
+        timeout=600,
     )
 
 

@@ -13,6 +13,7 @@ import signal
 import sqlite3
 import subprocess
 import sys
+import time
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from functools import partial
 
@@ -23,6 +24,7 @@ import xarray as xr
 import subzero
 from scenarios.parameters import with_parameters
 from subzero.cli import main
+from subzero.cli_sweep import _in_words
 from subzero.summary import summarise
 from subzero.sweeps import Design, Kept
 from subzero.sweeps.api import finished
@@ -593,3 +595,32 @@ def test_a_worker_that_is_at_a_task_ends_with_its_parent():
             parent.stderr.readline()
         parent.kill()
         assert parent.stderr.read() == b""  # ends when the last process that has the pipe has ended
+
+
+def lingering(run):
+    """A number of one's own that takes a second for the longest cable."""
+    time.sleep(1.0 if float(run["cable_length"][0]) > 9.0 else 0.0)
+    return 0.0
+
+
+def test_a_member_that_takes_much_longer_than_the_others_is_named_with_its_time():
+    seen = []
+    subzero.sweep(
+        "fig6", {"start.wet_length_m": [5.0]}, changes=SHORT, workers=Here()
+    )  # what is imported and compiled for the first member counts for none
+    subzero.sweep("fig6", {"start.wet_length_m": LENGTHS}, changes=SHORT, kept=Kept(function=lingering),
+                  workers=Here(), progress=seen.append)  # fmt: skip
+    member, seconds = seen[-1].slowest
+    assert member == LENGTHS.index(10.0)
+    assert 1.0 < seconds < 10.0
+    assert re.search(r"/s, .* left, member 2 alone took 1 s", _in_words(seen[-1]))
+    assert seen[0].slowest == (-1, 0.0)
+
+
+def test_each_member_keeps_which_share_of_its_work_finer_runs_took():
+    """A cross current on a cable that leaves its drum slack is ill-posed: its refinement ends with the budget."""
+    for asked, refined in ((0.0, False), (0.02, True)):
+        runs = subzero.sweep("fig6", {"water.current_east_m_s": [0.1]}, workers=Here(),
+                             changes={"run.duration_s": 3.0, "run.rtol": asked})  # fmt: skip
+        (share,) = runs["refinement_share"].values
+        assert (0.3 < share < 1.0) if refined else share == 0.0

@@ -15,6 +15,7 @@ from subzero.diagnosis.results import (
     CALIBRATED,
     CAUSE_NAMED,
     DATA_ERROR,
+    MAX_NAMED,
     NOTHING_NEAR,
     NOTHING_WRONG,
     OUTSIDE,
@@ -26,6 +27,7 @@ from subzero.diagnosis.results import (
     NextTrial,
     Unknown,
     Verdict,
+    worth_naming,
 )
 from subzero.external_force import FEATURES
 
@@ -57,10 +59,6 @@ ONE_SIDED = 0.25
 
 UNCHANGED = "No file was changed. All that follows is said of the records as they are once that is put right."
 
-NAMED_FROM = 0.01
-"""What is less probable than that is not said to explain the records as well."""
-MAX_NAMED = 5
-"""So many explanations are named in a sentence."""
 ALTERNATIVE_PROBABILITY = 0.1
 """A feature that is as probable in a formula, and not in the one that is told, is told too."""
 
@@ -262,10 +260,10 @@ def _within(verdict: Verdict) -> str:
 
 def _undecided(verdict: Verdict) -> str:
     """Return what the records allow, the most probable first."""
-    ranked = sorted(verdict.probabilities.items(), key=lambda item: -item[1])
-    known = sentences(verdict)
-    worth = sum(p >= NAMED_FROM for _, p in ranked[:MAX_NAMED])
-    shown = "; ".join(f"{explanation(name, known)} ({probability(p)})" for name, p in ranked[: max(worth, 2)])
+    known, chances = sentences(verdict), verdict.probabilities
+    shown = "; ".join(
+        f"{explanation(name, known)} ({probability(chances[name])})" for name in worth_naming(chances)
+    )
     more = len(verdict.rivals) - MAX_NAMED
     rest = f"; and {more} more that are less probable" if more > 0 else ""
     return f"These records cannot tell apart: {shown}{rest}."

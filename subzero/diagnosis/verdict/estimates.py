@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from subzero.diagnosis.assessment.goodness_of_fit import curves
 from subzero.diagnosis.assessment.identifiability import against, information, marginal
 from subzero.diagnosis.hypothesis.catalogue.sensors import SPECS
 from subzero.diagnosis.hypothesis.hypotheses import Ids, columns_of, variances
@@ -29,7 +30,7 @@ from subzero.diagnosis.inference.latent_force import AXIS_WORDS, DRIFT, FORCE, M
 from subzero.diagnosis.inference.linear_gaussian import KAPPAS, log_sum, posterior
 from subzero.diagnosis.inference.model_average import practical_causes
 from subzero.diagnosis.inference.posing import rewhitened
-from subzero.diagnosis.results import Cause, Estimate, Extended, Rival, Unknown
+from subzero.diagnosis.results import Cause, Curves, Estimate, Extended, Rival, Unknown
 
 if TYPE_CHECKING:
     from subzero.diagnosis.hypothesis.effect import Parameter
@@ -288,11 +289,9 @@ def of_unknown(work: Findings) -> Extension:
     """Return the extension by the most probable force, with the noise beside it; beside the drift of a sensor there is
     nothing new but causes.
     """
-    explanation, what = most_probable_force(work)
+    explanation, _ = most_probable_force(work)
+    found = _estimated(work, explanation)
     problem = explanation.own or work.problem
-    found = _estimated(work, explanation, what, problem)
-    if found.missing is None:
-        found = replace(found, fit=fit_beside_drift(problem, found, found.fit.D))
     deviations = by_effect(problem, found.fit.z, explanation.causes)
     calibration = by_effect(problem, found.fit.z, None, but=explanation.causes)
     extended = Extended(deviations=deviations, calibration=calibration, missing=found.missing)
@@ -311,16 +310,30 @@ def _as_formula(unknown: Unknown, formula: Formula) -> Unknown:
                    features={one: p for one, p in formula.features.items() if p >= MENTIONED_PROBABILITY})  # fmt: skip
 
 
-def _estimated(
-    work: Findings, explanation: OutOfCatalogue, what: LatentForceCandidate, problem: Problem
-) -> EstimatedForce:
-    """Return a force or a drift, fitted together with the causes that it was found with."""
+def curves_outside(work: Findings, explanation: OutOfCatalogue, label: str) -> dict[str, Curves]:
+    """Return record → curves of a force, or of a drift with what the sensor makes of it, as one model."""
+    found = _estimated(work, explanation)
+    made = curves(found.problem, {label: found.fit})
+    for i, record in enumerate(found.problem.records if found.missing is None else ()):
+        own = found.knots.record == i
+        made[record.name].models[label][found.unknown.axis] += np.interp(
+            record.time, found.knots.time[own], found.force[own]
+        )
+    return made
+
+
+def _estimated(work: Findings, explanation: OutOfCatalogue) -> EstimatedForce:
+    """Return a force or a drift, fitted beside the causes that it stands beside."""
+    problem = explanation.own or work.problem
     base = work.search.candidates[explanation.causes]
-    fit, D = rewhitened(base.fit, work.problem, problem), variances(problem.entries, base.ids, what.kappa)
+    assert isinstance(explanation.what, LatentForceCandidate)
+    kappa = explanation.what.kappa
+    fit, D = rewhitened(base.fit, work.problem, problem), variances(problem.entries, base.ids, kappa)
     kind, _, which = explanation.id.partition(":")
     if kind + ":" == FORCE:
         return estimate_force(problem, fit, which, D)
-    return estimate_drift(problem, fit, which, MAX_DRIFT_LEVELS * SPECS[which].noise, D)
+    found = estimate_drift(problem, fit, which, MAX_DRIFT_LEVELS * SPECS[which].noise, D)
+    return replace(found, fit=fit_beside_drift(problem, found, found.fit.D))
 
 
 def of_sudden(work: Findings, what: FittedChangePoint, cause: Cause) -> Extension:

@@ -41,6 +41,7 @@ from subzero.diagnosis.results import (
     Curves,
     Gain,
     NextTrial,
+    worth_naming,
 )
 from subzero.diagnosis.verdict.conclude import (
     ClosestRival,
@@ -54,6 +55,7 @@ from subzero.diagnosis.verdict.conclude import (
 from subzero.diagnosis.verdict.estimates import (
     Extension,
     cause_of,
+    curves_outside,
     name,
     of_causes,
     of_nothing,
@@ -66,8 +68,8 @@ if TYPE_CHECKING:
     from subzero.diagnosis.inference.map_fit import Candidate, Fit
     from subzero.diagnosis.inference.model_search import Search
 
-RIVALS_DRAWN = {CAUSE_NAMED: 1, OUTSIDE: 1, UNDECIDED: 3, NOTHING_NEAR: 1, CALIBRATED: 0, NOTHING_WRONG: 0}
-"""Verdict → so many rivals are drawn: of what is undecided, the best and two more."""
+RIVALS_DRAWN = {CAUSE_NAMED: 1, OUTSIDE: 1, NOTHING_NEAR: 1, CALIBRATED: 0, NOTHING_WRONG: 0}
+"""Verdict → so many rivals are drawn; of what is undecided all that is named."""
 MAX_SURVIVORS = 4
 """At most so many hypotheses are to be told apart by the next trial."""
 
@@ -106,7 +108,7 @@ def follow_up(findings: Findings, known: Ranked) -> FollowUp:
         next_trial=_next_trial(findings, left, known.probabilities)
         if is_full and verdict == UNDECIDED
         else None,
-        curves=_curves(findings, verdict, new, [one.ids for one in others if one.ids]),
+        curves=_curves(findings, verdict, new, known, [one.ids for one in others if one.ids]),
     )
 
 
@@ -251,19 +253,31 @@ def _next_trial(
     return next_trial(findings.problem, few, probabilities=weights, seed=findings.seed)
 
 
-def _curves(findings: Findings, verdict: str, new: Extension, rivals: Sequence[Ids]) -> dict[str, Curves]:
+def _curves(
+    findings: Findings, verdict: str, new: Extension, known: Ranked, rivals: Sequence[Ids]
+) -> dict[str, Curves]:
     """Return record → curves of the nominal model, of the refits, and of as many rivals as are drawn, in their order:
-    causes that hold throughout, and those that began in mid-trial, each with the problem that it was fitted in.
+    causes that hold throughout, those that began in mid-trial, forces and drifts, each with the problem that it was
+    fitted in.
     """
     candidates = findings.search.candidates
     late: dict[Ids, FittedChangePoint] = {(one.id,): one for one in _change_points(findings)}
     fits: dict[str, Fit | None] = {"nominal": None, "tolerance": candidates[()].fit}
     fits |= {"extended": new.fit} if verdict in (CAUSE_NAMED, OUTSIDE) else {}
-    drawn = [ids for ids in rivals if ids in candidates or ids in late][: RIVALS_DRAWN[verdict]]
+    outside = {(*one.causes, one.id): one for one in findings.out_of_catalogue}
+    if verdict == UNDECIDED:
+        drawn = [ids for ids in worth_naming(known.probabilities) if ids]
+    else:
+        drawn = [ids for ids in rivals if ids in candidates or ids in late][: RIVALS_DRAWN[verdict]]
     fits |= {f"rival: {name(ids)}": candidates[ids].fit for ids in drawn if ids in candidates}
     found = curves(new.problem, fits)
-    for begun in (late[ids] for ids in drawn if ids not in candidates):
-        own = curves(begun.problem, {f"rival: {begun.id}": begun.fit})
+    for ids in (ids for ids in drawn if ids not in candidates and (ids in late or ids in outside)):
+        label = f"rival: {name(ids)}"
+        what = late.get(ids) or outside[ids].what
+        if isinstance(what, FittedChangePoint):
+            own = curves(what.problem, {label: what.fit})
+        else:
+            own = curves_outside(findings, outside[ids], label)
         found = {record: replace(one, models={**one.models, **own[record].models})
                  for record, one in found.items()}  # fmt: skip
     return found
