@@ -85,7 +85,7 @@ EXAMPLES = (
 
 HEAD = """# Gallery
 
-Every kind of figure, with the command that makes it; below them, [examples in Python](#examples-in-python). Each command
+Every kind of figure, with the command that makes it; below them [examples in Python](#examples-in-python). Each command
 also writes `report.html`, with these figures and a replay ([what it shows](page.md)). `simulate` and `compare` take
 `--width 3.4` for one column of a journal page, and `--figures pdf` or `svg`; in Python every figure takes
 `with subzero.figures.page_width(3.4):`.
