@@ -5,7 +5,7 @@ import numpy as np
 
 import subzero
 
-# A stand-in for a log of your own; CSV files do as well: subzero.calibrate(["zigzag.csv", "dive.csv"], "fig6").
+# In place of a log of your own; CSV files do as well: subzero.calibrate(["zigzag.csv", "dive.csv"], "fig6").
 truth = {"vehicle.axial_drag.drag_coefficient": 0.30, "vehicle.rudder.lift_slope": 2.2}
 true = subzero.simulate(subzero.load_scenario("zigzag").with_changes(truth))
 noise = {

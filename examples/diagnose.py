@@ -5,7 +5,7 @@ import numpy as np
 
 import subzero
 
-# A stand-in for a log of your own; a CSV file does as well: subzero.diagnose("record.csv", "fig6").
+# In place of a log of your own; a CSV file does as well: subzero.diagnose("record.csv", "fig6").
 trial = subzero.load_scenario("fig6")
 thrust = subzero.Model.of(trial).vehicle.propeller.thrust_constant
 true = subzero.simulate(trial.with_changes({"vehicle.propeller.thrust_constant": 1.3 * thrust}))

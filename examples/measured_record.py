@@ -4,7 +4,7 @@ import numpy as np
 
 import subzero
 
-# A stand-in for a log of your own: a vehicle with 10 % more thrust, its sensors noisy and read five times a second.
+# In place of a log of your own: a vehicle with 10 % more thrust, its sensors noisy and read five times a second.
 trial = subzero.load_scenario("fig6")
 thrust = subzero.Model.of(trial).vehicle.propeller.thrust_constant
 true = subzero.simulate(trial.with_changes({"vehicle.propeller.thrust_constant": 1.1 * thrust}))

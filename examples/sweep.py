@@ -6,7 +6,7 @@ import subzero
 
 
 def main():
-    """Sweep six members; worker processes import this file, so that what it does stands in a function."""
+    """Sweep six members: in a function, because worker processes import this file."""
     values = {"start.wet_length_m": [0.0, 20.0, 40.0], "water.current_east_m_s": [0.0, 0.1]}
     runs = subzero.sweep("fig6", values, changes={"run.duration_s": 20.0}, workers=1)
     print(runs)

@@ -1,4 +1,4 @@
-"""Pay out and reel in a heavy cable that hangs between a vessel and a vehicle that stays where it is."""
+"""Pay out and reel in a heavy cable that hangs between a vessel and a vehicle that does not move."""
 
 import matplotlib.pyplot as plt
 import numpy as np
