@@ -6,7 +6,7 @@ import numpy as np
 
 environment = gymnasium.make(
     "subzero.gym_environment:subzero/TetheredHeading-v0"
-)  # pip install "subzero[gym]"
+)  # pip install "subzero-auv[gym]"
 rng = np.random.default_rng(1)
 
 
