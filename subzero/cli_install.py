@@ -64,7 +64,7 @@ def doctor(*, voice: Voice = PLAIN) -> int:
     """
     from subzero.progress import progress_bar
 
-    installed = {name: _version(name) for name in ("subzero", *LIBRARIES)}
+    installed = {name: _version(name) for name in (DISTRIBUTION, *LIBRARIES)}
     extras = dict(_extras())
     with progress_bar("Checking this machine") as progress:
         checks = _checks(progress)

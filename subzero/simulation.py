@@ -33,7 +33,7 @@ from subzero.engine.recording import (
     run_so_far,
 )
 from subzero.engine.time_loop import NO_ROOM, run_rows
-from subzero.errors import UserError, whole
+from subzero.errors import DISTRIBUTION, UserError, whole
 from subzero.model import Model, load, model_of
 from subzero.provenance import code_digest, digest_of, processor, trial_digest
 from subzero.room import (
@@ -149,7 +149,7 @@ def _kept(
         "trial": trial_digest(trial),
         "model": digest_of(model.parameters()),
         "later models": digest_of([[time, changed.parameters()] for time, changed in later]),
-        "version of subzero": f"{version('subzero')} {code_digest()}",
+        "version of subzero": f"{version(DISTRIBUTION)} {code_digest()}",
         "processor": processor(),
     }
     with opened(checkpoint, "tethered" if tethered else "untethered", manifest) as keeper:

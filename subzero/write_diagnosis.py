@@ -303,7 +303,7 @@ def _section(one: Told, figures: Mapping[str, Figure]) -> Section:
 def _sources(logged: Sequence[Logged], extended_toml: str) -> dict[str, str]:
     texts = {f"The trial {one.setting.trial.name}, as it was read": one.setting.trial.text for one in logged}
     extended = {"The extended model, extended.toml": extended_toml} if extended_toml else {}
-    libraries = ("subzero", "numpy", "scipy", "numba", "xarray")
+    libraries = (DISTRIBUTION, "numpy", "scipy", "numba", "xarray")
     return {**extended, **texts, "Versions": "\n".join(f"{name} {version(name)}" for name in libraries)}
 
 
