@@ -1,0 +1,424 @@
+"""A table of numbers from a file as a logger wrote it: CSV of any kind, MATLAB, netCDF, MOOS.
+
+Every cell becomes a number. Dates and times of day become seconds, a text becomes a gap, and a column knows which of
+them it holds (`Column.form`). Which column is what is not decided here (`logs.names`), and no unit is converted.
+
+A CSV file is read in chunks of lines, so that memory grows with its numbers, not with its text. Its delimiter and its
+decimal sign are those with which most cells of its first lines are numbers or times, in equally long rows.
+"""
+
+from __future__ import annotations
+
+import csv
+import itertools
+import re
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from subzero.errors import UserError, printable, short
+from subzero.logs.names import is_unit
+from subzero.logs.times import DATE_AND_TIME, MIXED, seconds_of
+from subzero.user_file import MEGABYTE, MOST_COLUMNS, check_readable
+
+NUMBER, TEXT = "number", "text"
+GAPS = frozenset(
+    ("", "nan", "+nan", "-nan", "null", "none", "na", "n/a", "#n/a", "-", "--", "inf", "-inf", "+inf")
+)
+"""Cells that hold no measurement, in small letters."""
+SENTINELS = (9999.0, 99999.0)
+"""Numbers, of either sign, that stand for a gap in a column whose other values are all less than half as large."""
+MOST_OF_A_LOG = 1024 * MEGABYTE
+"""Its numbers take about as much memory. [byte]"""
+HEAD, LONGEST_LINE, CHUNK = 1 << 16, 1 << 20, 20_000
+"""What is looked at first [byte], the longest line [character], and lines that are converted at once."""
+SAMPLE = 100
+"""Lines that tell delimiter, decimal sign and header."""
+REMARKS = ("#", "%", "//")
+FORMATS = ((",", "."), *itertools.product((";", "\t", "|", " "), (".", ",")))
+"""Delimiter (a blank is any white space) and decimal sign."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Column:
+    """One column of a log.
+
+    Args:
+        values: numbers, or seconds of dates and times; NaN in gaps. Shape (rows,).
+        unit: as the file writes it, empty if it does not.
+        form: what its cells are: "number", "text", or a form of `logs.times`.
+    """
+
+    values: np.ndarray
+    unit: str = ""
+    form: str = NUMBER
+
+
+@dataclass(frozen=True, kw_only=True)
+class Table:
+    """What a log holds.
+
+    Args:
+        source: the file, as the user named it.
+        columns: name → column; all of one length.
+        notes: what was left out in reading, in sentences.
+    """
+
+    source: str
+    columns: Mapping[str, Column]
+    notes: tuple[str, ...] = ()
+
+
+def read_table(path: str | Path) -> Table:
+    """Return the table in a file; its ending says how it is read, and all others are CSV.
+
+    Raises:
+        UserError: it cannot be read, is too large, or holds no table.
+    """
+    check_readable(path)
+    size = Path(path).stat().st_size
+    if size > MOST_OF_A_LOG:
+        raise refusal(
+            path,
+            f"it has {size // MEGABYTE} MB, and at most {MOST_OF_A_LOG // MEGABYTE} are read",
+            "Split it.",
+        )
+    read = READERS.get(Path(path).suffix.lower(), _read_csv)
+    columns, notes = read(Path(path))
+    if len(columns) > MOST_COLUMNS:
+        raise refusal(
+            path, f"it has {len(columns)} columns, and at most {MOST_COLUMNS} are read", "Leave some out."
+        )
+    columns = {
+        name: column for name, column in columns.items() if not (_is_nameless(name) and _is_empty(column))
+    }
+    if not columns or not max(column.values.size for column in columns.values()):
+        raise refusal(path, "it holds no samples", "It needs names of columns, and rows of numbers.")
+    gaps = [_without_sentinels(name, column) for name, column in columns.items()]
+    found = {name: column for name, (column, _) in zip(columns, gaps, strict=True)}
+    return Table(
+        source=printable(str(path)), columns=found, notes=(*notes, *(words for _, words in gaps if words))
+    )
+
+
+def refusal(path: str | Path, why: str, remedy: str) -> UserError:
+    """Return the error for a log that cannot be imported, in one line."""
+    return UserError(f"The log {printable(str(path))} cannot be imported: {why}. {remedy}")
+
+
+def _is_nameless(name: str) -> bool:
+    return name.startswith("column ")
+
+
+def _is_empty(column: Column) -> bool:
+    return not np.isfinite(column.values).any()
+
+
+def _without_sentinels(name: str, column: Column) -> tuple[Column, str]:
+    """Return a column without numbers that stand for a gap, and a sentence about them."""
+    size = np.abs(column.values)
+    for sentinel in SENTINELS:
+        is_gap = size == sentinel
+        others = size[~is_gap & np.isfinite(size)]
+        if column.form == NUMBER and is_gap.any() and others.size and others.max() < 0.5 * sentinel:
+            words = f"{short(name)}: {is_gap.sum()} cells of ±{sentinel:g} are taken as gaps."
+            return replace(column, values=np.where(is_gap, np.nan, column.values)), words
+    return column, ""
+
+
+# CSV
+
+
+class _Layout(NamedTuple):
+    """How a CSV file is written: delimiter, decimal sign, names, units, and lines before the first row."""
+
+    delimiter: str
+    decimal: str
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    skipped: int
+
+
+def _read_csv(path: Path) -> tuple[dict[str, Column], list[str]]:
+    layout = _layout(path, list(itertools.islice(_lines(path), SAMPLE)))
+    gathered: list[list[Column]] = [[] for _ in layout.names]
+    notes: list[str] = []
+    for rows in _chunks(path, layout, notes):
+        for at, cells in enumerate(zip(*rows, strict=True)):
+            gathered[at].append(_column(cells, layout.decimal))
+    columns = {
+        name: replace(_joined(parts), unit=unit)
+        for name, unit, parts in zip(layout.names, layout.units, gathered, strict=True)
+        if parts
+    }
+    return columns, notes
+
+
+def _lines(path: Path) -> Iterator[str]:
+    """Give the lines of a text file, without ends."""
+    with open(path, encoding=_encoding(path), errors="replace", newline=None) as file:
+        while line := file.readline(LONGEST_LINE):
+            if len(line) == LONGEST_LINE:
+                raise refusal(
+                    path, f"a line has more than {LONGEST_LINE} characters", "Is it a table in text?"
+                )
+            yield line.rstrip("\n")
+
+
+def _encoding(path: Path) -> str:
+    """Return the encoding of a text file, from its first bytes."""
+    with open(path, "rb") as file:
+        head = file.read(HEAD)
+    if head.startswith((b"\xff\xfe", b"\xfe\xff")):
+        return "utf-16"
+    if b"\0" in head:
+        raise refusal(
+            path, "it is no text, and its ending says nothing else", f"Read are CSV, {', '.join(READERS)}."
+        )
+    try:
+        head.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        return "utf-8-sig" if error.start > len(head) - 4 == HEAD - 4 else "latin-1"
+    return "utf-8-sig"
+
+
+def _layout(path: Path, lines: list[str]) -> _Layout:
+    """Find how a CSV file is written from its first lines; a remark before the first row may hold the names."""
+    plain = [line for line in lines if line.strip() and not line.startswith(REMARKS)]
+    if not plain:
+        raise refusal(path, "it holds no samples", "It needs names of columns, and rows of numbers.")
+    delimiter, decimal = max(FORMATS, key=lambda kind: _fit(plain, *kind))
+    rows = [(at, _cells(line, delimiter)) for at, line in enumerate(lines) if line.strip()]
+    width = _width([_cells(line, delimiter) for line in plain])
+    first = next(at for at, row in rows if len(row) == width and not lines[at].startswith(REMARKS))
+    if _has_numbers(rows_at(rows, first), decimal):  # the names stand in a remark, or nowhere
+        named = [_cells(lines[at].lstrip("#%/ "), delimiter) for at, _ in rows if at < first]
+        names = next((row for row in reversed(named) if len(row) == width), None)
+        if names is None:
+            raise refusal(path, "its first row has numbers, not names of columns", "Write names above it.")
+        first -= 1
+    else:
+        names = rows_at(rows, first)
+    second = next((at for at, row in rows if at > first and not lines[at].startswith(REMARKS)), None)
+    units = rows_at(rows, second) if second is not None else []
+    has_units = len(units) == width and _are_units(units, decimal)
+    skipped = second + 1 if has_units and second is not None else first + 1
+    return _Layout(delimiter, decimal, _distinct(names), tuple(units if has_units else [""] * width), skipped)
+
+
+def rows_at(rows: list[tuple[int, list[str]]], line: int) -> list[str]:
+    """Return the cells of a line by its number."""
+    return next(row for at, row in rows if at == line)
+
+
+def _cells(line: str, delimiter: str) -> list[str]:
+    if delimiter == " ":
+        return line.split()
+    try:
+        return [
+            cell.strip() for cell in next(csv.reader([line], delimiter=delimiter, skipinitialspace=True), [])
+        ]
+    except csv.Error:
+        return []
+
+
+def _width(rows: Sequence[Sequence[str]]) -> int:
+    """Return the usual number of cells in a row."""
+    return Counter(len(row) for row in rows).most_common(1)[0][0]
+
+
+def _fit(lines: list[str], delimiter: str, decimal: str) -> tuple[bool, float, int]:
+    """Say how well a delimiter and a decimal sign suit some lines: the share of cells that are values in full rows."""
+    rows = [_cells(line, delimiter) for line in lines]
+    width = _width(rows)
+    full = [row for row in rows if len(row) == width]
+    good = sum(_is_value(cell, decimal) for row in full for cell in row)
+    return width > 1, len(full) / len(rows) * good / max(sum(map(len, full)), 1), width
+
+
+def _is_value(cell: str, decimal: str) -> bool:
+    return cell.lower() in GAPS or _number(cell, decimal) is not None or seconds_of(cell) is not None
+
+
+def _has_numbers(row: Sequence[str], decimal: str) -> bool:
+    return any(_number(cell, decimal) is not None or seconds_of(cell) is not None for cell in row)
+
+
+def _are_units(row: Sequence[str], decimal: str) -> bool:
+    """Say whether a row holds units: no numbers, and most of its cells are known."""
+    written = [cell for cell in row if cell]
+    return bool(written) and not _has_numbers(row, decimal) and 2 * sum(map(is_unit, written)) > len(written)
+
+
+def _distinct(names: Sequence[str]) -> tuple[str, ...]:
+    """Return names of which none is empty and none occurs twice."""
+    found: list[str] = []
+    for at, name in enumerate(names, start=1):
+        base = name or f"column {at}"
+        found.append(
+            next(new for k in itertools.count(1) if (new := base if k == 1 else f"{base} ({k})") not in found)
+        )
+    return tuple(found)
+
+
+def _chunks(path: Path, layout: _Layout, notes: list[str]) -> Iterator[list[list[str]]]:
+    """Give the rows, some thousands at once; a last row that was cut off is left out."""
+    short_row, rows, width = 0, list[list[str]](), len(layout.names)
+    for number, line in enumerate(_lines(path), start=1):
+        if number <= layout.skipped or not line.strip() or line.startswith(REMARKS):
+            continue
+        if short_row:
+            break
+        row = _cells(line, layout.delimiter)
+        if len(row) == width:
+            rows.append(row)
+        else:
+            short_row = number
+        if len(rows) == CHUNK:
+            yield rows
+            rows = []
+    else:
+        if short_row:
+            notes.append(f"The last row, line {short_row}, was cut off and is left out.")
+        yield rows
+        return
+    raise refusal(
+        path, f"line {short_row} has another number of cells than the {width} names", "Repair or remove it."
+    )
+
+
+def _number(cell: str, decimal: str) -> float | None:
+    try:
+        return float(cell.replace(",", ".", 1) if decimal == "," else cell)
+    except ValueError:
+        return None
+
+
+def _column(cells: Sequence[str], decimal: str) -> Column:
+    """Convert cells of one column; its form is that of most of them that are no gaps."""
+    if decimal == ".":
+        try:
+            return _finite(np.array(cells, dtype=float), NUMBER)
+        except ValueError:
+            pass
+    values, forms = np.full(len(cells), np.nan), Counter[str]()
+    for at, cell in enumerate(cells):
+        if cell.lower() in GAPS:
+            continue
+        number, time = _number(cell, decimal), None
+        if number is None:
+            time = seconds_of(cell)
+        form, value = (NUMBER, number) if number is not None else time or (TEXT, np.nan)
+        values[at] = value
+        forms[form] += 1
+    return _finite(values, _form(forms))
+
+
+def _finite(values: np.ndarray, form: str) -> Column:
+    return Column(values=np.where(np.isfinite(values), values, np.nan), form=form)
+
+
+def _form(forms: Counter[str]) -> str:
+    """Return the form of a column; dates with a zone and dates without cannot be set side by side."""
+    if not forms:
+        return NUMBER
+    if all(form in forms for form in DATE_AND_TIME):
+        return MIXED
+    return TEXT if TEXT in forms and 2 * forms[TEXT] >= forms.total() else forms.most_common(1)[0][0]
+
+
+def _joined(parts: list[Column]) -> Column:
+    forms = Counter(part.form for part in parts if not _is_empty(part)) or Counter([parts[0].form])
+    return Column(values=np.concatenate([part.values for part in parts]), form=_form(forms))
+
+
+# Other files
+
+
+def _read_mat(path: Path) -> tuple[dict[str, Column], list[str]]:
+    """Read vectors of a MATLAB file, also those in structures; the most frequent length is that of the log."""
+    from scipy.io import loadmat
+
+    try:
+        content = loadmat(path, simplify_cells=True)
+    except NotImplementedError:
+        raise refusal(path, "it is MATLAB's version 7.3", "Save it with -v7.") from None
+    except (ValueError, TypeError, OSError, MemoryError, IndexError, KeyError) as error:
+        raise refusal(
+            path, f"it is damaged or no MATLAB file ({_one_line(error)})", "Save it anew."
+        ) from None
+    vectors = dict(_vectors("", content))
+    length = max(
+        Counter(v.size for v in vectors.values()).items(), key=lambda item: item[::-1], default=(0, 0)
+    )[0]
+    return {name: _finite(v, NUMBER) for name, v in vectors.items() if v.size == length}, []
+
+
+def _vectors(name: str, value: Any) -> Iterator[tuple[str, np.ndarray]]:
+    """Give the vectors of numbers in nested mappings."""
+    if isinstance(value, dict):
+        for key, inner in value.items():
+            if not key.startswith("__"):
+                yield from _vectors(f"{name}.{key}" if name else key, inner)
+    elif (
+        isinstance(value, np.ndarray)
+        and value.dtype.kind in "fiu"
+        and max(value.shape, default=0) == value.size > 1
+    ):
+        yield name, value.astype(float).ravel()
+
+
+def _read_netcdf(path: Path) -> tuple[dict[str, Column], list[str]]:
+    """Read the variables of a netCDF file along its time."""
+    import xarray as xr
+
+    try:
+        with xr.open_dataset(path, engine="netcdf4", decode_timedelta=False) as opened:
+            data = opened.load()
+    except (ValueError, OSError, RuntimeError, KeyError, TypeError, OverflowError) as error:
+        raise refusal(
+            path, f"it is damaged or no netCDF file ({_one_line(error)})", "Save it anew."
+        ) from None
+    flat = {str(name): v for name, v in data.variables.items() if v.ndim == 1 and v.dtype.kind in "fiuM"}
+    along = Counter(v.dims[0] for v in flat.values()).most_common(1)
+    return {name: _of_variable(v) for name, v in flat.items() if v.dims[0] == along[0][0]}, []
+
+
+def _of_variable(variable: Any) -> Column:
+    if variable.dtype.kind == "M":
+        stamps = variable.values.astype("datetime64[ns]")
+        seconds = stamps.astype(np.int64) / 1e9
+        return Column(values=np.where(np.isnat(stamps), np.nan, seconds), form=DATE_AND_TIME[0])
+    return replace(_finite(variable.values.astype(float), NUMBER), unit=str(variable.attrs.get("units", "")))
+
+
+def _read_alog(path: Path) -> tuple[dict[str, Column], list[str]]:
+    """Read the numbers of a MOOS log: ``time  NAME  source  value``; each name becomes a column with gaps."""
+    series: dict[str, dict[float, float]] = {}
+    for line in _lines(path):
+        parts = line.split(None, 3)
+        if len(parts) < 4 or line.startswith("%"):
+            continue
+        time, value = _number(parts[0], "."), _number(parts[3].strip(), ".")
+        if time is not None and value is not None:
+            series.setdefault(parts[1], {})[time] = value
+    times = np.array(sorted(set().union(*series.values())))
+    columns = {"time_s": Column(values=times, unit="s")}
+    for name, samples in series.items():
+        values = np.full(times.size, np.nan)
+        values[np.searchsorted(times, list(samples))] = list(samples.values())
+        columns[name] = _finite(values, NUMBER)
+    return (columns if series else {}), []
+
+
+def _one_line(error: Exception) -> str:
+    return printable(re.sub(r"\s+", " ", str(error))[:120])
+
+
+Reader = Callable[[Path], tuple[dict[str, Column], list[str]]]
+READERS: dict[str, Reader] = {".mat": _read_mat, ".nc": _read_netcdf, ".alog": _read_alog}
+"""Ending of a file's name → what reads it."""
