@@ -1,7 +1,7 @@
 """From a log to a checked record: read, map, convert, say what was done.
 
-No value is changed without a line about it: `Imported.table` has one for each column, and `Record.notes` name what was
-left out, shifted, or not decided by the values.
+No value is changed without a line about it: `Imported.table` has one for each column, and the notes of the record name
+what was left out, shifted, or not decided by the values.
 """
 
 from __future__ import annotations
@@ -17,20 +17,19 @@ from subzero.errors import UserError, listed, printable, short
 from subzero.logs import times
 from subzero.logs.mapping import (
     ASKED,
-    TARGETS,
     Clock,
-    Line,
     Map,
+    contradictions,
     find_clock,
-    find_lines,
+    find_map,
     north_and_east,
     read_map,
 )
-from subzero.logs.names import LATITUDE, LONGITUDE, PRESSURE, UNITS, kind_of
+from subzero.logs.names import CLOCK_UNITS, LATITUDE, LONGITUDE, PRESSURE, TARGETS, UNITS, kind_of
 from subzero.logs.table import Table, read_table, refusal
 from subzero.records.record import LARGEST, Record, as_measured
 
-HOUR = 3600.0
+SHOWN_QUESTIONS = 10
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,28 +39,24 @@ class Imported:
     Args:
         source: the log, as the user named it.
         mapping: which column is which channel.
-        record: values as they are to be written, NaN in gaps; None if the map asks something.
+        record: values as they are written, NaN in gaps; None if the map asks something.
     """
 
     source: str
     mapping: Map
-    record: Record | None
+    record: Record | None = None
 
     def table(self) -> list[tuple[str, str, str, str, str]]:
         """Return column, channel, unit, factor to the channel's unit, and reason, a row for each column of the log."""
         clock = self.mapping.clock
         rows = [(name, TIME.name, clock.unit or "-", "", clock.reason) for name in clock.columns]
-        return rows + [
-            (line.name, line.channel, line.unit, _factor(line), line.reason) for line in self.mapping.lines
-        ]
-
-
-def _factor(line: Line) -> str:
-    if not line.channel or line.unit == ASKED:
-        return ""
-    unit = UNITS[kind_of(line.channel)][line.unit]
-    offset = f" {unit.offset:+.5g}" if unit.offset else ""
-    return f"{line.factor * unit.factor:.5g}{offset}"
+        for line in self.mapping.lines:
+            factor = ""
+            if line.channel and line.unit != ASKED:
+                unit = UNITS[kind_of(line.channel)][line.unit]
+                factor = f"{line.factor * unit.factor:.5g}" + (f" {unit.offset:+.5g}" if unit.offset else "")
+            rows.append((line.name, line.channel, line.unit, factor, line.reason))
+        return rows
 
 
 @checked_arguments
@@ -69,7 +64,7 @@ def read_log(path: str | Path, map: str | Path | None = None) -> Record:
     """Read a log as its logger wrote it, as a checked record.
 
     Units, names and times are found from the columns' names and values; ``record.notes`` says what was done. What they
-    do not decide has to be said by a map (``subzero import LOG --map-out MAP.toml`` writes one to edit).
+    do not decide has to be said by a map (``subzero import LOG --map-out map.toml`` writes one to edit).
 
     Args:
         path: CSV of any delimiter and encoding, ``.mat``, netCDF ``.nc``, or MOOS ``.alog``.
@@ -86,11 +81,10 @@ def read_log(path: str | Path, map: str | Path | None = None) -> Record:
 
 def undecided(found: Imported) -> UserError:
     """Return the error that asks what names and values of a log do not decide."""
-    title = (
-        f"The log {found.source} is not imported: {len(found.mapping.questions)} things have to be decided."
-    )
-    remedy = f"subzero import {found.source} --map-out map.toml writes the map; put the units in, and give it with --map"
-    return UserError(listed(title, [*found.mapping.questions[:10], remedy]))
+    questions = found.mapping.questions
+    remedy = f"write the map with subzero import {found.source} --map-out map.toml, edit it, and give it with --map"
+    title = f"The log {found.source} cannot be imported before this is decided:"
+    return UserError(listed(title, [*questions[:SHOWN_QUESTIONS], remedy]))
 
 
 def import_log(path: str | Path, map_path: str | Path | None = None) -> Imported:
@@ -100,19 +94,26 @@ def import_log(path: str | Path, map_path: str | Path | None = None) -> Imported
         UserError: it cannot be read, or the map does not suit.
     """
     table = read_table(path)
-    mapping = Map(clock=find_clock(table)) if map_path is None else read_map(map_path, table)
-    rows, time, notes = _rows(path, table, mapping.clock)
     if map_path is None:
-        mapping = replace(mapping, lines=find_lines(table, mapping.clock, rows, time))
-        if not any(line.channel for line in mapping.lines):
-            names = ", ".join(short(name) for name in table.columns)
-            raise refusal(
-                path, f"none of its columns is a channel ({names})", "Name them in a map: see docs/logs.md."
-            )
+        clock, questions = find_clock(table)
+        rows, time, notes = _rows(path, table, clock)
+        mapping = find_map(table, clock, rows, time)
+        mapping = replace(mapping, questions=(*questions, *mapping.questions))
+    else:
+        mapping = read_map(map_path, table)
+        rows, time, notes = _rows(path, table, mapping.clock)
+        mapping = replace(mapping, notes=contradictions(mapping, table, rows, time))
+    if not any(line.channel for line in mapping.lines):
+        names = ", ".join(short(name) for name in table.columns)
+        raise refusal(
+            path, f"none of its columns is a channel: {names}", "Name them in a map, see docs/logs.md."
+        )
     if mapping.questions:
-        return Imported(source=table.source, mapping=mapping, record=None)
+        return Imported(source=table.source, mapping=mapping)
     values, more = _values(table, mapping, rows)
-    notes = [*table.notes, *notes, *more, *_open_units(mapping)]
+    if not values:
+        raise refusal(path, "no channel has a number in the rows that are used", "Look at its times.")
+    notes = [*table.notes, *notes, *more, *mapping.notes, *_open_units(mapping)]
     record = Record(source=table.source, time=time, values=values, notes=tuple(notes))
     return Imported(source=table.source, mapping=mapping, record=record)
 
@@ -123,25 +124,24 @@ def _rows(path: str | Path, table: Table, clock: Clock) -> tuple[np.ndarray, np.
     if not clock.columns:
         return (
             np.arange(size),
-            clock.every * np.arange(size),
-            [f"Times: rows are {clock.every:g} s apart, by the map."],
+            clock.every_s * np.arange(size),
+            [f"Times: a row every {clock.every_s:g} s, by the map."],
         )
     seconds = _seconds(path, table, clock)
     rows = np.flatnonzero(np.isfinite(seconds))
     notes = [f"{size - rows.size} rows have no time and are left out."] if rows.size < size else []
-    if clock.sort:
-        rows = rows[np.argsort(seconds[rows], kind="stable")]
-    begins = [0] if clock.sort or not rows.size else times.parts_of(seconds[rows])
+    rows = rows[np.argsort(seconds[rows], kind="stable")] if clock.sort else rows
+    begins = times.parts_of(seconds[rows])
     if clock.part:
-        if clock.part > len(begins):
+        if not 0 < clock.part <= len(begins):
             raise refusal(
-                path, f"the map asks for part {clock.part} of its clock, and there are {len(begins)}", ""
+                path, f"the map asks for part {clock.part}, and its clock has {len(begins)}", "Correct it."
             )
         rows = rows[begins[clock.part - 1] : [*begins, rows.size][clock.part]]
-        notes.append(f"Part {clock.part} of {len(begins)} of the log is used: {rows.size} of {size} rows.")
+        notes.append(f"Part {clock.part} of {len(begins)} is used: {rows.size} of {size} rows.")
         begins = [0]
     if problem := times.problem_of(seconds[rows], begins):
-        raise refusal(path, problem, "")
+        raise refusal(path, *problem)
     return _from_start(path, clock, rows, seconds[rows], notes)
 
 
@@ -150,11 +150,11 @@ def _seconds(path: str | Path, table: Table, clock: Clock) -> np.ndarray:
     columns = [table.columns[name] for name in clock.columns]
     if any(column.form == times.MIXED for column in columns):
         raise refusal(path, "some of its times have a zone and some have none", "Write all of them with one.")
-    total = np.sum([column.values for column in columns], axis=0)
-    if any(column.form == times.TIME_OF_DAY for column in columns) and len(columns) == 1:
+    total: np.ndarray = np.sum([column.values for column in columns], axis=0)
+    if [column.form for column in columns] == [times.TIME_OF_DAY]:
         return times.over_midnight(total)
-    unit = times.unit_by_values(total)[:1] or ["s"] if clock.unit == ASKED else [clock.unit or "s"]
-    return total * times.CLOCK_UNITS[unit[0]]
+    likely = [*times.unit_by_values(total), "s"][0] if clock.unit == ASKED else clock.unit or "s"
+    return total * CLOCK_UNITS[likely]
 
 
 def _from_start(
@@ -164,59 +164,54 @@ def _from_start(
     start = float(seconds[0])
     if clock.start is not None:
         given = times.start_of(clock.start) or 0.0
-        start = given if isinstance(clock.start, str) else given * times.CLOCK_UNITS[clock.unit or "s"]
+        start = given if isinstance(clock.start, str) else given * CLOCK_UNITS[clock.unit or "s"]
     kept = seconds >= start
     if kept.sum() < 2:
         raise refusal(
             path, f"the start in the map, {short(clock.start)}, leaves fewer than two rows", "Correct it."
         )
-    if not kept.all():
-        notes.append(f"{(~kept).sum()} rows before the start are left out.")
+    notes += [] if kept.all() else [f"{(~kept).sum()} rows before the start are left out."]
     if start != 0.0:
         whose = "the first time of the log" if clock.start is None else "the start in the map"
-        notes.append(f"Times: {start:.10g} s, {whose}, is taken from all of them.")
-    # Digits that a float of seconds since 1970 does not have are not written either.
-    digits = 6 if abs(start) > HOUR * 1e5 else 9
+        notes.append(f"Times: {start:.12g} s, {whose}, is taken from all of them.")
+    digits = 9 if abs(start) < 1e6 else 6  # a float of seconds since 1970 has no more
     return rows[kept], np.round(seconds[kept] - start, digits), notes
 
 
 def _values(table: Table, mapping: Map, rows: np.ndarray) -> tuple[dict[str, np.ndarray], list[str]]:
     """Return channel → values in its unit, and what was made of places and pressures."""
-    by_channel = {line.channel: line for line in mapping.lines if line.channel}
-    values, notes = {}, []
-    for channel, line in by_channel.items():
-        if channel in (LATITUDE, LONGITUDE):
-            continue
-        unit = UNITS[kind_of(channel)][line.unit]
-        column = line.factor * (table.columns[line.name].values[rows] * unit.factor + unit.offset)
-        values[TARGETS.get(channel, channel)] = np.where(np.abs(column) <= LARGEST, column, np.nan)
-        if channel == PRESSURE:
-            notes.append(
-                "Depth is the pressure over that of sea water of 1025 kg/m³, less 1013.25 hPa if absolute."
-            )
-    places = [by_channel.get(name) for name in (LATITUDE, LONGITUDE)]
-    if places[0] and places[1]:
-        latitude, longitude = (table.columns[line.name].values[rows] for line in places if line)
-        values["north"], values["east"] = north_and_east(latitude, longitude, places[0].unit, places[1].unit)
+    lines = {line.channel: line for line in mapping.lines if line.channel}
+    values, notes = dict[str, np.ndarray](), list[str]()
+    for channel, line in lines.items():
+        if channel not in (LATITUDE, LONGITUDE):
+            unit, written = UNITS[kind_of(channel)][line.unit], table.columns[line.name].values[rows]
+            values[TARGETS.get(channel, channel)] = line.factor * (written * unit.factor + unit.offset)
+    if LATITUDE in lines and LONGITUDE in lines:
+        places = [lines[name] for name in (LATITUDE, LONGITUDE)]
+        written = [table.columns[place.name].values[rows] for place in places]
+        values["north"], values["east"] = north_and_east(written, [place.unit for place in places])
         notes.append("North and east are metres from the first place, on the ellipsoid WGS 84.")
-    values = {name: column for name, column in values.items() if np.isfinite(column).any()}
-    return values, notes
+    if PRESSURE in lines:
+        notes.append("Depth is by pressure, in sea water of 1025 kg/m³; an absolute one less 1013.25 hPa.")
+    values = {name: np.where(np.abs(column) <= LARGEST, column, np.nan) for name, column in values.items()}
+    return {name: column for name, column in values.items() if np.isfinite(column).any()}, notes
 
 
 def _open_units(mapping: Map) -> list[str]:
-    """Return a sentence about units that only a name vouches for, and about ones that the values contradict."""
-    names = [line.name for line in mapping.lines if line.channel and not line.is_checked]
-    if not names:
-        return []
-    listing = ", ".join(short(name) for name in names)
-    return [f"Units of {listing}: taken from names; the values of the log alone would also allow others."]
+    """Return a sentence about units that only a name vouches for."""
+    names = ", ".join(short(line.name) for line in mapping.lines if line.is_open)
+    return (
+        [f"Units of {names}: taken from names; the values of the log alone would allow others too."]
+        if names
+        else []
+    )
 
 
 def to_csv(record: Record) -> str:
     """Return a record in the form that `subzero.read_record` takes, with ten digits."""
     names = [name for name in BY_NAME if name in record.values]
+    remarks = ["# " + printable(line).replace('"', "'") for line in (f"from {record.source}", *record.notes)]
     header = ",".join([TIME.column, *(BY_NAME[name].column for name in names)])
     table = np.column_stack([record.time, *(record.values[name] for name in names)])
-    remarks = ["# " + printable(line).replace('"', "'") for line in (f"from {record.source}", *record.notes)]
     rows = (",".join("" if value != value else f"{value:.10g}" for value in row) for row in table.tolist())
     return "\n".join([*remarks, header, *rows]) + "\n"

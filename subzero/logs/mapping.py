@@ -7,8 +7,8 @@
     [columns]
     "NAV_SPEED" = { channel = "surge_speed", unit = "kn" }
 
-Without a map it is found from names (`logs.names`) and values (`logs.evidence`). What they do not decide, or contradict,
-is asked: the map then has to say it. A map that is given is the whole map, and its word holds.
+Without a map it is found from names (`logs.names`) and values (`logs.evidence`). What they do not decide, or
+contradict, is asked: the map then has to say it. A map that is given is the whole map, and its word holds.
 """
 
 from __future__ import annotations
@@ -16,26 +16,25 @@ from __future__ import annotations
 import json
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from subzero.channels import BY_COLUMN, BY_NAME
-from subzero.channels import TIME as TIME_CHANNEL
-from subzero.errors import UserError, listed, printable, real, short, suggestion
-from subzero.logs import evidence, times
-from subzero.logs.evidence import Finding, Measured, findings
+from subzero.channels import BY_COLUMN, BY_NAME, TIME
+from subzero.errors import UserError, listed, printable, short, suggestion
+from subzero.logs import times
+from subzero.logs.evidence import Contradiction, Findings, Measured, findings, tied, units_by_size
 from subzero.logs.names import (
+    CLOCK_UNITS,
     LATITUDE,
     LONGITUDE,
-    PRESSURE,
+    TARGETS,
     UNITS,
     Named,
     kind_of,
     recognised,
-    time_name,
     unit_of,
 )
 from subzero.logs.table import NUMBER, TEXT, Table
@@ -43,13 +42,19 @@ from subzero.user_file import MOST_OF_A_TOML, UnreadableFileError, read_text
 
 ASKED = "?"
 """Unit in a map that the user has to fill in."""
-TARGETS = {LATITUDE: "north", LONGITUDE: "east", PRESSURE: "depth"}
-"""What is no channel itself → the channel that it becomes."""
-EQUATOR_M, SQUARED_ECCENTRICITY = 6378137.0, 6.69437999014e-3
-"""Ellipsoid WGS 84."""
 ALIKE = 0.98
 """Cosine between two columns from which on they measure the same. [-]"""
-TIME_KEYS = ("columns", "unit", "start", "part", "sort", "every_s")
+EQUATOR_M, SQUARED_ECCENTRICITY = 6378137.0, 6.69437999014e-3
+"""Ellipsoid WGS 84."""
+TIME_KEYS = {
+    "columns": list,
+    "unit": str,
+    "start": (int, float, str),
+    "part": int,
+    "sort": bool,
+    "every_s": (int, float),
+}
+COLUMN_KEYS = {"channel": str, "unit": str, "factor": (int, float)}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,8 +67,7 @@ class Line:
         unit: of the column; "?" if it is asked for.
         factor: times the column, besides its unit; −1 for one that is upside down.
         reason: why.
-        question: what the user has to decide; empty if nothing.
-        is_checked: the values leave no other unit.
+        is_open: the unit is that of the name, and the values leave others too.
     """
 
     name: str
@@ -71,8 +75,7 @@ class Line:
     unit: str = ""
     factor: float = 1.0
     reason: str = ""
-    question: str = ""
-    is_checked: bool = False
+    is_open: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,100 +84,78 @@ class Clock:
 
     Args:
         columns: one with times, or a date and a time of day; none if rows are evenly spread.
-        unit: of its numbers, of `times.CLOCK_UNITS`; empty for dates and times of day.
+        unit: of its numbers; empty for dates and times of day, "?" if it is asked for.
         start: time of the log that is t = 0; its first one if None.
         part: which part of a clock that was restarted, from 1; 0 if it was not.
         sort: put rows in the order of their times.
-        every: time between rows, if there are no columns. [s]
+        every_s: time between rows, if there are no columns. [s]
         reason: why.
-        question: what the user has to decide; empty if nothing.
     """
 
     columns: tuple[str, ...] = ()
     unit: str = ""
-    start: Any = None
+    start: float | str | None = None
     part: int = 0
     sort: bool = False
-    every: float = 0.0
+    every_s: float = 0.0
     reason: str = "map"
-    question: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Map:
-    """How a log becomes a record."""
+    """How a log becomes a record, what the user has to decide first, and what is odd about it, in sentences."""
 
     clock: Clock
-    lines: tuple[Line, ...] = field(default=())
-
-    @property
-    def questions(self) -> list[str]:
-        """What the user has to decide, in sentences."""
-        return [line.question for line in (self.clock, *self.lines) if line.question]
+    lines: tuple[Line, ...] = ()
+    questions: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
 
-# Found
-
-
-def find_clock(table: Table) -> Clock:
-    """Return how the times of a log are read, by names and forms of its columns.
+def find_clock(table: Table) -> tuple[Clock, tuple[str, ...]]:
+    """Return how the times of a log are read, by names and forms of its columns, and what has to be asked.
 
     Raises:
         UserError: there is no time.
     """
-    forms = {name: column.form for name, column in table.columns.items() if column.form not in (NUMBER, TEXT)}
-    for name, form in forms.items():
-        if form in (*times.DATE_AND_TIME, times.MIXED):
-            return Clock(columns=(name,), reason=form)
-    days, hours = (
-        [name for name, form in forms.items() if form == kind] for kind in (times.DATE, times.TIME_OF_DAY)
-    )
-    if days and hours:
-        return Clock(columns=(days[0], hours[0]), reason="date, and time of day")
-    named = {name: found for name in table.columns if name not in days + hours and (found := time_name(name))}
-    numbers = [
-        name
-        for name in named
-        if table.columns[name].form == NUMBER and np.isfinite(table.columns[name].values).any()
-    ]
-    if not numbers:
-        if hours:
-            return Clock(columns=(hours[0],), reason="time of day")
+    by_form: dict[str, list[str]] = {}
+    for name, column in table.columns.items():
+        by_form.setdefault(column.form, []).append(name)
+    for form in (*times.DATE_AND_TIME, times.MIXED):
+        if form in by_form:
+            return Clock(columns=(by_form[form][0],), reason=form), ()
+    clocks = [by_form[form][0] for form in (times.DATE, times.TIME_OF_DAY) if form in by_form]
+    named = {name: found for name in by_form.get(NUMBER, ()) if (found := _is_time(table, name))}
+    if len(clocks) == 2 or (not named and times.TIME_OF_DAY in by_form):
+        return Clock(columns=tuple(clocks), reason="date and time of day"[0 if len(clocks) == 2 else 9 :]), ()
+    if not named:
         raise UserError(
             f"The log {table.source} cannot be imported: none of its columns is a time. Name it in the map: [time] "
             'columns = ["NAME"], unit = "s", or say how far rows are apart: [time] every_s = 0.1.'
         )
-    name = min(numbers, key=lambda name: named[name][0])
-    column = table.columns[name]
-    written = named[name][1] or {"seconds": "s"}.get(
-        column.unit, column.unit if column.unit in times.CLOCK_UNITS else ""
-    )
-    return _clock_of_numbers(name, column.values, written)
+    name = min(named, key=lambda name: named[name].rank)
+    return _clock_of_numbers(name, table.columns[name].values, named[name].unit)
 
 
-def _clock_of_numbers(name: str, values: np.ndarray, written: str) -> Clock:
+def _is_time(table: Table, name: str) -> Named | None:
+    """Return what is said of a column of numbers that is a time by its name."""
+    found, column = recognised(name, table.columns[name].unit), table.columns[name]
+    return found if found and found.channel == TIME.name and np.isfinite(column.values).any() else None
+
+
+def _clock_of_numbers(name: str, values: np.ndarray, written: str) -> tuple[Clock, tuple[str, ...]]:
     """Return the clock of a column of numbers, in the unit that is written if its size and steps allow that."""
-    likely = times.unit_by_values(values)
-    if written and (written in likely or written not in ("s", "ms", "us", "ns")):
-        return Clock(columns=(name,), unit=written, reason="unit in the name")
-    if likely == ["s"] or (len(likely) == 1 and not written) or (len(likely) == 1 and _is_epoch(values)):
-        return Clock(
-            columns=(name,), unit=likely[0], reason="since 1970" if _is_epoch(values) else "by its steps"
-        )
-    said = (
-        f"by its name in {written}, but its steps look like {_either(likely)}"
-        if written
-        else f"in {_either(likely)}"
-    )
-    question = f"time {short(name)}: {said}; say in the map which: [time] unit"
-    return Clock(columns=(name,), unit=ASKED, reason="asked", question=question)
+    likely, is_epoch = times.unit_by_values(values), times.is_epoch(values)
+    if written in likely or written in ("min", "h", "datenum"):
+        return Clock(columns=(name,), unit=written, reason="unit in the name"), ()
+    if len(likely) == 1 and (not written or is_epoch):
+        reason = "counts from 1970" if is_epoch else "by its steps"
+        return Clock(columns=(name,), unit=likely[0], reason=reason), ()
+    said = f"by its name in {written}, by its steps in" if written else "in"
+    question = f"{short(name)} (time): {said} {_either(likely) or 'no unit that is known'}"
+    return Clock(columns=(name,), unit=ASKED, reason="asked"), (question,)
 
 
-def _is_epoch(values: np.ndarray) -> bool:
-    return bool(values[np.isfinite(values)][0] > min(times.EPOCHS))
-
-
-def find_lines(table: Table, clock: Clock, rows: np.ndarray, time: np.ndarray) -> tuple[Line, ...]:
+def find_map(table: Table, clock: Clock, rows: np.ndarray, time: np.ndarray) -> Map:
     """Return what every column of a log is, by names and values.
 
     Args:
@@ -186,53 +167,166 @@ def find_lines(table: Table, clock: Clock, rows: np.ndarray, time: np.ndarray) -
     named = {
         name: found
         for name, column in table.columns.items()
-        if name not in clock.columns and column.form == NUMBER and (found := recognised(name, column.unit))
+        if column.form == NUMBER and (found := recognised(name, column.unit)) and found.channel != TIME.name
         and np.isfinite(column.values[rows]).any()
     }  # fmt: skip
-    chosen = _chosen(named, {name: table.columns[name].values[rows] for name in named}, time)
+    values = {name: table.columns[name].values[rows] for name in named}
+    chosen, questions = _chosen(named, values, time)
+    used = {name: named[name] for name, reason in chosen.items() if not reason.startswith("not used")}
     columns = {
-        named[name].channel: Measured(
-            channel=named[name].channel, values=table.columns[name].values[rows], unit=named[name].unit
-        )
-        for name, reason in chosen.items()
-        if not reason.startswith("not used")
+        found.channel: Measured(found.channel, values[name], found.unit) for name, found in used.items()
     }
-    found = findings({**_positions(columns), **columns}, time)
-    return tuple(
-        Line(name=name, reason=_why_unused(table, clock, name, chosen))
-        if name not in named or chosen[name].startswith("not used")
-        else _line(name, named[name], found[named[name].channel], chosen[name])
+    said = findings({**_positions(columns), **columns}, time)
+    lines = [
+        _line(name, used[name], said, chosen[name])
+        if name in used
+        else Line(name=name, reason=chosen.get(name) or _why_unused(table, name))
         for name in table.columns
         if name not in clock.columns
+    ]
+    questions += [_question(line, said) for line in lines if line.unit == ASKED]
+    names = {line.channel: line for line in lines}
+    odd = [_words(one, names) for one in said.contradictions if one.channels[0] in names]
+    is_asked = [one.is_of_units for one in said.contradictions if one.channels[0] in names]
+    questions += [words for words, asked in zip(odd, is_asked, strict=True) if asked]
+    notes = tuple(words for words, asked in zip(odd, is_asked, strict=True) if not asked)
+    return Map(clock=clock, lines=tuple(lines), questions=tuple(questions), notes=notes)
+
+
+def contradictions(mapping: Map, table: Table, rows: np.ndarray, time: np.ndarray) -> tuple[str, ...]:
+    """Return what the values say against a map that was given, in sentences; its word holds all the same."""
+    lines = {line.channel: line for line in mapping.lines if line.channel}
+    values = {channel: line.factor * table.columns[line.name].values[rows] for channel, line in lines.items()}
+    columns = {channel: Measured(channel, values[channel], line.unit) for channel, line in lines.items()}
+    found = findings({**_positions(columns), **columns}, time)
+    return tuple(_words(one, lines) for one in found.contradictions if one.channels[0] in lines)
+
+
+def _why_unused(table: Table, name: str) -> str:
+    column, named = table.columns[name], recognised(name)
+    if column.form == TEXT or not np.isfinite(column.values).any():
+        return "not used: no numbers"
+    is_time = column.form != NUMBER or (named and named.channel == TIME.name)
+    return "not used: another time" if is_time else "not used: no channel has this name"
+
+
+def _line(name: str, named: Named, found: Findings, choice: str) -> Line:
+    """Return the line of a column whose unit is stated, decided by values, or asked."""
+    units, agrees = found.units[named.channel], found.agrees[named.channel]
+    why = (
+        [choice, named.reason if named.unit else "by its values"]
+        if choice
+        else [named.reason if named.unit else "by its values"]
     )
+    why += [f"agrees with the {' and the '.join(dict.fromkeys(agrees))}"] if agrees else []
+    line = Line(name=name, channel=named.channel, unit=named.unit, reason="; ".join(why))
+    if named.unit:
+        return replace(
+            line, unit=named.unit if named.unit in units or agrees else ASKED, is_open=units != [named.unit]
+        )
+    return replace(line, unit=units[0]) if len(units) == 1 else replace(line, unit=ASKED, reason="asked")
+
+
+def _question(line: Line, found: Findings) -> str:
+    """Return what is asked about a column whose unit is not decided."""
+    units = _either(found.units[line.channel]) or "no unit that is known"
+    if line.is_open:
+        return f"{short(line.name)} ({line.channel}): its numbers cannot be in the unit of its name; {units} would do"
+    return f"{short(line.name)} ({line.channel}): in {units}, which nothing in the log decides"
+
+
+def _words(one: Contradiction, lines: Mapping[str, Line]) -> str:
+    """Return a contradiction in words, with the columns' own names."""
+    of = {channel: short(line.name) for channel, line in lines.items()}
+    columns = " and ".join(of.get(channel, channel) for channel in one.channels)
+    repairs = [f"{unit} for {of.get(channel, channel)}" for channel, unit in one.repairs]
+    alone = f"; alone {_either(repairs)} would do" if repairs else ""
+    if one.is_of_units:
+        return f"{columns} contradict the {one.words} in these units: one or more is in another{alone}"
+    return f"{columns} contradict the {one.words}, in whatever units: look at them."
+
+
+def _either(words: Sequence[str]) -> str:
+    return " or ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
+
+
+def _chosen(
+    named: Mapping[str, Named], values: Mapping[str, np.ndarray], time: np.ndarray
+) -> tuple[dict[str, str], list[str]]:
+    """Return why each column is chosen among those of its channel, or "not used: …"; and what has to be asked."""
+    ranks = {name: (found.channel in TARGETS, found.rank) for name, found in named.items()}
+    by_target: dict[str, list[str]] = {}
+    for name in sorted(named, key=lambda name: ranks[name]):
+        by_target.setdefault(TARGETS.get(named[name].channel, named[name].channel), []).append(name)
+    reasons, questions = dict[str, str](), []
+    for target, names in by_target.items():
+        rivals = [name for name in names if ranks[name] == ranks[names[0]]]
+        first, reason = _best_of(rivals, named, values, time)
+        if not first:
+            questions.append(
+                f"{_either([short(name) for name in rivals])} is the {target}; they differ: keep one in the map"
+            )
+        reasons |= {
+            name: reason if name == first else f"not used: {short(first)} is the {target}" for name in names
+        }
+    return reasons, questions
+
+
+def _best_of(
+    rivals: Sequence[str], named: Mapping[str, Named], values: Mapping[str, np.ndarray], time: np.ndarray
+) -> tuple[str, str]:
+    """Return which of some columns with one name measures what it is called, and why; no name if that is open."""
+    if len(rivals) == 1:
+        return rivals[0], ""
+    others = {found.channel: Measured(found.channel, values[name]) for name, found in named.items()}
+    channel = named[rivals[0]].channel
+    agreeing = [
+        one for one in rivals if tied(channel, {**others, channel: Measured(channel, values[one])}, time)
+    ]
+    best = agreeing or list(rivals)
+    if all(_are_alike(values[best[0]], values[name]) for name in best[1:]):
+        odd, same = [name for name in rivals if name not in best], ", ".join(map(short, best[1:]))
+        words = [f"as good as {same}"] if same else []
+        words += [f"changes as others say, which {', '.join(map(short, odd))} does not"] if odd else []
+        return best[0], "; ".join(words)
+    return "", ""
+
+
+def _are_alike(first: np.ndarray, second: np.ndarray) -> bool:
+    """Say whether two columns change alike, by as much."""
+    known = np.isfinite(first) & np.isfinite(second)
+    a, b = (one[known] - one[known].mean() if known.any() else one[known] for one in (first, second))
+    size = float(a @ a + b @ b)
+    return bool(known.any()) and 2.0 * float(a @ b) >= ALIKE * size
 
 
 def _positions(columns: Mapping[str, Measured]) -> dict[str, Measured]:
     """Return north and east of latitude and longitude, if their unit is known by their size or by their names."""
-    if not {LATITUDE, LONGITUDE} <= set(columns):
+    places = [columns[name] for name in (LATITUDE, LONGITUDE) if name in columns]
+    likely = units_by_size(LATITUDE, places[0].values) if len(places) == 2 else []
+    units = [place.unit or (likely[0] if len(likely) == 1 else "") for place in places]
+    if len(places) < 2 or not all(units):
         return {}
-    latitude, longitude = columns[LATITUDE], columns[LONGITUDE]
-    likely = evidence.units_by_size(LATITUDE, latitude.values)
-    units = [column.unit or (likely[0] if len(likely) == 1 else "") for column in (latitude, longitude)]
-    if not all(units):
-        return {}
-    metres = north_and_east(latitude.values, longitude.values, *units)
+    metres = north_and_east([place.values for place in places], units)
     return {
-        channel: Measured(channel=channel, values=values, unit="m", is_final=True)
-        for channel, values in zip(("north", "east"), metres, strict=True)
+        name: Measured(name, values, "m", True)
+        for name, values in zip(("north", "east"), metres, strict=True)
     }
 
 
-def north_and_east(
-    latitude: np.ndarray, longitude: np.ndarray, latitude_unit: str, longitude_unit: str
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the way north and east of the first place (n,), on the tangent to the ellipsoid WGS 84 there. [m]"""
-    phi, lam = _radians(latitude, latitude_unit), _radians(longitude, longitude_unit)
-    first = np.flatnonzero(np.isfinite(phi) & np.isfinite(lam))[:1]
-    phi0, lam0 = (float(phi[first[0]]), float(lam[first[0]])) if first.size else (0.0, 0.0)
-    w = 1.0 - SQUARED_ECCENTRICITY * np.sin(phi0) ** 2
+def north_and_east(places: Sequence[np.ndarray], units: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
+    """Return the way north and east of the first place (n,), on the tangent to the ellipsoid WGS 84 there. [m]
+
+    Args:
+        places: latitude and longitude (n,).
+        units: of both.
+    """
+    phi, lam = (_radians(place, unit) for place, unit in zip(places, units, strict=True))
+    first = int(np.argmax(np.isfinite(phi) & np.isfinite(lam)))
+    lam = lam[first] + np.remainder(lam - lam[first] + np.pi, 2.0 * np.pi) - np.pi  # the date line is no jump
+    w = 1.0 - SQUARED_ECCENTRICITY * np.sin(phi[first]) ** 2
     meridian, normal = EQUATOR_M * (1.0 - SQUARED_ECCENTRICITY) / w**1.5, EQUATOR_M / np.sqrt(w)
-    return meridian * (phi - phi0), normal * np.cos(phi0) * (lam - lam0)
+    return meridian * (phi - phi[first]), normal * np.cos(phi[first]) * (lam - lam[first])
 
 
 def _radians(angle: np.ndarray, unit: str) -> np.ndarray:
@@ -243,145 +337,35 @@ def _radians(angle: np.ndarray, unit: str) -> np.ndarray:
     return radians
 
 
-def _why_unused(table: Table, clock: Clock, name: str, chosen: Mapping[str, str]) -> str:
-    column = table.columns[name]
-    if name in chosen:
-        return chosen[name]
-    if not np.isfinite(column.values).any():
-        return "not used: no numbers"
-    return "not used: another time" if time_name(name) else "not used: no channel of this name"
-
-
-def _line(name: str, named: Named, found: Finding, choice: str) -> Line:
-    """Return the line of a column whose unit is stated, decided by values, or asked."""
-    ties = f"; agrees with the {' and the '.join(found.agrees)}" if found.agrees else ""
-    line = Line(name=name, channel=named.channel, reason=choice)
-    if choice.startswith("asked"):
-        return replace(
-            line, unit=named.unit or ASKED, question=f"{short(name)}: {choice.removeprefix('asked: ')}"
-        )
-    prefix = f"{choice}; " if choice else ""
-    if not named.unit:
-        if len(found.units) == 1:
-            return replace(line, unit=found.units[0], reason=f"{prefix}by its values{ties}", is_checked=True)
-        words = f"{_either(found.units) or 'no unit fits'}; nothing in the log decides"
-        question = f"{short(name)} ({named.channel}): {words}"
-        return replace(line, unit=ASKED, reason="asked", question=question)
-    if found.broken or named.unit not in found.units:
-        contradiction = (
-            f"contradicts the {' and the '.join(found.broken)}"
-            if found.broken
-            else "its values are too large or too small for that"
-        )
-        fitting = (
-            f"{_either(found.units)} would fit"
-            if found.units
-            else "no single change of unit would repair that"
-        )
-        question = (
-            f"{short(name)} ({named.channel}): by its name in {named.unit}, but {contradiction}; {fitting}"
-        )
-        return replace(line, unit=ASKED, reason="asked", question=question)
-    is_checked = found.units == (named.unit,)
-    return replace(line, unit=named.unit, reason=f"{prefix}{named.reason}{ties}", is_checked=is_checked)
-
-
-def _either(units: Sequence[str]) -> str:
-    return " or ".join([", ".join(units[:-1]), units[-1]] if len(units) > 1 else units)
-
-
-def _chosen(named: Mapping[str, Named], values: Mapping[str, np.ndarray], time: np.ndarray) -> dict[str, str]:
-    """Return for each column why it is chosen among those of its channel, "not used: …", or "asked: …"."""
-    by_target: dict[str, list[str]] = {}
-    for name, found in named.items():
-        by_target.setdefault(TARGETS.get(found.channel, found.channel), []).append(name)
-    reasons = {}
-    for target, names in by_target.items():
-        best = min((named[name].channel in TARGETS, named[name].rank) for name in names)
-        rivals = [name for name in names if (named[name].channel in TARGETS, named[name].rank) == best]
-        first, reason = _best_of(rivals, named, values, time)
-        for name in names:
-            reasons[name] = reason if name == first else f"not used: {short(first)} is the {target}"
-    return reasons
-
-
-def _best_of(
-    rivals: Sequence[str], named: Mapping[str, Named], values: Mapping[str, np.ndarray], time: np.ndarray
-) -> tuple[str, str]:
-    """Return which of some columns with one name is measured where it counts, and why, or that it is asked."""
-    if len(rivals) == 1:
-        return rivals[0], ""
-    channel = TARGETS.get(named[rivals[0]].channel, named[rivals[0]].channel)
-    others = {
-        found.channel: Measured(channel=found.channel, values=values[name]) for name, found in named.items()
-    }
-    agreeing = [
-        name
-        for name in rivals
-        if evidence.tied(channel, {**others, channel: Measured(channel=channel, values=values[name])}, time)
-    ]
-    others_words = ", ".join(short(name) for name in rivals if name not in agreeing)
-    if len(agreeing) == 1:
-        return agreeing[
-            0
-        ], f"agrees with the change of {channel} that others measure, {others_words} does not"
-    candidates = agreeing or list(rivals)
-    if all(_are_alike(values[candidates[0]], values[name]) for name in candidates[1:]):
-        return candidates[0], f"as good as {', '.join(map(short, candidates[1:]))}"
-    question = f"one of {', '.join(map(short, rivals))} is the {channel}; they differ, and nothing in the log decides"
-    return candidates[0], f"asked: {question}"
-
-
-def _are_alike(first: np.ndarray, second: np.ndarray) -> bool:
-    """Say whether two columns change alike, by as much."""
-    known = np.isfinite(first) & np.isfinite(second)
-    if known.sum() < 2:
-        return False
-    a, b = first[known] - first[known].mean(), second[known] - second[known].mean()
-    size = float(a @ a + b @ b)
-    return size == 0.0 or 2.0 * float(a @ b) >= ALIKE * size
-
-
 # Written and read
 
 
 def to_toml(mapping: Map, source: str) -> str:
-    """Return a map as TOML, with every reason, ready to be edited."""
+    """Return a map as TOML, with every reason and question, ready to be edited."""
     clock = mapping.clock
-    lines = [
-        f"# How {source} is read: edit it, and give it again with subzero import ... --map.",
-        "",
-        "[time]",
-    ]
-    lines += [f"columns = {_text(list(clock.columns))}  # {clock.reason}"] if clock.columns else []
-    entries = {
-        "unit": clock.unit,
-        "start": clock.start,
-        "part": clock.part,
-        "sort": clock.sort,
-        "every_s": clock.every,
-    }
-    lines += [
+    asked = [f"# To decide: {printable(question)}" for question in mapping.questions]
+    entries = {key: getattr(clock, key) for key in TIME_KEYS}
+    said = [
         f"{key} = {_text(value)}"
         for key, value in entries.items()
         if value or (key == "start" and value == 0)
     ]
-    lines += ["", "[columns]"]
-    for line in mapping.lines:
-        if line.channel:
-            factor = f", factor = {line.factor:g}" if line.factor != 1.0 else ""
-            entry = f"{{ channel = {_text(line.channel)}, unit = {_text(line.unit)}{factor} }}"
-            lines.append(f"{_text(line.name)} = {entry}  # {printable(line.question or line.reason)}")
-        else:
-            lines.append(f"# {printable(_text(line.name))}  {printable(line.reason)}")
-    return "\n".join(lines) + "\n"
+    lines = [_entry(line) for line in mapping.lines]
+    head = f"# How {source} is read: edit it, and give it again with subzero import ... --map."
+    return "\n".join([head, *asked, "", f"[time]  # {clock.reason}", *said, "", "[columns]", *lines]) + "\n"
+
+
+def _entry(line: Line) -> str:
+    name, reason = _text(line.name), printable(line.reason)
+    if not line.channel:
+        return f"# {name}  {reason}"
+    factor = f", factor = {line.factor:g}" if line.factor != 1.0 else ""
+    return f"{name} = {{ channel = {_text(line.channel)}, unit = {_text(line.unit)}{factor} }}  # {reason}"
 
 
 def _text(value: object) -> str:
     """Return a value as TOML writes it, which for texts, numbers and lists of texts is as JSON does."""
-    return json.dumps(
-        value if isinstance(value, str | int | float | bool | list) else str(value), ensure_ascii=True
-    )
+    return json.dumps(list(value) if isinstance(value, tuple) else value, ensure_ascii=True)
 
 
 def read_map(path: str | Path, table: Table) -> Map:
@@ -390,110 +374,99 @@ def read_map(path: str | Path, table: Table) -> Map:
     Raises:
         UserError: it cannot be read, or does not suit; names every problem.
     """
-    title = f"The map {printable(str(path))} cannot be used:"
     try:
         content = tomllib.loads(read_text(path, MOST_OF_A_TOML))
-    except UnreadableFileError as error:
-        raise UserError(listed(title, [f"{error.why}. {error.remedy}"])) from None
-    except (tomllib.TOMLDecodeError, RecursionError, ValueError) as error:
-        raise UserError(listed(title, [f"it is no TOML: {error}"])) from None
-    problems: list[str] = [
-        f"unknown table {short(key)}; allowed: time, columns"
-        for key in content
-        if key not in ("time", "columns")
-    ]
-    clock, columns = content.get("time", {}), content.get("columns", {})
-    if not isinstance(clock, dict) or not isinstance(columns, dict):
-        raise UserError(listed(title, ["time and columns are tables: [time], [columns]"]))
-    found = _read_clock(clock, table, problems)
-    lines = [line for name, entry in columns.items() if (line := _read_line(name, entry, table, problems))]
-    if not columns:
-        problems.append("it names no columns; write them below [columns]")
-    targets = [TARGETS.get(line.channel, line.channel) for line in lines]
-    problems += [
-        f"more than one column is {target}; keep one"
-        for target in sorted({t for t in targets if targets.count(t) > 1})
-    ]
+        problems = _keys("the map", content, {"time": dict, "columns": dict})
+    except (UnreadableFileError, ValueError, RecursionError) as error:
+        content, problems = {}, [str(error)]
+    if not problems:
+        clock = _read_clock(content.get("time", {}), table, problems)
+        columns = content.get("columns", {})
+        lines = [
+            line for name, entry in columns.items() if (line := _read_line(name, entry, table, problems))
+        ]
+        targets = [TARGETS.get(line.channel, line.channel) for line in lines]
+        problems += [
+            f"{one} is more than one column; keep one"
+            for one in dict.fromkeys(targets)
+            if targets.count(one) > 1
+        ]
+        problems += [] if columns else ["it names no columns; write them below [columns]"]
     if problems:
-        raise UserError(listed(title, problems))
-    unused = [
-        Line(name=name, reason="not used: not in the map")
-        for name in table.columns
-        if name not in {*columns, *found.columns}
+        raise UserError(listed(f"The map {printable(str(path))} cannot be used:", problems))
+    rest = [name for name in table.columns if name not in {*columns, *clock.columns}]
+    return Map(
+        clock=clock, lines=(*lines, *(Line(name=name, reason="not used: not in the map") for name in rest))
+    )
+
+
+def _keys(where: str, entry: object, allowed: Mapping[str, Any]) -> list[str]:
+    """Return the keys of a table that are not allowed, or hold a value of another kind."""
+    if not isinstance(entry, dict):
+        return [f"{where} must be a table with {', '.join(allowed)}"]
+    unknown = [key for key in entry if key not in allowed]
+    wrong = [
+        key
+        for key, value in entry.items()
+        if key in allowed
+        and (not isinstance(value, allowed[key]) or (isinstance(value, bool) and allowed[key] is not bool))
     ]
-    return Map(clock=found, lines=(*lines, *unused))
+    return [
+        f"{where} has no {short(key)}.{suggestion(key, allowed)} Allowed: {', '.join(allowed)}"
+        for key in unknown
+    ] + [f"{where}: {key} is {short(entry[key])}, which is no value for it" for key in wrong]
 
 
-def _read_clock(entry: Mapping[str, Any], table: Table, problems: list[str]) -> Clock:
+def _read_clock(entry: dict[str, Any], table: Table, problems: list[str]) -> Clock:
     """Read how times are read; problems are added to a list."""
-    problems += [
-        f"[time] has no {short(key)}.{suggestion(key, TIME_KEYS)} Allowed: {', '.join(TIME_KEYS)}"
-        for key in entry
-        if key not in TIME_KEYS
-    ]
-    names, unit, every, part = (
-        entry.get("columns", []),
-        entry.get("unit", ""),
-        entry.get("every_s", 0.0),
-        entry.get("part", 0),
-    )
-    if not isinstance(names, list) or not all(isinstance(name, str) for name in names) or len(names) > 2:
-        problems.append("[time] columns must be a list of one name, or two")
-        names = []
-    problems += [_missing(name, table) for name in names if name not in table.columns]
-    numbers = [name for name in names if name in table.columns and table.columns[name].form == NUMBER]
-    if (unit or numbers) and unit not in times.CLOCK_UNITS:
-        problems.append(f"[time] unit is {short(unit)}; it must be one of {', '.join(times.CLOCK_UNITS)}")
-    if ("every_s" in entry) == bool(names) or (not names and not (real(every) or 0.0) > 0.0):
-        problems.append("[time] needs columns, or every_s, a number of seconds above 0, not both")
-    if (
-        isinstance(part, bool)
-        or not isinstance(part, int)
-        or part < 0
-        or not isinstance(entry.get("sort", False), bool)
-    ):
-        problems.append("[time] part must be a whole number from 1, and sort true or false")
-    start = entry.get("start")
-    if start is not None and times.start_of(start) is None:
-        problems.append(f"[time] start is {short(start)}; it must be a time as the log writes it")
-    return Clock(
-        columns=tuple(names),
-        unit=str(unit),
-        start=start,
-        part=part,
-        sort=bool(entry.get("sort")),
-        every=real(every) or 0.0,
-    )
+    if wrong := _keys("[time]", entry, TIME_KEYS):
+        problems += wrong
+        return Clock()
+    clock = Clock(**{**entry, "columns": tuple(entry.get("columns", ()))})
+    problems += [_missing(name, table) for name in clock.columns if name not in table.columns]
+    is_number = [table.columns[name].form == NUMBER for name in clock.columns if name in table.columns]
+    if (clock.unit or any(is_number)) and clock.unit not in CLOCK_UNITS:
+        problems.append(f"[time]: unit is {short(clock.unit)}; it must be one of {', '.join(CLOCK_UNITS)}")
+    if bool(clock.columns) == bool(clock.every_s) or clock.every_s < 0.0 or len(clock.columns) > 2:
+        problems.append("[time] needs columns, one or two, or else every_s, a number of seconds above 0")
+    if clock.start is not None and times.start_of(clock.start) is None:
+        problems.append(f"[time]: start is {short(clock.start)}; it must be a time as the log writes it")
+    return clock
 
 
-def _read_line(name: str, entry: object, table: Table, problems: list[str]) -> Line | None:
+def _read_line(name: str, entry: Any, table: Table, problems: list[str]) -> Line | None:
     """Read the line of one column; problems are added to a list."""
+    wrong = _keys(short(name), entry, COLUMN_KEYS)
+    if not wrong and not {"channel", "unit"} <= set(entry):
+        wrong = [f"{short(name)} needs channel and unit"]
     if name not in table.columns:
-        problems.append(_missing(name, table))
-        return None
-    if not isinstance(entry, dict) or not {"channel", "unit"} <= set(entry) <= {"channel", "unit", "factor"}:
-        problems.append(f'{short(name)} must be {{ channel = "...", unit = "..." }}, and may have a factor')
-        return None
-    channel, factor = entry["channel"], real(entry.get("factor", 1.0))
-    channel = BY_COLUMN[channel].name if channel in BY_COLUMN else channel
-    allowed = [one for one in (*BY_NAME, *TARGETS) if one != TIME_CHANNEL.name]
-    if channel not in allowed:
-        problems.append(f"{short(name)}: there is no channel {short(channel)}.{suggestion(channel, allowed)}")
-        return None
-    unit = unit_of(kind_of(channel), str(entry["unit"]))
-    if not unit:
+        wrong.append(_missing(name, table))
+    elif not np.isfinite(table.columns[name].values).any() or table.columns[name].form != NUMBER:
+        wrong.append(f"{short(name)} holds no numbers in this log; leave it out")
+    allowed = [channel for channel in (*BY_NAME, *TARGETS) if channel != TIME.name]
+    channel = (
+        ""
+        if wrong
+        else BY_COLUMN[entry["channel"]].name
+        if entry["channel"] in BY_COLUMN
+        else entry["channel"]
+    )
+    if not wrong and channel not in allowed:
+        wrong = [f"{short(name)}: there is no channel {short(channel)}.{suggestion(channel, allowed)}"]
+    unit = "" if wrong else unit_of(kind_of(channel), entry["unit"])
+    if not wrong and (not unit or entry.get("factor") == 0):
         known = ", ".join(UNITS[kind_of(channel)])
-        problems.append(
-            f"{short(name)}: unit {short(entry['unit'])} of {channel} is not known; allowed: {known}"
-        )
-    if not factor:
-        problems.append(
-            f"{short(name)}: factor is {short(entry.get('factor'))}; it must be a number other than 0"
-        )
-    if table.columns[name].form != NUMBER or not np.isfinite(table.columns[name].values).any():
-        problems.append(f"{short(name)} holds no numbers in this log; leave it out")
-    return Line(name=name, channel=channel, unit=unit, factor=factor or 1.0, reason="map", is_checked=True)
+        wrong = [
+            f"{short(name)}: {channel} is in one of {known}, not in {short(entry['unit'])}, times a factor other than 0"
+        ]
+    problems += wrong
+    return (
+        None
+        if wrong
+        else Line(name=name, channel=channel, unit=unit, factor=entry.get("factor", 1.0), reason="map")
+    )
 
 
 def _missing(name: object, table: Table) -> str:
-    return f"the log has no column {short(name)}.{suggestion(name, table.columns)} It has {', '.join(map(short, table.columns))}"
+    have = ", ".join(map(short, table.columns))
+    return f"the log has no column {short(name)}.{suggestion(name, table.columns)} It has {have}"

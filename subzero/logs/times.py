@@ -14,13 +14,12 @@ from datetime import UTC, datetime
 
 import numpy as np
 
+from subzero.logs.names import CLOCK_UNITS
+
 DATE_AND_TIME = "date and time", "date and time with a zone"
 DATE, TIME_OF_DAY, MIXED = "date", "time of day", "dates with a zone and without"
 DAY = 86400.0
 """[s]"""
-
-CLOCK_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0, "datenum": DAY}
-"""Unit of a clock → seconds; MATLAB's datenum counts days."""
 
 EPOCHS = {1e17: "ns", 1e14: "us", 1e11: "ms", 1e9: "s"}
 """A first time beyond this counts from 1970 in that unit."""
@@ -34,7 +33,7 @@ _BOTH = re.compile(r"(\d{4}[-/]\d\d[-/]\d\d|\d\d\.\d\d\.\d{4})[T ]\s*(\d\d:\d\d.
 
 
 def seconds_of(cell: str) -> tuple[str, float] | None:
-    """Return the form of a cell that is a date or a time, and its seconds (dates: since 1970); None if it is neither."""
+    """Return the form of a cell that is a date or a time, and its seconds (dates: since 1970); else None."""
     if ":" in cell:
         if match := _CLOCK.match(cell):
             days, hours, minutes, seconds = match.groups()
@@ -87,29 +86,40 @@ def over_midnight(clock: np.ndarray) -> np.ndarray:
     return clock + DAY * days
 
 
-def problem_of(time: np.ndarray, begins: Sequence[int]) -> str:
-    """Return in one sentence what is wrong with times (n,) [s], and what to do; empty if they increase."""
+def is_epoch(clock: np.ndarray) -> bool:
+    """Say whether a clock counts from 1970."""
+    return bool(clock[np.isfinite(clock)][0] > min(EPOCHS))
+
+
+def problem_of(time: np.ndarray, begins: Sequence[int]) -> tuple[str, str] | None:
+    """Return what is wrong with times (n,) [s], and what to do; None if they increase.
+
+    Args:
+        time: of the rows. [s]
+        begins: rows in which the clock begins anew, `parts_of`.
+    """
     steps = np.diff(time)
+    same, back = np.flatnonzero(steps == 0.0), np.flatnonzero(steps < 0.0)
     if time.size < 2:
-        return "it has fewer than two rows with a time. Give a log with more"
-    if (same := int((steps == 0.0).sum())) > 1 and not (steps < 0.0).any():
+        return "it has fewer than two rows with a time", "Give a log with more."
+    if same.size > 1 and not back.size:
+        why = f"{same.size} rows have the time of the row before: fractions of a second were not written"
         return (
-            f"{same} rows have the time of the row before: fractions of a second were not written. Export the times "
-            "with all their digits, or say in the map how far rows are apart: [time] every_s = 0.1"
+            why,
+            "Export times with all digits, or say in the map how far rows are apart: [time] every_s = 0.1.",
         )
-    if len(begins) > 1 and (steps < 0.0).sum() == len(begins) - 1:
+    if len(begins) > 1 and back.size == len(begins) - 1:
         where = ", ".join(str(at + 1) for at in begins[1:4])
+        why = f"its clock begins anew at row {where}: the logger was restarted"
+        return why, f"Say in the map which part is meant, 1 to {len(begins)}: [time] part = 1."
+    if same.size + back.size:
+        row = int(np.flatnonzero(steps <= 0.0)[0]) + 2
+        why = f"{same.size + back.size} rows are not later than the row before, the first is row {row}"
         return (
-            f"its clock begins anew at row {where}: the logger was restarted. Say in the map which part is meant: "
-            f"[time] part = 1 ... {len(begins)}"
+            why,
+            "If rows are only out of order, say so in the map: [time] sort = true; else repair the times.",
         )
-    if (steps <= 0.0).any():
-        rows = np.flatnonzero(steps <= 0.0)
-        return (
-            f"{rows.size} rows are not later than the row before, the first is row {rows[0] + 2}. If rows were only "
-            "written out of order, say so in the map: [time] sort = true. If the clock jumped, repair the times"
-        )
-    return ""
+    return None
 
 
 def parts_of(time: np.ndarray) -> list[int]:

@@ -211,7 +211,8 @@ def _header_problems(header: list[str]) -> list[str]:
     )
     if between:
         return [
-            f"its columns are separated by {between}; separate them by commas, and write numbers with a point; {IMPORTED}"
+            f"its columns are separated by {between}; separate them by commas, and write numbers with a point; "
+            f"{IMPORTED}"
         ]
     places = [name for name in header if re.match(PLACE_ON_EARTH, name.lower())]
     if places:
