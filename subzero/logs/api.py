@@ -103,7 +103,7 @@ def import_log(path: str | Path, map_path: str | Path | None = None) -> Imported
         mapping = read_map(map_path, table)
         rows, time, notes = _rows(path, table, mapping.clock)
         mapping = replace(mapping, notes=contradictions(mapping, table, rows, time))
-    if not any(line.channel for line in mapping.lines):
+    if not any(line.channel for line in mapping.lines) and not mapping.questions:
         names = ", ".join(short(name) for name in table.columns)
         raise refusal(
             path, f"none of its columns is a channel: {names}", "Name them in a map, see docs/logs.md."

@@ -17,13 +17,14 @@ import json
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from subzero.channels import BY_COLUMN, BY_NAME, TIME
-from subzero.errors import UserError, listed, printable, short, suggestion
+from subzero.errors import UserError, listed, printable, real, short, suggestion
 from subzero.logs import times
 from subzero.logs.evidence import Contradiction, Findings, Measured, findings, tied, units_by_size
 from subzero.logs.names import (
@@ -42,6 +43,8 @@ from subzero.user_file import MOST_OF_A_TOML, UnreadableFileError, read_text
 
 ASKED = "?"
 """Unit in a map that the user has to fill in."""
+RIVAL = "one of several with this channel"
+"""Reason of a column that may be the one to be used."""
 ALIKE = 0.98
 """Cosine between two columns from which on they measure the same. [-]"""
 EQUATOR_M, SQUARED_ECCENTRICITY = 6378137.0, 6.69437999014e-3
@@ -172,25 +175,24 @@ def find_map(table: Table, clock: Clock, rows: np.ndarray, time: np.ndarray) -> 
     }  # fmt: skip
     values = {name: table.columns[name].values[rows] for name in named}
     chosen, questions = _chosen(named, values, time)
-    used = {name: named[name] for name, reason in chosen.items() if not reason.startswith("not used")}
+    used = {
+        name: named[name] for name, why in chosen.items() if why != RIVAL and not why.startswith("not used")
+    }
     columns = {
         found.channel: Measured(found.channel, values[name], found.unit) for name, found in used.items()
     }
     said = findings({**_positions(columns), **columns}, time)
-    lines = [
-        _line(name, used[name], said, chosen[name])
-        if name in used
-        else Line(name=name, reason=chosen.get(name) or _why_unused(table, name))
-        for name in table.columns
-        if name not in clock.columns
-    ]
-    questions += [_question(line, said) for line in lines if line.unit == ASKED]
-    names = {line.channel: line for line in lines}
+    lines = {name: _unused(table, name, chosen) for name in table.columns if name not in clock.columns}
+    lines |= {name: Line(name=name, channel=named[name].channel, unit=named[name].unit or ASKED, reason=RIVAL)
+              for name, reason in chosen.items() if reason == RIVAL}  # fmt: skip
+    lines |= {name: _line(name, found, said, chosen[name]) for name, found in used.items()}
+    questions += [_question(lines[name], said) for name in used if lines[name].unit == ASKED]
+    names = {found.channel: lines[name] for name, found in used.items()}
     odd = [_words(one, names) for one in said.contradictions if one.channels[0] in names]
     is_asked = [one.is_of_units for one in said.contradictions if one.channels[0] in names]
     questions += [words for words, asked in zip(odd, is_asked, strict=True) if asked]
     notes = tuple(words for words, asked in zip(odd, is_asked, strict=True) if not asked)
-    return Map(clock=clock, lines=tuple(lines), questions=tuple(questions), notes=notes)
+    return Map(clock=clock, lines=tuple(lines.values()), questions=tuple(questions), notes=notes)
 
 
 def contradictions(mapping: Map, table: Table, rows: np.ndarray, time: np.ndarray) -> tuple[str, ...]:
@@ -202,12 +204,15 @@ def contradictions(mapping: Map, table: Table, rows: np.ndarray, time: np.ndarra
     return tuple(_words(one, lines) for one in found.contradictions if one.channels[0] in lines)
 
 
-def _why_unused(table: Table, name: str) -> str:
+def _unused(table: Table, name: str, chosen: Mapping[str, str]) -> Line:
+    """Return the line of a column that is not used, and why."""
     column, named = table.columns[name], recognised(name)
+    reason = "not used: no channel has this name"
+    if column.form not in (NUMBER, TEXT) or (named and named.channel == TIME.name):
+        reason = "not used: another time"
     if column.form == TEXT or not np.isfinite(column.values).any():
-        return "not used: no numbers"
-    is_time = column.form != NUMBER or (named and named.channel == TIME.name)
-    return "not used: another time" if is_time else "not used: no channel has this name"
+        reason = "not used: no numbers"
+    return Line(name=name, reason=chosen.get(name, reason))
 
 
 def _line(name: str, named: Named, found: Findings, choice: str) -> Line:
@@ -263,11 +268,12 @@ def _chosen(
         rivals = [name for name in names if ranks[name] == ranks[names[0]]]
         first, reason = _best_of(rivals, named, values, time)
         if not first:
-            questions.append(
-                f"{_either([short(name) for name in rivals])} is the {target}; they differ: keep one in the map"
-            )
+            either = _either([short(name) for name in rivals])
+            questions.append(f"{either} is the {target}; they differ, so keep one in the map")
+        unused = f"not used: {short(first or names[0])} is the {target}"
         reasons |= {
-            name: reason if name == first else f"not used: {short(first)} is the {target}" for name in names
+            name: reason if name == first else RIVAL if not first and name in rivals else unused
+            for name in names
         }
     return reasons, questions
 
@@ -405,24 +411,34 @@ def _keys(where: str, entry: object, allowed: Mapping[str, Any]) -> list[str]:
     if not isinstance(entry, dict):
         return [f"{where} must be a table with {', '.join(allowed)}"]
     unknown = [key for key in entry if key not in allowed]
-    wrong = [
-        key
-        for key, value in entry.items()
-        if key in allowed
-        and (not isinstance(value, allowed[key]) or (isinstance(value, bool) and allowed[key] is not bool))
-    ]
-    return [
+    wrong = [key for key, value in entry.items() if key in allowed and not _is(value, allowed[key])]
+    problems = [
         f"{where} has no {short(key)}.{suggestion(key, allowed)} Allowed: {', '.join(allowed)}"
         for key in unknown
-    ] + [f"{where}: {key} is {short(entry[key])}, which is no value for it" for key in wrong]
+    ]
+    return problems + [f"{where}: {key} is {short(entry[key])}, which is no value for it" for key in wrong]
+
+
+def _is(value: object, kinds: Any) -> bool:
+    """Say whether a value is of some kinds: a finite number, a truth value only where that is asked for."""
+    if isinstance(value, bool) or kinds is bool:
+        return isinstance(value, bool) and kinds is bool
+    return isinstance(value, kinds) and (isinstance(value, str | list | dict) or real(value) is not None)
 
 
 def _read_clock(entry: dict[str, Any], table: Table, problems: list[str]) -> Clock:
     """Read how times are read; problems are added to a list."""
-    if wrong := _keys("[time]", entry, TIME_KEYS):
+    names, start = entry.get("columns", []), entry.get("start")
+    entry = entry | (
+        {"start": str(start)} if isinstance(start, datetime) else {}
+    )  # TOML has dates of its own
+    wrong = _keys("[time]", entry, TIME_KEYS)
+    if not wrong and not all(isinstance(name, str) for name in names):
+        wrong = [f"[time]: columns is {short(names)}, which is no value for it"]
+    if wrong:
         problems += wrong
         return Clock()
-    clock = Clock(**{**entry, "columns": tuple(entry.get("columns", ()))})
+    clock = Clock(**{**entry, "columns": tuple(names)})
     problems += [_missing(name, table) for name in clock.columns if name not in table.columns]
     is_number = [table.columns[name].form == NUMBER for name in clock.columns if name in table.columns]
     if (clock.unit or any(is_number)) and clock.unit not in CLOCK_UNITS:

@@ -1,7 +1,7 @@
 """Every form in which a logger writes a record is read, or named in one line.
 
-Verifies: `subzero.read_log` and the table, the times and the names below it. Configuration: one small record, written in
-the forms of `../shared/data/field_cases/make_logs.py` and others. Tolerance: the digits that are written.
+Verifies: `subzero.read_log`, with the table, times and names below it. Configuration: one small record, written in the
+forms of `../shared/data/field_cases/make_logs.py` and others. Tolerance: the digits that are written.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ import subzero
 from subzero.errors import UserError
 
 STEP, ROWS = 0.1, 301
-COLUMNS = "time_s surge_speed_m_s heading_deg yaw_rate_deg_s pitch_deg roll_deg depth_m".split()
-CHANNELS = "surge_speed heading yaw_rate pitch roll_angle depth".split()
+COLUMNS = ["time_s", "surge_speed_m_s", "heading_deg", "yaw_rate_deg_s", "pitch_deg", "roll_deg", "depth_m"]
+CHANNELS = ["surge_speed", "heading", "yaw_rate", "pitch", "roll_angle", "depth"]
 EPOCH = 1_636_500_000
 SHARED = Path(__file__).parents[3] / "shared" / "data"
 
@@ -78,7 +78,7 @@ def converted(factors, names):
 
 
 RAD = np.pi / 180.0
-GERMAN = "Zeit [s],Fahrt [m/s],Kurs [°],Drehrate [°/s],Pitch [°],Roll [°],Tiefe [m]".split(",")
+GERMAN = ["Zeit [s]", "Fahrt [m/s]", "Kurs [°]", "Drehrate [°/s]", "Pitch [°]", "Roll [°]", "Tiefe [m]"]
 READ = {
     "plain": text(cells()),
     "decimal comma": text(cells(), sep=";", dec=","),
@@ -115,7 +115,7 @@ READ = {
     "radians, knots, feet": converted(
         [1.0, 3600.0 / 1852.0, RAD, RAD, RAD, RAD, 1.0 / 0.3048],
         ["t", "Speed (kn)", "yaw_rad", "YawRate [rad/s]", "pitch_rad", "Roll(rad)", "depth[ft]"]),
-    "MOOS": converted([1.0] * 7, ["TIME", "NAV_SPEED", "NAV_HEADING", "yaw_rate_deg_s", "pitch_deg", "roll_deg", "NAV_DEPTH"]),
+    "MOOS": converted([1.0] * 7, ["TIME", "NAV_SPEED", "NAV_HEADING", *COLUMNS[3:6], "NAV_DEPTH"]),
     "angles decided by values": converted(
         [1.0, 1.0, RAD, RAD, RAD, RAD, 100.0],
         ["time", "speed_m_s", "yaw", "yawrate_rad_s", "pitch", "roll", "depth_cm"]),
@@ -220,7 +220,7 @@ def test_of_two_pressure_sensors_the_one_that_dives_is_taken_and_it_is_said(tmp_
 def test_two_sensors_that_differ_are_asked_about(tmp_path):
     rows = "".join(f"{k},{1 + 0.1 * k},{3 - 0.2 * k:g}\n" for k in range(30))
     with pytest.raises(
-        UserError, match=r"'depth\[0\] \(m\)' or 'depth\[1\] \(m\)' is the depth; they differ"
+        UserError, match=r"'depth\[0\] \(m\)' or 'depth\[1\] \(m\)' is the depth; they differ, so"
     ):
         subzero.read_log(make(tmp_path / "log.csv", "time_s,depth[0] (m),depth[1] (m)\n" + rows))
 
