@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from subzero.logs.api import Imported
 
 FINE, ASKED = 0, 2
+SHORTER = "Name fewer columns in a map, or split the log."
 HEADINGS = ("column", "channel", "unit", "factor", "why")
 
 
@@ -82,7 +83,9 @@ def _written(
     from subzero.atomic_output import open_output_folder
     from subzero.logs.api import to_csv
     from subzero.logs.mapping import to_toml
+    from subzero.logs.table import refusal
     from subzero.records.record import read_record
+    from subzero.user_file import MEGABYTE, MOST_OF_A_CSV
 
     maps = [map_out.name] if map_out is not None else [f"{target.stem}.map.toml" for target in targets]
     names = [*maps, *(target.name for target in targets if map_out is None)]
@@ -90,7 +93,12 @@ def _written(
         for one, name, target in zip(found, maps, targets, strict=True):
             (output.path / name).write_text(to_toml(one.mapping, one.source), encoding="utf-8")
             if map_out is None and one.record is not None:
-                (output.path / target.name).write_text(to_csv(one.record), encoding="utf-8")
+                text = to_csv(one.record)
+                if len(text) > MOST_OF_A_CSV:
+                    raise refusal(
+                        one.source, f"its record has {len(text) // MEGABYTE} MB, more than is read", SHORTER
+                    )
+                (output.path / target.name).write_text(text, encoding="utf-8")
                 read_record(output.path / target.name)  # what is written can be read
     return output.files()
 

@@ -23,7 +23,7 @@ import numpy as np
 from subzero.errors import UserError, printable, short
 from subzero.logs.names import is_unit
 from subzero.logs.times import DATE_AND_TIME, MIXED, seconds_of
-from subzero.user_file import MEGABYTE, MOST_COLUMNS, check_readable
+from subzero.user_file import MEGABYTE, MOST_COLUMNS, UnreadableFileError, check_readable
 
 NUMBER, TEXT = "number", "text"
 GAPS = frozenset(
@@ -79,7 +79,10 @@ def read_table(path: str | Path) -> Table:
     Raises:
         UserError: it cannot be read, is too large, or holds no table.
     """
-    check_readable(path)
+    try:
+        check_readable(path)
+    except UnreadableFileError as error:
+        raise refusal(path, error.why, error.remedy) from None
     size = Path(path).stat().st_size
     if size > MOST_OF_A_LOG:
         raise refusal(
@@ -188,42 +191,35 @@ def _encoding(path: Path) -> str:
 
 def _layout(path: Path, lines: list[str]) -> _Layout:
     """Find how a CSV file is written from its first lines; a remark before the first row may hold the names."""
-    plain = [line for line in lines if line.strip() and not line.startswith(REMARKS)]
+    written = [(at, line) for at, line in enumerate(lines) if line.strip()]
+    plain = [line for _, line in written if not line.startswith(REMARKS)]
     if not plain:
         raise refusal(path, "it holds no samples", "It needs names of columns, and rows of numbers.")
     delimiter, decimal = max(FORMATS, key=lambda kind: _fit(plain, *kind))
-    rows = [(at, _cells(line, delimiter)) for at, line in enumerate(lines) if line.strip()]
     width = _width([_cells(line, delimiter) for line in plain])
-    first = next(at for at, row in rows if len(row) == width and not lines[at].startswith(REMARKS))
-    if _has_numbers(rows_at(rows, first), decimal):  # the names stand in a remark, or nowhere
-        named = [_cells(lines[at].lstrip("#%/ "), delimiter) for at, _ in rows if at < first]
-        names = next((row for row in reversed(named) if len(row) == width), None)
-        if names is None:
-            raise refusal(path, "its first row has numbers, not names of columns", "Write names above it.")
-        first -= 1
-    else:
-        names = rows_at(rows, first)
-    second = next((at for at, row in rows if at > first and not lines[at].startswith(REMARKS)), None)
-    units = rows_at(rows, second) if second is not None else []
-    has_units = len(units) == width and _are_units(units, decimal)
-    skipped = second + 1 if has_units and second is not None else first + 1
-    return _Layout(delimiter, decimal, _distinct(names), tuple(units if has_units else [""] * width), skipped)
-
-
-def rows_at(rows: list[tuple[int, list[str]]], line: int) -> list[str]:
-    """Return the cells of a line by its number."""
-    return next(row for at, row in rows if at == line)
+    rows = [(at, _cells(line.lstrip("#%/ "), delimiter), line.startswith(REMARKS)) for at, line in written]
+    full = [row for row in rows if len(row[1]) == width]
+    first = next(k for k, (_, _, is_remark) in enumerate(full) if not is_remark)
+    first -= _has_numbers(full[first][1], decimal)  # then the names stand in a remark before, or nowhere
+    if first < 0:
+        raise refusal(path, "its first row has numbers, not names of columns", "Write names above it.")
+    at, units = full[first][0], [""] * width
+    if len(full) > first + 1 and _are_units(full[first + 1][1], decimal):
+        at, units, _ = full[first + 1]
+    return _Layout(delimiter, decimal, _distinct(full[first][1]), tuple(units), at + 1)
 
 
 def _cells(line: str, delimiter: str) -> list[str]:
     if delimiter == " ":
         return line.split()
-    try:
-        return [
-            cell.strip() for cell in next(csv.reader([line], delimiter=delimiter, skipinitialspace=True), [])
-        ]
-    except csv.Error:
-        return []
+    if '"' in line:
+        try:
+            return [
+                cell.strip() for cell in next(csv.reader([line], delimiter=delimiter, skipinitialspace=True))
+            ]
+        except (csv.Error, StopIteration):
+            return []
+    return [cell.strip() for cell in line.split(delimiter)]
 
 
 def _width(rows: Sequence[Sequence[str]]) -> int:
@@ -256,39 +252,35 @@ def _are_units(row: Sequence[str], decimal: str) -> bool:
 
 def _distinct(names: Sequence[str]) -> tuple[str, ...]:
     """Return names of which none is empty and none occurs twice."""
-    found: list[str] = []
+    found: dict[str, None] = {}
     for at, name in enumerate(names, start=1):
-        base = name or f"column {at}"
-        found.append(
-            next(new for k in itertools.count(1) if (new := base if k == 1 else f"{base} ({k})") not in found)
-        )
+        new = name or f"column {at}"
+        while new in found:
+            new = f"{name} ({at})"
+            name = f"{name}_"
+        found[new] = None
     return tuple(found)
 
 
 def _chunks(path: Path, layout: _Layout, notes: list[str]) -> Iterator[list[list[str]]]:
     """Give the rows, some thousands at once; a last row that was cut off is left out."""
-    short_row, rows, width = 0, list[list[str]](), len(layout.names)
+    rows, width, cut = list[list[str]](), len(layout.names), 0
     for number, line in enumerate(_lines(path), start=1):
         if number <= layout.skipped or not line.strip() or line.startswith(REMARKS):
             continue
-        if short_row:
-            break
+        if cut:
+            why = f"line {cut} has another number of cells than the {width} names"
+            raise refusal(path, why, "Repair or remove it.")
         row = _cells(line, layout.delimiter)
         if len(row) == width:
             rows.append(row)
         else:
-            short_row = number
+            cut = number
         if len(rows) == CHUNK:
             yield rows
             rows = []
-    else:
-        if short_row:
-            notes.append(f"The last row, line {short_row}, was cut off and is left out.")
-        yield rows
-        return
-    raise refusal(
-        path, f"line {short_row} has another number of cells than the {width} names", "Repair or remove it."
-    )
+    notes += [f"The last row, line {cut}, was cut off and is left out."] if cut else []
+    yield rows
 
 
 def _number(cell: str, decimal: str) -> float | None:
@@ -307,14 +299,10 @@ def _column(cells: Sequence[str], decimal: str) -> Column:
             pass
     values, forms = np.full(len(cells), np.nan), Counter[str]()
     for at, cell in enumerate(cells):
-        if cell.lower() in GAPS:
-            continue
-        number, time = _number(cell, decimal), None
-        if number is None:
-            time = seconds_of(cell)
-        form, value = (NUMBER, number) if number is not None else time or (TEXT, np.nan)
-        values[at] = value
-        forms[form] += 1
+        if cell.lower() not in GAPS:
+            number = _number(cell, decimal)
+            form, values[at] = (NUMBER, number) if number is not None else seconds_of(cell) or (TEXT, np.nan)
+            forms[form] += 1
     return _finite(values, _form(forms))
 
 
