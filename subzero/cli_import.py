@@ -32,7 +32,7 @@ def import_(
     """Make records of logs as their loggers wrote them: names, units and times found, and every change said.
 
     Args:
-        logs: CSV of any delimiter, .mat, .nc or .alog; each becomes a record.
+        logs: CSV of any delimiter, .mat, .nc, .alog or .bin; each becomes a record.
         map: TOML file that says which column is which channel, in which unit; found from names and values without it.
         out: the record; its map goes there too, as NAME.map.toml. With several logs a folder, for one record of each.
         map_out: write the map to this file, and no record: to edit it, and give it again with --map.

@@ -67,7 +67,8 @@ def read_log(path: str | Path, map: str | Path | None = None) -> Record:
     do not decide has to be said by a map (``subzero import LOG --map-out map.toml`` writes one to edit).
 
     Args:
-        path: CSV of any delimiter and encoding, ``.mat``, netCDF ``.nc``, or MOOS ``.alog``.
+        path: CSV of any delimiter and encoding, ``.mat``, netCDF ``.nc``, MOOS ``.alog``, or ArduPilot ``.bin``
+            (with the extra ``logs``).
         map: TOML file that says which column is which channel, in which unit; found if None.
 
     Raises:

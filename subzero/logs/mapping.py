@@ -148,7 +148,7 @@ def _is_time(table: Table, name: str) -> Named | None:
 def _clock_of_numbers(name: str, values: np.ndarray, written: str) -> tuple[Clock, tuple[str, ...]]:
     """Return the clock of a column of numbers, in the unit that is written if its size and steps allow that."""
     likely, is_epoch = times.unit_by_values(values), times.is_epoch(values)
-    if written in likely or written in ("min", "h", "datenum"):
+    if written and (written in likely or len(likely) != 1 or written in ("min", "h", "datenum")):
         return Clock(columns=(name,), unit=written, reason="unit in the name"), ()
     if len(likely) == 1 and (not written or is_epoch):
         reason = "counts from 1970" if is_epoch else "by its steps"
@@ -172,6 +172,7 @@ def find_map(table: Table, clock: Clock, rows: np.ndarray, time: np.ndarray) -> 
         for name, column in table.columns.items()
         if column.form == NUMBER and (found := recognised(name, column.unit)) and found.channel != TIME.name
         and np.isfinite(column.values[rows]).any()
+        and (found.channel not in (LATITUDE, LONGITUDE) or np.nan_to_num(column.values[rows]).any())  # 0: no fix
     }  # fmt: skip
     values = {name: table.columns[name].values[rows] for name in named}
     chosen, questions = _chosen(named, values, time)

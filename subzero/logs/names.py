@@ -64,7 +64,7 @@ def recognised(name: str, unit: str = "") -> Named | None:
     """
     plain = re.sub(BRACKET, " ", name)
     words = _words(plain)
-    if len("".join(words)) == 1 and re.search(r"\d", plain):  # T1 is no time
+    if re.search(r"(^|[^A-Za-z])[A-Za-z]\d+$", plain.strip()):  # T1 is no time, and Q1 no pitch rate
         return None
     inside = next((text for text in re.findall(BRACKET, name) if not text.isdigit()), "")
     for end in range(len(words), max(len(words) - 3, 0), -1):  # the last words may be a unit

@@ -1,4 +1,4 @@
-"""A table of numbers from a file as a logger wrote it: CSV of any kind, MATLAB, netCDF, MOOS.
+"""A table of numbers from a file as a logger wrote it: CSV of any kind, MATLAB, netCDF, MOOS, ArduPilot.
 
 Every cell becomes a number. Dates and times of day become seconds, a text becomes a gap, and a column knows which of
 them it holds (`Column.form`). Which column is what is not decided here (`logs.names`), and no unit is converted.
@@ -9,9 +9,13 @@ decimal sign are those with which most cells of its first lines are numbers or t
 
 from __future__ import annotations
 
+import contextlib
 import csv
+import functools
 import itertools
+import os
 import re
+import struct
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -20,8 +24,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from subzero.channels import TIME
 from subzero.errors import UserError, printable, short
-from subzero.logs.names import is_unit
+from subzero.logs.names import is_unit, recognised
 from subzero.logs.times import DATE_AND_TIME, MIXED, seconds_of
 from subzero.user_file import MEGABYTE, MOST_COLUMNS, UnreadableFileError, check_readable
 
@@ -38,6 +43,8 @@ HEAD, LONGEST_LINE, CHUNK = 1 << 16, 1 << 20, 20_000
 """What is looked at first [byte], the longest line [character], and lines that are converted at once."""
 SAMPLE = 100
 """Lines that tell delimiter, decimal sign and header."""
+DATAFLASH = b"\xa3\x95"
+"""Every message of an ArduPilot log begins so."""
 REMARKS = ("#", "%", "//")
 FORMATS = ((",", "."), *itertools.product((";", "\t", "|", " "), (".", ",")))
 """Delimiter (a blank is any white space) and decimal sign."""
@@ -394,13 +401,59 @@ def _read_alog(path: Path) -> tuple[dict[str, Column], list[str]]:
         time, value = _number(parts[0], "."), _number(parts[3].strip(), ".")
         if time is not None and value is not None:
             series.setdefault(parts[1], {})[time] = value
+    return _side_by_side(series), []
+
+
+def _read_dataflash(path: Path) -> tuple[dict[str, Column], list[str]]:
+    """Read the numbers of an ArduPilot log that are channels; a name has its message and instance, ``BARO[0].Alt``."""
+    try:
+        from pymavlink.DFReader import DFReader_binary
+    except ImportError:
+        raise refusal(path, "pymavlink is not installed", "pip install 'subzero[logs]'.") from None
+    with open(path, "rb") as file:
+        if file.read(2) != DATAFLASH:
+            raise refusal(path, "it is no log of ArduPilot", "Give the .BIN file that the autopilot wrote.")
+    series: dict[str, dict[float, float]] = {}
+    try:
+        with (
+            open(os.devnull, "w") as nowhere,
+            contextlib.redirect_stderr(nowhere),
+        ):  # it prints every bad byte
+            log = DFReader_binary(str(path))
+            with contextlib.closing(log.filehandle), contextlib.closing(log.data_map):
+                while (message := log.recv_msg()) is not None:
+                    _add_numbers(message.to_dict(), series)
+    except (ValueError, TypeError, IndexError, KeyError, AttributeError, OSError, struct.error) as error:
+        raise refusal(
+            path, f"it is damaged or no log of ArduPilot ({_one_line(error)})", "Copy it anew."
+        ) from None
+    return _side_by_side(series), []
+
+
+def _add_numbers(message: dict[str, Any], series: dict[str, dict[float, float]]) -> None:
+    """Add the numbers of a message that are channels by their names."""
+    instance = f"[{message['I']}]" if "I" in message else ""
+    for field, value in message.items():
+        name = f"{message['mavpackettype']}{instance}.{field}"
+        if isinstance(value, int | float) and "TimeUS" in message and _is_channel(name):
+            series.setdefault(name, {})[message["TimeUS"] * 1e-6] = value
+
+
+@functools.cache
+def _is_channel(name: str) -> bool:
+    named = recognised(name)
+    return named is not None and named.channel != TIME.name
+
+
+def _side_by_side(series: Mapping[str, Mapping[float, float]]) -> dict[str, Column]:
+    """Return samples that each have their own times as columns with gaps, in seconds of one clock."""
     times = np.array(sorted(set().union(*series.values())))
-    columns = {"time_s": Column(values=times, unit="s")}
+    columns = {TIME.column: Column(values=times, unit="s")} if series else {}
     for name, samples in series.items():
         values = np.full(times.size, np.nan)
         values[np.searchsorted(times, list(samples))] = list(samples.values())
         columns[name] = _finite(values, NUMBER)
-    return (columns if series else {}), []
+    return columns
 
 
 def _one_line(error: Exception) -> str:
@@ -408,5 +461,10 @@ def _one_line(error: Exception) -> str:
 
 
 Reader = Callable[[Path], tuple[dict[str, Column], list[str]]]
-READERS: dict[str, Reader] = {".mat": _read_mat, ".nc": _read_netcdf, ".alog": _read_alog}
+READERS: dict[str, Reader] = {
+    ".mat": _read_mat,
+    ".nc": _read_netcdf,
+    ".alog": _read_alog,
+    ".bin": _read_dataflash,
+}
 """Ending of a file's name → what reads it."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import datetime
 import json
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -307,3 +308,27 @@ def test_the_shared_logs_are_read_or_named():
     assert "restarted" in said["L4_r"]
     assert "centidegree" in said["L18_"]
     assert "rad/s for 'yaw_rate_deg_s'" in said["log4"]
+
+
+@pytest.mark.skipif(not SHARED.exists(), reason="the shared logs are not here")
+def test_a_log_of_ardupilot_is_read_without_the_barometer_in_the_hull():
+    pytest.importorskip("pymavlink")
+    from subzero.logs.api import import_log
+
+    found = import_log(SHARED / "ardusub_logs" / "small.BIN")
+    lines = {line.name: line for line in found.mapping.lines}
+    assert lines["CTUN.BAlt"].channel == "depth"
+    assert lines["BARO[0].Alt"].channel == ""
+    assert lines["ATT.Yaw"].unit == "degree"
+
+
+def test_what_is_no_log_of_ardupilot_is_named(tmp_path):
+    pytest.importorskip("pymavlink")
+    with pytest.raises(UserError, match="it is no log of ArduPilot"):
+        subzero.read_log(make(tmp_path / "log.bin", b"\0" * 1000))
+
+
+def test_without_pymavlink_a_log_of_ardupilot_says_what_to_install(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pymavlink.DFReader", None)
+    with pytest.raises(UserError, match=r"pymavlink is not installed. pip install 'subzero\[logs\]'"):
+        subzero.read_log(make(tmp_path / "log.bin", b"x"))
