@@ -15,7 +15,6 @@ import functools
 import itertools
 import os
 import re
-import struct
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -43,6 +42,8 @@ HEAD, LONGEST_LINE, CHUNK = 1 << 16, 1 << 20, 20_000
 """What is looked at first [byte], the longest line [character], and lines that are converted at once."""
 SAMPLE = 100
 """Lines that tell delimiter, decimal sign and header."""
+LARGEST = 1e19
+"""Nothing that is logged is larger; nanoseconds since 1970 are 2e18."""
 DATAFLASH = b"\xa3\x95"
 """Every message of an ArduPilot log begins so."""
 REMARKS = ("#", "%", "//")
@@ -314,7 +315,7 @@ def _column(cells: Sequence[str], decimal: str) -> Column:
 
 
 def _finite(values: np.ndarray, form: str) -> Column:
-    return Column(values=np.where(np.isfinite(values), values, np.nan), form=form)
+    return Column(values=np.where(np.abs(values) <= LARGEST, values, np.nan), form=form)
 
 
 def _form(forms: Counter[str]) -> str:
@@ -414,19 +415,20 @@ def _read_dataflash(path: Path) -> tuple[dict[str, Column], list[str]]:
         if file.read(2) != DATAFLASH:
             raise refusal(path, "it is no log of ArduPilot", "Give the .BIN file that the autopilot wrote.")
     series: dict[str, dict[float, float]] = {}
-    try:
-        with (
-            open(os.devnull, "w") as nowhere,
-            contextlib.redirect_stderr(nowhere),
-        ):  # it prints every bad byte
+    with (
+        open(os.devnull, "w") as nowhere,
+        contextlib.redirect_stderr(nowhere),
+        contextlib.redirect_stdout(nowhere),
+    ):
+        try:  # and print nothing of what is damaged
             log = DFReader_binary(str(path))
             with contextlib.closing(log.filehandle), contextlib.closing(log.data_map):
                 while (message := log.recv_msg()) is not None:
                     _add_numbers(message.to_dict(), series)
-    except (ValueError, TypeError, IndexError, KeyError, AttributeError, OSError, struct.error) as error:
-        raise refusal(
-            path, f"it is damaged or no log of ArduPilot ({_one_line(error)})", "Copy it anew."
-        ) from None
+        except Exception as error:  # pymavlink raises plain ones
+            raise refusal(
+                path, f"it is damaged or no log of ArduPilot ({_one_line(error)})", "Copy it anew."
+            ) from None
     return _side_by_side(series), []
 
 
