@@ -3,14 +3,17 @@
     python -m benchmarks.gallery [--width 3.4] [FOLDER ...]
 
 Writes ``docs/gallery.md`` and its pictures in ``docs/figures``: the commands of the table are run in an empty folder,
-one after the other, and what is shown of each is taken from there; of some only, if their folders are named. Pictures
-that are not made keep their place on the page. With --width the page stays, and figures are made as narrow as one
-column of a journal page, into ``build/gallery``, to be looked at. Three diagnoses and two sweeps take some minutes.
+one after the other, then the scripts of ``examples/``, and what is shown of each is taken from there; of some only, if
+their folders are named (``examples`` for the scripts). Pictures that are not made keep their place on the page. With
+--width the page stays, and figures are made as narrow as one column of a journal page, into ``build/gallery``, to be
+looked at. Three diagnoses and two sweeps take some minutes.
 """
 
 from __future__ import annotations
 
+import ast
 import io
+import runpy
 import shlex
 import shutil
 import sys
@@ -26,6 +29,7 @@ from subzero.page.report import caption
 ROOT = Path(__file__).resolve().parent.parent
 PAGE, PICTURES = ROOT / "docs" / "gallery.md", ROOT / "docs" / "figures"
 NARROW = ROOT / "build" / "gallery"
+SCRIPTS = ROOT / "examples"
 COLOURS = 64
 
 
@@ -73,21 +77,33 @@ GALLERY = (
 )  # fmt: skip
 """Every command that draws, in the order of the page, behind those that it needs: each is run once."""
 
+EXAMPLES = (
+    "fig6", "own_trial", "own_cable", "measured_record", "sweep", "cable_pulled_out", "static_shape", "winch",
+    "vehicle_alone", "own_controller", "autopilot", "gymnasium_environment", "diagnose", "calibrate",
+)  # fmt: skip
+"""The scripts of ``examples/``, in the order of the page."""
+
 HEAD = """# Gallery
 
-Every kind of figure, with the command that makes it. Each command also writes `report.html`, with these figures and a
-replay ([what it shows](page.md)). `simulate` and `compare` take `--width 3.4` for one column of a journal page, and
-`--figures pdf` or `svg`; in Python every figure takes `with subzero.figures.page_width(3.4):`.
+Every kind of figure, with the command that makes it; below them [examples in Python](#examples-in-python). Each command
+also writes `report.html`, with these figures and a replay ([what it shows](page.md)). `simulate` and `compare` take
+`--width 3.4` for one column of a journal page, and `--figures pdf` or `svg`; in Python every figure takes
+`with subzero.figures.page_width(3.4):`.
 `python -m benchmarks.gallery` runs the commands and makes this page anew.
 
 ![The replay of a page](figures/page_follows.png)
+"""
+
+EXAMPLES_HEAD = """## Examples in Python
+
+Short scripts; `python examples/fig6.py` leaves `fig6.png` in the current folder.
 """
 
 
 def main() -> None:
     words = sys.argv[1:]
     narrow = float(words.pop(words.index("--width") + 1)) if "--width" in words else None
-    wanted = [one for one in GALLERY if not set(words) - {"--width"} or one.folder in words]
+    wanted = [one for one in GALLERY if not words or one.folder in words]
     out = NARROW if narrow else PICTURES
     out.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as folder, chdir(folder):
@@ -99,6 +115,8 @@ def main() -> None:
         for one in wanted:
             for name in one.figures:
                 (out / picture(one, name)).write_bytes(small(Path(one.folder) / f"{name}.png"))
+        if not narrow and (not words or "examples" in words):
+            draw_examples()
     if not narrow:
         PAGE.write_text(page(), encoding="utf-8")
 
@@ -110,6 +128,19 @@ def run(command: str) -> None:
     print(command, flush=True)
     if main([*shlex.split(command)[1:], "--quiet"]) != FINE:
         raise SystemExit(f"This failed: {command}")
+
+
+def draw_examples() -> None:
+    """Run every script, and take its picture."""
+    import matplotlib.pyplot as plt
+
+    plt.switch_backend("agg")
+    for name in EXAMPLES:
+        print(f"examples/{name}.py", flush=True)
+        runpy.run_path(str(SCRIPTS / f"{name}.py"), run_name="__main__")
+        if name != "fig6":  # the same picture is at the top of the page
+            (PICTURES / f"example_{name}.png").write_bytes(small(Path(f"{name}.png")))
+        plt.close("all")
 
 
 def picture(shown: Shown, figure: str) -> str:
@@ -142,6 +173,12 @@ def page() -> str:
             for name in one.figures
             if (PICTURES / picture(one, name)).exists()
         ]
+    parts.append(EXAMPLES_HEAD)
+    for name in EXAMPLES:
+        sentence = ast.get_docstring(ast.parse((SCRIPTS / f"{name}.py").read_text(encoding="utf-8")))
+        parts.append(f"**[{name}.py](../examples/{name}.py)**: {sentence}\n")
+        if (PICTURES / f"example_{name}.png").exists():
+            parts.append(f"![{sentence}](figures/example_{name}.png)\n")
     return "\n".join(parts)
 
 

@@ -1,4 +1,4 @@
-# A notebook: pip install "subzero[notebook]", then "marimo edit first_look.py" (or "marimo run", or plain "python").
+# A notebook: pip install "subzero-auv[notebook]", then "marimo edit first_look.py" (or "marimo run", or plain "python").
 # It is a Python file, so that its history can be read; tests/cli/test_notebook.py carries out every cell.
 
 import marimo

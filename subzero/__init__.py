@@ -71,7 +71,9 @@ def __getattr__(name: str) -> Any:
     if name == "__version__":
         from importlib.metadata import version
 
-        value: Any = version("subzero")
+        from subzero.errors import DISTRIBUTION
+
+        value: Any = version(DISTRIBUTION)
     elif name in _PACKAGES:
         value = import_module(f"subzero.{name}")
     elif name in _HOME:

@@ -26,7 +26,7 @@ from cyclopts import Parameter
 import scenarios
 from subzero import cli_autopilot, cli_diagnosis, cli_import, cli_install, cli_sweep, cli_trials
 from subzero.cli_examples import EXAMPLES, register
-from subzero.errors import UserError, nearest, printable
+from subzero.errors import DISTRIBUTION, UserError, nearest, printable
 from subzero.interrupts import INTERRUPTED, reset, say_interrupted, was_interrupted
 from subzero.voice import COMMAND, NOT_STRICT, PLAIN, StrictVoice, Voice, speak
 
@@ -176,7 +176,7 @@ NO_INPUTS, USUAL_OUTPUTS, ALL_KEPT = Inputs(), Outputs(), Kept()
 def _version() -> str:
     from importlib.metadata import version
 
-    return version("subzero")
+    return version(DISTRIBUTION)
 
 
 app = cyclopts.App(

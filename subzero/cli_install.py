@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 import cyclopts
 
 from subzero.cli_examples import register
-from subzero.errors import printable
+from subzero.errors import DISTRIBUTION, printable
 from subzero.voice import PLAIN, Voice
 
 if TYPE_CHECKING:
@@ -146,7 +146,7 @@ def _extras() -> Iterator[tuple[str, list[str]]]:
     from importlib.metadata import requires
 
     wanted: dict[str, list[str]] = {}
-    for line in requires("subzero") or ():
+    for line in requires(DISTRIBUTION) or ():
         found = re.match(r"([\w.-]+).*extra == ['\"]([\w-]+)['\"]", line)
         if found and found[2] not in ("test", "dev") and _version(found[1]) == "missing":
             wanted.setdefault(found[2], []).append(found[1])

@@ -15,7 +15,7 @@ import cyclopts
 from cyclopts import Parameter
 
 from subzero.cli_examples import register
-from subzero.errors import UserError, printable, whole
+from subzero.errors import UserError, missing_extra, printable, whole
 from subzero.voice import NOT_STRICT, StrictVoice
 
 if TYPE_CHECKING:
@@ -223,7 +223,7 @@ def _client(scheduler: str) -> Iterator[Any]:
     try:
         import distributed
     except ImportError:
-        raise UserError("--scheduler needs Dask: pip install 'subzero[cluster]'.") from None
+        raise missing_extra("--scheduler", "Dask", "cluster") from None
     connect: Any = distributed.Client
     try:
         client = connect(scheduler, timeout=CONNECT_S)

@@ -20,7 +20,7 @@ import numpy as np
 import scenarios
 from subzero.channels import BY_NAME, CHANNELS, TIME
 from subzero.convergence import Accuracy, as_numbers
-from subzero.errors import printable
+from subzero.errors import DISTRIBUTION, printable
 from subzero.model import Model
 from subzero.validity import as_json, check_run
 from vehicle import BREAKDOWN
@@ -331,6 +331,6 @@ def _provenance(trial: scenarios.Trial, model: Model, tethered: bool, run: Run) 
 def _versions() -> dict[str, str]:
     """Return the versions of what computed it; looked up once, for each time a file is read."""
     return {
-        "subzero_version": version("subzero"),
+        "subzero_version": version(DISTRIBUTION),
         "versions": json.dumps({name: version(name) for name in LIBRARIES}),
     }

@@ -16,6 +16,9 @@ from typing import TypeVar
 
 Line = TypeVar("Line")
 
+DISTRIBUTION = "subzero-auv"
+"""Name in the package index, where "subzero" is another project."""
+
 SHOWN_PROBLEMS = 12
 """So many problems of one file are spelt out: enough to repair it, few enough to read on one screen."""
 
@@ -114,6 +117,11 @@ def chosen(table: Mapping[str, Line], name: object, what: str) -> Line:
     raise UserError(
         f"There is no {what} {short(name)}.{suggestion(name, table)} Allowed: {', '.join(table)}."
     )
+
+
+def missing_extra(what: str, libraries: str, extra: str) -> UserError:
+    """Return the error of a feature whose libraries are not installed: what needs them, and how to get them."""
+    return UserError(f"{what} needs {libraries}: pip install '{DISTRIBUTION}[{extra}]'.")
 
 
 SHOWN_CHARACTERS = 60

@@ -27,7 +27,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from uuid import uuid4
 
-from subzero.errors import UserError, printable, real
+from subzero.errors import UserError, missing_extra, printable, real
 from subzero.explore import Answer, Exploration, Newest, Slider, Values
 from subzero.local_access import HOST, Access
 
@@ -67,7 +67,7 @@ def address(port: int) -> Iterator[tuple[Access, socket.socket]]:
     """
     missing = [name for name in NEEDED if find_spec(name) is None]
     if missing:
-        raise UserError(f"A page to explore needs {', '.join(missing)}. pip install 'subzero[explore]'.")
+        raise missing_extra("A page to explore", ", ".join(missing), "explore")
     if not 0 <= port <= HIGHEST_PORT:
         raise UserError(f"--port is {port}; it must be 0 to {HIGHEST_PORT}.")
     with socket.socket() as listening:

@@ -26,7 +26,7 @@ from scipy.spatial.transform import Rotation
 from subzero.arguments import check_is_run, checked_arguments
 from subzero.atomic_output import friendly_errors
 from subzero.channels import CHANNELS, TIME
-from subzero.errors import UserError, chosen, printable
+from subzero.errors import UserError, chosen, missing_extra, printable
 from subzero.page.replay import cable_origin
 
 if TYPE_CHECKING:
@@ -69,9 +69,7 @@ def writer_of(kind: str) -> Callable[[xr.Dataset, Path], None]:
     try:
         importlib.import_module(library)
     except ImportError:
-        raise UserError(
-            f"The export {kind} needs the library {library.split('.')[0]}: pip install 'subzero[export]'."
-        ) from None
+        raise missing_extra(f"The export {kind}", library.split(".")[0], "export") from None
     return write
 
 

@@ -7,7 +7,7 @@ What stands before the colon is imported, and registers the name; once it is imp
 ``gymnasium.make("subzero/TetheredHeading-v0")`` will do. (Gymnasium looks for no environments in installed packages
 since 1.0.)
 
-It needs the extra ``subzero[gym]``. The vehicle starts from rest as in a scenario, with a constant propeller command;
+It needs the extra ``subzero-auv[gym]``. The vehicle starts from rest as in a scenario, with a constant propeller;
 the action is the rudder, and the reward punishes the heading error and the work of the rudder. A new heading is drawn
 at each reset. ``gymnasium.make_vec("subzero/TetheredHeading-v0", num_envs=8)`` gives many in one process.
 """
@@ -25,7 +25,7 @@ import numpy as np
 
 from subzero.arguments import checked_arguments
 from subzero.channels import Observation
-from subzero.errors import BadValueError, UserError, checked, short, whole
+from subzero.errors import BadValueError, checked, missing_extra, short, whole
 from subzero.model import load
 from subzero.simulator import RunStoppedError, Simulator
 
@@ -33,9 +33,7 @@ try:
     import gymnasium
     import gymnasium.vector
 except ImportError as missing:  # pragma: no cover - told to the user
-    raise UserError(
-        "The environment needs Gymnasium. Install it with: pip install 'subzero[gym]'"
-    ) from missing
+    raise missing_extra("The environment", "Gymnasium", "gym") from missing
 
 ENVIRONMENT = "subzero/TetheredHeading-v0"
 STEPS = 300

@@ -39,7 +39,7 @@ from subzero.diagnosis.results import (
     Extended,
     Verdict,
 )
-from subzero.errors import printable
+from subzero.errors import DISTRIBUTION, printable
 from subzero.output import lacking_letters_as_boxes
 from subzero.page.replay import HULL, Actor, as_run, encode
 from subzero.page.report import Answer, Line, Report, Section, render
@@ -247,7 +247,7 @@ def page_of_diagnosis(
             command_name="diagnose",
             scenario=", ".join(trials),
             title=words.title(verdict),
-            version=version("subzero"),
+            version=version(DISTRIBUTION),
             outcome=_outcome(verdict, logged),
             command=command,
             answers=[Answer(**one._asdict()) for one in summary(verdict, logged[0].setting.trial.source)],

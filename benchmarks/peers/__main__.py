@@ -333,8 +333,8 @@ def main():
 
 
 NEEDED = {
-    "MoorDyn": ("moordyn", "pip install 'subzero[peers]'"),
-    "CableDyn": ("cabledyn", "pip install 'subzero[peers]'"),
+    "MoorDyn": ("moordyn", "pip install 'subzero-auv[peers]'"),
+    "CableDyn": ("cabledyn", "pip install 'subzero-auv[peers]'"),
     "PythonVehicleSimulator": ("python_vehicle_simulator", "from its repository"),
 }
 

@@ -1,7 +1,7 @@
 """CableDyn (implicit finite elements) on what it shares with `cable`: a cable between two held ends, one of them led.
 
 It has no pay-out, and refuses a cable without weight: this one weighs a hundredth more than its water. It carries no
-added mass, as in `moordyn_wire`. `pip install 'subzero[peers]'` brings it.
+added mass, as in `moordyn_wire`. `pip install 'subzero-auv[peers]'` brings it.
 """
 
 from __future__ import annotations

@@ -7,7 +7,7 @@ Inertia is where the two differ by intention: MoorDyn moves (m I + C_a ρA P)·a
 momentum m V + ρA P V, which for a wire that slides along its own curve is another tension, by ρA U². Where they are
 compared there is no added mass: C_a = 0 there; here `Bare`, a wire that displaces nothing but weighs as if it did.
 
-`pip install 'subzero[peers]'` brings it.
+`pip install 'subzero-auv[peers]'` brings it.
 """
 
 from __future__ import annotations

@@ -10,7 +10,7 @@ Paying out, MoorDyn rescales all segments: the material at s moves at U s/L inst
 comes to a third. Nor can one say what the drum's tension shall be. That is shown without a verdict.
 
 MoorDyn's forces are those of its version 2.7.2 in `benchmarks/validation/data`; where it is installed
-(`pip install 'subzero[peers]'`), this page's command runs it and writes them anew.
+(`pip install 'subzero-auv[peers]'`), this page's command runs it and writes them anew.
 """
 
 from __future__ import annotations

@@ -25,7 +25,7 @@ from subzero.diagnosis.assessment import curves
 from subzero.diagnosis.hypothesis.logged import Logged
 from subzero.diagnosis.inference import Progress, pose
 from subzero.diagnosis.read_trials import read_trials
-from subzero.errors import UserError
+from subzero.errors import DISTRIBUTION, UserError
 from subzero.model import Model
 
 Given = Logged | str | Path
@@ -201,7 +201,7 @@ class PartFile:
         own = {vehicle_file.section_of(name)[1]: found[name] for name in self.names}
         error = f"{found.error('before'):.3g} noise levels before, {found.error():.3g} after ({found.how})"
         said = vehicle_file.provenance(found.records, self.name, datetime.now(UTC).isoformat(timespec="seconds"),
-                                       version("subzero"), error)  # fmt: skip
+                                       version(DISTRIBUTION), error)  # fmt: skip
         return vehicle_file.text_of(self.before, own, said)
 
 

@@ -48,6 +48,7 @@ _HOME = {
     "OUTSIDE": ("results", "OUTSIDE"),
     "Parameter": ("hypothesis.effect", "Parameter"),
     "Rival": ("results", "Rival"),
+    "SAMPLED": ("hypothesis.catalogue", "SAMPLED"),
     "SPECS": ("hypothesis.catalogue", "SPECS"),
     "START": ("hypothesis.catalogue", "START"),
     "Sensing": ("hypothesis.configuration", "Sensing"),

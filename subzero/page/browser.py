@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from subzero.errors import UserError
+from subzero.errors import UserError, missing_extra
 
 if TYPE_CHECKING:
     from PIL import Image
@@ -64,7 +64,7 @@ def check_film() -> None:
     _needed()
     missing = [name for name in ("imageio_ffmpeg", "PIL") if find_spec(name) is None]
     if missing:
-        raise UserError(f"A film of the replay needs {', '.join(missing)}. pip install 'subzero[animate]'.")
+        raise missing_extra("A film of the replay", ", ".join(missing), "animate")
 
 
 def _needed() -> tuple[str, str]:
@@ -76,7 +76,7 @@ def _needed() -> tuple[str, str]:
             "(Debian: apt install chromium chromium-driver), or leave --animate away: report.html has the replay."
         )
     if find_spec("selenium") is None:
-        raise UserError("A film of the replay needs selenium. pip install 'subzero[animate]'.")
+        raise missing_extra("A film of the replay", "selenium", "animate")
     return found
 
 

@@ -28,7 +28,7 @@ import numpy as np
 import scenarios
 from scenarios.parameters import declared_ranges, parameter, parameter_unit, with_parameters
 from subzero.arguments import checked_arguments
-from subzero.errors import UserError, chosen, real, short, suggestion, whole
+from subzero.errors import UserError, chosen, missing_extra, real, short, suggestion, whole
 
 MOST_MEMBERS = 20_000_000
 """More points than this are a slip of the pen: they would take months on a thousand cores. [-]"""
@@ -354,7 +354,7 @@ def salib(kind: str, method: str) -> Any:
     try:
         return import_module(f"SALib.{kind}.{method}")
     except ImportError:
-        raise UserError("Designs for sensitivities need SALib: pip install 'subzero[sensitivity]'.") from None
+        raise missing_extra("A design for sensitivities", "SALib", "sensitivity") from None
 
 
 DESIGNS: dict[str, Callable[[tuple[Spread, ...], int, int], Made]] = {

@@ -33,7 +33,7 @@ import scenarios
 from scenarios.files import Source, read_toml
 from scenarios.parameters import with_parameters
 from subzero.arguments import checked_arguments
-from subzero.errors import UserError, listed, printable, short, suggestion, truth
+from subzero.errors import DISTRIBUTION, UserError, listed, printable, short, suggestion, truth
 from subzero.model import load
 from subzero.provenance import code_digest, trial_digest
 from subzero.sweeps.design import DISTRIBUTION_KEYS, GRID, Design, Points, points_of
@@ -94,7 +94,7 @@ class Plan:
             "design": self.points.design,
             "seed": self.points.seed,
             "manifest": json.dumps(self.manifest(), sort_keys=True),
-            "subzero_version": version("subzero"),
+            "subzero_version": version(DISTRIBUTION),
         }
 
 

@@ -1,4 +1,4 @@
-"""The whole way once, with the real simulation: a command, its files, a record, the README's Python."""
+"""The whole way once, with the real simulation: a command, its files, a record, the Python of README and tour."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ import subzero
 from subzero.channels import CHANNELS
 from subzero.cli import FINE, MISTAKE, main
 
-README = Path(__file__).resolve().parents[2] / "README.md"
+ROOT = Path(__file__).resolve().parents[2]
 
 
 @pytest.fixture(scope="module")
@@ -76,13 +76,25 @@ def test_a_vehicle_that_cannot_be_built_is_a_mistake_not_a_bug(tmp_path, monkeyp
     assert [path.name for path in tmp_path.iterdir()] == ["mine.toml"]
 
 
-def test_the_python_of_the_readme_runs(tmp_path, monkeypatch):
-    """Behind the command of its first lines, whose files it opens."""
+def run_python_of(page):
+    """Carry out the blocks of Python of a page; return their names."""
+    names: dict[str, object] = {}
+    for block in re.findall(r"```python\n(.*?)```", (ROOT / page).read_text(encoding="utf-8"), re.DOTALL):
+        exec(block, names)
+    return names
+
+
+def test_the_python_of_the_readme_runs_in_an_empty_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert isinstance(run_python_of("README.md")["comparison"], subzero.Comparison)
+    assert {path.name for path in tmp_path.iterdir()} == {"tension.png", "fig6.png"}
+
+
+def test_the_python_of_the_tour_runs(tmp_path, monkeypatch):
+    """After the command whose file it opens."""
     monkeypatch.chdir(tmp_path)
     assert main(["compare", "fig6"]) == FINE
-    names: dict[str, object] = {}
-    for block in re.findall(r"```python\n(.*?)```", README.read_text(encoding="utf-8"), re.DOTALL):
-        exec(block, names)
+    names = run_python_of("docs/python.md")
     assert set(names["numbers"]) >= {"peak_speed_m_s", "path_length_m", "energy"}  # type: ignore[call-overload]
     assert "fig6" in names["figures"]  # type: ignore[operator]
     assert isinstance(names["comparison"], subzero.Comparison)

@@ -205,5 +205,5 @@ def test_what_cannot_be_exported_is_refused_before_the_run(tmp_path, monkeypatch
     assert "Did you mean 'mcap'? Allowed: mcap, mat, parquet, cf." in capsys.readouterr().err
     monkeypatch.setitem(sys.modules, "pyarrow.parquet", None)
     assert main(["compare", "fig6", "--export", "parquet"]) == MISTAKE
-    assert "needs the library pyarrow: pip install 'subzero[export]'" in capsys.readouterr().err
+    assert "needs pyarrow: pip install 'subzero-auv[export]'" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []

@@ -187,7 +187,7 @@ def test_two_columns_for_one_command_are_refused(here, capsys):
 def test_the_rule_of_the_last_row_is_said_the_same_everywhere():
     rule = "a row of a file holds until the next, the last one for one sampling interval more, at most 1 s"
     root = Path(__file__).parents[2]
-    for page in ("README.md", "scenarios/trials/fig6.toml", "scenarios/samples.py"):
+    for page in ("docs/trials.md", "scenarios/trials/fig6.toml", "scenarios/samples.py"):
         words = " ".join((root / page).read_text(encoding="utf-8").replace("\n#", "\n").lower().split())
         assert rule in words, page
 

@@ -1,4 +1,4 @@
-"""What the README says is what happens."""
+"""What the README and the pages of the command line say is what happens."""
 
 from __future__ import annotations
 
@@ -17,8 +17,19 @@ README = (ROOT / "README.md").read_text(encoding="utf-8")
 TEST_LINE = (
     'python3 -m venv .venv && .venv/bin/pip install ".[test]" && .venv/bin/pytest -n 2 --dist loadfile'
 )
-SHELL = [line for block in re.findall(r"```sh\n(.*?)```", README, re.DOTALL) for line in block.splitlines()]
-COMMANDS = [line.partition("#")[0].strip() for line in SHELL if line.startswith("subzero ")]
+PAGES = [(ROOT / "docs" / name).read_text(encoding="utf-8") for name in ("command_line.md", "trials.md")]
+
+
+def shell_lines(text):
+    return [line for block in re.findall(r"```sh\n(.*?)```", text, re.DOTALL) for line in block.splitlines()]
+
+
+SHELL = shell_lines(README)
+COMMANDS = [
+    line.partition("#")[0].strip()
+    for line in dict.fromkeys(line for text in (README, *PAGES) for line in shell_lines(text))
+    if line.startswith("subzero ")
+]
 
 
 def test_two_lines_do_everything_each_with_its_own_environment():
@@ -39,14 +50,28 @@ def test_ci_takes_its_test_line_from_the_readme():
 
 
 @pytest.mark.parametrize("line", COMMANDS)
-def test_every_command_of_the_readme_is_understood(line):
+def test_every_command_is_understood(line):
     command, bound, _ = app.parse_args(shlex.split(line)[1:], exit_on_error=False, print_error=False)
     assert shlex.split(line)[1] in EXAMPLES
     assert callable(command)
     assert bound.arguments or shlex.split(line)[1] in ("list", "doctor", "warm")
 
 
-def test_every_column_of_the_readme_exists():
-    columns = set(re.findall(r"`(time_s, [^`]*_N), …`", README)[0].split(", "))
+def test_the_readme_is_short_with_a_picture_at_the_top():
+    lines = README.splitlines()
+    assert len(lines) <= 120
+    pictures = re.findall(r"!\[.+?\]\((.+?)\)", "\n".join(lines[:20]))
+    assert pictures
+    assert all((ROOT / path).stat().st_size < 150_000 for path in pictures)
+
+
+def test_every_link_of_the_readme_leads_to_a_file():
+    links = re.findall(r"\]\(([^)#]+)(?:#[^)]*)?\)", README)
+    assert links
+    assert [link for link in links if not (ROOT / link).exists()] == []
+
+
+def test_every_column_that_is_named_exists():
+    columns = set(re.findall(r"`(time_s, [^`]*_N), …`", PAGES[0])[0].split(", "))
     assert columns
     assert columns <= set(BY_COLUMN)

@@ -13,9 +13,9 @@ import pytest
 import subzero
 from benchmarks.diagnosis.headings import NOISE, measured, scenario
 from benchmarks.diagnosis.sampled import filled_in
-from subzero.diagnosis.hypothesis.catalogue.sensors import SAMPLED
-from subzero.diagnosis.inference.simulator import respond
-from subzero.diagnosis.read_trials import read_trials
+from subzero.diagnosis import SAMPLED, Setting
+from subzero.diagnosis.inference import respond
+from subzero.model import Model
 from subzero.records.record import Record
 
 ROWS = 10
@@ -37,23 +37,28 @@ def logged(record, kind):
     return Record(source="record", time=record.time, values=values)
 
 
+def setting_of(trial, channels):
+    """A trial in which a logger held some channels for a second."""
+    loaded = subzero.load_scenario(trial)
+    return Setting(trial=loaded, model=Model.of(loaded), intervals=dict.fromkeys(channels, 0.1 * ROWS))
+
+
 @pytest.mark.parametrize(("share", "first"), [(0.5, 0), (-0.5, -ROWS)])
 def test_a_mean_over_an_interval_is_a_sample_of_its_middle(share, first, trial, clean):
     """A mean over the second that begins at its time (share ½), or that ends there (−½)."""
-    (record,) = read_trials(logged(clean, "held"), scenario=trial)
-    setting, time = SAMPLED.apply(record.setting, share), np.arange(5.0, 25.0)
+    held = setting_of(trial, NOISE)
+    setting, time = SAMPLED.apply(held, share), np.arange(5.0, 25.0)
     rows = 0.1 * (np.arange(ROWS + 1) + first)
-    fine = respond(record.setting, np.add.outer(time, rows).ravel(), NOISE)
+    fine = respond(held, np.add.outer(time, rows).ravel(), NOISE)
     for name, shown in respond(setting, time, NOISE).items():
         means = np.trapezoid(fine[name].reshape(time.size, -1), axis=1) / ROWS
         assert np.sqrt(np.mean((shown - means) ** 2)) < 0.1 * NOISE[name]
 
 
 def test_no_other_channel_is_read_at_another_time(trial, clean):
-    half = dataclasses.replace(clean, values={**logged(clean, "held").values, "depth": clean.values["depth"]})
-    (record,) = read_trials(half, scenario=trial)
-    shown = respond(SAMPLED.apply(record.setting, 0.5), clean.time, NOISE)
-    at_once = respond(record.setting, clean.time, NOISE)
+    held = setting_of(trial, NOISE.keys() - {"depth"})
+    shown = respond(SAMPLED.apply(held, 0.5), clean.time, NOISE)
+    at_once = respond(held, clean.time, NOISE)
     np.testing.assert_array_equal(shown["depth"], at_once["depth"])
     assert np.abs(shown["surge_speed"] - at_once["surge_speed"]).max() > NOISE["surge_speed"]
 

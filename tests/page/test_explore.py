@@ -273,7 +273,7 @@ def test_what_is_not_installed_is_one_message(
     monkeypatch.setattr("subzero.explore_page.find_spec", lambda name: None)
     assert main(["explore", "fig6"]) == MISTAKE
     said = capsys.readouterr().err
-    assert said == "A page to explore needs nicegui, tomlkit. pip install 'subzero[explore]'.\n"
+    assert said == "A page to explore needs nicegui, tomlkit: pip install 'subzero-auv[explore]'.\n"
 
 
 @needs_extra

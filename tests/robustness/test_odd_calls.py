@@ -62,7 +62,8 @@ LEGAL = {
     "None":
         "Design.samples Kept.channels Kept.every Kept.function Kept.scalars Model.missing Model.profile "
         "Model.vessel Model.winch Simulator.model Simulator.sample_time Simulator.step.command "
-        "TetheredHeading.reset.options TetheredHeading.reset.seed TetheredHeading.sample_time "
+        "TetheredHeading.render_mode TetheredHeading.reset.options TetheredHeading.reset.seed "
+        "TetheredHeading.sample_time "
         "TetheredHeadings.workers calibration.read.commands calibration.read.scenario calibration.read.vehicle "
         "check.model check.progress compare.checkpoint compare.every compare.measured compare.model "
         "compare.progress draw.record export.kind extended_toml.effects extended_toml.effects_file hold.cable "
