@@ -42,14 +42,14 @@ def import_(
 
     targets = _targets(logs, out, map_out)
     found = [import_log(log, map) for log in logs]
-    open_ones = [one for one in found if one.record is None]
+    open_ones = [log for log in found if log.record is None]
     if open_ones and map_out is None:
         raise undecided(open_ones[0])
     folder = map_out.parent if map_out is not None else targets[0].parent
     written = _written(found, targets, folder, map_out)
-    with voice.tells({**written, "logs": [_as_json(one) for one in found]}):
-        for one in found:
-            _tell(one)
+    with voice.tells({**written, "logs": [_as_json(log) for log in found]}):
+        for log in found:
+            _tell(log)
         print(f"Wrote {', '.join(printable(str(folder / name)) for name in written['files'])}")
     return FINE
 
@@ -90,13 +90,13 @@ def _written(
     maps = [map_out.name] if map_out is not None else [f"{target.stem}.map.toml" for target in targets]
     names = [*maps, *(target.name for target in targets if map_out is None)]
     with open_output_folder(folder, names) as output:
-        for one, name, target in zip(found, maps, targets, strict=True):
-            (output.path / name).write_text(to_toml(one.mapping, one.source), encoding="utf-8")
-            if map_out is None and one.record is not None:
-                text = to_csv(one.record)
+        for log, name, target in zip(found, maps, targets, strict=True):
+            (output.path / name).write_text(to_toml(log.mapping, log.source), encoding="utf-8")
+            if map_out is None and log.record is not None:
+                text = to_csv(log.record)
                 if len(text) > MOST_OF_A_CSV:
                     raise refusal(
-                        one.source, f"its record has {len(text) // MEGABYTE} MB, more than is read", SHORTER
+                        log.source, f"its record has {len(text) // MEGABYTE} MB, more than is read", SHORTER
                     )
                 (output.path / target.name).write_text(text, encoding="utf-8")
                 read_record(output.path / target.name)  # what is written can be read

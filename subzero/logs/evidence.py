@@ -194,9 +194,11 @@ def _circle(loose: Sequence[Measured]) -> str:
     Within 2π (pitch π/2, roll π), and a heading over more than a quarter of a turn, they are radians; beyond that
     degrees, beyond two turns of degrees hundredths of a degree. Nothing if smaller angles leave it open.
     """
-    sizes = [(np.nanmax(np.abs(one.values)), LARGEST_ANGLES.get(one.channel, math.pi)) for one in loose]
+    sizes = [(np.nanmax(np.abs(angle.values)), LARGEST_ANGLES.get(angle.channel, math.pi)) for angle in loose]
     if all(size <= 1.01 * most for size, most in sizes):
-        spans = [np.ptp(one.values[np.isfinite(one.values)]) for one in loose if one.channel == "heading"]
+        spans = [
+            np.ptp(angle.values[np.isfinite(angle.values)]) for angle in loose if angle.channel == "heading"
+        ]
         return "rad" if spans and spans[0] > QUARTER_TURN else ""
     return "degree" if max(size for size, _ in sizes) <= LIMITS["degree"] else "centidegree"
 
@@ -224,13 +226,13 @@ def _slope(tie: Tie, columns: Mapping[str, Measured], time: np.ndarray) -> _Slop
 def _estimates(left: Sequence[np.ndarray], total: np.ndarray) -> Iterator[tuple[float, float, float]]:
     """Give for each number of windows the cosine between both sides, and the least and the largest slope.
 
-    The slope is fitted through zero, and beside a constant, which takes up a drift or a current.
+    The slope is fitted through zero, and with a constant added, which takes up a drift or a current.
     """
     for count in WINDOWS:
         if total.size < 3 * count and count > WINDOWS[-1]:
             continue
         edges = np.linspace(0, total.size, count + 1).astype(int)
-        moved = [np.diff(np.add.reduceat(one, edges[:-1]) / np.diff(edges)) for one in (*left, total)]
+        moved = [np.diff(np.add.reduceat(side, edges[:-1]) / np.diff(edges)) for side in (*left, total)]
         y, x = np.hypot(*moved[:-1]) if len(left) > 1 else moved[0], moved[-1]
         fits = [_cosine(x, y), _cosine(x - x.mean(), y - y.mean())]
         slopes = [slope for cosine, slope in fits if abs(cosine) >= PROPORTIONAL] or [0.0]

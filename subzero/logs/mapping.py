@@ -189,8 +189,8 @@ def find_map(table: Table, clock: Clock, rows: np.ndarray, time: np.ndarray) -> 
     lines |= {name: _line(name, found, said, chosen[name]) for name, found in used.items()}
     questions += [_question(lines[name], said) for name in used if lines[name].unit == ASKED]
     names = {found.channel: lines[name] for name, found in used.items()}
-    odd = [_words(one, names) for one in said.contradictions if one.channels[0] in names]
-    is_asked = [one.is_of_units for one in said.contradictions if one.channels[0] in names]
+    odd = [_words(tie, names) for tie in said.contradictions if tie.channels[0] in names]
+    is_asked = [tie.is_of_units for tie in said.contradictions if tie.channels[0] in names]
     questions += [words for words, asked in zip(odd, is_asked, strict=True) if asked]
     notes = tuple(words for words, asked in zip(odd, is_asked, strict=True) if not asked)
     return Map(clock=clock, lines=tuple(lines.values()), questions=tuple(questions), notes=notes)
@@ -202,7 +202,7 @@ def contradictions(mapping: Map, table: Table, rows: np.ndarray, time: np.ndarra
     values = {channel: line.factor * table.columns[line.name].values[rows] for channel, line in lines.items()}
     columns = {channel: Measured(channel, values[channel], line.unit) for channel, line in lines.items()}
     found = findings({**_positions(columns), **columns}, time)
-    return tuple(_words(one, lines) for one in found.contradictions if one.channels[0] in lines)
+    return tuple(_words(tie, lines) for tie in found.contradictions if tie.channels[0] in lines)
 
 
 def _unused(table: Table, name: str, chosen: Mapping[str, str]) -> Line:
@@ -241,15 +241,15 @@ def _question(line: Line, found: Findings) -> str:
     return f"{short(line.name)} ({line.channel}): in {units}, which nothing in the log decides"
 
 
-def _words(one: Contradiction, lines: Mapping[str, Line]) -> str:
+def _words(tie: Contradiction, lines: Mapping[str, Line]) -> str:
     """Return a contradiction in words, with the columns' own names."""
     of = {channel: short(line.name) for channel, line in lines.items()}
-    columns = " and ".join(of.get(channel, channel) for channel in one.channels)
-    repairs = [f"{unit} for {of.get(channel, channel)}" for channel, unit in one.repairs]
+    columns = " and ".join(of.get(channel, channel) for channel in tie.channels)
+    repairs = [f"{unit} for {of.get(channel, channel)}" for channel, unit in tie.repairs]
     alone = f"; alone {_either(repairs)} would do" if repairs else ""
-    if one.is_of_units:
-        return f"{columns} contradict the {one.words} in these units: one or more is in another{alone}"
-    return f"{columns} contradict the {one.words}, in whatever units: look at them."
+    if tie.is_of_units:
+        return f"{columns} contradict the {tie.words} in these units: one or more is in another{alone}"
+    return f"{columns} contradict the {tie.words}, in whatever units: look at them."
 
 
 def _either(words: Sequence[str]) -> str:
@@ -288,7 +288,7 @@ def _best_of(
     others = {found.channel: Measured(found.channel, values[name]) for name, found in named.items()}
     channel = named[rivals[0]].channel
     agreeing = [
-        one for one in rivals if tied(channel, {**others, channel: Measured(channel, values[one])}, time)
+        name for name in rivals if tied(channel, {**others, channel: Measured(channel, values[name])}, time)
     ]
     best = agreeing or list(rivals)
     if all(_are_alike(values[best[0]], values[name]) for name in best[1:]):
@@ -302,7 +302,9 @@ def _best_of(
 def _are_alike(first: np.ndarray, second: np.ndarray) -> bool:
     """Say whether two columns change alike, by as much."""
     known = np.isfinite(first) & np.isfinite(second)
-    a, b = (one[known] - one[known].mean() if known.any() else one[known] for one in (first, second))
+    a, b = (
+        values[known] - values[known].mean() if known.any() else values[known] for values in (first, second)
+    )
     size = float(a @ a + b @ b)
     return bool(known.any()) and 2.0 * float(a @ b) >= ALIKE * size
 
@@ -394,9 +396,9 @@ def read_map(path: str | Path, table: Table) -> Map:
         ]
         targets = [TARGETS.get(line.channel, line.channel) for line in lines]
         problems += [
-            f"{one} is more than one column; keep one"
-            for one in dict.fromkeys(targets)
-            if targets.count(one) > 1
+            f"{target} is more than one column; keep one"
+            for target in dict.fromkeys(targets)
+            if targets.count(target) > 1
         ]
         problems += [] if columns else ["it names no columns; write them below [columns]"]
     if problems:

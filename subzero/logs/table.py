@@ -410,7 +410,7 @@ def _read_dataflash(path: Path) -> tuple[dict[str, Column], list[str]]:
     try:
         from pymavlink.DFReader import DFReader_binary
     except ImportError:
-        raise refusal(path, "pymavlink is not installed", "pip install 'subzero[logs]'.") from None
+        raise refusal(path, "pymavlink is not installed", "pip install 'subzero-auv[logs]'.") from None
     with open(path, "rb") as file:
         if file.read(2) != DATAFLASH:
             raise refusal(path, "it is no log of ArduPilot", "Give the .BIN file that the autopilot wrote.")

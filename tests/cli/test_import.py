@@ -54,7 +54,8 @@ def test_its_map_gives_the_same_record_again(here):
     assert main(["import", "log.csv", "--out", "a/x.csv"]) == FINE
     assert main(["import", "log.csv", "--map", "a/x.map.toml", "--out", "b/x.csv"]) == FINE
     first, second = (
-        [line for line in (here / one / "x.csv").read_text().splitlines() if line[0] != "#"] for one in "ab"
+        [line for line in (here / folder / "x.csv").read_text().splitlines() if line[0] != "#"]
+        for folder in "ab"
     )
     assert first == second
 

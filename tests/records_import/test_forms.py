@@ -267,7 +267,7 @@ def test_a_file_that_is_not_what_its_ending_says_is_one_message(ending, tmp_path
 
 
 def test_a_map_says_part_start_order_and_steps(tmp_path):
-    columns = {name: {"channel": one, "unit": unit} for name, one, unit in
+    columns = {name: {"channel": channel, "unit": unit} for name, channel, unit in
                zip(COLUMNS[1:], CHANNELS, ["m/s", "deg", "deg/s", "deg", "deg", "m"], strict=True)}  # fmt: skip
 
     def read(content, **time):
@@ -330,5 +330,5 @@ def test_what_is_no_log_of_ardupilot_is_named(tmp_path):
 
 def test_without_pymavlink_a_log_of_ardupilot_says_what_to_install(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "pymavlink.DFReader", None)
-    with pytest.raises(UserError, match=r"pymavlink is not installed. pip install 'subzero\[logs\]'"):
+    with pytest.raises(UserError, match=r"pymavlink is not installed. pip install 'subzero-auv\[logs\]'"):
         subzero.read_log(make(tmp_path / "log.bin", b"x"))

@@ -51,7 +51,7 @@ def write(path, columns):
 
 
 def channel_of(column):
-    return {one.column: one.name for one in subzero.CHANNELS}[column]
+    return {channel.column: channel.name for channel in subzero.CHANNELS}[column]
 
 
 def test_of_200_logs_with_wrong_units_none_is_imported_wrongly_without_a_word(tmp_path):
@@ -62,8 +62,8 @@ def test_of_200_logs_with_wrong_units_none_is_imported_wrongly_without_a_word(tm
         wrong = {}
         for name in rng.choice(list(MISTAKES), size=rng.integers(1, 6), replace=False):
             wrong[name] = rng.choice(list(MISTAKES[name]))
-            for one in (name, *(("east_m",) if name == "north_m" else ())):
-                columns[one] = columns[one] * MISTAKES[name][wrong[name]]
+            for column in (name, *(("east_m",) if name == "north_m" else ())):
+                columns[column] = columns[column] * MISTAKES[name][wrong[name]]
         try:
             record = subzero.read_log(write(tmp_path / "log.csv", columns))
         except UserError:
