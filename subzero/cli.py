@@ -1,6 +1,6 @@
 """The command line: ``subzero simulate``, ``compare``, ``plot``, ``explore``; ``list``, ``new``, ``show``, ``validate``
-(`cli_trials`); ``manoeuvre``, ``autopilot`` (`cli_autopilot`); ``diagnose``, ``challenge`` (`cli_diagnosis`); ``sweep``
-(`cli_sweep`); ``doctor``, ``warm``, ``completion`` (`cli_install`).
+(`cli_trials`); ``manoeuvre``, ``autopilot`` (`cli_autopilot`); ``import`` (`cli_import`); ``diagnose``, ``calibrate``,
+``challenge`` (`cli_diagnosis`); ``sweep`` (`cli_sweep`); ``doctor``, ``warm``, ``completion`` (`cli_install`).
 
 Exit codes: 0 all is well; 2 the user has to change something (one clean message on standard error,
 nothing is written); 3 a run could not go on (what it has is written, the message says when, where and
@@ -24,7 +24,7 @@ import cyclopts
 from cyclopts import Parameter
 
 import scenarios
-from subzero import cli_autopilot, cli_diagnosis, cli_install, cli_sweep, cli_trials
+from subzero import cli_autopilot, cli_diagnosis, cli_import, cli_install, cli_sweep, cli_trials
 from subzero.cli_examples import EXAMPLES, register
 from subzero.errors import DISTRIBUTION, UserError, nearest, printable
 from subzero.interrupts import INTERRUPTED, reset, say_interrupted, was_interrupted
@@ -348,7 +348,7 @@ def explore(
 cli_trials.add_to(app)
 for _command in (simulate, compare, plot, explore):
     register(app, _command)
-for _module in (cli_autopilot, cli_diagnosis, cli_sweep, cli_install):
+for _module in (cli_autopilot, cli_import, cli_diagnosis, cli_sweep, cli_install):
     _module.add_to(app)
 
 

@@ -27,6 +27,7 @@ EXAMPLES = {
         "subzero autopilot heading_step",
         "subzero autopilot depth_step fig6 --autopilot lqr --feed-forward model",
     ),
+    "import": ("subzero import log.csv --out record.csv", "subzero import log.csv --map map.toml"),
     "diagnose": (
         "subzero diagnose fig6 record.csv --out found",
         "subzero diagnose hidden --scenario fig6 --screen",

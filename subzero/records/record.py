@@ -55,6 +55,9 @@ EPOCHS = {
 }
 """A first time beyond this counts from 1970 in that unit, of which so many make a second."""
 
+IMPORTED = "`subzero import` reads it"
+"""Ends the refusal of a form that a logger writes."""
+
 TIMES_OF_DAY = {
     r"\d{4}-\d\d-\d\d[T ]": "dates and times",
     r"(\d+ days? )?\d+:\d\d(:\d\d)?([.,]\d+)?$": "hours, minutes and seconds",
@@ -107,8 +110,13 @@ def read_record(path: str | Path) -> Record:
     problems += _heading_problems(columns.get(BY_NAME[HEADING].column, np.empty(0)))
     _refuse(path, problems)
     values = {BY_COLUMN[name].name: column for name, column in columns.items() if name != TIME.column}
-    record = measured_alone(Record(source=_name(path), time=columns[TIME.column], values=values))
-    if HEADING not in values:
+    return as_measured(Record(source=_name(path), time=columns[TIME.column], values=values))
+
+
+def as_measured(record: Record) -> Record:
+    """Return a record as it is used: without what a logger filled in, its heading without jumps."""
+    record = measured_alone(record)
+    if HEADING not in record.values:
         return record
     like = expected(record.time, record.values.get(YAW_RATE))
     return replace(record, values={**record.values, HEADING: continuous(record.values[HEADING], like)})
@@ -203,19 +211,21 @@ def _header_problems(header: list[str]) -> list[str]:
     )
     if between:
         return [
-            f"its columns are separated by {between}; separate them by commas, and write numbers with a point"
+            f"its columns are separated by {between}; separate them by commas, and write numbers with a point; "
+            f"{IMPORTED}"
         ]
     places = [name for name in header if re.match(PLACE_ON_EARTH, name.lower())]
     if places:
         return [
             f"columns {', '.join(map(shown, places))} are latitude and longitude; replace them by north_m and east_m "
-            "from the start: 111 320 m a degree, east times the cosine of the latitude (integers are 1e-7 degrees)"
+            "from the start: 111 320 m a degree, east times the cosine of the latitude (integers are 1e-7 degrees); "
+            f"{IMPORTED}"
         ]
     problems = [_unknown(name) for name in header if name not in BY_COLUMN]
     if problems:
         problems.append(
             f"rename such a column, in the unit of its new name, or leave it out. Columns are {TIME.column}, "
-            f"{USUAL}, and more in docs/diagnosis.md"
+            f"{USUAL}, and more in docs/diagnosis.md; {IMPORTED}"
         )
     twice = sorted({name for name in header if header.count(name) > 1})
     problems += [f"column {shown(name)} occurs twice; keep one" for name in twice]
@@ -276,7 +286,7 @@ def _format_of_time(cells: list[str]) -> list[str]:
         if re.match(pattern, first):
             zones = {zone.group() for cell in cells if (zone := re.search(r"(Z|[+-]\d\d:?\d\d)$", cell[10:]))}
             utc = f"convert all to UTC ({len(zones)} time zones occur), " if len(zones) > 1 else ""
-            return [f"'{TIME.column}' holds {words}, such as {shown(first)}: {utc}{remedy}"]
+            return [f"'{TIME.column}' holds {words}, such as {shown(first)}: {utc}{remedy}; {IMPORTED}"]
     try:
         number = float(first)
     except ValueError:
@@ -284,7 +294,9 @@ def _format_of_time(cells: list[str]) -> list[str]:
     for least, (unit, count) in EPOCHS.items():
         if least < number < np.inf:
             divide = f"divide by {count:g}, " if count > 1.0 else ""
-            return [f"the first time is {shown(first)}, {unit} since 1970, a time of day: {divide}{remedy}"]
+            return [
+                f"the first time is {shown(first)}, {unit} since 1970, a time of day: {divide}{remedy}; {IMPORTED}"
+            ]
     return []
 
 
@@ -304,7 +316,7 @@ def _time_problems(time: np.ndarray, rows: list[Row], at: int) -> list[str]:
         parts = f"line{'s' * (back.size > 1)} {', '.join(str(lines[k]) for k in back[:3])}"
         problems.append(
             f"the time begins anew at {parts}: the logger was restarted; make a record of each part, and leave out "
-            "those without the first command"
+            f"those without the first command; {IMPORTED}"
         )
         back = back[:0]
     return problems + [
@@ -320,7 +332,7 @@ def _heading_problems(heading: np.ndarray) -> list[str]:
         return []
     return [
         f"'heading_deg' begins at {first[0]:g}, more than two turns, so that it is probably in centidegrees: divide it "
-        "by 100"
+        f"by 100; {IMPORTED}"
     ]
 
 

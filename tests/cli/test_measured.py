@@ -46,7 +46,8 @@ def test_a_heading_that_jumps_from_360_to_0_is_made_continuous(file):
 
 RENAME = (
     "rename such a column, in the unit of its new name, or leave it out. Columns are time_s, surge_speed_m_s, "
-    "heading_deg, yaw_rate_deg_s, pitch_deg, roll_deg, depth_m, cable_tension_N, and more in docs/diagnosis.md"
+    "heading_deg, yaw_rate_deg_s, pitch_deg, roll_deg, depth_m, cable_tension_N, and more in docs/diagnosis.md; "
+    "`subzero import` reads it"
 )
 REFUSED = {
     "time_s,surge_sped_m_s,heading,x\n0,1,2,3\n": [
@@ -70,11 +71,12 @@ REFUSED = {
         RENAME,
     ],
     "time_s;depth_m\n0;1,5\n": [
-        "its columns are separated by semicolons; separate them by commas, and write numbers with a point"
+        "its columns are separated by semicolons; separate them by commas, and write numbers with a point; "
+        "`subzero import` reads it"
     ],
     "time_s,depth_m\n1700000000,1\n1700000001,2\n": [
         "the first time is '1700000000', seconds since 1970, a time of day: subtract the first one, and write seconds "
-        "since the first command"
+        "since the first command; `subzero import` reads it"
     ],
     "depth_m,depth_m\n0,1\n": [
         "column 'depth_m' occurs twice; keep one",

@@ -118,6 +118,7 @@ def calls() -> dict[str, tuple[Callable[..., Any], dict[str, Any]]]:
         "Model.of": (subzero.Model.of, {"trial": trial}),
         "Checkpoint": (subzero.Checkpoint, {"folder": "kept"}),
         "open_run": (subzero.open_run, {"path": missing}),
+        "read_log": (subzero.read_log, {"path": missing, "map": missing}),
         "read_record": (subzero.read_record, {"path": missing}),
         "read_trials": (subzero.read_trials, {"paths": missing}),
         "diagnose": (subzero.diagnose, {"records": missing}),

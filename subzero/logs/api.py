@@ -1,0 +1,218 @@
+"""From a log to a checked record: read, map, convert, say what was done.
+
+No value is changed without a line about it: `Imported.table` has one for each column, and the notes of the record name
+what was left out, shifted, or not decided by the values.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from subzero.arguments import checked_arguments
+from subzero.channels import BY_NAME, TIME
+from subzero.errors import UserError, listed, printable, short
+from subzero.logs import times
+from subzero.logs.mapping import (
+    ASKED,
+    Clock,
+    Map,
+    contradictions,
+    find_clock,
+    find_map,
+    north_and_east,
+    read_map,
+)
+from subzero.logs.names import CLOCK_UNITS, LATITUDE, LONGITUDE, PRESSURE, TARGETS, UNITS, kind_of
+from subzero.logs.table import Table, read_table, refusal
+from subzero.records.record import LARGEST, Record, as_measured
+
+SHOWN_QUESTIONS = 10
+
+
+@dataclass(frozen=True, kw_only=True)
+class Imported:
+    """A log as a record, and how it became one.
+
+    Args:
+        source: the log, as the user named it.
+        mapping: which column is which channel.
+        record: values as they are written, NaN in gaps; None if the map asks something.
+    """
+
+    source: str
+    mapping: Map
+    record: Record | None = None
+
+    def table(self) -> list[tuple[str, str, str, str, str]]:
+        """Return column, channel, unit, factor to the channel's unit, and reason, a row for each column of the log."""
+        clock = self.mapping.clock
+        rows = [(name, TIME.name, clock.unit or "-", "", clock.reason) for name in clock.columns]
+        for line in self.mapping.lines:
+            factor = ""
+            if line.channel and line.unit != ASKED:
+                unit = UNITS[kind_of(line.channel)][line.unit]
+                factor = f"{line.factor * unit.factor:.5g}" + (f" {unit.offset:+.5g}" if unit.offset else "")
+            rows.append((line.name, line.channel, line.unit, factor, line.reason))
+        return rows
+
+
+@checked_arguments
+def read_log(path: str | Path, map: str | Path | None = None) -> Record:
+    """Read a log as its logger wrote it, as a checked record.
+
+    Units, names and times are found from the columns' names and values; ``record.notes`` says what was done. What they
+    do not decide has to be said by a map (``subzero import LOG --map-out map.toml`` writes one to edit).
+
+    Args:
+        path: CSV of any delimiter and encoding, ``.mat``, netCDF ``.nc``, MOOS ``.alog``, or ArduPilot ``.bin``
+            (with the extra ``logs``).
+        map: TOML file that says which column is which channel, in which unit; found if None.
+
+    Raises:
+        UserError: it cannot be read, or something has to be decided first; says what to do.
+    """
+    found = import_log(path, map)
+    if found.record is None:
+        raise undecided(found)
+    return as_measured(found.record)
+
+
+def undecided(found: Imported) -> UserError:
+    """Return the error that asks what names and values of a log do not decide."""
+    questions = found.mapping.questions
+    remedy = f"write the map with subzero import {found.source} --map-out map.toml, edit it, and give it with --map"
+    title = f"The log {found.source} cannot be imported before this is decided:"
+    return UserError(listed(title, [*questions[:SHOWN_QUESTIONS], remedy]))
+
+
+def import_log(path: str | Path, map_path: str | Path | None = None) -> Imported:
+    """Read a log with the map that is given or found.
+
+    Raises:
+        UserError: it cannot be read, or the map does not suit.
+    """
+    table = read_table(path)
+    if map_path is None:
+        clock, questions = find_clock(table)
+        rows, time, notes = _rows(path, table, clock)
+        mapping = find_map(table, clock, rows, time)
+        mapping = replace(mapping, questions=(*questions, *mapping.questions))
+    else:
+        mapping = read_map(map_path, table)
+        rows, time, notes = _rows(path, table, mapping.clock)
+        mapping = replace(mapping, notes=contradictions(mapping, table, rows, time))
+    if not any(line.channel for line in mapping.lines) and not mapping.questions:
+        names = ", ".join(short(name) for name in table.columns)
+        raise refusal(
+            path, f"none of its columns is a channel: {names}", "Name them in a map, see docs/logs.md."
+        )
+    if mapping.questions:
+        return Imported(source=table.source, mapping=mapping)
+    values, more = _values(table, mapping, rows)
+    if not values:
+        raise refusal(path, "no channel has a number in the rows that are used", "Look at its times.")
+    notes = [*table.notes, *notes, *more, *mapping.notes, *_open_units(mapping)]
+    record = Record(source=table.source, time=time, values=values, notes=tuple(notes))
+    return Imported(source=table.source, mapping=mapping, record=record)
+
+
+def _rows(path: str | Path, table: Table, clock: Clock) -> tuple[np.ndarray, np.ndarray, list[str]]:
+    """Return the rows that are used, in the order of time, their times from t = 0 on [s], and what was done."""
+    size = next(iter(table.columns.values())).values.size
+    if not clock.columns:
+        return (
+            np.arange(size),
+            clock.every_s * np.arange(size),
+            [f"Times: a row every {clock.every_s:g} s, by the map."],
+        )
+    seconds = _seconds(path, table, clock)
+    rows = np.flatnonzero(np.isfinite(seconds))
+    notes = [f"{size - rows.size} rows have no time and are left out."] if rows.size < size else []
+    rows = rows[np.argsort(seconds[rows], kind="stable")] if clock.sort else rows
+    begins = times.parts_of(seconds[rows])
+    if clock.part:
+        if not 0 < clock.part <= len(begins):
+            raise refusal(
+                path, f"the map asks for part {clock.part}, and its clock has {len(begins)}", "Correct it."
+            )
+        rows = rows[begins[clock.part - 1] : [*begins, rows.size][clock.part]]
+        notes.append(f"Part {clock.part} of {len(begins)} is used: {rows.size} of {size} rows.")
+        begins = [0]
+    if problem := times.problem_of(seconds[rows], begins):
+        raise refusal(path, *problem)
+    return _from_start(path, clock, rows, seconds[rows], notes)
+
+
+def _seconds(path: str | Path, table: Table, clock: Clock) -> np.ndarray:
+    """Return the clock of all rows in seconds, NaN where there is none."""
+    columns = [table.columns[name] for name in clock.columns]
+    if any(column.form == times.MIXED for column in columns):
+        raise refusal(path, "some of its times have a zone and some have none", "Write all of them with one.")
+    total: np.ndarray = np.sum([column.values for column in columns], axis=0)
+    if [column.form for column in columns] == [times.TIME_OF_DAY]:
+        return times.over_midnight(total)
+    likely = [*times.unit_by_values(total), "s"][0] if clock.unit == ASKED else clock.unit or "s"
+    return total * CLOCK_UNITS[likely]
+
+
+def _from_start(
+    path: str | Path, clock: Clock, rows: np.ndarray, seconds: np.ndarray, notes: list[str]
+) -> tuple[np.ndarray, np.ndarray, list[str]]:
+    """Shift times so that they count from the start of the trial, and leave out what was before."""
+    start = float(seconds[0])
+    if clock.start is not None:
+        given = times.start_of(clock.start) or 0.0
+        start = given if isinstance(clock.start, str) else given * CLOCK_UNITS[clock.unit or "s"]
+    kept = seconds >= start
+    if kept.sum() < 2:
+        raise refusal(
+            path, f"the start in the map, {short(clock.start)}, leaves fewer than two rows", "Correct it."
+        )
+    notes += [] if kept.all() else [f"{(~kept).sum()} rows before the start are left out."]
+    if start != 0.0:
+        whose = "the first time of the log" if clock.start is None else "the start in the map"
+        notes.append(f"Times: {start:.12g} s, {whose}, is taken from all of them.")
+    digits = 9 if abs(start) < 1e6 else 6  # a float of seconds since 1970 has no more
+    return rows[kept], np.round(seconds[kept] - start, digits), notes
+
+
+def _values(table: Table, mapping: Map, rows: np.ndarray) -> tuple[dict[str, np.ndarray], list[str]]:
+    """Return channel → values in its unit, and what was made of places and pressures."""
+    lines = {line.channel: line for line in mapping.lines if line.channel}
+    values, notes = dict[str, np.ndarray](), list[str]()
+    for channel, line in lines.items():
+        if channel not in (LATITUDE, LONGITUDE):
+            unit, written = UNITS[kind_of(channel)][line.unit], table.columns[line.name].values[rows]
+            values[TARGETS.get(channel, channel)] = line.factor * (written * unit.factor + unit.offset)
+    if LATITUDE in lines and LONGITUDE in lines:
+        places = [lines[name] for name in (LATITUDE, LONGITUDE)]
+        written = [table.columns[place.name].values[rows] for place in places]
+        values["north"], values["east"] = north_and_east(written, [place.unit for place in places])
+        notes.append("North and east are metres from the first place, on the ellipsoid WGS 84.")
+    if PRESSURE in lines:
+        notes.append("Depth is by pressure, in sea water of 1025 kg/m³; an absolute one less 1013.25 hPa.")
+    values = {name: np.where(np.abs(column) <= LARGEST, column, np.nan) for name, column in values.items()}
+    return {name: column for name, column in values.items() if np.isfinite(column).any()}, notes
+
+
+def _open_units(mapping: Map) -> list[str]:
+    """Return a sentence about units that only a name vouches for."""
+    names = ", ".join(short(line.name) for line in mapping.lines if line.is_open)
+    return (
+        [f"Units of {names}: taken from names; the values of the log alone would allow others too."]
+        if names
+        else []
+    )
+
+
+def to_csv(record: Record) -> str:
+    """Return a record in the form that `subzero.read_record` takes, with ten digits."""
+    names = [name for name in BY_NAME if name in record.values]
+    remarks = ["# " + printable(line).replace('"', "'") for line in (f"from {record.source}", *record.notes)]
+    header = ",".join([TIME.column, *(BY_NAME[name].column for name in names)])
+    table = np.column_stack([record.time, *(record.values[name] for name in names)])
+    rows = (",".join("" if value != value else f"{value:.10g}" for value in row) for row in table.tolist())
+    return "\n".join([*remarks, header, *rows]) + "\n"
