@@ -81,7 +81,7 @@ class Plan:
             "points": self.points.digest,
             "outcomes": self.job.outcomes.digest(),
             "tethered": str(self.job.tethered),
-            "version of subzero": f"{version('subzero')} {self.job.code}",
+            "version of subzero": f"{version(DISTRIBUTION)} {self.job.code}",
         }
 
     @property
