@@ -22,7 +22,7 @@ from subzero.calibration.fit import Fitted, fitted
 from subzero.calibration.numbers import USUAL, Number, full_name, numbers_of, with_free_numbers
 from subzero.calibration.results import Advice, Calibration, Profile, Source
 from subzero.diagnosis.assessment import curves
-from subzero.diagnosis.hypothesis.logged import Logged
+from subzero.diagnosis.hypothesis.logged import NO_RECORD, Logged
 from subzero.diagnosis.inference import Progress, pose
 from subzero.diagnosis.read_trials import read_trials
 from subzero.errors import DISTRIBUTION, UserError
@@ -100,7 +100,7 @@ def _with_vehicle(one: Logged, vehicle: str | Path) -> Logged:
 def _check(logged: Sequence[Logged]) -> None:
     """Refuse records that no number of one vehicle can be estimated from."""
     if not logged:
-        raise UserError("No measured record is given. Give the path of a CSV file, or of a folder of them.")
+        raise UserError(NO_RECORD)
     first = logged[0]
     for one in logged:
         if one.setting.trial.commands is None:

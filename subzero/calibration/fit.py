@@ -159,14 +159,14 @@ def wider_by_rows(problem: Problem, fit: Fit, M: np.ndarray) -> np.ndarray:
 def with_rows_of_outliers(problem: Problem) -> Problem | None:
     """Return the problem with the samples that were left out side by side; None if there are none."""
     records, any_row = [], False
-    for one in problem.records:
+    for record in problem.records:
         noise = {}
-        for name, old in one.noise.items():
-            out = np.isfinite(one.values[name]) & ~old.used
+        for name, old in record.noise.items():
+            out = np.isfinite(record.values[name]) & ~old.used
             row = out & (np.r_[False, out[:-1]] | np.r_[out[1:], False])
             any_row |= bool(row.any())
-            noise[name] = replace(old, used=old.used | row, time=one.time[old.used | row])
-        records.append(replace(one, noise=noise))
+            noise[name] = replace(old, used=old.used | row, time=record.time[old.used | row])
+        records.append(replace(record, noise=noise))
     return replace(problem, records=tuple(records)) if any_row else None
 
 

@@ -31,7 +31,7 @@ from subzero.diagnosis.assessment.identifiability import detectability, with_who
 from subzero.diagnosis.hypothesis.catalogue import load
 from subzero.diagnosis.hypothesis.data_error import DataError
 from subzero.diagnosis.hypothesis.effect import Effect
-from subzero.diagnosis.hypothesis.logged import Logged
+from subzero.diagnosis.hypothesis.logged import NO_RECORD, Logged
 from subzero.diagnosis.hypothesis.noise import level_of
 from subzero.diagnosis.inference.data_error_choice import compared
 from subzero.diagnosis.inference.data_error_evidence import Explained, leaves_only_noise
@@ -147,7 +147,7 @@ def diagnose_trials(
         UserError: no record, seed or budget; the nominal model cannot be run through a trial.
     """
     if not records:
-        raise UserError("No measured record is given. Give the path of a CSV file, or of a folder of them.")
+        raise UserError(NO_RECORD)
     whole("seed", seed)
     chosen(dict.fromkeys(BUDGETS), budget, "budget")
     effects = tuple(effects)
@@ -444,10 +444,10 @@ def _recorded(
 ) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Return channel → times and values as a record has them, of channels with errors in their data."""
     return {
-        channel: (records[one.record].record.time, records[one.record].record.values[channel])
-        for one in found
-        for channel in (() if one.error.is_of_commands else one.error.channels)
-        if records[one.record].name == name
+        channel: (records[suspect.record].record.time, records[suspect.record].record.values[channel])
+        for suspect in found
+        for channel in (() if suspect.error.is_of_commands else suspect.error.channels)
+        if records[suspect.record].name == name
     }
 
 
@@ -488,14 +488,14 @@ def _with_planted(
 ) -> dict[str, Curves]:
     """Return record → curves, also what explains the records without further errors, as recorded with these."""
     found, made = dict(shown), curves(more.work.problem, {label: more.work.search.best().fit})
-    for i, one in enumerate(records):
-        own = made[one.name]
-        logged = replace(one, record=Record(source="", time=own.time, values=own.models[label]))
-        for each in further:
-            logged = each.error.planted(logged) if each.record == i else logged
+    for i, record in enumerate(records):
+        own = made[record.name]
+        logged = replace(record, record=Record(source="", time=own.time, values=own.models[label]))
+        for suspect in further:
+            logged = suspect.error.planted(logged) if suspect.record == i else logged
         time, values = logged.record.time, logged.record.values
-        model = {name: np.interp(shown[one.name].time, time, column) for name, column in values.items()}
-        found[one.name] = replace(shown[one.name], models={**shown[one.name].models, label: model})
+        model = {name: np.interp(shown[record.name].time, time, column) for name, column in values.items()}
+        found[record.name] = replace(shown[record.name], models={**shown[record.name].models, label: model})
     return found
 
 

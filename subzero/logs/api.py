@@ -13,7 +13,7 @@ import numpy as np
 
 from subzero.arguments import checked_arguments
 from subzero.channels import BY_NAME, TIME
-from subzero.errors import UserError, listed, printable, short
+from subzero.errors import SHOWN_PROBLEMS, UserError, listed, printable, short
 from subzero.logs import times
 from subzero.logs.mapping import (
     ASKED,
@@ -28,8 +28,6 @@ from subzero.logs.mapping import (
 from subzero.logs.names import CLOCK_UNITS, LATITUDE, LONGITUDE, PRESSURE, TARGETS, UNITS, kind_of
 from subzero.logs.table import Table, read_table, refusal
 from subzero.records.record import LARGEST, Record, as_measured
-
-SHOWN_QUESTIONS = 10
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,7 +83,7 @@ def undecided(found: Imported) -> UserError:
     questions = found.mapping.questions
     remedy = f"write the map with subzero import {found.source} --map-out map.toml, edit it, and give it with --map"
     title = f"The log {found.source} cannot be imported before this is decided:"
-    return UserError(listed(title, [*questions[:SHOWN_QUESTIONS], remedy]))
+    return UserError(listed(title, [*questions[: SHOWN_PROBLEMS - 1], remedy]))
 
 
 def import_log(path: str | Path, map_path: str | Path | None = None) -> Imported:

@@ -24,7 +24,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from subzero.channels import TIME
-from subzero.errors import UserError, printable, short
+from subzero.errors import DISTRIBUTION, UserError, printable, short
 from subzero.logs.names import is_unit, recognised
 from subzero.logs.times import DATE_AND_TIME, MIXED, seconds_of
 from subzero.user_file import MEGABYTE, MOST_COLUMNS, UnreadableFileError, check_readable
@@ -410,7 +410,7 @@ def _read_dataflash(path: Path) -> tuple[dict[str, Column], list[str]]:
     try:
         from pymavlink.DFReader import DFReader_binary
     except ImportError:
-        raise refusal(path, "pymavlink is not installed", "pip install 'subzero-auv[logs]'.") from None
+        raise refusal(path, "pymavlink is not installed", f"pip install '{DISTRIBUTION}[logs]'.") from None
     with open(path, "rb") as file:
         if file.read(2) != DATAFLASH:
             raise refusal(path, "it is no log of ArduPilot", "Give the .BIN file that the autopilot wrote.")

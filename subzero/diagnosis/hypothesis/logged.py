@@ -11,6 +11,9 @@ from dataclasses import dataclass, field
 from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.records.record import Record
 
+NO_RECORD = "No measured record is given. Give the path of a CSV file, or of a folder of them."
+"""What is wrong where a diagnosis or a calibration is given nothing."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Logged:

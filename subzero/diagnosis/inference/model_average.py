@@ -4,8 +4,8 @@ nothing_wrong      p(none) ≥ 0.5, or the named size is within the practical on
 calibrated         the same, but numbers had to move by more than 4 tolerances, or tolerances 4 times as wide explain
                    the records best: the model wants calibration
 nothing_near       nothing is named, and what the best fit leaves is no noise; or the best explanation, whatever it
-                   names, moves what it does not name beyond any calibration; or a name would need tolerances four times
-                   as wide (κ = 4), which is as if the declared vehicle were another one
+                   names, moves what it does not name beyond any calibration; or the name holds only with tolerances
+                   four times as wide (κ = 4): the declared vehicle is another one
 cause_named        one hypothesis, or one cause that begins in mid-trial, with p ≥ 0.9, D ≥ 9 to its closest rival,
                    its size beyond 4 tolerances
 outside_catalogue  a latent force or a drift that no cause explains has p ≥ 0.9
