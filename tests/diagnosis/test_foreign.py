@@ -63,3 +63,8 @@ def test_a_vehicle_of_another_simulator_is_near_to_nothing(tmp_path):
     )
     assert verdict.verdict == "nothing_near"
     assert verdict.causes == ()
+    (curves,) = verdict.curves.values()
+    for error in verdict.data_errors:  # possible at most; drawn as it is recorded, with the error
+        assert error.probability < 0.9
+        drawn, seen = curves.models[f"rival: {error.id}"]["roll_angle"], curves.measured["roll_angle"]
+        assert np.nanmean((seen - drawn) ** 2) < np.nanmean((seen + drawn) ** 2)
