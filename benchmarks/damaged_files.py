@@ -137,8 +137,8 @@ def checkpointed(folder: Path):
 def make_good(folder: Path) -> None:
     """Write one good file of each kind."""
     import subzero
-    from subzero.integrity import TAIL
-    from subzero.output import write_netcdf
+    from subzero.files.integrity import TAIL
+    from subzero.results.netcdf_csv import write_netcdf
     from subzero.sweeps.plan import plan_sweep
     from subzero.sweeps.store import opened
 

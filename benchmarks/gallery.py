@@ -123,7 +123,7 @@ def main() -> None:
 
 def run(command: str) -> None:
     """Carry out a line of the shell."""
-    from subzero.cli import FINE, main
+    from subzero.cli.app import FINE, main
 
     print(command, flush=True)
     if main([*shlex.split(command)[1:], "--quiet"]) != FINE:

@@ -24,7 +24,7 @@ import numpy as np
 
 import scenarios
 import subzero
-from subzero.simulation import run_trial
+from subzero.simulation.run import run_trial
 
 GRADINGS = (0.05, 0.1, 0.2)
 MINUTES = 20.0
@@ -153,8 +153,8 @@ LONG = {
 
 def measure(name: str) -> dict[str, float]:
     """Return what a long run costs, files and all but figures, in this process."""
-    from subzero.atomic_output import open_output_folder
-    from subzero.output import write_run
+    from subzero.files.atomic_output import open_output_folder
+    from subzero.results.netcdf_csv import write_run
 
     subzero.simulate("fig6")  # whatever is loaded or compiled once
     trial, begun = trial_of(**LONG[name]), process_time()  # type: ignore[arg-type]

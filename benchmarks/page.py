@@ -20,7 +20,7 @@ import psutil
 import subzero
 from subzero.figures import draw
 from subzero.page import browser, page_of_runs
-from subzero.summary import summary_of
+from subzero.results.summary import summary_of
 
 FIGURES = Path(__file__).parent.parent / "docs" / "figures"
 FRAMES = 60

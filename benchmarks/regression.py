@@ -14,7 +14,7 @@ import pytest
 import subzero
 from benchmarks.sweep import plan
 from benchmarks.throughput import long_trial, short_trial
-from subzero.simulation import run_trial
+from subzero.simulation.run import run_trial
 
 pytest.importorskip("pytest_benchmark")
 in_processor_time = pytest.mark.benchmark(timer=time.process_time)

@@ -200,8 +200,8 @@ def peak_memory(members):
     code = (
         "import resource, sys, subzero; from benchmarks.sweep import plan, SHORT, GRID;"
         "import tempfile; from pathlib import Path; from subzero.sweeps.api import finished;"
-        "from subzero.atomic_output import open_output_folder;"
-        "from subzero.sweeps.tell import write_sweep;"
+        "from subzero.files.atomic_output import open_output_folder;"
+        "from subzero.cli.write_sweep import write_sweep;"
         "d = tempfile.mkdtemp(); one = plan({}, SHORT);\n"
         "with finished(one, Path(d), workers=2) as done, open_output_folder(Path(d)) as out:\n"
         "    write_sweep(one, done, out)\n"

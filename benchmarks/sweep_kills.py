@@ -65,9 +65,7 @@ def noted(log):
 
 def command(spec, out, log):
     """Start the command, with members that note themselves."""
-    code = (
-        f"from benchmarks.sweep_kills import noted; noted({str(log)!r}); from subzero.cli import main; main()"
-    )
+    code = f"from benchmarks.sweep_kills import noted; noted({str(log)!r}); from subzero.cli.app import main; main()"
     words = ["sweep", str(spec), "--out", str(out), "--workers", "2"]
     return subprocess.Popen(
         [sys.executable, "-c", code, *words], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL

@@ -56,7 +56,7 @@ from scipy.stats import binomtest
 import scenarios
 import subzero
 from benchmarks.trust_trials import draw, tags_of
-from subzero.comparison import MOST, refine
+from subzero.simulation.comparison import MOST, refine
 from subzero.validity import DOUBTS
 
 WRONG, RIGHT = 0.03, 0.01

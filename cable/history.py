@@ -13,7 +13,7 @@ from cable.current import Current
 from cable.doubts import SLACK_SHARE, above_surface, doubts_of
 from cable.properties import CableProperties
 from subzero.errors import BadValueError, real, short
-from subzero.overview import Overview
+from subzero.files.text_repr import Overview
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -14,10 +14,10 @@ from pathlib import Path
 from typing import Any
 
 from scenarios.errors import Problem, ScenarioError, nearest, nearest_or_all
-from subzero import user_file
 from subzero.errors import printable
 from subzero.errors import short as shown
-from subzero.user_file import MOST_OF_A_TOML, UnreadableFileError
+from subzero.files import read_file
+from subzero.files.read_file import MOST_OF_A_TOML, UnreadableFileError
 
 ROOT = Path(__file__).parent
 
@@ -104,7 +104,7 @@ def read_text(path: Path, name: str, most: int = MOST_OF_A_TOML) -> str:
         ScenarioError: it is not there, is no plain file, holds more than `most` bytes, cannot be read, or is not text.
     """
     try:
-        return user_file.read_text(path, most).replace("\r\n", "\n")
+        return read_file.read_text(path, most).replace("\r\n", "\n")
     except UnreadableFileError as error:
         remedy = _neighbour(path) if error.is_missing else error.remedy
         problem = Problem(file=printable(name), why=error.why, remedy=remedy)

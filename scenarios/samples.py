@@ -41,7 +41,7 @@ from scenarios.schema import LISTS, check_section
 from subzero.channels import BY_COLUMN
 from subzero.errors import printable
 from subzero.errors import short as shown
-from subzero.user_file import MOST_COLUMNS, MOST_OF_A_CSV
+from subzero.files.read_file import MOST_COLUMNS, MOST_OF_A_CSV
 
 LEFT_OPEN = ("depth_m", "wet_length_m", "drum_north_m", "drum_east_m", "drum_down_m")
 """Keys of [start] that a prescribed motion leaves open; the depth unless the motion says it."""

@@ -35,7 +35,7 @@ from scenarios.quantities import (
 )
 from scenarios.steps import even_times, misfits, run_times
 from subzero.errors import short
-from subzero.overview import Overview
+from subzero.files.text_repr import Overview
 
 SETPOINT = dict(zip(CONTROLS, (*WINCH[1:], None), strict=True))
 """Control of a winch → the quantity that it follows."""
@@ -247,7 +247,7 @@ class Trial:
         far_grading: by this much per metre; 0 leaves them as they are. [-]
         every: time between results that are kept, a whole number of cable steps; 0 keeps all. The last is kept. [s]
         rtol: error of the tow force that is allowed, as a share of its largest: where the run and a coarser one differ
-            by more, steps and segments are halved (`subzero.convergence`); 0 takes them as they are. [-]
+            by more, steps and segments are halved (`subzero.simulation.refinement`); 0 takes them as they are. [-]
         budget: how long runs with halved steps may take in all; 0 for ten times the plain run. [s]
         scheme: one of `SCHEMES`.
         start: how the vehicle lies at t = 0.

@@ -8,7 +8,7 @@
 Names come from their modules when they are first used, so that ``import subzero`` costs nothing:
 `simulate` and `compare` run a trial, `simulate_many` many at once, `Checkpoint` keeps where a long run stands,
 `Comparison` holds two runs, `load_scenario` reads a trial,
-`open_run` reads its file again, and ``run.subzero.plot`` draws it (`subzero.accessor`),
+`open_run` reads its file again, and ``run.subzero.plot`` draws it (`subzero.figures.accessor`),
 `warnings_of` says what may be wrong with a run, `check` how much it changes with half the steps,
 `read_record` a measured record, `read_log` one from a file as its logger wrote it, `draw` makes the figures,
 `export` writes a run for other programs,
@@ -24,32 +24,32 @@ from typing import Any
 
 _HOME = {
     "CHANNELS": ("subzero.channels", "CHANNELS"),
-    "Checkpoint": ("subzero.checkpoint", "Checkpoint"),
-    "Comparison": ("subzero.comparison", "Comparison"),
+    "Checkpoint": ("subzero.simulation.checkpoint", "Checkpoint"),
+    "Comparison": ("subzero.simulation.comparison", "Comparison"),
     "Logged": ("subzero.diagnosis.hypothesis.logged", "Logged"),
     "Model": ("subzero.model", "Model"),
     "Observation": ("subzero.channels", "Observation"),
     "Record": ("subzero.records.record", "Record"),
-    "Refinement": ("subzero.comparison", "Refinement"),
+    "Refinement": ("subzero.simulation.comparison", "Refinement"),
     "RunWarning": ("subzero.validity", "RunWarning"),
-    "RunStoppedError": ("subzero.simulator", "RunStoppedError"),
-    "Simulator": ("subzero.simulator", "Simulator"),
+    "RunStoppedError": ("subzero.simulation.stepper", "RunStoppedError"),
+    "Simulator": ("subzero.simulation.stepper", "Simulator"),
     "UserError": ("subzero.errors", "UserError"),
     "calibrate": ("subzero.calibration.api", "calibrate"),
     "challenge": ("subzero.synthetic.challenge", "challenge"),
-    "check": ("subzero.comparison", "check"),
-    "compare": ("subzero.comparison", "compare"),
+    "check": ("subzero.simulation.comparison", "check"),
+    "compare": ("subzero.simulation.comparison", "compare"),
     "diagnose": ("subzero.diagnosis.api", "diagnose"),
     "draw": ("subzero.figures", "draw"),
-    "export": ("subzero.exports", "export"),
+    "export": ("subzero.results.export", "export"),
     "load_scenario": ("subzero.model", "load"),
-    "open_run": ("subzero.accessor", "open_run"),
+    "open_run": ("subzero.figures.accessor", "open_run"),
     "plan_sweep": ("subzero.sweeps.plan", "plan_sweep"),
     "read_log": ("subzero.logs.api", "read_log"),
     "read_record": ("subzero.records.record", "read_record"),
     "read_trials": ("subzero.diagnosis.read_trials", "read_trials"),
-    "simulate": ("subzero.simulation", "simulate"),
-    "simulate_many": ("subzero.simulation", "simulate_many"),
+    "simulate": ("subzero.simulation.run", "simulate"),
+    "simulate_many": ("subzero.simulation.run", "simulate_many"),
     "sweep": ("subzero.sweeps.api", "sweep"),
     "warnings_of": ("subzero.validity", "warnings_of"),
 }
@@ -67,7 +67,7 @@ __all__ = sorted([*_HOME, *_PACKAGES, "__version__"])
 def __getattr__(name: str) -> Any:
     """Fetch a public name from its module, once."""
     if name in _GIVE_RUNS:
-        import_module("subzero.accessor")
+        import_module("subzero.figures.accessor")
     if name == "__version__":
         from importlib.metadata import version
 

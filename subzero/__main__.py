@@ -5,7 +5,7 @@ from __future__ import annotations
 import gc
 import sys
 
-from subzero import interrupts, standard_streams
+from subzero.cli import interrupts, standard_streams
 
 YOUNG = 50_000
 """So many new objects before Python looks for garbage among them. A command lives for seconds and keeps most of what it
@@ -21,7 +21,7 @@ def run() -> None:
     standard_streams.protect()
     try:
         interrupts.watch()
-        from subzero.cli import main
+        from subzero.cli.app import main
 
         code = main()
         if error := standard_streams.output_error():

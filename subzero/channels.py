@@ -9,7 +9,8 @@ down, heading runs clockwise from north and is continuous (no jump at 360 degree
 turns the heading clockwise, positive stern-planes raise the nose. Forces and moments of the cable are
 those *on the vehicle*, and moments are about the hull centre.
 
-To add a channel, add a row here and fill it in `subzero.dataset.channel_values`; files, records and reports follow.
+To add a channel, add a row here and fill it in `subzero.results.dataset.channel_values`; files, records and reports
+follow.
 """
 
 from __future__ import annotations
@@ -174,7 +175,9 @@ def channel_of_column(column: str) -> Channel | None:
 
 @runtime_checkable
 class AnyRun(Protocol):
-    """A run by the names of its variables: the dataset of `subzero.simulate`, or a `subzero.dataset.PlainRun`."""
+    """A run by the names of its variables: the dataset of `subzero.simulate`, or a
+    `subzero.results.dataset.PlainRun`.
+    """
 
     @property
     def attrs(self) -> dict[Any, Any]:

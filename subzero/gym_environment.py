@@ -27,7 +27,7 @@ from subzero.arguments import checked_arguments
 from subzero.channels import Observation
 from subzero.errors import BadValueError, checked, missing_extra, short, whole
 from subzero.model import load
-from subzero.simulator import RunStoppedError, Simulator
+from subzero.simulation.stepper import RunStoppedError, Simulator
 
 try:
     import gymnasium

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from subzero import autopilot
-from subzero.simulator import Simulator
+from subzero.simulation.stepper import Simulator
 
 from .trials import trial, tuning
 

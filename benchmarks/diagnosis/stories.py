@@ -18,9 +18,9 @@ import numpy as np
 
 import subzero
 from benchmarks.diagnosis.story_cases import STORIES, Story
-from subzero import write_diagnosis
 from subzero.channels import BY_NAME
-from subzero.cli_diagnosis import simulated
+from subzero.cli import write_diagnosis
+from subzero.cli.diagnosis import simulated
 from subzero.diagnosis.hypothesis.catalogue import START, catalogue
 from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.logged import Logged
@@ -30,7 +30,7 @@ from subzero.diagnosis.report.summary import summary
 from subzero.diagnosis.results import Verdict
 from subzero.figures.diagnosis import draw_diagnosis
 from subzero.figures.style import Title
-from subzero.output import open_output_folder
+from subzero.results.netcdf_csv import open_output_folder
 from subzero.synthetic.challenge import SAMPLE_S
 from subzero.synthetic.planted import Hidden, draw_deviations, hide, make_record
 

@@ -27,10 +27,10 @@ from scenarios import Trial
 from scenarios.steps import whole_steps
 from subzero.autopilot.coupled_plant import CABLE_OUTPUTS, HULL_SIZE, NoRoomError, Tethered, blank_trial
 from subzero.channels import BY_NAME
-from subzero.convergence import resolved
 from subzero.errors import UserError
 from subzero.model import Model, load
-from subzero.simulation import simulate
+from subzero.simulation.refinement import resolved
+from subzero.simulation.run import simulate
 from subzero.steady_motion.hull_state_space import INPUT_NAMES, STATE_NAMES, UNITS
 from subzero.steady_motion.trim_point import Trim
 

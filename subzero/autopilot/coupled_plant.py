@@ -24,11 +24,11 @@ from scenarios import Start, Trial
 from subzero.engine.coupling import FINE, forget
 from subzero.engine.initial_conditions import RUN_IN, prepare
 from subzero.engine.recording import new_recording
+from subzero.engine.run_state import Live, Orders
 from subzero.engine.time_loop import NO_ROOM, SPARE, run_rows
 from subzero.errors import UserError, checked
 from subzero.model import Model
-from subzero.run_state import Live, Orders
-from subzero.simulation import in_words
+from subzero.simulation.run import in_words
 from subzero.steady_motion.hull_state_space import (
     INPUT_NAMES,
     PLACE,
@@ -175,7 +175,7 @@ class Tethered:
 NOT_KEPT = ("blocks", "pivots", "rows", "load", "slip", "normal_gain", "forcing", "solved")
 """Fields of `cable.moving_end.state.Line` and its ends that a step fills before it reads them, or that stay zero."""
 OF_NOW = ("force", "force_before", "last_step")
-"""Fields of `subzero.run_state.Now` that a step leaves for the next."""
+"""Fields of `subzero.engine.run_state.Now` that a step leaves for the next."""
 
 
 class Memory:

@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from subzero.errors import UserError, suggestion
-from subzero.overview import Overview
+from subzero.files.text_repr import Overview
 
 if TYPE_CHECKING:
     import control

@@ -34,7 +34,7 @@ from subzero.autopilot.tuning import Tuning
 from subzero.channels import Observation
 from subzero.errors import UserError
 from subzero.model import Model
-from subzero.simulator import RunStoppedError, Simulator
+from subzero.simulation.stepper import RunStoppedError, Simulator
 
 SHORTEST_STEP = 0.01
 """The angle is moved on in steps of at most this. [s]"""

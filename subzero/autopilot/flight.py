@@ -17,8 +17,8 @@ from subzero.autopilot.standard import Wanted
 from subzero.channels import DEGREE, HEADING, Observation
 from subzero.errors import BadValueError, UserError, short
 from subzero.model import Model
-from subzero.simulation import Progress
-from subzero.simulator import COMMANDED, CommandError, RunStoppedError, Simulator
+from subzero.simulation.run import Progress
+from subzero.simulation.stepper import COMMANDED, CommandError, RunStoppedError, Simulator
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -23,7 +23,7 @@ from subzero.autopilot.standard import Wanted
 from subzero.channels import Observation
 from subzero.errors import UserError, checked, chosen
 from subzero.model import Model, load, model_of
-from subzero.simulation import Progress
+from subzero.simulation.run import Progress
 from subzero.steady_motion.hull_state_space import INPUT_NAMES
 from subzero.steady_motion.trim import trim
 

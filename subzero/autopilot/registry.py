@@ -24,8 +24,8 @@ from subzero.autopilot.stability_margins import check_stable
 from subzero.autopilot.standard import StandardAutopilot
 from subzero.autopilot.tuning import Tuning, tune
 from subzero.errors import UserError, chosen, real, short
+from subzero.files.read_file import MOST_OF_A_PROGRAM, read_bytes
 from subzero.model import Model, model_of
-from subzero.user_file import MOST_OF_A_PROGRAM, read_bytes
 
 Build = Callable[[Tuning, float, CableModel], Autopilot]
 """What makes an autopilot, from a tuning, a sample time [s] and a cable model."""

@@ -20,8 +20,8 @@ from subzero.autopilot.estimator import MEASURED, STATES, Estimates
 from subzero.autopilot.linear import linearise, subsystem
 from subzero.autopilot.tuning import Tuning
 from subzero.errors import UserError, suggestion
+from subzero.files.text_repr import Overview
 from subzero.model import Model
-from subzero.overview import Overview
 from subzero.steady_motion.trim import trim
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ import numpy as np
 
 from subzero.channels import BY_NAME
 from subzero.external_force import MissingForce
-from subzero.overview import Overview
+from subzero.files.text_repr import Overview
 
 Name = TypeVar("Name")
 

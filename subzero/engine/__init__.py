@@ -5,5 +5,5 @@ In reading order: `initial_conditions` puts together what stays and what changes
 in mid-run. `time_loop` goes from one recorded time to the next; in each, `coupling` lets hull and cable agree on the
 tow force, `vehicle_step` takes the hull through it, and `energy` books where the work went. `recording` keeps the rows.
 
-The values that all of them share stand below: `subzero.model`, `subzero.run_state`, `subzero.external_force`.
+The values that all of them share stand below: `subzero.model`, `subzero.engine.run_state`, `subzero.external_force`.
 """

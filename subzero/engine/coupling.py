@@ -22,9 +22,9 @@ from cable.drum_motion import lead_drum
 from cable.moving_end import accept, energy_flow, impedance, in_water, try_step
 from subzero.engine.energy import book, take_jolt_of_motion
 from subzero.engine.external_wrench import tow_point
+from subzero.engine.run_state import Live, Now, Setup
 from subzero.engine.vehicle_step import advance_hull, follow_track
 from subzero.jit import compiled, inlined, inner, scratch
-from subzero.run_state import Live, Now, Setup
 from vehicle import STATE_SIZE
 
 MOST_EXCHANGES = 60

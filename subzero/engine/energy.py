@@ -32,8 +32,8 @@ from cable.moving_end import (
     take_jolt,
 )
 from subzero.engine.external_wrench import add_missing, feel_current, row_at, tow_wrench
+from subzero.engine.run_state import HEADING, LINEAR_ROWS, PITCH, TIME, Live, Setup
 from subzero.jit import allocating, inlined, inner
-from subzero.run_state import HEADING, LINEAR_ROWS, PITCH, TIME, Live, Setup
 from vehicle import kinetic_energy, power, rotation
 
 PROPELLER, HULL_LOSS, CABLE_LOSS, KINETIC, DRUM, ADDED, RESIDUAL = range(7)

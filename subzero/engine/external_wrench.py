@@ -12,9 +12,9 @@ from __future__ import annotations
 import numpy as np
 
 from cable.current import water_velocity
+from subzero.engine.run_state import HullWork, Live, Setup
 from subzero.external_force import FACTORS, fill_factors
 from subzero.jit import allocating, compiled, inlined, inner
-from subzero.run_state import HullWork, Live, Setup
 from vehicle import deflections, relative_velocity, rotation
 from vehicle.motor import shaft_speed
 from vehicle.state import CHARGE, SHAFT

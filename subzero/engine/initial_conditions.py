@@ -44,12 +44,12 @@ from subzero.engine.environment import drum_of, way_of_drum
 from subzero.engine.external_wrench import feel_current, tow_point, way_of_tow_point
 from subzero.engine.prescribed_motion import knots
 from subzero.engine.recording import new_recording, record_row
+from subzero.engine.run_state import LINEAR_ROWS, Fixed, HullWork, Ledger, Live, Now, Orders, Setup
 from subzero.engine.vehicle_step import pose
 from subzero.errors import UserError, printable
 from subzero.external_force import MissingForce
 from subzero.jit import Call, allocating, compile_beside, compiled, made_once
 from subzero.model import Model
-from subzero.run_state import LINEAR_ROWS, Fixed, HullWork, Ledger, Live, Now, Orders, Setup
 from vehicle import POWERS, STATE_SIZE, initial_state, kinetic_energy, rotation
 from vehicle.state import LINKAGE, POSITION, SERVO, VELOCITY
 

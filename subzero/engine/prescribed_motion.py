@@ -17,8 +17,8 @@ from __future__ import annotations
 import numpy as np
 
 import scenarios
+from subzero.engine.run_state import KNOT_ROWS, PLACE, SLOPE, TIME
 from subzero.errors import UserError, printable
-from subzero.run_state import KNOT_ROWS, PLACE, SLOPE, TIME
 
 FAR_OFF = 0.5
 """Places and speeds do not belong together if they differ by more than this share of the speed … [-]"""
@@ -29,7 +29,7 @@ COORDINATES = ("north", "east", "depth")
 
 
 def knots(motion: scenarios.Motion, depth: float) -> np.ndarray:
-    """Return the table of a smooth motion, rows as in `subzero.run_state`. Shape (KNOT_ROWS, samples).
+    """Return the table of a smooth motion, rows as in `subzero.engine.run_state`. Shape (KNOT_ROWS, samples).
 
     Args:
         motion: at least two samples.

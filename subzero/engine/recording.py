@@ -15,8 +15,8 @@ import numpy as np
 
 from cable.moving_end import NOW, paid_out
 from subzero.engine.external_wrench import feel_current, row_at, tow_wrench
+from subzero.engine.run_state import Live, Setup
 from subzero.jit import compiled
-from subzero.run_state import Live, Setup
 from vehicle import BREAKDOWN, STATE_SIZE, battery_voltage, breakdown, deflections, euler_angles
 
 BREATH_S = 0.1

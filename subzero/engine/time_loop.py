@@ -1,6 +1,6 @@
 """The compiled time loop: exchange after exchange, row after row, no Python inside.
 
-Stepped from outside (`subzero.simulator`), a run is held by one reference, so that a step from Python costs
+Stepped from outside (`subzero.simulation.stepper`), a run is held by one reference, so that a step from Python costs
 microseconds: compiled functions unpack a named tuple, array by array, each time Python calls them, and with some fifty
 arrays that costs more than the step itself. A `Handle` is unpacked once and then passed as one pointer.
 """
@@ -17,9 +17,9 @@ from numba.experimental import structref
 
 from subzero.engine.coupling import FINE, exchange
 from subzero.engine.recording import Recording, note, record_row, row_of
+from subzero.engine.run_state import Live, Setup
 from subzero.jit import allocating, compiled
 from subzero.jit.unbroken import unbroken
-from subzero.run_state import Live, Setup
 
 NO_ROOM = 4
 """The room that was reserved is nearly full: enlarge it and go on. The other endings are in `coupling`."""
@@ -159,7 +159,7 @@ def advance(
         rudder: rudder command. [rad]
         port: command of the port plane. [rad]
         starboard: command of the starboard plane. [rad]
-        seen: filled with the new present row, in the order of `subzero.simulator.Observation`.
+        seen: filled with the new present row, in the order of `subzero.simulation.stepper.Observation`.
 
     Returns:
         how it ended, which at[ENDING] says, too.

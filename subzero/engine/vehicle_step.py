@@ -13,8 +13,8 @@ from __future__ import annotations
 import numpy as np
 
 from subzero.engine.external_wrench import add_missing, feel_current, row_at, tow_wrench
+from subzero.engine.run_state import HEADING, LINEAR_ROWS, PITCH, PLACE, SLOPE, SPEED, TIME, Live, Setup
 from subzero.jit import allocating, compiled, inlined, inner, scratch
-from subzero.run_state import HEADING, LINEAR_ROWS, PITCH, PLACE, SLOPE, SPEED, TIME, Live, Setup
 from vehicle import STATE_SIZE, derivative, derivative_and_power, finish_step, quaternion_from_euler, rotation
 
 GAUSS_OFFSET = 0.5 * np.sqrt(0.6)

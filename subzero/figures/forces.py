@@ -20,7 +20,7 @@ from subzero.figures.style import (
     sheet,
     time_label,
 )
-from subzero.summary import ENERGY_PARTS, FORCE, MOMENT
+from subzero.results.summary import ENERGY_PARTS, FORCE, MOMENT
 
 if TYPE_CHECKING:
     import xarray as xr

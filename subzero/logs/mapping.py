@@ -25,6 +25,7 @@ import numpy as np
 
 from subzero.channels import BY_COLUMN, BY_NAME, TIME
 from subzero.errors import UserError, listed, printable, real, short, suggestion
+from subzero.files.read_file import MOST_OF_A_TOML, UnreadableFileError, read_text
 from subzero.logs import times
 from subzero.logs.evidence import Contradiction, Findings, Measured, findings, tied, units_by_size
 from subzero.logs.names import (
@@ -39,7 +40,6 @@ from subzero.logs.names import (
     unit_of,
 )
 from subzero.logs.table import NUMBER, TEXT, Table
-from subzero.user_file import MOST_OF_A_TOML, UnreadableFileError, read_text
 
 ASKED = "?"
 """Unit in a map that the user has to fill in."""

@@ -25,9 +25,9 @@ import numpy as np
 
 from subzero.channels import TIME
 from subzero.errors import DISTRIBUTION, UserError, printable, short
+from subzero.files.read_file import MEGABYTE, MOST_COLUMNS, UnreadableFileError, check_readable
 from subzero.logs.names import is_unit, recognised
 from subzero.logs.times import DATE_AND_TIME, MIXED, seconds_of
-from subzero.user_file import MEGABYTE, MOST_COLUMNS, UnreadableFileError, check_readable
 
 NUMBER, TEXT = "number", "text"
 GAPS = frozenset(

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from subzero.page.replay import HULL, actors_of, encode
 from subzero.page.report import Line, Report, Section, Table, render
-from subzero.report import NOTHING, RUNS, fit_rows, index_words, number_groups
+from subzero.results.tables import NOTHING, RUNS, fit_rows, index_words, number_groups
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -31,7 +31,7 @@ def page_of_runs(
 
     Args:
         runs: runs by name; the first one is followed by the camera, the others are ghosts.
-        summary: of `subzero.summary.summary_of`, perhaps with ``indices`` of each run.
+        summary: of `subzero.results.summary.summary_of`, perhaps with ``indices`` of each run.
         figures: by name.
         command: the line that makes them again.
         record: what was measured.

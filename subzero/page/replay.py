@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from subzero.channels import BY_NAME, CHANNELS
+from subzero.results.dataset import cable_origin
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -143,20 +144,6 @@ def _points(rows: np.ndarray, count: int, points: int) -> np.ndarray:
     share = (at - before)[:, None]
     between: np.ndarray = (1.0 - share) * rows[before] + share * rows[before + 1]
     return between
-
-
-def cable_origin(run: xr.Dataset) -> np.ndarray:
-    """Return from where the cable's places count, (3,): at the start, node 0 is at the tow point. [m]"""
-    from scipy.spatial.transform import Rotation
-
-    first = int(np.argmax(run["node_count"].values > 0))
-    hull = np.array([run[name].values[first] for name in ("north", "east", "depth")])
-    tow = json.loads(run.attrs["parameters"])["vehicle"]["tow_point"]
-    arm = np.array([tow["x"], tow["y"], tow["z"]])
-    angles = [run[name].values[first] for name in ("heading", "pitch", "roll_angle")]
-    to_earth = Rotation.from_euler("ZYX", angles, degrees=True)
-    place: np.ndarray = hull + to_earth.apply(arm) - run["cable_position"].values[first, 0]
-    return place
 
 
 def _spread(size: int, most: int) -> np.ndarray:

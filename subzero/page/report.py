@@ -17,7 +17,7 @@ from functools import cache
 from importlib import resources
 from typing import TYPE_CHECKING, Any, Literal
 
-from subzero.output import lacking_letters_as_boxes
+from subzero.results.netcdf_csv import lacking_letters_as_boxes
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -32,7 +32,7 @@ from subzero.arguments import checked_arguments
 from subzero.channels import BY_COLUMN, BY_NAME, HEADING, TIME
 from subzero.errors import UserError, listed, nearest, printable
 from subzero.errors import short as shown
-from subzero.user_file import MOST_COLUMNS, MOST_OF_A_CSV, UnreadableFileError, read_text
+from subzero.files.read_file import MOST_COLUMNS, MOST_OF_A_CSV, UnreadableFileError, read_text
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -31,8 +31,8 @@ from typing import NoReturn
 import numpy as np
 
 from subzero.errors import UserError, real, short
+from subzero.files.text_repr import Overview
 from subzero.model import Model
-from subzero.overview import Overview
 from subzero.steady_motion.hull_state_space import (
     DEPTH,
     PITCH,

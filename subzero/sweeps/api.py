@@ -191,7 +191,7 @@ class _Tally:
             count = self._finished - self._before
             rate = count / max(monotonic() - self._begun, 1e-9)
             others = (self._seconds - self._slowest[1]) / max(count - 1, 1)
-            from subzero.convergence import BUDGET_RATIO  # heavy, and there is no member without it
+            from subzero.simulation.refinement import BUDGET_RATIO  # heavy, and there is no member without it
 
             slowest = self._slowest if count > 1 and self._slowest[1] > BUDGET_RATIO * others else (-1, 0.0)
             self._progress(

@@ -25,7 +25,7 @@ from subzero.figures.style import (
     time_label,
     width,
 )
-from subzero.report import index_words
+from subzero.results.tables import index_words
 from subzero.sweeps.design import Points
 from subzero.sweeps.member import Job
 from subzero.sweeps.outcomes import unit_of

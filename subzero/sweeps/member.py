@@ -19,11 +19,11 @@ import numpy as np
 import scenarios
 from scenarios.parameters import with_parameters
 from subzero.errors import UserError, printable
-from subzero.provenance import code_digest
+from subzero.simulation.provenance import code_digest
 from subzero.sweeps.outcomes import Outcomes, channels_of, own_numbers, scalars_of
 
 if TYPE_CHECKING:
-    from subzero.dataset import PlainRun
+    from subzero.results.dataset import PlainRun
 
 LONGEST_REASON = 1000
 """So much of a reason is kept. [characters]"""
@@ -88,7 +88,7 @@ class Job:
 
     def rehearse(self) -> None:
         """Run a few steps and forget them: what is imported, loaded or compiled for a member is there afterwards."""
-        from subzero.simulation import simulate_plainly
+        from subzero.simulation.run import simulate_plainly
 
         steps = min(self.trial.duration, REHEARSED_STEPS * self.trial.cable_step)
         with warnings.catch_warnings():
@@ -98,7 +98,7 @@ class Job:
 
     def _run(self, index: int, row: np.ndarray) -> tuple[PlainRun, dict[str, float]]:
         """Return the run of a member, and the indices that it is judged by."""
-        from subzero.simulation import simulate_plainly
+        from subzero.simulation.run import simulate_plainly
 
         trial = with_parameters(self.trial, dict(zip(self.names, row.tolist(), strict=True)))
         return simulate_plainly(trial, tethered=self.tethered), {}

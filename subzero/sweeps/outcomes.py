@@ -23,7 +23,7 @@ from subzero.channels import BY_NAME, AnyRun
 from subzero.errors import UserError, real, short, suggestion
 
 if TYPE_CHECKING:
-    from subzero.dataset import PlainRun
+    from subzero.results.dataset import PlainRun
 
 Function = Callable[[Any], Any]
 """Of one's own: takes a run, a dataset of xarray, returns a number, or numbers by name."""
@@ -43,7 +43,7 @@ SUMMARY = (
     "depth_at_end_m", "path_length_m", "cable_length_at_end_m", "largest_cable_force_N",
     "time_of_largest_cable_force_s", "largest_cable_moment_N_m", "time_of_largest_cable_moment_s",
 )  # fmt: skip
-"""Numbers of `subzero.summary.summarise`."""
+"""Numbers of `subzero.results.summary.summarise`."""
 
 TABLES = {
     "energy": (
@@ -210,7 +210,7 @@ def scalars_of(run: AnyRun, names: tuple[str, ...], indices: Mapping[str, float]
     needs_summary = any(name in SUMMARY or name.partition(".")[0] in TABLES for name in names)
     summary: dict[str, Any] = {}
     if needs_summary:
-        from subzero.summary import summarise
+        from subzero.results.summary import summarise
 
         summary = summarise(run)
     return np.array([_scalar(run, name, summary, indices) for name in names], dtype=float)

@@ -1,6 +1,6 @@
 """``report.html`` of a sweep: in a few sentences what was varied, what came out and what matters; then all of it.
 
-The tables are those of the terminal (`subzero.sweeps.tell`), from the numbers of ``summary.json``.
+The tables are those of the terminal (`subzero.cli.write_sweep`), from the numbers of ``summary.json``.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from subzero.sweeps.plan import Plan
 
 Summary = dict[str, Any]
-"""Of `subzero.sweeps.tell.summary_of`."""
+"""Of `subzero.cli.write_sweep.summary_of`."""
 
 COLUMNS = {"min": "min", "p5": "5 %", "p50": "median", "p95": "95 %", "max": "max", "mean": "mean",
            "standard_deviation": "deviation"}  # fmt: skip

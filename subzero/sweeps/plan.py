@@ -35,7 +35,7 @@ from scenarios.parameters import with_parameters
 from subzero.arguments import checked_arguments
 from subzero.errors import DISTRIBUTION, UserError, listed, printable, short, suggestion, truth
 from subzero.model import load
-from subzero.provenance import code_digest, trial_digest
+from subzero.simulation.provenance import code_digest, trial_digest
 from subzero.sweeps.design import DISTRIBUTION_KEYS, GRID, Design, Points, points_of
 from subzero.sweeps.member import Job
 from subzero.sweeps.outcomes import AS_USUAL, Kept, outcomes_of

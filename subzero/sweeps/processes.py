@@ -312,7 +312,7 @@ def serve_forks() -> NoReturn:
 def _load() -> None:
     """Import what every member needs: the parent still plans."""
     with _all_stays():
-        import subzero.simulation  # noqa: F401
+        import subzero.simulation.run  # noqa: F401
 
 
 @contextmanager

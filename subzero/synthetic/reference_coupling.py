@@ -16,8 +16,8 @@ from cable.drum_motion import lead_drum
 from cable.lumped import GAMMA, OLD, REST, STATE, Rope, accept_step, try_step
 from subzero.engine.coupling import _move, _solve_three, hull_steps
 from subzero.engine.recording import Recording, record_row
+from subzero.engine.run_state import Live, Setup
 from subzero.jit import allocating, compiled
-from subzero.run_state import Live, Setup
 from vehicle import STATE_SIZE
 
 MAX_ITERATIONS = 40

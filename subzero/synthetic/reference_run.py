@@ -25,10 +25,10 @@ from subzero.diagnosis.hypothesis.configuration import Sensing, Setting
 from subzero.engine.environment import drum_of
 from subzero.engine.initial_conditions import go_on_with, prepare, rows_of_changes
 from subzero.engine.recording import Run, new_recording, record_row
+from subzero.engine.run_state import Live, Setup
 from subzero.errors import UserError
 from subzero.model import Model
-from subzero.run_state import Live, Setup
-from subzero.simulation import run_trial
+from subzero.simulation.run import run_trial
 from subzero.synthetic.reference_coupling import FINE, Led, follow_rope
 
 STATE = {"north": 0, "east": 1, "depth": 2, "sway_speed": 8, "heave_speed": 9,

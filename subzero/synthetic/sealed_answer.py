@@ -17,7 +17,7 @@ from subzero.diagnosis.hypothesis.effect import plain_id
 from subzero.diagnosis.report import words
 from subzero.errors import UserError, printable
 from subzero.external_force import FEATURES
-from subzero.user_file import MOST_OF_AN_ANSWER, UnreadableFileError, read_bytes
+from subzero.files.read_file import MOST_OF_AN_ANSWER, UnreadableFileError, read_bytes
 
 SEALED = "answer.sealed"
 

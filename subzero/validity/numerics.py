@@ -73,7 +73,9 @@ def energy_residual(run: AnyRun, trial: scenarios.Trial, _: Model) -> list[str]:
 
 
 def resolution(run: AnyRun, trial: scenarios.Trial, model: Model) -> list[str]:
-    """Steps and segments twice as long give another tow force, however fine they are: `subzero.convergence`."""
+    """Steps and segments twice as long give another tow force, however fine they are:
+    `subzero.simulation.refinement`.
+    """
     accuracy = json.loads(run.attrs.get("accuracy", "{}"))
     if not accuracy or is_resolved(run):
         return []

@@ -16,8 +16,8 @@ from subzero import autopilot
 from subzero.autopilot import Wanted
 from subzero.autopilot.manoeuvres import VerticalZigZag, ZigZag
 from subzero.autopilot.stability_margins import check_stable
-from subzero.cli import MISTAKE, main
-from subzero.cli_autopilot import STOPPED
+from subzero.cli.app import MISTAKE, main
+from subzero.cli.autopilot import STOPPED
 
 GOOD = """
 class Mine:

@@ -11,7 +11,7 @@ import pytest
 
 import scenarios
 from subzero import autopilot
-from subzero.cli import FINE, MISTAKE, STOPPED, main
+from subzero.cli.app import FINE, MISTAKE, STOPPED, main
 
 FILES = {
     "manoeuvre.png",
@@ -91,7 +91,7 @@ def test_help_imports_nothing_heavy(words):
     heavy = ("numba", "xarray", "matplotlib", "scipy", "netCDF4", "control", "vehicle", "cable", "gymnasium")
     code = f"""if True:
         import sys
-        from subzero.cli import main
+        from subzero.cli.app import main
         main({words!r})
         print("LOADED", *(name for name in {heavy!r} if name in sys.modules))
     """
@@ -101,7 +101,7 @@ def test_help_imports_nothing_heavy(words):
 
 @pytest.mark.parametrize("command", ["rudder_command", "stern_plane_port_command", "propeller_command"])
 def test_the_headlines_of_the_figure_are_on_the_sheet(command):
-    from subzero.autopilot.output import picture
+    from subzero.cli.write_flights import picture
 
     run, _ = autopilot.manoeuvre("crash_stop", tethered=False)
     figure = picture({"untethered": run}, "title", "heading", command)

@@ -137,7 +137,7 @@ def test_a_simulator_that_was_interrupted_while_it_began_again_stands_where_it_s
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr("subzero.simulator.observe", interrupted)
+        patch.setattr("subzero.simulation.stepper.observe", interrupted)
         with pytest.raises(KeyboardInterrupt):
             sim.reset()
     assert sim.observation == before

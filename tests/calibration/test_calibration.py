@@ -17,7 +17,7 @@ import scenarios
 import subzero
 from scenarios.parameters import with_parameters
 from subzero.channels import column_name
-from subzero.cli import main
+from subzero.cli.app import main
 from subzero.diagnosis import Setting
 from subzero.model import Model
 from subzero.synthetic.planted import make_record
@@ -164,7 +164,7 @@ def test_calibrated_again_a_vehicle_stays_as_it_is(found, written, records):
 
 
 def test_the_json_file_has_it_all_and_no_nan(found):
-    from subzero.write_calibration import text
+    from subzero.cli.write_calibration import text
 
     read = json.loads(text(found))
     assert set(read["numbers"]) == {f"vehicle.{name}" for name in (*FREE, UNSEEN)}

@@ -19,7 +19,7 @@ import pytest
 import xarray as xr
 
 from subzero.channels import BY_NAME, CHANNELS
-from subzero.cli import main
+from subzero.cli.app import main
 
 DRAG_PER_METRE = 0.5 * 1000.0 * np.pi * 0.0025 * 0.01
 STOPPED = "The cable did not converge at t = 3 s, node 4. Try a shorter cable step."
@@ -144,10 +144,10 @@ def put_on_rails(patch):
         prescribed = None if scenario.motion is None else "straight"
         return make_run(tethered=tethered, prescribed=prescribed, name=scenario.name)
 
-    module = types.ModuleType("subzero.simulation")
+    module = types.ModuleType("subzero.simulation.run")
     vars(module)["simulate"] = simulate
-    patch.setitem(sys.modules, "subzero.simulation", module)
-    patch.delitem(sys.modules, "subzero.comparison", raising=False)
+    patch.setitem(sys.modules, "subzero.simulation.run", module)
+    patch.delitem(sys.modules, "subzero.simulation.comparison", raising=False)
     return asked
 
 
@@ -155,7 +155,7 @@ def put_on_rails(patch):
 def rails(monkeypatch):
     """Runs on rails instead of the simulation; gives the list of what was asked for: (trial, tethered)."""
     yield put_on_rails(monkeypatch)
-    sys.modules.pop("subzero.comparison", None)
+    sys.modules.pop("subzero.simulation.comparison", None)
 
 
 @dataclass(frozen=True)
@@ -177,5 +177,5 @@ def compared(tmp_path_factory):
         patch.setenv("COLUMNS", "200")
         asked = put_on_rails(patch)
         code = main(["compare", "fig6"])
-        sys.modules.pop("subzero.comparison", None)
+        sys.modules.pop("subzero.simulation.comparison", None)
     return Done(code, said.getvalue(), here, asked)

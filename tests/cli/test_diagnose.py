@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import scenarios
-from subzero.cli import FINE, INTERRUPTED, MISTAKE, main
+from subzero.cli.app import FINE, INTERRUPTED, MISTAKE, main
 from subzero.diagnosis import (
     CAUSE_NAMED,
     NOTHING_WRONG,
@@ -243,8 +243,8 @@ def test_no_id_and_no_word_of_a_table_is_broken_however_narrow_the_terminal(widt
 
     from rich.console import Console
 
+    from subzero.cli.write_diagnosis import _rich
     from subzero.diagnosis import report
-    from subzero.write_diagnosis import _rich
 
     ids = ["sensor_scale:propeller_speed@12.5", "cable_tangential_drag"]
     cells = (

@@ -14,7 +14,7 @@ from numpy.testing import assert_allclose
 import scenarios
 import subzero
 from subzero.channels import CHANNELS
-from subzero.cli import FINE, MISTAKE, main
+from subzero.cli.app import FINE, MISTAKE, main
 
 ROOT = Path(__file__).resolve().parents[2]
 

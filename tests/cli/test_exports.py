@@ -20,7 +20,7 @@ from scipy.spatial.transform import Rotation
 import scenarios
 import subzero
 from subzero.channels import CHANNELS, TIME
-from subzero.cli import FINE, MISTAKE, main
+from subzero.cli.app import FINE, MISTAKE, main
 
 
 @pytest.fixture(scope="module")

@@ -259,7 +259,7 @@ def test_a_cable_that_would_be_a_flat_line_is_stretched_and_says_how_much(make_r
 
 @pytest.mark.parametrize("kind", ["svg", pytest.param("pdf", marks=pytest.mark.slow)])
 def test_figures_are_drawings_if_asked_for_and_two_are_alike_to_the_last_byte(kind, rails, tmp_path):
-    from subzero.cli import FINE, main
+    from subzero.cli.app import FINE, main
 
     for folder in ("one", "two"):
         words = ["simulate", "fig6", "--figures", kind, "--width", "3.4", "--out", str(tmp_path / folder)]

@@ -13,9 +13,9 @@ import xarray as xr
 from numpy.testing import assert_allclose
 
 from subzero.channels import BY_COLUMN, CHANNELS, column_name
-from subzero.cli import FINE, STOPPED, main
-from subzero.output import open_output_folder, storage, write_netcdf
+from subzero.cli.app import FINE, STOPPED, main
 from subzero.records.record import read_record
+from subzero.results.netcdf_csv import open_output_folder, storage, write_netcdf
 
 PICTURES = {"fig6.png", "attitude.png", "cable.png", "tension.png", "forces.png"}
 RUN_KEYS = """outcome outcome_message time_at_end_s peak_speed_m_s time_of_peak_speed_s speed_at_end_m_s
@@ -150,7 +150,7 @@ def test_a_run_that_stops_keeps_what_it_has_and_exits_with_3(tmp_path, rails, mo
     def stops(_trial, *, tethered, progress):
         return make_run(outcome="stopped", samples=31) if tethered else make_run(tethered=False)
 
-    monkeypatch.setattr(sys.modules["subzero.simulation"], "simulate", stops)
+    monkeypatch.setattr(sys.modules["subzero.simulation.run"], "simulate", stops)
     assert main(["compare", "fig6", "--out", str(tmp_path)]) == STOPPED
     said = capsys.readouterr()
     assert said.err.endswith(
@@ -170,7 +170,7 @@ def test_a_run_that_stops_keeps_what_it_has_and_exits_with_3(tmp_path, rails, mo
 def test_the_folder_of_a_trial_is_always_here(name, folder):
     from types import SimpleNamespace
 
-    from subzero.write_results import default_folder
+    from subzero.cli.write_results import default_folder
 
     assert str(default_folder(SimpleNamespace(name=name))) == folder  # type: ignore[arg-type]
 

@@ -10,7 +10,7 @@ import pytest
 
 import scenarios
 import subzero
-from subzero.cli import FINE, main
+from subzero.cli.app import FINE, main
 
 FORMATS = ("pydantic", "pydantic_core")
 """What reads a scenario: light enough for a mistake in one, not needed for help."""
@@ -33,7 +33,7 @@ HEAVY = ("numba", "xarray", "pandas", "matplotlib", "scipy", "netCDF4", "control
 def test_help_and_mistakes_import_nothing_heavy(words, refused):
     code = f"""if True:
         import sys
-        from subzero.cli import main
+        from subzero.cli.app import main
         main({words!r})
         print("LOADED", *(name for name in {refused!r} if name in sys.modules))
     """
@@ -43,7 +43,7 @@ def test_help_and_mistakes_import_nothing_heavy(words, refused):
 
 def test_workers_of_a_sweep_can_begin_before_numpy_is_there():
     """What starts them is imported with the command line; they import the rest while the command reads its file."""
-    code = "import sys, subzero.cli, subzero.sweeps.workers; print('numpy' in sys.modules)"
+    code = "import sys, subzero.cli.app, subzero.sweeps.workers; print('numpy' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "False"
 
@@ -100,7 +100,7 @@ def test_a_terminal_without_our_letters_is_no_reason_to_fail():
     plain = {**os.environ, "PYTHONIOENCODING": "ascii", "PYTHONUTF8": "0"}
     code = """if True:
         import sys
-        from subzero.cli import main
+        from subzero.cli.app import main
         main(["nonsense\u2212"])
         print("still here \u2212")
     """

@@ -8,7 +8,7 @@ import tomllib
 import pytest
 from numpy.testing import assert_allclose
 
-from subzero.cli import FINE, MISTAKE, main
+from subzero.cli.app import FINE, MISTAKE, main
 from subzero.records.record import read_record
 
 LOG = "Time [ms];Speed (kn);hdg;yaw_rate_rad_s;mode\n" + "".join(

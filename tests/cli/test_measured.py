@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from subzero.cli import FINE, MISTAKE, main
+from subzero.cli.app import FINE, MISTAKE, main
 from subzero.errors import UserError
 from subzero.records.record import Record, beside, fit, modelled, read_record
 

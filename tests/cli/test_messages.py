@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from subzero.cli import MISTAKE, main
+from subzero.cli.app import MISTAKE, main
 
 MESSAGES = {
     "simulat fig6": 'Unknown command "simulat". Did you mean "simulate"? '
@@ -92,7 +92,7 @@ def test_a_bug_of_ours_keeps_its_traceback(here, rails, monkeypatch):
     def broken(*_args, **_kwargs):
         raise ZeroDivisionError("a bug")
 
-    monkeypatch.setattr(sys.modules["subzero.simulation"], "simulate", broken)
+    monkeypatch.setattr(sys.modules["subzero.simulation.run"], "simulate", broken)
     with pytest.raises(ZeroDivisionError):
         main(["simulate", "fig6"])
     assert not (here / "fig6").exists()
@@ -102,7 +102,7 @@ def test_an_interrupted_run_leaves_nothing(here, rails, monkeypatch, capsys):
     def interrupted(*_args, **_kwargs):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(sys.modules["subzero.simulation"], "simulate", interrupted)
+    monkeypatch.setattr(sys.modules["subzero.simulation.run"], "simulate", interrupted)
     assert main(["simulate", "fig6"]) == 130
     assert capsys.readouterr().err.endswith("Interrupted; nothing was written.\n")
     assert sorted(path.name for path in here.iterdir()) == ["file", "here"]

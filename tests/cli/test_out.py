@@ -10,9 +10,9 @@ import threading
 
 import pytest
 
-from subzero import interrupts
-from subzero.cli import FINE, INTERRUPTED, MISTAKE, STOPPED, main
-from subzero.user_file import INCOMPLETE
+from subzero.cli import interrupts
+from subzero.cli.app import FINE, INTERRUPTED, MISTAKE, STOPPED, main
+from subzero.files.read_file import INCOMPLETE
 
 
 def simulate(out):
@@ -67,7 +67,7 @@ def test_an_unusable_folder_is_refused_before_the_run(what, tmp_path, rails, cap
 
 
 def test_a_folder_that_cannot_be_known_before_stops_all_files(tmp_path, rails, monkeypatch, capsys):
-    monkeypatch.setattr("subzero.output.RUN_FILES", ())
+    monkeypatch.setattr("subzero.results.netcdf_csv.RUN_FILES", ())
     assert simulate(taken(tmp_path)) == MISTAKE
     assert "'fig6.png' in it is a folder" in capsys.readouterr().err
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["fig6.png"]
@@ -78,7 +78,7 @@ def stops(monkeypatch, make_run):
     def stop(_trial, *, tethered, progress):
         return make_run(outcome="stopped", samples=31)
 
-    return lambda: monkeypatch.setattr(sys.modules["subzero.simulation"], "simulate", stop)
+    return lambda: monkeypatch.setattr(sys.modules["subzero.simulation.run"], "simulate", stop)
 
 
 def outcome(folder):
@@ -149,7 +149,7 @@ def test_files_are_in_doubt_until_a_command_writes_them_anew(tmp_path, rails):
 
 
 def test_a_living_command_keeps_its_hidden_folder(tmp_path):
-    from subzero.output import open_output_folder
+    from subzero.results.netcdf_csv import open_output_folder
 
     with open_output_folder(tmp_path / "one") as first:
         with open_output_folder(tmp_path / "two") as second:
@@ -160,7 +160,7 @@ def test_a_living_command_keeps_its_hidden_folder(tmp_path):
 
 def test_a_full_disk_is_told_whoever_writes(tmp_path):
     from subzero.errors import UserError
-    from subzero.output import open_output_folder
+    from subzero.results.netcdf_csv import open_output_folder
 
     def write():
         with open_output_folder(tmp_path / "out") as output_folder:
@@ -176,7 +176,7 @@ def test_an_interrupt_after_the_last_move_is_told_as_it_is(tmp_path, rails, monk
     def interrupted(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("subzero.write_results.tell", interrupted)
+    monkeypatch.setattr("subzero.cli.write_results.tell", interrupted)
     assert simulate(tmp_path) == INTERRUPTED
     assert capsys.readouterr().err.endswith(f"Interrupted; all files were written to {tmp_path}.\n")
 
@@ -190,7 +190,7 @@ def test_a_command_says_nothing_of_a_former_one_in_the_same_process(tmp_path, ra
     def broken(*_, **__):
         raise RuntimeError("a bug")
 
-    monkeypatch.setattr("subzero.write_results.tell", broken)
+    monkeypatch.setattr("subzero.cli.write_results.tell", broken)
     with pytest.raises(RuntimeError, match="a bug"):
         simulate(tmp_path)
     interrupts.say_interrupted()

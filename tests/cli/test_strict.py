@@ -8,7 +8,7 @@ import sys
 import pytest
 import xarray as xr
 
-from subzero.cli import FINE, STOPPED, main
+from subzero.cli.app import FINE, STOPPED, main
 from subzero.figures import draw
 
 DOUBTS = [
@@ -26,7 +26,7 @@ def doubtful(rails, monkeypatch, make_run):
         run = make_run(tethered=tethered)
         return run.assign_attrs(warnings=json.dumps(DOUBTS if tethered else []))
 
-    monkeypatch.setattr(sys.modules["subzero.simulation"], "simulate", simulate)
+    monkeypatch.setattr(sys.modules["subzero.simulation.run"], "simulate", simulate)
 
 
 def test_dataset_json_and_terminal_tell_the_same_warnings(doubtful, tmp_path, capsys, monkeypatch):

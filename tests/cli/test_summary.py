@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from subzero.output import OutputFolder, write_csv, write_summary
-from subzero.progress import ProgressBar
-from subzero.report import show
-from subzero.summary import summarise, summary_of
+from subzero.cli.progress import ProgressBar
+from subzero.results.netcdf_csv import OutputFolder, write_csv, write_summary
+from subzero.results.summary import summarise, summary_of
+from subzero.results.tables import show
 
 
 @pytest.fixture
@@ -107,8 +107,8 @@ def test_a_comparison_tells_its_progress_once_from_0_to_1(rails, make_run, monke
             progress(fraction)
         return make_run(tethered=tethered)
 
-    monkeypatch.setattr(sys.modules["subzero.simulation"], "simulate", simulate)
-    from subzero.comparison import compare
+    monkeypatch.setattr(sys.modules["subzero.simulation.run"], "simulate", simulate)
+    from subzero.simulation.comparison import compare
 
     told: list[float] = []
     comparison = compare("fig6", progress=told.append)
@@ -123,7 +123,7 @@ def test_a_comparison_tells_its_progress_once_from_0_to_1(rails, make_run, monke
 )
 def test_a_bar_is_shown_on_a_terminal_for_what_takes_over_a_second(seconds, is_terminal, shown, monkeypatch):
     now = [0.0]
-    monkeypatch.setattr("subzero.progress.monotonic", lambda: now[0])
+    monkeypatch.setattr("subzero.cli.progress.monotonic", lambda: now[0])
     out = io.StringIO()
     with ProgressBar("Simulating fig6", Console(file=out, force_terminal=is_terminal)) as progress:
         now[0] = seconds

@@ -24,7 +24,7 @@ SUBZERO = f'subzero() {{ "{sys.executable}" -m subzero "$@"; }}'
 def test_every_command_of_the_page_is_understood():
     import shlex
 
-    from subzero.cli import app
+    from subzero.cli.app import app
 
     lines = [line for kind, block in BLOCKS if kind == "sh" for line in block.splitlines()]
     commands = [shlex.split(line) for line in lines if line.startswith("subzero ")]

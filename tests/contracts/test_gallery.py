@@ -5,7 +5,7 @@ from __future__ import annotations
 import shlex
 
 from benchmarks.gallery import GALLERY, PAGE, page
-from subzero.cli import app
+from subzero.cli.app import app
 from subzero.page.report import FIGURES
 
 

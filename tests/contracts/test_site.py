@@ -26,5 +26,5 @@ def test_the_site_is_built_without_a_warning(tmp_path):
     assert done.returncode == 0, done.stderr[-3000:]
     reference = (tmp_path / "site" / "api" / "index.html").read_text(encoding="utf-8")
     assert all(
-        f'id="{name}"' in reference for name in ("subzero.simulation.simulate", "cable.history.History")
+        f'id="{name}"' in reference for name in ("subzero.simulation.run.simulate", "cable.history.History")
     )

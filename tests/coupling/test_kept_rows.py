@@ -12,8 +12,8 @@ import xarray as xr
 
 import scenarios
 import subzero
-from subzero.cli import FINE, MISTAKE, main
-from subzero.room import MOST_KEPT, bytes_of_results, with_fewer_results
+from subzero.cli.app import FINE, MISTAKE, main
+from subzero.simulation.memory_estimate import MOST_KEPT, bytes_of_results, with_fewer_results
 
 
 def held_against(plain, kept):
@@ -96,7 +96,7 @@ def test_the_file_and_the_command_say_it(tmp_path, monkeypatch, capsys):
 @pytest.fixture
 def little_kept(monkeypatch):
     """Of fig6, 0.4 MB are kept unasked, and all of it takes 1 MB about."""
-    monkeypatch.setattr("subzero.room.MOST_KEPT", 4e5)
+    monkeypatch.setattr("subzero.simulation.memory_estimate.MOST_KEPT", 4e5)
 
 
 def test_a_long_run_keeps_fewer_results_unasked_says_so_and_keeps_all_when_told_to(little_kept):

@@ -12,7 +12,7 @@ import pytest
 
 import subzero
 from subzero.errors import UserError
-from subzero.simulation import run_trial
+from subzero.simulation.run import run_trial
 
 AT = 12.0
 

@@ -20,7 +20,7 @@ import scenarios
 import subzero
 from subzero import autopilot
 from subzero.channels import RENAMED_CHANNELS
-from subzero.output import write_csv
+from subzero.results.netcdf_csv import write_csv
 
 FORCES = [f"cable_force_{axis}" for axis in ("forward", "starboard", "down")]
 MOMENTS = [f"cable_moment_{axis}" for axis in ("roll", "pitch", "yaw")]

@@ -14,7 +14,7 @@ import pytest
 import subzero
 from subzero.diagnosis import NOISE, Setting
 from subzero.external_force import MissingForce, Term
-from subzero.simulation import run_trial
+from subzero.simulation.run import run_trial
 from subzero.synthetic.reference_run import NoTruthError, seen, simulate_reference, truth_of
 
 FIG6 = subzero.load_scenario("fig6")

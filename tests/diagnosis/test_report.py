@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from subzero.atomic_output import OutputFolder
+from subzero.cli.write_diagnosis import tell
 from subzero.diagnosis import (
     CALIBRATED,
     CAUSE_NAMED,
@@ -38,7 +38,7 @@ from subzero.diagnosis import (
 from subzero.diagnosis.assessment import detectability
 from subzero.figures.diagnosis import draw_diagnosis
 from subzero.figures.style import Title
-from subzero.write_diagnosis import tell
+from subzero.files.atomic_output import OutputFolder
 
 TIME = np.linspace(0.0, 30.0, 301)
 LAG = Estimate(value=0.31, low=0.23, high=0.39, unit="s", nominal=0.1, deviation=0.21, deviation_sd=0.04)

@@ -9,12 +9,12 @@ import zlib
 
 import pytest
 
-from subzero.cli import MISTAKE, main
+from subzero.cli.app import MISTAKE, main
 from subzero.diagnosis import read_extended
 from subzero.errors import UserError
+from subzero.files.read_file import MEGABYTE
 from subzero.records.metadata import read_metadata
 from subzero.synthetic.sealed_answer import SEALED, Answer, reveal, seal
-from subzero.user_file import MEGABYTE
 
 TERM = '[[missing_term]]\naxis = "X"\nfeature = "u"\ncoefficient = {}\n'
 HISTORY = '[[missing_force]]\naxis = "X"\ntime_s = [0, 1]\nforce_N = [0, {}]\n'

@@ -1,10 +1,11 @@
 """Coupled runs say how far their force can be trusted, and are taken finer where that is not far enough.
 
-Verifies: `subzero.convergence` against runs with steps and segments an eighth as long, and the criterion of the theory
-page for a free drum: the direction in which a cable leaves it is only determined if it pulls there with T(S) > m₁U².
-Configuration: shipped trials and changes of them. Tolerance: the estimate must bound the true error, with a tenth to
-spare for what the fine run itself errs by. (Segments of 3 cm are too fine on a free drum: within 2m₁/ρπdC_t = 0.25 m of
-it a cable has less tension than m₁U², and what is undetermined there begins to grow when eight segments resolve it.)
+Verifies: `subzero.simulation.refinement` against runs with steps and segments an eighth as long, and the criterion of
+the theory page for a free drum: the direction in which a cable leaves it is only determined if it pulls there with
+T(S) > m₁U². Configuration: shipped trials and changes of them. Tolerance: the estimate must bound the true error,
+with a tenth to spare for what the fine run itself errs by. (Segments of 3 cm are too fine on a free drum: within
+2m₁/ρπdC_t = 0.25 m of it a cable has less tension than m₁U², and what is undetermined there begins to grow when eight
+segments resolve it.)
 """
 
 import dataclasses
@@ -16,9 +17,9 @@ import pytest
 
 import scenarios
 import subzero
-from subzero.convergence import Accuracy, Budget, prove, run_converged
 from subzero.engine.recording import Grid
-from subzero.simulation import run_trial
+from subzero.simulation.refinement import Accuracy, Budget, prove, run_converged
+from subzero.simulation.run import run_trial
 
 BODY = ("cable_force_forward", "cable_force_starboard", "cable_force_down")
 

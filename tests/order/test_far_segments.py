@@ -15,7 +15,7 @@ import scenarios
 import subzero
 from cable.moving_end import LONGEST
 from subzero.engine.initial_conditions import RUN_IN
-from subzero.simulation import run_trial
+from subzero.simulation.run import run_trial
 
 FORCE_TOLERANCE = 1e-4
 MINUTES_S = 300.0

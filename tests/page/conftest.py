@@ -26,7 +26,7 @@ def runs() -> dict[str, object]:
 @pytest.fixture(scope="session")
 def page(runs: dict, tmp_path_factory: pytest.TempPathFactory) -> Path:
     from subzero.figures import draw
-    from subzero.summary import summary_of
+    from subzero.results.summary import summary_of
 
     path = tmp_path_factory.mktemp("page") / "report.html"
     text = page_of_runs(runs, summary_of(runs, None), draw(runs), command=COMMAND)

@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 
 import subzero
+from subzero.cli.write_diagnosis import page_of_diagnosis, replayed
 from subzero.diagnosis import (
     CAUSE_NAMED,
     DATA_ERROR,
@@ -41,7 +42,6 @@ from subzero.figures.style import Title
 from subzero.model import Model
 from subzero.page import browser
 from subzero.records.record import Record
-from subzero.write_diagnosis import page_of_diagnosis, replayed
 
 OFF = {"rudder_offset": {"angle": 3.0}}
 EVIL = "<script>window.acted = 1</script> $x^2$ [bold]ß漢字[/bold] &amp; " * 5

@@ -1,7 +1,7 @@
 """`subzero explore`: what sliders say is what `Trial.with_changes` says, and the file that is saved says it too.
 
-Runs are compared to the last bit. Behaviour is that of the public face: the values of `subzero.explore`, the command,
-and the page in a real browser.
+Runs are compared to the last bit. Behaviour is that of the public face: the values of `subzero.explore.exploration`,
+the command, and the page in a real browser.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ import pytest
 
 import scenarios
 import subzero
-from subzero.cli import MISTAKE, main
-from subzero.explore import Exploration, Newest, sliders_of
+from subzero.cli.app import MISTAKE, main
+from subzero.explore.exploration import Exploration, Newest, sliders_of
 from subzero.page import browser as browser_of_page
-from subzero.summary import summarise
+from subzero.results.summary import summarise
 
 is_installed = find_spec("nicegui") is not None and find_spec("tomlkit") is not None
 needs_extra = pytest.mark.skipif(
@@ -146,7 +146,7 @@ def saved(one: Exploration, values: dict[str, float], path: Path) -> Any:
 @needs_extra
 @pytest.mark.parametrize("name", ["fig6", "zigzag", "rov_umbilical", "current"])
 def test_a_saved_file_is_the_same_trial_to_the_last_bit_whatever_was_moved(name: str, tmp_path: Path) -> None:
-    from subzero.provenance import trial_digest
+    from subzero.simulation.provenance import trial_digest
 
     trial = subzero.load_scenario(name)
     one = Exploration(trial=trial, nominal=None, simulate=None)  # type: ignore[arg-type]  # nothing is run
@@ -270,7 +270,7 @@ def test_a_bug_in_one_request_is_told_and_the_next_one_is_worked_on(
 def test_what_is_not_installed_is_one_message(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("subzero.explore_page.find_spec", lambda name: None)
+    monkeypatch.setattr("subzero.explore.page.find_spec", lambda name: None)
     assert main(["explore", "fig6"]) == MISTAKE
     said = capsys.readouterr().err
     assert said == "A page to explore needs nicegui, tomlkit: pip install 'subzero-auv[explore]'.\n"

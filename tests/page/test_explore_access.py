@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 import pytest
 
 import subzero
-from subzero.explore import Exploration
+from subzero.explore.exploration import Exploration
 from tests.page.test_explore import needs_browser, needs_extra, served, short, soon
 
 if find_spec("nicegui") is None:
@@ -182,7 +182,7 @@ def test_a_websocket_without_the_cookie_is_refused(server: Server, cookie: str) 
 
 @needs_extra
 def test_what_a_browser_is_started_with_does_not_hold_the_token(monkeypatch: pytest.MonkeyPatch) -> None:
-    from subzero.explore_page import _opened
+    from subzero.explore.page import _opened
 
     seen: list[tuple[str, int, str]] = []
 
@@ -239,7 +239,7 @@ def test_a_file_is_named_by_printable_characters_without_a_path(server: Server, 
 
 @needs_extra
 def test_pages_that_nobody_looks_at_are_forgotten(server: Server) -> None:
-    from subzero.explore_page import MOST_TABS
+    from subzero.explore.page import MOST_TABS
 
     with opened(server) as page:
         sizes = []
@@ -282,7 +282,7 @@ def test_a_long_run_is_answered_by_its_first_seconds(short: Exploration) -> None
     """Each report of progress takes as long as an attempt may: the clock of the test, not that of the machine."""
     from dataclasses import replace
 
-    from subzero import explore
+    from subzero.explore import exploration as explore
 
     def slow(trial: Any, progress: Any) -> Any:
         def told(fraction: float) -> None:

@@ -19,8 +19,8 @@ import scenarios
 import subzero
 import vehicle
 from subzero.model import Model
-from subzero.simulation import run_trial
-from subzero.summary import summarise
+from subzero.results.summary import summarise
+from subzero.simulation.run import run_trial
 
 DRAG = 0.5 * 1000.0 * np.pi * 0.0025 * 0.01
 """½ρπdC_t [N s²/m³]."""
@@ -222,4 +222,4 @@ def test_a_default_run_imports_nothing_of_the_papers_scheme():
     scheme, modules = json.loads(done.stdout)
     assert scheme == "moving_end"
     assert "cable.moving_end.state" in modules
-    assert [m for m in modules if m.startswith(("subzero.paper", "cable.feng_allen"))] == []
+    assert [m for m in modules if m.startswith(("subzero.simulation.feng_allen", "cable.feng_allen"))] == []

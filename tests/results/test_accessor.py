@@ -10,7 +10,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import subzero
-from subzero.accessor import figures_of
+from subzero.figures.accessor import figures_of
 
 
 @pytest.fixture(scope="module")

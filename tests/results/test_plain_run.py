@@ -1,8 +1,8 @@
 """A run in plain arrays is its dataset, and shapes that are spread where they lie are those that are copied.
 
-Verifies: `subzero.simulation.simulate_plainly` against `subzero.simulate`; `spends` of `subzero.dataset.plain_run`, in
-blocks of a few rows. Configuration: three seconds of fig6, whose cable grows by a node a second or so, and a vehicle
-alone. Tolerance: identity.
+Verifies: `subzero.simulation.run.simulate_plainly` against `subzero.simulate`; `spends` of
+`subzero.results.dataset.plain_run`, in blocks of a few rows. Configuration: three seconds of fig6, whose cable grows
+by a node a second or so, and a vehicle alone. Tolerance: identity.
 """
 
 import dataclasses
@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 import subzero
-import subzero.dataset
-from subzero.dataset import plain_run
-from subzero.simulation import run_trial, simulate_plainly
+import subzero.results.dataset
+from subzero.results.dataset import plain_run
+from subzero.simulation.run import run_trial, simulate_plainly
 
 FIG6 = dataclasses.replace(subzero.load_scenario("fig6"), duration=3.0)
 
@@ -30,7 +30,7 @@ def test_what_stands_in_plain_arrays_is_what_is_labelled(tethered):
 
 @pytest.mark.parametrize("rows", [1, 4, 1000])
 def test_shapes_that_are_spread_where_they_lie_are_those_that_are_copied(rows, monkeypatch):
-    monkeypatch.setattr(subzero.dataset, "BLOCK", rows)
+    monkeypatch.setattr(subzero.results.dataset, "BLOCK", rows)
     model = subzero.Model.of(FIG6)
     copied = plain_run(FIG6, model, True, run_trial(FIG6, model, True))
     run = run_trial(FIG6, model, True)

@@ -115,7 +115,7 @@ def held() -> str:
 @cache
 def record() -> Path:
     """Return a record of a vehicle whose propeller pushes less."""
-    from subzero.output import write_csv
+    from subzero.results.netcdf_csv import write_csv
 
     model = subzero.Model.of(subzero.load_scenario("fig6"))
     weak = model.vehicle.propeller.thrust_constant * 0.9

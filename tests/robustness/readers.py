@@ -25,11 +25,11 @@ import scenarios
 from subzero.diagnosis import read_extended
 from subzero.diagnosis.read_trials import read_trials
 from subzero.errors import UserError
+from subzero.files.read_file import INCOMPLETE, read_bytes
 from subzero.model import load
 from subzero.records.metadata import read_metadata
 from subzero.records.record import read_record
 from subzero.synthetic.sealed_answer import SEALED, Answer, reveal, seal
-from subzero.user_file import INCOMPLETE, read_bytes
 
 LONGEST = 20.0
 """A reader that takes longer hangs: the largest file of a mutation takes half a second on an idle machine. [s]"""

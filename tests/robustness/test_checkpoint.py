@@ -1,9 +1,9 @@
 """A run that is killed and started again ends as if nothing had happened, to the last bit.
 
-Verifies: `subzero.checkpoint`. Configuration: stop_and_drift, whose accuracy takes several runs; a model that changes
-in mid-run; a winch on a moving drum; no cable; a command that is killed. Tolerance: identity of every value and every
-attribute. Each run is broken off at each of many operations on the disk, and the command by SIGKILL at random times
-(slow: once, and 20 times).
+Verifies: `subzero.simulation.checkpoint`. Configuration: stop_and_drift, whose accuracy takes several runs; a model
+that changes in mid-run; a winch on a moving drum; no cable; a command that is killed. Tolerance: identity of every
+value and every attribute. Each run is broken off at each of many operations on the disk, and the command by SIGKILL
+at random times (slow: once, and 20 times).
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ import xarray as xr
 
 import scenarios
 import subzero
-from subzero.checkpoint import MANIFEST, STATE, Checkpoint
-from subzero.cli import FINE, MISTAKE, main
+from subzero.cli.app import FINE, MISTAKE, main
+from subzero.simulation.checkpoint import MANIFEST, STATE, Checkpoint
 
 
 class Killed(BaseException):
@@ -91,7 +91,7 @@ def test_what_is_finished_is_not_run_again(tmp_path, monkeypatch):
     checkpoint = Checkpoint(folder=tmp_path / "kept", minutes=60.0)
     plain = subzero.simulate("fig6", checkpoint=checkpoint)
     assert checkpoint.stands_at() is not None
-    monkeypatch.setattr("subzero.simulation.run_rows", None)
+    monkeypatch.setattr("subzero.simulation.run.run_rows", None)
     xr.testing.assert_identical(subzero.simulate("fig6", checkpoint=checkpoint), plain)
     (tmp_path / "kept" / "mine.txt").write_text("mine", encoding="utf-8")
     checkpoint.remove()
@@ -113,7 +113,7 @@ def test_another_simulation_is_refused_with_what_differs(what, tmp_path, monkeyp
         options["later"] = [(0.5, model)]
     else:
         monkeypatch.setattr(
-            f"subzero.simulation.{'code_digest' if what.startswith('version') else 'processor'}",
+            f"subzero.simulation.run.{'code_digest' if what.startswith('version') else 'processor'}",
             lambda: "another",
         )
     with pytest.raises(
@@ -144,7 +144,7 @@ def test_a_damaged_file_is_told_and_never_taken_for_a_run(name, spoil, tmp_path)
 
 
 def test_two_commands_do_not_share_one(tmp_path):
-    from subzero.checkpoint import opened
+    from subzero.simulation.checkpoint import opened
 
     checkpoint = Checkpoint(folder=tmp_path)
     with (

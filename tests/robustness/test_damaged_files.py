@@ -1,6 +1,6 @@
 """Files that were damaged, or that claim what cannot be, are one `UserError`; their numbers are never used.
 
-Verifies: `subzero.integrity` at `open_run`, `subzero plot`, `simulate(checkpoint=...)` and `sweep(out=...)`.
+Verifies: `subzero.files.integrity` at `open_run`, `subzero plot`, `simulate(checkpoint=...)` and `sweep(out=...)`.
 Configuration: 2 s of fig6. What is read is compared to the last bit. Long form: ``python -m benchmarks.damaged_files``.
 """
 
@@ -18,10 +18,10 @@ import pytest
 import xarray as xr
 
 import subzero
-from subzero.checkpoint import STATE, Checkpoint
-from subzero.cli import MISTAKE, main
-from subzero.integrity import MARK, TAIL, append_digest
-from subzero.output import write_netcdf
+from subzero.cli.app import MISTAKE, main
+from subzero.files.integrity import MARK, TAIL, append_digest
+from subzero.results.netcdf_csv import write_netcdf
+from subzero.simulation.checkpoint import STATE, Checkpoint
 
 FIG6 = dataclasses.replace(subzero.load_scenario("fig6"), duration=2.0, rtol=0.0)
 

@@ -18,15 +18,15 @@ from pathlib import Path
 
 import pytest
 
-from subzero.atomic_output import open_output_folder
 from subzero.errors import UserError
-from subzero.user_file import INCOMPLETE, read_bytes
+from subzero.files.atomic_output import open_output_folder
+from subzero.files.read_file import INCOMPLETE, read_bytes
 
 BREAKER = '''
 import errno, json, os, shutil, signal, sys
 from pathlib import Path
-from subzero import atomic_output as module
-from subzero.user_file import interrupted_files, read_bytes
+from subzero.files import atomic_output as module
+from subzero.files.read_file import interrupted_files, read_bytes
 from subzero.errors import UserError
 
 how, is_new, twice, top = sys.argv[1], sys.argv[2] == "new", sys.argv[3] == "twice", Path(sys.argv[4])

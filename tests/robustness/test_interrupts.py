@@ -24,9 +24,9 @@ from pathlib import Path
 
 import pytest
 
-from subzero.atomic_output import TEMPORARY
-from subzero.cli import INTERRUPTED
-from subzero.user_file import INCOMPLETE
+from subzero.cli.app import INTERRUPTED
+from subzero.files.atomic_output import TEMPORARY
+from subzero.files.read_file import INCOMPLETE
 
 DRIVER = Path(__file__).with_name("interrupted.py")
 SHORT, LONG, LONG_DIAGNOSES = 20, 940, 60
@@ -263,7 +263,8 @@ import os, signal, sys
 from contextlib import nullcontext
 from pathlib import Path
 from types import SimpleNamespace
-from subzero import atomic_output, cli
+from subzero.cli import app as cli
+from subzero.files import atomic_output
 
 def parsed(*arguments, **options):
     try:
@@ -391,8 +392,8 @@ def test_an_interrupted_compilation_is_gone_within_two_seconds(made, tmp_path):
 FORCED = """
 import sys, time
 from pathlib import Path
-from subzero import interrupts
-from subzero.atomic_output import open_output_folder
+from subzero.cli import interrupts
+from subzero.files.atomic_output import open_output_folder
 interrupts.watch()
 with open_output_folder(Path("out")) as output:
     (output.path / "file").write_text("half")
@@ -424,7 +425,7 @@ def test_a_command_that_has_to_be_ended_leaves_no_hidden_files(tmp_path):
 
 LATE = """
 import os, signal, time
-from subzero import cli, interrupts
+from subzero.cli import app as cli, interrupts
 from subzero.__main__ import run
 
 class Hanging:
@@ -451,7 +452,7 @@ def test_a_command_that_is_ended_behind_its_last_words_has_said_them_once():
 ENDLESS = """
 import sys, time
 from types import SimpleNamespace
-from subzero import cli
+from subzero.cli import app as cli
 from subzero.__main__ import run
 
 def parsed(*_, **__):

@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 
 import scenarios
-from subzero.cli import MISTAKE, main
+from subzero.cli.app import MISTAKE, main
 from subzero.diagnosis import load_effects, read_extended
 from subzero.errors import UserError
 

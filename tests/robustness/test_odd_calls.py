@@ -26,10 +26,10 @@ import xarray as xr
 import cable
 import subzero
 from subzero import diagnosis, sweeps, validity
-from subzero.accessor import figures_of
 from subzero.arguments import checked_arguments
 from subzero.calibration.api import read
 from subzero.diagnosis.hypothesis.logged import Logged
+from subzero.figures.accessor import figures_of
 from subzero.gym_environment import TetheredHeading, TetheredHeadings
 from subzero.synthetic.sealed_answer import reveal
 

@@ -14,7 +14,7 @@ from contextlib import contextmanager
 
 import pytest
 
-from subzero.cli import FINE, MISTAKE, main
+from subzero.cli.app import FINE, MISTAKE, main
 from tests.robustness import odd_records
 
 HANGS_S = 300.0

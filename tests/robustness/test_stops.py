@@ -21,8 +21,8 @@ import scenarios
 import subzero
 from cable.moving_end.state import new_line
 from cable.moving_end.stops import describe_stop
-from subzero.cli import MISTAKE, main
-from subzero.progress import LONG_S, STANDSTILL_S, ProgressBar, costs_of
+from subzero.cli.app import MISTAKE, main
+from subzero.cli.progress import LONG_S, STANDSTILL_S, ProgressBar, costs_of
 
 SHARE_CURED, STOPS = 0.8, 100
 
@@ -78,8 +78,8 @@ def test_the_command_line_refuses_what_does_not_fit(tmp_path, monkeypatch, capsy
 
 def test_a_run_that_outgrows_the_memory_keeps_what_it_has(fig6, monkeypatch):
     whole = subzero.simulate(fig6)
-    monkeypatch.setattr("subzero.simulation.has_room", lambda _: False)
-    monkeypatch.setattr("subzero.simulation.new_recording", with_little_room)
+    monkeypatch.setattr("subzero.simulation.run.has_room", lambda _: False)
+    monkeypatch.setattr("subzero.simulation.run.new_recording", with_little_room)
     run = subzero.simulate(fig6)
     assert run.attrs["outcome"] == "stopped"
     assert re.match(r"The cable's shapes until t = [0-9.]+ s fill the memory", run.attrs["outcome_message"])
@@ -98,7 +98,7 @@ def with_little_room(rows, nodes, times):
 def clock(monkeypatch):
     """A clock that is set by hand."""
     now = [0.0]
-    monkeypatch.setattr("subzero.progress.monotonic", lambda: now[0])
+    monkeypatch.setattr("subzero.cli.progress.monotonic", lambda: now[0])
     return now
 
 
@@ -139,7 +139,7 @@ def test_work_that_will_take_hours_is_told(bar, clock):
 
 
 def test_compiling_is_no_standing_still(bar, clock, monkeypatch):
-    monkeypatch.setattr("subzero.progress._compiling", lambda: True)
+    monkeypatch.setattr("subzero.cli.progress._compiling", lambda: True)
     for clock[0] in range(100):
         bar.look()
     monkeypatch.undo()
@@ -147,12 +147,12 @@ def test_compiling_is_no_standing_still(bar, clock, monkeypatch):
 
 
 def test_while_functions_are_compiled_their_number_grows_on_a_line_every_second(bar, clock, monkeypatch):
-    monkeypatch.setattr("subzero.progress._compiling", lambda: True)
+    monkeypatch.setattr("subzero.cli.progress._compiling", lambda: True)
     monkeypatch.setattr("subzero.jit.beside._told", [0])  # none by a second process of an earlier test
     for count in (1, 1, 12):
         monkeypatch.setattr("subzero.jit.machine_code._made", [count])
         bar.look()
-    monkeypatch.setattr("subzero.progress._compiling", lambda: False)
+    monkeypatch.setattr("subzero.cli.progress._compiling", lambda: False)
     bar.look()
     assert bar.text.getvalue() == " 1. 12 functions.\n"
 
@@ -170,9 +170,9 @@ def test_a_command_whose_run_stands_still_says_so_while_it_computes(tmp_path, mo
 
     tell = ProgressBar._tell
     monkeypatch.setattr(ProgressBar, "_tell", lambda self, *words: (tell(self, *words), told.set()))
-    monkeypatch.setattr("subzero.progress.STANDSTILL_S", 0.05)
-    monkeypatch.setattr("subzero.progress.LOOK_S", 0.01)
-    monkeypatch.setattr("subzero.simulation.simulate", stuck)
+    monkeypatch.setattr("subzero.cli.progress.STANDSTILL_S", 0.05)
+    monkeypatch.setattr("subzero.cli.progress.LOOK_S", 0.01)
+    monkeypatch.setattr("subzero.simulation.run.simulate", stuck)
     monkeypatch.chdir(tmp_path)
     assert main(["simulate", "fig6"]) == MISTAKE
     line = next(line for line in capsys.readouterr().err.splitlines() if "stands at" in line)

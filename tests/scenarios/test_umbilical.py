@@ -14,7 +14,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import subzero
-from subzero.summary import summarise
+from subzero.results.summary import summarise
 
 FORCE = ("cable_force_forward", "cable_force_starboard", "cable_force_down")
 

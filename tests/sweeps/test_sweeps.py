@@ -23,9 +23,9 @@ import xarray as xr
 
 import subzero
 from scenarios.parameters import with_parameters
-from subzero.cli import main
-from subzero.cli_sweep import _in_words
-from subzero.summary import summarise
+from subzero.cli.app import main
+from subzero.cli.sweep import _in_words
+from subzero.results.summary import summarise
 from subzero.sweeps import Design, Kept
 from subzero.sweeps.api import finished
 from subzero.sweeps.design import points_of
@@ -373,7 +373,7 @@ def test_a_worker_labels_nothing_and_so_starts_a_second_sooner():
     finally:
         pool.shutdown(cancel_futures=True)
     assert [one.reason for one in members] == ["", ""]
-    assert "subzero.dataset" in loaded
+    assert "subzero.results.dataset" in loaded
     assert not loaded & {"xarray", "pandas", "dask", "matplotlib", "netCDF4", "scipy.stats"}
 
 

@@ -12,8 +12,8 @@ import xarray as xr
 
 import scenarios
 import subzero
-from subzero.cli import FINE, STOPPED, main
-from subzero.comparison import halved
+from subzero.cli.app import FINE, STOPPED, main
+from subzero.simulation.comparison import halved
 
 SHORT = dataclasses.replace(subzero.load_scenario("fig6"), duration=4.0, rtol=0.0)
 

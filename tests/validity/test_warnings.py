@@ -14,7 +14,7 @@ import pytest
 import scenarios
 import subzero
 from benchmarks.trust_trials import draw
-from subzero.comparison import halved
+from subzero.simulation.comparison import halved
 from subzero.validity import CHECKS, refinement_that_settles
 from subzero.validity.limits import bend_radii
 from subzero.validity.numerics import drum_is_ill_posed, is_resolved, load_across, roughness

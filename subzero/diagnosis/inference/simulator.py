@@ -41,8 +41,8 @@ from vehicle import STATE_SIZE
 
 if TYPE_CHECKING:
     from subzero.diagnosis.hypothesis.configuration import Setting
+    from subzero.engine.run_state import Live, Setup
     from subzero.model import Model
-    from subzero.run_state import Live, Setup
 
 
 TOO_LONG = NO_ROOM + 1

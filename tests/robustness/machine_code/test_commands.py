@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-from subzero import progress
+from subzero.cli import progress
 from subzero.jit import machine_code
 from subzero.jit.machine_code import OTHERS, home_of
 
@@ -51,7 +51,7 @@ def test_compiling_is_announced_when_something_is_compiled_and_only_then(run, ke
     assert announced() == 0
 
 
-COMMAND = "import sys; from subzero.cli import main; sys.exit(main(sys.argv[1:]))"
+COMMAND = "import sys; from subzero.cli.app import main; sys.exit(main(sys.argv[1:]))"
 
 
 def heed_again():

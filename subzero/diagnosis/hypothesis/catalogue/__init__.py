@@ -17,7 +17,7 @@ from subzero.diagnosis.hypothesis.catalogue import cable, fins, hull, propulsion
 from subzero.diagnosis.hypothesis.catalogue.sensors import NOISE, SAMPLED, SPECS, START
 from subzero.diagnosis.hypothesis.effect import Effect
 from subzero.errors import UserError
-from subzero.user_file import MOST_OF_A_PROGRAM, read_bytes
+from subzero.files.read_file import MOST_OF_A_PROGRAM, read_bytes
 
 __all__ = ["NOISE", "ONSETS", "SAMPLED", "SPECS", "START", "all_effects", "catalogue", "load"]
 ONSETS = (*fins.ONSETS, *hull.ONSETS, *propulsion.ONSETS)

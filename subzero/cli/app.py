@@ -1,0 +1,482 @@
+"""The command line: ``subzero simulate``, ``compare``, ``plot``, ``explore``; ``list``, ``new``, ``show``, ``validate``
+(`trials`); ``manoeuvre``, ``autopilot`` (`autopilot`); ``import`` (`import_log`); ``diagnose``, ``calibrate``,
+``challenge`` (`diagnosis`); ``sweep`` (`sweep`); ``doctor``, ``warm``, ``completion`` (`install`).
+
+Exit codes: 0 all is well; 2 the user has to change something (one clean message on standard error,
+nothing is written); 3 a run could not go on (what it has is written, the message says when, where and
+what to try), or ends with warnings under --strict (all is written); 130 it was interrupted
+(`subzero.cli.interrupts`). A bug of ours keeps its traceback. Everything heavy (numba, xarray, matplotlib, pydantic)
+is imported inside the commands, after the request has been checked, so that help and mistakes answer at once.
+"""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import cyclopts
+from cyclopts import Parameter
+
+import scenarios
+from subzero.cli import autopilot, diagnosis, import_log, install, sweep, trials
+from subzero.cli.examples import EXAMPLES, register
+from subzero.cli.interrupts import INTERRUPTED, reset, say_interrupted, was_interrupted
+from subzero.cli.output_mode import COMMAND, NOT_STRICT, PLAIN, StrictVoice, Voice, speak
+from subzero.errors import DISTRIBUTION, UserError, nearest, printable
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from subzero.cli.progress import ProgressBar
+
+    Runs = dict[str, xr.Dataset]
+
+Flag = autopilot.Flag
+Export = Annotated[tuple[str, ...], Parameter(negative=())]
+FINE, MISTAKE, STOPPED = 0, 2, 3
+OPTION_LIKENESS = 0.6
+"""An option that is less like an unknown one was not meant by it, on `difflib`'s scale from 0 to 1."""
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class Outputs:
+    """Which files are made, and how.
+
+    Attributes:
+        export: further files, for other programs: mcap, mat, parquet or cf; more than one may be given.
+        width: of the figures in inches: 7.2 for two columns of a journal page, 3.4 for one.
+        figures: png, svg or pdf.
+        animate: film the replay of report.html as a gif or an mp4; needs Chromium and the extra [animate].
+    """
+
+    export: Export = ()
+    width: float | None = None
+    figures: Literal["png", "svg", "pdf"] = "png"
+    animate: Literal["gif", "mp4"] | None = None
+
+    def check(self) -> None:
+        """Refuse what cannot be made, before anything is simulated."""
+        from subzero.cli.write_results import check_pictures
+
+        _refuse_no_export(self.export)
+        check_pictures(self.width, self.animate)
+
+    def kinds(self) -> dict[str, Any]:
+        """Return what `subzero.cli.write_results.write_all` is to make."""
+        return {"width": self.width, "kind": self.figures, "exports": self.export}
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class Inputs:
+    """What is simulated besides the scenario.
+
+    Attributes:
+        with_: extended model that a diagnosis has written (extended.toml).
+        effects: Python file with causes of your own that the extended model names; it is run.
+        commands: CSV file of commands, instead of those of the scenario.
+        motion: CSV file of the vehicle's measured states, such as a run's own tethered.csv, which it then follows.
+    """
+
+    with_: diagnosis.With = None
+    effects: diagnosis.Own = None
+    commands: Path | None = None
+    motion: Path | None = None
+
+    def read(self, scenario: str) -> scenarios.Trial:
+        """Read the trial, without the vehicle's own check."""
+        return scenarios.load(scenario, commands_csv=self.commands, motion_csv=self.motion)
+
+    def checked(self, scenario: str) -> tuple[scenarios.Trial, dict[str, Any]]:
+        """Read the trial again with the vehicle's own check, which needs the compiler and so comes late.
+
+        Returns:
+            the trial, and the extended model as arguments of a run.
+        """
+        from subzero.model import load
+
+        trial = load(scenario, commands_csv=self.commands, motion_csv=self.motion)
+        return diagnosis.extended_run(trial, self.with_, self.effects)
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class Kept:
+    """What is kept of it, and where.
+
+    Attributes:
+        out: folder for the files; by default one named after the scenario, here.
+        every: seconds between results that are kept, a whole number of cable steps; without it as the trial says.
+        float64: write all numbers in double precision; shapes and forces by name have 7 digits without it.
+        checkpoint: minutes after which it is kept again how far the run is; the same command goes on from there.
+    """
+
+    out: Path | None = None
+    every: float | None = None
+    float64: Flag = False
+    checkpoint: float | None = None
+
+    def of(self, trial: scenarios.Trial) -> scenarios.Trial:
+        """Return a trial with the results that are asked for."""
+        if self.every is None:
+            return trial
+        try:
+            return replace(trial, every=self.every)
+        except scenarios.ScenarioError as error:  # the user wrote an option, not a field of a trial
+            raise scenarios.ScenarioError(
+                replace(one, file="--every", key="") for one in error.problems
+            ) from error
+
+    def folder(self, trial: scenarios.Trial) -> Path:
+        """Return where the files go."""
+        from subzero.cli import write_results
+
+        return self.out or write_results.default_folder(trial)
+
+    @contextmanager
+    def kept_in(self, folder: Path) -> Iterator[dict[str, Any]]:
+        """Give the checkpoint of a command as an argument of a run; it is removed when all is delivered."""
+        if self.checkpoint is None:
+            yield {}
+            return
+        from subzero.cli.interrupts import set_exit_message
+        from subzero.simulation.checkpoint import Checkpoint
+
+        kept = Checkpoint(folder=folder / "checkpoint", minutes=self.checkpoint)
+        where = printable(str(kept.folder))
+
+        def left() -> str:
+            time = kept.stands_at()
+            if time is None:
+                return "nothing was kept yet"
+            return f"the run up to t = {time:g} s is kept in {where}; the same command goes on from there"
+
+        set_exit_message(left)
+        if (time := kept.stands_at()) is not None:
+            print(f"Going on from t = {time:g} s, which is kept in {where}.", file=sys.stderr)
+        try:
+            yield {"checkpoint": kept}
+        except BaseException:
+            if kept.stands_at() is None:
+                kept.remove()
+            raise
+        kept.remove()
+
+
+NO_INPUTS, USUAL_OUTPUTS, ALL_KEPT = Inputs(), Outputs(), Kept()
+
+
+def _version() -> str:
+    from importlib.metadata import version
+
+    return version(DISTRIBUTION)
+
+
+app = cyclopts.App(
+    name="subzero",
+    help="Simulate a tethered underwater vehicle and the cable it pulls off a drum on the shore.",
+    version=_version,
+    help_format="plaintext",
+)
+
+
+def simulate(
+    scenario: str,
+    /,
+    *,
+    untethered: Annotated[bool, Parameter(negative=())] = False,
+    inputs: Inputs = NO_INPUTS,
+    kept: Kept = ALL_KEPT,
+    check: Flag = False,
+    outputs: Outputs = USUAL_OUTPUTS,
+    voice: StrictVoice = NOT_STRICT,
+) -> int:
+    """Simulate one run, and write its channels, a summary and figures.
+
+    Args:
+        scenario: name of a scenario (see "subzero list"), or path of a scenario file.
+        untethered: leave the cable away.
+        inputs: what is simulated besides the scenario.
+        kept: what is kept of it, and where.
+        check: run it once more with half the steps and half the segment length, and say what changes.
+        outputs: which files are made, and how.
+        voice: how the command speaks.
+    """
+    from subzero.cli import write_results
+    from subzero.results.netcdf_csv import open_output_folder
+
+    trial = inputs.read(scenario)
+    outputs.check()
+    folder = kept.folder(kept.of(trial))
+    with kept.kept_in(folder) as checkpoint, open_output_folder(folder) as output_folder:
+        trial, extended = inputs.checked(scenario)
+        trial = kept.of(trial)
+        with _progress(trial) as progress:
+            from subzero.simulation.run import simulate as run
+
+            result = run(trial, tethered=not untethered, **extended, **checkpoint, progress=progress)
+        runs = {"untethered" if untethered else "tethered": result}
+        runs = _refined(runs, trial, extended) if check else runs
+        summary = write_results.write_all(runs, None, output_folder, **outputs.kinds(), float64=kept.float64)
+        write_results.write_film(outputs.animate, output_folder)
+    return FINE if write_results.tell(summary, output_folder, strict=voice.strict, voice=voice) else STOPPED
+
+
+def compare(
+    scenario: str,
+    /,
+    *,
+    measured: Path | None = None,
+    inputs: Inputs = NO_INPUTS,
+    kept: Kept = ALL_KEPT,
+    check: Flag = False,
+    outputs: Outputs = USUAL_OUTPUTS,
+    voice: StrictVoice = NOT_STRICT,
+) -> int:
+    """Simulate with the cable and without, and set both side by side.
+
+    Args:
+        scenario: name of a scenario (see "subzero list"), or path of a scenario file.
+        measured: CSV file of measured channels, to set beside both runs.
+        inputs: what is simulated besides the scenario.
+        kept: what is kept of it, and where.
+        check: run both once more with half the steps and half the segment length, and say what changes.
+        outputs: which files are made, and how.
+        voice: how the command speaks.
+    """
+    from subzero.cli import write_results
+    from subzero.records.record import read_record
+    from subzero.results.netcdf_csv import open_output_folder
+
+    trial = inputs.read(scenario)
+    record = read_record(measured) if measured is not None else None
+    outputs.check()
+    folder = kept.folder(kept.of(trial))
+    with kept.kept_in(folder) as checkpoint, open_output_folder(folder) as output_folder:
+        trial, extended = inputs.checked(scenario)
+        trial = kept.of(trial)
+        with _progress(trial) as progress:
+            from subzero.simulation.comparison import compare as run
+
+            result = run(trial, measured=record, **extended, **checkpoint, progress=progress)
+        runs = _refined(result.runs, trial, extended) if check else result.runs
+        summary = write_results.write_all(
+            runs, result.measured, output_folder, **outputs.kinds(), float64=kept.float64
+        )
+        write_results.write_film(outputs.animate, output_folder)
+    return FINE if write_results.tell(summary, output_folder, strict=voice.strict, voice=voice) else STOPPED
+
+
+def plot(
+    run: Path,
+    /,
+    *,
+    what: Annotated[list[str] | None, Parameter(consume_multiple=True, negative=())] = None,
+    out: Path | None = None,
+    format: Literal["png", "svg", "pdf"] = "png",
+    voice: Voice = PLAIN,
+) -> int:
+    """Draw a run from its file again: figures by name, or any channel over time.
+
+    Args:
+        run: tethered.nc or untethered.nc of an earlier command.
+        what: tension, shape3d, motion, forces, attitude, cable; or channels, such as heading. Without it, all six.
+        out: folder for the figures; by default the folder of the run.
+        format: of the files.
+        voice: how the command speaks.
+    """
+    from subzero.files.atomic_output import open_output_folder
+
+    names = [f"{run.stem}_{name}.{format}" for name in what or ()]
+    with open_output_folder(out or run.parent, names) as output_folder:
+        from subzero.figures.accessor import figures_of, open_run
+        from subzero.results.netcdf_csv import lacking_letters_as_boxes
+
+        dataset = open_run(run)
+        for name, figure in figures_of(dataset, what).items():
+            with lacking_letters_as_boxes():
+                figure.savefig(output_folder.path / f"{run.stem}_{name}.{format}")
+    with voice.tells(output_folder.files()):
+        print(output_folder.words())
+    return FINE
+
+
+def explore(
+    scenario: str,
+    /,
+    *,
+    port: int = 8642,
+    no_browser: Annotated[bool, Parameter(negative=())] = False,
+    voice: Voice = PLAIN,
+) -> int:
+    """Open a page on this machine, with sliders that say at once what the trial would do otherwise.
+
+    Args:
+        scenario: name of a scenario (see "subzero list"), or path of a scenario file.
+        port: of the page's address, http://127.0.0.1:PORT; 0 is any that is free.
+        no_browser: say the address, and open no browser.
+        voice: how the command speaks.
+    """
+    from subzero.cli.interrupts import set_exit_message
+    from subzero.explore import page as explore_page
+
+    trial = scenarios.load(scenario)
+    with explore_page.address(port) as (access, listening):
+        from subzero.explore.exploration import Exploration
+        from subzero.model import load
+        from subzero.simulation.run import simulate as run
+
+        trial = load(scenario)
+        with _progress(trial) as progress:
+            nominal = run(trial, progress=progress)
+        page = explore_page.Page(Exploration(trial=trial, nominal=nominal, simulate=run))
+        with voice.tells({"url": access.url}):
+            print(f"Exploring {printable(trial.name)} at {access.url} . Ctrl-C ends it.")
+        sys.stdout.flush()
+        set_exit_message(lambda: "the page is closed, and files that were saved stay")
+        page.serve(listening, access, browser=not no_browser)
+    return FINE
+
+
+trials.add_to(app)
+for _command in (simulate, compare, plot, explore):
+    register(app, _command)
+for _module in (autopilot, import_log, diagnosis, sweep, install):
+    _module.add_to(app)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line, and return its exit code.
+
+    Args:
+        arguments: words behind ``subzero``; those of this process if None.
+    """
+    _never_choke(sys.stdout, sys.stderr)
+    reset()
+    _note_command(sys.argv[1:] if arguments is None else arguments)
+    try:
+        command, bound, _ = app.parse_args(arguments, exit_on_error=False, print_error=False)
+        voice = next((one for one in bound.kwargs.values() if isinstance(one, Voice)), PLAIN)
+        with _aloud(voice):
+            return command(*bound.args, **bound.kwargs) or FINE
+    except cyclopts.CycloptsError as error:
+        asked = " ".join(["subzero", *(error.command_chain or ())])
+        return _refuse(f"{_in_words(error)}\nTry '{asked} --help'.")
+    except UserError as error:
+        return _refuse(str(error))
+    except KeyboardInterrupt:
+        say_interrupted()
+        return INTERRUPTED
+    except Exception:  # matplotlib's drawing in C++ made a ValueError of an interrupt in a call back
+        if not was_interrupted():
+            raise
+        say_interrupted()
+        return INTERRUPTED
+
+
+@contextmanager
+def _aloud(voice: Voice) -> Iterator[None]:
+    """Let a command speak as it was asked to; with --verbose, say what runs, and in the end how long it took."""
+    speak(voice)
+    began = perf_counter()
+    if voice.verbose:
+        import platform
+
+        print(f"subzero {_version()}, Python {platform.python_version()}, {sys.executable}", file=sys.stderr)
+    try:
+        yield
+    finally:
+        speak(PLAIN)
+        if voice.verbose:
+            print(f"{_effort()}{perf_counter() - began:.1f} s in all.", file=sys.stderr)
+
+
+def _effort() -> str:
+    """Return what was compiled by this command and where it is kept, as far as it has needed any machine code."""
+    if "subzero.jit.machine_code" not in sys.modules:
+        return ""
+    from subzero.jit.machine_code import base_folder, made
+
+    return f"{made()} functions compiled; machine code is kept in {printable(str(base_folder()))}. "
+
+
+def _note_command(words: Sequence[str]) -> None:
+    """Keep the line that is carried out, for the pages that tell how to do it again; where it writes to is no part."""
+    kept = [word for before, word in zip(["", *words], words, strict=False)
+            if "--out" not in (before, word) and not word.startswith("--out=")]  # fmt: skip
+    COMMAND.set(printable(shlex.join(["subzero", *kept])))
+
+
+def _never_choke(*streams: Any) -> None:
+    """Let a terminal that lacks a letter show ``?`` instead."""
+    for stream in streams:
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="replace")
+
+
+def _refuse(message: str) -> int:
+    """Print a message, and return the exit code of a mistake."""
+    print("\n".join(map(printable, message.split("\n"))), file=sys.stderr)
+    return MISTAKE
+
+
+def _in_words(error: cyclopts.CycloptsError) -> str:
+    """Say what is wrong with the words of a command."""
+    if isinstance(error, cyclopts.UnusedCliTokensError):
+        return f"Unexpected argument: {' '.join(error.unused_tokens or [])}."
+    if isinstance(error, cyclopts.MissingArgumentError) and error.argument and error.command_chain:
+        return _missing(error.command_chain[0], error.argument)
+    if isinstance(error, cyclopts.UnknownOptionError):
+        return _unknown_option(error)
+    return str(error)
+
+
+def _unknown_option(error: cyclopts.UnknownOptionError) -> str:
+    """Say which option is most like one that is unknown, by their letters: all options have the dashes in common."""
+    word = (error.token.keyword or error.token.value).split("=")[0]
+    options = {one.lstrip("-"): one for argument in error.argument_collection for one in argument.names}
+    close = nearest(word.lstrip("-"), options, likeness=OPTION_LIKENESS)
+    return f"Unknown option: {word}.{f' Did you mean {options[close[0]]}?' if close else ''}"
+
+
+def _missing(command: str, argument: cyclopts.Argument) -> str:
+    """Say what a command needs, and how it is called."""
+    if not argument.required:
+        return f"{argument.name} needs a value."
+    return (
+        f"subzero {command} needs {argument.name.removeprefix('--').upper()}, as in: {EXAMPLES[command][0]}"
+    )
+
+
+def _refuse_no_export(kinds: Sequence[str]) -> None:
+    """Refuse a kind of file that nothing here writes, before the run."""
+    if kinds:
+        from subzero.results.export import writer_of
+
+        for kind in kinds:
+            writer_of(kind)
+
+
+def _refined(runs: Runs, trial: scenarios.Trial, extended: dict[str, Any]) -> Runs:
+    """Return runs that know how much they change with half the steps."""
+    from subzero.simulation.comparison import refine
+
+    marked = {}
+    for label, run in runs.items():
+        with _progress(trial, f"Checking the {label} run of {trial.name}") as progress:
+            marked[label] = refine(run, trial, **extended, progress=progress).marked_run()
+    return marked
+
+
+def _progress(trial: scenarios.Trial, words: str = "") -> ProgressBar:
+    """Return a progress bar that says what costs in this trial where it stands still."""
+    from subzero.cli.progress import costs_of, progress_bar
+
+    return progress_bar(words or f"Simulating {trial.name}", lambda: costs_of(trial))

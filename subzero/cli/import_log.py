@@ -1,0 +1,127 @@
+"""The command ``import``: from logs as they were written to records; everything heavy is imported inside."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import cyclopts
+from cyclopts import Parameter
+
+from subzero.cli.examples import register
+from subzero.cli.output_mode import PLAIN, Voice
+from subzero.errors import UserError, printable
+
+if TYPE_CHECKING:
+    from subzero.logs.api import Imported
+
+FINE, ASKED = 0, 2
+SHORTER = "Name fewer columns in a map, or split the log."
+HEADINGS = ("column", "channel", "unit", "factor", "why")
+
+
+def import_(
+    logs: Annotated[list[Path], Parameter(negative=())],
+    /,
+    *,
+    map: Path | None = None,
+    out: Path = Path("record.csv"),
+    map_out: Path | None = None,
+    voice: Voice = PLAIN,
+) -> int:
+    """Make records of logs as their loggers wrote them: names, units and times found, and every change said.
+
+    Args:
+        logs: CSV of any delimiter, .mat, .nc, .alog or .bin; each becomes a record.
+        map: TOML file that says which column is which channel, in which unit; found from names and values without it.
+        out: the record; its map goes there too, as NAME.map.toml. With several logs a folder, for one record of each.
+        map_out: write the map to this file, and no record: to edit it, and give it again with --map.
+        voice: how the command speaks.
+    """
+    from subzero.logs.api import import_log, undecided
+
+    targets = _targets(logs, out, map_out)
+    found = [import_log(log, map) for log in logs]
+    open_ones = [log for log in found if log.record is None]
+    if open_ones and map_out is None:
+        raise undecided(open_ones[0])
+    folder = map_out.parent if map_out is not None else targets[0].parent
+    written = _written(found, targets, folder, map_out)
+    with voice.tells({**written, "logs": [_as_json(log) for log in found]}):
+        for log in found:
+            _tell(log)
+        print(f"Wrote {', '.join(printable(str(folder / name)) for name in written['files'])}")
+    return FINE
+
+
+def _targets(logs: list[Path], out: Path, map_out: Path | None) -> list[Path]:
+    """Return the file for each record, or refuse names that cannot be."""
+    if len(logs) > 1 and map_out is not None:
+        raise UserError("--map-out writes the map of one log, and several are given. Give one.")
+    if len(logs) == 1:
+        if out.suffix != ".csv":
+            raise UserError(f"--out {printable(str(out))} must end in .csv, such as record.csv.")
+        targets = [out]
+    else:
+        if out.suffix == ".csv":
+            out = out.parent / out.stem
+        targets = [out / f"{log.stem}.csv" for log in logs]
+    if map_out is not None and map_out.suffix != ".toml":
+        raise UserError(f"--map-out {printable(str(map_out))} must end in .toml, such as map.toml.")
+    inputs = {log.absolute() for log in logs}
+    if len(set(targets)) < len(targets) or inputs & {target.absolute() for target in targets}:
+        raise UserError(
+            "A record would replace a log or another record. Give another --out, or other names of logs."
+        )
+    return targets
+
+
+def _written(
+    found: list[Imported], targets: list[Path], folder: Path, map_out: Path | None
+) -> dict[str, Any]:
+    """Write all records with their maps, or the map that was asked for, and return what was written."""
+    from subzero.files.atomic_output import open_output_folder
+    from subzero.files.read_file import MEGABYTE, MOST_OF_A_CSV
+    from subzero.logs.api import to_csv
+    from subzero.logs.mapping import to_toml
+    from subzero.logs.table import refusal
+    from subzero.records.record import read_record
+
+    maps = [map_out.name] if map_out is not None else [f"{target.stem}.map.toml" for target in targets]
+    names = [*maps, *(target.name for target in targets if map_out is None)]
+    with open_output_folder(folder, names) as output:
+        for log, name, target in zip(found, maps, targets, strict=True):
+            (output.path / name).write_text(to_toml(log.mapping, log.source), encoding="utf-8")
+            if map_out is None and log.record is not None:
+                text = to_csv(log.record)
+                if len(text) > MOST_OF_A_CSV:
+                    raise refusal(
+                        log.source, f"its record has {len(text) // MEGABYTE} MB, more than is read", SHORTER
+                    )
+                (output.path / target.name).write_text(text, encoding="utf-8")
+                read_record(output.path / target.name)  # what is written can be read
+    return output.files()
+
+
+def _tell(found: Imported) -> None:
+    """Print a line for each column, and what was done."""
+    rows = [HEADINGS, *found.table()]
+    widths = [max(len(printable(row[at])) for row in rows) for at in range(4)]
+    print(f"{found.source}:")
+    for row in rows:
+        cells = [printable(cell).ljust(width) for cell, width in zip(row[:4], widths, strict=True)]
+        print("  " + "  ".join([*cells, printable(row[4])]).rstrip())
+    for line in found.record.notes if found.record else found.mapping.questions:
+        print(printable(line))
+
+
+def _as_json(found: Imported) -> dict[str, Any]:
+    """Return what was found, as plain values."""
+    rows = [dict(zip(HEADINGS, row, strict=True)) for row in found.table()]
+    notes = list(found.record.notes) if found.record else []
+    return {"log": found.source, "columns": rows, "notes": notes, "questions": found.mapping.questions}
+
+
+def add_to(app: cyclopts.App) -> None:
+    """Add the command to the command line."""
+    register(app, import_, "import")

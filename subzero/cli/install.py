@@ -1,0 +1,258 @@
+"""The commands about the installation: ``subzero doctor``, ``warm``, ``completion``; all heavy is imported inside."""
+
+from __future__ import annotations
+
+import os
+import platform
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+
+import cyclopts
+
+from subzero.cli.examples import register
+from subzero.cli.output_mode import PLAIN, Voice
+from subzero.errors import DISTRIBUTION, printable
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from subzero.simulation.run import Progress
+
+FINE, STOPPED = 0, 3
+Shell = Literal["bash", "zsh", "fish"]
+LIBRARIES = (
+    "numpy",
+    "scipy",
+    "numba",
+    "llvmlite",
+    "xarray",
+    "netCDF4",
+    "matplotlib",
+    "pydantic",
+    "cyclopts",
+    "rich",
+)
+WARM_S = 1.0
+"""A run of this length calls all that a longer one does. [s]"""
+
+
+class Check(NamedTuple):
+    """A result held to something exact: what, how far it is off, how far it may be, relatively."""
+
+    name: str
+    error: float
+    allowed: float
+
+    @property
+    def is_fine(self) -> bool:
+        """Whether it is as near as it must be."""
+        return self.error <= self.allowed
+
+
+def doctor(*, voice: Voice = PLAIN) -> int:
+    """Say what is installed, where machine code is kept, and whether this machine computes what is known exactly.
+
+    Three self-checks take some ten seconds: the straight pull of equation (37), a hanging chain, and the energy balance
+    of a run. If one is off, the exit code is 3.
+
+    Args:
+        voice: how the command speaks.
+    """
+    from subzero.cli.progress import progress_bar
+
+    installed = {name: _version(name) for name in (DISTRIBUTION, *LIBRARIES)}
+    extras = dict(_extras())
+    with progress_bar("Checking this machine") as progress:
+        checks = _checks(progress)
+    about = {
+        "python": platform.python_version(),
+        "machine": f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores",
+        "versions": installed,
+        "extras_missing": extras,
+        "machine_code": _machine_code(),
+        "checks": [one._asdict() | {"fine": one.is_fine} for one in checks],
+    }
+    with voice.tells(about):
+        _tell(about, checks)
+    return FINE if all(one.is_fine for one in checks) else STOPPED
+
+
+def warm(*, voice: Voice = PLAIN) -> int:
+    """Compile what a comparison such as "subzero compare fig6" uses, once, so that later commands start at once.
+
+    Args:
+        voice: how the command speaks.
+    """
+    import warnings
+
+    from subzero.cli.progress import progress_bar
+    from subzero.jit.machine_code import made
+
+    began = perf_counter()
+    with progress_bar("Warming up") as progress:
+        from subzero.figures import draw
+        from subzero.model import load
+        from subzero.simulation.run import simulate
+
+        trial, runs = replace(load("fig6"), duration=WARM_S), {}
+        for share, label in ((0.0, "tethered"), (0.5, "untethered")):
+            progress(share)
+            runs[label] = simulate(trial, tethered=label == "tethered")
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            draw(runs)["fig6"].canvas.draw()  # matplotlib looks for its fonts
+    seconds, kept = perf_counter() - began, _machine_code()
+    told = {"compiled": made(), "seconds": round(seconds, 1), **kept}
+    with voice.tells(told):
+        if made():
+            print(f"Compiled {made()} functions in {seconds:.0f} s; they are kept in {kept['folder']}.")
+        else:
+            print(f"All is compiled already, in {kept['folder']} ({kept['files']} files).")
+    return FINE
+
+
+def add_to(app: cyclopts.App) -> None:
+    """Add the commands to the command line."""
+
+    def completion(shell: Shell, /) -> int:
+        """Print what makes a shell complete commands and options; put it where your shell looks for completions.
+
+        Args:
+            shell: bash, zsh or fish.
+        """
+        sys.stdout.write(app.generate_completion(prog_name="subzero", shell=shell))
+        return FINE
+
+    for command in (doctor, warm, completion):
+        register(app, command)
+
+
+def _version(name: str) -> str:
+    from importlib.metadata import PackageNotFoundError, version
+
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return "missing"
+
+
+def _extras() -> Iterator[tuple[str, list[str]]]:
+    """Return each extra of ours that is not installed whole, and what it lacks."""
+    import re
+    from importlib.metadata import requires
+
+    wanted: dict[str, list[str]] = {}
+    for line in requires(DISTRIBUTION) or ():
+        found = re.match(r"([\w.-]+).*extra == ['\"]([\w-]+)['\"]", line)
+        if found and found[2] not in ("test", "dev") and _version(found[1]) == "missing":
+            wanted.setdefault(found[2], []).append(found[1])
+    yield from wanted.items()
+
+
+def _machine_code() -> dict[str, Any]:
+    """Return where machine code is kept, how many files of how many MB, and whether more can be."""
+    from subzero.jit.machine_code import base_folder
+
+    base = base_folder()
+    if base is None:
+        return {"folder": "nowhere", "files": 0, "megabytes": 0.0, "writable": False}
+    files = [path for path in base.rglob("*.code") if path.is_file()] if base.is_dir() else []
+    nearest = next((folder for folder in (base, *base.parents) if folder.is_dir()), Path("/"))
+    return {
+        "folder": printable(str(base)),
+        "files": len(files),
+        "megabytes": round(sum(path.stat().st_size for path in files) / 1e6, 1),
+        "writable": os.access(nearest, os.W_OK),
+    }
+
+
+# Self-checks.
+
+
+def _checks(progress: Progress) -> list[Check]:
+    """Return all self-checks."""
+    checks: tuple[Callable[[], Check], ...] = (_straight_pull, _hanging_chain, _energy)
+    done = []
+    for at, check in enumerate(checks):
+        progress(at / len(checks))
+        done.append(check())
+    return done
+
+
+def _straight_pull() -> Check:
+    """Hold the tension at the tow point of Fig. 4 to its closed form, equation (37)."""
+    from subzero.figures.prescribed import exact_tension
+    from subzero.model import load
+    from subzero.simulation.run import simulate
+
+    run = simulate(replace(load("fig4"), duration=10.0))
+    exact = exact_tension(run)
+    return Check("straight pull, equation (37)", _off(run["cable_tension"].values, exact), 1e-6)
+
+
+def _hanging_chain() -> Check:
+    """Hold a cable at rest between two ends at one depth to the catenary z = a cosh(x/a): its tension at the ends.
+
+    With the span L and the length S, a follows from S = 2 a sinh(L/2a); the tension there is w a cosh(L/2a).
+    """
+    import numpy as np
+    from scipy.optimize import brentq
+
+    import cable
+
+    span, length = 8.0, 10.0
+    chain = cable.CableProperties(mass_per_length=0.5, cross_section_area=1e-4)
+    weight = chain.weight_in_water
+    a = float(brentq(lambda a: 2.0 * a * np.sinh(0.5 * span / a) - length, 1.0, 100.0))
+    found = cable.hold(((0.0, 0.0, 0.0), (span, 0.0, 0.0)), length, cable=chain, segment_length=0.05)
+    exact = weight * a * np.cosh(0.5 * span / a)
+    return Check("hanging chain, catenary", abs(float(np.linalg.norm(found.tow_force)) / exact - 1.0), 1e-3)
+
+
+def _energy() -> Check:
+    """Hold the energy that a coupled run leaves unexplained to none, as a share of the work of the propeller."""
+    from subzero.model import load
+    from subzero.results.summary import energy_balance
+    from subzero.simulation.run import simulate
+
+    balance = energy_balance(simulate(replace(load("fig6"), duration=10.0)))
+    share = balance["unexplained_share"] if balance else None
+    return Check("energy balance of fig6, share of the work", float("inf") if share is None else share, 1e-2)
+
+
+def _off(found: np.ndarray, exact: np.ndarray) -> float:
+    """Return the largest error as a share of the largest exact value. [-]"""
+    return float(abs(found - exact).max() / abs(exact).max())
+
+
+def _tell(about: dict[str, Any], checks: list[Check]) -> None:
+    """Print what was found."""
+    from rich.console import Console
+    from rich.markup import escape
+    from rich.table import Table
+
+    table = Table.grid(padding=(0, 2))
+    table.add_column(no_wrap=True)
+    code = about["machine_code"]
+    kept = f"{code['folder']}, {code['files']} files, {code['megabytes']} MB"
+    rows = [
+        ("Python", f"{about['python']}, {about['machine']}"),
+        ("versions", ", ".join(f"{name} {number}" for name, number in about["versions"].items())),
+        ("machine code", kept if code["writable"] else f"{kept}; NOT WRITABLE: set SUBZERO_CACHE_DIR"),
+        *(
+            (f"extra [{name}]", f"not installed: {', '.join(lacks)}")
+            for name, lacks in about["extras_missing"].items()
+        ),
+        *((one.name, f"error {one.error:.1e}, allowed {one.allowed:.0e}: {_word(one)}") for one in checks),
+    ]
+    for name, words in rows:
+        table.add_row(escape(name), escape(words))
+    Console(highlight=False).print(table)
+
+
+def _word(one: Check) -> str:
+    return "fine" if one.is_fine else "OFF. Do not trust results of this machine; report it with this output."

@@ -1,0 +1,240 @@
+"""The command ``subzero sweep``: everything heavy is imported inside it."""
+
+from __future__ import annotations
+
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from functools import partial
+from pathlib import Path
+from time import monotonic
+from typing import TYPE_CHECKING, Annotated, Any, Self
+
+import cyclopts
+from cyclopts import Parameter
+
+from subzero.cli.examples import register
+from subzero.cli.output_mode import NOT_STRICT, StrictVoice
+from subzero.errors import UserError, missing_extra, printable, whole
+
+if TYPE_CHECKING:
+    from subzero.files.atomic_output import OutputFolder
+    from subzero.sweeps.api import Standing
+
+FINE, STOPPED = 0, 3
+
+Flag = Annotated[bool, Parameter(negative=())]
+
+
+def sweep(
+    spec: Path,
+    /,
+    *,
+    out: Path | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    retry: Flag = False,
+    voice: StrictVoice = NOT_STRICT,
+) -> int:
+    """Run a trial with many values of its parameters, and show what they do.
+
+    Kill it at any moment and give the same command again: it goes on with the members that are not finished.
+
+    Args:
+        spec: TOML file that says which trial, which parameters, which design (see docs/sweeps.md).
+        out: folder for the files; by default one named after the file, here.
+        workers: processes on this machine; by default one for each of its cores.
+        scheduler: address of a Dask scheduler, such as tcp://host:8786, to run on its workers instead.
+        retry: run members again that failed.
+        voice: how the command speaks.
+    """
+    if workers is not None and scheduler is not None:
+        raise UserError("--workers are processes here, and --scheduler has its own. Leave out one of them.")
+    with _executor(workers, scheduler) as executor:
+        summary, output_folder = _swept(spec, out, executor, retry)
+    from subzero.cli.write_sweep import tell_sweep
+
+    tell_sweep(summary, output_folder, voice)
+    return STOPPED if summary["failed"] or (voice.strict and summary["warnings"]) else FINE
+
+
+def _swept(spec: Path, out: Path | None, executor: Any, retry: bool) -> tuple[dict[str, Any], OutputFolder]:
+    """Run what a file asks for, write all of it, and return the summary and where the files are."""
+    from subzero.sweeps.workers import WorkerPool, rehearse_file
+
+    if isinstance(executor, WorkerPool):
+        executor.prepare(partial(rehearse_file, spec))
+    from subzero.sweeps.plan import read_plan
+
+    plan = read_plan(spec)
+    from subzero.files.atomic_output import open_output_folder
+    from subzero.sweeps.api import finished
+
+    folder, artists = out or Path(spec.stem or "sweep"), _Artists(executor)
+    with (
+        _Bar(plan.description, len(plan.points.values), folder) as bar,
+        finished(plan, folder, workers=executor, progress=artists.beside(bar), retry=retry) as store,
+    ):
+        from subzero.cli.write_sweep import FILES, write_sweep
+
+        with open_output_folder(folder, FILES) as output_folder, artists.pool() as pool:
+            summary = write_sweep(plan, store, output_folder, pool)
+    return summary, output_folder
+
+
+class _Artists:
+    """What draws and tells, imported while workers run: it takes half a second, which nobody then waits for."""
+
+    def __init__(self, executor: Any) -> None:
+        self._executor, self._ready = executor, False
+
+    def beside(self, progress: Callable[[Standing], None]) -> Callable[[Standing], None]:
+        """Return a progress that has it imported once workers are at work."""
+
+        def told(standing: Standing) -> None:
+            if standing.rate > 0.0:
+                self._prepare()
+            progress(standing)
+
+        return told
+
+    def _prepare(self) -> None:
+        from subzero.sweeps.processes import FORKS
+        from subzero.sweeps.workers import WorkerPool
+
+        if not self._ready:
+            self._ready, others_draw = True, isinstance(self._executor, WorkerPool) and FORKS
+            if others_draw:
+                self._executor.prepare(_load_what_draws)
+            mine = _import_what_tells if others_draw else _load_what_draws
+            threading.Thread(target=mine, daemon=True).start()
+
+    @contextmanager
+    def pool(self) -> Iterator[Any]:
+        """Give processes that draw; None where this one does."""
+        from subzero.sweeps.workers import WorkerPool
+
+        self._prepare()
+        pool = self._executor.sibling() if isinstance(self._executor, WorkerPool) else None
+        try:
+            yield pool
+        finally:
+            if pool is not None:
+                pool.shutdown(cancel_futures=True)
+
+
+def _load_what_draws() -> None:
+    """Import what draws, and have it draw something small."""
+    with suppress(Exception):  # whoever needs it finds out
+        from subzero.cli.write_sweep import load
+
+        load()
+
+
+def _import_what_tells() -> None:
+    """Import what tells of a sweep."""
+    with suppress(Exception):  # whoever needs it finds out
+        import subzero.cli.write_sweep  # noqa: F401
+
+
+@contextmanager
+def _executor(workers: int | None, scheduler: str | None) -> Iterator[Any]:
+    """Give a Dask client, or processes here, which begin before the plan is read: they have as much to import."""
+    if scheduler is not None:
+        with _client(scheduler) as client:
+            yield client
+        return
+    from subzero.sweeps.workers import WorkerPool, cores
+
+    pool = WorkerPool(cores() if workers is None else whole("workers", workers, least=1))
+    try:
+        yield pool
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+def add_to(app: cyclopts.App) -> None:
+    """Add the command to the command line."""
+    register(app, sweep)
+
+
+LINE_EVERY_S = 30.0
+"""So often a line tells how far it is where there is no terminal for a bar. [s]"""
+
+
+class _Bar:
+    """Shows how far a sweep is: a bar on a terminal, now and then a line elsewhere; and what an interrupt has left."""
+
+    def __init__(self, words: str, members: int, folder: Path) -> None:
+        from subzero.cli import interrupts
+        from subzero.cli.progress import progress_bar
+
+        self._bar = progress_bar(
+            words, lambda: "Workers compile what is not compiled yet in their first run."
+        )
+        self._said, self._members, self._finished, self._folder = monotonic(), members, 0, folder
+        interrupts.set_exit_message(self._left)
+
+    def __enter__(self) -> Self:
+        self._bar.__enter__()
+        return self
+
+    def __exit__(self, *error: Any) -> None:
+        self._bar.__exit__(*error)
+
+    def __call__(self, standing: Standing) -> None:
+        """Show how far it is."""
+        self._finished = standing.finished
+        words = _in_words(standing)
+        self._bar(standing.finished / standing.members, words)
+        if not sys.stderr.isatty() and monotonic() - self._said > LINE_EVERY_S:
+            self._said = monotonic()
+            print(words, file=sys.stderr)
+
+    def _left(self) -> str:
+        return (
+            f"{self._finished} of {self._members} members are kept in {printable(str(self._folder))}; "
+            "the same command goes on from there"
+        )
+
+
+def _in_words(standing: Standing) -> str:
+    """Return how far a sweep is, its rate, how long it will take, and how many members failed."""
+    parts = [f"{standing.finished} of {standing.members} members"]
+    if standing.rate > 0.0:
+        parts += [f"{standing.rate:.3g}/s", f"{_span(standing.seconds_left)} left"]
+    member, seconds = standing.slowest
+    if member >= 0:
+        parts += [f"member {member} alone took {_span(seconds)}"]
+    return ", ".join([*parts, *([f"{standing.failed} failed"] if standing.failed else [])])
+
+
+def _span(seconds: float) -> str:
+    """Return a time as people say it."""
+    if seconds < 100.0:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60.0:.0f} min" if seconds < 6000.0 else f"{seconds / 3600.0:.1f} h"
+
+
+@contextmanager
+def _client(scheduler: str) -> Iterator[Any]:
+    """Give a client of a Dask scheduler."""
+    try:
+        import distributed
+    except ImportError:
+        raise missing_extra("--scheduler", "Dask", "cluster") from None
+    connect: Any = distributed.Client
+    try:
+        client = connect(scheduler, timeout=CONNECT_S)
+    except (OSError, ValueError, TypeError) as error:
+        raise UserError(
+            f"No Dask scheduler answers at {scheduler} ({error}). Start one with 'dask scheduler',"
+            " or leave out --scheduler."
+        ) from error
+    with client:
+        yield client
+
+
+CONNECT_S = 10
+"""So long is waited for a scheduler's answer. [s]"""

@@ -1,0 +1,241 @@
+"""The commands that look at files before anything runs: ``subzero list``, ``new``, ``show``, ``validate``."""
+
+from __future__ import annotations
+
+import math
+import shutil
+import textwrap
+from collections.abc import Iterator
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import cyclopts
+from cyclopts import Parameter
+
+import scenarios
+from subzero.cli.examples import register
+from subzero.cli.output_mode import PLAIN, Voice
+from subzero.errors import UserError, printable, short
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from scenarios.contents import Contents, Number
+
+Flag = Annotated[bool, Parameter(negative=())]
+FINE = 0
+COMMANDS_COLUMN = "propeller_rps"
+"""A CSV file with this column holds commands; any other is a measured record."""
+
+
+def list_shipped(*, vehicles: Flag = False, cables: Flag = False, voice: Voice = PLAIN) -> int:
+    """List the scenarios that are shipped; with a flag, the vehicles or the cables instead.
+
+    Args:
+        vehicles: list the vehicles.
+        cables: list the cables.
+        voice: how the command speaks.
+    """
+    from scenarios.contents import first_line
+    from scenarios.files import shipped
+
+    kinds = [kind for kind, asked in (("vehicle", vehicles), ("cable", cables)) if asked]
+    rows = {f"{kind}s": {name: first_line(kind, name) for name in shipped(f"{kind}s")} for kind in kinds}
+    rows = rows or {"scenarios": {name: scenarios.describe(name) for name in scenarios.names()}}
+    with voice.tells(rows):
+        table = _grid()
+        for names in rows.values():
+            for name, words in names.items():
+                table.add_row(_bold(name), _plain(words))
+        _print(table)
+    return FINE
+
+
+def new(path: Path, /, *, like: str = "fig6", voice: Voice = PLAIN) -> int:
+    """Make a file of your own to begin with: a copy of a shipped scenario, vehicle or cable, every key explained.
+
+    Args:
+        path: file to make, such as my_trial.toml; one that exists is left alone.
+        like: what to copy: a name of "subzero list", "subzero list --vehicles" or "subzero list --cables".
+        voice: how the command speaks.
+    """
+    from scenarios.contents import locate
+    from subzero.files.read_file import make_toml
+
+    if like.endswith(".toml"):
+        raise UserError(
+            f"--like takes the name of something shipped, and {short(like)} is a path. Copy that file itself."
+        )
+    kind, source = locate(like)
+    make_toml(path, source.text)
+    told = {"path": printable(str(path)), "kind": kind, "like": like}
+    with voice.tells(told):
+        print(f"Wrote {told['path']}, a {kind} like {like}. Edit it, then:")
+        print(f"  subzero validate {told['path']}")
+        if kind == "trial":
+            print(f"  subzero compare {told['path']}")
+        else:
+            print(f'  and name it in a trial: {kind} = "{told["path"]}"')
+    return FINE
+
+
+def show(name: str, /, *, voice: Voice = PLAIN) -> int:
+    """Show what a scenario, a vehicle or a cable says: every value with its unit, its range and its source.
+
+    Args:
+        name: a shipped name (see "subzero list"), or the path of a TOML file.
+        voice: how the command speaks.
+    """
+    from scenarios.contents import contents
+
+    found = contents(name)
+    with voice.tells(_as_json(found)):
+        width = shutil.get_terminal_size().columns - 1
+        head = f"{found.kind.capitalize()} {found.name}: {found.description}"
+        legend = "Each value with its range, and below it what it is."
+        for line in (*textwrap.wrap(head, width), legend, *_lines(found, width)):
+            print(printable(line))
+        for kind, named in found.parts.items():
+            print(printable(f"Its {kind} is {named}: subzero show {named}"))
+    return FINE
+
+
+def validate(path: Path, /, *, voice: Voice = PLAIN) -> int:
+    """Check a file without running it: a scenario, vehicle, cable or sweep (TOML); commands or a record (CSV).
+
+    Args:
+        path: the file. All its problems are told at once, each with its line and what is allowed.
+        voice: how the command speaks.
+    """
+    kind, told = _record(path) if path.suffix == ".csv" else _toml(path)
+    with voice.tells({"path": printable(str(path)), "kind": kind, "valid": True, "about": told}):
+        print(f"{printable(str(path))} is a valid {kind}: {told}")
+    return FINE
+
+
+def add_to(app: cyclopts.App) -> None:
+    """Add the commands to the command line."""
+    register(app, list_shipped, name="list")
+    for command in (new, show, validate):
+        register(app, command)
+
+
+def _toml(path: Path) -> tuple[str, str]:
+    """Return what a TOML file is, and what is in it; refuse one that cannot be used."""
+    from scenarios.contents import contents, locate
+    from scenarios.files import read_toml
+
+    source = read_toml(path, str(path))
+    if isinstance(source.table.get("trial"), str):
+        from subzero.sweeps.plan import read_plan
+
+        return "sweep", f"{len(read_plan(path).points.values)} runs"
+    kind, _ = locate(path)
+    if kind == "trial":
+        from subzero.model import load
+
+        trial = load(path)
+        return kind, f"{trial.duration:g} s; {printable(trial.description)}"
+    found = contents(path)
+    if kind == "vehicle":
+        _check_vehicle(found)
+    return kind, f"{len(found.numbers)} numbers, {_outside(found)} outside their own plausible range"
+
+
+def _check_vehicle(found: Contents) -> None:
+    """Refuse a vehicle that its own equations refuse."""
+    from scenarios.parts import nested
+    from vehicle import from_mapping
+
+    numbers = nested({one.name.removeprefix("vehicle."): one.values[0] for one in found.numbers})
+    from_mapping(numbers)
+
+
+def _outside(found: Contents) -> int:
+    return sum(not one.low <= one.values[0] <= one.high for one in found.numbers if not math.isnan(one.low))
+
+
+def _record(path: Path) -> tuple[str, str]:
+    """Return what a CSV file is, and what is in it; refuse one that cannot be used."""
+    from scenarios.samples import check_times, read_csv
+    from subzero.files.read_file import MOST_OF_A_CSV, UnreadableFileError, read_text
+    from subzero.records.record import read_record
+
+    try:
+        header = read_text(path, MOST_OF_A_CSV).partition("\n")[0]
+    except UnreadableFileError as error:
+        raise UserError(str(error)) from None
+    if COMMANDS_COLUMN in header.split(","):
+        samples, problems = read_csv(path, str(path), "commands")
+        problems += check_times(samples, None) if samples else []
+        if problems or samples is None:
+            raise scenarios.ScenarioError(problems)
+        return "file of commands", f"{len(samples.time)} rows, to {samples.time[-1]:g} s"
+    record = read_record(path)
+    return "record", f"{record.time.size} samples of {', '.join(record.values)}, to {record.time[-1]:g} s"
+
+
+# Tables.
+
+
+def _grid() -> Table:
+    from rich.table import Table
+
+    table = Table.grid(padding=(0, 2))
+    table.add_column(no_wrap=True)
+    return table
+
+
+def _print(table: Table) -> None:
+    from rich.console import Console
+
+    Console(highlight=False).print(table)
+
+
+def _bold(text: str) -> str:
+    return f"[bold]{_plain(text)}[/bold]"
+
+
+def _plain(text: str) -> str:
+    """Return a text that rich prints as it stands, brackets and all."""
+    from rich.markup import escape
+
+    return escape(printable(text))
+
+
+def _lines(found: Contents, width: int) -> Iterator[str]:
+    """Return all numbers as lines of a width: name, value and range; below, where the value comes from."""
+    names = [one.name.rpartition(".") for one in found.numbers]
+    values = [_value(one) for one in found.numbers]
+    long, wide = max(len(key) for _, _, key in names), max(map(len, values))
+    above = ""
+    for one, (section, _, key), value in zip(found.numbers, names, values, strict=True):
+        if section != above:
+            yield f"[{section}]"
+            above = section
+        yield f"  {key:<{long}}  {value:>{wide}}  {_span(one)}".rstrip()
+        indent = " " * 6
+        yield from textwrap.wrap(one.source, max(width, 40), initial_indent=indent, subsequent_indent=indent)
+
+
+MOST_VALUES = 3
+"""So many values of a list are shown."""
+
+
+def _value(one: Number) -> str:
+    shown = [f"{value:.6g}" for value in one.values[:MOST_VALUES]]
+    unit = "" if one.unit == "1" else f" {one.unit}"
+    return ", ".join(shown) + (", …" if len(one.values) > MOST_VALUES else "") + unit
+
+
+def _span(one: Number) -> str:
+    return "" if math.isnan(one.low) else f"{one.low:g} … {one.high:g}"
+
+
+def _as_json(found: Contents) -> dict[str, Any]:
+    """Return the contents, ready for JSON."""
+    whole = asdict(found)
+    for one in whole["numbers"]:
+        one["low"], one["high"] = (None if math.isnan(x) else x for x in (one["low"], one["high"]))
+    return whole

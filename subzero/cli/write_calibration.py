@@ -1,0 +1,189 @@
+"""Deliver a calibration: the vehicle's file, JSON (docs/calibration.md explains every key), figures, and what is told
+on the terminal.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from rich import box
+from rich.console import Console
+from rich.table import Table
+
+from subzero.calibration.results import REMEDY, Advice, Calibration, Estimate
+from subzero.cli.output_mode import PLAIN, Voice
+from subzero.errors import UserError, printable
+
+if TYPE_CHECKING:
+    from subzero.files.atomic_output import OutputFolder
+
+ENDINGS = (".toml", "_cable.toml", ".json", "_numbers.png", "_errors.png", "_profiles.png")
+"""Of the files that are written, behind the name of the vehicle."""
+
+
+def files_of(out: Path) -> tuple[str, ...]:
+    """Return the names of all files that a calibration may write.
+
+    Raises:
+        UserError: the name of the vehicle's file does not end in .toml.
+    """
+    if out.suffix != ".toml":
+        raise UserError(f"'{printable(str(out))}' is no name for a vehicle's file. Give --out one that ends in .toml, "
+                        "such as my_vehicle.toml.")  # fmt: skip
+    return tuple(f"{out.stem}{ending}" for ending in ENDINGS)
+
+
+def write_all(found: Calibration, output_folder: OutputFolder, stem: str) -> None:
+    """Write the vehicle (and the cable), the JSON file and the figures, under a common name."""
+    from subzero.figures.calibration import draw_calibration
+    from subzero.figures.style import Title
+    from subzero.results.netcdf_csv import write_figures
+
+    for kind, content in found.files.items():
+        ending = ".toml" if kind == "vehicle" else "_cable.toml"
+        if content:
+            (output_folder.path / f"{stem}{ending}").write_text(content, encoding="utf-8")
+    (output_folder.path / f"{stem}.json").write_text(text(found), encoding="utf-8")
+    trials = ", ".join(dict.fromkeys(one.trial for one in found.records))
+    title = Title(words=f"Calibration of {', '.join(one.name for one in found.records)}", scenario=trials)
+    figures = draw_calibration(found, title)
+    write_figures({f"{stem}_{name}": figure for name, figure in figures.items()}, output_folder)
+
+
+def tell(found: Calibration, output_folder: OutputFolder, out: Path, *, voice: Voice = PLAIN) -> None:
+    """Print the numbers, what the records do not determine, and where the files are."""
+    with voice.tells(plain(mapping(found)) | output_folder.files()):
+        _tell(found, output_folder, out, Console())
+
+
+def _tell(found: Calibration, output_folder: OutputFolder, out: Path, console: Console) -> None:
+    table = Table(box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=(0, 1, 0, 0))
+    for name in ("number", "before", "calibrated", "95 %", "change"):
+        words = name in ("number", "change")
+        table.add_column(
+            name, justify="left" if words else "right", overflow="fold", no_wrap=name != "change"
+        )
+    for row in rows(found):
+        table.add_row(*row)
+    console.print(table, highlight=False)
+    for line in (headline(found), *story(found)):
+        console.print(printable(line), highlight=False, markup=False)
+    console.print(output_folder.words(), highlight=False, markup=False)
+    if not found.refused:
+        console.print(f'Fly it: vehicle = "{out.name}" in a trial beside it.', highlight=False, markup=False)
+
+
+FORMAT = "subzero calibration 1"
+STRONG = 0.9
+"""Correlations from this size on are told. [-]"""
+MOST_TOLD = 3
+"""So many directions, correlations and trials are told on the terminal; the JSON file has all."""
+WORTH_FLYING = 1.2
+"""A trial that makes no interval this many times narrower is not advised. [-]"""
+
+
+def rows(found: Calibration) -> list[tuple[str, str, str, str, str]]:
+    """Return a row for every number: name, before, after, the interval of 95 %, and what to know of it."""
+    return [(_short(one.name), f"{one.before:.4g}", f"{one.value:.4g}", f"{one.low:.4g} to {one.high:.4g}", _mark(one))
+            for one in found.estimates]  # fmt: skip
+
+
+def _mark(one: Estimate) -> str:
+    """Return by how much a number has changed, and whether the records say so."""
+    change = f"{100.0 * one.change:+.1f} %" if one.before else ""
+    words = [change, "" if one.is_determined else "not determined", "at its bound" if one.is_at_bound else ""]
+    return ", ".join(filter(None, words))
+
+
+def headline(found: Calibration) -> str:
+    """Return what was gained, in one sentence; or that nothing was."""
+    if found.refused:
+        return "Nothing comes near these records: the numbers above are no calibration, and no vehicle is written."
+    count, moved = len(found.estimates), sum(one.is_determined for one in found.estimates)
+    return (f"{moved} of {count} numbers are determined; on {found.how}, not fitted, the error goes from "
+            f"{found.error('before'):.3g} to {found.error():.3g} noise levels.")  # fmt: skip
+
+
+def story(found: Calibration) -> Iterator[str]:
+    """Give the lines that belong below the table; where nothing came near, why, and what to do."""
+    if found.refused:
+        yield from (*found.refused[:MOST_TOLD], REMEDY, *found.notes)
+        return
+    for one in found.directions[:MOST_TOLD]:
+        yield f"Not determined by these records: {one.sentence}."
+    for a, b, rho in correlations(found)[:MOST_TOLD]:
+        yield f"Hardly told apart: {_short(a)} and {_short(b)} (correlation {rho:+.2f})."
+    if found.advice and max(found.advice[0].sharper.values()) >= WORTH_FLYING:
+        yield "To determine more: " + advised(found.advice[0])
+    yield from found.strange
+    if found.strange:
+        yield "Something is left that no number explains: diagnose these records with the calibrated vehicle."
+    yield from found.notes
+
+
+def advised(one: Advice) -> str:
+    """Return a trial to fly, and what it would make sharper."""
+    sharper = [(name, factor) for name, factor in one.sharper.items() if factor >= WORTH_FLYING][:MOST_TOLD]
+    words = ", ".join(f"{_short(name)} {factor:.1f} times" for name, factor in sharper)
+    return f"{one.sentence} It would narrow the interval of {words}."
+
+
+def correlations(found: Calibration, least: float = STRONG) -> list[tuple[str, str, float]]:
+    """Return pairs of numbers with a correlation of at least this size, the strongest first."""
+    names, C = [one.name for one in found.estimates], found.correlation
+    pairs = [(names[i], names[j], float(C[i, j])) for i in range(len(names)) for j in range(i)]
+    return sorted((one for one in pairs if abs(one[2]) >= least), key=lambda one: -abs(one[2]))
+
+
+def _short(name: str) -> str:
+    return name.removeprefix("vehicle.")
+
+
+def text(found: Calibration) -> str:
+    """Return a calibration as JSON."""
+    return json.dumps(plain(mapping(found)), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def mapping(found: Calibration) -> dict[str, Any]:
+    """Return a calibration in plain numbers and texts."""
+    return {
+        "format": FORMAT,
+        "verdict": found.verdict,
+        "sentence": headline(found),
+        "refused": list(found.refused),
+        "converged": found.converged,
+        "numbers": {one.name: {**asdict(one), "change": one.change} for one in found.estimates},
+        "correlation": {"names": [one.name for one in found.estimates], "matrix": found.correlation},
+        "not_determined": [asdict(one) for one in found.directions],
+        "profiles": {name: {"values": one.values, "rise": one.rise, "low": one.low, "high": one.high}
+                     for name, one in found.profiles.items()},
+        "held_out": {"how": found.how, "before": found.error("before"), "after": found.error(),
+                     "fitted": found.error("fitted"),
+                     "records": {name: {key: asdict(one) for key, one in channels.items()}
+                                 for name, channels in found.held_out.items()}},
+        "advice": [asdict(one) for one in found.advice],
+        "nuisances": {name: {"mean": mean, "sd": sd} for name, (mean, sd) in found.nuisances.items()},
+        "strange": list(found.strange),
+        "records": [asdict(one) for one in found.records],
+        "notes": list(found.notes),
+        "seconds": dict(found.seconds),
+    }  # fmt: skip
+
+
+def plain(value: Any) -> Any:
+    """Return a value as JSON takes it: arrays as lists, numbers that do not exist as null."""
+    if isinstance(value, Mapping):
+        return {key: plain(one) for key, one in value.items()}
+    if isinstance(value, np.ndarray):
+        return plain(value.tolist())
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return [plain(one) for one in value]
+    if isinstance(value, np.generic):
+        return plain(value.item())
+    return None if isinstance(value, float) and not math.isfinite(value) else value

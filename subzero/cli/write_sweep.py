@@ -1,0 +1,211 @@
+"""What the command leaves behind: dataset, table, summary, figures, page; and tells: numbers and what matters.
+
+Each figure takes a quarter of a second, most of it in Python. So where processes can be forked, they draw the figures
+together, and what draws is imported once, while members still run.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+from rich import box
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from subzero.cli.output_mode import COMMAND, PLAIN, Voice
+from subzero.errors import printable
+from subzero.page.report import Drawn, drawn
+from subzero.results import netcdf_csv
+from subzero.sweeps.design import Points
+from subzero.sweeps.member import Job
+from subzero.sweeps.outcomes import unit_of
+from subzero.sweeps.page import numbers, page_of_sweep, warning_lines, what_matters
+from subzero.sweeps.plan import Plan
+from subzero.sweeps.result import RESULT, TABLE, Gathered, percentiles, write_result
+from subzero.sweeps.sensitivity import Effect, effects_of, words_of
+from subzero.sweeps.store import FILE, Store
+from subzero.sweeps.workers import WorkerDiedError
+
+if TYPE_CHECKING:
+    from subzero.files.atomic_output import OutputFolder
+    from subzero.page.report import Table as Rows
+    from subzero.sweeps.workers import WorkerPool
+
+FIGURES = ("bands", "histograms", "against", "tornado")
+"""All that there may be, in the order in which a page has them."""
+LONGEST_FIRST = ("against", "histograms", "bands", "tornado")
+FILES = (RESULT, TABLE, "summary.json", "report.html", *(f"{name}.png" for name in FIGURES))
+"""What a sweep writes beside its store."""
+SHOWN_REASONS = 5
+"""So many members that failed are told with their reason. [-]"""
+KEPT_REASONS = 100
+"""So many stand in the summary; the table has all."""
+
+
+def write_sweep(
+    plan: Plan, store: Store, output_folder: OutputFolder, pool: WorkerPool | None = None
+) -> dict[str, Any]:
+    """Write everything that belongs to a finished sweep, and return its summary; a pool draws, if there is one."""
+    from subzero.files.atomic_output import friendly_errors
+
+    with friendly_errors(output_folder.folder):
+        found = write_result(store, plan.job, plan.points, plan.attributes, output_folder.path)
+    effects = effects_of(plan.points, found)
+    summary = summary_of(plan, store, found, effects)
+    netcdf_csv.write_summary(summary, output_folder)
+    below = _in_short(summary)
+    shown = Shown(
+        points=plan.points,
+        job=plan.job,
+        found=found,
+        effects=effects,
+        words=plan.description,
+        warnings=below,
+    )
+    made = pictures(shown, pool)
+    with friendly_errors(output_folder.folder):
+        for name, one in made.items():
+            (output_folder.path / f"{name}.png").write_bytes(one.png)
+    figures = {name: one.drawn for name, one in made.items()}
+    netcdf_csv.write_page(page_of_sweep(plan, summary, figures, COMMAND.get()), output_folder)
+    return summary
+
+
+@dataclass(frozen=True, kw_only=True)
+class Shown:
+    """What figures show: points, what was run, what came of it, what matters; and what stands above and below."""
+
+    points: Points
+    job: Job
+    found: Gathered
+    effects: list[Effect]
+    words: str
+    warnings: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Picture:
+    """A figure as the bytes of a PNG, and as it stands in a page."""
+
+    png: bytes
+    drawn: Drawn
+
+
+def pictures(shown: Shown, pool: WorkerPool | None = None) -> dict[str, Picture]:
+    """Return the pictures that there are, by name, in the order of `FIGURES`; drawn by a pool, if there is one."""
+    if pool is None:
+        made = drawn_here(shown, FIGURES)
+    else:
+        made, asked = {}, {name: pool.submit(drawn_here, shown, [name]) for name in LONGEST_FIRST}
+        for name, one in asked.items():
+            try:
+                made |= one.result()
+            except WorkerDiedError:  # somebody killed it: no member is lost by that, and no figure
+                made |= drawn_here(shown, [name])
+    return {name: made[name] for name in FIGURES if name in made}
+
+
+def drawn_here(shown: Shown, names: Sequence[str]) -> dict[str, Picture]:
+    """Draw those of some figures that there are, in this process."""
+    from subzero.figures.style import Title
+    from subzero.sweeps.figures import draw_sweep
+
+    title = Title(words=shown.words, scenario=shown.job.trial.name, warnings=shown.warnings)
+    figures = draw_sweep(shown.points, shown.job, shown.found, shown.effects, title, names)
+    made = {}
+    for name, figure in figures.items():
+        held = io.BytesIO()
+        netcdf_csv.save(figure, held, "png")
+        made[name] = Picture(png=held.getvalue(), drawn=drawn(figure))
+    return made
+
+
+def load() -> None:
+    """Import what draws, and have it draw a letter and a formula, in both ways: the first ones take longer."""
+    import subzero.sweeps.figures  # noqa: F401
+    from subzero.figures.style import Title, label, sheet
+
+    figure, panels = sheet(1, 1, Title(words="a", scenario="b"))
+    label(panels[0], "t", "$x$ [m]")
+    netcdf_csv.save(figure, io.BytesIO(), "png")
+    drawn(figure)
+
+
+def summary_of(plan: Plan, store: Store, found: Gathered, effects: list[Effect]) -> dict[str, Any]:
+    """Return a sweep in a few numbers, ready for JSON."""
+    points = plan.points
+    return {
+        "scenario": plan.job.trial.name,
+        "title": plan.description,
+        "subzero_version": plan.attributes["subzero_version"],
+        "design": {"name": points.design, "samples": points.samples, "seed": points.seed},
+        "parameters": {
+            one.name: {"unit": one.unit, "from": one.ends[0], "to": one.ends[1]} for one in points.spreads
+        },
+        "members": len(points.values),
+        "failed": int(found.failed.sum()),
+        "reasons": dict(store.reasons(KEPT_REASONS)),
+        "warnings": dict(found.warned.most_common()),
+        "scalars": {name: {"unit": unit_of(name), **one} for name, one in percentiles(found).items()},
+        "sensitivity": {"method": words_of(points.design)[0], "effects": [_plain(one) for one in effects]},
+    }
+
+
+def _plain(effect: Effect) -> dict[str, Any]:
+    return {
+        key: None if isinstance(one, float) and not math.isfinite(one) else one
+        for key, one in asdict(effect).items()
+    }
+
+
+def _in_short(summary: dict[str, Any]) -> str:
+    """Return how many members failed or warn, for a line of a figure; or nothing."""
+    failed = [f"{summary['failed']} of {summary['members']} members failed"] if summary["failed"] else []
+    warned = [f"{count} warn of {check.replace('_', ' ')}" for check, count in summary["warnings"].items()]
+    return "; ".join([*failed, *warned])
+
+
+def tell_sweep(summary: dict[str, Any], output_folder: OutputFolder, voice: Voice = PLAIN) -> None:
+    """Print what came of a sweep."""
+    with voice.tells(summary | output_folder.files()):
+        _tell(summary, output_folder, Console())
+
+
+def _tell(summary: dict[str, Any], output_folder: OutputFolder, console: Console) -> None:
+    console.print(f"{summary['scenario']}: {summary['title']}", highlight=False, markup=False)
+    console.print(_rich(numbers(summary), words=1), highlight=False)
+    if summary["sensitivity"]["effects"]:
+        matters = what_matters(summary)
+        console.print(matters.title, highlight=False, markup=False)
+        console.print(_rich(matters, words=2), highlight=False)
+    for line in _troubles(summary):
+        console.print(printable(line), highlight=False, markup=False, soft_wrap=True)
+    kept = f"{FILE} keeps its members: the same command does not run them again."
+    console.print(f"{output_folder.words()}\n{kept}", highlight=False, markup=False)
+
+
+def _rich(rows: Rows, *, words: int) -> Table:
+    """Return rows as the terminal shows them: `words` columns of words, and numbers behind."""
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    for at, name in enumerate(rows.header):
+        table.add_column(escape(name), justify="left" if at < words else "right", overflow="fold")
+    for group in rows.groups:
+        for row in group:
+            table.add_row(*(escape(printable(cell)) for cell in row))
+    return table
+
+
+def _troubles(summary: dict[str, Any]) -> Iterator[str]:
+    """Give the lines on members that warn or failed."""
+    yield from (f"Warning: {line}" for line in warning_lines(summary))
+    if summary["failed"]:
+        yield f"{summary['failed']} of {summary['members']} members failed:"
+        for member, reason in list(summary["reasons"].items())[:SHOWN_REASONS]:
+            yield f"  member {member}: {' '.join(reason.split())}"
+        if summary["failed"] > SHOWN_REASONS:
+            yield f"  … and {summary['failed'] - SHOWN_REASONS} more, in {TABLE}."

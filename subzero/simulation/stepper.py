@@ -1,0 +1,257 @@
+"""A simulation that is driven from outside, step by step: for people with a controller of their own.
+
+    >>> import subzero
+    >>> sim = subzero.Simulator("fig6")
+    >>> obs = sim.observation
+    >>> while sim.time < 1.0:
+    ...     obs = sim.step((25.0, 0.5 * (0.6 - obs.heading), 0.0, 0.0))   # propeller [rev/s], fins [rad]
+    >>> run = sim.result()                              # the dataset of subzero.simulate
+    >>> run["rudder_command"].attrs["units"]
+    'degree'
+
+Each step holds a command for one sample time. The exchanges of hull and cable inside are those of `subzero.simulate`:
+the same commands give the same numbers, to the last bit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import isfinite, pi
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+import scenarios
+from scenarios.steps import whole_steps
+from subzero.arguments import checked_arguments
+from subzero.channels import Observation
+from subzero.engine import coupling
+from subzero.engine.initial_conditions import prepare
+from subzero.engine.recording import Recording, Run, cut, new_recording, record_row
+from subzero.engine.run_state import Live, Orders, Setup
+from subzero.engine.time_loop import ENDING, NO_ROOM, ROW, USED, advance, hold, observe
+from subzero.errors import UserError, real, short
+from subzero.model import Model, load, model_of
+from subzero.simulation.run import WENT_WELL, in_words, more_room
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Command = Sequence[float] | np.ndarray
+"""Propeller [rev/s], rudder, port and starboard stern-plane [rad]."""
+
+COMMANDED = ("propeller [rev/s]", "rudder [rad]", "port stern-plane [rad]", "starboard stern-plane [rad]")
+
+
+MOST_EXCHANGES = 1e6
+"""A sample of more cable steps than this is a slip of the pen."""
+WELL = (coupling.FINE, NO_ROOM)
+"""Endings of a step from which a run can go on."""
+
+
+class Held(NamedTuple):
+    """A run: its arrays, times of its rows (n,) [s], where it stands (`subzero.engine.time_loop`), what is seen,
+    and the handle that machine code knows the arrays by. It is exchanged as a whole: an interrupt finds the old one
+    or the new one.
+    """
+
+    setup: Setup
+    live: Live
+    recording: Recording
+    times: np.ndarray
+    at: np.ndarray
+    seen: np.ndarray
+    handle: Any
+
+    @classmethod
+    def of(
+        cls,
+        setup: Setup,
+        live: Live,
+        recording: Recording,
+        times: np.ndarray,
+        at: np.ndarray,
+        seen: np.ndarray,
+    ) -> Held:
+        """Return a run with its handle."""
+        return cls(setup, live, recording, times, at, seen, hold(setup, live, recording, times))
+
+
+class CommandError(UserError, ValueError):
+    """A command that is not four finite numbers; the run stands where it was."""
+
+
+class RunStoppedError(UserError):
+    """The simulation cannot go on: when, where, what to try. `Simulator.result` keeps what it has."""
+
+
+class Simulator:
+    """A run that waits for the next command.
+
+    Attributes:
+        trial: what is simulated; it goes on beyond the trial's duration if asked to.
+        model: vehicle, cable, drum and water.
+        sample_time: how long a step lasts. [s]
+        observation: what is true now.
+    """
+
+    @checked_arguments
+    def __init__(
+        self,
+        scenario: str | Path | scenarios.Trial,
+        *,
+        tethered: bool = True,
+        model: Model | None = None,
+        sample_time: float | None = None,
+    ) -> None:
+        """Prepare a run.
+
+        Args:
+            scenario: name of a shipped scenario, path of a file, or a trial.
+            tethered: with the cable.
+            model: another model than the one that the scenario describes.
+            sample_time: how long a step holds its command, a whole number of cable steps; one by default. [s]
+
+        Raises:
+            UserError: a prescribed motion, a scheme that cannot be stepped, a sample time that does not fit.
+        """
+        self.trial = scenario if isinstance(scenario, scenarios.Trial) else load(scenario)
+        self.model = model_of(self.trial, model)
+        self._tethered = bool(tethered)
+        self._exchanges = _exchanges(self.trial, sample_time, self._tethered)
+        self.sample_time = self._exchanges * self.trial.cable_step
+        self.reset()
+
+    def reset(self) -> Observation:
+        """Go back to the start, and return what is true there."""
+        setup, live = prepare(self.trial, self.model, self._tethered)
+        setup = setup._replace(orders=Orders(np.zeros(1), np.zeros((1, 4))))
+        setup.orders.values[0] = self._command_at(0.0)
+        times = _times(self.trial)
+        recording = new_recording(times.size, 4 * times.size * live.line.length.size if self._tethered else 0)
+        used = record_row(setup, live, recording, 0, 0.0, 0)
+        at, seen = np.array([0, used, coupling.FINE]), np.zeros(len(Observation._fields))
+        seen[6] = pi - 1e-12  # headings begin in [0, 2π), as in `subzero.results.dataset`
+        held = Held.of(setup, live, recording, times, at, seen)
+        observe(held.handle, 0, seen)
+        self._held = held
+        return self.observation
+
+    @property
+    def observation(self) -> Observation:
+        """What is true now."""
+        return Observation(*self._held.seen.tolist())
+
+    @property
+    def time(self) -> float:
+        """Time since the start [s]."""
+        return float(self._held.seen[0])
+
+    def step(self, command: Command | None = None) -> Observation:
+        """Hold a command for one sample time, and return what is true then.
+
+        Args:
+            command: propeller [rev/s], rudder, port and starboard stern-plane [rad]; None: what the scenario commands
+                at this time.
+
+        Raises:
+            CommandError: the command is not four finite numbers (a UserError); the run stands where it was.
+            RunStoppedError: the simulation cannot go on.
+        """
+        n, rudder, port, starboard = (
+            self._command_at(self.time) if command is None else self._checked(command)
+        )
+        self._check_on()
+        goal = int(self._held.at[ROW]) + self._exchanges
+        if goal >= self._held.times.size:
+            self._held = _with_rows(self._held, goal)
+        while True:
+            held = self._held
+            count = goal - int(held.at[ROW])
+            ending = advance(held.handle, held.at, count, n, rudder, port, starboard, held.seen)
+            if ending != NO_ROOM:
+                break
+            live, recording = more_room(held.live, held.recording, int(held.at[USED]))
+            self._held = Held.of(held.setup, live, recording, held.times, held.at, held.seen)
+        self._check_on()
+        return self.observation
+
+    def result(self) -> xr.Dataset:
+        """Return the run so far as `subzero.simulate` does: channels with units, forces, the cable's shape."""
+        from subzero.results.dataset import plain_run
+
+        row, used, ending = self._held.at.tolist()
+        run = Run(
+            times=self._held.times[: row + 1].copy(),
+            recording=cut(self._held.recording, row + 1, used),
+            completed=ending in WELL,
+            message=self._message(),
+        )
+        return plain_run(self.trial, self.model, self._tethered, run).labelled()
+
+    def _checked(self, command: Command) -> tuple[float, float, float, float]:
+        """Return a command as four floats."""
+        try:
+            n, rudder, port, starboard = (float(value + 0.0) for value in command)  # no text is a number
+            if isfinite(n) and isfinite(rudder) and isfinite(port) and isfinite(starboard):
+                return n, rudder, port, starboard
+        except (TypeError, ValueError, OverflowError):
+            pass
+        raise CommandError(
+            f"At t = {self.time:g} s the command is {short(command)}. Allowed: four finite numbers,"
+            f" {', '.join(COMMANDED)}."
+        )
+
+    def _command_at(self, time: float) -> tuple[float, float, float, float]:
+        """Return what the scenario commands at a time [s]."""
+        commands = self.trial.commands
+        if commands is None:
+            return 0.0, 0.0, 0.0, 0.0
+        n, rudder, port, starboard = commands.at(time).tolist()
+        return n, rudder, port, starboard
+
+    def _message(self) -> str:
+        """Say how the last step ended."""
+        ending = int(self._held.at[ENDING])
+        return WENT_WELL if ending in WELL else in_words(ending, self.time, self._held.setup, self._held.live)
+
+    def _check_on(self) -> None:
+        """Refuse to go on where a step has failed."""
+        if self._held.at[ENDING] not in WELL:
+            raise RunStoppedError(self._message())
+
+
+def _with_rows(held: Held, goal: int) -> Held:
+    """Return a run with room for rows up to `goal`, and for twice as many as there were."""
+    old, times = held.recording, held.times
+    rows = max(2 * times.size, goal + 1)
+    new = new_recording(rows, old.tension.size)
+    for name, values in old._asdict().items():
+        getattr(new, name)[: values.shape[0]] = values
+    further = whole_steps(times[1], rows)[times.size :]
+    return Held.of(held.setup, held.live, new, np.concatenate([times, further]), held.at, held.seen)
+
+
+def _times(trial: scenarios.Trial) -> np.ndarray:
+    """Return times of rows (n,), whole cable steps; as far as the trial goes, those of `subzero.simulate` [s]."""
+    times = trial.times()
+    even = np.allclose(np.diff(times), trial.cable_step, rtol=0.0, atol=1e-9)
+    return times if even else whole_steps(trial.cable_step, times.size + 1)
+
+
+def _exchanges(trial: scenarios.Trial, sample_time: float | None, tethered: bool) -> int:
+    """Return the number of exchanges in a sample, or refuse what cannot be stepped."""
+    if trial.motion is not None:
+        raise UserError(
+            f"'{trial.name}' prescribes its motion, so there is nothing to command. Use subzero.simulate."
+        )
+    if tethered and trial.scheme != "moving_end":
+        raise UserError(f"'{trial.name}' has the scheme '{trial.scheme}'; only 'moving_end' can be stepped.")
+    count = 1.0 if sample_time is None else (real(sample_time) or 0.0) / trial.cable_step
+    if not (0.5 < count < MOST_EXCHANGES and abs(count - round(count)) < 1e-6):
+        raise UserError(
+            f"A sample time of {short(sample_time)} s does not fit. Allowed: a whole number of cable steps,"
+            f" {trial.cable_step:g} s each."
+        )
+    return round(count)
