@@ -110,4 +110,4 @@ def decoded_bytes(arrays: Mapping[str, Any]) -> float:
     sizes = [
         float(np.prod(array.shape, dtype=float)) * np.dtype(array.dtype).itemsize for array in arrays.values()
     ]
-    return COPIES * sum(sizes)
+    return COPIES * float(sum(sizes))

@@ -1,17 +1,13 @@
 """Checkpoints of long runs: a run that was killed goes on from there, and ends as if nothing had happened.
 
-A checkpoint is a folder. `simulate` makes several runs of a trial (`subzero.simulation.refinement`), always in the
-same order: each has a numbered folder in it, with
+A checkpoint is a folder. `simulate` makes several runs of a trial (`subzero.simulation.refinement`), always in the same
+order; each has a numbered folder in it with one file, ``state.npz``: all that changes in a run, and its recording so
+far. The file is replaced as a whole by one renaming, so a process that is killed leaves the last one. What is read back
+are the same bits, and a run does not know how many of its steps were taken at a time: so the rest of the run is the
+same to the last bit, too.
 
-    rows-000000.npz, …   the rows of its recording, as many as came between two checkpoints, and
-    state.npz            where it stands: all that changes in a run, and of how many of those files it is the end.
-
-Every file is written beside its place, forced to the disk and renamed, the state last; so whenever the process is
-killed, the state and the rows that it names are whole. What is read back are the same bits, and a run does not know how
-many of its steps were taken at a time: so the rest of the run is the same to the last bit, too.
-
-The files hold numbers only (``allow_pickle=False``), with a digest of their own; kinds and shapes of all arrays are
-proved before compiled code, which does not look at bounds, gets them. What they belong to stands in ``manifest.json``.
+The file holds numbers only (``allow_pickle=False``), with a digest of its own; kinds and shapes of all arrays are
+checked before compiled code, which does not look at bounds, gets them. ``manifest.json`` says what they belong to.
 """
 
 from __future__ import annotations
@@ -40,15 +36,11 @@ from subzero.files.integrity import DamagedError, append_digest, check_arrays, w
 from subzero.jit import Record
 
 MANIFEST, STATE, LOCK = "manifest.json", "state.npz", "lock"
-COUNTS = ("files", "rows", "nodes", "times", "behind", "used", "ending", "room")
-"""Of a state: files, rows, nodes and times kept; times behind, nodes in use, how the last call ended, nodes at most."""
+COUNTS = ("behind", "used", "ending", "room")
+"""Of a state: times behind, nodes in use, how the last call ended, nodes at most."""
 MINUTE_S = 60.0
 BYTES_A_NODE = 5 * 8
 """Place, tension and arc length."""
-
-
-class _UnreadableError(Exception):
-    """A file of a checkpoint is not what was written."""
 
 
 @checked_arguments
@@ -77,7 +69,7 @@ class Checkpoint:
         states = sorted(Path(self.folder).glob(f"*/*/{STATE}"), key=lambda path: path.stat().st_mtime_ns)
         try:
             return _read(states[-1])["time"].item() if states else None
-        except _UnreadableError:
+        except UserError:
             return None
 
     def remove(self) -> None:
@@ -114,41 +106,25 @@ class KeptRun:
     """
 
     def __init__(self, folder: Path, every: float) -> None:
-        self._folder, self._every, self._kept = folder, every, monotonic()
-        self._files, self._rows, self._nodes, self._times = 0, 0, 0, 0
+        self._path, self._every, self._kept, self._times = folder / STATE, every, monotonic(), 0
         folder.mkdir(exist_ok=True)
 
     def go_on(self, begun: Standing) -> Standing:
         """Return where the run stands that was kept here; what has `begun` where none was."""
-        path = self._folder / STATE
-        if not path.exists():
+        if not self._path.exists():
             return begun
-        state = _read(path)
-        with _named(path):
+        state = _read(self._path)
+        with _damage_named(self._path):
             counts = {name: _count(state, name) for name in COUNTS}
             line = enlarged(begun.live.line, _capacity(begun, state))
             like = _arrays(begun.setup, "setup") | _arrays(begun.live._replace(line=line), "live")
-            check_arrays(state, {name: _layout(array) for name, array in like.items()})
-            rows, times = begun.recording.state.shape[0], begun.recording.trace.shape[0]
-            most = {
-                "rows": rows,
-                "times": times,
-                "behind": times,
-                "nodes": counts["room"],
-                "used": counts["room"],
-            }
-            if not fits(BYTES_A_NODE * counts["room"]) or any(counts[name] > most[name] for name in most):
-                raise DamagedError("it has more rows than its run")
-        room = new_recording(rows, counts["room"], times)
-        for number in range(counts["files"]):
-            self._fill(room, self._folder / _rows_file(number))
-        self._files, self._rows, self._nodes, self._times = (
-            counts[name] for name in ("files", "rows", "nodes", "times")
-        )
+            check_arrays(state, {name: (array.dtype, array.shape) for name, array in like.items()})
+            recording = _recording(begun, counts, state)
+        self._times = counts["behind"]
         return Standing(
             setup=_restored(begun.setup, "setup", state),
             live=_restored(begun.live, "live", state),
-            recording=room,
+            recording=recording,
             **{name: counts[name] for name in ("behind", "used", "ending")},
         )
 
@@ -157,43 +133,44 @@ class KeptRun:
         is_due = at_once or monotonic() - self._kept >= self._every
         if not is_due or now.behind == self._times:
             return
-        last = row_of(now.behind - 1, stride)
-        is_whole = (now.behind - 1) % stride == 0  # else the next time is written over the last row
-        nodes = now.used if is_whole else now.used + int(now.recording.nodes[last])
-        rows = {
-            "rows": slice(self._rows, last + 1),
-            "nodes": slice(self._nodes, nodes),
-            "times": slice(self._times, now.behind),
-        }
-        kept = {name: values[rows[_kind(name)]] for name, values in now.recording._asdict().items()}
-        _write(
-            self._folder / _rows_file(self._files),
-            kept | {f"first of {kind}": np.array(part.start) for kind, part in rows.items()},
-        )
-        self._files += 1
-        self._rows, self._nodes, self._times = (last + 1 if is_whole else last), now.used, now.behind
-        self._write_state(now, float(times[now.behind - 1]))
-        self._kept = monotonic()
-
-    def _write_state(self, now: Standing, time: float) -> None:
         numbers = {
-            "files": self._files, "rows": self._rows, "nodes": self._nodes, "times": self._times,
-            "behind": now.behind, "used": now.used, "ending": now.ending,
-            "room": now.recording.tension.size, "time": time,
-        }  # fmt: skip
+            "behind": now.behind,
+            "used": now.used,
+            "ending": now.ending,
+            "room": now.recording.tension.size,
+            "time": float(times[now.behind - 1]),
+        }
         arrays = {name: np.array(number) for name, number in numbers.items()}
-        _write(self._folder / STATE, arrays | _arrays(now.setup, "setup") | _arrays(now.live, "live"))
+        _write(
+            self._path,
+            arrays | _arrays(now.setup, "setup") | _arrays(now.live, "live") | _filled(now, stride),
+        )
+        self._kept, self._times = monotonic(), now.behind
 
-    def _fill(self, room: Recording, path: Path) -> None:
-        """Put rows that were kept back to their place; the last of a file may stand in the next one again."""
-        kept = _read(path)
-        with _named(path):
-            firsts = {kind: _count(kept, f"first of {kind}") for kind in ("rows", "nodes", "times")}
-            for name, values in room._asdict().items():
-                first, part = firsts[_kind(name)], kept[name]
-                here = values[first : first + len(part)]
-                check_arrays({name: part}, {name: _layout(here)})
-                here[:] = part
+
+def _filled(now: Standing, stride: int) -> dict[str, np.ndarray]:
+    """Return what the arrays of a recording hold so far; the last row may be one that the next time replaces."""
+    last = row_of(now.behind - 1, stride)
+    is_whole = (now.behind - 1) % stride == 0
+    nodes = now.used if is_whole else now.used + int(now.recording.nodes[last])
+    ends = {"rows": last + 1, "nodes": nodes, "times": now.behind}
+    return {
+        f"recording.{name}": values[: ends[_kind(name)]] for name, values in now.recording._asdict().items()
+    }
+
+
+def _recording(begun: Standing, counts: Mapping[str, int], state: Mapping[str, np.ndarray]) -> Recording:
+    """Return a recording with what was kept of it, and room for the rest."""
+    rows, times = begun.recording.state.shape[0], begun.recording.trace.shape[0]
+    if not fits(BYTES_A_NODE * counts["room"]) or counts["behind"] > times or counts["used"] > counts["room"]:
+        raise DamagedError("it has more rows than its run")
+    recording = new_recording(rows, counts["room"], times)
+    for name, values in recording._asdict().items():
+        part = state[f"recording.{name}"]
+        here = values[: len(part)]
+        check_arrays({name: part}, {name: (here.dtype, here.shape)})
+        here[:] = part
+    return recording
 
 
 def _count(arrays: Mapping[str, np.ndarray], name: str) -> int:
@@ -212,18 +189,9 @@ def _capacity(begun: Standing, state: Mapping[str, np.ndarray]) -> int:
     return max(state[name].size, begun.live.line.length.size) - 1
 
 
-def _layout(array: np.ndarray) -> tuple[np.dtype, tuple[int, ...]]:
-    """Return kind and shape of an array, as `check_arrays` expects them."""
-    return array.dtype, array.shape
-
-
 def _kind(name: str) -> str:
     """Return what the lines of an array of a recording are."""
     return "nodes" if name in BY_NODE else "times" if name in BY_TIME else "rows"
-
-
-def _rows_file(number: int) -> str:
-    return f"rows-{number:06d}.npz"
 
 
 def _arrays(value: Any, name: str) -> dict[str, np.ndarray]:
@@ -249,40 +217,41 @@ def _restored(like: Any, name: str, arrays: Mapping[str, np.ndarray]) -> Any:
 
 def _write(path: Path, arrays: Mapping[str, np.ndarray]) -> None:
     """Write arrays to a file: whole, or not at all."""
-    beside = path.with_suffix(".new")
-    with open(beside, "wb") as file:
+    unfinished = path.with_suffix(".new")
+    with open(unfinished, "wb") as file:
         np.savez(file, allow_pickle=False, **arrays)
-    append_digest(beside)
-    with open(beside, "rb") as file:
+    append_digest(unfinished)
+    with open(unfinished, "rb+") as file:
         os.fsync(file.fileno())
-    _rename(beside, path)
-
-
-def _rename(beside: Path, path: Path) -> None:
-    os.replace(beside, path)
-    with suppress(PermissionError):  # Windows opens no folder
-        handle = os.open(path.parent, os.O_RDONLY)
-        try:
-            os.fsync(handle)
-        finally:
-            os.close(handle)
+    os.replace(unfinished, path)
 
 
 def _read(path: Path) -> dict[str, np.ndarray]:
     """Return the arrays of a file, if it is what was written."""
-    with _named(path):
+    with _damage_named(path):
         inside = BytesIO(without_digest(path.read_bytes()))
         with np.load(inside, allow_pickle=False) as file:
             return {name: file[name] for name in file.files}
 
 
 @contextmanager
-def _named(path: Path) -> Iterator[None]:
-    """Say of which file it is what is wrong with it."""
+def _damage_named(path: Path) -> Iterator[None]:
+    """Say of a file that is not what was written what to do."""
     try:
         yield
-    except (DamagedError, BadZipFile, ValueError, EOFError, LookupError, FileNotFoundError) as error:
-        raise _UnreadableError(path) from error
+    except (
+        DamagedError,
+        BadZipFile,
+        ValueError,
+        EOFError,
+        LookupError,
+        AttributeError,
+        FileNotFoundError,
+    ) as error:
+        raise UserError(
+            f"The checkpoint {printable(str(path.parent))} is damaged ({printable(path.name)}). Remove it to begin"
+            " anew, or give another folder."
+        ) from error
 
 
 @contextmanager
@@ -298,7 +267,7 @@ def opened(checkpoint: Checkpoint, label: str, manifest: Mapping[str, str]) -> I
         UserError: it holds another simulation, another command has it, it cannot be written or read.
     """
     folder = Path(checkpoint.folder) / label
-    with _told(folder):
+    with _disk_errors_named(folder):
         folder.mkdir(parents=True, exist_ok=True)
         with _locked(folder):
             _refuse_another(folder, manifest)
@@ -324,15 +293,13 @@ def _refuse_another(folder: Path, manifest: Mapping[str, str]) -> None:
     """Refuse the checkpoint of another simulation; mark a new one as this one's."""
     path = folder / MANIFEST
     if not path.exists():
-        beside = path.with_suffix(".new")
-        beside.write_text(json.dumps(dict(manifest), indent=1) + "\n", encoding="utf-8")
-        _rename(beside, path)
+        unfinished = path.with_suffix(".new")
+        unfinished.write_text(json.dumps(dict(manifest), indent=1) + "\n", encoding="utf-8")
+        os.replace(unfinished, path)
         return
-    try:
+    with _damage_named(path):
         known = json.loads(path.read_text(encoding="utf-8"))
         differ = [what for what in manifest if known.get(what) != manifest[what]]
-    except (ValueError, AttributeError) as error:
-        raise _UnreadableError(path) from error
     if differ:
         raise UserError(
             f"The checkpoint {printable(str(folder))} belongs to another simulation: its {', '.join(differ)}"
@@ -341,20 +308,14 @@ def _refuse_another(folder: Path, manifest: Mapping[str, str]) -> None:
 
 
 @contextmanager
-def _told(folder: Path) -> Iterator[None]:
-    """Turn a refusal of the disk, or a file that is damaged, into a clean message."""
-    name = printable(str(folder))
+def _disk_errors_named(folder: Path) -> Iterator[None]:
+    """Say of a checkpoint that cannot be written what to do."""
     try:
         yield
-    except _UnreadableError as error:
-        raise UserError(
-            f"The checkpoint {name} is damaged ({printable(str(error))}). Remove it to begin anew, or give another"
-            " folder."
-        ) from error
     except OSError as error:
         if error.filename is None and error.errno not in DISK_FULL:
             raise
         raise UserError(
-            f"The checkpoint {name} cannot be written: {error.strerror}. What it has is kept: make room, and start the"
-            " same again, or give another folder."
+            f"The checkpoint {printable(str(folder))} cannot be written: {error.strerror}. What it has is kept: make"
+            " room, and start the same again, or give another folder."
         ) from error
