@@ -402,9 +402,9 @@ def _effort() -> str:
     """Return what was compiled by this command and where it is kept, as far as it has needed any machine code."""
     if "subzero.jit.machine_code" not in sys.modules:
         return ""
-    from subzero.jit.machine_code import base_folder, made
+    from subzero.jit.machine_code import base_folder, compiled_functions
 
-    return f"{made()} functions compiled; machine code is kept in {printable(str(base_folder()))}. "
+    return f"{compiled_functions()} functions compiled; machine code is kept in {printable(str(base_folder()))}. "
 
 
 def _note_command(words: Sequence[str]) -> None:

@@ -90,7 +90,7 @@ def warm(*, voice: Voice = PLAIN) -> int:
     import warnings
 
     from subzero.cli.progress import progress_bar
-    from subzero.jit.machine_code import made
+    from subzero.jit.machine_code import compiled_functions
 
     began = perf_counter()
     with progress_bar("Warming up") as progress:
@@ -106,10 +106,12 @@ def warm(*, voice: Voice = PLAIN) -> int:
             warnings.simplefilter("ignore")
             draw(runs)["fig6"].canvas.draw()  # matplotlib looks for its fonts
     seconds, kept = perf_counter() - began, _machine_code()
-    told = {"compiled": made(), "seconds": round(seconds, 1), **kept}
+    told = {"compiled": compiled_functions(), "seconds": round(seconds, 1), **kept}
     with voice.tells(told):
-        if made():
-            print(f"Compiled {made()} functions in {seconds:.0f} s; they are kept in {kept['folder']}.")
+        if compiled_functions():
+            print(
+                f"Compiled {compiled_functions()} functions in {seconds:.0f} s; they are kept in {kept['folder']}."
+            )
         else:
             print(f"All is compiled already, in {kept['folder']} ({kept['files']} files).")
     return FINE

@@ -102,15 +102,15 @@ class ProgressBar:
 
     def _count(self) -> None:
         """Show how many functions are compiled."""
-        from subzero.jit.machine_code import counting, made
+        from subzero.jit.machine_code import compiled_functions, counting
 
         self._counting = True
         self._open()
         if self._bar is not None:
-            words = f"{self._words}: {made()} functions compiled"
+            words = f"{self._words}: {compiled_functions()} functions compiled"
             self._bar.update(self._bar.task_ids[0], description=words)
         else:
-            now = made()
+            now = compiled_functions()
             self._console.print(f" {now}" if now != self._made else ".", end="", soft_wrap=True)
             self._console.file.flush()
             self._made, counting[0] = now, True

@@ -39,7 +39,6 @@ from cable.moving_end import (
     try_step,
 )
 from cable.task import START_LENGTH
-from subzero.engine.energy import book
 from subzero.engine.environment import drum_of, way_of_drum
 from subzero.engine.external_wrench import feel_current, tow_point, way_of_tow_point
 from subzero.engine.prescribed_motion import knots
@@ -48,7 +47,7 @@ from subzero.engine.run_state import LINEAR_ROWS, Fixed, HullWork, Ledger, Live,
 from subzero.engine.vehicle_step import pose
 from subzero.errors import UserError, printable
 from subzero.external_force import MissingForce
-from subzero.jit import Call, allocating, compile_beside, compiled, made_once
+from subzero.jit import Call, allocating, compile_in_parallel, compiled, made_once
 from subzero.model import Model
 from vehicle import POWERS, STATE_SIZE, initial_state, kinetic_energy, rotation
 from vehicle.state import LINKAGE, POSITION, SERVO, VELOCITY
@@ -103,7 +102,7 @@ def prepare(
         load=new_load(),
     )
     if tethered:
-        compile_beside(lambda: _needed_last(setup, live), lambda: _needed_then(setup, live))
+        compile_in_parallel(lambda: _needed_last(setup, live))
     live.now.length = wet if tethered else 0.0
     layout = live.line.ends.layout
     layout.segment_length, layout.grading = trial.segment_length, trial.grading
@@ -129,12 +128,6 @@ def _needed_last(setup: Setup, live: Live) -> list[Call]:
         (accept, (line, step, c, work)),
         (record_row, (*run, row, step, row)),
     ]
-
-
-def _needed_then(setup: Setup, live: Live) -> list[Call]:
-    """Return what a run calls once the cable is solved and accepted, and for which arguments: the longest of it."""
-    kind, number = numba.typeof, numba.float64
-    return [(book, (kind(setup), kind(live), number, number, numba.int64))]
 
 
 @made_once

@@ -7,7 +7,6 @@ arrays that costs more than the step itself. A `Handle` is unpacked once and the
 
 from __future__ import annotations
 
-from functools import partial
 from typing import Any, NamedTuple
 
 import numba
@@ -18,8 +17,7 @@ from numba.experimental import structref
 from subzero.engine.coupling import FINE, exchange
 from subzero.engine.recording import Recording, note, record_row, row_of
 from subzero.engine.run_state import Live, Setup
-from subzero.jit import allocating, compiled
-from subzero.jit.unbroken import unbroken
+from subzero.jit import allocating, compiled, deferred_signals
 
 NO_ROOM = 4
 """The room that was reserved is nearly full: enlarge it and go on. The other endings are in `coupling`."""
@@ -129,7 +127,8 @@ def hold(setup: Setup, live: Live, recording: Recording, times: np.ndarray) -> A
 
     No signal breaks in: numba builds the object by Python code and dies of an interrupt in there.
     """
-    return unbroken(partial(make_handle, setup, live, recording, times))
+    with deferred_signals():
+        return make_handle(setup, live, recording, times)
 
 
 @allocating

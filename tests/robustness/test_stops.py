@@ -148,9 +148,8 @@ def test_compiling_is_no_standing_still(bar, clock, monkeypatch):
 
 def test_while_functions_are_compiled_their_number_grows_on_a_line_every_second(bar, clock, monkeypatch):
     monkeypatch.setattr("subzero.cli.progress._compiling", lambda: True)
-    monkeypatch.setattr("subzero.jit.beside._told", [0])  # none by a second process of an earlier test
     for count in (1, 1, 12):
-        monkeypatch.setattr("subzero.jit.machine_code._made", [count])
+        monkeypatch.setattr("subzero.jit.machine_code._compiled", [count])
         bar.look()
     monkeypatch.setattr("subzero.cli.progress._compiling", lambda: False)
     bar.look()

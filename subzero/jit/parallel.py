@@ -1,0 +1,96 @@
+"""Let a second process compile some functions while this one compiles others: the compiler uses one core only.
+
+Who is about to compile much names the functions that are needed last, and for which arguments. A second process
+compiles and keeps them (`subzero.jit.machine_code`); where this one needs such a function, it waits for the file. No
+result depends on it: what does not arrive is compiled here. The second process ends with this one, whose end breaks
+the pipe that it reads.
+"""
+
+from __future__ import annotations
+
+import os
+import pickle
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from importlib import import_module
+from multiprocessing import parent_process
+from pathlib import Path
+from typing import Any
+
+import numba
+
+from subzero.jit.signals import deliver_pending
+
+Call = tuple[Callable[..., Any], tuple[Any, ...]]
+"""A compiled function, and numba's types of the arguments that it will be called with."""
+
+POLL_S = 0.02
+"""Time between two looks at a file that is awaited. [s]"""
+START = "import sys; sys.path[:] = sys.argv[1:]; from subzero.jit.parallel import serve; serve()"
+
+_process: list[subprocess.Popen[bytes]] = []
+"""The second process of this one, if there has been one."""
+_awaited: set[Path] = set()
+
+
+def compile_in_parallel(calls: Callable[[], Sequence[Call]]) -> None:
+    """Have functions compiled by a second process, where there is a core for it; returns at once, and works once.
+
+    Args:
+        calls: returns what that process is to compile, in this order.
+    """
+    is_alone = parent_process() is None and threading.current_thread() is threading.main_thread()
+    if _process or numba.config.DISABLE_JIT or not is_alone or _cores() == 1 or not sys.executable:
+        return
+    from numba.core.registry import cpu_target
+
+    wanted = calls()
+    codegen = cpu_target.target_context.codegen()
+    files = [function.machine_code.file_for(types, codegen) for function, types in wanted]  # type: ignore[attr-defined]
+    if None in files or any(file.exists() for file in files):
+        return
+    with suppress(OSError):  # no more processes: this one compiles all
+        work = pickle.dumps([(function.__module__, function.__name__, types) for function, types in wanted])
+        process = subprocess.Popen(
+            [sys.executable, "-c", START, *sys.path],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            start_new_session=True,  # Ctrl-C is for this process, whose end is the end of that one
+        )
+        _process.append(process)
+        _awaited.update(files)
+        assert process.stdin is not None
+        process.stdin.write(work)
+        process.stdin.flush()  # and stays open
+
+
+def _cores() -> int:
+    """Return how many cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def wait_for(file: Path) -> None:
+    """Wait for a file that the second process makes, as long as it works."""
+    while file in _awaited and not file.exists() and _process[0].poll() is None:
+        time.sleep(POLL_S)
+        deliver_pending()
+
+
+def serve() -> None:
+    """Compile what stands in standard input: the second process's whole life."""
+    work = pickle.load(sys.stdin.buffer)
+    threading.Thread(target=_end_with_the_first, daemon=True).start()
+    for module, name, types in work:
+        getattr(import_module(module), name).compile(types)
+
+
+def _end_with_the_first() -> None:
+    """Wait until standard input breaks."""
+    with suppress(OSError):
+        os.read(0, 1)  # not through `sys.stdin`: its lock, held by a thread, aborts a process that ends
+    os._exit(1)
