@@ -76,9 +76,8 @@ def bare_loops(members, at_a_time):
 
 
 def one_thread():
-    from subzero.sweeps.processes import ONE_THREAD
-
-    return os.environ | ONE_THREAD
+    names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+    return os.environ | dict.fromkeys(names, "1")
 
 
 def timed(one, workers=None):

@@ -47,20 +47,24 @@ def noted(log):
     """Let every worker of the sweeps of this process note each member that it begins; see `command`."""
     from subzero.sweeps import workers
 
-    def note(rehearsal):
-        from subzero.sweeps.member import Job
+    submit = workers.WorkerPool.submit
 
-        run, handle = Job.run, os.open(log, os.O_WRONLY | os.O_APPEND | os.O_CREAT)
+    def noting(fn):
+        def run(job, indices, rows):
+            handle = os.open(log, os.O_WRONLY | os.O_APPEND | os.O_CREAT)
+            members = []
+            for k, index in enumerate(indices):
+                os.write(handle, int(index).to_bytes(4, "little"))
+                members += fn(job, [index], rows[k : k + 1])
+            os.close(handle)
+            return members
 
-        def with_a_note(job, index, row):
-            os.write(handle, int(index).to_bytes(4, "little"))
-            return run(job, index, row)
+        return run
 
-        Job.run = with_a_note
-        rehearsal()
+    def submitted(pool, fn, *args):
+        return submit(pool, noting(fn) if fn.__name__ == "run_members" else fn, *args)
 
-    prepare = workers.WorkerPool.prepare
-    workers.WorkerPool.prepare = lambda pool, rehearsal: prepare(pool, lambda: note(rehearsal))
+    workers.WorkerPool.submit = submitted
 
 
 def command(spec, out, log):
@@ -174,11 +178,12 @@ def _size(folder):
 
 
 def _workers(pid):
-    """Return the processes that run members: children of what they come from, not that itself."""
+    """Return the processes that run members; another child tracks what they share."""
     import psutil
 
     with suppress(psutil.NoSuchProcess):
-        return [one.pid for child in psutil.Process(pid).children() for one in child.children()]
+        children = psutil.Process(pid).children()
+        return [child.pid for child in children if any("spawn_main" in word for word in child.cmdline())]
     return []
 
 

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import sys
-import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
-from functools import partial
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from time import monotonic
 from typing import TYPE_CHECKING, Annotated, Any, Self
@@ -61,81 +59,23 @@ def sweep(
 
 def _swept(spec: Path, out: Path | None, executor: Any, retry: bool) -> tuple[dict[str, Any], OutputFolder]:
     """Run what a file asks for, write all of it, and return the summary and where the files are."""
-    from subzero.sweeps.workers import WorkerPool, rehearse_file
-
-    if isinstance(executor, WorkerPool):
-        executor.prepare(partial(rehearse_file, spec))
-    from subzero.sweeps.plan import read_plan
-
-    plan = read_plan(spec)
     from subzero.files.atomic_output import open_output_folder
     from subzero.sweeps.api import finished
+    from subzero.sweeps.plan import read_plan
+    from subzero.sweeps.workers import WorkerPool
 
-    folder, artists = out or Path(spec.stem or "sweep"), _Artists(executor)
+    plan = read_plan(spec)
+    folder = out or Path(spec.stem or "sweep")
     with (
         _Bar(plan.description, len(plan.points.values), folder) as bar,
-        finished(plan, folder, workers=executor, progress=artists.beside(bar), retry=retry) as store,
+        finished(plan, folder, workers=executor, progress=bar, retry=retry) as store,
     ):
         from subzero.cli.write_sweep import FILES, write_sweep
 
-        with open_output_folder(folder, FILES) as output_folder, artists.pool() as pool:
+        with open_output_folder(folder, FILES) as output_folder:
+            pool = executor if isinstance(executor, WorkerPool) else None
             summary = write_sweep(plan, store, output_folder, pool)
     return summary, output_folder
-
-
-class _Artists:
-    """What draws and tells, imported while workers run: it takes half a second, which nobody then waits for."""
-
-    def __init__(self, executor: Any) -> None:
-        self._executor, self._ready = executor, False
-
-    def beside(self, progress: Callable[[Standing], None]) -> Callable[[Standing], None]:
-        """Return a progress that has it imported once workers are at work."""
-
-        def told(standing: Standing) -> None:
-            if standing.rate > 0.0:
-                self._prepare()
-            progress(standing)
-
-        return told
-
-    def _prepare(self) -> None:
-        from subzero.sweeps.processes import FORKS
-        from subzero.sweeps.workers import WorkerPool
-
-        if not self._ready:
-            self._ready, others_draw = True, isinstance(self._executor, WorkerPool) and FORKS
-            if others_draw:
-                self._executor.prepare(_load_what_draws)
-            mine = _import_what_tells if others_draw else _load_what_draws
-            threading.Thread(target=mine, daemon=True).start()
-
-    @contextmanager
-    def pool(self) -> Iterator[Any]:
-        """Give processes that draw; None where this one does."""
-        from subzero.sweeps.workers import WorkerPool
-
-        self._prepare()
-        pool = self._executor.sibling() if isinstance(self._executor, WorkerPool) else None
-        try:
-            yield pool
-        finally:
-            if pool is not None:
-                pool.shutdown(cancel_futures=True)
-
-
-def _load_what_draws() -> None:
-    """Import what draws, and have it draw something small."""
-    with suppress(Exception):  # whoever needs it finds out
-        from subzero.cli.write_sweep import load
-
-        load()
-
-
-def _import_what_tells() -> None:
-    """Import what tells of a sweep."""
-    with suppress(Exception):  # whoever needs it finds out
-        import subzero.cli.write_sweep  # noqa: F401
 
 
 @contextmanager
@@ -148,6 +88,7 @@ def _executor(workers: int | None, scheduler: str | None) -> Iterator[Any]:
     from subzero.sweeps.workers import WorkerPool, cores
 
     pool = WorkerPool(cores() if workers is None else whole("workers", workers, least=1))
+    pool.start()
     try:
         yield pool
     finally:

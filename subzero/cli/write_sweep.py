@@ -1,7 +1,6 @@
 """What the command leaves behind: dataset, table, summary, figures, page; and tells: numbers and what matters.
 
-Each figure takes a quarter of a second, most of it in Python. So where processes can be forked, they draw the figures
-together, and what draws is imported once, while members still run.
+The processes that ran the members draw the figures at the same time.
 """
 
 from __future__ import annotations
@@ -9,6 +8,7 @@ from __future__ import annotations
 import io
 import math
 from collections.abc import Iterator, Sequence
+from concurrent.futures import BrokenExecutor
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -29,7 +29,6 @@ from subzero.sweeps.plan import Plan
 from subzero.sweeps.result import RESULT, TABLE, Gathered, percentiles, write_result
 from subzero.sweeps.sensitivity import Effect, effects_of, words_of
 from subzero.sweeps.store import FILE, Store
-from subzero.sweeps.workers import WorkerDiedError
 
 if TYPE_CHECKING:
     from subzero.files.atomic_output import OutputFolder
@@ -105,7 +104,7 @@ def pictures(shown: Shown, pool: WorkerPool | None = None) -> dict[str, Picture]
         for name, one in asked.items():
             try:
                 made |= one.result()
-            except WorkerDiedError:  # somebody killed it: no member is lost by that, and no figure
+            except BrokenExecutor:  # somebody killed it: no member is lost by that, and no figure
                 made |= drawn_here(shown, [name])
     return {name: made[name] for name in FIGURES if name in made}
 
@@ -123,17 +122,6 @@ def drawn_here(shown: Shown, names: Sequence[str]) -> dict[str, Picture]:
         netcdf_csv.save(figure, held, "png")
         made[name] = Picture(png=held.getvalue(), drawn=drawn(figure))
     return made
-
-
-def load() -> None:
-    """Import what draws, and have it draw a letter and a formula, in both ways: the first ones take longer."""
-    import subzero.sweeps.figures  # noqa: F401
-    from subzero.figures.style import Title, label, sheet
-
-    figure, panels = sheet(1, 1, Title(words="a", scenario="b"))
-    label(panels[0], "t", "$x$ [m]")
-    netcdf_csv.save(figure, io.BytesIO(), "png")
-    drawn(figure)
 
 
 def summary_of(plan: Plan, store: Store, found: Gathered, effects: list[Effect]) -> dict[str, Any]:

@@ -160,8 +160,6 @@ def finished(
         tally = _Tally(store, len(rows), int(done.sum()), progress)
         if not done.all():
             with _executor(workers, len(rows) - int(done.sum())) as (executor, count):
-                if isinstance(executor, WorkerPool):
-                    executor.prepare(job.rehearse)
                 Schedule(job, rows, np.flatnonzero(~done), count, tally.keep).run(executor)
         yield store
 

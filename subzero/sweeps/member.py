@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from time import perf_counter
 from typing import TYPE_CHECKING
 
@@ -27,8 +27,6 @@ if TYPE_CHECKING:
 
 LONGEST_REASON = 1000
 """So much of a reason is kept. [characters]"""
-REHEARSED_STEPS = 10
-"""Steps of the cable, enough for coarser runs beside it."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,16 +83,6 @@ class Job:
         except Exception as error:
             told = str(error) if isinstance(error, UserError) else f"{type(error).__name__}: {error}"
             return self.failed(first, told, perf_counter() - begun)
-
-    def rehearse(self) -> None:
-        """Run a few steps and forget them: what is imported, loaded or compiled for a member is there afterwards."""
-        from subzero.simulation.run import simulate_plainly
-
-        steps = min(self.trial.duration, REHEARSED_STEPS * self.trial.cable_step)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            run = simulate_plainly(replace(self.trial, duration=steps), tethered=self.tethered)
-        scalars_of(run, self.outcomes.scalars, {})
 
     def _run(self, index: int, row: np.ndarray) -> tuple[PlainRun, dict[str, float]]:
         """Return the run of a member, and the indices that it is judged by."""

@@ -1,9 +1,9 @@
 """Hand the members of a sweep to an executor in batches, and keep what comes back.
 
 A batch takes about `BATCH_S`, so that handing it out costs little, and less towards the end, so that no worker waits
-for another. Only a few batches are under way at a time, so memory does not grow with the number of members. A batch
-whose worker dies is taken apart, and its members run again one by one; one that dies alone `MOST_DEATHS` times has
-failed.
+for another. Only a few batches are under way at a time, so memory does not grow with the number of members. Where a
+worker dies, the members that were under way run again, each with nothing else under way; one that so ends
+`MOST_DEATHS` workers has failed.
 """
 
 from __future__ import annotations
@@ -94,9 +94,11 @@ class Schedule:
         return bool(self._under_way)
 
     def _batch(self) -> Batch | None:
-        """Return the next batch; None if all are handed out."""
+        """Return the next batch; None if all are handed out, or one that may end its worker is still to be alone."""
         if self._again:
-            return self._again.popleft()
+            return None if self._under_way else self._again.popleft()
+        if any(batch.deaths for batch in self._under_way.values()):
+            return None
         left = self.todo.size - self._next
         if left == 0:
             return None
@@ -111,11 +113,7 @@ class Schedule:
             members = future.result()
         except UserError:
             raise
-        except BrokenExecutor as error:
-            raise UserError(
-                f"The workers cannot go on: {error}. Run the same again: what is finished is kept."
-            ) from error
-        except Exception as error:
+        except Exception as error:  # of a worker that died
             self._lost(batch, error)
         else:
             each = sum(one.seconds for one in members) / len(members)
