@@ -188,13 +188,16 @@ class History:
         rows = [
             ("time", f"{self.time[0]:g} to {self.time[-1]:g} s, {self.time.size} rows"),
             ("length", f"{self.length[0]:.4g} m at the start, {self.length[-1]:.4g} m at the end"),
-            ("tow tension", f"{self.tow_tension[-1]:.4g} N at the end, at most {self.tow_tension[largest]:.4g} N "
-                            f"at {self.time[largest]:.4g} s"),
+            (
+                "tow tension",
+                f"{self.tow_tension[-1]:.4g} N at the end, at most {self.tow_tension[largest]:.4g} N "
+                f"at {self.time[largest]:.4g} s",
+            ),
             ("drum tension", f"{self.drum_tension[-1]:.4g} N at the end"),
             ("outcome", self.outcome.message),
             *(("warning", words) for words in self.warnings),
             ("more", "shape(t), tension(t), diagnostics(), to_dataset()"),
-        ]  # fmt: skip
+        ]
         return Overview(f"Cable run, scheme {self.scheme}", rows)
 
     def _row(self, t: float) -> int:

@@ -156,9 +156,13 @@ def _of_part(kind: str, part: Part) -> Iterator[Number]:
     for key, leaf in leaves(part.source.table if part.source else {}):
         low, high = leaf.get("range", (float("nan"), float("nan")))
         yield Number(
-            name=f"{above}{key}", values=(float(leaf["value"]),), unit=str(leaf.get("unit", "")),
-            low=float(low), high=float(high), source=str(leaf.get("source", "")),
-        )  # fmt: skip
+            name=f"{above}{key}",
+            values=(float(leaf["value"]),),
+            unit=str(leaf.get("unit", "")),
+            low=float(low),
+            high=float(high),
+            source=str(leaf.get("source", "")),
+        )
 
 
 def _of_trial(trial: Trial, source: Source) -> Contents:

@@ -170,7 +170,7 @@ def declared_ranges(trial: Trial) -> dict[str, tuple[float, float]]:
     ranges: dict[str, tuple[float, float]] = {}
     for kind in PATTERNS:
         above = "vehicle." if kind == "vehicle" else ""
-        ranges |= {f"{above}{key}": one for key, one in ranges_in(part_file(trial, kind)).items()}
+        ranges |= {f"{above}{key}": each for key, each in ranges_in(part_file(trial, kind)).items()}
     return ranges
 
 
@@ -209,11 +209,17 @@ def with_vehicle(trial: Trial, named: str | Path) -> tuple[Trial, Source]:
     """
     here = replace(_source_of(trial), folder=Path())
     part, file = _part(here, "vehicle", str(named))
-    values = {f"vehicle.{key}": one for key, one in part.values.items()}
+    values = {f"vehicle.{key}": value for key, value in part.values.items()}
     changes, _ = read_changes(here)
-    changed = with_parameters(trial, values | {key: one for key, one in changes.items() if key in values})
-    tolerances = {key: one for key, one in trial.tolerances.items() if not key.startswith("vehicle.")}
-    tolerances |= {f"vehicle.{key}": one for key, one in part.tolerances.items()} | read_tolerances(here)[0]
+    changed = with_parameters(
+        trial, values | {key: change for key, change in changes.items() if key in values}
+    )
+    tolerances = {
+        key: tolerance for key, tolerance in trial.tolerances.items() if not key.startswith("vehicle.")
+    }
+    tolerances |= {
+        f"vehicle.{key}": tolerance for key, tolerance in part.tolerances.items()
+    } | read_tolerances(here)[0]
     return replace(changed, tolerances=tolerances), file
 
 
@@ -406,7 +412,7 @@ def _with_lists(section: str) -> Callable[[Trial, Mapping[str, float]], dict[str
             at = _at(name)
             column[slice(None) if at is None else at] = value * row.scale
         part = getattr(trial, _LISTS[section])
-        return {_LISTS[section]: replace(part, **_part_fields(section, part, [one for _, one in rows]))}
+        return {_LISTS[section]: replace(part, **_part_fields(section, part, [each for _, each in rows]))}
 
     return changed
 

@@ -62,11 +62,16 @@ def _read(table: str, *, many: bool = False) -> tuple[Quantity, ...]:
     rows = [[cell.strip() for cell in line.split("|")] for line in table.strip().splitlines()]
     return tuple(
         Quantity(
-            name=name, unit=unit, low=float(low), high=float(high),
-            default=float(default) if default else None, meaning=meaning, many=many,
+            name=name,
+            unit=unit,
+            low=float(low),
+            high=float(high),
+            default=float(default) if default else None,
+            meaning=meaning,
+            many=many,
         )
         for name, unit, low, high, default, meaning in rows
-    )  # fmt: skip
+    )
 
 
 RUN = _read("""

@@ -156,7 +156,9 @@ def _parts(
     vehicle = nested({**part.values, **of_vehicle})
     if check and part.complete:
         reading.problems.extend(_complaint(reading, part, of_vehicle, said) for said in check(vehicle))
-    declared = {f"vehicle.{key}": one for key, one in part.tolerances.items()} | dict(cable.tolerances)
+    declared = {f"vehicle.{key}": tolerance for key, tolerance in part.tolerances.items()} | dict(
+        cable.tolerances
+    )
     return (
         vehicle,
         nested({**cable.values, **of_cable}),

@@ -229,10 +229,14 @@ def check_motion(samples: Samples) -> list[Problem]:
     section = "" if samples.lines else "motion."
     return [
         Problem(
-            file=samples.file, line=samples.key_line, key=f"{section}{names.get(name, name)}", why=why, remedy=remedy
+            file=samples.file,
+            line=samples.key_line,
+            key=f"{section}{names.get(name, name)}",
+            why=why,
+            remedy=remedy,
         )
         for name, why, remedy in motion_faults(given, samples.interpolation)
-    ]  # fmt: skip
+    ]
 
 
 def _check_smooth(samples: Samples, duration: float | None) -> list[Problem]:
@@ -392,12 +396,15 @@ def _shape_problems(name: str, columns: list[str], rows: list[Row]) -> list[Prob
     count = len(columns)
     return [
         Problem(
-            file=name, line=line, found=f"{len(cells)} cells",
-            why=f"the header has {count} columns", remedy="Give every column one cell.",
+            file=name,
+            line=line,
+            found=f"{len(cells)} cells",
+            why=f"the header has {count} columns",
+            remedy="Give every column one cell.",
         )
         for line, cells in rows
         if len(cells) != count
-    ]  # fmt: skip
+    ]
 
 
 def _number(name: str, quantity: Quantity, line: int, cell: str, problems: list[Problem]) -> float:

@@ -21,8 +21,11 @@ STRICT = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
 LISTS = ("commands", "motion")
 """Sections that may stand in a CSV file: one value a sample."""
 
-CHOICES = {"scheme": ("this is not a scheme", SCHEMES), "control": ("a winch cannot do this", CONTROLS),
-           "interpolation": ("a motion is not interpolated so", INTERPOLATIONS)}  # fmt: skip
+CHOICES = {
+    "scheme": ("this is not a scheme", SCHEMES),
+    "control": ("a winch cannot do this", CONTROLS),
+    "interpolation": ("a motion is not interpolated so", INTERPOLATIONS),
+}
 """Keys that hold one of some words → why another cannot be, and the words."""
 
 

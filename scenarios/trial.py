@@ -52,9 +52,17 @@ RUN_FIELDS, START_FIELDS = by_field(RUN), by_field(START)
 """Fields of a trial that hold the numbers of [run], and those of a start, with their quantities."""
 
 FOUND_BY_TRIM = (
-    "pitch", "sway_speed", "heave_speed", "roll_rate", "pitch_rate", "yaw_rate", "propeller_speed",
-    "rudder_angle", "stern_plane_port_angle", "stern_plane_starboard_angle",
-)  # fmt: skip
+    "pitch",
+    "sway_speed",
+    "heave_speed",
+    "roll_rate",
+    "pitch_rate",
+    "yaw_rate",
+    "propeller_speed",
+    "rudder_angle",
+    "stern_plane_port_angle",
+    "stern_plane_starboard_angle",
+)
 """Fields of a start that a start in trim leaves no room for."""
 FOUND_WHY = "a start with at_trim finds it"
 TRIM_NEEDS_SPEED = "a start with at_trim holds a forward speed: fins need a flow"
@@ -124,8 +132,13 @@ class Start:
     def velocity(self) -> tuple[float, float, float, float, float, float]:
         """u, v, w, p, q, r over ground, body axes. [m/s, rad/s]."""
         return (
-            self.surge_speed, self.sway_speed, self.heave_speed, self.roll_rate, self.pitch_rate, self.yaw_rate
-        )  # fmt: skip
+            self.surge_speed,
+            self.sway_speed,
+            self.heave_speed,
+            self.roll_rate,
+            self.pitch_rate,
+            self.yaw_rate,
+        )
 
     @property
     def fins(self) -> tuple[float, float, float]:
@@ -225,8 +238,8 @@ def _tuples(array: np.ndarray | None) -> Any:
 
 def _keep(value: Any, **fields: Any) -> None:
     """Set fields of a frozen value that is being made."""
-    for name, one in fields.items():
-        object.__setattr__(value, name, one)
+    for name, each in fields.items():
+        object.__setattr__(value, name, each)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -370,15 +383,27 @@ class Trial:
         told = self.commands if self.commands is not None else self.motion
         rows = [
             ("duration", f"{self.duration:g} s, hull in steps of {self.hull_step:g} s"),
-            ("start", f"heading {heading:g}°, depth {start.depth:g} m, speed {speed:g} m/s, "
-                      f"{start.wet_length:g} m of cable out"),
-            ("cable", f"{1e3 * cable.get('diameter', 0.0):g} mm, {1e3 * cable.get('mass_per_length', 0.0):g} g/m, "
-                      f"segments of {self.segment_length:g} m, scheme {self.scheme}"),
-            ("current", f"north {self.current[0]:g}, east {self.current[1]:g} m/s"
-                        + (", with a profile" if self.profile else "")),
-            ("drum", (self.winch.control.replace("_", " ") if self.winch else "free")
-                     + (", on a vessel" if self.vessel else "")),
-        ]  # fmt: skip
+            (
+                "start",
+                f"heading {heading:g}°, depth {start.depth:g} m, speed {speed:g} m/s, "
+                f"{start.wet_length:g} m of cable out",
+            ),
+            (
+                "cable",
+                f"{1e3 * cable.get('diameter', 0.0):g} mm, {1e3 * cable.get('mass_per_length', 0.0):g} g/m, "
+                f"segments of {self.segment_length:g} m, scheme {self.scheme}",
+            ),
+            (
+                "current",
+                f"north {self.current[0]:g}, east {self.current[1]:g} m/s"
+                + (", with a profile" if self.profile else ""),
+            ),
+            (
+                "drum",
+                (self.winch.control.replace("_", " ") if self.winch else "free")
+                + (", on a vessel" if self.vessel else ""),
+            ),
+        ]
         if told is not None:
             kind = "commands" if told is self.commands else "motion"
             rows.append((kind, f"{len(told.time)} rows, to {float(told.time[-1]):g} s"))

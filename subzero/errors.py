@@ -172,12 +172,12 @@ def printable(text: str) -> str:
     """
     if text.isprintable():
         return text
-    return "".join(one if one.isprintable() else _escape(one) for one in text)
+    return "".join(each if each.isprintable() else _escape(each) for each in text)
 
 
-def _escape(one: str) -> str:
+def _escape(name: str) -> str:
     r"""Return ``\x1b`` for a control character; the bytes of a file name that is not UTF-8 as they are, ``\xff``."""
-    code = ord(one)
+    code = ord(name)
     if 0xDC80 <= code <= 0xDCFF:  # where Python keeps such bytes
         return f"\\x{code - 0xDC00:02x}"
-    return one.encode("unicode_escape").decode("ascii")
+    return name.encode("unicode_escape").decode("ascii")

@@ -171,9 +171,7 @@ class TetheredHeading(gymnasium.Env[np.ndarray, np.ndarray]):
     def felt(self) -> tuple[float, ...]:
         """What the agent sees, before it is cut to the limits of its space: the values of `LIMITS`."""
         error, seen = self._wanted - self.seen.heading, self.seen
-        return (
-            sin(error), cos(error), seen.yaw_rate, seen.surge_speed, seen.rudder_angle, seen.cable_length
-        )  # fmt: skip
+        return (sin(error), cos(error), seen.yaw_rate, seen.surge_speed, seen.rudder_angle, seen.cable_length)
 
     @property
     def truth(self) -> tuple[float, ...]:
@@ -234,7 +232,7 @@ class TetheredHeadings(gymnasium.vector.SyncVectorEnv):
         rudders = _shares(actions, self.num_envs)
         parts = self._map(self._held, self._parts, repeat(rudders))
         rewards, ended = map(np.array, zip(*chain.from_iterable(parts), strict=True))
-        cut = np.array([one.is_over for one in self._ours])
+        cut = np.array([our.is_over for our in self._ours])
         self._autoreset_envs = ended | cut
         return self._observed(), rewards, ended, cut, self._infos()
 
@@ -243,22 +241,22 @@ class TetheredHeadings(gymnasium.vector.SyncVectorEnv):
         return [self._held_one(self._ours[i], rudders[i], self._autoreset_envs[i]) for i in which]
 
     @staticmethod
-    def _held_one(one: TetheredHeading, rudder: float, is_over: bool) -> tuple[float, bool]:
+    def _held_one(env: TetheredHeading, rudder: float, is_over: bool) -> tuple[float, bool]:
         """Step one environment, or let it begin again where its episode is over."""
         if is_over:
-            one.reset()
+            env.reset()
             return 0.0, False
-        stopped = one.hold(rudder)
-        return one.reward(rudder), stopped
+        stopped = env.hold(rudder)
+        return env.reward(rudder), stopped
 
     def _observed(self) -> np.ndarray:
         """Return what the agents see, within the limits of their space (num_envs, 6)."""
         space: Any = self.observation_space
-        return np.clip(np.array([one.felt for one in self._ours], dtype=np.float32), space.low, space.high)
+        return np.clip(np.array([our.felt for our in self._ours], dtype=np.float32), space.low, space.high)
 
     def _infos(self) -> dict[str, Any]:
         """Return the truth of all by name, (num_envs,) each; and by the name with _ before it, that each has it."""
-        values = dict(zip(TRUTH, np.array([one.truth for one in self._ours]).T.copy(), strict=True))
+        values = dict(zip(TRUTH, np.array([our.truth for our in self._ours]).T.copy(), strict=True))
         return values | {f"_{name}": np.ones(self.num_envs, dtype=bool) for name in TRUTH}
 
     def close_extras(self, **kwargs: Any) -> None:

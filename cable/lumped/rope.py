@@ -113,12 +113,28 @@ def new_rope(capacity: int) -> Rope:
     """Return an empty rope with room for `capacity` springs."""
     n = capacity + 2
     ends = RopeEnds(
-        count=1, free_end=False, compliance=0.0, stretch=0.0, bending=0.0, tail_drag=0.0,
-        last=np.zeros(3), payout=np.zeros(3), loose=np.zeros(3), spin=np.zeros(3), since_loose=SMOOTH_STEPS,
-        stage_end=0.0, payout_rate=0.0, start_last=0.0, start_payout=0.0,
-        drum_place=np.zeros(3), drum_velocity=np.zeros(3), drum_pull=0.0, tow_force=np.zeros(3),
-        by_payout=0.0, wanted=0.0,
-    )  # fmt: skip
+        count=1,
+        free_end=False,
+        compliance=0.0,
+        stretch=0.0,
+        bending=0.0,
+        tail_drag=0.0,
+        last=np.zeros(3),
+        payout=np.zeros(3),
+        loose=np.zeros(3),
+        spin=np.zeros(3),
+        since_loose=SMOOTH_STEPS,
+        stage_end=0.0,
+        payout_rate=0.0,
+        start_last=0.0,
+        start_payout=0.0,
+        drum_place=np.zeros(3),
+        drum_velocity=np.zeros(3),
+        drum_pull=0.0,
+        tow_force=np.zeros(3),
+        by_payout=0.0,
+        wanted=0.0,
+    )
     return Rope(
         ends=ends,
         position=np.zeros((3, n, 3)),

@@ -95,8 +95,8 @@ class Along:
         names = (*STATE_NAMES, *CABLE_OUTPUTS)
         units = UNITS | {name: BY_NAME[name].unit for name in CABLE_OUTPUTS}
         variables = {
-            name: ("time", one, {"units": units[name], "long_name": f"deviation of {name}"})
-            for name, one in zip(names, values, strict=True)
+            name: ("time", value, {"units": units[name], "long_name": f"deviation of {name}"})
+            for name, value in zip(names, values, strict=True)
         }
         return xr.Dataset(variables, coords={"time": ("time", self.time, {"units": "s"})})
 

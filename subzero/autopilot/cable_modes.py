@@ -113,7 +113,7 @@ def _shapes(bends: int) -> list[Polynomial]:
     """Return 1 − σ and the φ_k as polynomials of σ on [0, 1]."""
     straight, sigma = Polynomial([1.0, -1.0]), Polynomial([0.0, 1.0])
     legendre = [Legendre.basis(k, domain=[0.0, 1.0]).convert(kind=Polynomial) for k in range(bends)]
-    return [straight, *(sigma * straight * one for one in legendre)]
+    return [straight, *(sigma * straight * each for each in legendre)]
 
 
 def _state_space(M: np.ndarray, C: np.ndarray, K: np.ndarray, U: float, S: float) -> CableModes:

@@ -169,9 +169,17 @@ def design_gains(
             " command reaches all that does not settle by itself, and weights that see it."
         ) from error
     return Gains(
-        states=labels, tracked=tracked, feedback=K[:n], integral=-float(K[n]), A=A, B=B, Q=Q, R=R, ahead=ahead,
+        states=labels,
+        tracked=tracked,
+        feedback=K[:n],
+        integral=-float(K[n]),
+        A=A,
+        B=B,
+        Q=Q,
+        R=R,
+        ahead=ahead,
         loop=control.ss(A, B, K[None], [[0.0]], name=f"{part.name}_loop"),
-    )  # fmt: skip
+    )
 
 
 def _check_part(part: control.StateSpace) -> None:

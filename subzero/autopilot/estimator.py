@@ -83,15 +83,15 @@ def estimates(
     sampled = [control.c2d(part, sample_time) for part in parts]
     process = PROCESS_NOISE * sample_time
     filters = [
-        np.asarray(control.dlqe(np.asarray(one.A), np.eye(4), MEASURED, process, MEASUREMENT_NOISE)[0])
-        for one in sampled
+        np.asarray(control.dlqe(np.asarray(model.A), np.eye(4), MEASURED, process, MEASUREMENT_NOISE)[0])
+        for model in sampled
     ]
     speeds = np.array(tuning.speeds)
     turn = np.stack([tuning.sway_per_yaw.values, tuning.rudder_per_yaw.values], axis=1)
     return Estimates(
         designs=designs,
-        feedback=Schedule(speeds, np.array([one.numbers() for one in designs])),
-        model=Schedule(speeds, np.array([np.hstack([one.A, one.B]) for one in sampled])),
+        feedback=Schedule(speeds, np.array([design.numbers() for design in designs])),
+        model=Schedule(speeds, np.array([np.hstack([model.A, model.B]) for model in sampled])),
         filter=Schedule(speeds, np.array(filters)),
         turn=Schedule(speeds, turn),
     )

@@ -229,7 +229,7 @@ def subsystem(linear: control.StateSpace, name: str) -> control.StateSpace:
     to_u = _rows(INPUT_NAMES, "stern_plane_port_command", SUBSYSTEM_COMMANDS)
     rows = np.array([to_x[state] for state in own])
     states = np.column_stack([_spread(row) for row in rows])
-    inputs = np.column_stack([_spread(to_u[one]) for one in part.inputs])
+    inputs = np.column_stack([_spread(to_u[each]) for each in part.inputs])
     A, B = rows @ np.asarray(linear.A) @ states, rows @ np.asarray(linear.B) @ inputs
     names = {"states": list(own), "outputs": list(own), "inputs": list(part.inputs)}
     return control.ss(A, B, np.eye(len(rows)), np.zeros(B.shape), name=name, **names)

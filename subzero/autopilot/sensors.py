@@ -119,7 +119,7 @@ class Sensors:
 
     def read(self, seen: Observation) -> Observation:
         """Return what the sensors tell now; NaN for channels that have none. (Clocks are exact.)"""
-        told = {one.sensor.channel: one.read(seen) for one in self._running}
+        told = {sensor.sensor.channel: sensor.read(seen) for sensor in self._running}
         return UNKNOWN._replace(time=seen.time, **told)
 
 

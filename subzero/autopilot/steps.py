@@ -69,9 +69,13 @@ class Pilot:
     def made(self, trial: scenarios.Trial) -> Autopilot:
         """Return the autopilot for a trial, with a sample for each cable step."""
         return make(
-            self.autopilot, trial, feed_forward=self.feed_forward, sample_time=trial.cable_step, tuning=self.tuning,
+            self.autopilot,
+            trial,
+            feed_forward=self.feed_forward,
+            sample_time=trial.cable_step,
+            tuning=self.tuning,
             believed=self.believed,
-        )  # fmt: skip
+        )
 
 
 PID = Pilot()
@@ -115,9 +119,13 @@ def step(
         trim(Model.of(trial), speed=fast)  # refuses a speed that the bare hull does not reach
     begin = replace(trial, start=replace(trial.start, surge_speed=speed), duration=DURATION)
     run = fly(
-        begin, flown_by, lambda t: goal if t >= STEP_AT - 1e-9 else before,
-        tethered=tethered, sensors=pilot.sensors, progress=progress,
-    )  # fmt: skip
+        begin,
+        flown_by,
+        lambda t: goal if t >= STEP_AT - 1e-9 else before,
+        tethered=tethered,
+        sensors=pilot.sensors,
+        progress=progress,
+    )
     values = run[line.channel].values
     wanted = getattr(goal, line.field) / line.scale
     indices = step_response(run["time"].values, values, wanted, STEP_AT)

@@ -86,7 +86,7 @@ def tune(
         speeds=speeds,
         linear=tuple(lines),
         designs=designs,
-        gains={name: over_speed([one.numbers() for one in found]) for name, found in designs.items()},
+        gains={name: over_speed([each.numbers() for each in found]) for name, found in designs.items()},
         hull_drag=over_speed([np.array(_thrust(model, steady)) for steady in trims]),
         planes=over_speed([_mixed_planes(steady) for steady in trims]),
         rudder_for=over_speed(
@@ -113,9 +113,12 @@ def design_loop(linear: control.StateSpace, weights: Weights) -> Gains:
     part = reduced(subsystem(linear, weights.part), weights.measured)
     steady = -np.linalg.lstsq(np.asarray(part.B), np.asarray(part.A), rcond=None)[0][0, -1]
     return design_gains(
-        part, tracked=weights.measured[-1], largest=weights.largest, largest_command=weights.largest_command,
+        part,
+        tracked=weights.measured[-1],
+        largest=weights.largest,
+        largest_command=weights.largest_command,
         ahead=float(steady) if weights.foreseen else 0.0,
-    )  # fmt: skip
+    )
 
 
 def _thrust(model: Model, steady: Trim) -> float:

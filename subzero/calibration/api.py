@@ -88,13 +88,13 @@ def read(
     found = [record for record in records if isinstance(record, Logged)]
     paths = [record for record in records if not isinstance(record, Logged)]
     found += read_trials(paths, scenario=scenario, commands=commands) if paths else []
-    return found if vehicle is None else [_with_vehicle(one, vehicle) for one in found]
+    return found if vehicle is None else [_with_vehicle(trial, vehicle) for trial in found]
 
 
-def _with_vehicle(one: Logged, vehicle: str | Path) -> Logged:
-    trial, _ = with_vehicle(one.setting.trial, vehicle)
-    setting = dataclasses.replace(one.setting, trial=trial, model=Model.of(trial))
-    return dataclasses.replace(one, setting=setting)
+def _with_vehicle(found: Logged, vehicle: str | Path) -> Logged:
+    trial, _ = with_vehicle(found.setting.trial, vehicle)
+    setting = dataclasses.replace(found.setting, trial=trial, model=Model.of(trial))
+    return dataclasses.replace(found, setting=setting)
 
 
 def _check(logged: Sequence[Logged]) -> None:
@@ -102,14 +102,18 @@ def _check(logged: Sequence[Logged]) -> None:
     if not logged:
         raise UserError(NO_RECORD)
     first = logged[0]
-    for one in logged:
-        if one.setting.trial.commands is None:
-            raise UserError(f"The trial of '{one.name}' prescribes the motion: it moves alike with any numbers. "
-                            "Calibrate with trials that give commands.")  # fmt: skip
-    for one in logged[1:]:
-        if one.setting.model.vehicle != first.setting.model.vehicle:
-            raise UserError(f"'{first.name}' and '{one.name}' were flown with different vehicles. Calibrate records of "
-                            "one vehicle, or give it with --vehicle.")  # fmt: skip
+    for trial in logged:
+        if trial.setting.trial.commands is None:
+            raise UserError(
+                f"The trial of '{trial.name}' prescribes the motion: it moves alike with any numbers. "
+                "Calibrate with trials that give commands."
+            )
+    for each in logged[1:]:
+        if each.setting.model.vehicle != first.setting.model.vehicle:
+            raise UserError(
+                f"'{first.name}' and '{each.name}' were flown with different vehicles. Calibrate records of "
+                "one vehicle, or give it with --vehicle."
+            )
 
 
 @dataclasses.dataclass(frozen=True)
@@ -129,7 +133,7 @@ class _Work:
     ) -> Calibration:
         """Return the calibration of some records."""
         files = files_of(logged[0], names, vehicle)
-        ranges = {name: one for part in files.values() for name, one in part.ranges.items()}
+        ranges = {name: each for part in files.values() for name, each in part.ranges.items()}
         with self._part("fit", 0.0, 0.5) as progress:
             whole = pose(logged)
             numbers = numbers_of(whole, names, ranges)
@@ -146,7 +150,7 @@ class _Work:
             with self._part("advice", 0.8, 1.0) as progress:
                 advice = assessment.advice(numbers, work, progress)
         found = assessment.estimates(numbers, work)
-        sources, free = tuple(source_of(one) for one in logged), range(len(numbers))
+        sources, free = tuple(source_of(trial) for trial in logged), range(len(numbers))
         M = work.M[np.ix_(free, free)]
         made = Calibration(
             estimates=found,
@@ -200,12 +204,17 @@ class PartFile:
             return ""
         own = {vehicle_file.section_of(name)[1]: found[name] for name in self.names}
         error = f"{found.error('before'):.3g} noise levels before, {found.error():.3g} after ({found.how})"
-        said = vehicle_file.provenance(found.records, self.name, datetime.now(UTC).isoformat(timespec="seconds"),
-                                       version(DISTRIBUTION), error)  # fmt: skip
+        said = vehicle_file.provenance(
+            found.records,
+            self.name,
+            datetime.now(UTC).isoformat(timespec="seconds"),
+            version(DISTRIBUTION),
+            error,
+        )
         return vehicle_file.text_of(self.before, own, said)
 
 
-def files_of(one: Logged, names: Sequence[str], vehicle: str | Path | None) -> dict[str, PartFile]:
+def files_of(given: Logged, names: Sequence[str], vehicle: str | Path | None) -> dict[str, PartFile]:
     """Return the file of the vehicle, and that of the cable if numbers of it are free."""
     found = {}
     for kind in ("vehicle", "cable"):
@@ -213,7 +222,7 @@ def files_of(one: Logged, names: Sequence[str], vehicle: str | Path | None) -> d
         if not own and kind == "cable":
             continue
         try:
-            trial = one.setting.trial
+            trial = given.setting.trial
             named = kind == "vehicle" and vehicle is not None
             source = with_vehicle(trial, str(vehicle))[1] if named else part_file(trial, kind)
             above = "vehicle." if kind == "vehicle" else ""
@@ -226,30 +235,38 @@ def files_of(one: Logged, names: Sequence[str], vehicle: str | Path | None) -> d
     return found
 
 
-def source_of(one: Logged) -> Source:
+def source_of(trial: Logged) -> Source:
     """Return what a calibrated file says of a record: its bytes if it is a file, else its values."""
-    path = Path(one.record.source)
+    path = Path(trial.record.source)
     if path.is_file():
         digest = hashlib.sha256(path.read_bytes())
     else:
-        digest = hashlib.sha256(one.record.time.tobytes())
-        for name in sorted(one.record.values):
-            digest.update(name.encode() + np.ascontiguousarray(one.record.values[name]).tobytes())
-    time = one.record.time
-    return Source(name=one.name, file=path.name, sha256=digest.hexdigest(), trial=one.setting.trial.name,
-                  samples=int(time.size), duration=float(time[-1]))  # fmt: skip
+        digest = hashlib.sha256(trial.record.time.tobytes())
+        for name in sorted(trial.record.values):
+            digest.update(name.encode() + np.ascontiguousarray(trial.record.values[name]).tobytes())
+    time = trial.record.time
+    return Source(
+        name=trial.name,
+        file=path.name,
+        sha256=digest.hexdigest(),
+        trial=trial.setting.trial.name,
+        samples=int(time.size),
+        duration=float(time[-1]),
+    )
 
 
 def _notes(logged: Sequence[Logged], numbers: Sequence[Number], work: Fitted) -> Iterator[str]:
     """Give what else to know."""
-    for one in logged:
-        yield from one.notes
+    for trial in logged:
+        yield from trial.notes
     if len(logged) == 1:
         yield "One record alone: what it says of another manoeuvre is not known. Fly a second one."
     if not work.settled:
         yield "The fit did not settle: a further step would still gain. Its intervals are too narrow."
-    for one in logged:
-        own = [number.name for number in numbers if number.name in changes_of(one.setting.trial)]
+    for each in logged:
+        own = [number.name for number in numbers if number.name in changes_of(each.setting.trial)]
         if own:
-            yield (f"The trial {one.setting.trial.name} changes {', '.join(own)} itself, and will go on to: remove "
-                   "that from its [changes] to fly the calibrated vehicle.")  # fmt: skip
+            yield (
+                f"The trial {each.setting.trial.name} changes {', '.join(own)} itself, and will go on to: remove "
+                "that from its [changes] to fly the calibrated vehicle."
+            )

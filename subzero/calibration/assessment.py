@@ -43,12 +43,21 @@ def estimates(numbers: Sequence[Number], work: Fitted) -> tuple[Estimate, ...]:
     for k, number in enumerate(numbers):
         z, sd = float(work.fit.z[k]), float(np.sqrt(work.M[k, k]))
         ends = np.clip([z - SIGMAS_95 * sd, z + SIGMAS_95 * sd], number.low, number.high)
-        found.append(Estimate(name=number.name, unit=number.unit, before=number.nominal,
-                              value=number.nominal + z, sd=sd,
-                              low=float(number.nominal + ends[0]), high=float(number.nominal + ends[1]),
-                              prior_sd=number.prior_sd, tolerance=float(np.hypot(number.tolerance, sd)),
-                              is_determined=sd < UNDETERMINED_ABOVE * number.prior_sd,
-                              is_at_bound=min(z - number.low, number.high - z) < AT_BOUND))  # fmt: skip
+        found.append(
+            Estimate(
+                name=number.name,
+                unit=number.unit,
+                before=number.nominal,
+                value=number.nominal + z,
+                sd=sd,
+                low=float(number.nominal + ends[0]),
+                high=float(number.nominal + ends[1]),
+                prior_sd=number.prior_sd,
+                tolerance=float(np.hypot(number.tolerance, sd)),
+                is_determined=sd < UNDETERMINED_ABOVE * number.prior_sd,
+                is_at_bound=min(z - number.low, number.high - z) < AT_BOUND,
+            )
+        )
     return tuple(found)
 
 
@@ -65,8 +74,11 @@ def directions(numbers: Sequence[Number], M: np.ndarray) -> tuple[Direction, ...
     shares = prior[:, None] * (np.linalg.inv(M) - np.diag(prior**-2)) * prior
     values, vectors = np.linalg.eigh(0.5 * (shares + shares.T))
     left = 1.0 / np.sqrt(1.0 + np.maximum(values, 0.0))
-    return tuple(_direction(numbers, vector, share) for vector, share in zip(vectors.T, left.tolist(), strict=True)
-                 if share > UNDETERMINED_ABOVE)  # fmt: skip
+    return tuple(
+        _direction(numbers, vector, share)
+        for vector, share in zip(vectors.T, left.tolist(), strict=True)
+        if share > UNDETERMINED_ABOVE
+    )
 
 
 def _direction(numbers: Sequence[Number], vector: np.ndarray, left: float) -> Direction:
@@ -174,12 +186,12 @@ def _errors(
 ) -> dict[str, Held]:
     """Return channel → errors of whitened residuals (m,) in a record, in levels of its noise."""
     rows = rows_of(problem)
-    raw = [judged.raw(problem, one) for one in (before, after, fitted)]
+    raw = [judged.raw(problem, each) for each in (before, after, fitted)]
     found = {}
     for name, noise in problem.records[record].noise.items():
         own = (rows.record == record) & (rows.channel == name)
         b, a, f = (
-            float(np.sqrt(np.mean(one[own] ** 2))) / noise.sd if own.any() else math.nan for one in raw
+            float(np.sqrt(np.mean(each[own] ** 2))) / noise.sd if own.any() else math.nan for each in raw
         )
         found[name] = Held(before=b, after=a, fitted=f, noise=noise.sd, samples=int(own.sum()))
     return found
@@ -211,10 +223,10 @@ def refused(numbers: Sequence[Number], work: Fitted) -> tuple[str, ...]:
                 found.append(
                     f"The best fit leaves the {words} wandering by {noise.slow / level:.1f} times the usual noise."
                 )
-    for k, (one, z) in enumerate(zip(numbers, work.fit.z, strict=False)):
-        is_determined = np.sqrt(work.M[k, k]) < UNDETERMINED_ABOVE * one.prior_sd
-        if is_determined and min(z - one.low, one.high - z) < AT_BOUND:
-            found.append(f"{one.name} stands at its bound: it makes up for something else.")
+    for k, (number, z) in enumerate(zip(numbers, work.fit.z, strict=False)):
+        is_determined = np.sqrt(work.M[k, k]) < UNDETERMINED_ABOVE * number.prior_sd
+        if is_determined and min(z - number.low, number.high - z) < AT_BOUND:
+            found.append(f"{number.name} stands at its bound: it makes up for something else.")
     if not work.repeated:
         found.append("Every start ended in another minimum: which of them is the vehicle is not known.")
     if not work.settled:
@@ -266,9 +278,16 @@ def advice(numbers: Sequence[Number], work: Fitted, progress: Progress) -> tuple
         information = 0.5 * float(np.linalg.slogdet(old)[1] - np.linalg.slogdet(new)[1])
         shrinks = np.sqrt(np.diag(old) / np.diag(new))
         sharper = {numbers[i].name: float(shrinks[i]) for i in np.argsort(-shrinks)}
-        found.append(Advice(name=name, sentence=sentence, information=information, sharper=sharper,
-                            commands=trial_rows(coming.records[0].setting)))  # fmt: skip
-    return tuple(sorted(found, key=lambda one: -one.information))
+        found.append(
+            Advice(
+                name=name,
+                sentence=sentence,
+                information=information,
+                sharper=sharper,
+                commands=trial_rows(coming.records[0].setting),
+            )
+        )
+    return tuple(sorted(found, key=lambda each: -each.information))
 
 
 def _information(coming: Problem, z: np.ndarray) -> np.ndarray:
@@ -280,7 +299,7 @@ def _information(coming: Problem, z: np.ndarray) -> np.ndarray:
 
 def _with_new_start(M: np.ndarray) -> np.ndarray:
     """Return the covariance of what trials share and of the start of a new one."""
-    start = [one.tolerance**2 for effect in START for one in effect.parameters]
+    start = [parameter.tolerance**2 for effect in START for parameter in effect.parameters]
     whole = np.zeros((M.shape[0] + len(start),) * 2)
     whole[: M.shape[0], : M.shape[0]] = M
     whole[range(M.shape[0], whole.shape[0]), range(M.shape[0], whole.shape[0])] = start
@@ -292,10 +311,12 @@ def nuisances(work: Fitted, count: int) -> dict[str, tuple[float, float]]:
     tolerance = np.sqrt(work.fit.D)
     names = [entry.name for entry in work.problem.entries]
     sd = np.sqrt(np.diag(work.M))
-    return {names[k]: (float(work.fit.z[k] / tolerance[k]), float(sd[k] / tolerance[k]))
-            for k in range(count, len(names))}  # fmt: skip
+    return {
+        names[k]: (float(work.fit.z[k] / tolerance[k]), float(sd[k] / tolerance[k]))
+        for k in range(count, len(names))
+    }
 
 
 def at_nominal(problem: Problem) -> Problem:
     """Return the problem without what was added to its simulations."""
-    return replace(problem, records=tuple(replace(one, correction={}) for one in problem.records))
+    return replace(problem, records=tuple(replace(record, correction={}) for record in problem.records))

@@ -180,13 +180,13 @@ def _first(
     for i, (z, shares) in enumerate(_starts(problem, free, D.size)):
         progress(0.5 * i / (len(HORIZONS) + MORE_STARTS), f"first fit, from start {i + 1}")
         ends.append(_fit_from(problem, z, D, shares))
-        best = min(ends, key=lambda one: one.objective)
-        same = [one for one in ends if one.objective < best.objective + SAME_MINIMUM]
+        best = min(ends, key=lambda end: end.objective)
+        same = [end for end in ends if end.objective < best.objective + SAME_MINIMUM]
         if len(same) > 1:
             break
     sd = np.sqrt(np.diag(posterior(best.quadratic, D).M))
     apart = [
-        np.abs(one.z - best.z) / sd / np.sqrt(1.0 + 2.0 * (one.objective - best.objective)) for one in same
+        np.abs(each.z - best.z) / sd / np.sqrt(1.0 + 2.0 * (each.objective - best.objective)) for each in same
     ]
     return best.z, np.maximum(np.max(apart, axis=0), 1.0), len(same) > 1
 
@@ -262,13 +262,13 @@ def beginnings(problem: Problem, share: float) -> Problem:
     if share >= 1.0:
         return problem
     records = []
-    for one in problem.records:
-        end = share * float(one.time[-1])
+    for record in problem.records:
+        end = share * float(record.time[-1])
         noise = {}
-        for name, old in one.noise.items():
-            used = old.used & (one.time <= end)
-            noise[name] = replace(old, used=used, time=one.time[used])
-        records.append(replace(one, noise=noise, setting=economical(one.setting, end)))
+        for name, old in record.noise.items():
+            used = old.used & (record.time <= end)
+            noise[name] = replace(old, used=used, time=record.time[used])
+        records.append(replace(record, noise=noise, setting=economical(record.setting, end)))
     return replace(problem, records=tuple(records))
 
 
@@ -307,8 +307,17 @@ def _settled(problem: Problem, z: np.ndarray, D: np.ndarray, *, is_first: bool =
             damping, harder = max(damping, FIRST_DAMPING) * harder, 2.0 * harder
         if share < FRESH_SHARE and not fresh:
             J, made_at = slopes(z), z
-    return Fit(z=z, r=r, J=J, D=D, objective=now, converged=left < SETTLED_GAIN, predicted_gain=left, fresh=0,
-               made_at=made_at)  # fmt: skip
+    return Fit(
+        z=z,
+        r=r,
+        J=J,
+        D=D,
+        objective=now,
+        converged=left < SETTLED_GAIN,
+        predicted_gain=left,
+        fresh=0,
+        made_at=made_at,
+    )
 
 
 def _apart(problem: Problem, z: np.ndarray, other: np.ndarray) -> float:
@@ -321,15 +330,15 @@ def with_more_noise(problem: Problem, factor: float) -> Problem:
     """Return the problem with noise that is a factor larger in every channel."""
     records = tuple(
         replace(
-            one,
+            record,
             noise={
                 name: replace(
                     old, white=factor * old.white, slow=factor * old.slow, resolution=factor * old.resolution
                 )
-                for name, old in one.noise.items()
+                for name, old in record.noise.items()
             },
         )
-        for one in problem.records
+        for record in problem.records
     )
     return replace(problem, records=records)
 
@@ -363,5 +372,5 @@ def block_scores(problem: Problem, fit: Fit) -> np.ndarray:
                 )
                 block = ((noise.time - noise.time[0]) // length).astype(int)
                 score = fit.J[own] * fit.r[own][:, None]
-                found.append(np.stack([score[block == one].sum(axis=0) for one in np.unique(block)]))
+                found.append(np.stack([score[block == each].sum(axis=0) for each in np.unique(block)]))
     return np.concatenate(found)

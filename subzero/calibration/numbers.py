@@ -76,10 +76,21 @@ class Number:
 
     def effect(self) -> Effect:
         """Return the deviation of the number as an effect."""
-        parameter = Parameter(name="deviation", unit=self.unit, tolerance=self.step, scale=self.prior_sd,
-                              low=self.low, high=self.high)  # fmt: skip
-        return Effect(id=self.name, sentence=f"{self.name} is another", slot="hull", parameters=(parameter,),
-                      apply=partial(with_deviation, self.name))  # fmt: skip
+        parameter = Parameter(
+            name="deviation",
+            unit=self.unit,
+            tolerance=self.step,
+            scale=self.prior_sd,
+            low=self.low,
+            high=self.high,
+        )
+        return Effect(
+            id=self.name,
+            sentence=f"{self.name} is another",
+            slot="hull",
+            parameters=(parameter,),
+            apply=partial(with_deviation, self.name),
+        )
 
 
 def with_deviation(name: str, setting: Setting, deviation: float) -> Setting:
@@ -98,13 +109,15 @@ def full_name(name: str) -> str:
         UserError: there is no such number.
     """
     known = changeable()
-    for one in (name, f"vehicle.{name}"):
-        if one in known:
-            return one
-    last = [one for one in known if one.rpartition(".")[2] == name.rpartition(".")[2]]
+    for number in (name, f"vehicle.{name}"):
+        if number in known:
+            return number
+    last = [each for each in known if each.rpartition(".")[2] == name.rpartition(".")[2]]
     hint = f" Did you mean '{last[0]}'?" if last else suggestion(name, known)
-    raise UserError(f"Nothing is called '{name}' in a vehicle or a cable, so it cannot be free.{hint} Write "
-                    "section.key as in its file, such as axial_drag.drag_coefficient, or cable.key.")  # fmt: skip
+    raise UserError(
+        f"Nothing is called '{name}' in a vehicle or a cable, so it cannot be free.{hint} Write "
+        "section.key as in its file, such as axial_drag.drag_coefficient, or cable.key."
+    )
 
 
 def numbers_of(
@@ -128,15 +141,24 @@ def _number(problem: Problem, name: str, declared: tuple[float, float] | None) -
     low, high = declared if declared is not None else (nominal, nominal)
     width = high - low
     if nominal == 0.0 and not width > 0.0:
-        raise UserError(f"'{name}' is 0 and its file gives no range, so nothing says how far it may be off. Add "
-                        "range = [least, greatest] to it, or leave it out of the free ones.")  # fmt: skip
+        raise UserError(
+            f"'{name}' is 0 and its file gives no range, so nothing says how far it may be off. Add "
+            "range = [least, greatest] to it, or leave it out of the free ones."
+        )
     step = STEP_SHARE * (abs(nominal) or width)
     at_least, at_most = _bounds(nominal, low, high)
     limits = leaf.get("limits", (-math.inf, math.inf))
     prior = max(width, LEAST_PRIOR_SHARE * abs(nominal))
-    return Number(name=name, unit=str(leaf["unit"]), nominal=nominal, prior_sd=prior, step=step,
-                  tolerance=_tolerance(problem, name) or step,
-                  low=max(at_least, limits[0] - nominal), high=min(at_most, limits[1] - nominal))  # fmt: skip
+    return Number(
+        name=name,
+        unit=str(leaf["unit"]),
+        nominal=nominal,
+        prior_sd=prior,
+        step=step,
+        tolerance=_tolerance(problem, name) or step,
+        low=max(at_least, limits[0] - nominal),
+        high=min(at_most, limits[1] - nominal),
+    )
 
 
 def _tolerance(problem: Problem, name: str) -> float:
@@ -145,8 +167,10 @@ def _tolerance(problem: Problem, name: str) -> float:
     if name in setting.trial.tolerances:
         return float(setting.trial.tolerances[name])
     effects = dict.fromkeys(entry.effect for entry in problem.entries if entry.record < 0)
-    return max((abs(number_of(name, _moved(effect, setting)) - number_of(name, setting)) for effect in effects),
-               default=0.0)  # fmt: skip
+    return max(
+        (abs(number_of(name, _moved(effect, setting)) - number_of(name, setting)) for effect in effects),
+        default=0.0,
+    )
 
 
 def _moved(effect: Effect, setting: Setting) -> Setting:
@@ -170,7 +194,9 @@ def with_free_numbers(problem: Problem, numbers: Sequence[Number]) -> tuple[Prob
     """
     setting = problem.records[0].setting
     effects = list(dict.fromkeys(entry.effect for entry in problem.entries if entry.record < 0))
-    nuisances = [one for one in effects if not _touches(one, setting, [number.name for number in numbers])]
+    nuisances = [
+        effect for effect in effects if not _touches(effect, setting, [number.name for number in numbers])
+    ]
     free = [number.effect() for number in numbers]
     entries = entries_of((*free, *nuisances), START, len(problem.records))
     made = Problem(records=problem.records, entries=entries, pool=problem.pool)
@@ -185,5 +211,7 @@ def prior_variances(entries: Sequence[Entry], numbers: Sequence[Number]) -> np.n
 
 def _touches(effect: Effect, setting: Setting, names: Sequence[str]) -> bool:
     """Say whether an effect moves one of some numbers."""
-    before, after = ([number_of(name, one) for name in names] for one in (setting, _moved(effect, setting)))
+    before, after = (
+        [number_of(name, number) for name in names] for number in (setting, _moved(effect, setting))
+    )
     return any(abs(b - a) > MOVED * max(abs(a), abs(b)) for a, b in zip(before, after, strict=True))

@@ -178,15 +178,17 @@ class Calibration:
         Raises:
             KeyError: it was not free.
         """
-        return {key: one for one in self.estimates for key in (one.name, one.name.removeprefix("vehicle."))}[
-            name
-        ]
+        return {
+            key: estimate
+            for estimate in self.estimates
+            for key in (estimate.name, estimate.name.removeprefix("vehicle."))
+        }[name]
 
     def error(self, when: str = "after") -> float:
         """Return the root mean square over all records and channels of errors `before`, `after` or `fitted`. [noise]"""
-        rows = [one for channels in self.held_out.values() for one in channels.values()]
-        squares = [one.samples * getattr(one, when) ** 2 for one in rows]
-        return float(np.sqrt(sum(squares) / max(sum(one.samples for one in rows), 1)))
+        rows = [channel for channels in self.held_out.values() for channel in channels.values()]
+        squares = [row.samples * getattr(row, when) ** 2 for row in rows]
+        return float(np.sqrt(sum(squares) / max(sum(row.samples for row in rows), 1)))
 
     @property
     def verdict(self) -> str:

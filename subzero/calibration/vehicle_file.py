@@ -55,18 +55,23 @@ def text_of(before: str, estimates: Mapping[str, Estimate], provenance: Mapping[
     return text
 
 
-def _number_line(line: str, one: Estimate) -> str:
+def _number_line(line: str, estimate: Estimate) -> str:
     """Return the line of a number with what was estimated in it."""
     leaf = next(iter(tomllib.loads(line).values()))
     key = line.partition("=")[0].rstrip()
-    said = leaf if isinstance(leaf, Mapping) else {"unit": one.unit}
+    said = leaf if isinstance(leaf, Mapping) else {"unit": estimate.unit}
     kept = {
         name: value for name, value in said.items() if name not in ("value", "range", "tolerance", "source")
     }
-    was = f"calibrated from records, see [{PROVENANCE}]; was {one.before:g}"
-    was += "" if one.is_determined else "; they hardly determine it"
-    new = {"value": _rounded(one.value), **kept, "range": [_rounded(one.low), _rounded(one.high)],
-           "tolerance": _rounded(one.tolerance), "source": f"{was} ({said.get('source', 'no source')})"}  # fmt: skip
+    was = f"calibrated from records, see [{PROVENANCE}]; was {estimate.before:g}"
+    was += "" if estimate.is_determined else "; they hardly determine it"
+    new = {
+        "value": _rounded(estimate.value),
+        **kept,
+        "range": [_rounded(estimate.low), _rounded(estimate.high)],
+        "tolerance": _rounded(estimate.tolerance),
+        "source": f"{was} ({said.get('source', 'no source')})",
+    }
     return f"{key} = {{ {', '.join(f'{name} = {_toml(value)}' for name, value in new.items())} }}"
 
 
@@ -92,10 +97,16 @@ def _rounded(value: float) -> float:
 def _check(text: str, estimates: Mapping[str, Estimate]) -> None:
     """Refuse a text that does not hold what it should: the file was not written one number a line."""
     held = dict(leaves(tomllib.loads(text)))
-    wrong = [key for key, one in estimates.items() if held.get(key, {}).get("value") != _rounded(one.value)]
+    wrong = [
+        key
+        for key, estimate in estimates.items()
+        if held.get(key, {}).get("value") != _rounded(estimate.value)
+    ]
     if wrong:
-        raise UserError(f"The file of the vehicle has no line of its own for {', '.join(wrong)}, so the calibrated one "
-                        'cannot be written. Write each as key = { value = ..., unit = "..." } on a line.')  # fmt: skip
+        raise UserError(
+            f"The file of the vehicle has no line of its own for {', '.join(wrong)}, so the calibrated one "
+            'cannot be written. Write each as key = { value = ..., unit = "..." } on a line.'
+        )
 
 
 def provenance(records: Sequence[Source], base: str, when: str, version: str, held: str) -> dict[str, Any]:
@@ -113,7 +124,8 @@ def provenance(records: Sequence[Source], base: str, when: str, version: str, he
         "when": when,
         "from_file": base,
         "records": [
-            f"{one.file} (trial {one.trial}, {one.duration:g} s, sha256 {one.sha256})" for one in records
+            f"{record.file} (trial {record.trial}, {record.duration:g} s, sha256 {record.sha256})"
+            for record in records
         ],
         "held_out": held,
     }

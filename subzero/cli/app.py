@@ -131,7 +131,7 @@ class Kept:
             return replace(trial, every=self.every)
         except scenarios.ScenarioError as error:  # the user wrote an option, not a field of a trial
             raise scenarios.ScenarioError(
-                replace(one, file="--every", key="") for one in error.problems
+                replace(problem, file="--every", key="") for problem in error.problems
             ) from error
 
     def folder(self, trial: scenarios.Trial) -> Path:
@@ -363,7 +363,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     _note_command(sys.argv[1:] if arguments is None else arguments)
     try:
         command, bound, _ = app.parse_args(arguments, exit_on_error=False, print_error=False)
-        voice = next((one for one in bound.kwargs.values() if isinstance(one, Voice)), PLAIN)
+        voice = next((kwarg for kwarg in bound.kwargs.values() if isinstance(kwarg, Voice)), PLAIN)
         with _aloud(voice):
             return command(*bound.args, **bound.kwargs) or FINE
     except cyclopts.CycloptsError as error:
@@ -409,8 +409,11 @@ def _effort() -> str:
 
 def _note_command(words: Sequence[str]) -> None:
     """Keep the line that is carried out, for the pages that tell how to do it again; where it writes to is no part."""
-    kept = [word for before, word in zip(["", *words], words, strict=False)
-            if "--out" not in (before, word) and not word.startswith("--out=")]  # fmt: skip
+    kept = [
+        word
+        for before, word in zip(["", *words], words, strict=False)
+        if "--out" not in (before, word) and not word.startswith("--out=")
+    ]
     COMMAND.set(printable(shlex.join(["subzero", *kept])))
 
 
@@ -441,7 +444,7 @@ def _in_words(error: cyclopts.CycloptsError) -> str:
 def _unknown_option(error: cyclopts.UnknownOptionError) -> str:
     """Say which option is most like one that is unknown, by their letters: all options have the dashes in common."""
     word = (error.token.keyword or error.token.value).split("=")[0]
-    options = {one.lstrip("-"): one for argument in error.argument_collection for one in argument.names}
+    options = {name.lstrip("-"): name for argument in error.argument_collection for name in argument.names}
     close = nearest(word.lstrip("-"), options, likeness=OPTION_LIKENESS)
     return f"Unknown option: {word}.{f' Did you mean {options[close[0]]}?' if close else ''}"
 

@@ -136,9 +136,14 @@ def fly_step(
 
     def fly(label: str, progress: Progress) -> tuple[xr.Dataset, dict[str, float]]:
         return run(
-            name, scenario, pilot=pilot.of(label), size=size, speed=speed, tethered=label == "tethered",
+            name,
+            scenario,
+            pilot=pilot.of(label),
+            size=size,
+            speed=speed,
+            tethered=label == "tethered",
             progress=progress,
-        )  # fmt: skip
+        )
 
     cable = "not fed forward" if pilot.feed_forward == "none" else f"fed forward by {pilot.feed_forward}"
     title = f"{name.replace('_', ' ').capitalize()}: autopilot {pilot.autopilot}, the cable {cable}"

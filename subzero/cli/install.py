@@ -74,11 +74,11 @@ def doctor(*, voice: Voice = PLAIN) -> int:
         "versions": installed,
         "extras_missing": extras,
         "machine_code": _machine_code(),
-        "checks": [one._asdict() | {"fine": one.is_fine} for one in checks],
+        "checks": [check._asdict() | {"fine": check.is_fine} for check in checks],
     }
     with voice.tells(about):
         _tell(about, checks)
-    return FINE if all(one.is_fine for one in checks) else STOPPED
+    return FINE if all(check.is_fine for check in checks) else STOPPED
 
 
 def warm(*, voice: Voice = PLAIN) -> int:
@@ -249,12 +249,17 @@ def _tell(about: dict[str, Any], checks: list[Check]) -> None:
             (f"extra [{name}]", f"not installed: {', '.join(lacks)}")
             for name, lacks in about["extras_missing"].items()
         ),
-        *((one.name, f"error {one.error:.1e}, allowed {one.allowed:.0e}: {_word(one)}") for one in checks),
+        *(
+            (check.name, f"error {check.error:.1e}, allowed {check.allowed:.0e}: {_word(check)}")
+            for check in checks
+        ),
     ]
     for name, words in rows:
         table.add_row(escape(name), escape(words))
     Console(highlight=False).print(table)
 
 
-def _word(one: Check) -> str:
-    return "fine" if one.is_fine else "OFF. Do not trust results of this machine; report it with this output."
+def _word(check: Check) -> str:
+    return (
+        "fine" if check.is_fine else "OFF. Do not trust results of this machine; report it with this output."
+    )

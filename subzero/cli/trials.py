@@ -148,12 +148,16 @@ def _check_vehicle(found: Contents) -> None:
     from scenarios.parts import nested
     from vehicle import from_mapping
 
-    numbers = nested({one.name.removeprefix("vehicle."): one.values[0] for one in found.numbers})
+    numbers = nested({number.name.removeprefix("vehicle."): number.values[0] for number in found.numbers})
     from_mapping(numbers)
 
 
 def _outside(found: Contents) -> int:
-    return sum(not one.low <= one.values[0] <= one.high for one in found.numbers if not math.isnan(one.low))
+    return sum(
+        not number.low <= number.values[0] <= number.high
+        for number in found.numbers
+        if not math.isnan(number.low)
+    )
 
 
 def _record(path: Path) -> tuple[str, str]:
@@ -206,36 +210,40 @@ def _plain(text: str) -> str:
 
 def _lines(found: Contents, width: int) -> Iterator[str]:
     """Return all numbers as lines of a width: name, value and range; below, where the value comes from."""
-    names = [one.name.rpartition(".") for one in found.numbers]
-    values = [_value(one) for one in found.numbers]
+    names = [each.name.rpartition(".") for each in found.numbers]
+    values = [_value(each) for each in found.numbers]
     long, wide = max(len(key) for _, _, key in names), max(map(len, values))
     above = ""
-    for one, (section, _, key), value in zip(found.numbers, names, values, strict=True):
+    for number, (section, _, key), value in zip(found.numbers, names, values, strict=True):
         if section != above:
             yield f"[{section}]"
             above = section
-        yield f"  {key:<{long}}  {value:>{wide}}  {_span(one)}".rstrip()
+        yield f"  {key:<{long}}  {value:>{wide}}  {_span(number)}".rstrip()
         indent = " " * 6
-        yield from textwrap.wrap(one.source, max(width, 40), initial_indent=indent, subsequent_indent=indent)
+        yield from textwrap.wrap(
+            number.source, max(width, 40), initial_indent=indent, subsequent_indent=indent
+        )
 
 
 MOST_VALUES = 3
 """So many values of a list are shown."""
 
 
-def _value(one: Number) -> str:
-    shown = [f"{value:.6g}" for value in one.values[:MOST_VALUES]]
-    unit = "" if one.unit == "1" else f" {one.unit}"
-    return ", ".join(shown) + (", …" if len(one.values) > MOST_VALUES else "") + unit
+def _value(number: Number) -> str:
+    shown = [f"{value:.6g}" for value in number.values[:MOST_VALUES]]
+    unit = "" if number.unit == "1" else f" {number.unit}"
+    return ", ".join(shown) + (", …" if len(number.values) > MOST_VALUES else "") + unit
 
 
-def _span(one: Number) -> str:
-    return "" if math.isnan(one.low) else f"{one.low:g} … {one.high:g}"
+def _span(number: Number) -> str:
+    return "" if math.isnan(number.low) else f"{number.low:g} … {number.high:g}"
 
 
 def _as_json(found: Contents) -> dict[str, Any]:
     """Return the contents, ready for JSON."""
     whole = asdict(found)
-    for one in whole["numbers"]:
-        one["low"], one["high"] = (None if math.isnan(x) else x for x in (one["low"], one["high"]))
+    for number in whole["numbers"]:
+        number["low"], number["high"] = (
+            None if math.isnan(x) else x for x in (number["low"], number["high"])
+        )
     return whole

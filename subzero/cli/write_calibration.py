@@ -34,8 +34,10 @@ def files_of(out: Path) -> tuple[str, ...]:
         UserError: the name of the vehicle's file does not end in .toml.
     """
     if out.suffix != ".toml":
-        raise UserError(f"'{printable(str(out))}' is no name for a vehicle's file. Give --out one that ends in .toml, "
-                        "such as my_vehicle.toml.")  # fmt: skip
+        raise UserError(
+            f"'{printable(str(out))}' is no name for a vehicle's file. Give --out one that ends in .toml, "
+            "such as my_vehicle.toml."
+        )
     return tuple(f"{out.stem}{ending}" for ending in ENDINGS)
 
 
@@ -50,8 +52,10 @@ def write_all(found: Calibration, output_folder: OutputFolder, stem: str) -> Non
         if content:
             (output_folder.path / f"{stem}{ending}").write_text(content, encoding="utf-8")
     (output_folder.path / f"{stem}.json").write_text(text(found), encoding="utf-8")
-    trials = ", ".join(dict.fromkeys(one.trial for one in found.records))
-    title = Title(words=f"Calibration of {', '.join(one.name for one in found.records)}", scenario=trials)
+    trials = ", ".join(dict.fromkeys(record.trial for record in found.records))
+    title = Title(
+        words=f"Calibration of {', '.join(record.name for record in found.records)}", scenario=trials
+    )
     figures = draw_calibration(found, title)
     write_figures({f"{stem}_{name}": figure for name, figure in figures.items()}, output_folder)
 
@@ -90,14 +94,26 @@ WORTH_FLYING = 1.2
 
 def rows(found: Calibration) -> list[tuple[str, str, str, str, str]]:
     """Return a row for every number: name, before, after, the interval of 95 %, and what to know of it."""
-    return [(_short(one.name), f"{one.before:.4g}", f"{one.value:.4g}", f"{one.low:.4g} to {one.high:.4g}", _mark(one))
-            for one in found.estimates]  # fmt: skip
+    return [
+        (
+            _short(estimate.name),
+            f"{estimate.before:.4g}",
+            f"{estimate.value:.4g}",
+            f"{estimate.low:.4g} to {estimate.high:.4g}",
+            _mark(estimate),
+        )
+        for estimate in found.estimates
+    ]
 
 
-def _mark(one: Estimate) -> str:
+def _mark(estimate: Estimate) -> str:
     """Return by how much a number has changed, and whether the records say so."""
-    change = f"{100.0 * one.change:+.1f} %" if one.before else ""
-    words = [change, "" if one.is_determined else "not determined", "at its bound" if one.is_at_bound else ""]
+    change = f"{100.0 * estimate.change:+.1f} %" if estimate.before else ""
+    words = [
+        change,
+        "" if estimate.is_determined else "not determined",
+        "at its bound" if estimate.is_at_bound else "",
+    ]
     return ", ".join(filter(None, words))
 
 
@@ -105,9 +121,11 @@ def headline(found: Calibration) -> str:
     """Return what was gained, in one sentence; or that nothing was."""
     if found.refused:
         return "Nothing comes near these records: the numbers above are no calibration, and no vehicle is written."
-    count, moved = len(found.estimates), sum(one.is_determined for one in found.estimates)
-    return (f"{moved} of {count} numbers are determined; on {found.how}, not fitted, the error goes from "
-            f"{found.error('before'):.3g} to {found.error():.3g} noise levels.")  # fmt: skip
+    count, moved = len(found.estimates), sum(estimate.is_determined for estimate in found.estimates)
+    return (
+        f"{moved} of {count} numbers are determined; on {found.how}, not fitted, the error goes from "
+        f"{found.error('before'):.3g} to {found.error():.3g} noise levels."
+    )
 
 
 def story(found: Calibration) -> Iterator[str]:
@@ -115,8 +133,8 @@ def story(found: Calibration) -> Iterator[str]:
     if found.refused:
         yield from (*found.refused[:MOST_TOLD], REMEDY, *found.notes)
         return
-    for one in found.directions[:MOST_TOLD]:
-        yield f"Not determined by these records: {one.sentence}."
+    for direction in found.directions[:MOST_TOLD]:
+        yield f"Not determined by these records: {direction.sentence}."
     for a, b, rho in correlations(found)[:MOST_TOLD]:
         yield f"Hardly told apart: {_short(a)} and {_short(b)} (correlation {rho:+.2f})."
     if found.advice and max(found.advice[0].sharper.values()) >= WORTH_FLYING:
@@ -127,18 +145,20 @@ def story(found: Calibration) -> Iterator[str]:
     yield from found.notes
 
 
-def advised(one: Advice) -> str:
+def advised(advice: Advice) -> str:
     """Return a trial to fly, and what it would make sharper."""
-    sharper = [(name, factor) for name, factor in one.sharper.items() if factor >= WORTH_FLYING][:MOST_TOLD]
+    sharper = [(name, factor) for name, factor in advice.sharper.items() if factor >= WORTH_FLYING][
+        :MOST_TOLD
+    ]
     words = ", ".join(f"{_short(name)} {factor:.1f} times" for name, factor in sharper)
-    return f"{one.sentence} It would narrow the interval of {words}."
+    return f"{advice.sentence} It would narrow the interval of {words}."
 
 
 def correlations(found: Calibration, least: float = STRONG) -> list[tuple[str, str, float]]:
     """Return pairs of numbers with a correlation of at least this size, the strongest first."""
-    names, C = [one.name for one in found.estimates], found.correlation
+    names, C = [estimate.name for estimate in found.estimates], found.correlation
     pairs = [(names[i], names[j], float(C[i, j])) for i in range(len(names)) for j in range(i)]
-    return sorted((one for one in pairs if abs(one[2]) >= least), key=lambda one: -abs(one[2]))
+    return sorted((pair for pair in pairs if abs(pair[2]) >= least), key=lambda pair: -abs(pair[2]))
 
 
 def _short(name: str) -> str:
@@ -158,32 +178,45 @@ def mapping(found: Calibration) -> dict[str, Any]:
         "sentence": headline(found),
         "refused": list(found.refused),
         "converged": found.converged,
-        "numbers": {one.name: {**asdict(one), "change": one.change} for one in found.estimates},
-        "correlation": {"names": [one.name for one in found.estimates], "matrix": found.correlation},
-        "not_determined": [asdict(one) for one in found.directions],
-        "profiles": {name: {"values": one.values, "rise": one.rise, "low": one.low, "high": one.high}
-                     for name, one in found.profiles.items()},
-        "held_out": {"how": found.how, "before": found.error("before"), "after": found.error(),
-                     "fitted": found.error("fitted"),
-                     "records": {name: {key: asdict(one) for key, one in channels.items()}
-                                 for name, channels in found.held_out.items()}},
-        "advice": [asdict(one) for one in found.advice],
+        "numbers": {
+            estimate.name: {**asdict(estimate), "change": estimate.change} for estimate in found.estimates
+        },
+        "correlation": {
+            "names": [estimate.name for estimate in found.estimates],
+            "matrix": found.correlation,
+        },
+        "not_determined": [asdict(direction) for direction in found.directions],
+        "profiles": {
+            name: {"values": profile.values, "rise": profile.rise, "low": profile.low, "high": profile.high}
+            for name, profile in found.profiles.items()
+        },
+        "held_out": {
+            "how": found.how,
+            "before": found.error("before"),
+            "after": found.error(),
+            "fitted": found.error("fitted"),
+            "records": {
+                name: {key: asdict(channel) for key, channel in channels.items()}
+                for name, channels in found.held_out.items()
+            },
+        },
+        "advice": [asdict(each) for each in found.advice],
         "nuisances": {name: {"mean": mean, "sd": sd} for name, (mean, sd) in found.nuisances.items()},
         "strange": list(found.strange),
-        "records": [asdict(one) for one in found.records],
+        "records": [asdict(record) for record in found.records],
         "notes": list(found.notes),
         "seconds": dict(found.seconds),
-    }  # fmt: skip
+    }
 
 
 def plain(value: Any) -> Any:
     """Return a value as JSON takes it: arrays as lists, numbers that do not exist as null."""
     if isinstance(value, Mapping):
-        return {key: plain(one) for key, one in value.items()}
+        return {key: plain(each) for key, each in value.items()}
     if isinstance(value, np.ndarray):
         return plain(value.tolist())
     if isinstance(value, Sequence) and not isinstance(value, str):
-        return [plain(one) for one in value]
+        return [plain(each) for each in value]
     if isinstance(value, np.generic):
         return plain(value.item())
     return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -142,8 +142,8 @@ def _rich(table: tables.Table, width: int) -> Table:
     them.
     """
     columns = [(name, [row[at] for row in table.rows]) for at, name in enumerate(table.header)]
-    while len(columns) > 2 and sum(_readable(*one) + COLUMN_GAP for one in columns) > width:
-        columns.remove(max(columns[1:-1], key=lambda one: sum(map(len, one[1]))))
+    while len(columns) > 2 and sum(_readable(*column) + COLUMN_GAP for column in columns) > width:
+        columns.remove(max(columns[1:-1], key=lambda column: sum(map(len, column[1]))))
     shown = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     for name, cells in columns:
         is_one_word = not any(" " in cell for cell in (name, *cells))
@@ -185,12 +185,13 @@ def write_all(
     output_folder.failed = not verdict.complete
     if effects_file is not None:
         shutil.copyfile(effects_file, output_folder.path / effects_file.name)
-    sources = ", ".join(one.record.source for one in logged)
+    sources = ", ".join(trial.record.source for trial in logged)
     own = effects_file.name if effects_file is not None else None
-    extended = text_of(verdict.extended, logged[0].setting, effects=all_effects(effects), effects_file=own,
-                       source=sources)  # fmt: skip
+    extended = text_of(
+        verdict.extended, logged[0].setting, effects=all_effects(effects), effects_file=own, source=sources
+    )
     _write(output_folder, "extended.toml", extended)
-    told = {one.name: _about(one) for one in logged}
+    told = {trial.name: _about(trial) for trial in logged}
     _write(output_folder, "diagnosis.json", json_file.text(verdict, told, logged[0].setting.trial.source))
     figures = _draw(verdict, logged, output_folder)
     _write(
@@ -210,8 +211,8 @@ def _draw(verdict: Verdict, logged: Sequence[Logged], output_folder: OutputFolde
     from subzero.figures.diagnosis import draw_diagnosis
     from subzero.figures.style import Title
 
-    names = ", ".join(dict.fromkeys(one.setting.trial.name for one in logged))
-    records = ", ".join(one.name for one in logged)
+    names = ", ".join(dict.fromkeys(trial.setting.trial.name for trial in logged))
+    records = ", ".join(trial.name for trial in logged)
     title = f"Diagnosis of {records}: {words.headline(verdict)}"
     figures = draw_diagnosis(verdict, Title(words=title, scenario=names))
     for name, figure in figures.items():
@@ -240,7 +241,7 @@ def page_of_diagnosis(
         extended_toml: text of the extended model's file.
         effects: causes of the user's own.
     """
-    trials = list(dict.fromkeys(one.setting.trial.name for one in logged))
+    trials = list(dict.fromkeys(trial.setting.trial.name for trial in logged))
     actors, said = replayed(verdict, logged[0], run, effects)
     return render(
         Report(
@@ -250,10 +251,12 @@ def page_of_diagnosis(
             version=version(DISTRIBUTION),
             outcome=_outcome(verdict, logged),
             command=command,
-            answers=[Answer(**one._asdict()) for one in summary(verdict, logged[0].setting.trial.source)],
+            answers=[Answer(**trial._asdict()) for trial in summary(verdict, logged[0].setting.trial.source)],
             warnings={"What else to know": verdict.notes} if verdict.notes else {},
             sections=[
-                _section(one, figures) for one in sections(verdict, about(logged)) if _is_there(one, figures)
+                _section(section, figures)
+                for section in sections(verdict, about(logged))
+                if _is_there(section, figures)
             ],
             replay=encode(actors, _as_corrected(logged[0].record, verdict, logged[0].name))
             if actors
@@ -267,8 +270,8 @@ def page_of_diagnosis(
 def about(logged: Sequence[Logged]) -> dict[str, str]:
     """Return what records are, each in a line."""
     return {
-        one.name: f"{one.record.source}, trial {one.setting.trial.name}. {' '.join(one.notes)}".strip()
-        for one in logged
+        trial.name: f"{trial.record.source}, trial {trial.setting.trial.name}. {' '.join(trial.notes)}".strip()
+        for trial in logged
     }
 
 
@@ -276,32 +279,34 @@ def _outcome(verdict: Verdict, logged: Sequence[Logged]) -> list[Line]:
     """Return the verdict, and what it is about."""
     kind: Any = "good" if verdict.verdict in (NOTHING_WRONG, CAUSE_NAMED) and verdict.complete else "bad"
     records = [
-        Line(text=f"{one.name}: {one.record.time.size} samples, {len(one.record.values)} channels")
-        for one in logged
+        Line(text=f"{trial.name}: {trial.record.time.size} samples, {len(trial.record.values)} channels")
+        for trial in logged
     ]
     return [Line(text=words.headline(verdict), kind=kind), *records]
 
 
-def _is_there(one: Told, figures: Mapping[str, Figure]) -> bool:
-    return bool(one.parts) or any(belongs(name, one) for name in figures)
+def _is_there(section: Told, figures: Mapping[str, Figure]) -> bool:
+    return bool(section.parts) or any(belongs(name, section) for name in figures)
 
 
-def _section(one: Told, figures: Mapping[str, Figure]) -> Section:
+def _section(section: Told, figures: Mapping[str, Figure]) -> Section:
     """Return a section of the page: a table has the paragraph above it as its title."""
     text: list[str] = []
     shown: list[Rows] = []
-    for part in one.parts:
+    for part in section.parts:
         if isinstance(part, tables.Table):
             title = text.pop().rstrip(":") if text and text[-1].endswith(":") else ""
             shown.append(Rows(title=title, header=part.header, groups=[part.rows], is_of_words=True))
         else:
             text.append(part)
-    own = {name: figure for name, figure in figures.items() if belongs(name, one)}
-    return Section(title=one.title, text=text, tables=shown, figures=own, is_folded=one.is_folded)
+    own = {name: figure for name, figure in figures.items() if belongs(name, section)}
+    return Section(title=section.title, text=text, tables=shown, figures=own, is_folded=section.is_folded)
 
 
 def _sources(logged: Sequence[Logged], extended_toml: str) -> dict[str, str]:
-    texts = {f"The trial {one.setting.trial.name}, as it was read": one.setting.trial.text for one in logged}
+    texts = {
+        f"The trial {trial.setting.trial.name}, as it was read": trial.setting.trial.text for trial in logged
+    }
     extended = {"The extended model, extended.toml": extended_toml} if extended_toml else {}
     libraries = (DISTRIBUTION, "numpy", "scipy", "numba", "xarray")
     return {**extended, **texts, "Versions": "\n".join(f"{name} {version(name)}" for name in libraries)}
@@ -365,16 +370,16 @@ def _best(verdict: Verdict) -> tuple[str, Extended | None]:
     return ("calibrated model", extended) if extended.calibration else ("", None)
 
 
-def _about(one: Logged) -> dict[str, object]:
+def _about(trial: Logged) -> dict[str, object]:
     """Return what diagnosis.json says of a record."""
     return {
-        "source": one.record.source,
-        "scenario": one.setting.trial.name,
-        "tethered": one.setting.tethered,
-        "channels": list(one.record.values),
-        "samples": int(one.record.time.size),
-        "duration_s": float(one.record.time[-1]),
-        "notes": list(one.notes),
+        "source": trial.record.source,
+        "scenario": trial.setting.trial.name,
+        "tethered": trial.setting.tethered,
+        "channels": list(trial.record.values),
+        "samples": int(trial.record.time.size),
+        "duration_s": float(trial.record.time[-1]),
+        "notes": list(trial.notes),
     }
 
 

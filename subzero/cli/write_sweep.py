@@ -68,9 +68,9 @@ def write_sweep(
     )
     made = pictures(shown, pool)
     with friendly_errors(output_folder.folder):
-        for name, one in made.items():
-            (output_folder.path / f"{name}.png").write_bytes(one.png)
-    figures = {name: one.drawn for name, one in made.items()}
+        for name, each in made.items():
+            (output_folder.path / f"{name}.png").write_bytes(each.png)
+    figures = {name: item.drawn for name, item in made.items()}
     netcdf_csv.write_page(page_of_sweep(plan, summary, figures, COMMAND.get()), output_folder)
     return summary
 
@@ -101,9 +101,9 @@ def pictures(shown: Shown, pool: WorkerPool | None = None) -> dict[str, Picture]
         made = drawn_here(shown, FIGURES)
     else:
         made, asked = {}, {name: pool.submit(drawn_here, shown, [name]) for name in LONGEST_FIRST}
-        for name, one in asked.items():
+        for name, each in asked.items():
             try:
-                made |= one.result()
+                made |= each.result()
             except BrokenExecutor:  # somebody killed it: no member is lost by that, and no figure
                 made |= drawn_here(shown, [name])
     return {name: made[name] for name in FIGURES if name in made}
@@ -133,21 +133,27 @@ def summary_of(plan: Plan, store: Store, found: Gathered, effects: list[Effect])
         "subzero_version": plan.attributes["subzero_version"],
         "design": {"name": points.design, "samples": points.samples, "seed": points.seed},
         "parameters": {
-            one.name: {"unit": one.unit, "from": one.ends[0], "to": one.ends[1]} for one in points.spreads
+            spread.name: {"unit": spread.unit, "from": spread.ends[0], "to": spread.ends[1]}
+            for spread in points.spreads
         },
         "members": len(points.values),
         "failed": int(found.failed.sum()),
         "reasons": dict(store.reasons(KEPT_REASONS)),
         "warnings": dict(found.warned.most_common()),
-        "scalars": {name: {"unit": unit_of(name), **one} for name, one in percentiles(found).items()},
-        "sensitivity": {"method": words_of(points.design)[0], "effects": [_plain(one) for one in effects]},
+        "scalars": {
+            name: {"unit": unit_of(name), **percentile} for name, percentile in percentiles(found).items()
+        },
+        "sensitivity": {
+            "method": words_of(points.design)[0],
+            "effects": [_plain(effect) for effect in effects],
+        },
     }
 
 
 def _plain(effect: Effect) -> dict[str, Any]:
     return {
-        key: None if isinstance(one, float) and not math.isfinite(one) else one
-        for key, one in asdict(effect).items()
+        key: None if isinstance(each, float) and not math.isfinite(each) else each
+        for key, each in asdict(effect).items()
     }
 
 

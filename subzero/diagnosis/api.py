@@ -120,7 +120,9 @@ def _logged(records: Sequence[Given], model: str | Path | Model | None, commands
     found += read_trials(paths, scenario=scenario, commands=commands) if paths else []
     if not isinstance(model, Model):
         return found
-    return [dataclasses.replace(one, setting=dataclasses.replace(one.setting, model=model)) for one in found]
+    return [
+        dataclasses.replace(trial, setting=dataclasses.replace(trial.setting, model=model)) for trial in found
+    ]
 
 
 @checked_arguments
@@ -160,7 +162,9 @@ def diagnose_trials(
     }
     try:
         verdict = _diagnosed(records, **asked)
-        return replace(verdict, notes=(*verdict.notes, *(note for one in records for note in one.notes)))
+        return replace(
+            verdict, notes=(*verdict.notes, *(note for record in records for note in record.notes))
+        )
     except np.linalg.LinAlgError:
         kept, note = _without_worst_channel(records)
     verdict = diagnose_trials(kept, **asked)
@@ -181,10 +185,15 @@ def _diagnosed(
     with threadpool_limits(limits=1, user_api="blas"):  # runs have the cores; matrices are small
         suspicion = suspected(problem, records)
         looking = _Looking(
-            problem=problem, effects=effects, progress=progress or (lambda share, words: None),
-            seen=seen or (lambda table: None), seed=seed, budget=budget, scanned=perf_counter() - begun,
+            problem=problem,
+            effects=effects,
+            progress=progress or (lambda share, words: None),
+            seen=seen or (lambda table: None),
+            seed=seed,
+            budget=budget,
+            scanned=perf_counter() - begun,
             most=len(suspicion.errors) + 1,
-        )  # fmt: skip
+        )
         if not suspicion.errors:
             work = looking.start(records)
             looking.begin(work)
@@ -201,10 +210,10 @@ def _without_worst_channel(records: Sequence[Logged]) -> tuple[list[Logged], str
         UserError: there is no other channel in that record.
     """
     far: dict[tuple[int, str], float] = {}
-    for i, one in enumerate(records):
-        for name, shown in respond(one.setting, one.record.time, tuple(one.record.values)).items():
-            left = one.record.values[name] - shown
-            far[i, name] = float(np.sqrt(np.nanmean(left**2))) / level_of(name, one.noise)
+    for i, each in enumerate(records):
+        for name, shown in respond(each.setting, each.record.time, tuple(each.record.values)).items():
+            left = each.record.values[name] - shown
+            far[i, name] = float(np.sqrt(np.nanmean(left**2))) / level_of(name, each.noise)
     at, name = max(far, key=lambda key: far[key])
     record, column = records[at].record, BY_NAME[name].column
     if len(record.values) < 2:
@@ -359,8 +368,8 @@ def _look_outside(findings: Findings, share: float, words: str) -> None:
 
 def _measure_misfit(findings: Findings) -> None:
     """Set the nominal simulation beside the records, with the noise as it is known by now."""
-    for one in findings.records:
-        findings.misfit[one.name] = misfits(one, respond(one.setting, one.time, one.noise))
+    for record in findings.records:
+        findings.misfit[record.name] = misfits(record, respond(record.setting, record.time, record.noise))
 
 
 def _one_explains(findings: Findings) -> bool:
@@ -397,13 +406,13 @@ def _on_records(
         tried: what errors they may have, each set with what explains the records besides and its log evidence.
         conclude: makes the verdict on records of what was found in them.
     """
-    sets = sorted((one for one, _ in tried), key=lambda one: len(one.errors))
-    total, logs = log_sum([log for _, log in tried]), {id(one): log for one, log in tried}
-    each = np.exp([logs[id(one)] - total for one in sets])
+    sets = sorted((trial for trial, _ in tried), key=lambda trial: len(trial.errors))
+    total, logs = log_sum([log for _, log in tried]), {id(trial): log for trial, log in tried}
+    each = np.exp([logs[id(trial)] - total for trial in sets])
     at_least = np.minimum(np.cumsum(each[::-1])[::-1], MOST)  # of a set, or one that holds it
-    told = max((i for i, one in enumerate(sets) if _is_named(one, at_least[i])), default=0)
+    told = max((i for i, trial in enumerate(sets) if _is_named(trial, at_least[i])), default=0)
     verdict = conclude(sets[told].work)
-    is_complete = all(one.work.complete for one in sets)
+    is_complete = all(trial.work.complete for trial in sets)
     if sets[told].errors:
         is_decided = is_complete or not any(map(is_soft, sets[told].errors))
         verdict = _with_errors(verdict, records, sets[told], float(at_least[told]) if is_decided else None)
@@ -413,30 +422,36 @@ def _on_records(
     return _with_possible(verdict, records, sets[told], sets[told + 1], float(at_least[told + 1]))
 
 
-def _is_named(one: Explained, probability: float) -> bool:
+def _is_named(explanation: Explained, probability: float) -> bool:
     """Say whether errors may be the verdict: they are probable, and without them the records are explained."""
-    if probability < NAMED_PROBABILITY or not leaves_only_noise(one.work):
+    if probability < NAMED_PROBABILITY or not leaves_only_noise(explanation.work):
         return False
-    return decided(one.work, ranked(one.work)) != NOTHING_NEAR
+    return decided(explanation.work, ranked(explanation.work)) != NOTHING_NEAR
 
 
 def _with_errors(
-    after: Verdict, records: Sequence[Logged], one: Explained, probability: float | None
+    after: Verdict, records: Sequence[Logged], explanation: Explained, probability: float | None
 ) -> Verdict:
     """Return the verdict `data_error`, which goes on with the diagnosis of the records without the errors; `undecided`
     where they could not be held against all else (None), as the diagnosis was interrupted.
     """
     share = EVEN if probability is None else probability
-    errors = _told(records, one.errors, share)
+    errors = _told(records, explanation.errors, share)
     curves = {
-        name: replace(own, recorded=_recorded(records, one.errors, name))
+        name: replace(own, recorded=_recorded(records, explanation.errors, name))
         for name, own in after.curves.items()
     }
-    listed = {_beside(one.errors, name): share * p for name, p in after.probabilities.items()}
+    listed = {_beside(explanation.errors, name): share * p for name, p in after.probabilities.items()}
     words = " ".join(f"{error.record}: {error.sentence}: {error.remedy}." for error in errors)
-    return replace(after, verdict=UNDECIDED if probability is None else DATA_ERROR, data_errors=errors,
-                   then=after.verdict, sentence=f"{words} After that: {after.sentence}",
-                   probabilities=listed, curves=curves)  # fmt: skip
+    return replace(
+        after,
+        verdict=UNDECIDED if probability is None else DATA_ERROR,
+        data_errors=errors,
+        then=after.verdict,
+        sentence=f"{words} After that: {after.sentence}",
+        probabilities=listed,
+        curves=curves,
+    )
 
 
 def _recorded(
@@ -461,19 +476,29 @@ def _with_possible(
     if probability < WORTH_TELLING:
         return told
     probability = min(probability, EVEN)
-    known = {(one.record, one.error.id) for one in less.errors}
-    further = [one for one in more.errors if (one.record, one.error.id) not in known]
+    known = {(error.record, error.error.id) for error in less.errors}
+    further = [error for error in more.errors if (error.record, error.error.id) not in known]
     errors = _told(records, further, probability)
     listed = {name: (1.0 - probability) * p for name, p in told.probabilities.items()}
     listed[_beside(more.errors, "none")] = probability
-    words = " and ".join(one.sentence for one in errors)
-    rival = Rival(ids=tuple(one.id for one in errors), sentence=words, probability=probability,
-                  discrimination=np.nan)  # fmt: skip
+    words = " and ".join(error.sentence for error in errors)
+    rival = Rival(
+        ids=tuple(error.id for error in errors),
+        sentence=words,
+        probability=probability,
+        discrimination=np.nan,
+    )
     drawn = _with_planted(told.curves, records, more, further, f"rival: {_beside(more.errors, 'none')}")
-    rivals = tuple(sorted([*told.rivals, rival], key=lambda one: -one.probability))
+    rivals = tuple(sorted([*told.rivals, rival], key=lambda each: -each.probability))
     ranked = dict(sorted(listed.items(), key=lambda pair: -pair[1]))
-    beside = replace(told, rivals=rivals, curves=drawn, probabilities=ranked, sentence=f"{told.sentence} Or {words}.",
-                     data_errors=told.data_errors or errors)  # fmt: skip
+    beside = replace(
+        told,
+        rivals=rivals,
+        curves=drawn,
+        probabilities=ranked,
+        sentence=f"{told.sentence} Or {words}.",
+        data_errors=told.data_errors or errors,
+    )
     if probability <= 1.0 - NAMED_PROBABILITY or told.on_model == NOTHING_NEAR:
         return beside
     return replace(beside, then=UNDECIDED) if told.then else replace(beside, verdict=UNDECIDED)
@@ -501,7 +526,7 @@ def _with_planted(
 
 def _beside(found: Sequence[SuspectedError], name: str) -> str:
     """Return the name of an explanation with errors in the data beside it."""
-    ids = dict.fromkeys(one.error.id for one in found)
+    ids = dict.fromkeys(trial.error.id for trial in found)
     return " + ".join([*ids, *([] if name == "none" else [name])])
 
 
@@ -510,13 +535,19 @@ def _told(
 ) -> tuple[FoundError, ...]:
     return tuple(
         FoundError(
-            id=one.error.id, record=records[one.record].name, columns=one.error.columns,
-            sentence=one.error.sentence(), remedy=one.error.remedy(), probability=probability,
-            amount=one.error.amount, amount_sd=one.error.amount_sd, since=one.error.since,
-            alike=tuple(_words(each) for each in one.alike),
+            id=trial.error.id,
+            record=records[trial.record].name,
+            columns=trial.error.columns,
+            sentence=trial.error.sentence(),
+            remedy=trial.error.remedy(),
+            probability=probability,
+            amount=trial.error.amount,
+            amount_sd=trial.error.amount_sd,
+            since=trial.error.since,
+            alike=tuple(_words(each) for each in trial.alike),
         )
-        for one in found
-    )  # fmt: skip
+        for trial in found
+    )
 
 
 def _words(error: DataError) -> str:

@@ -70,14 +70,16 @@ def read_trials(
         scenarios.ScenarioError: a scenario cannot be used.
     """
     given = [paths] if isinstance(paths, str | Path | Record) else paths
-    files = _files([one for one in given if not isinstance(one, Record)])
-    in_hand = [one for one in given if isinstance(one, Record)]
+    files = _files([each for each in given if not isinstance(each, Record)])
+    in_hand = [each for each in given if isinstance(each, Record)]
     names = [*_names(files), *(_name_in_hand(at, len(in_hand)) for at in range(len(in_hand)))]
     sidecars = [*(read_metadata(file.with_suffix(".toml")) for file in files), *(Metadata() for _ in in_hand)]
     records = [*map(read_record, files), *map(measured_alone, in_hand)]
-    logged = [_logged(record, sidecar, name, scenario, commands)
-              for record, sidecar, name in zip(records, sidecars, names, strict=True)]  # fmt: skip
-    return [_checked(one, sidecar, simulated) for one, sidecar in zip(logged, sidecars, strict=True)]
+    logged = [
+        _logged(record, sidecar, name, scenario, commands)
+        for record, sidecar, name in zip(records, sidecars, names, strict=True)
+    ]
+    return [_checked(trial, sidecar, simulated) for trial, sidecar in zip(logged, sidecars, strict=True)]
 
 
 def _name_in_hand(at: int, count: int) -> str:
@@ -155,7 +157,9 @@ def _channels(record: Record, sidecar: Metadata) -> tuple[dict[str, np.ndarray],
             f"{record.source} has no channel that can be diagnosed. Add one of: {_columns(SPECS)}."
         )
     rates = sidecar.rate
-    return {name: without_repeats(record.time, one, rates.get(name)) for name, one in values.items()}, notes
+    return {
+        name: without_repeats(record.time, value, rates.get(name)) for name, value in values.items()
+    }, notes
 
 
 def _checked(logged: Logged, sidecar: Metadata, simulated: Simulated | None) -> Logged:
@@ -170,7 +174,7 @@ def _checked(logged: Logged, sidecar: Metadata, simulated: Simulated | None) -> 
     kept = {channel: column for channel, column in values.items() if channel not in still}
     if not kept:
         raise UserError(f"{record.source}: no channel moves. A diagnosis needs one that the trial moves.")
-    asked = unit_questions({name: one for name, one in kept.items() if name in suspects}, nominal, noise)
+    asked = unit_questions({name: each for name, each in kept.items() if name in suspects}, nominal, noise)
     notes = (*logged.notes, *record.notes, *_notes(still, repeating(kept)), *(f"{words}." for words in asked))
     trusted = frozenset(kept) - frozenset(suspects)
     return dataclasses.replace(
@@ -222,7 +226,7 @@ def check_beside(record: Record, runs: Mapping[str, xr.Dataset], sidecar: Metada
     Raises:
         UserError: no sample can be compared, or a channel looks like another unit, another sign, or a stuck sensor.
     """
-    if not any(one.samples for by_run in fits(dict(runs), record).values() for one in by_run.values()):
+    if not any(each.samples for by_run in fits(dict(runs), record).values() for each in by_run.values()):
         _refuse_times(record, ["none of its samples can be compared: where the runs are, it has gaps"])
     suspects = {
         name: values for name, values in record.values.items() if name in NOISE and not sidecar.trusts(name)

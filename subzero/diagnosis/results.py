@@ -373,7 +373,8 @@ class Verdict:
     def _overview(self) -> Overview:
         """Return the verdict, what is named, what else is probable, what it gains and what to do next."""
         rows = [
-            ("cause", f"{one.id}: {one.sentence} (probability {one.probability:.3f})") for one in self.causes
+            ("cause", f"{cause.id}: {cause.sentence} (probability {cause.probability:.3f})")
+            for cause in self.causes
         ]
         if self.unknown is not None:
             rows.append(

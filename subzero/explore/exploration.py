@@ -146,7 +146,7 @@ def sliders_of(trial: Trial) -> tuple[Slider, ...]:
         for names, words, low, high in rows
         if all(name in known and _is_in_file(trial, name) for name in names.split())
     )
-    return tuple(one for one in found if one.low < one.high)
+    return tuple(slider for slider in found if slider.low < slider.high)
 
 
 def _is_in_file(trial: Trial, name: str) -> bool:
@@ -172,9 +172,15 @@ def _slider(
     shares = {key: value / nominal if nominal else 1.0 for key, value in values.items()}
     unit = parameter_unit(trial, names[0])
     return Slider(
-        name=names[0], words=words, unit=unit, low=low, high=high, nominal=nominal, shares=shares,
+        name=names[0],
+        words=words,
+        unit=unit,
+        low=low,
+        high=high,
+        nominal=nominal,
+        shares=shares,
         declared=declared,
-    )  # fmt: skip
+    )
 
 
 def _keys(trial: Trial, name: str) -> list[str]:
@@ -238,15 +244,15 @@ class Exploration:
     @cached_property
     def sliders(self) -> dict[str, Slider]:
         """The sliders by name."""
-        return {one.name: one for one in sliders_of(self.trial)}
+        return {slider.name: slider for slider in sliders_of(self.trial)}
 
     def changes(self, values: Values) -> dict[str, float]:
         """Return the numbers that sliders away from the trial's own values change."""
         moved = {name: value for name, value in values.items() if value != self.sliders[name].nominal}
         return {
-            key: one
+            key: change
             for name, value in moved.items()
-            for key, one in self.sliders[name].changes(value).items()
+            for key, change in self.sliders[name].changes(value).items()
         }
 
     def answer(self, values: Values, progress: Progress = lambda fraction: None) -> Answer:
@@ -307,7 +313,7 @@ class Exploration:
         """Return what is wrong, slider by slider."""
         if not isinstance(error, ScenarioError):
             return {"": str(error)}
-        owner = {key: one.name for one in self.sliders.values() for key in one.shares}
+        owner = {key: slider.name for slider in self.sliders.values() for key in slider.shares}
         told: dict[str, str] = {}
         for problem in error.problems:
             told.setdefault(owner.get(problem.key, ""), str(problem))
@@ -350,7 +356,8 @@ class Exploration:
 def _cells(nominal: float | None, changed: float | None, digits: int) -> tuple[str, str, str]:
     """Return two numbers and their difference as text; a dash for none, and for no difference."""
     before, after = (
-        "–" if one is None else f"{round(one, digits) + 0.0:.{digits}f}" for one in (nominal, changed)
+        "–" if slider is None else f"{round(slider, digits) + 0.0:.{digits}f}"
+        for slider in (nominal, changed)
     )
     if nominal is None or changed is None or before == after:
         return before, after, "–"

@@ -149,10 +149,16 @@ class Page:
         trial, nominal = self.exploration.trial, self.exploration.nominal
         return render(
             Report(
-                command_name="explore", scenario=trial.name, title=trial.description, outcome=[], command="",
-                version=nominal.attrs["subzero_version"], replay=self.replay(nominal), is_bare=True,
+                command_name="explore",
+                scenario=trial.name,
+                title=trial.description,
+                outcome=[],
+                command="",
+                version=nominal.attrs["subzero_version"],
+                replay=self.replay(nominal),
+                is_bare=True,
             )
-        )  # fmt: skip
+        )
 
     def replay(self, run: xr.Dataset) -> dict[str, Any] | None:
         """Return the replay of a run beside the nominal one; None where there is nothing to see."""
@@ -363,7 +369,7 @@ class Tab:
         for cells, row in zip(self.cells, self.page.exploration.numbers(summary), strict=True):
             for cell, text in zip(cells, row, strict=True):
                 cell.set_text(text)
-        told = [one["message"] for one in summary["warnings"]]
+        told = [each["message"] for each in summary["warnings"]]
         stopped = [] if summary["outcome"] == "completed" else [summary["outcome_message"]]
         self.warnings.clear()
         with self.warnings:
@@ -453,9 +459,12 @@ class Knob:
                     f'dense debounce=300 input-class=text-right aria-label="{slider.words}{unit}"'
                 )
             self.handle = ui.slider(
-                min=slider.low, max=slider.high, step=slider.step, value=slider.nominal,
+                min=slider.low,
+                max=slider.high,
+                step=slider.step,
+                value=slider.nominal,
                 on_change=lambda event: self.turn(event.value),
-            ).props(f'aria-label="{slider.words}{unit}"')  # fmt: skip
+            ).props(f'aria-label="{slider.words}{unit}"')
             for element in (self.number, self.handle):
                 element._event_args_to_value = _position  # type: ignore[assignment, method-assign]  # NiceGUI's fail with what is none
             ui.label(_range_words(slider)).classes("range")

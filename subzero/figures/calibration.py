@@ -37,9 +37,9 @@ def numbers(found: Calibration, title: Title) -> Figure:
     figure, (axes,) = sheet(1, 1, title)
     height = TOP + 0.4 + BOTTOM + ROW * max(len(found.estimates), 4)
     _resize(figure, height, left=0.36)
-    for at, one in enumerate(found.estimates):
-        scale = abs(one.before) or one.prior_sd
-        prior = 196.0 * one.prior_sd / scale
+    for at, estimate in enumerate(found.estimates):
+        scale = abs(estimate.before) or estimate.prior_sd
+        prior = 196.0 * estimate.prior_sd / scale
         axes.barh(
             at,
             2.0 * prior,
@@ -48,16 +48,24 @@ def numbers(found: Calibration, title: Title) -> Figure:
             color=style.PALE,
             label=None if at else "95 % beforehand",
         )
-        low, value, high = (100.0 * (x - one.before) / scale for x in (one.low, one.value, one.high))
-        colour = style.BLUE if one.is_determined else style.ORANGE
-        axes.plot([low, high], [at, at], color=colour, linewidth=2.2, solid_capstyle="butt",
-                  label=None if at else "95 % calibrated")  # fmt: skip
+        low, value, high = (
+            100.0 * (x - estimate.before) / scale for x in (estimate.low, estimate.value, estimate.high)
+        )
+        colour = style.BLUE if estimate.is_determined else style.ORANGE
+        axes.plot(
+            [low, high],
+            [at, at],
+            color=colour,
+            linewidth=2.2,
+            solid_capstyle="butt",
+            label=None if at else "95 % calibrated",
+        )
         axes.plot(value, at, "o", color=colour, markersize=4.0)
     axes.axvline(
         0.0, color=style.INK, linewidth=0.8, linestyle=style.DASHES[1], label="as in the file before"
     )
     axes.set_yticks(
-        range(len(found.estimates)), [_label(one) for one in found.estimates], fontsize=style.TINY
+        range(len(found.estimates)), [_label(each) for each in found.estimates], fontsize=style.TINY
     )
     axes.set_ylim(len(found.estimates) - 0.4, -0.6)
     axes.grid(visible=False, axis="y")
@@ -69,31 +77,37 @@ def numbers(found: Calibration, title: Title) -> Figure:
 
 def _span(found: Calibration) -> tuple[float, float]:
     """Return the range of the axis: all intervals, and some of what was believed beforehand."""
-    ends = [100.0 * (x - one.before) / (abs(one.before) or one.prior_sd)
-            for one in found.estimates for x in (one.low, one.high)]  # fmt: skip
+    ends = [
+        100.0 * (x - estimate.before) / (abs(estimate.before) or estimate.prior_sd)
+        for estimate in found.estimates
+        for x in (estimate.low, estimate.high)
+    ]
     far = max(20.0, *map(abs, ends)) * 1.1
     return -far, far
 
 
-def _label(one: Estimate) -> str:
-    unit = "" if one.unit == "1" else f" [{one.unit}]"
-    name = one.name.removeprefix("vehicle.").replace("_", " ").replace(".", ": ")
-    return f"{name}{unit}  {one.before:.3g} → {one.value:.3g}"
+def _label(estimate: Estimate) -> str:
+    unit = "" if estimate.unit == "1" else f" [{estimate.unit}]"
+    name = estimate.name.removeprefix("vehicle.").replace("_", " ").replace(".", ": ")
+    return f"{name}{unit}  {estimate.before:.3g} → {estimate.value:.3g}"
 
 
 def errors(found: Calibration, title: Title) -> Figure:
     """Draw the error of every channel before and after, in noise levels, in records that were not fitted."""
     names = list(dict.fromkeys(channel for rows in found.held_out.values() for channel in rows))
     figure, panels = sheet(len(found.held_out), 1, title)
-    bars = {"before": (style.ORANGE, "before"), "after": (style.BLUE, "calibrated, not fitted"),
-            "fitted": (style.SKY, "calibrated, fitted")}  # fmt: skip
+    bars = {
+        "before": (style.ORANGE, "before"),
+        "after": (style.BLUE, "calibrated, not fitted"),
+        "fitted": (style.SKY, "calibrated, fitted"),
+    }
     for axes, (record, rows) in zip(panels, found.held_out.items(), strict=True):
         for at, (key, (colour, words)) in enumerate(bars.items()):
             heights = [getattr(rows[name], key) if name in rows else math.nan for name in names]
             axes.bar(np.arange(len(names)) + 0.27 * (at - 1), heights, 0.27, color=colour, label=words)
         axes.axhline(1.0, color=style.INK, linewidth=0.9, linestyle=style.DASHES[1])
         log_scale(axes)
-        tops = [getattr(one, key) for one in rows.values() for key in bars]
+        tops = [getattr(row, key) for row in rows.values() for key in bars]
         axes.set_ylim(0.3, 2.0 * max([1.0, *(x for x in tops if math.isfinite(x))]))
         axes.set_xticks(range(len(names)), [name.replace("_", " ") for name in names], fontsize=style.SMALL)
         axes.set_ylabel("RMS error / noise", fontsize=style.NORMAL)
@@ -106,8 +120,8 @@ def profiles(found: Calibration, title: Title) -> Figure:
     """Draw how much worse the fit gets with each number held elsewhere, beside what its interval says."""
     columns = min(len(found.profiles), COLUMNS)
     figure, panels = sheet(math.ceil(len(found.profiles) / columns), columns, title)
-    for axes, (name, one) in zip(panels, found.profiles.items(), strict=False):
-        _profile(axes, one, found[name])
+    for axes, (name, each) in zip(panels, found.profiles.items(), strict=False):
+        _profile(axes, each, found[name])
         section, _, key = name.removeprefix("vehicle.").replace("_", " ").rpartition(".")
         axes.set_title(f"{section}:\n{key}", loc="left", fontsize=style.TINY, pad=3)
     for axes in panels[len(found.profiles) :]:
@@ -119,13 +133,19 @@ def profiles(found: Calibration, title: Title) -> Figure:
     return figure
 
 
-def _profile(axes: Axes, one: Profile, estimate: Estimate) -> None:
+def _profile(axes: Axes, profile: Profile, estimate: Estimate) -> None:
     """Draw a profile, the parabola of the interval, and the level at its ends."""
-    grid = np.linspace(one.values[0], one.values[-1], 80)
-    axes.plot(grid, ((grid - estimate.value) / estimate.sd) ** 2, color=style.GREY, linewidth=1.0,
-              linestyle=style.DASHES[1], label="what the interval supposes")  # fmt: skip
-    axes.plot(one.values, one.rise, "o", color=style.BLUE, markersize=3.0)
-    axes.plot(grid, _between(one, grid), color=style.BLUE, linewidth=1.2, label="all else fitted again")
+    grid = np.linspace(profile.values[0], profile.values[-1], 80)
+    axes.plot(
+        grid,
+        ((grid - estimate.value) / estimate.sd) ** 2,
+        color=style.GREY,
+        linewidth=1.0,
+        linestyle=style.DASHES[1],
+        label="what the interval supposes",
+    )
+    axes.plot(profile.values, profile.rise, "o", color=style.BLUE, markersize=3.0)
+    axes.plot(grid, _between(profile, grid), color=style.BLUE, linewidth=1.2, label="all else fitted again")
     axes.axhline(RISE_95, color=style.ORANGE, linewidth=0.8, label=f"ends of 95 %: {RISE_95}")
     axes.set_ylim(0.0, 14.0)
     axes.xaxis.set_major_locator(MaxNLocator(3))
@@ -133,10 +153,12 @@ def _profile(axes: Axes, one: Profile, estimate: Estimate) -> None:
     axes.set_xlabel(unit, fontsize=style.SMALL, labelpad=1)
 
 
-def _between(one: Profile, grid: np.ndarray) -> np.ndarray:
+def _between(profile: Profile, grid: np.ndarray) -> np.ndarray:
     """Return a profile between its points, from its signed root, which is nearly linear."""
-    root = np.sqrt(one.rise) * np.where(np.arange(one.rise.size) < int(np.argmin(one.rise)), -1.0, 1.0)
-    between: np.ndarray = np.interp(grid, one.values, root)
+    root = np.sqrt(profile.rise) * np.where(
+        np.arange(profile.rise.size) < int(np.argmin(profile.rise)), -1.0, 1.0
+    )
+    between: np.ndarray = np.interp(grid, profile.values, root)
     return between**2
 
 

@@ -148,12 +148,12 @@ def _wrapped(words: str) -> str:
 
 def detectable(verdict: Verdict, title: Title) -> Figure | None:
     """Draw signal and discrimination of every cause, the least distinct one on top."""
-    rows = sorted(verdict.detectable, key=lambda one: one.discrimination)
+    rows = sorted(verdict.detectable, key=lambda each: each.discrimination)
     if not rows:
         return None
     known = sentences(verdict)
     figure, (signal, apart) = _bars(2, len(rows), title, left=0.325, apart=2.05)
-    size = [max(one.signal, FLOOR) for one in rows]
+    size = [max(row.signal, FLOOR) for row in rows]
     signal.barh(
         range(len(rows)),
         size,
@@ -163,16 +163,24 @@ def detectable(verdict: Verdict, title: Title) -> Figure | None:
     signal.axvline(SEEN_SIGNAL, color=style.INK, linewidth=0.8, linestyle=style.DASHES[1])
     signal.set_xlabel("signal", fontsize=style.NORMAL)
     headline(signal, f"Seen: from {SEEN_SIGNAL:g}")
-    far = [max(one.discrimination, FLOOR) for one in rows]
-    apart.barh(range(len(rows)), far, color=[_verdict_colour(one) for one in far], height=0.65)
+    far = [max(row.discrimination, FLOOR) for row in rows]
+    apart.barh(range(len(rows)), far, color=[_verdict_colour(each) for each in far], height=0.65)
     for limit in (CONFUSED_BELOW, CLEAR_FROM):
         apart.axvline(limit, color=style.INK, linewidth=0.8, linestyle=style.DASHES[1])
     apart.set_xlabel("D", fontsize=style.NORMAL)
     headline(apart, f"Apart: from {CLEAR_FROM:g}")
-    apart.text(-0.06, 1.0, "looks most like:", ha="right", va="bottom", transform=apart.transAxes,
-               fontsize=style.TINY, color=style.GREY)  # fmt: skip
-    causes = [_short(explanation(one.id, known)) for one in rows]
-    alike = [_short(explanation(one.rival, known)) for one in rows]
+    apart.text(
+        -0.06,
+        1.0,
+        "looks most like:",
+        ha="right",
+        va="bottom",
+        transform=apart.transAxes,
+        fontsize=style.TINY,
+        color=style.GREY,
+    )
+    causes = [_short(explanation(row.id, known)) for row in rows]
+    alike = [_short(explanation(row.rival, known)) for row in rows]
     for axes, words in ((signal, causes), (apart, alike)):
         axes.set_xscale("log")
         axes.set_xlim(left=FLOOR)
@@ -220,7 +228,7 @@ def _gain_bars(axes: Axes, rows: Mapping[str, ChannelGain]) -> None:
 def _high(rows: Mapping[str, ChannelGain]) -> float:
     """Return the largest error, in noise floors."""
     found = [getattr(row, key) / row.floor for row in rows.values() for key in GAINS]
-    return float(max([1.0, *(one for one in found if np.isfinite(one))]))
+    return float(max([1.0, *(each for each in found if np.isfinite(each))]))
 
 
 def _words(name: str) -> str:
@@ -250,8 +258,13 @@ def _bars(
     between = BOTTOM + TOP
     height = above + stacked * bars + (stacked - 1) * between + BOTTOM
     figure.set_size_inches(style.width(), height)
-    figure.subplots_adjust(left=left if stacked == 1 else NARROW_LEFT, wspace=apart, hspace=between / bars,
-                           bottom=BOTTOM / height, top=1.0 - above / height)  # fmt: skip
+    figure.subplots_adjust(
+        left=left if stacked == 1 else NARROW_LEFT,
+        wspace=apart,
+        hspace=between / bars,
+        bottom=BOTTOM / height,
+        top=1.0 - above / height,
+    )
     for text in figure.texts:
         text.set_y(1.0 - 0.09 / height)
     figure.texts[0].set_x(0.02)
@@ -459,7 +472,7 @@ def _overlay(axes: Axes, drawn: Drawn, channel: str) -> None:
     label(axes, None, f"${BY_NAME[channel].symbol}$ [{BY_NAME[channel].unit}]")
     _in_time(axes, curves)
     if left_out.any() or wrong.size:
-        _fit_to(axes, [values[used], *(one[channel] for one in curves.models.values())])
+        _fit_to(axes, [values[used], *(model[channel] for model in curves.models.values())])
 
 
 def _recorded_wrong(curves: Curves, channel: str) -> np.ndarray:
@@ -536,7 +549,7 @@ def _smooth(time: np.ndarray, values: np.ndarray) -> np.ndarray:
 
 def _fit_to(axes: Axes, curves: list[np.ndarray]) -> None:
     """Let outliers lie outside of the panel rather than flatten what matters."""
-    values = np.concatenate([one[np.isfinite(one)] for one in curves])
+    values = np.concatenate([curve[np.isfinite(curve)] for curve in curves])
     low, high = values.min(), values.max()
     margin = 0.08 * (high - low) or 1.0
     axes.set_ylim(low - margin, high + margin)

@@ -53,8 +53,13 @@ ENERGY_WORDS = {
 }
 
 
-ENERGY_COLOURS = dict(zip(ENERGY_WORDS.values(), (style.BLUE, CABLE_COLOUR, style.ORANGE, style.PURPLE,
-                                                   style.AMBER, style.SKY), strict=True))  # fmt: skip
+ENERGY_COLOURS = dict(
+    zip(
+        ENERGY_WORDS.values(),
+        (style.BLUE, CABLE_COLOUR, style.ORANGE, style.PURPLE, style.AMBER, style.SKY),
+        strict=True,
+    )
+)
 
 
 def cable_forces(run: xr.Dataset, force: Axes, moment: Axes) -> None:
@@ -115,7 +120,7 @@ def _looks(run: xr.Dataset, components: list[str]) -> dict[int, dict[str, Any]]:
     shown = dict.fromkeys(at for name in components for at in _largest(run, name)[1][:TERMS_SHOWN])
     names = run["term"].values.tolist()
     others = [at for at in shown if names[at] != CABLE]
-    colours = [one for one in CYCLE[:TERMS_SHOWN] if one != CABLE_COLOUR]
+    colours = [colour for colour in CYCLE[:TERMS_SHOWN] if colour != CABLE_COLOUR]
     looks = [{"color": colour, "linestyle": dash} for dash in DASHES for colour in colours]
     own = {at: {"color": CABLE_COLOUR} for at in shown if names[at] == CABLE}
     return own | dict(zip(others, looks, strict=False))

@@ -66,7 +66,10 @@ TINY, SMALL, NORMAL, LARGE = 7.0, 7.5, 8.5, 9.5
 
 def warnings_in_short(runs: Runs) -> str:
     """Return how many warnings some runs end with, and which checks have them, for a line of a figure; or nothing."""
-    names = {label: [one.check.replace("_", " ") for one in warnings_of(run)] for label, run in runs.items()}
+    names = {
+        label: [warning.check.replace("_", " ") for warning in warnings_of(run)]
+        for label, run in runs.items()
+    }
     count = sum(map(len, names.values()))
     if not count:
         return ""
@@ -270,7 +273,7 @@ def _columns(labels: list[str], most: int, across: float, size: float, handle: f
         at_most = sum(max(map(len, part)) * WIDEST_LETTER * size / 72.0 + beside for part in parts)
         if at_most <= across:
             return columns
-        if sum(max(_wide(one, size) for one in part) + beside for part in parts) <= across:
+        if sum(max(_wide(each, size) for each in part) + beside for part in parts) <= across:
             return columns
     return 1
 

@@ -274,9 +274,12 @@ def _propagated(
 
 
 def _contradiction(
-    slope: _Slope, columns: Mapping[str, Measured], stated: Mapping[str, list[str]],
-    possible: Mapping[str, list[str]], variables: Mapping[str, str],
-) -> Contradiction:  # fmt: skip
+    slope: _Slope,
+    columns: Mapping[str, Measured],
+    stated: Mapping[str, list[str]],
+    possible: Mapping[str, list[str]],
+    variables: Mapping[str, str],
+) -> Contradiction:
     """Return what stated units break, and which one of them alone could be another one."""
     repairs = tuple(
         (channel, unit)

@@ -170,10 +170,14 @@ def find_map(table: Table, clock: Clock, rows: np.ndarray, time: np.ndarray) -> 
     named = {
         name: found
         for name, column in table.columns.items()
-        if column.form == NUMBER and (found := recognised(name, column.unit)) and found.channel != TIME.name
+        if column.form == NUMBER
+        and (found := recognised(name, column.unit))
+        and found.channel != TIME.name
         and np.isfinite(column.values[rows]).any()
-        and (found.channel not in (LATITUDE, LONGITUDE) or np.nan_to_num(column.values[rows]).any())  # 0: no fix
-    }  # fmt: skip
+        and (
+            found.channel not in (LATITUDE, LONGITUDE) or np.nan_to_num(column.values[rows]).any()
+        )  # 0: no fix
+    }
     values = {name: table.columns[name].values[rows] for name in named}
     chosen, questions = _chosen(named, values, time)
     used = {
@@ -184,8 +188,11 @@ def find_map(table: Table, clock: Clock, rows: np.ndarray, time: np.ndarray) -> 
     }
     said = findings({**_positions(columns), **columns}, time)
     lines = {name: _unused(table, name, chosen) for name in table.columns if name not in clock.columns}
-    lines |= {name: Line(name=name, channel=named[name].channel, unit=named[name].unit or ASKED, reason=RIVAL)
-              for name, reason in chosen.items() if reason == RIVAL}  # fmt: skip
+    lines |= {
+        name: Line(name=name, channel=named[name].channel, unit=named[name].unit or ASKED, reason=RIVAL)
+        for name, reason in chosen.items()
+        if reason == RIVAL
+    }
     lines |= {name: _line(name, found, said, chosen[name]) for name, found in used.items()}
     questions += [_question(lines[name], said) for name in used if lines[name].unit == ASKED]
     names = {found.channel: lines[name] for name, found in used.items()}

@@ -10,5 +10,14 @@ from subzero.page.replay import Actor, actors_of, encode
 from subzero.page.report import Answer, Line, Report, Section, Table, render
 
 __all__ = [
-    "Actor", "Answer", "Line", "Report", "Section", "Table", "actors_of", "encode", "page_of_runs", "render",
-]  # fmt: skip
+    "Actor",
+    "Answer",
+    "Line",
+    "Report",
+    "Section",
+    "Table",
+    "actors_of",
+    "encode",
+    "page_of_runs",
+    "render",
+]

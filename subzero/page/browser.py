@@ -23,9 +23,19 @@ if TYPE_CHECKING:
     from PIL import Image
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
-FLAGS = ("--headless=new", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
-         "--disable-quic", "--no-first-run", "--disable-background-networking", "--disable-component-update",
-         "--disable-sync", "--hide-scrollbars")  # fmt: skip
+FLAGS = (
+    "--headless=new",
+    "--no-sandbox",
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--hide-scrollbars",
+)
 """No window, no graphics card, no network."""
 
 
@@ -142,7 +152,9 @@ def film(page: Path, out: Path, progress: Callable[[float], None] | None = None)
 def _write_gif(frames: Iterator[Image.Image], out: Path, style: Film) -> None:
     from PIL import Image
 
-    few = [one.quantize(GIF_COLOURS, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE) for one in frames]
+    few = [
+        frame.quantize(GIF_COLOURS, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE) for frame in frames
+    ]
     few[0].save(out, save_all=True, append_images=few[1:], duration=round(1000 / style.rate), loop=0)
 
 
@@ -151,8 +163,8 @@ def _write_mp4(frames: Iterator[Image.Image], out: Path, style: Film) -> None:
 
     writer = write_frames(str(out), (style.width, style.height), fps=style.rate, quality=7)
     writer.send(None)
-    for one in frames:
-        writer.send(one.tobytes())
+    for frame in frames:
+        writer.send(frame.tobytes())
     writer.close()
 
 

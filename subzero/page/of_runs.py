@@ -79,7 +79,7 @@ def _outcome(label: str, run: dict[str, Any]) -> list[Line]:
 def _warnings(summary: dict[str, Any], labels: list[str]) -> dict[str, list[str]]:
     """Return the warnings of the runs that have some."""
     return {
-        f"{label} run": [one["message"] for one in summary[label]["warnings"]]
+        f"{label} run": [each["message"] for each in summary[label]["warnings"]]
         for label in labels
         if summary[label]["warnings"]
     }

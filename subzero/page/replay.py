@@ -82,9 +82,11 @@ def encode(actors: tuple[Actor, ...], record: Record | None = None) -> dict[str,
         "drum_on_vessel": parameters.get("vessel") is not None,
         "sea_bed": float(first.attrs.get("sea_bed_m", 0.0)) or None,
         "channels": {
-            one.name: {"unit": one.unit, "words": one.long_name} for one in CHANNELS if one.name in first
+            channel.name: {"unit": channel.unit, "words": channel.long_name}
+            for channel in CHANNELS
+            if channel.name in first
         },
-        "actors": [_actor(one) for one in actors],
+        "actors": [_actor(actor) for actor in actors],
         "measured": None if record is None else _measured(record),
     }
 
@@ -93,7 +95,9 @@ def _actor(actor: Actor) -> dict[str, Any]:
     """Return what one vehicle does."""
     run = actor.run
     kept = _spread(run.sizes["time"], MOST_SAMPLES)
-    channels = {one.name: pack(run[one.name].values[kept]) for one in CHANNELS if one.name in run}
+    channels = {
+        channel.name: pack(run[channel.name].values[kept]) for channel in CHANNELS if channel.name in run
+    }
     return {
         "name": actor.name,
         "ghost": actor.ghost,
@@ -200,7 +204,7 @@ def as_run(record: Record, beside: xr.Dataset, used: Mapping[str, np.ndarray]) -
     pose = {name: values.get(name, from_run[name]) for name in ("roll_angle", "pitch", "heading")}
     place = _reckoned(time, pose, values, {name: from_run[name][0] for name in ("north", "east", "depth")})
     shown = {**from_run, **values, **pose, **place}
-    data = {name: ("time", one, BY_NAME[name].attributes) for name, one in shown.items()}
+    data = {name: ("time", each, BY_NAME[name].attributes) for name, each in shown.items()}
     import xarray as xr
 
     return xr.Dataset(data, coords={"time": time}, attrs={**beside.attrs, "tethered": 0})

@@ -88,8 +88,8 @@ def repeating(values: Mapping[str, np.ndarray]) -> list[str]:
     """Return the channels of which most samples repeat the one before: their noise is hard to tell."""
     return [
         name
-        for name, one in values.items()
-        if np.mean(np.diff(one[np.isfinite(one)]) == 0.0) > REPEATED_SHARE
+        for name, value in values.items()
+        if np.mean(np.diff(value[np.isfinite(value)]) == 0.0) > REPEATED_SHARE
     ]
 
 
@@ -243,7 +243,7 @@ def _agree(trial: scenarios.Trial, record: Record, names: list[str]) -> None:
         column = trial.commands.values[:, list(REPORTED_COMMANDS).index(name)] * scale
         near = [held(trial.commands.time, column, record.time + shift) for shift in (0.0, -step, step)]
         logged = record.values[name]
-        far = np.min([np.abs(logged - one) for one in near], axis=0) > SAME_COMMAND
+        far = np.min([np.abs(logged - each) for each in near], axis=0) > SAME_COMMAND
         if far.any():
             same = np.abs(logged - near[0]) <= SAME_COMMAND
             at = int(np.flatnonzero(np.r_[True, same[: int(np.argmax(far))]])[-1])  # they agree until there

@@ -100,8 +100,11 @@ def read_record(path: str | Path) -> Record:
     header, rows = _table(path)
     problems = _header_problems(header)
     if not problems:
-        problems = [f"line {line}: {len(row)} cells, but the header has {len(header)} columns"
-                    for line, row in rows if len(row) != len(header)]  # fmt: skip
+        problems = [
+            f"line {line}: {len(row)} cells, but the header has {len(header)} columns"
+            for line, row in rows
+            if len(row) != len(header)
+        ]
     _refuse(path, problems)
     _refuse(path, _format_of_time([row[header.index(TIME.column)] for _, row in rows]))
     columns = {name: _numbers(name, at, rows, problems) for at, name in enumerate(header)}
@@ -250,7 +253,7 @@ def _meant(name: str) -> str:
     other loggers call so; or nothing.
     """
     words = re.findall(r"[a-z]+", re.sub(r"[\[(].*", "", name.lower()))  # without a unit in brackets
-    begun = max((one for one in BY_NAME if name.lower().startswith(f"{one}_")), key=len, default="")
+    begun = max((each for each in BY_NAME if name.lower().startswith(f"{each}_")), key=len, default="")
     if begun and ("rate" in words) == ("rate" in begun):
         return BY_NAME[begun].column
     others = [column for word in words for column, names in OTHER_WORDS.items() if word in names]

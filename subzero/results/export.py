@@ -106,9 +106,9 @@ def _topic(log: Any, topic: str, name: str, schema: dict[str, Any]) -> int:
 def _topics(run: xr.Dataset) -> dict[str, tuple[str, dict[str, Any]]]:
     """Return topic → name and JSON schema of its messages."""
     channels = {
-        one.column: {"type": "number", "description": f"{one.long_name} [{one.unit}]"}
-        for one in CHANNELS
-        if one.name in run
+        channel.column: {"type": "number", "description": f"{channel.long_name} [{channel.unit}]"}
+        for channel in CHANNELS
+        if channel.name in run
     }
     origin = np.zeros((1, 3))
     scene = _scene(0, "", "", cylinders=[_hull(run)], lines=[_line(origin)])
@@ -138,7 +138,9 @@ def _messages(run: xr.Dataset) -> Iterator[tuple[int, str, dict[str, Any]]]:
     times = np.rint(1e9 * run["time"].values).astype(np.int64).tolist()
     yield times[0], "/tf", _transform(times[0], "map", "ned", np.zeros(3), UP_AND_EAST)
     yield times[0], "/scene", _scene(times[0], "vehicle", "vehicle", cylinders=[_hull(run)])
-    columns = {one.column: run[one.name].values.tolist() for one in CHANNELS if one.name in run}
+    columns = {
+        channel.column: run[channel.name].values.tolist() for channel in CHANNELS if channel.name in run
+    }
     place, turn = _poses(run)
     shapes = _shapes(run)
     for row, at in enumerate(times):
@@ -180,8 +182,8 @@ def _shapes(run: xr.Dataset) -> list[np.ndarray] | None:
 
 def _told(run: xr.Dataset) -> Iterator[tuple[int, str]]:
     """Give the level and the words of what a run says of itself."""
-    for one in json.loads(run.attrs.get("warnings", "[]")):
-        yield WARNING, f"{one['check']}: {one['message']}"
+    for load in json.loads(run.attrs.get("warnings", "[]")):
+        yield WARNING, f"{load['check']}: {load['message']}"
     if run.attrs["outcome"] != "completed":
         yield ERROR, run.attrs["outcome_message"]
 
@@ -255,8 +257,12 @@ def write_mat(run: xr.Dataset, path: Path) -> None:
 
     everything: dict[str, Any] = {str(name): _matlab(run[name].values) for name in run.variables}
     for name, key in (("units", "units"), ("meanings", "long_name")):
-        everything[name] = {str(one): run[one].attrs[key] for one in run.variables if key in run[one].attrs}
-    everything["axes"] = {str(one): ", ".join(map(str, run[one].dims)) for one in run.data_vars}
+        everything[name] = {
+            str(variable): run[variable].attrs[key]
+            for variable in run.variables
+            if key in run[variable].attrs
+        }
+    everything["axes"] = {str(var): ", ".join(map(str, run[var].dims)) for var in run.data_vars}
     everything["about"] = {str(name): value for name, value in run.attrs.items()}
     savemat(path, everything, long_field_names=True, do_compression=True, oned_as="column")
 
@@ -271,8 +277,11 @@ def write_parquet(run: xr.Dataset, path: Path) -> None:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    columns = [(one.column, pa.array(run[one.name].values), one.attributes)
-               for one in (TIME, *CHANNELS) if one.name in run]  # fmt: skip
+    columns = [
+        (channel.column, pa.array(run[channel.name].values), channel.attributes)
+        for channel in (TIME, *CHANNELS)
+        if channel.name in run
+    ]
     columns += [
         (name, pa.array(lists, pa.list_(pa.float64())), {"units": unit}) for name, unit, lists in _lists(run)
     ]

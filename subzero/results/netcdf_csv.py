@@ -21,15 +21,37 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-RUN_FILES = (*("tethered.nc", "tethered.csv", "untethered.nc", "untethered.csv", "summary.json", "report.html"),
-             *(f"{name}.{kind}" for kind in ("png", "svg", "pdf")
-               for name in ("fig4", "fig5", "fig6", "attitude", "cable", "tension", "forces", "deployment", "measured",
-                            "manoeuvre")),
-             *("replay.gif", "replay.mp4"))  # fmt: skip
+RUN_FILES = (
+    *("tethered.nc", "tethered.csv", "untethered.nc", "untethered.csv", "summary.json", "report.html"),
+    *(
+        f"{name}.{kind}"
+        for kind in ("png", "svg", "pdf")
+        for name in (
+            "fig4",
+            "fig5",
+            "fig6",
+            "attitude",
+            "cable",
+            "tension",
+            "forces",
+            "deployment",
+            "measured",
+            "manoeuvre",
+        )
+    ),
+    *("replay.gif", "replay.mp4"),
+)
 """Files of runs; `subzero.figures.draw` names the figures."""
 
-DIAGNOSIS_FILES = ("diagnosis.json", "extended.toml", "report.md", "report.html", "record.csv", "record.toml",
-                   "answer.sealed")  # fmt: skip
+DIAGNOSIS_FILES = (
+    "diagnosis.json",
+    "extended.toml",
+    "report.md",
+    "report.html",
+    "record.csv",
+    "record.toml",
+    "answer.sealed",
+)
 """Files of diagnoses and challenges."""
 
 
@@ -122,7 +144,7 @@ def _append(run: xr.Dataset, path: Path, stored: dict[str, dict[str, Any]]) -> N
 
     with netCDF4.Dataset(path, "a") as file:
         _forget_homeless(
-            file, {one for name in stored for one in _located(run, name).get("coordinates", "").split()}
+            file, {each for name in stored for each in _located(run, name).get("coordinates", "").split()}
         )
         for name, how in stored.items():
             values = run.variables[name]
@@ -150,9 +172,9 @@ def _forget_homeless(file: Any, found: set[str]) -> None:
 def _located(run: xr.Dataset, name: str) -> dict[str, str]:
     """Return the attribute that names the coordinates of a variable that are no axes of it, by the CF conventions."""
     beside = sorted(
-        str(one)
-        for one, values in run.coords.items()
-        if one not in run.dims and set(values.dims) <= set(run[name].dims)
+        str(coord)
+        for coord, values in run.coords.items()
+        if coord not in run.dims and set(values.dims) <= set(run[name].dims)
     )
     return {"coordinates": " ".join(beside)} if beside and name not in run.coords else {}
 

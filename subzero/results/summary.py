@@ -37,7 +37,7 @@ def summarise(run: AnyRun) -> dict[str, Any]:
     return {
         "outcome": run.attrs["outcome"],
         "outcome_message": run.attrs["outcome_message"],
-        "warnings": [one._asdict() for one in warnings_of(run)],
+        "warnings": [warning._asdict() for warning in warnings_of(run)],
         "time_at_end_s": number(time[-1]),
         "peak_speed_m_s": number(speed[peak]),
         "time_of_peak_speed_s": number(time[peak]),
@@ -91,21 +91,24 @@ def summary_of(runs: dict[str, xr.Dataset], record: Record | None) -> dict[str, 
     first = next(iter(runs.values()))
     head = {key: first.attrs[key] for key in ("scenario", "title", "subzero_version")}
     body = {label: summarise(run) for label, run in runs.items()}
-    measured = None if record is None else {
-        "source": record.source, "channels": _explained(runs, record), "notes": list(record.notes)}  # fmt: skip
+    measured = (
+        None
+        if record is None
+        else {"source": record.source, "channels": _explained(runs, record), "notes": list(record.notes)}
+    )
     return {**head, "prescribed": bool(first.attrs["prescribed"]), **body, "measured": measured}
 
 
 def _explained(runs: dict[str, xr.Dataset], record: Record) -> dict[str, Any]:
     """Return channel → its unit and, by run, the numbers of the fit."""
     return {
-        name: {"unit": BY_NAME[name].unit, **{label: _plain(one) for label, one in by_run.items()}}
+        name: {"unit": BY_NAME[name].unit, **{label: _plain(each) for label, each in by_run.items()}}
         for name, by_run in fits(runs, record).items()
     }
 
 
-def _plain(one: Fit) -> dict[str, float | int | None]:
-    return {key: value if isinstance(value, int) else number(value) for key, value in asdict(one).items()}
+def _plain(fit: Fit) -> dict[str, float | int | None]:
+    return {key: value if isinstance(value, int) else number(value) for key, value in asdict(fit).items()}
 
 
 def energy_balance(run: AnyRun) -> dict[str, float | None] | None:

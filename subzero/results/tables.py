@@ -85,9 +85,9 @@ def show_warnings(runs: dict[str, Summary], console: Console) -> None:
     for label, run in runs.items():
         if run["warnings"]:
             console.print(f"Warnings, {label} run:", highlight=False, markup=False)
-        for one in run["warnings"]:
+        for each in run["warnings"]:
             row = Table.grid(padding=(0, 1))
-            row.add_row("  •", escape(one["message"]))
+            row.add_row("  •", escape(each["message"]))
             console.print(row, highlight=False)
 
 
@@ -162,7 +162,7 @@ def _energy_rows(balances: list[Summary]) -> list[Row]:
 def _diagnostic_rows(found: list[Summary]) -> list[Row]:
     """Return what tells how far to trust the cable; nothing where there is no cable."""
     return [
-        (words, *(NOTHING if (x := one.get(key)) is None else form.format(x) for one in found))
+        (words, *(NOTHING if (x := each.get(key)) is None else form.format(x) for each in found))
         for key, (words, form) in DIAGNOSTIC_ROWS.items()
     ]
 
@@ -208,6 +208,6 @@ def fit_rows(measured: Summary) -> list[Row]:
     return rows
 
 
-def _fit_cells(one: Summary) -> list[str]:
-    errors = [_plain(one[key], digits) for key, digits in (("rmse", 4), ("bias", 4), ("fit_percent", 1))]
-    return [str(one["samples"]), *errors]
+def _fit_cells(summary: Summary) -> list[str]:
+    errors = [_plain(summary[key], digits) for key, digits in (("rmse", 4), ("bias", 4), ("fit_percent", 1))]
+    return [str(summary["samples"]), *errors]

@@ -80,8 +80,8 @@ class Comparison:
         rows: list[tuple[str, ...]] = [("", *self.runs)]
         for key, unit in SHOWN.items():
             words = key.removesuffix(f"_{UNITS[unit][0]}").replace("_", " ")
-            rows.append((words, *("–" if one[key] is None else f"{one[key]:.4g} {unit}" for one in both)))
-        rows.append(("warnings", *(str(len(one["warnings"])) for one in both)))
+            rows.append((words, *("–" if each[key] is None else f"{each[key]:.4g} {unit}" for each in both)))
+        rows.append(("warnings", *(str(len(each["warnings"])) for each in both)))
         if self.measured is not None:
             rows.append(("measured", f"{', '.join(self.measured.values)} ({self.measured.source})"))
         return Overview(f"{self.trial.name}: {self.trial.description}", rows)
@@ -184,8 +184,17 @@ VECTORS = (
 )
 """Channels that are parts of one thing: each is held against the largest of them, for a change of a part that hardly
 matters is none of the whole."""
-NOTHING = {"m": 1e-6, "m/s": 1e-6, "degree": 1e-4, "degree/s": 1e-4, "rev/s": 1e-6, "V": 1e-6, "N": 1e-6,
-           "N m": 1e-7, "J": 1e-6}  # fmt: skip
+NOTHING = {
+    "m": 1e-6,
+    "m/s": 1e-6,
+    "degree": 1e-4,
+    "degree/s": 1e-4,
+    "rev/s": 1e-6,
+    "V": 1e-6,
+    "N": 1e-6,
+    "N m": 1e-7,
+    "J": 1e-6,
+}
 """A channel that never gets larger than this, by unit, is zero, and a share of it means nothing."""
 
 

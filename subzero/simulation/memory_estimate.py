@@ -90,7 +90,7 @@ def with_fewer_results(trial: scenarios.Trial, model: Model, tethered: bool) -> 
     if size <= MOST_KEPT:
         return trial
     power = 10 ** int(np.log10(size / MOST_KEPT))
-    stride = next(power * one for one in (*ROUND, 10) if power * one * MOST_KEPT >= size)
+    stride = next(power * each for each in (*ROUND, 10) if power * each * MOST_KEPT >= size)
     return dataclasses.replace(trial, every=stride * trial.cable_step)
 
 
@@ -155,7 +155,7 @@ def _way(trial: scenarios.Trial, model: Model) -> float:
     if trial.motion is not None:
         motion = trial.motion
         speeds = (motion.surge_speed, motion.sway_speed, motion.heave_speed)
-        speed = np.sqrt(sum(one**2 for one in speeds if one is not None))
+        speed = np.sqrt(sum(each**2 for each in speeds if each is not None))
         return float(np.trapezoid(speed, motion.time))
     if trial.commands is None:
         return 0.0

@@ -57,11 +57,11 @@ def digest_of(value: Any) -> str:
 def canonical(value: Any) -> Any:
     """Return a value of a trial as JSON can hold it, floats to the last bit."""
     if is_dataclass(value):
-        return {one.name: canonical(getattr(value, one.name)) for one in fields(value)}
+        return {field.name: canonical(getattr(value, field.name)) for field in fields(value)}
     if isinstance(value, np.ndarray):
         return value.tolist()
     if isinstance(value, Mapping):
         return {str(key): canonical(inside) for key, inside in sorted(value.items())}
     if isinstance(value, list | tuple):
-        return [canonical(one) for one in value]
+        return [canonical(each) for each in value]
     return value

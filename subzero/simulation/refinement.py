@@ -323,19 +323,19 @@ def _start(trial: scenarios.Trial, take: Take, budget: Budget, run: Run, halving
     return Change(size=0.0, time=0.0)
 
 
-def _change(one: Run, fine: Run, first: int, largest: float) -> Change:
+def _change(run: Run, fine: Run, first: int, largest: float) -> Change:
     """Return the change from a run to a finer one, at their common times from number `first` of the finer one on.
 
     The force of time 0 is a guess. Forces are compared with the `largest` of the run. [N]
     """
-    rows = np.searchsorted(fine.all_times, one.all_times - 1e-9)
+    rows = np.searchsorted(fine.all_times, run.all_times - 1e-9)
     here = (rows < fine.all_times.size) & (rows >= first)
     if not here.any():
         return Change(size=0.0, time=0.0)
-    gap = fine.recording.trace[rows[here], :3] - one.recording.trace[here, :3]
+    gap = fine.recording.trace[rows[here], :3] - run.recording.trace[here, :3]
     size = np.linalg.norm(gap, axis=1)
     worst = int(np.argmax(size))
-    return Change(size=float(size[worst]) / largest, time=float(one.all_times[here][worst]))
+    return Change(size=float(size[worst]) / largest, time=float(run.all_times[here][worst]))
 
 
 def _largest(run: Run) -> float:

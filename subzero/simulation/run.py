@@ -183,7 +183,7 @@ def simulate_many(
         UserError: the first trial that cannot be used; nothing is simulated then.
     """
     threads = os.cpu_count() if workers is None else whole("simulate_many: workers", workers, least=1)
-    known = [one if isinstance(one, scenarios.Trial) else load(one) for one in trials]
+    known = [trial if isinstance(trial, scenarios.Trial) else load(trial) for trial in trials]
     found: list[xr.Dataset] = []
     with ThreadPoolExecutor(threads) as pool:
         begun = [pool.submit(simulate, trial, tethered=tethered, every=every) for trial in known]
@@ -218,7 +218,7 @@ def _as_fine_as_asked(
 
 def _taker(model: Model, keeper: Keeper | None) -> Take:
     """Return what makes a tethered run of a trial for `subzero.simulation.refinement`."""
-    return lambda one, grid, told: run_trial(one, model, True, told, grid=grid, keeper=keeper)
+    return lambda each, grid, told: run_trial(each, model, True, told, grid=grid, keeper=keeper)
 
 
 def run_trial(

@@ -141,10 +141,15 @@ class Demand(NamedTuple):
 def ideal(hull: Vehicle) -> Vehicle:
     """Return a vehicle whose actuators know no limit, dead band, offset, play or sag; lags stay (none: `QUICKEST`)."""
 
-    def servo(one: Servo) -> Servo:
-        free = {"dead_band": 0.0, "offset": 0.0, "half_backlash": 0.0, "position_feedback": 0.0,
-                "lost_command": 0.0}  # fmt: skip
-        return replace(one, **free, lag=max(one.lag, QUICKEST), rate_limit=inf, deflection_limit=inf)
+    def servo(servo: Servo) -> Servo:
+        free = {
+            "dead_band": 0.0,
+            "offset": 0.0,
+            "half_backlash": 0.0,
+            "position_feedback": 0.0,
+            "lost_command": 0.0,
+        }
+        return replace(servo, **free, lag=max(servo.lag, QUICKEST), rate_limit=inf, deflection_limit=inf)
 
     lag = max(hull.motor.lag, QUICKEST)
     return replace(

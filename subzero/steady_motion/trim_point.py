@@ -371,11 +371,11 @@ def _balanced(hull: Vehicle, motion: Motion) -> np.ndarray:
 
 def check_limits(hull: Vehicle, x: np.ndarray) -> None:
     """Refuse a steady motion that some actuator cannot hold."""
-    beyond = [one for one in demands(hull, x) if one.value > one.limit]
+    beyond = [demand for demand in demands(hull, x) if demand.value > demand.limit]
     if beyond:
         said = "; ".join(
-            f"the {one.name} would need {one.value:.3g} {one.unit}, its limit is {one.limit:.3g}"
-            for one in beyond
+            f"the {each.name} would need {each.value:.3g} {each.unit}, its limit is {each.limit:.3g}"
+            for each in beyond
         )
         raise NoTrimError(
             f"There is no such steady motion: {said}. Ask for less turn or depth rate, or another speed."

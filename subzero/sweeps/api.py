@@ -177,10 +177,10 @@ class _Tally:
     def keep(self, members: Sequence[Member]) -> None:
         self._store.add(members)
         self._finished += len(members)
-        self._failed += sum(bool(one.reason) for one in members)
-        self._seconds += sum(one.seconds for one in members)
+        self._failed += sum(bool(member.reason) for member in members)
+        self._seconds += sum(member.seconds for member in members)
         self._slowest = max(
-            self._slowest, *((one.index, one.seconds) for one in members), key=lambda pair: pair[1]
+            self._slowest, *((member.index, member.seconds) for member in members), key=lambda pair: pair[1]
         )
         self._tell()
 

@@ -114,16 +114,16 @@ def _expanded(trial: scenarios.Trial, parameters: Mapping[str, Any]) -> Any:
             yield name, said
             continue
         declared = declared_ranges(trial)
-        known = [one for one in fnmatch.filter(declared, name) if one not in parameters]
+        known = [item for item in fnmatch.filter(declared, name) if item not in parameters]
         if said != "declared" or not known:
             raise UserError(
                 f'{name} stands for several parameters, and is {short(said)}. Allowed: "declared", and names of'
                 f" parameters whose file declares a range.{suggestion(name, declared)}"
             )
-        for one in known:
-            low, high = declared[one]
+        for each in known:
+            low, high = declared[each]
             if low < high:
-                yield one, "declared"
+                yield each, "declared"
 
 
 def _spread(trial: scenarios.Trial, name: str, said: Any) -> Spread:
@@ -217,7 +217,7 @@ def _normal(name: str, unit: str, numbers: Any) -> Spread:
     """Return a normal distribution."""
     if not isinstance(numbers, Sequence) or isinstance(numbers, str) or len(numbers) != 2:
         raise UserError(f"{name}: normal is {short(numbers)}. Allowed: [mean, standard deviation].")
-    mean, deviation = (_number(name, one) for one in numbers)
+    mean, deviation = (_number(name, number) for number in numbers)
     if not deviation > 0.0:
         raise UserError(f"{name}: the standard deviation is {deviation:g}. Allowed: above 0.")
     from scipy.special import ndtri
@@ -286,7 +286,7 @@ def _grid(spreads: tuple[Spread, ...], _: int, seed: int) -> Made:
     if math.prod(map(len, levels)) > MOST_MEMBERS:
         raise UserError(f"A grid of {math.prod(map(len, levels))} points. Allowed: up to {MOST_MEMBERS}.")
     mesh = np.meshgrid(*map(np.array, levels), indexing="ij")
-    return np.empty((0, 0)), np.column_stack([one.ravel() for one in mesh])
+    return np.empty((0, 0)), np.column_stack([each.ravel() for each in mesh])
 
 
 def _together(spreads: tuple[Spread, ...], _: int, seed: int) -> Made:
@@ -295,7 +295,7 @@ def _together(spreads: tuple[Spread, ...], _: int, seed: int) -> Made:
     if len(set(map(len, levels))) > 1:
         counts = ", ".join(f"{spread.name} {len(spread.levels)}" for spread in spreads)
         raise UserError(f'A "together" design needs lists of the same length; they have {counts} values.')
-    return np.empty((0, 0)), np.column_stack([np.array(one) for one in levels])
+    return np.empty((0, 0)), np.column_stack([np.array(level) for level in levels])
 
 
 def _monte_carlo(spreads: tuple[Spread, ...], samples: int, seed: int) -> Made:

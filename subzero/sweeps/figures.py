@@ -167,18 +167,18 @@ def _against(points: Points, found: Gathered, effects: list[Effect], title: Titl
 def _important(points: Points, effects: list[Effect]) -> list[int]:
     """Return the parameters, those first that matter more: by the sum of their shares in each scalar."""
     total = dict.fromkeys(points.names, 0.0)
-    for scalar in dict.fromkeys(one.scalar for one in effects):
-        own = [one for one in effects if one.scalar == scalar]
-        largest = max((abs(one.size) for one in own if one.size == one.size), default=0.0)
-        for one in own:
-            if largest > 0.0 and one.size == one.size:
-                total[one.parameter] += abs(one.size) / largest
+    for scalar in dict.fromkeys(effect.scalar for effect in effects):
+        own = [effect for effect in effects if effect.scalar == scalar]
+        largest = max((abs(item.size) for item in own if item.size == item.size), default=0.0)
+        for each in own:
+            if largest > 0.0 and each.size == each.size:
+                total[each.parameter] += abs(each.size) / largest
     return sorted(range(len(points.names)), key=lambda k: -total[points.names[k]])
 
 
 def _tornado(points: Points, effects: list[Effect], title: Title) -> Figure:
     """Draw how much each parameter moves each scalar, the greatest on top."""
-    scalars = list(dict.fromkeys(one.scalar for one in effects))[:MOST_ROWS]
+    scalars = list(dict.fromkeys(effect.scalar for effect in effects))[:MOST_ROWS]
     method, first, second = words_of(points.design)
     figure, panels = sheet(len(scalars), 1, title)
     bars = min(MOST_BARS, len(points.names))
@@ -187,16 +187,16 @@ def _tornado(points: Points, effects: list[Effect], title: Title) -> Figure:
     figure.subplots_adjust(left=BAR_LEFT if width() >= ONE_COLUMN else 2.0 * BAR_LEFT, right=0.97)
     figure.subplots_adjust(hspace=0.5 * usual / (usual + more))
     for axes, scalar in zip(panels, scalars, strict=True):
-        own = [one for one in effects if one.scalar == scalar][:MOST_BARS]
+        own = [effect for effect in effects if effect.scalar == scalar][:MOST_BARS]
         places = np.arange(len(own))
-        errors = [one.error if one.error == one.error else 0.0 for one in own]
-        sizes = [one.size for one in own]
+        errors = [each.error if each.error == each.error else 0.0 for each in own]
+        sizes = [each.size for each in own]
         axes.barh(places, sizes, color=BLUE, alpha=0.75, height=0.62, label=first)
         if any(errors):
             axes.errorbar(sizes, places, xerr=errors, fmt="none", ecolor=INK, elinewidth=0.8)
         if second:
-            axes.plot([one.other for one in own], places, "o", color=ORANGE, markersize=3.5, label=second)
-        axes.set_yticks(places, [_short(one.parameter, 34) for one in own], fontsize=TINY)
+            axes.plot([each.other for each in own], places, "o", color=ORANGE, markersize=3.5, label=second)
+        axes.set_yticks(places, [_short(each.parameter, 34) for each in own], fontsize=TINY)
         axes.invert_yaxis()
         axes.axvline(0.0, color=GREY, linewidth=0.8)
         if points.design not in ("morris", "saltelli"):

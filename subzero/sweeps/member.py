@@ -93,7 +93,9 @@ class Job:
 
     def _seen(self, index: int, run: PlainRun, indices: dict[str, float], begun: float) -> Member:
         """Return what is kept of a run."""
-        warned = tuple((one["check"], one["message"]) for one in json.loads(run.attrs.get("warnings", "[]")))
+        warned = tuple(
+            (load["check"], load["message"]) for load in json.loads(run.attrs.get("warnings", "[]"))
+        )
         if run.attrs["outcome"] != "completed":
             return self.failed(index, run.attrs["outcome_message"], perf_counter() - begun, warned)
         return Member(

@@ -39,21 +39,40 @@ STATISTICS: dict[str, Callable[[np.ndarray], float]] = {
 """Of a channel over its samples, in its display unit; the mean counts every sample alike."""
 
 SUMMARY = (
-    "time_at_end_s", "peak_speed_m_s", "time_of_peak_speed_s", "speed_at_end_m_s", "heading_at_end_deg",
-    "depth_at_end_m", "path_length_m", "cable_length_at_end_m", "largest_cable_force_N",
-    "time_of_largest_cable_force_s", "largest_cable_moment_N_m", "time_of_largest_cable_moment_s",
-)  # fmt: skip
+    "time_at_end_s",
+    "peak_speed_m_s",
+    "time_of_peak_speed_s",
+    "speed_at_end_m_s",
+    "heading_at_end_deg",
+    "depth_at_end_m",
+    "path_length_m",
+    "cable_length_at_end_m",
+    "largest_cable_force_N",
+    "time_of_largest_cable_force_s",
+    "largest_cable_moment_N_m",
+    "time_of_largest_cable_moment_s",
+)
 """Numbers of `subzero.results.summary.summarise`."""
 
 TABLES = {
     "energy": (
-        "propeller_work_J", "hull_loss_J", "cable_loss_J", "kinetic_change_J", "drum_J", "added_mass_term_J",
-        "residual_J", "unexplained_share",
+        "propeller_work_J",
+        "hull_loss_J",
+        "cable_loss_J",
+        "kinetic_change_J",
+        "drum_J",
+        "added_mass_term_J",
+        "residual_J",
+        "unexplained_share",
     ),
     "diagnostics": (
-        "closure_error_m", "energy_residual", "largest_courant_number", "smallest_tension_N", "newton_iterations",
+        "closure_error_m",
+        "energy_residual",
+        "largest_courant_number",
+        "smallest_tension_N",
+        "newton_iterations",
     ),
-}  # fmt: skip
+}
 """Tables in it, and their numbers."""
 
 INDEX = "index."
@@ -180,7 +199,7 @@ def scalar_names() -> list[str]:
     return [
         *SUMMARY,
         *tables,
-        *(f"{channel}.{one}" for channel in BY_NAME if channel != "time" for one in STATISTICS),
+        *(f"{channel}.{each}" for channel in BY_NAME if channel != "time" for each in STATISTICS),
     ]
 
 
@@ -268,7 +287,7 @@ def text_of(function: Function | None) -> str:
         return name_of(function)
     cells = [cell.cell_contents for cell in getattr(function, "__closure__", None) or ()]
     held = [
-        one for one in (*(getattr(function, "__defaults__", None) or ()), *cells) if isinstance(one, PLAIN)
+        cell for cell in (*(getattr(function, "__defaults__", None) or ()), *cells) if isinstance(cell, PLAIN)
     ]
     return f"{_code_text(code)} {held!r}"
 
@@ -279,5 +298,5 @@ PLAIN = (int, float, complex, str, bytes, tuple, type(None))
 
 def _code_text(code: CodeType) -> str:
     """Return a piece of compiled Python as text, without lines and places."""
-    inside = [_code_text(one) if isinstance(one, CodeType) else repr(one) for one in code.co_consts]
+    inside = [_code_text(const) if isinstance(const, CodeType) else repr(const) for const in code.co_consts]
     return f"{code.co_code.hex()} {code.co_names} {inside}"

@@ -22,8 +22,15 @@ if TYPE_CHECKING:
 Summary = dict[str, Any]
 """Of `subzero.cli.write_sweep.summary_of`."""
 
-COLUMNS = {"min": "min", "p5": "5 %", "p50": "median", "p95": "95 %", "max": "max", "mean": "mean",
-           "standard_deviation": "deviation"}  # fmt: skip
+COLUMNS = {
+    "min": "min",
+    "p5": "5 %",
+    "p50": "median",
+    "p95": "95 %",
+    "max": "max",
+    "mean": "mean",
+    "standard_deviation": "deviation",
+}
 """Statistics of a scalar, and what they are called."""
 SHOWN_EFFECTS = 5
 """So many parameters are told for each scalar. [-]"""
@@ -65,8 +72,8 @@ def page_of_sweep(plan: Plan, summary: Summary, figures: Mapping[str, Drawn], co
 def numbers(summary: Summary) -> Table:
     """Return the statistics of all scalars."""
     rows = [
-        (f"{scalar}{_bracket(one['unit'])}", *(f"{one[name]:.4g}" for name in COLUMNS))
-        for scalar, one in summary["scalars"].items()
+        (f"{scalar}{_bracket(row['unit'])}", *(f"{row[name]:.4g}" for name in COLUMNS))
+        for scalar, row in summary["scalars"].items()
     ]
     header = (f"{summary['members'] - summary['failed']} members", *COLUMNS.values())
     return Table(title="Numbers", header=header, groups=[rows])
@@ -75,19 +82,21 @@ def numbers(summary: Summary) -> Table:
 def what_matters(summary: Summary) -> Table:
     """Return the parameters that move each scalar most: a group of rows for each."""
     method, *columns = words_of(summary["design"]["name"])
-    columns = [one for one in columns if one]
+    columns = [column for column in columns if column]
     groups = []
     for scalar in summary["scalars"]:
         own = _effects(summary, scalar)[:SHOWN_EFFECTS]
-        sizes = [[one["size"], one["other"]][: len(columns)] for one in own]
-        groups.append([
-            (scalar if i == 0 else "", one["parameter"], *map(_cell, size))
-            for i, (one, size) in enumerate(zip(own, sizes, strict=True))
-        ])  # fmt: skip
+        sizes = [[row["size"], row["other"]][: len(columns)] for row in own]
+        groups.append(
+            [
+                (scalar if i == 0 else "", row["parameter"], *map(_cell, size))
+                for i, (row, size) in enumerate(zip(own, sizes, strict=True))
+            ]
+        )
     return Table(
         title=f"What matters: {method}",
         header=("number", "parameter", *columns),
-        groups=[one for one in groups if one],
+        groups=[group for group in groups if group],
         is_of_words=True,
     )
 
@@ -102,7 +111,7 @@ def warning_lines(summary: Summary) -> list[str]:
 
 def _effects(summary: Summary, scalar: str) -> list[Summary]:
     """Return what moves a scalar, the greatest first."""
-    return [one for one in summary["sensitivity"]["effects"] if one["scalar"] == scalar]
+    return [row for row in summary["sensitivity"]["effects"] if row["scalar"] == scalar]
 
 
 def _cell(value: float | None) -> str:
@@ -142,8 +151,8 @@ def _answers(summary: Summary) -> list[Answer]:
 def _varied(summary: Summary) -> list[str]:
     design, parameters = summary["design"], summary["parameters"]
     spans = [
-        f"{name} from {one['from']:.4g} to {_with_unit(one['to'], one['unit'])}"
-        for name, one in parameters.items()
+        f"{name} from {parameter['from']:.4g} to {_with_unit(parameter['to'], parameter['unit'])}"
+        for name, parameter in parameters.items()
     ]
     more = f"; and {len(spans) - IN_WORDS} more parameters" if len(spans) > IN_WORDS else ""
     return [
@@ -155,9 +164,9 @@ def _varied(summary: Summary) -> list[str]:
 def _came_out(summary: Summary) -> list[str]:
     """Return of some scalars where most members lie."""
     return [
-        f"{in_words(name).capitalize()}: {_with_unit(one['p50'], one['unit'])} in the middle; "
-        f"nine of ten members lie between {one['p5']:.4g} and {one['p95']:.4g}."
-        for name, one in list(summary["scalars"].items())[:IN_WORDS]
+        f"{in_words(name).capitalize()}: {_with_unit(row['p50'], row['unit'])} in the middle; "
+        f"nine of ten members lie between {row['p5']:.4g} and {row['p95']:.4g}."
+        for name, row in list(summary["scalars"].items())[:IN_WORDS]
     ]
 
 
@@ -174,8 +183,8 @@ def _matters(summary: Summary) -> list[str]:
 
 def _sections(summary: Summary, figures: Mapping[str, Drawn]) -> list[Section]:
     effects = bool(summary["sensitivity"]["effects"])
-    tornado = {name: one for name, one in figures.items() if name == "tornado"}
-    others = {name: one for name, one in figures.items() if name != "tornado"}
+    tornado = {name: figure for name, figure in figures.items() if name == "tornado"}
+    others = {name: figure for name, figure in figures.items() if name != "tornado"}
     matters = Section(
         title="What matters", tables=[what_matters(summary)] if effects else (), figures=tornado
     )
@@ -199,5 +208,5 @@ def _failures(summary: Summary) -> Section:
 def _versions(summary: Summary) -> str:
     rows = {"subzero": summary["subzero_version"], "python": sys.version.split()[0]}
     return "\n".join(
-        f"{name} {number}" for name, number in (rows | {one: version(one) for one in LIBRARIES}).items()
+        f"{name} {number}" for name, number in (rows | {row: version(row) for row in LIBRARIES}).items()
     )

@@ -225,7 +225,7 @@ def _dotted(table: Mapping[str, Any], above: str = "") -> dict[str, Any]:
     for key, inside in table.items():
         name = f"{above}{key}"
         is_spread = isinstance(inside, Mapping) and any(
-            not isinstance(one, Mapping) for one in inside.values()
+            not isinstance(each, Mapping) for each in inside.values()
         )
         if isinstance(inside, Mapping) and not (is_spread and _says_spread(inside)):
             found |= _dotted(inside, f"{name}.")

@@ -103,7 +103,7 @@ def write_result(
             for block in store.blocks():
                 _gather(block, found, own, drawn, place)
                 _write_block(file, block, job, found)
-                rows.writerows(_table_row(one, points, found) for one in block)
+                rows.writerows(_table_row(column, points, found) for column in block)
     except RuntimeError as error:
         if "HDF error" not in str(error):
             raise
@@ -129,7 +129,7 @@ def _own_names(store: Store, job: Job) -> tuple[str, ...]:
     """Return the names of all numbers of one's own, in the order in which they first come."""
     if job.outcomes.function is None:
         return ()
-    names = tuple(dict.fromkeys(name for block in store.blocks() for one in block for name in one.own))
+    names = tuple(dict.fromkeys(name for block in store.blocks() for column in block for name in column.own))
     taken = set(names) & {*TAKEN, *job.names, *job.outcomes.scalars, *job.outcomes.channels}
     if taken:
         raise UserError(
@@ -195,13 +195,13 @@ def _gather(
     block: list[Member], found: Gathered, own: tuple[str, ...], drawn: np.ndarray, place: np.ndarray
 ) -> None:
     """Note what is looked at of some members."""
-    for one in block:
-        numbers = [one.own.get(name, np.nan) for name in own]
-        found.scalars[one.index] = np.concatenate([one.scalars, numbers])
-        found.failed[one.index] = bool(one.reason)
-        found.warned.update({check for check, _ in one.warnings})
-        if drawn[one.index]:
-            found.channels[place[one.index]] = one.channels
+    for column in block:
+        numbers = [column.own.get(name, np.nan) for name in own]
+        found.scalars[column.index] = np.concatenate([column.scalars, numbers])
+        found.failed[column.index] = bool(column.reason)
+        found.warned.update({check for check, _ in column.warnings})
+        if drawn[column.index]:
+            found.channels[place[column.index]] = column.channels
 
 
 def _write_block(file: Any, block: list[Member], job: Job, found: Gathered) -> None:
@@ -210,23 +210,23 @@ def _write_block(file: Any, block: list[Member], job: Job, found: Gathered) -> N
     for name, column in zip(found.names, found.scalars[at].T, strict=True):
         file[name][at] = column
     file["failed"][at] = found.failed[at]
-    file["refinement_share"][at] = [one.refinement_share for one in block]
-    file["reason"][at] = np.array([one.reason for one in block], dtype=object)
-    file["warnings"][at] = np.array([_checks(one) for one in block], dtype=object)
+    file["refinement_share"][at] = [each.refinement_share for each in block]
+    file["reason"][at] = np.array([each.reason for each in block], dtype=object)
+    file["warnings"][at] = np.array([_checks(each) for each in block], dtype=object)
     if job.outcomes.channels:
-        channels = np.array([one.channels for one in block])
+        channels = np.array([each.channels for each in block])
         for i, name in enumerate(job.outcomes.channels):
             file[name][at] = channels[:, i]
 
 
-def _checks(one: Member) -> str:
-    return ", ".join(dict.fromkeys(check for check, _ in one.warnings))
+def _checks(member: Member) -> str:
+    return ", ".join(dict.fromkeys(check for check, _ in member.warnings))
 
 
-def _table_row(one: Member, points: Points, found: Gathered) -> Iterable[str]:
-    numbers = (*points.values[one.index], *found.scalars[one.index])
+def _table_row(member: Member, points: Points, found: Gathered) -> Iterable[str]:
+    numbers = (*points.values[member.index], *found.scalars[member.index])
     cells = ("" if number != number else format(number, ".10g") for number in numbers)
-    return (str(one.index), *cells, one.reason, _checks(one))
+    return (str(member.index), *cells, member.reason, _checks(member))
 
 
 def percentiles(found: Gathered) -> dict[str, dict[str, float]]:

@@ -116,7 +116,7 @@ class Schedule:
         except Exception as error:  # of a worker that died
             self._lost(batch, error)
         else:
-            each = sum(one.seconds for one in members) / len(members)
+            each = sum(member.seconds for member in members) / len(members)
             self._seconds += (FORGETTING if self._seconds else 1.0) * (each - self._seconds)
             self.keep(members)
 

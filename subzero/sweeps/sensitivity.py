@@ -62,7 +62,7 @@ def effects_of(points: Points, found: Gathered) -> list[Effect]:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")  # of divisions by a variance of nothing
                 rows = work(points, name, values)
-            effects += sorted(rows, key=lambda one: -abs(one.size) if one.size == one.size else 1.0)
+            effects += sorted(rows, key=lambda row: -abs(row.size) if row.size == row.size else 1.0)
     return effects
 
 
@@ -108,15 +108,17 @@ def _ranks(values: np.ndarray) -> np.ndarray:
     return shared
 
 
-def _correlation(one: np.ndarray, other: np.ndarray) -> float:
+def _correlation(first: np.ndarray, other: np.ndarray) -> float:
     """Return Pearson's correlation of two ranks; nothing of one that does not change."""
     return (
-        float(np.corrcoef(one, other)[0, 1]) if one.max() > one.min() and other.max() > other.min() else 0.0
+        float(np.corrcoef(first, other)[0, 1])
+        if first.max() > first.min() and other.max() > other.min()
+        else 0.0
     )
 
 
 def _effects(points: Points, name: str, sizes: Any, others: Any, errors: Any) -> list[Effect]:
     return [
-        Effect(scalar=name, parameter=one, size=float(size), other=float(other), error=float(error))
-        for one, size, other, error in zip(points.names, sizes, others, errors, strict=True)
+        Effect(scalar=name, parameter=each, size=float(size), other=float(other), error=float(error))
+        for each, size, other, error in zip(points.names, sizes, others, errors, strict=True)
     ]

@@ -75,13 +75,17 @@ class Store:
         """
         rows = [
             (
-                int(one.index), one.reason, json.dumps(one.warnings) if one.warnings else "",
-                json.dumps(one.own) if one.own else "", one.scalars.tobytes(),
-                b"" if one.reason else one.channels.tobytes(), float(one.seconds),
-                float(one.refinement_share),
+                int(member.index),
+                member.reason,
+                json.dumps(member.warnings) if member.warnings else "",
+                json.dumps(member.own) if member.own else "",
+                member.scalars.tobytes(),
+                b"" if member.reason else member.channels.tobytes(),
+                float(member.seconds),
+                float(member.refinement_share),
             )
-            for one in members
-        ]  # fmt: skip
+            for member in members
+        ]
         with _told(self.path), self._file:
             self._file.execute("BEGIN")
             self._file.executemany(

@@ -77,8 +77,8 @@ def draw_effect(
 
 def apply_all(setting: Setting, effects: Iterable[Effect], *deviations: Deviations) -> Setting:
     """Return the setting with the sums of some deviations; sums are kept within the bounds."""
-    for effect in sorted(effects, key=lambda one: one.id):
-        rows = [one[effect.id] for one in deviations if effect.id in one]
+    for effect in sorted(effects, key=lambda each: each.id):
+        rows = [deviation[effect.id] for deviation in deviations if effect.id in deviation]
         if rows:
             total = np.sum(rows, axis=0)
             bounded = (min(max(x, p.low), p.high) for x, p in zip(total, effect.parameters, strict=True))

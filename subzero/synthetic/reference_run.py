@@ -31,8 +31,17 @@ from subzero.model import Model
 from subzero.simulation.run import run_trial
 from subzero.synthetic.reference_coupling import FINE, Led, follow_rope
 
-STATE = {"north": 0, "east": 1, "depth": 2, "sway_speed": 8, "heave_speed": 9,
-         "roll_rate": 10, "pitch_rate": 11, "yaw_rate": 12, "propeller_speed": 13}  # fmt: skip
+STATE = {
+    "north": 0,
+    "east": 1,
+    "depth": 2,
+    "sway_speed": 8,
+    "heave_speed": 9,
+    "roll_rate": 10,
+    "pitch_rate": 11,
+    "yaw_rate": 12,
+    "propeller_speed": 13,
+}
 """Channel → its place in the state of the hull."""
 SHORT = 0.01
 """A lag of less than this share of a step leaves nothing of the step before. [-]"""
@@ -151,9 +160,16 @@ def simulate_reference(
     """
     last = float(np.max(times)) + max(-setting.clock_offset, 0.0)
     steps = int(np.ceil(min(last, setting.trial.duration) / cable_step - 1e-6))
-    trial = replace(setting.trial, cable_step=cable_step, segment_length=segment_length,
-                    hull_step=fitting_step(cable_step, hull_step), grading=0.0, far_grading=0.0, every=0.0,
-                    duration=max(steps, 1) * cable_step)  # fmt: skip
+    trial = replace(
+        setting.trial,
+        cable_step=cable_step,
+        segment_length=segment_length,
+        hull_step=fitting_step(cable_step, hull_step),
+        grading=0.0,
+        far_grading=0.0,
+        every=0.0,
+        duration=max(steps, 1) * cable_step,
+    )
     fine = replace(setting, trial=trial, later=_within(setting, trial))
     return seen(fine, truth_of(fine), times, channels)
 

@@ -66,7 +66,7 @@ class Answer:
 def _size(cause: str, parameter: str, deviation: float) -> str:
     """Return how far a number of a cause is from the model's, with its unit."""
     effect = words.effects().get(plain_id(cause))
-    units = {one.name: one.unit for one in effect.parameters} if effect is not None else {}
+    units = {each.name: each.unit for each in effect.parameters} if effect is not None else {}
     unit = units.get(parameter, "")
     sign = "+" if deviation >= 0.0 and unit != "1" else ""
     return f"{parameter.replace('_', ' ')} {sign}{words.number(deviation, unit)}"

@@ -126,16 +126,25 @@ def _pulse(axis: str, window: tuple[float, float], size: float) -> MissingForce:
 def snag(draw: Draw) -> UnmodelledForce:
     """A weed, a net, a rope: held for some seconds."""
     size = -draw.force * abs(draw.size(0.25, 0.8))
-    return UnmodelledForce(name="snag", sentence="the vehicle was held back for some seconds", axis="X",
-                   missing=_pulse("X", draw.window(2.5, 6.0), size))  # fmt: skip
+    return UnmodelledForce(
+        name="snag",
+        sentence="the vehicle was held back for some seconds",
+        axis="X",
+        missing=_pulse("X", draw.window(2.5, 6.0), size),
+    )
 
 
 def fouling_shed(draw: Draw) -> UnmodelledForce:
     """Something caught on the hull, and shed again."""
     c = draw.force * abs(draw.size(0.25, 0.8))
-    return UnmodelledForce(name="fouling_shed", sentence="something clung to the hull for a while", axis="X",
-                   feature="u|u|", missing=MissingForce(terms=(Term("X", "u|u|", -c),)),
-                   window=draw.window(6.0, 12.0))  # fmt: skip
+    return UnmodelledForce(
+        name="fouling_shed",
+        sentence="something clung to the hull for a while",
+        axis="X",
+        feature="u|u|",
+        missing=MissingForce(terms=(Term("X", "u|u|", -c),)),
+        window=draw.window(6.0, 12.0),
+    )
 
 
 def waves(draw: Draw) -> UnmodelledForce:
@@ -155,60 +164,98 @@ def waves(draw: Draw) -> UnmodelledForce:
 def fouling_grows(draw: Draw) -> UnmodelledForce:
     """A drag that grows all the time."""
     c = draw.force * abs(draw.size(0.4, 1.2)) / draw.duration
-    return UnmodelledForce(name="fouling_grows", sentence="the drag of the hull grew all the time", axis="X",
-                   feature="time*u2", missing=MissingForce(terms=(Term("X", "time*u2", -c),)))  # fmt: skip
+    return UnmodelledForce(
+        name="fouling_grows",
+        sentence="the drag of the hull grew all the time",
+        axis="X",
+        feature="time*u2",
+        missing=MissingForce(terms=(Term("X", "time*u2", -c),)),
+    )
 
 
 def bent_nose(draw: Draw) -> UnmodelledForce:
     """A lateral force at the bow, with the square of the speed."""
     c = draw.force * draw.size(0.1, 0.3)
     terms = Term("Y", "u|u|", c), Term("N", "u|u|", 0.4 * draw.length * c)
-    return UnmodelledForce(name="bent_nose", sentence="the water pushed the bow sideways", axis="Y", feature="u|u|",
-                   missing=MissingForce(terms=terms))  # fmt: skip
+    return UnmodelledForce(
+        name="bent_nose",
+        sentence="the water pushed the bow sideways",
+        axis="Y",
+        feature="u|u|",
+        missing=MissingForce(terms=terms),
+    )
 
 
 def pitch_moment(draw: Draw) -> UnmodelledForce:
     """A pure moment with the square of the speed, without the force of a stern-plane."""
     c = draw.force * draw.length * draw.size(0.03, 0.1)
-    return UnmodelledForce(name="pitch_moment", sentence="the water pitched the hull", axis="M", feature="u|u|",
-                   missing=MissingForce(terms=(Term("M", "u|u|", c),)))  # fmt: skip
+    return UnmodelledForce(
+        name="pitch_moment",
+        sentence="the water pitched the hull",
+        axis="M",
+        feature="u|u|",
+        missing=MissingForce(terms=(Term("M", "u|u|", c),)),
+    )
 
 
 def roll_pulse(draw: Draw) -> UnmodelledForce:
     """A heel that comes and goes."""
     size = draw.force * draw.length * draw.size(0.01, 0.03)
-    return UnmodelledForce(name="roll_pulse", sentence="something heeled the hull for some seconds", axis="K",
-                   missing=_pulse("K", draw.window(3.0, 7.0), size))  # fmt: skip
+    return UnmodelledForce(
+        name="roll_pulse",
+        sentence="something heeled the hull for some seconds",
+        axis="K",
+        missing=_pulse("K", draw.window(3.0, 7.0), size),
+    )
 
 
 def dying_push(draw: Draw) -> UnmodelledForce:
     """A push at the launch that dies away."""
     time, lasts = np.arange(0.0, draw.duration + HISTORY_STEP_S, HISTORY_STEP_S), draw.between(3.0, 8.0)
     push = draw.force * draw.size(0.25, 0.8) * np.exp(-time / lasts)
-    return UnmodelledForce(name="dying_push", sentence="a push at the launch died away", axis="X",
-                   missing=_history("X", time, push))  # fmt: skip
+    return UnmodelledForce(
+        name="dying_push",
+        sentence="a push at the launch died away",
+        axis="X",
+        missing=_history("X", time, push),
+    )
 
 
 def race_yaw(draw: Draw) -> UnmodelledForce:
     """A yaw moment of the propeller's race."""
     c = draw.force * draw.length * draw.size(0.02, 0.06) / 25.0**2
-    return UnmodelledForce(name="race_yaw", sentence="the propeller's race turned the hull", axis="N", feature="n|n|",
-                   missing=MissingForce(terms=(Term("N", "n|n|", c),)))  # fmt: skip
+    return UnmodelledForce(
+        name="race_yaw",
+        sentence="the propeller's race turned the hull",
+        axis="N",
+        feature="n|n|",
+        missing=MissingForce(terms=(Term("N", "n|n|", c),)),
+    )
 
 
 def thrust_lost(draw: Draw) -> UnmodelledForce:
     """Air or weed in the propeller for some seconds."""
     c = draw.force * abs(draw.size(0.5, 1.2)) / 25.0**2
-    return UnmodelledForce(name="thrust_lost", sentence="the propeller lost thrust for some seconds", axis="X",
-                   feature="n|n|", missing=MissingForce(terms=(Term("X", "n|n|", -c),)),
-                   window=draw.window(3.5, 5.0))  # fmt: skip
+    return UnmodelledForce(
+        name="thrust_lost",
+        sentence="the propeller lost thrust for some seconds",
+        axis="X",
+        feature="n|n|",
+        missing=MissingForce(terms=(Term("X", "n|n|", -c),)),
+        window=draw.window(3.5, 5.0),
+    )
 
 
 def leak(draw: Draw) -> UnmodelledForce:
     """Water that comes in, all the time."""
     c = draw.force * abs(draw.size(0.2, 0.6)) / draw.duration
-    return UnmodelledForce(name="leak", sentence="the vehicle took in water", axis="Z", feature="time",
-                   missing=MissingForce(terms=(Term("Z", "time", c),)))  # fmt: skip
+    return UnmodelledForce(
+        name="leak",
+        sentence="the vehicle took in water",
+        axis="Z",
+        feature="time",
+        missing=MissingForce(terms=(Term("Z", "time", c),)),
+    )
 
 
 KINDS: dict[str, Callable[[Draw], UnmodelledForce]] = {

@@ -86,7 +86,7 @@ def refinement_that_settles(run: AnyRun, trial: scenarios.Trial, model: Model) -
     """
     if run.attrs["outcome"] != "completed" or starts_otherwise(run):
         return 0
-    if not {one.check for one in warnings_of(run)}.intersection(DOUBTS):
+    if not {warning.check for warning in warnings_of(run)}.intersection(DOUBTS):
         return PROOF if only_just_fits(run) or is_left_open(run, trial, model) else 0
     for finer in sorted({PROOF, DRUM_PROOF}):
         proved = json.loads(run.attrs["accuracy"]) | {"force_error": 0.0, "proof_finer": finer}
@@ -100,12 +100,12 @@ def refinement_that_settles(run: AnyRun, trial: scenarios.Trial, model: Model) -
 def warnings_of(run: AnyRun) -> tuple[RunWarning, ...]:
     """Return the warnings that a run carries in its attributes; none from a version that did not know them."""
     told = json.loads(run.attrs.get("warnings", "[]"))
-    return tuple(RunWarning(one["check"], one["message"]) for one in told)
+    return tuple(RunWarning(each["check"], each["message"]) for each in told)
 
 
 def as_json(warnings: list[RunWarning]) -> str:
     """Return warnings as they stand in the attributes of a run."""
-    return json.dumps([one._asdict() for one in warnings], ensure_ascii=False)
+    return json.dumps([warning._asdict() for warning in warnings], ensure_ascii=False)
 
 
 CHECKS: dict[str, Check] = {

@@ -49,8 +49,11 @@ MOST_OF_THE_RUN, LONG, SHORT = 0.9, 10.0, 2.0
 than the last is none: an actuator takes its time. [-], [s], [s]"""
 BEHIND = 0.95
 """A propeller slower than this share of its command is behind it. [-]"""
-FINS = {"rudder": "rudder_servo", "stern_plane_port": "stern_plane_port_servo",
-        "stern_plane_starboard": "stern_plane_starboard_servo"}  # fmt: skip
+FINS = {
+    "rudder": "rudder_servo",
+    "stern_plane_port": "stern_plane_port_servo",
+    "stern_plane_starboard": "stern_plane_starboard_servo",
+}
 """Fin → its servo in the vehicle."""
 
 
@@ -80,7 +83,7 @@ def _outside(
         down = run["cable_position"].values[:, :, 2]
         places["cable"] = down, _depth_of_start(run, model) - down[0, 0]
     for name, (down, offset) in places.items():
-        farthest = np.concatenate([_farthest(beyond, down[one] + offset) for one in blocks_of(time.size)])
+        farthest = np.concatenate([_farthest(beyond, down[block] + offset) for block in blocks_of(time.size)])
         row = int(farthest.argmax())
         if farthest[row] > ROUNDING:
             depth, first = down[row] + offset, first_time(time, farthest > ROUNDING)
@@ -150,7 +153,7 @@ def bend_radii(run: AnyRun) -> np.ndarray:
         return np.full((P.shape[0], 1), np.inf)
     side = np.diff(P, axis=1)
     a, b = side[:, :-1], side[:, 1:]
-    aa, bb, ab = (np.einsum("tni,tni->tn", one, two) for one, two in ((a, a), (b, b), (a, b)))
+    aa, bb, ab = (np.einsum("tni,tni->tn", each, two) for each, two in ((a, a), (b, b), (a, b)))
     product = np.sqrt(aa * bb * (aa + bb + 2.0 * ab))
     square = aa * bb - ab * ab
     pulls = np.minimum(np.minimum(T[:, :-2], T[:, 1:-1]), T[:, 2:]) > TAUT

@@ -33,13 +33,13 @@ WINDOW_S = 2.0
 COMMANDS = ("propeller", "rudder", "port stern-plane", "starboard stern-plane")
 
 
-def misfits(one: Observed, simulated: dict[str, np.ndarray]) -> dict[str, Misfit]:
+def misfits(record: Observed, simulated: dict[str, np.ndarray]) -> dict[str, Misfit]:
     """Return channel → misfit of a record, from what the nominal model says to its times."""
-    return {name: _misfit(one, name, simulated[name]) for name in one.noise}
+    return {name: _misfit(record, name, simulated[name]) for name in record.noise}
 
 
-def _misfit(one: Observed, name: str, simulated: np.ndarray) -> Misfit:
-    noise, measured = one.noise[name], one.values[name]
+def _misfit(record: Observed, name: str, simulated: np.ndarray) -> Misfit:
+    noise, measured = record.noise[name], record.values[name]
     residual = (measured - simulated)[noise.used]
     spread = measured[noise.used] - np.mean(measured[noise.used])
     rmse = float(np.sqrt(np.mean(residual**2)))
@@ -50,8 +50,8 @@ def _misfit(one: Observed, name: str, simulated: np.ndarray) -> Misfit:
         fit_percent=100.0 * (1.0 - float(np.linalg.norm(residual)) / norm) if norm > 0.0 else float("nan"),
         bias=float(np.mean(residual)),
         whiteness_p=whiteness(noise.whiten(measured - simulated)),
-        command_correlation=_correlations(one, noise, measured - simulated),
-        windows=_windows(one.time[noise.used], residual, noise),
+        command_correlation=_correlations(record, noise, measured - simulated),
+        windows=_windows(record.time[noise.used], residual, noise),
         noise_sd=noise.sd,
         noise_slow=noise.slow,
         noise_time=noise.correlation_time,
@@ -71,15 +71,15 @@ def whiteness(white: np.ndarray, lags: int = LJUNG_BOX_LAGS) -> float:
     return float(chdtrc(lags, n * (n + 2) * np.sum(rho**2 / (n - np.arange(1, lags + 1)))))
 
 
-def _correlations(one: Observed, noise: Noise, difference: np.ndarray) -> dict[str, tuple[float, float]]:
+def _correlations(record: Observed, noise: Noise, difference: np.ndarray) -> dict[str, tuple[float, float]]:
     """Return command → (lag [s], correlation) of the residual with a command up to 25 samples before, strongest."""
-    commands = one.setting.trial.commands
+    commands = record.setting.trial.commands
     if commands is None:
         return {}
-    held = np.asarray(commands.values)[np.searchsorted(commands.time, one.time + 1e-9, side="right") - 1]
+    held = np.asarray(commands.values)[np.searchsorted(commands.time, record.time + 1e-9, side="right") - 1]
     residual = np.where(noise.used, difference, 0.0)
     residual = np.where(noise.used, residual - np.mean(difference[noise.used]), 0.0)
-    step, found = float(np.median(np.diff(one.time))), {}
+    step, found = float(np.median(np.diff(record.time))), {}
     for name, column in zip(COMMANDS, held.T, strict=True):
         x = column - np.mean(column)
         scale = np.linalg.norm(x) * np.linalg.norm(residual)
@@ -112,20 +112,22 @@ def curves(problem: Problem, fits: Mapping[str, Fit | None]) -> dict[str, Curves
         problem: with the entries of all fits; those of a fit with fewer are the first ones.
         fits: label → fit.
     """
-    return {one.name: _curves(problem, i, fits) for i, one in enumerate(problem.records)}
+    return {record.name: _curves(problem, i, fits) for i, record in enumerate(problem.records)}
 
 
 def _curves(problem: Problem, record: int, fits: Mapping[str, Fit | None]) -> Curves:
     """Return the curves of a record."""
-    one, models, count = problem.records[record], {}, len(problem.entries)
+    found, models, count = problem.records[record], {}, len(problem.entries)
     for label, fit in fits.items():
         z = fit.z if fit else np.zeros(count)
-        models[label] = respond(problem.setting(record, np.pad(z, (0, count - z.size))), one.time, one.noise)
+        models[label] = respond(
+            problem.setting(record, np.pad(z, (0, count - z.size))), found.time, found.noise
+        )
     return Curves(
-        time=one.time,
-        measured=one.values,
+        time=found.time,
+        measured=found.values,
         models=models,
-        used={name: n.used for name, n in one.noise.items()},
+        used={name: n.used for name, n in found.noise.items()},
     )
 
 
@@ -168,9 +170,9 @@ def gain(
     rows = rows_of(problem)
     parts = parts_of(problem, rows)
     nominal = whitened_again(tolerance.problem, problem, nominal)
-    models = [_made_white(one, problem) for one in (tolerance, extended, rival or tolerance)]
-    fitted = [nominal, *(one.fit.r for one in models)]
-    held = [nominal, *(held_out(one, parts) for one in models)]
+    models = [_made_white(each, problem) for each in (tolerance, extended, rival or tolerance)]
+    fitted = [nominal, *(model.fit.r for model in models)]
+    held = [nominal, *(held_out(model, parts) for model in models)]
     n, t, e = (held[i] ** 2 for i in range(3))
     return Gain(
         fitted=_channels(problem, rows, fitted),
@@ -201,9 +203,9 @@ def share(before: float, after: float, samples: float) -> float:
 def rows_of(problem: Problem) -> _Row:
     """Return whose the rows of a residual are."""
     record, channel, time = [], [], []
-    for i, one in enumerate(problem.records):
-        for name, noise in one.noise.items():
-            used = one.time[noise.used]
+    for i, each in enumerate(problem.records):
+        for name, noise in each.noise.items():
+            used = each.time[noise.used]
             record.append(np.full(used.size, i))
             channel.append(np.full(used.size, name, dtype=object))
             time.append(used)
@@ -234,13 +236,13 @@ def held_out(model: Fitted, parts: np.ndarray) -> np.ndarray:
 
 def _channels(problem: Problem, rows: _Row, residuals: list[np.ndarray]) -> Mapping[str, ChannelGain]:
     """Return the root mean square of residuals in each channel's unit, beside the noise."""
-    squares = [raw(problem, one) ** 2 for one in residuals]
+    squares = [raw(problem, residual) ** 2 for residual in residuals]
     found = {}
     for name in dict.fromkeys(rows.channel.tolist()):
         before, tolerance, after, rival = (
-            float(np.sqrt(one[rows.channel == name].mean())) for one in squares
+            float(np.sqrt(square[rows.channel == name].mean())) for square in squares
         )
-        levels = [one.noise[name].sd for one in problem.records if name in one.noise]
+        levels = [record.noise[name].sd for record in problem.records if name in record.noise]
         floor = float(np.sqrt(np.mean(np.square(levels))))
         found[name] = ChannelGain(before=before, tolerance=tolerance, after=after, rival=rival, floor=floor)
     return found
@@ -249,8 +251,8 @@ def _channels(problem: Problem, rows: _Row, residuals: list[np.ndarray]) -> Mapp
 def raw(problem: Problem, whitened: np.ndarray) -> np.ndarray:
     """Return a residual (m,) in the channels' units, of a whitened one."""
     parts, at = [], 0
-    for one in problem.records:
-        for noise in one.noise.values():
+    for record in problem.records:
+        for noise in record.noise.values():
             parts.append(noise.colour(whitened[at : at + noise.count]))
             at += noise.count
     return np.concatenate(parts)
@@ -266,9 +268,9 @@ def _lower(before: np.ndarray, after: np.ndarray, blocks: np.ndarray, seed: int)
     """Return the lower bound of `share` when blocks of squares are drawn again and again."""
     count = int(blocks.max()) + 1
     sums = [
-        np.bincount(blocks, weights=one, minlength=count) for one in (before, after, np.ones_like(before))
+        np.bincount(blocks, weights=each, minlength=count) for each in (before, after, np.ones_like(before))
     ]
     drawn = np.random.default_rng(seed).integers(count, size=(BOOTSTRAP_DRAWS, count))
-    b, a, n = (one[drawn].sum(axis=1) for one in sums)
+    b, a, n = (each[drawn].sum(axis=1) for each in sums)
     shares = [share(x / k, y / k, k) for x, y, k in zip(b, a, n, strict=True)]
     return float(np.quantile(shares, LOWER_LEVEL))

@@ -80,13 +80,13 @@ def against(
 def detectability(problem: Problem, J: np.ndarray) -> tuple[Detectability, ...]:
     """Return what the records can show of every cause, at one effect scale, the weakest first."""
     M = marginal(problem, J)
-    found = [_of(problem, M, J, one, nameable(problem.entries)) for one in nameable(problem.entries)]
-    return tuple(sorted(found, key=lambda one: one.discrimination))
+    found = [_of(problem, M, J, each, nameable(problem.entries)) for each in nameable(problem.entries)]
+    return tuple(sorted(found, key=lambda each: each.discrimination))
 
 
-def _of(problem: Problem, M: np.ndarray, J: np.ndarray, one: str, others: list[str]) -> Detectability:
+def _of(problem: Problem, M: np.ndarray, J: np.ndarray, name: str, others: list[str]) -> Detectability:
     """Return the detectability of a cause: of its parameter with the greatest signal."""
-    at = columns_of(problem.entries, (one,))
+    at = columns_of(problem.entries, (name,))
     signals = {k: _signal(problem, M, k) for k in at}
     step = np.array(
         [problem.entries[k].parameter.scale if signals[k] == max(signals.values()) else 0.0 for k in at]
@@ -95,13 +95,13 @@ def _of(problem: Problem, M: np.ndarray, J: np.ndarray, one: str, others: list[s
         (
             (*against(problem, M, at, step, columns_of(problem.entries, (other,))), other)
             for other in others
-            if other != one
+            if other != name
         ),
         key=lambda triple: triple[0],
     )
     D, cosine, rival = ranked[0] if ranked else (max(signals.values()) ** 2, 0.0, "none")
     return Detectability(
-        id=one,
+        id=name,
         signal=max(signals.values()),
         smallest={
             problem.entries[k].parameter.name: SEEN_SIGNAL

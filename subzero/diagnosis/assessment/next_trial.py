@@ -73,14 +73,14 @@ class Belief:
 def beliefs(problem: Problem, survivors: Sequence[Survivor]) -> list[Belief]:
     """Return what each hypothesis says of all that trials share, and of the start of a new one."""
     shared = [k for k, entry in enumerate(problem.entries) if entry.record < 0]
-    start = np.array([one.tolerance**2 for effect in START for one in effect.parameters])
+    start = np.array([parameter.tolerance**2 for effect in START for parameter in effect.parameters])
     found = []
-    for one in survivors:
-        M = posterior(one.fit.quadratic, one.fit.D).M[np.ix_(shared, shared)]
+    for survivor in survivors:
+        M = posterior(survivor.fit.quadratic, survivor.fit.D).M[np.ix_(shared, shared)]
         whole = np.zeros((len(shared) + start.size,) * 2)
         whole[: len(shared), : len(shared)] = M
         whole[range(len(shared), len(whole)), range(len(shared), len(whole))] = start
-        found.append(Belief(z=np.concatenate([one.fit.z[shared], np.zeros(start.size)]), M=whole))
+        found.append(Belief(z=np.concatenate([survivor.fit.z[shared], np.zeros(start.size)]), M=whole))
     return found
 
 
@@ -91,10 +91,15 @@ def prepared_trial(problem: Problem, setting: Setting, channels: Sequence[str] =
     setting = economical(setting, setting.trial.duration)
     time = np.arange(step, setting.trial.duration + 1e-9, step)
     used = np.ones(time.size, bool)
-    noise = {name: replace(one, used=used, time=time) for name, one in first.noise.items()}
+    noise = {name: replace(each, used=used, time=time) for name, each in first.noise.items()}
     noise |= {name: usual_noise(time, used, Usual(NOISE[name], 0.0, is_known=False)) for name in channels}
-    seen = Observed(name="to come", time=time, values={name: np.zeros(time.size) for name in noise}, noise=noise,
-                    setting=setting)  # fmt: skip
+    seen = Observed(
+        name="to come",
+        time=time,
+        values={name: np.zeros(time.size) for name in noise},
+        noise=noise,
+        setting=setting,
+    )
     effects = list(dict.fromkeys(entry.effect for entry in problem.entries if entry.record < 0))
     return replace(problem, records=(seen,), entries=entries_of(effects, START, 1))
 
@@ -232,7 +237,7 @@ def outlooks(problem: Problem, survivors: Sequence[Survivor]) -> list[tuple[str,
     """Return what every safe trial of the library would show."""
     held, setting = beliefs(problem, survivors), problem.records[0].setting
     coming = {name: prepared_trial(problem, make(setting)) for name, (_, make) in LIBRARY.items()}
-    shown = {name: _shown(one, held) for name, one in coming.items()}
+    shown = {name: _shown(each, held) for name, each in coming.items()}
     return [
         (name, outlook(h, coming[name].jacobian(held[0].z), held))
         for name, h in shown.items()
@@ -281,19 +286,26 @@ def _looked_at(
 
 def _shown(coming: Problem, held: Sequence[Belief]) -> np.ndarray | None:
     """Return h(z) (hypotheses, m) of a trial; None if a hypothesis leads it out of safe depths."""
-    tracks = coming.tracks([(0, one.z) for one in held])
+    tracks = coming.tracks([(0, each.z) for each in held])
     if not is_safe(coming, tracks):
         return None
-    return np.stack([coming.whitened(0, coming.setting(0, one.z), track)
-                     for one, track in zip(held, tracks, strict=True)])  # fmt: skip
+    return np.stack(
+        [
+            coming.whitened(0, coming.setting(0, each.z), track)
+            for each, track in zip(held, tracks, strict=True)
+        ]
+    )
 
 
 def is_safe(coming: Problem, tracks: Sequence[Track]) -> bool:
     """Say whether a trial to come stays within safe depths, whatever of some tracks it takes."""
     depths = np.stack([track[1][:, 2] for track in tracks])
     start = coming.records[0].setting.trial.start.depth
-    return bool(np.isfinite(depths).all() and depths.min() >= min(MIN_DEPTH_M, start)
-                and depths.max() <= start + MAX_DEEPER_M)  # fmt: skip
+    return bool(
+        np.isfinite(depths).all()
+        and depths.min() >= min(MIN_DEPTH_M, start)
+        and depths.max() <= start + MAX_DEEPER_M
+    )
 
 
 def _apart(shown: np.ndarray) -> float:
@@ -305,8 +317,14 @@ def _apart(shown: np.ndarray) -> float:
 def _viewed(coming: Problem, plan: Plan, shown: np.ndarray, held: Sequence[Belief]) -> Plan:
     """Return a plan with what it would show."""
     view = outlook(shown, coming.jacobian(held[0].z), held)
-    return Plan(name=plan.name, sentence=plan.sentence, setting=plan.setting, channel=plan.channel,
-                discrimination=view.discrimination(), view=view)  # fmt: skip
+    return Plan(
+        name=plan.name,
+        sentence=plan.sentence,
+        setting=plan.setting,
+        channel=plan.channel,
+        discrimination=view.discrimination(),
+        view=view,
+    )
 
 
 def _with_channels(problem: Problem, setting: Setting, held: Sequence[Belief]) -> list[Plan]:
@@ -321,8 +339,16 @@ def _with_channels(problem: Problem, setting: Setting, held: Sequence[Belief]) -
     for name in more:
         own = ~np.isin(rows, [other for other in more if other != name])
         view = outlook(shown[:, own], J[own], held)
-        found.append(Plan(name="same", sentence="Fly the same trial again. " + CHANNELS[name], setting=setting,
-                          channel=name, discrimination=view.discrimination(), view=view))  # fmt: skip
+        found.append(
+            Plan(
+                name="same",
+                sentence="Fly the same trial again. " + CHANNELS[name],
+                setting=setting,
+                channel=name,
+                discrimination=view.discrimination(),
+                view=view,
+            )
+        )
     return found
 
 
@@ -330,8 +356,10 @@ def _drawn(setting: Setting, hypotheses: int, seed: int) -> list[Plan]:
     """Return trials drawn at random, as many as runs allow."""
     random = np.random.default_rng(seed)
     words = "Fly the commands below, made to measure."
-    return [Plan(name=f"optimised {i}", sentence=words, setting=_random(setting, random))
-            for i in range(max(MAX_OPTIMISER_RUNS // hypotheses, 1))]  # fmt: skip
+    return [
+        Plan(name=f"optimised {i}", sentence=words, setting=_random(setting, random))
+        for i in range(max(MAX_OPTIMISER_RUNS // hypotheses, 1))
+    ]
 
 
 def _random(setting: Setting, random: np.random.Generator) -> Setting:

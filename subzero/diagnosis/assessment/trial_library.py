@@ -163,11 +163,22 @@ def rich(setting: Setting) -> Setting:
     n, r, s = cruise(setting), RUDDER_AMPLITUDE, PLANE_AMPLITUDE
     fast = min(1.2 * n, fastest(setting))
     rows: list[Row] = [
-        (0, n, 0, 0, 0), (6, n, r, 0, 0), (8, n, -r, 0, 0), (10, n, 0, 0, 0), (14, 0.6 * n, 0, 0, 0),
-        (20, 0.6 * n, r, 0, 0), (21.5, 0.6 * n, -r, 0, 0), (23, 0.6 * n, 0, 0, 0), (26, fast, 0, 0, 0),
-        (30, fast, 0, s, s), (32, fast, 0, -s, -s), (34, fast, 0, 0, 0), (38, fast, -0.5 * r, 0, 0),
-        (44, fast, 0, 0, 0), (48, 0, 0, 0, 0),
-    ]  # fmt: skip
+        (0, n, 0, 0, 0),
+        (6, n, r, 0, 0),
+        (8, n, -r, 0, 0),
+        (10, n, 0, 0, 0),
+        (14, 0.6 * n, 0, 0, 0),
+        (20, 0.6 * n, r, 0, 0),
+        (21.5, 0.6 * n, -r, 0, 0),
+        (23, 0.6 * n, 0, 0, 0),
+        (26, fast, 0, 0, 0),
+        (30, fast, 0, s, s),
+        (32, fast, 0, -s, -s),
+        (34, fast, 0, 0, 0),
+        (38, fast, -0.5 * r, 0, 0),
+        (44, fast, 0, 0, 0),
+        (48, 0, 0, 0, 0),
+    ]
     return flown(setting, rows, 60.0)
 
 

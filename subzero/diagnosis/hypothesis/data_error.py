@@ -114,8 +114,8 @@ class DataError:
     def columns(self) -> tuple[str, ...]:
         """The columns of the record that it befalls."""
         if self.is_of_commands:
-            return tuple(BY_NAME[one].column for group in self.channels for one in COMMAND_GROUPS[group])
-        return tuple(BY_NAME[one].column for one in self.channels) or ("time_s",)
+            return tuple(BY_NAME[error].column for group in self.channels for error in COMMAND_GROUPS[group])
+        return tuple(BY_NAME[channel].column for channel in self.channels) or ("time_s",)
 
     @property
     def factor(self) -> float:
@@ -238,9 +238,9 @@ def _repeated(error: DataError, time: np.ndarray, values: np.ndarray) -> np.ndar
 
 
 def _exchanged(error: DataError, logged: Logged) -> Logged:
-    one, other = error.channels
+    first, other = error.channels
     values = logged.record.values
-    return _with(logged, **{one: values[other], other: values[one]})
+    return _with(logged, **{first: values[other], other: values[first]})
 
 
 def _inside(logged: Logged, time: np.ndarray) -> Logged:
@@ -272,9 +272,14 @@ def _read_at(logged: Logged, when: np.ndarray, channels: tuple[str, ...]) -> Log
     """Return a record whose channels show at its times what they showed at others (n,); held at its ends."""
     time, values = logged.record.time, logged.record.values
     known = {name: np.isfinite(values[name]) for name in channels}
-    shown = {name: np.where(_nearest(known[name], time, when),
-                            np.interp(when, time[known[name]], values[name][known[name]]), np.nan)
-             for name in channels}  # fmt: skip
+    shown = {
+        name: np.where(
+            _nearest(known[name], time, when),
+            np.interp(when, time[known[name]], values[name][known[name]]),
+            np.nan,
+        )
+        for name in channels
+    }
     return _with(logged, **shown)
 
 
@@ -327,7 +332,7 @@ def _with_commands(logged: Logged, values: np.ndarray) -> Logged:
 
 
 def _columns(group: str) -> list[int]:
-    return [COMMANDS.index(one) for one in COMMAND_GROUPS[group]]
+    return [COMMANDS.index(error) for error in COMMAND_GROUPS[group]]
 
 
 def _commands_turned(error: DataError, logged: Logged) -> Logged:
@@ -340,8 +345,8 @@ def _commands_turned(error: DataError, logged: Logged) -> Logged:
 def _commands_exchanged(error: DataError, logged: Logged) -> Logged:
     assert logged.setting.trial.commands is not None
     old = logged.setting.trial.commands.values
-    values, (one, other) = old.copy(), map(_columns, error.channels)
-    values[:, one], values[:, other] = old[:, other[:1]], old[:, one[:1]]
+    values, (found, other) = old.copy(), map(_columns, error.channels)
+    values[:, found], values[:, other] = old[:, other[:1]], old[:, found[:1]]
     return _with_commands(logged, values)
 
 
@@ -350,11 +355,11 @@ def _long(channel: str) -> str:
 
 
 def _both(error: DataError) -> str:
-    return " and ".join(_long(one) for one in error.channels)
+    return " and ".join(_long(channel) for channel in error.channels)
 
 
 def _groups(error: DataError) -> str:
-    return " and ".join(one.replace("_", " ") for one in error.channels)
+    return " and ".join(channel.replace("_", " ") for channel in error.channels)
 
 
 def _spans(times: tuple[float, ...]) -> str:
@@ -384,48 +389,112 @@ def _reference_remedy(error: DataError) -> str:
 
 
 KINDS: Mapping[str, Kind] = {
-    "sign": Kind(0.15, _values(_negative), _values(_negative),
-                 lambda one: f"{_both(one)} has the other sign",
-                 lambda one: f"change its sign ({BY_NAME[one.channels[0]].long_name})"),
-    "unit": Kind(0.2, _values(_in_right_unit), _values(_in_wrong_unit),
-                 lambda one: f"{_both(one)} is in {one.how}", _unit_remedy),
-    "reference": Kind(0.1, _values(_to_north), _values(_from_reference),
-                      lambda one: f"{_both(one)} {one.how}", _reference_remedy),
-    "step": Kind(0.05, _values(_without_step), _values(_with_step),
-                 lambda one: f"{_both(one)} jumps {'up' if one.amount > 0.0 else 'down'} by {_number(one)} "
-                             f"{BY_NAME[one.channels[0]].unit} at {one.since:.3g} s, and nothing else does",
-                 lambda one: f"subtract {one.amount:.3g} {BY_NAME[one.channels[0]].unit} from {one.since:.3g} s on, or "
-                             "leave gaps there"),
-    "frozen": Kind(0.08, _values(_as_gaps), _values(_repeated),
-                   lambda one: f"{_both(one)} is frozen from {one.since:.3g} s on",
-                   lambda one: f"leave its cells empty from {one.since:.3g} s on"),
-    "dropout": Kind(0.1, _values(_as_gaps), _values(_repeated),
-                    lambda one: f"{_both(one)} {f'shows {one.how}' if one.how else 'repeats a value'} in place of "
-                                f"measurements ({_spans(one.at)})",
-                    lambda one: "leave these cells empty"),
-    "swapped": Kind(0.08, _exchanged, _exchanged,
-                    lambda one: f"{_both(one)} have each other's values",
-                    lambda one: "exchange the headers of the two columns"),
-    "late_clock": Kind(0.08, _earlier, _later,
-                       lambda one: f"the clock of the record is {_number(one)} s "
-                                   f"{'late' if one.amount > 0.0 else 'early'} against the commands'",
-                       lambda one: f"{'subtract' if one.amount > 0.0 else 'add'} {abs(one.amount):.3g} s "
-                                   f"{'from' if one.amount > 0.0 else 'to'} time_s"),
-    "clock_rate": Kind(0.03, _slower, _faster,
-                       lambda one: f"the clock of the record runs {_number(one, 100.0)} % too "
-                                   f"{'fast' if one.amount > 0.0 else 'slow'}",
-                       lambda one: f"divide time_s by {1.0 + one.amount:.4g}"),
-    "latency": Kind(0.05, _in_time, _delayed,
-                    lambda one: f"{_both(one)} is {_number(one)} s {'late' if one.amount > 0.0 else 'early'} "
-                                "against the other channels",
-                    lambda one: f"shift that column by {-one.amount:+.3g} s"),
-    "command_sign": Kind(0.05, _commands_turned, _commands_turned,
-                         lambda one: f"the command of the {_groups(one)} has the other sign",
-                         lambda one: "change the sign of that command"),
-    "command_swap": Kind(0.03, _commands_exchanged, _commands_exchanged,
-                         lambda one: f"the commands of the {_groups(one)} are in each other's columns",
-                         lambda one: "exchange these columns of the commands"),
-}  # fmt: skip
+    "sign": Kind(
+        0.15,
+        _values(_negative),
+        _values(_negative),
+        lambda suspect: f"{_both(suspect)} has the other sign",
+        lambda suspect: f"change its sign ({BY_NAME[suspect.channels[0]].long_name})",
+    ),
+    "unit": Kind(
+        0.2,
+        _values(_in_right_unit),
+        _values(_in_wrong_unit),
+        lambda suspect: f"{_both(suspect)} is in {suspect.how}",
+        _unit_remedy,
+    ),
+    "reference": Kind(
+        0.1,
+        _values(_to_north),
+        _values(_from_reference),
+        lambda suspect: f"{_both(suspect)} {suspect.how}",
+        _reference_remedy,
+    ),
+    "step": Kind(
+        0.05,
+        _values(_without_step),
+        _values(_with_step),
+        lambda suspect: (
+            f"{_both(suspect)} jumps {'up' if suspect.amount > 0.0 else 'down'} by {_number(suspect)} "
+            f"{BY_NAME[suspect.channels[0]].unit} at {suspect.since:.3g} s, and nothing else does"
+        ),
+        lambda suspect: (
+            f"subtract {suspect.amount:.3g} {BY_NAME[suspect.channels[0]].unit} from {suspect.since:.3g} s on, or "
+            "leave gaps there"
+        ),
+    ),
+    "frozen": Kind(
+        0.08,
+        _values(_as_gaps),
+        _values(_repeated),
+        lambda suspect: f"{_both(suspect)} is frozen from {suspect.since:.3g} s on",
+        lambda suspect: f"leave its cells empty from {suspect.since:.3g} s on",
+    ),
+    "dropout": Kind(
+        0.1,
+        _values(_as_gaps),
+        _values(_repeated),
+        lambda suspect: (
+            f"{_both(suspect)} {f'shows {suspect.how}' if suspect.how else 'repeats a value'} in place of "
+            f"measurements ({_spans(suspect.at)})"
+        ),
+        lambda suspect: "leave these cells empty",
+    ),
+    "swapped": Kind(
+        0.08,
+        _exchanged,
+        _exchanged,
+        lambda suspect: f"{_both(suspect)} have each other's values",
+        lambda suspect: "exchange the headers of the two columns",
+    ),
+    "late_clock": Kind(
+        0.08,
+        _earlier,
+        _later,
+        lambda suspect: (
+            f"the clock of the record is {_number(suspect)} s "
+            f"{'late' if suspect.amount > 0.0 else 'early'} against the commands'"
+        ),
+        lambda suspect: (
+            f"{'subtract' if suspect.amount > 0.0 else 'add'} {abs(suspect.amount):.3g} s "
+            f"{'from' if suspect.amount > 0.0 else 'to'} time_s"
+        ),
+    ),
+    "clock_rate": Kind(
+        0.03,
+        _slower,
+        _faster,
+        lambda suspect: (
+            f"the clock of the record runs {_number(suspect, 100.0)} % too "
+            f"{'fast' if suspect.amount > 0.0 else 'slow'}"
+        ),
+        lambda suspect: f"divide time_s by {1.0 + suspect.amount:.4g}",
+    ),
+    "latency": Kind(
+        0.05,
+        _in_time,
+        _delayed,
+        lambda suspect: (
+            f"{_both(suspect)} is {_number(suspect)} s {'late' if suspect.amount > 0.0 else 'early'} "
+            "against the other channels"
+        ),
+        lambda suspect: f"shift that column by {-suspect.amount:+.3g} s",
+    ),
+    "command_sign": Kind(
+        0.05,
+        _commands_turned,
+        _commands_turned,
+        lambda suspect: f"the command of the {_groups(suspect)} has the other sign",
+        lambda suspect: "change the sign of that command",
+    ),
+    "command_swap": Kind(
+        0.03,
+        _commands_exchanged,
+        _commands_exchanged,
+        lambda suspect: f"the commands of the {_groups(suspect)} are in each other's columns",
+        lambda suspect: "exchange these columns of the commands",
+    ),
+}
 """Kind → what it is; shares sum to one."""
 
 REPEATED = ("frozen", "dropout")
@@ -436,7 +505,7 @@ ANY = 0.1
 
 def corrected(logged: Logged, errors: tuple[DataError, ...]) -> Logged:
     """Return a record without some errors, undone in turn; first what stands at the times that were written."""
-    for error in sorted(errors, key=lambda one: one.kind not in REPEATED):
+    for error in sorted(errors, key=lambda each: each.kind not in REPEATED):
         logged = error.corrected(logged)
     return logged
 
@@ -453,5 +522,5 @@ def places(logged: Logged, errors: Iterable[DataError]) -> dict[str, np.ndarray]
     """
     count = np.arange(logged.record.time.size, dtype=float)
     written = dataclasses.replace(logged.record, values=dict.fromkeys(logged.record.values, count))
-    moved = tuple(one for one in errors if one.kind in (*SHIFTS, *REPEATED))
+    moved = tuple(error for error in errors if error.kind in (*SHIFTS, *REPEATED))
     return dict(corrected(dataclasses.replace(logged, record=written), moved).record.values)

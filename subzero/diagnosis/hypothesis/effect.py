@@ -98,10 +98,18 @@ def growing(effect: Effect, id: str, sentence: str) -> Effect:
     """Return the effect as it grows in proportion to the time from an onset on; its deviations are per minute."""
     faster = MINUTE_S / USUAL_GROWTH_S
     rates = tuple(
-        replace(one, unit=f"{one.unit}/min", tolerance=faster * one.tolerance, scale=faster * one.scale,
-                low=faster * one.low, high=faster * one.high, nominal=nothing, least=-np.inf)
-        for one in effect.parameters
-    )  # fmt: skip
+        replace(
+            parameter,
+            unit=f"{parameter.unit}/min",
+            tolerance=faster * parameter.tolerance,
+            scale=faster * parameter.scale,
+            low=faster * parameter.low,
+            high=faster * parameter.high,
+            nominal=nothing,
+            least=-np.inf,
+        )
+        for parameter in effect.parameters
+    )
     apply = partial(_within_bounds, effect)
     return replace(
         effect, id=id, sentence=sentence, parameters=rates, apply=apply, sudden=True, grows=effect.id
@@ -142,8 +150,15 @@ def with_free_onset(effect: Effect, time: float, end: float) -> Effect:
     """Return the effect as it begins at about a time [s] of a trial until `end`: when exactly is its last parameter, as
     likely at any time.
     """
-    begins = Parameter(name="start_time", unit="s", tolerance=ONSET_LINEAR_WITHIN_S, scale=end / np.sqrt(2.0 * np.pi),
-                       low=MIN_MARGIN_S - time, high=end - MIN_MARGIN_S - time, step=ONSET_STEP_S)  # fmt: skip
+    begins = Parameter(
+        name="start_time",
+        unit="s",
+        tolerance=ONSET_LINEAR_WITHIN_S,
+        scale=end / np.sqrt(2.0 * np.pi),
+        low=MIN_MARGIN_S - time,
+        high=end - MIN_MARGIN_S - time,
+        step=ONSET_STEP_S,
+    )
     at = with_onset(effect, time)
     return replace(at, parameters=(*effect.parameters, begins), apply=partial(_from_about, effect, time))
 
@@ -168,7 +183,7 @@ def _from_then_on(effect: Effect, time: float, setting: Setting, *deviations: fl
     before = [pair for pair in setting.later if pair[0] < first]
     after = [pair for pair in setting.later if pair[0] > first]
     if share < 1.0 - 1e-6:
-        before += [(first, _changed(effect, setting, base, *(share * one for one in deviations)))]
+        before += [(first, _changed(effect, setting, base, *(share * deviation for deviation in deviations)))]
         first += step
     changed = [
         (when, _changed(effect, setting, model, *deviations)) for when, model in [(first, base), *after]

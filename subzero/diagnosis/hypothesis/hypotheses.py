@@ -86,10 +86,10 @@ def with_tolerances(effect: Effect, setting: Setting) -> Effect:
     if not declared:
         return effect
     parameters = []
-    for at, one in enumerate(effect.parameters):
+    for at, parameter in enumerate(effect.parameters):
         slopes = {name: _slope(effect, at, setting, name) for name in declared}
         allowed = [declared[name] / slope for name, slope in slopes.items() if slope > 0.0]
-        parameters.append(replace(one, tolerance=min(allowed)) if allowed else one)
+        parameters.append(replace(parameter, tolerance=min(allowed)) if allowed else parameter)
     return replace(effect, parameters=tuple(parameters))
 
 
@@ -108,19 +108,22 @@ def small_deviation(parameter: Parameter) -> float:
 def _moved(effect: Effect, at: int, setting: Setting) -> Setting:
     """Return a setting with one parameter of an effect moved by its tolerance."""
     return effect.apply(
-        setting, *(small_deviation(one) if i == at else 0.0 for i, one in enumerate(effect.parameters))
+        setting,
+        *(small_deviation(parameter) if i == at else 0.0 for i, parameter in enumerate(effect.parameters)),
     )
 
 
 def moves_nothing(effect: Effect, setting: Setting) -> bool:
     """Say whether an effect is none in a setting: a share of a number that is zero there."""
     moved = [_moved(effect, at, setting) for at in range(len(effect.parameters))]
-    return all(_same(one, setting) for one in moved)
+    return all(_same(each, setting) for each in moved)
 
 
-def _same(one: Setting, other: Setting) -> bool:
+def _same(setting: Setting, other: Setting) -> bool:
     parts = ("model", "sensing", "clock_offset", "later", "tethered")
-    return one.trial is other.trial and all(getattr(one, part) == getattr(other, part) for part in parts)
+    return setting.trial is other.trial and all(
+        getattr(setting, part) == getattr(other, part) for part in parts
+    )
 
 
 Ids = tuple[str, ...]
@@ -174,7 +177,7 @@ def variances(entries: Sequence[Entry], ids: Ids, kappa: float) -> np.ndarray:
 def variances_named(entries: Sequence[Entry], at: Sequence[int], kappa: float) -> np.ndarray:
     """Return the prior variances that entries have if their causes are named (at,): s²."""
     own = [entries[k].parameter for k in at]
-    return np.array([max(one.scale, 2.0 * kappa * one.tolerance) ** 2 for one in own])
+    return np.array([max(each.scale, 2.0 * kappa * each.tolerance) ** 2 for each in own])
 
 
 @checked_arguments

@@ -280,8 +280,14 @@ def usual_noise(time: np.ndarray, used: np.ndarray, usual: Usual) -> Noise:
     slow = usual.level if usual.is_known else slow_usual(usual)
     share = SLOW_SHARE / np.sqrt(1.0 + SLOW_SHARE**2) if usual.is_known else 1.0
     white = np.sqrt(max(1.0 - share**2, 0.0)) * usual.level if usual.is_known else usual.level
-    return Noise(white=float(white), slow=float(share * slow), correlation_time=USUAL_TIME,
-                 resolution=usual.resolution, used=used, time=time[used])  # fmt: skip
+    return Noise(
+        white=float(white),
+        slow=float(share * slow),
+        correlation_time=USUAL_TIME,
+        resolution=usual.resolution,
+        used=used,
+        time=time[used],
+    )
 
 
 def resolution_of(values: np.ndarray, level: float) -> float:
@@ -372,8 +378,11 @@ def times_beside(noise: Mapping[str, Noise]) -> dict[str, TimesBeside]:
     """Return what the correlation times beside each channel are like; without those beside which too few others have a
     slow part.
     """
-    slow = {name: one.correlation_time for name, one in noise.items()
-            if one.slow**2 >= SEEN_SLOW**2 * one.unrelated}  # fmt: skip
+    slow = {
+        name: each.correlation_time
+        for name, each in noise.items()
+        if each.slow**2 >= SEEN_SLOW**2 * each.unrelated
+    }
     others = {name: np.log([time for other, time in slow.items() if other != name]) for name in noise}
     return {name: _about_their_median(logs) for name, logs in others.items() if logs.size >= FEWEST_BESIDE}
 
@@ -403,7 +412,7 @@ def prior_of(usual: Usual) -> Prior:
     """Return what is known of a usual sensor's noise beforehand."""
     time, spread, freedom = usual.times_beside or (USUAL_TIME, TIME_SPREAD, np.inf)
     mean = np.log([usual.level, slow_usual(usual), time])
-    below, above = (np.array([WHITE_SPREAD, one, spread]) for one in (SLOW_SPREAD, SLOW_SPREAD_ABOVE))
+    below, above = (np.array([WHITE_SPREAD, each, spread]) for each in (SLOW_SPREAD, SLOW_SPREAD_ABOVE))
     level = float(mean[0]) if usual.is_known else np.nan
     most = float(np.log(TIME_SPREAD / spread)) + _log_height(freedom)
     return Prior(mean, below, above, freedom, level, most)

@@ -99,17 +99,17 @@ def fit_change_points(
         large: hypotheses whose causes are tried as large as they are there.
     """
     done: dict[str, FittedChangePoint] = {}
-    candidates = [one for point in points for one in ranked_in(problem, point, able, record)]
-    candidates += [one for each in large for one in ranked_by_runs(problem, each, able, record)]
+    candidates = [candidate for point in points for candidate in ranked_in(problem, point, able, record)]
+    candidates += [run for each in large for run in ranked_by_runs(problem, each, able, record)]
     for _ in range(settings.MAX_TRIED):
         worth = _worth(candidates, done, least)
         if not worth:
             break
-        for one in side.map(partial(_fitted, problem), worth):
-            name = one.change_point.effect.id
-            done[name] = max(one, done.get(name, one), key=lambda each: each.log_posterior)
-        best = max(done.values(), key=lambda one: one.log_posterior)
-        candidates = [one for one in candidates if not any(one is each for each in worth)]
+        for item in side.map(partial(_fitted, problem), worth):
+            name = item.change_point.effect.id
+            done[name] = max(item, done.get(name, item), key=lambda each: each.log_posterior)
+        best = max(done.values(), key=lambda candidate: candidate.log_posterior)
+        candidates = [candidate for candidate in candidates if not any(candidate is each for each in worth)]
         is_place = best.log_posterior > least - settings.HOPELESS_NATS and not is_poor_fit(best.fit)
         if is_place:
             candidates = ranked_in(problem, linearised_at(problem, best), able, record)
@@ -122,15 +122,24 @@ def _worth(
     """Return what is worth a fit: each cause where it comes out best, if it gains anything there, may come close to
     the best, known or hoped for, and is promised more than what is known of it.
     """
-    ranked = sorted(candidates, key=lambda one: -one.log_posterior)
-    first = {one.change_point.effect.id: one for one in reversed(ranked)}
-    known = {name: one.log_posterior for name, one in done.items()}
-    bar = max([least, *known.values(), *(one.log_posterior for one in ranked[:1])]) - settings.HOPELESS_NATS
-    found = [one for name, one in first.items()
-             if one.at_most(settings.NON_LINEAR_SHARE_OF_FIRST if one is ranked[0] else settings.NON_LINEAR_SHARE) > bar
-             and one.change_point.log_gain + one.change_point.between > settings.CLOSE_NATS
-             and one.log_posterior > known.get(name, -np.inf) + settings.CLOSE_NATS]  # fmt: skip
-    return sorted(found, key=lambda one: -one.log_posterior)[: settings.MAX_TRIED]
+    ranked = sorted(candidates, key=lambda candidate: -candidate.log_posterior)
+    first = {candidate.change_point.effect.id: candidate for candidate in reversed(ranked)}
+    known = {name: candidate.log_posterior for name, candidate in done.items()}
+    bar = (
+        max([least, *known.values(), *(candidate.log_posterior for candidate in ranked[:1])])
+        - settings.HOPELESS_NATS
+    )
+    found = [
+        candidate
+        for name, candidate in first.items()
+        if candidate.at_most(
+            settings.NON_LINEAR_SHARE_OF_FIRST if candidate is ranked[0] else settings.NON_LINEAR_SHARE
+        )
+        > bar
+        and candidate.change_point.log_gain + candidate.change_point.between > settings.CLOSE_NATS
+        and candidate.log_posterior > known.get(name, -np.inf) + settings.CLOSE_NATS
+    ]
+    return sorted(found, key=lambda candidate: -candidate.log_posterior)[: settings.MAX_TRIED]
 
 
 def _fitted(problem: Problem, candidate: RankedChangePoint) -> FittedChangePoint:
@@ -181,9 +190,9 @@ def _prior(problem: Problem, more: Problem, kappa: float) -> np.ndarray:
     return np.concatenate([variances(problem.entries, (), kappa), own])
 
 
-def linearised_at(problem: Problem, one: FittedChangePoint) -> LinearisationPoint:
+def linearised_at(problem: Problem, fitted: FittedChangePoint) -> LinearisationPoint:
     """Return the linear problem around a sudden cause's fit, of all but it."""
-    n, fit = len(problem.entries), one.fit
+    n, fit = len(problem.entries), fitted.fit
     r = fit.r + fit.J[:, n:-1] @ fit.z[n:-1]
     without = replace(fit, z=fit.z[:n], r=r, J=fit.J[:, :n], D=fit.D[:n], made_at=None)
-    return LinearisationPoint(fit=without, along=BaseRun(one.problem, fit.z))
+    return LinearisationPoint(fit=without, along=BaseRun(fitted.problem, fit.z))

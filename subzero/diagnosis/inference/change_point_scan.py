@@ -135,8 +135,8 @@ def scan(
     columns = onset_columns(along, effects, record)
     found = _tried(point, D, columns, record)
     first = _strongest(found)
-    worth = [one for one in first[:best] if one.log_gain > settings.SCAN_GAIN_NATS]
-    near = [(one.effect, time) for one in worth for time in _peaks(one, found)]
+    worth = [candidate for candidate in first[:best] if candidate.log_gain > settings.SCAN_GAIN_NATS]
+    near = [(candidate.effect, time) for candidate in worth for time in _peaks(candidate, found)]
     finer = list(dict.fromkeys((effect, at) for effect, time in near for at in _around(time, spacing)))
     if not finer:
         return first
@@ -147,8 +147,14 @@ def scan(
 def _peaks(best: ChangePoint, found: list[ChangePoint]) -> list[float]:
     """Return the times of a grid at which an effect comes out about as well as at its best one, that one first."""
     least = best.log_gain - settings.LINEAR_NATS
-    alike = [one for one in found if one.effect.id == best.effect.id and one.log_gain > least]
-    return [one.time for one in sorted(alike, key=lambda one: -one.log_gain)[: settings.MAX_TRIED]]
+    alike = [
+        candidate
+        for candidate in found
+        if candidate.effect.id == best.effect.id and candidate.log_gain > least
+    ]
+    return [
+        each.time for each in sorted(alike, key=lambda candidate: -candidate.log_gain)[: settings.MAX_TRIED]
+    ]
 
 
 def in_rough_steps(along: BaseRun) -> BaseRun:
@@ -160,9 +166,11 @@ def onset_columns(along: BaseRun, effects: Sequence[Effect], record: int) -> dic
     """Return whitened sensitivities (m, parameters) to every sudden effect from every time of a grid on."""
     able = [effect for effect in effects if effect.sudden]
     coarse = times_of(along.problem, record)
-    steps = [(one, time) for one in able if not one.grows for time in coarse]
+    steps = [(candidate, time) for candidate in able if not candidate.grows for time in coarse]
     columns = dict(zip(steps, change_point_columns(along, steps, record), strict=True))
-    return columns | grown([one for one in able if one.grows], columns, spacing_of(along.problem, record))
+    return columns | grown(
+        [candidate for candidate in able if candidate.grows], columns, spacing_of(along.problem, record)
+    )
 
 
 def grown(
@@ -177,7 +185,7 @@ def grown(
     found = dict[Begun, np.ndarray]()
     for effect in effects:
         total: np.ndarray | float = 0.0
-        own = {time: C for (one, time), C in columns.items() if one.id == effect.grows}
+        own = {time: C for (candidate, time), C in columns.items() if candidate.id == effect.grows}
         for time in sorted(own, reverse=True):
             found[effect, time] = (total + 0.5 * own[time]) * spacing / MINUTE_S
             total = total + own[time]
@@ -187,27 +195,29 @@ def grown(
 def _around(time: float, spacing: float) -> list[float]:
     """Return the finer times between a time of the grid and its neighbours."""
     finer = [time + i * spacing / FINE_PER_COARSE for i in range(1 - FINE_PER_COARSE, FINE_PER_COARSE) if i]
-    return [round(one, 6) for one in finer]  # those of two neighbours are the same
+    return [round(candidate, 6) for candidate in finer]  # those of two neighbours are the same
 
 
 def _strongest(found: list[ChangePoint]) -> list[ChangePoint]:
     """Return the best time of every effect, most probable first."""
-    ranked = sorted(found, key=lambda one: -one.log_gain)
-    first = {one.effect.id: one for one in reversed(ranked)}
+    ranked = sorted(found, key=lambda candidate: -candidate.log_gain)
+    first = {candidate.effect.id: candidate for candidate in reversed(ranked)}
     return [
-        replace(one, between=_between(one, found))
-        for one in sorted(first.values(), key=lambda one: -one.log_gain)
+        replace(each, between=_between(each, found))
+        for each in sorted(first.values(), key=lambda candidate: -candidate.log_gain)
     ]
 
 
 def _between(best: ChangePoint, found: list[ChangePoint]) -> float:
     """Return how far a parabola through an effect's best time and its neighbours rises above it."""
-    at = {one.time: one for one in found if one.effect.id == best.effect.id}
+    at = {candidate.time: candidate for candidate in found if candidate.effect.id == best.effect.id}
     own = [at[time] for time in sorted(at)]
-    k = next(k for k, one in enumerate(own) if one.time == best.time)
+    k = next(k for k, candidate in enumerate(own) if candidate.time == best.time)
     if not 0 < k < len(own) - 1:
         return 0.0
-    times, gains = ([getattr(one, name) for one in own[k - 1 : k + 2]] for name in ("time", "log_gain"))
+    times, gains = (
+        [getattr(candidate, name) for candidate in own[k - 1 : k + 2]] for name in ("time", "log_gain")
+    )
     a, b, c = np.polyfit(np.array(times) - best.time, gains, 2)
     return float(c - b * b / (4.0 * a) - best.log_gain) if a < 0.0 else 0.0
 
@@ -275,8 +285,10 @@ class OnsetResponses(NamedTuple):
             or self.shown.keys() != other.shown.keys()
         ):
             return False
-        apart = [float(np.mean((self.shown[name] - other.shown[name]) ** 2)) / noise.sd**2
-                 for name, noise in seen.noise.items()]  # fmt: skip
+        apart = [
+            float(np.mean((self.shown[name] - other.shown[name]) ** 2)) / noise.sd**2
+            for name, noise in seen.noise.items()
+        ]
         return max(apart) < SAME_RUN_LEVELS**2
 
 
@@ -286,8 +298,13 @@ def change_point_columns(along: BaseRun, pairs: Sequence[Begun], record: int = 0
     """
     problem, seen = along.problem, along.problem.records[record]
     known = _responses_along(along, record)
-    known.changes.update(_changes(along, [(one, time) for one, time in pairs if (one.id, time) not in known.changes],
-                                  record))  # fmt: skip
+    known.changes.update(
+        _changes(
+            along,
+            [(candidate, time) for candidate, time in pairs if (candidate.id, time) not in known.changes],
+            record,
+        )
+    )
     first, size = _rows(problem, record)
     found: list[np.ndarray] = []
     for effect, time in pairs:
@@ -318,8 +335,11 @@ def _changes(
     """Return what onsets change along a run: (effect, onset) → channel → (n, parameters)."""
     problem, z = along
     base, steps = _plain(problem, record, z), [np.diag(_steps(effect)) for effect, _ in pairs]
-    jobs = [(with_onset(effect, time).apply(base, *row.tolist()), time)
-            for (effect, time), rows in zip(pairs, steps, strict=True) for row in rows]  # fmt: skip
+    jobs = [
+        (with_onset(effect, time).apply(base, *row.tolist()), time)
+        for (effect, time), rows in zip(pairs, steps, strict=True)
+        for row in rows
+    ]
     if not jobs:
         return {}
     problem.kept.count(1 + len(jobs))
@@ -331,7 +351,7 @@ def _changes(
         moved = [problem.shown(record, setting, track) for track in islice(tracks, len(rows))]
         found[effect.id, time] = {
             name: np.column_stack(
-                [(one[name] - own) / step for one, step in zip(moved, np.diag(rows), strict=True)]
+                [(candidate[name] - own) / step for candidate, step in zip(moved, np.diag(rows), strict=True)]
             )
             for name, own in shown.items()
         }
@@ -340,7 +360,10 @@ def _changes(
 
 def _steps(effect: Effect) -> list[float]:
     """Return the step of each parameter, to where there is more room."""
-    return [SECANT_SCALES * one.scale * (1.0 if one.high >= -one.low else -1.0) for one in effect.parameters]
+    return [
+        SECANT_SCALES * parameter.scale * (1.0 if parameter.high >= -parameter.low else -1.0)
+        for parameter in effect.parameters
+    ]
 
 
 def _plain(problem: Problem, record: int, z: np.ndarray) -> Setting:
@@ -356,7 +379,7 @@ def _run(stops: Mapping[float, Stop], job: tuple[Setting, float]) -> Track:
 
 def _rows(problem: Problem, record: int) -> tuple[int, int]:
     """Return where the rows of a record begin, and how many there are in all."""
-    sizes = [sum(noise.count for noise in one.noise.values()) for one in problem.records]
+    sizes = [sum(noise.count for noise in each.noise.values()) for each in problem.records]
     return sum(sizes[:record]), sum(sizes)
 
 
@@ -390,16 +413,16 @@ def ranked_in(
     """Return every sudden cause at its best time, in the linear problem of a place."""
     here = _log_none(problem, point.fit, record)
     found = scan(point, variances(problem.entries, (), 1.0), able, record)
-    return [RankedChangePoint(here + one.log_gain, one, point) for one in found]
+    return [RankedChangePoint(here + candidate.log_gain, candidate, point) for candidate in found]
 
 
 def ranked_by_runs(
-    problem: Problem, one: Candidate, able: Sequence[Effect], record: int
+    problem: Problem, candidate: Candidate, able: Sequence[Effect], record: int
 ) -> list[RankedChangePoint]:
     """Return the causes of a hypothesis from their best times on, by real runs from its fit: what nearly stops in
     mid-trial says little where it is changed a little.
     """
-    return [_large(problem, one.fit, effect, record) for effect in able if effect.id in one.ids]
+    return [_large(problem, candidate.fit, effect, record) for effect in able if effect.id in candidate.ids]
 
 
 def _large(problem: Problem, fit: Fit, effect: Effect, record: int) -> RankedChangePoint:
@@ -411,11 +434,13 @@ def _large(problem: Problem, fit: Fit, effect: Effect, record: int) -> RankedCha
     first = ChangePoint(effect=effect, time=times[0], record=record, log_gain=-np.inf, mean=fit.z[own])
     sizes = [np.clip(share * fit.z[own], low[own], high[own]) for share in settings.LATER_SIZES]
     jobs = [replace(first, time=time, mean=size) for time in times for size in sizes]
-    at = [np.concatenate([without, one.mean, [one.time - first.time]]) for one in jobs]
+    at = [np.concatenate([without, job.mean, [job.time - first.time]]) for job in jobs]
     point, none = LinearisationPoint(fit, BaseRun(problem, fit.z)), _log_none(problem, fit, record)
-    tried = [_at_size(problem, RankedChangePoint(none, one, point), without, r)
-             for one, r in zip(jobs, with_change_point(problem, first).residuals(at), strict=True)]  # fmt: skip
-    return max(tried, key=lambda one: one.log_posterior)
+    tried = [
+        _at_size(problem, RankedChangePoint(none, job, point), without, r)
+        for job, r in zip(jobs, with_change_point(problem, first).residuals(at), strict=True)
+    ]
+    return max(tried, key=lambda candidate: candidate.log_posterior)
 
 
 def _at_size(
@@ -426,7 +451,7 @@ def _at_size(
         return none._replace(log_posterior=-np.inf)
     change_point, D = none.change_point, variances(problem.entries, (), 1.0)
     there = posterior(Quadratic.at(without, r, none.point.fit.J), D)
-    scale = np.array([one.scale for one in change_point.effect.parameters])
+    scale = np.array([parameter.scale for parameter in change_point.effect.parameters])
     far = 0.5 * float(np.sum((change_point.mean / scale) ** 2)) + scale.size
     nothing = posterior(none.point.fit.quadratic, D).log_evidence
     gain = there.log_evidence - far - nothing

@@ -52,9 +52,9 @@ def is_clear(errors: Sequence[SuspectedError], work: Findings) -> bool:
     """Say whether errors need not be held against a search of the records with them: what is left then is explained
     without anything that begins in mid-trial, and without a force.
     """
-    outside = max((one.log_posterior for one in work.out_of_catalogue), default=-np.inf)
+    outside = max((error.log_posterior for error in work.out_of_catalogue), default=-np.inf)
     explained = work.search.best().log_posterior > outside and leaves_only_noise(work)
-    return explained and all(one.is_clear for one in errors)
+    return explained and all(error.is_clear for error in errors)
 
 
 class Look(Protocol):
@@ -99,18 +99,18 @@ def compared(suspicion: Suspicion, records: Sequence[Logged], look: Look) -> lis
         if not tried:
             raise
         tried[-1].work.complete = False
-    per_lost, least = least_means(tried), min(tried, key=lambda one: len(one.errors))
+    per_lost, least = least_means(tried), min(tried, key=lambda error: len(error.errors))
     return [
         (
-            replace(one, errors=numbers.get(id(one), one.errors)),
-            one.log_evidence(per_lost) + _of_samples_outside(one, least, records, per_lost),
+            replace(error, errors=numbers.get(id(error), error.errors)),
+            error.log_evidence(per_lost) + _of_samples_outside(error, least, records, per_lost),
         )
-        for one in tried
+        for error in tried
     ]
 
 
 def _of_samples_outside(
-    one: Explained, least: Explained, records: Sequence[Logged], per_lost: Mapping[str, float]
+    explanation: Explained, least: Explained, records: Sequence[Logged], per_lost: Mapping[str, float]
 ) -> float:
     """Return by how much samples that a clock or a delay puts outside the trial are more probable than those of their
     channel on average: they have their density given all others, beside the explanation of the records with the least
@@ -120,9 +120,11 @@ def _of_samples_outside(
 
     The ends of a record are like no others: something begins there, and noise that wanders is at its farthest.
     """
-    kept, seen = _inside(one, least, records), least.work.problem.records
-    gone = [{name: ~some[name] & np.isfinite(record.values[name]) for name in record.noise}
-            for some, record in zip(kept, seen, strict=True)]  # fmt: skip
+    kept, seen = _inside(explanation, least, records), least.work.problem.records
+    gone = [
+        {name: ~some[name] & np.isfinite(record.values[name]) for name in record.noise}
+        for some, record in zip(kept, seen, strict=True)
+    ]
     if not any(lost.any() for each in gone for lost in each.values()):
         return 0.0
     every = [{name: np.ones(some.size, dtype=bool) for name, some in each.items()} for each in kept]
@@ -138,11 +140,13 @@ def _of_samples_outside(
     return found
 
 
-def _inside(one: Explained, least: Explained, records: Sequence[Logged]) -> list[dict[str, np.ndarray]]:
+def _inside(
+    explanation: Explained, least: Explained, records: Sequence[Logged]
+) -> list[dict[str, np.ndarray]]:
     """Return channel → which samples of the records with the least errors are inside the trial with others (n,)."""
     found = []
     for i, logged in enumerate(records):
-        places, here = places_of(logged, one.errors, i), places_of(logged, least.errors, i)
+        places, here = places_of(logged, explanation.errors, i), places_of(logged, least.errors, i)
         found.append({name: np.isin(column, places[name]) for name, column in here.items()})
     return found
 
@@ -203,9 +207,11 @@ class _Comparison:
         """Search the records with some errors of a set left in them, in the place of all sets that hold one of them; if
         that is interrupted before anything is found, what there was stays.
         """
-        gone, before = {(one.record, one.error.id) for one in needless}, self.tried[:]
-        left = tuple(one for one in now.errors if (one.record, one.error.id) not in gone)
-        self.tried[:] = [one for one in self.tried if not _holds_one(one, gone) and one.errors != left]
+        gone, before = {(error.record, error.error.id) for error in needless}, self.tried[:]
+        left = tuple(error for error in now.errors if (error.record, error.error.id) not in gone)
+        self.tried[:] = [
+            error for error in self.tried if not _holds_one(error, gone) and error.errors != left
+        ]
         try:
             self._race([self._look_at(left, self.look.start(without(self.records, left)))])
         except KeyboardInterrupt:
@@ -220,11 +226,11 @@ class _Comparison:
         self.tried.remove(less)
         return more
 
-    def _explains_more(self, one: Explained, other: Explained) -> bool:
+    def _explains_more(self, explanation: Explained, other: Explained) -> bool:
         """Say whether errors with some numbers are more probable than with others, with what those put outside."""
-        per_lost = least_means([one, other])
-        outside = _of_samples_outside(one, other, self.records, per_lost)
-        return one.log_evidence(per_lost) + outside > other.log_evidence(per_lost)
+        per_lost = least_means([explanation, other])
+        outside = _of_samples_outside(explanation, other, self.records, per_lost)
+        return explanation.log_evidence(per_lost) + outside > other.log_evidence(per_lost)
 
     def _looks(self, more: Sequence[tuple[SuspectedError, ...]]) -> list[Explained]:
         """Give further sets of errors a first look, and return what is found, unless interrupted."""
@@ -257,21 +263,21 @@ class _Comparison:
         """Say whether records without errors are hopelessly behind something that was tried, even with the causes of
         that: what is far from a run is not found around it.
         """
-        better = [one for one in self.tried if self._explained(errors, work).is_behind(one)]
-        for one in better:
-            if one.work.problem.entries is not work.problem.entries:
+        better = [suspect for suspect in self.tried if self._explained(errors, work).is_behind(suspect)]
+        for error in better:
+            if error.work.problem.entries is not work.problem.entries:
                 return False
-            work.search.fit_like(one.work.search.best())
+            work.search.fit_like(error.work.search.best())
         now = self._explained(errors, work)
-        return any(now.is_behind(one) for one in better)
+        return any(now.is_behind(suspect) for suspect in better)
 
     def _race(self, new: Sequence[Explained]) -> None:
         """Finish what may be the most probable, of what is new among what was tried."""
-        waiting = [one for one in new if not one.work.given_up]
+        waiting = [error for error in new if not error.work.given_up]
         while waiting and _is_complete(self.tried):
             now = _first(waiting)
             waiting.remove(now)
-            if not any(now.is_behind(one) for one in self.tried):
+            if not any(now.is_behind(error) for error in self.tried):
                 self._fit_like_others(now.work)
                 self.look.finish(now.work)
 
@@ -279,17 +285,24 @@ class _Comparison:
         """Fit what explains the records without other errors from where it does: a fit may end in a local minimum, and
         what it lacks there is no evidence of an error.
         """
-        for one in self.tried:
-            if one.work is not work and one.work.problem.entries is work.problem.entries:
-                work.search.fit_like(one.work.search.best())
+        for error in self.tried:
+            if error.work is not work and error.work.problem.entries is work.problem.entries:
+                work.search.fit_like(error.work.search.best())
 
     def _explained(self, errors: tuple[SuspectedError, ...], work: Findings) -> Explained:
         """Return records that are taken to have errors, with what was found in the records without them."""
-        prior = sum(log_prior(one.error, ALIKE)
-                    + one.error.log_jacobian * measured_by(self.records[one.record], one.error)
-                    for one in errors)  # fmt: skip
-        return Explained(errors=errors, work=work, log_prior=float(prior), lost=self._lost(errors, work),
-                         standing=standing_of(self.suspicion, errors, self.records))  # fmt: skip
+        prior = sum(
+            log_prior(error.error, ALIKE)
+            + error.error.log_jacobian * measured_by(self.records[error.record], error.error)
+            for error in errors
+        )
+        return Explained(
+            errors=errors,
+            work=work,
+            log_prior=float(prior),
+            lost=self._lost(errors, work),
+            standing=standing_of(self.suspicion, errors, self.records),
+        )
 
     def _lost(self, errors: Sequence[SuspectedError], work: Findings) -> Counter[str]:
         """Return how many samples of each channel are no measurements without errors: more than 0 or fewer, where
@@ -299,9 +312,9 @@ class _Comparison:
         for logged, seen in zip(self.records, work.problem.records, strict=True):
             lost.update({name: int(np.isfinite(logged.record.values[name]).sum()) for name in seen.noise})
         lost.subtract(samples_of(work))
-        for one in errors:
-            if one.may_stand_still:
-                lost[one.error.channels[0]] -= int(lost_by(one, errors, self.records).sum())
+        for error in errors:
+            if error.may_stand_still:
+                lost[error.error.channels[0]] -= int(lost_by(error, errors, self.records).sum())
         return lost
 
 
@@ -314,16 +327,16 @@ def _is_settled(work: Findings) -> bool:
     return leaves_only_noise(work) and not work.search.is_poor()
 
 
-def _holds_one(one: Explained, errors: Container[tuple[int, str]]) -> bool:
+def _holds_one(explanation: Explained, errors: Container[tuple[int, str]]) -> bool:
     """Say whether a set holds one of some errors (record, id)."""
-    return any((each.record, each.error.id) in errors for each in one.errors)
+    return any((each.record, each.error.id) in errors for each in explanation.errors)
 
 
 def _is_complete(tried: Sequence[Explained]) -> bool:
     """Say whether nothing was interrupted."""
-    return all(one.work.complete for one in tried)
+    return all(error.work.complete for error in tried)
 
 
 def _first(tried: Sequence[Explained]) -> Explained:
     per_lost = least_means(tried)
-    return max(tried, key=lambda one: one.log_evidence(per_lost))
+    return max(tried, key=lambda error: error.log_evidence(per_lost))

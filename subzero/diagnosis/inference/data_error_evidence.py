@@ -71,7 +71,7 @@ Samples = list[dict[str, np.ndarray]]
 def leaves_only_noise(work: Findings) -> bool:
     """Say whether one explanation leaves nothing but the noise of usual sensors."""
     return _is_quiet(work) and (
-        not is_poor_fit(work.search.best().fit) or any(one.point for one in work.out_of_catalogue)
+        not is_poor_fit(work.search.best().fit) or any(error.point for error in work.out_of_catalogue)
     )
 
 
@@ -80,10 +80,10 @@ def _is_quiet(work: Findings) -> bool:
     was estimated behind wide tolerances may be that of a misfit, which something explains by now.
     """
     problem, r = _best_residual(work)
-    for i, one in enumerate(problem.records):
-        for name, noise in one.noise.items():
+    for i, record in enumerate(problem.records):
+        for name, noise in record.noise.items():
             left = min(float(np.sqrt(np.mean(_own(problem, r, i, name) ** 2))), 1.0)
-            level = sensor_of(one, name).level
+            level = sensor_of(record, name).level
             most = LOUD * float(np.hypot(level, noise.resolution / np.sqrt(12.0)))
             if noise.sd * left >= most:
                 return False
@@ -102,8 +102,8 @@ class Standing(NamedTuple):
         best fit, and the log odds that it is frozen, not standing still, where each value is an interval.
         """
         problem, r = _best_residual(work)
-        one, white = problem.records[self.record], _own(problem, r, self.record, self.channel)
-        noise, usual = one.noise[self.channel], sensor_of(one, self.channel)
+        record, white = problem.records[self.record], _own(problem, r, self.record, self.channel)
+        noise, usual = record.noise[self.channel], sensor_of(record, self.channel)
         run = self.run[noise.used]
         if not run.any():
             return 0.0
@@ -118,20 +118,20 @@ def _best_residual(work: Findings) -> tuple[Problem, np.ndarray]:
     """
     best = work.search.best()
     least, found = best.log_posterior, (work.problem, best.fit.r)
-    for one in work.out_of_catalogue:
-        if one.log_posterior > least and isinstance(one.what, FittedChangePoint):
-            least, found = one.log_posterior, (one.what.problem, one.what.fit.r)
-        elif one.log_posterior > least and one.point and one.id.startswith(FORCE):
-            along = one.point.along
-            least, found = one.log_posterior, (along.problem, along.problem.residual(along.z))
+    for error in work.out_of_catalogue:
+        if error.log_posterior > least and isinstance(error.what, FittedChangePoint):
+            least, found = error.log_posterior, (error.what.problem, error.what.fit.r)
+        elif error.log_posterior > least and error.point and error.id.startswith(FORCE):
+            along = error.point.along
+            least, found = error.log_posterior, (along.problem, along.problem.residual(along.z))
     return found
 
 
 def _own(problem: Problem, r: np.ndarray, record: int, channel: str) -> np.ndarray:
     """Return the part of a residual (m,) that is of one channel of one record."""
     at = 0
-    for i, one in enumerate(problem.records):
-        for name, noise in one.noise.items():
+    for i, each in enumerate(problem.records):
+        for name, noise in each.noise.items():
             if (i, name) == (record, channel):
                 return r[at : at + noise.count]
             at += noise.count
@@ -143,18 +143,18 @@ def standing_of(
 ) -> tuple[Standing, ...]:
     """Return the rounded channels that are held to stand still where only some suspected errors are corrected."""
     return tuple(
-        Standing(one.record, one.error.channels[0], lost_by(one, errors, records))
-        for one in whole.errors
-        if one.may_stand_still and not any(one is each for each in errors)
+        Standing(error.record, error.error.channels[0], lost_by(error, errors, records))
+        for error in whole.errors
+        if error.may_stand_still and not any(error is each for each in errors)
     )
 
 
-def lost_by(one: SuspectedError, errors: Sequence[SuspectedError], records: Sequence[Logged]) -> np.ndarray:
+def lost_by(error: SuspectedError, errors: Sequence[SuspectedError], records: Sequence[Logged]) -> np.ndarray:
     """Return which samples of its channel (n,) one more error takes from a record."""
-    others = tuple(each.error for each in errors if each.record == one.record and each is not one)
+    others = tuple(each.error for each in errors if each.record == error.record and each is not error)
     before, after = (
-        np.isfinite(corrected(records[one.record], found).record.values[one.error.channels[0]])
-        for found in (others, (*others, one.error))
+        np.isfinite(corrected(records[error.record], found).record.values[error.error.channels[0]])
+        for found in (others, (*others, error.error))
     )
     return before & ~after
 
@@ -182,7 +182,7 @@ class Explained:
         channel is given. That a frozen channel repeats its value is certain; one that stands still has its odds in
         place of a density.
         """
-        standing = sum(one.log_excess(self.work) for one in self.standing)
+        standing = sum(error.log_excess(self.work) for error in self.standing)
         lost = sum(count * per_lost.get(name, 0.0) for name, count in self.lost.items())
         return log_evidence(self.work) + self.log_prior + lost - standing
 
@@ -192,10 +192,10 @@ class Explained:
         problem, r = _best_residual(self.work)
         samples = samples_of(self.work)
         total = dict.fromkeys(samples, 0.0)
-        for i, one in enumerate(problem.records):
-            for name in one.noise:
+        for i, record in enumerate(problem.records):
+            for name in record.noise:
                 square = float(np.sum(_own(problem, r, i, name) ** 2))
-                total[name] += _fixed(one, name) - 0.5 * square
+                total[name] += _fixed(record, name) - 0.5 * square
         return {name: total[name] / count for name, count in samples.items() if count}
 
     def is_behind(self, other: Explained) -> bool:
@@ -210,63 +210,70 @@ class Explained:
         if not self.work.search.screen.log_posterior:
             return settings.MAX_PREDICTED_GAIN_NATS
         fits = self.work.search.candidates.values()
-        return max(one.optimistic_log_posterior for one in fits) - max(one.log_posterior for one in fits)
+        return max(fit.optimistic_log_posterior for fit in fits) - max(fit.log_posterior for fit in fits)
 
 
 def least_means(several: Sequence[Explained]) -> dict[str, float]:
     """Return channel → the least of the mean log densities of a sample."""
-    means = [one.means for one in several]
-    return {name: min(one[name] for one in means if name in one) for name in set().union(*means)}
+    means = [error.means for error in several]
+    return {name: min(mean[name] for mean in means if name in mean) for name in set().union(*means)}
 
 
 def without(records: Sequence[Logged], errors: Errors) -> list[Logged]:
     """Return records without errors in them."""
-    return [corrected(logged, tuple(one.error for one in errors if one.record == i))
-            for i, logged in enumerate(records)]  # fmt: skip
+    return [
+        corrected(logged, tuple(error.error for error in errors if error.record == i))
+        for i, logged in enumerate(records)
+    ]
 
 
 def places_of(logged: Logged, errors: Errors, record: int) -> dict[str, np.ndarray]:
     """Return channel → which of the samples that were written stands where when clocks are put right (n,); NaN where
     none does.
     """
-    return places(logged, [one.error for one in errors if one.record == record and one.error.kind in SHIFTS])
+    return places(
+        logged, [error.error for error in errors if error.record == record and error.error.kind in SHIFTS]
+    )
 
 
 def measured_by(logged: Logged, error: DataError) -> int:
     """Return how many samples of an error's channels were measured."""
-    return sum(int(np.isfinite(logged.record.values[name]).sum()) for name in error.channels
-               if name in logged.record.values)  # fmt: skip
+    return sum(
+        int(np.isfinite(logged.record.values[name]).sum())
+        for name in error.channels
+        if name in logged.record.values
+    )
 
 
 def log_evidence(work: Findings) -> float:
     """Return the log evidence of records, all explanations together, as a density of what was measured."""
     inside = work.search.beliefs.log_total()
-    found = log_sum([inside, *(one.log_posterior for one in work.out_of_catalogue)])
-    return found + sum(_fixed(one, name) for one in work.problem.records for name in one.noise)
+    found = log_sum([inside, *(error.log_posterior for error in work.out_of_catalogue)])
+    return found + sum(_fixed(record, name) for record in work.problem.records for name in record.noise)
 
 
 def samples_of(work: Findings) -> Counter[str]:
     """Return how many samples of each channel were measured."""
     samples = Counter[str]()
-    for one in work.problem.records:
-        samples.update({name: int(np.isfinite(one.values[name]).sum()) for name in one.noise})
+    for record in work.problem.records:
+        samples.update({name: int(np.isfinite(record.values[name]).sum()) for name in record.noise})
     return samples
 
 
-def _fixed(one: Observed, name: str) -> float:
+def _fixed(record: Observed, name: str) -> float:
     """Return what the noise of a channel adds to its log density: −½ log det Σ, what outliers cost, and its prior."""
-    return log_of_outliers(*_outliers(one, name)) + log_density_of_noise(one, name)
+    return log_of_outliers(*_outliers(record, name)) + log_density_of_noise(record, name)
 
 
-def log_outlier(one: Observed, name: str) -> float:
+def log_outlier(record: Observed, name: str) -> float:
     """Return the log density of a further outlier of a channel."""
-    return log_of_outlier(*_outliers(one, name))
+    return log_of_outlier(*_outliers(record, name))
 
 
-def _outliers(one: Observed, name: str) -> tuple[int, int, float]:
+def _outliers(record: Observed, name: str) -> tuple[int, int, float]:
     """Return how many samples of a channel are outliers, how many were measured, and the usual level of its sensor."""
-    measured = int(np.isfinite(one.values[name]).sum())
-    return measured - one.noise[name].count, measured, sensor_of(one, name).level
+    measured = int(np.isfinite(record.values[name]).sum())
+    return measured - record.noise[name].count, measured, sensor_of(record, name).level
 
 
 class Numbers(NamedTuple):
@@ -281,21 +288,21 @@ class Numbers(NamedTuple):
     may_be_told: bool = True
 
 
-def numbers_again(one: Explained, records: Sequence[Logged]) -> Numbers:
+def numbers_again(explanation: Explained, records: Sequence[Logged]) -> Numbers:
     """Return the errors of an explanation with their numbers, found anew one after the other, and the gain.
 
     Args:
-        one: errors, and what explains the records without them.
+        explanation: errors, and what explains the records without them.
         records: as they were written.
     """
     needless: list[SuspectedError] = []
-    errors, gain = list(one.errors), 0.0
-    outside = max((each.log_posterior for each in one.work.out_of_catalogue), default=-np.inf)
-    may_be_told = outside <= one.work.search.best().log_posterior
-    samples = _known(one.work.search, records, one.errors)
-    for i, each in enumerate(one.errors):
+    errors, gain = list(explanation.errors), 0.0
+    outside = max((each.log_posterior for each in explanation.work.out_of_catalogue), default=-np.inf)
+    may_be_told = outside <= explanation.work.search.best().log_posterior
+    samples = _known(explanation.work.search, records, explanation.errors)
+    for i, each in enumerate(explanation.errors):
         if each.error.kind in NUMBERED and not each.is_read_off:
-            logs_of, begin = _density(one.work.search, samples, records, errors, i)
+            logs_of, begin = _density(explanation.work.search, samples, records, errors, i)
             number = each.error.amount
             found = peak(logs_of, number, begin, FIRST_SHARE * abs(number))
             if found is not None and abs(found.mean) >= LEAST.get(each.error.kind, 0.0):
@@ -314,12 +321,12 @@ def _density(
     clock late besides is part of a late clock.
     """
     amount, z = errors[i].error.amount, search.best().fit.z.copy()
-    late = [k for k, one in enumerate(search.problem.entries) if one.effect.id == CLOCK.id]
+    late = [k for k, entry in enumerate(search.problem.entries) if entry.effect.id == CLOCK.id]
     more = float(z[late].sum()) if errors[i].error.kind == "late_clock" else 0.0
     z[late] -= more
 
     def logs_of(amounts: Sequence[float]) -> np.ndarray:
-        each = [[*errors[:i], _with_number(errors[i], one), *errors[i + 1 :]] for one in amounts]
+        each = [[*errors[:i], _with_number(errors[i], amount), *errors[i + 1 :]] for amount in amounts]
         try:
             kept = _inside_of_all(samples, records, each)
             return np.array([_log_density(search, z, records, some, kept) for some in each])
@@ -329,8 +336,8 @@ def _density(
     return logs_of, amount + more
 
 
-def _with_number(one: SuspectedError, amount: float, sd: float = 0.0) -> SuspectedError:
-    return replace(one, error=replace(one.error, amount=float(amount), amount_sd=float(sd)))
+def _with_number(error: SuspectedError, amount: float, sd: float = 0.0) -> SuspectedError:
+    return replace(error, error=replace(error.error, amount=float(amount), amount_sd=float(sd)))
 
 
 class Peak(NamedTuple):
@@ -369,15 +376,15 @@ def peak(logs_of: Density, known: float, first: float, apart: float) -> Peak | N
 def _known(search: Search, records: Sequence[Logged], errors: Errors) -> Samples:
     """Return the samples that the fits without errors are made to: no outliers."""
     found = Samples()
-    for i, (logged, one) in enumerate(zip(records, search.problem.records, strict=True)):
+    for i, (logged, record) in enumerate(zip(records, search.problem.records, strict=True)):
         where = places_of(logged, errors, i)
-        found.append({name: where[name][noise.used] for name, noise in one.noise.items()})
+        found.append({name: where[name][noise.used] for name, noise in record.noise.items()})
     return found
 
 
 def _inside_of_all(known: Samples, records: Sequence[Logged], several: Sequence[Errors]) -> Samples:
     """Return those of known samples that none of several sets of errors puts outside the trial."""
-    found = [dict(one) for one in known]
+    found = [dict(error) for error in known]
     for errors in several:
         for i, logged in enumerate(records):
             where = places_of(logged, errors, i)
@@ -397,11 +404,15 @@ def _log_density(
     linear = Linear(problem.residual(z) + J @ z, J)
     each = [(ids, kappa) for ids in search.candidates for kappa in KAPPAS]
     q = linear.quadratic
-    logs = [log_prior(ids, count) + np.log(KAPPAS[kappa]) + linear_evidence(problem, q, ids, kappa)
-            for ids, kappa in each]  # fmt: skip
+    logs = [
+        log_prior(ids, count) + np.log(KAPPAS[kappa]) + linear_evidence(problem, q, ids, kappa)
+        for ids, kappa in each
+    ]
     best = variances(problem.entries, *each[int(np.argmax(logs))])
     found = log_sum(logs) + gain_of_own_noise(problem, linear, best)
-    return found + sum(log_density_of_noise(one, name) for one in problem.records for name in one.noise)
+    return found + sum(
+        log_density_of_noise(record, name) for record in problem.records for name in record.noise
+    )
 
 
 def _posed_like(search: Search, records: Sequence[Logged], errors: Errors, kept: Samples) -> Problem:

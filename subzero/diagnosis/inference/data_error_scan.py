@@ -87,19 +87,26 @@ def suspects(yardstick: Yardstick, trusted: frozenset[str] = frozenset()) -> lis
     """
     rough = []
     for group in possible(yardstick, trusted):
-        group = group._replace(each=[one for one in group.each if not _is_known(one, yardstick.corrected)])
-        each = [_judged(yardstick, one, group) for one in group.each]
-        rough += [(one, group) for one in (_peaks(each) if group.step else each)]
-    close = [(_judged(yardstick, one.error, group, closer=True), group) for one, group in rough
-             if one.generous > HOPELESS or _may_be_commanded(yardstick, one.error)]  # fmt: skip
-    lead = max((one.lead for one, _ in close), default=-np.inf)
+        group = group._replace(
+            each=[suspect for suspect in group.each if not _is_known(suspect, yardstick.corrected)]
+        )
+        each = [_judged(yardstick, suspect, group) for suspect in group.each]
+        rough += [(peak, group) for peak in (_peaks(each) if group.step else each)]
+    close = [
+        (_judged(yardstick, suspect.error, group, closer=True), group)
+        for suspect, group in rough
+        if suspect.generous > HOPELESS or _may_be_commanded(yardstick, suspect.error)
+    ]
+    lead = max((suspect.lead for suspect, _ in close), default=-np.inf)
     found: dict[str, Suspect] = {}
-    for one, group in close:
-        if one.lead > max(UNREFINED, lead - FAR_BEHIND) and (group.step or one.error.kind == "step"):
-            one = _refined(yardstick, one, group)
-        if one.lead > found.get(one.error.id, one).lead or one.error.id not in found:
-            found[one.error.id] = one
-    return sorted((one for one in found.values() if one.lead > 0.0), key=lambda one: -one.lead)
+    for error, group in close:
+        if error.lead > max(UNREFINED, lead - FAR_BEHIND) and (group.step or error.error.kind == "step"):
+            error = _refined(yardstick, error, group)
+        if error.lead > found.get(error.error.id, error).lead or error.error.id not in found:
+            found[error.error.id] = error
+    return sorted(
+        (suspect for suspect in found.values() if suspect.lead > 0.0), key=lambda suspect: -suspect.lead
+    )
 
 
 def judged_as_it_is(yardstick: Yardstick, error: DataError) -> Suspect:
@@ -116,7 +123,7 @@ def clock_below_least(yardstick: Yardstick) -> Suspect | None:
     sizes = np.arange(0.5 * CLOCK_STEP_S, least + CLOCK_STEP_S, 0.5 * CLOCK_STEP_S)
     both = [side * float(size) for size in sizes for side in (1.0, -1.0)]
     each = [judge(DataError(kind="late_clock", amount=amount)) for amount in both]
-    best = max(each, key=lambda one: one.lead)
+    best = max(each, key=lambda error: error.lead)
     if best.lead < UNREFINED:
         return None
     best = best_number(judge, best, 0.5 * CLOCK_STEP_S)
@@ -126,33 +133,35 @@ def clock_below_least(yardstick: Yardstick) -> Suspect | None:
 def likeliest(yardstick: Yardstick, errors: Sequence[DataError]) -> DataError:
     """Return the most probable of errors that are read off a record, and may be as small as they are."""
     group = Group(list(errors), is_read_off=True)
-    return max(errors, key=lambda one: _judged(yardstick, one, group, closer=True).lead)
+    return max(errors, key=lambda error: _judged(yardstick, error, group, closer=True).lead)
 
 
 def judged_again(yardstick: Yardstick, error: DataError) -> Suspect:
     """Return the same with its numbers found anew."""
-    one, group = judged_as_it_is(yardstick, error), _group_of(yardstick, error)
-    return _refined(yardstick, one, group) if group.step or error.kind == "step" else one
+    suspect, group = judged_as_it_is(yardstick, error), _group_of(yardstick, error)
+    return _refined(yardstick, suspect, group) if group.step or error.kind == "step" else suspect
 
 
 def _group_of(yardstick: Yardstick, error: DataError) -> Group:
     """Return the errors that share the probability of one, those that only the record itself tells by themselves."""
     groups = possible(yardstick, frozenset())
-    found = (group for group in groups if any(one.id == error.id for one in group.each))
+    found = (group for group in groups if any(suspect.id == error.id for suspect in group.each))
     return next(found, Group([error]))
 
 
 def _is_known(error: DataError, known: Sequence[DataError]) -> bool:
     """Say whether such an error is corrected already."""
-    return any(one.kind == error.kind and set(one.channels) == set(error.channels) for one in known)
+    return any(
+        suspect.kind == error.kind and set(suspect.channels) == set(error.channels) for suspect in known
+    )
 
 
 def _peaks(each: Sequence[Suspect]) -> list[Suspect]:
     """Return those of a grid of numbers that are better than their neighbours, the best first."""
-    row = sorted(each, key=lambda one: one.error.amount)
-    value = [-np.inf, *(one.generous for one in row), -np.inf]
-    tops = [one for i, one in enumerate(row) if value[i + 1] >= max(value[i], value[i + 2])]
-    return sorted(tops, key=lambda one: -one.generous)[:PEAKS]
+    row = sorted(each, key=lambda error: error.error.amount)
+    value = [-np.inf, *(error.generous for error in row), -np.inf]
+    tops = [error for i, error in enumerate(row) if value[i + 1] >= max(value[i], value[i + 2])]
+    return sorted(tops, key=lambda top: -top.generous)[:PEAKS]
 
 
 def log_prior(error: DataError, alike: int) -> float:
@@ -237,35 +246,36 @@ def _lost(yardstick: Yardstick, error: DataError, terms: Mapping[str, Term], as_
     return sum(yardstick.of_lost(name, lost, as_is) for name, lost in yardstick.lost_by(error).items())
 
 
-def _refined(yardstick: Yardstick, one: Suspect, group: Group) -> Suspect:
+def _refined(yardstick: Yardstick, suspect: Suspect, group: Group) -> Suspect:
     """Return an error with the numbers that are best close to those that were tried."""
     judge = partial(_judged, yardstick, group=group, closer=True)
     if group.step:
-        return best_number(judge, one, group.step)
+        return best_number(judge, suspect, group.step)
     time = yardstick.time
-    at, span = int(np.searchsorted(time, one.error.since)), max(time.size // STEP_TIMES, 1)
+    at, span = int(np.searchsorted(time, suspect.error.since)), max(time.size // STEP_TIMES, 1)
     around = time[max(at - span, 1) : at + span + 1 : max(span // 4, 1)]
     for _ in range(2):
-        one = best_number(judge, one, 0.6 * abs(one.error.amount))
-        one = max(
-            [one, *(judge(replace(one.error, since=float(t))) for t in around)], key=lambda each: each.lead
+        suspect = best_number(judge, suspect, 0.6 * abs(suspect.error.amount))
+        suspect = max(
+            [suspect, *(judge(replace(suspect.error, since=float(t))) for t in around)],
+            key=lambda each: each.lead,
         )
-        around = time[max(int(np.searchsorted(time, one.error.since)) - 3, 1) :][:7]
-    return one
+        around = time[max(int(np.searchsorted(time, suspect.error.since)) - 3, 1) :][:7]
+    return suspect
 
 
-def best_number(judge: Callable[[DataError], Suspect], one: Suspect, step: float) -> Suspect:
+def best_number(judge: Callable[[DataError], Suspect], suspect: Suspect, step: float) -> Suspect:
     """Return an error with the number between amount ± step that is judged best (golden section); where others are
     about as good, with their mean.
     """
     ratio = 0.5 * (np.sqrt(5.0) - 1.0)
 
     def at(amount: float) -> Suspect:
-        return judge(replace(one.error, amount=float(amount)))
+        return judge(replace(suspect.error, amount=float(amount)))
 
-    low, high = one.error.amount - step, one.error.amount + step
+    low, high = suspect.error.amount - step, suspect.error.amount + step
     inner = [at(high - ratio * step * 2.0), at(low + ratio * step * 2.0)]
-    seen = [one, *inner]
+    seen = [suspect, *inner]
     while high - low > FINEST * step:
         if inner[0].lead > inner[1].lead:
             high = inner[1].error.amount
@@ -275,14 +285,14 @@ def best_number(judge: Callable[[DataError], Suspect], one: Suspect, step: float
             low = inner[0].error.amount
             inner = [inner[1], at(low + ratio * (high - low))]
             seen.append(inner[1])
-    seen += [at(one.error.amount + share * step) for share in (-1.0, -0.5, 0.5, 1.0)]
+    seen += [at(suspect.error.amount + share * step) for share in (-1.0, -0.5, 0.5, 1.0)]
     best, mean = max(seen, key=lambda each: each.lead), at(_mean_number(seen))
     return mean if mean.lead > best.lead - AS_GOOD else best
 
 
 def _mean_number(seen: Sequence[Suspect]) -> float:
     """Return the mean of a number, by what is judged of some of its values (trapezoidal rule)."""
-    row = sorted({one.error.amount: one.lead for one in seen}.items())
+    row = sorted({error.error.amount: error.lead for error in seen}.items())
     x, lead = np.array(row).T
     density = np.exp(lead - lead.max())
     return float(np.trapezoid(density * x, x) / np.trapezoid(density, x))
@@ -303,9 +313,12 @@ def possible(yardstick: Yardstick, trusted: frozenset[str]) -> list[Group]:
     values, time = yardstick.logged.record.values, yardstick.logged.record.time
     names = [name for name in values if name in yardstick.nominal]
     open_ = [name for name in names if name not in trusted]
-    units = [DataError(kind="unit", channels=(name,), how=how)
-             for name in open_ for how in MISTAKEN.get(BY_NAME[name].unit, {})]  # fmt: skip
-    units = [one for one in units if _is_quiet(yardstick, one)]
+    units = [
+        DataError(kind="unit", channels=(name,), how=how)
+        for name in open_
+        for how in MISTAKEN.get(BY_NAME[name].unit, {})
+    ]
+    units = [unit for unit in units if _is_quiet(yardstick, unit)]
     pairs = [DataError(kind="swapped", channels=pair) for pair in itertools.combinations(open_, 2)]
     found = [
         Group([DataError(kind="sign", channels=(name,)) for name in open_]),
@@ -318,9 +331,9 @@ def possible(yardstick: Yardstick, trusted: frozenset[str]) -> list[Group]:
             ]
         ),
         Group(pairs),
-        Group([one for one in yardstick.repeated if one.channels[0] in open_]),
+        Group([error for error in yardstick.repeated if error.channels[0] in open_]),
     ]
-    found += [Group([one for name in open_ for one in _step(yardstick, name)]), *_clocks(time, open_)]
+    found += [Group([error for name in open_ for error in _step(yardstick, name)]), *_clocks(time, open_)]
     if yardstick.logged.setting.trial.commands is not None:
         found += _commands(yardstick.logged)
     return [group for group in found if group.each]
@@ -374,11 +387,11 @@ def _different(logged: Logged, errors: Iterable[DataError]) -> list[DataError]:
     found: dict[bytes, DataError] = {}
     own = logged.setting.trial.commands
     assert own is not None
-    for one in errors:
-        changed = one.corrected(logged).setting.trial.commands
+    for error in errors:
+        changed = error.corrected(logged).setting.trial.commands
         assert changed is not None
         if not np.array_equal(changed.values, own.values):
-            found.setdefault((changed.values + 0.0).tobytes(), one)
+            found.setdefault((changed.values + 0.0).tobytes(), error)
     return list(found.values())
 
 
@@ -393,8 +406,13 @@ def _step(yardstick: Yardstick, name: str) -> list[DataError]:
     noise = usual_noise(time, used, usual)
     begins = time[0] + (time[-1] - time[0]) * np.linspace(STEP_MARGIN, 1.0 - STEP_MARGIN, STEP_TIMES)
     steps = (time[:, None] >= begins).astype(float)
-    rows = np.column_stack([values - expected - yardstick.at(yardstick.slopes[name], time) @ here.z, steps,
-                            yardstick.at(yardstick.slopes[name], time)])  # fmt: skip
+    rows = np.column_stack(
+        [
+            values - expected - yardstick.at(yardstick.slopes[name], time) @ here.z,
+            steps,
+            yardstick.at(yardstick.slopes[name], time),
+        ]
+    )
     white = noise.whiten(rows) / here.scales[name]
     r, C, J = white[:, 0], white[:, 1 : 1 + begins.size], white[:, 1 + begins.size :]
     cross = J.T @ C

@@ -76,16 +76,16 @@ class SuspectedError:
     is_read_off: bool = False
 
 
-def is_soft(one: SuspectedError) -> bool:
+def is_soft(error: SuspectedError) -> bool:
     """Say whether something that a vehicle does may look like an error: not like one that the values tell."""
-    return one.error.kind in SOFT and not one.is_read_off
+    return error.error.kind in SOFT and not error.is_read_off
 
 
 def explain(errors: Sequence[SuspectedError]) -> bool:
     """Say whether errors are all that the linear problem needs: what broke in mid-trial makes an error of a clock
     likely, too, but that leaves more than noise.
     """
-    return all(one.left < LOUD for one in errors)
+    return all(error.left < LOUD for error in errors)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -100,26 +100,26 @@ class Suspicion:
 
     def first(self, count: int) -> tuple[SuspectedError, ...]:
         """Return so many of them, in their order: first what is clear, then what no vehicle does, the best first."""
-        ranked = sorted(self.errors, key=lambda one: (not one.is_clear, is_soft(one), -one.lead))
-        return tuple(one for one in self.errors if any(one is each for each in ranked[:count]))
+        ranked = sorted(self.errors, key=lambda error: (not error.is_clear, is_soft(error), -error.lead))
+        return tuple(error for error in self.errors if any(error is each for each in ranked[:count]))
 
     @property
     def firm(self) -> int:
         """How many of them leave physics no chance, or are what no vehicle does."""
-        return sum(one.is_clear or not is_soft(one) for one in self.errors)
+        return sum(error.is_clear or not is_soft(error) for error in self.errors)
 
     def fewer(self, count: int) -> list[tuple[SuspectedError, ...]]:
         """Return the sets with less than so many of them: with one after the other of those that are not clear taken
         away, and with none.
         """
-        clear = sum(one.is_clear for one in self.errors)
+        clear = sum(error.is_clear for error in self.errors)
         return [*(self.first(k) for k in reversed(range(max(clear, 1), count))), ()] if count else []
 
 
 def suspected(problem: Problem, records: Sequence[Logged]) -> Suspicion:
     """Return what errors the data of some records may have."""
     each = [_of_record(problem, records, i) for i in range(len(records))]
-    return Suspicion(errors=tuple(one for found in each for one in found))
+    return Suspicion(errors=tuple(error for found in each for error in found))
 
 
 Physics = Callable[[Problem, int], float]
@@ -137,27 +137,41 @@ def _of_record(problem: Problem, records: Sequence[Logged], record: int) -> list
     """Return the errors that a record may have."""
     logged = records[record]
     repeated = repeated_values(logged, logged.trusted)
-    unclear = tuple(one for one in repeated if may_be_measured(one, logged))
+    unclear = tuple(error for error in repeated if may_be_measured(error, logged))
     begun = replace(yardstick_of(problem, record, logged), repeated=unclear)
-    read_off = [one for one in repeated if not may_be_measured(one, logged)]
+    read_off = [error for error in repeated if not may_be_measured(error, logged)]
     jumps = steps_off_grid(logged, logged.trusted)
-    read_off += [likeliest(begun, begun.by_whole_steps(one)) for one in jumps]
+    read_off += [likeliest(begun, begun.by_whole_steps(jump)) for jump in jumps]
     begun, found = _beside_clock(begun, read_off, _forward(begun, read_off, logged.trusted), logged.trusted)
     found = _by_clock_of_others(begun, read_off, found, logged.trusted)
     found = _closer(problem, record, begun, read_off, _back(begun, read_off, found))
-    made = [*(_Judged(Suspect(one, SIGNATURE_LEAD, SIGNATURE_LEAD), ()) for one in read_off), *found]
-    against = _Against(problem=problem, records=records, record=record, begun=begun, read_off=len(read_off),
-                       errors=tuple(one.suspect.error for one in made))  # fmt: skip
+    made = [*(_Judged(Suspect(error, SIGNATURE_LEAD, SIGNATURE_LEAD), ()) for error in read_off), *found]
+    against = _Against(
+        problem=problem,
+        records=records,
+        record=record,
+        begun=begun,
+        read_off=len(read_off),
+        errors=tuple(error.suspect.error for error in made),
+    )
     if against.few_causes_explain_more():
-        made = [one for one in made if not any(one.suspect.error is soft for soft in against.soft)]
-        against = replace(against, errors=tuple(one.suspect.error for one in made), kept={})
-    left, clear = against.left if found else 0.0, _clear(against, [one.suspect for one in made])
+        made = [error for error in made if not any(error.suspect.error is soft for soft in against.soft)]
+        against = replace(against, errors=tuple(error.suspect.error for error in made), kept={})
+    left, clear = against.left if found else 0.0, _clear(against, [error.suspect for error in made])
     return [
-        SuspectedError(record=record, error=one.error, lead=one.lead, generous=one.generous, alike=alike,
-                       left=left, is_clear=any(one.error is other for other in clear),
-                       may_stand_still=may_stand_still(begun, one.error), is_read_off=i < len(read_off))
-        for i, (one, alike) in enumerate(made)
-    ]  # fmt: skip
+        SuspectedError(
+            record=record,
+            error=error.error,
+            lead=error.lead,
+            generous=error.generous,
+            alike=alike,
+            left=left,
+            is_clear=any(error.error is other for other in clear),
+            may_stand_still=may_stand_still(begun, error.error),
+            is_read_off=i < len(read_off),
+        )
+        for i, (error, alike) in enumerate(made)
+    ]
 
 
 def _beside_clock(
@@ -166,7 +180,7 @@ def _beside_clock(
     """Return errors that came out one after the other, with what they are judged by: beside a clock that is late by
     less than an error, where a vehicle may look like some of them, and that explains more.
     """
-    soft = any(one.suspect.error.kind in SOFT for one in found)
+    soft = any(error.suspect.error.kind in SOFT for error in found)
     clock = clock_below_least(begun.after(read_off)) if soft else None
     if clock is None:
         return begun, found
@@ -178,7 +192,7 @@ def _beside_clock(
 
 def _total_lead(found: Sequence[_Judged]) -> float:
     """Return by how much errors are more probable than none, each judged with those before it corrected."""
-    return sum(one.suspect.lead for one in found)
+    return sum(error.suspect.lead for error in found)
 
 
 def _by_clock_of_others(
@@ -187,8 +201,8 @@ def _by_clock_of_others(
     """Return errors, or what comes out better with the clock of a channel that seems to be late besides: if most
     channels say little, the one that is early by itself has set the clock of all.
     """
-    clocks = [one.suspect.error for one in found if one.suspect.error.kind == "late_clock"]
-    later = [one.suspect.error.amount for one in found if one.suspect.error.kind == "latency"]
+    clocks = [suspect.suspect.error for suspect in found if suspect.suspect.error.kind == "late_clock"]
+    later = [suspect.suspect.error.amount for suspect in found if suspect.suspect.error.kind == "latency"]
     tried = [found]
     for error in (replace(clock, amount=clock.amount + more) for clock in clocks for more in later):
         first = _Judged(judged_again(begun.after(read_off), error), ())
@@ -202,13 +216,15 @@ def _forward(
     """Return the errors that come out best one after the other, each with those before it corrected."""
     found = [*first]
     for _ in range(MOST_ERRORS - len(found)):
-        before = [*read_off, *(one.suspect.error for one in found)]
+        before = [*read_off, *(error.suspect.error for error in found)]
         ranked = suspects(begun.after(before), trusted)
         while ranked and _is_suspected(ranked[0]) and _makes_loud(begun, before, ranked[0].error):
             ranked = ranked[1:]
         if not ranked or not _is_suspected(ranked[0]):
             break
-        alike = tuple(one.error for one in ranked[1:] if one.lead > ranked[0].lead - ALIKE_LEAD)
+        alike = tuple(
+            candidate.error for candidate in ranked[1:] if candidate.lead > ranked[0].lead - ALIKE_LEAD
+        )
         found.append(_Judged(ranked[0], alike))
     return found
 
@@ -225,11 +241,11 @@ def _back(begun: Yardstick, read_off: Sequence[DataError], found: list[_Judged])
     """Return the errors that are still needed with all others corrected, judged so."""
     last = len(found) - 1  # is judged so already
     while len(found) > 1:
-        found = [one if i == last else _again(begun, read_off, found, i) for i, one in enumerate(found)]
-        weakest = min(found, key=lambda one: one.suspect.lead - _least(one.suspect))
+        found = [error if i == last else _again(begun, read_off, found, i) for i, error in enumerate(found)]
+        weakest = min(found, key=lambda error: error.suspect.lead - _least(error.suspect))
         if _is_suspected(weakest.suspect):
             break
-        found, last = [one for one in found if one is not weakest], -1
+        found, last = [error for error in found if error is not weakest], -1
     return found
 
 
@@ -239,8 +255,8 @@ def _closer(
     """Return the errors that are still suspected where the problem is linear close to what explains the record without
     them: far from the nominal model it errs by as much as a delay does. Of those of commands it is simulated anyway.
     """
-    errors = [*read_off, *(one.suspect.error for one in found)]
-    if not any(one.kind in SOFT for one in errors) or any(one.is_of_commands for one in errors):
+    errors = [*read_off, *(error.suspect.error for error in found)]
+    if not any(error.kind in SOFT for error in errors) or any(error.is_of_commands for error in errors):
         return found
     z = np.clip(begun.after(errors).likeliest.z, *bounds(problem))
     if not np.isfinite(problem.residual(z)).all():
@@ -249,12 +265,12 @@ def _closer(
         yardstick_of(problem, record, begun.logged, z), repeated=begun.repeated, clock=begun.clock
     )
     found = [_again(there, read_off, found, i) for i in range(len(found))]
-    return [one for one in found if _is_suspected(one.suspect)]
+    return [error for error in found if _is_suspected(error.suspect)]
 
 
 def _again(begun: Yardstick, read_off: Sequence[DataError], found: Sequence[_Judged], i: int) -> _Judged:
     """Return one of some errors, judged with all others corrected."""
-    others = [one.suspect.error for k, one in enumerate(found) if k != i]
+    others = [error.suspect.error for k, error in enumerate(found) if k != i]
     after = begun.after([*read_off, *others], len(read_off) + i)
     return found[i]._replace(suspect=judged_again(after, found[i].suspect.error))
 
@@ -290,7 +306,7 @@ class _Against:
     @property
     def soft(self) -> list[DataError]:
         """Those that something a vehicle does may look like."""
-        return [one for one in self.errors[self.read_off :] if one.kind in SOFT]
+        return [error for error in self.errors[self.read_off :] if error.kind in SOFT]
 
     def few_causes_explain_more(self) -> bool:
         """Say whether soft errors, with a few causes beside them, are far behind a few causes in their place."""
@@ -312,24 +328,24 @@ class _Against:
     def _alone(self, some: Sequence[DataError]) -> float:
         """Return by how much some errors are more probable than none, with all others corrected."""
         held, lead = self._others(some), 0.0
-        for one in some:
-            place = sum(self._at(other) < self._at(one) for other in held)
-            lead += judged_as_it_is(self.begun.after(held, place), one).lead
-            held.insert(place, one)
+        for error in some:
+            place = sum(self._at(other) < self._at(error) for other in held)
+            lead += judged_as_it_is(self.begun.after(held, place), error).lead
+            held.insert(place, error)
         return lead
 
     def _others(self, some: Sequence[DataError]) -> list[DataError]:
-        return [one for one in self.errors if not any(one is other for other in some)]
+        return [error for error in self.errors if not any(error is other for other in some)]
 
-    def _at(self, one: DataError) -> int:
-        return next(i for i, other in enumerate(self.errors) if other is one)
+    def _at(self, error: DataError) -> int:
+        return next(i for i, other in enumerate(self.errors) if other is error)
 
     def _beside(self, held: Sequence[DataError], physics: Physics) -> float:
         """Return by how much some physics is more probable than the yardstick, where errors are corrected."""
-        key = (physics, tuple(self._at(one) for one in held))
+        key = (physics, tuple(self._at(error) for error in held))
         if key not in self.kept:
             after = self.begun.after(held)
-            each = [after.logged if i == self.record else one for i, one in enumerate(self.records)]
+            each = [after.logged if i == self.record else record for i, record in enumerate(self.records)]
             most = physics(posed_again(self.problem, each), self.record)
             self.kept[key] = most + after.log_none - after.log_sparse
         return self.kept[key]
@@ -342,20 +358,27 @@ def _clear(against: _Against, made: Sequence[Suspect]) -> list[DataError]:
     a force or a drift may be as sudden.
     """
     soft = against.soft
-    firm = [one for one in made if not any(one.error is each for each in soft)]
-    clear = [one.error for one in firm if one.lead > CLEAR_LEAD and one.generous > CLEAR_GENEROUS_LEAD]
-    clear = [one for one in clear if not may_stand_still(against.begun, one)
-             or against.lead([one], most_of_physics) > CLEAR_LEAD]  # fmt: skip
-    likely = [one.error for one in made if one.lead > FAR_BEHIND and any(one.error is each for each in soft)]
-    likely = [one for one in likely if one.kind != "step"]
+    firm = [error for error in made if not any(error.error is each for each in soft)]
+    clear = [
+        error.error for error in firm if error.lead > CLEAR_LEAD and error.generous > CLEAR_GENEROUS_LEAD
+    ]
+    clear = [
+        error
+        for error in clear
+        if not may_stand_still(against.begun, error) or against.lead([error], most_of_physics) > CLEAR_LEAD
+    ]
+    likely = [
+        error.error for error in made if error.lead > FAR_BEHIND and any(error.error is each for each in soft)
+    ]
+    likely = [error for error in likely if error.kind != "step"]
     if not likely or against.left >= LOUD or not against.are_far_ahead(soft):
         return clear
-    return clear + [one for one in likely if len(soft) == 1 or against.are_far_ahead([one])]
+    return clear + [error for error in likely if len(soft) == 1 or against.are_far_ahead([error])]
 
 
-def _is_suspected(one: Suspect) -> bool:
-    return one.lead > _least(one)
+def _is_suspected(suspect: Suspect) -> bool:
+    return suspect.lead > _least(suspect)
 
 
-def _least(one: Suspect) -> float:
-    return LEAST_SOFT_LEAD if one.error.kind in SOFT else LEAST_LEAD
+def _least(suspect: Suspect) -> float:
+    return LEAST_SOFT_LEAD if suspect.error.kind in SOFT else LEAST_LEAD

@@ -134,8 +134,9 @@ class Yardstick:
         """
         every, here = (*errors, *self.clock), len(errors) if place is None and self.clock else place
         base = self.under(corrected(self.written, every))
-        return replace(base, written=self.written, repeated=self.repeated, corrected=every, place=here,
-                       clock=self.clock)  # fmt: skip
+        return replace(
+            base, written=self.written, repeated=self.repeated, corrected=every, place=here, clock=self.clock
+        )
 
     def with_scale_held(self, channels: Iterable[str]) -> Yardstick:
         """Return the same with the scales of some sensors within tolerances: a unit and a scale that undoes it are no
@@ -316,7 +317,10 @@ class Yardstick:
         best = sorted(range(len(gains)), key=lambda i: -gains[i])[:CAUSES_TRIED]
         each = [reckon(said, self._freed(self.causes[i])) for i in best]
         prior = float(np.log(PRIOR["single"] / max(len(self.causes), 1)))
-        return [(none.log + float(np.log(PRIOR["none"])), none), *((one.log + prior, one) for one in each)]
+        return [
+            (none.log + float(np.log(PRIOR["none"])), none),
+            *((error.log + prior, error) for error in each),
+        ]
 
     def _freed(self, at: Sequence[int]) -> np.ndarray:
         D = self.narrow.copy()
@@ -370,9 +374,9 @@ def _covariance(A: np.ndarray, root: np.ndarray) -> tuple[np.ndarray, np.ndarray
     return factor, root[:, None] * inverse * root
 
 
-def _square(one: Term, z: np.ndarray) -> float:
+def _square(term: Term, z: np.ndarray) -> float:
     """Return the square of what is left of a channel with parameters (k,), whitened."""
-    return one.rr - 2.0 * float(one.b @ z) + float(z @ one.A @ z)
+    return term.rr - 2.0 * float(term.b @ z) + float(z @ term.A @ z)
 
 
 def _scales(square: np.ndarray, samples: np.ndarray, least: np.ndarray) -> np.ndarray:
@@ -396,8 +400,8 @@ def yardstick_of(problem: Problem, record: int, logged: Logged, z: np.ndarray | 
         logged: the record.
         z: deviations of the model that is linear close by (k,); of the nominal one if not given.
     """
-    z, one = np.zeros(len(problem.entries)) if z is None else z, problem.records[record]
-    names = [name for name in logged.record.values if name in one.noise]
+    z, found = np.zeros(len(problem.entries)) if z is None else z, problem.records[record]
+    names = [name for name in logged.record.values if name in found.noise]
     (base,), setting = problem.tracks([(record, z)]), problem.setting(record, z)
     shown = shown_on_grid(setting, base, names)
     ks = [k for k, entry in enumerate(problem.entries) if entry.record in (-1, record)]
@@ -411,9 +415,19 @@ def yardstick_of(problem: Problem, record: int, logged: Logged, z: np.ndarray | 
     nominal = {name: shown[name] - slopes[name] @ z for name in names}
     grid, causes = base[0], [columns_of(problem.entries, (name,)) for name in nameable(problem.entries)]
     scales = {name: k for name in names for k in columns_of(problem.entries, (f"sensor_scale:{name}",))}
-    return Yardstick(logged=logged, written=logged, step=float(grid[1] - grid[0]), nominal=nominal, slopes=slopes,
-                     D=generous_variances(problem), narrow=variances(problem.entries, (), KAPPA_NARROW),
-                     causes=causes, scales=scales, z=z, setting=setting)  # fmt: skip
+    return Yardstick(
+        logged=logged,
+        written=logged,
+        step=float(grid[1] - grid[0]),
+        nominal=nominal,
+        slopes=slopes,
+        D=generous_variances(problem),
+        narrow=variances(problem.entries, (), KAPPA_NARROW),
+        causes=causes,
+        scales=scales,
+        z=z,
+        setting=setting,
+    )
 
 
 def generous_variances(problem: Problem) -> np.ndarray:
@@ -439,5 +453,5 @@ def shown_on_grid(setting: Setting, track: Track, names: Iterable[str]) -> dict[
     grid, states = track
     shown = {name: sensed(setting.sensing.get(name), grid, truth(setting, states, name)) for name in names}
     if setting.clock_offset:
-        shown = {name: np.interp(grid - setting.clock_offset, grid, one) for name, one in shown.items()}
+        shown = {name: np.interp(grid - setting.clock_offset, grid, error) for name, error in shown.items()}
     return shown

@@ -96,8 +96,8 @@ def most_of_physics(problem: Problem, record: int) -> float:
     best = none = now.log + log_prior
     for _ in range(MAX_CAUSES):
         further = [*_causes(problem, here, now), *_onsets(problem, here, now, begun)]
-        one = max(further, key=lambda each: each.log_evidence + each.log_prior)
-        here, log_prior = one.beside(), log_prior + one.log_prior
+        found = max(further, key=lambda each: each.log_evidence + each.log_prior)
+        here, log_prior = found.beside(), log_prior + found.log_prior
         now = here.reckoned()
         if now.log + log_prior <= best:
             break
@@ -119,8 +119,8 @@ def most_of_one_cause(problem: Problem, record: int) -> float:
     best: dict[str, Reckoned] = {}
     for k, there in _at_sizes(problem, record, here):
         now, name = there.reckoned(), problem.entries[k].effect.id
-        best[name] = max(now, best.get(name, now), key=lambda one: one.log)
-    logs = [one.log for one in best.values()]
+        best[name] = max(now, best.get(name, now), key=lambda fit: fit.log)
+    logs = [fit.log for fit in best.values()]
     for name in sorted(best, key=lambda name: -best[name].log)[:MAX_ADDED]:
         logs += _closer_by(problem, record, name, best[name])
     return max(logs, default=-np.inf) + float(np.log(PRIOR["single"] / len(names))) - none
@@ -140,10 +140,10 @@ def _at_sizes(problem: Problem, record: int, here: Linear) -> Iterator[tuple[int
     """Give the linear problem of a record at each size of each entry that is simulated, with its cause free."""
     zero, entries = np.zeros(len(problem.entries)), problem.entries
     at = [k for k, entry in enumerate(entries) if entry.record < 0]
-    for one in sizes_run(problem, zero, here.r, at, MERGED_SCALES, [record]):
-        J, D = here.J.copy(), _with_free(problem, here.D, entries[one.k].effect.id)
-        J[:, one.k] = one.column
-        yield one.k, replace(here, r=one.r + one.column * one.z[one.k], J=J, D=D)
+    for fit in sizes_run(problem, zero, here.r, at, MERGED_SCALES, [record]):
+        J, D = here.J.copy(), _with_free(problem, here.D, entries[fit.k].effect.id)
+        J[:, fit.k] = fit.column
+        yield fit.k, replace(here, r=fit.r + fit.column * fit.z[fit.k], J=J, D=D)
 
 
 def _with_free(problem: Problem, D: np.ndarray, name: str) -> np.ndarray:
@@ -161,18 +161,20 @@ def _linear(problem: Problem, record: int, z: np.ndarray | None = None) -> Linea
     z, seen_ = np.zeros(len(problem.entries)) if z is None else z, problem.records[record]
     places = [k for k, entry in enumerate(problem.entries) if entry.record in (-1, record)]
     moved = [to_usual_sizes(problem, k, z) for k in places]
-    base, *tracks = problem.tracks([(record, one) for one in (z, *moved)])
+    base, *tracks = problem.tracks([(record, each) for each in (z, *moved)])
     setting = problem.setting(record, z)
     plain = problem.whitened(record, setting, base)
     J = np.zeros((plain.size, z.size))
-    for k, one, track in zip(places, moved, tracks, strict=True):
-        there = problem.whitened(record, problem.setting(record, one), track)
-        J[:, k] = np.nan_to_num((there - plain) / (one[k] - z[k]))
+    for k, fit, track in zip(places, moved, tracks, strict=True):
+        there = problem.whitened(record, problem.setting(record, fit), track)
+        J[:, k] = np.nan_to_num((there - plain) / (fit[k] - z[k]))
     ends = np.cumsum([0, *(noise.count for noise in seen_.noise.values())]).tolist()
     own = {name: slice(a, b) for name, a, b in zip(seen_.noise, ends[:-1], ends[1:], strict=True)}
     nothing = np.zeros(0)
-    bare = {name: Term(nothing, nothing, 0.0, noise.count, -noise.log_scale, least_scale(noise), noise.count)
-            for name, noise in seen_.noise.items()}  # fmt: skip
+    bare = {
+        name: Term(nothing, nothing, 0.0, noise.count, -noise.log_scale, least_scale(noise), noise.count)
+        for name, noise in seen_.noise.items()
+    }
     r = problem.whitened(record, setting, base, measured=True) + J @ z
     return Linear(r=r, J=J, D=variances(problem.entries, (), KAPPA_NARROW), own=own, bare=bare)
 
@@ -180,7 +182,7 @@ def _linear(problem: Problem, record: int, z: np.ndarray | None = None) -> Linea
 def _begun(problem: Problem, record: int, here: Linear) -> dict[Begun, np.ndarray]:
     """Return what causes that begin at times of a grid change in the rows of a record (m, parameters)."""
     along = in_rough_steps(BaseRun(problem, np.zeros(len(problem.entries))))
-    before = sum(noise.count for one in problem.records[:record] for noise in one.noise.values())
+    before = sum(noise.count for each in problem.records[:record] for noise in each.noise.values())
     columns = onset_columns(along, problem.sudden_effects, record)
     return {pair: C[before : before + here.r.size] for pair, C in columns.items()}
 

@@ -103,11 +103,11 @@ def refined(
     times = SHAPE_STEP_S * np.arange(to_knots.shape[1])
     plain = {shape.feature: shape for shape in shapes if shape.is_plain}
     for shape in formula.shapes:
-        others = [one for one in formula.shapes if one is not shape]
-        tried = [(*others, one) for one in shifted(shape, plain.get(shape.feature, shape), times)]
+        others = [each for each in formula.shapes if each is not shape]
+        tried = [(*others, each) for each in shifted(shape, plain.get(shape.feature, shape), times)]
         best = max(
-            (_fixed(formula.axis, one, data, to_knots, amplitudes) for one in tried),
-            key=lambda one: one.log_gain,
+            (_fixed(formula.axis, each, data, to_knots, amplitudes) for each in tried),
+            key=lambda each: each.log_gain,
         )
         formula = replace(best, features=formula.features)
     return formula
@@ -147,13 +147,13 @@ def choose(
     kept: list[tuple[int, ...]] = [()]
     narrow: list[int] = list(range(len(shapes)))
     for size in range(1, MAX_TERMS + 1):
-        sets = {tuple(sorted({*one, i})) for one in kept for i in narrow if i not in one}
-        for one in sets:
-            scores[one] = _score(one, shapes, scaled, data, axis, amplitudes)
-        ranked = sorted((one for one in sets), key=lambda one: -scores[one])
+        sets = {tuple(sorted({*formula, i})) for formula in kept for i in narrow if i not in formula}
+        for each in sets:
+            scores[each] = _score(each, shapes, scaled, data, axis, amplitudes)
+        ranked = sorted((formula for formula in sets), key=lambda formula: -scores[formula])
         kept = _different(ranked, shapes)
         narrow = _narrow(narrow, ranked, shapes) if size == 1 else narrow
-    best = max(scores, key=lambda one: scores[one])
+    best = max(scores, key=lambda score: scores[score])
     return _formula(best, scores, shapes, scaled, data, axis, amplitudes)
 
 
@@ -161,10 +161,10 @@ def _different(ranked: list[tuple[int, ...]], shapes: Sequence[Shape]) -> list[t
     """Return the best sums, no more than two of the same features."""
     kept: list[tuple[int, ...]] = []
     counts: dict[tuple[str, ...], int] = {}
-    for one in ranked:
-        key = tuple(shapes[i].feature for i in one)
+    for candidate in ranked:
+        key = tuple(shapes[i].feature for i in candidate)
         counts[key] = counts.get(key, 0) + 1
-        kept += [one] if counts[key] <= 2 and len(kept) < BEAM_WIDTH else []
+        kept += [candidate] if counts[key] <= 2 and len(kept) < BEAM_WIDTH else []
     return kept
 
 
@@ -242,7 +242,7 @@ def _features(scores: Mapping[tuple[int, ...], float], shapes: Sequence[Shape]) 
     """Return the probability of every feature to belong to the formula."""
     total = log_sum(list(scores.values()))
     found: dict[str, float] = {}
-    for one, score in scores.items():
-        for name in {shapes[i].feature for i in one}:
+    for each, score in scores.items():
+        for name in {shapes[i].feature for i in each}:
             found[name] = found.get(name, 0.0) + float(np.exp(score - total))
     return dict(sorted(found.items(), key=lambda pair: -pair[1]))

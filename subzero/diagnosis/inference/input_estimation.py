@@ -139,8 +139,8 @@ def latent_force_candidates(
     found = []
     for name, C in columns.items():
         gains = {
-            kappa: _log_gain(problem, name, seen(q.A, q.b, one.D, fit.J, C, whole), knots, terms or {})
-            for kappa, one in scales.items()
+            kappa: _log_gain(problem, name, seen(q.A, q.b, scale.D, fit.J, C, whole), knots, terms or {})
+            for kappa, scale in scales.items()
         }
         gain, kappa = mixed(scales, gains)
         found.append(
@@ -148,7 +148,7 @@ def latent_force_candidates(
                 id=name, log_gain=gain, kappa=kappa, fit=fit, columns=C, knots=knots, terms=terms or {}
             )
         )
-    return sorted(found, key=lambda one: -one.log_gain)
+    return sorted(found, key=lambda each: -each.log_gain)
 
 
 def _log_gain(
@@ -299,8 +299,18 @@ def _estimated(axis: str, problem: Problem, fit: Fit, D: np.ndarray, found: Hist
     band = np.sqrt(np.maximum(np.diag(covariance)[own], 0.0))
     unknown = Unknown(axis=axis, time=knots.time[own], force=force[own], band=band)
     missing = None if axis in BY_NAME else history(axis, knots.time[own], force[own])
-    return EstimatedForce(unknown=unknown, record=record, missing=missing, problem=problem, fit=fit, knots=knots,
-                     force=force, covariance=covariance, columns=columns, data=_seen(fit, D, columns))  # fmt: skip
+    return EstimatedForce(
+        unknown=unknown,
+        record=record,
+        missing=missing,
+        problem=problem,
+        fit=fit,
+        knots=knots,
+        force=force,
+        covariance=covariance,
+        columns=columns,
+        data=_seen(fit, D, columns),
+    )
 
 
 class RelinearisedForce(NamedTuple):
@@ -366,18 +376,18 @@ def linear_candidates(
     scales = {kappa: Scale(log[kappa] - total, D[kappa]) for kappa in kappas}
     total += log_prior((), len(nameable(problem.entries)))
     return [
-        (total + one.log_gain, one)
-        for one in latent_force_candidates(problem, columns, fit, scales, knots, terms)
+        (total + candidate.log_gain, candidate)
+        for candidate in latent_force_candidates(problem, columns, fit, scales, knots, terms)
     ]
 
 
 def fit_beside_drift(problem: Problem, found: EstimatedForce, D: np.ndarray) -> Fit:
     """Return the fit of the records without a drift, under prior variances D (k,)."""
     start, channel, records = found.fit, found.unknown.axis, []
-    for i, one in enumerate(problem.records):
+    for i, record in enumerate(problem.records):
         own = found.knots.record == i
-        drift = np.interp(one.time, found.knots.time[own], found.force[own])
-        records.append(one.corrected({channel: drift}))
+        drift = np.interp(record.time, found.knots.time[own], found.force[own])
+        records.append(record.corrected({channel: drift}))
     cleared = replace(problem, records=tuple(records))
     J, left = start.J, start.r + start.J @ start.z - found.columns @ found.force
     there = posterior(Quadratic(A=J.T @ J, b=J.T @ left, rr=float(left @ left)), D).z
@@ -389,8 +399,16 @@ def _without(found: EstimatedForce, done: Fit, count: int) -> Fit:
     """Return a fit with a force or beside a drift as one of the entries before it: with what the records lack then."""
     z, D, r = done.z[:count], done.D[:count], done.r + found.columns @ found.force
     objective = 0.5 * float(r @ r) + 0.5 * float(np.sum(z * z / D))
-    return Fit(z=z, r=r, J=done.J[:, :count], D=D, objective=objective, converged=done.converged, predicted_gain=0.0,
-               fresh=done.fresh)  # fmt: skip
+    return Fit(
+        z=z,
+        r=r,
+        J=done.J[:, :count],
+        D=D,
+        objective=objective,
+        converged=done.converged,
+        predicted_gain=0.0,
+        fresh=done.fresh,
+    )
 
 
 def _possible(problem: Problem, done: Fit) -> float:

@@ -45,10 +45,13 @@ if TYPE_CHECKING:
 COARSE_SPACING_S, FINE_SPACING_S = 2.0, 1.0
 """Of knots: to look for a force, and to tell its history. [s]"""
 AXIS_WORDS = {
-    "X": "forward force", "Y": "force to starboard", "Z": "downward force",
-    "K": "moment that rolls it to starboard", "M": "moment that raises the nose",
+    "X": "forward force",
+    "Y": "force to starboard",
+    "Z": "downward force",
+    "K": "moment that rolls it to starboard",
+    "M": "moment that raises the nose",
     "N": "moment that turns it to starboard",
-}  # fmt: skip
+}
 """What a positive force or moment does to the vehicle."""
 FORCE, DRIFT = "unknown_force:", "sensor_drift:"
 MAX_DRIFT_LEVELS = 20.0
@@ -79,9 +82,9 @@ class Knots(NamedTuple):
 
 def knots_of(problem: Problem, spacing: float = COARSE_SPACING_S) -> Knots:
     """Return knots over all records, from start to end of each."""
-    ends = [float(one.time[-1]) for one in problem.records]
+    ends = [float(each.time[-1]) for each in problem.records]
     times = [np.linspace(0.0, end, max(round(end / spacing), 1) + 1) for end in ends]
-    record = np.repeat(np.arange(len(times)), [one.size for one in times])
+    record = np.repeat(np.arange(len(times)), [time.size for time in times])
     return Knots(record, np.concatenate(times), spacing)
 
 
@@ -117,8 +120,13 @@ def force_effect(axis: str, times: np.ndarray, L: np.ndarray, size: float) -> Ef
         for i in range(L.shape[1])
     )
     sentence = f"a {AXIS_WORDS[axis]} acts that no cause explains"
-    return Effect(id=FORCE + axis, sentence=sentence, slot="hull", parameters=parameters,
-                  apply=partial(_push, axis, times, L))  # fmt: skip
+    return Effect(
+        id=FORCE + axis,
+        sentence=sentence,
+        slot="hull",
+        parameters=parameters,
+        apply=partial(_push, axis, times, L),
+    )
 
 
 def with_force(problem: Problem, axis: str, knots: Knots, L: np.ndarray, size: float) -> Problem:
@@ -148,11 +156,11 @@ def force_columns(
 def drift_columns(problem: Problem, channel: str, knots: Knots) -> np.ndarray:
     """Return the whitened sensitivities (m, n) to a drift of one unit at each knot; of one channel, without runs."""
     rows: list[np.ndarray] = []
-    for record, one in enumerate(problem.records):
+    for record, each in enumerate(problem.records):
         own = np.where(knots.record == record, 1.0, 0.0)
-        apart = np.abs(np.subtract.outer(one.time, knots.time)) / knots.spacing
+        apart = np.abs(np.subtract.outer(each.time, knots.time)) / knots.spacing
         hats = np.maximum(1.0 - apart, 0.0) * own
-        rows += [noise.whiten(hats if name == channel else 0.0 * hats) for name, noise in one.noise.items()]
+        rows += [noise.whiten(hats if name == channel else 0.0 * hats) for name, noise in each.noise.items()]
     return np.concatenate(rows)
 
 
@@ -245,24 +253,36 @@ def shifted(shape: Shape, plain: Shape, times: np.ndarray) -> list[Shape]:
 
 def _acting(shapes: list[Shape]) -> list[Shape]:
     """Return the shapes that are not 0 throughout."""
-    return [one for one in shapes if np.abs(one.columns).max() > ZERO_SIZE]
+    return [shape for shape in shapes if np.abs(shape.columns).max() > ZERO_SIZE]
 
 
 def _between(shape: Shape, times: np.ndarray, start: float, end: float | None, log_prior: float) -> Shape:
     last = np.inf if end is None else end
     inside = np.where((times >= start - 1e-9) & (times < last - 1e-9), 1.0, 0.0)
     when = f"from {start:g} s on" if end is None else f"from {start:g} to {end:g} s"
-    return Shape(feature=shape.feature, words=f"{shape.words}, {when}", columns=shape.columns * inside[:, None],
-                 start=float(start), end=None if end is None else float(end), log_prior=float(log_prior))  # fmt: skip
+    return Shape(
+        feature=shape.feature,
+        words=f"{shape.words}, {when}",
+        columns=shape.columns * inside[:, None],
+        start=float(start),
+        end=None if end is None else float(end),
+        log_prior=float(log_prior),
+    )
 
 
 def _gradual(shape: Shape, times: np.ndarray, start: float, end: float, log_prior: float) -> Shape:
     """Return a shape that rises to the middle between two times and falls: few pushes begin and end at once."""
     apart = np.abs(times - 0.5 * (start + end)) / (0.5 * (end - start))
     when = f"rising and falling from {start:g} to {end:g} s"
-    return Shape(feature=shape.feature, words=f"{shape.words}, {when}", start=float(start), end=float(end),
-                 columns=shape.columns * np.maximum(1.0 - apart, 0.0)[:, None], is_gradual=True,
-                 log_prior=float(log_prior))  # fmt: skip
+    return Shape(
+        feature=shape.feature,
+        words=f"{shape.words}, {when}",
+        start=float(start),
+        end=float(end),
+        columns=shape.columns * np.maximum(1.0 - apart, 0.0)[:, None],
+        is_gradual=True,
+        log_prior=float(log_prior),
+    )
 
 
 def decaying(shape: Shape, times: np.ndarray, edges: np.ndarray) -> list[Shape]:
@@ -281,8 +301,14 @@ def _dying(shape: Shape, times: np.ndarray, start: float, T: float, log_prior: f
     """Return exp(−(t − start)/T) times a shape, 0 before the start."""
     window = np.where(times >= start - 1e-9, np.exp(-np.maximum(times - start, 0.0) / T), 0.0)
     when = f"from {start:g} s on, dying away in {T:g} s" if start else f"dying away in {T:g} s"
-    return Shape(feature=shape.feature, words=f"{shape.words}, {when}", columns=shape.columns * window[:, None],
-                 start=float(start) or None, decay=T, log_prior=float(log_prior))  # fmt: skip
+    return Shape(
+        feature=shape.feature,
+        words=f"{shape.words}, {when}",
+        columns=shape.columns * window[:, None],
+        start=float(start) or None,
+        decay=T,
+        log_prior=float(log_prior),
+    )
 
 
 def waves(times: np.ndarray) -> list[Shape]:
@@ -291,10 +317,14 @@ def waves(times: np.ndarray) -> list[Shape]:
     periods = 1.0 / np.arange(1.0 / WAVE_PERIODS_S[1], 1.0 / WAVE_PERIODS_S[0], apart)
     log_prior = -float(np.log(periods.size))
     return [
-        Shape(feature=WAVE, words=f"a wave with a period of {period:.2g} s", log_prior=log_prior,
-              columns=np.column_stack([trig(2.0 * np.pi * times / period) for trig in (np.cos, np.sin)]))
+        Shape(
+            feature=WAVE,
+            words=f"a wave with a period of {period:.2g} s",
+            log_prior=log_prior,
+            columns=np.column_stack([trig(2.0 * np.pi * times / period) for trig in (np.cos, np.sin)]),
+        )
         for period in periods
-    ]  # fmt: skip
+    ]
 
 
 def samples_of(end: float) -> np.ndarray:
@@ -327,8 +357,8 @@ def all_shapes(factors: np.ndarray, times: np.ndarray) -> list[Shape]:
     """Return every shape that is tried, from the factors of features at times."""
     plain = plain_shapes(factors)
     edges = np.arange(0.0, times[-1], 1.0 if times[-1] < 40.0 else 2.0)
-    able = [one for one in plain if one.feature in SWITCHED]
-    parts = [[*windowed(one, times, edges), *decaying(one, times, edges)] for one in able]
+    able = [record for record in plain if record.feature in SWITCHED]
+    parts = [[*windowed(record, times, edges), *decaying(record, times, edges)] for record in able]
     return plain + [shape for part in parts for shape in part] + waves(times)
 
 
@@ -348,7 +378,7 @@ def one_terms(problem: Problem, z: np.ndarray, knots: Knots) -> Mapping[str, Ter
     """Return axis → formulas of one term, each in one record, along the runs of z."""
     records = range(len(problem.records))
     parts = [_of_record(problem, z, knots, record) for record in records]
-    phi = np.concatenate([one for one, _ in parts], axis=1)
+    phi = np.concatenate([record for record, _ in parts], axis=1)
     return {axis: Terms(phi, _normal([weights[axis] for _, weights in parts])) for axis in AXES}
 
 
@@ -361,10 +391,10 @@ def _of_record(
     shapes = all_shapes(factors_along(problem.setting(record, z), times), times)
     phi, to_knots = np.zeros((knots.time.size, len(shapes), 2)), at_knots(times, knots.time[own])
     for column in (0, 1):
-        having = [i for i, one in enumerate(shapes) if one.columns.shape[1] > column]
+        having = [i for i, shape in enumerate(shapes) if shape.columns.shape[1] > column]
         known = np.column_stack([shapes[i].columns[:, column] / size_of(shapes[i]) for i in having])
         phi[np.ix_(own, having, [column])] = (to_knots @ known)[:, :, None]
-    return phi, {axis: np.array([shape_weight(one, axis) for one in shapes]) for axis in AXES}
+    return phi, {axis: np.array([shape_weight(shape, axis) for shape in shapes]) for axis in AXES}
 
 
 def _normal(weights: list[np.ndarray]) -> np.ndarray:

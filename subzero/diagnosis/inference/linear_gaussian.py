@@ -160,7 +160,7 @@ def each_freed(
     """Return the log evidence (hypotheses,) when the entries of each hypothesis, so many as it has, get the prior
     variances that are wide (k,).
     """
-    found, sizes = np.empty(len(places)), np.array([len(one) for one in places])
+    found, sizes = np.empty(len(places)), np.array([len(place) for place in places])
     for size in set(sizes.tolist()):
         alike = np.flatnonzero(sizes == size)
         at = np.array([places[i] for i in alike.tolist()], dtype=int).reshape(-1, size)

@@ -245,17 +245,17 @@ def refit(
     z, r = runnable(problem, np.clip(z, *bounds(problem)), r)
     now, fresh, converged, left = objective(r, z, D), 0, False, 0.0
     for _ in range(settings.MAX_STEPS):
-        one = damped_step(problem, z, r, now, J, D)
-        if one.share > 0.0:
-            J = broyden_update(J, one.z - z, one.r - r, D)
-        z, r, now, left = one.z, one.r, one.now, one.left
+        step = damped_step(problem, z, r, now, J, D)
+        if step.share > 0.0:
+            J = broyden_update(J, step.z - z, step.r - r, D)
+        z, r, now, left = step.z, step.r, step.now, step.left
         if (
-            one.share < settings.STALE_GAIN_SHARE
-            and one.predicted > settings.CONVERGED_GAIN_NATS
+            step.share < settings.STALE_GAIN_SHARE
+            and step.predicted > settings.CONVERGED_GAIN_NATS
             and fresh < most_fresh
         ):
             J, fresh, made_at = problem.jacobian(z), fresh + 1, z.copy()
-        elif one.share <= 0.0:
+        elif step.share <= 0.0:
             converged = left < settings.CONVERGED_GAIN_NATS
             break
     return Fit(
@@ -286,8 +286,14 @@ def non_smooth(problem: Problem, but: Ids) -> list[int]:
     """Return the entries of causes on one side only, but for sensors' and some causes': drums stop, cables fall slack,
     gears have play.
     """
-    return [k for k, entry in enumerate(problem.entries) if entry.record < 0 and entry.parameter.low == 0.0
-            and entry.effect.slot != "sensors" and entry.effect.id not in but]  # fmt: skip
+    return [
+        k
+        for k, entry in enumerate(problem.entries)
+        if entry.record < 0
+        and entry.parameter.low == 0.0
+        and entry.effect.slot != "sensors"
+        and entry.effect.id not in but
+    ]
 
 
 def at_bad_minimum(problem: Problem, fit: Fit, ids: Ids) -> bool:
@@ -382,7 +388,7 @@ def candidate_of(problem: Problem, ids: Ids, fit: Fit) -> Candidate:
 def _evidence(problem: Problem, ids: Ids, fit: Fit) -> dict[float, float]:
     """Return κ → log evidence of a hypothesis."""
     under = {kappa: variances(problem.entries, ids, kappa) for kappa in KAPPAS}
-    causes = [columns_of(problem.entries, (one,)) for one in ids]
+    causes = [columns_of(problem.entries, (cause_id,)) for cause_id in ids]
     return laplace(problem.entries, fit, under, causes, PRACTICAL_TOLERANCES)
 
 
@@ -409,11 +415,11 @@ def laplace(
     here = -fit.objective - found[nearest].log_evidence - 0.5 * found[nearest].log_det
     every = range(len(entries))
     return {
-        kappa: one.log_evidence
+        kappa: each.log_evidence
         + here
-        + possible(entries, every, one.z, np.sqrt(np.diag(one.M)), held=True)
-        + of_sizes(entries, one, under[kappa], causes, practical * kappa)
-        for kappa, one in found.items()
+        + possible(entries, every, each.z, np.sqrt(np.diag(each.M)), held=True)
+        + of_sizes(entries, each, under[kappa], causes, practical * kappa)
+        for kappa, each in found.items()
     }
 
 

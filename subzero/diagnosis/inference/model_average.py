@@ -52,16 +52,16 @@ REFUTED_NATS = 16.0
 def sizes_in_tolerances(entries: Sequence[Entry], ids: Ids, z: np.ndarray, kappa: float) -> dict[str, float]:
     """Return cause → its size in tolerances, of its largest parameter."""
     found: dict[str, float] = {}
-    for one in ids:
-        at = columns_of(entries, (one,))
-        found[one] = max(abs(float(z[k])) / (kappa * entries[k].parameter.tolerance) for k in at)
+    for cause_id in ids:
+        at = columns_of(entries, (cause_id,))
+        found[cause_id] = max(abs(float(z[k])) / (kappa * entries[k].parameter.tolerance) for k in at)
     return found
 
 
 def practical_causes(entries: Sequence[Entry], ids: Ids, z: np.ndarray, kappa: float) -> Ids:
     """Return those causes that are of a practical size: beyond what calibration may do."""
     found = sizes_in_tolerances(entries, ids, z, kappa)
-    return tuple(one for one in ids if found[one] > PRACTICAL_TOLERANCES)
+    return tuple(cause_id for cause_id in ids if found[cause_id] > PRACTICAL_TOLERANCES)
 
 
 def credible_set(probabilities: Mapping[Key, float], total: float = CREDIBLE_SET_PROBABILITY) -> list[Key]:
@@ -234,9 +234,16 @@ class Beliefs:
         seen = self.one_more.get(ids)
         if seen and seen.beside in fitted:
             return fitted[seen.beside] + seen.log_gain
-        parts = [one for size in range(len(ids)) for one in combinations(ids, size) if one in fitted]
-        part = max(parts, key=lambda one: fitted[one], default=())
-        promised_too_much = sum(self._promised_too_much((one,), fitted) for one in ids if one not in part)
+        parts = [
+            combination
+            for size in range(len(ids))
+            for combination in combinations(ids, size)
+            if combination in fitted
+        ]
+        part = max(parts, key=lambda each: fitted[each], default=())
+        promised_too_much = sum(
+            self._promised_too_much((cause_id,), fitted) for cause_id in ids if cause_id not in part
+        )
         return fitted[part] + self.screen.adds(ids, part) - promised_too_much
 
     def _promised_too_much(self, ids: Ids, fitted: Mapping[Ids, float]) -> float:
@@ -248,8 +255,8 @@ class Beliefs:
     def _without_small(self, problem: Problem, probabilities: Mapping[Ids, float]) -> dict[Ids, float]:
         """Return probabilities where causes of less than a practical size are not told beside others of more."""
         found = dict(probabilities)
-        for ids, one in self.candidates.items():
-            kept = practical_causes(problem.entries, ids, one.fit.z, one.kappa)
+        for ids, candidate in self.candidates.items():
+            kept = practical_causes(problem.entries, ids, candidate.fit.z, candidate.kappa)
             if kept and kept != ids:
                 found[kept] = found.get(kept, 0.0) + found.pop(ids)
         return found
@@ -262,7 +269,9 @@ def occam_folded(probabilities: Mapping[Ids, float]) -> dict[Ids, float]:
     found = dict(probabilities)
     for ids in sorted(probabilities, key=len, reverse=True):
         if len(ids) > 1:
-            part = max(combinations(ids, len(ids) - 1), key=lambda one: probabilities.get(one, 0.0))
+            part = max(
+                combinations(ids, len(ids) - 1), key=lambda combination: probabilities.get(combination, 0.0)
+            )
             if probabilities.get(part, 0.0) * FURTHER_CAUSE_ODDS > probabilities[ids]:
                 found[part] += found.pop(ids)
     return dict(sorted(found.items(), key=lambda pair: -pair[1]))
@@ -270,7 +279,7 @@ def occam_folded(probabilities: Mapping[Ids, float]) -> dict[Ids, float]:
 
 def tolerance_scale(candidates: Collection[Candidate]) -> dict[float, float]:
     """Return κ → probability, over all candidates."""
-    top = max(one.log_posterior for one in candidates)
+    top = max(each.log_posterior for each in candidates)
     weight = dict.fromkeys(KAPPAS, 0.0)
     for candidate in candidates:
         parts = {kappa: np.log(prior) + candidate.log_evidence[kappa] for kappa, prior in KAPPAS.items()}

@@ -123,14 +123,16 @@ class Fits:
         runs = settings.MAX_RUNS_PER_RECORD * len(self.problem.records)
         for _ in range(settings.MAX_RANKED if most is None else most):
             self.refined |= {
-                one.ids
-                for one in self.candidates.values()
-                if self._settled(one.fit, settings.JACOBIAN_HOLDS_TOLERANCES)
+                candidate.ids
+                for candidate in self.candidates.values()
+                if self._settled(candidate.fit, settings.JACOBIAN_HOLDS_TOLERANCES)
             }
-            waiting = [one for one in self.candidates.values() if one.ids not in self.refined]
+            waiting = [
+                candidate for candidate in self.candidates.values() if candidate.ids not in self.refined
+            ]
             if not waiting:
                 return
-            now = max(waiting, key=lambda one: one.optimistic_log_posterior)
+            now = max(waiting, key=lambda candidate: candidate.optimistic_log_posterior)
             done = [self.candidates[ids].log_posterior for ids in self.refined]
             behind = 0.0 if self.problem.kept.asked > runs else hopeless
             if len(done) >= 2 and now.optimistic_log_posterior < max(done) - behind:
@@ -144,8 +146,11 @@ class Fits:
         """
         for _ in range(settings.MAX_ADDED):
             best = self.best()
-            close = [ids for ids in self._ranked()[1:settings.MAX_RANKED]
-                     if self.candidates[ids].log_posterior > best.log_posterior - settings.HOPELESS_NATS]  # fmt: skip
+            close = [
+                ids
+                for ids in self._ranked()[1 : settings.MAX_RANKED]
+                if self.candidates[ids].log_posterior > best.log_posterior - settings.HOPELESS_NATS
+            ]
             self.fit_all(close, best.fit)
             starts = [self.candidates[ids].fit for ids in close]
             for found in self._in_parallel(partial(self._fitted, best.ids), starts):
@@ -153,16 +158,20 @@ class Fits:
             if self.best().log_posterior < best.log_posterior + settings.CONVERGED_GAIN_NATS:
                 return
 
-    def _again(self, one: Candidate) -> None:
+    def _again(self, candidate: Candidate) -> None:
         """Fit a candidate with sensitivities of its own, under its most probable κ; again if that turns out another."""
-        self.refined.add(one.ids)
-        (J, made_at), D = self._slopes_at(one.fit), variances(self.problem.entries, one.ids, one.kappa)
-        fit = refit(self.problem, one.fit.z, J, D, r=one.fit.r, most_fresh=1, made_at=made_at)
-        now = self._keep(one.ids, fit)
-        if now.kappa != one.kappa:
-            D = variances(self.problem.entries, one.ids, now.kappa)
+        self.refined.add(candidate.ids)
+        (J, made_at), D = (
+            self._slopes_at(candidate.fit),
+            variances(self.problem.entries, candidate.ids, candidate.kappa),
+        )
+        fit = refit(self.problem, candidate.fit.z, J, D, r=candidate.fit.r, most_fresh=1, made_at=made_at)
+        now = self._keep(candidate.ids, fit)
+        if now.kappa != candidate.kappa:
+            D = variances(self.problem.entries, candidate.ids, now.kappa)
             self._keep(
-                one.ids, refit(self.problem, fit.z, fit.J, D, r=fit.r, most_fresh=0, made_at=fit.made_at)
+                candidate.ids,
+                refit(self.problem, fit.z, fit.J, D, r=fit.r, most_fresh=0, made_at=fit.made_at),
             )
 
     def _slopes_at(self, fit: Fit) -> tuple[np.ndarray, np.ndarray]:
@@ -171,8 +180,11 @@ class Fits:
         """
         near = settings.JACOBIAN_HOLDS_TOLERANCES
         if fit.moved(self.problem) > near:
-            made = [(one.fit.J, one.fit.made_at) for one in self.candidates.values()
-                    if one.fit.made_at is not None]  # fmt: skip
+            made = [
+                (candidate.fit.J, candidate.fit.made_at)
+                for candidate in self.candidates.values()
+                if candidate.fit.made_at is not None
+            ]
             apart = [replace(fit, made_at=made_at).moved(self.problem) for _, made_at in made]
             if apart and min(apart) < near:
                 return made[int(np.argmin(apart))]
@@ -240,8 +252,10 @@ class Fits:
         if found is None:
             return False
         old, again = self.economical, partial(whitened_again, self.economical, found)
-        self.candidates = {ids: candidate_of(found, ids, rewhitened(one.fit, old, found))
-                           for ids, one in self.candidates.items()}  # fmt: skip
+        self.candidates = {
+            ids: candidate_of(found, ids, rewhitened(candidate.fit, old, found))
+            for ids, candidate in self.candidates.items()
+        }
         self.wide, self.economical = self._nearer(rewhitened(self.wide, old, found)), found
         self.nominal = again(self.nominal[0]), again(self.nominal[1])
         self.problem = found
@@ -259,11 +273,13 @@ class Fits:
         """Give up what is hopelessly behind the best candidate, also after the step that its linear problem promises
         under the noise as it is known by now; but no part of the best.
         """
-        behind = {ids: one.optimistic_log_posterior - best.optimistic_log_posterior
-                  for ids, one in self.candidates.items()}  # fmt: skip
+        behind = {
+            ids: candidate.optimistic_log_posterior - best.optimistic_log_posterior
+            for ids, candidate in self.candidates.items()
+        }
         kept = {ids for ids in behind if behind[ids] > -settings.HOPELESS_NATS or set(ids) <= set(best.ids)}
         self.behind |= {ids: log for ids, log in behind.items() if ids not in kept}
-        self.candidates = {ids: one for ids, one in self.candidates.items() if ids in kept}
+        self.candidates = {ids: candidate for ids, candidate in self.candidates.items() if ids in kept}
 
     def _go_on(self) -> None:
         """Fit all candidates from where they are, with the sensitivities at hand."""
@@ -279,15 +295,18 @@ class Fits:
         return refit(self.problem, fit.z, fit.J, fit.D, most_fresh=0, made_at=fit.made_at)
 
 
-def log_density_of_noise(one: Observed, name: str) -> float:
+def log_density_of_noise(record: Observed, name: str) -> float:
     """Return what the noise of a channel adds to the log density of its samples: −½ log det Σ + log p(θ)."""
-    return log_prior_of(one.noise[name], sensor_of(one, name)) - one.noise[name].log_scale
+    return log_prior_of(record.noise[name], sensor_of(record, name)) - record.noise[name].log_scale
 
 
 def gained_by_noise(before: Problem, after: Problem) -> float:
     """Return what another noise adds to the log density of all samples, but for their residual."""
-    return sum(log_density_of_noise(new, name) - log_density_of_noise(old, name)
-               for old, new in zip(before.records, after.records, strict=True) for name in old.noise)  # fmt: skip
+    return sum(
+        log_density_of_noise(new, name) - log_density_of_noise(old, name)
+        for old, new in zip(before.records, after.records, strict=True)
+        for name in old.noise
+    )
 
 
 class WithOwnNoise(NamedTuple):
@@ -300,14 +319,14 @@ class WithOwnNoise(NamedTuple):
     before: Candidate
 
 
-def candidate_with_own_noise(problem: Problem, one: Candidate) -> WithOwnNoise:
+def candidate_with_own_noise(problem: Problem, candidate: Candidate) -> WithOwnNoise:
     """Return a hypothesis with the noise that is the most probable one behind it, which may ask for another κ."""
-    fit, found = one.fit, list[WithOwnNoise]()
-    for kappa in sorted({one.kappa, min(KAPPAS)}):
-        D = variances(problem.entries, one.ids, kappa)
+    fit, found = candidate.fit, list[WithOwnNoise]()
+    for kappa in sorted({candidate.kappa, min(KAPPAS)}):
+        D = variances(problem.entries, candidate.ids, kappa)
         more = with_own_noise(problem, Linear(fit.r + fit.J @ fit.z, fit.J), D)
         J = whitened_again(problem, more, fit.J)
-        new = candidate_of(more, one.ids, refit(more, fit.z, J, D, most_fresh=0, made_at=fit.made_at))
+        new = candidate_of(more, candidate.ids, refit(more, fit.z, J, D, most_fresh=0, made_at=fit.made_at))
         gain = gained_by_noise(problem, more)
         log = {each: value + gain for each, value in new.log_evidence.items()}
         again = replace(new, log_evidence=log, log_posterior=new.log_posterior + gain)
@@ -320,8 +339,8 @@ def gain_of_own_noise(problem: Problem, linear: Linear, D: np.ndarray) -> float:
     probable beside it; D are the prior variances of its parameters (k,).
     """
     more = with_own_noise(problem, linear, D)
-    again = Linear(*(whitened_again(problem, more, one) for one in linear))
-    before, after = (posterior(one.quadratic, D).log_evidence for one in (linear, again))
+    again = Linear(*(whitened_again(problem, more, candidate) for candidate in linear))
+    before, after = (posterior(candidate.quadratic, D).log_evidence for candidate in (linear, again))
     return after - before + gained_by_noise(problem, more)
 
 
@@ -334,8 +353,13 @@ def with_own_noise(problem: Problem, linear: Linear, D: np.ndarray) -> Problem:
         D: prior variances of its parameters (k,).
     """
     new = iter(_with_noise_behind(_channels(problem, linear), D))
-    records = [replace(one, noise={name: replace(next(new).noise, used=old.used) for name, old in one.noise.items()})
-               for one in problem.records]  # fmt: skip
+    records = [
+        replace(
+            record,
+            noise={name: replace(next(new).noise, used=old.used) for name, old in record.noise.items()},
+        )
+        for record in problem.records
+    ]
     return replace(problem, records=tuple(records))
 
 
@@ -352,9 +376,9 @@ def log_evidence_of(
         kept: channel → which of its samples are kept (n,), of every record.
     """
     channels, masks = _channels(problem, linear), []
-    for one, some in zip(problem.records, kept, strict=True):
-        masks += [some[name][noise.used] for name, noise in one.noise.items()]
-    some_of_each = [one.only(mask) for one, mask in zip(channels, masks, strict=True)]
+    for record, some in zip(problem.records, kept, strict=True):
+        masks += [some[name][noise.used] for name, noise in record.noise.items()]
+    some_of_each = [channel.only(mask) for channel, mask in zip(channels, masks, strict=True)]
     return _log_evidence(_with_noise_behind(some_of_each, D), D)
 
 
@@ -400,8 +424,8 @@ def _with_noise_behind(channels: list[_Channel], D: np.ndarray) -> list[_Channel
     """Return channels with their most probable noise, beside parameters of prior variances D (k,)."""
     now = _log_evidence(channels, D)
     for _ in range(settings.MAX_TRIED):
-        for i, one in enumerate(channels):
-            channels[i] = one.with_noise_given(_sum(channels[:i] + channels[i + 1 :], D.size), D)
+        for i, channel in enumerate(channels):
+            channels[i] = channel.with_noise_given(_sum(channels[:i] + channels[i + 1 :], D.size), D)
         then = _log_evidence(channels, D)
         if then < now + settings.NEGLIGIBLE_GAIN_NATS:
             break
@@ -412,12 +436,12 @@ def _with_noise_behind(channels: list[_Channel], D: np.ndarray) -> list[_Channel
 def _channels(problem: Problem, linear: Linear) -> list[_Channel]:
     """Return what a linear problem leaves of every channel of every record."""
     found, at = list[_Channel](), 0
-    for one in problem.records:
-        for name, noise in one.noise.items():
+    for record in problem.records:
+        for name, noise in record.noise.items():
             own = slice(at, at + noise.count)
             every = replace(noise, used=np.ones(noise.count, dtype=bool))
             whole, J = (noise.colour(part[own]) for part in linear)
-            found.append(_Channel(sensor_of(one, name), every, whole, J))
+            found.append(_Channel(sensor_of(record, name), every, whole, J))
             at += noise.count
     return found
 
@@ -425,13 +449,13 @@ def _channels(problem: Problem, linear: Linear) -> list[_Channel]:
 def _sum(channels: Sequence[_Channel], k: int) -> Quadratic:
     """Return the linear problem of some channels together, of k parameters."""
     A, b = np.zeros((k, k)), np.zeros(k)
-    for one in channels:
-        A += one.q.A
-        b += one.q.b
-    return Quadratic(A=A, b=b, rr=sum(one.q.rr for one in channels))
+    for channel in channels:
+        A += channel.q.A
+        b += channel.q.b
+    return Quadratic(A=A, b=b, rr=sum(each.q.rr for each in channels))
 
 
 def _log_evidence(channels: Sequence[_Channel], D: np.ndarray) -> float:
     """Return the log evidence of all channels under prior variances D (k,), and of their noise."""
-    fixed = sum(log_prior_of(one.noise, one.usual) - one.noise.log_scale for one in channels)
+    fixed = sum(log_prior_of(channel.noise, channel.usual) - channel.noise.log_scale for channel in channels)
     return posterior(_sum(channels, D.size), D).log_evidence + fixed

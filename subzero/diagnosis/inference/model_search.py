@@ -84,7 +84,7 @@ class Search(Fits):
 
     def _without(self, best: Candidate, without: str) -> None:
         """Fit the best hypothesis without one of its causes, and with others in its place."""
-        rest = tuple(one for one in best.ids if one != without)
+        rest = tuple(cause_id for cause_id in best.ids if cause_id != without)
         self._below(rest, best.fit)
         found = self._unknown(with_one_swapped(self.problem, best, rest))
         self.fit_all(sorted(found, key=lambda ids: -found[ids])[: settings.MAX_TRIED], best.fit)
@@ -94,11 +94,11 @@ class Search(Fits):
         right pair may be far from a wrong cause that is as good as any by itself.
         """
         found: dict[Ids, tuple[float, Fit]] = {}
-        for one in self.candidates.values():
-            if one is not best and len(one.ids) < MAX_CAUSES:
-                for ids, log in self._unknown(with_one_added(self.problem, one)).items():
+        for candidate in self.candidates.values():
+            if candidate is not best and len(candidate.ids) < MAX_CAUSES:
+                for ids, log in self._unknown(with_one_added(self.problem, candidate)).items():
                     if log > max(best.log_posterior, found.get(ids, (-np.inf,))[0]):
-                        found[ids] = log, one.fit
+                        found[ids] = log, candidate.fit
         for ids in sorted(found, key=lambda ids: -found[ids][0])[: settings.MAX_ADDED]:
             self.fit(ids, found[ids][1])
 
@@ -108,13 +108,13 @@ class Search(Fits):
         """
         found, entries = dict[Ids, TriedSize](), self.problem.entries
         flat = set(without_slope(self.problem, best.fit.J))
-        rests = [tuple(one for one in best.ids if one != without) for without in best.ids]
+        rests = [tuple(cause_id for cause_id in best.ids if cause_id != without) for without in best.ids]
         for rest in [best.ids, *rests] if len(best.ids) < MAX_CAUSES else rests:
-            for ids, one in with_sizes_tried(
+            for ids, candidate in with_sizes_tried(
                 self.problem, best, rest, sorted(flat - set(columns_of(entries, rest))), settings.SWEEP_SCALES
             ).items():
-                if ids not in found or one.log_posterior > found[ids].log_posterior:
-                    found[ids] = one
+                if ids not in found or candidate.log_posterior > found[ids].log_posterior:
+                    found[ids] = candidate
         for ids in self._worth_fitting(found, best, -settings.FURTHER_CAUSE_NATS):
             D = variances(entries, ids, best.kappa)
             fit = refit(self.problem, found[ids].z, found[ids].J, D, most_fresh=0)
@@ -126,7 +126,8 @@ class Search(Fits):
         """
         best, found, entries = self.best(), dict[Ids, TriedSize](), self.problem.entries
         others = columns_of(
-            entries, tuple(one for one in nameable(self.problem.entries) if one not in best.ids)
+            entries,
+            tuple(candidate for candidate in nameable(self.problem.entries) if candidate not in best.ids),
         )
         for rest in combinations(best.ids, len(best.ids) - 2) if len(best.ids) > 1 else ():
             found |= with_sizes_tried(self.problem, best, rest, others, settings.MERGED_SCALES)
@@ -139,22 +140,28 @@ class Search(Fits):
 
     def _worth_fitting(self, found: Mapping[Ids, TriedSize], best: Candidate, least: float) -> list[Ids]:
         """Return the best of what was tried that no fit is known of, if its log posterior adds `least` to the best."""
-        new = self._unknown({ids: one.log_posterior for ids, one in found.items() if ids != best.ids})
+        new = self._unknown(
+            {ids: candidate.log_posterior for ids, candidate in found.items() if ids != best.ids}
+        )
         return _best_of(new, best.log_posterior + least)
 
-    def restart(self, one: Candidate) -> Candidate:
+    def restart(self, candidate: Candidate) -> Candidate:
         """Fit a candidate from off its kinks, once, and return what is best then."""
-        if one.ids not in self.restarted:
-            self.restarted.add(one.ids)
-            D = variances(self.problem.entries, one.ids, one.kappa)
+        if candidate.ids not in self.restarted:
+            self.restarted.add(candidate.ids)
+            D = variances(self.problem.entries, candidate.ids, candidate.kappa)
             self._take(
-                candidate_of(self.problem, one.ids, restarted_where_smooth(self.problem, one.fit, one.ids, D))
+                candidate_of(
+                    self.problem,
+                    candidate.ids,
+                    restarted_where_smooth(self.problem, candidate.fit, candidate.ids, D),
+                )
             )
         return self.best()
 
     def _unknown(self, found: dict[Ids, float]) -> dict[Ids, float]:
         """Return those of estimated log posteriors that no fit is known of, or only one that went astray from afar."""
-        known = {ids: one.log_posterior for ids, one in self.candidates.items()}
+        known = {ids: candidate.log_posterior for ids, candidate in self.candidates.items()}
         return {
             ids: log for ids, log in found.items() if known.get(ids, -np.inf) < log - settings.HOPELESS_NATS
         }
@@ -230,8 +237,8 @@ class Search(Fits):
 
     def take_back(self, candidates: Mapping[Ids, Candidate]) -> None:
         """Keep candidates that are better than what is known of them."""
-        for one in candidates.values():
-            self._take(one)
+        for candidate in candidates.values():
+            self._take(candidate)
 
     def refine_first(self) -> None:
         """Fit what came out best again, with sensitivities of its own."""
@@ -251,13 +258,18 @@ class Search(Fits):
         stuck: set[Ids] = set()
         for _ in range(settings.MAX_TRIED):
             best = self.best()
-            for one in [one for one in self.candidates.values() if self._is_open(one, best)]:
-                if one.ids in stuck:
+            for each in [
+                candidate for candidate in self.candidates.values() if self._is_open(candidate, best)
+            ]:
+                if each.ids in stuck:
                     continue
-                self._say(0.75, "settling", one.ids)
-                self._again(one)
-                if self.candidates[one.ids].log_posterior < one.log_posterior + settings.NEGLIGIBLE_GAIN_NATS:
-                    stuck.add(one.ids)
+                self._say(0.75, "settling", each.ids)
+                self._again(each)
+                if (
+                    self.candidates[each.ids].log_posterior
+                    < each.log_posterior + settings.NEGLIGIBLE_GAIN_NATS
+                ):
+                    stuck.add(each.ids)
         self.cross()
         self._nothing()
 
@@ -269,14 +281,16 @@ class Search(Fits):
                 self._say(0.75, "once more", ids)
                 self.restart(self.candidates[ids])
 
-    def _is_open(self, one: Candidate, best: Candidate) -> bool:
+    def _is_open(self, candidate: Candidate, best: Candidate) -> bool:
         """Say whether a candidate that is as good as the best, or might still catch up with it, has not settled."""
-        behind = best.log_posterior - one.optimistic_log_posterior
+        behind = best.log_posterior - candidate.optimistic_log_posterior
         if behind < settings.CLOSE_NATS:
-            return not self._settled(one.fit, settings.OWN_JACOBIAN_TOLERANCES)
-        akin = behind < settings.HOPELESS_NATS and _akin(one.ids, best.ids)
+            return not self._settled(candidate.fit, settings.OWN_JACOBIAN_TOLERANCES)
+        akin = behind < settings.HOPELESS_NATS and _akin(candidate.ids, best.ids)
         return (
-            akin and not one.fit.converged and not self._settled(one.fit, settings.JACOBIAN_HOLDS_TOLERANCES)
+            akin
+            and not candidate.fit.converged
+            and not self._settled(candidate.fit, settings.JACOBIAN_HOLDS_TOLERANCES)
         )
 
     @property

@@ -72,16 +72,20 @@ def linearisation_points(
     best = search.best()
     here = LinearisationPoint(fit=best.fit, along=BaseRun(search.problem, best.fit.z))
     known = [] if search.is_poor() else [best.log_posterior - prior]
-    least = max([*(one.log_posterior for one in close), *known], default=0.0) - settings.LINEAR_NATS
-    alike = [one.point for one in close[: settings.MAX_ADDED] if one.log_posterior > least]
+    least = (
+        max([*(candidate.log_posterior for candidate in close), *known], default=0.0) - settings.LINEAR_NATS
+    )
+    alike = [candidate.point for candidate in close[: settings.MAX_ADDED] if candidate.log_posterior > least]
     return [here, *alike]
 
 
 def largest_hypotheses(search: Search) -> list[Candidate]:
     """Return the hypotheses whose causes may be what begins in mid-trial: the best that have any."""
     least = search.best().log_posterior - settings.LINEAR_NATS
-    ranked = sorted(search.candidates.values(), key=lambda one: -one.log_posterior)
-    return [one for one in ranked if one.log_posterior > least and one.ids][: settings.MAX_ADDED]
+    ranked = sorted(search.candidates.values(), key=lambda candidate: -candidate.log_posterior)
+    return [candidate for candidate in ranked if candidate.log_posterior > least and candidate.ids][
+        : settings.MAX_ADDED
+    ]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -114,8 +118,15 @@ def explanations_outside(search: Search) -> list[OutOfCatalogue]:
     columns, terms = all_columns(problem, best.fit.z, knots), one_terms(problem, best.fit.z, knots)
     found = _suspected(search, columns, knots, terms)
     close = _around_themselves(search, found, columns, knots, terms)
-    own = [OutOfCatalogue(causes=(), what=one.what, log_posterior=one.log_posterior + _log_prior(problem),
-                   point=None if one.is_poor else one.point) for one in close]  # fmt: skip
+    own = [
+        OutOfCatalogue(
+            causes=(),
+            what=candidate.what,
+            log_posterior=candidate.log_posterior + _log_prior(problem),
+            point=None if candidate.is_poor else candidate.point,
+        )
+        for candidate in close
+    ]
     sudden = _sudden(search, close, max(_most(found + own), best.log_posterior))
     if _most(found + own) > max(_most(sudden), best.log_posterior) - settings.CLOSE_NATS:
         found = _finer(search, found, own)
@@ -135,20 +146,26 @@ def _nothing_again(search: Search, first: OutOfCatalogue) -> None:
 def _finer(search: Search, found: list[OutOfCatalogue], own: list[OutOfCatalogue]) -> list[OutOfCatalogue]:
     """Return forces and drifts, and again with finer knots forces that are about as probable as each other."""
     problem, best = search.problem, search.best()
-    alike = {one.id.removeprefix(FORCE) for one in _close(found + own) if one.id.startswith(FORCE)}
+    alike = {
+        candidate.id.removeprefix(FORCE)
+        for candidate in _close(found + own)
+        if candidate.id.startswith(FORCE)
+    }
     if len(alike) < 2:
         return found
     finer = knots_of(problem, FINE_SPACING_S)
     columns = {FORCE + axis: C for axis, C in force_columns(problem, best.fit.z, alike, finer).items()}
     terms = one_terms(problem, best.fit.z, finer)
-    return [one for one in found if one.id not in columns] + _suspected(search, columns, finer, terms)
+    return [candidate for candidate in found if candidate.id not in columns] + _suspected(
+        search, columns, finer, terms
+    )
 
 
 def is_explained(search: Search, out_of_catalogue: Sequence[OutOfCatalogue]) -> bool:
     """Say whether a sudden cause leaves nothing but noise, and is so far before the best hypothesis that no sum of
     causes that hold throughout can come close.
     """
-    best = max(out_of_catalogue, key=lambda one: one.log_posterior, default=None)
+    best = max(out_of_catalogue, key=lambda candidate: candidate.log_posterior, default=None)
     if best is None or not isinstance(best.what, FittedChangePoint) or is_poor_fit(best.what.fit):
         return False
     return best.log_posterior > search.best().log_posterior + settings.DECISIVE_NATS
@@ -157,8 +174,8 @@ def is_explained(search: Search, out_of_catalogue: Sequence[OutOfCatalogue]) -> 
 def _sorted(found: list[OutOfCatalogue], own: list[OutOfCatalogue]) -> list[OutOfCatalogue]:
     """Return it all, the most probable first; of what was asked at two linearisation points, the more probable."""
     kept: dict[tuple[str, Ids], OutOfCatalogue] = {}
-    for one in sorted(found + own, key=lambda one: -one.log_posterior):
-        kept.setdefault((one.id, one.causes), one)
+    for each in sorted(found + own, key=lambda candidate: -candidate.log_posterior):
+        kept.setdefault((each.id, each.causes), each)
     return list(kept.values())
 
 
@@ -170,10 +187,12 @@ def _suspected(
     found: list[OutOfCatalogue] = []
     for candidate in _bases(search):
         scales = candidate.scales(problem)
-        found += [OutOfCatalogue(causes=candidate.ids, what=one,
-                                 log_posterior=candidate.log_posterior + one.log_gain + prior)
-                  for one in latent_force_candidates(problem, columns, candidate.fit, scales, knots,
-                                                     terms)]  # fmt: skip
+        found += [
+            OutOfCatalogue(
+                causes=candidate.ids, what=each, log_posterior=candidate.log_posterior + each.log_gain + prior
+            )
+            for each in latent_force_candidates(problem, columns, candidate.fit, scales, knots, terms)
+        ]
     return found
 
 
@@ -190,13 +209,15 @@ def _around_themselves(
     problem, best, prior = search.problem, search.best(), _log_prior(search.problem)
     if not best.ids and best.kappa == min(KAPPAS):
         return []
-    predicted = {one.id: one.log_posterior for one in found if not one.causes}
+    predicted = {candidate.id: candidate.log_posterior for candidate in found if not candidate.causes}
     for log, what in linear_candidates(problem, best.fit, columns, knots, terms, list(KAPPAS)):
         predicted[what.id] = max(predicted[what.id], log + prior)
     finer = knots_of(problem, FINE_SPACING_S)
     terms = one_terms(problem, best.fit.z, finer)
     look = partial(relinearised_force, problem, best.fit, kappa=1.0, knots=finer, terms=terms)
-    return sorted(search.side.map(look, _worth_a_look(predicted, best)), key=lambda one: -one.log_posterior)
+    return sorted(
+        search.side.map(look, _worth_a_look(predicted, best)), key=lambda candidate: -candidate.log_posterior
+    )
 
 
 def _worth_a_look(predicted: dict[str, float], best: Candidate) -> list[str]:
@@ -215,13 +236,13 @@ def _log_prior(problem: Problem) -> float:
 
 def _most(found: Sequence[OutOfCatalogue]) -> float:
     """Return the log posterior of the most probable."""
-    return max((one.log_posterior for one in found), default=-np.inf)
+    return max((candidate.log_posterior for candidate in found), default=-np.inf)
 
 
 def _close(found: list[OutOfCatalogue]) -> list[OutOfCatalogue]:
     """Return what is about as probable as the best."""
     best = _most(found)
-    return [one for one in found if one.log_posterior > best - settings.LINEAR_NATS]
+    return [candidate for candidate in found if candidate.log_posterior > best - settings.LINEAR_NATS]
 
 
 def _bases(search: Search) -> list[Candidate]:
@@ -237,12 +258,20 @@ def _sudden(search: Search, close: Sequence[RelinearisedForce], known: float) ->
         return []
     prior = float(np.log(PRIOR["sudden"] / (len(effects) * len(problem.records))))
     points, large = linearisation_points(search, close, _log_prior(problem)), largest_hypotheses(search)
-    made = [one for record in range(len(problem.records))
-            for one in fit_change_points(problem, points, effects, record, known - prior, search.side,
-                                         large)]  # fmt: skip
-    return [OutOfCatalogue(causes=(), what=one, log_posterior=log + prior,
-                    point=None if is_poor_fit(one.fit) else linearised_at(problem, one))
-            for one, log in special_cases_folded(made)]  # fmt: skip
+    made = [
+        point
+        for record in range(len(problem.records))
+        for point in fit_change_points(problem, points, effects, record, known - prior, search.side, large)
+    ]
+    return [
+        OutOfCatalogue(
+            causes=(),
+            what=candidate,
+            log_posterior=log + prior,
+            point=None if is_poor_fit(candidate.fit) else linearised_at(problem, candidate),
+        )
+        for candidate, log in special_cases_folded(made)
+    ]
 
 
 def special_cases_folded(made: Sequence[FittedChangePoint]) -> list[tuple[FittedChangePoint, float]]:
@@ -252,19 +281,19 @@ def special_cases_folded(made: Sequence[FittedChangePoint]) -> list[tuple[Fitted
     As with a further cause (`occam_folded`): what is not FURTHER_CAUSE_ODDS times as probable as its special case is
     told as that, which has the probability of both.
     """
-    log = {(one.change_point.effect.id, one.change_point.record): one.log_posterior for one in made}
-    for one in made:
-        own = one.change_point.effect.id, one.change_point.record
+    log = {(each.change_point.effect.id, each.change_point.record): each.log_posterior for each in made}
+    for candidate in made:
+        own = candidate.change_point.effect.id, candidate.change_point.record
         for special in {
-            (parameter.also_of, own[1]) for parameter in one.change_point.effect.parameters
+            (parameter.also_of, own[1]) for parameter in candidate.change_point.effect.parameters
         } & log.keys():
             if log[own] < log[special] + np.log(FURTHER_CAUSE_ODDS):
                 log[special] = log_sum([log[special], log.pop(own)])
                 break
     return [
-        (one, log[key])
-        for one in made
-        if (key := (one.change_point.effect.id, one.change_point.record)) in log
+        (each, log[key])
+        for each in made
+        if (key := (each.change_point.effect.id, each.change_point.record)) in log
     ]
 
 
@@ -276,12 +305,12 @@ def shares(
     """
     inside = search.beliefs.probabilities(search.problem)
     scale = search.beliefs.log_total()
-    outside = log_sum([one.log_posterior for one in out_of_catalogue]) if out_of_catalogue else -np.inf
+    outside = log_sum([each.log_posterior for each in out_of_catalogue]) if out_of_catalogue else -np.inf
     total = log_sum([scale, outside])
     found: dict[Ids, float] = {}
-    for one in out_of_catalogue:
-        ids = (*one.causes, one.id)
-        found[ids] = found.get(ids, 0.0) + float(np.exp(one.log_posterior - total))
+    for candidate in out_of_catalogue:
+        ids = (*candidate.causes, candidate.id)
+        found[ids] = found.get(ids, 0.0) + float(np.exp(candidate.log_posterior - total))
     kept = float(np.exp(scale - total))
     return {ids: kept * p for ids, p in inside.items()}, occam_folded(found)
 
@@ -298,79 +327,93 @@ def each_with_own_noise(search: Search, outside: Sequence[OutOfCatalogue]) -> li
     none = nothing.before
     gained = max(none.log_posterior - fits[()].log_posterior, 0.0)
     least = max(first, none.log_posterior) - gained - settings.HOPELESS_NATS
-    ranked = sorted(fits.values(), key=lambda one: -one.log_posterior)[: settings.MAX_RANKED]
-    near = [one for one in ranked if one.ids and one.log_posterior > least]
-    fits.update({one.before.ids: one.before for one in [nothing, *search.side.map(own, near)]})
-    few = [one for one in outside[: settings.MAX_RANKED]
-           if one.log_posterior > least and (one.point or not _is_force(one))]  # fmt: skip
+    ranked = sorted(fits.values(), key=lambda fit: -fit.log_posterior)[: settings.MAX_RANKED]
+    near = [candidate for candidate in ranked if candidate.ids and candidate.log_posterior > least]
+    fits.update(
+        {candidate.before.ids: candidate.before for candidate in [nothing, *search.side.map(own, near)]}
+    )
+    few = [
+        candidate
+        for candidate in outside[: settings.MAX_RANKED]
+        if candidate.log_posterior > least and (candidate.point or not _is_force(candidate))
+    ]
     found = search.side.map(partial(_with_own_noise, search.problem, nothing.problem), few)
     forces = search.side.map(partial(_beside_nothing, search.problem, nothing), filter(_is_force, outside))
-    return _sorted([*found, *forces], [one for one in outside if one not in few and not _is_force(one)])
+    return _sorted(
+        [*found, *forces],
+        [candidate for candidate in outside if candidate not in few and not _is_force(candidate)],
+    )
 
 
-def _is_force(one: OutOfCatalogue) -> bool:
+def _is_force(candidate: OutOfCatalogue) -> bool:
     """Say whether it is a force or a drift beside nothing."""
-    return isinstance(one.what, LatentForceCandidate) and not one.causes
+    return isinstance(candidate.what, LatentForceCandidate) and not candidate.causes
 
 
-def _with_own_noise(problem: Problem, behind: Problem, one: OutOfCatalogue) -> OutOfCatalogue:
+def _with_own_noise(problem: Problem, behind: Problem, candidate: OutOfCatalogue) -> OutOfCatalogue:
     """Return what lies outside with the evidence that it has with the noise beside it; `behind` is the problem with
     that behind "nothing is wrong".
     """
-    if isinstance(one.what, FittedChangePoint):
-        return replace(one, log_posterior=one.log_posterior + _gain_of_own_noise(problem, one.what))
-    log = one.log_posterior - one.what.log_evidence(problem, one.causes) + gained_by_noise(problem, behind)
-    return _beside_noise(one, one.what.made_white(problem, behind), log, behind)
+    if isinstance(candidate.what, FittedChangePoint):
+        return replace(
+            candidate, log_posterior=candidate.log_posterior + _gain_of_own_noise(problem, candidate.what)
+        )
+    log = (
+        candidate.log_posterior
+        - candidate.what.log_evidence(problem, candidate.causes)
+        + gained_by_noise(problem, behind)
+    )
+    return _beside_noise(candidate, candidate.what.made_white(problem, behind), log, behind)
 
 
-def _gain_of_own_noise(problem: Problem, one: FittedChangePoint) -> float:
+def _gain_of_own_noise(problem: Problem, fitted: FittedChangePoint) -> float:
     """Return what the log evidence of a sudden cause gains with the noise that is the most probable beside it, fitted
     again with that: no linear problem knows that a fin cannot lose more than all of its command.
     """
-    own = with_own_noise(problem, *one.linear(problem))
-    more, fit = replace(one.problem, records=own.records), one.fit
+    own = with_own_noise(problem, *fitted.linear(problem))
+    more, fit = replace(fitted.problem, records=own.records), fitted.fit
     J = whitened_again(problem, own, fit.J)
     again = refit(more, fit.z, J, fit.D, most_fresh=0, made_at=fit.made_at)
-    found = as_fitted(own, more, one.change_point, again)
-    return found.log_posterior - one.log_posterior + gained_by_noise(problem, own)
+    found = as_fitted(own, more, fitted.change_point, again)
+    return found.log_posterior - fitted.log_posterior + gained_by_noise(problem, own)
 
 
-def _beside_nothing(problem: Problem, nothing: WithOwnNoise, one: OutOfCatalogue) -> OutOfCatalogue:
+def _beside_nothing(problem: Problem, nothing: WithOwnNoise, candidate: OutOfCatalogue) -> OutOfCatalogue:
     """Return a force or a drift likewise, around "nothing is wrong" as it is fitted with the noise behind it."""
-    assert isinstance(one.what, LatentForceCandidate)
+    assert isinstance(candidate.what, LatentForceCandidate)
     own, none = nothing.problem, nothing.again
-    what = replace(one.what.made_white(problem, own), fit=none.fit, kappa=none.kappa)
+    what = replace(candidate.what.made_white(problem, own), fit=none.fit, kappa=none.kappa)
     without = posterior(none.fit.quadratic, variances(own.entries, (), none.kappa)).log_evidence
-    return _beside_noise(one, what, none.log_posterior + _log_prior(own) - without, own)
+    return _beside_noise(candidate, what, none.log_posterior + _log_prior(own) - without, own)
 
 
 def _beside_noise(
-    one: OutOfCatalogue, what: LatentForceCandidate, log: float, behind: Problem
+    candidate: OutOfCatalogue, what: LatentForceCandidate, log: float, behind: Problem
 ) -> OutOfCatalogue:
     """Return a force or a drift with the noise behind nothing, or with that beside all that it might do: behind nothing
     it is noise, and beside that noise there is little left of it; the two have an optimum each.
 
     Args:
-        one: as it is.
+        candidate: as it is.
         what: it is, white by the noise behind nothing.
         log: what is added to its log evidence then.
         behind: the problem with that noise.
     """
 
     def log_posterior(own: Problem) -> float:
-        evidence = what.made_white(behind, own).log_evidence(own, one.causes)
+        evidence = what.made_white(behind, own).log_evidence(own, candidate.causes)
         return log + evidence + gained_by_noise(behind, own)
 
     tried = [(log_posterior(behind), behind)]
-    linear, D = what.linear_at_most(behind, one.causes)
+    linear, D = what.linear_at_most(behind, candidate.causes)
     for _ in range(settings.MAX_TRIED):
         own = with_own_noise(tried[-1][1], linear, D)
         tried.append((log_posterior(own), own))
         if tried[-1][0] < tried[-2][0] + settings.NEGLIGIBLE_GAIN_NATS:
             break
-        linear, D = what.made_white(behind, own).linear(own, one.causes)
+        linear, D = what.made_white(behind, own).linear(own, candidate.causes)
     best, own = max(tried, key=lambda each: each[0])
-    return replace(one, what=what.made_white(behind, own), log_posterior=best, own=own)
+    return replace(candidate, what=what.made_white(behind, own), log_posterior=best, own=own)
 
 
 def linear_of_first(search: Search, outside: Sequence[OutOfCatalogue]) -> tuple[Linear, np.ndarray]:
@@ -384,16 +427,16 @@ def linear_of_first(search: Search, outside: Sequence[OutOfCatalogue]) -> tuple[
 
 def _first(search: Search, outside: Sequence[OutOfCatalogue]) -> OutOfCatalogue | None:
     """Return what lies outside if that is the most probable explanation."""
-    first = max(outside, key=lambda one: one.log_posterior, default=None)
+    first = max(outside, key=lambda candidate: candidate.log_posterior, default=None)
     return first if first and first.log_posterior > search.best().log_posterior else None
 
 
-def _linear_of(problem: Problem, one: OutOfCatalogue) -> tuple[Linear, np.ndarray]:
+def _linear_of(problem: Problem, candidate: OutOfCatalogue) -> tuple[Linear, np.ndarray]:
     """Return the linear problem around what lies outside, and the prior variances of all its parameters (k,)."""
-    if isinstance(one.what, FittedChangePoint):
-        return one.what.linear(problem)
-    own = one.own or problem
-    linear, D = one.what.linear(own, one.causes)
+    if isinstance(candidate.what, FittedChangePoint):
+        return candidate.what.linear(problem)
+    own = candidate.own or problem
+    linear, D = candidate.what.linear(own, candidate.causes)
     return Linear(*(whitened_again(own, problem, part) for part in linear)), D
 
 

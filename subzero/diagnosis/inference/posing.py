@@ -57,16 +57,16 @@ def pose(records: Sequence[Logged], more: Iterable[Effect] = ()) -> Problem:
     Raises:
         UserError: the nominal model cannot be run through a trial.
     """
-    observed = tuple(_observed(one) for one in records)
-    channels = list(dict.fromkeys(name for one in observed for name in one.noise))
+    observed = tuple(_observed(record) for record in records)
+    channels = list(dict.fromkeys(name for trial in observed for name in trial.noise))
     nominal = observed[0].setting
     effects = [
-        replace(effect, parameters=tuple(one.within(nominal) for one in effect.parameters))
-        for effect in (with_tolerances(one, nominal) for one in catalogue(channels, more).values())
+        replace(effect, parameters=tuple(parameter.within(nominal) for parameter in effect.parameters))
+        for effect in (with_tolerances(trial, nominal) for trial in catalogue(channels, more).values())
         if _possible(effect, observed) and not moves_nothing(effect, nominal)
     ]
     onsets = tuple(effect for effect in ONSETS if _possible(effect, observed))
-    own = (*START, SAMPLED) if any(one.setting.intervals for one in observed) else START
+    own = (*START, SAMPLED) if any(trial.setting.intervals for trial in observed) else START
     return Problem(records=observed, entries=entries_of(effects, own, len(observed)), onsets=onsets)
 
 
@@ -83,44 +83,51 @@ def posed_again(problem: Problem, records: Sequence[Logged], more: Iterable[Effe
         UserError: the nominal model cannot be run through a trial.
     """
     new = pose(records, more)
-    if [list(one.noise) for one in new.records] != [list(one.noise) for one in problem.records]:
+    if [list(record.noise) for record in new.records] != [list(record.noise) for record in problem.records]:
         return new
     pairs = zip(problem.records, new.records, strict=True)
     known = tuple(replace(b, setting=a.setting) if _serves(a.setting, b.setting) else b for a, b in pairs)
     return replace(problem, records=known, kept=problem.kept.again())
 
 
-def _serves(one: Setting, other: Setting) -> bool:
+def _serves(setting: Setting, other: Setting) -> bool:
     """Say whether runs in a setting serve for another of the same trial: the same commands, and at least as long."""
-    return one.trial.commands is other.trial.commands and one.trial.duration >= other.trial.duration
+    return setting.trial.commands is other.trial.commands and setting.trial.duration >= other.trial.duration
 
 
 def _possible(effect: Effect, observed: Sequence[Observed]) -> bool:
     """Say whether a cause can be in these trials: without a cable or a free drum, some cannot."""
-    tethered = any(one.setting.tethered for one in observed)
-    winch = any(one.setting.model.winch is not None for one in observed)
+    tethered = any(trial.setting.tethered for trial in observed)
+    winch = any(trial.setting.model.winch is not None for trial in observed)
     return (effect.slot not in ("cable", "drum") or tethered) and not (effect.slot == "drum" and winch)
 
 
-def _observed(one: Logged) -> Observed:
+def _observed(trial: Logged) -> Observed:
     """Return a record with its noise."""
-    time = one.record.time
-    setting = economical(one.setting, min(float(time[-1]), one.setting.trial.duration) + EARLIEST_CLOCK_S)
-    values = {name: column for name, column in one.record.values.items()
-              if name in SPECS and np.isfinite(column).any()}  # fmt: skip
+    time = trial.record.time
+    setting = economical(trial.setting, min(float(time[-1]), trial.setting.trial.duration) + EARLIEST_CLOCK_S)
+    values = {
+        name: column
+        for name, column in trial.record.values.items()
+        if name in SPECS and np.isfinite(column).any()
+    }
     if not values:
-        raise UserError(f"'{one.name}' has no measured sample in any channel that can be diagnosed.")
+        raise UserError(f"'{trial.name}' has no measured sample in any channel that can be diagnosed.")
     setting, run = with_limit(setting)
     simulated = read(setting, run, time, values)
     if not all(np.isfinite(column).all() for column in simulated.values()):
         raise UserError(
-            f"The nominal model cannot be run through '{one.name}'. Try `subzero simulate` on its scenario."
+            f"The nominal model cannot be run through '{trial.name}'. Try `subzero simulate` on its scenario."
         )
     if HEADING in values:
         values[HEADING] = turned(values[HEADING], simulated[HEADING])
-    noise = {name: _usual(time, column, column - simulated[name], usual_of(name, column, one.noise, one.steps))
-             for name, column in values.items()}  # fmt: skip
-    return Observed(name=one.name, time=time, values=values, noise=noise, setting=setting, known=one.noise)
+    noise = {
+        name: _usual(time, column, column - simulated[name], usual_of(name, column, trial.noise, trial.steps))
+        for name, column in values.items()
+    }
+    return Observed(
+        name=trial.name, time=time, values=values, noise=noise, setting=setting, known=trial.noise
+    )
 
 
 def _usual(time: np.ndarray, values: np.ndarray, difference: np.ndarray, usual: Usual) -> Noise:
@@ -147,20 +154,23 @@ def with_noise_behind(
         white: sensitivities of the problem close to z (m, k); if they are known, outliers are, too.
     """
     records = tuple(
-        _without_outliers(problem, i, z) if white is None else one for i, one in enumerate(problem.records)
+        _without_outliers(problem, i, z) if white is None else each for i, each in enumerate(problem.records)
     )
-    plain = replace(problem, records=tuple(replace(one, noise=_unit(one)) for one in records))
+    plain = replace(problem, records=tuple(replace(each, noise=_unit(each)) for each in records))
     r, J = plain.residual(z), plain.jacobian(z) if white is None else whitened_again(problem, plain, white)
     rest, at, found = r + J @ z, 0, []
-    for one in records:
+    for record in records:
         noise = {}
-        for name, old in one.noise.items():
+        for name, old in record.noise.items():
             own = slice(at, at + old.count)
-            noise[name] = _behind(one, name, Behind(residual=rest[own], J=J[own], D=D))
+            noise[name] = _behind(record, name, Behind(residual=rest[own], J=J[own], D=D))
             at += old.count
-        found.append(replace(one, noise=noise, noise_times=times_beside(noise)))
-    if all(_alike(one.noise[name], new.noise[name]) for one, new in zip(problem.records, found, strict=True)
-           for name in one.noise):  # fmt: skip
+        found.append(replace(record, noise=noise, noise_times=times_beside(noise)))
+    if all(
+        _alike(each.noise[name], new.noise[name])
+        for each, new in zip(problem.records, found, strict=True)
+        for name in each.noise
+    ):
         return None
     return replace(problem, records=tuple(found))
 
@@ -190,30 +200,30 @@ def rewhitened(fit: Fit, before: Problem, after: Problem) -> Fit:
 
 def _without_outliers(problem: Problem, record: int, z: np.ndarray) -> Observed:
     """Return a record without the samples that lie far off behind deviations z."""
-    one = problem.records[record]
-    shown = respond(problem.setting(record, z), one.time, one.noise)
+    found = problem.records[record]
+    shown = respond(problem.setting(record, z), found.time, found.noise)
     noise = {}
-    for name, old in one.noise.items():
-        used = _used(one.values[name], one.values[name] - shown[name], sensor_of(one, name))
-        noise[name] = replace(old, used=used, time=one.time[used])
-    return replace(one, noise=noise)
+    for name, old in found.noise.items():
+        used = _used(found.values[name], found.values[name] - shown[name], sensor_of(found, name))
+        noise[name] = replace(old, used=used, time=found.time[used])
+    return replace(found, noise=noise)
 
 
-def sensor_of(one: Observed, name: str) -> Usual:
+def sensor_of(record: Observed, name: str) -> Usual:
     """Return what the sensor of a channel is like, by what is known of it and by the record as it was posed."""
-    level, resolution = one.known.get(name, SPECS[name].noise), one.noise[name].resolution
-    return Usual(level, resolution, name in one.known, one.noise_times.get(name))
+    level, resolution = record.known.get(name, SPECS[name].noise), record.noise[name].resolution
+    return Usual(level, resolution, name in record.known, record.noise_times.get(name))
 
 
-def _unit(one: Observed) -> dict[str, Noise]:
+def _unit(record: Observed) -> dict[str, Noise]:
     """Return noise that leaves values in their units, without outliers and gaps."""
-    return {name: Noise(white=1.0, used=noise.used, time=noise.time) for name, noise in one.noise.items()}
+    return {name: Noise(white=1.0, used=noise.used, time=noise.time) for name, noise in record.noise.items()}
 
 
-def _behind(one: Observed, name: str, behind: Behind) -> Noise:
+def _behind(record: Observed, name: str, behind: Behind) -> Noise:
     """Return the noise of a channel behind a fit."""
-    old = one.noise[name]
-    return replace(estimate(old.time, behind, sensor_of(one, name)), used=old.used)
+    old = record.noise[name]
+    return replace(estimate(old.time, behind, sensor_of(record, name)), used=old.used)
 
 
 def _alike(old: Noise, new: Noise) -> bool:
@@ -228,18 +238,18 @@ def _alike(old: Noise, new: Noise) -> bool:
 def with_finer_steps(problem: Problem, z: np.ndarray) -> Problem | None:
     """Return the problem with the error of economical steps at z made good; None if that is not seen."""
     records, size = [], 0.0
-    for i, one in enumerate(problem.records):
+    for i, record in enumerate(problem.records):
         wrong = _error_of_steps(problem, i, z)
-        size += sum(float(np.sum(one.noise[name].whiten(column) ** 2)) for name, column in wrong.items())
-        records.append(one.corrected(wrong))
+        size += sum(float(np.sum(record.noise[name].whiten(column) ** 2)) for name, column in wrong.items())
+        records.append(record.corrected(wrong))
     return replace(problem, records=tuple(records)) if VISIBLE_STEP_ERROR < size < np.inf else None
 
 
 def _error_of_steps(problem: Problem, record: int, z: np.ndarray) -> dict[str, np.ndarray]:
     """Return channel → what economical steps get wrong at z (n,). [display unit]"""
-    one, setting = problem.records[record], problem.setting(record, z)
-    coarse, fine = (respond(made, one.time, one.noise) for made in (setting, finer(setting)))
-    return {name: fine[name] - coarse[name] for name in one.noise}
+    found, setting = problem.records[record], problem.setting(record, z)
+    coarse, fine = (respond(made, found.time, found.noise) for made in (setting, finer(setting)))
+    return {name: fine[name] - coarse[name] for name in found.noise}
 
 
 class SensitiveRun(NamedTuple):
@@ -255,13 +265,15 @@ def sensitive_runs(problem: Problem, z: np.ndarray) -> tuple[SensitiveRun, ...]:
     one than z: where a motion is unstable, errors of a run grow to what they like, and none can be made good.
     """
     found = []
-    for i, one in enumerate(problem.records):
-        if not one.correction:
+    for i, record in enumerate(problem.records):
+        if not record.correction:
             continue
         here, close = _error_of_steps(problem, i, z), _error_of_steps(problem, i, LITTLE_CLOSER * z)
-        apart = {name: float(np.sqrt(np.mean((close[name] - here[name])[noise.used] ** 2)) / noise.sd)
-                 for name, noise in one.noise.items()}  # fmt: skip
+        apart = {
+            name: float(np.sqrt(np.mean((close[name] - here[name])[noise.used] ** 2)) / noise.sd)
+            for name, noise in record.noise.items()
+        }
         channel = max(apart, key=lambda name: apart[name])
         if apart[channel] > SENSITIVE_LEVELS:
-            found.append(SensitiveRun(one.name, channel, apart[channel]))
+            found.append(SensitiveRun(record.name, channel, apart[channel]))
     return tuple(found)

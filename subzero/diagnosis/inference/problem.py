@@ -112,8 +112,12 @@ class Problem:
     def setting(self, record: int, z: np.ndarray, *, late: bool = True) -> Setting:
         """Return the setting of a record with deviations z (k,); without those of the sensors if not `late`."""
         setting = self.records[record].setting
-        early = self.kept.setting(setting, self.entries, np.where(self._is_early, z, 0.0),
-                                  lambda: self._changed(setting, record, z, late=False))  # fmt: skip
+        early = self.kept.setting(
+            setting,
+            self.entries,
+            np.where(self._is_early, z, 0.0),
+            lambda: self._changed(setting, record, z, late=False),
+        )
         return self._changed(early, record, z, late=True) if late else early
 
     def roughly(self, z: np.ndarray) -> Problem:
@@ -122,10 +126,12 @@ class Problem:
         """
         whole = np.zeros(0)
         made = [
-            self.kept.setting(one.setting, rougher, whole, partial(rougher, one.setting))
-            for one in self.records
+            self.kept.setting(record.setting, rougher, whole, partial(rougher, record.setting))
+            for record in self.records
         ]
-        records = (replace(one, setting=setting) for one, setting in zip(self.records, made, strict=True))
+        records = (
+            replace(record, setting=setting) for record, setting in zip(self.records, made, strict=True)
+        )
         rough = replace(self, records=tuple(records))
         apart = rough.residual(z) - self.residual(z)
         return rough if float(np.mean(apart**2)) < ROUGH_LEVELS**2 else self
@@ -155,7 +161,8 @@ class Problem:
         """Effects with their entries: those that change a run, and those of the sensors (True)."""
         every = grouped(self.entries)
         return {
-            late: [one for one in every if late == (one[0].slot in POST_RUN_SLOTS)] for late in (False, True)
+            late: [each for each in every if late == (each[0].slot in POST_RUN_SLOTS)]
+            for late in (False, True)
         }
 
     def residual(self, z: np.ndarray) -> np.ndarray:
@@ -168,8 +175,10 @@ class Problem:
         """Return r(z) (m,) of several z, run side by side; of some records only, if given."""
         wanted = range(len(self.records)) if records is None else records
         jobs = [(i, z) for z in several for i in wanted]
-        shown = [self.whitened(i, self.setting(i, z), track, measured=True)
-                 for (i, z), track in zip(jobs, self.tracks(jobs), strict=True)]  # fmt: skip
+        shown = [
+            self.whitened(i, self.setting(i, z), track, measured=True)
+            for (i, z), track in zip(jobs, self.tracks(jobs), strict=True)
+        ]
         count = len(wanted)
         return [np.concatenate(shown[at : at + count]) for at in range(0, len(shown), count)]
 
@@ -183,8 +192,12 @@ class Problem:
         base = self.tracks([(i, z) for i in range(len(self.records))])
         true = [self.true(i, self.setting(i, z, late=False), track) for i, track in enumerate(base)]
         shown = [self.whitened(i, self.setting(i, z), track, true=true[i]) for i, track in enumerate(base)]
-        jobs = [(k, i, self.moved(z, k, side)) for k in wanted for i in range(len(self.records))
-                if self.entries[k].record in (-1, i)]  # fmt: skip
+        jobs = [
+            (k, i, self.moved(z, k, side))
+            for k in wanted
+            for i in range(len(self.records))
+            if self.entries[k].record in (-1, i)
+        ]
         stops = [self._stops(i, z, wanted) for i in range(len(self.records))]
         early = [(k, i, moved) for k, i, moved in jobs if not self._late(k)]
         begun = [stops[i].get(self.entries[k].parameter.begins) for k, i, _ in early]
@@ -234,8 +247,11 @@ class Problem:
         for name, (i, z) in zip(names, asked, strict=True):
             if track := self.kept.get(self.records[i].setting, self.entries, z):
                 found[name] = track
-        new = {name: (*job, stop) for name, job, stop in zip(names, asked, stops or [None] * len(jobs), strict=True)
-               if name not in found}  # fmt: skip
+        new = {
+            name: (*job, stop)
+            for name, job, stop in zip(names, asked, stops or [None] * len(jobs), strict=True)
+            if name not in found
+        }
         for (name, (i, z, _)), track in zip(new.items(), self._run(list(new.values())), strict=True):
             found[name] = track
             self.kept.keep(self.records[i].setting, self.entries, z, track)
@@ -268,8 +284,10 @@ class Problem:
         """Return W h of a record, or W (y − h); quicker if it is known what is `true` along the track."""
         seen, shown = self.records[record], self.shown(record, setting, track, true)
         if measured:
-            shown = {name: seen.values[name] - values - seen.correction.get(name, 0.0)
-                     for name, values in shown.items()}  # fmt: skip
+            shown = {
+                name: seen.values[name] - values - seen.correction.get(name, 0.0)
+                for name, values in shown.items()
+            }
         return seen.whiten(shown)
 
     def shown(
@@ -328,16 +346,18 @@ def sizes_run(
     of: dict[int, dict[float, np.ndarray]] = {k: {float(z[k]): here} for k in at}
     for (k, size), r in zip(jobs, problem.residuals(moved, records), strict=True):
         of[k][size] = r
-    found = [SizeRun(k, there, of[k][size], _slope_at(of[k], size))
-             for (k, size), there in zip(jobs, moved, strict=True)]  # fmt: skip
-    return [one for one in found if np.isfinite(one.r).all() and np.isfinite(one.column).all()]
+    found = [
+        SizeRun(k, there, of[k][size], _slope_at(of[k], size))
+        for (k, size), there in zip(jobs, moved, strict=True)
+    ]
+    return [each for each in found if np.isfinite(each.r).all() and np.isfinite(each.column).all()]
 
 
 def _slope_at(runs: Mapping[float, np.ndarray], size: float) -> np.ndarray:
     """Return the sensitivity (m,) at a size of runs, size → residual (m,), between those next to it; NaN if there is
     none.
     """
-    row = sorted(one for one in runs if one == size or np.isfinite(runs[one]).all())
+    row = sorted(run for run in runs if run == size or np.isfinite(runs[run]).all())
     i = row.index(size)
     below, above = row[max(i - 1, 0)], row[min(i + 1, len(row) - 1)]
     return (runs[below] - runs[above]) / (above - below if above > below else np.nan)

@@ -95,8 +95,14 @@ def steps_off_grid(logged: Logged, trusted: frozenset[str] = frozenset()) -> lis
         first = int(np.argmax(np.abs(beside) > OFF_GRID))
         same = np.abs(_beside_multiples(beside[first:] - beside[first])) < OFF_GRID
         if FEWEST_FROZEN <= first <= known.size - FEWEST_FROZEN and same.all():
-            found.append(DataError(kind="step", channels=(name,), amount=float(step * np.median(beside[first:])),
-                                   since=float(logged.record.time[known[first]])))  # fmt: skip
+            found.append(
+                DataError(
+                    kind="step",
+                    channels=(name,),
+                    amount=float(step * np.median(beside[first:])),
+                    since=float(logged.record.time[known[first]]),
+                )
+            )
     return found
 
 
@@ -152,7 +158,7 @@ def _far_values(values: np.ndarray, level: float) -> Mapping[float, np.ndarray]:
     """
     distinct, counts = np.unique(values[np.isfinite(values)], return_counts=True)
     often, found = distinct[counts >= FEWEST_FAR], dict[float, np.ndarray]()
-    for value in sorted(often.tolist(), key=lambda one: -abs(one - np.nanmedian(values))):
+    for value in sorted(often.tolist(), key=lambda each: -abs(each - np.nanmedian(values))):
         if (far := _where_far(value, values, found, level)).any():
             found[value] = far
     for value in list(found):
@@ -306,11 +312,15 @@ def log_evidence_up_to(steps: Steps) -> np.ndarray:
 def _noises(usual: Usual) -> Sequence[tuple[Noise, float]]:
     """Return the noises that are tried, each with its log prior."""
     own, nothing = usual._replace(resolution=0.0), np.zeros(0)  # rounding is none of it
-    each = [Noise(white=w * usual.level, slow=s * usual.level, correlation_time=t, used=nothing, time=nothing)
-            for w in WHITE_LEVELS for s in SLOW_LEVELS for t in TIMES_S]  # fmt: skip
-    logs = [log_prior_of(one, own) for one in each]
+    each = [
+        Noise(white=w * usual.level, slow=s * usual.level, correlation_time=t, used=nothing, time=nothing)
+        for w in WHITE_LEVELS
+        for s in SLOW_LEVELS
+        for t in TIMES_S
+    ]
+    logs = [log_prior_of(item, own) for item in each]
     total = log_sum(logs)
-    return [(one, log - total) for one, log in zip(each, logs, strict=True)]
+    return [(item, log - total) for item, log in zip(each, logs, strict=True)]
 
 
 def _seen_between(x: _Belief, white: np.ndarray, low: float, high: float) -> tuple[np.ndarray, _Belief]:
@@ -328,8 +338,8 @@ def _seen_between(x: _Belief, white: np.ndarray, low: float, high: float) -> tup
     return inside, _Belief(x.mean + gain * mean, x.variance - gain**2 * (1.0 - variance))
 
 
-def _mixed(one: _Belief, other: _Belief, share: np.ndarray) -> _Belief:
+def _mixed(belief: _Belief, other: _Belief, share: np.ndarray) -> _Belief:
     """Return mean and variance of two beliefs, of which the other has a share (g,)."""
-    apart = other.mean - one.mean
-    variance = share * other.variance + (1.0 - share) * one.variance + share * (1.0 - share) * apart**2
-    return _Belief(one.mean + share * apart, variance)
+    apart = other.mean - belief.mean
+    variance = share * other.variance + (1.0 - share) * belief.variance + share * (1.0 - share) * apart**2
+    return _Belief(belief.mean + share * apart, variance)

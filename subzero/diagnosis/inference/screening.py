@@ -108,7 +108,7 @@ def screening_of(
     names = nameable(problem.entries)
     found = Screening(count=len(names))
     base = _bases(problem, wide.quadratic, ())
-    several: list[Ids] = [(), *((one,) for one in names), *pairs_of(problem.entries, names)]
+    several: list[Ids] = [(), *((name,) for name in names), *pairs_of(problem.entries, names)]
     for ids, log in linear_evidences(problem, base, (), several).items():
         found.log_posterior[ids] = log + log_prior(ids, len(names))
     _sweep(problem, wide.z, wide.J, without_slope(problem, wide.J), found, wide.r, settings.SWEEP_SCALES)
@@ -124,7 +124,7 @@ def _from_afar(problem: Problem, r: np.ndarray, J: np.ndarray) -> Screening:
     found.log_posterior[()] = mixed_evidence(problem, Quadratic.at(zero, r, J)) + log_prior((), len(names))
     _sweep(problem, zero, J, _of_the_model(problem), found, r, settings.SWEEP_SCALES)
     for pair in pairs_of(problem.entries, names):
-        better = max(found.log_posterior[(one,)] for one in pair)
+        better = max(found.log_posterior[(cause,)] for cause in pair)
         found.log_posterior[pair] = better + log_prior(pair, len(names)) - log_prior(pair[:1], len(names))
     return found
 
@@ -162,14 +162,17 @@ def linear_evidences(
 ) -> dict[Ids, float]:
     """Return hypothesis → log evidence, mixed over κ, with its causes freed beside those that are free in `base`."""
     entries, by_sizes = problem.entries, dict[tuple[int, ...], list[tuple[Ids, list[int]]]]()
-    own = {one: columns_of(entries, (one,)) for one in {one for ids in (*several, held) for one in ids}}
+    own = {
+        cause: columns_of(entries, (cause,))
+        for cause in {cause_id for ids in (*several, held) for cause_id in ids}
+    }
     for ids in several:
-        more = [own[one] for one in ids if one not in held]
+        more = [own[cause_id] for cause_id in ids if cause_id not in held]
         sizes = tuple(len(at) for at in more)
         by_sizes.setdefault(sizes, []).append((ids, [k for at in more for k in at]))
     known = {
         kappa: np.log(prior)
-        + of_sizes(entries, *base[kappa], [own[one] for one in held], PRACTICAL_TOLERANCES * kappa)
+        + of_sizes(entries, *base[kappa], [own[cause] for cause in held], PRACTICAL_TOLERANCES * kappa)
         for kappa, prior in KAPPAS.items()
     }
     found = dict[Ids, float]()
@@ -203,8 +206,11 @@ def _freed_evidence(
 
 def without_slope(problem: Problem, J: np.ndarray) -> list[int]:
     """Return the entries that do nothing when they are small."""
-    return [k for k, entry in enumerate(problem.entries)
-            if entry.record < 0 and entry.parameter.low == 0.0 and is_flat(entry, J[:, k])]  # fmt: skip
+    return [
+        k
+        for k, entry in enumerate(problem.entries)
+        if entry.record < 0 and entry.parameter.low == 0.0 and is_flat(entry, J[:, k])
+    ]
 
 
 def _sweep(
@@ -219,13 +225,13 @@ def _sweep(
     """Try sizes of entries about z, side by side, with the residual `here` there; keep the best of every cause."""
     names, flat, at_z = nameable(problem.entries), without_slope(problem, J), Quadratic.at(z, here, J)
     best: dict[Ids, float] = {(problem.entries[k].effect.id,): -np.inf for k in at}  # that cannot be run
-    for one in sizes_run(problem, z, here, at, scales):
-        ids: Ids = (problem.entries[one.k].effect.id,)
-        value = _evidence_there(problem, _quadratic_of(one, at_z, J), (), ids) + log_prior(ids, len(names))
+    for cause in sizes_run(problem, z, here, at, scales):
+        ids: Ids = (problem.entries[cause.k].effect.id,)
+        value = _evidence_there(problem, _quadratic_of(cause, at_z, J), (), ids) + log_prior(ids, len(names))
         if value > best[ids]:
-            best[ids], found.starts[ids] = value, one.z
-            if one.k in flat:
-                found.columns[one.k] = (here - one.r) / (one.z[one.k] - z[one.k])
+            best[ids], found.starts[ids] = value, cause.z
+            if cause.k in flat:
+                found.columns[cause.k] = (here - cause.r) / (cause.z[cause.k] - z[cause.k])
     found.log_posterior.update(best)
 
 
@@ -257,25 +263,25 @@ def linear_evidence(problem: Problem, q: Quadratic, ids: Ids, kappa: float) -> f
     """Return the log evidence of some causes, or of nothing, under a κ."""
     D = variances(problem.entries, ids, kappa)
     said = posterior(q, D)
-    causes = [columns_of(problem.entries, (one,)) for one in ids]
+    causes = [columns_of(problem.entries, (cause_id,)) for cause_id in ids]
     return said.log_evidence + of_sizes(problem.entries, said, D, causes, PRACTICAL_TOLERANCES * kappa)
 
 
-def with_one_added(problem: Problem, one: Candidate) -> dict[Ids, float]:
+def with_one_added(problem: Problem, candidate: Candidate) -> dict[Ids, float]:
     """Return hypothesis → log posterior of all with one cause more than a candidate, in the linear problem there."""
-    names, base = nameable(problem.entries), _bases(problem, one.fit.quadratic, one.ids)
-    several = [tuple(sorted({*one.ids, more})) for more in names if more not in one.ids]
-    logs = linear_evidences(problem, base, one.ids, [one.ids, *several])
+    names, base = nameable(problem.entries), _bases(problem, candidate.fit.quadratic, candidate.ids)
+    several = [tuple(sorted({*candidate.ids, more})) for more in names if more not in candidate.ids]
+    logs = linear_evidences(problem, base, candidate.ids, [candidate.ids, *several])
     there = {ids: log + log_prior(ids, len(names)) for ids, log in logs.items()}
-    return {ids: one.log_posterior + there[ids] - there[one.ids] for ids in several}
+    return {ids: candidate.log_posterior + there[ids] - there[candidate.ids] for ids in several}
 
 
-def with_one_swapped(problem: Problem, one: Candidate, rest: Ids) -> dict[Ids, float]:
+def with_one_swapped(problem: Problem, candidate: Candidate, rest: Ids) -> dict[Ids, float]:
     """Return hypothesis → log posterior of all with another cause beside the rest of a candidate, likewise."""
-    q, names, found = one.fit.quadratic, nameable(problem.entries), {}
+    q, names, found = candidate.fit.quadratic, nameable(problem.entries), {}
     for other in names:
         ids = tuple(sorted({*rest, other}))
-        if len(ids) > len(rest) and ids != one.ids:
+        if len(ids) > len(rest) and ids != candidate.ids:
             found[ids] = mixed_evidence(problem, q, ids) + log_prior(ids, len(names))
     return found
 
@@ -290,7 +296,7 @@ class TriedSize(NamedTuple):
 
 def with_sizes_tried(
     problem: Problem,
-    one: Candidate,
+    candidate: Candidate,
     rest: Ids,
     at: Sequence[int],
     scales: Sequence[float],
@@ -299,13 +305,15 @@ def with_sizes_tried(
 
     Args:
         problem: records and parameters.
-        one: the candidate.
+        candidate: the candidate.
         rest: those of its causes that are kept.
         at: places of the entries that are tried.
         scales: sizes that they are tried at, in effect scales, either way.
     """
-    entries, names, J = problem.entries, nameable(problem.entries), one.fit.J
-    z = np.maximum(posterior(one.fit.quadratic, variances(entries, rest, one.kappa)).z, _lowest(problem))
+    entries, names, J = problem.entries, nameable(problem.entries), candidate.fit.J
+    z = np.maximum(
+        posterior(candidate.fit.quadratic, variances(entries, rest, candidate.kappa)).z, _lowest(problem)
+    )
     here = problem.residual(z)
     found, at_z = dict[Ids, TriedSize](), Quadratic.at(z, here, J)
     for run in sizes_run(problem, z, here, at, scales):

@@ -178,8 +178,9 @@ def _begun(setting: Setting) -> tuple[Stop, np.ndarray, int]:
     trial = setting.trial
     # Even segments, however the cable begins: a mesh that changes with its initial length has no slope.
     room = 16 + int(FASTEST_PAY_OUT * trial.duration / trial.segment_length)
-    setup, live = prepare(trial, setting.model, setting.tethered, longest_exchange=trial.cable_step,
-                          run_in=0.0, room=room)  # fmt: skip
+    setup, live = prepare(
+        trial, setting.model, setting.tethered, longest_exchange=trial.cable_step, run_in=0.0, room=room
+    )
     _ease(setup)
     grid, steps = _exchanges(setting)
     track = np.full((1 + (grid.size - 1) * steps, COLUMNS), np.nan)
@@ -270,9 +271,14 @@ def economical(setting: Setting, duration: float) -> Setting:
     hull_step = max(trial.hull_step, HULL_STEP_S) if on_grid else trial.hull_step
     cable_step = max(trial.cable_step, CABLE_STEP_S)
     steps = int(np.ceil(duration / cable_step - 1e-9))
-    made = replace(trial, hull_step=fitting_step(cable_step, hull_step), cable_step=cable_step,
-                   duration=steps * cable_step, segment_length=max(trial.segment_length, SEGMENT_M),
-                   every=0.0)  # fmt: skip
+    made = replace(
+        trial,
+        hull_step=fitting_step(cable_step, hull_step),
+        cable_step=cable_step,
+        duration=steps * cable_step,
+        segment_length=max(trial.segment_length, SEGMENT_M),
+        every=0.0,
+    )
     return replace(setting, trial=made)
 
 
@@ -281,8 +287,11 @@ def rougher(setting: Setting) -> Setting:
     trial = setting.trial
     on_grid = trial.commands is None or multiples(trial.commands.time, ROUGH_HULL_STEP_S)
     hull_step = max(trial.hull_step, ROUGH_HULL_STEP_S) if on_grid else trial.hull_step
-    made = replace(trial, hull_step=fitting_step(trial.cable_step, hull_step),
-                   segment_length=max(trial.segment_length, ROUGH_SEGMENT_M))  # fmt: skip
+    made = replace(
+        trial,
+        hull_step=fitting_step(trial.cable_step, hull_step),
+        segment_length=max(trial.segment_length, ROUGH_SEGMENT_M),
+    )
     return replace(setting, trial=made)
 
 
@@ -291,8 +300,13 @@ def finer(setting: Setting) -> Setting:
     hull_step, cable_step, segment = FINE_STEPS
     trial = setting.trial
     cable_step = min(trial.cable_step, cable_step)
-    made = replace(trial, hull_step=fitting_step(cable_step, min(trial.hull_step, hull_step)), cable_step=cable_step,
-                   segment_length=min(trial.segment_length, segment), every=0.0)  # fmt: skip
+    made = replace(
+        trial,
+        hull_step=fitting_step(cable_step, min(trial.hull_step, hull_step)),
+        cable_step=cable_step,
+        segment_length=min(trial.segment_length, segment),
+        every=0.0,
+    )
     more, most = setting.trial.segment_length / made.segment_length, setting.most_work
     return replace(setting, trial=made, most_work=most and more * most)
 

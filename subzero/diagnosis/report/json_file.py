@@ -34,12 +34,12 @@ def mapping(
         "format": FORMAT,
         "verdict": verdict.verdict,
         "sentence": words.sentence(verdict),
-        "summary": [one._asdict() for one in summary(verdict, scenario)],
+        "summary": [each._asdict() for each in summary(verdict, scenario)],
         "complete": verdict.complete,
-        "data_errors": [_plain(one) for one in verdict.data_errors],
+        "data_errors": [_plain(error) for error in verdict.data_errors],
         "then": verdict.then,
-        "causes": [_cause(one) for one in verdict.causes],
-        "rivals": [_rival(one) for one in verdict.rivals],
+        "causes": [_cause(cause) for cause in verdict.causes],
+        "rivals": [_rival(rival) for rival in verdict.rivals],
         "probabilities": _plain(verdict.probabilities),
         "explanations": {name: words.explanation(name, known) for name in verdict.probabilities},
         "tolerance_scale": {f"{scale:g}": p for scale, p in verdict.tolerance_scale.items()},
@@ -47,7 +47,7 @@ def mapping(
         "gain_overall": _overall(verdict.gain),
         "next_trial": _next_trial(verdict),
         "unknown": _unknown(verdict),
-        "detectable": [_plain(one) for one in verdict.detectable],
+        "detectable": [_plain(each) for each in verdict.detectable],
         "misfit": _plain(verdict.misfit),
         "extended": _extended(verdict),
         "deviations": {name: {"mean": mean, "sd": sd} for name, (mean, sd) in verdict.deviations.items()},
@@ -71,19 +71,30 @@ def text(
     )
 
 
-def _cause(one: Cause) -> dict[str, Any]:
-    parameters = {name: _plain(estimate) for name, estimate in one.parameters.items()}
-    return {"id": one.id, "sentence": one.sentence, "probability": one.probability, "start_time_s": one.start_time,
-            "start_sd_s": None if one.start_time is None else one.start_sd, "parameters": parameters}  # fmt: skip
+def _cause(cause: Cause) -> dict[str, Any]:
+    parameters = {name: _plain(estimate) for name, estimate in cause.parameters.items()}
+    return {
+        "id": cause.id,
+        "sentence": cause.sentence,
+        "probability": cause.probability,
+        "start_time_s": cause.start_time,
+        "start_sd_s": None if cause.start_time is None else cause.start_sd,
+        "parameters": parameters,
+    }
 
 
-def _rival(one: Rival) -> dict[str, Any]:
+def _rival(rival: Rival) -> dict[str, Any]:
     """A rival of one cause reads like a cause; of several, its parameters are named by cause."""
-    tables = {name: {key: _plain(e) for key, e in table.items()} for name, table in one.parameters.items()}
-    parameters = next(iter(tables.values()), {}) if len(one.ids) < 2 else tables
-    return {"id": " + ".join(one.ids) or "none", "ids": list(one.ids), "sentence": one.sentence,
-            "probability": one.probability, "discrimination": one.discrimination,
-            "parameters": parameters}  # fmt: skip
+    tables = {name: {key: _plain(e) for key, e in table.items()} for name, table in rival.parameters.items()}
+    parameters = next(iter(tables.values()), {}) if len(rival.ids) < 2 else tables
+    return {
+        "id": " + ".join(rival.ids) or "none",
+        "ids": list(rival.ids),
+        "sentence": rival.sentence,
+        "probability": rival.probability,
+        "discrimination": rival.discrimination,
+        "parameters": parameters,
+    }
 
 
 def _gain(gain: Gain | None) -> dict[str, Any]:
@@ -108,32 +119,42 @@ def _overall(gain: Gain | None) -> dict[str, Any] | None:
 
 
 def _next_trial(verdict: Verdict) -> dict[str, Any] | None:
-    one = verdict.next_trial
-    if one is None:
+    next_trial = verdict.next_trial
+    if next_trial is None:
         return None
     names = ("time_s", "propeller_rps", "rudder_deg", "stern_plane_port_deg", "stern_plane_starboard_deg")
-    rows = [(*row[:2], *(math.degrees(angle) for angle in row[2:])) for row in one.commands]
+    rows = [(*row[:2], *(math.degrees(angle) for angle in row[2:])) for row in next_trial.commands]
     columns = [list(column) for column in zip(*rows, strict=True)] if rows else [[] for _ in names]
-    return {**{key: value for key, value in _plain(one).items() if key != "commands"},
-            "commands": dict(zip(names, columns, strict=True))}  # fmt: skip
+    return {
+        **{key: value for key, value in _plain(next_trial).items() if key != "commands"},
+        "commands": dict(zip(names, columns, strict=True)),
+    }
 
 
 def _unknown(verdict: Verdict) -> dict[str, Any] | None:
-    one = verdict.unknown
-    if one is None:
+    unknown = verdict.unknown
+    if unknown is None:
         return None
     names = ("words", "feature", "coefficient", "low", "high")
-    return {"axis": one.axis, "unit": one.unit, "time_s": one.time.tolist(),
-            "force": one.force.tolist(), "band": one.band.tolist(),
-            "formula": [dict(zip(names, term, strict=True)) for term in one.formula],
-            "features": dict(one.features)}  # fmt: skip
+    return {
+        "axis": unknown.axis,
+        "unit": unknown.unit,
+        "time_s": unknown.time.tolist(),
+        "force": unknown.force.tolist(),
+        "band": unknown.band.tolist(),
+        "formula": [dict(zip(names, term, strict=True)) for term in unknown.formula],
+        "features": dict(unknown.features),
+    }
 
 
 def _extended(verdict: Verdict) -> dict[str, Any]:
-    one = verdict.extended
-    return {"deviations": _plain(one.deviations), "start_times_s": _plain(one.start_times),
-            "calibration": _plain(one.calibration),
-            "missing": None if one.missing is None else _plain(asdict(one.missing))}  # fmt: skip
+    extended = verdict.extended
+    return {
+        "deviations": _plain(extended.deviations),
+        "start_times_s": _plain(extended.start_times),
+        "calibration": _plain(extended.calibration),
+        "missing": None if extended.missing is None else _plain(asdict(extended.missing)),
+    }
 
 
 def _plain(value: Any) -> Any:
@@ -141,9 +162,9 @@ def _plain(value: Any) -> Any:
     if is_dataclass(value) and not isinstance(value, type):
         return {field.name: _plain(getattr(value, field.name)) for field in fields(value)}
     if isinstance(value, Mapping):
-        return {str(key): _plain(one) for key, one in value.items()}
+        return {str(key): _plain(each) for key, each in value.items()}
     if isinstance(value, (list, tuple)):
-        return [_plain(one) for one in value]
+        return [_plain(each) for each in value]
     if isinstance(value, np.ndarray):
         return value.tolist()
     return value.item() if isinstance(value, np.generic) else value
@@ -152,9 +173,9 @@ def _plain(value: Any) -> Any:
 def _finite(value: Any) -> Any:
     """Return None for every number that JSON cannot hold."""
     if isinstance(value, dict):
-        return {key: _finite(one) for key, one in value.items()}
+        return {key: _finite(each) for key, each in value.items()}
     if isinstance(value, list):
-        return [_finite(one) for one in value]
+        return [_finite(each) for each in value]
     if isinstance(value, np.generic):
         value = value.item()
     return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -50,7 +50,7 @@ def belongs(figure: str, section: Section) -> bool:
 
 
 def _explanations(verdict: Verdict) -> list[str | tables.Table]:
-    parts: list[str | tables.Table] = [words.cause(one) for one in verdict.causes]
+    parts: list[str | tables.Table] = [words.cause(cause) for cause in verdict.causes]
     if verdict.rivals:
         undecided = verdict.on_model == UNDECIDED
         what = "What the records allow" if undecided else "What else the records allow"
@@ -76,21 +76,21 @@ def _misfit(verdict: Verdict, records: Mapping[str, str]) -> list[str | tables.T
 
 def _noise(rows: Mapping[str, Misfit]) -> str:
     """Return the noise of the channels: its level, its slow part, the step of its values, outliers and gaps."""
-    return "; ".join(f"{name.replace('_', ' ')} {_parts(one)}" for name, one in rows.items())
+    return "; ".join(f"{name.replace('_', ' ')} {_parts(row)}" for name, row in rows.items())
 
 
-def _parts(one: Misfit) -> str:
-    rounded = f", rounded to {one.resolution:.3g}" if one.resolution > 0.0 else ""
+def _parts(misfit: Misfit) -> str:
+    rounded = f", rounded to {misfit.resolution:.3g}" if misfit.resolution > 0.0 else ""
     return (
-        f"{one.noise_sd:.3g} (of that slow {one.noise_slow:.2g}, over {one.noise_time:.2g} s{rounded}; "
-        f"outliers {one.outliers}, gaps {one.gaps})"
+        f"{misfit.noise_sd:.3g} (of that slow {misfit.noise_slow:.2g}, over {misfit.noise_time:.2g} s{rounded}; "
+        f"outliers {misfit.outliers}, gaps {misfit.gaps})"
     )
 
 
 def _gain(verdict: Verdict) -> list[str | tables.Table]:
     parts: list[str | tables.Table] = []
-    for name, one in tables.gain(verdict).items():
-        parts += [f"Root mean square error, {name}:", one]
+    for name, each in tables.gain(verdict).items():
+        parts += [f"Root mean square error, {name}:", each]
     if verdict.gain:
         total, owed, low = (f"{100.0 * share:.1f} %" for share in _shares(verdict.gain))
         parts.append(
@@ -174,7 +174,7 @@ def markdown(
             lines += [f"## {section.title}", ""]
             for part in section.parts:
                 lines += table(part) if isinstance(part, tables.Table) else _paragraphs([part])
-            lines += [line for one in shown for line in (one, "")]
+            lines += [line for each in shown for line in (each, "")]
     return "\n".join(lines).rstrip() + "\n"
 
 
@@ -182,9 +182,9 @@ def _paragraphs(texts: Sequence[str]) -> list[str]:
     return [line for text in texts for line in (_escaped(text), "")]
 
 
-def table(one: tables.Table) -> list[str]:
+def table(table: tables.Table) -> list[str]:
     """Return a table as Markdown, with an empty line below it."""
-    rows = [one.header, ("---",) * len(one.header), *one.rows]
+    rows = [table.header, ("---",) * len(table.header), *table.rows]
     return [
         *(f"| {' | '.join(_escaped(cell) if row != rows[1] else cell for cell in row)} |" for row in rows),
         "",

@@ -104,11 +104,11 @@ def _is_new(verdict: Verdict) -> bool:
 def _wrong(verdict: Verdict) -> Iterator[str]:
     """Give what is wrong: errors in the data first, then the model on records without them."""
     if verdict.then or verdict.verdict == UNDECIDED:
-        yield from (words.data_error(one) for one in verdict.data_errors)
+        yield from (words.data_error(error) for error in verdict.data_errors)
     if verdict.then:
         yield words.UNCHANGED
     if verdict.on_model == CAUSE_NAMED:
-        yield from (words.cause_in_short(one) for one in verdict.causes)
+        yield from (words.cause_in_short(cause) for cause in verdict.causes)
     elif verdict.on_model == OUTSIDE and verdict.unknown is not None:
         yield words.unknown(verdict.unknown)
     else:
@@ -119,8 +119,11 @@ def _wrong(verdict: Verdict) -> Iterator[str]:
 
 def _in_every_explanation(verdict: Verdict) -> Iterator[str]:
     """Give the causes that hardly any probable explanation lacks: they are known, however undecided the rest is."""
-    parts = {name: without.split(" + ") for name in verdict.probabilities
-             if (without := words.without_errors(name, verdict)) != "none"}  # fmt: skip
+    parts = {
+        name: without.split(" + ")
+        for name in verdict.probabilities
+        if (without := words.without_errors(name, verdict)) != "none"
+    }
     for cause in dict.fromkeys(part for ids in parts.values() for part in ids):
         probability = sum(verdict.probabilities[name] for name, ids in parts.items() if cause in ids)
         if probability < IN_EVERY:
@@ -134,8 +137,8 @@ def _in_every_explanation(verdict: Verdict) -> Iterator[str]:
 def _sure(verdict: Verdict) -> Iterator[str]:
     """Give how probable it is, what comes next, and whether these records can tell the two apart."""
     probability = _probability(verdict)
-    for one in verdict.data_errors if verdict.then else ():
-        yield f"That {one.sentence}: {_in_words(one.probability).lower()}."
+    for error in verdict.data_errors if verdict.then else ():
+        yield f"That {error.sentence}: {_in_words(error.probability).lower()}."
     if verdict.on_model == UNDECIDED:
         yield "Not sure enough to name one of them."
     elif probability is not None:
@@ -160,7 +163,7 @@ def _sure(verdict: Verdict) -> Iterator[str]:
 def _probability(verdict: Verdict) -> float | None:
     """Return the probability of what is told; of several causes that of the least sure one; None if it is not known."""
     if verdict.on_model == CAUSE_NAMED and verdict.causes:
-        return min(one.probability for one in verdict.causes)
+        return min(cause.probability for cause in verdict.causes)
     if verdict.on_model in (OUTSIDE, NOTHING_WRONG):
         told = [p for name, p in verdict.probabilities.items() if words.is_told(name, verdict)]
         return sum(told) if told else None
@@ -175,7 +178,7 @@ def _in_words(probability: float) -> str:
 def _not_seen(verdict: Verdict) -> Iterator[str]:
     """Give what these records could not have shown, which "nothing is wrong" says nothing of."""
     rows = verdict.detectable
-    hidden = [words.explanation(one.id) for one in rows if one.signal < SEEN_SIGNAL]
+    hidden = [words.explanation(row.id) for row in rows if row.signal < SEEN_SIGNAL]
     if not rows:
         return
     yield (
@@ -196,7 +199,8 @@ def _runner_up(verdict: Verdict) -> Iterator[str]:
     said, ids = words.beside_errors(first, verdict), words.without_errors(first, verdict)
     said = f"What comes next: {said} (probability {words.probability(verdict.probabilities[first])})"
     D = next(
-        (one.discrimination for one in verdict.rivals if (" + ".join(one.ids) or "none") == ids), math.nan
+        (rival.discrimination for rival in verdict.rivals if (" + ".join(rival.ids) or "none") == ids),
+        math.nan,
     )
     yield f"{said}{_apart(D)}."
 
@@ -208,8 +212,10 @@ def _apart(D: float) -> str:
     apart = (
         "cannot tell the two apart"
         if D < CONFUSED_BELOW
-        else "can hardly tell the two apart" if D < CLEAR_FROM else "can tell the two apart"
-    )  # fmt: skip
+        else "can hardly tell the two apart"
+        if D < CLEAR_FROM
+        else "can tell the two apart"
+    )
     return f"; these records {apart} (D {D:.3g})"
 
 
@@ -219,7 +225,9 @@ def _costs(verdict: Verdict) -> Iterator[str]:
         yield from _gained(verdict)
         return
     rows = {
-        (record, name): one for record, channels in verdict.misfit.items() for name, one in channels.items()
+        (record, name): channel
+        for record, channels in verdict.misfit.items()
+        for name, channel in channels.items()
     }
     worst = sorted(rows, key=lambda key: -_finite(rows[key].nrmse))[:MOST_CHANNELS]
     if not worst:
@@ -243,8 +251,8 @@ def _best_misses(verdict: Verdict, worst: list[tuple[str, str]]) -> Iterator[str
     }
     for model, said in known.items():
         left = [_left(verdict, record, name, model) for record, name in worst]
-        if all(math.isfinite(one) for one in left):
-            sizes = [words.number(one, _unit(name)) for one, (_, name) in zip(left, worst, strict=True)]
+        if all(math.isfinite(each) for each in left):
+            sizes = [words.number(each, _unit(name)) for each, (_, name) in zip(left, worst, strict=True)]
             yield f"With {said} that is {_joined(sizes)}."
             return
 
@@ -293,16 +301,17 @@ def _times(levels: float) -> str:
 
 def _next(verdict: Verdict) -> Iterator[str]:
     """Give what to do with the records, the vehicle and the model."""
-    yield from (f"In {one.record}: {one.remedy}." for one in verdict.data_errors if verdict.then)
+    yield from (f"In {error.record}: {error.remedy}." for error in verdict.data_errors if verdict.then)
     if verdict.on_model == CAUSE_NAMED:
-        places = list(dict.fromkeys(filter(None, (_place(one.id) for one in verdict.causes))))
+        places = list(dict.fromkeys(filter(None, (_place(cause.id) for cause in verdict.causes))))
         yield from (f"Look at {place}." for place in places)
     elif verdict.on_model == OUTSIDE and verdict.unknown is not None:
-        one = verdict.unknown
+        unknown = verdict.unknown
         yield (
             "Look at that sensor: its drift is corrected in the comparison, not in the record."
-            if one.is_drift
-            else f"Look for what {words.something(one.axis, one.force).partition(' ')[2]}; the figure below says when."
+            if unknown.is_drift
+            else f"Look for what {words.something(unknown.axis, unknown.force).partition(' ')[2]}; "
+            "the figure below says when."
         )
     elif verdict.on_model == UNDECIDED:
         yield (

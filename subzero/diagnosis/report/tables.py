@@ -42,93 +42,129 @@ def detectable(verdict: Verdict | Sequence[Detectability], *, every: bool = Fals
     """Return what the records could show: causes that would be missed or mixed up, or all of them."""
     rows = verdict.detectable if isinstance(verdict, Verdict) else verdict
     known = sentences(verdict) if isinstance(verdict, Verdict) else {}
-    shown = [one for one in rows if every or one.signal < SEEN_SIGNAL or one.discrimination < CLEAR_FROM]
-    shown = sorted(shown, key=lambda one: one.discrimination)
+    shown = [row for row in rows if every or row.signal < SEEN_SIGNAL or row.discrimination < CLEAR_FROM]
+    shown = sorted(shown, key=lambda each: each.discrimination)
     header = ("cause", "signal", "smallest that is seen", "looks most like", "D", "", "id")
-    return Table(header, [(explanation(one.id, known), f"{one.signal:.3g}", _smallest(one),
-                           explanation(one.rival, known) if one.rival else NOTHING, f"{one.discrimination:.3g}",
-                           _told(one), one.id) for one in shown])  # fmt: skip
+    return Table(
+        header,
+        [
+            (
+                explanation(each.id, known),
+                f"{each.signal:.3g}",
+                _smallest(each),
+                explanation(each.rival, known) if each.rival else NOTHING,
+                f"{each.discrimination:.3g}",
+                _told(each),
+                each.id,
+            )
+            for each in shown
+        ],
+    )
 
 
-def _smallest(one: Detectability) -> str:
+def _smallest(detectability: Detectability) -> str:
     """Return the smallest deviations that are seen, with their units; of a share there is none."""
-    if one.signal < INVISIBLE:
+    if detectability.signal < INVISIBLE:
         return NOTHING
-    units = {name: "" if unit == "1" else f" {unit}" for name, unit in one.units.items()}
+    units = {name: "" if unit == "1" else f" {unit}" for name, unit in detectability.units.items()}
     sizes = [
-        f"{name.replace('_', ' ')} {size:.3g}{units.get(name, '')}" for name, size in one.smallest.items()
+        f"{name.replace('_', ' ')} {size:.3g}{units.get(name, '')}"
+        for name, size in detectability.smallest.items()
     ]
     return "; ".join(sizes) or NOTHING
 
 
-def _told(one: Detectability) -> str:
-    if one.signal < SEEN_SIGNAL:
+def _told(detectability: Detectability) -> str:
+    if detectability.signal < SEEN_SIGNAL:
         return "not seen"
-    if one.discrimination < CONFUSED_BELOW:
+    if detectability.discrimination < CONFUSED_BELOW:
         return "not told apart"
-    return "hardly told apart" if one.discrimination < CLEAR_FROM else "told apart"
+    return "hardly told apart" if detectability.discrimination < CLEAR_FROM else "told apart"
 
 
 def misfit(rows: Mapping[str, Misfit]) -> Table:
     """Return how the nominal model fails in each channel of one record."""
     header = ("channel", "RMSE", "in noise", "fit %", "bias", "white?", "follows", "when")
-    return Table(header, [(channel(name), f"{one.rmse:.3g}", f"{one.nrmse:.2f}", f"{one.fit_percent:.1f}",
-                           f"{one.bias:.2g}", probability(one.whiteness_p), _follows(one), _when(one))
-                          for name, one in rows.items()])  # fmt: skip
+    return Table(
+        header,
+        [
+            (
+                channel(name),
+                f"{row.rmse:.3g}",
+                f"{row.nrmse:.2f}",
+                f"{row.fit_percent:.1f}",
+                f"{row.bias:.2g}",
+                probability(row.whiteness_p),
+                _follows(row),
+                _when(row),
+            )
+            for name, row in rows.items()
+        ],
+    )
 
 
-def _follows(one: Misfit) -> str:
+def _follows(misfit: Misfit) -> str:
     """Return the command that the residual follows most, and how late."""
-    if not one.command_correlation:
+    if not misfit.command_correlation:
         return NOTHING
-    name, (lag, r) = max(one.command_correlation.items(), key=lambda item: abs(item[1][1]))
+    name, (lag, r) = max(misfit.command_correlation.items(), key=lambda item: abs(item[1][1]))
     return f"{name.removesuffix('_command').replace('_', ' ')} {r:+.2f} at {lag:.2g} s"
 
 
-def _when(one: Misfit) -> str:
-    return ", ".join(f"{start:.3g}–{end:.3g} s" for start, end in one.windows[:3]) or NOTHING
+def _when(misfit: Misfit) -> str:
+    return ", ".join(f"{start:.3g}–{end:.3g} s" for start, end in misfit.windows[:3]) or NOTHING
 
 
 def rivals(verdict: Verdict, *, short: bool = False) -> Table:
     """Return what else explains the records, and how far it is from what is told; `short` without parameters."""
     if short:
-        rows = [_short(one) for one in _worth(verdict.rivals)]
+        rows = [_short(each) for each in _worth(verdict.rivals)]
         words = (
             "what explains the records" if verdict.on_model == UNDECIDED else "what else explains the records"
         )
         return Table((words, "probability", "D"), rows[:MOST_RIVALS])
-    return Table(("explanation", "probability", "D", "parameters", "id"),
-                 [(rival_words(one), probability(one.probability), number(one.discrimination), _numbers(one),
-                   _id(one)) for one in verdict.rivals])  # fmt: skip
+    return Table(
+        ("explanation", "probability", "D", "parameters", "id"),
+        [
+            (
+                rival_words(rival),
+                probability(rival.probability),
+                number(rival.discrimination),
+                _numbers(rival),
+                _id(rival),
+            )
+            for rival in verdict.rivals
+        ],
+    )
 
 
-def _short(one: Rival) -> tuple[str, ...]:
-    return rival_words(one), probability(one.probability), number(one.discrimination)
+def _short(rival: Rival) -> tuple[str, ...]:
+    return rival_words(rival), probability(rival.probability), number(rival.discrimination)
 
 
 def _worth(found: Sequence[Rival]) -> Sequence[Rival]:
     """Return the rivals that are worth a line; the first one if none is."""
-    return [one for one in found if one.probability >= WORTH_A_LINE] or found[:1]
+    return [each for each in found if each.probability >= WORTH_A_LINE] or found[:1]
 
 
-def rival_words(one: Rival) -> str:
+def rival_words(rival: Rival) -> str:
     """Return a rival in words; a force or a drift as everybody understands it."""
-    return explanation(_id(one), {_id(one): one.sentence} if ":" not in _id(one) else {})
+    return explanation(_id(rival), {_id(rival): rival.sentence} if ":" not in _id(rival) else {})
 
 
-def _id(one: Rival) -> str:
-    return " + ".join(one.ids) or "none"
+def _id(rival: Rival) -> str:
+    return " + ".join(rival.ids) or "none"
 
 
-def _numbers(one: Rival) -> str:
+def _numbers(rival: Rival) -> str:
     return "; ".join(
-        estimate(name, parameter) for table in one.parameters.values() for name, parameter in table.items()
+        estimate(name, parameter) for table in rival.parameters.values() for name, parameter in table.items()
     )
 
 
-def next_trial(one: NextTrial) -> Table | None:
+def next_trial(trial: NextTrial) -> Table | None:
     """Return the commands of a trial that is not in any file; None without them."""
-    if not one.commands:
+    if not trial.commands:
         return None
     header = (
         "time [s]",
@@ -137,8 +173,10 @@ def next_trial(one: NextTrial) -> Table | None:
         "port plane [degree]",
         "starboard plane [degree]",
     )
-    rows = [(f"{time:.4g}", f"{speed:.4g}", *(f"{math.degrees(angle) + 0.0:.3g}" for angle in angles))
-            for time, speed, *angles in one.commands]  # fmt: skip
+    rows = [
+        (f"{time:.4g}", f"{speed:.4g}", *(f"{math.degrees(angle) + 0.0:.3g}" for angle in angles))
+        for time, speed, *angles in trial.commands
+    ]
     return Table(header, rows)
 
 
@@ -161,9 +199,11 @@ def gain(verdict: Verdict, *, short: bool = False) -> dict[str, Table]:
     shown = {key: words for key, words in GAINS.items() if not (short and key == "tolerance")}
     parts = {f"held out ({verdict.gain.how})": verdict.gain.held_out, "fitted": verdict.gain.fitted}
     found = {
-        words: Table(("channel", *shown.values()),
-                     [(channel(name), *(number(getattr(one, key)) for key in shown)) for name, one in rows.items()])
+        words: Table(
+            ("channel", *shown.values()),
+            [(channel(name), *(number(getattr(row, key)) for key in shown)) for name, row in rows.items()],
+        )
         for words, rows in parts.items()
         if rows
-    }  # fmt: skip
+    }
     return dict(list(found.items())[:1]) if short else found

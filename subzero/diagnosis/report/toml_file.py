@@ -328,8 +328,8 @@ def _missing(source: Source, problems: list[str]) -> MissingForce | None:
 def _together(histories: list[MissingForce]) -> list[MissingForce]:
     """Return histories with those at the same times added, so that they stay exactly what they are."""
     sums: dict[tuple[float, ...], np.ndarray] = {}
-    for one in histories:
-        sums[one.time] = sums.get(one.time, 0.0) + np.array(one.wrench)
+    for history in histories:
+        sums[history.time] = sums.get(history.time, 0.0) + np.array(history.wrench)
     return [
         MissingForce(time=time, wrench=tuple(map(tuple, wrench.tolist()))) for time, wrench in sums.items()
     ]

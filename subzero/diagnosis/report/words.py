@@ -72,34 +72,40 @@ def number(value: float, unit: str = "") -> str:
     return f"{value + 0.0:.3g} {unit}".strip()
 
 
-def estimate(name: str, one: Estimate) -> str:
+def estimate(name: str, estimate: Estimate) -> str:
     """Return a parameter in words: value, interval, what the model has."""
-    value, low, high = (number(x, one.unit) for x in (one.value, one.low, one.high))
-    return f"{name.replace('_', ' ')} {value} (95 %: {low} to {high}; model: {number(one.nominal, one.unit)})"
+    value, low, high = (number(x, estimate.unit) for x in (estimate.value, estimate.low, estimate.high))
+    return f"{name.replace('_', ' ')} {value} (95 %: {low} to {high}; model: {number(estimate.nominal, estimate.unit)})"
 
 
-def cause(one: Cause) -> str:
+def cause(cause: Cause) -> str:
     """Return a cause in words, with its parameters and its probability."""
-    numbers = "; ".join(estimate(name, parameter) for name, parameter in one.parameters.items())
-    return f"{_capital(one.sentence)}{_since(one)}: {numbers}. Probability {probability(one.probability)}."
+    numbers = "; ".join(estimate(name, parameter) for name, parameter in cause.parameters.items())
+    return (
+        f"{_capital(cause.sentence)}{_since(cause)}: {numbers}. Probability {probability(cause.probability)}."
+    )
 
 
-def cause_in_short(one: Cause) -> str:
+def cause_in_short(cause: Cause) -> str:
     """Return a cause in words, with its value beside that of the model."""
-    numbers = "; ".join(_against_model(name, parameter) for name, parameter in one.parameters.items())
-    return f"{_capital(one.sentence)}{_since(one)}{': ' if numbers else ''}{numbers}."
+    numbers = "; ".join(_against_model(name, parameter) for name, parameter in cause.parameters.items())
+    return f"{_capital(cause.sentence)}{_since(cause)}{': ' if numbers else ''}{numbers}."
 
 
-def _against_model(name: str, one: Estimate) -> str:
+def _against_model(name: str, estimate: Estimate) -> str:
     """Return a parameter beside that of the model; a share as what is more or less than there."""
-    if name == "share" and one.unit == "1" and one.nominal == 0.0:
-        return f"{100.0 * abs(one.value):.3g} % {'more' if one.value > 0.0 else 'less'} than in the model"
-    value, nominal = number(one.value, one.unit), number(one.nominal, one.unit)
+    if name == "share" and estimate.unit == "1" and estimate.nominal == 0.0:
+        return f"{100.0 * abs(estimate.value):.3g} % {'more' if estimate.value > 0.0 else 'less'} than in the model"
+    value, nominal = number(estimate.value, estimate.unit), number(estimate.nominal, estimate.unit)
     return f"{name.replace('_', ' ')} {value}, where the model has {nominal}"
 
 
-def _since(one: Cause) -> str:
-    return "" if one.start_time is None else f", since t = {one.start_time:.3g} ± {1.96 * one.start_sd:.2g} s"
+def _since(cause: Cause) -> str:
+    return (
+        ""
+        if cause.start_time is None
+        else f", since t = {cause.start_time:.3g} ± {1.96 * cause.start_sd:.2g} s"
+    )
 
 
 def something(axis: str, force: np.ndarray | None = None) -> str:
@@ -120,13 +126,13 @@ def explanation(name: str, known: Mapping[str, str] | None = None) -> str:
         name: as in `Verdict.probabilities`: "none", "rudder_lag", "a + b", "hull_drag@12.5", "unknown_force:X".
         known: id → sentence of causes that the catalogue does not have.
     """
-    return " and ".join(_explained(one, known or {}) for one in name.split(" + "))
+    return " and ".join(_explained(each, known or {}) for each in name.split(" + "))
 
 
 def without_errors(name: str, verdict: Verdict) -> str:
     """Return a hypothesis without the errors in the data that are told."""
-    told = {one.id for one in verdict.data_errors} if verdict.then else set()
-    return " + ".join(one for one in name.split(" + ") if one not in told) or "none"
+    told = {error.id for error in verdict.data_errors} if verdict.then else set()
+    return " + ".join(each for each in name.split(" + ") if each not in told) or "none"
 
 
 def beside_errors(name: str, verdict: Verdict) -> str:
@@ -137,18 +143,18 @@ def beside_errors(name: str, verdict: Verdict) -> str:
     return explanation(rest, sentences(verdict))
 
 
-def _explained(one: str, known: Mapping[str, str]) -> str:
+def _explained(name: str, known: Mapping[str, str]) -> str:
     """Return a single cause, force or drift in words."""
-    if one in known:
-        return known[one]
-    if one in ("none", ""):
+    if name in known:
+        return known[name]
+    if name in ("none", ""):
         return "nothing is wrong"
-    if one.startswith(FORCE) and one.removeprefix(FORCE) in PUSHES:
-        return something(one.removeprefix(FORCE))
-    if one.startswith(DRIFT):
-        return f"the sensor of the {_spaced(one.removeprefix(DRIFT))} drifts"
-    what, _, since = one.partition("@")
-    effect = effects().get(plain_id(one))
+    if name.startswith(FORCE) and name.removeprefix(FORCE) in PUSHES:
+        return something(name.removeprefix(FORCE))
+    if name.startswith(DRIFT):
+        return f"the sensor of the {_spaced(name.removeprefix(DRIFT))} drifts"
+    what, _, since = name.partition("@")
+    effect = effects().get(plain_id(name))
     sentence = known.get(what) or (effect.sentence if effect is not None else _spaced(what))
     return f"from {since} s on {sentence}" if since else sentence
 
@@ -163,10 +169,10 @@ def _spaced(name: str) -> str:
 
 def sentences(verdict: Verdict) -> dict[str, str]:
     """Return what a verdict itself says of its causes and rivals: hypothesis → sentence."""
-    told = {" + ".join(one.ids) or "none": one.sentence for one in verdict.rivals}
+    told = {" + ".join(rival.ids) or "none": rival.sentence for rival in verdict.rivals}
     told = {name: said for name, said in told.items() if not name.startswith(FORCE)}
-    told |= {one.id: one.sentence for one in verdict.causes if one.start_time is None}
-    told |= {one.id: one.sentence for one in verdict.data_errors}
+    told |= {each.id: each.sentence for each in verdict.causes if each.start_time is None}
+    told |= {error.id: error.sentence for error in verdict.data_errors}
     if verdict.unknown is not None and not verdict.unknown.is_drift:
         told[f"{FORCE}{verdict.unknown.axis}"] = something(verdict.unknown.axis, verdict.unknown.force)
     return told
@@ -191,12 +197,12 @@ def headline(verdict: Verdict) -> str:
 
 def is_told(name: str, verdict: Verdict) -> bool:
     """Say whether a hypothesis is what the verdict tells: its causes, whenever they began, or its force or drift."""
-    parts = [one for one in without_errors(name, verdict).split(" + ") if one != "none"]
+    parts = [error for error in without_errors(name, verdict).split(" + ") if error != "none"]
     if verdict.on_model == UNDECIDED:
         return False
     if verdict.on_model == OUTSIDE and verdict.unknown is not None:
         return parts == [f"{DRIFT if verdict.unknown.is_drift else FORCE}{verdict.unknown.axis}"]
-    ids = sorted(one.partition("@")[0] for one in parts)
+    ids = sorted(part.partition("@")[0] for part in parts)
     begins = any(cause.start_time is not None for cause in verdict.causes)
     return ids == sorted(cause.id for cause in verdict.causes) and ("@" in name) == begins
 
@@ -206,17 +212,17 @@ def title(verdict: Verdict) -> str:
     if verdict.data_errors and verdict.then:
         return headline(verdict)
     if verdict.on_model == CAUSE_NAMED and verdict.causes:
-        return _capital(" and ".join(one.sentence for one in verdict.causes))
+        return _capital(" and ".join(each.sentence for each in verdict.causes))
     if verdict.on_model == OUTSIDE and verdict.unknown is not None:
         return on_model(verdict).rstrip(".")
     return headline(verdict)
 
 
-def data_error(one: FoundError) -> str:
+def data_error(error: FoundError) -> str:
     """Return an error in the data in words: where, what, what to change, and what else it may be."""
-    alike = "".join(f" Or, which these records cannot tell from it: {other}." for other in one.alike)
-    what = f"{one.sentence}: {one.remedy}. Probability {probability(one.probability)}."
-    return f"{one.record}: {what}{alike}"
+    alike = "".join(f" Or, which these records cannot tell from it: {other}." for other in error.alike)
+    what = f"{error.sentence}: {error.remedy}. Probability {probability(error.probability)}."
+    return f"{error.record}: {what}{alike}"
 
 
 def sentence(verdict: Verdict) -> str:
@@ -231,11 +237,11 @@ def on_model(verdict: Verdict) -> str:
     if verdict.on_model == UNDECIDED:
         return _undecided(verdict)
     if verdict.on_model == OUTSIDE and verdict.unknown is not None:
-        one = verdict.unknown
+        unknown = verdict.unknown
         said = (
-            f"the sensor of the {_spaced(one.axis)} drifts"
-            if one.is_drift
-            else something(one.axis, one.force)
+            f"the sensor of the {_spaced(unknown.axis)} drifts"
+            if unknown.is_drift
+            else something(unknown.axis, unknown.force)
         )
         return f"{_capital(said)}, and no cause of the catalogue explains it."
     if verdict.on_model == NOTHING_WRONG:
@@ -269,28 +275,32 @@ def _undecided(verdict: Verdict) -> str:
     return f"These records cannot tell apart: {shown}{rest}."
 
 
-def unknown(one: Unknown) -> str:
+def unknown(unknown: Unknown) -> str:
     """Return what is outside the catalogue in words: what it does, its size, its formula; or the drift of a sensor."""
-    most = max(range(len(one.force)), key=lambda at: abs(one.force[at]))
+    most = max(range(len(unknown.force)), key=lambda at: abs(unknown.force[at]))
     size = (
-        f"{one.force[most]:.3g} ± {1.96 * one.band[most]:.2g} {one.unit} at t = {one.time[most]:.3g} s, where it is "
-        "largest."
+        f"{unknown.force[most]:.3g} ± {1.96 * unknown.band[most]:.2g} {unknown.unit} "
+        f"at t = {unknown.time[most]:.3g} s, where it is largest."
     )
-    if one.is_drift:
-        what = f"The sensor of the {_spaced(one.axis)} drifts as no cause explains: {size}"
+    if unknown.is_drift:
+        what = f"The sensor of the {_spaced(unknown.axis)} drifts as no cause explains: {size}"
     else:
-        kind = "force" if one.unit == "N" else "moment"
-        what = f"{_capital(something(one.axis, one.force))} that no cause explains, with a {kind} of {size}"
-    if not one.formula:
+        kind = "force" if unknown.unit == "N" else "moment"
+        what = f"{_capital(something(unknown.axis, unknown.force))} that no cause explains, with a {kind} of {size}"
+    if not unknown.formula:
         return what
-    return f"{what} It looks like {' + '.join(formula_term(term) for term in one.formula)}.{_other_features(one)}"
+    formula = " + ".join(map(formula_term, unknown.formula))
+    return f"{what} It looks like {formula}.{_other_features(unknown)}"
 
 
-def _other_features(one: Unknown) -> str:
+def _other_features(unknown: Unknown) -> str:
     """Return what may be in the formula instead, in words; empty if nothing is as probable as that."""
-    told = {feature for _, feature, *_ in one.formula}
-    others = [f"{name} ({_described(name)}; probability {p:.2f})" for name, p in one.features.items()
-              if name not in told and p >= ALTERNATIVE_PROBABILITY]  # fmt: skip
+    told = {feature for _, feature, *_ in unknown.formula}
+    others = [
+        f"{name} ({_described(name)}; probability {p:.2f})"
+        for name, p in unknown.features.items()
+        if name not in told and p >= ALTERNATIVE_PROBABILITY
+    ]
     return f" What is not ruled out: {', '.join(others)}." if others else ""
 
 
@@ -309,11 +319,11 @@ def formula_term(term: tuple[str, str, float, float, float]) -> str:
     return f"{size} × {feature}, {words}"
 
 
-def next_trial(one: NextTrial) -> str:
+def next_trial(trial: NextTrial) -> str:
     """Return what to do next."""
-    adds = f" Log {column(one.channel)} too." if one.channel else ""
-    sentence = one.sentence.rstrip(".")
-    return f"Next trial: {sentence} ({one.name}); it decides with probability {one.decides:.2f}.{adds}"
+    adds = f" Log {column(trial.channel)} too." if trial.channel else ""
+    sentence = trial.sentence.rstrip(".")
+    return f"Next trial: {sentence} ({trial.name}); it decides with probability {trial.decides:.2f}.{adds}"
 
 
 def channel(name: str) -> str:

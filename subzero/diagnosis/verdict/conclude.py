@@ -113,13 +113,14 @@ class Ranked:
         )
 
 
-def is_large(one: FittedChangePoint) -> bool:
+def is_large(fitted: FittedChangePoint) -> bool:
     """Say whether a sudden cause is of a practical size; calibration changes nothing in the middle of a trial, so that
     half of what calibration may do is enough.
     """
-    sizes = zip(one.change_point.mean, one.change_point.effect.parameters, strict=True)
+    sizes = zip(fitted.change_point.mean, fitted.change_point.effect.parameters, strict=True)
     return any(
-        abs(float(z)) > PRACTICAL_TOLERANCES_SUDDEN * one.change_point.kappa * p.tolerance for z, p in sizes
+        abs(float(z)) > PRACTICAL_TOLERANCES_SUDDEN * fitted.change_point.kappa * p.tolerance
+        for z, p in sizes
     )
 
 
@@ -184,7 +185,7 @@ def _explanation(
         first = ranked.change_points[0]
         change = first.change_point
         return first.problem.entries, first.fit.z, (change.effect.id,), change.kappa
-    strange = max(findings.out_of_catalogue, key=lambda one: one.log_posterior, default=None)
+    strange = max(findings.out_of_catalogue, key=lambda each: each.log_posterior, default=None)
     if strange and strange.point and strange.log_posterior > best.log_posterior:
         return entries, strange.point.fit.z, best.ids, kappa
     return entries, best.fit.z, best.ids, kappa
@@ -195,7 +196,7 @@ def remaining_models(ranked: Ranked) -> RemainingModels:
     credible = credible_set(ranked.probabilities)
     return RemainingModels(
         hypotheses=[ids for ids in credible if ids in ranked.inside],
-        change_points=[one for one in ranked.change_points if (one.id,) in credible],
+        change_points=[point for point in ranked.change_points if (point.id,) in credible],
         forces=[ids for ids in credible if ids and ids[-1] in OUTSIDE_SENTENCES],
         credible=credible,
     )
@@ -209,12 +210,15 @@ def rivals_of(
     found = rivals(findings, best, ranked.inside, remaining.hypotheses, None if is_undecided else best.ids)
     if new.cause:
         found = (closest_rival(findings, ranked.inside, *ranked.close_to_change_point),)
-    late = [rival_of(findings, one, ranked.outside[(one.id,)]) for one in remaining.change_points
-            if one.id != new.id]  # fmt: skip
+    late = [
+        rival_of(findings, point, ranked.outside[(point.id,)])
+        for point in remaining.change_points
+        if point.id != new.id
+    ]
     forces = (
         [force_rival(findings, ids, ranked.outside[ids]) for ids in remaining.forces] if is_undecided else []
     )
-    return tuple(sorted([*found, *late, *forces], key=lambda one: -one.probability))
+    return tuple(sorted([*found, *late, *forces], key=lambda force: -force.probability))
 
 
 def conclude(findings: Findings, ranked: Ranked, follow_up: FollowUp) -> Verdict:
@@ -280,8 +284,8 @@ def _notes(work: Findings, best: Candidate, inside: float) -> tuple[str, ...]:
         for run in work.sensitive
     ]
     for record, channels in work.misfit.items():
-        for channel, one in channels.items():
-            ratio = one.noise_sd / SPECS[channel].noise
+        for channel, each in channels.items():
+            ratio = each.noise_sd / SPECS[channel].noise
             if not USUAL_NOISE_RATIO[0] < ratio < USUAL_NOISE_RATIO[1]:
                 found.append(f"{record}, {channel}: the noise is {ratio:.1f} times that of a usual sensor.")
     return tuple(found)

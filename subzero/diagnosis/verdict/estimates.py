@@ -83,11 +83,11 @@ def estimate(parameter: Parameter, nominal: float, mean: float, sd: float) -> Es
     )
 
 
-def estimates(work: Findings, candidate: Candidate, one: str) -> dict[str, Estimate]:
+def estimates(work: Findings, candidate: Candidate, name: str) -> dict[str, Estimate]:
     """Return the parameters of a cause in a candidate's fit."""
     problem, sd = work.problem, _spread(work.problem, candidate)
     setting, found = problem.records[0].setting, {}
-    for k in columns_of(problem.entries, (one,)):
+    for k in columns_of(problem.entries, (name,)):
         parameter = problem.entries[k].parameter
         found[parameter.name] = estimate(
             parameter, parameter.nominal(setting), float(candidate.fit.z[k]), float(sd[k])
@@ -95,9 +95,9 @@ def estimates(work: Findings, candidate: Candidate, one: str) -> dict[str, Estim
     return found
 
 
-def sentence_of(problem: Problem, one: str) -> str:
+def sentence_of(problem: Problem, name: str) -> str:
     """Return what a cause is, in words."""
-    return next(entry.effect.sentence for entry in problem.entries if entry.effect.id == one)
+    return next(entry.effect.sentence for entry in problem.entries if entry.effect.id == name)
 
 
 def practical_of(work: Findings, candidate: Candidate) -> Ids:
@@ -108,14 +108,14 @@ def practical_of(work: Findings, candidate: Candidate) -> Ids:
 def causes(work: Findings, best: Candidate, inside: Mapping[Ids, float], ids: Ids) -> tuple[Cause, ...]:
     """Return the named causes of a candidate, each with the probability that it is among those of the truth."""
     found = []
-    for one in ids:
-        p = sum(share for ids, share in inside.items() if one in ids)
+    for cause_id in ids:
+        p = sum(share for ids, share in inside.items() if cause_id in ids)
         found.append(
             Cause(
-                id=one,
-                sentence=sentence_of(work.problem, one),
+                id=cause_id,
+                sentence=sentence_of(work.problem, cause_id),
                 probability=min(p, 1.0),
-                parameters=estimates(work, best, one),
+                parameters=estimates(work, best, cause_id),
             )
         )
     return tuple(found)
@@ -130,8 +130,14 @@ def cause_of(work: Findings, what: FittedChangePoint, probability: float) -> Cau
         p.name: estimate(p, p.nominal(setting), float(fit.z[n + i]), float(sd[n + i]))
         for i, p in enumerate(effect.parameters)
     }
-    return Cause(id=effect.id, sentence=effect.sentence, probability=probability, parameters=numbers,
-                 start_time=what.change_point.time, start_sd=float(sd[-1]))  # fmt: skip
+    return Cause(
+        id=effect.id,
+        sentence=effect.sentence,
+        probability=probability,
+        parameters=numbers,
+        start_time=what.change_point.time,
+        start_sd=float(sd[-1]),
+    )
 
 
 def rivals(
@@ -153,8 +159,8 @@ def rivals(
 
 def _rival(work: Findings, best: Candidate, ids: Ids, p: float) -> Rival:
     candidate = work.search.candidates.get(ids)
-    words = " and ".join(sentence_of(work.problem, one) for one in ids)
-    numbers = {one: estimates(work, candidate, one) for one in ids} if candidate else {}
+    words = " and ".join(sentence_of(work.problem, cause_id) for cause_id in ids)
+    numbers = {cause_id: estimates(work, candidate, cause_id) for cause_id in ids} if candidate else {}
     return Rival(
         ids=ids,
         sentence=words or "nothing is wrong",
@@ -171,7 +177,7 @@ def between(problem: Problem, fit: Fit, ids: Ids, others: Ids) -> float:
         return between(problem, _scaled(problem, fit, others), others, ids) if others else 0.0
     own = columns_of(problem.entries, ids)
     M = marginal(problem, fit.J[:, : len(problem.entries)])
-    other = columns_of(problem.entries, tuple(one for one in others if one not in ids))
+    other = columns_of(problem.entries, tuple(each for each in others if each not in ids))
     step = fit.z[own]
     if not other:
         return float(step @ information(problem, M, own) @ step)
@@ -190,20 +196,25 @@ def rival_of(work: Findings, what: FittedChangePoint, probability: float) -> Riv
     """Return a sudden cause as a rival of what is told."""
     cause = cause_of(work, what, probability)
     sentence = what.change_point.with_onset.sentence
-    return Rival(ids=(what.id,), sentence=sentence, probability=probability, discrimination=np.nan,
-                 parameters={what.id: cause.parameters},
-                 extended=of_sudden(work, what, cause).extended)  # fmt: skip
+    return Rival(
+        ids=(what.id,),
+        sentence=sentence,
+        probability=probability,
+        discrimination=np.nan,
+        parameters={what.id: cause.parameters},
+        extended=of_sudden(work, what, cause).extended,
+    )
 
 
 def closest_rival(work: Findings, inside: Mapping[Ids, float], D: float, ids: Ids) -> Rival:
     """Return what comes closest to the most probable sudden cause, at a distance D, as a rival."""
-    words = " and ".join(_words(work, one) for one in ids) or "nothing is wrong"
+    words = " and ".join(_words(work, cause_id) for cause_id in ids) or "nothing is wrong"
     return Rival(ids=ids, sentence=words, probability=inside.get(ids, 0.0), discrimination=D)
 
 
-def _words(work: Findings, one: str) -> str:
+def _words(work: Findings, name: str) -> str:
     """Return a cause in words, also one that begins in mid-trial."""
-    which, _, time = one.partition("@")
+    which, _, time = name.partition("@")
     begins = {effect.id: effect.sentence for effect in work.problem.sudden_effects}
     sentence = begins[which] if which in begins else sentence_of(work.problem, which)
     return f"from {time} s on {sentence}" if time else sentence
@@ -218,13 +229,13 @@ OUTSIDE_SENTENCES = {
 
 def force_rival(work: Findings, ids: Ids, probability: float) -> Rival:
     """Return a force or a drift, with the causes beside it, as a rival."""
-    words = [*(sentence_of(work.problem, one) for one in ids[:-1]), OUTSIDE_SENTENCES[ids[-1]]]
+    words = [*(sentence_of(work.problem, cause_id) for cause_id in ids[:-1]), OUTSIDE_SENTENCES[ids[-1]]]
     return Rival(ids=ids, sentence=" and ".join(words), probability=probability, discrimination=math.nan)
 
 
 def names_of(whole: Sequence[Ids], others: Sequence[Rival]) -> list[str]:
     """Return the names of all that the records cannot tell apart."""
-    return list(dict.fromkeys([*map(name, whole), *(name(one.ids) for one in others)]))
+    return list(dict.fromkeys([*map(name, whole), *(name(other.ids) for other in others)]))
 
 
 MENTIONED_PROBABILITY = 0.01
@@ -308,8 +319,14 @@ def _as_formula(unknown: Unknown, formula: Formula) -> Unknown:
     times = samples_of(float(unknown.time[-1]))
     columns = np.column_stack([shape.columns for shape in formula.shapes])
     band = np.sqrt(np.maximum(np.sum(columns @ formula.covariance * columns, axis=1), 0.0))
-    return replace(unknown, time=times, force=formula.force(), band=band, formula=formula.terms(),
-                   features={one: p for one, p in formula.features.items() if p >= MENTIONED_PROBABILITY})  # fmt: skip
+    return replace(
+        unknown,
+        time=times,
+        force=formula.force(),
+        band=band,
+        formula=formula.terms(),
+        features={feature: p for feature, p in formula.features.items() if p >= MENTIONED_PROBABILITY},
+    )
 
 
 def curves_outside(work: Findings, explanation: OutOfCatalogue, label: str) -> dict[str, Curves]:
@@ -341,7 +358,7 @@ def _estimated(work: Findings, explanation: OutOfCatalogue) -> EstimatedForce:
 def of_sudden(work: Findings, what: FittedChangePoint, cause: Cause) -> Extension:
     """Return the extension by a cause that begins in mid-trial, as it is fitted."""
     extended = Extended(
-        deviations={cause.id: {parameter: one.deviation for parameter, one in cause.parameters.items()}},
+        deviations={cause.id: {parameter: each.deviation for parameter, each in cause.parameters.items()}},
         start_times={cause.id: what.change_point.time},
         calibration=by_effect(work.problem, what.fit.z, None, but=(cause.id,)),
     )
@@ -352,7 +369,7 @@ def by_effect(problem: Problem, z: np.ndarray, ids: Ids | None, but: Ids = ()) -
     """Return effect → parameter → deviation of some effects; of all that hold for every trial if `ids` is None."""
     found: dict[str, dict[str, float]] = {}
     for value, entry in zip(z, problem.entries, strict=False):
-        one = entry.effect.id
-        if entry.record < 0 and one not in but and (ids is None or one in ids):
-            found.setdefault(one, {})[entry.parameter.name] = float(value)
+        cause_id = entry.effect.id
+        if entry.record < 0 and cause_id not in but and (ids is None or cause_id in ids):
+            found.setdefault(cause_id, {})[entry.parameter.name] = float(value)
     return found

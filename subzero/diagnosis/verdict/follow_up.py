@@ -96,7 +96,7 @@ def follow_up(findings: Findings, known: Ranked) -> FollowUp:
     new = _extension(findings, known, verdict)
     left = _with_closest(findings, known, verdict, remaining_models(known))
     others = rivals_of(findings, known, verdict, left, new)
-    fitted_too = [one.ids for one in others if one.ids and one.ids in candidates]
+    fitted_too = [other.ids for other in others if other.ids and other.ids in candidates]
     rival = candidates[fitted_too[0]].fit if fitted_too else None
     is_full = findings.budget == "full" and findings.complete
     return FollowUp(
@@ -108,14 +108,14 @@ def follow_up(findings: Findings, known: Ranked) -> FollowUp:
         next_trial=_next_trial(findings, left, known.probabilities)
         if is_full and verdict == UNDECIDED
         else None,
-        curves=_curves(findings, verdict, new, known, [one.ids for one in others if one.ids]),
+        curves=_curves(findings, verdict, new, known, [other.ids for other in others if other.ids]),
     )
 
 
 def _change_points(findings: Findings) -> list[FittedChangePoint]:
     """Return the change points that have a fit of their own, the most probable first."""
-    ordered = sorted(findings.out_of_catalogue, key=lambda one: -one.log_posterior)
-    return [one.what for one in ordered if isinstance(one.what, FittedChangePoint)]
+    ordered = sorted(findings.out_of_catalogue, key=lambda candidate: -candidate.log_posterior)
+    return [candidate.what for candidate in ordered if isinstance(candidate.what, FittedChangePoint)]
 
 
 def _close_to(findings: Findings, best: Candidate, ids: Ids) -> ClosestRival:
@@ -127,36 +127,36 @@ def _close_to(findings: Findings, best: Candidate, ids: Ids) -> ClosestRival:
     return ClosestRival(D, () if rival == "none" else (rival,))
 
 
-def _closest(findings: Findings, one: FittedChangePoint) -> ClosestRival:
+def _closest(findings: Findings, fitted: FittedChangePoint) -> ClosestRival:
     """Return what comes closest to a change point: the tolerances, a cause that holds throughout, or another from its
     time on.
     """
-    n, more = len(findings.problem.entries), one.problem
-    M, own = marginal(more, one.fit.J, one.change_point.kappa), list(range(n, len(more.entries) - 1))
-    step = one.fit.z[own]
-    found: dict[Ids, float] = {(): float(step @ information(more, M, own, one.change_point.kappa) @ step)}
+    n, more = len(findings.problem.entries), fitted.problem
+    M, own = marginal(more, fitted.fit.J, fitted.change_point.kappa), list(range(n, len(more.entries) - 1))
+    step = fitted.fit.z[own]
+    found: dict[Ids, float] = {(): float(step @ information(more, M, own, fitted.change_point.kappa) @ step)}
     for other in nameable(more.entries):
         at = columns_of(more.entries, (other,))
-        found[(other,)] = against(more, M, own, step, at, one.change_point.kappa)[0]
-    found |= _from_its_time_on(findings, one)
+        found[(other,)] = against(more, M, own, step, at, fitted.change_point.kappa)[0]
+    found |= _from_its_time_on(findings, fitted)
     rival = min(found, key=lambda ids: found[ids])
     return ClosestRival(found[rival], rival)
 
 
-def _from_its_time_on(findings: Findings, one: FittedChangePoint) -> dict[Ids, float]:
+def _from_its_time_on(findings: Findings, fitted: FittedChangePoint) -> dict[Ids, float]:
     """Return D against each other cause that would begin when it does: what no tolerance and no size of that explains,
 
     D = sᵀ (I + B Bᵀ)⁻¹ s,    B = [J κτ, C s_b]
 
     A jam of a fin with no command lost is an offset of the fin: what both do is no rival of either.
     """
-    begun, fit, n = one.change_point, one.fit, len(findings.problem.entries)
+    begun, fit, n = fitted.change_point, fitted.fit, len(findings.problem.entries)
     others = [effect for effect in findings.problem.sudden_effects if effect.id != begun.effect.id]
     C = change_point_columns(
-        BaseRun(one.problem, fit.z), [(effect, begun.time) for effect in others], begun.record
+        BaseRun(fitted.problem, fit.z), [(effect, begun.time) for effect in others], begun.record
     )
     free = [*range(n), fit.z.size - 1]
-    tolerance = np.array([begun.kappa * one.problem.entries[k].parameter.tolerance for k in free])
+    tolerance = np.array([begun.kappa * fitted.problem.entries[k].parameter.tolerance for k in free])
     shown, within = fit.J[:, n:-1] @ fit.z[n:-1], fit.J[:, free] * tolerance
     found = dict[Ids, float]()
     for effect, own in zip(others, C, strict=True):
@@ -188,15 +188,18 @@ def _with_closest(findings: Findings, known: Ranked, verdict: str, left: Remaini
     hypotheses, late, best = left.hypotheses, left.change_points, known.best
     if verdict != UNDECIDED:
         return left
-    is_same_cause = all((one.change_point.effect.id,) in hypotheses for one in late)
+    is_same_cause = all((candidate.change_point.effect.id,) in hypotheses for candidate in late)
     if len(hypotheses) == 1 and best.ids and is_same_cause:
         closest = _close_to(findings, best, best.ids).ids
         findings.search.fit(closest)
         hypotheses = [*hypotheses, closest]
     if len(late) == len(left.credible) == 1:
         rival = known.close_to_change_point.ids
-        late = late + [one for one in known.change_points if rival and "@" in rival[0]
-                       and one.change_point.effect.id == rival[0].partition("@")[0]]  # fmt: skip
+        late = late + [
+            point
+            for point in known.change_points
+            if rival and "@" in rival[0] and point.change_point.effect.id == rival[0].partition("@")[0]
+        ]
     return left._replace(hypotheses=hypotheses, change_points=late)
 
 
@@ -237,19 +240,24 @@ def _survivors(findings: Findings, left: RemainingModels) -> list[Survivor]:
     """
     candidates = findings.search.candidates
     found: list[Survivor] = [candidates[ids] for ids in left.hypotheses if ids in candidates]
-    broken = [_calibration_from_onset(findings, one) for one in left.change_points
-              if (one.change_point.effect.id,) not in left.hypotheses]  # fmt: skip
-    return found + [one for one in broken if one]
+    broken = [
+        _calibration_from_onset(findings, point)
+        for point in left.change_points
+        if (point.change_point.effect.id,) not in left.hypotheses
+    ]
+    return found + [candidate for candidate in broken if candidate]
 
 
 def _next_trial(
     findings: Findings, left: RemainingModels, probabilities: Mapping[Ids, float]
 ) -> NextTrial | None:
     """Return the trial that would best tell apart the most probable of what is left."""
-    survivors = sorted(_survivors(findings, left), key=lambda one: -probabilities.get(one.ids, 0.0))
+    survivors = sorted(_survivors(findings, left), key=lambda survivor: -probabilities.get(survivor.ids, 0.0))
     few = survivors[:MAX_SURVIVORS]
-    findings.search.progress(0.92, "the next trial, for " + ", ".join(name(one.ids) for one in few))
-    weights = [probabilities.get(one.ids, 0.0) for one in few]
+    findings.search.progress(
+        0.92, "the next trial, for " + ", ".join(name(candidate.ids) for candidate in few)
+    )
+    weights = [probabilities.get(candidate.ids, 0.0) for candidate in few]
     return next_trial(findings.problem, few, probabilities=weights, seed=findings.seed)
 
 
@@ -261,10 +269,10 @@ def _curves(
     fitted in.
     """
     candidates = findings.search.candidates
-    late: dict[Ids, FittedChangePoint] = {(one.id,): one for one in _change_points(findings)}
+    late: dict[Ids, FittedChangePoint] = {(point.id,): point for point in _change_points(findings)}
     fits: dict[str, Fit | None] = {"nominal": None, "tolerance": candidates[()].fit}
     fits |= {"extended": new.fit} if verdict in (CAUSE_NAMED, OUTSIDE) else {}
-    outside = {(*one.causes, one.id): one for one in findings.out_of_catalogue}
+    outside = {(*candidate.causes, candidate.id): candidate for candidate in findings.out_of_catalogue}
     if verdict == UNDECIDED:
         drawn = [ids for ids in worth_naming(known.probabilities) if ids]
     else:
@@ -278,8 +286,10 @@ def _curves(
             own = curves(what.problem, {label: what.fit})
         else:
             own = curves_outside(findings, outside[ids], label)
-        found = {record: replace(one, models={**one.models, **own[record].models})
-                 for record, one in found.items()}  # fmt: skip
+        found = {
+            record: replace(candidate, models={**candidate.models, **own[record].models})
+            for record, candidate in found.items()
+        }
     return found
 
 

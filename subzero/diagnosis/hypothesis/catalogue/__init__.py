@@ -58,7 +58,7 @@ def load(path: str | Path) -> tuple[Effect, ...]:
         raise UserError(
             f"'{path}' cannot be run: {type(error).__name__}: {error}. Allowed: a Python file that runs by itself."
         ) from error
-    if not isinstance(found, (list, tuple)) or not all(isinstance(one, Effect) for one in found):
+    if not isinstance(found, (list, tuple)) or not all(isinstance(each, Effect) for each in found):
         raise UserError(f"'{path}' has no list EFFECTS of effects. Allowed: EFFECTS = [Effect(...)].")
     return tuple(found)
 

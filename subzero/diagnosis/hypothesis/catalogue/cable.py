@@ -71,29 +71,77 @@ def _velocity(name: str) -> Parameter:
 
 
 EFFECTS = (
-    Effect(id="cable_tangential_drag", sentence="the cable drags more or less along itself", slot="cable",
-           parameters=(Parameter(name="share", unit="1", tolerance=0.05, scale=0.60, low=-0.95, high=10.0),),
-           apply=cable_tangential_drag, sudden=True),
-    Effect(id="cable_normal_drag", sentence="the cable drags more or less across itself", slot="cable",
-           parameters=(Parameter(name="share", unit="1", tolerance=0.10, scale=0.80, low=-0.95, high=10.0),),
-           apply=cable_normal_drag),
-    Effect(id="cable_initial_length", sentence="more cable was in the water at the start", slot="cable",
-           parameters=(Parameter(name="length", unit="m", tolerance=0.3, scale=12.0, low=0.0, high=60.0, step=3.0,
-                                 nominal=_wet_length),),
-           apply=cable_initial_length),
-    Effect(id="drum_friction", sentence="the drum rubs", slot="drum",
-           parameters=(Parameter(name="force", unit="N", tolerance=0.02, scale=0.4, low=0.0, high=5.0,
-                                 nominal=_friction),),
-           apply=drum_friction, sudden=True),
-    Effect(id="drum_inertia", sentence="the drum is heavy to turn", slot="drum",
-           parameters=(Parameter(name="mass", unit="kg", tolerance=0.2, scale=4.0, low=0.0, high=40.0,
-                                 nominal=_inertia),),
-           apply=drum_inertia),
-    Effect(id="cable_weight", sentence="the cable sinks or floats", slot="cable",
-           parameters=(Parameter(name="weight", unit="N/m", tolerance=0.0005, scale=0.02, low=-0.03, high=0.3,
-                                 nominal=_weight),),
-           apply=cable_weight),
-    Effect(id="current", sentence="the water moves", slot="water",
-           parameters=(_velocity("north"), _velocity("east")), apply=current),
-)  # fmt: skip
+    Effect(
+        id="cable_tangential_drag",
+        sentence="the cable drags more or less along itself",
+        slot="cable",
+        parameters=(Parameter(name="share", unit="1", tolerance=0.05, scale=0.60, low=-0.95, high=10.0),),
+        apply=cable_tangential_drag,
+        sudden=True,
+    ),
+    Effect(
+        id="cable_normal_drag",
+        sentence="the cable drags more or less across itself",
+        slot="cable",
+        parameters=(Parameter(name="share", unit="1", tolerance=0.10, scale=0.80, low=-0.95, high=10.0),),
+        apply=cable_normal_drag,
+    ),
+    Effect(
+        id="cable_initial_length",
+        sentence="more cable was in the water at the start",
+        slot="cable",
+        parameters=(
+            Parameter(
+                name="length",
+                unit="m",
+                tolerance=0.3,
+                scale=12.0,
+                low=0.0,
+                high=60.0,
+                step=3.0,
+                nominal=_wet_length,
+            ),
+        ),
+        apply=cable_initial_length,
+    ),
+    Effect(
+        id="drum_friction",
+        sentence="the drum rubs",
+        slot="drum",
+        parameters=(
+            Parameter(
+                name="force", unit="N", tolerance=0.02, scale=0.4, low=0.0, high=5.0, nominal=_friction
+            ),
+        ),
+        apply=drum_friction,
+        sudden=True,
+    ),
+    Effect(
+        id="drum_inertia",
+        sentence="the drum is heavy to turn",
+        slot="drum",
+        parameters=(
+            Parameter(name="mass", unit="kg", tolerance=0.2, scale=4.0, low=0.0, high=40.0, nominal=_inertia),
+        ),
+        apply=drum_inertia,
+    ),
+    Effect(
+        id="cable_weight",
+        sentence="the cable sinks or floats",
+        slot="cable",
+        parameters=(
+            Parameter(
+                name="weight", unit="N/m", tolerance=0.0005, scale=0.02, low=-0.03, high=0.3, nominal=_weight
+            ),
+        ),
+        apply=cable_weight,
+    ),
+    Effect(
+        id="current",
+        sentence="the water moves",
+        slot="water",
+        parameters=(_velocity("north"), _velocity("east")),
+        apply=current,
+    ),
+)
 """To add one: a function (setting, deviation) → setting, and a line here."""

@@ -73,38 +73,105 @@ def _angle(name: str) -> Parameter:
 
 
 EFFECTS = (
-    Effect(id="rudder_lag", sentence="the rudder servo lags", slot="fins",
-           parameters=(Parameter(name="time_constant", unit="s", tolerance=0.03, scale=0.4, low=-0.09, high=5.0,
-                                 least=0.06, nominal=_lag),),
-           apply=rudder_lag),
-    Effect(id="rudder_rate_limit", sentence="the rudder servo turns slowly", slot="fins",
-           parameters=(Parameter(name="inverse_rate", unit="s/degree", tolerance=0.004, scale=0.1, low=0.0, high=2.0,
-                                 nominal=_slowness),),
-           apply=rudder_rate_limit),
-    Effect(id="rudder_offset", sentence="the rudder is off its centre", slot="fins",
-           parameters=(Parameter(name="angle", unit="degree", tolerance=0.15, scale=2.0, low=-20.0, high=20.0,
-                                 nominal=_offset),),
-           apply=rudder_offset, sudden=True),
-    Effect(id="rudder_lift_slope", sentence="the rudder lifts more or less", slot="fins",
-           parameters=(Parameter(name="share", unit="1", tolerance=0.03, scale=0.30, low=-0.95, high=3.0),),
-           apply=rudder_lift_slope, sudden=True),
-    Effect(id="rudder_backlash", sentence="the rudder linkage has play", slot="fins",
-           parameters=(Parameter(name="half_gap", unit="degree", tolerance=0.05, scale=1.0, low=0.0, high=15.0,
-                                 nominal=_half_gap),),
-           apply=rudder_backlash),
-    Effect(id="stern_plane_offset", sentence="the stern-planes are off their centre", slot="fins",
-           parameters=(_angle("common"), _angle("differential")), apply=stern_plane_offset, sudden=True),
-)  # fmt: skip
+    Effect(
+        id="rudder_lag",
+        sentence="the rudder servo lags",
+        slot="fins",
+        parameters=(
+            Parameter(
+                name="time_constant",
+                unit="s",
+                tolerance=0.03,
+                scale=0.4,
+                low=-0.09,
+                high=5.0,
+                least=0.06,
+                nominal=_lag,
+            ),
+        ),
+        apply=rudder_lag,
+    ),
+    Effect(
+        id="rudder_rate_limit",
+        sentence="the rudder servo turns slowly",
+        slot="fins",
+        parameters=(
+            Parameter(
+                name="inverse_rate",
+                unit="s/degree",
+                tolerance=0.004,
+                scale=0.1,
+                low=0.0,
+                high=2.0,
+                nominal=_slowness,
+            ),
+        ),
+        apply=rudder_rate_limit,
+    ),
+    Effect(
+        id="rudder_offset",
+        sentence="the rudder is off its centre",
+        slot="fins",
+        parameters=(
+            Parameter(
+                name="angle", unit="degree", tolerance=0.15, scale=2.0, low=-20.0, high=20.0, nominal=_offset
+            ),
+        ),
+        apply=rudder_offset,
+        sudden=True,
+    ),
+    Effect(
+        id="rudder_lift_slope",
+        sentence="the rudder lifts more or less",
+        slot="fins",
+        parameters=(Parameter(name="share", unit="1", tolerance=0.03, scale=0.30, low=-0.95, high=3.0),),
+        apply=rudder_lift_slope,
+        sudden=True,
+    ),
+    Effect(
+        id="rudder_backlash",
+        sentence="the rudder linkage has play",
+        slot="fins",
+        parameters=(
+            Parameter(
+                name="half_gap",
+                unit="degree",
+                tolerance=0.05,
+                scale=1.0,
+                low=0.0,
+                high=15.0,
+                nominal=_half_gap,
+            ),
+        ),
+        apply=rudder_backlash,
+    ),
+    Effect(
+        id="stern_plane_offset",
+        sentence="the stern-planes are off their centre",
+        slot="fins",
+        parameters=(_angle("common"), _angle("differential")),
+        apply=stern_plane_offset,
+        sudden=True,
+    ),
+)
 """To add one: a function (setting, deviation) → setting, and a line here."""
 
 
 def _jammed(fin: str, servo: str, words: str, offset: str) -> Effect:
     """Return the jam of a fin, whose angle may also be an offset of it."""
-    return Effect(id=f"{fin}_jam", sentence=f"{words} no longer follows its command: it is jammed or slips",
-                  parameters=(Parameter(name="lost_share", unit="1", tolerance=0.02, scale=0.6, low=0.0, high=1.0),
-                              Parameter(name="angle", unit="degree", tolerance=0.15, scale=5.0, low=-25.0, high=25.0,
-                                        also_of=offset)),
-                  slot="fins", apply=partial(_jam, servo), sudden=True)  # fmt: skip
+    return Effect(
+        id=f"{fin}_jam",
+        sentence=f"{words} no longer follows its command: it is jammed or slips",
+        parameters=(
+            Parameter(name="lost_share", unit="1", tolerance=0.02, scale=0.6, low=0.0, high=1.0),
+            Parameter(
+                name="angle", unit="degree", tolerance=0.15, scale=5.0, low=-25.0, high=25.0, also_of=offset
+            ),
+        ),
+        slot="fins",
+        apply=partial(_jam, servo),
+        sudden=True,
+    )
 
 
 ONSETS = (

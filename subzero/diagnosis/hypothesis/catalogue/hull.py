@@ -74,29 +74,76 @@ def _net(setting: Setting) -> float:
 
 
 EFFECTS = (
-    Effect(id="hull_drag", sentence="the hull has another drag", slot="hull",
-           parameters=_share(0.03, 0.30), apply=hull_drag, sudden=True),
-    Effect(id="surge_added_mass", sentence="the hull carries another mass of water forward", slot="hull",
-           parameters=(Parameter(name="share_of_mass", unit="1", tolerance=0.03, scale=0.25, low=-0.5, high=3.0),),
-           apply=surge_added_mass),
-    Effect(id="yaw_inertia", sentence="the hull has another inertia in yaw", slot="hull",
-           parameters=_share(0.03, 0.40), apply=yaw_inertia),
-    Effect(id="yaw_damping", sentence="the hull has another damping in yaw", slot="hull",
-           parameters=_share(0.03, 0.40), apply=yaw_damping),
-    Effect(id="sway_damping", sentence="the hull has another damping in sway", slot="hull",
-           parameters=_share(0.03, 0.40), apply=sway_damping),
-    Effect(id="munk_moment", sentence="the hull has another Munk moment", slot="hull",
-           parameters=_share(0.03, 0.40), apply=munk_moment),
-    Effect(id="net_buoyancy", sentence="the vehicle is not as buoyant as said", slot="hull",
-           parameters=(Parameter(name="force", unit="N", tolerance=0.03, scale=0.5, low=-10.0, high=10.0,
-                                 nominal=_net),),
-           apply=net_buoyancy, sudden=True),
-    Effect(id="cg_offset", sentence="the centre of gravity lies further forward or aft", slot="hull",
-           parameters=(Parameter(name="forward", unit="mm", tolerance=0.3, scale=4.0, low=-50.0, high=50.0),),
-           apply=cg_offset),
-    Effect(id="roll_stiffness", sentence="the vehicle is stiffer or softer in roll", slot="hull",
-           parameters=_share(0.03, 0.40), apply=roll_stiffness),
-)  # fmt: skip
+    Effect(
+        id="hull_drag",
+        sentence="the hull has another drag",
+        slot="hull",
+        parameters=_share(0.03, 0.30),
+        apply=hull_drag,
+        sudden=True,
+    ),
+    Effect(
+        id="surge_added_mass",
+        sentence="the hull carries another mass of water forward",
+        slot="hull",
+        parameters=(
+            Parameter(name="share_of_mass", unit="1", tolerance=0.03, scale=0.25, low=-0.5, high=3.0),
+        ),
+        apply=surge_added_mass,
+    ),
+    Effect(
+        id="yaw_inertia",
+        sentence="the hull has another inertia in yaw",
+        slot="hull",
+        parameters=_share(0.03, 0.40),
+        apply=yaw_inertia,
+    ),
+    Effect(
+        id="yaw_damping",
+        sentence="the hull has another damping in yaw",
+        slot="hull",
+        parameters=_share(0.03, 0.40),
+        apply=yaw_damping,
+    ),
+    Effect(
+        id="sway_damping",
+        sentence="the hull has another damping in sway",
+        slot="hull",
+        parameters=_share(0.03, 0.40),
+        apply=sway_damping,
+    ),
+    Effect(
+        id="munk_moment",
+        sentence="the hull has another Munk moment",
+        slot="hull",
+        parameters=_share(0.03, 0.40),
+        apply=munk_moment,
+    ),
+    Effect(
+        id="net_buoyancy",
+        sentence="the vehicle is not as buoyant as said",
+        slot="hull",
+        parameters=(
+            Parameter(name="force", unit="N", tolerance=0.03, scale=0.5, low=-10.0, high=10.0, nominal=_net),
+        ),
+        apply=net_buoyancy,
+        sudden=True,
+    ),
+    Effect(
+        id="cg_offset",
+        sentence="the centre of gravity lies further forward or aft",
+        slot="hull",
+        parameters=(Parameter(name="forward", unit="mm", tolerance=0.3, scale=4.0, low=-50.0, high=50.0),),
+        apply=cg_offset,
+    ),
+    Effect(
+        id="roll_stiffness",
+        sentence="the vehicle is stiffer or softer in roll",
+        slot="hull",
+        parameters=_share(0.03, 0.40),
+        apply=roll_stiffness,
+    ),
+)
 """To add one: a function (setting, deviation) → setting, and a line here."""
 
 _BY_ID = {effect.id: effect for effect in EFFECTS}

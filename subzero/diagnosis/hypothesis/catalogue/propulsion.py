@@ -39,23 +39,56 @@ def _lag(setting: Setting) -> float:
 
 
 EFFECTS = (
-    Effect(id="propeller_thrust_gain", sentence="the propeller gives another thrust at rest", slot="propulsion",
-           parameters=(Parameter(name="share", unit="1", tolerance=0.03, scale=0.20, low=-0.9, high=3.0),),
-           apply=propeller_thrust_gain, sudden=True),
-    Effect(id="propeller_thrust_slope", sentence="the thrust falls differently with speed", slot="propulsion",
-           parameters=(Parameter(name="share", unit="1", tolerance=0.04, scale=0.40, low=-2.0, high=4.0),),
-           apply=propeller_thrust_slope),
-    Effect(id="motor_lag", sentence="the motor reaches its speed later or sooner", slot="propulsion",
-           parameters=(Parameter(name="time_constant", unit="s", tolerance=0.03, scale=0.6, low=-0.24, high=5.0,
-                                 least=0.06, nominal=_lag),),
-           apply=motor_lag),
-    Effect(id="battery_sag", sentence="the battery sags, and the shaft with it", slot="propulsion",
-           parameters=(Parameter(name="share_per_60_C", unit="1", tolerance=0.005, scale=0.10, low=0.0, high=0.8),),
-           apply=battery_sag),
-    Effect(id="propeller_torque", sentence="the propeller twists the hull more or less", slot="propulsion",
-           parameters=(Parameter(name="share", unit="1", tolerance=0.05, scale=0.60, low=-2.0, high=5.0),),
-           apply=propeller_torque),
-)  # fmt: skip
+    Effect(
+        id="propeller_thrust_gain",
+        sentence="the propeller gives another thrust at rest",
+        slot="propulsion",
+        parameters=(Parameter(name="share", unit="1", tolerance=0.03, scale=0.20, low=-0.9, high=3.0),),
+        apply=propeller_thrust_gain,
+        sudden=True,
+    ),
+    Effect(
+        id="propeller_thrust_slope",
+        sentence="the thrust falls differently with speed",
+        slot="propulsion",
+        parameters=(Parameter(name="share", unit="1", tolerance=0.04, scale=0.40, low=-2.0, high=4.0),),
+        apply=propeller_thrust_slope,
+    ),
+    Effect(
+        id="motor_lag",
+        sentence="the motor reaches its speed later or sooner",
+        slot="propulsion",
+        parameters=(
+            Parameter(
+                name="time_constant",
+                unit="s",
+                tolerance=0.03,
+                scale=0.6,
+                low=-0.24,
+                high=5.0,
+                least=0.06,
+                nominal=_lag,
+            ),
+        ),
+        apply=motor_lag,
+    ),
+    Effect(
+        id="battery_sag",
+        sentence="the battery sags, and the shaft with it",
+        slot="propulsion",
+        parameters=(
+            Parameter(name="share_per_60_C", unit="1", tolerance=0.005, scale=0.10, low=0.0, high=0.8),
+        ),
+        apply=battery_sag,
+    ),
+    Effect(
+        id="propeller_torque",
+        sentence="the propeller twists the hull more or less",
+        slot="propulsion",
+        parameters=(Parameter(name="share", unit="1", tolerance=0.05, scale=0.60, low=-2.0, high=5.0),),
+        apply=propeller_torque,
+    ),
+)
 """To add one: a function (setting, deviation) → setting, and a line here."""
 
 _BY_ID = {effect.id: effect for effect in EFFECTS}

@@ -76,12 +76,22 @@ def sensor_effects(channels: Iterable[str]) -> tuple[Effect, ...]:
 def _of(channel: str, spec: Spec) -> tuple[Effect, ...]:
     unit = BY_NAME[channel].unit
     rows = (
-        ("scale", "shows too much or too little", Parameter(name="share", unit="1", tolerance=SCALE[0],
-                                                            scale=SCALE[1], low=-0.9, high=9.0)),
-        ("bias", "is shifted", Parameter(name="shift", unit=unit, tolerance=spec.bias, scale=10.0 * spec.bias)),
-        ("lag", "lags", Parameter(name="time_constant", unit="s", tolerance=LAG[0], scale=LAG[1], low=0.0,
-                                  high=10.0)),
-    )  # fmt: skip
+        (
+            "scale",
+            "shows too much or too little",
+            Parameter(name="share", unit="1", tolerance=SCALE[0], scale=SCALE[1], low=-0.9, high=9.0),
+        ),
+        (
+            "bias",
+            "is shifted",
+            Parameter(name="shift", unit=unit, tolerance=spec.bias, scale=10.0 * spec.bias),
+        ),
+        (
+            "lag",
+            "lags",
+            Parameter(name="time_constant", unit="s", tolerance=LAG[0], scale=LAG[1], low=0.0, high=10.0),
+        ),
+    )
     return tuple(
         Effect(
             id=f"sensor_{kind}:{channel}",
@@ -141,8 +151,13 @@ def _moved(key: str) -> Callable[[Setting, float], Setting]:
 def _nuisance(key: str, unit: str, tolerance: float) -> Effect:
     make = _turned if unit == "degree" else _moved
     parameter = Parameter(name=key, unit=unit, tolerance=tolerance, scale=tolerance)
-    return Effect(id=f"start:{key}", sentence=f"another {key.replace('_', ' ')} at the start", slot="start",
-                  parameters=(parameter,), apply=make(key))  # fmt: skip
+    return Effect(
+        id=f"start:{key}",
+        sentence=f"another {key.replace('_', ' ')} at the start",
+        slot="start",
+        parameters=(parameter,),
+        apply=make(key),
+    )
 
 
 START = (
